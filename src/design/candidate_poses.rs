@@ -144,7 +144,7 @@ impl PoseRanges {
 struct Draft {
     /// Joint coordinates \[rad\] or \[m\].
     joints: Vec<f64>,
-    /// Position in the list of payloads, from 0 (first) to 1 (last).
+    /// Position in the list of payloads, from 0 (first payload) to 1 (last payload).
     choice: f64,
     hoist: Option<f64>,
     temperature: Option<f64>,

@@ -175,7 +175,8 @@ impl Exchange {
         ExchangeResult { chosen, values }
     }
 
-    /// Returns the scaled information of a set of candidates.
+    /// Returns the information matrix of the given rows and a set of candidates, in scaled
+    /// unknowns.
     fn information(&self, poses: impl Iterator<Item = usize>) -> DMatrix<f64> {
         let mut information = self.base_information.clone();
         for pose in poses {

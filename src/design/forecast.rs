@@ -54,11 +54,11 @@ pub struct Forecast {
 /// Expected error of predicted positions over some poses \[m\].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Prediction {
-    /// Median over the poses of the root mean square error length.
+    /// Median over the poses of the root mean square error length \[m\].
     pub median: f64,
-    /// 95 % quantile over the poses.
+    /// 95 % quantile over the poses of the root mean square error length \[m\].
     pub quantile_95: f64,
-    /// Root mean square error length over all poses.
+    /// Root mean square error length over all poses \[m\].
     pub rms: f64,
 }
 
@@ -178,9 +178,9 @@ impl ExpectedParameter {
 
 /// Posterior of the unknowns given data and priors.
 struct Posterior {
-    /// Covariance of x with fixed undetermined combinations.
+    /// Covariance of the deviations x of the unknowns, with undetermined combinations held fixed.
     covariance: DMatrix<f64>,
-    /// Diagonal of the covariance.
+    /// Diagonal of the covariance: variances of the deviations x.
     variances: Vec<f64>,
     /// Rows that span the undetermined combinations.
     gauge: DMatrix<f64>,

@@ -49,7 +49,7 @@ pub enum Candidates {
     Rows(Box<Measurements>),
 }
 
-/// Options of a plan.
+/// Settings of a plan: number of poses, criterion, seed and limits.
 #[derive(Clone, Copy)]
 pub struct PlanOptions<'a> {
     /// Number of poses to plan.

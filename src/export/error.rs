@@ -20,9 +20,9 @@ pub enum ExportError {
     /// A number is too large for a constant.
     #[error("{what} is {value}, which C cannot hold")]
     NotFinite {
-        /// Meaning of the number.
+        /// Description of the number, for the message.
         what: String,
-        /// The number.
+        /// Number in SI units that a C `double` literal cannot hold.
         value: f64,
     },
     /// Too few of the poses drawn are inside the workspace.

@@ -28,7 +28,7 @@ pub struct Sources {
 /// Writes the model of an identified arm as C99, with the poses and answers of its test.
 ///
 /// # Errors
-/// A law depends on earlier poses, or a number is not finite.
+/// Returns an error if a law depends on earlier poses, or a number is not finite.
 pub fn sources(
     problem: &Problem,
     model: &Model,

@@ -45,7 +45,7 @@ pub fn modified_dh(problem: &Problem, arm: &Arm<f64>) -> String {
 /// of the tool: base · Π Rz(θ+q) Tz(d) Tx(a) Rx(α) · tool.
 ///
 /// # Errors
-/// The joints branch.
+/// Returns an error if the joints branch.
 pub fn standard_dh(problem: &Problem, arm: &Arm<f64>) -> Result<String, ExportError> {
     let frames: Vec<(String, Frame<f64>)> = joint_origins(problem, arm, YamlFormat::Ros)?
         .into_iter()

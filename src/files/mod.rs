@@ -19,7 +19,7 @@ pub(crate) use staged::StagedFile;
 /// Reads a file of at most `max_bytes` bytes.
 ///
 /// # Errors
-/// The file cannot be read, or is larger ([`io::ErrorKind::FileTooLarge`]).
+/// Returns an error if the file cannot be read, or is larger ([`io::ErrorKind::FileTooLarge`]).
 pub fn read_limited(path: &Path, max_bytes: u64) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     open(path)?.take(max_bytes + 1).read_to_end(&mut bytes)?;
@@ -30,7 +30,7 @@ pub fn read_limited(path: &Path, max_bytes: u64) -> io::Result<Vec<u8>> {
 /// never end. The standard input is allowed as `/dev/stdin`, `/dev/fd/N` or `/proc/self/fd/N`.
 ///
 /// # Errors
-/// The file cannot be opened, or is neither a regular file nor a folder.
+/// Returns an error if the file cannot be opened, or is neither a regular file nor a folder.
 pub fn open(path: &Path) -> io::Result<File> {
     let kind = fs::metadata(path)?.file_type();
     let descriptors = ["/dev/stdin", "/dev/fd", "/proc/self/fd"];
@@ -46,7 +46,7 @@ pub fn open(path: &Path) -> io::Result<File> {
 /// Reads a text file of any size; see [`open`] for the files that are refused.
 ///
 /// # Errors
-/// The file cannot be opened or read, or is not UTF-8.
+/// Returns an error if the file cannot be opened or read, or is not UTF-8.
 pub fn read_text(path: &Path) -> io::Result<String> {
     io::read_to_string(open(path)?)
 }

@@ -38,7 +38,7 @@ impl FolderRecord {
     /// Reads the record of a folder; returns an empty record if there is none.
     ///
     /// # Errors
-    /// The record exists and cannot be read.
+    /// Returns an error if the record exists and cannot be read.
     pub fn read(folder: &Path) -> io::Result<Self> {
         let text = match read_limited(&folder.join(RECORD_NAME), MAX_RECORD_BYTES) {
             Ok(text) => text,
@@ -102,7 +102,7 @@ impl FolderRecord {
     /// Writes the record to its folder.
     ///
     /// # Errors
-    /// The record cannot be written.
+    /// Returns an error if the record cannot be written.
     pub fn write(&self, folder: &Path) -> io::Result<()> {
         let line = |Line { digest, command, name }: &Line| format!("{digest} {command} {name}\n");
         let lines = self.lines.iter().map(line).collect::<Vec<_>>().concat();

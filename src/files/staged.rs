@@ -51,7 +51,7 @@ impl StagedFile {
     /// Moves the file to its path and atomically replaces a file that exists there.
     ///
     /// # Errors
-    /// The file cannot be renamed.
+    /// Returns an error if the file cannot be renamed.
     pub fn commit(self) -> io::Result<()> {
         let folder = folder_of(&self.path);
         match self.file {

@@ -9,11 +9,11 @@ use crate::quantity::Unit;
 /// Values per axis of the measuring frame and for the Euclidean norm \[m\].
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct AxisValues {
-    /// Value along the x axis.
+    /// Value along the x axis \[m\].
     pub x: f64,
-    /// Value along the y axis.
+    /// Value along the y axis \[m\].
     pub y: f64,
-    /// Value along the z axis.
+    /// Value along the z axis \[m\].
     pub z: f64,
     /// Value for the Euclidean norm.
     pub norm: f64,

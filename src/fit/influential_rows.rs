@@ -69,7 +69,7 @@ fn explains(fit: &Identification) -> bool {
     fit.noise == Noise::Declared && fit.noise_factor <= 1.0 + 1e-9
 }
 
-/// Returns the residual variance of `fit` relative to that of `other`.
+/// Returns the residual variance of `fit` divided by that of `other`.
 fn part(fit: &Identification, other: &Identification) -> f64 {
     match (fit.reduced_chi2, other.reduced_chi2) {
         (Some(chi2), Some(other)) => chi2 / other,

@@ -34,12 +34,12 @@ pub struct Estimate {
     pub name: String,
     /// Kind of quantity, which determines the SI unit of the values.
     pub unit: Unit,
-    /// Nominal value.
+    /// Nominal value, SI.
     pub nominal: f64,
-    /// Estimated value.
+    /// Estimated value, SI.
     pub estimate: f64,
-    /// Standard error of the value. `None` if it was not fitted, rests on a bound, belongs to an
-    /// undetermined combination, or if the data do not determine it.
+    /// Standard error of the value, SI. `None` if it was not fitted, rests on a bound, belongs to
+    /// an undetermined combination, or if the data do not determine it.
     pub std_error: Option<f64>,
     /// Bound on which the value rests; `None` if it is inside its bounds.
     pub at_bound: Option<AtBound>,

@@ -191,7 +191,8 @@ pub enum Need {
     Payload,
     /// The payload varies, and joints approach from both sides.
     PayloadFromBothSides,
-    /// The joint approaches from both sides, or, without recorded sides, has a moment.
+    /// The joint is approached from both sides. If the table records no sides, loads must exert a
+    /// moment on the joint instead.
     Play,
     /// The covariate is recorded and varies.
     Covariate,

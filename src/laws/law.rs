@@ -40,7 +40,7 @@ pub enum LawPlace {
 /// Gaussian prior of the coefficients of a law about 0.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LawPrior {
-    /// Standard deviation (1 σ) \[SI\].
+    /// Standard deviation (1 σ) of each coefficient \[SI\].
     pub sigma: f64,
     /// Key in files, for example `sigma_deg`.
     pub key: String,

@@ -52,7 +52,7 @@ impl ColumnTable {
     /// Creates a table from named columns; messages call the table `name`.
     ///
     /// # Errors
-    /// A column has another length than the first.
+    /// Returns an error if a column has another length than the first.
     pub fn new(
         name: impl Into<PathBuf>,
         columns: Vec<(String, ColumnValues)>,

@@ -54,7 +54,7 @@ impl Dataset {
     /// about ignored columns.
     ///
     /// # Errors
-    /// The first error in the files or in the split.
+    /// Returns the first error in the files or in the split.
     pub fn read(problem: &Problem) -> Result<(Self, Vec<Warning>), InputError> {
         Self::read_files(&problem.data.files, problem)
     }
@@ -62,7 +62,7 @@ impl Dataset {
     /// Reads other files than those of the problem; see [`read`](Self::read).
     ///
     /// # Errors
-    /// The first error in the files or in the split.
+    /// Returns the first error in the files or in the split.
     pub fn read_files(
         files: &[PathBuf],
         problem: &Problem,
@@ -76,7 +76,7 @@ impl Dataset {
     /// Reads a table in memory; see [`read`](Self::read).
     ///
     /// # Errors
-    /// The first error in the table or in the split.
+    /// Returns the first error in the table or in the split.
     #[doc(hidden)]
     pub fn read_columns(
         table: ColumnTable,

@@ -59,8 +59,8 @@ impl JoinedLog {
     /// Reads the joint table that the problem declares.
     ///
     /// # Errors
-    /// A file cannot be read, its columns differ from those of the first, the key column is
-    /// missing, or a name occurs twice.
+    /// Returns an error if a file cannot be read, its columns differ from those of the first, the
+    /// key column is missing, or a name occurs twice.
     pub fn read(log: &JointLog, problem: &Problem) -> Result<Self, InputError> {
         let dialect = &problem.data.dialect;
         let mut joined = Self {

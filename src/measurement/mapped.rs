@@ -25,7 +25,7 @@ impl<'a> Names<'a> {
     /// by flexcal are readable whatever the map says.
     ///
     /// # Errors
-    /// The column of a rule does not exist or is ambiguous.
+    /// Returns an error if the column of a rule does not exist or is ambiguous.
     pub fn map(table: &'a Table, dialect: &'a Dialect) -> Result<Self, InputError> {
         let mut of_place: Vec<(&str, Option<&ColumnRule>)> =
             table.header.iter().map(|name| (name.as_str(), None)).collect();

@@ -18,7 +18,7 @@ use crate::problem::{Fixture, KnownDistance, Observation, Problem};
 /// Quantity that a row measures, with its numbers.
 pub(super) struct Observed {
     pub observation: Observation,
-    /// True if its numbers have been measured.
+    /// True if the numbers of the row have been measured, false for a planned row.
     pub measured: bool,
 }
 

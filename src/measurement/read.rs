@@ -18,7 +18,7 @@ impl Measurements {
     /// Reads files one after the other; also returns warnings, for example about ignored columns.
     ///
     /// # Errors
-    /// The first error in the files, or a file cannot be read.
+    /// Returns the first error in the files, or an error if a file cannot be read.
     #[doc(hidden)]
     pub fn read(files: &[PathBuf], problem: &Problem) -> Result<(Self, Vec<Warning>), InputError> {
         Self::read_table(files, problem, true)
@@ -27,7 +27,7 @@ impl Measurements {
     /// Reads poses that may still be unmeasured; missing positions are zero.
     ///
     /// # Errors
-    /// The first error in the files, or a file cannot be read.
+    /// Returns the first error in the files, or an error if a file cannot be read.
     pub fn read_poses(
         files: &[PathBuf],
         problem: &Problem,
@@ -38,7 +38,7 @@ impl Measurements {
     /// Reads a table in memory; also returns warnings, for example about ignored columns.
     ///
     /// # Errors
-    /// The first error in the table.
+    /// Returns the first error in the table.
     pub(crate) fn read_columns(
         table: ColumnTable,
         problem: &Problem,
@@ -49,7 +49,7 @@ impl Measurements {
     /// Reads poses from a table in memory that may still be unmeasured; missing positions are zero.
     ///
     /// # Errors
-    /// The first error in the table.
+    /// Returns the first error in the table.
     #[doc(hidden)]
     pub fn read_pose_columns(
         table: ColumnTable,

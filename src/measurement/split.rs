@@ -21,7 +21,8 @@ impl Split {
     /// Splits the rows as the problem declares.
     ///
     /// # Errors
-    /// A part is empty, the held-out session does not exist, or no split is declared.
+    /// Returns an error if a part is empty, the held-out session does not exist, or no split is
+    /// declared.
     #[doc(hidden)]
     pub fn new(problem: &Problem, measurements: &Measurements) -> Result<Self, InputError> {
         let error = |kind| problem.data.held_out_location.clone().error(kind);

@@ -24,7 +24,7 @@ impl Arm<f64> {
     /// Returns the line of the arm to the frame of the joint `tip` in a pose, arm base frame.
     ///
     /// # Errors
-    /// The arm is too soft for its loads.
+    /// Returns an error if the arm is too soft for its loads.
     pub fn centre_line(&self, setup: &PoseView, tip: usize) -> Result<CentreLine, StaticsError> {
         let drawn =
             Self { beam_elements: self.beam_elements.max(MIN_DRAWN_ELEMENTS), ..self.clone() };

@@ -61,7 +61,8 @@ impl Sensitivity {
     /// the frame for which the equilibrium was computed.
     ///
     /// # Errors
-    /// Λ does not settle: with a little more load, the arm would have no equilibrium.
+    /// Returns an error if Λ does not converge: with a little more load, the arm would have no
+    /// equilibrium.
     pub fn differentiate(
         &mut self,
         setup: &PoseView,

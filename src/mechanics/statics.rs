@@ -62,7 +62,7 @@ impl Arm<f64> {
     /// Computes the equilibrium of one pose and the frame of the last joint.
     ///
     /// # Errors
-    /// The arm is too soft for its loads.
+    /// Returns an error if the arm is too soft for its loads.
     pub fn equilibrate(
         &self,
         setup: &PoseView,
@@ -75,7 +75,7 @@ impl Arm<f64> {
     /// Computes the equilibrium of one pose and the frame of the joint `tip`, counted from 0.
     ///
     /// # Errors
-    /// The arm is too soft for its loads.
+    /// Returns an error if the arm is too soft for its loads.
     pub fn equilibrate_at(
         &self,
         setup: &PoseView,
@@ -155,7 +155,8 @@ impl AdjointSolver {
     /// the equilibrium was computed.
     ///
     /// # Errors
-    /// Λ does not settle: with a little more load, the arm would have no equilibrium.
+    /// Returns an error if Λ does not converge: with a little more load, the arm would have no
+    /// equilibrium.
     pub fn adjoint(
         &mut self,
         setup: &PoseView,

@@ -52,7 +52,7 @@ impl Model {
     /// Returns the full parameter vector of values by name \[SI\].
     ///
     /// # Errors
-    /// A free parameter has no value; its name is returned.
+    /// Returns the name of a free parameter that has no value.
     #[doc(hidden)]
     pub fn parameter_vector(
         &self,

@@ -84,8 +84,8 @@ impl Model {
     /// target per name in `targets`.
     ///
     /// # Errors
-    /// A rule of `[parameters]` or a constraint matches no parameter, or a name in
-    /// `targets` is not among the problem's declared targets.
+    /// Returns an error if a rule of `[parameters]` or a constraint matches no parameter, or a name
+    /// in `targets` is not among the problem's declared targets.
     pub fn new(
         problem: &Problem,
         bases: &[String],

@@ -7,11 +7,11 @@ use statrs::function::erf::{erfc, erfc_inv};
 /// Estimate with its confidence interval.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Interval {
-    /// Estimate of the quantity.
+    /// Estimate of the quantity, in its unit.
     pub value: f64,
-    /// Lower end of the interval.
+    /// Lower end of the interval, in the unit of the quantity.
     pub low: f64,
-    /// Upper end of the interval.
+    /// Upper end of the interval, in the unit of the quantity.
     pub high: f64,
 }
 

@@ -32,7 +32,7 @@ use crate::spatial::{Frame, rotate};
 /// Predicted numbers of a row and their first derivatives.
 #[derive(Debug, Clone, Copy)]
 pub struct Slopes {
-    /// Predicted numbers, followed by zeros.
+    /// Predicted numbers, padded with zeros, in the units of the observation.
     pub value: Vector3<f64>,
     /// Derivative with respect to the position of the target, or of the point of the second fixture.
     pub by_target: Matrix3<f64>,

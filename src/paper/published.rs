@@ -27,9 +27,9 @@ pub const ERRORS: [[f64; 5]; 4] = [
 /// Position errors over 50 poses \[mm\]: along x, y, z, and their length.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Published {
-    /// Maximum of each component.
+    /// Maximum over the poses of each component \[mm\].
     pub max: [f64; 4],
-    /// Mean of each component.
+    /// Mean over the poses of each component \[mm\].
     pub mean: [f64; 4],
 }
 

@@ -7,7 +7,7 @@ use crate::error::InputErrorKind;
 /// means the frame of joint `tool` (counted from 0).
 ///
 /// # Errors
-/// The word names no frame.
+/// Returns an error if the word names no frame.
 pub(crate) fn frame(word: &str, joints: &[Joint], tool: usize) -> Result<usize, InputErrorKind> {
     let named = || joints.iter().position(|joint| joint.name == word).map(|index| index + 1);
     let numbered = || {

@@ -159,7 +159,7 @@ impl Problem {
     /// Returns an error if the joints form a tree; `what` names the operation that needs a chain.
     ///
     /// # Errors
-    /// The parent of a joint is not the joint before it.
+    /// Returns an error if the parent of a joint is not the joint before it.
     pub(crate) fn require_chain(&self, what: &'static str) -> Result<(), InputError> {
         let mut joints = self.joints.iter().enumerate();
         match joints.find(|(index, joint)| joint.parent != index.checked_sub(1)) {
@@ -175,7 +175,7 @@ impl Problem {
     /// Returns the `[[target]]` called `word`, or the point of `[tool]` if no target is declared.
     ///
     /// # Errors
-    /// Targets are declared and none has that name.
+    /// Returns an error if targets are declared and none has that name.
     pub(crate) fn target(&self, word: &str) -> Result<Target, InputError> {
         let location = Location { line: None, excerpt: None, ..self.data.location.clone() };
         if self.targets.is_empty() {

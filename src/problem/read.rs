@@ -24,7 +24,7 @@ impl Problem {
     /// Reads a problem; `path` is its file or the folder that contains `problem.toml`.
     ///
     /// # Errors
-    /// The first error in the file, or the file cannot be read.
+    /// Returns the first error in the file, or an error if the file cannot be read.
     pub fn read(path: &Path) -> Result<Self, InputError> {
         Self::read_with_text(path).map(|(problem, _)| problem)
     }
@@ -33,7 +33,7 @@ impl Problem {
     /// be read only once.
     ///
     /// # Errors
-    /// The first error in the file, or the file cannot be read.
+    /// Returns the first error in the file, or an error if the file cannot be read.
     #[doc(hidden)]
     pub fn read_with_text(path: &Path) -> Result<(Self, Arc<str>), InputError> {
         let file = if path.is_dir() { path.join("problem.toml") } else { path.to_owned() };
@@ -45,7 +45,7 @@ impl Problem {
     /// folder.
     ///
     /// # Errors
-    /// The first error in the text.
+    /// Returns the first error in the text.
     pub fn parse(text: &str, file: &Path) -> Result<Self, InputError> {
         problem_of(&Document { file: file.to_owned(), text: Arc::from(text) })
     }
@@ -76,7 +76,7 @@ impl Problem {
     /// `named` names the text in messages.
     ///
     /// # Errors
-    /// The text is no effect, or the effect cannot act on this arm.
+    /// Returns an error if the text is no effect, or the effect cannot act on this arm.
     pub fn effect(&self, text: &str, named: &Path) -> Result<EffectDeclaration, InputError> {
         effects::parse(text, named, self)
     }

@@ -37,7 +37,7 @@ pub(super) struct Leverage<'a> {
     gram: DMatrix<f64>,
     /// Degrees of freedom ν = tr(I − H).
     pub freedom: f64,
-    /// tr (I − H)², ν without priors.
+    /// Sum of squares tr((I − H)²); equal to ν without priors.
     pub squared_freedom: f64,
     /// Matrix (I − H)_bb^(−½) of each pose b, shape = (3, 3).
     pub whiteners: Vec<Matrix3<f64>>,
@@ -50,7 +50,7 @@ impl<'a> Leverage<'a> {
     /// each pose; unmeasured rows of Q are 0.
     ///
     /// # Errors
-    /// The fit leaves too few degrees of freedom.
+    /// Returns an error if the fit leaves too few degrees of freedom.
     pub fn of(fitted: Cow<'a, DMatrix<f64>>, coordinates: Vec<usize>) -> Result<Self, Untestable> {
         let gram = gram(&fitted);
         let freedom = coordinates.iter().sum::<usize>() as f64 - gram.trace();

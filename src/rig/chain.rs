@@ -122,7 +122,7 @@ pub(super) enum Force {
     Rope {
         /// Tension of the rope \[N\].
         tension: f64,
-        /// Direction of the rope with the hook at the origin, base frame.
+        /// Unit vector along the rope with the hook at the origin, base frame.
         direction: Vector3<f64>,
         /// Change of the x and y components of the direction per x and y of the hook [1/m].
         trolley: f64,

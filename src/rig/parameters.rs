@@ -10,9 +10,9 @@ pub struct TrueParameter {
     pub name: String,
     /// Unit of the quantity.
     pub unit: Unit,
-    /// Value that the problem declares.
+    /// Value that the problem declares, SI.
     pub nominal: f64,
-    /// Value of the true arm.
+    /// Value of the true arm, SI.
     pub value: f64,
 }
 

@@ -38,7 +38,7 @@ impl HarmonicPrior {
         }
     }
 
-    /// Returns σ of an order \[rad\]; `None` if the prior lacks it.
+    /// Returns σ of an order \[rad\]; `None` if the prior does not contain the order.
     pub(super) fn sigma(&self, order: u32) -> Option<f64> {
         let place = self.by_order.binary_search_by_key(&order, |entry| entry.0).ok()?;
         self.by_order.get(place).map(|entry| entry.1)

@@ -126,7 +126,7 @@ pub(super) const MIN_SHARE_OF_SUBSETS: f64 = 0.75;
 pub(super) const SUBSET_PARTS: usize = 5;
 /// Number of resamples of the bootstrap interval of the gain.
 pub(super) const RESAMPLES: usize = 2000;
-/// Level of that interval.
+/// Probability that the bootstrap interval of the gain covers the gain.
 pub(super) const INTERVAL_LEVEL: f64 = 0.95;
 
 // Plans.

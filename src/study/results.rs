@@ -31,15 +31,15 @@ pub struct ParameterResult<'a> {
     pub parameter: &'a Parameter,
     /// Number of trusted fits whose truth is known.
     pub fits: u64,
-    /// Mean of estimate − truth.
+    /// Mean of estimate − truth, in the unit of x.
     pub bias: Option<f64>,
-    /// Standard deviation of estimate − truth.
+    /// Standard deviation of estimate − truth, in the unit of x.
     pub spread: Option<f64>,
-    /// Root mean square of estimate − truth.
+    /// Root mean square of estimate − truth, in the unit of x.
     pub rms_error: Option<f64>,
     /// Number of fits that report a standard error.
     pub with_std_error: u64,
-    /// Mean of the reported standard errors.
+    /// Mean of the reported standard errors, in the unit of x.
     pub std_error: Option<f64>,
     /// Share of those fits whose estimate is within 1.96 standard errors of the truth.
     pub coverage: Option<f64>,
@@ -48,11 +48,11 @@ pub struct ParameterResult<'a> {
 /// Durations of the fits of a cell \[s\].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Timing {
-    /// Median duration of a fit.
+    /// Median duration of a fit \[s\].
     pub median: f64,
-    /// Duration of the slowest fit.
+    /// Duration of the slowest fit \[s\].
     pub slowest: f64,
-    /// Sum over all fits.
+    /// Total duration of all fits \[s\].
     pub total: f64,
 }
 

@@ -48,8 +48,8 @@ impl<'a> Chain<'a> {
     /// joints.
     ///
     /// # Errors
-    /// The links form no tree, several roots or leaves are possible, a joint type is unsupported,
-    /// or no joint moves.
+    /// Returns an error if the links form no tree, several roots or leaves are possible, a joint
+    /// type is unsupported, or no joint moves.
     pub fn new(
         robot: &'a Robot,
         base: Option<&str>,
@@ -106,7 +106,7 @@ impl<'a> Chain<'a> {
     /// Finds the chain of a problem that was made from a URDF.
     ///
     /// # Errors
-    /// See [`new`](Self::new).
+    /// Returns the errors of [`new`](Self::new).
     pub fn from_problem(robot: &'a Robot, problem: &Problem) -> Result<Self, InputError> {
         let ends = problem.urdf.as_ref();
         Self::new(robot, ends.map(|ends| ends.base.as_str()), ends.map(|ends| ends.tip.as_str()))

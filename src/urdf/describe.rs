@@ -52,7 +52,7 @@ struct Row {
     /// Placement by xyz and rpy, for fixed joints.
     placement: Option<Frame<f64>>,
     mimic: Option<(usize, f64)>,
-    /// Parameters α, a, θ, d, β.
+    /// Joint parameters α \[rad\], a \[m\], θ \[rad\], d \[m\], β \[rad\].
     numbers: [f64; 5],
     limits: Option<(f64, f64)>,
     /// Name, mass and centre of mass of each body.
@@ -62,7 +62,7 @@ struct Row {
 /// Converts a chain to a problem whose measurement file does not exist yet.
 ///
 /// # Errors
-/// A number of the URDF is too large for a problem.
+/// Returns an error if a number of the URDF is too large for a problem.
 pub fn describe(chain: &Chain) -> Result<Description, InputError> {
     let mut notes = Vec::new();
     let rows = rows(chain, &mut notes);

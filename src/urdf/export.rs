@@ -72,7 +72,7 @@ impl Steps {
     /// nominal arm. With it an arm without errors keeps the frames of the file.
     ///
     /// # Errors
-    /// The nominal arm differs from the chain.
+    /// Returns an error if the nominal arm differs from the chain.
     fn gauges(&self, chain: &Chain) -> Result<Vec<Frame<f64>>, InputError> {
         let mut gauges = vec![Frame::identity()];
         let mut gauge = Frame::identity();
@@ -120,8 +120,8 @@ fn words((angle, distance): (f64, f64)) -> String {
 /// enter the origin of the next. Inertial data and everything outside the chain stay unchanged.
 ///
 /// # Errors
-/// Problem and chain describe different arms, or no origin follows the last joint that could hold
-/// its parameters.
+/// Returns an error if problem and chain describe different arms, or if no origin after the last
+/// joint can hold its parameters.
 pub fn export(chain: &Chain, problem: &Problem, arm: &Arm<f64>) -> Result<Export, InputError> {
     problem.require_chain("export to a URDF")?;
     check_names(chain, problem)?;

@@ -61,7 +61,8 @@ pub(super) struct Joint {
     pub axis: Vector3<f64>,
     /// Range of q \[rad\] or \[m\], infinite without limits.
     pub limits: (f64, f64),
-    /// Limits that are ignored because the lower one is above the upper one.
+    /// Limits \[rad\] or \[m\] as (lower, upper) that are ignored because the lower one is above
+    /// the upper one; `None` if the limits are valid.
     pub reversed_limits: Option<(f64, f64)>,
     /// Index of the joint that a mimic joint follows, factor and offset; `None` for other joints.
     pub mimic: Option<(usize, f64, f64)>,
@@ -98,7 +99,7 @@ impl Robot {
     /// Reads a URDF file.
     ///
     /// # Errors
-    /// The first error in the file, or the file cannot be read.
+    /// Returns the first error in the file, or an error if the file cannot be read.
     pub fn read(file: &Path) -> Result<Self, InputError> {
         let source = Document::read(file, InputErrorKind::Urdf(UrdfErrorKind::Missing))?;
         Self::from_document(source)
@@ -107,7 +108,7 @@ impl Robot {
     /// Parses a URDF; `file` names the text in messages.
     ///
     /// # Errors
-    /// The first error in the text.
+    /// Returns the first error in the text.
     #[doc(hidden)]
     pub fn parse(text: &str, file: &Path) -> Result<Self, InputError> {
         Self::from_document(Document { file: file.to_owned(), text: text.into() })

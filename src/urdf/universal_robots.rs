@@ -25,7 +25,7 @@ const FORM_TOLERANCE: f64 = 1e-6;
 /// the form above.
 ///
 /// # Errors
-/// Description of the difference between the nominal arm and this form.
+/// Returns a description of the difference if the nominal arm does not have this form.
 pub(super) fn origins(nominal: &Steps, identified: &Steps) -> Result<Vec<Frame<f64>>, String> {
     if nominal.before.len() != LINKS.len() {
         return Err(format!("it has {} moving joints, not 6", nominal.before.len()));

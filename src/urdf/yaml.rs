@@ -38,7 +38,7 @@ pub struct JointOrigin {
 /// Joint angles of zero are those of the problem.
 ///
 /// # Errors
-/// The form is Universal Robots' and the arm does not have it.
+/// Returns an error if the form is Universal Robots' and the arm does not have it.
 pub fn joint_origins(
     problem: &Problem,
     arm: &Arm<f64>,

@@ -64,9 +64,9 @@ pub struct AcceptancePose {
 pub struct Accuracy {
     /// Mean with its 95 % confidence interval, by the BCa bootstrap over poses  [Efron 1987].
     pub mean: Interval,
-    /// Root mean square of the accuracies.
+    /// Root mean square of the accuracies AP over the poses \[m\].
     pub rms: f64,
-    /// Largest accuracy value.
+    /// Largest accuracy AP of a pose \[m\].
     pub max: f64,
 }
 

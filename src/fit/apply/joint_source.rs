@@ -12,9 +12,9 @@ use crate::problem::{JointSource, Problem};
 pub struct JointSources {
     /// Source that the problem uses.
     pub used: JointSource,
-    /// Error with commanded joint values \[m\].
+    /// Root mean square position error of the fit with commanded joint values \[m\].
     pub commanded: f64,
-    /// Error with read joint values \[m\].
+    /// Root mean square position error of the fit with joint values read from encoders \[m\].
     pub read: f64,
 }
 

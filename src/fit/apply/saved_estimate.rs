@@ -55,7 +55,7 @@ struct Entry {
     name: String,
     nominal: f64,
     estimate: f64,
-    /// Standard error of the value; `None` if it has none, or in files of older versions.
+    /// Standard error of the value, SI; `None` if it has none, or in files of older versions.
     std_error: Option<f64>,
     identified: Option<f64>,
     /// False if the strategy held the parameter; older versions did not write it.

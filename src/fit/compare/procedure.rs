@@ -9,9 +9,9 @@ use crate::problem::{Joint, Problem};
 /// Geometric parameter of table 2 \[m\] or \[rad\].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TableEntry {
-    /// Value that the problem declares.
+    /// Value that the problem declares \[m\] or \[rad\].
     pub nominal: f64,
-    /// Value that the procedure identified.
+    /// Value that the procedure identified \[m\] or \[rad\].
     pub identified: f64,
     /// Share of the value that the data determine, 0…1; `None` if it was not identified.
     pub seen: Option<f64>,

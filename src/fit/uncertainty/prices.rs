@@ -27,7 +27,7 @@ impl Stage<'_> {
     /// μ ≥ 0 at a lower limit and μ ≤ 0 at an upper one; the same signs hold for w.
     ///
     /// # Errors
-    /// The rows of the priors do not match the unknowns.
+    /// Returns an error if the rows of the priors do not match the unknowns.
     pub fn prices(
         &self,
         at: &DVector<f64>,

@@ -125,13 +125,13 @@ struct Evidence {
     information: DMatrix<f64>,
     /// Vector Rᵀc of the free unknowns.
     vector: DVector<f64>,
-    /// Squares ‖r₀‖² at nominal.
+    /// Sum ‖r₀‖² of the squared whitened residuals of the nominal arm.
     squares: f64,
     /// Number m of measured coordinates.
     coordinates: f64,
     /// Indices of the free unknowns.
     free: Vec<usize>,
-    /// Largest noise variance that is tried.
+    /// Largest noise variance that is tried, as a multiple of the declared one.
     max_variance: f64,
 }
 

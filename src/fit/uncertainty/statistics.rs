@@ -53,7 +53,7 @@ impl Statistics {
     /// open.
     ///
     /// # Errors
-    /// A constraint is not finite, or the priors do not match the unknowns.
+    /// Returns an error if a constraint is not finite, or the priors do not match the unknowns.
     pub fn of(
         stage: &Stage,
         end: &FitEnd,

@@ -33,7 +33,8 @@ struct Part {
 /// Parses a formula: sums, products, powers and functions of the words of `vocabulary`.
 ///
 /// # Errors
-/// The text is no formula, uses an unknown word, or mixes units; the error contains the column.
+/// Returns an error with the column if the text is no formula, uses an unknown word, or mixes
+/// units.
 pub fn parse(text: &str, vocabulary: &Vocabulary) -> Result<Parsed, FormulaError> {
     let mut parser = Parser { text, at: 0, depth: 0, vocabulary };
     if text.chars().count() > MAX_LENGTH {

@@ -15,9 +15,9 @@ use crate::quantity::Unit;
 pub struct LinearConstraint {
     /// Indices of free parameters, with their coefficients.
     pub terms: Vec<(usize, f64)>,
-    /// Lower limit on Σ c x.
+    /// Lower limit on Σ c x, in the SI unit of the sum.
     pub lower: f64,
-    /// Upper limit on Σ c x.
+    /// Upper limit on Σ c x, in the SI unit of the sum.
     pub upper: f64,
     /// Text of the sum: `ln A.EI − ln B.EI`.
     pub sum: String,
@@ -40,8 +40,8 @@ impl LinearConstraint {
 /// Creates the constraints of `problem` on its free `parameters`.
 ///
 /// # Errors
-/// A name is no parameter, units do not match, a limit has another unit, or no parameter of the
-/// constraint is free.
+/// Returns an error if a name is no parameter, units do not match, a limit has another unit, or no
+/// parameter of the constraint is free.
 pub fn constrain(
     problem: &Problem,
     bases: &[String],

@@ -195,7 +195,7 @@ impl Regressor {
     /// Parses a formula in the syntax of problem files, such as `sin(2*q3)*T`.
     ///
     /// # Errors
-    /// The text is no formula of this arm; the error contains the column.
+    /// Returns an error with the column if the text is no formula of this arm.
     pub fn parse(text: &str, problem: &Problem) -> Result<Self, FormulaError> {
         let (slides, covariates) = (problem.slides(), problem.covariate_names());
         let vocabulary =

@@ -17,7 +17,8 @@ pub(super) struct Candidate {
     pub(super) site: ParameterSite,
     pub(super) regressor: Regressor,
     pub(super) nominal: f64,
-    /// Default prior of a parameter of an effect, which is free unless a rule holds it.
+    /// Default 1 σ of the prior of an effect's parameter, SI. The parameter is free unless a rule
+    /// holds it.
     effect_sigma: Option<f64>,
     /// Bounds of a parameter of an effect, SI.
     limits: (f64, f64),
@@ -46,7 +47,8 @@ pub struct EffectParameter {
     pub site: ParameterSite,
     /// Factor that multiplies the parameter at its site.
     pub regressor: Regressor,
-    /// Value at which the effect vanishes; for a position or time of an effect, its start value.
+    /// Nominal value, SI, at which the effect vanishes; for a position or time of an effect, its
+    /// start value.
     pub nominal: f64,
     /// Standard deviation (1 σ) of a prior wide enough for every realistic size, in SI units or ln.
     pub sigma: f64,
@@ -79,7 +81,7 @@ fn names(rule: &ParameterRule, name: &str, plain: &str) -> bool {
 /// A single base or target with an empty name has no brackets: `base.x`.
 ///
 /// # Errors
-/// A rule matches nothing, or gives a quantity of the wrong unit.
+/// Returns an error if a rule matches nothing, or gives a quantity of the wrong unit.
 pub fn resolve(
     problem: &Problem,
     bases: &[String],

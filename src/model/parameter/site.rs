@@ -29,7 +29,7 @@ pub enum ParameterSite {
     Base {
         /// Index of the base.
         base: usize,
-        /// Coordinate 0 to 5.
+        /// Index 0 to 5 of the coordinate in that order.
         axis: usize,
     },
     /// Coordinate of a target in the frame that carries it: position x, y, z, then rotation vector
@@ -66,7 +66,7 @@ pub enum ParameterSite {
     /// Entry of the strain E of the measuring frame: p reads as p + E p. E is triangular, in the
     /// order xx, yy, zz, xy, xz, yz.
     Strain {
-        /// Entry 0 to 5.
+        /// Index 0 to 5 of the entry in that order.
         entry: usize,
     },
 }

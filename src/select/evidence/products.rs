@@ -235,7 +235,8 @@ pub(super) struct Left<'p, 'a> {
     /// Vector Z r.
     taken: DVector<f64>,
     squares: f64,
-    /// Log density of the residual that the set leaves.
+    /// Logarithm of the density of the residual that remains after the set is fitted, without the
+    /// term in det L.
     without: f64,
     /// Log determinant of L.
     ln_determinant: f64,

@@ -23,7 +23,7 @@ const MIN_PART_OF_ONE_PROJECTION: f64 = 0.1;
 /// Unknowns of a fit at its end, with their priors and active constraints.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Unknowns {
-    /// Values, as deviations from nominal.
+    /// Values of the unknowns, as deviations from nominal, SI.
     pub x: Vec<f64>,
     /// Standard deviation (1 σ) of the prior of each unknown; `None` without a prior.
     pub priors: Vec<Option<f64>>,

@@ -20,9 +20,9 @@ pub(crate) struct Score {
 /// Sums of squares and degrees of freedom of a fit.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Sums {
-    /// Sum of squares, priors included.
+    /// Sum of squared whitened residuals of data and priors.
     pub squares: f64,
-    /// Sum of squares of the data alone.
+    /// Sum of squared whitened residuals of the data alone.
     data_squares: f64,
     /// Degrees of freedom of the data.
     pub data_freedom: f64,
@@ -31,7 +31,7 @@ pub(crate) struct Sums {
 /// Gain of a fit by a candidate, with its p-value.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Gain {
-    /// Reduction of the sum of squares.
+    /// Reduction of the sum of squared whitened residuals.
     pub squares: f64,
     /// Number of new directions k, the degrees of freedom of the numerator.
     pub freedom: usize,

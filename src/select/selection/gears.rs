@@ -42,7 +42,7 @@ fn coefficients(fitted: &Fitted) -> Vec<(usize, u32)> {
 /// Criterion by which the scale of the prior is chosen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum ScaleBy {
-    /// Maximises the evidence.
+    /// Chooses the scale that maximises the evidence.
     Evidence,
     /// Predicts left-out parts of the joints' ranges best.
     LeftOutRanges,
