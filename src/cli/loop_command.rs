@@ -36,8 +36,10 @@ pub struct Arguments {
     verbose: bool,
 }
 
-/// Runs the loop, writes `loop.json`, `problem.closed.toml`, `residuals.csv` and both reports, and
-/// prints the result.
+/// Fits the problem, searches for the effects that it lacks, and prints the result.
+///
+/// Writes `loop.json`, `problem.closed.toml`, `residuals.csv` and both reports, and
+/// `remainder.json` if a remainder is kept.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let common = &arguments.common;
     let (problem, text) = Problem::read_with_text(common.problem())?;

@@ -16,7 +16,8 @@ const PRIOR_DOMINATED: f64 = 0.5;
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Criterion {
-    /// Determinant of C, the volume of the confidence ellipsoid; independent of units.
+    /// Determinant of C over the arm's parameters; its root is proportional to the volume of their
+    /// confidence ellipsoid. Units do not change the choice of poses.
     D,
     /// Product Π C_kk of the variances; its root is the geometric mean of the standard errors.
     /// Independent of units.

@@ -109,7 +109,7 @@ impl FolderRecord {
         StagedFile::new(&Self::file(folder), &lines)?.commit()
     }
 
-    /// Returns the path of the record of a folder.
+    /// Returns the path of the file `.flexcal` in a folder, which lists what flexcal wrote there.
     pub fn file(folder: &Path) -> PathBuf {
         folder.join(RECORD_NAME)
     }

@@ -53,7 +53,8 @@ impl<'a, P: LeastSquares> Fit<'a, P> {
         Self { problem, rows: Vec::new(), loss: Loss::Squares, cache: None }
     }
 
-    /// Replaces the loss of the items; linear rows keep their squares.
+    /// Sets the loss of each item's residual (an item is a pose). Linear rows, such as priors,
+    /// always count by their squares.
     #[must_use]
     pub fn with_loss(mut self, loss: Loss) -> Self {
         self.loss = loss;

@@ -14,7 +14,7 @@ use crate::problem::PoseView;
 /// Differentiates the tilts of frames, with one copy of the arm in dual numbers for each input.
 pub(super) struct TiltDerivatives {
     arm: Arm<f64>,
-    /// Arm in dual numbers with zero derivatives.
+    /// Copy of `arm` in dual numbers with zero derivatives, for the values of the frame's axes.
     unseeded: Arm<Dual64>,
     inputs: Vec<(Input, Arm<Dual64>)>,
     state: StaticState,

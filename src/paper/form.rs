@@ -43,7 +43,8 @@ pub enum Misprint {
     LinkTransfer,
     /// Eq. 28, 29: `dT_i` = `Δ_i` `T_i` instead of `T_i` `Δ_i`.
     GeometricSide,
-    /// Eq. 37, 39: motions in the end frame are used as motions in the measuring frame.
+    /// Eq. 37, 39: the end point's motion stays in the end frame, instead of being rotated into the
+    /// measuring frame.
     EndFrame,
     /// Eq. 45: `E_j` lacks β.
     BetaLeftOut,

@@ -8,7 +8,8 @@ use crate::files::Changes;
 use crate::fit::SavedEstimate;
 use crate::problem::Problem;
 
-/// Reads the remainder that a problem declares and uses; `None` if there is none.
+/// Reads the correction of joint errors from the file that the section `[remainder]` names. Returns
+/// `None` if the problem lacks the section or sets `use = false` in it.
 ///
 /// # Errors
 /// Returns an error if the file is no remainder of this problem.

@@ -11,7 +11,8 @@ use crate::problem::PoseView;
 /// Number of coordinates of a position.
 pub(super) const AXES: usize = 3;
 
-/// Sites at which the arm may err, and the inputs on which these errors may depend.
+/// Joint coordinates and compliances at which the remainder models errors, and the inputs of its
+/// functions.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Layout {
     pub sites: Vec<Site>,

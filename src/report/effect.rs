@@ -44,7 +44,8 @@ fn value(parameter: &ParameterValue) -> String {
     }
 }
 
-/// Returns a list item for each group of effects, with the group's reason.
+/// Groups effects by family and reason, and returns a list item per group: the effects, then the
+/// reason.
 pub(super) fn reasons<'a>(effects: impl IntoIterator<Item = (Effect, &'a str)>) -> Vec<Point> {
     grouped(effects)
         .into_iter()

@@ -37,7 +37,7 @@ pub(super) struct Leverage<'a> {
     gram: DMatrix<f64>,
     /// Degrees of freedom ν = tr(I − H).
     pub freedom: f64,
-    /// Sum of squares tr((I − H)²); equal to ν without priors.
+    /// Trace tr (I − H)²; equal to ν if there are no priors.
     pub squared_freedom: f64,
     /// Matrix (I − H)_bb^(−½) of each pose b, shape = (3, 3).
     pub whiteners: Vec<Matrix3<f64>>,

@@ -18,7 +18,7 @@ const ONE_IN: usize = 5;
 
 /// Result of a search for outliers.
 pub(super) struct Found<'a> {
-    /// Test of the pose with the largest distance.
+    /// Outlier test of the pose with the largest F statistic, before any pose is removed.
     pub tried: Tried,
     /// Fit to the poses without the outliers; `None` if there are no outliers.
     pub kept: Option<Kept<'a>>,

@@ -103,8 +103,8 @@ impl<'a> Data<'a> {
         self.rows().iter().map(|&row| self.measurements.session.of_row[row]).collect()
     }
 
-    /// Returns which optional columns the identification rows have, with their ranges and which of
-    /// them vary.
+    /// Collects what the identification rows record and vary, which decides the effects that they
+    /// can show. Ranges are those of commands and payloads.
     pub fn conditions(&self, problem: &Problem) -> DataCoverage {
         fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
             values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {

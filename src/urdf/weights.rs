@@ -17,8 +17,8 @@ pub(super) struct Weight {
     pub at: Vector3<f64>,
 }
 
-/// Returns all links with a mass after the first joint of the chain, and the names of joints
-/// outside the chain that move some of them.
+/// Returns all links with a mass after the chain's first moving joint, and the names of the moving
+/// joints that branch off after it.
 pub(super) fn weights(chain: &Chain) -> (Vec<Weight>, Vec<String>) {
     let robot = chain.robot;
     let (mut weights, mut beside) = (Vec::new(), Vec::new());

@@ -153,11 +153,12 @@ impl SecondOrder {
             && self.formations < MAX_FORMATIONS
     }
 
-    /// Returns the number of steps expected after a series of slow ones; 0 if the last steps were
-    /// not slow.
+    /// Extrapolates the number of steps still to come after a series of slow ones. Returns 0 if the
+    /// last steps were not slow, and infinity if they did not shrink.
     ///
-    /// Steps that shrink by a factor s reduce the cost by s² of the previous reduction. A reduction
-    /// of `worth` times the smallest is then followed by ln(worth) / (2 ln 1/s) more steps.
+    /// `worth` is the predicted reduction of the present step over the smallest one that is worth a
+    /// step. Steps that shrink by a factor s reduce the cost by s² of the previous reduction. The
+    /// reduction reaches the smallest one after ln(worth) / (2 ln 1/s) steps.
     fn expected_steps(&self, worth: f64) -> f64 {
         let Some(last) =
             self.lengths.len().checked_sub(SLOW_STEPS + 1).map(|first| &self.lengths[first..])

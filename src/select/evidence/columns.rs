@@ -312,8 +312,8 @@ impl<'a, 'l> Columns<'a, 'l> {
         all.enumerate().filter_map(|(k, (joint, pair))| Some((k, of(joint, pair)?))).collect()
     }
 
-    /// Returns true if the search has an effect at `site` that is linear in the covariate. If the
-    /// covariate has only two values, every function of it is linear.
+    /// Returns true if a candidate effect depends on this covariate alone and adds a term linear in
+    /// it at `site`. If the covariate has only two values, every function of it is linear.
     fn has_law(&self, site: ParameterSite, of: &Known) -> bool {
         let is_line = |term: &Term| {
             let is_linear = matches!(

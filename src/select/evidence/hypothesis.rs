@@ -117,7 +117,8 @@ pub struct Hypothesis {
     pub kind: HypothesisKind,
     /// Site at which the error acts.
     pub site: Site,
-    /// Coordinate of the site, if the error is one of a single coordinate.
+    /// Coordinate to which a smooth, periodic, pose-wise or wandering function adds, if it is a
+    /// single one. `None` for effects, limits and other functions.
     pub coordinate: Option<ParameterSite>,
     /// Quantities on which it depends, ascending.
     pub depends_on: Vec<Covariate>,
