@@ -1,4 +1,5 @@
-//! Argument of commands that apply an estimate, and the reader of its file.
+//! Command-line argument of commands that apply an estimate, and the function that reads the
+//! estimate.
 
 use std::path::Path;
 
@@ -18,7 +19,8 @@ pub struct Trust {
 }
 
 impl Trust {
-    /// Reads an estimate. If changes are accepted, a warning names the first key that was changed.
+    /// Reads an estimate. If changed files are accepted, it prints a warning with the first changed
+    /// key.
     pub fn read(self, file: &Path) -> Result<SavedEstimate, SavedEstimateError> {
         let changes = if self.trust { Changes::Accepted } else { Changes::Refused };
         let estimate = SavedEstimate::read_with(file, changes)?;

@@ -15,7 +15,8 @@ pub const STATUS: u8 = 130;
 const PATIENCE: Duration =
     Duration::from_millis(if cfg!(debug_assertions) { 20_000 } else { 1_700 });
 
-/// Work that replaces the rest of a command whose time is over; it returns the exit status.
+/// Last work of a command that has not ended in time after an interrupt; it returns the exit
+/// status.
 type LastWork = Box<dyn FnOnce() -> u8 + Send>;
 
 /// Lock that is held while files take their names.
@@ -25,13 +26,14 @@ static IS_WATCHED: AtomicBool = AtomicBool::new(false);
 /// State of the running command.
 static STATE: Mutex<State> = Mutex::new(State::Running(None));
 
-/// State of the running command, which decides what ends the process.
+/// State of the running command, which decides how an interrupt ends the process.
 enum State {
-    /// It works, and may be ended once its time is over, after the last work.
+    /// The command is working. If it does not end in time after an interrupt, its last work runs
+    /// and the process ends.
     Running(Option<LastWork>),
-    /// It writes its results, which takes little time.
+    /// The command is writing its results, which takes little time; it is not ended.
     Writing,
-    /// Its time is over, and the process is about to end.
+    /// The time after the interrupt is over, and the process is about to end.
     Over,
 }
 
@@ -44,13 +46,14 @@ pub fn stop() -> Stop {
     install()
 }
 
-/// Sets the work of the running command for the case that its time after an interrupt is over.
+/// Sets the last work of the running command, which runs if the command has not ended in time after
+/// an interrupt.
 pub fn at_deadline(work: impl FnOnce() -> u8 + Send + 'static) {
     *locked(&STATE) = State::Running(Some(Box::new(work)));
 }
 
-/// Declares that the command writes its results, after which it ends by itself. Does not return if
-/// its time is over already.
+/// Declares that the command is writing its results, so that it is no longer ended. Does not return
+/// if the time after an interrupt is over already.
 pub fn begin_writing() {
     let is_over = {
         let mut state = locked(&STATE);
@@ -71,7 +74,7 @@ pub fn unbroken() -> MutexGuard<'static, ()> {
     locked(&WRITING)
 }
 
-/// Installs the handler once and returns the request that it makes.
+/// Installs the signal handler once, and returns the stop request that the handler sets.
 fn install() -> Stop {
     static STOP: OnceLock<Stop> = OnceLock::new();
     let stop = STOP.get_or_init(|| {
@@ -92,7 +95,7 @@ fn install() -> Stop {
     stop.clone()
 }
 
-/// Ends the process if the command has not ended by itself in time.
+/// Ends the process if the command has not ended in time after an interrupt.
 fn end_in_time() {
     thread::sleep(PATIENCE);
     let work = {

@@ -14,7 +14,7 @@ use super::{diagnostic, interrupt};
 /// Names of the files of a report.
 pub const REPORT: [&str; 2] = ["report.md", "report.html"];
 const FIGURES: &str = "figures";
-/// Time for which a command waits while another one writes to the same folder.
+/// Maximum time for which a command waits while another command writes to the same folder.
 const MAX_WAIT: Duration = Duration::from_secs(10);
 
 /// Error of results that cannot be written.
@@ -92,13 +92,13 @@ impl Results {
         format!("\nWritten to {}: {}\n", self.folder.display(), names.join(", "))
     }
 
-    /// Returns true if this command wrote the file `name`, and it is unchanged.
+    /// Returns true if this command has written the file `name` and the file has not changed since.
     pub fn is_recorded(&self, name: &str) -> bool {
         self.record().is_ok_and(|record| record.writer(&self.folder, name) == Some(self.command))
     }
 
-    /// Returns the same results in the folder `name` below this one, in which no other file may be
-    /// in their way.
+    /// Returns results that are written to the subfolder `name` instead; the subfolder may contain
+    /// no other files with the same names.
     pub fn below(&self, name: &str) -> Result<Self, WriteError> {
         let names: Vec<&str> = self.names.iter().map(String::as_str).collect();
         let (folder, flags) = (self.folder.join(name), (self.force, self.quiet));
@@ -202,7 +202,7 @@ impl Results {
         report.and_then(other).or_else(|| texts.iter().find_map(other))
     }
 
-    /// Locks the folder, so that no other flexcal writes there meanwhile.
+    /// Locks the folder, so that no other flexcal process writes there at the same time.
     fn lock(&self) -> Result<FolderLock, WriteError> {
         let busy = |_| WriteError::Busy { folder: self.folder.clone() };
         FolderLock::take(&self.folder, MAX_WAIT).map_err(busy)

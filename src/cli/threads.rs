@@ -1,13 +1,13 @@
-//! Number of threads, as the environment asks for it.
+//! Check of the number of threads that the environment variable requests.
 
 use std::env;
 
-/// Variable with the number of threads.
+/// Environment variable with the number of threads.
 const VARIABLE: &str = "RAYON_NUM_THREADS";
-/// Maximum number of threads; more of them only wait for one another.
+/// Maximum number of threads; additional ones would only wait for each other.
 pub const MAX_THREADS: usize = 1024;
 
-/// Number of threads that is not possible.
+/// Error for a number of threads that is not valid.
 #[derive(Debug, thiserror::Error)]
 #[error(
     "{VARIABLE}={text}: a whole number from 0 (as many as processors) to {MAX_THREADS} is needed; correct it or unset it"
@@ -16,7 +16,7 @@ pub struct BadThreads {
     text: String,
 }
 
-/// Checks the number of threads before the first one starts.
+/// Checks the requested number of threads before the first thread starts.
 pub fn check() -> Result<(), BadThreads> {
     let Some(text) = env::var_os(VARIABLE) else { return Ok(()) };
     let text = text.to_string_lossy().into_owned();

@@ -1,4 +1,4 @@
-//! Results of a loop that was interrupted.
+//! Results of a loop that was interrupted before it ended.
 
 use std::fs;
 use std::io;
@@ -13,20 +13,22 @@ use serde_json::Value;
 use super::output::{Results, WriteError};
 use super::{diagnostic, interrupt};
 
-/// Folder, below that of the results, for an interrupted loop beside a finished one.
+/// Subfolder of the results for an interrupted loop, used if the results already contain a finished
+/// loop.
 const FOLDER: &str = "interrupted";
 /// Name of the file with the effects that were found.
 const CLOSED_PROBLEM: &str = "problem.closed.toml";
-/// Exit status of an interrupted loop that has written something.
+/// Exit status of an interrupted loop that has written a file.
 const STATUS: u8 = 1;
 
-/// Loop under way: what an interrupt leaves of it if it cannot end in time.
+/// Record of a running loop, from which results are written if it is interrupted and cannot end in
+/// time.
 #[derive(Clone)]
 pub struct Unfinished {
     /// Text of the problem file.
     text: String,
     declared: Vec<Effect>,
-    /// Measurement files and joint tables.
+    /// Paths of the measurement files and of the joint tables.
     files: [Vec<PathBuf>; 2],
     results: Results,
     /// Effects that the finished rounds have added.
@@ -46,7 +48,8 @@ impl Unfinished {
         }
     }
 
-    /// Returns a sink that records the effects of finished rounds and passes progress on.
+    /// Returns a progress receiver that records the effects of finished rounds and passes progress
+    /// on to `shown`.
     pub fn watching(&self, shown: Option<ProgressSink>) -> ProgressSink {
         let added = Arc::clone(&self.added);
         Arc::new(move |progress: Progress| {
@@ -59,7 +62,8 @@ impl Unfinished {
         })
     }
 
-    /// Returns the results, in a folder below if a finished loop is in theirs.
+    /// Returns the folder of the results, or a subfolder if the folder already contains a finished
+    /// loop.
     pub fn keeping_finished(&self) -> Result<Results, WriteError> {
         if !self.results.is_recorded("loop.json") || !is_finished(&self.results.path("loop.json")) {
             return Ok(self.results.clone());
@@ -73,7 +77,8 @@ impl Unfinished {
         Ok(below)
     }
 
-    /// Returns the measurement files and the joint tables as seen from a folder, which is created.
+    /// Creates a folder, and returns the paths of the measurement files and joint tables relative
+    /// to it.
     pub fn files_from(&self, folder: &Path) -> Result<[Vec<PathBuf>; 2], WriteError> {
         let of = |files: &[PathBuf]| -> io::Result<Vec<PathBuf>> {
             fs::create_dir_all(folder)?;
@@ -84,8 +89,8 @@ impl Unfinished {
         Ok([of(files).map_err(unseen)?, of(joint_files).map_err(unseen)?])
     }
 
-    /// Writes the problem with the effects of the finished rounds, says so, and returns the exit
-    /// status.
+    /// Writes the problem with the effects of the finished rounds, prints a message, and returns
+    /// the exit status.
     pub fn write(self) -> u8 {
         let added = self.added.lock().unwrap_or_else(PoisonError::into_inner).clone();
         if added.is_empty() {
@@ -108,7 +113,7 @@ impl Unfinished {
         }
     }
 
-    /// Writes the problem with these effects declared, and returns its file.
+    /// Writes the problem with the `added` effects declared, and returns the path of its file.
     fn declare(&self, added: &[Effect]) -> Result<PathBuf, Box<dyn std::error::Error>> {
         let results = self.keeping_finished()?;
         let [files, joint_files] = self.files_from(&results.folder)?;
@@ -124,14 +129,14 @@ impl Unfinished {
     }
 }
 
-/// Returns true if a loop.json is of a loop that was not interrupted.
+/// Returns true if a `loop.json` is the result of a loop that was not interrupted.
 fn is_finished(file: &Path) -> bool {
     let result: Option<Value> =
         fs::read_to_string(file).ok().and_then(|text| serde_json::from_str(&text).ok());
     result.is_some_and(|result| result.get("interrupted") == Some(&Value::Bool(false)))
 }
 
-/// Returns a file as seen from a folder, as an absolute path if no relative one exists.
+/// Returns the path of a file relative to a folder, or its absolute path if no relative one exists.
 fn seen_from(folder: &Path, file: &Path) -> io::Result<PathBuf> {
     let (folder, file) = (folder.canonicalize()?, file.canonicalize()?);
     Ok(pathdiff::diff_paths(&file, folder).unwrap_or(file))

@@ -99,7 +99,7 @@ pub enum UrdfErrorKind {
     NotUr { why: String },
 }
 
-/// Returns how to convert a file with this outermost element to a URDF.
+/// Returns instructions for converting a file with this outermost element to a URDF.
 fn conversion(found: &str) -> &'static str {
     match found {
         "mujoco" => {

@@ -114,7 +114,8 @@ fn covariate(meant: Option<&str>) -> &'static str {
     if meant.is_none() { " (name it in [data.covariates] if the arm may depend on it)" } else { "" }
 }
 
-/// Returns the hint for rows whose nearest partner in time is too far.
+/// Returns the hint for a join by time in which rows have no partner within the tolerance; `gap` is
+/// their usual distance in words.
 pub(super) fn nearest_in_time(gap: Option<&str>) -> String {
     gap.map_or_else(String::new, |gap| {
         format!(

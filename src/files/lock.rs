@@ -19,10 +19,10 @@ pub struct FolderLock {
 }
 
 impl FolderLock {
-    /// Takes the lock of an existing folder. Waits for another process for at most `patience`.
+    /// Locks an existing folder. Waits for at most `patience` if another process holds the lock.
     ///
     /// # Errors
-    /// [`io::ErrorKind::WouldBlock`] if another process holds the lock for longer.
+    /// Returns [`io::ErrorKind::WouldBlock`] if another process holds the lock for longer.
     pub fn take(folder: &Path, patience: Duration) -> io::Result<Self> {
         // Windows does not open folders as files, and some network folders have no locks.
         let Some(open) = folder.is_dir().then(|| File::open(folder).ok()).flatten() else {

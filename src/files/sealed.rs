@@ -1,4 +1,4 @@
-//! Digests in JSON files that are read back, so that a change since is noticed.
+//! Digests in JSON files that flexcal reads back, by which it detects later changes to them.
 
 use std::collections::BTreeMap;
 
@@ -7,23 +7,24 @@ use serde_json::{Map, Value};
 
 use super::digest;
 
-/// Key of the digests, an object with a digest for each other key of the file.
+/// Key of the digests in a file. Its value is an object with one digest for every other key of the
+/// file.
 pub(crate) const DIGEST_KEY: &str = "digest";
-/// Number of hexadecimal digits of a digest, enough for changes by mistake.
+/// Number of hexadecimal digits of a digest, enough to detect accidental changes.
 const DIGEST_DIGITS: usize = 16;
 
 /// Treatment of files that were changed since flexcal wrote them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Changes {
-    /// A changed file is an error.
+    /// A changed file causes an error.
     #[default]
     Refused,
-    /// A changed file is read as it is.
+    /// A changed file is read despite the change.
     Accepted,
 }
 
-/// Returns the JSON object `text` with the digests of its values as its last key. A text that is no
-/// JSON object is returned unchanged.
+/// Returns the JSON object `text` with the digests of its values under an additional last key. A
+/// text that is no JSON object is returned unchanged.
 pub(crate) fn sealed(text: &str) -> String {
     let Ok(digests) = digests(text) else { return text.to_owned() };
     let body = text.trim_end().strip_suffix('}').unwrap_or(text).trim_end();
@@ -32,11 +33,12 @@ pub(crate) fn sealed(text: &str) -> String {
     format!("{body},\n  \"{DIGEST_KEY}\": {digests}\n}}\n")
 }
 
-/// Returns the first key of a JSON object whose value is not as [`sealed`] wrote it: changed, added
-/// or removed. Returns `None` if nothing changed, and for files without digests.
+/// Returns the first key of a JSON object whose value differs from the one that [`sealed`] wrote,
+/// or that was added or removed. Returns `None` if nothing changed, or if the file contains no
+/// digests.
 ///
 /// # Errors
-/// The text is no JSON object.
+/// Returns an error if the text is no JSON object.
 pub(crate) fn changed_key(text: &str) -> serde_json::Result<Option<String>> {
     let mut found = digests(text)?;
     found.remove(DIGEST_KEY);
@@ -49,7 +51,7 @@ pub(crate) fn changed_key(text: &str) -> serde_json::Result<Option<String>> {
 }
 
 /// Returns the digest of each value of a JSON object. White space and the order of keys do not
-/// matter.
+/// affect the digests.
 fn digests(text: &str) -> serde_json::Result<BTreeMap<String, String>> {
     let values: Map<String, Value> = serde_json::from_str(text)?;
     let short = |value: &Value| {

@@ -389,7 +389,7 @@ impl Columns {
     }
 }
 
-/// Returns true for a column that only tables of flexcal's results have.
+/// Returns true for a column name that occurs only in result tables of flexcal.
 fn is_unmistakable_result(name: &str) -> bool {
     let is_bound = name
         .strip_prefix("bound")
@@ -399,7 +399,7 @@ fn is_unmistakable_result(name: &str) -> bool {
     is_bound || starts.iter().any(|start| name.starts_with(start))
 }
 
-/// Returns true for a column that flexcal writes beside its results and does not read.
+/// Returns true for a column that flexcal writes to result tables, but does not read.
 fn is_result(name: &str) -> bool {
     let others = [
         "file",

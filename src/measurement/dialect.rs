@@ -15,9 +15,9 @@ const MAX_HEADER_LINES: usize = 100;
 /// Delimiter that replaces a run of spaces.
 const TAB: u8 = b'\t';
 
-/// Marks that programs put before a header line, as before a comment.
+/// Marks that some programs put before the header line, as before a comment.
 const HEADER_MARKS: [&str; 3] = ["//", "#", "%"];
-/// Minimum number of known names in a line that is recognised as the header by them.
+/// Minimum number of known column names by which a line is recognised as the header.
 const MIN_KNOWN_NAMES: usize = 2;
 
 /// Delimiter of a table and position of its header.
@@ -185,7 +185,7 @@ pub(super) struct NormalizedText<R> {
     pub lines: R,
     /// Number of lines before the header that are still unread.
     skipped: usize,
-    /// Number of bytes of the mark before the header; 0 once the header is read.
+    /// Number of bytes of the mark before the header; 0 after the header has been read.
     mark_bytes: usize,
     comment: Option<Vec<u8>>,
     spaces: bool,

@@ -36,7 +36,7 @@ pub(super) struct JoinedLog {
     unpaired: Vec<Location>,
     paired: usize,
     decoding_warnings: Vec<Warning>,
-    /// Times from rows without a partner to the nearest row of the log, for a join by time \[s\].
+    /// For rows without a partner in a join by time, the time to the nearest row of the log \[s\].
     gaps: Vec<f64>,
 }
 
@@ -199,7 +199,7 @@ impl JoinedLog {
         Ok(true)
     }
 
-    /// Returns the row nearest to a time \[s\], and how far it is from it \[s\].
+    /// Returns the index of the joint row nearest to a time \[s\], and the time between them \[s\].
     fn nearest(&self, time: f64) -> Option<(usize, f64)> {
         let time_of = |&row: &usize| self.rows.get(row).map_or(f64::NAN, |row| row.time);
         let after = self.by_time.partition_point(|row| time_of(row) < time);
@@ -211,8 +211,8 @@ impl JoinedLog {
             .map(|row| (*row, distance(row)))
     }
 
-    /// Returns the usual time from a row without a partner to the nearest row of the log in words;
-    /// `None` for other joins.
+    /// Returns, in words, the usual time between a row without a partner and the nearest row of the
+    /// log; `None` if the tables are not joined by time.
     fn gap(&self) -> Option<String> {
         let mut gaps = self.gaps.clone();
         gaps.sort_by(f64::total_cmp);

@@ -6,7 +6,8 @@ use csv::ByteRecord;
 
 use crate::error::BYTE_ORDER_MARKS;
 
-/// Characters of the bytes 0x80 to 0x9f that occur in text; the others are taken for binary data.
+/// Bytes 0x80 to 0x9f that occur in text, with their characters. Other bytes in this range mark
+/// binary data.
 const MARKS: [(u8, char); 9] = [
     (0x80, '€'),
     (0x85, '…'),
@@ -18,15 +19,16 @@ const MARKS: [(u8, char); 9] = [
     (0x97, '—'),
     (0x99, '™'),
 ];
-/// Signs of the bytes 0xa0 to 0xbf that occur in the names of columns and in words.
+/// Characters of the bytes 0xa0 to 0xbf that occur in column names and in words.
 const SIGNS: &str = "\u{a0}§ª«°±²³´µ·¹º»¼½¾¿";
-/// First byte of the letters.
+/// First byte of the accented letters.
 const FIRST_LETTER: u8 = 0xc0;
 /// Bytes above [`FIRST_LETTER`] that hardly occur in text: Ð × Þ ð ÷ þ ÿ.
 const RARE: [u8; 7] = [0xd0, 0xd7, 0xde, 0xf0, 0xf7, 0xfe, 0xff];
 
-/// Returns the text of bytes that are not UTF-8 as Windows-1252; `None` if they do not look like
-/// text: a control character, a rare character, or an accented letter that no letter is next to.
+/// Decodes bytes that are not UTF-8 as Windows-1252. Returns `None` if they do not look like text:
+/// they contain a control character, a rare character, or an accented letter without a letter next
+/// to it.
 fn windows_1252(bytes: &[u8]) -> Option<String> {
     let is_letter = |place: Option<usize>| {
         let byte = place.and_then(|place| bytes.get(place)).copied().unwrap_or_default();
@@ -45,7 +47,8 @@ fn windows_1252(bytes: &[u8]) -> Option<String> {
     bytes.iter().enumerate().map(character).collect()
 }
 
-/// Returns text for the search of a header: UTF-8, else Windows-1252, else what can be read of it.
+/// Decodes bytes in which a header is searched: as UTF-8, else as Windows-1252, else with
+/// replacement characters.
 pub(super) fn decoded(bytes: &[u8]) -> Cow<'_, str> {
     match std::str::from_utf8(bytes) {
         Ok(text) => Cow::Borrowed(text),
@@ -55,8 +58,8 @@ pub(super) fn decoded(bytes: &[u8]) -> Cow<'_, str> {
     }
 }
 
-/// Returns a record whose cells that are not UTF-8 are decoded from Windows-1252; `None` if all are
-/// UTF-8, or if one does not look like text.
+/// Returns a record in which cells that are not UTF-8 are decoded from Windows-1252. Returns `None`
+/// if all cells are UTF-8, or if one does not look like text.
 pub(super) fn decoded_record(record: &ByteRecord) -> Option<ByteRecord> {
     let is_utf16 = BYTE_ORDER_MARKS.iter().any(|mark| record.as_slice().starts_with(mark));
     if is_utf16 || record.iter().all(|cell| std::str::from_utf8(cell).is_ok()) {

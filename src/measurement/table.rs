@@ -42,7 +42,7 @@ pub(super) struct Table {
     appended: Option<(CellStyle, usize)>,
     /// File and line from which the appended cells of the current row come.
     partner: Option<(PathBuf, usize)>,
-    /// First line that was decoded from Windows-1252.
+    /// Number of the first line that was decoded from Windows-1252; `None` if there is none.
     decoded_line: Option<usize>,
 }
 
@@ -284,7 +284,7 @@ impl Table {
         }
     }
 
-    /// Returns true if the word is a unit in the row below the header.
+    /// Returns true if the word is one of the units in the row below the header.
     fn is_unit_below_header(&self, word: &str) -> bool {
         let unit = word.trim_matches(['[', ']', '(', ')', ' ']);
         self.line == self.header_line + 1

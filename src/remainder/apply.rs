@@ -32,8 +32,8 @@ pub struct CorrectedPrediction {
 
 /// Predicts `rows` as [`fit::predict`] does, and adds the correction to the positions.
 ///
-/// Bases and tools of sessions that the correction has not seen are fitted to what it leaves of their
-/// rows, also where the estimate has some that were fitted without the correction.
+/// Bases and tools of sessions that were not used to fit the correction are fitted to the corrected
+/// rows. This replaces values in the estimate that were fitted without the correction.
 ///
 /// # Errors
 /// Returns the errors of [`fit::predict`].
@@ -78,11 +78,11 @@ pub fn predict(
     Ok(CorrectedPrediction { prediction, poses: corrected })
 }
 
-/// Predicts positions of `rows` with the arm identified in `found` and its correction, as
-/// [`Identification::predict`], with the correction and uncertainty of each.
+/// Predicts positions of `rows` as [`Identification::predict`] does, and adds the correction. Also
+/// returns the correction and the uncertainty of each row.
 ///
 /// # Errors
-/// As [`Identification::predict`].
+/// Returns the errors of [`Identification::predict`].
 pub fn predict_identified(
     found: &Identification,
     problem: &Problem,

@@ -54,11 +54,12 @@ pub(super) struct Linearised {
     pub estimate: f64,
 }
 
-/// Parameters of a correction in a model.
+/// Parameters of a correction that exist in a model.
 struct Columns {
-    /// Column of the posterior, and index in the model.
+    /// Column of the posterior, and index in the model, of each of these parameters.
     found: Vec<(usize, usize)>,
-    /// Deviation in the model from that about which the correction was linearised.
+    /// Difference between the deviation in the model and the one about which the correction was
+    /// linearised, for every column.
     moved: DVector<f64>,
 }
 
@@ -67,8 +68,8 @@ struct Columns {
 pub struct CorrectedPose {
     /// Vector that is added to the predicted position, measuring frame \[m\].
     pub shift: Vector3<f64>,
-    /// Covariance of measured − predicted, measuring frame \[m²\]: of parameters and remainder, of
-    /// the noise, and of what fading leaves out.
+    /// Covariance of measured − predicted in the measuring frame \[m²\]. It is the sum for
+    /// parameters and remainder, for noise, and for the part of the correction that is not applied.
     pub covariance: Matrix3<f64>,
     /// Expected root mean square of the error length ‖measured − predicted‖ \[m\]. Its product with
     /// [`Scores::quantile`] is an error bound.
@@ -79,7 +80,7 @@ pub struct CorrectedPose {
 }
 
 impl CorrectedPose {
-    /// 1 σ of measured − predicted along each axis \[m\].
+    /// Returns 1 σ of measured − predicted along each axis \[m\].
     pub fn sigma(&self) -> Vector3<f64> {
         self.covariance.diagonal().map(f64::sqrt)
     }
@@ -120,8 +121,8 @@ impl Correction {
         self.posterior.hyper.sites() > 0
     }
 
-    /// Names of the free parameters of bases and tools of `model` none of whose parameters moved the
-    /// rows fitted: those of sessions and targets that took no part.
+    /// Returns the names of the free parameters of those bases and tools of `model` that no fitted
+    /// row depends on, because their sessions or targets were not fitted.
     pub(super) fn unseen_placements<'a>(&self, model: &'a Model) -> HashSet<&'a str> {
         let whole = |name: &str| name.split('.').next().unwrap_or_default().to_owned();
         let seen: HashSet<String> =
@@ -156,8 +157,8 @@ impl Correction {
     /// Returns the corrections of `poses`, with the arm at the full parameter vector `x` of
     /// `model`. They are NaN for poses without equilibrium.
     ///
-    /// The bases and tools `placed`, parameters of `model`, are fitted to the corrected poses that
-    /// use them. Mean and covariance leave out what that fit takes up.
+    /// The parameters `placed` of bases and tools are fitted to the corrected poses that use them.
+    /// The part of the correction that this fit can reproduce is removed from mean and covariance.
     pub(crate) fn at(
         &self,
         (problem, model, x): (&Problem, &Model, &DVector<f64>),
@@ -186,7 +187,8 @@ impl Correction {
         chunks().flat_map(corrected).collect()
     }
 
-    /// Finds the parameters of the correction in `model`.
+    /// Finds the parameters of the correction in `model`, and their changes since the
+    /// linearisation.
     fn columns(&self, model: &Model, x: &DVector<f64>) -> Columns {
         let places: HashMap<&str, usize> = model
             .parameters
@@ -205,8 +207,9 @@ impl Correction {
         Columns { found, moved }
     }
 
-    /// Rows of some poses and the posterior of their corrections, as far as `x` does not make them
-    /// already. Coordinates of poses without an equilibrium have a residual of NaN and zeros.
+    /// Returns the linearised rows of some poses and the posterior of their corrections, without
+    /// the part that `x` already contains. For poses without equilibrium, the residual is NaN and
+    /// all else is 0.
     fn factors(
         &self,
         Columns { found, moved }: &Columns,
@@ -230,8 +233,9 @@ impl Correction {
         (rows, factors)
     }
 
-    /// Fades the corrections of rows with these posteriors; `noise_shares` are the parts of the
-    /// variance of the noise of each coordinate that residuals show.
+    /// Returns the applied share of each correction, with its uncertainty. `noise_shares` are the
+    /// fractions of the noise variance that remain in the coordinates after bases and tools are
+    /// fitted.
     fn corrected(
         &self,
         rows: &Rows,

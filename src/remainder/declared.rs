@@ -17,7 +17,8 @@ pub fn declared(problem: &Problem) -> Result<Option<Correction>, SavedRemainderE
     of_problem(problem, Changes::Refused)
 }
 
-/// Reads the remainder that a problem declares and uses; `changes` may be accepted.
+/// Reads the remainder that a problem declares and uses; `changes` states whether a changed file is
+/// accepted.
 fn of_problem(
     problem: &Problem,
     changes: Changes,
@@ -26,9 +27,9 @@ fn of_problem(
     used.map(|declared| read(problem, &declared.file, changes)).transpose()
 }
 
-/// Reads the correction for predictions with `estimate`: the remainder of the problem, or else that
-/// of the estimate, or else only the uncertainty of predictions. Returns `None` if the estimate
-/// does not contain the uncertainty.
+/// Reads the correction for predictions with `estimate`: the remainder of the problem, else that of
+/// the estimate, else a correction of 0 with the uncertainty of predictions. Returns `None` if the
+/// estimate does not contain the uncertainty.
 ///
 /// # Errors
 /// Returns an error if the file is no remainder of this problem.

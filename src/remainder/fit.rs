@@ -36,21 +36,21 @@ pub struct Fitted {
     pub is_declared: bool,
 }
 
-/// Outcome of the search for a remainder.
+/// Summary of the search for a remainder.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Outcome {
-    /// Gain of a remainder on configurations left out, whether it is kept or not.
+    /// Gain in accuracy by the remainder on left-out configurations, whether it is kept or not.
     pub(crate) gain: Option<Gain>,
-    /// True if the remainder was read from a file that the problem declares.
+    /// True if the remainder was read from a file that the problem names.
     pub(crate) is_declared: bool,
-    /// Number of joints that a remainder corrects.
+    /// Number of joints whose errors the remainder corrects.
     pub(crate) joints: usize,
     /// Mean held-out error with the remainder \[m\]; `None` if none is kept.
     pub(crate) held_out: Option<f64>,
 }
 
 impl Fitted {
-    /// Outcome of the search for a remainder.
+    /// Summarises the search for a remainder.
     pub fn outcome(&self) -> Outcome {
         let residuals = self.residuals.as_ref();
         Outcome {
@@ -61,7 +61,8 @@ impl Fitted {
         }
     }
 
-    /// Correction of predictions: the remainder, or else the uncertainty of the arm alone.
+    /// Returns the correction of predictions: with the remainder if it is kept, else with the
+    /// uncertainty alone.
     pub(crate) fn correction(&self) -> &Correction {
         self.remainder.as_ref().unwrap_or(&self.alone)
     }

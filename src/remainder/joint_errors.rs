@@ -6,35 +6,37 @@ use super::correction::Correction;
 use super::kernel::Hyperparameters;
 use super::rows::{AXES, Rows, Site, SiteKind};
 
-/// Error of a joint's coordinate that follows its own command, and motions of the target by all
-/// errors of the joint.
+/// Error of a joint's coordinate as a function of its own command, and the motions of the position
+/// that all errors of the joint cause.
 #[derive(Debug, Clone, PartialEq)]
 pub struct JointError {
     /// Joint, counted from 0.
     pub joint: usize,
-    /// Length of the function of the joint's own command: \[rad\], or \[m\] of a joint that slides.
+    /// Length ℓᵤ of the function of the joint's own command: \[rad\], or \[m\] for a prismatic
+    /// joint.
     pub length: f64,
-    /// Error over the measured range of the command; its mean is taken off, because the offset of
-    /// the joint takes it up.
+    /// Error over the measured range of the command. The mean over the range is subtracted, because
+    /// it only changes the joint's offset.
     pub points: Vec<JointErrorPoint>,
-    /// Root mean square motion of the target at the centres by the function of the joint's own
-    /// command, by that of all inputs, and by the additional compliance \[m\].
+    /// Root mean square motion of the position at the centres \[m\]: by the function of the joint's
+    /// own command, by the function of all inputs, and by the additional compliance.
     pub motions: [f64; 3],
 }
 
-/// Error of a joint at a value of its command.
+/// Error of a joint at one value of its command.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct JointErrorPoint {
-    /// Command \[rad or m\].
+    /// Command \[rad\] or \[m\].
     pub command: f64,
-    /// Mean error, as motion of the target at the lever of the joint \[m\].
+    /// Mean error as motion of the position, that is error times the joint's lever \[m\].
     pub mean: f64,
-    /// 1 σ of the error \[m\].
+    /// 1 σ of the error, as motion of the position \[m\].
     pub sigma: f64,
 }
 
 impl Correction {
-    /// Errors of each joint whose coordinate errs, at `count` commands; none without a remainder.
+    /// Returns the errors of each joint whose coordinate errs, at `count` commands over its
+    /// measured range. The list is empty without a remainder.
     pub fn joint_errors(&self, count: usize) -> Vec<JointError> {
         let sites = self.layout.sites.iter().enumerate();
         let coordinates = sites.filter(|(_, site)| site.kind == SiteKind::Coordinate);
@@ -100,7 +102,8 @@ impl Correction {
         })
     }
 
-    /// Root mean square motion of the target at the centres by part of the processes \[m\].
+    /// Returns the root mean square motion of the position at the centres \[m\] by the processes
+    /// whose amplitudes in `part` are not 0.
     fn motion(&self, part: &Hyperparameters) -> f64 {
         let inducing = &self.posterior.inducing;
         let cross = inducing.cross(part, &self.layout.inputs, &inducing.centres);
@@ -109,12 +112,12 @@ impl Correction {
     }
 }
 
-/// One of some amplitudes; 0 for all others.
+/// Returns a list in which the amplitude at `place` is kept and all others are 0.
 fn only(amplitudes: &[f64], place: usize) -> Vec<f64> {
     amplitudes.iter().enumerate().map(|(k, a)| if k == place { *a } else { 0.0 }).collect()
 }
 
-/// The same lengths with amplitudes of 0.
+/// Returns the hyperparameters with the same lengths and noise, but with all amplitudes 0.
 fn silent(hyper: &Hyperparameters) -> Hyperparameters {
     let zeros = vec![0.0; hyper.sites()];
     Hyperparameters {

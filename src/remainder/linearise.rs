@@ -58,8 +58,8 @@ impl Linearisation<'_> {
         Rows { residual, jacobian: -slopes, sites, inputs, configuration, relative_sigma }
     }
 
-    /// Derivatives of the positions of `poses` by the unknowns, shape = (3 poses, unknowns); NaN where
-    /// the arm has no equilibrium.
+    /// Returns the derivatives of the positions of `poses` with respect to the unknowns, shape = (3
+    /// poses, unknowns). They are NaN for poses without equilibrium.
     pub fn jacobian(&self, poses: Vec<Pose>) -> DMatrix<f64> {
         let poses: Vec<Pose> = poses.into_iter().map(|pose| Pose { sigma: 1.0, ..pose }).collect();
         let residuals =

@@ -1,4 +1,4 @@
-//! Bases and tools that are fitted to rows after their correction.
+//! Fit of bases and tools to rows after their correction.
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
@@ -8,28 +8,29 @@ use super::rows::AXES;
 use crate::model::{Model, Pose};
 use crate::problem::Problem;
 
-/// Singular values below this share of the largest are no direction of a base or tool.
+/// Smallest eigenvalue of CᵀC, relative to the largest, that counts as a direction in which bases
+/// and tools can move. C holds their derivatives, scaled to unit columns.
 const RANK_TOLERANCE: f64 = 1e-9;
 
-/// Fit of the bases, tools and points that a correction has no columns of, to the rows that use
-/// them, to first order.
+/// Linear least-squares fit of those bases, tools and points that are no parameters of the
+/// correction, to the rows that use them.
 ///
-/// With an orthonormal basis Q of their columns, the fit turns errors e of the rows into
-/// e − Q Qᵀ e.
+/// With an orthonormal basis Q of their derivatives, the fit turns errors e of the rows into e − Q
+/// Qᵀ e.
 pub(super) struct PlacementFit {
-    /// Q, shape = (3 rows, directions); 0 for rows without an equilibrium.
+    /// Basis Q, shape = (3 rows, directions); 0 for rows without equilibrium.
     basis: DMatrix<f64>,
 }
 
-/// Qᵀ of the mean and of the spread of the corrections of all rows.
+/// Products of Qᵀ with the mean and with the covariance factor of the corrections of all rows.
 pub(super) struct Taken {
     mean: DVector<f64>,
     spread: DMatrix<f64>,
 }
 
 impl PlacementFit {
-    /// Linearises the placement `placed`, parameters of `model`, of `poses`, with the arm at the
-    /// full parameter vector `x`.
+    /// Linearises the rows `poses` in the parameters `placed` of bases and tools, with the arm at
+    /// the full parameter vector `x` of `model`.
     pub fn of(
         (problem, model, x): (&Problem, &Model, &DVector<f64>),
         placed: &[usize],
@@ -43,12 +44,12 @@ impl PlacementFit {
         Self { basis: orthonormal(linearisation.jacobian(poses.to_vec())) }
     }
 
-    /// True if a base, tool or point is fitted.
+    /// Returns true if at least one direction is fitted.
     pub fn has_columns(&self) -> bool {
         self.basis.ncols() > 0
     }
 
-    /// Adds what the fit takes of the corrections of the rows from `first` on.
+    /// Adds to `taken` the products of Qᵀ with the corrections of the rows from index `first` on.
     pub fn add_to(&self, taken: &mut Option<Taken>, first: usize, factors: &RowFactors) {
         let basis = self.basis.rows(AXES * first, factors.mean.len());
         let (mean, spread) = (basis.tr_mul(&factors.mean), basis.tr_mul(&factors.spread));
@@ -61,19 +62,22 @@ impl PlacementFit {
         }
     }
 
-    /// Subtracts what the fit takes from the corrections of the rows from `first` on.
+    /// Subtracts from the corrections of the rows from index `first` on the part that the fit of
+    /// bases and tools reproduces.
     pub fn subtract(&self, taken: &Taken, first: usize, factors: &mut RowFactors) {
         let basis = self.basis.rows(AXES * first, factors.mean.len());
         factors.mean -= basis * &taken.mean;
         factors.spread -= basis * &taken.spread;
     }
 
-    /// Shares of the variance of independent noise that the fit leaves in the coordinates of a row.
+    /// Returns the fraction of the variance of independent noise that remains in each coordinate of
+    /// a row after the fit.
     pub fn shares_left(&self, row: usize) -> Vector3<f64> {
         Vector3::from_fn(|axis, _| 1.0 - self.basis.row(AXES * row + axis).norm_squared())
     }
 
-    /// Adds to the shifts what the fit takes of the residuals that they leave.
+    /// Fits bases and tools to the residuals that remain after the shifts \[m\], and adds their
+    /// motion to the shifts.
     pub fn refit(&self, shifts: &mut [Vector3<f64>], residuals: &[Vector3<f64>]) {
         let left = residuals.iter().zip(shifts.iter()).flat_map(|(residual, shift)| {
             let left = residual - shift;
@@ -88,7 +92,8 @@ impl PlacementFit {
     }
 }
 
-/// Orthonormal basis of the columns of a matrix; rows with a number that is not finite become 0.
+/// Returns an orthonormal basis of the columns of a matrix. Rows that contain a number that is not
+/// finite become 0.
 fn orthonormal(mut columns: DMatrix<f64>) -> DMatrix<f64> {
     for mut row in columns.row_iter_mut() {
         if row.iter().any(|value| !value.is_finite()) {

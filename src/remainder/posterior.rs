@@ -52,20 +52,21 @@ pub(super) struct RowPosterior {
     pub prior: f64,
 }
 
-/// Posterior of the corrections of some rows, its covariance as factors.
+/// Posterior of the corrections of some rows, with their joint covariance as a factor.
 #[derive(Debug, Clone)]
 pub(super) struct RowFactors {
-    /// Means of measured − predicted, three coordinates a row \[m\].
+    /// Mean of measured − predicted position, three coordinates for each row \[m\].
     pub mean: DVector<f64>,
-    /// S of the covariance S Sᵀ that weights and parameters give, shape = (3 rows, features) \[m\].
+    /// Factor S of the part S Sᵀ of the covariance that weights and parameters cause, shape = (3
+    /// rows, features) \[m\].
     pub spread: DMatrix<f64>,
-    /// Prior variance of the remainder at each row, its trace, and the covariance that the
-    /// features leave of it \[m²\].
+    /// For each row, the trace of the remainder's prior covariance \[m²\], and the part of that
+    /// covariance that the features do not represent \[m²\].
     priors: Vec<(f64, Matrix3<f64>)>,
 }
 
 impl RowFactors {
-    /// Posterior of each row.
+    /// Returns the posterior of each row.
     pub fn rows(&self) -> Vec<RowPosterior> {
         let of_row = |(row, &(prior, left)): (usize, &(f64, Matrix3<f64>))| RowPosterior {
             mean: Vector3::from_fn(|axis, _| self.mean[AXES * row + axis]),
@@ -76,7 +77,7 @@ impl RowFactors {
     }
 }
 
-/// Product F Fᵀ of the first columns F of the three coordinates of a row.
+/// Returns F Fᵀ, with F the first `columns` columns of the three coordinates of a row.
 fn outer_block(of: &DMatrix<f64>, row: usize, columns: usize) -> Matrix3<f64> {
     let block = of.view((AXES * row, 0), (AXES, columns));
     let product = block * block.transpose();
@@ -164,13 +165,13 @@ impl Posterior {
         self.factors(rows).rows()
     }
 
-    /// Mean and factors of the covariance of the correction at such rows.
+    /// Returns mean and covariance factor of the correction at `rows`.
     pub fn factors(&self, rows: &Rows) -> RowFactors {
         self.factors_of(&self.hyper, rows)
     }
 
-    /// The same for a part of the processes: some amplitudes of `part` are 0, and all else is as in
-    /// the hyperparameters.
+    /// Returns mean and covariance factor of the correction by a part of the processes. `part`
+    /// contains the hyperparameters, with the amplitudes of all other processes set to 0.
     pub fn factors_of(&self, part: &Hyperparameters, rows: &Rows) -> RowFactors {
         let inducing = (&self.inducing, &self.inverse);
         let features = features(part, &self.inputs, inducing, &self.prior, rows);

@@ -85,8 +85,8 @@ pub(super) fn in_measuring_frame(
     }
 }
 
-/// Fitted bases, tools and points that are no parameters of the correction: those that only
-/// held-out rows use.
+/// Returns the parameters of fitted bases, tools and points that are not among the parameters of
+/// the correction, because only held-out rows use them.
 fn placed(found: &Identification, model: &Model, correction: &Correction) -> Vec<usize> {
     let in_correction: HashSet<&str> =
         correction.parameters.iter().map(|parameter| parameter.name.as_str()).collect();

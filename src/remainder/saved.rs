@@ -149,7 +149,7 @@ impl Correction {
         sealed(&self.to_text())
     }
 
-    /// Returns the correction as JSON text, ending in a line break.
+    /// Returns the correction as JSON text that ends in a line break.
     pub(crate) fn to_text(&self) -> String {
         let Posterior { hyper, prior, inducing: Inducing { centres, knots }, factor, .. } =
             &self.posterior;
@@ -226,7 +226,8 @@ impl Correction {
     /// Reads a `remainder.json`.
     ///
     /// # Errors
-    /// The file cannot be read, is no remainder.json, or was changed and `changes` are refused.
+    /// Returns an error if the file cannot be read, is not a `remainder.json`, or was changed and
+    /// `changes` refuses that.
     pub fn read(file: &Path, changes: Changes) -> Result<Self, SavedRemainderError> {
         let unreadable = |source| SavedRemainderError::Unreadable { file: file.to_owned(), source };
         let bytes = read_limited(file, LARGEST_MIB << 20).map_err(unreadable)?;

@@ -86,7 +86,7 @@ pub fn acceptance_page(problem: &Problem, result: &AcceptanceResult) -> String {
     report(problem, "acceptance", &blocks).html
 }
 
-/// Returns the verdict on a tolerance and its grounds in words.
+/// Returns sentences with the verdict on a tolerance and the reasons for it.
 pub fn tolerance_text(test: &TestedTolerance) -> String {
     let percent = |share: f64| format!("{} %", (share * 1e4).round() / 100.0);
     let (share, risk) = (percent(test.share), percent(test.risk));
@@ -120,7 +120,8 @@ pub fn tolerance_text(test: &TestedTolerance) -> String {
     }
 }
 
-/// Returns AP before and after, the scope of the figures, the bounds, and the repeatability.
+/// Returns the accuracy AP before and after identification, the poses to which the numbers apply,
+/// the error bounds, and the repeatability.
 fn judgement<'a>(result: &AcceptanceResult) -> Vec<Block<'a>> {
     let row = |name: &str, of: &PoseAccuracy| {
         let [low, high] = of.interval_95_mm;

@@ -9,7 +9,7 @@ use crate::quantity::format::{counted, mm, number};
 use crate::remainder::{Bounds, Gain, JointError, Outcome};
 use crate::results::PlotData;
 
-/// Returns one sentence on the search for a remainder; `found` has the errors without it.
+/// Returns one sentence about the search for a remainder; `found` contains the errors without it.
 pub fn remainder_text(found: &Identification, outcome: &Outcome) -> String {
     let before = number(found.fitted.held_out.mean.norm * 1e3, 4);
     let after = outcome.held_out.map(|error| number(error * 1e3, 4));
@@ -45,7 +45,7 @@ pub fn remainder_text(found: &Identification, outcome: &Outcome) -> String {
     }
 }
 
-/// Returns the blocks on the remainder and on the uncertainty of predictions.
+/// Returns the blocks about the remainder and the uncertainty of predictions.
 pub(super) fn uncertainty<'a>(found: &Identification, plots: &'a PlotData) -> Vec<Block<'a>> {
     let Some(uncertainty) = &plots.uncertainty else { return Vec::new() };
     let mut blocks = vec![

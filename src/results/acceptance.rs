@@ -83,14 +83,14 @@ pub struct TestedTolerance {
     pub tolerance_mm: f64,
     /// Share of the poses that must be within the tolerance.
     pub share: f64,
-    /// Largest probability of a wrong pass, and of a wrong fail.
+    /// Largest acceptable probability of a wrong pass, and of a wrong fail.
     pub risk: f64,
     pub poses: usize,
-    /// Poses beyond the tolerance.
+    /// Number of tested poses with an error above the tolerance.
     pub beyond: usize,
-    /// Bounds of the share of all poses within the tolerance, each at the risk.
+    /// Bounds of the share of all poses within the tolerance; each is wrong with at most `risk`.
     pub share_within: [f64; 2],
-    /// Number of poses from which as many beyond the tolerance would pass.
+    /// Number of poses that would pass with as many poses beyond the tolerance.
     pub poses_to_pass: Option<usize>,
 }
 

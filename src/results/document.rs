@@ -19,8 +19,8 @@ pub trait Document: Serialize + JsonSchema + Sized {
     /// Name of the format, for example `flexcal-loop`.
     const FORMAT: &'static str;
 
-    /// True if flexcal reads the files back. Their texts end in a digest of each key, so that
-    /// changes are noticed.
+    /// True if flexcal reads the files back. They then end in a digest of each key, by which later
+    /// changes are detected.
     const IS_READ_BACK: bool = false;
 
     /// Returns the JSON text of the result, ending in a line break: `format` and `program` first,

@@ -119,8 +119,8 @@ pub(super) const MAX_CORRECTED_ERROR: f64 = 0.95;
 pub(super) const MIN_ALTERNATIVE_ODDS: f64 = 0.05;
 /// Number of random subsets of the configurations by which the stability of a finding is measured.
 pub(super) const SUBSETS: u64 = 20;
-/// Smallest part of these subsets that must name an effect for its probability to be that of all
-/// rows. Of an effect that fewer subsets name, the mean over the subsets is stated.
+/// Smallest share of these subsets that must contain an effect for its probability to be that on
+/// all rows. With a smaller share, the mean over the subsets is stated.
 pub(super) const MIN_SHARE_OF_SUBSETS: f64 = 0.75;
 /// Reciprocal of the share of configurations that each of these subsets leaves out.
 pub(super) const SUBSET_PARTS: usize = 5;

@@ -9,7 +9,7 @@ use crate::spatial::Frame;
 
 /// Maximum number of joints in a chain: the maximum of a problem, less a fixed joint at each end.
 const MAX_JOINTS: usize = 98;
-/// Minimum number of moving joints of a leaf that is chosen among several.
+/// Minimum number of moving joints between base and leaf at which a leaf is chosen among several.
 const MIN_PLAIN_JOINTS: usize = 4;
 
 /// Joints of a robot from one link to another.
@@ -23,7 +23,8 @@ pub struct Chain<'a> {
     pub(super) stages: Vec<Stage>,
     /// Frame of the tip in the last axis frame.
     pub(super) end: Frame<f64>,
-    /// Other leaves with their moving joints, where the tip was chosen among several.
+    /// Other leaves, with their numbers of moving joints, if the tip was chosen among several;
+    /// otherwise empty.
     pub(super) other_leaves: Vec<String>,
 }
 
@@ -44,8 +45,7 @@ pub(super) struct Stage {
 
 impl<'a> Chain<'a> {
     /// Finds the chain from `base` to `tip`. The defaults are the root and the only leaf below the
-    /// base, or the leaf that is plainly meant: every other one has at most half as many moving
-    /// joints.
+    /// base, or the leaf with at least twice as many moving joints as every other one.
     ///
     /// # Errors
     /// Returns an error if the links form no tree, several roots or leaves are possible, a joint
@@ -252,8 +252,8 @@ fn root(robot: &Robot, above: &[Option<(usize, usize)>]) -> Result<usize, InputE
     }
 }
 
-/// Returns the only link below `base` that is no joint's parent, or the one that is plainly meant
-/// with the others in words.
+/// Returns the only leaf below `base`, or the leaf with at least twice as many moving joints as
+/// every other one. Also returns descriptions of the other leaves.
 fn leaf(
     robot: &Robot,
     above: &[Option<(usize, usize)>],

@@ -291,7 +291,7 @@ fn nearest(rpy: &Vector3<f64>, old: &Vector3<f64>) -> Vector3<f64> {
     if (first - old).norm() <= (second - old).norm() { first } else { second }
 }
 
-/// Returns x, y, z, w of the rotation by roll, pitch and yaw.
+/// Returns the quaternion x, y, z, w of the rotation by roll, pitch and yaw \[rad\].
 fn quaternion(rpy: &Vector3<f64>) -> String {
     let rotation = UnitQuaternion::from_euler_angles(rpy.x, rpy.y, rpy.z);
     let [x, y, z, w] = [rotation.i, rotation.j, rotation.k, rotation.w];

@@ -31,7 +31,7 @@ pub(super) fn of_chain(chain: &Chain) -> Vec<String> {
     notes
 }
 
-/// Returns a note if the tip was chosen among several links.
+/// Returns a note if the tip was chosen among several leaves.
 fn chosen_tip(chain: &Chain) -> Option<String> {
     let others = &chain.other_leaves;
     (!others.is_empty()).then(|| {

@@ -13,10 +13,10 @@ use crate::problem::item::Document;
 use crate::quantity::rounded_right_angle;
 use crate::spatial::Frame;
 
-/// Maximum deviation of a quaternion's norm from 1 by the rounding of its numbers.
+/// Largest deviation of a quaternion's norm from 1 that is taken for rounding of its numbers.
 const MAX_QUATERNION_NORM_ERROR: f64 = 1e-3;
-/// Maximum deviation of an angle from a right angle by the rounding of a quaternion with seven
-/// decimals \[rad\].
+/// Largest deviation of an angle from a right angle that is taken for rounding of a quaternion with
+/// seven decimals \[rad\].
 const MAX_QUATERNION_ROUNDING: f64 = 2e-7;
 
 /// Numbers with their byte range in the text.
@@ -166,13 +166,14 @@ impl Robot {
     }
 }
 
-/// Returns the right angle that rounding of a quaternion changed to `angle`, or the angle itself.
+/// Returns the multiple of 90° \[rad\] that `angle` deviates from by the rounding of a quaternion,
+/// or `angle` itself.
 fn right_angle_of_quaternion(angle: f64) -> f64 {
     let right = (angle / FRAC_PI_2).round() * FRAC_PI_2;
     if (angle - right).abs() < MAX_QUATERNION_ROUNDING { right } else { angle }
 }
 
-/// Returns what a text is that is not XML; `None` for XML and unknown formats.
+/// Returns the name of the format of a text that is not XML; `None` for XML and unknown formats.
 fn other_format(text: &str) -> Option<&'static str> {
     let start = text.trim_start();
     let formats = [

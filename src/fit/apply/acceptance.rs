@@ -102,7 +102,8 @@ pub fn held_out_positions(
 /// Computes pose accuracy and repeatability of the identified arm in the held-out poses with
 /// measured positions. Poses without an equilibrium are left out.
 ///
-/// `corrected` are the residuals of all rows where a remainder corrects the predictions.
+/// If a remainder corrects the predictions, `corrected` contains the residuals of all rows after
+/// the correction.
 ///
 /// # Errors
 /// Returns an error if problem and data do not fit each other, or no held-out row measures a

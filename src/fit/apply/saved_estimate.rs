@@ -15,7 +15,7 @@ use crate::model::{Model, Pose};
 use crate::problem::Problem;
 use crate::problem::item::MAX_MAGNITUDE;
 
-/// Name of the format and newest version that is read.
+/// Name of the file format, and its newest version that is read.
 const FORMAT: (&str, u32) = ("flexcal-estimate", 2);
 /// Maximum size of an `estimate.json` \[MiB\].
 const LARGEST_MIB: u64 = 256;
@@ -28,9 +28,9 @@ const IDENTIFIED: f64 = 0.99;
 pub struct SavedEstimate {
     /// Path of the file.
     pub file: PathBuf,
-    /// Treatment of files that belong to the estimate and were changed.
+    /// Treatment of files that belong to the estimate and were changed since flexcal wrote them.
     pub changes: Changes,
-    /// Key of the file that was changed since flexcal wrote it, if changes are accepted.
+    /// First key of the file that was changed since flexcal wrote it; `None` if nothing changed.
     pub changed_key: Option<String>,
     /// True if the fit was trusted.
     pub trusted: bool,
@@ -58,7 +58,7 @@ struct Entry {
     /// Standard error of the value, SI; `None` if it has none, or in files of older versions.
     std_error: Option<f64>,
     identified: Option<f64>,
-    /// False if the strategy held the parameter; older versions did not write it.
+    /// False if the strategy held the parameter fixed; `None` in files of older versions.
     fitted: Option<bool>,
 }
 
@@ -70,7 +70,7 @@ struct Format {
 
 #[derive(Debug, Deserialize)]
 struct Document {
-    /// Absent in files of older versions.
+    /// Name and version of the file format; `None` in files of older versions.
     format: Option<Format>,
     problem: String,
     arm_digest: Option<String>,
@@ -124,7 +124,7 @@ pub enum SavedEstimateError {
 }
 
 impl SavedEstimate {
-    /// Returns the estimate without some of the parameters that were fitted.
+    /// Returns the estimate without those fitted parameters for whose names `is_left_out` is true.
     pub(crate) fn without_fitted(&self, is_left_out: impl Fn(&str) -> bool) -> Self {
         let mut estimate = self.clone();
         estimate.parameters.retain(|entry| entry.fitted != Some(true) || !is_left_out(&entry.name));
@@ -140,7 +140,7 @@ impl SavedEstimate {
         Self::read_with(file, Changes::Refused)
     }
 
-    /// Reads an `estimate.json`, whose `changes` may be accepted.
+    /// Reads an `estimate.json`; `changes` states whether a changed file is accepted.
     ///
     /// # Errors
     /// Returns the errors of [`read`](Self::read).

@@ -1,38 +1,42 @@
-//! Test of a tolerance: pass or fail with a stated risk of a wrong pass.
+//! Test of whether an arm meets a tolerance, with a stated probability of a wrong pass.
 
 use statrs::distribution::{Binomial, DiscreteCDF as _};
 
 use crate::numeric::bisect;
 
-/// Halvings of the interval in which a bound of a share is sought.
+/// Number of halvings of the interval in which the bound of a share is searched.
 const HALVINGS: usize = 50;
-/// Maximum poses up to which a number of poses that would suffice is sought.
+/// Maximum number of poses up to which the number that would suffice is searched.
 const MAX_POSES: usize = 1_000_000;
 
-/// Requirement on the accuracy of an arm: a share of its poses errs by no more than a tolerance.
+/// Requirement on the accuracy of an arm: a given share of its poses has an error of at most a
+/// tolerance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tolerance {
-    /// Largest error of a pose that meets the requirement \[m\].
+    /// Tolerance: largest error of a pose that meets the requirement \[m\].
     pub length: f64,
-    /// Share of the poses that must meet it, between 0 and 1.
+    /// Share of the poses that must meet the tolerance, between 0 and 1.
     pub share: f64,
-    /// Largest probability of a pass if fewer poses meet it, between 0 and 1.
+    /// Largest acceptable probability of a pass if a smaller share of the poses meets the
+    /// tolerance, between 0 and 1.
     pub risk: f64,
 }
 
-/// Verdict on a tolerance.
+/// Result of the test of a tolerance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
-    /// The required share of poses is within the tolerance; wrong with at most the stated risk.
+    /// The required share of poses is within the tolerance; this is wrong with at most the
+    /// probability `risk`.
     Pass,
-    /// Fewer poses are within the tolerance; wrong with at most the stated risk.
+    /// A smaller share of poses is within the tolerance; this is wrong with at most the probability
+    /// `risk`.
     Fail,
-    /// The poses are too few to decide.
+    /// There are too few poses to decide.
     Undecided,
 }
 
 impl Verdict {
-    /// Returns the word for files.
+    /// Returns the word for the verdict in result files.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Pass => "pass",
@@ -42,30 +46,31 @@ impl Verdict {
     }
 }
 
-/// Exact binomial test of a tolerance on the errors of poses that took no part in the fit.
+/// Exact binomial test of a tolerance, on the errors of poses that were not used in the fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ToleranceTest {
     /// Requirement that is tested.
     pub tolerance: Tolerance,
-    /// Verdict at its risk.
+    /// Result of the test.
     pub verdict: Verdict,
     /// Number of poses.
     pub poses: usize,
-    /// Number of poses beyond the tolerance.
+    /// Number of tested poses with an error above the tolerance.
     pub beyond: usize,
-    /// Lower and upper bound of the share of all poses within the tolerance, each of which fails
-    /// with a probability of at most the risk  [Clopper & Pearson 1934].
+    /// Lower and upper confidence bound of the share of all poses that are within the tolerance.
+    /// Each bound is wrong with at most the probability `risk`. [Clopper & Pearson 1934]
     pub share_within: [f64; 2],
-    /// Number of poses from which as many beyond the tolerance would pass.
+    /// Number of poses that would pass with as many poses beyond the tolerance as were found;
+    /// `None` above [`MAX_POSES`].
     pub poses_to_pass: Option<usize>,
 }
 
 impl Tolerance {
     /// Tests the requirement on the errors of some poses \[m\].
     ///
-    /// The poses stand for those that the arm will take: the test holds for poses drawn in the same
-    /// way. The number beyond the tolerance is binomial then, whatever the distribution of the
-    /// errors. Noise of the measurements counts as error of the arm.
+    /// The poses must be drawn in the same way as those that the arm will take. The number beyond
+    /// the tolerance then has a binomial distribution, whatever the distribution of the errors.
+    /// Measurement noise counts as an error of the arm.
     pub fn test(self, errors: &[f64]) -> ToleranceTest {
         let poses = errors.len();
         // An error that is not a number meets no tolerance.
@@ -101,7 +106,8 @@ impl Tolerance {
     }
 }
 
-/// Returns the probability of at most `beyond` of `poses` if each is beyond with a probability.
+/// Returns the binomial probability that at most `beyond` of `poses` are beyond the tolerance, if
+/// each is with `probability`.
 fn at_most(poses: usize, beyond: usize, probability: f64) -> f64 {
     if beyond >= poses {
         return 1.0;
@@ -110,7 +116,8 @@ fn at_most(poses: usize, beyond: usize, probability: f64) -> f64 {
         .map_or(1.0, |distribution| distribution.cdf(beyond as u64))
 }
 
-/// Returns the share which that of `within` of `poses` falls short of with probability `risk`.
+/// Returns the lower confidence bound of a share, if `within` of `poses` were found within the
+/// tolerance. The bound is too high with at most the probability `risk`.
 fn lower_bound(poses: usize, within: usize, risk: f64) -> f64 {
     // P(at most n − w beyond) falls from 1 to 0 as the share of those beyond rises.
     let is_likely = |share: f64| at_most(poses, poses - within, 1.0 - share) <= risk;

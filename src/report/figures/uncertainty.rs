@@ -1,4 +1,5 @@
-//! Bounds of predictions over the workspace, and errors of joints that a remainder corrects.
+//! Figures of the error bounds of predictions over the workspace, and of the joint errors that a
+//! remainder corrects.
 
 use std::collections::BTreeMap;
 
@@ -14,8 +15,8 @@ const MAX_HEIGHT: f64 = 330.0;
 /// Height of the panel of a joint in displayed pixels.
 const JOINT_HEIGHT: f64 = 64.0;
 
-/// Draws the bound of the error of predictions over the workspace, from above and from the side;
-/// `None` without bounds.
+/// Draws the error bound of predictions over the workspace, from above and from the side; `None` if
+/// there are no bounds.
 pub fn bounds_over_workspace(data: &PlotData) -> Option<Drawing> {
     let uncertainty = data.uncertainty.as_ref()?;
     let bounds = &uncertainty.bounds;
@@ -74,16 +75,16 @@ pub fn bounds_over_workspace(data: &PlotData) -> Option<Drawing> {
     Some(Drawing::new(("bounds", title), caption, svg, sheet(header, rows)))
 }
 
-/// Cell of a view with the mean bound of the configurations in it.
+/// Cell of a view, with the mean error bound of the configurations whose position is in it.
 struct Cell {
     from: (f64, f64),
-    /// Mean bound \[m\].
+    /// Mean error bound \[m\].
     bound: f64,
     count: usize,
     extrapolated: usize,
 }
 
-/// Returns the cells of a view across x and `axis` that hold a configuration.
+/// Returns those cells of a view, spanned by x and `axis`, that contain a configuration.
 fn cells(bounds: &[BoundAt], (axis, cell): (usize, f64), (left, bottom): (f64, f64)) -> Vec<Cell> {
     let mut cells: BTreeMap<(i64, i64), Cell> = BTreeMap::new();
     for at in bounds {

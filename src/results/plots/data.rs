@@ -93,7 +93,7 @@ pub struct PlotData {
     pub causes: Vec<Cause>,
     /// Partial residuals of structure without a known cause.
     pub(crate) trend: Option<Cause>,
-    /// Uncertainty of predictions, and what a remainder does.
+    /// Error bounds over the workspace, and the joint errors that a remainder corrects.
     pub(crate) uncertainty: Option<Uncertainty>,
 }
 
@@ -264,8 +264,8 @@ impl PlotData {
         }
     }
 
-    /// Adds the uncertainty of predictions over the workspace, and what a remainder does at each
-    /// joint.
+    /// Adds the error bounds of predictions over the workspace, and the joint errors that a
+    /// remainder corrects.
     ///
     /// # Errors
     /// Returns an error if problem and data do not match.

@@ -1,4 +1,4 @@
-//! Bounds of predictions over the workspace, and what a remainder does at each joint.
+//! Error bounds of predictions over the workspace, and the joint errors that a remainder corrects.
 
 use nalgebra::Vector3;
 use rand::RngExt as _;
@@ -9,38 +9,39 @@ use crate::problem::Problem;
 use crate::random::stream;
 use crate::remainder::{Bounds, Fitted, JointError, Outcome, predict_identified};
 
-/// Number of configurations whose bounds are drawn.
+/// Number of random configurations whose error bounds are drawn.
 const TRIED: usize = 1500;
-/// Probability with which a bound holds.
+/// Probability with which an error bound holds.
 const LEVEL: f64 = 0.95;
 /// Number of commands at which the error of a joint is drawn.
 const COMMANDS: usize = 120;
-/// Seed of the configurations.
+/// Seed of the random configurations.
 const SEED: u64 = 0x626f_756e_64;
 
-/// Uncertainty of predictions.
+/// Uncertainty of predictions over the workspace.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Uncertainty {
-    /// Outcome of the search for a remainder.
+    /// Summary of the search for a remainder.
     pub outcome: Outcome,
-    /// Probability with which a bound holds.
+    /// Probability with which an error bound holds.
     pub level: f64,
-    /// Bounds over the workspace.
+    /// Error bounds at random configurations in the workspace.
     pub bounds: Vec<BoundAt>,
-    /// Errors of the joints that a remainder corrects; none without one.
+    /// Errors of the joints that a remainder corrects; empty without a remainder.
     pub joints: Vec<JointError>,
 }
 
-/// Bound of the error of a predicted position.
+/// Error bound of a predicted position.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BoundAt {
     /// Predicted position, frame of the arm's base \[m\].
     pub position: Vector3<f64>,
-    /// Bound of measured − predicted \[m\].
+    /// Upper bound of the error length ‖measured − predicted‖ \[m\].
     pub bound: f64,
     /// Length of the correction \[m\].
     pub correction: f64,
-    /// True where the pose lies outside of what was measured.
+    /// True if the pose lies outside the measured range, or too far from measured poses to apply
+    /// half of the correction.
     pub is_extrapolated: bool,
 }
 

@@ -79,7 +79,7 @@ impl<'a> Again<'a> {
         blocks(self.fitted, self.data, self.hypotheses, &self.probable_candidates(), left_out)
     }
 
-    /// Returns the evidence about the probable hypotheses from the data without the poses `left_out`.
+    /// Returns the evidence about the probable hypotheses, evaluated without the poses `left_out`.
     fn without(&self, left_out: &[usize]) -> Option<Evidence> {
         let (blocks, target) = self.blocks(left_out)?;
         let present = self.members(|known| known.effect().is_some());
@@ -135,18 +135,21 @@ pub(super) fn carried_by_one(
     searched.into_iter().find_map(alone)
 }
 
-/// Evidence about an effect in random subsets of the configurations, a fifth left out of each.
+/// Evidence about an effect in random subsets of the configurations, each of which leaves out a
+/// fifth of them.
 #[derive(Debug, Clone)]
 pub(in crate::select) struct SubsetEvidence {
     pub effect: Effect,
-    /// Part of the subsets whose most probable set holds the effect.
+    /// Share of the subsets whose most probable set contains the effect.
     pub share: f64,
-    /// Mean probabilities of its place, of its quantities, and of its law.
+    /// Mean over the subsets of the probabilities of the effect's place, of the quantities on which
+    /// it depends, and of its law.
     pub means: [f64; 3],
 }
 
-/// Returns the evidence about each effect of a set in random subsets, linear about the fit to all
-/// rows. Another value of a searched argument counts for the effect.
+/// Returns the evidence about each effect of a set in random subsets, in the linear neighbourhood
+/// of the fit to all rows. An effect with another value of its searched argument counts as the
+/// same.
 pub(in crate::select) fn subset_evidence(
     fitted: &Fitted,
     data: &Data,

@@ -162,11 +162,11 @@ fn claims(evidence: &Evidence, effect: &Effect) -> Option<Claims> {
     }
 }
 
-/// Returns claims with probabilities no larger than their means over random subsets of the
-/// configurations, those of the part with the most probable law.
+/// Returns the claims with no probability above its mean over random subsets of the configurations.
+/// If the effect has several parts, the means of the part with the most probable law are used.
 ///
-/// Where no set of hypotheses describes the data, the posterior is surer of the best one than it may
-/// be; its mean over resampled data is not [Huggins and Miller 2023].
+/// If no set of hypotheses describes the data, the posterior overstates the probability of the best
+/// one. Its mean over resampled data does not. [Huggins and Miller 2023]
 fn over_subsets(mut claims: Claims, of_parts: &[&SubsetEvidence]) -> Claims {
     if let Some(part) = of_parts.iter().max_by(|a, b| a.means[2].total_cmp(&b.means[2])) {
         let probabilities =
