@@ -3,8 +3,12 @@
 use std::path::PathBuf;
 
 use super::{ColumnTable, Measurements, Split};
-use crate::error::{InputError, Warning};
-use crate::problem::Problem;
+use crate::error::{InputError, InputErrorKind, Location, Warning};
+use crate::problem::{Freedom, Problem};
+
+/// Maximum number of sessions, or of targets, whose bases or tools are fitted. The time of a fit
+/// grows with the cube of their number: 50 take a second, 200 some minutes.
+const MAX_FITTED_SETUPS: usize = 150;
 
 /// Measured poses with their split into fitted rows and held-out rows, which only judge the fit.
 ///
@@ -26,6 +30,29 @@ pub struct Dataset {
     pub split: Split,
 }
 
+/// Checks that not too many bases or tools are fitted.
+fn check_setups(problem: &Problem, measurements: &Measurements) -> Result<(), InputError> {
+    let is_fitted = |name: &str| {
+        problem.parameters.iter().any(|rule| {
+            let is_meant = rule.pattern.starts_with(name) || rule.pattern.starts_with('*');
+            is_meant && !matches!(rule.freedom, Freedom::Fixed)
+        })
+    };
+    let targets = measurements.target.as_ref().map_or(0, |target| target.names.len());
+    let sessions = measurements.session.names.len();
+    for (parameters, what, found) in [
+        ("base", "sessions, each with a base of its own", sessions),
+        ("tool", "targets, each with a tool of its own", targets),
+    ] {
+        if found > MAX_FITTED_SETUPS && is_fitted(parameters) {
+            let kind = InputErrorKind::TooMany { what, found, most: MAX_FITTED_SETUPS };
+            let file = measurements.files.first().cloned().unwrap_or_default();
+            return Err(Location::file(&file).error(kind));
+        }
+    }
+    Ok(())
+}
+
 impl Dataset {
     /// Creates a data set from measurements and a split; `split` holds row numbers in ascending
     /// order.
@@ -45,6 +72,7 @@ impl Dataset {
         problem: &Problem,
         measurements: Measurements,
     ) -> Result<Self, InputError> {
+        check_setups(problem, &measurements)?;
         measurements.enough_contacts(problem)?;
         let split = Split::new(problem, &measurements)?;
         Ok(Self { measurements, split })

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use flexcal::error::{InputError, Warning};
-use flexcal::measurement::Measurements;
+use flexcal::measurement::{Dataset, Measurements};
 use flexcal::problem::Problem;
 
 const ARM: &str = "name = 'arm'\n[[joint]]\n[[joint]]\na_m = 0.5\n";
@@ -242,4 +242,28 @@ fn columns_of_results_are_passed_over_in_silence() {
     let other = "q1_deg,q2_deg,x_mm,y_mm,z_mm,line,reached\n1,2,3,4,5,6,true\n";
     let said = words(&read("", other, true).unwrap().1);
     assert!(said.contains("column line: unknown") && said.contains("column reached"), "{said}");
+}
+
+#[test]
+fn more_sessions_than_can_be_fitted_are_refused_at_once() {
+    let rows = |count: usize| -> String {
+        let row = |k: usize| format!("{},{},1,2,3,s{k}\n", k % 90, k % 70);
+        "q1_deg,q2_deg,x_mm,y_mm,z_mm,session\n".to_owned()
+            + &(0..count).map(row).collect::<String>()
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("rows.csv");
+    fs::write(&file, rows(1000)).unwrap();
+    let arm = |rule: &str| {
+        problem(&format!(
+            "{ARM}[parameters]\n'base.*' = {rule}\n[data]\nheld_out = {{ fraction = 0.3, seed = 1 }}\n"
+        ))
+    };
+    let read = |rule: &str| Dataset::read_files(std::slice::from_ref(&file), &arm(rule));
+    let error = read("{ free = true }").unwrap_err().to_string();
+    assert!(
+        error.contains("rows.csv: 1000 sessions, each with a base of its own; at most 150"),
+        "{error}"
+    );
+    assert!(read("{ fixed = true }").is_ok());
 }
