@@ -50,7 +50,12 @@ pub(super) fn formula(regressor: &Regressor, first: usize) -> Result<String, Exp
         Regressor::Formula(formula) => (formula.reference(), formula.hoist()),
         _ => (0.0, 0.0),
     };
-    let refuse = || ExportError::NeedsPast { formula: regressor.text() };
+    let follows_loads =
+        || regressor.quantities().iter().any(|quantity| matches!(quantity, Quantity::Moment(_)));
+    let refuse = || match regressor.text() {
+        formula if follows_loads() => ExportError::NeedsLoads { formula },
+        formula => ExportError::NeedsPast { formula },
+    };
     Printer { first, reference, hoist }.print(&expression).ok_or_else(refuse)
 }
 
@@ -116,7 +121,9 @@ impl Printer {
                 format!("(pose->has_approach != 0 ? pose->approach[{joint}] : R(0.0))")
             }
             Quantity::Covariate(index) => format!("pose->covariate[{index}]"),
-            Quantity::Lagging { .. } | Quantity::Friction { .. } => return None,
+            Quantity::Lagging { .. } | Quantity::Friction { .. } | Quantity::Moment(_) => {
+                return None;
+            }
         })
     }
 }

@@ -184,6 +184,7 @@ fn site(site: PartSite) -> String {
     match site {
         PartSite::Joint(joint) => format!("coordinate of joint {}", joint + 1),
         PartSite::Strain { joint, which } => format!("strain {which} on joint {}", joint + 1),
+        PartSite::Motion { joint, which } => format!("motion {which} of joint {}", joint + 1),
         PartSite::Shift { axis, is_error } => format!("shift of {}, axis {axis}", of(is_error)),
         PartSite::Turn { axis, is_error } => format!("rotation of {}, axis {axis}", of(is_error)),
     }

@@ -9,6 +9,7 @@ use super::error::ExportError;
 use super::formula::{array, formula, helpers, real};
 use super::numbers::{BEAM, FRAME, HOIST, JOINT, LOAD, Numbers, inner};
 use super::remainder::remainder;
+use crate::laws::RANGE;
 use crate::model::parameter::{JointField, ParameterSite};
 use crate::model::{Model, ModelParts, PartSite};
 use crate::problem::{Equilibrium, JointKind, Problem};
@@ -267,6 +268,9 @@ fn terms(parts: &ModelParts, numbers: &Numbers) -> Result<String, ExportError> {
             PartSite::Strain { joint, which } => {
                 let beam = parts.arm.joints[..joint].iter().filter(|j| j.beam.is_some()).count();
                 format!("strain[{beam}][{which}]")
+            }
+            PartSite::Shift { axis: RANGE, .. } | PartSite::Motion { .. } => {
+                return Err(ExportError::NoSite { formula: term.regressor.text() });
             }
             PartSite::Shift { axis, is_error } => {
                 format!("shift[{}][{axis}]", usize::from(is_error))

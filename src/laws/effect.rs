@@ -300,7 +300,31 @@ impl Effect {
     /// Returns true if the search determines an argument, such as a time. Effects with equal
     /// [`Self::name_and_place`] then count as one.
     pub(crate) fn is_searched(&self) -> bool {
-        self.searched().is_some()
+        self.searched().is_some() || self.is_described()
+    }
+
+    /// Returns true for a law that a search wrote down.
+    pub(crate) fn is_described(&self) -> bool {
+        matches!(self, Self::Law(law) if law.description().is_some())
+    }
+
+    /// Returns true if all that it does is to change the coordinate of a joint, or to let it turn
+    /// about its axis.
+    pub(crate) fn acts_at_joint(&self) -> bool {
+        let is_there = |at: At| {
+            matches!(
+                at,
+                At::Coordinate
+                    | At::Joint(JointField::Compliance | JointField::Cubic | JointField::Play)
+                    | At::JointOrSlide(JointField::Play, _)
+            )
+        };
+        match self {
+            Self::Law(law) => is_there(law.at()),
+            _ => self.family().is_some_and(|family| {
+                self.joint().is_some() && family.terms.iter().all(|entry| is_there(entry.at))
+            }),
+        }
     }
 
     /// Returns true if both effects are equal except for the value of the argument that the search

@@ -101,6 +101,9 @@ impl TermEntry {
     }
 }
 
+/// Axis of displacements along the line of sight from the station, the origin of the measuring frame.
+pub(crate) const RANGE: usize = 3;
+
 /// Site of a parameter, relative to the place that the effect names.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
@@ -115,7 +118,8 @@ pub enum At {
     Beam(BeamField),
     /// Field of the arm as a whole.
     Arm(ArmField),
-    /// Displacement of every measured position along an axis of the measuring frame, 0 to 2.
+    /// Displacement of every measured position along an axis of the measuring frame, 0 to 2, or
+    /// away from the station ([`RANGE`]).
     Shift(usize),
     /// Rotation of the instrument about an axis of the measuring frame, 0 to 2.
     Turn(usize),
@@ -123,6 +127,12 @@ pub enum At {
     BaseShift(usize),
     /// Rotation of the base about an axis of the measuring frame, 0 to 2.
     BaseTurn(usize),
+    /// Small motion of the joint's frame before it turns: x, y, z, rx, ry, rz.
+    Before(usize),
+    /// Small motion of the frame behind the joint: x, y, z, rx, ry, rz.
+    After(usize),
+    /// Small motion of the tool in the frame that carries it: x, y, z, rx, ry, rz.
+    Tool(usize),
     /// Relative error of every measured coordinate.
     Scale,
     /// Entry of the strain of the measuring frame: xx, yy, zz, xy, xz, yz.

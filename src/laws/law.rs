@@ -1,10 +1,10 @@
 //! Declared laws: terms with formulas at one site, declared in a problem or found.
 
 use super::argument::Argument;
-use super::expression::{FormulaError, Names, Parsed, Vocabulary, parse};
-use super::family::{At, Prior};
+use super::expression::{Expression, FormulaError, Names, Parsed, Vocabulary, parse};
+use super::family::{At, Prior, RANGE};
 use super::parameter::LawParameter;
-use super::site::BeamField;
+use super::site::{BeamField, MOTION_NAMES};
 use super::term::EffectTerm;
 
 /// Name of declared laws in files.
@@ -23,6 +23,8 @@ pub struct Law {
     terms: Vec<Parsed>,
     parameters: Vec<LawParameter>,
     covariates: Vec<String>,
+    /// ln of the prior probability of a law that a search wrote down.
+    description: Option<f64>,
 }
 
 /// Place of a law on the arm.
@@ -79,8 +81,9 @@ impl LawSite {
         names: &[(String, usize)],
         links: &[String],
     ) -> Result<Self, String> {
-        const AXES: [&str; 3] = ["x", "y", "z"];
-        const TURNS: [&str; 3] = ["rx", "ry", "rz"];
+        let [x, y, z, turns @ ..] = MOTION_NAMES;
+        let axes = [x, y, z];
+        let motion = |field: &str| MOTION_NAMES.iter().position(|name| *name == field);
         let (head, field) = text.split_once('.').unwrap_or((text, ""));
         let axis = |words: [&str; 3]| words.iter().position(|word| *word == field);
         let whole = |at: Option<At>, write: &str| match at {
@@ -88,17 +91,18 @@ impl LawSite {
             None => Err(format!("{text} is no site; write {write}")),
         };
         match head {
-            "measurement" if field == "range" => {
-                return Err(
-                    "measurement.range is no site yet; write measurement.x, .y or .z".into()
-                );
-            }
             "measurement" => {
-                return whole(axis(AXES).map(At::Shift), "measurement.x, .y or .z");
+                let range = (field == "range").then_some(At::Shift(RANGE));
+                let at = axis(axes).map(At::Shift).or(range);
+                return whole(at, "measurement.x, .y, .z or .range");
             }
             "base" => {
-                let at = axis(AXES).map(At::BaseShift).or(axis(TURNS).map(At::BaseTurn));
+                let at = axis(axes).map(At::BaseShift).or(axis(turns).map(At::BaseTurn));
                 return whole(at, "base.x, .y, .z, .rx, .ry or .rz");
+            }
+            "tool" => {
+                let at = motion(field).map(At::Tool);
+                return whole(at, "tool.x, .y, .z, .rx, .ry or .rz");
             }
             _ => {}
         }
@@ -121,9 +125,16 @@ impl LawSite {
             Some(joint) if (1..=joints).contains(&joint) && field.is_empty() => {
                 Ok(Self::of_joint(joint))
             }
-            Some(joint) if (1..=joints).contains(&joint) => Err(format!(
-                "{text} is no site yet: a law adds to the coordinate of a joint; write joint{joint}"
-            )),
+            Some(joint) if (1..=joints).contains(&joint) => {
+                let behind = field.strip_prefix("after.").and_then(motion).map(At::After);
+                match motion(field).map(At::Before).or(behind) {
+                    Some(at) => Ok(Self { place: LawPlace::Joint(joint), at }),
+                    None => Err(format!(
+                        "{text} is no site; write {head}, {head}.x, .y, .z, .rx, .ry, .rz or \
+                         {head}.after.x"
+                    )),
+                }
+            }
             Some(joint) => Err(format!("no joint {joint}; the arm has {joints}, counted from 1")),
             None => Err(format!(
                 "{text} is no site; write joint1, measurement.x, base.rx{}",
@@ -166,7 +177,21 @@ impl Law {
                 .collect::<Result<_, _>>()?,
             parameters,
             covariates: vocabulary.covariates.to_vec(),
+            description: None,
         })
+    }
+
+    /// Returns the law as a search wrote it down, with ln of its prior probability among all laws
+    /// that the search could write at its site.
+    #[must_use]
+    pub fn described(self, ln_prior: f64) -> Self {
+        Self { description: Some(ln_prior), ..self }
+    }
+
+    /// Returns ln of the prior probability of a law that a search wrote down; `None` for a declared
+    /// one.
+    pub fn description(&self) -> Option<f64> {
+        self.description
     }
 
     /// Returns the name of the law.
@@ -202,6 +227,11 @@ impl Law {
         self.terms.iter().any(uses)
     }
 
+    /// Returns the formulas, one for each coefficient.
+    pub fn expressions(&self) -> impl Iterator<Item = &Expression> {
+        self.terms.iter().map(|term| &term.expression)
+    }
+
     /// Returns the formulas as text, with the names of covariates and parameters.
     pub fn formulas(&self) -> Vec<String> {
         let parameters: Vec<String> =
@@ -213,7 +243,12 @@ impl Law {
     /// Returns the site in the syntax of files.
     pub fn site(&self) -> String {
         const AXES: [&str; 3] = ["x", "y", "z"];
+        let moved = |axis: usize| MOTION_NAMES.get(axis).copied().unwrap_or_default();
         let field = match self.at {
+            At::Tool(axis) => return format!("tool.{}", moved(axis)),
+            At::Before(axis) => &format!(".{}", moved(axis)),
+            At::After(axis) => &format!(".after.{}", moved(axis)),
+            At::Shift(RANGE) => return "measurement.range".to_owned(),
             At::Shift(axis) => return format!("measurement.{}", AXES[axis.min(2)]),
             At::BaseShift(axis) => return format!("base.{}", AXES[axis.min(2)]),
             At::BaseTurn(axis) => return format!("base.r{}", AXES[axis.min(2)]),
@@ -231,6 +266,17 @@ impl Law {
 
     /// Returns the description of the law in words.
     pub(super) fn describe(&self) -> String {
+        if self.description.is_some() {
+            let place = self.site().replace("joint", "joint ");
+            let formulas = self.formulas();
+            return match formulas.split_last() {
+                Some((last, [])) => format!("{place} errs by a multiple of {last}"),
+                Some((last, rest)) => {
+                    format!("{place} errs by multiples of {} and {last}", rest.join(", "))
+                }
+                None => place,
+            };
+        }
         format!("{} at {}: {}", self.name, self.site(), self.formulas().join(", "))
     }
 

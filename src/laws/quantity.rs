@@ -35,6 +35,9 @@ pub enum Quantity {
     /// Direction from which a joint approached, −1, 0 or +1, written `approach3`; 0 if not
     /// recorded.
     Approach(usize),
+    /// Moment about the axis of a joint of everything beyond it, on the undeflected arm with the
+    /// declared loads [N·m], written `M3`.
+    Moment(usize),
     /// Covariate of the problem, counted from 0, in its unit; written as the name of its column.
     Covariate(usize),
 }
@@ -72,7 +75,7 @@ impl Quantity {
     /// Returns the joint, counted from 0, to which the quantity belongs; `None` if there is none.
     pub fn joint(self) -> Option<usize> {
         match self {
-            Self::Approach(joint) => Some(joint),
+            Self::Approach(joint) | Self::Moment(joint) => Some(joint),
             other => other.commanded_joint(),
         }
     }

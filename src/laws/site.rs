@@ -39,7 +39,14 @@ pub enum JointField {
     Roll,
     Pitch,
     Yaw,
+    /// Number of the small motion before the joint turns: x, y, z \[m\], rx, ry, rz \[rad\].
+    Before(usize),
+    /// Number of the small motion behind the joint: x, y, z \[m\], rx, ry, rz \[rad\].
+    After(usize),
 }
+
+/// Names of the numbers of a small motion.
+pub(crate) const MOTION_NAMES: [&str; 6] = ["x", "y", "z", "rx", "ry", "rz"];
 
 /// Field of a beam that may be free: rigidities, then the fields that effects change.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -122,6 +129,15 @@ impl JointField {
         Self::PLACEMENT.iter().position(|&field| field == self)
     }
 
+    /// Returns the index among the numbers of the two small motions of a joint.
+    pub fn motion(self) -> Option<usize> {
+        match self {
+            Self::Before(axis) => Some(axis),
+            Self::After(axis) => Some(MOTION_NAMES.len() + axis),
+            _ => None,
+        }
+    }
+
     /// Returns true for geometry that a problem declares.
     pub fn is_geometry(self) -> bool {
         Self::GEOMETRY.contains(&self) || self.placement().is_some()
@@ -151,6 +167,8 @@ impl JointField {
             Self::Roll => "roll",
             Self::Pitch => "pitch",
             Self::Yaw => "yaw",
+            Self::Before(_) => "before",
+            Self::After(_) => "after",
         }
     }
 }

@@ -295,7 +295,7 @@ impl Measurements {
                 .map(|column| &column[row * self.joints..(row + 1) * self.joints]),
             covariates: self.covariates_of(row),
             past: LazyPast::row(self, narrow),
-            strains: None,
+            offsets: None,
         }
     }
 

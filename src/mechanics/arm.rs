@@ -99,7 +99,7 @@ impl<S: Scalar> Arm<S> {
         let mut frame = Frame::identity();
         for (index, (joint, &q)) in self.joints.iter().zip(setup.configuration).enumerate() {
             if self.tree.path_contains(index, tip) {
-                joint.advance(&mut frame, q);
+                joint.advance(&mut frame, q, setup.motion(index));
             }
         }
         frame
@@ -116,7 +116,7 @@ impl<S: Scalar> Arm<S> {
             }
             let mut root = frame;
             joint.advance_to_axis(&mut root);
-            joint.advance(&mut frame, q);
+            joint.advance(&mut frame, q, None);
             forks.extend((0..self.tree.extra_branches_on(index)).map(|_| frame));
             (root.origin, root.axes[2], frame)
         };

@@ -8,6 +8,7 @@ use super::arm::Arm;
 use super::element::{Element, LinkLoad};
 use super::joint::Coordinates;
 use super::link::{Beam, Hoist, PointMass};
+use super::motion::SIDES;
 use super::segment::{Cut, SLIDE_TILTS, Segment};
 use super::workspace::{Event, Workspace};
 use crate::problem::PoseView;
@@ -252,6 +253,12 @@ impl<S: Scalar> Arm<S> {
             if let Some(lateral) = &joint.lateral {
                 walk.tilt(lateral, Segment::Joint(i), ws);
             }
+            let motion = setup.motion(i);
+            joint.displace(&mut walk.frame, motion, SIDES[0]);
+            if joint.motion.is_some() {
+                // The axis moves with it: it belongs to the next part.
+                walk.cut(Segment::Joint(i), 0, &mut ws.events, &mut ws.cuts);
+            }
             let (mut twist, mut play_offset) = (None, None);
             if joint.has_twist() {
                 let approach = setup.approach.map(|approach| approach[i]);
@@ -278,6 +285,7 @@ impl<S: Scalar> Arm<S> {
                 walk.frame.translate_z(offset);
             }
             walk.frame.rotate_y(joint.beta.sin_cos);
+            joint.displace(&mut walk.frame, motion, SIDES[1]);
             if self.tree.path_contains(i, tip) {
                 ws.trail.push(walk.frame.origin);
             }
@@ -323,7 +331,7 @@ impl<S: Scalar> Arm<S> {
         let elements = self.beam_elements;
         let length = self.joints[link].a / elements as f64;
         self.load_beam(beam, ropes[link], length, link_loads);
-        let of_pose = walk.setup.strains.and_then(|strains| strains.get(link).copied());
+        let of_pose = walk.setup.offsets.and_then(|all| Some(all.get(link)?.strain));
         let strain = beam.strain.as_ref().map(|strain| strain.plus(of_pose.unwrap_or_default()));
         let weight = self.gravity * S::from(beam.mass / elements as f64);
         for number in 0..elements {

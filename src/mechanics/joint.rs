@@ -5,6 +5,7 @@ use nalgebra::Vector3;
 use super::compensator::Compensator;
 use super::imperfection::Nonlinear;
 use super::link::{Beam, PointMass, point_masses};
+use super::motion::{MOTION, SIDES};
 use crate::problem::{self, JointKind};
 use crate::scalar::Scalar;
 use crate::spatial::Frame;
@@ -92,6 +93,9 @@ pub struct Joint<S> {
     pub slide: Option<S>,
     /// Spring that takes up part of the moment about `z_i`.
     pub compensator: Option<Compensator<S>>,
+    /// Small motion before the joint turns, and behind it: translation \[m\] and rotation vector
+    /// \[rad\] each; `None` if no parameter is one.
+    pub motion: Option<Box<[S; 2 * MOTION]>>,
     /// Elastic link along the length a.
     pub beam: Option<Beam<S>>,
     /// Masses carried by frame i.
@@ -122,6 +126,7 @@ impl Joint<f64> {
             lateral: None,
             slide: None,
             compensator: None,
+            motion: None,
             beam: joint.beam.as_ref().map(Beam::nominal),
             bodies: point_masses(&joint.bodies),
         }
@@ -142,6 +147,7 @@ impl Joint<f64> {
             lateral: self.lateral.map(|lateral| lateral.map(S::from)),
             slide: self.slide.map(S::from),
             compensator: self.compensator.as_ref().map(Compensator::lift),
+            motion: self.motion.as_ref().map(|motion| Box::new(motion.map(S::from))),
             beam: self.beam.as_ref().map(Beam::lift),
             bodies: self.bodies.clone(),
         }
@@ -232,12 +238,34 @@ impl<S: Scalar> Joint<S> {
         frame.translate_z(self.d);
     }
 
-    /// Moves `frame` through the whole undeflected `T_i`.
-    pub(super) fn advance(&self, frame: &mut Frame<S>, q: f64) {
+    /// Moves `frame` through the whole undeflected `T_i`, with the small motions of a pose.
+    pub(super) fn advance(&self, frame: &mut Frame<S>, q: f64, motion: Option<&[f64; 2 * MOTION]>) {
         self.advance_to_axis(frame);
+        self.displace(frame, motion, SIDES[0]);
         let Coordinates { angle, offset } = self.coordinates(q);
         frame.rotate_z(angle);
         frame.translate_z(offset);
         frame.rotate_y(self.beta.sin_cos);
+        self.displace(frame, motion, SIDES[1]);
+    }
+
+    /// Moves a frame by the motion that begins at the number `first`: the parameters of the arm and
+    /// those of the pose together.
+    pub(super) fn displace(
+        &self,
+        frame: &mut Frame<S>,
+        of_pose: Option<&[f64; 2 * MOTION]>,
+        first: usize,
+    ) {
+        if self.motion.is_none() && of_pose.is_none() {
+            return;
+        }
+        let number = |axis: usize| {
+            let k = first + axis;
+            let own = self.motion.as_ref().map_or_else(|| S::from(0.0), |motion| motion[k]);
+            own + of_pose.map_or(0.0, |motion| motion[k])
+        };
+        frame.translate(&Vector3::from_fn(|axis, _| number(axis)));
+        frame.rotate(&Vector3::from_fn(|axis, _| number(3 + axis)));
     }
 }

@@ -14,6 +14,8 @@ mod imperfection;
 mod joint;
 mod linearise;
 mod link;
+mod moments;
+mod motion;
 mod segment;
 mod sensitivity;
 
@@ -30,6 +32,8 @@ pub(crate) use imperfection::{AddedMass, HoistError, Nonlinear, Strain};
 pub(crate) use joint::Coordinates;
 pub use joint::{Angle, Joint, Placement};
 pub use link::{Beam, Hoist, PointMass};
+pub(crate) use moments::AxisMoments;
+pub(crate) use motion::{MOTION, SIDES};
 pub(crate) use segment::Segment;
 pub use sensitivity::Sensitivity;
 pub(crate) use statics::AdjointSolver;

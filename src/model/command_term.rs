@@ -1,4 +1,4 @@
-//! Terms that add to the joints' commands and to the strains of beams.
+//! Terms that add to the joints' commands, to the strains of beams, and to small motions.
 
 use crate::model::parameter::{
     BeamField, JointField, Parameter, ParameterSite, Regressor, value_regressor,
@@ -15,6 +15,13 @@ pub(super) enum TermSite {
         /// Index of the joint.
         joint: usize,
         /// Index 0, 1 or 2 of the strain.
+        which: usize,
+    },
+    /// Small motion of a joint's frame.
+    Motion {
+        /// Index of the joint.
+        joint: usize,
+        /// Index 0 to 5 before the joint turns, 6 to 11 behind it.
         which: usize,
     },
 }
@@ -62,6 +69,9 @@ impl TermSite {
         match site {
             ParameterSite::Joint { joint, field: JointField::Theta | JointField::D } => {
                 Some(Self::Joint(joint))
+            }
+            ParameterSite::Joint { joint, field } => {
+                Some(Self::Motion { joint, which: field.motion()? })
             }
             ParameterSite::Beam { joint, field } => {
                 let which = BeamField::STRAINS.iter().position(|strain| *strain == field)?;

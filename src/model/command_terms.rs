@@ -3,7 +3,7 @@
 use super::command_term::{CommandTerm, TermSite};
 use super::harmonic_sum::HarmonicSum;
 use crate::model::parameter::{Parameter, Waves};
-use crate::problem::PoseView;
+use crate::problem::{JointOffsets, PoseView};
 
 /// Sum of the terms that add to commands and strains, evaluated for one pose at a time.
 #[derive(Debug, Clone, Default)]
@@ -12,7 +12,7 @@ pub(super) struct CommandTerms {
     /// Terms that no [`HarmonicSum`] contains.
     others: Vec<CommandTerm>,
     configuration: Vec<f64>,
-    strains: Vec<[f64; 3]>,
+    offsets: Vec<JointOffsets>,
 }
 
 impl CommandTerms {
@@ -24,7 +24,7 @@ impl CommandTerms {
         Self { series, others, ..Self::default() }
     }
 
-    /// Returns the pose with all terms added to its configuration and strains.
+    /// Returns the pose with all terms added to its configuration, strains and motions.
     #[inline]
     pub fn apply<'b>(&'b mut self, setup: &PoseView<'b>) -> PoseView<'b> {
         if self.others.is_empty() && self.series.is_empty() {
@@ -32,7 +32,7 @@ impl CommandTerms {
         }
         self.configuration.clear();
         self.configuration.extend_from_slice(setup.configuration);
-        self.strains.clear();
+        self.offsets.clear();
         let mut waves = Waves::default();
         let others = self
             .others
@@ -43,14 +43,18 @@ impl CommandTerms {
             match site {
                 TermSite::Joint(joint) => self.configuration[joint] += added,
                 TermSite::Strain { joint, which } => {
-                    self.strains.resize(self.configuration.len(), [0.0; 3]);
-                    self.strains[joint][which] += added;
+                    self.offsets.resize(self.configuration.len(), JointOffsets::default());
+                    self.offsets[joint].strain[which] += added;
+                }
+                TermSite::Motion { joint, which } => {
+                    self.offsets.resize(self.configuration.len(), JointOffsets::default());
+                    self.offsets[joint].motion[which] += added;
                 }
             }
         }
         PoseView {
             configuration: &self.configuration,
-            strains: (!self.strains.is_empty()).then_some(&self.strains),
+            offsets: (!self.offsets.is_empty()).then_some(&self.offsets),
             ..*setup
         }
     }
@@ -100,15 +104,18 @@ mod tests {
                     TermSite::Strain { joint, which } => {
                         strains[joint][which] += value * regressor.value(&pose);
                     }
+                    TermSite::Motion { .. } => {}
                 }
             }
             let found = commands.apply(&pose);
+            let found_strains: Vec<[f64; 3]> =
+                found.offsets.unwrap().iter().map(|offsets| offsets.strain).collect();
             let near = |a: &[f64], b: &[f64]| {
                 a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-14)
             };
             assert!(
                 near(found.configuration, &joints)
-                    && near(found.strains.unwrap().as_flattened(), strains.as_flattened())
+                    && near(found_strains.as_flattened(), strains.as_flattened())
             );
         }
     }

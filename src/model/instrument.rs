@@ -2,6 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use crate::laws::RANGE;
 use crate::model::parameter::{Parameter, ParameterSite, Regressor, value_regressor};
 use crate::problem::PoseView;
 use crate::spatial::Frame;
@@ -82,7 +83,7 @@ impl Instrument {
             reading += strain * position;
         }
         for (axis, regressor, size) in &self.shifts {
-            reading[*axis] += size * regressor.value(setup);
+            reading += direction(*axis, position) * (size * regressor.value(setup));
         }
         reading
     }
@@ -98,15 +99,28 @@ impl Instrument {
         match site {
             ParameterSite::Scale => *position,
             ParameterSite::Strain { entry } => unit_strain(entry) * position,
-            ParameterSite::Shift { axis } => Vector3::ith(axis, regressor.value(setup)),
+            ParameterSite::Shift { axis } => direction(axis, position) * regressor.value(setup),
             _ => Vector3::zeros(),
         }
     }
 
-    /// Returns I + E / (1 + s). It converts derivatives that already contain the factor 1 + s to
-    /// those of the reading. `None` without a strain.
-    pub fn relative_strain(&self) -> Option<Matrix3<f64>> {
-        self.strain.map(|strain| Matrix3::identity() + strain / (1.0 + self.scale))
+    /// Returns I + (E + ∂d/∂p) / (1 + s): the factor from derivatives that contain the scale to
+    /// those of the reading of a position; `None` without a strain and without a displacement d
+    /// along the line of sight.
+    pub fn relative_strain(
+        &self,
+        position: &Vector3<f64>,
+        setup: &PoseView,
+    ) -> Option<Matrix3<f64>> {
+        let along = self.shifts.iter().filter(|(axis, ..)| *axis == RANGE);
+        let mut added = self.strain;
+        for (_, regressor, size) in along {
+            let sight = direction(RANGE, position);
+            let across = Matrix3::identity() - sight * sight.transpose();
+            let turned = size * regressor.value(setup) / position.norm().max(f64::MIN_POSITIVE);
+            *added.get_or_insert_with(Matrix3::zeros) += across * turned;
+        }
+        added.map(|added| Matrix3::identity() + added / (1.0 + self.scale))
     }
 
     /// Returns true if effects rotate the bases.
@@ -136,11 +150,23 @@ impl Instrument {
     }
 }
 
+/// Returns the direction of a displacement of readings: an axis of the measuring frame, or the line
+/// of sight from the station, its origin.
+fn direction(axis: usize, position: &Vector3<f64>) -> Vector3<f64> {
+    if axis == RANGE {
+        position.try_normalize(0.0).unwrap_or_default()
+    } else {
+        Vector3::ith(axis.min(2), 1.0)
+    }
+}
+
 /// Returns Σ size × value(regressor) of the terms of each axis.
 fn sum(terms: &[(usize, Regressor, f64)], value: impl Fn(&Regressor) -> f64) -> Vector3<f64> {
     let mut sum = Vector3::zeros();
     for (axis, regressor, size) in terms {
-        sum[*axis] += size * value(regressor);
+        if let Some(entry) = sum.get_mut(*axis) {
+            *entry += size * value(regressor);
+        }
     }
     sum
 }

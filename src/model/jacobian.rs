@@ -261,7 +261,7 @@ impl<'m> JacobianWriter<'m> {
             return;
         };
         let predicted = write_placement(&frame, base, target, &mut rows);
-        if let Some(strain) = self.instrument.relative_strain() {
+        if let Some(strain) = self.instrument.relative_strain(&predicted, &pose.setup) {
             rows.multiply(&strain);
         }
         rows.scale = per_sigma;

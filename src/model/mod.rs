@@ -132,7 +132,9 @@ impl Model {
         for &(site, nominal) in sites {
             sites::prepare_site(&mut model.nominal, site, nominal);
             let added = match site {
-                ParameterSite::Joint { field, .. } => field.is_geometry(),
+                ParameterSite::Joint { field, .. } => {
+                    field.is_geometry() || field.motion().is_some()
+                }
                 ParameterSite::Shift { .. } => true,
                 _ => false,
             };

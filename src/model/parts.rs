@@ -18,6 +18,13 @@ pub enum PartSite {
         /// Index 0, 1 or 2 of the strain.
         which: usize,
     },
+    /// Small motion of a joint's frame: 0 to 5 before it turns, 6 to 11 behind it.
+    Motion {
+        /// Index of the joint.
+        joint: usize,
+        /// Index of the number.
+        which: usize,
+    },
     /// Displacement of the position along an axis of the measuring frame.
     Shift {
         /// Axis 0, 1 or 2.
@@ -69,6 +76,7 @@ impl Model {
             let site = match site {
                 TermSite::Joint(joint) => PartSite::Joint(joint),
                 TermSite::Strain { joint, which } => PartSite::Strain { joint, which },
+                TermSite::Motion { joint, which } => PartSite::Motion { joint, which },
             };
             PartTerm { site, regressor, value }
         };

@@ -10,10 +10,10 @@ use num_dual::Dual64;
 
 use super::inputs::Input;
 use super::rows::Rows;
-use crate::mechanics::{Angle, Arm, Coordinates, Joint, Placement};
+use crate::mechanics::{Angle, Arm, Coordinates, Joint, MOTION, Placement, SIDES};
 use crate::model::parameter::{JointField, ParameterSite};
 use crate::problem::{PoseView, Tree};
-use crate::spatial::{Frame, rotated_about_x, rotated_about_y, rotated_about_z};
+use crate::spatial::{Frame, rotate, rotated_about_x, rotated_about_y, rotated_about_z};
 
 /// Derivatives of a rigid arm, one elementary motion (rotation or translation) at a time.
 pub(super) struct Rigid {
@@ -33,6 +33,8 @@ struct Link {
     joint: Joint<Dual64>,
     inputs: [Option<usize>; 5],
     placing: [Option<usize>; 6],
+    /// Inputs of the small motions.
+    moving: [Option<usize>; 2 * MOTION],
 }
 
 /// Derivatives of the target with respect to the five motions of a link, each in the frame before
@@ -40,6 +42,8 @@ struct Link {
 struct Carried {
     derivatives: [Vector3<f64>; 5],
     coordinates: Coordinates<Dual64>,
+    /// Derivatives with respect to the small motions, if the link has some.
+    motions: Option<Box<[Vector3<f64>; 2 * MOTION]>>,
 }
 
 impl Rigid {
@@ -55,6 +59,9 @@ impl Rigid {
                 }
                 if let Some(place) = field.placement() {
                     links[joint].placing[place] = Some(index);
+                }
+                if let Some(place) = field.motion() {
+                    links[joint].moving[place] = Some(index);
                 }
             }
         }
@@ -77,13 +84,14 @@ impl Rigid {
         let mut point = *target;
         let way = || {
             let path = links.iter().zip(setup.configuration).enumerate();
-            path.filter(|(joint, _)| tree.path_contains(*joint, tip)).map(|(_, link)| link)
+            path.filter(|(joint, _)| tree.path_contains(*joint, tip))
         };
-        for (link, &q) in way().rev() {
+        for (joint, (link, &q)) in way().rev() {
             let coordinates = link.joint.coordinates(q);
-            let derivatives;
-            (derivatives, point) = link.carry(&coordinates, &point);
-            carried.push(Carried { derivatives, coordinates });
+            let motion = link.motion(setup.motion(joint));
+            let (derivatives, motions);
+            (derivatives, motions, point) = link.carry(&coordinates, &point, motion.as_ref());
+            carried.push(Carried { derivatives, coordinates, motions });
             if let Some(placement) = &link.joint.placement {
                 let derivatives;
                 (derivatives, point) = carry_through(placement, &point);
@@ -91,7 +99,9 @@ impl Rigid {
             }
         }
         let mut frame = *base;
-        for ((link, _), Carried { derivatives, coordinates }) in way().zip(carried.iter().rev()) {
+        for ((joint, (link, _)), Carried { derivatives, coordinates, motions }) in
+            way().zip(carried.iter().rev())
+        {
             if let Some((placement, derivatives)) =
                 link.joint.placement.as_ref().and_then(|placement| Some((placement, placed.pop()?)))
             {
@@ -105,10 +115,24 @@ impl Rigid {
                     }
                 });
             }
-            link.advance(coordinates, &mut frame, |place, frame| {
-                if let Some(input) = link.inputs[place] {
-                    rows.put_input(&inputs[input], commanded, &frame.vector(&derivatives[place]));
+            let motion = link.motion(setup.motion(joint));
+            let write_motion = |side: usize, frame: &Frame<f64>, rows: &mut Rows| {
+                let Some(motions) = motions else { return };
+                for place in SIDES[side]..SIDES[side] + MOTION {
+                    if let Some(input) = link.moving[place] {
+                        let column = frame.vector(&motions[place]);
+                        rows.put_input(&inputs[input], commanded, &column);
+                    }
                 }
+            };
+            link.advance(coordinates, &mut frame, motion.as_ref(), |place, frame| match place {
+                Place::Geometry(place) => {
+                    if let Some(input) = link.inputs[place] {
+                        let column = frame.vector(&derivatives[place]);
+                        rows.put_input(&inputs[input], commanded, &column);
+                    }
+                }
+                Place::Motion(side) => write_motion(side, frame, rows),
             });
         }
         frame
@@ -129,7 +153,14 @@ impl Link {
             joint: Joint { placement, alpha, a, theta, d, beta, ..joint.lift() },
             inputs: [None; 5],
             placing: [None; 6],
+            moving: [None; 2 * MOTION],
         }
+    }
+
+    /// Returns the small motions in a pose; `None` if the link has none.
+    fn motion(&self, of_pose: Option<&[f64; 2 * MOTION]>) -> Option<[f64; 2 * MOTION]> {
+        self.joint.motion.as_ref()?;
+        Some(of_pose.copied().unwrap_or_default())
     }
 
     /// Transforms a point \[m\] from the frame behind the link to the frame before it. Returns
@@ -139,15 +170,23 @@ impl Link {
         &self,
         at: &Coordinates<Dual64>,
         point: &Vector3<f64>,
-    ) -> ([Vector3<f64>; 5], Vector3<f64>) {
+        motion: Option<&[f64; 2 * MOTION]>,
+    ) -> ([Vector3<f64>; 5], Option<Box<[Vector3<f64>; 2 * MOTION]>>, Vector3<f64>) {
         let Joint { alpha, a, beta, .. } = &self.joint;
-        let (by_beta, point) = derivative(&rotated_about_y(beta.sin_cos, point));
+        let mut motions = motion.map(|_| Box::new([Vector3::zeros(); 2 * MOTION]));
+        let mut displaced = |side: usize, point: Vector3<f64>| match (motion, &mut motions) {
+            (Some(motion), Some(motions)) => displace(motion, motions, SIDES[side], &point),
+            _ => point,
+        };
+        let point = displaced(1, *point);
+        let (by_beta, point) = derivative(&rotated_about_y(beta.sin_cos, &point));
         let (by_d, point) =
             derivative(&Vector3::new(point.x.into(), point.y.into(), at.offset + point.z));
         let (by_theta, point) = derivative(&rotated_about_z(at.angle, &point));
+        let point = displaced(0, point);
         let (by_a, point) = derivative(&Vector3::new(*a + point.x, point.y.into(), point.z.into()));
         let (by_alpha, point) = derivative(&rotated_about_x(alpha.sin_cos, &point));
-        ([by_alpha, by_a, by_theta, by_d, by_beta], point)
+        ([by_alpha, by_a, by_theta, by_d, by_beta], motions, point)
     }
 
     /// Moves `frame` through the link. Calls `before` with the index of each motion and the frame
@@ -157,20 +196,63 @@ impl Link {
         &self,
         at: &Coordinates<Dual64>,
         frame: &mut Frame<f64>,
-        mut before: impl FnMut(usize, &Frame<f64>),
+        motion: Option<&[f64; 2 * MOTION]>,
+        mut before: impl FnMut(Place, &Frame<f64>),
     ) {
         let Joint { alpha, a, beta, .. } = &self.joint;
-        before(0, frame);
+        let displaced =
+            |side: usize, frame: &mut Frame<f64>, before: &mut dyn FnMut(Place, &Frame<f64>)| {
+                if let Some(motion) = motion {
+                    before(Place::Motion(side), frame);
+                    let [translation, rotation] = vectors(motion, SIDES[side]);
+                    frame.translate(&translation);
+                    frame.rotate(&rotation);
+                }
+            };
+        before(Place::Geometry(0), frame);
         frame.rotate_x(real(alpha.sin_cos));
-        before(1, frame);
+        before(Place::Geometry(1), frame);
         frame.translate_x(a.re);
-        before(2, frame);
+        displaced(0, frame, &mut before);
+        before(Place::Geometry(2), frame);
         frame.rotate_z(real(at.angle));
-        before(3, frame);
+        before(Place::Geometry(3), frame);
         frame.translate_z(at.offset.re);
-        before(4, frame);
+        before(Place::Geometry(4), frame);
         frame.rotate_y(real(beta.sin_cos));
+        displaced(1, frame, &mut before);
     }
+}
+
+/// Motion of a link: one of its geometry, or a small motion on one side of the joint.
+#[derive(Clone, Copy)]
+enum Place {
+    Geometry(usize),
+    Motion(usize),
+}
+
+/// Returns translation and rotation vector of a small motion.
+fn vectors(motion: &[f64; 2 * MOTION], first: usize) -> [Vector3<f64>; 2] {
+    [first, first + 3].map(|first| Vector3::from_column_slice(&motion[first..first + 3]))
+}
+
+/// Carries a point \[m\] from behind a small motion to before it, and writes its derivatives in the
+/// frame before it.
+fn displace(
+    motion: &[f64; 2 * MOTION],
+    motions: &mut [Vector3<f64>; 2 * MOTION],
+    first: usize,
+    point: &Vector3<f64>,
+) -> Vector3<f64> {
+    let [translation, rotation] = vectors(motion, first);
+    let dual = point.map(Dual64::from);
+    for axis in 0..3 {
+        motions[first + axis] = Vector3::ith(axis, 1.0);
+        let mut seeded = rotation.map(Dual64::from);
+        seeded[axis] = seeded[axis].derivative();
+        motions[first + 3 + axis] = derivative(&rotate(&seeded, &dual)).0;
+    }
+    translation + rotate(&rotation, point)
 }
 
 /// Transforms a point \[m\] from the frame behind a placement to the frame before it. Returns first

@@ -24,6 +24,9 @@ pub(super) fn prepare_site(arm: &mut Arm<f64>, site: ParameterSite, nominal: f64
                     _ = joint.lateral.get_or_insert([0.0; 2]);
                 }
                 JointField::SlideFlexibility => _ = joint.slide.get_or_insert(0.0),
+                JointField::Before(_) | JointField::After(_) => {
+                    joint.motion.get_or_insert_with(Box::default);
+                }
                 _ => {}
             }
         }

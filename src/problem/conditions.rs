@@ -50,10 +50,19 @@ pub struct PoseView<'a> {
     pub covariates: &'a [f64],
     /// Earlier poses of the session.
     pub past: LazyPast<'a>,
-    /// Stress-free strain of each joint's beam, shape = (joints): elongation, then curvatures about
-    /// y and z [1/m]. `None` for no strain. A thin reference keeps the views small, because most
-    /// poses have no strain.
-    pub strains: Option<&'a Vec<[f64; 3]>>,
+    /// Strains and small motions of each joint, shape = (joints); `None` for none. A thin reference
+    /// keeps the views small, because most poses have none.
+    pub offsets: Option<&'a Vec<JointOffsets>>,
+}
+
+/// What effects add to a joint in one pose besides its coordinate.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct JointOffsets {
+    /// Stress-free strain of the joint's beam: elongation, then curvatures about y and z [1/m].
+    pub strain: [f64; 3],
+    /// Small motion before the joint turns, then behind it: translation \[m\] and rotation vector
+    /// \[rad\] each.
+    pub motion: [f64; 12],
 }
 
 impl<'a> PoseView<'a> {
@@ -65,7 +74,13 @@ impl<'a> PoseView<'a> {
 }
 
 impl PoseView<'_> {
-    /// Returns a copy that owns its numbers; strains are left out.
+    /// Returns the small motions of a joint, if any joint has some.
+    #[inline]
+    pub(crate) fn motion(&self, joint: usize) -> Option<&[f64; 12]> {
+        Some(&self.offsets?.get(joint)?.motion)
+    }
+
+    /// Returns a copy that owns its numbers; strains and motions are left out.
     pub fn to_owned(&self) -> PoseConditions {
         PoseConditions {
             configuration: self.configuration.to_vec(),
@@ -103,7 +118,7 @@ impl PoseConditions {
             approach: self.approach.as_deref(),
             covariates: &self.covariates,
             past: LazyPast::from(&self.past),
-            strains: None,
+            offsets: None,
         }
     }
 }

@@ -137,7 +137,7 @@ fn only_entry<'a, 'i>(section: &Section<'a, 'i>) -> Result<(&'a str, Item<'a, 'i
 }
 
 /// Reads an effect of the catalogue, or a declared law.
-fn declared(
+pub(crate) fn declared(
     name: &str,
     item: &Item<'_, '_>,
     joints: &[Joint],

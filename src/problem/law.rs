@@ -64,7 +64,7 @@ fn check(law: &Law, at: &Item, joints: &[Joint]) -> Result<(), InputError> {
     let joint = law.joint();
     let declared = joint.and_then(|joint| joints.get(joint.wrapping_sub(1)));
     match (joint, declared.map(Joint::command_kind)) {
-        (Some(joint), Some(JointKind::Fixed)) => {
+        (Some(joint), Some(JointKind::Fixed)) if law.at() == At::Coordinate => {
             return Err(at.error(InputErrorKind::NoCommand { joint }));
         }
         _ if matches!(law.at(), At::Beam(_)) => {}
@@ -99,6 +99,7 @@ fn unit(site: &LawSite, joints: &[Joint]) -> Unit {
     match site.at {
         At::Coordinate if site.joint().is_some_and(slides) => Unit::Length,
         At::Coordinate | At::BaseTurn(_) => Unit::Angle,
+        At::Before(3..) | At::After(3..) | At::Tool(3..) => Unit::Angle,
         At::Beam(BeamField::Stretch) => Unit::Ratio,
         At::Beam(_) => Unit::PerLength,
         _ => Unit::Length,

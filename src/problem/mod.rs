@@ -62,7 +62,7 @@ pub(crate) use target::Tool;
 // Public for the tests, the benches and the Python module only.
 #[doc(hidden)]
 pub use self::{
-    conditions::{PoseConditions, PoseView},
+    conditions::{JointOffsets, PoseConditions, PoseView},
     data::{Data, DeclaredCovariate, HeldOut},
     effect::EffectDeclaration,
     joint::{Beam, Hoist, Joint, JointKind, Mimic, Placement},

@@ -52,6 +52,7 @@ impl Covariate {
             Quantity::Hoist => vec![Self::Hoist],
             Quantity::Elapsed | Quantity::Time => vec![Self::time(time_measured)],
             Quantity::Approach(joint) => vec![Self::Approach(joint)],
+            Quantity::Moment(_) => vec![Self::Load],
             Quantity::Covariate(index) => vec![Self::declared(index, problem)],
         }
     }

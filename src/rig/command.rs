@@ -66,6 +66,9 @@ impl Rig {
                 {
                     rate * self.covariate(of, conditions)
                 }
+                (Effect::Law(law), coefficients) if law.joint() == Some(number) => {
+                    self.law_error(law, coefficients, conditions)
+                }
                 (Effect::JointCoupling { joint, from }, [factor]) if *joint == number => {
                     factor * command(*from)
                 }
@@ -117,7 +120,7 @@ impl Rig {
 
 /// Returns the friction state z ∈ [−1, 1] of a joint (index from 0) after the earlier poses of the
 /// session. `distance` is the friction path \[rad\] or \[m\] [Dahl 1968].
-fn friction(conditions: &PoseConditions, joint: usize, distance: f64) -> f64 {
+pub(super) fn friction(conditions: &PoseConditions, joint: usize, distance: f64) -> f64 {
     let past = &conditions.past;
     let joints = conditions.configuration.len();
     let no_sides = vec![0.0; joints];

@@ -166,8 +166,11 @@ pub(super) fn keys(cause: &Cause, joints: &[Joint]) -> Vec<(String, Unit)> {
             let turns = ["rx", "ry", "rz"].map(|name| (name, Unit::AnglePerUnit));
             named(&[turns, ["x", "y", "z"].map(|name| (name, Unit::LengthPerUnit))].concat())
         }
-        // The rig implements the laws of the catalogue only.
-        Effect::Law(_) => Vec::new(),
+        Effect::Law(law) => {
+            let slides = law.joint().is_some_and(|joint| slides(&joint));
+            let unit = if slides { Unit::Length } else { Unit::Angle };
+            (1..=law.formulas().len()).map(|number| (format!("c{number}"), unit)).collect()
+        }
     }
 }
 

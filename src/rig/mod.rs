@@ -16,6 +16,7 @@ mod contact;
 mod draw;
 mod effect;
 mod equilibrium;
+mod law;
 mod link;
 #[deny(clippy::indexing_slicing)]
 mod output;

@@ -1,9 +1,11 @@
 //! Reader of the tables `[[effect]]` of a truth: effects as in the problem file, with their values.
 
 use super::effect::{Cause, Shape, TrueEffect, keys};
+use super::law;
 use crate::error::{InputError, InputErrorKind, Location};
+use crate::laws::LAW;
 use crate::problem::effect::NAMES;
-use crate::problem::effects::{effect, gives_way};
+use crate::problem::effects::{declared, effect, gives_way};
 use crate::problem::item::Item;
 use crate::problem::section::Section;
 use crate::problem::{Effect, PoseRanges, Problem};
@@ -44,6 +46,14 @@ fn located_effect(
     section.get(name);
     let cause = if name == OUTSIDE {
         outside(&item, problem)?
+    } else if name == LAW {
+        let effect = declared(name, &item, &problem.joints, &problem.data)?;
+        if let Effect::Law(law) = &effect
+            && let Some(reason) = law::refusal(law)
+        {
+            return Err(item.error(InputErrorKind::LawSite { reason: reason.to_owned() }));
+        }
+        Cause::Catalogued(effect)
     } else {
         Cause::Catalogued(effect(name, &item, &problem.joints)?)
     };

@@ -2,6 +2,7 @@
 
 use crate::select::settings::{CROSS_VALIDATION_BLOCKS, MAX_SHIFT_TIMES, MIN_POSES_BESIDE_SHIFT};
 use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex};
 
 use rand::SeedableRng as _;
 use rand::seq::SliceRandom as _;
@@ -35,7 +36,13 @@ pub(super) struct Data<'a> {
     pub takes_gears: bool,
     /// Request to stop the search early.
     pub stop: Stop,
+    /// Laws that the grammar proposed, by joint and by what acts beside: evidence about the next fit
+    /// needs no new search.
+    pub proposed: Proposed,
 }
+
+/// Laws by joint, from 0, and by the names of the hypotheses beside which they were searched.
+pub(super) type Proposed = Arc<Mutex<BTreeMap<(usize, Vec<String>), Vec<Effect>>>>;
 
 impl<'a> Data<'a> {
     pub fn new(problem: &Problem, dataset: &'a Dataset, rules: &'a SelectionRules) -> Self {
@@ -62,6 +69,7 @@ impl<'a> Data<'a> {
             candidates: &[],
             takes_gears: takes_common_prior(problem),
             stop: Stop::default(),
+            proposed: Proposed::default(),
         }
     }
 

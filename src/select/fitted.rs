@@ -11,7 +11,7 @@ use super::data::Data;
 use super::neighbourhood::{Derivatives, LinearNeighbourhood, Linearised, Unknowns};
 use crate::fit::{Identification, IdentifyError, Noise, Options, Placement, identify};
 use crate::least_squares::MANY_UNKNOWNS;
-use crate::model::parameter::{BeamField, ParameterSite};
+use crate::model::parameter::{BeamField, ParameterSite, Regressor};
 use crate::model::{Model, Pose};
 use crate::problem::{Effect, EffectDeclaration, Problem};
 
@@ -356,9 +356,11 @@ impl Fitted {
         let is_place = |site: ParameterSite| {
             matches!(site, ParameterSite::Beam { field: BeamField::AddedAt, .. })
         };
-        for &j in
-            without.iter().filter(|&&j| !is_place(self.model.parameters[self.unknowns[j]].site))
-        {
+        let is_inside = |&&j: &&usize| {
+            let parameter = &self.model.parameters[self.unknowns[j]];
+            is_place(parameter.site) || parameter.regressor == Regressor::Inner
+        };
+        for &j in without.iter().filter(|j| !is_inside(j)) {
             residual.axpy(-self.found.x[self.unknowns[j]], &columns.column(j), 1.0);
         }
         let unknowns = self.unknowns_without(linearised, without, 1.0);

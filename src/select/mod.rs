@@ -14,6 +14,7 @@ mod data;
 mod detection;
 mod evidence;
 mod fitted;
+mod grammar;
 mod harmonic_prior;
 mod neighbourhood;
 mod power;

@@ -161,7 +161,8 @@ fn mistakes_have_their_column_and_the_word_that_is_meant() {
         ("lag(t, 3)", 1, "write lag(T, seconds)"),
         ("friction(q2, -1)", 1, "write friction(q1, distance)"),
         ("1e999", 1, "1e999 is no finite number"),
-        ("q1*M2", 4, "M2: moments under the loads are no quantity of formulas yet"),
+        ("q1*M4", 4, "M4 names no joint; the arm has 3, counted from 1"),
+        ("q1 + M2", 1, "rad and m·N cannot be added"),
         ("", 1, "found the end of the formula"),
         ("`tilt` + 1", 1, "unknown word tilt"),
         ("sin(q2) é", 9, "found é"),
@@ -193,7 +194,9 @@ fn numbers_may_carry_any_unit() {
 
 /// A random formula of valid words.
 fn random(rng: &mut ChaCha8Rng, depth: u32) -> String {
-    const WORDS: [&str; 14] = [
+    const WORDS: [&str; 16] = [
+        "M1",
+        "M3",
         "q1",
         "q2",
         "q3",

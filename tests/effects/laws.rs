@@ -85,6 +85,14 @@ fn derivatives_by_coefficients_and_inner_parameters_are_exact() {
         "law = { name = 'lift', at = 'base.z', terms = ['T^2'], sigma_mm = 1 }",
         "law = { name = 'bow', at = 'A.curvature_y', terms = ['T/(1 + r*T)'], sigma_per_m = 1e-3, \
          r = { start = 0.1 } }",
+        "law = { name = 'ranging', at = 'measurement.range', terms = ['T', 'sin(2*q1)'], sigma_mm = 1 }",
+        "law = { name = 'windup', at = 'joint2', terms = ['tanh(M2/k)', 'M2*q3'], sigma_deg = 0.1, \
+         k = { start = 40 } }",
+        "law = { name = 'race', at = 'joint3.ry', terms = ['sin(q3)', 'cos(q3)'], sigma_deg = 0.1 }",
+        "law = { name = 'rail', at = 'joint2.y', terms = ['q2^2'], sigma_mm = 1 }",
+        "law = { name = 'wrist', at = 'joint2.after.rz', terms = ['M2', 'T'], sigma_deg = 0.1 }",
+        "law = { name = 'flange', at = 'joint3.after.z', terms = ['T'], sigma_mm = 1 }",
+        "law = { name = 'gripper', at = 'tool.rx', terms = ['payload*sin(q1)'], sigma_deg = 0.1 }",
         "law = { name = 'edge', at = 'joint2', terms = ['sqrt(abs(q2 - c))'], sigma_deg = 0.1, \
          c = { start = 0.2 } }",
     ];
@@ -113,6 +121,35 @@ fn derivatives_by_coefficients_and_inner_parameters_are_exact() {
             assert!(check.relative_error < 1e-7_f64.max(check.accuracy), "{name}: {check:?}");
         }
     }
+}
+
+#[test]
+fn a_law_of_the_moment_is_a_compliance() {
+    let (arm, _) = lunar();
+    let rows = poses(&arm, 20, true, &mut ChaCha8Rng::seed_from_u64(6));
+    let all: Vec<usize> = (0..rows.len()).collect();
+    let moved = |text: &str| {
+        let model = model_of(&arm.with_effect(law(&arm, text)), &rows);
+        let zero = DVector::zeros(model.parameters.len());
+        let mut x = zero.clone();
+        let first = model.parameters.iter().position(|own| {
+            own.name.starts_with("law[") || own.name.starts_with("joint-compliance")
+        });
+        x[first.unwrap()] = 1e-8;
+        let of =
+            |x: &DVector<f64>| model.residuals(Placement::of(&rows).poses(&rows, &all, 1.0), x);
+        of(&x).into_iter().zip(of(&zero)).map(|(a, b)| a - b).collect::<Vec<_>>()
+    };
+    let (catalogued, written) = (
+        moved("joint-compliance = { joint = 3 }"),
+        moved("law = { name = 'a', at = 'joint3', terms = ['M3'] }"),
+    );
+    // The compliance acts on the deflected arm, the law on the rigid one.
+    let squares =
+        |all: &[nalgebra::Vector3<f64>]| all.iter().map(|a| a.norm_squared()).sum::<f64>();
+    let apart: Vec<_> = catalogued.iter().zip(&written).map(|(a, b)| a - b).collect();
+    let (apart, whole) = (squares(&apart).sqrt(), squares(&catalogued).sqrt());
+    assert!(whole > 0.0 && apart < 0.1 * whole, "{apart} of {whole}");
 }
 
 #[test]
@@ -165,8 +202,9 @@ fn mistakes_are_located() {
         ("at = 'joint2', terms = ['q2 + T']", "terms[1]", "rad and K cannot be added"),
         ("at = 'joint9', terms = ['1']", "at", "no joint 9; the arm has 3, counted from 1"),
         ("at = 'joint3', terms = ['q1']", "at", "joint 3 is fixed and takes no command"),
-        ("at = 'joint2.rx', terms = ['q1']", "at", "joint2.rx is no site yet"),
-        ("at = 'measurement.range', terms = ['q1']", "at", "measurement.range is no site yet"),
+        ("at = 'joint2.rw', terms = ['q1']", "at", "joint2.rw is no site; write joint2, joint2.x"),
+        ("at = 'tool.w', terms = ['q1']", "at", "tool.w is no site; write tool.x"),
+        ("at = 'measurement.r', terms = ['q1']", "at", "write measurement.x, .y, .z or .range"),
         ("at = 'lever', terms = ['q1']", "at", "lever is no site; write joint1"),
         ("at = 'joint2', terms = []", "terms", "no formula"),
         (

@@ -200,7 +200,7 @@ impl<'a> Stage<'a> {
                 approach,
                 covariates,
                 past,
-                strains: _,
+                offsets: _,
             } = &pose.setup;
             let columns =
                 configuration.iter().chain(approach.iter().copied().flatten()).chain(*covariates);

@@ -34,6 +34,8 @@ pub enum Per {
     Mass,
     /// Time \[s\].
     Second,
+    /// [N·m]
+    Torque,
     /// Unit of a covariate.
     Covariate,
 }
@@ -49,6 +51,8 @@ impl Dimension {
     pub(super) const MASS: Self = Self::base(3);
     pub(super) const SECOND: Self = Self::base(4);
     pub(super) const FORCE: Self = Self::base(5);
+    /// N·m.
+    pub(super) const TORQUE: Self = Self { powers: [0, 1, 0, 0, 0, 1, 0], ..Self::base(5) };
     pub(super) const COVARIATE: Self = Self { flexible: true, ..Self::base(6) };
 
     const fn base(index: usize) -> Self {
@@ -66,6 +70,7 @@ impl Dimension {
             (Self::KELVIN, Per::Kelvin),
             (Self::MASS, Per::Mass),
             (Self::SECOND, Per::Second),
+            (Self::TORQUE, Per::Torque),
             (Self::COVARIATE, Per::Covariate),
         ];
         known.into_iter().find(|(of, _)| is(*of)).map_or(Per::Number, |(_, per)| per)

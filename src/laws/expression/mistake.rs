@@ -90,14 +90,6 @@ pub enum Mistake {
         /// Unit of the function's argument.
         unit: String,
     },
-    /// A quantity is not supported in formulas.
-    #[error("{word}: {reason}")]
-    Unsupported {
-        /// Word in the text.
-        word: String,
-        /// Reason why it is not supported.
-        reason: &'static str,
-    },
     /// A formula that is too long or too deeply nested.
     #[error("a formula takes at most {most} {of}")]
     TooLarge {

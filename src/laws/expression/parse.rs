@@ -305,12 +305,7 @@ impl<'a> Parser<'a> {
             }
             let joint = number - 1;
             return match (prefix, of) {
-                ("M", _) => {
-                    let reason = "moments under the loads are no quantity of formulas yet; \
-                                  joint-compliance and joint-nonlinear-stiffness follow them";
-                    let mistake = Mistake::Unsupported { word: word.to_owned(), reason };
-                    Err(self.error(span, mistake))
-                }
+                ("M", _) => quantity(Quantity::Moment(joint), Dimension::TORQUE),
                 (_, Some(())) => quantity(Quantity::Command(joint), self.command(joint)),
                 _ => quantity(Quantity::Approach(joint), Dimension::PLAIN),
             };
@@ -322,11 +317,18 @@ impl<'a> Parser<'a> {
         let Vocabulary { slides, joints, covariates, parameters } = self.vocabulary;
         let commands = (1..=slides.len()).map(|number| format!("q{number}"));
         let sides = (1..=slides.len()).map(|number| format!("approach{number}"));
+        let moments = (1..=slides.len()).map(|number| format!("M{number}"));
         let known = Vocabulary::QUANTITIES.map(str::to_owned).into_iter();
         let functions = Function::ALL.iter().map(|(_, name)| (*name).to_owned());
         let names = joints.iter().map(|(name, _)| name.clone());
         let words = parameters.iter().chain(*covariates).cloned();
-        let all = words.chain(names).chain(commands).chain(sides).chain(known).chain(functions);
+        let all = words
+            .chain(names)
+            .chain(commands)
+            .chain(sides)
+            .chain(moments)
+            .chain(known)
+            .chain(functions);
         Mistake::UnknownWord { word: word.to_owned(), near: nearest(word, all) }
     }
 

@@ -104,6 +104,7 @@ impl Named<'_> {
             Quantity::Payload => f.write_str("payload"),
             Quantity::Hoist => f.write_str("hoist"),
             Quantity::Approach(joint) => write!(f, "approach{}", joint + 1),
+            Quantity::Moment(joint) => write!(f, "M{}", joint + 1),
             Quantity::Covariate(index) => match self.names.covariates.get(index) {
                 Some(name) if is_word(name) => f.write_str(name),
                 Some(name) => write!(f, "`{name}`"),

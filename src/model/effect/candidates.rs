@@ -185,6 +185,7 @@ impl Effect {
                     let both = data.both_sides.get(joint).copied().unwrap_or(false);
                     (!both).then_some("the joint was not approached from both sides")
                 }
+                Quantity::Moment(_) => (!data.weighs()).then_some(NO_LOADS),
                 Quantity::Covariate(index) => {
                     let varies = data.covariates.get(index).copied().unwrap_or(false);
                     (!varies).then_some("the covariate does not change in these poses")

@@ -96,6 +96,12 @@ impl Effect {
             At::Arm(field) => ParameterSite::Arm(field),
             At::Shift(axis) | At::BaseShift(axis) => ParameterSite::Shift { axis },
             At::Turn(axis) | At::BaseTurn(axis) => ParameterSite::Turn { axis },
+            At::Before(axis) => of_joint(JointField::Before(axis), JointField::Before(axis))?,
+            At::After(axis) => of_joint(JointField::After(axis), JointField::After(axis))?,
+            At::Tool(axis) => {
+                let joint = problem.tool.joint.min(problem.joints.len().checked_sub(1)?);
+                ParameterSite::Joint { joint, field: JointField::After(axis) }
+            }
             At::Scale => ParameterSite::Scale,
             At::Strain(entry) => ParameterSite::Strain { entry },
         })

@@ -86,6 +86,7 @@ pub(crate) fn unit(site: ParameterSite, regressor: &Regressor) -> Unit {
         (Per::Mass, Unit::Angle) => Unit::AnglePerMass,
         (Per::Mass, _) => Unit::LengthPerMass,
         (Per::Second, _) => Unit::Speed,
+        (Per::Torque, Unit::Angle) => Unit::Compliance,
         (Per::Covariate, Unit::Angle) => Unit::AnglePerUnit,
         (Per::Covariate, _) => Unit::LengthPerUnit,
         (Per::Angle, Unit::Length) => Unit::LengthPerAngle,

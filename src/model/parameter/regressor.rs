@@ -6,6 +6,7 @@ use num_dual::Dual64;
 
 use crate::laws::Quantity;
 use crate::laws::expression::{Expression, FormulaError, Names, Parsed, Per, Vocabulary, parse};
+use crate::mechanics::AxisMoments;
 use crate::problem::{PoseView, Problem, ThermalLag};
 
 /// Function of a pose that multiplies a parameter at its site.
@@ -68,6 +69,8 @@ pub struct Formula {
     hoist: f64,
     /// Full names and values of the parameters inside the formula.
     parameters: Vec<(String, f64)>,
+    /// Loads of the arm, where the formula takes their moments.
+    moments: Option<Arc<AxisMoments<f64>>>,
     /// True if the term displaces the base itself, false if it is an error of the instrument's
     /// readings.
     moves_base: bool,
@@ -107,13 +110,22 @@ impl Formula {
             Quantity::Payload => setup.payload.copied().unwrap_or(self.payload),
             Quantity::Hoist => setup.hoist.copied().unwrap_or(self.hoist),
             Quantity::Approach(joint) => side(joint),
+            Quantity::Moment(joint) => {
+                let moments = self.moments.as_ref().map(|moments| moments.at(setup));
+                moments.and_then(|moments| moments.get(joint).copied()).unwrap_or(0.0)
+            }
             Quantity::Covariate(index) => setup.covariates.get(index).copied().unwrap_or(0.0),
         }
     }
 
     /// Returns the derivative of a quantity with respect to the command of a joint, counted from 0.
-    fn quantity_slope(quantity: Quantity, setup: &PoseView, joint: usize) -> f64 {
+    fn quantity_slope(&self, quantity: Quantity, setup: &PoseView, joint: usize) -> f64 {
         match quantity {
+            Quantity::Moment(about) => {
+                let seed = Dual64::from(0.0).derivative();
+                let moments = self.moments.as_ref().map(|all| all.seeded(joint, seed).at(setup));
+                moments.and_then(|moments| Some(moments.get(about)?.eps)).unwrap_or(0.0)
+            }
             Quantity::Command(commanded) if commanded == joint => 1.0,
             Quantity::Friction { joint: held, distance } if held == joint => {
                 let side =
@@ -188,6 +200,12 @@ impl Regressor {
             payload: problem.tool.payload_mass,
             hoist: hoists.map(|hoist| hoist.force).sum(),
             parameters,
+            moments: formula
+                .expression
+                .quantities()
+                .iter()
+                .any(follows_loads)
+                .then(|| Arc::new(AxisMoments::new(problem))),
             moves_base,
         }))
     }
@@ -315,7 +333,7 @@ impl Regressor {
             }
             Self::Formula(formula) => {
                 let seeded = |quantity: Quantity| {
-                    let slope = Formula::quantity_slope(quantity, setup, joint);
+                    let slope = formula.quantity_slope(quantity, setup, joint);
                     Dual64::new(formula.quantity(quantity, setup), slope)
                 };
                 let values: Vec<Dual64> =
@@ -328,13 +346,20 @@ impl Regressor {
 
     /// Returns true if it depends on the commands of joints.
     pub fn follows_commands(&self) -> bool {
-        self.quantities().iter().any(|quantity| quantity.commanded_joint().is_some())
+        let follows =
+            |quantity: &Quantity| quantity.commanded_joint().is_some() || follows_loads(quantity);
+        self.quantities().iter().any(follows)
     }
 
     /// Returns true if the parameter is itself the quantity of its site.
     pub fn is_constant(&self) -> bool {
         *self == Self::Constant
     }
+}
+
+/// Returns true for the moments of the loads.
+fn follows_loads(quantity: &Quantity) -> bool {
+    matches!(quantity, Quantity::Moment(_))
 }
 
 /// Largest order difference to the last harmonic that recurrence bridges. For a larger one, a sine

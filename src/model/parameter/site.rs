@@ -52,7 +52,7 @@ pub enum ParameterSite {
     },
     /// Displacement of every measured position, measuring frame.
     Shift {
-        /// Axis 0, 1 or 2.
+        /// Axis 0, 1 or 2, or 3 for the line of sight from the origin.
         axis: usize,
     },
     /// Rotation of every base about an axis through the measuring frame's origin; its parameter
@@ -94,6 +94,8 @@ impl ParameterSite {
                 | JointField::X
                 | JointField::Y
                 | JointField::Z => Unit::Length,
+                JointField::Before(axis) | JointField::After(axis) if axis < 3 => Unit::Length,
+                JointField::Before(_) | JointField::After(_) => Unit::Angle,
                 JointField::Stiffness => Unit::TorsionalStiffness,
                 JointField::Compliance | JointField::LateralX | JointField::LateralY => {
                     Unit::Compliance
@@ -137,7 +139,8 @@ impl ParameterSite {
     pub fn is_elastic(self) -> bool {
         match self {
             Self::Joint { field, .. } => {
-                !field.is_geometry() && !matches!(field, JointField::Play | JointField::SlidingPlay)
+                let is_play = matches!(field, JointField::Play | JointField::SlidingPlay);
+                !field.is_geometry() && !is_play && field.motion().is_none()
             }
             Self::Beam { field, .. } => !field.is_strain(),
             Self::Arm(_) => true,

@@ -127,6 +127,10 @@ pub(super) struct Block {
     pub is_gear: bool,
     /// Name of its effect's family; `None` for a function without a law.
     pub family: Option<String>,
+    /// Joint, from 0, whose angle its effect changes.
+    pub joint: Option<usize>,
+    /// True for a law of the grammar: it is all that acts at its joint.
+    pub is_whole_law: bool,
 }
 
 #[derive(Debug, Clone)]
@@ -187,6 +191,8 @@ impl Block {
                 is_surface: false,
                 is_gear: false,
                 family: None,
+                joint: None,
+                is_whole_law: false,
             }
         };
         designs.into_iter().map(of).collect()

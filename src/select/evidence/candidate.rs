@@ -50,6 +50,9 @@ impl Candidate {
         let mut blocks = Block::all(all.iter().map(design).collect(), fit);
         for (block, candidate) in blocks.iter_mut().zip(all) {
             block.family = candidate.hypothesis.effect().map(|effect| effect.name().to_owned());
+            let effect = candidate.hypothesis.effect();
+            block.joint = effect.filter(|effect| effect.acts_at_joint()).and_then(Effect::joint);
+            block.is_whole_law = effect.is_some_and(Effect::is_described);
             block.is_gear = matches!(candidate.hypothesis.kind, HypothesisKind::Gear(_));
             block.is_surface = !block.is_law() && candidate.hypothesis.depends_on.len() > 1;
         }

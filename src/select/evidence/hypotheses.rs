@@ -17,6 +17,7 @@ use crate::residual_tests::Covariate;
 use crate::select::candidates::Candidates;
 use crate::select::data::Data;
 use crate::select::fitted::Fitted;
+use crate::select::grammar;
 use crate::select::neighbourhood::Linearised;
 
 /// Fit linearised at some rows, with all hypotheses about its residual.
@@ -56,14 +57,18 @@ impl<'a> Hypotheses<'a> {
         let linearised =
             fitted.linearised_with(data, rows, &candidates, &hypothesis_sites(&fitted.problem));
         let fit = linearised.fitted();
-        let known = added
-            .iter()
-            .zip(&columns_of_part)
-            .map(|(part, columns_of_part)| (part.clone(), fit.select_columns(columns_of_part)));
+        let known = added.iter().zip(&columns_of_part).map(|(part, columns_of_part)| {
+            // Of a law the coefficients: what stands inside of it keeps its value.
+            let inner = if let Effect::Law(law) = part { law.parameters().len() } else { 0 };
+            let count = columns_of_part.len().saturating_sub(inner);
+            (part.clone(), fit.select_columns(&columns_of_part[..count]))
+        });
         // No list holds all waves and moves: each has its own chance, whichever others are looked
         // at.
         let is_unlisted = |effect: &Effect| {
-            order_of(effect).is_some() || matches!(effect, Effect::StationMove { .. })
+            order_of(effect).is_some()
+                || effect.is_described()
+                || matches!(effect, Effect::StationMove { .. })
         };
         let (unlisted, known): (Vec<_>, Vec<_>) =
             known.partition(|(effect, _)| is_unlisted(effect));
@@ -122,7 +127,9 @@ impl<'a> Hypotheses<'a> {
             Effect::StationMove { .. } => self.times.len().max(1) as f64,
             _ => effect.tries(&family.collect::<Vec<_>>(), problem),
         };
-        let ln_prior = self.ln_family - tries.ln();
+        let ln_prior = grammar::ln_prior(effect, problem)
+            .map(|ln_prior| self.ln_family + ln_prior)
+            .unwrap_or_else(|| self.ln_family - tries.ln());
         let hypothesis = Hypothesis::of_effect(effect, problem, self.coverage);
         Some(Candidate { hypothesis, variant: 0, design, ln_prior, coefficients })
     }

@@ -22,6 +22,7 @@ mod functions;
 mod hypotheses;
 mod hypothesis;
 mod hypothesis_set;
+mod laws;
 mod limits;
 mod marginal;
 mod moves;
@@ -174,7 +175,8 @@ fn weighed_without<'a>(
             let moves = moves::promising(&hypotheses, &weighted, times, (fitted, left_out));
             [waves, moves].concat()
         };
-        (weighted, unlisted, products.into_known())
+        let laws = laws::promising(&hypotheses, &weighted, &products, (fitted, data, left_out));
+        (weighted, [unlisted, laws].concat(), products.into_known())
     };
     let blocks_of = |some: &[Candidate]| {
         Candidate::blocks(&some.iter().collect::<Vec<_>>(), (fitted, &target.fit), left_out)

@@ -112,6 +112,14 @@ impl<'a> Products<'a> {
 
     /// Returns ln of the prior probability of a hypothesis in a set that contains the `others`.
     pub fn ln_prior(&self, block: &Block, others: &[usize]) -> f64 {
+        // A law of the grammar is all that acts at its joint.
+        let is_shared = |other: &usize| {
+            let other = &self.blocks[*other];
+            other.joint == block.joint && (other.is_whole_law || block.is_whole_law)
+        };
+        if block.joint.is_some() && others.iter().any(is_shared) {
+            return f64::NEG_INFINITY;
+        }
         let is_alike =
             block.is_law() && others.iter().any(|&other| self.blocks[other].family == block.family);
         block.ln_prior + if is_alike { self.target.alike } else { 0.0 }
@@ -280,6 +288,32 @@ impl Left<'_, '_> {
         let normal = Normal::Dense { gram: gram / (size * size), product: product / size };
         let (ln_summed, size) = block.over_sizes(&normal, (squares, target.noise.freedom), grid);
         Some((ln_summed - self.ln_determinant - ln_determinant, size))
+    }
+
+    /// Returns the sum of squares that the set leaves.
+    pub fn squares(&self) -> f64 {
+        self.squares
+    }
+
+    /// Returns B and p of columns along one lever, one for each pose: they have the products
+    /// diag(|l|²) − BᵀB with one another, everything fitted and the set projected out, and p with
+    /// the residual.
+    pub fn along_lever(&self, lever: &DVector<f64>) -> (DMatrix<f64>, DVector<f64>) {
+        let (fitted, reach, residual) =
+            (self.products.target.fit.fitted(), self.reach(), self.residual());
+        let rows = [fitted.ncols(), reach.nrows()];
+        let poses = lever.len() / 3;
+        let mut less = DMatrix::zeros(rows[0] + rows[1], poses);
+        let mut product = DVector::zeros(poses);
+        for pose in 0..poses {
+            let lever = lever.rows(3 * pose, 3);
+            let mut column = less.column_mut(pose);
+            column.rows_mut(0, rows[0]).gemv_tr(1.0, &fitted.rows(3 * pose, 3), &lever, 0.0);
+            let mut below = column.rows_mut(rows[0], rows[1]);
+            below.gemv(1.0, &reach.columns(3 * pose, 3), &lever, 0.0);
+            product[pose] = lever.dot(&residual.rows(3 * pose, 3));
+        }
+        (less, product)
     }
 
     /// Returns the residual that the set leaves, with the fitted parameters projected out.

@@ -145,7 +145,7 @@ fn at_link<'a>(found: &Effect, problem: &Problem, rows: &'a Rows) -> Option<View
 /// Returns the view of an effect that displaces the measuring frame as a function of time; `None`
 /// for other effects. Every pose moves in the same direction.
 fn of_time<'a>(problem: &Problem, rows: &'a Rows) -> Option<View<'a>> {
-    let is_shift = |site: &ParameterSite| matches!(site, ParameterSite::Shift { .. });
+    let is_shift = |site: &ParameterSite| matches!(site, ParameterSite::Shift { axis: 0..3 });
     let &[quantity @ (Known::Elapsed | Known::Time)] = rows.quantities().as_slice() else {
         return None;
     };

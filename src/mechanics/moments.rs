@@ -1,0 +1,61 @@
+//! Moments of the loads about the axes of the joints, as formulas of laws take them.
+
+use super::arm::Arm;
+use super::forward::Bend;
+use super::workspace::Workspace;
+use crate::problem::{PoseView, Problem};
+use crate::scalar::Scalar;
+
+/// Undeflected arm whose loads have a moment about every joint's axis.
+///
+/// The masses, payload and hoists are those that the problem declares; what deflects or is an error
+/// of a load is left out.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AxisMoments<S> {
+    arm: Arm<S>,
+}
+
+impl AxisMoments<f64> {
+    /// Creates the arm of a problem.
+    pub fn new(problem: &Problem) -> Self {
+        let mut arm = Arm::nominal(problem);
+        (arm.mounting, arm.rope, arm.mixing) = (None, None, None);
+        for joint in &mut arm.joints {
+            // A joint that gives way by nothing: the moment about its axis is summed.
+            joint.flexibility = Some(0.0);
+            (joint.nonlinear, joint.lateral, joint.slide) = (None, None, None);
+        }
+        Self { arm }
+    }
+
+    /// Converts the arm to another scalar, the coordinate of one joint being `seeded`.
+    pub fn seeded<S: Scalar>(&self, joint: usize, seed: S) -> AxisMoments<S> {
+        let mut arm: Arm<S> = self.arm.lift();
+        if let Some(joint) = arm.joints.get_mut(joint) {
+            match joint.kind {
+                crate::problem::JointKind::Prismatic => joint.d += seed,
+                _ => joint.theta += seed,
+            }
+        }
+        AxisMoments { arm }
+    }
+}
+
+impl<S: Scalar> AxisMoments<S> {
+    /// Returns the moment of everything beyond each joint about its axis [N·m], shape = (joints).
+    pub fn at(&self, setup: &PoseView) -> Vec<S> {
+        let arm = &self.arm;
+        let mut ws = Workspace::default();
+        arm.gather_forces(setup, &[], &mut ws);
+        arm.walk(setup, Bend::Rigid, arm.last(), &mut ws);
+        ws.sum_moments();
+        let mut next = 0;
+        // Three moments for each element of a beam come before that of its joint.
+        let moment = |joint: &super::Joint<S>| {
+            let of_beam = if joint.beam.is_some() { 3 * arm.beam_elements } else { 0 };
+            next += of_beam + 1;
+            ws.next_moments.get(next - 1).copied().unwrap_or_else(|| S::from(0.0))
+        };
+        arm.joints.iter().map(moment).collect()
+    }
+}

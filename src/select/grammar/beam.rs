@@ -1,0 +1,221 @@
+//! Beam search over sums of terms.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use super::site::{BEAM_VARIANCE, Noise, Span, WhitenedSite};
+use super::terms::{Chunk, Product, Terms};
+
+/// Terms of a sum at most.
+const MAX_TERMS: usize = 3;
+/// Sums of equally many terms that are extended.
+const WIDTH: usize = 8;
+/// Sums whose terms are each exchanged.
+const EXCHANGED: usize = 4;
+/// Extensions of a sum that are kept, by evidence and by guide.
+const KEPT: [usize; 2] = [100, 40];
+/// Difference of the predictions of two sums of the beam, in units of the noise.
+const DISTINCT: f64 = 0.7;
+
+/// Sum of terms.
+pub type Sum = Vec<Product>;
+
+/// Evidence of a sum.
+#[derive(Debug, Clone, Copy)]
+pub struct Scored {
+    /// ln of evidence and prior.
+    pub ln_posterior: f64,
+    /// The same where what is not explained yet counts as noise: simple terms come first.
+    guide: f64,
+}
+
+/// Sum that is extended.
+struct State {
+    sum: Sum,
+    ln_prior: f64,
+    span: Span,
+    /// Weighted columns transposed, shape = (k, poses).
+    weighted: DMatrix<f32>,
+}
+
+/// Term that extends a sum, with its place.
+struct Extension {
+    place: (usize, usize),
+    scored: Scored,
+}
+
+/// Search at one joint.
+pub struct Beam<'a> {
+    /// All terms.
+    pub terms: &'a Terms,
+    /// Products at the joint.
+    pub site: &'a WhitenedSite,
+    /// Likelihood over the noise.
+    pub noise: &'a Noise,
+    /// Sum of squares that a free value in each pose explains.
+    explainable: f64,
+}
+
+/// Returns ln of the prior probability of a sum: each further term halves it, terms have no order.
+pub fn ln_prior(terms: &Terms, sum: &Sum) -> f64 {
+    let count = sum.len().max(1);
+    let orderings: f64 = (1..=count).map(|k| k as f64).product();
+    let of_terms: f64 = sum.iter().map(|term| terms.ln_prior(term)).sum();
+    of_terms + (count - 1) as f64 * 0.5_f64.ln() + orderings.ln()
+}
+
+impl<'a> Beam<'a> {
+    /// Creates the search.
+    pub fn new(terms: &'a Terms, site: &'a WhitenedSite, noise: &'a Noise) -> Self {
+        Self { terms, site, noise, explainable: site.explainable() }
+    }
+
+    /// Returns all sums that were evaluated.
+    pub fn search(&self) -> BTreeMap<Sum, Scored> {
+        let mut known: BTreeMap<Sum, Scored> = BTreeMap::new();
+        let mut extended: BTreeSet<Sum> = BTreeSet::new();
+        let mut front: Vec<Sum> = vec![Vec::new()];
+        for depth in 1..=MAX_TERMS {
+            let mut next: BTreeMap<Sum, Scored> = BTreeMap::new();
+            self.extend(&front, &mut extended, &mut next);
+            if depth > 1 {
+                let exchanged: BTreeSet<Sum> = self
+                    .best(&next, EXCHANGED)
+                    .into_iter()
+                    .flat_map(|sum| {
+                        (0..sum.len()).map(move |k| [&sum[..k], &sum[k + 1..]].concat())
+                    })
+                    .filter(|sum| !extended.contains(sum))
+                    .collect();
+                let exchanged: Vec<Sum> = exchanged.into_iter().collect();
+                self.extend(&exchanged, &mut extended, &mut next);
+            }
+            front = self.best(&next, WIDTH);
+            known.extend(next);
+        }
+        known
+    }
+
+    /// Extends sums by every term.
+    fn extend(&self, sums: &[Sum], extended: &mut BTreeSet<Sum>, next: &mut BTreeMap<Sum, Scored>) {
+        for sum in sums {
+            extended.insert(sum.clone());
+            let state = self.state(sum);
+            for Extension { place: (chunk, term), scored } in self.extensions(&state) {
+                let term = &self.terms.chunks[chunk].terms[term];
+                if state.sum.contains(term) {
+                    continue;
+                }
+                let mut longer = [state.sum.as_slice(), std::slice::from_ref(term)].concat();
+                longer.sort();
+                let entry = next.entry(longer).or_insert(scored);
+                if scored.ln_posterior > entry.ln_posterior {
+                    *entry = scored;
+                }
+            }
+        }
+    }
+
+    fn state(&self, sum: &Sum) -> State {
+        let columns: Vec<DVector<f64>> =
+            sum.iter().flat_map(|term| self.terms.columns(term)).map(normed).collect();
+        let span = self.site.span(&columns);
+        let weighted = span.weighted.transpose().map(|value| value as f32);
+        let ln_prior = if sum.is_empty() { 0.0 } else { ln_prior(self.terms, sum) };
+        State { sum: sum.clone(), ln_prior, span, weighted }
+    }
+
+    /// Returns the best extensions of a sum.
+    fn extensions(&self, state: &State) -> Vec<Extension> {
+        let count = state.sum.len() as f64;
+        let further = if state.sum.is_empty() { 0.0 } else { 0.5_f64.ln() + (count + 1.0).ln() };
+        let (before, rank) = (state.span.taken(), state.span.along.len());
+        let of_chunk = |(number, chunk): (usize, &Chunk)| {
+            let along = &state.weighted * &chunk.columns;
+            let product = |a: usize, b: usize| {
+                let pairs = along.column(a).into_iter().zip(along.column(b).into_iter());
+                pairs.map(|(x, y)| f64::from(*x) * f64::from(*y)).sum::<f64>()
+            };
+            let taken = |a: usize| {
+                let pairs = along.column(a).into_iter().zip(state.span.along.iter());
+                pairs.map(|(x, y)| f64::from(*x) * y).sum::<f64>()
+            };
+            let mut all: Vec<Extension> = Vec::new();
+            for term in 0..chunk.terms.len() {
+                let (gain, new) = chunk.gain(term, product, taken);
+                if new == 0 {
+                    continue;
+                }
+                let prior = state.ln_prior + chunk.ln_prior[term] + further;
+                let scored = self.scored(before + gain, rank + new, prior);
+                all.push(Extension { place: (number, term), scored });
+            }
+            best_of(all)
+        };
+        let all: Vec<Extension> =
+            self.terms.chunks.par_iter().enumerate().flat_map_iter(of_chunk).collect();
+        best_of(all)
+    }
+
+    fn scored(&self, taken: f64, rank: usize, ln_prior: f64) -> Scored {
+        let shrunk = taken * BEAM_VARIANCE / (1.0 + BEAM_VARIANCE);
+        let occam = 0.5 * rank as f64 * (1.0 + BEAM_VARIANCE).ln();
+        let poses = self.site.diagonal.len() as f64;
+        let left = (1.0 - shrunk / self.explainable.max(f64::MIN_POSITIVE)).max(1e-12);
+        Scored {
+            ln_posterior: self.noise.gain(shrunk) - occam + ln_prior,
+            guide: -0.5 * poses * left.ln() - occam + ln_prior,
+        }
+    }
+
+    /// Returns the best sums, by evidence and by guide in turn, each with another prediction.
+    fn best(&self, all: &BTreeMap<Sum, Scored>, most: usize) -> Vec<Sum> {
+        const LOOKED_AT: usize = 120;
+        let by = |of: fn(&Scored) -> f64| {
+            let mut sorted: Vec<(&Sum, f64)> = all.iter().map(|(sum, s)| (sum, of(s))).collect();
+            sorted.sort_by(|a, b| b.1.total_cmp(&a.1));
+            sorted.truncate(LOOKED_AT);
+            sorted
+        };
+        let (by_evidence, by_guide) = (by(|s| s.ln_posterior), by(|s| s.guide));
+        let in_turn = by_evidence.iter().zip(&by_guide).flat_map(|(a, b)| [a.0, b.0]);
+        let mut found: Vec<(Sum, DVector<f64>)> = Vec::new();
+        for sum in in_turn {
+            if found.len() >= most {
+                break;
+            }
+            if found.iter().any(|(known, _)| known == sum) {
+                continue;
+            }
+            let prediction = self.state(sum).span.prediction();
+            let is_near = |(_, other): &(Sum, DVector<f64>)| {
+                self.site.squares(&(other - &prediction)) < DISTINCT.powi(2) * self.noise.factor
+            };
+            if !found.iter().any(is_near) {
+                found.push((sum.clone(), prediction));
+            }
+        }
+        found.into_iter().map(|(sum, _)| sum).collect()
+    }
+}
+
+/// Returns a column of length 1.
+fn normed(column: DVector<f64>) -> DVector<f64> {
+    let norm = column.norm();
+    if norm > 0.0 { column / norm } else { column }
+}
+
+/// Returns the best extensions by evidence and by guide.
+fn best_of(mut all: Vec<Extension>) -> Vec<Extension> {
+    if all.len() <= KEPT[0] {
+        return all;
+    }
+    all.sort_by(|a, b| b.scored.ln_posterior.total_cmp(&a.scored.ln_posterior));
+    let mut others = all.split_off(KEPT[0]);
+    others.sort_by(|a, b| b.scored.guide.total_cmp(&a.scored.guide));
+    others.truncate(KEPT[1]);
+    all.extend(others);
+    all
+}

@@ -1,0 +1,266 @@
+//! Classes of sums whose predictions noise does not tell apart.
+
+use nalgebra::DVector;
+
+use super::beam::{Beam, Sum, ln_prior};
+use super::dictionary::factors;
+use super::quantities::Quantities;
+use super::site::{Noise, WhitenedSite};
+use super::terms::{Terms, product};
+use super::written::{Written, written};
+
+/// ln odds behind the best sum beyond which sums are left out.
+const LN_ODDS: f64 = 12.0;
+/// Sums that form classes at most.
+const MAX_SUMS: usize = 400;
+/// Sums whose inner parameters are refined.
+const MAX_REFINED: usize = 40;
+/// Classes that become laws.
+const MAX_CLASSES: usize = 8;
+/// Difference of predictions, in units of the noise, below which sums are one class.
+const SAME: f64 = 2.0;
+/// Values of an inner parameter that are tried: from one step below to one step above.
+const GRID: i32 = 8;
+
+/// Law that stands for its class.
+#[derive(Debug, Clone)]
+pub struct Proposal {
+    /// Formulas and parameters of the simplest law of the class.
+    pub law: Written,
+    /// ln of the prior probability of the class, its likelihood being that of this law.
+    pub ln_prior: f64,
+    /// True if a law that the fit holds belongs to the class.
+    pub is_present: bool,
+}
+
+/// Sum with the values of its inner parameters.
+struct Refined {
+    sum: Sum,
+    /// For each term the value of the parameter inside of each factor.
+    inner: Vec<Vec<f64>>,
+    ln_posterior: f64,
+    ln_evidence: f64,
+    ln_prior: f64,
+    prediction: DVector<f64>,
+}
+
+struct Class {
+    first: Refined,
+    /// ln of the sum of the posteriors.
+    ln_posterior: f64,
+}
+
+/// Returns the most probable laws at the coordinate of a joint, counted from 0; `present` are the
+/// columns of laws that the fit holds.
+pub fn proposals(
+    known: &Quantities,
+    joint: usize,
+    (site, noise): (&WhitenedSite, &Noise),
+    present: &[Vec<DVector<f64>>],
+) -> Vec<Proposal> {
+    let terms = Terms::new(factors(known, joint), known, site);
+    let beam = Beam::new(&terms, site, noise);
+    let mut sums: Vec<(Sum, f64)> =
+        beam.search().into_iter().map(|(sum, scored)| (sum, scored.ln_posterior)).collect();
+    sums.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let Some(best) = sums.first().map(|sum| sum.1) else { return Vec::new() };
+    sums.retain(|(_, ln)| *ln > best - LN_ODDS);
+    sums.truncate(MAX_SUMS);
+    let refiner = Refiner { terms: &terms, known, site, noise };
+    let mut all: Vec<Refined> = sums
+        .into_iter()
+        .enumerate()
+        .map(|(place, (sum, _))| refiner.refined(sum, place < MAX_REFINED))
+        .collect();
+    all.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
+    let mut classes: Vec<Class> = Vec::new();
+    for refined in all {
+        let is_same = |class: &&mut Class| {
+            let difference = &class.first.prediction - &refined.prediction;
+            site.squares(&difference) < SAME.powi(2) * noise.factor
+        };
+        match classes.iter_mut().find(is_same) {
+            Some(class) => {
+                class.ln_posterior = ln_add(class.ln_posterior, refined.ln_posterior);
+                // The simplest that is hardly less probable stands for the class.
+                let is_simpler = refined.ln_prior > class.first.ln_prior + 1e-9
+                    && refined.ln_posterior > class.first.ln_posterior - 0.5;
+                if is_simpler {
+                    class.first = refined;
+                }
+            }
+            None => {
+                let ln_posterior = refined.ln_posterior;
+                classes.push(Class { first: refined, ln_posterior });
+            }
+        }
+    }
+    classes.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
+    let predictions: Vec<DVector<f64>> =
+        present.iter().map(|columns| site.span(columns).prediction()).collect();
+    let proposal = |class: Class| {
+        let first = &class.first;
+        let is_catalogued = first.sum.iter().all(|term| {
+            matches!(term.as_slice(), [k] if terms.factors[usize::from(*k)].form.is_catalogued(joint))
+        });
+        if is_catalogued {
+            return None;
+        }
+        let is_near = |other: &DVector<f64>| {
+            site.squares(&(other - &first.prediction)) < SAME.powi(2) * noise.factor
+        };
+        let is_present = predictions.iter().any(is_near);
+        let law = written((&terms, known), joint, &first.sum, &first.inner);
+        let ln_prior = class.ln_posterior - first.ln_evidence;
+        Some(Proposal { law, ln_prior, is_present })
+    };
+    classes.into_iter().filter_map(proposal).take(MAX_CLASSES).collect()
+}
+
+/// Refinement of parameters inside of sums.
+struct Refiner<'a> {
+    terms: &'a Terms,
+    known: &'a Quantities,
+    site: &'a WhitenedSite,
+    noise: &'a Noise,
+}
+
+impl Refiner<'_> {
+    /// Returns a sum with its inner parameters at their best values, averaged over the cell of the
+    /// grid that each stands for.
+    fn refined(&self, sum: Sum, is_refined: bool) -> Refined {
+        let starts = |term: &Vec<u16>| {
+            term.iter()
+                .map(|&k| self.terms.factors[usize::from(k)].inner.map_or(0.0, |inner| inner.0))
+                .collect::<Vec<f64>>()
+        };
+        let mut inner: Vec<Vec<f64>> = sum.iter().map(starts).collect();
+        let ln_prior = ln_prior(self.terms, &sum);
+        let mut averaged = 0.0;
+        for (t, term) in sum.iter().enumerate().filter(|_| is_refined) {
+            for (f, &factor) in term.iter().enumerate() {
+                let Some((start, step)) = self.terms.factors[usize::from(factor)].inner else {
+                    continue;
+                };
+                let at = |k: i32| start + step * f64::from(k) / f64::from(GRID);
+                let mut evidences = Vec::new();
+                for k in -GRID..=GRID {
+                    inner[t][f] = at(k);
+                    evidences.push((k, self.evidence(&sum, &inner)));
+                }
+                let best = evidences
+                    .iter()
+                    .copied()
+                    .max_by(|a, b| a.1.total_cmp(&b.1).then_with(|| b.0.abs().cmp(&a.0.abs())));
+                let (k, most) = best.unwrap_or((0, 0.0));
+                inner[t][f] = at(k);
+                // Over the cell about the best value.
+                let cell: Vec<f64> = evidences
+                    .iter()
+                    .filter(|(other, _)| (other - k).abs() <= GRID / 2)
+                    .map(|(_, ln)| (ln - most).exp())
+                    .collect();
+                averaged += (cell.iter().sum::<f64>() / f64::from(GRID + 1)).ln();
+            }
+        }
+        let columns = self.columns(&sum, &inner);
+        let span = self.site.span(&columns);
+        let ln_evidence = self.noise.evidence(span.taken(), span.along.len());
+        Refined {
+            ln_posterior: ln_evidence + averaged + ln_prior,
+            prediction: span.prediction(),
+            ln_evidence,
+            ln_prior,
+            inner,
+            sum,
+        }
+    }
+
+    fn evidence(&self, sum: &Sum, inner: &[Vec<f64>]) -> f64 {
+        let span = self.site.span(&self.columns(sum, inner));
+        self.noise.evidence(span.taken(), span.along.len())
+    }
+
+    fn columns(&self, sum: &Sum, inner: &[Vec<f64>]) -> Vec<DVector<f64>> {
+        let of_term = |(term, inner): (&Vec<u16>, &Vec<f64>)| {
+            let of_factor = |(&k, &x): (&u16, &f64)| {
+                let form = self.terms.factors[usize::from(k)].form;
+                form.columns(self.known, x).into_iter().map(DVector::from_vec).collect::<Vec<_>>()
+            };
+            let factors: Vec<Vec<DVector<f64>>> = term.iter().zip(inner).map(of_factor).collect();
+            product(factors.iter().map(Vec::as_slice)).unwrap_or_default()
+        };
+        sum.iter().zip(inner).flat_map(of_term).collect()
+    }
+}
+
+fn ln_add(a: f64, b: f64) -> f64 {
+    let most = a.max(b);
+    most + ((a - most).exp() + (b - most).exp()).ln()
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::DMatrix;
+
+    use super::*;
+
+    /// Returns numbers without pattern, of mean 0 and root mean square 1 about.
+    fn scattered(count: usize, seed: f64) -> Vec<f64> {
+        let value = |k: usize| ((12.9898 * k as f64 + 78.233 * seed).sin() * 43_758.545_3).fract();
+        (0..count).map(|k| 2.0 * 3.0_f64.sqrt() * (value(k).abs() - 0.5)).collect()
+    }
+
+    /// Returns the laws of a residual of 60 poses of three joints that one function makes beside
+    /// noise.
+    fn found(function: impl Fn(&[f64; 3]) -> f64) -> Vec<Proposal> {
+        let commands: Vec<(usize, Vec<f64>)> =
+            (0..3).map(|joint| (joint, scattered(60, 1.0 + joint as f64))).collect();
+        let known = Quantities {
+            commands: commands.clone(),
+            turns: vec![true; 3],
+            sides: Vec::new(),
+            moments: Vec::new(),
+            warming: Some(scattered(60, 9.0)),
+            lag: None,
+            elapsed: None,
+            payload: None,
+            covariates: Vec::new(),
+            names: Vec::new(),
+        };
+        let noise = scattered(60, 20.0);
+        let at = |pose: usize| std::array::from_fn(|joint| commands[joint].1[pose]);
+        let product = DVector::from_fn(60, |pose, _| function(&at(pose)) + noise[pose]);
+        let squares = product.norm_squared();
+        let site = WhitenedSite {
+            diagonal: DVector::repeat(60, 1.0),
+            less: DMatrix::zeros(0, 60),
+            product,
+        };
+        let noise = Noise::new(squares, 60.0, |squares| -0.5 * squares);
+        proposals(&known, 0, (&site, &noise), &[])
+    }
+
+    #[test]
+    fn a_product_of_two_joints_is_written_down() {
+        let laws = found(|q| 12.0 * q[0].sin() * q[1].cos());
+        assert_eq!(laws[0].law.formulas, ["sin(q1)*cos(q2)"]);
+        assert_eq!(laws[0].law.name, "joint1-sin-q1-cos-q2");
+        let second = laws.get(1).map_or(f64::NEG_INFINITY, |law| law.ln_prior);
+        assert!(laws[0].ln_prior.is_finite() && second < 0.0);
+    }
+
+    #[test]
+    fn a_kink_has_its_place_as_a_parameter() {
+        let laws = found(|q| 9.0 * (q[2] - 0.35).abs());
+        assert_eq!(laws[0].law.formulas, ["abs(q3 - c)"]);
+        let place = &laws[0].law.parameters[0];
+        assert!((place.start - 0.35).abs() < 0.15, "{place:?}");
+    }
+
+    #[test]
+    fn a_law_of_the_catalogue_is_left_to_it() {
+        let laws = found(|q| 8.0 * q[0]);
+        assert!(laws.iter().all(|law| law.law.formulas != ["q1"]), "{laws:?}");
+    }
+}

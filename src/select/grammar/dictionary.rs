@@ -1,0 +1,114 @@
+//! All factors at one joint, each with its prior probability.
+
+use std::collections::BTreeSet;
+
+use super::factor::{Factor, Form};
+use super::quantities::{Quantities, range};
+
+/// Highest order of a wave of a joint's command.
+const HIGHEST_ORDER: u32 = 5;
+/// Positions of a kink along the range of a joint.
+const KINKS: u32 = 9;
+/// Times of a step along the time measured.
+const STEPS: u32 = 16;
+/// Parts of the time measured at both ends without a step.
+const STEP_MARGIN: f64 = 0.04;
+/// Time constants of a settling, as parts of the time measured.
+const SETTLINGS: (f64, f64, u32) = (0.08, 0.8, 4);
+/// Factors a and b of sums of angles a q + b q'.
+const SUMS: [[i32; 2]; 4] = [[1, 1], [1, -1], [2, -1], [1, -2]];
+/// Smallest part of the poses with a moment of either sign for the sign to be a factor.
+const MIN_SIGN_SHARE: f64 = 0.1;
+
+/// Returns all factors at the coordinate of a joint.
+///
+/// All kinds of factors are as probable. Half of a kind belongs to the joint itself, the other half
+/// to the other joints; order k has 1/k² of order 1; a parameter inside costs the number of values
+/// tried.
+pub fn factors(known: &Quantities, own: usize) -> Vec<Factor> {
+    let mut all: Vec<Factor> = Vec::new();
+    let mut add = |form: Form, inner: Option<(f64, f64)>, ln_prior: f64| {
+        all.push(Factor { form, inner, ln_prior });
+    };
+    let others = known.commands.len().saturating_sub(1).max(1) as f64;
+    let of_joint = |joint: usize| if joint == own { 0.5_f64.ln() } else { (0.5 / others).ln() };
+    let orders: f64 = (1..=HIGHEST_ORDER).map(|k| f64::from(k).powi(-2)).sum();
+    for (joint, values) in &known.commands {
+        let (joint, ln_joint) = (*joint, of_joint(*joint));
+        add(Form::Command(joint), None, ln_joint);
+        add(Form::Square(joint), None, ln_joint);
+        let (low, high) = range(values);
+        let step = (high - low) / f64::from(KINKS);
+        for k in 0..KINKS {
+            let at = low + (f64::from(k) + 0.5) * step;
+            add(Form::Kink(joint), Some((at, step)), ln_joint - f64::from(KINKS).ln());
+        }
+        for order in (1..=HIGHEST_ORDER).filter(|_| known.turns[joint]) {
+            let ln_prior = ln_joint - (f64::from(order).powi(2) * orders).ln() - 3.0_f64.ln();
+            for cosine in [false, true] {
+                add(Form::Wave { joint, order, cosine }, None, ln_prior);
+            }
+            add(Form::Harmonic { joint, order }, None, ln_prior);
+        }
+    }
+    let turning: Vec<usize> =
+        known.commands.iter().map(|(joint, _)| *joint).filter(|j| known.turns[*j]).collect();
+    let pairs: Vec<[usize; 2]> = turning
+        .iter()
+        .enumerate()
+        .flat_map(|(k, &one)| turning[k + 1..].iter().map(move |&other| [one, other]))
+        .collect();
+    let of_sum = -(pairs.len().max(1) as f64 * SUMS.len() as f64 * 2.0).ln();
+    for joints in pairs {
+        for factors in SUMS {
+            for cosine in [false, true] {
+                add(Form::OfSum { joints, factors, cosine }, None, of_sum);
+            }
+        }
+    }
+    for (joint, _) in &known.sides {
+        add(Form::Side(*joint), None, of_joint(*joint));
+    }
+    for (joint, values) in &known.moments {
+        add(Form::Moment(*joint), None, of_joint(*joint));
+        add(Form::CubicMoment(*joint), None, of_joint(*joint));
+        let positive = values.iter().filter(|moment| **moment > 0.0).count() as f64;
+        let share = positive / values.len().max(1) as f64;
+        if (MIN_SIGN_SHARE..=1.0 - MIN_SIGN_SHARE).contains(&share) {
+            add(Form::MomentSign(*joint), None, of_joint(*joint));
+        }
+    }
+    if known.warming.is_some() {
+        add(Form::Warming, None, 0.0);
+        add(Form::WarmingSquare, None, 0.0);
+    }
+    if known.lag.is_some() {
+        add(Form::Lag, None, 0.0);
+    }
+    if known.elapsed.is_some() {
+        add(Form::Elapsed, None, 0.0);
+        let (first, last, count) = SETTLINGS;
+        for k in 0..count {
+            let part = f64::from(k) / f64::from(count - 1);
+            let constant = first * (last / first).powf(part);
+            add(Form::Settling, Some((constant, 0.25 * constant)), -f64::from(count).ln());
+        }
+        let width = (1.0 - 2.0 * STEP_MARGIN) / f64::from(STEPS);
+        for k in 0..STEPS {
+            let at = STEP_MARGIN + (f64::from(k) + 0.5) * width;
+            add(Form::Step, Some((at, width)), -f64::from(STEPS).ln());
+        }
+    }
+    if known.payload.is_some() {
+        add(Form::Payload, None, 0.0);
+        add(Form::PayloadSquare, None, 0.0);
+    }
+    let covariates = known.covariates.len().max(1) as f64;
+    for k in 0..known.covariates.len() {
+        add(Form::Covariate(k), None, -covariates.ln());
+    }
+    let families: BTreeSet<usize> = all.iter().map(|factor| factor.form.family()).collect();
+    let ln_families = (families.len().max(1) as f64).ln();
+    all.iter_mut().for_each(|factor| factor.ln_prior -= ln_families);
+    all
+}

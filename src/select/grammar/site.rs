@@ -1,0 +1,142 @@
+//! Gram matrix of the lever of one coordinate in all poses, everything else projected out.
+
+use nalgebra::{DMatrix, DVector};
+
+/// Points of the table of the likelihood over the noise.
+const POINTS: usize = 400;
+/// Variances of the coefficients, relative to that of their estimates, that are equally probable.
+const VARIANCES: [f64; 3] = [300.0, 5000.0, 80_000.0];
+/// Variance that the beam search takes.
+pub const BEAM_VARIANCE: f64 = 3000.0;
+/// Part of a column's squared length that must be left beside others for it to count.
+const MIN_LEFT: f64 = 1e-4;
+
+/// ln of the density of a residual by its sum of squares, integrated over the noise.
+pub struct Noise {
+    squares: f64,
+    table: Vec<f64>,
+    /// Estimate of the noise factor's square where all that is left is noise.
+    pub factor: f64,
+}
+
+impl Noise {
+    /// Tabulates the density up to the squares of the residual; `freedom` are its degrees of freedom.
+    pub fn new(squares: f64, freedom: f64, ln_density: impl Fn(f64) -> f64) -> Self {
+        let at = |k: usize| squares * (k as f64 / POINTS as f64).powi(2);
+        let table: Vec<f64> = (0..=POINTS).map(|k| ln_density(at(k))).collect();
+        Self { squares, table, factor: (squares / freedom.max(1.0)).max(1e-12) }
+    }
+
+    /// Returns ln of the density where `taken` is taken off the squares, over that of the whole.
+    pub fn gain(&self, taken: f64) -> f64 {
+        let left = ((self.squares - taken).max(0.0) / self.squares.max(f64::MIN_POSITIVE)).sqrt();
+        let place = left * POINTS as f64;
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "an index")]
+        let low = (place as usize).min(POINTS - 1);
+        let part = place - low as f64;
+        self.table[low] * (1.0 - part) + self.table[low + 1] * part - self.table[POINTS]
+    }
+
+    /// Returns ln of the evidence for columns of `rank` new directions that take `squares` off.
+    pub fn evidence(&self, squares: f64, rank: usize) -> f64 {
+        let at = |variance: f64| {
+            self.gain(squares * variance / (1.0 + variance))
+                - 0.5 * rank as f64 * (1.0 + variance).ln()
+        };
+        let all = VARIANCES.map(at);
+        let most = all.into_iter().fold(f64::NEG_INFINITY, f64::max);
+        most + (all.iter().map(|ln| (ln - most).exp()).sum::<f64>() / all.len() as f64).ln()
+    }
+}
+
+/// Products of columns at one coordinate: the column of a function f of the pose has the squares
+/// fᵀWf and the product fᵀp with the residual, W = diag(d) − BᵀB.
+pub struct WhitenedSite {
+    /// d, shape = (poses).
+    pub diagonal: DVector<f64>,
+    /// B, shape = (directions, poses).
+    pub less: DMatrix<f64>,
+    /// p, shape = (poses).
+    pub product: DVector<f64>,
+}
+
+/// Columns that are orthonormal in W, with what they take off the residual.
+pub struct Span {
+    /// Functions of the pose, shape = (poses, k).
+    pub functions: DMatrix<f64>,
+    /// W times these functions.
+    pub weighted: DMatrix<f64>,
+    /// Their products with the residual.
+    pub along: DVector<f64>,
+}
+
+impl WhitenedSite {
+    /// Returns W times a function.
+    pub fn times(&self, function: &DVector<f64>) -> DVector<f64> {
+        let mut out = self.diagonal.component_mul(function);
+        let along = &self.less * function;
+        out.gemv_tr(-1.0, &self.less, &along, 1.0);
+        out
+    }
+
+    /// Returns the largest sum of squares that functions of the pose take off the residual.
+    pub fn explainable(&self) -> f64 {
+        let n = self.diagonal.len();
+        let mut gram = DMatrix::from_diagonal(&self.diagonal);
+        gram.gemm(-1.0, &self.less.transpose(), &self.less, 1.0);
+        let ridge = 1e-6 * gram.trace() / n.max(1) as f64;
+        (0..n).for_each(|k| gram[(k, k)] += ridge);
+        let solved = gram.cholesky().map(|factor| factor.solve(&self.product));
+        solved.map_or(0.0, |solved| solved.dot(&self.product))
+    }
+
+    /// Returns the span of some functions; those that the others or the fit take up are left out.
+    pub fn span(&self, functions: &[DVector<f64>]) -> Span {
+        let n = self.diagonal.len();
+        let mut span = Span {
+            functions: DMatrix::zeros(n, 0),
+            weighted: DMatrix::zeros(n, 0),
+            along: DVector::zeros(0),
+        };
+        for function in functions {
+            let mut left = function.clone();
+            let mut weighted = self.times(&left);
+            let whole = left.dot(&weighted);
+            for _ in 0..2 {
+                let along = span.functions.tr_mul(&weighted);
+                left -= &span.functions * &along;
+                weighted -= &span.weighted * along;
+            }
+            let length = left.dot(&weighted);
+            if length.is_nan() || length <= MIN_LEFT * whole || whole <= 0.0 {
+                continue;
+            }
+            let scale = length.sqrt().recip();
+            let k = span.along.len();
+            span.functions = span.functions.insert_column(k, 0.0);
+            span.functions.set_column(k, &(left * scale));
+            span.weighted = span.weighted.insert_column(k, 0.0);
+            span.weighted.set_column(k, &(weighted * scale));
+            let along = span.functions.column(k).dot(&self.product);
+            span.along = span.along.push(along);
+        }
+        span
+    }
+
+    /// Returns the squared length of a function's column in units of the noise.
+    pub fn squares(&self, function: &DVector<f64>) -> f64 {
+        function.dot(&self.times(function))
+    }
+}
+
+impl Span {
+    /// Returns the sum of squares taken off the residual.
+    pub fn taken(&self) -> f64 {
+        self.along.norm_squared()
+    }
+
+    /// Returns the function of the pose that fits the residual best.
+    pub fn prediction(&self) -> DVector<f64> {
+        &self.functions * &self.along
+    }
+}

@@ -1,0 +1,270 @@
+//! Terms: products of up to three factors, with their columns and products.
+
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use super::factor::Factor;
+use super::quantities::Quantities;
+use super::site::WhitenedSite;
+
+/// Probability of one, two and three factors.
+const FACTOR_COUNTS: [f64; 3] = [0.6, 0.3, 0.1];
+/// Part of a column's length that must be left by the fit.
+const MIN_LEFT: f64 = 2e-3;
+/// Terms whose columns are multiplied together.
+const TOGETHER: usize = 1024;
+/// Terms of two factors that are kept.
+const MAX_PAIRS: usize = 8_000;
+/// Terms of two factors to which a third is added.
+const MAX_EXTENDED: usize = 40;
+
+/// Numbers of the factors of a term, ascending.
+pub type Product = Vec<u16>;
+
+/// Terms of one width with their columns.
+pub struct Chunk {
+    /// Columns of one term.
+    pub width: usize,
+    /// Factors of each term.
+    pub terms: Vec<Product>,
+    /// ln of the prior probability of each term.
+    pub ln_prior: Vec<f64>,
+    /// Columns, shape = (poses, terms × width).
+    pub columns: DMatrix<f32>,
+    /// Squares of each column.
+    pub squares: Vec<f64>,
+    /// Product of the two columns of each term of width 2.
+    pub mixed: Vec<f64>,
+    /// Product of each column with the residual.
+    pub along: Vec<f64>,
+}
+
+/// All terms that are searched at one joint.
+pub struct Terms {
+    /// Factors with their columns.
+    pub factors: Vec<Factor>,
+    values: Vec<Vec<DVector<f64>>>,
+    /// Terms by width.
+    pub chunks: Vec<Chunk>,
+}
+
+impl Terms {
+    /// Creates all factors, the products of two that do best, and products of three from these.
+    pub fn new(factors: Vec<Factor>, known: &Quantities, site: &WhitenedSite) -> Self {
+        let columns = |factor: &Factor| {
+            let columns = factor.form.columns(known, factor.inner.map_or(0.0, |inner| inner.0));
+            columns.into_iter().map(DVector::from_vec).collect()
+        };
+        let values: Vec<Vec<DVector<f64>>> = factors.iter().map(columns).collect();
+        let mut all = Self { factors, values, chunks: Vec::new() };
+        let number = |k: usize| u16::try_from(k).unwrap_or(u16::MAX);
+        let count = all.factors.len().min(usize::from(u16::MAX));
+        let single: Vec<Product> = (0..count).map(|k| vec![number(k)]).collect();
+        let pairs: Vec<Product> = (0..count)
+            .flat_map(|a| (a..count).map(move |b| vec![number(a), number(b)]))
+            .filter(|pair| all.is_new(pair))
+            .collect();
+        let mut chunks = all.chunks_of(single, site);
+        let pairs = all.best(all.chunks_of(pairs, site), MAX_PAIRS);
+        let extended: Vec<Product> = all
+            .best_terms(&pairs, MAX_EXTENDED)
+            .into_iter()
+            .flat_map(|pair| {
+                (0..count).map(move |c| {
+                    let mut term = [pair.as_slice(), &[number(c)]].concat();
+                    term.sort_unstable();
+                    term
+                })
+            })
+            .filter(|term| all.is_new(term))
+            .collect();
+        let mut extended = extended;
+        extended.sort_unstable();
+        extended.dedup();
+        chunks.extend(pairs);
+        chunks.extend(all.chunks_of(extended, site));
+        all.chunks = chunks;
+        all
+    }
+
+    /// Returns true if a product says something that fewer or other factors do not.
+    fn is_new(&self, term: &Product) -> bool {
+        let of = |k: u16| &self.factors[usize::from(k)];
+        let wide = term.iter().filter(|k| of(**k).form.width() > 1).count();
+        wide <= 1
+            && term.iter().enumerate().all(|(k, &one)| {
+                term[k + 1..].iter().all(|&other| {
+                    let (a, b) = (of(one), of(other));
+                    let is_same = one == other;
+                    // One kink, step or settling of a quantity in a product.
+                    let is_shifted = a.form == b.form && a.inner.is_some();
+                    !(is_same && (a.form.is_idempotent() || a.form.width() > 1)) && !is_shifted
+                })
+            })
+    }
+
+    /// Returns ln of the prior probability of a term.
+    pub fn ln_prior(&self, term: &Product) -> f64 {
+        let distinct = {
+            let mut term = term.clone();
+            term.dedup();
+            term.len()
+        };
+        let orderings: f64 = match (term.len(), distinct) {
+            (2, 2) => 2.0,
+            (3, 3) => 6.0,
+            (3, 2) => 3.0,
+            _ => 1.0,
+        };
+        let factors = term.iter().map(|&k| self.factors[usize::from(k)].ln_prior);
+        FACTOR_COUNTS[term.len().clamp(1, 3) - 1].ln() + factors.sum::<f64>() + orderings.ln()
+    }
+
+    /// Returns the columns of a term.
+    pub fn columns(&self, term: &[u16]) -> Vec<DVector<f64>> {
+        let all = term.iter().map(|&k| &self.values[usize::from(k)]);
+        product(all.map(Vec::as_slice)).unwrap_or_default()
+    }
+
+    fn width(&self, term: &[u16]) -> usize {
+        term.iter().map(|&k| self.factors[usize::from(k)].form.width()).product()
+    }
+
+    fn chunks_of(&self, terms: Vec<Product>, site: &WhitenedSite) -> Vec<Chunk> {
+        let (narrow, wide): (Vec<Product>, Vec<Product>) =
+            terms.into_iter().partition(|term| self.width(term) == 1);
+        let chunk = |(width, terms): (usize, &[Product])| self.chunk(width, terms, site);
+        let all: Vec<(usize, &[Product])> = narrow
+            .chunks(TOGETHER)
+            .map(|some| (1, some))
+            .chain(wide.chunks(TOGETHER).map(|some| (2, some)))
+            .collect();
+        all.into_par_iter().map(chunk).collect()
+    }
+
+    fn chunk(&self, width: usize, terms: &[Product], site: &WhitenedSite) -> Chunk {
+        let n = site.diagonal.len();
+        let mut columns = DMatrix::<f64>::zeros(n, terms.len() * width);
+        for (k, term) in terms.iter().enumerate() {
+            for (j, values) in self.columns(term).iter().enumerate().take(width) {
+                columns.set_column(k * width + j, values);
+            }
+        }
+        // To one length: powers of large numbers would leave the range of single precision.
+        for mut column in columns.column_iter_mut() {
+            let norm = column.norm();
+            column /= if norm > 0.0 { norm } else { 1.0 };
+        }
+        let less = &site.less * &columns;
+        let dot = |a: usize, b: usize| {
+            let (x, y) = (columns.column(a), columns.column(b));
+            let whole: f64 =
+                x.iter().zip(y.iter()).zip(site.diagonal.iter()).map(|((x, y), d)| x * y * d).sum();
+            (whole, whole - less.column(a).dot(&less.column(b)))
+        };
+        let mut chunk = Chunk {
+            width,
+            terms: terms.to_vec(),
+            ln_prior: terms.iter().map(|term| self.ln_prior(term)).collect(),
+            squares: Vec::new(),
+            mixed: Vec::new(),
+            along: (0..columns.ncols()).map(|k| columns.column(k).dot(&site.product)).collect(),
+            columns: columns.map(|value| value as f32),
+        };
+        for k in 0..columns.ncols() {
+            let (whole, left) = dot(k, k);
+            let is_seen = left.is_finite() && left > MIN_LEFT * MIN_LEFT * whole;
+            chunk.squares.push(if is_seen { left } else { 0.0 });
+        }
+        if width == 2 {
+            chunk.mixed = (0..terms.len()).map(|k| dot(2 * k, 2 * k + 1).1).collect();
+        }
+        chunk
+    }
+
+    /// Returns the terms of some chunks that take most off the residual, in chunks.
+    fn best(&self, chunks: Vec<Chunk>, most: usize) -> Vec<Chunk> {
+        let mut gains: Vec<f64> = chunks.iter().flat_map(Chunk::lone_gains).collect();
+        if gains.len() <= most {
+            return chunks;
+        }
+        gains.sort_by(|a, b| b.total_cmp(a));
+        let least = gains[most];
+        chunks.into_iter().map(|chunk| chunk.above(least)).collect()
+    }
+
+    /// Returns the terms that take most off the residual.
+    fn best_terms(&self, chunks: &[Chunk], most: usize) -> Vec<Product> {
+        let mut all: Vec<(f64, &Product)> =
+            chunks.iter().flat_map(|chunk| chunk.lone_gains().zip(&chunk.terms)).collect();
+        all.sort_by(|a, b| b.0.total_cmp(&a.0).then_with(|| a.1.cmp(b.1)));
+        all.into_iter().take(most).map(|(_, term)| term.clone()).collect()
+    }
+}
+
+impl Chunk {
+    /// Returns what each term takes off the residual alone.
+    fn lone_gains(&self) -> impl Iterator<Item = f64> + '_ {
+        (0..self.terms.len()).map(|term| self.gain(term, |_, _| 0.0, |_| 0.0).0)
+    }
+
+    /// Returns what a term takes off the residual and its number of new directions, where `less`
+    /// are the products of its columns that others take, and `taken` those with the residual.
+    pub fn gain(
+        &self,
+        term: usize,
+        less: impl Fn(usize, usize) -> f64,
+        taken: impl Fn(usize) -> f64,
+    ) -> (f64, usize) {
+        const MIN_NEW: f64 = 1e-4;
+        let first = term * self.width;
+        let one = |k: usize| {
+            let left = self.squares[k] - less(k, k);
+            let is_new = left > MIN_NEW * self.squares[k] && self.squares[k] > 0.0;
+            if is_new { ((self.along[k] - taken(k)).powi(2) / left, left) } else { (0.0, 0.0) }
+        };
+        if self.width == 1 {
+            let (gain, left) = one(first);
+            return (gain, usize::from(left > 0.0));
+        }
+        let (a, b) = (one(first), one(first + 1));
+        let mixed = self.mixed[term] - less(first, first + 1);
+        let determinant = a.1 * b.1 - mixed * mixed;
+        if a.1 <= 0.0 || b.1 <= 0.0 || determinant <= 1e-6 * a.1 * b.1 {
+            let (gain, left) = if a.1 >= b.1 { a } else { b };
+            return (gain, usize::from(left > 0.0));
+        }
+        let [p, q] = [first, first + 1].map(|k| self.along[k] - taken(k));
+        ((b.1 * p * p - 2.0 * mixed * p * q + a.1 * q * q) / determinant, 2)
+    }
+
+    /// Returns the terms that take more than `least` off the residual.
+    fn above(self, least: f64) -> Self {
+        let gains: Vec<f64> = self.lone_gains().collect();
+        let kept: Vec<usize> = (0..gains.len()).filter(|&k| gains[k] > least).collect();
+        let columns: Vec<usize> =
+            kept.iter().flat_map(|k| (0..self.width).map(move |j| k * self.width + j)).collect();
+        Self {
+            width: self.width,
+            terms: kept.iter().map(|&k| self.terms[k].clone()).collect(),
+            ln_prior: kept.iter().map(|&k| self.ln_prior[k]).collect(),
+            columns: self.columns.select_columns(&columns),
+            squares: columns.iter().map(|&k| self.squares[k]).collect(),
+            mixed: if self.width == 2 {
+                kept.iter().map(|&k| self.mixed[k]).collect()
+            } else {
+                Vec::new()
+            },
+            along: columns.iter().map(|&k| self.along[k]).collect(),
+        }
+    }
+}
+
+/// Returns the products of columns, one of each factor.
+pub fn product<'a>(factors: impl Iterator<Item = &'a [DVector<f64>]>) -> Option<Vec<DVector<f64>>> {
+    factors.map(<[DVector<f64>]>::to_vec).reduce(|left, right| {
+        left.iter()
+            .flat_map(|one| right.iter().map(move |other| one.component_mul(other)))
+            .collect()
+    })
+}

@@ -1,0 +1,119 @@
+//! Sums as formulas of a law.
+
+use super::beam::Sum;
+use super::factor::Form;
+use super::quantities::Quantities;
+use super::terms::Terms;
+use crate::laws::LawParameter;
+
+/// Formulas of a law with the parameters inside.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Written {
+    /// Name: joint and quantities, without numbers.
+    pub name: String,
+    /// Formulas, one for each coefficient.
+    pub formulas: Vec<String>,
+    /// Parameters inside.
+    pub parameters: Vec<LawParameter>,
+}
+
+/// Digits of the values of inner parameters.
+const DIGITS: i32 = 3;
+
+/// Writes a sum at a joint, counted from 0, with the values of its inner parameters.
+pub fn written(
+    (terms, known): (&Terms, &Quantities),
+    joint: usize,
+    sum: &Sum,
+    inner: &[Vec<f64>],
+) -> Written {
+    let span = known.elapsed.as_ref().map_or(1.0, |elapsed| elapsed.1);
+    let mut parameters: Vec<LawParameter> = Vec::new();
+    let mut formulas = Vec::new();
+    let mut order: Vec<usize> = (0..sum.len()).collect();
+    // The most probable term first.
+    order.sort_by(|&a, &b| terms.ln_prior(&sum[b]).total_cmp(&terms.ln_prior(&sum[a])));
+    for t in order {
+        let mut products: Vec<Vec<String>> = vec![Vec::new()];
+        for (&k, &x) in sum[t].iter().zip(&inner[t]) {
+            let factor = &terms.factors[usize::from(k)];
+            let word = match (factor.form, factor.inner) {
+                (Form::Step, _) => digits(x * span).to_string(),
+                (form, Some((_, step))) => {
+                    let (letter, unit) =
+                        if form == Form::Settling { ("tau", span) } else { ("c", 1.0) };
+                    let same = parameters.iter().filter(|known| known.name.starts_with(letter));
+                    let name = match same.count() {
+                        0 => letter.to_owned(),
+                        count => format!("{letter}{}", count + 1),
+                    };
+                    parameters.push(LawParameter {
+                        name: name.clone(),
+                        start: digits(x * unit),
+                        min: None,
+                        max: None,
+                        sigma: Some(digits(step * unit)),
+                    });
+                    name
+                }
+                _ => String::new(),
+            };
+            let texts = factor.form.texts(known, &word);
+            products = products
+                .iter()
+                .flat_map(|left| {
+                    texts.iter().map(move |right| [left.as_slice(), &[right.clone()]].concat())
+                })
+                .collect();
+        }
+        formulas.extend(products.iter().map(|factors| joined(factors)));
+    }
+    Written { name: name(joint, &formulas), formulas, parameters }
+}
+
+/// Joins factors by signs of multiplication; powers of one quantity become one.
+fn joined(factors: &[String]) -> String {
+    let mut powers: Vec<(&str, u32)> = Vec::new();
+    for factor in factors {
+        let (base, power) = match factor.rsplit_once('^').map(|(base, power)| (base, power.parse()))
+        {
+            Some((base, Ok(power))) => (base, power),
+            _ => (factor.as_str(), 1),
+        };
+        match powers.iter_mut().find(|(known, _)| *known == base) {
+            Some((_, sum)) => *sum += power,
+            None => powers.push((base, power)),
+        }
+    }
+    let written = powers.into_iter().map(|(base, power)| match power {
+        1 => base.to_owned(),
+        power => format!("{base}^{power}"),
+    });
+    written.collect::<Vec<_>>().join("*")
+}
+
+/// Returns the name of a law: its joint, and its formulas without values that are searched.
+fn name(joint: usize, formulas: &[String]) -> String {
+    let mut name = format!("joint{}", joint + 1);
+    for formula in formulas {
+        let searched = formula.split("step(t - ").enumerate().map(|(k, part)| match k {
+            0 => part.to_owned(),
+            _ => {
+                format!("step{}", part.trim_start_matches(|c: char| c.is_ascii_digit() || c == '.'))
+            }
+        });
+        let text = searched.collect::<String>().replace("^2", "squared").replace("^3", "cubed");
+        let text = text.replace(" - ", "-minus-").replace(" + ", "-plus-");
+        let words = text.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty());
+        for word in words {
+            name.push('-');
+            name.push_str(word);
+        }
+    }
+    name
+}
+
+/// Rounds to a few digits.
+fn digits(value: f64) -> f64 {
+    format!("{value:.*e}", usize::try_from(DIGITS).unwrap_or(3)).parse().unwrap_or(value)
+}
