@@ -2,9 +2,12 @@
 
 use super::arm::Arm;
 use super::forward::Bend;
-use super::workspace::Workspace;
+use super::workspace::{Event, Workspace};
 use crate::problem::{PoseView, Problem};
 use crate::scalar::Scalar;
+
+/// Largest rounding of a moment, relative to the sum of the moments of all loads about the base.
+const ROUNDING: f64 = 1e-12;
 
 /// Undeflected arm whose loads have a moment about every joint's axis.
 ///
@@ -49,12 +52,19 @@ impl<S: Scalar> AxisMoments<S> {
         arm.gather_forces(setup, &[], &mut ws);
         arm.walk(setup, Bend::Rigid, arm.last(), &mut ws);
         ws.sum_moments();
+        // A moment that is rounding has no sign.
+        let term = |event: &Event<S>| match event {
+            Event::Load { at, force } => at.map(|x| x.re()).norm() * force.map(|x| x.re()).norm(),
+            _ => 0.0,
+        };
+        let least = ROUNDING * ws.events.iter().map(term).sum::<f64>();
         let mut next = 0;
         // Three moments for each element of a beam come before that of its joint.
         let moment = |joint: &super::Joint<S>| {
             let of_beam = if joint.beam.is_some() { 3 * arm.beam_elements } else { 0 };
             next += of_beam + 1;
-            ws.next_moments.get(next - 1).copied().unwrap_or_else(|| S::from(0.0))
+            let moment = ws.next_moments.get(next - 1).copied();
+            moment.filter(|moment| moment.re().abs() > least).unwrap_or_else(|| S::from(0.0))
         };
         arm.joints.iter().map(moment).collect()
     }
