@@ -20,8 +20,6 @@ mod input;
 mod interrupt;
 #[path = "cli/printed.rs"]
 mod printed;
-#[path = "cli/readme.rs"]
-mod readme;
 #[path = "cli/results.rs"]
 mod results;
 #[path = "cli/strategies.rs"]

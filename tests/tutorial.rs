@@ -216,71 +216,33 @@ fn commands(page: &str) -> Vec<String> {
     commands.map(|line| line.split(" # ").next().unwrap().trim_end().to_owned()).collect()
 }
 
-/// Returns a URDF of the arm in problems/panda, with the links panda_link0 to panda_link8.
-fn panda_urdf() -> String {
-    const QUARTER: f64 = std::f64::consts::FRAC_PI_2;
-    let origins = [
-        ([0.0, 0.0, 0.333], 0.0),
-        ([0.0; 3], -QUARTER),
-        ([0.0, -0.316, 0.0], QUARTER),
-        ([0.0825, 0.0, 0.0], QUARTER),
-        ([-0.0825, 0.384, 0.0], -QUARTER),
-        ([0.0; 3], QUARTER),
-        ([0.088, 0.0, 0.0], QUARTER),
-        ([0.0, 0.0, 0.107], 0.0),
-    ];
-    let mut text = "<robot name=\"panda\">\n<link name=\"panda_link0\"/>\n".to_owned();
-    for (k, ([x, y, z], roll)) in origins.into_iter().enumerate() {
-        let (number, kind) = (k + 1, if k < 7 { "revolute" } else { "fixed" });
-        let (lower, upper) = match number {
-            4 => (-3.07, -0.07),
-            6 => (-0.02, 3.75),
-            _ => (-2.9, 2.9),
-        };
-        writeln!(
-            text,
-            "<link name=\"panda_link{number}\"/>\n<joint name=\"panda_joint{number}\" type=\"{kind}\">\n  \
-             <parent link=\"panda_link{k}\"/>\n  <child link=\"panda_link{number}\"/>\n  \
-             <origin xyz=\"{x} {y} {z}\" rpy=\"{roll} 0 0\"/>\n  <axis xyz=\"0 0 1\"/>\n  \
-             <limit lower=\"{lower}\" upper=\"{upper}\"/>\n</joint>"
-        )
-        .unwrap();
-    }
-    text + "</robot>\n"
-}
-
+#[cfg(unix)]
 #[test]
 fn an_own_arm_goes_the_way_of_the_readme_to_its_end() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let readme = fs::read_to_string(root.join("README.md")).unwrap();
     let (_, section) = readme.split_once("## Your own arm").unwrap();
-    let commands = commands(section.split("\n## ").next().unwrap());
+    let section = section.split("\n## ").next().unwrap();
     let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("panda.urdf"), panda_urdf()).unwrap();
+    std::os::unix::fs::symlink(root.join("problems"), folder.path().join("problems")).unwrap();
     let mut said = Vec::new();
-    for command in &commands {
-        said.push(printed(command, folder.path()));
-        if command.starts_with("flexcal init ") {
-            // The rig simulates the measurements that a user takes with an instrument.
-            let truth = root.join("problems/panda/TRUTH.toml");
-            let measure = format!(
-                "flexcal simulate panda --truth '{}' --poses 80 --seed 1 --out rig",
-                truth.display()
-            );
-            printed(&measure, folder.path());
-            fs::copy(
-                folder.path().join("rig/measurements.csv"),
-                folder.path().join("panda/measurements.csv"),
-            )
-            .unwrap();
+    for line in section.lines().filter_map(|line| line.strip_prefix("    ")) {
+        let command = line.split(" # ").next().unwrap().trim_end();
+        match words(command).as_slice() {
+            [program, from, to] if program == "cp" => {
+                let name = Path::new(from).file_name().unwrap();
+                let to = folder.path().join(to).join(name);
+                fs::copy(folder.path().join(from), to).unwrap();
+            }
+            _ => said.push(printed(command, folder.path())),
         }
     }
-    let [init, check, found, _, exported] = said.as_slice() else { panic!("{commands:?}") };
+    let [init, check, found, _, exported] = said.as_slice() else { panic!("{section}") };
     for words in [
         "target_m",
         "position_sigma_mm",
         "30 % of the poses",
-        "Next: flexcal check panda --poses 40",
+        "Next: flexcal check bench-arm --poses 40",
     ] {
         assert!(init.contains(words), "{words:?} missing in:\n{init}");
     }
@@ -288,14 +250,17 @@ fn an_own_arm_goes_the_way_of_the_readme_to_its_end() {
         assert!(check.contains(words), "{words:?} missing in:\n{check}");
     }
     assert!(
-        found.contains("Explained: one effect was found") && found.contains("joint = 4"),
+        found.contains("Explained: one effect was found") && found.contains("joint = 2"),
         "{found}"
     );
     assert!(exported.contains("held-out poses: mean 0."), "{exported}");
     assert!(
-        folder.path().join("calibrated.urdf").is_file()
-            && folder.path().join("out/panda-closed/report.html").is_file()
+        folder.path().join("out/calibrated.urdf").is_file()
+            && folder.path().join("out/bench-closed/report.html").is_file()
     );
+    let two_tables = "flexcal identify problems/bench-arm/two-tables --out out/two-tables";
+    let told = printed(two_tables, folder.path());
+    assert!(told.contains("27 parameters from 41 poses, 18 poses held out"), "{told}");
 }
 
 #[test]
