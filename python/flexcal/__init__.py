@@ -13,6 +13,7 @@ otherwise (``x_mm``, ``mean_mm``, ``temperature_C``).
 
 from __future__ import annotations
 
+from ._forward import Prediction
 from ._problem import Problem
 from ._progress import Progress
 from ._results import Check, ClosedLoop, Export, Identification, Plan, Trace
@@ -26,6 +27,7 @@ __all__ = [
     "Identification",
     "InputError",
     "Plan",
+    "Prediction",
     "Problem",
     "Progress",
     "Trace",

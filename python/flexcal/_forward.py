@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from collections.abc import Callable
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -13,10 +14,74 @@ from ._tables import configurations, Shape, warn
 Array = npt.NDArray[np.float64]
 
 
+class _Bounded(NamedTuple):
+    """Uncertainty of predictions."""
+
+    covariance: Array
+    bound: Any
+    extrapolated: Any
+
+
 class _Predicts(Protocol):
     def predict(self, poses: _core.Poses) -> bytearray: ...
 
     def jacobian(self, poses: _core.Poses) -> bytearray: ...
+
+
+class Prediction(np.ndarray[Any, np.dtype[np.float64]]):
+    """Predicted positions, an array of shape (poses, 3) or (3,), measuring frame [m], with their uncertainty.
+
+    The uncertainty is that of measured − predicted: of the parameters, of the remainder, of the noise of a measurement, and of
+    what the model is known to miss. It is computed when it is first read. Arrays computed from a prediction are plain arrays.
+    """
+
+    _bounded: Callable[[float], _Bounded | None] | None
+
+    def __array_finalize__(self, source: Any) -> None:
+        self._bounded = None
+
+    def __array_wrap__(self, array: Any, context: Any = None, return_scalar: bool = False) -> Any:
+        return array[()] if return_scalar else np.asarray(array)
+
+    @classmethod
+    def _of(cls, positions: Array, bounded: Callable[[float], _Bounded | None]) -> Prediction:
+        prediction = positions.view(cls)
+        prediction._bounded = bounded
+        return prediction
+
+    def _uncertainty(self, level: float = 0.95) -> _Bounded:
+        if self._bounded is None:
+            raise ValueError("a part or a copy of a prediction has no uncertainty; read it from the prediction itself")
+        bounded = self._bounded(level)
+        if bounded is None:
+            raise ValueError(
+                "the rows fitted give no bounds of predictions: fewer than ten configurations, or rows that measure no position"
+            )
+        return bounded
+
+    @property
+    def covariance(self) -> Array:
+        """Covariance of measured − predicted, shape (poses, 3, 3) or (3, 3), measuring frame [m²]."""
+        return self._uncertainty().covariance
+
+    @property
+    def sigma(self) -> Array:
+        """1 σ of measured − predicted along each axis, shape (poses, 3) or (3,), measuring frame [m]."""
+        return np.sqrt(np.diagonal(self.covariance, axis1=-2, axis2=-1))
+
+    @property
+    def bound95(self) -> Any:
+        """Length of measured − predicted that is not exceeded with a probability of 95 %, one a pose [m]."""
+        return self.bound()
+
+    def bound(self, level: float = 0.95) -> Any:
+        """Length of measured − predicted that is not exceeded with probability ``level``, one a pose [m]."""
+        return self._uncertainty(level).bound
+
+    @property
+    def extrapolated(self) -> Any:
+        """True where the pose lies outside of what was measured, one a pose."""
+        return self._uncertainty().extrapolated
 
 
 class Forward:

@@ -128,6 +128,7 @@ class Problem(Forward):
         strategy: Strategy = "joint",
         solver: Solver = "auto",
         *,
+        remainder: bool = False,
         progress: Told = False,
     ) -> Identification:
         """Fits the free parameters to the rows that are not held out.
@@ -141,6 +142,9 @@ class Problem(Forward):
             Which parameters are fitted together.
         solver
             ``"auto"`` keeps bounds and constraints where there are any.
+        remainder
+            Correct predictions by what no law explains, if poses left out gain by it (docs/accuracy.md). A remainder that the
+            problem declares corrects them anyway.
         progress
             A function that is called with a :class:`Progress` at every step, or True for a line on standard error.
 
@@ -152,8 +156,8 @@ class Problem(Forward):
         given = self._given_data(data)
         read = self._read(given)
         with told(progress) as step:
-            core = self._core.identify(read, strategy, solver, step)
-        result = Identification(core, self, Spec("identify", self, given, strategy, solver))
+            core = self._core.identify(read, strategy, solver, remainder, step)
+        result = Identification(core, self, Spec("identify", self, given, strategy, solver, remainder))
         result._warn(stacklevel=2)
         return result
 

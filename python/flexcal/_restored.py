@@ -19,6 +19,7 @@ class Spec(NamedTuple):
     data: Source
     strategy: str = "joint"
     solver: str = "auto"
+    remainder: bool = False
 
     def part(self, name: str) -> Spec:
         """The call that gives a fit of the result, ``"before"`` or ``"after"`` a loop or the ``"fit"`` of a trace."""
@@ -30,7 +31,7 @@ class Spec(NamedTuple):
         data = core.data(self.data)
         call, _, part = self.call.partition(".")
         if call == "identify":
-            return core.identify(data, self.strategy, self.solver, None)
+            return core.identify(data, self.strategy, self.solver, self.remainder, None)
         whole = core.close(data, None) if call == "loop" else core.trace(data, None)
         return getattr(whole, part)() if part else whole
 

@@ -6,13 +6,14 @@ import json
 import pathlib
 import tempfile
 from collections.abc import Callable
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 from . import _html
-from ._forward import Forward
+from ._forward import _Bounded, Forward, Prediction
 from ._restored import Restored, Spec, said
 from ._tables import Path, table, warn
 
@@ -228,6 +229,41 @@ class Identification(_Fit, Forward):
         self._forward = self._fit
         self._reader = self._problem._core
 
+    def predict(self, q: Any, **columns: Any) -> Prediction:
+        """Positions of the measured point with their uncertainty, measuring frame [m]; corrected where a remainder was fitted.
+
+        Parameters are those of :meth:`Problem.predict`.
+
+        Returns
+        -------
+        An array of shape (poses, 3), or (3,) for one configuration, with ``covariance``, ``sigma``, ``bound95``, ``bound(level)``
+        and ``extrapolated``; NaN where the arm has no equilibrium.
+        """
+        poses, shape = self._poses(q, columns)
+        positions = np.frombuffer(self._forward.predict(poses), dtype=np.float64).reshape(-1, 3)
+
+        @lru_cache(maxsize=4)
+        def bounded(level: float) -> _Bounded | None:
+            parts = self._core.predict_bounded(poses, level)
+            if parts is None:
+                return None
+            _, covariance, bound, extrapolated = (np.frombuffer(part, dtype=np.float64) for part in parts)
+            all_poses = _Bounded(covariance.reshape(-1, 3, 3), bound, extrapolated > 0.5)
+            return _Bounded(*(part[0] for part in all_poses)) if shape.single else all_poses
+
+        return Prediction._of(positions[0] if shape.single else positions, bounded)
+
+    @property
+    def remainder(self) -> dict[str, Any] | None:
+        """What the remainder is and gains: ``sites``, ``inputs``, ``left_out_without_mm``, ``left_out_mm``,
+        ``held_out_without`` … (docs/results.md); None without one."""
+        found: dict[str, Any] | None = self._document.get("remainder")
+        return found
+
+    def remainder_json(self) -> str | None:
+        """``remainder.json`` of the command line, which ``[remainder] file`` of a problem names; None without a remainder."""
+        return self._core.remainder_json()
+
     def export_urdf(self, urdf: Path) -> Export:
         """The URDF that the problem came from, with the origins of its chain as they were identified.
 
@@ -270,6 +306,13 @@ class ClosedLoop(_Fit):
         is claimed with (``place_probability`` …; None and NaN where no evidence was weighed); ``stability``.
         """
         return _effects(self._document["effects"])
+
+    @property
+    def remainder(self) -> dict[str, Any] | None:
+        """What the remainder beside the effects is and gains; None without one. :attr:`after` predicts with it, and
+        ``after.remainder_json()`` is its file."""
+        found: dict[str, Any] | None = self._document.get("remainder")
+        return found
 
     @property
     def unexplained(self) -> dict[str, Any] | None:

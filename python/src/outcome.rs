@@ -1,11 +1,13 @@
 //! What came of identifications, loops and traces.
 
 use std::path::PathBuf;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
-use flexcal::fit;
-use flexcal::measurement::Dataset;
+use flexcal::fit::{self, IdentifyError};
+use flexcal::measurement::{Dataset, Measurements};
+use flexcal::nalgebra::{DMatrix, Vector3};
 use flexcal::problem::Problem;
+use flexcal::remainder::{self, Bounds, Correction, Fitted};
 use flexcal::report::{self, Report};
 use flexcal::results::{Document as _, IdentificationResult, LoopResult, PlotData, TraceResult};
 use pyo3::exceptions::PyValueError;
@@ -28,6 +30,10 @@ pub struct Identification {
     pub problem: Arc<Problem>,
     pub data: Arc<Dataset>,
     pub found: Arc<fit::Identification>,
+    /// Remainder and uncertainty; the uncertainty alone is computed when it is first needed.
+    pub fitted: OnceLock<Option<Arc<Fitted>>>,
+    /// True if a remainder was sought or declared, so that it corrects what is predicted.
+    pub is_corrected: bool,
 }
 
 /// A closed loop.
@@ -37,6 +43,8 @@ pub struct ClosedLoop {
     pub text: Arc<str>,
     pub data: Arc<Dataset>,
     pub closure: Arc<flexcal::select::ClosedLoop>,
+    /// Remainder beside the effects that were found.
+    pub fitted: Option<Arc<Fitted>>,
 }
 
 /// What a residual points to.
@@ -47,33 +55,143 @@ pub struct Trace {
     pub found: Arc<flexcal::select::Trace>,
 }
 
+/// Slope of a correction: half the difference of commands [rad or m].
+const STEP: f64 = 1e-5;
+
+/// Positions, covariances, bounds, and flags of extrapolation.
+type Bounded<'py> = (Array<'py>, Array<'py>, Array<'py>, Array<'py>);
+
+impl Identification {
+    /// An identification whose predictions no remainder corrects.
+    pub fn plain(
+        problem: &Arc<Problem>,
+        data: &Arc<Dataset>,
+        found: Arc<fit::Identification>,
+    ) -> Self {
+        let (problem, data) = (Arc::clone(problem), Arc::clone(data));
+        Self { problem, data, found, fitted: OnceLock::new(), is_corrected: false }
+    }
+
+    /// An identification whose predictions are corrected by what was fitted beside it.
+    pub fn corrected(self, fitted: Option<Arc<Fitted>>) -> Self {
+        Self { fitted: OnceLock::from(fitted), is_corrected: true, ..self }
+    }
+
+    /// Remainder and uncertainty; `None` where the rows do not allow any.
+    fn fitted(&self) -> Result<Option<&Fitted>, IdentifyError> {
+        if let Some(fitted) = self.fitted.get() {
+            return Ok(fitted.as_deref());
+        }
+        let fitted = remainder::uncertainty(&self.found, &self.problem, &self.data)?;
+        Ok(self.fitted.get_or_init(|| fitted.map(Arc::new)).as_deref())
+    }
+
+    /// The remainder that corrects predictions.
+    fn remainder(&self) -> Option<&Correction> {
+        let fitted = self.fitted.get().filter(|_| self.is_corrected)?.as_ref()?;
+        fitted.remainder.as_ref()
+    }
+
+    /// Slopes of the correction by the commands, added to those of the arm.
+    fn add_slopes(
+        &self,
+        correction: &Correction,
+        rows: &Measurements,
+        slopes: &mut [DMatrix<f64>],
+    ) -> Result<(), IdentifyError> {
+        for joint in 0..rows.joints {
+            let shifts = |step: f64| -> Result<Vec<Vector3<f64>>, IdentifyError> {
+                let mut moved = rows.clone();
+                moved.configurations.chunks_mut(rows.joints).for_each(|q| q[joint] += step);
+                let (_, poses) =
+                    remainder::predict_identified(&self.found, &self.problem, correction, &moved)?;
+                Ok(poses.into_iter().map(|pose| pose.shift).collect())
+            };
+            for ((slope, more), less) in slopes.iter_mut().zip(shifts(STEP)?).zip(shifts(-STEP)?) {
+                let mut column = slope.column_mut(joint);
+                column += (more - less) / (2.0 * STEP);
+            }
+        }
+        Ok(())
+    }
+}
+
 #[pymethods]
 impl Identification {
     /// Returns estimate.json, with the uncertainty of predictions.
     fn json(&self, py: Python<'_>) -> PyResult<String> {
         detached(py, || {
             let mut result = IdentificationResult::new(&self.problem, &self.found);
-            let fitted = flexcal::remainder::uncertainty(&self.found, &self.problem, &self.data)?;
-            if let Some(fitted) = fitted {
-                result = result.with_predictions(&self.found, &fitted);
+            if let Some(fitted) = self.fitted()? {
+                result = result.with_predictions(&self.found, fitted);
             }
             Ok(result.to_json())
         })?
-        .map_err(|error: fit::IdentifyError| raised(&error))
+        .map_err(|error: IdentifyError| raised(&error))
     }
 
     /// What the command line prints.
     fn summary(&self, py: Python<'_>) -> PyResult<String> {
-        detached(py, || report::estimate_text(&self.problem, &self.found))
+        detached(py, || {
+            let mut text = report::estimate_text(&self.problem, &self.found);
+            if let Some(fitted) = self.fitted()?.filter(|_| self.is_corrected) {
+                text += &format!("\n{}\n", report::remainder_text(&self.found, &fitted.outcome()));
+            }
+            Ok(text)
+        })?
+        .map_err(|error: IdentifyError| raised(&error))
+    }
+
+    /// remainder.json; `None` without a remainder.
+    fn remainder_json(&self, py: Python<'_>) -> PyResult<Option<String>> {
+        detached(py, || self.remainder().map(Correction::to_json))
+    }
+
+    /// Positions of the identified arm, their covariance, shape = (poses, 3, 3) [m²], the bound of
+    /// measured − predicted that holds with probability `level` [m], and 1 where the pose lies
+    /// outside of what was measured; `None` where the rows fitted do not allow any.
+    fn predict_bounded<'py>(
+        &self,
+        py: Python<'py>,
+        poses: &Poses,
+        level: f64,
+    ) -> PyResult<Option<Bounded<'py>>> {
+        if !(0.0 < level && level < 1.0) {
+            return Err(PyValueError::new_err("level: a probability between 0 and 1 is needed"));
+        }
+        let predicted = detached(py, || -> Result<_, IdentifyError> {
+            let Some(fitted) = self.fitted()? else { return Ok(None) };
+            let correction = self.remainder().unwrap_or(&fitted.alone);
+            let rows = &poses.rows;
+            let (positions, corrected) =
+                remainder::predict_identified(&self.found, &self.problem, correction, rows)?;
+            Ok(Some((positions, Bounds::new(correction, corrected, level))))
+        })?;
+        let Some((positions, bounds)) = predicted.map_err(|error| raised(&error))? else {
+            return Ok(None);
+        };
+        let entries = bounds.poses.iter().flat_map(|pose| pose.covariance.iter().copied());
+        let bound = (0..bounds.poses.len()).map(|pose| bounds.bound(pose));
+        let flags = bounds.poses.iter().map(|pose| f64::from(u8::from(pose.is_extrapolated)));
+        Ok(Some((
+            points(py, &positions),
+            numbers(py, entries),
+            numbers(py, bound),
+            numbers(py, flags),
+        )))
     }
 
     /// Pages and figures.
     fn report(&self, py: Python<'_>) -> PyResult<Pages> {
         detached(py, || {
-            let shown = PlotData::of_identification(&self.problem, &self.data, &self.found)?;
+            let mut shown = PlotData::of_identification(&self.problem, &self.data, &self.found)?;
+            if let Some(fitted) = self.fitted()? {
+                let found = (&*self.found, &*self.problem);
+                shown = shown.with_uncertainty(found, &self.data, fitted)?;
+            }
             Ok(pages(report::identification_report(&self.problem, &self.found, &shown)))
         })?
-        .map_err(|error: fit::IdentifyError| raised(&error))
+        .map_err(|error: IdentifyError| raised(&error))
     }
 
     /// Why the fit is not to be trusted, if it is not.
@@ -104,14 +222,28 @@ impl Identification {
 
     /// Columns of the residual table.
     fn residuals<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let found = detached(py, || self.found.residuals(&self.problem, &self.data))?;
+        let corrected = self.remainder().and(self.fitted.get()).and_then(Option::as_ref);
+        let found =
+            detached(py, || match corrected.and_then(|fitted| fitted.residuals.as_ref()) {
+                Some(corrected) => Ok(corrected.rows.clone()),
+                None => self.found.residuals(&self.problem, &self.data),
+            })?;
         residuals::table(py, &self.problem, &self.data, &found.map_err(|error| raised(&error))?)
     }
 
-    /// Positions of the identified arm, shape = (poses, 3), measuring frame [m].
+    /// Positions of the identified arm, corrected by its remainder, shape = (poses, 3), measuring
+    /// frame [m].
     fn predict<'py>(&self, py: Python<'py>, poses: &Poses) -> PyResult<Array<'py>> {
-        let found = detached(py, || self.found.predict(&self.problem, &poses.rows))?;
-        Ok(points(py, &found.map_err(|error| raised(&error))?))
+        let (problem, rows) = (&self.problem, &poses.rows);
+        let found = detached(py, || match self.remainder() {
+            Some(correction) => {
+                let predicted =
+                    remainder::predict_identified(&self.found, problem, correction, rows);
+                Ok(predicted?.0)
+            }
+            None => self.found.predict(problem, rows),
+        })?;
+        Ok(points(py, &found.map_err(|error: IdentifyError| raised(&error))?))
     }
 
     /// The URDF that the problem came from, with the origins that were identified.
@@ -120,10 +252,15 @@ impl Identification {
             .map_err(|error| raised(&error))
     }
 
-    /// ∂p/∂q of the identified arm, shape = (poses, 3, joints).
+    /// ∂p/∂q of the identified arm, corrected by its remainder, shape = (poses, 3, joints).
     fn jacobian<'py>(&self, py: Python<'py>, poses: &Poses) -> PyResult<Array<'py>> {
-        let jacobian = || fit::jacobian(&self.problem, Some(&self.found), &poses.rows);
-        let found = detached(py, jacobian)?;
+        let found = detached(py, || {
+            let mut slopes = fit::jacobian(&self.problem, Some(&self.found), &poses.rows)?;
+            if let Some(correction) = self.remainder() {
+                self.add_slopes(correction, &poses.rows, &mut slopes)?;
+            }
+            Ok::<_, IdentifyError>(slopes)
+        })?;
         Ok(derivatives(py, &found.map_err(|error| raised(&error))?))
     }
 }
@@ -132,7 +269,13 @@ impl Identification {
 impl ClosedLoop {
     /// loop.json.
     fn json(&self, py: Python<'_>) -> PyResult<String> {
-        detached(py, || LoopResult::new(&self.problem, &self.closure).to_json())
+        detached(py, || {
+            let result = LoopResult::new(&self.problem, &self.closure);
+            match &self.fitted {
+                Some(fitted) => result.with_remainder(&self.closure, fitted).to_json(),
+                None => result.to_json(),
+            }
+        })
     }
 
     /// What the command line prints.
@@ -143,32 +286,32 @@ impl ClosedLoop {
     /// Pages and figures.
     fn report(&self, py: Python<'_>) -> PyResult<Pages> {
         detached(py, || {
-            let shown = PlotData::of_loop(&self.problem, &self.data, &self.closure)?;
+            let mut shown = PlotData::of_loop(&self.problem, &self.data, &self.closure)?;
+            if let Some(fitted) = &self.fitted {
+                let found = (&self.closure.after, &self.closure.closed);
+                shown = shown.with_uncertainty(found, &self.data, fitted)?;
+            }
             Ok(pages(report::loop_report(&self.problem, &self.closure, &shown)))
         })?
-        .map_err(|error: fit::IdentifyError| raised(&error))
+        .map_err(|error: IdentifyError| raised(&error))
     }
 
     /// problem.closed.toml: the problem with what was found declared, its data where they were.
     fn closed_problem(&self) -> PyResult<String> {
-        let data = &self.problem.data;
-        let joint_files = data.joint_log.as_ref().map_or(&[][..], |log| log.files.as_slice());
-        let files = [data.files.as_slice(), joint_files];
-        report::closed_problem(&self.text, &self.problem, &self.closure, files)
-            .map_err(|error| PyValueError::new_err(error.to_string()))
+        closed_text(&self.text, &self.problem, &self.closure).map_err(PyValueError::new_err)
     }
 
     /// The fit of the declared problem.
     fn before(&self) -> Identification {
         let found = Arc::new(self.closure.before.fit.clone());
-        Identification { problem: Arc::clone(&self.problem), data: Arc::clone(&self.data), found }
+        Identification::plain(&self.problem, &self.data, found)
     }
 
     /// The fit with everything that was found.
     fn after(&self) -> Identification {
         let (problem, found) =
             (Arc::new(self.closure.closed.clone()), Arc::new(self.closure.after.clone()));
-        Identification { problem, data: Arc::clone(&self.data), found }
+        Identification::plain(&problem, &self.data, found).corrected(self.fitted.clone())
     }
 }
 
@@ -187,8 +330,20 @@ impl Trace {
     /// The fit of the declared problem.
     fn fit(&self) -> Identification {
         let found = Arc::new(self.found.fit.clone());
-        Identification { problem: Arc::clone(&self.problem), data: Arc::clone(&self.data), found }
+        Identification::plain(&self.problem, &self.data, found)
     }
+}
+
+/// problem.closed.toml, its data where they were.
+pub fn closed_text(
+    text: &str,
+    problem: &Problem,
+    closure: &flexcal::select::ClosedLoop,
+) -> Result<String, String> {
+    let data = &problem.data;
+    let joint_files = data.joint_log.as_ref().map_or(&[][..], |log| log.files.as_slice());
+    let files = [data.files.as_slice(), joint_files];
+    report::closed_problem(text, problem, closure, files).map_err(|error| error.to_string())
 }
 
 fn pages(report: Report) -> Pages {

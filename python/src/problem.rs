@@ -3,10 +3,11 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use flexcal::fit::{self, Options, Placement, SolverChoice, Strategy};
+use flexcal::fit::{self, IdentifyError, Options, Placement, SolverChoice, Strategy};
 use flexcal::model::Model;
 use flexcal::nalgebra::DVector;
 use flexcal::problem::{Joint, JointKind};
+use flexcal::remainder;
 use flexcal::select;
 use flexcal::urdf::{Chain, Description, Robot, describe};
 use pyo3::prelude::*;
@@ -14,7 +15,7 @@ use pyo3::prelude::*;
 use crate::array::{Array, derivatives, points};
 use crate::data::{Data, Poses, Source};
 use crate::error::{of_argument, raised};
-use crate::outcome::{ClosedLoop, Identification, Trace};
+use crate::outcome::{ClosedLoop, Identification, Trace, closed_text};
 use crate::pool::detached;
 use crate::supervise::supervised;
 
@@ -116,18 +117,24 @@ impl Problem {
         detached(py, || Poses::read(input, &self.declared))?.map_err(|error| raised(&error))
     }
 
-    /// Fits the free parameters.
+    /// Fits the free parameters, and a remainder beside them where that is asked for.
     fn identify(
         &self,
         py: Python<'_>,
         data: &Data,
         strategy: &str,
         solver: &str,
+        remainder: bool,
         progress: Option<Bound<'_, PyAny>>,
     ) -> PyResult<Identification> {
         let strategy = word("strategy", strategy, &Strategy::EACH, Strategy::as_str)?;
         let solver = word("solver", solver, &SolverChoice::CHOICES, SolverChoice::as_str)?;
         let (problem, data) = (Arc::clone(&self.declared), Arc::clone(&data.data));
+        let declared = match remainder {
+            true => None,
+            false => remainder::declared(&problem).map_err(|error| raised(&error))?,
+        };
+        let is_corrected = remainder || declared.is_some();
         let found = supervised(py, progress.as_ref(), {
             let (problem, data) = (Arc::clone(&problem), Arc::clone(&data));
             move |sink| {
@@ -136,11 +143,23 @@ impl Problem {
                     .with_strategy(strategy)
                     .with_solver(solver)
                     .with_progress(sink);
-                fit::identify(&problem, &data, &options)
+                let found = fit::identify(&problem, &data, &options)?;
+                let fitted = match (remainder, declared) {
+                    (true, _) => remainder::fit(&found, &problem, &data)?,
+                    (false, Some(declared)) => remainder::uncertainty(&found, &problem, &data)?
+                        .map(|fitted| fitted.with_declared(declared, (&found, &problem), &data))
+                        .transpose()?,
+                    (false, None) => None,
+                };
+                Ok::<_, IdentifyError>((found, fitted))
             }
         })?;
-        let found = found.map_err(|error| raised(&error))?;
-        Ok(Identification { problem, data, found: Arc::new(found) })
+        let (found, fitted) = found.map_err(|error| raised(&error))?;
+        let identified = Identification::plain(&problem, &data, Arc::new(found));
+        Ok(match is_corrected {
+            true => identified.corrected(fitted.map(Arc::new)),
+            false => identified,
+        })
     }
 
     /// Finds the effects that the problem lacks.
@@ -153,16 +172,32 @@ impl Problem {
         let (problem, data) = (Arc::clone(&self.declared), Arc::clone(&data.data));
         let closure = supervised(py, progress.as_ref(), {
             let (problem, data) = (Arc::clone(&problem), Arc::clone(&data));
+            let text = Arc::clone(&self.text);
             move |sink| {
-                select::close(
-                    &problem,
-                    &data,
-                    &Options::default().with_influential_rows().with_progress(sink),
-                )
+                let options = Options::default().with_influential_rows().with_progress(sink);
+                let closure = select::close(&problem, &data, &options)?;
+                // The extended problem may declare another arm than was fitted, as without an
+                // effect that data contradict.
+                let text = closed_text(&text, &problem, &closure).ok();
+                let file = &problem.data.location.file;
+                let closed = text
+                    .and_then(|text| flexcal::problem::Problem::parse(&text, file).ok())
+                    .filter(|closed| closed.digest() == closure.closed.digest());
+                let fitted = closed
+                    .map(|_| remainder::fit(&closure.after, &closure.closed, &data))
+                    .transpose()?
+                    .flatten();
+                Ok::<_, IdentifyError>((closure, fitted))
             }
         })?;
-        let closure = closure.map_err(|error| raised(&error))?;
-        Ok(ClosedLoop { problem, text: Arc::clone(&self.text), data, closure: Arc::new(closure) })
+        let (closure, fitted) = closure.map_err(|error| raised(&error))?;
+        Ok(ClosedLoop {
+            problem,
+            text: Arc::clone(&self.text),
+            data,
+            closure: Arc::new(closure),
+            fitted: fitted.map(Arc::new),
+        })
     }
 
     /// Ranks the effects that the residual points to.
