@@ -10,6 +10,8 @@ use crate::results::{BoundAt, CommandedJoint};
 
 /// Number of cells along the width of a view.
 const CELLS: usize = 24;
+/// One in so many cells lies beyond the scale of colours.
+const DEEPEST: usize = 20;
 /// Maximum height of a view in displayed pixels.
 const MAX_HEIGHT: f64 = 330.0;
 /// Height of the panel of a joint in displayed pixels.
@@ -34,9 +36,13 @@ pub fn bounds_over_workspace(data: &PlotData) -> Option<Drawing> {
     let cell = (across.1 - across.0) / CELLS as f64;
     let views = [(1, "y [m]", "x [m], seen from above"), (2, "z [m]", "x [m], seen from the side")];
     let cells = views.map(|(axis, ..)| cells(bounds, (axis, cell), (across.0, extent(axis).0)));
-    let (least, most) = range(cells.iter().flatten().map(|cell| cell.bound));
+    let mut sorted: Vec<f64> = cells.iter().flatten().map(|cell| cell.bound).collect();
+    sorted.sort_by(f64::total_cmp);
+    // A few cells far from all poses would leave the others without contrast.
+    let deepest = sorted.len() - 1 - sorted.len() / DEEPEST;
+    let (least, most) = (sorted[0], sorted[deepest]);
     let shade = |bound: f64| {
-        let share = if most > least { (bound - least) / (most - least) } else { 0.5 };
+        let share = if most > least { ((bound - least) / (most - least)).min(1.0) } else { 0.5 };
         Paint::fill(WARM).faded(0.08 + 0.92 * share)
     };
     let panels = views.iter().zip(&cells).map(|(&(axis, label, below), cells)| {
@@ -57,7 +63,7 @@ pub fn bounds_over_workspace(data: &PlotData) -> Option<Drawing> {
     let beyond = bounds.iter().filter(|at| at.is_extrapolated).count();
     let caption = format!(
         "Mean bound of measured − predicted that holds with a probability of {level} %, over the \
-         workspace in the frame of the arm's base: pale {} mm, deep {} mm. Of {} random \
+         workspace in the frame of the arm's base: pale {} mm, deep {} mm or more. Of {} random \
          configurations, each joint within its measured values, {beyond} are far from all measured \
          poses; a ring marks cells where most are.",
         two_digits(least * 1e3, 4),
