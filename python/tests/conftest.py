@@ -74,4 +74,5 @@ def timeless(text: str) -> Any:
     """A result without the time that it took."""
     document = json.loads(text)
     document.pop("seconds", None)
+    document.get("digest", {}).pop("seconds", None)
     return document
