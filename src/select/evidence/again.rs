@@ -121,7 +121,9 @@ pub(super) fn carried_by_one(
     let searched: Vec<&Hypothesis> = best
         .hypotheses
         .iter()
-        .filter(|hypothesis| hypothesis.effect().is_some_and(Effect::is_searched))
+        .filter(|hypothesis| {
+            hypothesis.effect().is_some_and(|effect| effect.is_searched() && !effect.is_described())
+        })
         .collect();
     if searched.is_empty() || !best.gears().is_empty() {
         return None;

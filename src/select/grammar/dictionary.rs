@@ -16,7 +16,7 @@ const STEP_MARGIN: f64 = 0.04;
 /// Time constants of a settling, as parts of the time measured.
 const SETTLINGS: (f64, f64, u32) = (0.08, 0.8, 4);
 /// Factors a and b of sums of angles a q + b q'.
-const SUMS: [[i32; 2]; 4] = [[1, 1], [1, -1], [2, -1], [1, -2]];
+const SUMS: [[i32; 2]; 6] = [[1, 1], [1, -1], [2, 1], [2, -1], [1, 2], [1, -2]];
 /// Smallest part of the poses with a moment of either sign for the sign to be a factor.
 const MIN_SIGN_SHARE: f64 = 0.1;
 

@@ -196,6 +196,8 @@ impl Form {
                     match factors {
                         [1, 1] => format!("{first} + {second}"),
                         [1, -1] => format!("{first} - {second}"),
+                        [2, 1] => format!("2*{first} + {second}"),
+                        [1, 2] => format!("{first} + 2*{second}"),
                         [2, -1] => format!("2*{first} - {second}"),
                         [1, -2] => format!("{first} - 2*{second}"),
                         [a, b] => format!("{a}*{first} + {b}*{second}"),
