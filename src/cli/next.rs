@@ -52,7 +52,8 @@ pub fn after_fit(
         }
         None if is_structured
             || exceeds_noise(found)
-            || found.has(FindingCode::HeldOutBeyondPrediction) =>
+            || found.has(FindingCode::HeldOutBeyondPrediction)
+            || found.has(FindingCode::RowsSetAside) =>
         {
             format!("flexcal loop {named} looks for what the model lacks")
         }

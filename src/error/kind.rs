@@ -394,7 +394,9 @@ pub enum InputErrorKind {
     Urdf(#[from] UrdfErrorKind),
 
     // Errors of held-out rows.
-    #[error("give one of column, fraction (with seed) or session")]
+    #[error(
+        "give one of column, fraction (with seed) or session, or held_out = \"none\" to fit all rows"
+    )]
     NotOneHeldOut,
     #[error(
         "no held-out rows are declared; write held_out = {{ fraction = 0.3, seed = 1 }} in \

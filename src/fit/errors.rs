@@ -45,8 +45,11 @@ pub struct ErrorSummary {
 pub struct Errors {
     /// Errors on the identification rows, which are fitted.
     pub identification: ErrorSummary,
-    /// Errors on the held-out rows, which are not fitted.
+    /// Errors on the held-out rows, which decide nothing, or of configurations that are left out.
     pub held_out: ErrorSummary,
+    /// True if no row is held out: `held_out` then summarises all rows, each configuration
+    /// predicted by a fit without it.
+    pub is_left_out: bool,
 }
 
 /// Errors of orientation \[rad\]: lengths and components of the rotation vectors from predicted to

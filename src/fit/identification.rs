@@ -1,5 +1,6 @@
 //! Identification: from a problem and its data to estimates, their uncertainty, and findings.
 
+use std::cell::OnceCell;
 use std::collections::BTreeSet;
 use std::sync::{Arc, OnceLock};
 use std::time::Instant;
@@ -28,13 +29,13 @@ use crate::fit::uncertainty::prior_sizes::prior_sizes;
 use crate::fit::uncertainty::refuted_priors::refuted_priors;
 use crate::fit::uncertainty::statistics::Statistics;
 use crate::fit::warm_start::WarmStart;
-use crate::fit::{Errors, IdentifyError, Options, Placement, SolverChoice, Strategy};
+use crate::fit::{ErrorSummary, Errors, IdentifyError, Options, Placement, SolverChoice, Strategy};
 use crate::least_squares::solver::Termination;
 use crate::least_squares::{LinearisationCache, Loss};
 use crate::measurement::{Dataset, Measurements, Split};
 use crate::model::Model;
 use crate::model::parameter::Parameter;
-use crate::problem::{ParameterRule, Problem, Robust, RobustLoss, pattern};
+use crate::problem::{HeldOut, ParameterRule, Problem, Robust, RobustLoss, pattern};
 
 /// Identifies the free parameters of `problem` from the identification rows of `data`. Held-out
 /// rows do not influence the estimates of the arm.
@@ -182,7 +183,23 @@ fn fit_rows(
     let whitened_triangle =
         if asked { fitting.whole().data_triangle(&start) } else { DMatrix::zeros(0, 0) };
     let (estimates, covariance, not_converged) = estimated(&fitting, &mut end, &statistics, noise)?;
-    let (fitted, whole) = (fitting.errors(&end.x), fitting.whole());
+    let (mut fitted, whole) = (fitting.errors(&end.x), fitting.whole());
+    let mut registered = registered;
+    let left_out = if problem.data.held_out == Some(HeldOut::Nothing) {
+        let configurations = measurements.configurations(problem).0;
+        let at = |x: &DVector<f64>, unknowns: &[usize], errors: &mut Errors| {
+            let left_out = fitting.left_out_errors(x, unknowns, &configurations);
+            let rows = split.identification.iter().copied();
+            errors.held_out = ErrorSummary::of_rows(measurements, rows, &left_out);
+            errors.is_left_out = true;
+            left_out
+        };
+        at(&start, &fitting.placements(), &mut registered);
+        let free = whole.unknowns.iter().zip(&end.at_bound).filter(|(_, bound)| bound.is_none());
+        at(&end.x, &free.map(|(&k, _)| k).collect::<Vec<usize>>(), &mut fitted)
+    } else {
+        Vec::new()
+    };
     let (noise_factor, sigma_taken) = taken(&whole, measurements.leading());
     let told = asked && noise != Noise::Unknown && end.termination.converged();
     let values: Vec<f64> = whole.unknowns.iter().map(|&k| end.x[k]).collect();
@@ -227,6 +244,7 @@ fn fit_rows(
             hidden: &statistics.hidden,
             prior_sizes: &prior_sizes,
             spreads: &spreads,
+            explanations: OnceCell::new(),
         })
     } else {
         not_converged.into_iter().collect()
@@ -246,6 +264,7 @@ fn fit_rows(
         noise,
         registered,
         fitted,
+        left_out,
         reduced_chi2: statistics.reduced_chi2.filter(|_| has_declared_noise),
         chance: statistics.chance.filter(|_| has_declared_noise),
         noise_factor,

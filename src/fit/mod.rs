@@ -38,6 +38,7 @@ pub use checks::outliers::{InfluentialRows, Outlier};
 pub use checks::point_spread::PointSpread;
 pub(crate) use checks::required_columns::{check_columns, missing_target_columns};
 pub(crate) use checks::row_kind::{rows as rows_of_kind, size as size_of_kind};
+pub(crate) use checks::set_aside::selection as selection_of_outliers;
 pub(crate) use compare::baseline::Baseline;
 pub(crate) use compare::comparison::{Before, CompareOptions, Comparison};
 pub(crate) use compare::procedure::{Procedure, TableEntry};

@@ -2,7 +2,7 @@
 
 use std::sync::OnceLock;
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::fit::checks::finding::{Finding, FindingCode, Severity};
 use crate::fit::stages::fitting::FitEnd;
@@ -88,6 +88,9 @@ pub struct Identification {
     pub registered: Errors,
     /// Errors of the identified arm.
     pub fitted: Errors,
+    /// Errors of the identification rows, each configuration predicted by a fit without it \[m\];
+    /// empty where rows are held out.
+    pub(crate) left_out: Vec<Vector3<f64>>,
     /// Errors of each kind of rows before and after the fit, where there are several kinds; the
     /// first pair is `registered` and `fitted`.
     pub kinds: Vec<(Errors, Errors)>,

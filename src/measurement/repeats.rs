@@ -21,7 +21,7 @@ impl Measurements {
     /// Returns the number of each row's configuration and the number of distinct configurations.
     /// The numbering does not depend on the order of the rows: it follows session, pose number,
     /// time and measured values.
-    pub(super) fn configurations(&self, problem: &Problem) -> (Vec<usize>, usize) {
+    pub(crate) fn configurations(&self, problem: &Problem) -> (Vec<usize>, usize) {
         let mut order: Vec<usize> = (0..self.len()).collect();
         let keys: Vec<_> = order.iter().map(|&row| self.key(row)).collect();
         let compare = |a: &(&str, Vec<f64>), b: &(&str, Vec<f64>)| {

@@ -34,12 +34,16 @@ impl Split {
             Some(HeldOut::Fraction { fraction, seed }) => {
                 random_fraction(*fraction, *seed, problem, measurements)
             }
+            Some(HeldOut::Nothing) => {
+                let (identification, held_out) = ((0..measurements.len()).collect(), Vec::new());
+                return Ok(Self { identification, held_out });
+            }
         };
         let held_out = with_known_distances(held_out, measurements);
         let (held_out, identification): (Vec<_>, Vec<_>) =
             (0..measurements.len()).partition(|&row| held_out[row]);
         let cause = |word| match &problem.data.held_out {
-            None => NoRows::Column { column: "split".to_owned(), word },
+            None | Some(HeldOut::Nothing) => NoRows::Column { column: "split".to_owned(), word },
             Some(HeldOut::Column(column)) => NoRows::Column { column: column.clone(), word },
             Some(HeldOut::Session(session)) => NoRows::Session { session: session.clone() },
             Some(HeldOut::Fraction { fraction, .. }) => NoRows::Fraction {

@@ -25,7 +25,7 @@ pub struct Arm<S> {
     /// Index of the joint whose frame carries the payload; the last joint if `None`.
     pub payload_on: Option<usize>,
     /// Position of the payload in that frame \[m\].
-    pub payload_at: Vector3<f64>,
+    pub payload_at: Vector3<S>,
     /// Payload mass of poses that give none \[kg\].
     pub payload_mass: f64,
     /// Excess of the payload mass over the declared one, in poses with a payload \[kg\].
@@ -67,7 +67,7 @@ impl Arm<f64> {
             joints: self.joints.iter().map(Joint::lift).collect(),
             tree: self.tree.clone(),
             payload_on: self.payload_on,
-            payload_at: self.payload_at,
+            payload_at: self.payload_at.map(S::from),
             payload_mass: self.payload_mass,
             payload_error: S::from(self.payload_error),
             rope: self.rope.as_ref().map(HoistError::lift),
@@ -121,6 +121,11 @@ impl<S: Scalar> Arm<S> {
             (root.origin, root.axes[2], frame)
         };
         self.joints.iter().zip(configuration).enumerate().map(along).collect()
+    }
+
+    /// Returns true if a payload hangs on the arm in a pose.
+    pub(crate) fn carries_payload(&self, setup: &PoseView) -> bool {
+        self.payload(setup).re() != 0.0
     }
 
     /// Returns the payload mass of a pose \[kg\].

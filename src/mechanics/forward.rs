@@ -301,7 +301,7 @@ impl<S: Scalar> Arm<S> {
             if i == self.payload_joint() {
                 let payload = self.payload(setup);
                 if walk.records_events() && payload.re() != 0.0 {
-                    let at = walk.frame.point(&self.payload_at.map(S::from));
+                    let at = walk.frame.point(&self.payload_at);
                     ws.events.push(Event::Load { at, force: self.gravity * payload });
                 }
             }

@@ -108,7 +108,11 @@ impl Elastic {
             None if !whole.is_empty() => adjoint.adjoint(setup, target, state).ok()?,
             None => {}
         }
+        let carries_payload = arm.carries_payload(setup);
         for WholeArmInput { arm, input } in whole {
+            if matches!(input.site, ParameterSite::Target { .. }) && !carries_payload {
+                continue;
+            }
             let position = arm.target_position(setup, target, state, ws);
             rows.put_input(
                 input,

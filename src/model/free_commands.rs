@@ -24,6 +24,7 @@ impl Model {
             instrument: self.instrument_at(x.as_slice()),
             bases: self.base_poses(x.as_slice()),
             targets: self.target_positions(x.as_slice()),
+            payload_follows: self.payload_follows,
             target_joints: self.target_joints.clone(),
             fixtures: self.fixtures(x.as_slice()),
             declared: self.declared.clone(),

@@ -23,10 +23,11 @@ pub(super) fn inputs(model: &Model, x: &[f64], unknowns: &[usize]) -> Vec<Input>
     let mut inputs: Vec<Input> = Vec::new();
     for (column, &k) in unknowns.iter().enumerate() {
         let parameter = &model.parameters[k];
-        if !matches!(
+        let is_of_arm = matches!(
             parameter.site,
             ParameterSite::Joint { .. } | ParameterSite::Beam { .. } | ParameterSite::Arm(_)
-        ) {
+        );
+        if !is_of_arm && model.payload_axis(parameter.site).is_none() {
             continue;
         }
         let existing = inputs.iter().position(|input| input.site == parameter.site);

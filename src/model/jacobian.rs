@@ -294,8 +294,11 @@ fn write_placement(
     for (column, slope) in base.point_slopes(&position) {
         rows.put(column, &slope);
     }
-    for (axis, &column) in target.columns.iter().take(3).enumerate() {
-        rows.put_if(column, || frame.axes[axis]);
+    // The payload may hang at the target, whose coordinates then change the loads as well.
+    for (axis, column) in target.columns.iter().take(3).enumerate() {
+        if let Some(column) = *column {
+            rows.add(column, &frame.axes[axis]);
+        }
     }
     position
 }

@@ -62,6 +62,8 @@ pub struct Model {
     instrument: Instrument,
     bases: Vec<BasePose>,
     targets: Vec<Vector3<f64>>,
+    /// True if the payload hangs at the target, which is the only one.
+    payload_follows: bool,
     /// Index of the joint whose frame carries each target.
     target_joints: Vec<usize>,
     /// Orientation of each target in that frame, as a rotation vector \[rad\].
@@ -108,6 +110,9 @@ impl Model {
             fixed_terms: CommandTerm::declared(problem),
             instrument: Instrument::default(),
             bases: vec![problem.base.clone(); bases.len()],
+            payload_follows: problem.tool.payload_follows
+                && problem.targets.is_empty()
+                && targets.len() == 1,
             targets: declared.iter().map(|target| target.at).collect(),
             target_joints: declared.iter().map(|target| target.joint).collect(),
             target_rotations: declared.iter().map(|target| target.rotation).collect(),
@@ -202,6 +207,9 @@ impl Model {
             if parameter.regressor.is_constant() {
                 sites::set_site(&mut arm, parameter.site, parameter.nominal, x(k), &mut tilt);
             }
+            if let Some(axis) = self.payload_axis(parameter.site) {
+                arm.payload_at[axis] += x(k);
+            }
         }
         if self
             .parameters
@@ -211,6 +219,15 @@ impl Model {
             sites::rotate_gravity(&mut arm, tilt);
         }
         arm
+    }
+
+    /// Returns the axis along which a parameter moves the payload with the target.
+    fn payload_axis(&self, site: ParameterSite) -> Option<usize> {
+        match site {
+            ParameterSite::Target { axis: axis @ 0..3, .. } => Some(axis),
+            _ => None,
+        }
+        .filter(|_| self.payload_follows)
     }
 
     /// Returns the terms that add to the joints' commands at the full parameter vector `x`.

@@ -80,6 +80,8 @@ pub enum HeldOut {
     },
     /// Holds out all rows of one session.
     Session(String),
+    /// Holds out no row: errors are those of configurations that are left out.
+    Nothing,
 }
 
 impl Data {
@@ -149,7 +151,11 @@ pub(super) fn read(root: &mut Section<'_, '_>) -> Result<Data, InputError> {
     let mut held_out_location = location.clone();
     if let Some(item) = section.get("held_out") {
         held_out_location = item.location();
-        held_out = Some(held_out_rows(item.section()?)?);
+        held_out = Some(match item.text() {
+            Ok("none") => HeldOut::Nothing,
+            Ok(_) => return Err(item.error(InputErrorKind::NotOneHeldOut)),
+            Err(_) => held_out_rows(item.section()?)?,
+        });
     }
     let reference_temperature = section.number("reference_temperature", Unit::Temperature)?;
     let (mut joints, mut joint_log) = (JointSource::default(), None);

@@ -23,6 +23,7 @@ impl Problem {
     ///   `on` and its number;
     /// - for each target a new line with `target`, its quoted name, the number of its joint, its
     ///   position and rotation vector;
+    /// - `payload fixed` if the payload is declared at the target but does not follow it;
     /// - for each joint a new line with `revolute`, `prismatic` or `fixed`; if its parent is not
     ///   the joint before it, `on` and the parent's number (0 for the base); if it has xyz and rpy,
     ///   `placed` and these; if it follows another joint, `mimic`, that joint's number and the
@@ -38,7 +39,7 @@ impl Problem {
     pub fn digest(&self) -> String {
         let Self { gravity, statics, joints, tool, targets, base, effects, data, .. } = self;
         let Statics { equilibrium, beam_elements } = statics;
-        let Tool { joint: carrier, target, rotation: turned, payload_at, payload_mass } = tool;
+        let Tool { joint: carrier, target, rotation: turned, payload_at, payload_mass, .. } = tool;
         let BasePose { translation, rotation } = base;
         let mut text = match equilibrium {
             Equilibrium::Undeflected => "undeflected".to_owned(),
@@ -47,6 +48,10 @@ impl Problem {
         let _ = write!(text, " {beam_elements}");
         vectors(&mut text, &[gravity, target, payload_at, translation, rotation]);
         number(&mut text, *payload_mass);
+        // Elsewhere the place of the payload says so.
+        if !tool.payload_follows && payload_at == target {
+            text.push_str(" payload fixed");
+        }
         if *turned != Vector3::zeros() {
             text.push_str(" turned");
             vectors(&mut text, &[turned]);

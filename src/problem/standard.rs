@@ -2,8 +2,11 @@
 
 use nalgebra::Vector3;
 
-use super::{Joint, JointKind, Placement};
+use super::{Joint, JointKind, Placement, Problem};
 use crate::spatial::Frame;
+
+/// Name of the fixed joint that holds a and α of the last row.
+const FLANGE: &str = "flange";
 
 /// Converts rows of standard DH, T = Rz(θ+q) Tz(d) Tx(a) Rx(α), to joints of modified DH.
 ///
@@ -33,7 +36,7 @@ pub(super) fn modified(rows: Vec<Joint>) -> Vec<Joint> {
     if let Some(location) = last {
         let (a, alpha) = previous;
         joints.push(Joint {
-            name: "flange".to_owned(),
+            name: FLANGE.to_owned(),
             kind: JointKind::Fixed,
             parent: joints.len().checked_sub(1),
             placement: None,
@@ -51,6 +54,53 @@ pub(super) fn modified(rows: Vec<Joint>) -> Vec<Joint> {
         });
     }
     joints
+}
+
+impl Problem {
+    /// Reads the joint table as standard DH, whose rows were taken for modified DH; `None` where
+    /// the table has no such rows.
+    pub(crate) fn read_as_standard(&self) -> Option<Self> {
+        let has_row = |joint: &Joint| {
+            joint.kind != JointKind::Fixed
+                && joint.beam.is_none()
+                && joint.beta == 0.0
+                && joint.placement.is_none()
+        };
+        if !self.is_chain() || !self.joints.iter().all(has_row) {
+            return None;
+        }
+        Some(self.with_chain(modified(self.joints.clone())))
+    }
+
+    /// Reads the joint table as modified DH, whose rows were taken for standard DH; `None` where
+    /// the table was not declared as standard.
+    pub(crate) fn read_as_modified(&self) -> Option<Self> {
+        let (last, rows) = self.joints.split_last()?;
+        let is_standard = last.kind == JointKind::Fixed && last.name == FLANGE;
+        let first = rows.first()?;
+        let is_shifted = (first.a, first.alpha) == (0.0, 0.0);
+        if !(self.is_chain() && is_standard && is_shifted) {
+            return None;
+        }
+        let mut joints = rows.to_vec();
+        for (joint, next) in joints.iter_mut().zip(&self.joints[1..]) {
+            (joint.a, joint.alpha) = (next.a, next.alpha);
+            let link = link((next.a, next.alpha));
+            for body in &mut joint.bodies {
+                body.position = link.resolve(&(body.position - link.origin));
+            }
+        }
+        Some(self.with_chain(joints))
+    }
+
+    /// Replaces the joints of a chain; the last one carries the tool and all targets.
+    fn with_chain(&self, joints: Vec<Joint>) -> Self {
+        let last = joints.len() - 1;
+        let mut problem = Self { joints, ..self.clone() };
+        problem.tool.joint = last;
+        problem.targets.iter_mut().for_each(|target| target.joint = last);
+        problem
+    }
 }
 
 /// Returns the transform Tx(a) Rx(α) of a link.

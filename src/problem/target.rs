@@ -19,6 +19,8 @@ pub struct Tool {
     pub rotation: Vector3<f64>,
     /// Position of the payload in that frame \[m\].
     pub payload_at: Vector3<f64>,
+    /// True if the payload hangs at the target, also where the target is identified.
+    pub payload_follows: bool,
     /// Payload without a column `payload_kg` \[kg\].
     pub payload_mass: f64,
 }
@@ -82,12 +84,15 @@ pub(super) fn tool(
 ) -> Result<Tool, InputError> {
     let joint = carriers.joints.len().saturating_sub(1);
     let (target, rotation, payload_at) = (Vector3::zeros(), Vector3::zeros(), Vector3::zeros());
-    let mut tool = Tool { joint, target, rotation, payload_at, payload_mass: 0.0 };
+    let mut tool =
+        Tool { joint, target, rotation, payload_at, payload_follows: true, payload_mass: 0.0 };
     let Some(mut section) = section else { return Ok(tool) };
     tool.joint = carriers.joint(&mut section)?.unwrap_or(joint);
     tool.target = section.vector("target", Unit::Length)?.unwrap_or_default();
     tool.rotation = section.vector("rotation", Unit::Angle)?.unwrap_or_default();
-    tool.payload_at = section.vector("payload_at", Unit::Length)?.unwrap_or(tool.target);
+    let payload_at = section.vector("payload_at", Unit::Length)?;
+    tool.payload_follows = payload_at.is_none();
+    tool.payload_at = payload_at.unwrap_or(tool.target);
     tool.payload_mass = section.not_negative("payload", Unit::Mass)?.unwrap_or(0.0);
     section.finish()?;
     Ok(tool)

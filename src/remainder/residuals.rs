@@ -64,9 +64,12 @@ pub fn residuals(
         let errors: Vec<Vector3<f64>> = part.iter().map(|&row| rows[row].position).collect();
         ErrorSummary::of_rows(table, part.iter().copied(), &errors)
     };
+    // Configurations that are left out are predicted without the remainder.
+    let Errors { held_out: left_out, is_left_out, .. } = found.fitted;
     let errors = Errors {
         identification: of(&data.split.identification),
-        held_out: of(&data.split.held_out),
+        held_out: if is_left_out { left_out } else { of(&data.split.held_out) },
+        is_left_out,
     };
     Ok(CorrectedResiduals { rows, poses: corrected, errors })
 }

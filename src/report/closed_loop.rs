@@ -3,7 +3,9 @@
 use std::fmt::Write as _;
 
 use super::document::{Block, Column, Headline, Point, Table, code, first_of, named, some_of};
-use super::errors::{NOMINAL, both_parts, header, held_out_rows, measure, rows_of, unpredicted};
+use super::errors::{
+    NOMINAL, both_parts, header, held_out_rows, judging, measure, rows_of, unpredicted,
+};
 use super::figures;
 use super::identify::{
     BEFORE, all_told, beware, fitted_parameters, mean, poses, spread, why_not_trusted,
@@ -178,11 +180,16 @@ fn blocks<'a>(
 ) -> Vec<Block<'a>> {
     let (fit, after) = (&closure.before.fit, &closure.after);
     let file = format!("the estimate.json of {}", code("flexcal identify problem.closed.toml"));
+    let held_out = if fit.fitted.is_left_out {
+        "none held out: errors are those of configurations that a fit leaves out".to_owned()
+    } else {
+        let rows = rows_of(fit, |errors| errors.held_out);
+        format!("{rows} held out, which took no part in any choice")
+    };
     let counts = format!(
-        "{} from {}; {} held out, which took no part in any choice.",
+        "{} from {}; {held_out}.",
         counted(fit.unknowns.len(), "parameter"),
         rows_of(fit, |errors| errors.identification),
-        rows_of(fit, |errors| errors.held_out)
     );
     let mut blocks = vec![
         Block::Headline(headline(problem, closure, result)),
@@ -243,7 +250,7 @@ fn headline(problem: &Problem, closure: &ClosedLoop, result: &LoopResult) -> Hea
         Some(correction) => (correction.held_out, ", smooth correction included"),
         None => (last, ""),
     };
-    let (_, unit) = result.after.errors.held_out.norms();
+    let (_, unit) = result.after.errors.judged().norms();
     let mut facts = vec![
         ("Verdict", result.verdict.as_str().replace('-', " ")),
         ("Effects found", counts(result)),
@@ -306,9 +313,9 @@ fn errors(closure: &ClosedLoop, result: &LoopResult) -> Table {
     let (fitted, extended) = (&before.errors, &after.errors);
     let declared = "as declared, fitted";
     let mut rows = vec![
-        row("held out", NOMINAL, &registered.held_out, None),
-        row("", declared, &fitted.held_out, None),
-        row("", EXTENDED, &extended.held_out, None),
+        row(judging(&closure.after.fitted), NOMINAL, registered.judged(), None),
+        row("", declared, fitted.judged(), None),
+        row("", EXTENDED, extended.judged(), None),
         row("identification", NOMINAL, &registered.identification, None),
         row("", declared, &fitted.identification, before.reduced_chi2),
         row("", EXTENDED, &extended.identification, after.reduced_chi2),
@@ -329,7 +336,7 @@ fn known_gain(result: &LoopResult) -> Option<Gain> {
 fn gained(closure: &ClosedLoop, result: &LoopResult) -> Option<String> {
     let after = &closure.after;
     let gain = known_gain(result).map(|Gain { mean, interval_95: [low, high] }| {
-        let (_, unit) = result.after.errors.held_out.norms();
+        let (_, unit) = result.after.errors.judged().norms();
         let falls = if mean < 0.0 { "rises" } else { "falls" };
         let [size, low, high] = [mean.abs(), low, high].map(|value| number(value, 4));
         format!(
@@ -416,7 +423,7 @@ fn point(result: &LoopResult, found: &FoundEffect, alternatives: usize) -> Point
         ": probability that noise alone does as well"
     });
     let then = found.held_out_after;
-    if then != result.after.errors.held_out {
+    if then != *result.after.errors.judged() {
         let ([mean, rms, _], unit) = then.norms();
         let _ = write!(
             chance,
@@ -461,8 +468,8 @@ fn rounds<'a>(closure: &'a ClosedLoop, result: &LoopResult) -> Vec<Block<'a>> {
         Column::number("round", |(round, _): &(usize, &Step)| round.to_string()),
         Column::words("effects in the model", effects),
         error(rms, |step| step.errors.identification.norms().0[1]),
-        error("held out mean", |step| step.errors.held_out.norms().0[0]),
-        error("held out rms", |step| step.errors.held_out.norms().0[1]),
+        error("held out mean", |step| step.errors.judged().norms().0[0]),
+        error("held out rms", |step| step.errors.judged().norms().0[1]),
     ];
     vec![
         Block::heading("Rounds"),

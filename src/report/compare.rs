@@ -160,7 +160,7 @@ fn side_by_side(
     };
     let norm = |summary: &Summary, which: usize| number(summary.norms().0[which], 4);
     let held_out = move |name: &'static str, which: usize| {
-        Column::number(name, move |(_, fit): &NamedFit| norm(&fit.errors.held_out, which))
+        Column::number(name, move |(_, fit): &NamedFit| norm(fit.errors.judged(), which))
     };
     let fitted = move |name: &'static str, which: usize| {
         Column::number(name, move |(_, fit): &NamedFit| norm(&fit.errors.identification, which))

@@ -65,6 +65,10 @@ pub(super) fn rows_of(found: &Identification, part: fn(&Errors) -> ErrorSummary)
 
 /// Counts both parts of the data: "50 poses to identify, 20 held out".
 pub(super) fn both_parts(found: &Identification) -> String {
+    if found.fitted.is_left_out {
+        let rows = rows_of(found, |errors| errors.identification);
+        return format!("{rows} to identify, none held out");
+    }
     let held_out = if found.kinds.is_empty() {
         found.fitted.held_out.n.to_string()
     } else {
@@ -73,9 +77,15 @@ pub(super) fn both_parts(found: &Identification) -> String {
     format!("{} to identify, {held_out} held out", rows_of(found, |errors| errors.identification))
 }
 
+/// Returns the word for rows that judge: held out, or left out where none is held out.
+pub(super) fn judging(errors: &Errors) -> &'static str {
+    if errors.is_left_out { "left out" } else { "held out" }
+}
+
 /// Counts the held-out rows of the leading kind: "50 held-out poses".
 pub(super) fn held_out_rows(found: &Identification) -> String {
-    counted_rows(found, &found.fitted.held_out, "held-out ")
+    let adjective = if found.fitted.is_left_out { "left-out " } else { "held-out " };
+    counted_rows(found, &found.fitted.held_out, adjective)
 }
 
 /// Counts rows of a kind; `adjective` precedes the noun and ends in a space.

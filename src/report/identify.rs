@@ -2,7 +2,9 @@
 
 use super::around::around;
 use super::document::{Block, Headline, Table};
-use super::errors::{axes, brief, held_out_rows, measure, rows_of, shown, unit, unpredicted};
+use super::errors::{
+    axes, brief, held_out_rows, judging, measure, rows_of, shown, unit, unpredicted,
+};
 use super::figures;
 use super::findings;
 use super::limits::{active_limits, alternation};
@@ -54,7 +56,10 @@ fn blocks<'a>(problem: &Problem, found: &'a Identification, plots: &'a PlotData)
         facts: vec![
             poses(found),
             fitted_parameters(found),
-            ("Held out, after", spread(&held_out)),
+            (
+                if found.fitted.is_left_out { "Left out, after" } else { "Held out, after" },
+                spread(&held_out),
+            ),
             size("Residual against σ", found),
             ("Strategy", found.strategy.as_str().to_owned()),
             ("Solver", format!("{}, {} steps", found.solver.as_str(), found.iterations)),
@@ -103,7 +108,11 @@ fn fitted(found: &Identification, separator: &str) -> String {
         "{} from {}, {} held out; strategy {}, solver {}{reason}{separator}{} after {}",
         counted(found.unknowns.len(), "parameter"),
         measured(found),
-        rows_of(found, |errors| errors.held_out),
+        if found.fitted.is_left_out {
+            "none".to_owned()
+        } else {
+            rows_of(found, |errors| errors.held_out)
+        },
         found.strategy.as_str(),
         found.solver.as_str(),
         found.termination,
@@ -148,6 +157,9 @@ pub(super) fn errors_by_axis(found: &Identification) -> Table {
     table
         .notes
         .push("before: nominal arm, with its base and tool fitted if they are free".to_owned());
+    if found.fitted.is_left_out {
+        table.notes.push("left out: each configuration predicted by a fit without it".to_owned());
+    }
     table.notes.extend(at_points(of));
     table.notes.extend(no_errors(found).map(|words| format!("–: {words}")));
     table
@@ -161,7 +173,7 @@ fn before_and_after(
     vec![
         row("identification", "before", &before.identification),
         row("", "after", &after.identification),
-        row("held out", "before", &before.held_out),
+        row(judging(after), "before", &before.held_out),
         row("", "after", &after.held_out),
     ]
 }

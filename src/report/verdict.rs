@@ -74,7 +74,9 @@ fn outcome(result: &LoopResult, takes_less: bool) -> String {
         }
         (_, false) => format!("{found}; structure in the residual could not be tested."),
         (Verdict::Unexplained, true) => {
-            let noise = if result.with_status(Status::Contradicted).next().is_some() {
+            let noise = if result.is_contradicted() {
+                " Held-out rows or rows that were set aside contradict the fit: see the warnings."
+            } else if result.with_status(Status::Contradicted).next().is_some() {
                 ""
             } else {
                 " With what is in the model, the residual looks like noise."

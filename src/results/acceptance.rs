@@ -218,6 +218,7 @@ fn protocol(problem: &Problem) -> String {
         Some(HeldOut::Session(name)) => {
             format!("every row of session {name}, to which its base and tool alone were fitted")
         }
+        Some(HeldOut::Nothing) => "no rows".to_owned(),
         Some(HeldOut::Column(name)) => format!("rows that the column {name} marks as validation"),
         _ => "rows that the column split marks as validation".to_owned(),
     };

@@ -10,7 +10,7 @@ use super::identification::{FindingKeys, InfluentialRowSet};
 use super::remainder::Remainder;
 use super::residual_test::ResidualTest;
 use super::summary::{Errors, KindErrors, Summary, by_unit};
-use crate::fit::{Estimate, Finding, Identification};
+use crate::fit::{Estimate, Finding, FindingCode, Identification};
 use crate::problem::{Effect, Problem};
 use crate::quantity::Unit;
 use crate::remainder::Fitted;
@@ -223,11 +223,22 @@ impl LoopResult {
             further: structures.collect(),
             set_aside: closure.set_aside.iter().map(Row::new).collect(),
             harmonic_prior: prior,
-            steps: closure.rounds.iter().map(Step::new).collect(),
+            steps: closure
+                .rounds
+                .iter()
+                .map(|round| Step::new(round, closure.after.fitted.is_left_out))
+                .collect(),
             checks_before: ResidualTest::all(&before.findings),
             checks_after: ResidualTest::all(&closure.findings),
             findings: closure.after.findings.clone(),
         }
+    }
+
+    /// Returns true if held-out rows, or rows that a robust loss sets aside, contradict the last
+    /// fit.
+    pub(crate) fn is_contradicted(&self) -> bool {
+        let codes = [FindingCode::HeldOutBeyondPrediction, FindingCode::RowsSetAside];
+        self.findings.iter().any(|finding| codes.contains(&finding.code))
     }
 
     /// Returns the result with the remainder, if one was accepted in addition to the effects.
@@ -396,10 +407,9 @@ impl Row {
 }
 
 impl Step {
-    fn new(round: &select::Round) -> Self {
+    fn new(round: &select::Round, is_left_out: bool) -> Self {
         let select::Round { effects, identification, held_out } = round;
-        let errors =
-            Errors { identification: Summary::of(identification), held_out: Summary::of(held_out) };
+        let errors = Errors::new(Summary::of(identification), Summary::of(held_out), is_left_out);
         Self { effects: effects.clone(), errors }
     }
 }

@@ -95,20 +95,39 @@ impl Sizes {
     }
 }
 
-/// Error summaries of the rows that are fitted and of those held out.
+/// Error summaries of the rows that are fitted and of those that judge.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct Errors {
     pub identification: Summary,
-    pub held_out: Summary,
+    /// Errors of held-out rows; absent if none is held out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub held_out: Option<Summary>,
+    /// Errors of all rows, each configuration predicted by a fit without it; only if no row is held
+    /// out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub left_out: Option<Summary>,
 }
 
 impl Errors {
     /// Creates the summaries of both parts.
     pub fn of(errors: &fit::Errors) -> Self {
-        Self {
-            identification: Summary::of(&errors.identification),
-            held_out: Summary::of(&errors.held_out),
+        let judged = Summary::of(&errors.held_out);
+        Self::new(Summary::of(&errors.identification), judged, errors.is_left_out)
+    }
+
+    /// Creates the errors of fitted rows and of those that judge: held out or, if `is_left_out`,
+    /// left out.
+    pub(super) fn new(identification: Summary, judged: Summary, is_left_out: bool) -> Self {
+        let (held_out, left_out) = (Some(judged), None);
+        if is_left_out {
+            return Self { identification, held_out: left_out, left_out: held_out };
         }
+        Self { identification, held_out, left_out }
+    }
+
+    /// Returns the errors of the rows that judge.
+    pub fn judged(&self) -> &Summary {
+        self.held_out.as_ref().or(self.left_out.as_ref()).unwrap_or(&self.identification)
     }
 
     /// Creates both summaries for errors that are angles, if the kind of rows does not determine
@@ -119,7 +138,8 @@ impl Errors {
             n: errors.n,
             sizes: Sizes::of(errors, Unit::Angle),
         };
-        Self { identification: of(&errors.identification), held_out: of(&errors.held_out) }
+        let judged = of(&errors.held_out);
+        Self::new(of(&errors.identification), judged, errors.is_left_out)
     }
 }
 

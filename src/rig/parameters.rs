@@ -100,6 +100,9 @@ pub(super) fn visit(problem: &mut Problem, mut set: impl FnMut(String, Unit, &mu
         }
     }
     visit_fixtures(&mut problem.fixtures, set);
+    if problem.tool.payload_follows && problem.targets.is_empty() {
+        problem.tool.payload_at = problem.tool.target;
+    }
 }
 
 /// Calls `set` for every unknown number of the fixtures, like [`visit`], which calls it last.

@@ -9,7 +9,9 @@ use statrs::distribution::{ContinuousCDF as _, StudentsT};
 
 use super::data::Data;
 use super::neighbourhood::{Derivatives, LinearNeighbourhood, Linearised, Unknowns};
-use crate::fit::{Identification, IdentifyError, Noise, Options, Placement, identify};
+use crate::fit::{
+    Identification, IdentifyError, Noise, Options, Placement, identify, selection_of_outliers,
+};
 use crate::least_squares::MANY_UNKNOWNS;
 use crate::model::parameter::{BeamField, ParameterSite, Regressor};
 use crate::model::{Model, Pose};
@@ -122,7 +124,12 @@ impl Fitted {
         };
         let work = data.rows().len() as f64 * (fitted.unknowns.len() as f64).powi(2);
         fitted.set_aside = match previous {
-            _ if fitted.problem.robust.is_some() => outliers_of_fit,
+            // Rows that a cause selects are what the search is about.
+            _ if fitted.problem.robust.is_some() => {
+                let found = &fitted.found.outliers;
+                let cause = selection_of_outliers(data.measurements, data.rows(), found);
+                if cause.is_some() { Vec::new() } else { outliers_of_fit }
+            }
             _ if work <= MAX_OUTLIER_WORK => outliers(&fitted, data),
             Some(previous) => previous.set_aside.clone(),
             None => outliers_of_fit,

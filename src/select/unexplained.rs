@@ -150,6 +150,9 @@ fn correction(
     let whole = bends.then(|| fitted.with_all_rows());
     let fitted = whole.as_ref().unwrap_or(fitted);
     let (here, there) = (data.rows(), &data.split.held_out);
+    if there.is_empty() {
+        return None;
+    }
     let weighed = data.evidence_rows();
     let few = Hypotheses::only(fitted, data, &weighed, weighed.len(), hypothesis);
     let (shape, sigma) = best_form(fitted, data, &few, best, hypothesis)?;

@@ -128,6 +128,7 @@ fn a_session_needs_points_that_tie_its_base_down() {
         let found = fit(&problem, &data);
         found
             .first_error()
+            .or(found.finding(FindingCode::HeldOutBaseNotDetermined))
             .map(|error| (error.code, error.word("of").map(str::to_owned), error.to_string()))
     };
     let of_b = |code, found: Option<(FindingCode, Option<String>, String)>| {
@@ -135,7 +136,7 @@ fn a_session_needs_points_that_tie_its_base_down() {
         assert_eq!((found, of.as_deref()), (code, Some("base[B]")));
         words
     };
-    of_b(FindingCode::TooFewEquations, with(&[70, 71]));
+    of_b(FindingCode::HeldOutBaseNotDetermined, with(&[70, 71]));
     assert_eq!(with(&[70, 71, 72]), None);
     let open = of_b(FindingCode::BaseNotDetermined, with(&[10, 11]));
     assert!(open.contains("leaves a turn"), "{open}");
@@ -250,8 +251,10 @@ fn what_may_have_been_misread_is_said() {
     });
     assert!(!metres.contains(&Misreading::Metres.to_string()), "{metres:?}");
     // No misreading explains shuffled rows.
-    let shuffled = with(&|_, data| data.measurements.positions.rotate_left(1));
-    assert!(shuffled.is_empty());
+    let shuffled = with(&|_, data| data.measurements.positions.reverse());
+    assert!(shuffled.is_empty(), "{shuffled:?}");
+    let shifted = with(&|_, data| data.measurements.positions.rotate_left(1));
+    assert_eq!(shifted, [Misreading::Shifted { by: -1, from: 0 }.to_string()]);
 }
 
 #[test]

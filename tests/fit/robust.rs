@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use flexcal::fit::{Identification, Options, identify};
+use flexcal::fit::{FindingCode, Identification, Options, identify};
 use flexcal::measurement::{Dataset, Measurements};
 use flexcal::problem::{Effect, Problem, Robust, RobustLoss};
 use flexcal::select::{Verdict, close};
@@ -122,5 +122,27 @@ fn gross_errors_hide_no_effect_from_the_loop() {
         robust.effects.len() == 1 && is_wave(&robust.effects[0].effect),
         "{:?}",
         robust.effects
+    );
+}
+
+#[test]
+fn rows_that_a_cause_selects_are_not_passed_over_as_gross_errors() {
+    let (mut problem, mut data) = lunar("h-none-large.csv");
+    problem.robust = Some(Robust { loss: RobustLoss::L1, threshold: None });
+    // The station moves by 2 mm before the last quarter of the rows.
+    let late = data.measurements.len() * 3 / 4;
+    for position in &mut data.measurements.positions[late..] {
+        *position += Vector3::new(1.2e-3, -1.0e-3, 1.2e-3);
+    }
+    let found = identify(&problem, &data, &Options::default()).unwrap();
+    let finding = found.finding(FindingCode::RowsSetAside).unwrap();
+    assert_eq!(finding.word("depends_on"), Some("time"), "{finding}");
+    let closed = close(&problem, &data, &Options::default()).unwrap();
+    assert_ne!(closed.verdict, Verdict::NothingFound);
+    let effects: Vec<&Effect> = closed.effects.iter().map(|found| &found.effect).collect();
+    assert!(
+        effects.iter().any(|effect| effect.declaration().contains("station")),
+        "{effects:?} {:?}",
+        closed.unexplained.first().map(|left| &left.depends_on)
     );
 }

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use flexcal::fit::{FindingCode, Identification, Misreading, Options, identify};
 use flexcal::measurement::Dataset;
+use flexcal::model::PoseResiduals;
 use flexcal::problem::Problem;
 use nalgebra::{DVector, UnitQuaternion, Vector3};
 use rand::SeedableRng;
@@ -171,4 +172,139 @@ fn orientations_in_another_convention_are_not_trusted_and_it_is_named() {
     let found = fit(&problem, &data);
     let finding = found.finding(FindingCode::OrientationMisfit).unwrap();
     assert!(!found.is_trusted() && finding.remedy.contains("R = Rz Ry Rx"), "{finding}");
+}
+
+/// Sixty poses of an arm with a free base, and thirty held-out ones.
+fn based() -> (Problem, Dataset) {
+    let problem = parse(&text(&format!("{PRIORS}\n'base.*' = {{ free = true }}")));
+    let data = measured(&problem, 8);
+    (problem, data)
+}
+
+#[test]
+fn gross_mistakes_are_fitted_and_named() {
+    let misread = |problem: &Problem, data: &Dataset| {
+        let found = fit(problem, data);
+        assert!(!found.is_trusted());
+        found.finding(FindingCode::Misread).map(ToString::to_string).unwrap_or_default()
+    };
+    let commands = |change: &dyn Fn(&mut [f64])| {
+        let (problem, mut data) = based();
+        data.measurements.configurations.chunks_exact_mut(5).for_each(change);
+        misread(&problem, &data)
+    };
+    let coupled = commands(&|q| q[2] += q[1]);
+    assert!(coupled.contains("joint 3 that also turns by -1.000 times the command of joint 2"));
+    assert!(commands(&|q| q.swap(1, 3)).contains("joints 2 and 4 that are exchanged"));
+    assert!(commands(&|q| q[3] -= 1.1).contains("joint 4 whose zero position is 63.0"));
+    assert!(commands(&|q| q[2] /= 1.7).contains("joint 3 that turns by 1.700"));
+    let (problem, mut data) = based();
+    data.measurements.positions[40..].rotate_left(1);
+    let shifted = misread(&problem, &data);
+    assert!(shifted.contains("the configuration 1 row after, from row 41"), "{shifted}");
+    let declared = |change: &dyn Fn(&mut Problem)| {
+        let (mut problem, data) = based();
+        change(&mut problem);
+        misread(&problem, &data)
+    };
+    let radians = declared(&|problem| problem.joints[1].alpha = 1.5708_f64.to_radians());
+    assert!(radians.contains("alpha of joint 2 that is in radians"), "{radians}");
+    let long = declared(&|problem| problem.joints[3].d *= 1e3);
+    assert!(long.contains("d of joint 4 that is in millimetres"), "{long}");
+    // Rows of a standard table: a and α of a joint belong to the next one.
+    let standard = declared(&|problem| {
+        let next: Vec<(f64, f64)> = problem.joints.iter().map(|j| (j.a, j.alpha)).collect();
+        for (k, joint) in problem.joints.iter_mut().enumerate() {
+            (joint.a, joint.alpha) = next.get(k + 1).copied().unwrap_or_default();
+        }
+    });
+    assert!(standard.contains("standard DH form"), "{standard}");
+}
+
+#[test]
+fn a_sound_table_is_not_misread() {
+    let (problem, data) = based();
+    let found = fit(&problem, &data);
+    assert!(found.is_trusted() && !found.has(FindingCode::Misread), "{:?}", found.findings);
+}
+
+#[test]
+fn a_payload_hangs_at_the_identified_target_unless_its_place_is_declared() {
+    let elastic = |tool: &str| {
+        format!(
+            "name = 'arm'\n[[joint]]\nd_m = 0.4\n[[joint]]\nalpha_deg = 90\na_m = 0.15\nstiffness_N_m_per_rad = 2e4\n\
+             [[joint]]\na_m = 0.6\nstiffness_N_m_per_rad = 1e4\n[[joint]]\nalpha_deg = -90\na_m = 0.1\nd_m = 0.6\n\
+             stiffness_N_m_per_rad = 3e3\n[tool]\ntarget_m = [0.05, 0.02, 0.12]\npayload_kg = 20\n{tool}[parameters]\n\
+             'tool.*' = {{ sigma_mm = 20 }}\n'joint*.stiffness' = {{ sigma_relative = 0.3 }}\n[data]\nposition_sigma_mm = 0.05\n"
+        )
+    };
+    let truth = [("tool.x", 0.02), ("tool.y", -0.01), ("tool.z", 0.03)];
+    let (follows, fixed) =
+        (parse(&elastic("")), parse(&elastic("payload_at_m = [0.05, 0.02, 0.12]\n")));
+    let data = simulated(&follows, &truth, [60, 20], 11);
+    let found = fit(&follows, &data);
+    for (name, value) in truth {
+        let estimate = found.estimates.iter().find(|estimate| estimate.name == name).unwrap();
+        let error = estimate.estimate - estimate.nominal - value;
+        assert!(error.abs() < 4.0 * estimate.std_error.unwrap(), "{name} {error}");
+    }
+    let chi2 = |problem| fit(problem, &data).reduced_chi2.unwrap();
+    assert!(chi2(&follows) < 1.5 && chi2(&fixed) > 3.0, "{} {}", chi2(&follows), chi2(&fixed));
+    assert_ne!(follows.digest(), fixed.digest());
+    // Derivatives with respect to the target contain those of the load.
+    let model = model_of(&follows, &data.measurements);
+    let placement = flexcal::fit::Placement::of(&data.measurements);
+    let rows: Vec<usize> = (0..6).collect();
+    let poses = || placement.poses(&data.measurements, &rows, 1e-3);
+    let x = DVector::from_element(model.parameters.len(), 1e-3);
+    let place = model.parameters.iter().position(|p| p.name == "tool.x").unwrap();
+    let at = |step: f64| {
+        let mut moved = x.clone();
+        moved[place] += step;
+        model.residuals(poses(), &moved)
+    };
+    let (ahead, behind) = (at(1e-4), at(-1e-4));
+    let unknowns: Vec<usize> = (0..model.parameters.len()).collect();
+    let residuals = PoseResiduals::new(&model, poses(), unknowns, x.clone());
+    let slopes = flexcal::least_squares::jacobian(&residuals, &x);
+    for (row, (ahead, behind)) in ahead.iter().zip(&behind).enumerate() {
+        let expected = (ahead - behind) / 2e-4 / 1e-3;
+        let found = slopes.fixed_view::<3, 1>(3 * row, place);
+        assert!((expected - found).norm() < 1e-4 * expected.norm(), "{expected} {found}");
+    }
+}
+
+#[test]
+fn a_held_out_session_on_a_line_is_a_finding_about_it_alone() {
+    let (problem, mut data) = based();
+    data.measurements.session =
+        crate::common::made::labels((0..90).map(|row| if row < 60 { "A" } else { "B" }));
+    data.measurements.target = Some(crate::common::made::labels((0..90).map(|_| "t")));
+    // One axis turns: the points lie on a circle about it, and four of them nearly on a line.
+    let rows: Vec<usize> = (0..60).chain([60, 61]).collect();
+    data = divided(60, &data.measurements.select(&rows));
+    let found = fit(&problem, &data);
+    assert!(found.is_trusted(), "{:?}", found.findings);
+    assert!(found.has(FindingCode::HeldOutBaseNotDetermined), "{:?}", found.findings);
+}
+
+#[test]
+fn all_rows_may_be_fitted_and_configurations_left_out_judge() {
+    let plain = parse(&text(PRIORS));
+    let problem = parse(&(text(PRIORS) + "held_out = 'none'\n"));
+    let whole = simulated(&plain, &[("joint2.alpha", 2e-3)], [24, 6], 12);
+    let data = Dataset::from_measurements(&problem, whole.measurements.clone()).unwrap();
+    assert_eq!((data.split.identification.len(), data.split.held_out.len()), (30, 0));
+    let found = fit(&problem, &data);
+    assert!(found.is_trusted() && found.fitted.is_left_out && found.fitted.held_out.n == 30);
+    let errors = (0..30).map(|row| {
+        let mut without = data.clone();
+        without.split.identification.retain(|&fitted| fitted != row);
+        without.split.held_out = vec![row];
+        fit(&plain, &without).fitted.held_out.rms.norm
+    });
+    let mean = errors.sum::<f64>() / 30.0;
+    let ratio = found.fitted.held_out.mean.norm / mean;
+    assert!((0.98..1.02).contains(&ratio), "{ratio}");
+    assert!(found.fitted.held_out.rms.norm > 1.02 * found.fitted.identification.rms.norm);
 }

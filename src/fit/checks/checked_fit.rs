@@ -1,8 +1,11 @@
 //! Input of the checks: a fit with everything that they look at.
 
+use std::cell::OnceCell;
+
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::finding::Finding;
+use super::misreading::{Explanations, explanations};
 use super::outliers::Outlier;
 use super::point_spread::PointSpread;
 use super::pose_sufficiency::PoseSufficiency;
@@ -65,9 +68,16 @@ pub(in crate::fit) struct CheckedFit<'a> {
     /// For each touched point, scatter of the prediction with the nominal and with the fitted arm,
     /// and true if all its rows are held out.
     pub spreads: &'a [(PointSpread, PointSpread, bool)],
+    /// Misreadings that explain the misfit, searched at first use.
+    pub explanations: OnceCell<Explanations>,
 }
 
 impl CheckedFit<'_> {
+    /// Returns the misreadings of table or problem that explain the misfit.
+    pub fn explanations(&self) -> &Explanations {
+        self.explanations.get_or_init(|| explanations(self))
+    }
+
     /// Returns the identification rows grouped by what they measure, positions first; rows that do
     /// not involve the arm are left out.
     pub fn kinds(&self) -> Vec<RowKind> {

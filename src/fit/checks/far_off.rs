@@ -4,7 +4,7 @@ use serde_json::json;
 
 use super::checked_fit::{Check, CheckedFit};
 use super::finding::{Finding, FindingCode};
-use super::misreading::{Misreading, misreadings};
+use super::misreading::Misreading;
 use super::row_kind::{RowKind, measured, named, size};
 
 /// Largest error of the registered nominal arm, relative to the spread of the measurements, that is
@@ -17,18 +17,25 @@ const ONE_PLACE: f64 = 0.05;
 /// Checks that the registered nominal arm is near the measurements.
 pub(super) struct NominalIsNear;
 
+/// Returns true if the registered nominal arm misses the leading kind of rows by more than
+/// [`MAX_NOMINAL_MISS`] of their spread.
+pub(super) fn is_nominal_far_off(fit: &CheckedFit) -> bool {
+    let rms = fit.registered.identification.rms.norm;
+    let RowKind { observation, spread, .. } = fit.kind(fit.fitting.measurements.leading());
+    let is_measured_directly = observation.is_measured_directly();
+    let least = if is_measured_directly { 0.0 } else { ONE_PLACE * fit.fitting.model.reach() };
+    spread > least && rms > MAX_NOMINAL_MISS * spread
+}
+
 impl Check for NominalIsNear {
     fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
-        let rms = fit.registered.identification.rms.norm;
-        let RowKind { observation, spread, .. } = fit.kind(fit.fitting.measurements.leading());
-        let is_measured_directly = observation.is_measured_directly();
-        let least = if is_measured_directly { 0.0 } else { ONE_PLACE * fit.fitting.model.reach() };
-        if !(spread > least && rms > MAX_NOMINAL_MISS * spread) {
+        if !is_nominal_far_off(fit) {
             return Vec::new();
         }
+        let rms = fit.registered.identification.rms.norm;
+        let RowKind { observation, spread, .. } = fit.kind(fit.fitting.measurements.leading());
         let kind = observation.kind();
-        let explanations = misreadings(fit.fitting, fit.problem, rms);
-        vec![far_off(kind, rms, spread, &explanations)]
+        vec![far_off(kind, rms, spread, &fit.explanations().near)]
     }
 }
 

@@ -80,6 +80,9 @@ finding_codes! {
     BaseNotDetermined: Error "base-not-determined" ["of", "poses"]
         "The measured points of a base leave its pose open, as points on a line do.",
         "measure more poses of this session, or give its base a prior";
+    Misread: Error "misread" ["explanations", "before", "after"]
+        "Table or problem read in another way leaves less than a fifth of the error.",
+        "correct the table or the problem";
     MissesMeasurements: Error "misses-measurements" ["kind", "rms", "spread"]
         "The fitted arm misses the measurements by more than 2 % of their spread and more than 100 σ.",
         "check units, signs of joints, and whether base and session are declared";
@@ -143,6 +146,12 @@ finding_codes! {
     InfluentialRows: Warning "influential-rows" ["rows", "reduced_chi2_without"]
         "A few rows cause most of the misfit.",
         "look at these rows; a section [robust] limits their influence";
+    RowsSetAside: Warning "rows-set-aside" ["rows", "of", "depends_on", "p_value"]
+        "A robust loss sets many rows aside, and time, session, a joint or a load decides which.",
+        "look for the cause with flexcal loop, or check these rows";
+    HeldOutBaseNotDetermined: Warning "held-out-base-not-determined" ["of", "poses"]
+        "The held-out points of a session do not determine its base or tool, so that its held-out errors say little.",
+        "measure more poses of this session, or give its base a prior";
     UnsteadyPoint: Warning "unsteady-point" ["point", "times", "share"]
         "The predictions at one touched point scatter far more than at the others, and along one direction.",
         "check whether the point moved or gave way";

@@ -11,6 +11,7 @@ pub(super) mod finding;
 pub(super) mod fitted_rows;
 pub(super) mod held_out;
 pub(super) mod misfit;
+mod misread;
 pub(super) mod misreading;
 mod orientation;
 pub(super) mod outliers;
@@ -21,6 +22,7 @@ mod prediction;
 pub(super) mod priors;
 pub(super) mod required_columns;
 pub(super) mod row_kind;
+pub(super) mod set_aside;
 
 use checked_fit::{Check, CheckedFit, Convergence, EnoughEquations};
 use finding::Finding;
@@ -28,6 +30,7 @@ use finding::Finding;
 /// All checks, in the order of the findings. Commands print the first error as the reason.
 const CHECKS: &[&dyn Check] = &[
     &EnoughEquations,
+    &misread::ReadAsMeant,
     &misfit::Misfit,
     &misfit::SizeOfArm,
     &Convergence,
@@ -46,6 +49,8 @@ const CHECKS: &[&dyn Check] = &[
     &bounds::BoundsAreSeen,
     &held_out::NotRepeated,
     &held_out::WithoutOutliers,
+    &pose_sufficiency::HeldOutPlaced,
+    &set_aside::SetAsideByChance,
     &fitted_rows::SteadyPoints,
     &fitted_rows::NoOutliers,
     &priors::PriorWidths,

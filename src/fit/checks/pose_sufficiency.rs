@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::DVector;
 
+use super::checked_fit::{Check, CheckedFit};
 use super::finding::{Finding, FindingCode};
 use crate::fit::Placement;
 use crate::fit::stages::fitting::Fitting;
@@ -22,6 +23,8 @@ pub(in crate::fit) struct PoseSufficiency {
     /// Finding that the poses are too few for some unknowns, regardless of priors; `None` if they
     /// suffice.
     pub finding: Option<Finding>,
+    /// Finding about a base or tool that only held-out rows use.
+    pub held_out: Option<Finding>,
     /// Number of measured coordinates that are independent of each other.
     pub coordinates: usize,
     /// Number of different poses of the arm among the identification rows; several targets in one
@@ -59,14 +62,15 @@ impl PoseSufficiency {
             .or_else(|| {
                 underdetermined((model, placement), (&numbers, &of_row), (rows, false), is_fitted)
             })
-            .or_else(|| {
-                underdetermined((model, placement), (&numbers, &of_row), (later, true), is_held_out)
-            })
-            .or_else(|| undetermined(fitting, &numbers, rows, at, is_fitted))
-            .or_else(|| undetermined(fitting, &numbers, later, at, is_held_out));
+            .or_else(|| undetermined(fitting, &numbers, rows, at, is_fitted));
+        // A session that is held out says nothing about the arm, whatever its points determine.
+        let held_out =
+            underdetermined((model, placement), (&numbers, &of_row), (later, true), is_held_out)
+                .or_else(|| undetermined(fitting, &numbers, later, at, is_held_out))
+                .map(of_held_out);
         let several_targets =
             poses < count_distinct(&numbers, split.identification.iter().copied());
-        Self { finding, coordinates, poses, several_targets }
+        Self { finding, held_out, coordinates, poses, several_targets }
     }
 
     /// Returns true if there are enough independent coordinates, given the number of `parameters`,
@@ -75,6 +79,23 @@ impl PoseSufficiency {
         let is_short = |finding: &Finding| finding.code == FindingCode::TooFewEquations;
         self.coordinates >= parameters && !self.finding.as_ref().is_some_and(is_short)
     }
+}
+
+/// Checks that held-out sessions determine their bases and tools.
+pub(super) struct HeldOutPlaced;
+
+impl Check for HeldOutPlaced {
+    fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
+        fit.poses.held_out.clone().into_iter().collect()
+    }
+}
+
+/// Turns a finding about a base or tool into one about held-out rows.
+fn of_held_out(finding: Finding) -> Finding {
+    let number = |name| finding.value(name).cloned().unwrap_or_default();
+    let text = format!("held-out rows of {}; their errors say little", finding.text);
+    let numbers = [number("of"), number("poses")];
+    Finding::new(FindingCode::HeldOutBaseNotDetermined, numbers, text)
 }
 
 /// Reports that `of`, the fit, a base or a tool, has fewer measured coordinates than parameters

@@ -123,6 +123,7 @@ fn baseline(
         errors: Errors {
             identification: ErrorSummary::of(&errors(&split.identification)),
             held_out: ErrorSummary::of(&held_out),
+            is_left_out: false,
         },
         held_out,
         iterations: found.iteration.iterations,

@@ -128,6 +128,11 @@ impl<'a> Fitting<'a> {
             .collect()
     }
 
+    /// Returns the indices of the parameters of bases and targets.
+    pub fn placements(&self) -> Vec<usize> {
+        self.choose(|parameter| parameter.site.is_placement())
+    }
+
     /// Returns `rows` as poses with their declared σ.
     pub fn poses(&self, rows: &[usize]) -> Vec<Pose<'a>> {
         self.placement.oriented_poses(self.measurements, rows, (self.sigma, self.turn_sigma))
@@ -258,7 +263,7 @@ impl<'a> Fitting<'a> {
     /// fitted.
     pub fn registered(&self) -> Result<DVector<f64>, StageError> {
         let mut x = self.located();
-        let placements = self.choose(|parameter| parameter.site.is_placement());
+        let placements = self.placements();
         if !placements.is_empty() {
             x = self.placing(&self.split.identification, placements).run(&x)?.x;
         }
@@ -392,6 +397,7 @@ impl<'a> Fitting<'a> {
         Errors {
             identification: of(&self.split.identification),
             held_out: of(&self.split.held_out),
+            is_left_out: false,
         }
     }
 
@@ -425,6 +431,7 @@ impl<'a> Fitting<'a> {
             Errors {
                 identification: of(&self.split.identification),
                 held_out: of(&self.split.held_out),
+                is_left_out: false,
             }
         };
         Some(OrientationErrors {

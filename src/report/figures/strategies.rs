@@ -66,7 +66,11 @@ pub fn ablations(comparison: &Comparison) -> Option<Drawing> {
 /// Draws the errors after each round of a loop, with the effects that it added.
 pub fn rounds(closure: &ClosedLoop) -> Option<Drawing> {
     let after = |(k, round): (usize, &Round)| {
-        let errors = Errors { identification: round.identification, held_out: round.held_out };
+        let errors = Errors {
+            identification: round.identification,
+            held_out: round.held_out,
+            is_left_out: false,
+        };
         entry(round_name(closure, k), &errors)
     };
     let mut entries = vec![entry("as declared".to_owned(), &closure.before.fit.fitted)];

@@ -9,7 +9,9 @@ use super::search::search;
 use super::state::{Round, SearchState};
 use super::status::{Status, Verdict};
 use crate::error::Location;
-use crate::fit::{ErrorSummary, Errors, Identification, IdentifyError, Options, Progress};
+use crate::fit::{
+    ErrorSummary, Errors, FindingCode, Identification, IdentifyError, Options, Progress,
+};
 use crate::measurement::Dataset;
 use crate::numeric::Interval;
 use crate::problem::{Effect, Problem};
@@ -136,14 +138,18 @@ pub fn close_by(
     } else {
         Some(fit_with_found(&state, &fitted, &effects, &unstoppable)?)
     };
-    let is_noise = unexplained.is_empty();
+    let contradicted = [FindingCode::HeldOutBeyondPrediction, FindingCode::RowsSetAside];
+    let is_noise =
+        unexplained.is_empty() && !contradicted.iter().any(|code| fitted.found.has(*code));
     let is_noise_with_found =
         is_noise && with_found.as_ref().is_none_or(|sure| !check_fit(sure, &data).is_structured());
     let verdict = Verdict::of(&statuses, is_noise, is_noise_with_found);
     let with_found = with_found.map_or(fitted.found.fitted, |sure| sure.found.fitted);
-    let held_out = &data.split.held_out;
-    let gain =
-        interval::gain(&data, &declared.errors(&data, held_out), &fitted.errors(&data, held_out));
+    let judged = |of: &Fitted| match data.split.held_out.as_slice() {
+        [] => of.found.left_out.clone(),
+        held_out => of.errors(&data, held_out),
+    };
+    let gain = interval::gain(&data, &judged(&declared), &judged(&fitted));
     let rows = data.evidence_rows();
     let carried = evidence.iter().flat_map(|evidence| &evidence.left_out).map(|&pose| rows[pose]);
     let aside: BTreeSet<usize> = fitted.set_aside.iter().copied().chain(carried).collect();
@@ -180,6 +186,10 @@ fn kept(
     data: &Data,
     options: &Options,
 ) -> Result<(Fitted, Option<Evidence>), IdentifyError> {
+    let is_extended = fitted.problem.effects.len() > declared.problem.effects.len();
+    if is_extended && declared.predicts_better_than(&fitted, data) {
+        return Ok((declared.clone(), None));
+    }
     if fitted.found.describes_arm() {
         return Ok((fitted, evidence));
     }

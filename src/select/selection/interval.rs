@@ -9,9 +9,11 @@ use super::super::data::{Data, bits};
 use crate::numeric::{Interval, mean_interval};
 
 /// Returns the mean reduction of the error on held-out rows of the leading kind, \[m\] or \[rad\],
-/// with a bootstrap interval over configurations.
+/// with a bootstrap interval over configurations. If no row is held out, all rows count.
 pub(super) fn gain(data: &Data, before: &[Vector3<f64>], after: &[Vector3<f64>]) -> Interval {
-    let (rows, kind) = (&data.split.held_out, data.measurements.leading().kind());
+    let kind = data.measurements.leading().kind();
+    let held_out = &data.split.held_out;
+    let rows = if held_out.is_empty() { data.rows() } else { held_out };
     let mut groups: BTreeMap<Vec<u64>, Vec<f64>> = BTreeMap::new();
     for ((&row, before), after) in rows.iter().zip(before).zip(after) {
         if data.measurements.observation(row).kind() != kind {

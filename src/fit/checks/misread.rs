@@ -1,0 +1,51 @@
+//! Check whether table and problem were read as they were meant.
+
+use serde_json::json;
+
+use super::checked_fit::{Check, CheckedFit};
+use super::far_off::is_nominal_far_off;
+use super::finding::{Finding, FindingCode};
+use super::parameter_limits::WithinPriors;
+use super::row_kind::size;
+
+/// Multiple of the declared σ up to which a residual needs no other reading of the table.
+const MIN_SIGMAS: f64 = 10.0;
+/// Part of the spread of the points above which a residual without a declared σ is looked at.
+const MIN_PART: f64 = 0.01;
+
+/// Number of explanations that a text names.
+const MAX_NAMED: usize = 4;
+
+/// Checks that no other reading of table or problem explains the measurements far better.
+pub(super) struct ReadAsMeant;
+
+impl Check for ReadAsMeant {
+    fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
+        let kind = fit.kind(fit.fitting.measurements.leading());
+        let errors = fit.fitting.position_errors(&kind.rows, &fit.end.x);
+        let rms = fit.rms(&kind.rows, &errors);
+        let limit = match kind.declared_sigma {
+            Some(sigma) => MIN_SIGMAS * kind.observation.root() * sigma,
+            None => MIN_PART * kind.spread,
+        };
+        let is_within_priors = WithinPriors.check(fit).is_empty();
+        if rms <= limit && is_within_priors && !is_nominal_far_off(fit) {
+            return Vec::new();
+        }
+        let explanations = fit.explanations();
+        let Some(best) = explanations.fitted.first() else { return Vec::new() };
+        let words: Vec<&str> =
+            explanations.fitted.iter().map(|explanation| explanation.words.as_str()).collect();
+        let more = words.len().saturating_sub(MAX_NAMED);
+        let more = if more > 0 { format!(", or {more} more") } else { String::new() };
+        let name = kind.observation.kind();
+        let text = format!(
+            "read in another way the measurements fit: {}{more} would leave {} of error instead of {}",
+            words[..words.len().min(MAX_NAMED)].join(", or "),
+            size(name, best.rms, 3),
+            size(name, explanations.as_read, 3)
+        );
+        let numbers = [json!(words), explanations.as_read.into(), best.rms.into()];
+        vec![Finding::new(FindingCode::Misread, numbers, text)]
+    }
+}

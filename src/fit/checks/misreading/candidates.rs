@@ -1,0 +1,211 @@
+//! Misreadings that a problem and the columns of its table allow.
+
+use std::f64::consts::PI;
+
+use super::Misreading;
+use super::undo::{LONG, is_far};
+use crate::measurement::Measurements;
+use crate::model::parameter::JointField;
+use crate::problem::{Joint, JointKind, Problem};
+
+/// Angle of a joint table in degrees, read as such, from which on it may be meant in radians.
+const MIN_RADIANS: f64 = 0.3;
+/// Lengths between which a length of the joint table is plausible \[m\].
+const PLAUSIBLE_LENGTHS: std::ops::Range<f64> = 0.01..3.0;
+/// Maximum number of joints of which every pair is tried.
+const MAX_PAIRED: usize = 12;
+/// Maximum number of masses that are tried one by one.
+const MAX_MASSES: usize = 12;
+/// Step of zero positions that are tried \[°\]; the fit finds what lies between.
+const ZERO_STEP: i16 = 15;
+/// Ratios that are tried, in hundredths; the fit finds what lies between.
+const RATIOS: [i16; 18] =
+    [1, 5, 10, 20, 25, 33, 50, 67, 80, 90, 110, 125, 150, 200, 300, 400, 500, 1000];
+/// Maximum number of rows by which positions may be shifted.
+const MAX_SHIFT: i8 = 3;
+/// Number of places at which a shift of the rows behind is tried.
+const SHIFT_PLACES: usize = 12;
+
+/// Returns every misreading that the problem and its table allow.
+pub(super) fn candidates(problem: &Problem, table: &Measurements) -> Vec<Misreading> {
+    let turns =
+        |radians| (0..problem.joints.len()).any(|joint| turns_in(problem, table, joint, radians));
+    let lengths = |metres| table.position_unit.is_none_or(|unit| (unit >= 1.0) == metres);
+    let long = problem
+        .joints
+        .iter()
+        .any(|joint| lengths_of(&mut joint.clone()).iter().any(|length| length.abs() > LONG));
+    let mut all = Vec::new();
+    all.extend(turns(true).then_some(Misreading::Degrees));
+    all.extend(turns(false).then_some(Misreading::Radians));
+    all.extend(lengths(false).then_some(Misreading::Metres));
+    all.extend(lengths(true).then_some(Misreading::Millimetres));
+    all.extend(lengths(false).then_some(Misreading::Inches));
+    all.push(Misreading::Mirrored);
+    all.extend(is_far(problem).then_some(Misreading::TargetInMillimetres));
+    all.extend(long.then_some(Misreading::ArmInMillimetres));
+    all.extend(of_commands(problem));
+    all.extend(of_order(table));
+    all.extend(of_joint_table(problem));
+    if problem.is_elastic() {
+        all.extend(of_loads(problem, table));
+    }
+    all
+}
+
+/// Returns misreadings of the joint columns: signs, exchanges, couplings, zeros and ratios.
+fn of_commands(problem: &Problem) -> Vec<Misreading> {
+    let kind = |joint: usize| problem.joints[joint - 1].command_kind();
+    let moving: Vec<usize> = (1..=problem.joints.len().min(64))
+        .filter(|&joint| kind(joint) != JointKind::Fixed)
+        .collect();
+    let turning = moving.iter().copied().filter(|&joint| kind(joint) == JointKind::Revolute);
+    let turning: Vec<usize> = turning.collect();
+    let mut all: Vec<Misreading> =
+        moving.iter().map(|&joint| Misreading::reversed(&[joint])).collect();
+    for (k, &joint) in moving.iter().enumerate().take(MAX_PAIRED) {
+        for &with in &moving[k + 1..moving.len().min(MAX_PAIRED)] {
+            if kind(joint) != kind(with) {
+                continue;
+            }
+            all.push(Misreading::Exchanged { joint, with });
+            for (joint, from) in [(joint, with), (with, joint)] {
+                let coupled = |is_opposite| Misreading::Coupled { joint, from, is_opposite };
+                all.extend([false, true].map(coupled));
+            }
+        }
+    }
+    for &joint in &turning {
+        let steps = (1 - 180 / ZERO_STEP..=180 / ZERO_STEP).filter(|&step| step != 0);
+        all.extend(steps.map(|step| Misreading::Zero { joint, degrees: step * ZERO_STEP }));
+    }
+    for &joint in &moving {
+        all.extend(RATIOS.map(|percent| Misreading::Ratio { joint, percent }));
+    }
+    all
+}
+
+/// Returns shifts of the positions against the configurations.
+fn of_order(table: &Measurements) -> Vec<Misreading> {
+    let shifts = (-MAX_SHIFT..=MAX_SHIFT).filter(|&by| by != 0);
+    let step = shift_step(table.len());
+    let places = (0..table.len()).step_by(step).take(SHIFT_PLACES);
+    let of_place = |from: usize| shifts.clone().map(move |by| Misreading::Shifted { by, from });
+    places.flat_map(of_place).collect()
+}
+
+/// Returns the distance of the places at which a shift is tried, for a number of rows.
+pub(super) fn shift_step(rows: usize) -> usize {
+    (rows / SHIFT_PLACES).max(1)
+}
+
+/// Returns misreadings of the joint table: its convention, units and signs.
+fn of_joint_table(problem: &Problem) -> Vec<Misreading> {
+    use JointField::{A, Alpha, Beta, D, Theta};
+    let mut all = vec![Misreading::StandardForm, Misreading::ModifiedForm];
+    let fields = [Alpha, Theta, Beta];
+    for field in fields {
+        let mut counts = [0; 2];
+        for (joint, declared) in (1..).zip(&problem.joints) {
+            let mut declared = declared.clone();
+            let Some(&mut angle) = number_of(&mut declared, field) else { continue };
+            if (MIN_RADIANS..=2.0 * PI).contains(&angle.to_degrees().abs()) {
+                all.push(Misreading::TableRadians { joint, field });
+                counts[0] += 1;
+            }
+            if angle.abs() > 2.0 * PI {
+                all.push(Misreading::TableDegrees { joint, field });
+                counts[1] += 1;
+            }
+            if angle != 0.0 {
+                all.push(Misreading::Sign { joint, field });
+            }
+        }
+        all.extend((counts[0] > 1).then_some(Misreading::TableRadians { joint: 0, field }));
+        all.extend((counts[1] > 1).then_some(Misreading::TableDegrees { joint: 0, field }));
+    }
+    for (joint, declared) in (1..).zip(&problem.joints) {
+        for field in [A, D, JointField::X, JointField::Y, JointField::Z] {
+            let mut declared = declared.clone();
+            let Some(&mut length) = number_of(&mut declared, field) else { continue };
+            if length == 0.0 {
+                continue;
+            }
+            all.push(Misreading::Sign { joint, field });
+            let is_plausible = |power: &i8| {
+                PLAUSIBLE_LENGTHS.contains(&(length.abs() * 10.0_f64.powi((*power).into())))
+            };
+            let powers = [-3, 3, -2, 2, -1, 1].into_iter().filter(is_plausible);
+            all.extend(powers.map(|power| Misreading::Length { joint, field, power }));
+        }
+    }
+    all
+}
+
+/// Returns misreadings of masses, stiffnesses and gravity.
+fn of_loads(problem: &Problem, table: &Measurements) -> Vec<Misreading> {
+    let powers = [-3, -1, 1, 3];
+    let masses = masses_of(&mut problem.clone()).len();
+    let single = if masses > MAX_MASSES { 0 } else { masses };
+    let of_mass = |mass: usize| powers.map(|power| Misreading::Mass { mass, power });
+    let mut all: Vec<Misreading> = (0..=single).flat_map(of_mass).collect();
+    if table.payload.is_some() || problem.tool.payload_mass > 0.0 {
+        all.extend(powers.map(|power| Misreading::Payload { power }));
+    }
+    all.extend([-3, 3, 0].map(|power| Misreading::Stiffness { power }));
+    for axis in 0..3 {
+        let of_sign = |is_negative| Misreading::Gravity { axis, is_negative };
+        all.extend([false, true].map(of_sign));
+    }
+    all
+}
+
+/// Returns true if a joint is revolute and its column may be in radians, or else in degrees; both
+/// may be where the unit is not known.
+pub(super) fn turns_in(
+    problem: &Problem,
+    table: &Measurements,
+    joint: usize,
+    radians: bool,
+) -> bool {
+    let turns =
+        problem.joints.get(joint).is_some_and(|joint| joint.command_kind() == JointKind::Revolute);
+    let column = table.command_columns.iter().find(|column| column.joint == joint);
+    turns && column.is_none_or(|column| (column.unit >= 1.0) == radians)
+}
+
+/// Returns the lengths of a joint \[m\].
+pub(super) fn lengths_of(joint: &mut Joint) -> Vec<&mut f64> {
+    let placement = joint.placement.as_mut().map(|placement| placement.xyz.iter_mut());
+    [&mut joint.a, &mut joint.d].into_iter().chain(placement.into_iter().flatten()).collect()
+}
+
+/// Returns a number of the joint table \[rad\] or \[m\].
+pub(super) fn number_of(joint: &mut Joint, field: JointField) -> Option<&mut f64> {
+    let placement = joint.placement.as_mut();
+    match field {
+        JointField::Alpha => Some(&mut joint.alpha),
+        JointField::Theta => Some(&mut joint.theta),
+        JointField::Beta => Some(&mut joint.beta),
+        JointField::A => Some(&mut joint.a),
+        JointField::D => Some(&mut joint.d),
+        JointField::X => placement.map(|placement| &mut placement.xyz.x),
+        JointField::Y => placement.map(|placement| &mut placement.xyz.y),
+        JointField::Z => placement.map(|placement| &mut placement.xyz.z),
+        _ => None,
+    }
+}
+
+/// Returns the declared masses along the arm \[kg\]: of each joint its beam, what the beam carries,
+/// and its bodies.
+pub(super) fn masses_of(problem: &mut Problem) -> Vec<&mut f64> {
+    let mut masses = Vec::new();
+    for joint in &mut problem.joints {
+        if let Some(beam) = &mut joint.beam {
+            masses.push(&mut beam.mass);
+            masses.extend(beam.masses.iter_mut().map(|body| &mut body.mass));
+        }
+        masses.extend(joint.bodies.iter_mut().map(|body| &mut body.mass));
+    }
+    masses
+}

@@ -1,0 +1,184 @@
+//! Misreadings of a table or problem: mistakes that would explain why an arm does not fit its
+//! measurements.
+//!
+//! Each [`Misreading`] is undone in a copy of table and problem. The registered nominal arm is
+//! compared with all of them ([`search`]); the best ones are then fitted in full, since no scan
+//! about a fit that is far off finds them.
+
+mod candidates;
+mod search;
+mod undo;
+mod words;
+
+pub(in crate::fit) use search::{Explanations, explanations};
+
+use crate::model::parameter::JointField;
+
+/// Misreading: a quantity that may have been declared in the wrong unit, sign, order or
+/// convention.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Misreading {
+    /// Joint angles are in degrees, declared as radians.
+    Degrees,
+    /// Joint angles are in radians, declared as degrees.
+    Radians,
+    /// Positions are in metres, declared as millimetres.
+    Metres,
+    /// Positions are in millimetres, declared as metres.
+    Millimetres,
+    /// Positions are in inches, declared as millimetres.
+    Inches,
+    /// Positions are in a left-handed frame: two coordinates are exchanged, or one has the wrong
+    /// sign.
+    Mirrored,
+    /// Joints whose measured angle has the opposite sign.
+    Reversed {
+        /// Set of joints: bit k is joint k + 1.
+        joints: u64,
+    },
+    /// The columns of two joints, by number, are exchanged.
+    Exchanged {
+        /// First joint.
+        joint: usize,
+        /// Second joint.
+        with: usize,
+    },
+    /// The angle of a joint, by number, contains that of another one.
+    Coupled {
+        /// Joint whose angle changes.
+        joint: usize,
+        /// Joint whose command is added.
+        from: usize,
+        /// True if the command is subtracted.
+        is_opposite: bool,
+    },
+    /// Positions belong to the configuration of another row.
+    Shifted {
+        /// Number of rows by which a position stands too late.
+        by: i8,
+        /// First row that is shifted, counted from 0.
+        from: usize,
+    },
+    /// The zero position of a joint, by number, is off.
+    Zero {
+        /// Joint.
+        joint: usize,
+        /// Angle that is to be added to the command \[°\].
+        degrees: i16,
+    },
+    /// A joint, by number, turns by a multiple of its command.
+    Ratio {
+        /// Joint.
+        joint: usize,
+        /// Multiple in hundredths.
+        percent: i16,
+    },
+    /// The joint table is in standard DH form, declared as modified.
+    StandardForm,
+    /// The joint table is in modified DH form, declared as standard.
+    ModifiedForm,
+    /// An angle of the joint table is in radians, declared in degrees.
+    TableRadians {
+        /// Joint, by number; all joints if 0.
+        joint: usize,
+        /// Angle.
+        field: JointField,
+    },
+    /// An angle of the joint table is in degrees, declared in radians.
+    TableDegrees {
+        /// Joint, by number; all joints if 0.
+        joint: usize,
+        /// Angle.
+        field: JointField,
+    },
+    /// A number of the joint table has the other sign.
+    Sign {
+        /// Joint, by number.
+        joint: usize,
+        /// Number with that sign.
+        field: JointField,
+    },
+    /// A length of the joint table is in another unit or has a misplaced decimal point.
+    Length {
+        /// Joint, by number.
+        joint: usize,
+        /// Length.
+        field: JointField,
+        /// Power of ten by which it is to be multiplied.
+        power: i8,
+    },
+    /// The target of `[tool]` is in millimetres, declared as metres.
+    TargetInMillimetres,
+    /// Lengths of joints are in millimetres, declared as metres; likewise a target longer than 1 m.
+    ArmInMillimetres,
+    /// A declared mass is in another unit or has a misplaced decimal point.
+    Mass {
+        /// Mass, counted along the arm from 1; all masses if 0.
+        mass: usize,
+        /// Power of ten by which it is to be multiplied.
+        power: i8,
+    },
+    /// The payloads of the table are in another unit.
+    Payload {
+        /// Power of ten by which they are to be multiplied.
+        power: i8,
+    },
+    /// Stiffnesses of joints are in another unit.
+    Stiffness {
+        /// Power of ten by which they are to be multiplied; per degree instead of per radian if 0.
+        power: i8,
+    },
+    /// Gravity points along another axis of the base frame.
+    Gravity {
+        /// Axis, 0…2.
+        axis: usize,
+        /// True if it points in the negative direction.
+        is_negative: bool,
+    },
+}
+
+impl Misreading {
+    /// Creates the misreading that these joints, by number, count the other way.
+    pub fn reversed(joints: &[usize]) -> Self {
+        Self::Reversed { joints: joints.iter().map(|joint| 1 << (joint - 1)).sum() }
+    }
+
+    /// Returns the first row that is shifted, where rows are.
+    fn shifted_from(self) -> Option<usize> {
+        match self {
+            Self::Shifted { from, .. } => Some(from),
+            _ => None,
+        }
+    }
+
+    /// Returns the same shift of the rows from another one on.
+    fn with_shift_from(self, from: usize) -> Self {
+        match self {
+            Self::Shifted { by, .. } => Self::Shifted { by, from },
+            _ => self,
+        }
+    }
+
+    /// Returns the group of misreadings that differ in size only, of which one is fitted in full.
+    fn group(self) -> (std::mem::Discriminant<Self>, usize, usize) {
+        let (first, second) = match self {
+            Self::Zero { joint, .. } | Self::Ratio { joint, .. } => (joint, 0),
+            Self::Exchanged { joint, with } => (joint, with),
+            Self::Coupled { joint, from, .. } => (joint, from),
+            Self::Length { joint, field, .. }
+            | Self::Sign { joint, field }
+            | Self::TableRadians { joint, field }
+            | Self::TableDegrees { joint, field } => (joint, field as usize),
+            Self::Mass { mass, .. } => (mass, 0),
+            Self::Reversed { joints } => (joints as usize, 0),
+            _ => (0, 0),
+        };
+        (std::mem::discriminant(&self), first, second)
+    }
+}
+
+/// Returns the numbers of the joints in a set.
+fn numbers_of(joints: u64) -> impl Iterator<Item = usize> {
+    (0..64).filter(move |joint| joints >> joint & 1 == 1).map(|joint| joint + 1)
+}

@@ -1,0 +1,267 @@
+//! Search for the misreadings that explain why an arm does not fit its measurements.
+
+use nalgebra::DVector;
+use rayon::prelude::*;
+
+use super::Misreading;
+use super::candidates::{candidates, shift_step};
+use crate::fit::checks::checked_fit::CheckedFit;
+use crate::fit::stages::fitting::Fitting;
+use crate::fit::{Placement, SolverChoice};
+use crate::least_squares::{LinearisationCache, Loss};
+use crate::measurement::{Measurements, Split};
+use crate::model::Model;
+use crate::problem::Problem;
+
+/// Largest error with a misreading corrected, relative to the error as read, at which the
+/// misreading is an explanation.
+const EXPLAINED: f64 = 0.2;
+/// Largest ratio to the smallest error at which a misreading is named in addition to the best one.
+const AS_GOOD: f64 = 1.5;
+/// Largest error, as a multiple of the arm's reach, at which misreadings are tried. Millimetres
+/// read as metres give a factor of 1000.
+const MAX_REACHES: f64 = 1e4;
+/// Maximum number of rows on which misreadings are tried.
+const MAX_ROWS: usize = 120;
+/// Maximum number of moving joints of which every subset is tried as reversed.
+const MAX_REVERSED: usize = 7;
+/// Number of misreadings that are fitted in full: those with which the nominal arm is nearest.
+const FITTED: usize = 12;
+/// Maximum number of steps of such a fit.
+const MAX_STEPS: u64 = 60;
+/// Part of the rows that a robust loss may set aside: the error is that of the others.
+const SET_ASIDE: f64 = 0.3;
+
+/// Misreading that explains the measurements after a fit in full.
+#[derive(Debug, Clone, PartialEq)]
+pub(in crate::fit) struct Explanation {
+    /// Description with the size that the fit found.
+    pub words: String,
+    /// Root mean squared error that the fit leaves \[m\], with the deviations from priors.
+    pub rms: f64,
+}
+
+/// Misreadings that explain why an arm does not fit, the best first.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(in crate::fit) struct Explanations {
+    /// Misreadings with which the nominal arm is near.
+    pub near: Vec<Misreading>,
+    /// Misreadings with which the fit is far better than as read.
+    pub fitted: Vec<Explanation>,
+    /// Root mean squared error as read, fitted or not, with the deviations from priors \[m\].
+    pub as_read: f64,
+}
+
+/// Rows with which misreadings are tried.
+struct Trial<'a> {
+    fitting: &'a Fitting<'a>,
+    problem: &'a Problem,
+    chosen: Vec<usize>,
+}
+
+/// Finds the misreadings that explain why a fit does not meet its measurements.
+pub(in crate::fit) fn explanations(fit: &CheckedFit) -> Explanations {
+    let Fitting { split, measurements, model, .. } = fit.fitting;
+    let nominal = fit.registered.identification.rms.norm;
+    if nominal.is_nan() || nominal > MAX_REACHES * model.reach() {
+        return Explanations::default();
+    }
+    let step = split.identification.len().div_ceil(MAX_ROWS).max(1);
+    let chosen: Vec<usize> = split.identification.iter().copied().step_by(step).collect();
+    let trial = Trial { fitting: fit.fitting, problem: fit.problem, chosen };
+    let is_position = measurements.leading().is_position();
+    // Contacts with one point agree with every arm that hardly moves.
+    let is_tested =
+        |misreading: &Misreading| is_position || matches!(misreading, Misreading::Reversed { .. });
+    let all: Vec<Misreading> =
+        candidates(fit.problem, measurements).into_iter().filter(is_tested).collect();
+    let mut errors = trial.registered(&all);
+    errors.extend(trial.several_reversed(&all));
+    errors.sort_by(|a, b| a.1.total_cmp(&b.1));
+    if let Some(shift) = errors.iter_mut().find(|(found, _)| found.shifted_from().is_some()) {
+        *shift = trial.refined(*shift);
+    }
+    errors.sort_by(|a, b| a.1.total_cmp(&b.1));
+    let mut explanations = Explanations { near: near(&errors, nominal), ..Explanations::default() };
+    if is_position {
+        let at = |x: &DVector<f64>| trial.penalised(fit.fitting, &trial.chosen, x);
+        explanations.as_read = at(&fit.end.x).min(at(fit.registered_x));
+        explanations.fitted = trial.fitted(&errors, explanations.as_read);
+    }
+    explanations
+}
+
+/// Returns the misreadings with which the nominal arm is far nearer than `nominal`, of errors in
+/// ascending order.
+fn near(errors: &[(Misreading, f64)], nominal: f64) -> Vec<Misreading> {
+    let best = errors.first().map_or(0.0, |found| found.1);
+    let limit = (EXPLAINED * nominal).min(AS_GOOD * best);
+    errors.iter().take_while(|found| found.1 <= limit).map(|(misreading, _)| *misreading).collect()
+}
+
+impl Trial<'_> {
+    /// Returns the error of the registered nominal arm with each misreading undone \[m\].
+    fn registered(&self, misreadings: &[Misreading]) -> Vec<(Misreading, f64)> {
+        let error = |&misreading: &Misreading| Some((misreading, self.rms(misreading, false)?.0));
+        let errors: Vec<_> = misreadings.par_iter().map(error).collect();
+        errors.into_iter().flatten().collect()
+    }
+
+    /// Fits the best misreadings in full; returns those that leave far less than `as_read`, the
+    /// best first.
+    fn fitted(&self, errors: &[(Misreading, f64)], as_read: f64) -> Vec<Explanation> {
+        let mut groups = Vec::new();
+        let mut is_first = |misreading: &Misreading| {
+            let is_new = !groups.contains(&misreading.group());
+            groups.push(misreading.group());
+            is_new
+        };
+        let chosen: Vec<Misreading> = errors
+            .iter()
+            .map(|(misreading, _)| *misreading)
+            .filter(|misreading| is_first(misreading))
+            .take(FITTED)
+            .collect();
+        let explanation = |&misreading: &Misreading| {
+            let (rms, size) = self.rms(misreading, true)?;
+            // A ratio that becomes negative is a joint that counts the other way.
+            if size.is_some_and(|size| matches!(misreading, Misreading::Ratio { .. }) && size < 0.0)
+            {
+                return None;
+            }
+            Some(Explanation { words: misreading.described(size), rms })
+        };
+        let explained: Vec<_> = chosen.par_iter().map(explanation).collect();
+        let mut explained: Vec<Explanation> = explained
+            .into_iter()
+            .flatten()
+            .filter(|explanation| explanation.rms < EXPLAINED * as_read)
+            .collect();
+        explained.sort_by(|a, b| a.rms.total_cmp(&b.rms));
+        let best = explained.first().map_or(0.0, |explanation| explanation.rms);
+        explained.retain(|explanation| explanation.rms <= AS_GOOD * best);
+        explained
+    }
+
+    /// Returns the error that is left with a misreading undone \[m\], of the registered nominal arm
+    /// or, if `is_fitted`, of a fit in full, with the size of the misreading that the fit found.
+    fn rms(&self, misreading: Misreading, is_fitted: bool) -> Option<(f64, Option<f64>)> {
+        let Fitting { model, measurements, .. } = *self.fitting;
+        let needs_problem = misreading.rewritten(self.problem);
+        if needs_problem.is_none() && misreading.concerns_problem() {
+            return None;
+        }
+        let free = is_fitted
+            .then(|| misreading.with_free_size(needs_problem.as_ref().unwrap_or(self.problem)));
+        let rewritten = free.flatten().or(needs_problem);
+        let joints = rewritten.as_ref().map_or(measurements.joints, |problem| problem.joints.len());
+        let rows = misreading.undone(measurements, &self.chosen, (self.problem, joints));
+        let split = Split { identification: (0..rows.len()).collect(), held_out: Vec::new() };
+        let placement = Placement::of(&rows);
+        let other;
+        let model = match &rewritten {
+            Some(problem) => {
+                let declared = Model::new(problem, &placement.bases, &placement.targets).ok()?;
+                other = self.fitting.strategy.model(declared);
+                &other
+            }
+            None => model,
+        };
+        // Linearisations of another model are not those of this one.
+        let cache = &LinearisationCache::default();
+        let fitting = Fitting {
+            model,
+            measurements: &rows,
+            split: &split,
+            placement: &placement,
+            held_out_only: placement.held_out_only(model, &rows, &split),
+            solver: SolverChoice::Auto.decide(model),
+            custom_solver: None,
+            progress: None,
+            max_steps: Some(MAX_STEPS),
+            turn_sigma: None,
+            cache,
+            linear_model: None,
+            ..self.fitting.with_declared_noise()
+        };
+        let registered = fitting.registered().ok()?;
+        let x = if is_fitted { fitting.run(&registered).ok()?.x } else { registered };
+        let error = if is_fitted {
+            self.penalised(&fitting, &split.identification, &x)
+        } else {
+            self.error(&fitting, &split.identification, &x)
+        };
+        let value = |name: &str| {
+            let place = model.parameters.iter().position(|parameter| parameter.name == name)?;
+            Some(x[place])
+        };
+        let name = misreading.size(0.0).map(|(name, _)| name);
+        let size = name.and_then(|name| Some(misreading.size(value(&name)?)?.1));
+        error.is_finite().then_some((error, size.filter(|_| is_fitted)))
+    }
+
+    /// Returns the root mean squared error of `rows` at the full parameter vector `x` \[m\] to
+    /// which the deviations from priors add like measured numbers: √((Σ e² + σ² Σ (x/σₚ)²) / n).
+    fn penalised(&self, fitting: &Fitting, rows: &[usize], x: &DVector<f64>) -> f64 {
+        let parameters = fitting.model.parameters.iter().zip(x);
+        let squares = parameters.filter_map(|(parameter, x)| Some((x / parameter.sigma?).powi(2)));
+        let deviations = squares.sum::<f64>() / rows.len().max(1) as f64;
+        let square = self.error(fitting, rows, x).powi(2);
+        (square + fitting.sigma.powi(2) * deviations).sqrt()
+    }
+
+    /// Moves the place from which rows are shifted to the one that leaves the smallest error.
+    fn refined(&self, (misreading, error): (Misreading, f64)) -> (Misreading, f64) {
+        let step = shift_step(self.fitting.measurements.len());
+        let places = misreading.shifted_from().into_iter().flat_map(|from| {
+            (from.saturating_sub(step)..from + step).map(move |from| (from, misreading))
+        });
+        let moved: Vec<Misreading> =
+            places.map(|(from, misreading)| misreading.with_shift_from(from)).collect();
+        let errors = self.registered(&moved);
+        errors
+            .into_iter()
+            .chain([(misreading, error)])
+            .min_by(|a, b| a.1.total_cmp(&b.1))
+            .unwrap_or((misreading, error))
+    }
+
+    /// Returns the root mean squared error of `rows` at the full parameter vector `x` \[m\]; with a
+    /// robust loss, of the rows that are left when the farthest ones are set aside.
+    fn error(&self, fitting: &Fitting, rows: &[usize], x: &DVector<f64>) -> f64 {
+        let measurements: &Measurements = fitting.measurements;
+        let kind = measurements.leading().kind();
+        let is_of_kind = |row: &usize| measurements.observation(*row).kind() == kind;
+        let rows: Vec<usize> = rows.iter().copied().filter(is_of_kind).collect();
+        let errors = fitting.position_errors(&rows, x);
+        let mut squares: Vec<f64> = errors.iter().map(nalgebra::Matrix::norm_squared).collect();
+        if self.fitting.loss != Loss::Squares {
+            squares.sort_by(f64::total_cmp);
+            squares.truncate(((1.0 - SET_ASIDE) * squares.len() as f64).ceil() as usize);
+        }
+        (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()
+    }
+
+    /// Returns the set of two and more joints which, taken to count the other way, leave the
+    /// smallest error, with that error; of sets that do about as well, the smallest.
+    fn several_reversed(&self, singles: &[Misreading]) -> Option<(Misreading, f64)> {
+        let joint = |misreading: &Misreading| match misreading {
+            Misreading::Reversed { joints } => Some(*joints),
+            _ => None,
+        };
+        let joints: Vec<u64> = singles.iter().filter_map(joint).take(MAX_REVERSED).collect();
+        let set = |bits: u64| -> u64 {
+            let members = joints.iter().enumerate().filter(|(k, _)| bits >> k & 1 == 1);
+            members.map(|(_, joint)| joint).sum()
+        };
+        let sets = (1..1_u64 << joints.len()).filter(|bits| bits.count_ones() > 1).map(set);
+        let sets: Vec<Misreading> = sets.map(|joints| Misreading::Reversed { joints }).collect();
+        let errors = self.registered(&sets);
+        let best = errors.iter().map(|(_, error)| *error).fold(f64::INFINITY, f64::min);
+        let size = |found: &(Misreading, f64)| match found.0 {
+            Misreading::Reversed { joints } => joints.count_ones(),
+            _ => 0,
+        };
+        errors.into_iter().filter(|(_, error)| *error <= AS_GOOD * best).min_by_key(size)
+    }
+}

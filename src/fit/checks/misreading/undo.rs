@@ -1,0 +1,238 @@
+//! Table and problem as they should have been read.
+
+use std::f64::consts::PI;
+
+use nalgebra::Vector3;
+
+use super::candidates::{lengths_of, masses_of, number_of, turns_in};
+use super::{Misreading, numbers_of};
+use crate::measurement::Measurements;
+use crate::model::parameter::JointField;
+use crate::problem::{Effect, Freedom, ParameterRule, Problem, Quantities};
+
+/// Length beyond which a number may be in millimetres \[m\].
+pub(super) const LONG: f64 = 1.0;
+/// Length of an inch \[mm\].
+const INCH: f64 = 25.4;
+
+/// Returns true if the target of `[tool]` is so far away that it may be in millimetres.
+pub(super) fn is_far(problem: &Problem) -> bool {
+    problem.targets.is_empty() && problem.tool.target.norm() > LONG
+}
+
+/// Returns ten to a power.
+fn ten(power: i8) -> f64 {
+    10.0_f64.powi(power.into())
+}
+
+impl Misreading {
+    /// Returns true if the misreading is one of the problem, not of the table.
+    pub(super) fn concerns_problem(self) -> bool {
+        matches!(
+            self,
+            Self::StandardForm
+                | Self::ModifiedForm
+                | Self::TableRadians { .. }
+                | Self::TableDegrees { .. }
+                | Self::Sign { .. }
+                | Self::Length { .. }
+        )
+    }
+
+    /// Returns the problem as it should have been written, if the misreading concerns the problem.
+    pub(super) fn rewritten(self, declared: &Problem) -> Option<Problem> {
+        let mut problem = declared.clone();
+        match self {
+            Self::TargetInMillimetres => {}
+            Self::ArmInMillimetres => {
+                let lengths = problem.joints.iter_mut().flat_map(lengths_of);
+                lengths.filter(|length| length.abs() > LONG).for_each(|length| *length *= 1e-3);
+            }
+            Self::StandardForm => return declared.read_as_standard(),
+            Self::ModifiedForm => return declared.read_as_modified(),
+            Self::TableRadians { joint, field } => {
+                scale(&mut problem, joint, field, 180.0 / PI, &|angle| {
+                    angle.to_degrees().abs() <= 2.0 * PI
+                })?;
+                return Some(problem);
+            }
+            Self::TableDegrees { joint, field } => {
+                scale(&mut problem, joint, field, PI / 180.0, &|angle| angle.abs() > 2.0 * PI)?;
+                return Some(problem);
+            }
+            Self::Sign { joint, field } => {
+                scale(&mut problem, joint, field, -1.0, &|_| true)?;
+                return Some(problem);
+            }
+            Self::Length { joint, field, power } => {
+                scale(&mut problem, joint, field, ten(power), &|_| true)?;
+                return Some(problem);
+            }
+            Self::Mass { mass, power } => {
+                let masses = (1..).zip(masses_of(&mut problem));
+                let chosen = masses.filter(|(number, _)| mass == 0 || *number == mass);
+                chosen.for_each(|(_, value)| *value *= ten(power));
+                return Some(problem);
+            }
+            Self::Payload { power } => problem.tool.payload_mass *= ten(power),
+            Self::Stiffness { power } => {
+                let factor = if power == 0 { 180.0 / PI } else { ten(power) };
+                let stiffnesses =
+                    problem.joints.iter_mut().filter_map(|joint| joint.stiffness.as_mut());
+                stiffnesses.for_each(|stiffness| *stiffness *= factor);
+                return Some(problem);
+            }
+            Self::Gravity { axis, is_negative } => {
+                let sign = if is_negative { -1.0 } else { 1.0 };
+                problem.gravity = Vector3::ith(axis, sign * declared.gravity.norm());
+                return Some(problem);
+            }
+            _ => return None,
+        }
+        if is_far(&problem) && !matches!(self, Self::Payload { .. }) {
+            problem.tool.target *= 1e-3;
+        }
+        Some(problem)
+    }
+
+    /// Returns the problem in which the size of the misreading is free without a prior, where it
+    /// has one.
+    pub(super) fn with_free_size(self, problem: &Problem) -> Option<Problem> {
+        let (pattern, _) = self.size(0.0)?;
+        let mut problem = match self {
+            Self::Ratio { joint, .. } => problem.with_effect(Effect::GearRatio { joint }),
+            Self::Coupled { joint, from, .. } => {
+                problem.with_effect(Effect::JointCoupling { joint, from })
+            }
+            _ => problem.clone(),
+        };
+        let none = Quantities::default();
+        problem.parameters.push(ParameterRule {
+            pattern,
+            freedom: Freedom::Free { sigma: none, min: none, max: none },
+            location: problem.data.location.clone(),
+        });
+        Some(problem)
+    }
+
+    /// Returns the parameter that holds the size of the misreading, and the size for its value x.
+    pub(super) fn size(self, x: f64) -> Option<(String, f64)> {
+        match self {
+            Self::Ratio { joint, percent } => {
+                let name = format!("gear-ratio[{joint}].error");
+                Some((name, f64::from(percent) / 100.0 * (1.0 + x)))
+            }
+            Self::Coupled { joint, from, is_opposite } => {
+                let name = format!("joint-coupling[{joint},{from}].factor");
+                Some((name, if is_opposite { -1.0 } else { 1.0 } + x))
+            }
+            Self::Zero { joint, degrees } => {
+                Some((format!("joint{joint}.theta"), f64::from(degrees).to_radians() + x))
+            }
+            _ => None,
+        }
+    }
+
+    /// Returns the chosen rows of a table as they should have been read; `joints` is the number of
+    /// joints of the problem as it should have been written.
+    pub(super) fn undone(
+        self,
+        table: &Measurements,
+        chosen: &[usize],
+        (problem, joints): (&Problem, usize),
+    ) -> Measurements {
+        let mut rows = if let Self::Shifted { by, from } = self {
+            let source = |row: usize| {
+                let shifted = row.checked_add_signed(by.into())?;
+                if row < from { Some(row) } else { (shifted < table.len()).then_some(shifted) }
+            };
+            let pairs = chosen.iter().filter_map(|&row| Some((row, source(row)?)));
+            let (chosen, sources): (Vec<usize>, Vec<usize>) = pairs.unzip();
+            let mut rows = table.select(&chosen);
+            rows.positions = sources.into_iter().map(|row| table.positions[row]).collect();
+            rows
+        } else {
+            table.select(chosen)
+        };
+        if joints != rows.joints {
+            resize(&mut rows, joints);
+        }
+        for q in rows.configurations.chunks_exact_mut(joints.max(1)) {
+            self.undo_command(q, problem, table);
+        }
+        match self {
+            Self::Metres => rows.positions.iter_mut().for_each(|position| *position *= 1e3),
+            Self::Millimetres => rows.positions.iter_mut().for_each(|position| *position *= 1e-3),
+            Self::Inches => rows.positions.iter_mut().for_each(|position| *position *= INCH),
+            Self::Mirrored => {
+                rows.positions.iter_mut().for_each(|position| position.swap_rows(0, 1));
+            }
+            Self::Payload { power } => {
+                rows.payload.iter_mut().flatten().for_each(|payload| *payload *= ten(power));
+            }
+            _ => {}
+        }
+        rows
+    }
+
+    /// Changes a configuration to what it should have been read as.
+    fn undo_command(self, q: &mut [f64], problem: &Problem, table: &Measurements) {
+        match self {
+            Self::Degrees | Self::Radians => {
+                let is_radians = self == Self::Degrees;
+                let factor = if is_radians { PI / 180.0 } else { 180.0 / PI };
+                let turning = (0..q.len()).filter(|&j| turns_in(problem, table, j, is_radians));
+                turning.for_each(|joint| q[joint] *= factor);
+            }
+            Self::Reversed { joints } => {
+                numbers_of(joints).for_each(|joint| q[joint - 1] = -q[joint - 1]);
+            }
+            Self::Exchanged { joint, with } => q.swap(joint - 1, with - 1),
+            Self::Coupled { joint, from, is_opposite } => {
+                let sign = if is_opposite { -1.0 } else { 1.0 };
+                q[joint - 1] += sign * q[from - 1];
+            }
+            Self::Zero { joint, degrees } => q[joint - 1] += f64::from(degrees).to_radians(),
+            Self::Ratio { joint, percent } => q[joint - 1] *= f64::from(percent) / 100.0,
+            _ => {}
+        }
+    }
+}
+
+/// Multiplies a number of one joint, or of all, by `factor` where `applies`; `None` if it applies
+/// nowhere.
+fn scale(
+    problem: &mut Problem,
+    joint: usize,
+    field: JointField,
+    factor: f64,
+    applies: &dyn Fn(f64) -> bool,
+) -> Option<()> {
+    let joints = (1..).zip(&mut problem.joints);
+    let chosen = joints.filter(|(number, _)| joint == 0 || *number == joint);
+    let mut count = 0;
+    for value in chosen.filter_map(|(_, joint)| number_of(joint, field)) {
+        if *value != 0.0 && applies(*value) {
+            *value *= factor;
+            count += 1;
+        }
+    }
+    (count > 0).then_some(())
+}
+
+/// Changes the number of joints of each configuration; added joints are at zero.
+fn resize(rows: &mut Measurements, joints: usize) {
+    let previous = rows.joints;
+    let resized = |column: &Vec<f64>| -> Vec<f64> {
+        let row = |q: &[f64]| {
+            let mut q = q.to_vec();
+            q.resize(joints, 0.0);
+            q
+        };
+        column.chunks_exact(previous.max(1)).flat_map(row).collect()
+    };
+    rows.configurations = resized(&rows.configurations);
+    rows.other_configurations = rows.other_configurations.as_ref().map(resized);
+    rows.approach = rows.approach.as_ref().map(resized);
+    rows.joints = joints;
+}

@@ -1,0 +1,134 @@
+//! Misreadings in words.
+
+use std::fmt;
+
+use super::{Misreading, numbers_of};
+use crate::model::parameter::JointField;
+
+/// Returns the number of the joint table that a misreading is about: `alpha of joint 3`.
+fn number(joint: usize, field: JointField) -> String {
+    match joint {
+        0 => format!("{} of all joints", field.name()),
+        _ => format!("{} of joint {joint}", field.name()),
+    }
+}
+
+/// Returns a power of ten as a factor: `0.001`.
+fn factor(power: i8) -> f64 {
+    10.0_f64.powi(power.into())
+}
+
+impl Misreading {
+    /// Describes the misreading with the size that a fit found for it, where it has one: an angle
+    /// \[rad\] or a ratio.
+    pub(super) fn described(self, size: Option<f64>) -> String {
+        match (self, size) {
+            (Self::Zero { joint, .. }, Some(size)) => {
+                format!("joint {joint} whose zero position is {:.2}° off", size.to_degrees())
+            }
+            (Self::Ratio { joint, .. }, Some(size)) => {
+                format!("joint {joint} that turns by {size:.4} times its command")
+            }
+            (Self::Coupled { joint, from, .. }, Some(size)) => format!(
+                "joint {joint} that also turns by {size:.3} times the command of joint {from} (declare joint-coupling)"
+            ),
+            _ => self.to_string(),
+        }
+    }
+}
+
+impl fmt::Display for Misreading {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::Degrees => f.write_str("joint angles that are degrees, declared as radians"),
+            Self::Radians => f.write_str("joint angles that are radians, declared as degrees"),
+            Self::Metres => f.write_str("positions that are metres, declared as millimetres"),
+            Self::Millimetres => f.write_str("positions that are millimetres, declared as metres"),
+            Self::Inches => f.write_str("positions that are inches, declared as millimetres"),
+            Self::Mirrored => {
+                f.write_str("two of x, y and z that are exchanged, or one of the other sign")
+            }
+            Self::Reversed { joints } => {
+                let numbers: Vec<String> =
+                    numbers_of(joints).map(|joint| joint.to_string()).collect();
+                match numbers.as_slice() {
+                    [joint] => write!(f, "joint {joint} that counts the other way"),
+                    [first @ .., last] => {
+                        write!(f, "joints {} and {last} that count the other way", first.join(", "))
+                    }
+                    [] => Ok(()),
+                }
+            }
+            Self::Exchanged { joint, with } => {
+                write!(f, "columns of joints {joint} and {with} that are exchanged")
+            }
+            Self::Coupled { joint, from, is_opposite } => {
+                let sign = if is_opposite { "minus " } else { "" };
+                write!(f, "joint {joint} that also turns by {sign}the command of joint {from}")
+            }
+            Self::Shifted { by, from } => {
+                let rows = if by.abs() == 1 { "row" } else { "rows" };
+                let side = if by > 0 { "before" } else { "after" };
+                write!(f, "positions that belong to the configuration {} {rows} {side}", by.abs())?;
+                if from > 0 { write!(f, ", from row {} of the table on", from + 1) } else { Ok(()) }
+            }
+            Self::Zero { joint, degrees } => {
+                write!(f, "joint {joint} whose zero position is {degrees}° off")
+            }
+            Self::Ratio { joint, percent } => {
+                let ratio = f64::from(percent) / 100.0;
+                write!(f, "joint {joint} that turns by {ratio} times its command")
+            }
+            Self::StandardForm => {
+                f.write_str("a joint table in standard DH form (declare dh = \"standard\")")
+            }
+            Self::ModifiedForm => {
+                f.write_str("a joint table in modified DH form, declared as standard")
+            }
+            Self::TableRadians { joint, field } => {
+                write!(f, "{} that is in radians, declared in degrees", number(joint, field))
+            }
+            Self::TableDegrees { joint, field } => {
+                write!(f, "{} that is in degrees, declared in radians", number(joint, field))
+            }
+            Self::Sign { joint, field } => {
+                write!(f, "{} that has the other sign", number(joint, field))
+            }
+            Self::Length { joint, field, power: -3 } => {
+                write!(f, "{} that is in millimetres, declared in metres", number(joint, field))
+            }
+            Self::Length { joint, field, power: 3 } => {
+                write!(f, "{} that is in metres, declared in millimetres", number(joint, field))
+            }
+            Self::Length { joint, field, power } => {
+                write!(f, "{} that is to be multiplied by {}", number(joint, field), factor(power))
+            }
+            Self::TargetInMillimetres => {
+                f.write_str("a target of [tool] that is in millimetres, declared in metres")
+            }
+            Self::ArmInMillimetres => {
+                f.write_str("lengths of joints that are in millimetres, declared in metres")
+            }
+            Self::Mass { mass: 0, power } => {
+                write!(f, "masses that are to be multiplied by {}", factor(power))
+            }
+            Self::Mass { mass, power } => {
+                let times = factor(power);
+                write!(f, "mass {mass}, counted along the arm, that is to be multiplied by {times}")
+            }
+            Self::Payload { power } => {
+                write!(f, "payloads that are to be multiplied by {}", factor(power))
+            }
+            Self::Stiffness { power: 0 } => {
+                f.write_str("stiffnesses of joints per degree, declared per radian")
+            }
+            Self::Stiffness { power } => {
+                write!(f, "stiffnesses of joints that are to be multiplied by {}", factor(power))
+            }
+            Self::Gravity { axis, is_negative } => {
+                let sign = if is_negative { "−" } else { "+" };
+                write!(f, "gravity that points along {sign}{}", ['x', 'y', 'z'][axis])
+            }
+        }
+    }
+}

@@ -1,0 +1,153 @@
+//! Check of the rows that a robust loss sets aside: whether chance or a cause selects them.
+//!
+//! A robust loss limits the influence of gross errors. A cause that acts in some rows only, such as
+//! a station that moves, then disappears from the residual: its rows are set aside. Such rows
+//! follow time, session or a joint, which gross errors do not.
+
+use serde_json::json;
+use statrs::distribution::{ContinuousCDF as _, Normal};
+
+use super::checked_fit::{Check, CheckedFit};
+use super::finding::{Finding, FindingCode};
+use super::outliers::Outlier;
+use crate::least_squares::Loss;
+use crate::measurement::Measurements;
+
+/// Part of the rows up to which a loss may set rows aside without a question.
+const MAX_PART: f64 = 0.05;
+/// Number of rows up to which nothing can be said about them.
+const MIN_ROWS: usize = 4;
+/// Probability below which the rows follow a quantity, whatever the number of quantities.
+const IMPROBABLE: f64 = 1e-3;
+
+/// Quantity that the rows which are set aside follow.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Selection {
+    /// Name of the quantity: `time`, `joint 2`, `session B`, …
+    pub quantity: String,
+    /// Probability of so clear a selection by chance, times the number of tests.
+    pub p_value: f64,
+}
+
+/// Returns the quantity that decides which of `rows` are outliers; `None` where there are few or
+/// chance explains them.
+pub(crate) fn selection(
+    table: &Measurements,
+    rows: &[usize],
+    outliers: &[Outlier],
+) -> Option<Selection> {
+    let count = outliers.len();
+    let is_many = count >= MIN_ROWS && count as f64 > MAX_PART * rows.len() as f64;
+    if !is_many || 2 * count > rows.len() {
+        return None;
+    }
+    let is_outlier: Vec<bool> = rows
+        .iter()
+        .map(|row| outliers.binary_search_by_key(row, |outlier| outlier.row).is_ok())
+        .collect();
+    let pick = |column: &dyn Fn(usize) -> f64| rows.iter().map(|&row| column(row)).collect();
+    let mut quantities: Vec<(String, Vec<f64>)> =
+        vec![("time".to_owned(), pick(&|row| table.time[row]))];
+    for joint in 0..table.joints {
+        let values = pick(&|row| table.configuration(row)[joint]);
+        quantities.push((format!("joint {}", joint + 1), values));
+    }
+    for (session, name) in table.session.names.iter().enumerate() {
+        let values = pick(&|row| f64::from(u8::from(table.session.of_row[row] == session)));
+        quantities.push((format!("session {name}"), values));
+    }
+    for (name, column) in [("payload", &table.payload), ("temperature", &table.temperature)] {
+        quantities.extend(column.iter().map(|column| (name.to_owned(), pick(&|row| column[row]))));
+    }
+    quantities.retain(|(_, values)| values.iter().any(|value| *value != values[0]));
+    let tests = 2.0 * quantities.len() as f64;
+    let best = quantities
+        .into_iter()
+        .map(|(quantity, values)| {
+            let p_value = tests * by_rank(&values, &is_outlier).min(by_runs(&values, &is_outlier));
+            Selection { quantity, p_value }
+        })
+        .min_by(|a, b| a.p_value.total_cmp(&b.p_value))?;
+    (best.p_value < IMPROBABLE).then_some(best)
+}
+
+/// Returns the two-sided probability of the rank sum of the marked values; ties share their rank
+/// [Mann & Whitney 1947].
+fn by_rank(values: &[f64], marked: &[bool]) -> f64 {
+    let mut order: Vec<usize> = (0..values.len()).collect();
+    order.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
+    let n = values.len() as f64;
+    let (mut sum, mut ties, mut first) = (0.0, 0.0, 0);
+    while first < order.len() {
+        let equal = order[first..].iter().take_while(|&&k| values[k] == values[order[first]]);
+        let count = equal.count();
+        let of_tie = order[first..first + count].iter().filter(|&&k| marked[k]).count() as f64;
+        let (t, middle) = (count as f64, first as f64 + 0.5 * (count as f64 + 1.0));
+        sum += of_tie * middle;
+        ties += t * t * t - t;
+        first += count;
+    }
+    let k = marked.iter().filter(|marked| **marked).count() as f64;
+    let variance = k * (n - k) / 12.0 * (n + 1.0 - ties / (n * (n - 1.0)));
+    2.0 * upper_tail((sum - 0.5 * k * (n + 1.0)).abs() / variance.sqrt())
+}
+
+/// Returns the probability of so few runs of marked and other values in ascending order [Wald &
+/// Wolfowitz 1940]; 1 where values are equal, whose order says nothing.
+fn by_runs(values: &[f64], marked: &[bool]) -> f64 {
+    let mut order: Vec<usize> = (0..values.len()).collect();
+    order.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
+    if order.windows(2).any(|pair| values[pair[0]] == values[pair[1]]) {
+        return 1.0;
+    }
+    let runs = 1 + order.windows(2).filter(|pair| marked[pair[0]] != marked[pair[1]]).count();
+    let (n, k) = (values.len() as f64, marked.iter().filter(|marked| **marked).count() as f64);
+    let product = 2.0 * k * (n - k);
+    let mean = product / n + 1.0;
+    let variance = product * (product - n) / (n * n * (n - 1.0));
+    upper_tail((mean - runs as f64) / variance.sqrt())
+}
+
+/// Returns the probability that a standard normal number exceeds `z`.
+fn upper_tail(z: f64) -> f64 {
+    Normal::new(0.0, 1.0).map_or(1.0, |normal| normal.sf(z))
+}
+
+/// Checks that no cause selects the rows that a robust loss sets aside.
+pub(super) struct SetAsideByChance;
+
+impl Check for SetAsideByChance {
+    fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
+        let rows = &fit.fitting.split.identification;
+        if fit.fitting.loss == Loss::Squares {
+            return Vec::new();
+        }
+        let found = selection(fit.fitting.measurements, rows, fit.outliers);
+        let finding = |Selection { quantity, p_value }: Selection| {
+            let (count, of) = (fit.outliers.len(), rows.len());
+            let text = format!(
+                "the robust loss sets {count} of {of} rows aside, and {quantity} decides which: a cause acts in them"
+            );
+            let numbers = [count.into(), of.into(), json!(quantity), p_value.into()];
+            Finding::new(FindingCode::RowsSetAside, numbers, text)
+        };
+        found.map(finding).into_iter().collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_follows_a_quantity_is_told_from_chance() {
+        let values: Vec<f64> = (0..100).map(f64::from).collect();
+        let marked =
+            |is_marked: fn(usize) -> bool| -> Vec<bool> { (0..100).map(is_marked).collect() };
+        let (late, block, scattered) =
+            (marked(|k| k >= 75), marked(|k| (40..60).contains(&k)), marked(|k| k * 37 % 100 < 20));
+        assert!(by_rank(&values, &late) < 1e-10 && by_runs(&values, &late) < 1e-10);
+        assert!(by_rank(&values, &block) > 0.5 && by_runs(&values, &block) < 1e-10);
+        assert!(by_rank(&values, &scattered) > 0.05 && by_runs(&values, &scattered) > 0.05);
+    }
+}

@@ -1,0 +1,67 @@
+//! Errors of configurations that are left out, where no rows are held out.
+
+use nalgebra::{DMatrix, DVector, Vector3};
+use rayon::prelude::*;
+
+use crate::fit::stages::fitting::Fitting;
+use crate::least_squares::jacobian_and_residual;
+
+/// Part of the squared length of a column that is added to it: directions that only one
+/// configuration determines then stay where the fit has them.
+const RIDGE: f64 = 1e-9;
+
+impl Fitting<'_> {
+    /// Predicts each configuration of the identification rows by a fit without it, linearised at
+    /// the full parameter vector `x`; returns the errors measured − predicted, measuring frame
+    /// \[m\].
+    ///
+    /// r₋ = (I − H)⁻¹ r with the block H of J (JᵀJ + Λ)⁻¹ Jᵀ of the configuration and the priors Λ
+    /// [Cook and Weisberg 1982]. `configurations` numbers those of all rows, and `unknowns` are the
+    /// parameters that were fitted and rest on no bound.
+    pub fn left_out_errors(
+        &self,
+        x: &DVector<f64>,
+        unknowns: &[usize],
+        configurations: &[usize],
+    ) -> Vec<Vector3<f64>> {
+        let rows = &self.split.identification;
+        let stage = self.stage(rows, unknowns.to_vec());
+        let (residuals, per_pose) = (stage.residuals(x), stage.coordinates());
+        let (jacobian, residual) = jacobian_and_residual(&residuals, &residuals.reduced(x));
+        let mut normal = jacobian.tr_mul(&jacobian);
+        for (j, &k) in unknowns.iter().enumerate() {
+            let precision = self.model.parameters[k].sigma.map_or(0.0, |sigma| sigma.powi(-2));
+            normal[(j, j)] += precision + RIDGE * normal[(j, j)] + f64::MIN_POSITIVE;
+        }
+        let mut groups: Vec<Vec<usize>> = Vec::new();
+        let mut group_of = std::collections::BTreeMap::new();
+        for (place, &row) in rows.iter().enumerate() {
+            let group = *group_of.entry(configurations[row]).or_insert_with(|| {
+                groups.push(Vec::new());
+                groups.len() - 1
+            });
+            groups[group].push(place);
+        }
+        let factor = normal.cholesky();
+        let of_group = |places: &Vec<usize>| -> Vec<(usize, Vector3<f64>)> {
+            let lines: Vec<usize> =
+                places.iter().flat_map(|place| per_pose * place..per_pose * (place + 1)).collect();
+            let mut left = residual.select_rows(&lines);
+            if let Some(factor) = &factor {
+                let columns = jacobian.select_rows(&lines);
+                let hat = &columns * factor.solve(&columns.transpose());
+                let matrix = DMatrix::identity(lines.len(), lines.len()) * (1.0 + RIDGE) - hat;
+                left = matrix.cholesky().map_or(left.clone(), |matrix| matrix.solve(&left));
+            }
+            let error = |(k, &place): (usize, &usize)| {
+                let whitened = left.fixed_rows::<3>(per_pose * k).into_owned();
+                (place, whitened * stage.poses[place].sigma)
+            };
+            places.iter().enumerate().map(error).collect()
+        };
+        let mut errors = vec![Vector3::zeros(); rows.len()];
+        let each: Vec<_> = groups.par_iter().flat_map_iter(of_group).collect();
+        each.into_iter().for_each(|(place, error)| errors[place] = error);
+        errors
+    }
+}
