@@ -82,7 +82,7 @@ finding_codes! {
         "measure more poses of this session, or give its base a prior";
     Misread: Error "misread" ["explanations", "before", "after"]
         "Table or problem read in another way leaves less than a fifth of the error.",
-        "correct the table or the problem";
+        "correct units, signs, order or convention in the table or the problem";
     MissesMeasurements: Error "misses-measurements" ["kind", "rms", "spread"]
         "The fitted arm misses the measurements by more than 2 % of their spread and more than 100 σ.",
         "check units, signs of joints, and whether base and session are declared";

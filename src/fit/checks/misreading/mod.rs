@@ -161,20 +161,20 @@ impl Misreading {
     }
 
     /// Returns the group of misreadings that differ in size only, of which one is fitted in full.
-    fn group(self) -> (std::mem::Discriminant<Self>, usize, usize) {
-        let (first, second) = match self {
-            Self::Zero { joint, .. } | Self::Ratio { joint, .. } => (joint, 0),
-            Self::Exchanged { joint, with } => (joint, with),
-            Self::Coupled { joint, from, .. } => (joint, from),
+    fn group(self) -> (std::mem::Discriminant<Self>, usize, usize, Option<JointField>) {
+        let (first, second, field) = match self {
+            Self::Zero { joint, .. } | Self::Ratio { joint, .. } => (joint, 0, None),
+            Self::Exchanged { joint, with } => (joint, with, None),
+            Self::Coupled { joint, from, .. } => (joint, from, None),
             Self::Length { joint, field, .. }
             | Self::Sign { joint, field }
             | Self::TableRadians { joint, field }
-            | Self::TableDegrees { joint, field } => (joint, field as usize),
-            Self::Mass { mass, .. } => (mass, 0),
-            Self::Reversed { joints } => (joints as usize, 0),
-            _ => (0, 0),
+            | Self::TableDegrees { joint, field } => (joint, 0, Some(field)),
+            Self::Mass { mass, .. } => (mass, 0, None),
+            Self::Reversed { joints } => (joints as usize, 0, None),
+            _ => (0, 0, None),
         };
-        (std::mem::discriminant(&self), first, second)
+        (std::mem::discriminant(&self), first, second, field)
     }
 }
 

@@ -76,13 +76,16 @@ pub(in crate::fit) fn explanations(fit: &CheckedFit) -> Explanations {
     let all: Vec<Misreading> =
         candidates(fit.problem, measurements).into_iter().filter(is_tested).collect();
     let mut errors = trial.registered(&all);
+    errors.sort_by(|a, b| a.1.total_cmp(&b.1));
+    let near_alone = near(&errors, nominal);
     errors.extend(trial.several_reversed(&all));
     errors.sort_by(|a, b| a.1.total_cmp(&b.1));
     if let Some(shift) = errors.iter_mut().find(|(found, _)| found.shifted_from().is_some()) {
         *shift = trial.refined(*shift);
     }
     errors.sort_by(|a, b| a.1.total_cmp(&b.1));
-    let mut explanations = Explanations { near: near(&errors, nominal), ..Explanations::default() };
+    let near = if near_alone.is_empty() { near(&errors, nominal) } else { near_alone };
+    let mut explanations = Explanations { near, ..Explanations::default() };
     if is_position {
         let at = |x: &DVector<f64>| trial.penalised(fit.fitting, &trial.chosen, x);
         explanations.as_read = at(&fit.end.x).min(at(fit.registered_x));
