@@ -1,13 +1,16 @@
-//! Interrupts from the keyboard (SIGINT, Ctrl-C) and requests to end (SIGTERM, SIGHUP).
+//! Interrupts from the keyboard (SIGINT, Ctrl-C) and requests to end (SIGTERM).
 
 use std::process::exit;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
+use std::sync::{Mutex, MutexGuard, Once, OnceLock, PoisonError};
 use std::thread;
 use std::time::Duration;
 
 use flexcal::fit::Stop;
 
+/// Exit status after a request to end with nothing written: 128 + SIGTERM, as in shells.
+#[cfg(unix)]
+const TERMINATED: u8 = 143;
 /// Exit status after an interrupt with nothing written: 128 + SIGINT, as in shells.
 pub const STATUS: u8 = 130;
 /// Time after an interrupt in which a command may finish by itself, so that it ends within 2 s.
@@ -74,25 +77,52 @@ pub fn unbroken() -> MutexGuard<'static, ()> {
     locked(&WRITING)
 }
 
-/// Installs the signal handler once, and returns the stop request that the handler sets.
-fn install() -> Stop {
+/// Returns the stop request of this process.
+fn request() -> &'static Stop {
     static STOP: OnceLock<Stop> = OnceLock::new();
-    let stop = STOP.get_or_init(|| {
-        let stop = Stop::default();
-        let asked = stop.clone();
-        let handler = move || {
-            let is_repeated = asked.request();
-            if is_repeated || !IS_WATCHED.load(Ordering::Relaxed) {
-                let _files = locked(&WRITING);
-                exit(i32::from(STATUS));
-            }
-            thread::spawn(end_in_time);
-        };
-        // Where there is a handler already, its program decides.
-        let _ = ctrlc::try_set_handler(handler);
-        stop
+    STOP.get_or_init(Stop::default)
+}
+
+/// Installs the handler of interrupts once and returns the stop request that it makes.
+fn install() -> Stop {
+    static INSTALLED: Once = Once::new();
+    // Where there is a handler already, its program decides.
+    INSTALLED.call_once(|| _ = ctrlc::try_set_handler(|| end_early(STATUS)));
+    request().clone()
+}
+
+/// Makes requests to end (SIGTERM) act as interrupts do. Must be called before other threads start,
+/// because they then leave the signal to the thread that waits for it.
+#[cfg(unix)]
+pub fn watch_termination() {
+    use nix::sys::signal::{SigSet, Signal};
+    static WATCHED: Once = Once::new();
+    WATCHED.call_once(|| {
+        let mut signals = SigSet::empty();
+        signals.add(Signal::SIGTERM);
+        if signals.thread_block().is_ok() {
+            thread::spawn(move || {
+                while signals.wait().is_ok() {
+                    end_early(TERMINATED);
+                }
+            });
+        }
     });
-    stop.clone()
+}
+
+/// Does nothing where the system knows no requests to end.
+#[cfg(not(unix))]
+pub fn watch_termination() {}
+
+/// Asks a watched command to end in time. Ends other commands at once, and all commands at the
+/// second request, except while files take their names.
+fn end_early(status: u8) {
+    let is_repeated = request().request();
+    if is_repeated || !IS_WATCHED.load(Ordering::Relaxed) {
+        let _files = locked(&WRITING);
+        exit(i32::from(status));
+    }
+    thread::spawn(end_in_time);
 }
 
 /// Ends the process if the command has not ended in time after an interrupt.
