@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::document::{Block, Column, Table};
+use super::document::{Block, Column, Table, code};
 use super::figures;
 use crate::fit::{Identification, Residual};
 use crate::quantity::format::{counted, mm, number};
@@ -48,10 +48,17 @@ pub fn remainder_text(found: &Identification, outcome: &Outcome) -> String {
 /// Returns the blocks about the remainder and the uncertainty of predictions.
 pub(super) fn uncertainty<'a>(found: &Identification, plots: &'a PlotData) -> Vec<Block<'a>> {
     let Some(uncertainty) = &plots.uncertainty else { return Vec::new() };
-    let mut blocks = vec![
-        Block::heading("Uncertainty of predictions"),
-        Block::Text(remainder_text(found, &uncertainty.outcome)),
-    ];
+    let outcome = &uncertainty.outcome;
+    let words = if outcome.gain.is_some() || outcome.is_declared {
+        remainder_text(found, outcome)
+    } else {
+        format!(
+            "Predictions are not corrected. {} fits a remainder if at least 20 configurations are \
+             measured, and keeps it if configurations left out gain by it.",
+            code("flexcal identify --remainder")
+        )
+    };
+    let mut blocks = vec![Block::heading("Uncertainty of predictions"), Block::Text(words)];
     let motion = |k: usize| move |of: &JointError| mm(of.motions[k], 4);
     let columns = [
         Column::words("joint", |of: &JointError| format!("{}", of.joint + 1)),
