@@ -198,6 +198,13 @@ impl Block {
         designs.into_iter().map(of).collect()
     }
 
+    /// Returns true if this and another block cannot act together: a law of the grammar is all that
+    /// acts at its joint.
+    pub fn excludes(&self, other: &Self) -> bool {
+        let is_same_joint = self.joint.is_some() && self.joint == other.joint;
+        is_same_joint && (self.is_whole_law || other.is_whole_law)
+    }
+
     /// Returns true if the hypothesis is an effect, which has a law.
     pub fn is_law(&self) -> bool {
         self.family.is_some()

@@ -181,7 +181,7 @@ impl Search<'_, '_, '_> {
         let Some(lever) = linearised.place(ParameterSite::coordinate(problem, joint + 1)) else {
             return Vec::new();
         };
-        let (less, product) = left.along_lever(&lever);
+        let (less, product) = along_lever(left, products, &lever);
         let at = |pose: &usize| lever.rows(3 * pose, 3);
         let site = WhitenedSite {
             diagonal: DVector::from_iterator(
@@ -191,7 +191,7 @@ impl Search<'_, '_, '_> {
             less: less.select_columns(kept),
             product: product.select_rows(kept),
         };
-        let noise = Noise::new(left.squares(), products.target.noise.freedom, |squares| {
+        let noise = Noise::new(left.squares, products.target.noise.freedom, |squares| {
             products.over_noise(squares)
         });
         let all = linearised.poses();
@@ -218,4 +218,27 @@ impl Search<'_, '_, '_> {
         let functions: Vec<Vec<DVector<f64>>> = present.iter().map(functions).collect();
         proposals(&known, joint, (&site, &noise), &functions)
     }
+}
+
+/// Returns B and p of columns along one lever, one column for each pose. With everything fitted and
+/// a set projected out, they have the products diag(|l|²) − BᵀB, and p with the residual.
+fn along_lever(
+    left: &Left,
+    products: &Products,
+    lever: &DVector<f64>,
+) -> (DMatrix<f64>, DVector<f64>) {
+    let (fitted, reach, residual) = (products.target.fit.fitted(), left.reach(), left.residual());
+    let rows = [fitted.ncols(), reach.nrows()];
+    let poses = lever.len() / 3;
+    let mut less = DMatrix::zeros(rows[0] + rows[1], poses);
+    let mut product = DVector::zeros(poses);
+    for pose in 0..poses {
+        let lever = lever.rows(3 * pose, 3);
+        let mut column = less.column_mut(pose);
+        column.rows_mut(0, rows[0]).gemv_tr(1.0, &fitted.rows(3 * pose, 3), &lever, 0.0);
+        let mut below = column.rows_mut(rows[0], rows[1]);
+        below.gemv(1.0, &reach.columns(3 * pose, 3), &lever, 0.0);
+        product[pose] = lever.dot(&residual.rows(3 * pose, 3));
+    }
+    (less, product)
 }

@@ -112,12 +112,7 @@ impl<'a> Products<'a> {
 
     /// Returns ln of the prior probability of a hypothesis in a set that contains the `others`.
     pub fn ln_prior(&self, block: &Block, others: &[usize]) -> f64 {
-        // A law of the grammar is all that acts at its joint.
-        let is_shared = |other: &usize| {
-            let other = &self.blocks[*other];
-            other.joint == block.joint && (other.is_whole_law || block.is_whole_law)
-        };
-        if block.joint.is_some() && others.iter().any(is_shared) {
+        if others.iter().any(|&other| block.excludes(&self.blocks[other])) {
             return f64::NEG_INFINITY;
         }
         let is_alike =
@@ -242,7 +237,7 @@ pub(super) struct Left<'p, 'a> {
     within: DMatrix<f64>,
     /// Vector Z r.
     taken: DVector<f64>,
-    squares: f64,
+    pub squares: f64,
     /// Logarithm of the density of the residual that remains after the set is fitted, without the
     /// term in det L.
     without: f64,
@@ -290,32 +285,6 @@ impl Left<'_, '_> {
         Some((ln_summed - self.ln_determinant - ln_determinant, size))
     }
 
-    /// Returns the sum of squares that the set leaves.
-    pub fn squares(&self) -> f64 {
-        self.squares
-    }
-
-    /// Returns B and p of columns along one lever, one for each pose: they have the products
-    /// diag(|l|²) − BᵀB with one another, everything fitted and the set projected out, and p with
-    /// the residual.
-    pub fn along_lever(&self, lever: &DVector<f64>) -> (DMatrix<f64>, DVector<f64>) {
-        let (fitted, reach, residual) =
-            (self.products.target.fit.fitted(), self.reach(), self.residual());
-        let rows = [fitted.ncols(), reach.nrows()];
-        let poses = lever.len() / 3;
-        let mut less = DMatrix::zeros(rows[0] + rows[1], poses);
-        let mut product = DVector::zeros(poses);
-        for pose in 0..poses {
-            let lever = lever.rows(3 * pose, 3);
-            let mut column = less.column_mut(pose);
-            column.rows_mut(0, rows[0]).gemv_tr(1.0, &fitted.rows(3 * pose, 3), &lever, 0.0);
-            let mut below = column.rows_mut(rows[0], rows[1]);
-            below.gemv(1.0, &reach.columns(3 * pose, 3), &lever, 0.0);
-            product[pose] = lever.dot(&residual.rows(3 * pose, 3));
-        }
-        (less, product)
-    }
-
     /// Returns the residual that the set leaves, with the fitted parameters projected out.
     pub fn residual(&self) -> DVector<f64> {
         let mut left = self.products.target.fit.residual().clone();
@@ -330,7 +299,7 @@ impl Left<'_, '_> {
     }
 
     /// Returns the matrix Z, which reduces columns and residuals by the set.
-    fn reach(&self) -> &DMatrix<f64> {
+    pub fn reach(&self) -> &DMatrix<f64> {
         self.reach.get_or_init(|| {
             let mut all =
                 DMatrix::zeros(self.taken.len(), self.products.target.fit.residual().len());
