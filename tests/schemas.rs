@@ -2,12 +2,13 @@
 //!
 //! `FLEXCAL_REFILL=1 cargo test --test schemas` writes the schemas of the types to docs/schema/.
 
-#![expect(clippy::unwrap_used, clippy::panic, reason = "a test that fails may panic")]
+#![expect(clippy::unwrap_used, reason = "a test that fails may panic")]
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use assert_cmd::Command;
+use common::arms::path;
+use common::program::Folder;
 use common::schema::violations;
 use flexcal::results::{FORMAT_VERSION, PROGRAM, schemas};
 use serde_json::Value;
@@ -15,8 +16,7 @@ use serde_json::Value;
 mod common;
 
 fn file(format: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/schema");
-    folder.join(format!("{}.schema.json", format.trim_start_matches("flexcal-")))
+    path("docs/schema").join(format!("{}.schema.json", format.trim_start_matches("flexcal-")))
 }
 
 #[test]
@@ -34,48 +34,32 @@ fn schemas_in_the_docs_are_those_of_the_types() {
     assert_eq!(kept, schemas().len(), "docs/schema holds no other file");
 }
 
-/// Runs a command with `--json` in a folder and returns what it prints.
-fn printed(folder: &Path, arguments: &[&str]) -> Value {
-    let mut flexcal = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
-    let output = flexcal.current_dir(folder).args(arguments).arg("--json").output().unwrap();
-    let said = String::from_utf8_lossy(&output.stderr);
-    serde_json::from_slice(&output.stdout).unwrap_or_else(|_| panic!("{arguments:?}: {said}"))
-}
-
 #[test]
 fn every_command_writes_what_its_schema_says() {
-    let folder = tempfile::tempdir().unwrap();
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let named = |path: &str| root.join(path).to_str().unwrap().to_owned();
-    let lunar = named("problems/lunar-sampler");
-    let [cases, data, urdf] =
-        ["tests/cases", "tests/cases/d-backlash.csv", "tests/urdf/odd.urdf"].map(named);
-    let targets = format!("{lunar}/targets.csv");
-    let estimate = "out/lunar-sampler/estimate.json";
-    let commands: [(&str, Vec<&str>); 11] = [
-        ("flexcal-estimate", vec!["identify", &lunar]),
-        ("flexcal-loop", vec!["loop", &cases, "--data", &data, "--out", "loop"]),
-        ("flexcal-trace", vec!["trace", &lunar]),
-        ("flexcal-compare", vec!["compare", &cases, "--data", &data, "--out", "compare"]),
-        ("flexcal-check", vec!["check", &lunar]),
-        ("flexcal-plan", vec!["plan", &lunar, "--truth", &lunar, "--poses", "8"]),
-        ("flexcal-errors", vec!["predict", &lunar, "--estimate", estimate]),
-        (
-            "flexcal-compensate",
-            vec!["compensate", &lunar, "--estimate", estimate, "--data", &targets],
-        ),
-        ("flexcal-export", vec!["export", &lunar, "--estimate", estimate, "--format", "ros-yaml"]),
-        ("flexcal-acceptance", vec!["accept", &lunar]),
-        ("flexcal-init", vec!["init", &urdf, "--tip", "tool"]),
+    let folder = Folder::new();
+    let full = |relative: &str| path(relative).display().to_string();
+    let lunar = full("problems/lunar-sampler");
+    let case = format!("{} --data {}", full("tests/cases"), full("tests/cases/d-backlash.csv"));
+    let estimated = format!("{lunar} --estimate out/lunar-sampler/estimate.json");
+    let commands: [(&str, String); 11] = [
+        ("flexcal-estimate", format!("identify {lunar}")),
+        ("flexcal-loop", format!("loop {case} --out loop")),
+        ("flexcal-trace", format!("trace {lunar}")),
+        ("flexcal-compare", format!("compare {case} --out compare")),
+        ("flexcal-check", format!("check {lunar}")),
+        ("flexcal-plan", format!("plan {lunar} --truth {lunar} --poses 8")),
+        ("flexcal-errors", format!("predict {estimated}")),
+        ("flexcal-compensate", format!("compensate {estimated} --data {lunar}/targets.csv")),
+        ("flexcal-export", format!("export {estimated} --format ros-yaml")),
+        ("flexcal-acceptance", format!("accept {lunar}")),
+        ("flexcal-init", format!("init {} --tip tool", full("tests/urdf/odd.urdf"))),
     ];
     let schemas = schemas();
     for (format, arguments) in commands {
-        let json = printed(folder.path(), &arguments);
+        let json = folder.flexcal(&format!("{arguments} --json")).json();
         let (_, schema) = schemas.iter().find(|(name, _)| *name == format).unwrap();
         let schema = serde_json::from_str(schema).unwrap();
         assert_eq!(violations(&schema, &json), Vec::<String>::new(), "{format}");
-        let keys: Vec<&String> = json.as_object().unwrap().keys().collect();
-        assert!(keys.iter().any(|key| *key == "format"), "{format}: {keys:?}");
         assert_eq!((&json["format"]["name"], &json["program"]), (&format.into(), &PROGRAM.into()));
         assert_eq!(json["format"]["version"], FORMAT_VERSION);
     }

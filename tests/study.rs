@@ -3,21 +3,21 @@
 
 #![expect(clippy::unwrap_used, reason = "a test that fails may panic")]
 
+mod common;
+
 #[path = "study/misprints.rs"]
 mod misprints;
-#[path = "common/schema.rs"]
-mod schema;
 
 use std::fs;
-use std::path::PathBuf;
 use std::process::{Command as Process, Stdio};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
-use assert_cmd::Command;
 use flexcal::results::{Document as _, StudyResult, study_csv, study_parameters_csv};
 use flexcal::study::{Results, Shard, Store, Study, collect, pending, run};
-use serde_json::Value;
+
+use common::program::{Folder, assert_contains, items, number};
+use common::schema;
 
 /// Problem of three rigid joints with few parameters, whose fit is fast.
 const ARM: &str = r#"
@@ -61,51 +61,26 @@ const PARTS: usize = 12;
 /// Result files that have to repeat exactly.
 const RESULTS: [&str; 3] = ["study.csv", "study.json", "parameters.csv"];
 
-/// Temporary folder with a study.
-struct Bench {
-    folder: tempfile::TempDir,
+/// Returns a folder with a study.
+fn bench() -> Folder {
+    Folder::with([("problem.toml", ARM), ("STUDY.toml", STUDY)])
 }
 
-impl Bench {
-    fn new() -> Self {
-        let folder = tempfile::tempdir().unwrap();
-        fs::write(folder.path().join("problem.toml"), ARM).unwrap();
-        fs::write(folder.path().join("STUDY.toml"), STUDY).unwrap();
-        Self { folder }
-    }
+fn read_study(folder: &Folder) -> Study {
+    Study::read(&folder.path("STUDY.toml")).unwrap()
+}
 
-    fn path(&self, name: &str) -> PathBuf {
-        self.folder.path().join(name)
-    }
+/// Returns the texts of the results in a folder.
+fn results(folder: &Folder, out: &str) -> Vec<String> {
+    RESULTS.iter().map(|name| folder.read(format!("{out}/{name}"))).collect()
+}
 
-    /// Replaces the first `from` in a file.
-    fn edit(&self, name: &str, from: &str, to: &str) {
-        let text = fs::read_to_string(self.path(name)).unwrap();
-        assert!(text.contains(from), "{name} has no {from:?}");
-        fs::write(self.path(name), text.replacen(from, to, 1)).unwrap();
-    }
-
-    fn study(&self) -> Study {
-        Study::read(&self.path("STUDY.toml")).unwrap()
-    }
-
-    /// Returns the texts of the results in a folder.
-    fn results(&self, out: &str) -> Vec<String> {
-        RESULTS.iter().map(|name| fs::read_to_string(self.path(out).join(name)).unwrap()).collect()
-    }
-
-    /// Returns the number of finished parts in a folder of results.
-    fn parts(&self, out: &str) -> usize {
-        let Ok(entries) = fs::read_dir(self.path(out).join("cells")) else { return 0 };
-        entries
-            .filter(|entry| entry.as_ref().unwrap().path().extension().is_some_and(|e| e == "json"))
-            .count()
-    }
-
-    fn flexcal(&self, arguments: &[&str]) -> assert_cmd::assert::Assert {
-        let mut command = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
-        command.current_dir(self.folder.path()).args(arguments).assert()
-    }
+/// Returns the number of finished parts in a folder of results.
+fn parts(folder: &Folder, out: &str) -> usize {
+    let Ok(entries) = fs::read_dir(folder.path(out).join("cells")) else { return 0 };
+    entries
+        .filter(|entry| entry.as_ref().unwrap().path().extension().is_some_and(|e| e == "json"))
+        .count()
 }
 
 /// Runs the pending parts of a shard on a number of threads.
@@ -123,35 +98,25 @@ fn texts(study: &Study, results: &Results) -> [String; 3] {
     ]
 }
 
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8(bytes.to_vec()).unwrap()
-}
-
 #[test]
 fn names_with_a_comma_stay_one_cell() {
-    let bench = Bench::new();
+    let bench = bench();
     bench.edit(
         "problem.toml",
         "[parameters]",
         "[[effect]]\njoint-coupling = { joint = 3, from = 2 }\n[parameters]",
     );
     bench.edit("STUDY.toml", "repetitions = 120", "repetitions = 3");
-    bench.flexcal(&["study", ".", "--out", "out", "--quiet"]).success();
-    for (name, column) in [("study.csv", "largest_bias_of"), ("parameters.csv", "parameter")] {
-        let mut table = csv::Reader::from_path(bench.path("out").join(name)).unwrap();
-        let place = table.headers().unwrap().iter().position(|name| name == column).unwrap();
-        let names: Vec<String> =
-            table.records().map(|row| row.unwrap()[place].to_owned()).collect();
-        assert!(
-            name == "study.csv" || names.iter().any(|name| name == "joint-coupling[3,2].factor"),
-            "{names:?}"
-        );
-    }
+    bench.flexcal("study . --out out --quiet").success();
+    bench.table("out/study.csv").place("largest_bias_of");
+    let parameters = bench.table("out/parameters.csv");
+    let names = parameters.column("parameter");
+    assert!(names.contains(&"joint-coupling[3,2].factor"), "{names:?}");
 }
 
 #[test]
 fn declared_effects_are_drawn_and_found_again() {
-    let bench = Bench::new();
+    let bench = bench();
     let effects = "[[effect]]\ngear-ratio = { joint = 2 }\n[[effect]]\njoint-harmonic = { joint = 3, orders = [1, 3] }\n[parameters]";
     bench.edit("problem.toml", "[parameters]", effects);
     bench.edit("STUDY.toml", "repetitions = 120", "repetitions = 40");
@@ -159,18 +124,16 @@ fn declared_effects_are_drawn_and_found_again() {
     bench.edit("STUDY.toml", "position_sigma_mm = [0.05, 0.2]", "position_sigma_mm = [0.05]");
     for source in ["model", "rig"] {
         bench.edit("STUDY.toml", "\n[poses]", &format!("\ndata = '{source}'\n[poses]"));
-        bench.flexcal(&["study", ".", "--out", source, "--quiet"]).success();
+        bench.flexcal(&format!("study . --out {source} --quiet")).success();
         bench.edit("STUDY.toml", &format!("\ndata = '{source}'"), "");
-        let mut table = csv::Reader::from_path(bench.path(source).join("parameters.csv")).unwrap();
-        let header = table.headers().unwrap().clone();
-        let place = |name: &str| header.iter().position(|column| column == name).unwrap();
+        let table = bench.table(format!("{source}/parameters.csv"));
         let mut seen = 0;
-        for row in table.records().map(Result::unwrap) {
-            let name = &row[place("parameter")];
+        for row in &table.rows {
+            let name = &row[table.place("parameter")];
             if !name.contains('[') {
                 continue;
             }
-            let number = |column: &str| row[place(column)].parse::<f64>().unwrap();
+            let number = |column: &str| row[table.place(column)].parse::<f64>().unwrap();
             // Values are drawn from priors of 1e-2 (gear ratio) and 1e-3: a fit of 30 poses is more
             // accurate, and reports how much.
             let (fits, rms, coverage) = (number("fits"), number("rms_error"), number("coverage"));
@@ -185,55 +148,45 @@ fn declared_effects_are_drawn_and_found_again() {
     // An effect that the poses cannot show is an error at the effect.
     bench.edit("problem.toml", "gear-ratio = { joint = 2 }", "joint-thermal-drift = { joint = 2 }");
     bench.edit("problem.toml", "[data]", "[data]\nreference_temperature_C = 20");
-    let error = text_of_error(&bench.flexcal(&["study", "."]).code(2));
-    assert!(
-        error.contains("problem.toml:") && error.contains("temperature_C = [from, to] in [poses]"),
-        "{error}"
-    );
+    let run = bench.flexcal("study .").code(2);
+    assert_contains(&run.stderr, &["problem.toml:", "temperature_C = [from, to] in [poses]"]);
 }
 
 #[test]
 fn an_effect_of_loads_or_temperature_is_studied_as_the_loop_declares_it() {
-    let bench = Bench::new();
+    let bench = bench();
     let problem = include_str!("cases/problem.toml");
     let effect = "[[effect]]\nlink-thermal-bending = { link = \"A\" }\n[parameters]";
-    fs::write(bench.path("problem.toml"), problem.replacen("[parameters]", effect, 1)).unwrap();
+    bench.write("problem.toml", problem.replacen("[parameters]", effect, 1));
     let (before, _) = STUDY.split_once("[poses]").unwrap();
     let study = before
         .replace("repetitions = 120", "repetitions = 2")
         .replace("[8]", "[30]")
         .replace(", \"gauss-newton\"", "");
     let poses = "[poses]\nq1_deg = [-90, 90]\nq2_deg = [-65, 15]\nq3_deg = [15, 130]\nq4_deg = [-95, 75]\ntemperature_C = [15, 30]\n";
-    fs::write(bench.path("STUDY.toml"), study + poses).unwrap();
-    bench.flexcal(&["study", ".", "--out", "out", "--quiet"]).success();
-    let rows = fs::read_to_string(bench.path("out/parameters.csv")).unwrap();
+    bench.write("STUDY.toml", study + poses);
+    bench.flexcal("study . --out out --quiet").success();
+    let rows = bench.read("out/parameters.csv");
     let fitted = rows
         .lines()
         .filter(|row| row.contains("link-thermal-bending[A].about_") && row.contains(",2,"));
     assert_eq!(fitted.count(), 4, "{rows}");
 }
 
-fn text_of_error(assert: &assert_cmd::assert::Assert) -> String {
-    text(&assert.get_output().stderr)
-}
-
 #[test]
 fn folders_to_merge_from_are_there() {
-    let bench = Bench::new();
+    let bench = bench();
     bench.edit("STUDY.toml", "repetitions = 120", "repetitions = 3");
-    bench.flexcal(&["study", ".", "--out", "one", "--quiet"]).success();
-    let merge = |more: &[&str]| {
-        bench.flexcal(&[&["study", "merge", ".", "--out", "all", "--from", "one"], more].concat())
-    };
-    merge(&[]).success();
-    let error = text_of_error(&merge(&["tow"]).code(2));
-    assert!(error.contains("--from tow: no such folder"), "{error}");
+    bench.flexcal("study . --out one --quiet").success();
+    bench.flexcal("study merge . --out all --from one").success();
+    let run = bench.flexcal("study merge . --out all --from one tow").code(2);
+    assert_contains(&run.stderr, &["--from tow: no such folder"]);
 }
 
 #[test]
 fn threads_shares_and_order_change_nothing() {
-    let bench = Bench::new();
-    let study = bench.study();
+    let bench = bench();
+    let study = read_study(&bench);
     assert_eq!((study.cells.len(), study.parts().len()), (CELLS, PARTS));
     let whole = Store::new(&bench.path("whole"));
     run_on(1, &study, &whole, Shard::WHOLE);
@@ -251,14 +204,14 @@ fn threads_shares_and_order_change_nothing() {
         assert_eq!(found, expected, "{threads} threads, {shares} shares");
         if shares > 1 {
             let message = collect(&study, &stores[1..]).unwrap_err().to_string();
-            assert!(message.contains("of 12 parts of the study are missing"), "{message}");
+            assert_contains(&message, &["of 12 parts of the study are missing"]);
         }
     }
 }
 
 #[test]
 fn finished_parts_are_kept_and_no_others_used() {
-    let bench = Bench::new();
+    let bench = bench();
     let store = Store::new(&bench.path("out"));
     let fits = |study: &Study| {
         let count = AtomicUsize::new(0);
@@ -266,16 +219,16 @@ fn finished_parts_are_kept_and_no_others_used() {
         run(study, &store, &open, || _ = count.fetch_add(1, Ordering::Relaxed)).unwrap();
         count.into_inner()
     };
-    let study = bench.study();
+    let study = read_study(&bench);
     assert_eq!(fits(&study), CELLS * 120);
     let first = texts(&study, &collect(&study, std::slice::from_ref(&store)).unwrap());
     assert_eq!(fits(&study), 0, "everything is there");
     // One more noise level keeps the parts of the others.
     bench.edit("STUDY.toml", "[0.05, 0.2]", "[0.1, 0.05, 0.2]");
-    assert_eq!(fits(&bench.study()), 2 * 120);
+    assert_eq!(fits(&read_study(&bench)), 2 * 120);
     // More repetitions keep full parts; the last one of 20 is replaced by one of 50.
     bench.edit("STUDY.toml", "repetitions = 120", "repetitions = 150");
-    assert_eq!(fits(&bench.study()), 6 * 50);
+    assert_eq!(fits(&read_study(&bench)), 6 * 50);
     // Other arms, poses or noise keep no part.
     for (file, from, to) in [
         ("STUDY.toml", "seed = 7", "seed = 8"),
@@ -284,130 +237,102 @@ fn finished_parts_are_kept_and_no_others_used() {
         ("problem.toml", "0.5 }", "0.4 }"),
     ] {
         bench.edit(file, from, to);
-        assert_eq!(fits(&bench.study()), 6 * 150, "{to}");
+        assert_eq!(fits(&read_study(&bench)), 6 * 150, "{to}");
     }
     // The original study finds its parts again.
-    fs::write(bench.path("STUDY.toml"), STUDY).unwrap();
-    fs::write(bench.path("problem.toml"), ARM).unwrap();
-    assert_eq!(fits(&bench.study()), 0);
+    bench.write("STUDY.toml", STUDY);
+    bench.write("problem.toml", ARM);
+    assert_eq!(fits(&read_study(&bench)), 0);
     assert_eq!(texts(&study, &collect(&study, std::slice::from_ref(&store)).unwrap()), first);
 }
 
 #[test]
 fn damaged_and_foreign_parts_are_not_used() {
-    let bench = Bench::new();
-    let study = bench.study();
+    let bench = bench();
+    let study = read_study(&bench);
     let store = Store::new(&bench.path("out"));
     run_on(2, &study, &store, Shard::WHOLE);
     let mut files = fs::read_dir(store.folder()).unwrap().map(|entry| entry.unwrap().path());
     let (one, other) = (files.next().unwrap(), files.next().unwrap());
     fs::copy(&other, &one).unwrap();
     let message = pending(&study, &store, Shard::WHOLE).unwrap_err().to_string();
-    assert!(
-        message.contains("belongs to other inputs") && message.contains(&one.display().to_string()),
-        "{message}"
-    );
+    assert_contains(&message, &["belongs to other inputs", &one.display().to_string()]);
     let cell = fs::read_to_string(&other).unwrap();
     fs::write(&other, cell.replacen("\"mean\": ", "\"mean\": 1", 1)).unwrap();
     fs::remove_file(&one).unwrap();
     let message = pending(&study, &store, Shard::WHOLE).unwrap_err().to_string();
-    assert!(message.contains("tally: changed since flexcal wrote it"), "{message}");
+    assert_contains(&message, &["tally: changed since flexcal wrote it"]);
     fs::write(&other, cell).unwrap();
     fs::write(&one, "{").unwrap();
-    let assert = bench.flexcal(&["study", "STUDY.toml", "--out", "out"]).code(2);
-    assert!(text(&assert.get_output().stderr).contains("damaged"));
+    assert_contains(&bench.flexcal("study STUDY.toml --out out").code(2).stderr, &["damaged"]);
     fs::remove_file(&one).unwrap();
     assert_eq!(pending(&study, &store, Shard::WHOLE).unwrap().len(), 1);
 }
 
 #[test]
 fn a_killed_study_goes_on_and_ends_alike() {
-    let bench = Bench::new();
+    let bench = bench();
     // Enough fits to interrupt the study.
     bench.edit("STUDY.toml", "repetitions = 120", "repetitions = 2000");
     let start = || {
         let mut process = Process::new(assert_cmd::cargo::cargo_bin!("flexcal"));
-        process.current_dir(bench.folder.path()).args(["study", ".", "--out", "killed", "--quiet"]);
+        process.current_dir(bench.path("")).args(["study", ".", "--out", "killed", "--quiet"]);
         process.env("RAYON_NUM_THREADS", "1").stdout(Stdio::null()).spawn().unwrap()
     };
     let mut stopped = 0;
     for wanted in [1, 40] {
         let mut process = start();
-        while bench.parts("killed") < wanted && process.try_wait().unwrap().is_none() {
+        while parts(&bench, "killed") < wanted && process.try_wait().unwrap().is_none() {
             std::thread::sleep(Duration::from_millis(1));
         }
         process.kill().unwrap();
         process.wait().unwrap();
-        stopped += usize::from(!bench.path("killed/study.csv").exists());
+        stopped += usize::from(!bench.has("killed/study.csv"));
     }
-    assert!(stopped > 0 && bench.parts("killed") < 160, "killed before the end");
-    bench.flexcal(&["study", ".", "--out", "killed", "--quiet"]).success();
-    bench.flexcal(&["study", ".", "--out", "whole", "--quiet"]).success();
-    assert_eq!(bench.results("killed"), bench.results("whole"));
+    assert!(stopped > 0 && parts(&bench, "killed") < 160, "killed before the end");
+    bench.flexcal("study . --out killed --quiet").success();
+    bench.flexcal("study . --out whole --quiet").success();
+    assert_eq!(results(&bench, "killed"), results(&bench, "whole"));
 }
 
 #[test]
 fn shares_of_the_command_line_merge_to_the_same_bytes() {
-    let bench = Bench::new();
-    let assert = bench.flexcal(&["study", "STUDY.toml"]).success();
-    let table = text(&assert.get_output().stdout);
-    for expected in
-        ["gauss-newton", "levenberg-marquardt", "held out mean", "out/small-study/study.csv"]
-    {
-        assert!(table.contains(expected), "{expected} missing in:\n{table}");
-    }
+    let bench = bench();
+    assert_contains(
+        &bench.flexcal("study STUDY.toml").success().stdout,
+        &["gauss-newton", "levenberg-marquardt", "held out mean", "out/small-study/study.csv"],
+    );
     for share in ["1/3", "2/3", "3/3"] {
         // All shards in one folder, and each in a separate one.
         let done = format!("done/{}", &share[..1]);
-        bench
-            .flexcal(&["study", "STUDY.toml", "--out", "shared", "--shard", share, "--done", &done])
-            .success();
-        assert_eq!(fs::read_to_string(bench.path(&done)).unwrap(), "flexcal study: done\n");
+        let study = format!("study STUDY.toml --shard {share}");
+        bench.flexcal(&format!("{study} --out shared --done {done}")).success();
+        assert_eq!(bench.read(&done), "flexcal study: done\n");
         let folder = format!("own-{}", &share[..1]);
-        bench
-            .flexcal(&["study", "STUDY.toml", "--out", &folder, "--shard", share, "--quiet"])
-            .success();
-        assert!(!bench.path("shared/study.csv").exists() && bench.parts(&folder) == PARTS / 3);
+        bench.flexcal(&format!("{study} --out {folder} --quiet")).success();
+        assert!(!bench.has("shared/study.csv") && parts(&bench, &folder) == PARTS / 3);
     }
     // Outdated results are removed until they are complete again; other files stay.
-    bench.flexcal(&["study", "no-such.toml", "--done", "done/1"]).code(2);
-    bench.flexcal(&["study", "STUDY.toml", "--done", "STUDY.toml"]).code(2);
-    assert!(!bench.path("done/1").exists() && bench.path("STUDY.toml").exists());
-    let assert = bench.flexcal(&["study", "merge", "STUDY.toml", "--out", "own-1"]).code(2);
-    assert!(text(&assert.get_output().stderr).contains("8 of 12 parts of the study are missing"));
-    let json =
-        bench.flexcal(&["study", "merge", "STUDY.toml", "--out", "shared", "--json"]).success();
-    let from = [
-        "study",
-        "merge",
-        "STUDY.toml",
-        "--out",
-        "all",
-        "--from",
-        "own-1",
-        "own-2",
-        "own-3",
-        "--quiet",
-    ];
-    bench.flexcal(&from).success();
-    let expected = bench.results("out/small-study");
-    assert_eq!(bench.results("shared"), expected);
-    assert_eq!(bench.results("all"), expected);
-    assert_eq!(text(&json.get_output().stdout), expected[1]);
-    assert_eq!(
-        fs::read_to_string(bench.path("all/timing.csv")).unwrap().lines().count(),
-        1 + CELLS
-    );
+    bench.flexcal("study no-such.toml --done done/1").code(2);
+    bench.flexcal("study STUDY.toml --done STUDY.toml").code(2);
+    assert!(!bench.has("done/1") && bench.has("STUDY.toml"));
+    let run = bench.flexcal("study merge STUDY.toml --out own-1").code(2);
+    assert_contains(&run.stderr, &["8 of 12 parts of the study are missing"]);
+    let merged = bench.flexcal("study merge STUDY.toml --out shared --json").success();
+    bench.flexcal("study merge STUDY.toml --out all --from own-1 own-2 own-3 --quiet").success();
+    let expected = results(&bench, "out/small-study");
+    assert_eq!(results(&bench, "shared"), expected);
+    assert_eq!(results(&bench, "all"), expected);
+    assert_eq!(merged.stdout, expected[1]);
+    assert_eq!(bench.table("all/timing.csv").rows.len(), CELLS);
 }
 
 #[test]
 fn figures_are_what_they_say() {
-    let bench = Bench::new();
+    let bench = bench();
     bench.edit("STUDY.toml", "repetitions = 120", "repetitions = 1000");
-    let assert = bench.flexcal(&["study", ".", "--json"]).success();
-    let json: Value = serde_json::from_slice(&assert.get_output().stdout).unwrap();
-    let cells = json["cells"].as_array().unwrap();
-    let number = |value: &Value| value.as_f64().unwrap();
+    let json = bench.flexcal("study . --json").success().json();
+    let cells = items(&json["cells"]);
     for cell in cells {
         assert_eq!((number(&cell["fits"]), number(&cell["failed"])), (1000.0, 0.0));
         assert!((number(&cell["reduced_chi2"]) - 1.0).abs() < 0.05, "{}", cell["reduced_chi2"]);
@@ -415,7 +340,7 @@ fn figures_are_what_they_say() {
         let noise = number(&cell["position_sigma_mm"]) * 3.0_f64.sqrt();
         let rms = number(&cell["held_out_mm"]["rms"]);
         assert!(rms > noise && rms < 1.5 * noise, "{rms} against {noise}");
-        for parameter in cell["parameters"].as_array().unwrap() {
+        for parameter in items(&cell["parameters"]) {
             let of = |key: &str| number(&parameter[key]);
             let (bias, spread, claimed) = (of("bias"), of("spread"), of("std_error"));
             // The limit is four standard deviations of each figure.
@@ -439,46 +364,33 @@ fn figures_are_what_they_say() {
 
 #[test]
 fn the_rig_measures_what_the_model_lacks() {
-    let bench = Bench::new();
+    let bench = bench();
     let truth = "[random]\n\"joint*.theta\" = { sigma_deg = 0.5 }\n[[effect]]\njoint-harmonic = { joint = 2, orders = [1] }\n\
                  sin1_deg = 0.1\n[poses]\nq1_deg = [-120, 120]\nq2_deg = [-40, 80]\nq3_deg = [-120, -10]\n";
-    fs::write(bench.path("TRUTH.toml"), truth).unwrap();
+    bench.write("TRUTH.toml", truth);
     let (before, _) = STUDY.split_once("[poses]").unwrap();
     let study = before.replace("repetitions = 120", "repetitions = 20");
-    fs::write(bench.path("STUDY.toml"), format!("{study}truth = \"TRUTH.toml\"\n")).unwrap();
-    let assert = bench.flexcal(&["study", "."]).code(2);
-    assert!(text(&assert.get_output().stderr).contains("write data = \"rig\""));
-    fs::write(bench.path("STUDY.toml"), format!("{study}truth = \"TRUTH.toml\"\ndata = \"rig\"\n"))
-        .unwrap();
-    let assert = bench.flexcal(&["study", ".", "--json"]).success();
-    let json: Value = serde_json::from_slice(&assert.get_output().stdout).unwrap();
-    let chi2 = json["cells"][0]["reduced_chi2"].as_f64().unwrap();
+    bench.write("STUDY.toml", format!("{study}truth = \"TRUTH.toml\"\n"));
+    assert_contains(&bench.flexcal("study .").code(2).stderr, &["write data = \"rig\""]);
+    bench.write("STUDY.toml", format!("{study}truth = \"TRUTH.toml\"\ndata = \"rig\"\n"));
+    let json = bench.flexcal("study . --json").success().json();
+    let chi2 = number(&json["cells"][0]["reduced_chi2"]);
     assert!(chi2 > 5.0, "a harmonic of 0.1° at 1 m is far above 0.05 mm: χ²/ν {chi2}");
-    assert!(json["cells"][0]["coverage"].as_f64().unwrap() < 0.95);
+    assert!(number(&json["cells"][0]["coverage"]) < 0.95);
 }
 
 #[test]
 fn a_folder_without_a_study_is_told_where_to_read() {
-    let folder = tempfile::tempdir().unwrap();
-    let mut command = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
-    let assert = command.args(["study", "."]).current_dir(folder.path()).assert().code(2);
-    let message = String::from_utf8_lossy(&assert.get_output().stderr).into_owned();
-    assert!(
-        message.contains("STUDY.toml: no such file") && message.contains("docs/study.md"),
-        "{message}"
-    );
+    let run = Folder::new().flexcal("study .").code(2);
+    assert_contains(&run.message(), &["STUDY.toml: no such file", "docs/study.md"]);
 }
 
 #[test]
 fn a_study_of_contacts_is_refused() {
-    let bench = Bench::new();
-    fs::write(bench.path("problem.toml"), format!("{ARM}[[point]]\nname = 'left'\n")).unwrap();
-    let assert = bench.flexcal(&["study", "."]).code(2);
-    let message = text(&assert.get_output().stderr);
-    assert!(
-        message.contains("STUDY.toml:3: problem: a study draws and fits positions"),
-        "{message}"
-    );
+    let bench = bench();
+    bench.write("problem.toml", format!("{ARM}[[point]]\nname = 'left'\n"));
+    let run = bench.flexcal("study .").code(2);
+    assert_contains(&run.stderr, &["STUDY.toml:3: problem: a study draws and fits positions"]);
 }
 
 #[test]
@@ -512,39 +424,29 @@ fn bad_studies_are_named_and_leave_nothing_behind() {
         ("[poses]", "truth = \"TRUTH.toml\"\n[poses]", &["STUDY.toml:11", "TRUTH.toml"]),
     ];
     for &(from, to, expected) in cases {
-        let bench = Bench::new();
+        let bench = bench();
         bench.edit("STUDY.toml", from, to);
-        let assert = bench.flexcal(&["study", "STUDY.toml"]).code(2);
-        let message = text(&assert.get_output().stderr);
-        for word in expected {
-            assert!(message.contains(word), "{to}: {word:?} missing in: {message}");
-        }
-        assert!(
-            assert.get_output().stdout.is_empty() && !bench.path("out").exists(),
-            "{to} left something behind"
-        );
+        let run = bench.flexcal("study STUDY.toml").code(2);
+        assert_contains(&run.stderr, expected);
+        assert!(run.stdout.is_empty() && !bench.has("out"), "{to} left something behind");
     }
-    let bench = Bench::new();
+    let bench = bench();
     bench.edit("problem.toml", "sigma_mm = 3.0 }", "sigma_mm = 3.0, max_mm = 9.0 }");
-    let assert = bench.flexcal(&["study", "STUDY.toml"]).code(2);
-    assert!(text(&assert.get_output().stderr).contains("gauss-newton does not keep the bounds"));
-    for arguments in [
-        &["study"][..],
-        &["study", ".", "--shard", "0/3"],
-        &["study", ".", "--shard", "1/3", "--json"],
-    ] {
+    let run = bench.flexcal("study STUDY.toml").code(2);
+    assert_contains(&run.stderr, &["gauss-newton does not keep the bounds"]);
+    for arguments in
+        ["study", "study . --shard 0/3", "study . --shard 1/3 --json", "study nowhere.toml"]
+    {
         bench.flexcal(arguments).code(2);
     }
-    bench.flexcal(&["study", "nowhere.toml"]).code(2);
 }
 
 #[test]
 fn poses_that_are_too_few_for_the_parameters_are_no_failure_of_the_solver() {
-    let bench = Bench::new();
+    let bench = bench();
     bench.edit("STUDY.toml", "repetitions = 120", "repetitions = 3");
     bench.edit("STUDY.toml", "identification_poses = [8]", "identification_poses = [1]");
-    bench.flexcal(&["study", ".", "--out", "out", "--quiet"]).success();
-    let mut table = csv::Reader::from_path(bench.path("out/study.csv")).unwrap();
-    let place = table.headers().unwrap().iter().position(|name| name == "failed").unwrap();
-    assert!(table.records().all(|row| &row.unwrap()[place] == "0"));
+    bench.flexcal("study . --out out --quiet").success();
+    let table = bench.table("out/study.csv");
+    assert!(table.column("failed").iter().all(|failed| *failed == "0"));
 }

@@ -9,7 +9,11 @@ use std::env;
 use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::Command;
+
+use common::arms::path;
+use common::program::{Folder, assert_contains, shell_words};
+
+mod common;
 
 /// Fenced block: the info string of its opening fence, and its lines.
 struct Block<'a> {
@@ -45,35 +49,14 @@ fn parts(page: &str) -> Vec<Part<'_>> {
     parts
 }
 
-/// Splits a command into arguments; quoted text stays together.
-fn words(command: &str) -> Vec<String> {
-    let (mut words, mut quote): (Vec<Option<String>>, Option<char>) = (vec![None], None);
-    for letter in command.chars() {
-        match (quote, letter) {
-            (Some(mark), _) if mark == letter => quote = None,
-            (None, '"' | '\'') => quote = Some(letter),
-            (None, ' ') => words.push(None),
-            _ => words.last_mut().unwrap().get_or_insert_default().push(letter),
-        }
-    }
-    words.into_iter().flatten().collect()
-}
-
 /// Returns the output of a command in a folder.
-fn printed(command: &str, folder: &Path) -> String {
-    let words = words(command);
-    let (program, arguments) = words.split_first().unwrap();
+fn printed(command: &str, folder: &Folder) -> String {
+    let (program, arguments) = command.split_once(' ').unwrap();
     if program == "cat" {
-        return fs::read_to_string(folder.join(&arguments[0])).unwrap();
+        return folder.read(arguments);
     }
     assert_eq!(program, "flexcal");
-    let output = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"))
-        .args(arguments)
-        .current_dir(folder)
-        .output()
-        .unwrap();
-    assert!(output.status.success(), "{command}: {}", String::from_utf8_lossy(&output.stderr));
-    String::from_utf8(output.stdout).unwrap()
+    folder.flexcal(arguments).success().stdout
 }
 
 /// Returns the lines of `text` that a block shows: all, or ranges counted from 1 with `…` between
@@ -124,9 +107,9 @@ fn the_page_of_laws_shows_what_happens() {
 
 /// Runs the commands of a page and compares its blocks with what they print, or refills them.
 fn shows_what_happens(page: &str, least_commands: usize) {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("docs/{page}.md"));
+    let path = path(&format!("docs/{page}.md"));
     let page = fs::read_to_string(&path).unwrap();
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Folder::new();
     let (mut filled, mut commands) = (String::new(), 0);
     for part in parts(&page) {
         let block = match part {
@@ -140,7 +123,7 @@ fn shows_what_happens(page: &str, least_commands: usize) {
         let mut lines: Vec<String> = block.lines.iter().map(|line| (*line).to_owned()).collect();
         if kind == "console" {
             let command = block.lines[0].strip_prefix("$ ").unwrap();
-            let shown = chosen(&printed(command, folder.path()), rest);
+            let shown = chosen(&printed(command, &folder), rest);
             if env::var_os("FLEXCAL_REFILL").is_none() {
                 let (page, now) = (
                     lines[1..].iter().map(|line| timeless(line)),
@@ -152,9 +135,7 @@ fn shows_what_happens(page: &str, least_commands: usize) {
             lines.extend(shown);
             commands += 1;
         } else if !rest.is_empty() {
-            let file = folder.path().join(rest);
-            fs::create_dir_all(file.parent().unwrap()).unwrap();
-            fs::write(file, lines.join("\n") + "\n").unwrap();
+            folder.write(rest, lines.join("\n") + "\n");
         }
         writeln!(filled, "```{}\n{}\n```", block.info, lines.join("\n")).unwrap();
     }
@@ -169,7 +150,7 @@ fn what_is_left_out_is_marked() {
     assert_eq!(chosen("a\nb\nc\nd\ne\n", "1-2 4-4"), ["a", "b", "…", "d", "…"]);
     assert_eq!(chosen("a\nb\n", ""), ["a", "b"]);
     assert_eq!(
-        words("plan a --separate \"x = { y = 1 }\" z"),
+        shell_words("plan a --separate \"x = { y = 1 }\" z"),
         ["plan", "a", "--separate", "x = { y = 1 }", "z"]
     );
     assert_eq!(
@@ -180,19 +161,17 @@ fn what_is_left_out_is_marked() {
 
 /// Returns the pages of the documentation, the README first.
 fn pages() -> Vec<PathBuf> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let docs = fs::read_dir(root.join("docs")).unwrap().map(|entry| entry.unwrap().path());
+    let docs = fs::read_dir(path("docs")).unwrap().map(|entry| entry.unwrap().path());
     let mut pages: Vec<PathBuf> =
         docs.filter(|path| path.extension().is_some_and(|ending| ending == "md")).collect();
     pages.sort();
-    pages.insert(0, root.join("README.md"));
+    pages.insert(0, path("README.md"));
     pages
 }
 
 #[test]
 fn every_page_is_in_the_book_and_every_link_leads_somewhere() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let book = fs::read_to_string(root.join("docs/SUMMARY.md")).unwrap();
+    let book = fs::read_to_string(path("docs/SUMMARY.md")).unwrap();
     for page in pages() {
         let name = page.file_name().unwrap().to_str().unwrap();
         if !["README.md", "SUMMARY.md"].contains(&name) {
@@ -219,82 +198,69 @@ fn commands(page: &str) -> Vec<String> {
 #[cfg(unix)]
 #[test]
 fn an_own_arm_goes_the_way_of_the_readme_to_its_end() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let readme = fs::read_to_string(root.join("README.md")).unwrap();
+    let readme = fs::read_to_string(path("README.md")).unwrap();
     let (_, section) = readme.split_once("## Your own arm").unwrap();
     let section = section.split("\n## ").next().unwrap();
-    let folder = tempfile::tempdir().unwrap();
-    std::os::unix::fs::symlink(root.join("problems"), folder.path().join("problems")).unwrap();
+    let folder = Folder::new();
+    std::os::unix::fs::symlink(path("problems"), folder.path("problems")).unwrap();
     let mut said = Vec::new();
     for line in section.lines().filter_map(|line| line.strip_prefix("    ")) {
         let command = line.split(" # ").next().unwrap().trim_end();
-        match words(command).as_slice() {
+        match shell_words(command).as_slice() {
             [program, from, to] if program == "cp" => {
                 let name = Path::new(from).file_name().unwrap();
-                let to = folder.path().join(to).join(name);
-                fs::copy(folder.path().join(from), to).unwrap();
+                fs::copy(folder.path(from), folder.path(to).join(name)).unwrap();
             }
-            _ => said.push(printed(command, folder.path())),
+            _ => said.push(printed(command, &folder)),
         }
     }
     let [init, check, found, _, exported] = said.as_slice() else { panic!("{section}") };
-    for words in [
-        "target_m",
-        "position_sigma_mm",
-        "30 % of the poses",
-        "Next: flexcal check bench-arm --poses 40",
-    ] {
-        assert!(init.contains(words), "{words:?} missing in:\n{init}");
-    }
-    for words in ["measure 58", "target_m = [0, 0, 0]"] {
-        assert!(check.contains(words), "{words:?} missing in:\n{check}");
-    }
-    assert!(
-        found.contains("Explained: one effect was found") && found.contains("joint = 2"),
-        "{found}"
+    assert_contains(
+        init,
+        &[
+            "target_m",
+            "position_sigma_mm",
+            "30 % of the poses",
+            "Next: flexcal check bench-arm --poses 40",
+        ],
     );
-    assert!(exported.contains("held-out poses: mean 0."), "{exported}");
-    assert!(
-        folder.path().join("out/calibrated.urdf").is_file()
-            && folder.path().join("out/bench-closed/report.html").is_file()
-    );
-    let two_tables = "flexcal identify problems/bench-arm/two-tables --out out/two-tables";
-    let told = printed(two_tables, folder.path());
-    assert!(told.contains("27 parameters from 41 poses, 18 poses held out"), "{told}");
+    assert_contains(check, &["measure 58", "target_m = [0, 0, 0]"]);
+    assert_contains(found, &["Explained: one effect was found", "joint = 2"]);
+    assert_contains(exported, &["held-out poses: mean 0."]);
+    assert!(folder.has("out/calibrated.urdf") && folder.has("out/bench-closed/report.html"));
+    let two_tables = "identify problems/bench-arm/two-tables --out out/two-tables";
+    let told = folder.flexcal(two_tables).success().stdout;
+    assert_contains(&told, &["27 parameters from 41 poses, 18 poses held out"]);
 }
 
 #[test]
 fn commands_of_the_documentation_are_understood() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let (empty, folder) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let (empty, folder) = (Folder::new(), Folder::new());
     #[cfg(unix)]
-    std::os::unix::fs::symlink(root.join("problems"), folder.path().join("problems")).unwrap();
-    let run = |command: &str, folder: &Path| {
-        let words = words(command);
-        let mut flexcal = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
-        let output = flexcal.args(&words[1..]).current_dir(folder).output().unwrap();
-        (output.status.code().unwrap(), String::from_utf8(output.stderr).unwrap())
+    std::os::unix::fs::symlink(path("problems"), folder.path("problems")).unwrap();
+    let run = |command: &str, folder: &Folder| {
+        folder.flexcal(command.split_once(' ').map_or("", |(_, arguments)| arguments))
     };
     let mut understood = 0;
     for page in pages() {
         for command in commands(&fs::read_to_string(&page).unwrap()) {
             // Without files only the arguments can be checked.
-            let (_, said) = run(&command, empty.path());
+            let said = run(&command, &empty).stderr;
             assert!(!said.contains("try '--help'"), "{}: {command}: {said}", page.display());
             understood += 1;
         }
     }
     assert!(understood > 20, "{understood}");
     // The quick commands of the command list run successfully.
-    let list = fs::read_to_string(root.join("docs/commands.md")).unwrap();
+    let list = fs::read_to_string(path("docs/commands.md")).unwrap();
     let is_quick = |command: &String| {
         command.contains("lunar-sampler")
-            && !["study", "plan"].contains(&words(command)[1].as_str())
+            && !["study", "plan"].contains(&shell_words(command)[1].as_str())
     };
     let quick: Vec<String> = commands(&list).into_iter().filter(is_quick).collect();
     assert!(quick.len() >= 8, "{quick:?}");
     for command in quick.iter().filter(|_| cfg!(unix)) {
-        let (status, said) = run(command, folder.path());
-        assert!(status < 2, "{command}: {said}");
+        let run = run(command, &folder);
+        assert!(run.status < 2, "{run:?}");
     }
 }

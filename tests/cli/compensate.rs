@@ -1,33 +1,30 @@
 //! Compensated commands, checked on the virtual rig.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use assert_cmd::Command;
 use flexcal::fit::{Options, Placement, compensate, identify};
-use flexcal::measurement::{Dataset, Measurements};
+use flexcal::measurement::Measurements;
 use flexcal::mechanics::{Arm, StaticState, Workspace};
-use flexcal::model::Model;
 use flexcal::problem::{PoseView, Problem};
 use flexcal::results::{commands_csv, poses_csv};
 use flexcal::rig::{Truth, simulate};
 use nalgebra::Vector3;
 
+use crate::common::arms::{parse, path};
+use crate::common::made::model_of;
+use crate::common::program::{Folder, assert_contains};
+use crate::common::reading::{read_dataset, read_table};
+
 fn case(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases").join(name)
+    path("tests/cases").join(name)
 }
 
-/// Reads measurements from CSV text.
-fn measured(text: &str, problem: &Problem) -> Measurements {
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("measurements.csv");
-    fs::write(&file, text).unwrap();
-    Measurements::read(&[file], problem).unwrap().0
-}
-
-fn model(problem: &Problem, rows: &Measurements) -> Model {
-    let placement = Placement::of(rows);
-    Model::new(problem, &placement.bases, &placement.targets).unwrap()
+/// Reads the lunar sampler and its data without an effect.
+fn lunar_sampler() -> (Problem, Measurements) {
+    let problem = Problem::read(&case("problem.toml")).unwrap();
+    let rows = Measurements::read(&[case("a-none.csv")], &problem).unwrap().0;
+    (problem, rows)
 }
 
 #[test]
@@ -35,7 +32,7 @@ fn fifty_targets_are_reached_after_twenty_eight_noisy_poses() {
     let problem = Problem::read(&case("problem.toml")).unwrap();
     let truth = Truth::read(&case("truth.toml"), &problem).unwrap();
     let simulation = simulate(&problem, &truth, 78, 7).unwrap();
-    let data = Dataset::from_measurements(&problem, measured(&simulation.csv(), &problem)).unwrap();
+    let data = read_dataset(&problem, &simulation.csv());
     let rows = &data.measurements;
     let found = identify(&problem, &data, &Options::default()).unwrap();
 
@@ -54,7 +51,7 @@ fn fifty_targets_are_reached_after_twenty_eight_noisy_poses() {
         nominal.equilibrate(&setup, &mut ws, &mut rest).unwrap();
         targets.positions[row] = rest.frame.point(&problem.tool.target);
     }
-    let commands = compensate(&problem, &model(&problem, rows), &found.x, &targets).unwrap();
+    let commands = compensate(&problem, &model_of(&problem, rows), &found.x, &targets).unwrap();
     let mut misses = Vec::new();
     for &row in &data.split.held_out {
         let command = &commands[row];
@@ -81,8 +78,7 @@ fn changed(from: &str, to: &str) -> String {
 
 #[test]
 fn the_digest_is_of_what_predictions_depend_on() {
-    let digest =
-        |from, to| Problem::parse(&changed(from, to), Path::new("problem.toml")).unwrap().digest();
+    let digest = |from, to| parse(&changed(from, to)).digest();
     let unchanged = digest("", "");
     // The digest does not depend on the machine.
     assert_eq!(unchanged, "843194ed2f0f49648c76b13cbc088316658d12dbee573d3f7cbb8807d2c1078b");
@@ -113,7 +109,7 @@ fn the_digest_is_of_what_predictions_depend_on() {
     }
     let warm = changed("[parameters]", drift)
         .replace("reference_temperature_C = 20.0", "reference_temperature_C = 25.0");
-    seen.push(Problem::parse(&warm, Path::new("problem.toml")).unwrap().digest());
+    seen.push(parse(&warm).digest());
     let count = seen.len();
     seen.sort_unstable();
     seen.dedup();
@@ -124,89 +120,45 @@ fn the_digest_is_of_what_predictions_depend_on() {
 /// warning.
 #[test]
 fn targets_without_what_an_effect_follows_are_reached_without_it() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = |name: &str| folder.path().join(name);
-    let run = |arguments: &[&str]| {
-        let mut command = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
-        command.current_dir(folder.path()).args(arguments).assert().success()
-    };
+    let folder = Folder::with_cases(&["a-none.csv"]);
     let drift = |joint: u32| format!("[[effect]]\njoint-thermal-drift = {{ joint = {joint} }}\n\n");
-    fs::write(
-        path("problem.toml"),
-        changed("[parameters]", &(drift(2) + &drift(3) + "[parameters]")),
-    )
-    .unwrap();
-    fs::copy(case("a-none.csv"), path("a-none.csv")).unwrap();
-    run(&["identify", ".", "--quiet", "--out", "."]);
-    fs::write(path("targets.csv"), "q1_deg,q2_deg,q3_deg,q4_deg\n0,10,-40,5\n").unwrap();
-    let done = run(&[
-        "compensate",
-        ".",
-        "--estimate",
-        "estimate.json",
-        "--data",
-        "targets.csv",
-        "--out",
-        "there",
-    ]);
-    let told = String::from_utf8_lossy(&done.get_output().stderr).into_owned();
+    let effects = drift(2) + &drift(3) + "[parameters]";
+    folder.write("problem.toml", changed("[parameters]", &effects));
+    folder.flexcal("identify . --quiet --out .").success();
+    folder.write("targets.csv", "q1_deg,q2_deg,q3_deg,q4_deg\n0,10,-40,5\n");
+    let run = folder
+        .flexcal("compensate . --estimate estimate.json --data targets.csv --out there")
+        .success();
     // There is one warning for each of the two effects.
-    assert_eq!(told.matches("commands leave out what depends on it").count(), 2, "{told}");
-    assert!(path("there/commands.csv").exists(), "{told}");
+    assert_eq!(run.stderr.matches("commands leave out what depends on it").count(), 2, "{run:?}");
+    assert!(folder.has("there/commands.csv"), "{run:?}");
 }
 
 #[test]
 fn an_estimate_of_another_arm_is_refused() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = |name: &str| folder.path().join(name);
-    let run = |arguments: &[&str]| {
-        let mut command = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
-        command.current_dir(folder.path()).args(arguments).assert()
-    };
-    fs::write(path("problem.toml"), changed("", "")).unwrap();
-    fs::copy(case("a-none.csv"), path("a-none.csv")).unwrap();
-    run(&["identify", ".", "--quiet", "--out", "."]).success();
-    let text = fs::read_to_string(path("estimate.json")).unwrap();
-    let few: Vec<String> = fs::read_to_string(path("a-none.csv"))
-        .unwrap()
-        .lines()
-        .take(4)
-        .map(|line| format!("{line}\n"))
-        .collect();
-    fs::write(path("targets.csv"), few.concat()).unwrap();
-    let compensate = || {
-        run(&[
-            "compensate",
-            ".",
-            "--estimate",
-            "estimate.json",
-            "--data",
-            "targets.csv",
-            "--out",
-            "there",
-        ])
-    };
+    let folder = Folder::with_lunar_sampler();
+    folder.flexcal("identify . --quiet --out .").success();
+    let few: Vec<String> =
+        folder.read("a-none.csv").lines().take(4).map(|line| format!("{line}\n")).collect();
+    folder.write("targets.csv", few.concat());
+    let compensate =
+        || folder.flexcal("compensate . --estimate estimate.json --data targets.csv --out there");
     compensate().success();
-    fs::write(path("problem.toml"), changed("mass_kg = 4.2", "mass_kg = 4.3")).unwrap();
-    let assert = compensate().code(2);
-    let message = String::from_utf8_lossy(&assert.get_output().stderr).into_owned();
-    assert!(
-        message.contains("estimate.json: was identified with another declared arm"),
-        "{message}"
-    );
+    folder.edit("problem.toml", "mass_kg = 4.2", "mass_kg = 4.3");
+    let run = compensate().code(2);
+    assert_contains(&run.stderr, &["estimate.json: was identified with another declared arm"]);
     // Estimates of older versions contain no digest of the arm.
-    let mut old: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let mut old = folder.json("estimate.json");
     assert!(old.as_object_mut().unwrap().remove("arm_digest").is_some());
-    fs::write(path("estimate.json"), old.to_string()).unwrap();
+    folder.write("estimate.json", old.to_string());
     compensate().success();
 }
 
 #[test]
 fn limits_are_kept_and_targets_out_of_reach_are_named() {
-    let mut problem = Problem::read(&case("problem.toml")).unwrap();
+    let (mut problem, rows) = lunar_sampler();
     problem.joints[1].limits = (-0.2, 0.3);
-    let rows = Measurements::read(&[case("a-none.csv")], &problem).unwrap().0;
-    let arm = model(&problem, &rows);
+    let arm = model_of(&problem, &rows);
     let mut targets = rows.clone();
     targets.positions[0] = Vector3::new(9.0, 0.0, 0.0);
     let x = nalgebra::DVector::zeros(arm.parameters.len());
@@ -224,9 +176,8 @@ fn limits_are_kept_and_targets_out_of_reach_are_named() {
 
 #[test]
 fn redundancy_stays_near_the_seed() {
-    let problem = Problem::read(&case("problem.toml")).unwrap();
-    let rows = Measurements::read(&[case("a-none.csv")], &problem).unwrap().0;
-    let arm = model(&problem, &rows);
+    let (problem, rows) = lunar_sampler();
+    let arm = model_of(&problem, &rows);
     let x = nalgebra::DVector::zeros(arm.parameters.len());
     for command in compensate(&problem, &arm, &x, &rows).unwrap() {
         // With four joints and three coordinates the result is a correction, not another posture.
@@ -249,12 +200,12 @@ fn a_joint_that_follows_moves_with_its_leader() {
                 [[joint]]\na_m = 0.6\ntheta_deg = -90\n[[joint]]\na_m = 0.5\nmimic = { joint = 2, ratio = -1 }\n\
                 [[joint]]\nkind = 'prismatic'\nmimic = { joint = 3, ratio = 0.1 }\n[tool]\ntarget_m = [0.1, 0.02, 0.05]\n\
                 [[effect]]\ngear-ratio = { joint = 2 }\n[parameters]\n'*gear-ratio*' = { free = true }\n";
-    let problem = Problem::parse(text, Path::new("problem.toml")).unwrap();
-    let rows = measured(
-        "q1_deg,q2_deg,q3_deg,x_m,y_m,z_m\n10,20,-15,0,0,0\n-80,-30,25,0,0,0\n45,55,0,0,0,0\n",
+    let problem = parse(text);
+    let rows = read_table(
         &problem,
+        "q1_deg,q2_deg,q3_deg,x_m,y_m,z_m\n10,20,-15,0,0,0\n-80,-30,25,0,0,0\n45,55,0,0,0,0\n",
     );
-    let arm = model(&problem, &rows);
+    let arm = model_of(&problem, &rows);
     let all: Vec<usize> = (0..rows.len()).collect();
     let x = nalgebra::DVector::from_element(arm.parameters.len(), 2e-3);
     let mut wanted = rows.clone();
@@ -280,11 +231,10 @@ fn a_joint_that_follows_moves_with_its_leader() {
 
 #[test]
 fn words_with_a_comma_stay_one_cell() {
-    let problem = Problem::read(&case("problem.toml")).unwrap();
-    let mut targets =
-        Measurements::read(&[case("a-none.csv")], &problem).unwrap().0.select(&[0, 1, 2]);
+    let (problem, rows) = lunar_sampler();
+    let mut targets = rows.select(&[0, 1, 2]);
     targets.session.names = vec!["bench \"A\", east".to_owned()];
-    let arm = model(&problem, &targets);
+    let arm = model_of(&problem, &targets);
     let x = nalgebra::DVector::zeros(arm.parameters.len());
     let commands = compensate(&problem, &arm, &x, &targets).unwrap();
     for text in [commands_csv(&problem, &targets, &commands, None), poses_csv(&problem, &targets)] {
@@ -300,9 +250,9 @@ fn words_with_a_comma_stay_one_cell() {
 fn errors_of_the_instrument_are_no_errors_of_the_arm() {
     let text = fs::read_to_string(case("problem.toml")).unwrap();
     let text = text + "\n[[effect]]\ntracker-scale = true\n\n[[effect]]\ntracker-drift = true\n";
-    let problem = Problem::parse(&text, &case("problem.toml")).unwrap();
+    let problem = parse(&text);
     let rows = Measurements::read(&[case("a-none.csv")], &problem).unwrap().0.select(&[3, 40]);
-    let model = model(&problem, &rows);
+    let model = model_of(&problem, &rows);
     let mut x = nalgebra::DVector::zeros(model.parameters.len());
     let seen =
         |name: &str| model.parameters.iter().position(|parameter| parameter.name == name).unwrap();

@@ -1,35 +1,30 @@
 //! Interrupts (SIGINT) sent at a chosen point of the progress line on a terminal.
 
-use std::fs;
 use std::io::Read as _;
 use std::path::Path;
 use std::process::{Child, ChildStdout, Command, Stdio};
 
 use assert_cmd::cargo::cargo_bin;
-use serde_json::Value;
+
+use crate::common::program::{Folder, assert_contains, items, texts};
 
 /// Number of poses for which a round of the loop takes seconds.
 const POSES: usize = 400;
 
-/// Writes measurements of an arm with an effect, most of them for identification.
-fn measured(folder: &Path) {
-    let arm = Path::new(env!("CARGO_MANIFEST_DIR")).join("problems/lunar-sampler");
-    let poses = (POSES + 20).to_string();
-    let mut simulate = assert_cmd::Command::new(cargo_bin!("flexcal"));
-    simulate
-        .current_dir(folder)
-        .arg("simulate")
-        .arg(&arm)
-        .arg("--truth")
-        .arg(arm.join("TRUTH.toml"));
-    simulate.args(["--poses", &poses, "--seed", "1", "--out", "rig"]).assert().success();
-    let table = fs::read_to_string(folder.join("rig/measurements.csv")).unwrap();
-    let lines = table.lines().enumerate();
-    let lines = lines.map(|(k, line)| {
-        if k <= POSES { line.replace("validation", "identification") } else { line.to_owned() }
+/// Returns a folder with measurements of an arm with an effect, most of them for identification.
+fn measured() -> Folder {
+    let folder = Folder::new();
+    folder.copy("problems/lunar-sampler/problem.toml", "problem.toml");
+    folder.copy("problems/lunar-sampler/TRUTH.toml", "TRUTH.toml");
+    folder.simulate(".", "TRUTH.toml", POSES + 20, 1, "data.csv");
+    folder.map_rows("data.csv", |line, row| {
+        Some(if line <= POSES + 1 {
+            row.replace("validation", "identification")
+        } else {
+            row.to_owned()
+        })
     });
-    fs::write(folder.join("data.csv"), lines.collect::<Vec<String>>().join("\n") + "\n").unwrap();
-    fs::copy(arm.join("problem.toml"), folder.join("problem.toml")).unwrap();
+    folder
 }
 
 /// Run of flexcal on a pseudo-terminal.
@@ -94,50 +89,42 @@ impl Terminal {
 
 #[test]
 fn an_interrupted_loop_tells_what_it_has_found() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
-    measured(folder);
-    let run = |out: &str| Terminal::run(folder, &format!("loop . --data data.csv --out {out}"));
+    let folder = measured();
+    let run = |arguments: &str| Terminal::run(&folder.path(""), arguments);
 
-    let mut once = run("once");
+    let mut once = run("loop . --data data.csv --out once");
     once.wait_for("round 2, 1 effect (last link-thermal-bending)");
     once.interrupt();
     let (status, shown) = once.end();
     assert_eq!(status, Some(1), "{shown}");
-    assert!(shown.contains("interrupted after 1 round: there may be more to find"), "{shown}");
-    let told: Value =
-        serde_json::from_str(&fs::read_to_string(folder.join("once/loop.json")).unwrap()).unwrap();
-    assert_eq!(told["interrupted"], true);
-    assert_eq!(
-        (&told["trusted"], &told["effects"][0]["effect"]),
-        (&true.into(), &"link-thermal-bending".into())
-    );
-    assert_eq!(told["steps"].as_array().unwrap().len(), 1);
-    for name in ["problem.closed.toml", "residuals.csv", "report.md", "report.html"] {
-        assert!(folder.join("once").join(name).is_file(), "{name}");
+    assert_contains(&shown, &["interrupted after 1 round: there may be more to find"]);
+    let found = folder.json("once/loop.json");
+    assert_eq!((&found["interrupted"], &found["trusted"]), (&true.into(), &true.into()));
+    assert_eq!(texts(&found["effects"], "effect"), ["link-thermal-bending"]);
+    assert_eq!(items(&found["steps"]).len(), 1);
+    for name in ["problem.closed.toml", "residuals.csv", "report.html"] {
+        assert!(folder.path("once").join(name).is_file(), "{name}");
     }
-    let report = fs::read_to_string(folder.join("once/report.md")).unwrap();
-    assert!(report.contains("Search interrupted after 1 round"), "{report}");
+    assert_contains(&folder.read("once/report.md"), &["Search interrupted after 1 round"]);
 
     // A second interrupt before the report is written leaves no output.
-    let mut twice = run("twice");
+    let mut twice = run("loop . --data data.csv --out twice");
     twice.wait_for("round 2");
     twice.interrupt();
     twice.wait_for("Ctrl-C again ends at once");
     twice.interrupt();
     let (status, shown) = twice.end();
     assert_eq!(status, Some(130), "{shown}");
-    assert!(!folder.join("twice").exists());
+    assert!(!folder.has("twice"));
 
     // An interrupt before the first result leaves no output.
-    let mut early =
-        Terminal::run(folder, "identify . --data data.csv --strategy sequential --out early");
+    let mut early = run("identify . --data data.csv --strategy sequential --out early");
     early.wait_for("step ");
     early.interrupt();
     let (status, shown) = early.end();
     assert_eq!(status, Some(130), "{shown}");
-    assert!(shown.contains("interrupted before there was a result"), "{shown}");
-    assert!(!folder.join("early").exists());
+    assert_contains(&shown, &["interrupted before there was a result"]);
+    assert!(!folder.has("early"));
 }
 
 #[test]

@@ -2,18 +2,16 @@
 
 use std::fs;
 
-use assert_cmd::Command;
 use assert_cmd::cargo::cargo_bin;
 use serde_json::Value;
 
-use super::{Bench, text};
+use crate::common::program::{Folder, Run, assert_contains};
 
 #[test]
 fn results_repeat_to_the_byte_but_for_the_time() {
-    let bench = Bench::new();
+    let folder = Folder::with_lunar_sampler();
     let run = || {
-        let mut json: Value =
-            serde_json::from_slice(&bench.identify(&["--json"]).get_output().stdout).unwrap();
+        let mut json = folder.flexcal("identify . --json").json();
         json["seconds"] = Value::Null;
         json
     };
@@ -22,33 +20,32 @@ fn results_repeat_to_the_byte_but_for_the_time() {
 
 #[test]
 fn a_result_that_cannot_be_written_is_an_error() {
-    let bench = Bench::new();
-    fs::write(bench.path("taken"), "a file where a folder is wanted").unwrap();
-    let assert = bench.identify(&["--out", "taken"]).code(2);
-    assert!(text(&assert.get_output().stderr).contains("cannot write"));
+    let folder = Folder::with_lunar_sampler();
+    folder.write("taken", "a file where a folder is wanted");
+    let run = folder.flexcal("identify . --out taken").code(2);
+    assert_contains(&run.stderr, &["cannot write"]);
     // One file that cannot be written prevents all output.
-    fs::create_dir_all(bench.path("page/report.html")).unwrap();
-    bench.identify(&["--out", "page"]).code(2);
-    assert_eq!(fs::read_dir(bench.path("page")).unwrap().count(), 1);
-    fs::create_dir(bench.path("drawn")).unwrap();
-    fs::write(bench.path("drawn/figures"), "").unwrap();
-    bench.identify(&["--out", "drawn"]).code(2);
-    assert_eq!(fs::read_dir(bench.path("drawn")).unwrap().count(), 1);
+    fs::create_dir_all(folder.path("page/report.html")).unwrap();
+    folder.write("drawn/figures", "");
+    for out in ["page", "drawn"] {
+        folder.flexcal(&format!("identify . --out {out}")).code(2);
+        assert_eq!(fs::read_dir(folder.path(out)).unwrap().count(), 1, "{out}");
+    }
 }
 
 #[cfg(unix)]
 #[test]
 fn new_results_are_for_whom_files_are_and_older_ones_keep_their_permissions() {
     use std::os::unix::fs::PermissionsExt as _;
-    let bench = Bench::new();
-    let mode = |name: &str| fs::metadata(bench.path(name)).unwrap().permissions().mode() & 0o777;
-    fs::write(bench.path("made"), "").unwrap();
-    bench.identify(&["--quiet", "--out", "out"]).success();
+    let folder = Folder::with_lunar_sampler();
+    let mode = |name: &str| fs::metadata(folder.path(name)).unwrap().permissions().mode() & 0o777;
+    folder.write("made", "");
+    folder.flexcal("identify . --quiet --out out").success();
     assert_eq!(mode("out/estimate.json"), mode("made"), "new");
     assert_eq!(mode("out/report.html"), mode("made"), "new");
-    fs::set_permissions(bench.path("out/estimate.json"), fs::Permissions::from_mode(0o640))
+    fs::set_permissions(folder.path("out/estimate.json"), fs::Permissions::from_mode(0o640))
         .unwrap();
-    bench.identify(&["--quiet", "--out", "out"]).success();
+    folder.flexcal("identify . --quiet --out out").success();
     assert_eq!(
         (mode("out/estimate.json"), mode("out/report.html")),
         (0o640, mode("made")),
@@ -58,35 +55,31 @@ fn new_results_are_for_whom_files_are_and_older_ones_keep_their_permissions() {
 
 #[test]
 fn figures_of_an_older_page_go_and_other_files_stay() {
-    let bench = Bench::new();
-    let flexcal = |command: &str| {
-        let mut flexcal = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
-        flexcal.current_dir(bench.folder.path()).args([command, ".", "--out", "out"]).assert()
-    };
-    let there = |name: &str| bench.path(&format!("out/figures/{name}")).exists();
+    let folder = Folder::with_lunar_sampler();
+    let flexcal = |command: &str| folder.flexcal(&format!("{command} . --out out"));
+    let is_there = |name: &str| folder.has(format!("out/figures/{name}"));
     flexcal("compare").success();
-    assert!(there("strategies.svg") && there("ablations.svg"));
-    let write = |name: &str| fs::write(bench.path(&format!("out/figures/{name}")), "mine").unwrap();
+    assert!(is_there("strategies.svg") && is_there("ablations.svg"));
+    let write = |name: &str| folder.write(format!("out/figures/{name}"), "mine");
     ["effect-mine.svg", "mine.svg", "ranking.txt"].into_iter().for_each(write);
     flexcal("identify").success();
-    assert!(!there("strategies.svg") && !there("ablations.svg"));
-    assert!(
-        ["effect-mine.svg", "mine.svg", "ranking.txt", "residual-order.svg"].into_iter().all(there)
-    );
+    assert!(!is_there("strategies.svg") && !is_there("ablations.svg"));
+    let kept = ["effect-mine.svg", "mine.svg", "ranking.txt", "residual-order.svg"];
+    assert!(kept.into_iter().all(is_there));
     // A foreign file with the name of a figure prevents all output before any work.
     write("effect-1.svg");
-    let error = text(&flexcal("identify").code(2).get_output().stderr);
-    assert!(error.contains("figures/effect-1.svg is there and not as flexcal wrote it"), "{error}");
+    let run = flexcal("identify").code(2);
+    assert_contains(&run.stderr, &["figures/effect-1.svg is there and not as flexcal wrote it"]);
 }
 
 #[test]
 fn runs_into_one_folder_at_once_leave_one_whole_result() {
-    let bench = Bench::new();
+    let folder = Folder::with_lunar_sampler();
     for _ in 0..3 {
         let started: Vec<_> = (0..6)
             .map(|_| {
                 std::process::Command::new(cargo_bin!("flexcal"))
-                    .current_dir(bench.path(""))
+                    .current_dir(folder.path(""))
                     .args(["identify", "problem.toml", "--data", "a-none.csv", "--out", "same"])
                     .arg("--quiet")
                     .spawn()
@@ -96,44 +89,29 @@ fn runs_into_one_folder_at_once_leave_one_whole_result() {
         for mut run in started {
             assert!(run.wait().unwrap().success());
         }
-        bench.identify(&["--quiet", "--out", "same"]).success();
+        folder.flexcal("identify . --quiet --out same").success();
     }
 }
 
 #[test]
 fn an_estimate_that_was_changed_is_refused_or_said() {
-    let bench = Bench::new();
-    bench.identify(&["--quiet", "--out", "out"]).success();
-    let predict = |more: &[&str]| {
-        let mut flexcal = Command::new(cargo_bin!("flexcal"));
-        flexcal.current_dir(bench.path("")).args([
-            "predict",
-            "problem.toml",
-            "--data",
-            "a-none.csv",
-        ]);
-        flexcal.args(["--estimate", "out/estimate.json", "--out", "predicted"]).args(more).assert()
+    const ESTIMATE: &str = "out/estimate.json";
+    let folder = Folder::with_lunar_sampler();
+    folder.flexcal("identify . --quiet --out out").success();
+    let predict = |more: &str| {
+        let data = "--data a-none.csv --estimate out/estimate.json --out predicted";
+        folder.flexcal(&format!("predict problem.toml {data} {more}"))
     };
-    predict(&[]).success();
-    let text_of = |name: &str| fs::read_to_string(bench.path(name)).unwrap();
-    let whole = text_of("out/estimate.json");
-    let json: Value = serde_json::from_str(&whole).unwrap();
-    let estimate = json["parameters"][0]["estimate"].to_string();
-    let from = format!("\"estimate\": {estimate}");
-    assert!(whole.contains(&from));
-    fs::write(bench.path("out/estimate.json"), whole.replacen(&from, "\"estimate\": 0.125", 1))
-        .unwrap();
-    let assert = predict(&[]).code(2);
-    let said = text(&assert.get_output().stderr);
-    assert!(
-        said.contains("out/estimate.json: parameters: changed since flexcal wrote it"),
-        "{said}"
+    predict("").success();
+    let whole = folder.read(ESTIMATE);
+    let estimate = folder.json(ESTIMATE)["parameters"][0]["estimate"].to_string();
+    folder.edit(ESTIMATE, &format!("\"estimate\": {estimate}"), "\"estimate\": 0.125");
+    let changed = "out/estimate.json: parameters: changed";
+    assert_contains(
+        &predict("").code(2).stderr,
+        &[&format!("{changed} since flexcal wrote it")],
     );
-    let said = text(&predict(&["--trust"]).success().get_output().stderr);
-    assert!(
-        said.contains("out/estimate.json: parameters: changed") && said.contains("all the same"),
-        "{said}"
-    );
+    assert_contains(&predict("--trust").success().stderr, &[changed, "all the same"]);
     for (from, to, words) in [
         (
             "\"version\": 2",
@@ -142,20 +120,18 @@ fn an_estimate_that_was_changed_is_refused_or_said() {
         ),
         ("flexcal-estimate", "flexcal-loop", "format: a file of flexcal-loop"),
     ] {
-        fs::write(bench.path("out/estimate.json"), whole.replacen(from, to, 1)).unwrap();
-        let said = text(&predict(&[]).code(2).get_output().stderr);
-        assert!(said.contains(words), "{said}");
+        folder.write(ESTIMATE, whole.replacen(from, to, 1));
+        assert_contains(&predict("").code(2).stderr, &[words]);
     }
 }
 
 #[test]
 fn an_impossible_number_of_threads_is_refused_at_once() {
-    let bench = Bench::new();
+    let folder = Folder::with_lunar_sampler();
     for threads in ["100000", "-1", "many"] {
-        let mut flexcal = Command::new(cargo_bin!("flexcal"));
-        flexcal.current_dir(bench.path("")).env("RAYON_NUM_THREADS", threads);
-        let assert = flexcal.args(["identify", "problem.toml"]).assert().code(2);
-        let said = text(&assert.get_output().stderr);
-        assert!(said.contains(&format!("RAYON_NUM_THREADS={threads}: a whole number")), "{said}");
+        let mut command = folder.command("identify problem.toml");
+        let run = Run::of(command.env("RAYON_NUM_THREADS", threads)).code(2);
+        let words = format!("RAYON_NUM_THREADS={threads}: a whole number");
+        assert_contains(&run.stderr, &[&words]);
     }
 }

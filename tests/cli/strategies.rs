@@ -1,290 +1,191 @@
 //! Strategies, solvers, declared effects, and comparisons.
 
-use std::fs;
+use serde_json::{Value, json};
 
-use assert_cmd::Command;
-use serde_json::Value;
+use crate::common::program::{Folder, assert_contains, items, named, number, texts};
 
-use super::{Bench, text};
+/// Runs a command on the arm, which succeeds, and returns its JSON.
+fn json(folder: &Folder, arguments: &str) -> Value {
+    folder.flexcal(&format!("{arguments} --json")).success().json()
+}
+
+fn held_out_rms(estimate: &Value) -> f64 {
+    number(&estimate["held_out"]["rms_mm"]["norm"])
+}
 
 #[test]
 fn strategies_and_solvers_are_what_they_say() {
-    let bench = Bench::new();
-    let rms = |arguments: &[&str]| {
-        let json: Value = serde_json::from_slice(
-            &bench.identify(&[&["--json"], arguments].concat()).get_output().stdout,
-        )
-        .unwrap();
-        (json["held_out"]["rms_mm"]["norm"].as_f64().unwrap(), json)
-    };
-    let (joint, _) = rms(&[]);
-    let (geometry, json) = rms(&["--strategy", "geometry-only"]);
-    assert_eq!(json["strategy"], "geometry-only");
-    assert!(geometry > 2.0 * joint, "{geometry} against {joint}");
-    let (bounded, json) = rms(&["--solver", "bounded"]);
-    assert_eq!(json["solver"], "bounded");
-    assert!((bounded - joint).abs() < 1e-6);
-    bench.edit(
+    let folder = Folder::with_lunar_sampler();
+    let identify =
+        |arguments: &str| folder.flexcal(&format!("identify . --json {arguments}")).json();
+    let joint = held_out_rms(&identify(""));
+    let geometry = identify("--strategy geometry-only");
+    assert_eq!(geometry["strategy"], "geometry-only");
+    assert!(held_out_rms(&geometry) > 2.0 * joint, "{} {joint}", held_out_rms(&geometry));
+    let bounded = identify("--solver bounded");
+    assert_eq!(bounded["solver"], "bounded");
+    assert!((held_out_rms(&bounded) - joint).abs() < 1e-6);
+    folder.edit(
         "problem.toml",
         "\"A.*\" = { sigma_relative = 0.5 }",
         "\"A.*\" = { min_relative = 0.9, max_relative = 1.1 }",
     );
-    let (_, json) = rms(&[]);
+    let held = identify("");
     assert_eq!(
-        (&json["solver"], &json["solver_reason"]),
-        (&"bounded".into(), &"bounds to keep".into())
+        (&held["solver"], &held["solver_reason"]),
+        (&json!("bounded"), &json!("bounds to keep"))
     );
-    let told = text(&bench.identify(&["-v"]).get_output().stdout);
-    assert!(told.contains("\n  –: no standard error, because "), "{told}");
-    let parameters = json["parameters"].as_array().unwrap();
-    let stiff = parameters.iter().find(|p| p["name"] == "A.EI").unwrap();
-    assert_eq!(stiff["at_bound"], "upper");
-    assert!((stiff["estimate"].as_f64().unwrap() - 1.1 * 2.6e4).abs() < 1e-6);
-    assert!(stiff["std_error"].is_null());
-    let assert = bench.identify(&["--solver", "levenberg-marquardt"]).code(2);
-    assert!(text(&assert.get_output().stderr).contains("does not keep the bounds"));
+    let printed = folder.flexcal("identify . -v").stdout;
+    assert_contains(&printed, &["\n  –: no standard error, because "]);
+    let stiff = named(&held["parameters"], "A.EI");
+    assert_eq!((&stiff["at_bound"], &stiff["std_error"]), (&json!("upper"), &Value::Null));
+    assert!((number(&stiff["estimate"]) - 1.1 * 2.6e4).abs() < 1e-6);
+    let run = folder.flexcal("identify . --solver levenberg-marquardt").code(2);
+    assert_contains(&run.stderr, &["does not keep the bounds"]);
 }
 
-/// Returns a bench whose problem declares effects and frees few other parameters.
-fn bench_with_effects() -> Bench {
-    let bench = Bench::new();
-    let text = fs::read_to_string(bench.path("problem.toml")).unwrap();
-    let (arm, rest) = text.split_once("[parameters]\n").unwrap();
-    let (_, data) = rest.split_once("[data]\n").unwrap();
-    // The geometry that is held leaves 9 mm.
-    let data = data.replace("position_sigma_mm = 0.05", "position_sigma_mm = 5.0");
+/// Returns the lunar sampler with declared effects and few other free parameters.
+fn arm_with_effects() -> Folder {
+    let folder = Folder::with_lunar_sampler();
     let effects = "[[effect]]\ngear-ratio = { joint = 3 }\n\n[[effect]]\njoint-harmonic = { joint = 2, orders = [1] }\n";
     let rules = "[parameters]\n\"joint*.theta\" = { sigma_deg = 1 }\n\"joint*.stiffness\" = { sigma_relative = 0.5 }\n\
                  \"joint-harmonic.*\" = { sigma_deg = 0.3 }\n";
-    fs::write(bench.path("problem.toml"), format!("{arm}{effects}\n{rules}\n[data]\n{data}"))
-        .unwrap();
-    bench
+    folder.map("problem.toml", |text| {
+        let (arm, rest) = text.split_once("[parameters]\n").unwrap();
+        let (_, data) = rest.split_once("[data]\n").unwrap();
+        // The geometry that is held leaves 9 mm.
+        let data = data.replace("position_sigma_mm = 0.05", "position_sigma_mm = 5.0");
+        format!("{arm}{effects}\n{rules}\n[data]\n{data}")
+    });
+    folder
 }
 
 #[test]
 fn declared_effects_are_in_the_results() {
-    let bench = bench_with_effects();
-    let told = text(&bench.identify(&["-v"]).success().get_output().stdout);
-    let line = |name: &str| told.lines().find(|line| line.contains(name)).unwrap().to_owned();
-    assert!(
-        line("gear-ratio[3].error").contains('‰') && line("joint-harmonic[2].cos1").contains('°'),
-        "{told}"
+    let folder = arm_with_effects();
+    let printed = folder.flexcal("identify . -v").success().stdout;
+    let result = json(&folder, "identify .");
+    for (name, unit, shown) in
+        [("gear-ratio[3].error", "1", '‰'), ("joint-harmonic[2].sin1", "rad", '°')]
+    {
+        assert_eq!(named(&result["parameters"], name)["unit"], unit, "{name}");
+        let line = printed.lines().find(|line| line.contains(name)).unwrap();
+        assert!(line.contains(shown), "{line}");
+    }
+    let compared = folder.flexcal("compare .").success().stdout;
+    assert_contains(
+        &compared,
+        &["paper: the closed forms of [Chen2021], without the declared effects"],
     );
-    let json = text(&bench.identify(&["--json"]).success().get_output().stdout);
-    let result: Value = serde_json::from_str(&json).unwrap();
-    let entries = result["parameters"].as_array().unwrap();
-    let unit =
-        |name: &str| entries.iter().find(|entry| entry["name"] == name).unwrap()["unit"].clone();
-    assert_eq!(
-        (unit("gear-ratio[3].error"), unit("joint-harmonic[2].sin1")),
-        ("1".into(), "rad".into())
-    );
-    let out = |arguments: &[&str]| {
-        let mut command = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
-        let done = command.current_dir(bench.folder.path()).args(arguments).assert().success();
-        text(&done.get_output().stdout)
-    };
-    let compared = out(&["compare", "."]);
-    assert!(
-        compared.contains("paper: the closed forms of [Chen2021], without the declared effects"),
-        "{compared}"
-    );
-    let file = format!("out/{}/estimate.json", result["problem"].as_str().unwrap());
-    out(&["compensate", ".", "--estimate", &file, "--data", "a-none.csv"]);
+    let estimate = "--estimate out/lunar-sampler/estimate.json";
+    folder.flexcal(&format!("compensate . {estimate} --data a-none.csv")).success();
 }
 
 #[test]
 fn effects_that_cannot_act_are_bad_input() {
-    let bench = bench_with_effects();
-    bench.edit("problem.toml", "gear-ratio = { joint = 3 }", "deflected-equilibrium = true");
-    let error = text(&bench.identify(&[]).code(2).get_output().stderr);
-    assert!(
-        error.contains("effect[1].deflected-equilibrium") && error.contains("[statics]"),
-        "{error}"
-    );
-}
-
-/// Returns the JSON of a command that succeeds.
-fn json(bench: &Bench, arguments: &[&str]) -> Value {
-    let mut flexcal = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
-    let done =
-        flexcal.current_dir(bench.folder.path()).args(arguments).arg("--json").assert().success();
-    serde_json::from_slice(&done.get_output().stdout).unwrap()
-}
-
-/// Returns the names of the procedures in a comparison.
-fn procedures(comparison: &Value) -> Vec<&str> {
-    comparison["procedures"]
-        .as_array()
-        .unwrap()
-        .iter()
-        .map(|row| row["procedure"].as_str().unwrap())
-        .collect()
+    let folder = arm_with_effects();
+    folder.edit("problem.toml", "gear-ratio = { joint = 3 }", "deflected-equilibrium = true");
+    let run = folder.flexcal("identify .").code(2);
+    assert_contains(&run.stderr, &["effect[1].deflected-equilibrium", "[statics]"]);
 }
 
 #[test]
 fn compare_has_the_papers_tables_from_each_procedure_of_its_arm() {
-    let bench = Bench::new();
-    let compared = json(&bench, &["compare", ".", "--out", "out"]);
+    let folder = Folder::with_lunar_sampler();
+    let compared = json(&folder, "compare . --out out");
+    let procedures = &compared["procedures"];
     let papers = ["nominal-stiffness", "from-positions"].map(|stage| format!("paper-{stage}"));
-    let expected =
-        [&["joint".to_owned()], &papers[..], &papers.clone().map(|name| name + "-as-printed")]
-            .concat();
-    assert_eq!(procedures(&compared), expected);
-    let rows: Vec<&str> = compared["rows"]
-        .as_array()
-        .unwrap()
-        .iter()
-        .map(|row| row["strategy"].as_str().unwrap())
-        .collect();
-    assert!(
-        rows.contains(&"paper-rigid") && rows.contains(&"rigid") && rows.contains(&"geometry-only"),
-        "{rows:?}"
+    let printed = papers.clone().map(|name| name + "-as-printed");
+    assert_eq!(
+        texts(procedures, "procedure"),
+        [&["joint".to_owned()], &papers[..], &printed].concat()
     );
-    for procedure in compared["procedures"].as_array().unwrap() {
-        let (table_2, table_3, figure) =
-            (&procedure["table_2"], &procedure["table_3"], &procedure["figure_13"]);
-        assert_eq!(
-            (table_2.as_array().unwrap().len(), &table_3["before_registered"]),
-            (4, &false.into())
-        );
-        let (beta, theta) = (&table_2[0]["beta_deg"], &table_2[1]["theta_deg"]);
-        assert!(
-            beta["seen"].as_f64().unwrap() < 0.6 && theta["seen"].as_f64().unwrap() < 0.6,
-            "{procedure}"
-        );
-        for (key, kind) in [
-            ("before", "before_mm"),
-            ("after", "after_mm"),
-            ("ignoring_elasticity", "ignoring_elasticity_mm"),
-        ] {
-            let poses = figure[kind].as_array().unwrap();
-            let norm = |pose: &Value| {
-                (0..3).map(|k| pose[k].as_f64().unwrap().powi(2)).sum::<f64>().sqrt()
-            };
+    let rows = texts(&compared["rows"], "strategy");
+    for strategy in ["paper-rigid", "rigid", "geometry-only"] {
+        assert!(rows.contains(&strategy), "{strategy} is none of {rows:?}");
+    }
+    for procedure in items(procedures) {
+        let (table_2, table_3) = (&procedure["table_2"], &procedure["table_3"]);
+        assert_eq!((items(table_2).len(), &table_3["before_registered"]), (4, &json!(false)));
+        for seen in [&table_2[0]["beta_deg"]["seen"], &table_2[1]["theta_deg"]["seen"]] {
+            assert!(number(seen) < 0.6, "{procedure}");
+        }
+        for key in ["before", "after", "ignoring_elasticity"] {
+            let poses = items(&procedure["figure_13"][format!("{key}_mm")]);
+            let norm = |pose: &Value| (0..3).map(|k| number(&pose[k]).powi(2)).sum::<f64>().sqrt();
             let mean = poses.iter().map(norm).sum::<f64>() / 50.0;
             assert_eq!(poses.len(), 50);
-            assert!(
-                (table_3[key]["mean_mm"]["norm"].as_f64().unwrap() - mean).abs() < 1e-9,
-                "{key}"
-            );
+            assert!((number(&table_3[key]["mean_mm"]["norm"]) - mean).abs() < 1e-9, "{key}");
         }
         let name = procedure["procedure"].as_str().unwrap();
         let figure = if name == "joint" { String::new() } else { format!("-{name}") };
-        assert!(bench.path(&format!("out/figures/held-out-errors{figure}.svg")).exists(), "{name}");
+        assert!(folder.has(format!("out/figures/held-out-errors{figure}.svg")), "{name}");
     }
-    let page = fs::read_to_string(bench.path("out/report.md")).unwrap();
-    for words in
-        ["paper: before", "48.9644", "85.44", "(0.", "before: nominal arm without elasticity"]
-    {
-        assert!(page.contains(words), "{words} missing in:\n{page}");
-    }
+    assert_contains(
+        &folder.read("out/report.md"),
+        &["paper: before", "48.9644", "85.44", "(0.", "before: nominal arm without elasticity"],
+    );
 }
+
+/// Arm of two joints without elasticity.
+const RIGID: &str = "name = \"own\"\ntitle = \"Two joints\"\n[[joint]]\nd_m = 0.3\n[[joint]]\nalpha_deg = 90\na_m = 0.1\n\
+    [tool]\ntarget_m = [0.5, 0.05, 0.0]\n[parameters]\n\"joint*.theta\" = { sigma_deg = 0.5 }\n\
+    [data]\nfiles = [\"measurements.csv\"]\nposition_sigma_mm = 0.1\nheld_out = { column = \"split\" }\n";
+const TRUTH: &str = "[random]\n\"*\" = { sigma_deg = 0.1, sigma_mm = 1 }\n[noise]\nposition_sigma_mm = 0.1\n\
+    [poses]\nq1_deg = [-120, 120]\nq2_deg = [-40, 80]\nidentification = 12\n";
 
 #[test]
 fn compare_on_an_arm_of_ones_own_leaves_the_paper_out_unless_asked() {
-    let bench = Bench::new();
-    let problem = "name = \"own\"\ntitle = \"Two joints\"\n[[joint]]\nd_m = 0.3\n[[joint]]\nalpha_deg = 90\na_m = 0.1\n\
-                   [tool]\ntarget_m = [0.5, 0.05, 0.0]\n[parameters]\n\"joint*.theta\" = { sigma_deg = 0.5 }\n\
-                   [data]\nfiles = [\"made/measurements.csv\"]\nposition_sigma_mm = 0.1\nheld_out = { column = \"split\" }\n";
-    let truth = "[random]\n\"*\" = { sigma_deg = 0.1, sigma_mm = 1 }\n[noise]\nposition_sigma_mm = 0.1\n\
-                 [poses]\nq1_deg = [-120, 120]\nq2_deg = [-40, 80]\nidentification = 12\n";
-    fs::write(bench.path("problem.toml"), problem).unwrap();
-    fs::write(bench.path("TRUTH.toml"), truth).unwrap();
-    json(
-        &bench,
+    let folder = Folder::with([("problem.toml", RIGID), ("TRUTH.toml", TRUTH)]);
+    folder.simulate(".", "TRUTH.toml", 20, 1, "measurements.csv");
+    let compare = |arguments: &str| json(&folder, &format!("compare . {arguments}"));
+    let procedures = |compared: &Value| texts(&compared["procedures"], "procedure").join(" ");
+    let compared = compare("--out out");
+    assert_eq!(procedures(&compared), "joint");
+    assert!(!texts(&compared["rows"], "strategy").contains(&"rigid"), "nothing to ignore");
+    let page = folder.read("out/report.md");
+    assert!(!page.contains("with elasticity") && !page.contains("paper:"), "{page}");
+    assert_contains(
+        &page,
         &[
-            "simulate",
-            ".",
-            "--truth",
-            "TRUTH.toml",
-            "--poses",
-            "20",
-            "--seed",
-            "1",
-            "--out",
-            "made",
+            "identified",
+            "## From each procedure, as in tables 2 and 3 and figure 13 of the paper",
+            "–: not identified, or fixed",
         ],
     );
-    let compared = json(&bench, &["compare", ".", "--out", "out"]);
-    assert_eq!(procedures(&compared), ["joint"]);
-    assert!(
-        compared["rows"].as_array().unwrap().iter().all(|row| row["strategy"] != "rigid"),
-        "nothing to ignore"
-    );
-    let page = fs::read_to_string(bench.path("out/report.md")).unwrap();
-    assert!(
-        !page.contains("with elasticity")
-            && !page.contains("paper:")
-            && page.contains("identified"),
-        "{page}"
-    );
-    for words in [
-        "## From each procedure, as in tables 2 and 3 and figure 13 of the paper",
-        "–: not identified, or fixed",
-    ] {
-        assert!(page.contains(words), "{words} missing in:\n{page}");
-    }
-    let asked = json(&bench, &["compare", ".", "--paper", "--out", "asked"]);
-    assert_eq!(procedures(&asked), ["joint", "paper-rigid"]);
+    assert_eq!(procedures(&compare("--paper --out asked")), "joint paper-rigid");
     // A free base without a prior has to be registered first.
-    bench.edit("problem.toml", "[parameters]\n", "[parameters]\n\"base.*\" = { free = true }\n");
-    let placed = json(&bench, &["compare", ".", "--out", "out"]);
-    assert_eq!(placed["procedures"][0]["table_3"]["before_registered"], true);
-    assert!(placed["procedures"][0]["table_2"][0]["a_mm"]["seen"].is_null(), "fixed");
+    folder.edit("problem.toml", "[parameters]\n", "[parameters]\n\"base.*\" = { free = true }\n");
+    let placed = &compare("--out out")["procedures"][0];
+    assert_eq!(placed["table_3"]["before_registered"], true);
+    assert!(placed["table_2"][0]["a_mm"]["seen"].is_null(), "fixed");
     // A fixed joint has none of these parameters and no approach side.
-    bench.edit(
-        "problem.toml",
-        "[tool]\n",
-        "[[joint]]\nkind = \"fixed\"\nxyz_mm = [1, 0, 0]\n[tool]\n",
-    );
-    let held = json(&bench, &["compare", ".", "--out", "out"]);
-    let joints = held["procedures"][0]["table_2"].as_array().unwrap();
-    assert_eq!(joints.iter().map(|row| row["joint"].as_u64().unwrap()).collect::<Vec<_>>(), [1, 2]);
-    let mut flexcal = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
-    let traced = flexcal
-        .current_dir(bench.folder.path())
-        .args(["trace", ".", "--out", "out"])
-        .output()
-        .unwrap();
-    assert!(
-        traced.status.success() && !text(&traced.stdout).contains("approach3"),
-        "{}",
-        text(&traced.stdout)
-    );
+    let fixed = "[[joint]]\nkind = \"fixed\"\nxyz_mm = [1, 0, 0]\n[tool]\n";
+    folder.edit("problem.toml", "[tool]\n", fixed);
+    let held = compare("--out out");
+    let joints = items(&held["procedures"][0]["table_2"]).iter().map(|row| &row["joint"]);
+    assert_eq!(joints.collect::<Vec<_>>(), [1, 2]);
+    let trace = json(&folder, "trace . --out out");
+    assert!(items(&trace["checks"]).iter().all(|check| check["about"] != "approach3"), "{trace}");
 }
 
 #[test]
 fn an_arm_identified_as_rigid_is_used_as_rigid() {
-    let bench = Bench::new();
+    let folder = Folder::with_lunar_sampler();
     // Without elasticity the residual is 2.6 mm: the declared σ is of that size here.
-    bench.edit("problem.toml", "position_sigma_mm = 0.05", "position_sigma_mm = 2.0");
-    let found = json(&bench, &["identify", ".", "--strategy", "rigid", "--out", "out"]);
-    let named = |row: &Value| row["name"].as_str().unwrap().to_owned();
-    let names: Vec<String> = found["parameters"].as_array().unwrap().iter().map(named).collect();
+    folder.edit("problem.toml", "position_sigma_mm = 0.05", "position_sigma_mm = 2.0");
+    let found = json(&folder, "identify . --strategy rigid --out out");
+    let names = texts(&found["parameters"], "name");
     assert!(
         names.iter().all(|name| !name.ends_with("stiffness") && !name.ends_with("EI")),
         "{names:?}"
     );
-    let geometry =
-        json(&bench, &["identify", ".", "--strategy", "geometry-only", "--out", "geometry"]);
-    let rms = |found: &Value| found["held_out"]["rms_mm"]["norm"].as_f64().unwrap();
-    assert!(rms(&found) > 3.0 * rms(&geometry), "{} {}", rms(&found), rms(&geometry));
+    let geometry = json(&folder, "identify . --strategy geometry-only --out geometry");
+    let (rigid, nominal) = (held_out_rms(&found), held_out_rms(&geometry));
+    assert!(rigid > 3.0 * nominal, "{rigid} {nominal}");
     // The commands bring the arm to the positions predicted by the rigid model.
-    let mut flexcal = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
-    let arguments = [
-        "compensate",
-        ".",
-        "--estimate",
-        "out/estimate.json",
-        "--data",
-        "a-none.csv",
-        "--out",
-        "out",
-        "--json",
-    ];
-    let output = flexcal.current_dir(bench.folder.path()).args(arguments).output().unwrap();
-    let commands: Value = serde_json::from_slice(&output.stdout).unwrap();
-    let before = commands["mean_miss_before_mm"].as_f64().unwrap();
+    let commands = folder
+        .flexcal("compensate . --estimate out/estimate.json --data a-none.csv --out out --json");
+    let before = number(&commands.json()["mean_miss_before_mm"]);
     assert!((0.5..20.0).contains(&before), "{before} mm, what the rigid fit leaves");
 }

@@ -6,4 +6,6 @@ pub mod arms;
 pub mod bounded;
 pub mod effects;
 pub mod made;
+pub mod program;
+pub mod reading;
 pub mod schema;

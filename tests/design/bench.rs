@@ -10,7 +10,7 @@ use nalgebra::{DVector, Vector3};
 use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 
-use super::common::arms::path;
+use super::common::arms::{parse, path};
 use super::common::made::{model_of, normal};
 
 /// Returns the lunar sampler and the truth of the test rig.
@@ -31,7 +31,7 @@ pub fn oriented() -> Problem {
         "position_sigma_mm = 0.05",
         "position_sigma_mm = 0.05\norientation_sigma_deg = 0.005",
     );
-    let problem = Problem::parse(&text, Path::new("problem.toml")).unwrap();
+    let problem = parse(&text);
     assert!(problem.data.fits_orientation);
     problem
 }

@@ -15,6 +15,7 @@ use rand_chacha::ChaCha8Rng;
 use crate::catalogue::{lunar, poses};
 use crate::common::arms::parse;
 use crate::common::made::{divided, draw, measure, model_of};
+use crate::common::reading::problem_error;
 
 /// 1 σ of a coordinate [m].
 const NOISE: f64 = 2e-5;
@@ -230,19 +231,19 @@ fn mistakes_are_located() {
     ];
     for (arguments, key, words) in cases {
         let text = format!("{arm}[[effect]]\nlaw = {{ name = 'a', {arguments} }}\n");
-        let error = Problem::parse(&text, Path::new("problem.toml")).unwrap_err();
+        let error = problem_error(&text);
         let said = error.to_string();
         assert!(said.contains(words), "{arguments}: {said}");
         assert!(said.starts_with("problem.toml:4: ") && said.contains(key), "{arguments}: {said}");
     }
     let twice =
         format!("{arm}{0}{0}", "[[effect]]\nlaw = { name = 'a', at = 'joint1', terms = ['q1'] }\n");
-    let error = Problem::parse(&twice, Path::new("problem.toml")).unwrap_err();
+    let error = problem_error(&twice);
     assert!(matches!(*error.kind, InputErrorKind::RepeatedEffect { .. }), "{error}");
     // The word itself is underlined.
     let text =
         format!("{arm}[[effect]]\nlaw = {{ name = 'a', at = 'joint1', terms = ['sin(qq)'] }}\n");
-    let error = Problem::parse(&text, Path::new("problem.toml")).unwrap_err();
+    let error = problem_error(&text);
     let excerpt = error.location.excerpt.unwrap();
     assert_eq!(excerpt.text.get(excerpt.span), Some("qq"));
 }

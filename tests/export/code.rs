@@ -11,7 +11,8 @@ use rand_chacha::ChaCha8Rng;
 
 use super::common::arms::path;
 use super::common::made::{at_random, csv, divided, measure, model_of};
-use super::{flexcal, lunar_sampler};
+use super::common::program::{Folder, assert_contains};
+use super::lunar_sampler;
 
 /// Options under which the code compiles without a warning.
 const STRICT: &str = "-std=c99 -O1 -Wall -Wextra -Werror -pedantic";
@@ -43,39 +44,33 @@ fn check(folder: &Path) {
 }
 
 /// Exports the estimate in `out` of a folder, and checks the code.
-fn export(folder: &Path, problem: &str) {
+fn export(folder: &Folder, problem: &str) {
     let words = format!(
         "export {problem} --estimate out/estimate.json --format c --out code --test-poses 100 --test-commands 20"
     );
-    let ran = flexcal(folder, &words);
-    assert!(ran.status.success(), "{}", String::from_utf8_lossy(&ran.stderr));
-    check(&folder.join("code"));
+    folder.flexcal(&words).success();
+    check(&folder.path("code"));
 }
 
 #[test]
 fn an_elastic_arm_with_hoist_and_loads() {
     let folder = lunar_sampler();
-    export(folder.path(), &path("tests/cases").display().to_string());
+    export(&folder, &path("tests/cases").display().to_string());
 }
 
 /// Writes a problem and rows of its arm with drawn parameters, identifies and exports it.
-fn made(text: &str, commands: &str) {
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("problem.toml");
-    fs::write(&file, text).unwrap();
-    let problem = Problem::read(&file).unwrap();
+fn made(text: &str) {
+    let folder = Folder::with([("problem.toml", text)]);
+    let problem = Problem::read(&folder.path("problem.toml")).unwrap();
     let mut rng = ChaCha8Rng::seed_from_u64(7);
     let mut rows = at_random(&problem, 60, 1.0, &mut rng);
     let x = DVector::zeros(model_of(&problem, &rows).parameters.len());
     measure(&problem, &mut rows, &x, 2e-5, &mut rng);
-    fs::write(folder.path().join("rows.csv"), csv(&problem, &divided(40, &rows))).unwrap();
-    let ran = flexcal(folder.path(), commands);
-    let said = String::from_utf8_lossy(&ran.stderr);
-    assert!(folder.path().join("out/estimate.json").exists(), "{said}");
-    export(folder.path(), ".");
+    folder.write("rows.csv", csv(&problem, &divided(40, &rows)));
+    let run = folder.flexcal("identify . --data rows.csv --out out --quiet");
+    assert!(folder.has("out/estimate.json"), "{run:?}");
+    export(&folder, ".");
 }
-
-const IDENTIFY: &str = "identify . --data rows.csv --out out --quiet";
 
 #[test]
 fn laws_play_springs_and_slides() {
@@ -99,7 +94,7 @@ fn laws_play_springs_and_slides() {
         law("joint2", "tanh(q3)^3 + atan2(q2, 2)"),
         law("measurement.x", "expm1(q2/5) + step(q3)*abs(q2)^1.5"),
     );
-    made(&text, IDENTIFY);
+    made(&text);
 }
 
 #[test]
@@ -117,31 +112,24 @@ fn a_remainder_at_the_joints() {
     let x = DVector::zeros(model_of(&problem, &rows).parameters.len());
     measure(&problem, &mut moved, &x, 2e-5, &mut rng);
     rows.positions = moved.positions;
-    let folder = tempfile::tempdir().unwrap();
-    fs::copy(path("problems/panda/problem.toml"), folder.path().join("problem.toml")).unwrap();
-    fs::write(folder.path().join("rows.csv"), csv(&problem, &divided(90, &rows))).unwrap();
-    let ran = flexcal(folder.path(), "identify . --data rows.csv --remainder --out out --quiet");
-    assert!(folder.path().join("out/remainder.json").exists(), "{ran:?}");
-    export(folder.path(), ".");
-    let code = fs::read_to_string(folder.path().join("code/flexcal_model.c")).unwrap();
-    assert!(code.contains("#define REMAINDER 1"));
+    let folder = Folder::with([("rows.csv", &csv(&problem, &divided(90, &rows)))]);
+    folder.copy("problems/panda/problem.toml", "problem.toml");
+    let run = folder.flexcal("identify . --data rows.csv --remainder --out out --quiet");
+    assert!(folder.has("out/remainder.json"), "{run:?}");
+    export(&folder, ".");
+    assert_contains(&folder.read("code/flexcal_model.c"), &["#define REMAINDER 1"]);
 }
 
 #[test]
 fn effects_with_memory_are_refused() {
-    let folder = tempfile::tempdir().unwrap();
-    let text = fs::read_to_string(path("tests/cases/problem.toml")).unwrap();
+    let folder = Folder::with_lunar_sampler();
     let lagging =
         "\n[[effect]]\nlink-thermal-bending-lag = { link = 'A', time_constant_s = 600 }\n";
-    fs::write(folder.path().join("problem.toml"), text + lagging).unwrap();
-    let rows = path("tests/cases/a-none.csv");
-    let run = format!("identify . --data {} --out out --quiet", rows.display());
-    let _ = flexcal(folder.path(), &run);
-    assert!(folder.path().join("out/estimate.json").exists());
-    let ran = flexcal(folder.path(), "export . --estimate out/estimate.json --format c --out code");
-    let said = String::from_utf8_lossy(&ran.stderr);
-    assert!(ran.status.code() == Some(2) && said.contains("depends on earlier poses"), "{said}");
-    assert!(!folder.path().join("code").exists());
+    folder.map("problem.toml", |text| format!("{text}{lagging}"));
+    folder.flexcal("identify . --out out --quiet");
+    let run = folder.flexcal("export . --estimate out/estimate.json --format c --out code").code(2);
+    assert_contains(&run.stderr, &["depends on earlier poses"]);
+    assert!(!folder.has("code"));
 }
 
 #[test]
@@ -152,6 +140,5 @@ fn the_page_shows_what_is_printed() {
     let (block, _) = block.split_once("```").unwrap();
     let (words, expected) = block.split_once('\n').unwrap();
     let words = words.replace("problems/lunar-sampler", &path("tests/cases").display().to_string());
-    let ran = flexcal(folder.path(), &format!("export {words}"));
-    assert_eq!(String::from_utf8_lossy(&ran.stdout), expected);
+    assert_eq!(folder.flexcal(&format!("export {words}")).stdout, expected);
 }

@@ -9,23 +9,13 @@ mod common;
 mod code;
 mod rigid;
 
-use std::path::Path;
-use std::process::{Command, Output};
-
 use common::arms::path;
+use common::program::Folder;
 
-/// Runs flexcal in a folder.
-fn flexcal(folder: &Path, words: &str) -> Output {
-    let mut command = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
-    command.args(words.split_whitespace()).current_dir(folder).output().unwrap()
-}
-
-/// Returns a folder with the problem and measurements of the lunar sampler, identified.
-fn lunar_sampler() -> tempfile::TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    let cases = path("tests/cases");
-    let rows = cases.join("a-none.csv");
-    let run = format!("identify {} --data {} --out out --quiet", cases.display(), rows.display());
-    assert!(flexcal(folder.path(), &run).status.success());
+/// Returns a folder with the estimate of the lunar sampler in `out`.
+fn lunar_sampler() -> Folder {
+    let folder = Folder::new();
+    let cases = path("tests/cases").display().to_string();
+    folder.flexcal(&format!("identify {cases} --out out --quiet")).success();
     folder
 }

@@ -1,13 +1,11 @@
 //! Tables of rigid geometry.
 
-use std::fs;
-
 use flexcal::problem::Problem;
 use flexcal::spatial::Frame;
 use nalgebra::Vector3;
 
 use super::common::arms::path;
-use super::{flexcal, lunar_sampler};
+use super::lunar_sampler;
 
 /// Returns the lists and numbers of a YAML table in their order, each with its key.
 fn numbers(text: &str) -> Vec<(String, Vec<f64>)> {
@@ -48,10 +46,8 @@ fn standard_parameters_describe_the_identified_arm() {
             "export {} --estimate out/estimate.json --format {form} --out {form}.yaml --force {more}",
             cases.display()
         );
-        let ran = flexcal(folder.path(), &words);
-        assert!(ran.status.success(), "{}", String::from_utf8_lossy(&ran.stderr));
-        let text = fs::read_to_string(folder.path().join(format!("{form}.yaml"))).unwrap();
-        (text, String::from_utf8(ran.stdout).unwrap())
+        let run = folder.flexcal(&words).success();
+        (folder.read(format!("{form}.yaml")), run.stdout)
     };
     let problem = Problem::read(&cases).unwrap();
     let (standard, modified) = (export("dh", "").0, export("mdh", "").0);

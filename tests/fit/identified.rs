@@ -1,11 +1,8 @@
 //! Identification as data: estimates by name, covariance, correlations, predictions, residuals.
 
 use std::fmt::Write as _;
-use std::fs;
 use std::path::Path;
 
-use crate::common::arms::path;
-use assert_cmd::Command;
 use flexcal::fit::{
     Identification, IdentifyError, Options, SavedEstimate, SavedEstimateError, identify, predict,
 };
@@ -14,6 +11,9 @@ use flexcal::nalgebra::Vector3;
 use flexcal::problem::Problem;
 use flexcal::results::{Document as _, IdentificationResult};
 use serde_json::Value;
+
+use crate::common::arms::{parse, path};
+use crate::common::program::{Folder, assert_contains, number};
 
 fn lunar() -> (Problem, Dataset, Identification) {
     let problem = Problem::read(&path("problems/lunar-sampler")).unwrap();
@@ -191,14 +191,14 @@ fn a_saved_estimate_predicts_what_the_fit_predicts() {
     assert!(expected, "{error}");
 }
 
-/// Writes a rigid arm of three joints and the tables of two sessions with different bases; session
+/// Returns a rigid arm of three joints and the tables of two sessions with different bases; session
 /// B has a gross error.
-fn two_sessions(folder: &Path) -> impl Fn(&str) -> assert_cmd::assert::Assert + '_ {
+fn two_sessions() -> Folder {
     let problem = "name = 'arm'\n[[joint]]\nd_m = 0.4\n[[joint]]\nalpha_deg = 90\n[[joint]]\na_m = 0.6\n\
                    [tool]\ntarget_m = [0.5, 0.1, 0.0]\n[parameters]\n'joint3.a' = { sigma_mm = 3 }\n'base.*' = { free = true }\n\
                    'tool.*' = { sigma_mm = 1 }\n[data]\nposition_sigma_mm = 0.02\nheld_out = { fraction = 0.3 }\n";
-    fs::write(folder.join("problem.toml"), problem).unwrap();
-    let arm = Problem::parse(problem, Path::new("problem.toml")).unwrap();
+    let folder = Folder::with([("problem.toml", problem)]);
+    let arm = parse(problem);
     for (session, shift) in [("A", 0.0), ("B", 100.0)] {
         let configurations: Vec<[f64; 3]> =
             (0..40).map(|k| [1.7, 2.3, 3.1].map(|step| f64::from(k) * step % 2.0 - 1.0)).collect();
@@ -210,36 +210,23 @@ fn two_sessions(folder: &Path) -> impl Fn(&str) -> assert_cmd::assert::Assert + 
             let [x, y, z] = [p.x * 1e3 + shift + off, p.y * 1e3 - 2.0 * shift, p.z * 1e3];
             writeln!(table, "{session},ball,{k},{},{},{},{x},{y},{z}", q[0], q[1], q[2]).unwrap();
         }
-        fs::write(folder.join(format!("{session}.csv")), table).unwrap();
+        folder.write(format!("{session}.csv"), table);
     }
-    move |arguments: &str| {
-        let mut command = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
-        command.current_dir(folder).args(arguments.split(' ')).assert()
-    }
+    folder
 }
 
 #[test]
 fn an_estimate_applies_to_another_session_without_a_refit() {
-    let folder = tempfile::tempdir().unwrap();
-    let run = two_sessions(folder.path());
-    let read = |name: &str| fs::read_to_string(folder.path().join(name)).unwrap();
-    run("identify problem.toml --quiet --out fit --data A.csv").success();
-    let assert =
-        run("predict problem.toml --estimate fit/estimate.json --out there --data A.csv B.csv")
-            .success();
-    let told = String::from_utf8_lossy(&assert.get_output().stdout).into_owned();
-    assert!(told.contains("Fitted to these rows, with the arm held: base[B].x"), "{told}");
-    let errors: Value = serde_json::from_str(&read("there/errors.json")).unwrap();
-    assert_eq!(
-        (errors["all"]["n"].as_u64(), errors["sessions"]["B"]["n"].as_u64()),
-        (Some(80), Some(40))
-    );
-    assert!(errors["sessions"]["A"]["max_mm"]["norm"].as_f64().unwrap() < 0.1, "{errors}");
-    assert!(
-        (errors["sessions"]["B"]["max_mm"]["norm"].as_f64().unwrap() - 0.6).abs() < 0.2,
-        "{errors}"
-    );
-    let residuals = read("there/residuals.csv");
+    let folder = two_sessions();
+    folder.flexcal("identify problem.toml --quiet --out fit --data A.csv").success();
+    let predict = "predict problem.toml --estimate fit/estimate.json";
+    let run = folder.flexcal(&format!("{predict} --out there --data A.csv B.csv")).success();
+    assert_contains(&run.stdout, &["Fitted to these rows, with the arm held: base[B].x"]);
+    let errors = folder.json("there/errors.json");
+    assert_eq!([&errors["all"]["n"], &errors["sessions"]["B"]["n"]], [80, 40]);
+    let max = |session: &str| number(&errors["sessions"][session]["max_mm"]["norm"]);
+    assert!(max("A") < 0.1 && (max("B") - 0.6).abs() < 0.2, "{errors}");
+    let residuals = folder.read("there/residuals.csv");
     let (header, rows) = residuals.split_once('\n').unwrap();
     let expected = "file,line,pose,session,target,predicted_x_mm,predicted_y_mm,predicted_z_mm,residual_x_mm,residual_y_mm,\
                     residual_z_mm,whitened,outlier,held_out";
@@ -251,21 +238,15 @@ fn an_estimate_applies_to_another_session_without_a_refit() {
         "{outliers:?}"
     );
     assert!(
-        read("there/predictions.csv")
+        folder
+            .read("there/predictions.csv")
             .starts_with("file,line,pose,session,target,q1_deg,q2_deg,q3_deg,predicted_x_mm,")
     );
-    assert_eq!(read("fit/residuals.csv").lines().count(), 41);
+    assert_eq!(folder.table("fit/residuals.csv").rows.len(), 40);
     // Without measurements the base of a new session is unknown.
-    let bare: Vec<String> = read("B.csv")
-        .lines()
-        .map(|line| line.splitn(7, ',').take(6).collect::<Vec<_>>().join(","))
-        .collect();
-    fs::write(folder.path().join("bare.csv"), bare.join("\n")).unwrap();
-    let assert =
-        run("predict problem.toml --estimate fit/estimate.json --out bare --data bare.csv").code(2);
-    let message = String::from_utf8_lossy(&assert.get_output().stderr).into_owned();
-    assert!(
-        message.contains("has no estimate of base[B].x") && !folder.path().join("bare").exists(),
-        "{message}"
-    );
+    let bare = |line: &str| line.splitn(7, ',').take(6).collect::<Vec<_>>().join(",") + "\n";
+    folder.write("bare.csv", folder.read("B.csv").lines().map(bare).collect::<String>());
+    let run = folder.flexcal(&format!("{predict} --out bare --data bare.csv")).code(2);
+    assert_contains(&run.stderr, &["has no estimate of base[B].x"]);
+    assert!(!folder.has("bare"));
 }

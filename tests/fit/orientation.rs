@@ -3,12 +3,13 @@
 use std::fs;
 use std::path::Path;
 
-use crate::common::arms::path;
+use crate::common::arms::{parse, path};
+use crate::common::reading::try_poses;
 use flexcal::fit::{
     Identification, Options, Placement, compensate, identify, seen_from_base, waypoints,
 };
 use flexcal::least_squares::check_jacobian;
-use flexcal::measurement::{Dataset, Measurements};
+use flexcal::measurement::Dataset;
 use flexcal::model::{Model, PoseResiduals};
 use flexcal::problem::{Effect, Problem};
 use flexcal::rig::{Simulation, Truth, simulate};
@@ -25,7 +26,7 @@ fn ur10() -> Problem {
          'joint*.d' = {{ sigma_mm = 3 }}\n'joint*.beta' = {{ sigma_deg = 0.5 }}\n'base.*' = {{ free = true }}\n'tool.*' = {{ sigma_mm = 5, sigma_deg = 2 }}\n\
          [data]\nposition_sigma_mm = 0.05\norientation_sigma_deg = 0.02\nheld_out = {{ column = 'split' }}\n"
     );
-    Problem::parse(&text, Path::new("problem.toml")).unwrap()
+    parse(&text)
 }
 
 fn rig(problem: &Problem, poses: usize, seed: u64, more: &str) -> (Simulation, Dataset) {
@@ -37,15 +38,10 @@ fn rig(problem: &Problem, poses: usize, seed: u64, more: &str) -> (Simulation, D
     );
     let truth = Truth::parse(&truth, Path::new("TRUTH.toml"), problem).unwrap();
     let simulation = simulate(problem, &truth, poses, seed).unwrap();
-    let data = Dataset::from_measurements(problem, measured(&simulation.csv(), problem)).unwrap();
+    let data =
+        Dataset::from_measurements(problem, try_poses(problem, &simulation.csv()).unwrap().0)
+            .unwrap();
     (simulation, data)
-}
-
-fn measured(text: &str, problem: &Problem) -> Measurements {
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("measurements.csv");
-    fs::write(&file, text).unwrap();
-    Measurements::read_poses(&[file], problem).unwrap().0
 }
 
 fn fit(problem: &Problem, data: &Dataset) -> Identification {
@@ -63,7 +59,7 @@ fn derivatives_of_orientations_are_those_of_differences() {
         "position_sigma_mm = 0.05",
         "position_sigma_mm = 0.05\norientation_sigma_deg = 0.02",
     );
-    let lunar = Problem::parse(&lunar, Path::new("problem.toml")).unwrap();
+    let lunar = parse(&lunar);
     let bent =
         lunar.with_effect(Effect::GearRatio { joint: 2 }).with_effect(Effect::BaseCompliance);
     for problem in [ur10(), lunar, bent] {

@@ -3,7 +3,6 @@
 use std::f64::consts::TAU;
 use std::path::Path;
 
-use assert_cmd::Command;
 use flexcal::fit::{Identification, Options, Placement, SavedEstimate, identify};
 use flexcal::measurement::{Dataset, Measurements};
 use flexcal::problem::Problem;
@@ -17,6 +16,8 @@ use serde_json::Value;
 
 use crate::common::arms::path;
 use crate::common::made::{at_random, csv, divided, measure, model_of};
+use crate::common::program::{Folder, number};
+use crate::common::reading::read_dataset;
 
 /// 1 σ of a coordinate [m].
 const SIGMA: f64 = 2e-5;
@@ -142,10 +143,7 @@ struct Plain {
 }
 
 fn plain(problem: &Problem, truth: &Truth, seed: u64) -> Plain {
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("rows.csv");
-    std::fs::write(&file, simulate(problem, truth, 78, seed).unwrap().csv()).unwrap();
-    let (data, _) = Dataset::read_files(&[file], problem).unwrap();
+    let data = read_dataset(problem, &simulate(problem, truth, 78, seed).unwrap().csv());
     let (found, fitted) = fitted(problem, &data);
     let after = fitted.residuals.as_ref().map_or(&found.fitted.held_out, |of| &of.errors.held_out);
     let json = IdentificationResult::new(problem, &found).to_json();
@@ -181,41 +179,27 @@ fn rigs_without_discrepancy_get_no_remainder_and_calibrated_bounds() {
 
 #[test]
 fn files_name_the_remainder_and_switch_it_off() {
-    let folder = tempfile::tempdir().unwrap();
     let problem = panda();
-    let text = std::fs::read_to_string(path("problems/panda/problem.toml")).unwrap();
-    let data = measured(&problem, 3e-4, 3);
-    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
-    write("problem.toml", &text);
-    write("rows.csv", &csv(&problem, &data));
-    let run = |words: &str| {
-        let mut command = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
-        command.args(words.split_whitespace()).current_dir(folder.path()).output().unwrap()
-    };
-    let mean = |json: &[u8]| -> f64 {
-        let json: Value = serde_json::from_slice(json).unwrap();
-        json["all"]["mean_mm"]["norm"].as_f64().unwrap()
-    };
-    let json = run("identify . --data rows.csv --remainder --json --out out").stdout;
-    let estimate: Value = serde_json::from_slice(&json).unwrap();
-    let norm = |of: &Value| of["mean_mm"]["norm"].as_f64().unwrap();
+    let rows = csv(&problem, &measured(&problem, 3e-4, 3));
+    let folder = Folder::with([("rows.csv", &rows)]);
+    folder.copy("problems/panda/problem.toml", "problem.toml");
+    let norm = |of: &Value| number(&of["mean_mm"]["norm"]);
+    let estimate = folder.flexcal("identify . --data rows.csv --remainder --json --out out").json();
     let remainder = &estimate["remainder"];
     assert!(norm(&estimate["held_out"]) < norm(&remainder["held_out_without"]));
     assert_eq!(remainder["file"], "remainder.json");
-    let predict = "predict . --estimate out/estimate.json --data rows.csv --json --out predicted";
-    let with = run(predict).stdout;
-    let table = std::fs::read_to_string(folder.path().join("predicted/predictions.csv")).unwrap();
-    let header = table.lines().next().unwrap();
-    assert!(
-        header.ends_with("sigma_x_mm,sigma_y_mm,sigma_z_mm,bound95_mm,extrapolated"),
-        "{header}"
-    );
-    let errors: Value = serde_json::from_slice(&with).unwrap();
-    assert!(errors["coverage"].as_f64().unwrap() > 0.9, "{errors}");
-    write("problem.toml", &(text.clone() + "\n[remainder]\nfile = \"out/remainder.json\"\n"));
-    let declared = run(predict).stdout;
-    assert_eq!(declared, with, "{}", String::from_utf8_lossy(&run(predict).stderr));
-    write("problem.toml", &(text + "\n[remainder]\nfile = \"out/remainder.json\"\nuse = false\n"));
-    let without = run(predict).stdout;
-    assert!(mean(&without) > mean(&with));
+    let predict = || {
+        let predict = "predict . --estimate out/estimate.json --data rows.csv --json";
+        folder.flexcal(&format!("{predict} --out predicted")).json()
+    };
+    let with = predict();
+    let columns = folder.table("predicted/predictions.csv").columns;
+    let expected = ["sigma_x_mm", "sigma_y_mm", "sigma_z_mm", "bound95_mm", "extrapolated"];
+    assert_eq!(columns[columns.len() - 5..], expected);
+    assert!(number(&with["coverage"]) > 0.9, "{with}");
+    let declared = "\n[remainder]\nfile = \"out/remainder.json\"\n";
+    folder.map("problem.toml", |text| format!("{text}{declared}"));
+    assert_eq!(predict(), with);
+    folder.map("problem.toml", |text| format!("{text}use = false\n"));
+    assert!(norm(&predict()["all"]) > norm(&with["all"]));
 }

@@ -4,7 +4,6 @@
 use std::fmt::Write as _;
 use std::fs;
 
-use assert_cmd::Command;
 use flexcal::measurement::Dataset;
 use nalgebra::Vector3;
 use rand::SeedableRng;
@@ -13,6 +12,7 @@ use serde_json::Value;
 
 use crate::common::arms::{parse, path};
 use crate::common::made::{at_random, csv, divided, draw, labels, measure, model_of};
+use crate::common::program::Folder;
 use crate::{judged, runaway, sigma};
 
 /// Free lengths, which absorb a wrong unit.
@@ -31,26 +31,16 @@ struct Told {
 impl Told {
     /// Runs a command on a problem, whose last section is `[data]`, and a table.
     fn by(command: &str, problem: &str, table: &str) -> Self {
-        let folder = tempfile::tempdir().unwrap();
-        let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
-        write(
-            "problem.toml",
-            &format!("{problem}files = ['rows.csv']\nheld_out = {{ column = 'split' }}\n"),
-        );
-        write("rows.csv", table);
-        let mut flexcal = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
-        let output = flexcal
-            .current_dir(folder.path())
-            .args([command, ".", "--out", "out"])
-            .output()
-            .unwrap();
-        let read = |name: &str| {
-            fs::read_to_string(folder.path().join("out").join(name)).unwrap_or_default()
-        };
+        let data = "files = ['rows.csv']\nheld_out = { column = 'split' }\n";
+        let problem = format!("{problem}{data}");
+        let folder = Folder::with([("problem.toml", &problem), ("rows.csv", table)]);
+        let run = folder.flexcal(&format!("{command} . --out out"));
+        let read =
+            |name: &str| fs::read_to_string(folder.path("out").join(name)).unwrap_or_default();
         let json = read(if command == "loop" { "loop.json" } else { "estimate.json" });
         Self {
-            status: output.status.code().unwrap(),
-            text: String::from_utf8(output.stderr).unwrap() + &read("report.md"),
+            status: run.status,
+            text: run.stderr + &read("report.md"),
             json: serde_json::from_str(&json).unwrap_or_default(),
         }
     }

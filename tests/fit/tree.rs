@@ -1,7 +1,7 @@
 //! Two arms on one torso, measured on the virtual test rig: fit and loop.
 
 use flexcal::fit::{Options, Placement, compensate, identify, seen_in_base, waypoints};
-use flexcal::measurement::{Dataset, Measurements, Split};
+use flexcal::measurement::{Dataset, Split};
 use flexcal::model::Model;
 use flexcal::problem::{Observation, Problem};
 use flexcal::results::commands_csv;
@@ -11,6 +11,8 @@ use flexcal::study::table;
 use std::path::Path;
 
 use crate::common::arms::{parse, path};
+use crate::common::program::assert_contains;
+use crate::common::reading::{read_dataset, read_tables};
 
 /// Number of arms that are drawn.
 const SEEDS: u64 = 24;
@@ -198,10 +200,7 @@ fn each_target_of_a_tree_meets_everything_that_is_measured_against() {
     };
     rig("tilts = [\"tool\"]\n", 200);
     let (problem, simulation) = rig("", 160);
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("rows.csv");
-    std::fs::write(&file, simulation.csv()).unwrap();
-    let data = Dataset::read_files(&[file], &problem).unwrap().0;
+    let data = read_dataset(&problem, &simulation.csv());
     let found = identify(&problem, &data, &Options::default()).unwrap();
     let chi2 = found.reduced_chi2.unwrap();
     assert!(
@@ -220,14 +219,8 @@ fn rows_of_tilts_need_no_target() {
     let (tilts, both) =
         ("frame,tilt_x_deg,tilt_y_deg", "x_mm,y_mm,z_mm,target,frame,tilt_x_deg,tilt_y_deg");
     let read = |tables: &[String]| -> Result<Vec<String>, String> {
-        let folder = tempfile::tempdir().unwrap();
-        let name = |(k, text): (usize, &String)| {
-            let file = folder.path().join(format!("{k}.csv"));
-            std::fs::write(&file, text).unwrap();
-            file
-        };
-        let files: Vec<_> = tables.iter().enumerate().map(name).collect();
-        let rows = Measurements::read(&files, &problem).map_err(|error| error.to_string())?.0;
+        let tables: Vec<_> = ["0.csv", "1.csv"].into_iter().zip(tables).collect();
+        let rows = read_tables(&problem, &tables).map_err(|error| error.to_string())?.0;
         let words = rows.target.unwrap();
         Ok(words.of_row.iter().map(|&word| words.names[word].clone()).collect())
     };
@@ -251,14 +244,9 @@ fn rows_of_tilts_need_no_target() {
         ("3,right", "3,lft", "0.csv:3: column target: no target is called \"lft\""),
         (",,,,tool", ",,,lft,tool", "0.csv:2: column target: no target is called \"lft\""),
     ] {
-        let error = read(&[mixed.replace(from, to)]).unwrap_err();
-        assert!(error.contains(wrong), "{error}");
+        assert_contains(&read(&[mixed.replace(from, to)]).unwrap_err(), &[wrong]);
     }
     let unnamed = format!("{q},x_mm,y_mm,z_mm,{tilts}\n{here},1,2,3,,,\n");
-    let error = read(&[unnamed]).unwrap_err();
-    assert!(
-        error
-            .contains("0.csv:2: the rows name no target; each of them measures one of left, right"),
-        "{error}"
-    );
+    let words = "0.csv:2: the rows name no target; each of them measures one of left, right";
+    assert_contains(&read(&[unnamed]).unwrap_err(), &[words]);
 }

@@ -1,14 +1,11 @@
 //! Fits without information are not trusted by any command.
 
-use std::fs;
-use std::path::PathBuf;
-use std::process::Output;
-
-use assert_cmd::Command;
 use flexcal::fit::{FindingCode, Options, identify};
 use flexcal::measurement::{Dataset, Measurements};
 use flexcal::problem::Problem;
 use serde_json::Value;
+
+use crate::common::program::{Folder, Run, assert_contains, entry, findings, items, named, number};
 
 /// Problem of a SCARA: two revolute joints, a prismatic one, a wrist.
 const ARM: &str = "name = 'scara'
@@ -46,46 +43,25 @@ const TRUTH: &str = "[random]\n'*' = { sigma_deg = 0.05, sigma_mm = 0.3 }
 [poses]\nq1_deg = [-130, 130]\nq2_deg = [-145, 145]\nq3_mm = [0, 200]\nq4_deg = [-180, 180]\npayload_kg = [0, 2]
 approach = false\nidentification = 40\n";
 
-/// Temporary folder with an arm and its measurements.
-struct Bench {
-    folder: tempfile::TempDir,
+/// Simulates sixty poses on the rig; `edit` changes the table before the fit.
+fn bench(parameters: &str, edit: impl Fn(Vec<&str>) -> Vec<String>) -> Folder {
+    let problem = format!("{ARM}{parameters}{DATA}");
+    let folder = Folder::with([("problem.toml", &problem), ("TRUTH.toml", TRUTH)]);
+    // The folder may be given in place of the file.
+    folder.simulate(".", ".", 60, 3, "rig.csv");
+    folder.write("m.csv", edit(folder.read("rig.csv").lines().collect()).join("\n"));
+    folder
 }
 
-impl Bench {
-    /// Simulates sixty poses on the rig; `edit` changes the table before the fit.
-    fn new(parameters: &str, edit: impl Fn(Vec<&str>) -> Vec<String>) -> Self {
-        let bench = Self { folder: tempfile::tempdir().unwrap() };
-        fs::write(bench.path("problem.toml"), format!("{ARM}{parameters}{DATA}")).unwrap();
-        fs::write(bench.path("TRUTH.toml"), TRUTH).unwrap();
-        // The folder may be given in place of the file.
-        let out = bench.run(&[
-            "simulate", ".", "--truth", ".", "--poses", "60", "--seed", "3", "--out", "rig",
-        ]);
-        assert_eq!(out.status.code(), Some(0), "{out:?}");
-        let text = fs::read_to_string(bench.path("rig/measurements.csv")).unwrap();
-        fs::write(bench.path("m.csv"), edit(text.lines().collect()).join("\n")).unwrap();
-        bench
-    }
+/// Identifies the arm.
+fn identify_arm(folder: &Folder) -> Run {
+    folder.flexcal("identify . --out out")
+}
 
-    fn path(&self, name: &str) -> PathBuf {
-        self.folder.path().join(name)
-    }
-
-    fn run(&self, arguments: &[&str]) -> Output {
-        let mut command = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
-        command.current_dir(self.folder.path()).args(arguments).output().unwrap()
-    }
-
-    /// Returns status, standard output and standard error of a command on the arm.
-    fn command(&self, command: &str, more: &[&str]) -> (i32, String, String) {
-        let out = self.run(&[&[command, ".", "--out", "out"], more].concat());
-        let text = |bytes: &[u8]| String::from_utf8(bytes.to_vec()).unwrap();
-        (out.status.code().unwrap(), text(&out.stdout), text(&out.stderr))
-    }
-
-    fn json(&self, name: &str) -> Value {
-        serde_json::from_str(&fs::read_to_string(self.path("out").join(name)).unwrap()).unwrap()
-    }
+/// Returns the first finding of a result with the given code.
+#[track_caller]
+fn finding(result: &Value, code: &str) -> Value {
+    entry(&result["findings"], |finding| finding["code"] == code)["numbers"].clone()
 }
 
 /// Returns the header, `count` identification rows that repeat the first `poses` ones, and the
@@ -101,29 +77,38 @@ fn repeated(lines: &[&str], poses: usize, count: usize) -> Vec<String> {
 
 #[test]
 fn poses_measured_again_decide_nothing() {
-    let two = Bench::new(PRIORS, |lines| repeated(&lines, 2, 30));
-    for command in ["identify", "trace", "loop", "compare"] {
-        let (status, out, err) = two.command(command, &[]);
-        assert_eq!(status, 0, "{command}: {err}");
-        let expected = "warning: 2 different poses measure 6 coordinates, fewer than the";
-        assert!(err.contains(expected), "{command}: {err}");
-        assert!(!out.contains("explains the data"), "{command}: {out}");
+    let two = bench(PRIORS, |lines| repeated(&lines, 2, 30));
+    for (command, file) in
+        [("identify", "estimate"), ("trace", "trace"), ("loop", "loop"), ("compare", "")]
+    {
+        let run = two.flexcal(&format!("{command} . --out out")).success();
+        if !file.is_empty() {
+            let numbers = finding(&two.json(format!("out/{file}.json")), "priors-decide");
+            assert_eq!([&numbers["poses"], &numbers["coordinates"]], [2, 6], "{command}");
+        }
+        assert_contains(
+            &run.stderr,
+            &["warning: 2 different poses measure 6 coordinates, fewer than the"],
+        );
+        assert!(!run.stdout.contains("explains the data"), "{command}: {run:?}");
     }
-    let three = Bench::new(PRIORS, |lines| repeated(&lines, 3, 3));
-    assert!(three.command("identify", &[]).2.contains("3 different poses measure 9 coordinates"));
-    let one = Bench::new(BASE, |lines| repeated(&lines, 1, 30));
-    let (status, _, err) = one.command("identify", &[]);
-    assert!(
-        status == 1 && err.contains("3 measured coordinates for 6 parameters without a prior"),
-        "{err}"
-    );
+    let three = bench(PRIORS, |lines| repeated(&lines, 3, 3));
+    identify_arm(&three);
+    let numbers = finding(&three.json("out/estimate.json"), "priors-decide");
+    assert_eq!([&numbers["poses"], &numbers["coordinates"]], [3, 9]);
+    let one = bench(BASE, |lines| repeated(&lines, 1, 30));
+    identify_arm(&one).code(1);
+    let numbers = finding(&one.json("out/estimate.json"), "too-few-equations");
+    assert_eq!([&numbers["coordinates"], &numbers["parameters"]], [3, 6]);
     // Enough different poses need no remark, and neither do repeated ones among them.
-    for all in [
-        Bench::new(PRIORS, |lines| repeated(&lines, 8, 30)),
-        Bench::new(BASE, |lines| repeated(&lines, 3, 3)),
+    for enough in [
+        bench(PRIORS, |lines| repeated(&lines, 8, 30)),
+        bench(BASE, |lines| repeated(&lines, 3, 3)),
     ] {
-        let (status, _, err) = all.command("identify", &[]);
-        assert!(status == 0 && !err.contains("coordinates"), "{err}");
+        let run = identify_arm(&enough).success();
+        let json = enough.json("out/estimate.json");
+        assert!(!findings(&json).contains(&"priors-decide"), "{json}");
+        assert!(!run.stderr.contains("coordinates"), "{run:?}");
     }
 }
 
@@ -132,26 +117,23 @@ fn a_check_does_not_trust_what_a_fit_would_not() {
     let again = |lines: &[&str]| {
         repeated(lines, 1, 30).into_iter().filter(|line| !line.contains("validation")).collect()
     };
-    let one = Bench::new(BASE, |lines| again(&lines));
-    let check = |bench: &Bench| bench.command("check", &["--candidates", "m.csv"]);
-    let (status, _, err) = check(&one);
-    assert!(
-        status == 1
-            && err.contains("do not determine 3 combinations of parameters without a prior"),
-        "{err}"
+    let one = bench(BASE, |lines| again(&lines));
+    let check = |folder: &Folder| folder.flexcal("check . --candidates m.csv --out out");
+    let run = check(&one).code(1);
+    assert_contains(
+        &run.stderr,
+        &["do not determine 3 combinations of parameters without a prior"],
     );
-    assert_eq!(one.json("check.json")["sufficient"], false);
+    let json = one.json("out/check.json");
+    assert_eq!((&json["sufficient"], items(&json["unidentified"]).len()), (&false.into(), 3));
     let without_limits = |text: String| -> String {
         text.lines()
             .filter(|line| !line.starts_with("min_") && !line.starts_with("max_"))
             .fold(String::new(), |all, line| all + line + "\n")
     };
-    fs::write(one.path("problem.toml"), without_limits(format!("{ARM}{BASE}{DATA}"))).unwrap();
-    let (status, _, err) = check(&one);
-    assert!(
-        status == 1 && err.contains("1 of the 30 poses differ and measure 3 coordinates"),
-        "{err}"
-    );
+    one.write("problem.toml", without_limits(format!("{ARM}{BASE}{DATA}")));
+    let run = check(&one).code(1);
+    assert_contains(&run.stderr, &["1 of the 30 poses differ and measure 3 coordinates"]);
     // The second joint never moves, but poses within its limits would determine its parameter.
     let free = "[parameters]\n'joint1.theta' = { free = true }\n'joint2.theta' = { free = true }\n'joint3.a' = { free = true }\n";
     let still = |lines: Vec<&str>| {
@@ -164,20 +146,20 @@ fn a_check_does_not_trust_what_a_fit_would_not() {
         };
         lines.iter().enumerate().map(hold).collect()
     };
-    let still = Bench::new(free, still);
-    let (status, _, err) = check(&still);
-    assert!(status == 1 && err.contains("do not determine 1 combination of parameters"), "{err}");
-    fs::copy(still.path("rig/measurements.csv"), still.path("m.csv")).unwrap();
-    assert_eq!(check(&still).0, 0);
+    let still = bench(free, still);
+    let run = check(&still).code(1);
+    assert_contains(&run.stderr, &["do not determine 1 combination of parameters"]);
+    assert_eq!(items(&still.json("out/check.json")["unidentified"]).len(), 1);
+    still.write("m.csv", still.read("rig.csv"));
+    check(&still).success();
 }
 
 #[test]
 fn poses_are_different_where_it_matters() {
-    let bench = Bench::new(PRIORS, |lines| repeated(&lines, 2, 4));
+    let folder = bench(PRIORS, |lines| repeated(&lines, 2, 4));
     let count = |problem: &str, edit: &dyn Fn(usize, &mut Vec<String>)| {
-        let path = bench.path("problem.toml");
-        fs::write(&path, problem).unwrap();
-        let text = fs::read_to_string(bench.path("m.csv")).unwrap();
+        folder.write("problem.toml", problem);
+        let text = folder.read("m.csv");
         let edited = text.lines().filter(|line| !line.contains("validation")).enumerate().map(
             |(row, line)| {
                 let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
@@ -185,9 +167,9 @@ fn poses_are_different_where_it_matters() {
                 cells.join(",")
             },
         );
-        fs::write(bench.path("edited.csv"), edited.collect::<Vec<_>>().join("\n")).unwrap();
-        let problem = Problem::read(&path).unwrap();
-        let (rows, _) = Measurements::read(&[bench.path("edited.csv")], &problem).unwrap();
+        folder.write("edited.csv", edited.collect::<Vec<_>>().join("\n"));
+        let problem = Problem::read(&folder.path("problem.toml")).unwrap();
+        let (rows, _) = Measurements::read(&[folder.path("edited.csv")], &problem).unwrap();
         rows.pose_numbers(&problem)
     };
     let rigid = format!("{ARM}{PRIORS}{DATA}");
@@ -217,17 +199,14 @@ fn poses_are_different_where_it_matters() {
 
 #[test]
 fn wrong_units_are_told_before_anything_else() {
-    let metres = Bench::new(&format!("{PRIORS}'base.*' = {{ free = true }}\n"), |lines| {
+    let metres = bench(&format!("{PRIORS}'base.*' = {{ free = true }}\n"), |lines| {
         let header = ["x", "y", "z"].iter().fold(lines[0].to_owned(), |all, axis| {
             all.replace(&format!("{axis}_mm"), &format!("{axis}_m"))
         });
         std::iter::once(header).chain(lines[1..].iter().map(|line| (*line).to_owned())).collect()
     });
-    let (status, _, err) = metres.command("identify", &[]);
-    assert!(
-        status == 1 && err.contains("misses the measurements by") && err.contains("check units"),
-        "{err}"
-    );
+    let run = identify_arm(&metres).code(1);
+    assert_contains(&run.stderr, &["misses the measurements by", "check units"]);
     // The message also appears if the fit did not converge.
     let problem = Problem::read(&metres.path("problem.toml")).unwrap();
     let fit = |table: &str, max_steps| {
@@ -242,23 +221,21 @@ fn wrong_units_are_told_before_anything_else() {
         stopped.termination
     );
     // A fit that was stopped close to the arm does not suspect its units.
-    let near = fit("rig/measurements.csv", Some(1));
+    let near = fit("rig.csv", Some(1));
     assert!(near.has(FindingCode::NotConverged), "{:?}", near.findings);
-    let radians = Bench::new(PRIORS, |lines| {
+    let radians = bench(PRIORS, |lines| {
         let header = lines[0].replace("q1_deg", "q1_rad");
         std::iter::once(header).chain(lines[1..].iter().map(|line| (*line).to_owned())).collect()
     });
-    let (_, _, err) = radians.command("identify", &[]);
-    let text = fs::read_to_string(radians.path("m.csv")).unwrap();
-    let commands =
-        text.lines().skip(1).map(|line| line.split(',').nth(2).unwrap().parse::<f64>().unwrap());
-    let beyond = commands.clone().filter(|q| q.abs() > 130_f64.to_radians()).count();
+    let run = identify_arm(&radians);
+    let commands = radians.table("m.csv").numbers("q1_rad");
+    let beyond = commands.iter().filter(|q| q.abs() > 130_f64.to_radians()).count();
     let (line, worst) = (2..).zip(commands).max_by(|a, b| a.1.abs().total_cmp(&b.1.abs())).unwrap();
     let expected = format!(
         "m.csv:{line}: joint 1: commanded beyond its limits (min_rad = -2.268928, max_rad = 2.268928) in {beyond} rows, furthest \
          here: q1_rad = {worst};"
     );
-    assert!(err.contains(&expected), "{expected} missing in\n{err}");
+    assert_contains(&run.stderr, &[&expected]);
 }
 
 #[test]
@@ -266,12 +243,10 @@ fn a_factor_between_a_turn_and_a_slide_has_their_units() {
     let coupled = format!(
         "{PRIORS}[[effect]]\njoint-coupling = {{ joint = 3, from = 4 }}\n[[effect]]\njoint-coupling = {{ joint = 2, from = 3 }}\n[[effect]]\njoint-coupling = {{ joint = 2, from = 1 }}\n"
     );
-    let bench = Bench::new(&coupled, |lines| lines.into_iter().map(str::to_owned).collect());
-    let (status, out, err) = bench.command("identify", &["-v"]);
-    assert_eq!(status, 0, "{err}");
-    let json = bench.json("estimate.json");
-    let parameters = json["parameters"].as_array().unwrap();
-    let of = |name: &str| parameters.iter().find(|parameter| parameter["name"] == name).unwrap();
+    let folder = bench(&coupled, |lines| lines.into_iter().map(str::to_owned).collect());
+    let out = folder.flexcal("identify . -v --out out").success().stdout;
+    let parameters = &folder.json("out/estimate.json")["parameters"];
+    let of = |name: &str| named(parameters, name);
     for (name, unit, shown) in
         [("[3,4]", "m/rad", "mm/rad"), ("[2,3]", "rad/m", "°/m"), ("[2,1]", "1", "‰")]
     {
@@ -280,14 +255,14 @@ fn a_factor_between_a_turn_and_a_slide_has_their_units() {
         let line = out.lines().find(|line| line.contains(&name)).unwrap();
         assert!(line.split_whitespace().any(|word| word == shown), "{line}");
     }
-    let found = of("joint-coupling[3,4].factor")["estimate"].as_f64().unwrap();
+    let found = number(&of("joint-coupling[3,4].factor")["estimate"]);
     assert!((found - 0.0005).abs() < 2e-5, "{found}");
 }
 
 #[test]
 fn a_mistyped_column_is_an_error_and_other_warnings_are_in_the_report() {
     let with = |name: &str| {
-        Bench::new(PRIORS, |lines| {
+        bench(PRIORS, |lines| {
             let cell = |row: usize| if row == 0 { name.to_owned() } else { "21".to_owned() };
             lines.iter().enumerate().map(|(row, line)| format!("{line},{}", cell(row))).collect()
         })
@@ -295,28 +270,26 @@ fn a_mistyped_column_is_an_error_and_other_warnings_are_in_the_report() {
     for (name, meant) in
         [("temprature_C", "temperature_C"), ("Session_", "session"), ("sgima_mm", "sigma_mm")]
     {
-        let (status, _, err) = with(name).command("identify", &[]);
+        let run = identify_arm(&with(name)).code(2);
         let expected =
             format!("m.csv:1: column {name}: unknown column, one letter away from {meant}");
-        assert!(status == 2 && err.contains(&expected), "{name}: {err}");
+        assert_contains(&run.stderr, &[&expected]);
     }
     // A column with another name, or without influence, only gives a warning.
     for name in ["room", "post"] {
-        let bench = with(name);
-        let (status, _, err) = bench.command("identify", &[]);
-        let expected = format!("m.csv:1: column {name}: unknown column");
-        assert!(status == 0 && err.contains(&expected), "{name}: {err}");
-        for file in ["report.md", "report.html"] {
-            let report = fs::read_to_string(bench.path("out").join(file)).unwrap();
-            assert!(report.contains(&format!("column {name}: unknown column")), "{file}: {report}");
+        let folder = with(name);
+        let run = identify_arm(&folder).success();
+        assert_contains(&run.stderr, &[&format!("m.csv:1: column {name}: unknown column")]);
+        for file in ["out/report.md", "out/report.html"] {
+            assert_contains(&folder.read(file), &[&format!("column {name}: unknown column")]);
         }
     }
 }
 
 #[test]
 fn nothing_that_is_printed_is_infinite() {
-    let bench = Bench::new(PRIORS, |lines| lines.into_iter().map(str::to_owned).collect());
-    assert_eq!(bench.command("identify", &[]).0, 0);
+    let folder = bench(PRIORS, |lines| lines.into_iter().map(str::to_owned).collect());
+    identify_arm(&folder).success();
     let numbers = |text: &str| {
         let words = text
             .split(|c: char| !(c.is_alphanumeric() || "+-.".contains(c)))
@@ -325,30 +298,24 @@ fn nothing_that_is_printed_is_infinite() {
             .filter(|word| ["nan", "inf", "-inf", "+inf", "infinity"].contains(&word.as_str()))
             .count()
     };
-    let estimate = fs::read_to_string(bench.path("out/estimate.json")).unwrap();
-    fs::write(
-        bench.path("targets.csv"),
-        "q1_deg,q2_deg,q3_mm,q4_deg,x_mm,y_mm,z_mm\n0,10,50,0,1900,100,400\n",
-    )
-    .unwrap();
-    fs::write(
-        bench.path("far.csv"),
-        "q1_deg,q2_deg,q3_mm,q4_deg,x_mm,y_mm,z_mm\n0,10,50,0,1e153,100,400\n",
-    )
-    .unwrap();
-    let value: Value = serde_json::from_str(&estimate).unwrap();
+    for (name, x) in [("targets.csv", "1900"), ("far.csv", "1e153")] {
+        let header = "q1_deg,q2_deg,q3_mm,q4_deg,x_mm,y_mm,z_mm";
+        folder.write(name, format!("{header}\n0,10,50,0,{x},100,400\n"));
+    }
+    let value = folder.json("out/estimate.json");
     for (huge, targets) in [("1e300", "targets.csv"), ("-1e200", "targets.csv"), ("1.0", "far.csv")]
     {
         let mut edited = value.clone();
         for parameter in edited["parameters"].as_array_mut().unwrap() {
             parameter["estimate"] = huge.parse::<f64>().unwrap().into();
         }
-        fs::write(bench.path("huge.json"), edited.to_string()).unwrap();
-        let (status, out, err) =
-            bench.command("compensate", &["--estimate", "huge.json", "--data", targets]);
+        folder.write("huge.json", edited.to_string());
+        let compensate = "compensate . --out out --estimate huge.json";
+        let run = folder.flexcal(&format!("{compensate} --data {targets}"));
+        let Run { status, stdout: out, stderr: err, .. } = run;
         assert!(status != 0 && numbers(&out) + numbers(&err) == 0, "{huge}: {out} {err}");
         if status == 1 {
-            let csv = fs::read_to_string(bench.path("out/commands.csv")).unwrap();
+            let csv = folder.read("out/commands.csv");
             assert_eq!(numbers(&csv), 0, "{huge}: {csv}");
         }
     }
@@ -357,13 +324,12 @@ fn nothing_that_is_printed_is_infinite() {
         let rules = format!(
             "[parameters]\n'joint*.*' = {{ sigma_deg = {sigma}, sigma_mm = {sigma} }}\n'tool.*' = {{ sigma_mm = {sigma} }}\n"
         );
-        fs::write(bench.path("problem.toml"), format!("{ARM}{rules}{DATA}")).unwrap();
-        let (status, out, err) = bench.command("identify", &[]);
+        folder.write("problem.toml", format!("{ARM}{rules}{DATA}"));
+        let Run { status, stdout: out, stderr: err, .. } = identify_arm(&folder);
         assert!(numbers(&out) + numbers(&err) == 0, "{sigma}: {status} {out} {err}");
         if status < 2 {
-            for file in ["estimate.json", "report.md", "report.html"] {
-                let text = fs::read_to_string(bench.path("out").join(file)).unwrap();
-                assert_eq!(numbers(&text), 0, "{sigma}: {file}");
+            for file in ["out/estimate.json", "out/report.md", "out/report.html"] {
+                assert_eq!(numbers(&folder.read(file)), 0, "{sigma}: {file}");
             }
         }
     }

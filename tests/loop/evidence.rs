@@ -7,6 +7,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use crate::common::arms::parse;
 use flexcal::fit::Options;
 use flexcal::measurement::{Dataset, NestReading, Split};
 use flexcal::problem::{Effect, Problem};
@@ -226,7 +227,7 @@ fn seven(masses: bool) -> Problem {
     }
     text += "[tool]\ntarget_m = [0, 0.05, 0.1]\n[data]\nfiles = ['measurements.csv']\nposition_sigma_mm = 0.05\n[parameters]\n\
              'joint*.*' = { free = true, sigma_mm = 2, sigma_deg = 0.5 }\n'tool.*' = { free = true, sigma_mm = 3 }\n";
-    Problem::parse(&text, Path::new("problem.toml")).unwrap()
+    parse(&text)
 }
 
 #[test]
@@ -303,7 +304,7 @@ fn boom(turned: f64) -> Problem {
          [data]\nfiles = ['measurements.csv']\nposition_sigma_mm = 0.03\n[parameters]\n'joint*.alpha' = {{ sigma_deg = 0.2 }}\n\
          'joint*.theta' = {{ sigma_deg = 0.2 }}\n'joint4.a' = {{ sigma_mm = 1 }}\n'tool.*' = {{ sigma_mm = 2 }}\n"
     );
-    Problem::parse(&text, Path::new("problem.toml")).unwrap()
+    parse(&text)
 }
 
 #[test]

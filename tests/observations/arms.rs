@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
+use crate::common::arms::parse;
 use flexcal::problem::{PoseConditions, Problem};
 use flexcal::rig::Rig;
 use nalgebra::Vector3;
@@ -303,11 +304,7 @@ impl Kind {
                     held_out = { column = \"split\" }\nreference_temperature_C = 20\n";
         let tilts = if how == Measured::Tilts { "tilt_sigma_deg = 0.002\n" } else { "" };
         let rules = format!("{}{base}{beta}", self.text);
-        Problem::parse(
-            &format!("{rules}{}[data]\n{data}{tilts}", around.declared),
-            Path::new("problem.toml"),
-        )
-        .unwrap()
+        parse(&format!("{rules}{}[data]\n{data}{tilts}", around.declared))
     }
 
     /// Returns the text of TRUTH.toml: true positions of the fixtures, and the poses.

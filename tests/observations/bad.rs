@@ -4,18 +4,13 @@ use std::path::Path;
 
 use flexcal::fit::{FindingCode, Options, identify};
 use flexcal::least_squares::UnidentifiableCombination;
-use flexcal::measurement::Dataset;
-use flexcal::problem::Problem;
 use flexcal::rig::Truth;
 
-use crate::bench::{ARM, AROUND, Bench, LINE, problem, read, true_arm};
+use crate::bench::{ARM, AROUND, Bench, LINE, problem, true_arm};
+use crate::common::reading::{assert_says, problem_error, read_dataset, try_dataset};
 
 fn table(more: &str, rows: &str) -> String {
-    let problem = problem(more);
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("rows.csv");
-    std::fs::write(&file, rows).unwrap();
-    Dataset::read_files(&[file], &problem).map(|_| ()).unwrap_err().to_string()
+    try_dataset(&problem(more), rows).unwrap_err().to_string()
 }
 
 #[test]
@@ -44,9 +39,7 @@ fn sections() {
         ),
     ] {
         let text = format!("{ARM}{more}");
-        let error =
-            Problem::parse(&text, Path::new("problem.toml")).map(|_| ()).unwrap_err().to_string();
-        assert!(error.contains(words) && error.contains("problem.toml:"), "{more}: {error}");
+        assert_says(&problem_error(&text), &[words, "problem.toml:"]);
     }
 }
 
@@ -110,7 +103,7 @@ fn what_contacts_cannot_tell_is_named() {
     let (arm, _) = true_arm(&problem, 2);
     let found = identify(
         &problem,
-        &read(&problem, &Bench::new(arm, 7).table(&["point"], 90)),
+        &read_dataset(&problem, &Bench::new(arm, 7).table(&["point"], 90)),
         &Options::default(),
     )
     .unwrap();
@@ -135,7 +128,7 @@ fn collinear_anchors_leave_a_turn_of_the_base_open() {
     );
     let problem = problem(&text);
     let (arm, _) = true_arm(&problem, 2);
-    let data = read(&problem, &Bench::new(arm, 7).table(&["distance on a line"], 150));
+    let data = read_dataset(&problem, &Bench::new(arm, 7).table(&["distance on a line"], 150));
     let found = identify(&problem, &data, &Options::default()).unwrap();
     let named = |combination: &UnidentifiableCombination| {
         combination.weights.iter().map(|&(k, _)| found.unknowns[k].clone()).collect::<Vec<String>>()
@@ -151,7 +144,7 @@ fn collinear_anchors_leave_a_turn_of_the_base_open() {
 fn what_nobody_knows_is_neither_held_nor_about_zero() {
     for rule in ["{ fixed = true }", "{ sigma_mm = 2 }"] {
         let problem = problem(&format!("\"anchor[A].x\" = {rule}\n{AROUND}"));
-        let data = read(&problem, &Bench::new(problem.clone(), 7).table(&["distance"], 40));
+        let data = read_dataset(&problem, &Bench::new(problem.clone(), 7).table(&["distance"], 40));
         let error =
             identify(&problem, &data, &Options::default()).map(|_| ()).unwrap_err().to_string();
         assert!(error.contains("the place of anchor[A].x is") && error.contains("at_m"), "{error}");
@@ -188,7 +181,7 @@ fn exchanged_names_are_not_trusted() {
         };
         let found = identify(
             &problem,
-            &read(&problem, &rows.map(row).collect::<String>()),
+            &read_dataset(&problem, &rows.map(row).collect::<String>()),
             &Options::default(),
         )
         .unwrap();

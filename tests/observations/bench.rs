@@ -1,15 +1,14 @@
 //! Arm of six joints that touches points and surfaces of its surroundings on the rig.
 
 use std::fmt::Write as _;
-use std::path::Path;
 
-use flexcal::measurement::Dataset;
 use flexcal::problem::{PoseConditions, Problem};
 use flexcal::rig::Rig;
 use nalgebra::{DMatrix, DVector, Vector3};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
+use crate::common::arms::parse;
 use crate::common::made::normal;
 
 /// Common beginning of all problems of this arm.
@@ -87,7 +86,7 @@ pub const LINE: [(&str, [f64; 3]); 3] =
 
 /// Returns a problem with this arm.
 pub fn problem(more: &str) -> Problem {
-    Problem::parse(&format!("{ARM}{more}"), Path::new("problem.toml")).unwrap()
+    parse(&format!("{ARM}{more}"))
 }
 
 /// Draws the true arm from the priors of the declared one.
@@ -240,12 +239,4 @@ impl Bench {
             }
         }
     }
-}
-
-/// Reads the rows of a table in a problem.
-pub fn read(problem: &Problem, table: &str) -> Dataset {
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("rows.csv");
-    std::fs::write(&file, table).unwrap();
-    Dataset::read_files(&[file], problem).unwrap().0
 }

@@ -16,6 +16,7 @@ use serde_json::Value;
 
 use crate::bench::{ARM, problem};
 use crate::common::made::{draw, model_of, normal};
+use crate::common::reading::{assert_says, problem_error, read_table, table_error};
 
 /// Cameras on the hand, on the base and in the world, and markers on the hand, on a link and in the
 /// world.
@@ -102,13 +103,6 @@ fn table(problem: &Problem, configurations: usize, position: bool) -> String {
     text
 }
 
-fn read(problem: &Problem, text: &str) -> Measurements {
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("rows.csv");
-    std::fs::write(&file, text).unwrap();
-    Measurements::read(&[file], problem).unwrap().0
-}
-
 /// Returns the rows that are predicted with the parameters `x`, with these numbers and `noise` in
 /// units of σ.
 fn measured(model: &Model, rows: &Measurements, x: &DVector<f64>, noise: f64) -> Measurements {
@@ -140,7 +134,7 @@ fn derivatives_of_pixels() {
             problem.joints.iter_mut().for_each(|joint| joint.stiffness = None);
             problem.parameters.retain(|rule| !rule.pattern.contains("stiffness"));
         }
-        let rows = read(&problem, &table(&problem, 12, false));
+        let rows = read_table(&problem, &table(&problem, 12, false));
         let model = model_of(&problem, &rows);
         let small = |unit| match unit {
             Unit::Length => 3e-3,
@@ -214,7 +208,7 @@ fn an_arm_is_found_from_pixels_alone_without_a_guess() {
 #[test]
 fn cameras_of_all_kinds_and_positions_are_fitted_together() {
     let problem = problem(CAMERAS);
-    let rows = read(&problem, &table(&problem, 40, true));
+    let rows = read_table(&problem, &table(&problem, 40, true));
     let model = model_of(&problem, &rows);
     let small = |unit| match unit {
         Unit::Length => 2e-3,
@@ -284,11 +278,7 @@ fn wrong_rows_are_named() {
             ":1: column u: a number of pixels needs a unit; write u_px",
         ),
     ] {
-        let folder = tempfile::tempdir().unwrap();
-        let file = folder.path().join("rows.csv");
-        std::fs::write(&file, format!("{head},{columns}\n{q},{cells}\n")).unwrap();
-        let error = Measurements::read(&[file], &problem).map(|_| ()).unwrap_err().to_string();
-        assert!(error.contains(words), "{columns} {cells}: {error}");
+        assert_says(&table_error(&problem, &format!("{head},{columns}\n{q},{cells}\n")), &[words]);
     }
     for (more, words) in [
         ("[[camera]]\nname = \"a\"\n", "on"),
@@ -301,16 +291,14 @@ fn wrong_rows_are_named() {
         ("[[marker]]\nname = \"a\"\npoints_mm = []\n", "empty"),
     ] {
         let text = format!("{ARM}{more}");
-        let error =
-            Problem::parse(&text, Path::new("problem.toml")).map(|_| ()).unwrap_err().to_string();
-        assert!(error.contains(words) && error.contains("problem.toml:"), "{more}: {error}");
+        assert_says(&problem_error(&text), &[words, "problem.toml:"]);
     }
 }
 
 #[test]
 fn a_point_behind_the_camera_is_an_error_with_its_row() {
     let problem = problem(&CAMERAS.replace("at_m = [3, 0, 0.7]", "at_m = [-3, 0, 0.7]"));
-    let rows = read(&problem, &table(&problem, 12, false));
+    let rows = read_table(&problem, &table(&problem, 12, false));
     let first =
         (0..rows.len()).find(|&row| rows.observation(row).fixtures()[0] == Some(2)).unwrap();
     let split = flexcal::measurement::Split::new(&problem, &rows).unwrap();

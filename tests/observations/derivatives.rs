@@ -9,8 +9,9 @@ use nalgebra::DVector;
 use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 
-use crate::bench::{AROUND, Bench, problem, read};
+use crate::bench::{AROUND, Bench, problem};
 use crate::common::made::{draw, model_of};
+use crate::common::reading::read_dataset;
 
 /// Largest allowed difference of a column of the Jacobian, relative to its norm.
 const WORST: f64 = 1e-7;
@@ -24,7 +25,7 @@ fn derivatives_of_every_kind() {
     for (what, problem) in [("elastic", elastic), ("rigid", rigid)] {
         let table = Bench::new(problem.clone(), 3)
             .table(&["position", "point", "distance", "plane", "sphere", "tilt"], 8);
-        let rows = read(&problem, &table).measurements;
+        let rows = read_dataset(&problem, &table).measurements;
         // Tilts of every frame, including the base.
         let mut rows = rows;
         for row in 0..rows.len() {

@@ -19,8 +19,8 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 use crate::arms::{ARMS, Around, Kind, Lacking, Measured, Strength, WITHOUT_TRACKER};
-use crate::bench::read;
 use crate::common::made::model_of;
+use crate::common::reading::read_dataset;
 
 /// Reduction of squares from which an effect is visible.
 const SEEN: f64 = 30.0;
@@ -177,7 +177,7 @@ fn judged(problem: &Problem, closed: &ClosedLoop, truth: Option<&Effect>) -> Loo
 
 /// Reads the rows of a simulation in a problem.
 fn rows(problem: &Problem, simulated: &Simulation) -> Dataset {
-    read(problem, &simulated.csv())
+    read_dataset(problem, &simulated.csv())
 }
 
 /// Returns the text of an effect for TRUTH.toml, with a size from a quarter to twice the listed

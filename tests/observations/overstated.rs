@@ -3,11 +3,11 @@
 use std::path::Path;
 
 use flexcal::fit::Options;
-use flexcal::problem::Problem;
 use flexcal::rig::{Truth, simulate};
 use flexcal::select::close;
 
-use crate::bench::read;
+use crate::common::arms::parse;
+use crate::common::reading::read_dataset;
 
 /// Four joints whose hand is placed in two sockets and on a table.
 const IN_SOCKETS: &str = "name = 'in sockets'
@@ -71,10 +71,10 @@ q4_deg = [-110, 110]
 fn the_sigma_that_a_fit_supports_speaks_for_no_effect() {
     // σ is declared too large and therefore estimated by each fit: a smaller σ is no better
     // explanation.
-    let problem = Problem::parse(IN_SOCKETS, Path::new("problem.toml")).unwrap();
+    let problem = parse(IN_SOCKETS);
     let truth = Truth::parse(GIVES_WAY, Path::new("TRUTH.toml"), &problem).unwrap();
     for seed in [1, 2, 3, 4] {
-        let data = read(&problem, &simulate(&problem, &truth, 120, seed).unwrap().csv());
+        let data = read_dataset(&problem, &simulate(&problem, &truth, 120, seed).unwrap().csv());
         let closure = close(&problem, &data, &Options::default()).unwrap();
         assert_eq!(closure.effects.len(), 1, "{seed}: {:?}", closure.effects);
         let found = &closure.effects[0];

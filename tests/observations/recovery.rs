@@ -5,7 +5,8 @@ use std::fmt::Write as _;
 use flexcal::fit::{Identification, Options, PointSpread, identify};
 use nalgebra::Vector3;
 
-use crate::bench::{ANCHORS, AROUND, Bench, CENTRE, POINTS, problem, read, true_arm};
+use crate::bench::{ANCHORS, AROUND, Bench, CENTRE, POINTS, problem, true_arm};
+use crate::common::reading::read_dataset;
 
 /// Returns the deviations from the truth in standard errors.
 fn deviations(found: &Identification, truth: &[(String, f64)]) -> Vec<(String, f64)> {
@@ -42,7 +43,10 @@ fn each_kind_and_all_together_find_the_arm() {
         for seed in 1..=3 {
             let (arm, mut truth) = true_arm(&problem, seed);
             truth.extend(fixtures());
-            let data = read(&problem, &Bench::new(arm, 100 + seed).table(kinds, 150 / kinds.len()));
+            let data = read_dataset(
+                &problem,
+                &Bench::new(arm, 100 + seed).table(kinds, 150 / kinds.len()),
+            );
             let found = identify(&problem, &data, &Options::default()).unwrap();
             assert!(found.is_trusted(), "{kinds:?}, seed {seed}: {:?}", found.findings);
             let chi2 = found.reduced_chi2.unwrap();
@@ -83,8 +87,10 @@ fn coverage_of_each_kind() {
         for seed in 1..=60 {
             let (arm, mut truth) = true_arm(&problem, 1000 + seed);
             truth.extend(fixtures());
-            let data =
-                read(&problem, &Bench::new(arm, 2000 + seed).table(kinds, 150 / kinds.len()));
+            let data = read_dataset(
+                &problem,
+                &Bench::new(arm, 2000 + seed).table(kinds, 150 / kinds.len()),
+            );
             let found = identify(&problem, &data, &Options::default()).unwrap();
             assert!(found.is_trusted(), "{kinds:?}, seed {seed}: {:?}", found.findings);
             all.extend(deviations(&found, &truth).into_iter().map(|deviation| deviation.1.abs()));
@@ -125,9 +131,12 @@ fn a_point_of_held_out_rows_alone_is_found_on_them() {
             _ => format!("{line},identification"),
         })
         .collect();
-    let found =
-        identify(&problem, &read(&problem, &(marked.join("\n") + "\n")), &Options::default())
-            .unwrap();
+    let found = identify(
+        &problem,
+        &read_dataset(&problem, &(marked.join("\n") + "\n")),
+        &Options::default(),
+    )
+    .unwrap();
     assert!(found.is_trusted(), "{:?}", found.findings);
     assert_eq!((found.fitted.held_out.n, found.fitted.held_out.kind), (30, "point"));
     assert!(found.fitted.held_out.rms.norm < 0.3e-3, "{:?}", found.fitted.held_out);
@@ -159,7 +168,7 @@ fn a_point_that_gives_way_is_named() {
             let _ = writeln!(table, "{},,,,{name},,,,,,,,validation", q.join(","));
         }
     }
-    let found = identify(&problem, &read(&problem, &table), &Options::default()).unwrap();
+    let found = identify(&problem, &read_dataset(&problem, &table), &Options::default()).unwrap();
     let unsteady = PointSpread::unsteady(found.spreads.iter().map(|spread| &spread.1));
     let [(spread, times)] = unsteady.as_slice() else { panic!("{unsteady:?}") };
     assert!(
@@ -190,7 +199,8 @@ fn planes_of_either_side_are_found() {
                 let q: Vec<String> = q.iter().map(|q| format!("{q:.12}")).collect();
                 let _ = writeln!(table, "{},,,,,,,table,{:.7},,,", q.join(","), offset * 1e3);
             }
-            let found = identify(&problem, &read(&problem, &table), &Options::default()).unwrap();
+            let found =
+                identify(&problem, &read_dataset(&problem, &table), &Options::default()).unwrap();
             let what = format!("{height} m, up {up}, step {step}, declared {declared}");
             assert!(found.is_trusted(), "{what}: {:?}", found.findings);
             let value =

@@ -1,37 +1,37 @@
 //! Error summaries of every kind of rows in all result files, compared with residuals.csv.
 
 use std::collections::BTreeMap;
-use std::fs;
-use std::path::Path;
 
-use assert_cmd::Command;
 use flexcal::design::{self, Candidates, Criterion, PlanOptions};
 use serde_json::Value;
 
-use crate::bench::{ARM, AROUND, Bench, LINE, problem, read, true_arm};
+use crate::bench::{ARM, AROUND, Bench, LINE, problem, true_arm};
+use crate::common::program::{Folder, assert_contains, number};
+use crate::common::reading::read_dataset;
 
-/// Runs a command in a folder and returns its output.
-fn run(folder: &Path, command: &str, out: &str, more: &[&str]) -> String {
-    let mut flexcal = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
-    let assert = flexcal
-        .current_dir(folder)
-        .args([command, ".", "--out", out])
-        .args(more)
-        .assert()
-        .success();
-    String::from_utf8(assert.get_output().stdout.clone()).unwrap()
+/// Returns a folder with a problem of the bench and the text of its table.
+fn with_table(around: &str, table: &str) -> Folder {
+    let problem = format!("{ARM}{around}files = [\"rows.csv\"]\n");
+    Folder::with([("problem.toml", &problem), ("rows.csv", table)])
 }
 
-fn json(folder: &Path, name: &str) -> Value {
-    serde_json::from_str(&fs::read_to_string(folder.join(name)).unwrap()).unwrap()
+/// Simulates a table with `rows` rows of each of `kinds`.
+fn table(kinds: &[&str], rows: usize) -> String {
+    let (arm, _) = true_arm(&problem(AROUND), 3);
+    Bench::new(arm, 5).table(kinds, rows)
+}
+
+/// Returns a folder with a problem of the bench and `rows` rows of each of `kinds`.
+fn bench(around: &str, kinds: &[&str], rows: usize) -> Folder {
+    with_table(around, &table(kinds, rows))
 }
 
 /// Residual lengths of residuals.csv by kind of rows, part of the data and session \[mm\] or \[°\].
 struct Residuals(Vec<(&'static str, String, String, f64)>);
 
 impl Residuals {
-    fn read(folder: &Path, name: &str) -> Self {
-        let mut rows = csv::Reader::from_path(folder.join(name)).unwrap();
+    fn read(folder: &Folder, name: &str) -> Self {
+        let mut rows = csv::Reader::from_path(folder.path(name)).unwrap();
         let of_row = |row: BTreeMap<String, String>| {
             let cell =
                 |name: &str| row.get(name).map(String::as_str).unwrap_or_default().to_owned();
@@ -95,36 +95,25 @@ fn error_summaries_are_of_the_rows_own_residuals_and_say_their_kind() {
         (&["tilt"], &mixed[4..]),
         (&["position", "point", "distance", "plane", "sphere", "tilt"], &mixed[..]),
     ] {
-        let folder = tempfile::tempdir().unwrap();
-        let folder = folder.path();
-        fs::write(folder.join("problem.toml"), format!("{ARM}{AROUND}files = [\"rows.csv\"]\n"))
-            .unwrap();
-        let (arm, _) = true_arm(&problem(AROUND), 3);
         // Session B contains every second row, or only the tilts.
         let session = |(k, line): (usize, &str)| match k {
             0 => format!("{line},session\n"),
             _ if kinds.len() == 1 => format!("{line},{}\n", ["A", "B"][k % 2]),
             _ => format!("{line},{}\n", if line.contains("flange") { "B" } else { "A" }),
         };
-        let table = Bench::new(arm, 5).table(measured, 120 / measured.len());
-        fs::write(
-            folder.join("rows.csv"),
-            table.lines().enumerate().map(session).collect::<String>(),
-        )
-        .unwrap();
+        let table = table(measured, 120 / measured.len());
+        let table: String = table.lines().enumerate().map(session).collect();
+        let folder = with_table(AROUND, &table);
 
-        let text = [
-            run(folder, "identify", "fit", &[]),
-            run(folder, "trace", "traced", &[]),
-            run(folder, "loop", "closed", &["-v"]),
-        ];
-        let left = Residuals::read(folder, "fit/residuals.csv");
-        let estimate = json(folder, "fit/estimate.json");
+        let text = ["identify . --out fit", "trace . --out traced", "loop . --out closed -v"]
+            .map(|arguments| folder.flexcal(arguments).success().stdout);
+        let left = Residuals::read(&folder, "fit/residuals.csv");
+        let estimate = folder.json("fit/estimate.json");
         left.both_agree(&estimate, kinds[0], "estimate.json");
         assert_eq!(estimate["registered"]["held_out"]["kind"], estimate["held_out"]["kind"]);
 
-        let all = json(folder, "closed/loop.json");
-        let after = Residuals::read(folder, "closed/residuals.csv");
+        let all = folder.json("closed/loop.json");
+        let after = Residuals::read(&folder, "closed/residuals.csv");
         after.both_agree(&all["after"], kinds[0], "loop.json");
         for part in ["registered", "before"] {
             for rows in ["identification", "held_out"] {
@@ -136,9 +125,9 @@ fn error_summaries_are_of_the_rows_own_residuals_and_say_their_kind() {
         assert_eq!(all["held_out_gain_deg"].is_object(), is_angle);
         assert_eq!(all["held_out_gain_mm"].is_object(), !is_angle);
 
-        run(folder, "predict", "there", &["--estimate", "fit/estimate.json"]);
-        let (errors, there) =
-            (json(folder, "there/errors.json"), Residuals::read(folder, "there/residuals.csv"));
+        folder.flexcal("predict . --estimate fit/estimate.json --out there").success();
+        let errors = folder.json("there/errors.json");
+        let there = Residuals::read(&folder, "there/residuals.csv");
         there.agree(&errors["all"], kinds[0], |_, _| true, "errors.json");
         for (name, kind) in [("A", kinds[0]), ("B", kinds[kinds.len() - 1])] {
             there.agree(
@@ -188,8 +177,7 @@ fn bad_references_end_with_status_2_and_write_nothing() {
     let contacts: Vec<String> = (0..40).map(|k| format!("0.{k},{},left,,,,,,", &q[4..])).collect();
     let contacts = contacts.join("\n");
     let at = |(name, _): &(&str, [f64; 3])| format!("[[anchor]]\nname = \"{name}\"\n");
-    let around =
-        format!("{}{AROUND}files = [\"rows.csv\"]\n", LINE[2..].iter().map(at).collect::<String>());
+    let around = LINE[2..].iter().map(at).collect::<String>() + AROUND;
     for (cells, words) in [
         (",D,800,,,,", "rows.csv:42: column anchor: no anchor is called \"D\""),
         (",,,wall,,,", "rows.csv:42: column surface: no surface is called \"wall\""),
@@ -197,10 +185,7 @@ fn bad_references_end_with_status_2_and_write_nothing() {
         ("top,,,,,,", "rows.csv:42: column point: the point \"top\" is measured by 1 row only"),
         (",C,800,,,,", "rows.csv:42: column anchor: the anchor \"C\" is measured by 1 row only"),
     ] {
-        let folder = tempfile::tempdir().unwrap();
-        fs::write(folder.path().join("problem.toml"), format!("{ARM}{around}")).unwrap();
-        fs::write(folder.path().join("rows.csv"), format!("{header}\n{contacts}\n{q},{cells}\n"))
-            .unwrap();
+        let folder = with_table(&around, &format!("{header}\n{contacts}\n{q},{cells}\n"));
         for command in ["identify", "loop", "trace", "predict"] {
             // For a prediction, too few rows leave the position of a point undetermined.
             let words = match cells {
@@ -212,16 +197,9 @@ fn bad_references_end_with_status_2_and_write_nothing() {
                 }
                 _ => words,
             };
-            let mut flexcal = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
-            let assert = flexcal
-                .current_dir(folder.path())
-                .args([command, ".", "--out", "out"])
-                .assert()
-                .code(2);
-            let error = String::from_utf8(assert.get_output().stderr.clone()).unwrap();
-            let error = error.split_whitespace().collect::<Vec<_>>().join(" ");
-            assert!(error.contains(words), "{command} {cells}: {error}");
-            assert!(!folder.path().join("out").exists(), "{command}");
+            let run = folder.flexcal(&format!("{command} . --out out")).code(2);
+            assert_contains(&run.message(), &[words]);
+            assert!(!folder.has("out"), "{command}");
         }
     }
 }
@@ -229,17 +207,15 @@ fn bad_references_end_with_status_2_and_write_nothing() {
 /// A plan from contacts lists what to touch, together with all known distances.
 #[test]
 fn a_plan_of_contacts_says_what_to_touch() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
-    fs::write(folder.join("problem.toml"), format!("{ARM}{AROUND}files = [\"rows.csv\"]\n"))
-        .unwrap();
-    let (arm, _) = true_arm(&problem(AROUND), 3);
-    let table = Bench::new(arm, 5).table(&["point", "distance", "plane", "tilt"], 40);
-    fs::write(folder.join("rows.csv"), &table).unwrap();
-    let text = run(folder, "plan", "plan", &["--candidates", "rows.csv", "--poses", "60"]);
-    assert!(text.contains("60 poses, from 160 candidates;"), "{text}");
-    assert_eq!(json(folder, "plan/plan.json")["given"], 0);
-    let mut plan = csv::Reader::from_path(folder.join("plan/plan.csv")).unwrap();
+    let table = table(&["point", "distance", "plane", "tilt"], 40);
+    let folder = with_table(AROUND, &table);
+    folder.flexcal("plan . --candidates rows.csv --poses 60 --out plan").success();
+    let planned = folder.json("plan/plan.json");
+    assert_eq!(
+        [&planned["poses"], &planned["candidates"], &planned["given"]],
+        [60, 160, 0].map(Value::from).each_ref()
+    );
+    let mut plan = csv::Reader::from_path(folder.path("plan/plan.csv")).unwrap();
     let mut kinds: BTreeMap<&str, usize> = BTreeMap::new();
     for row in plan.deserialize::<BTreeMap<String, String>>() {
         let row = row.unwrap();
@@ -255,7 +231,7 @@ fn a_plan_of_contacts_says_what_to_touch() {
 
     // A contact with a plane has one coordinate, a tilt has two.
     let problem = problem(AROUND);
-    let rows = read(&problem, &table).measurements;
+    let rows = read_dataset(&problem, &table).measurements;
     let of_kind = |kind: &str| {
         (0..rows.len()).filter(|&row| rows.observation(row).kind() == kind).collect::<Vec<_>>()
     };
@@ -277,37 +253,19 @@ fn a_plan_of_contacts_says_what_to_touch() {
     }
 }
 
-/// Writes a problem of the bench and `rows` rows of each of `kinds` to a folder.
-fn bench(around: &str, kinds: &[&str], rows: usize) -> tempfile::TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("problem.toml"), format!("{ARM}{around}files = [\"rows.csv\"]\n"))
-        .unwrap();
-    let (arm, _) = true_arm(&problem(AROUND), 3);
-    fs::write(folder.path().join("rows.csv"), Bench::new(arm, 5).table(kinds, rows)).unwrap();
-    folder
-}
-
 /// Pose accuracy uses positions only, and all of them.
 #[test]
 fn positions_alone_are_accepted() {
     let folder = bench(AROUND, &["point", "plane", "tilt"], 40);
-    let mut flexcal = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
-    let refused =
-        flexcal.current_dir(folder.path()).args(["accept", ".", "--out", "out"]).assert().code(2);
-    let error = String::from_utf8(refused.get_output().stderr.clone()).unwrap();
-    let error = error.split_whitespace().collect::<Vec<_>>().join(" ");
-    assert!(
-        error.contains("problem.toml:") && error.contains("no held-out row measures a position"),
-        "{error}"
-    );
-    assert!(!folder.path().join("out").exists());
+    let run = folder.flexcal("accept . --out out").code(2);
+    assert_contains(&run.message(), &["problem.toml:", "no held-out row measures a position"]);
+    assert!(!folder.has("out"));
 
     let folder = bench(AROUND, &["position", "plane", "tilt"], 40);
-    let folder = folder.path();
-    run(folder, "identify", "fit", &[]);
-    run(folder, "accept", "signed", &[]);
+    folder.flexcal("identify . --out fit").success();
+    folder.flexcal("accept . --out signed").success();
     let (estimate, record) =
-        (json(folder, "fit/estimate.json"), json(folder, "signed/acceptance.json"));
+        (folder.json("fit/estimate.json"), folder.json("signed/acceptance.json"));
     let kinds = estimate["kinds"].as_array().unwrap();
     let all: u64 = kinds.iter().map(|kind| kind["identification"]["n"].as_u64().unwrap()).sum();
     assert_eq!(record["identification_rows"], all);
@@ -315,8 +273,8 @@ fn positions_alone_are_accepted() {
     let [accepted, fitted] =
         [&record["after"]["rms_mm"], &estimate["held_out"]["rms_mm"]["norm"]].map(Value::as_f64);
     assert!((accepted.unwrap() / fitted.unwrap() - 1.0).abs() < 1e-9, "{record}");
-    let page = fs::read_to_string(folder.join("signed/acceptance.html")).unwrap();
-    assert!(page.contains(&format!("Rows that were fitted: {all}.")), "{page}");
+    let page = folder.read("signed/acceptance.html");
+    assert_contains(&page, &[&format!("Rows that were fitted: {all}.")]);
 }
 
 /// The exported geometry is evaluated with the identified points, anchors and surfaces; for a rigid
@@ -327,30 +285,10 @@ fn an_exported_geometry_is_judged_by_what_rows_measure() {
         [["point", "plane"], ["distance", "tilt"], ["plane", "distance"], ["tilt", "point"]]
     {
         let folder = bench(AROUND, &kinds, 60);
-        let folder = folder.path();
-        let fitted = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"))
-            .current_dir(folder)
-            .args(["identify", ".", "--strategy", "rigid", "--out", "fit"])
-            .output()
-            .unwrap();
-        assert!(matches!(fitted.status.code(), Some(0 | 1)), "{fitted:?}");
-        let exported = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"))
-            .current_dir(folder)
-            .args([
-                "export",
-                ".",
-                "--estimate",
-                "fit/estimate.json",
-                "--format",
-                "ros-yaml",
-                "--out",
-                "k.yaml",
-                "--json",
-            ])
-            .output()
-            .unwrap();
-        let exported: Value = serde_json::from_slice(&exported.stdout).unwrap();
-        let estimate = json(folder, "fit/estimate.json");
+        assert!(folder.flexcal("identify . --strategy rigid --out fit").status < 2);
+        let arguments = "--estimate fit/estimate.json --format ros-yaml --out k.yaml --json";
+        let exported = folder.flexcal(&format!("export . {arguments}")).json();
+        let estimate = folder.json("fit/estimate.json");
         for arm in ["whole", "rigid"] {
             let of = &exported["held_out"][arm];
             assert_eq!(
@@ -372,41 +310,18 @@ fn an_exported_geometry_is_judged_by_what_rows_measure() {
 fn commands_from_sockets_alone_are_for_the_frame_of_the_base() {
     let around = AROUND.replace("[[anchor]]", "[[anchor]]\nat_m = [1, 1, 1]");
     let folder = bench(&format!("\"base.*\" = {{ free = true }}\n{around}"), &["point"], 90);
-    let folder = folder.path();
-    run(folder, "identify", "fit", &[]);
-    fs::write(
-        folder.join("targets.csv"),
+    folder.flexcal("identify . --out fit").success();
+    folder.write(
+        "targets.csv",
         "q1_rad,q2_rad,q3_rad,q4_rad,q5_rad,q6_rad,x_m,y_m,z_m\n0,0.5,0.5,0,0.5,0,0.9,0.1,0.6\n",
-    )
-    .unwrap();
+    );
+    let compensate = "compensate . --estimate fit/estimate.json --data targets.csv";
     for (frame, is_said) in [("measuring", true), ("base", false)] {
-        let mut flexcal = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
-        let output = flexcal
-            .current_dir(folder)
-            .args([
-                "compensate",
-                ".",
-                "--estimate",
-                "fit/estimate.json",
-                "--data",
-                "targets.csv",
-                "--frame",
-                frame,
-            ])
-            .output()
-            .unwrap();
-        let error = String::from_utf8(output.stderr).unwrap();
-        assert!(output.status.success(), "{error}");
-        assert_eq!(error.contains("--frame base"), is_said, "{error}");
+        let run = folder.flexcal(&format!("{compensate} --frame {frame}")).success();
+        assert_eq!(run.stderr.contains("--frame base"), is_said, "{run:?}");
     }
     // The missing option is reported before missing columns of the poses.
-    let mut flexcal = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
-    let refused = flexcal
-        .current_dir(folder)
-        .args(["check", ".", "--poses", "80", "--out", "check"])
-        .assert()
-        .code(2);
-    let error = String::from_utf8(refused.get_output().stderr.clone()).unwrap();
+    let error = folder.flexcal("check . --poses 80 --out check").code(2).stderr;
     assert!(error.contains("write --candidates FILE.csv") || error.contains("min_deg"), "{error}");
 }
 
@@ -416,45 +331,37 @@ fn commands_from_sockets_alone_are_for_the_frame_of_the_base() {
 fn every_kind_is_told_in_its_own_terms() {
     let small = AROUND.replace("0.05", "0.01").replace("0.002", "0.0004");
     let folder = bench(&small, &["distance", "tilt"], 60);
-    let folder = folder.path();
-    let told = run(folder, "identify", "fit", &["-v"]);
-    let told = told.split_whitespace().collect::<Vec<_>>().join(" ");
-    assert!(told.contains("take every declared σ times"), "{told}");
-    assert!(told.contains("distance, mm mean rms max") && !told.contains("mean y"), "{told}");
-    let estimate = json(folder, "fit/estimate.json");
-    let number = |key: &str| estimate[key].as_f64().unwrap();
-    assert!(
-        (number("sigma_taken_mm") / 0.01 / number("noise_factor").sqrt() - 1.0).abs() < 1e-6,
-        "{estimate}"
+    let printed = folder.flexcal("identify . --out fit -v").success().words();
+    assert_contains(&printed, &["take every declared σ times", "distance, mm mean rms max"]);
+    assert!(!printed.contains("mean y"), "{printed}");
+    let estimate = folder.json("fit/estimate.json");
+    let taken = number(&estimate["sigma_taken_mm"]) / 0.01;
+    assert!((taken / number(&estimate["noise_factor"]).sqrt() - 1.0).abs() < 1e-6, "{estimate}");
+    assert_contains(
+        &folder.read("fit/report.html"),
+        &["no row measures a position", "The largest residuals of 60 rows"],
     );
-    let page = fs::read_to_string(folder.join("fit/report.html")).unwrap();
-    assert!(
-        page.contains("no row measures a position")
-            && page.contains("The largest residuals of 60 rows"),
-        "{page}"
-    );
-    assert!(!folder.join("fit/figures/residual-vectors.svg").exists());
+    assert!(!folder.has("fit/figures/residual-vectors.svg"));
 
     // √3 of the σ of distances, without the tilts.
-    let checked = run(folder, "check", "check", &[]);
-    let checked = checked.split_whitespace().collect::<Vec<_>>().join(" ");
-    let words =
-        "One position measured with the σ of the distances would have 0.017 mm of noise (rms).";
-    assert!(checked.contains(words), "{checked}");
+    let checked = folder.flexcal("check . --out check").success();
+    let noise = number(&folder.json("check/check.json")["noise_mm"]);
+    assert!((noise - 3.0_f64.sqrt() * 0.01).abs() < 1e-9, "{noise}");
+    assert_contains(
+        &checked.words(),
+        &["One position measured with the σ of the distances would have 0.017 mm of noise (rms)."],
+    );
 
     let folder = bench(AROUND, &["point"], 60);
-    let folder = folder.path();
-    run(folder, "identify", "fit", &[]);
-    let page = fs::read_to_string(folder.join("fit/report.html")).unwrap();
+    folder.flexcal("identify . --out fit").success();
+    let page = folder.read("fit/report.html");
     // The target is at the points, not at the origin; the known distance is no pose.
     assert_eq!(page.matches(r#""kind":"point""#).count(), 60, "{page}");
     assert!(!page.contains("known distance\","), "{page}");
     assert!(page.contains(r#""position":[70"#) || page.contains(r#""position":[69"#), "{page}");
 
     // The tables of the paper are of positions.
-    let compared = run(folder, "compare", "compare", &[]);
-    assert!(
-        !compared.contains("max x") && compared.contains("contacts with points to identify"),
-        "{compared}"
-    );
+    let compared = folder.flexcal("compare . --out compare").success().stdout;
+    assert!(!compared.contains("max x"), "{compared}");
+    assert_contains(&compared, &["contacts with points to identify"]);
 }

@@ -1,179 +1,176 @@
 //! Files that flexcal wrote, files of spreadsheets, and values in the wrong unit.
 
-use std::fs;
-use std::path::{Path, PathBuf};
-
-use flexcal::error::{InputError, Warning};
-use flexcal::measurement::{Dataset, Measurements};
+use flexcal::error::{InputError, Warning, WarningKind};
+use flexcal::measurement::Measurements;
 use flexcal::problem::Problem;
+
+use crate::common::arms::parse;
+use crate::common::program::{Folder, assert_contains};
+use crate::common::reading::{
+    assert_says, assert_warned, problem_error, read_dataset, read_tables, try_dataset, try_poses,
+    try_table, words,
+};
 
 const ARM: &str = "name = 'arm'\n[[joint]]\n[[joint]]\na_m = 0.5\n";
 const MAP: &str = "[data.columns]\n'A1' = 'q1_deg'\n'A2' = 'q2_deg'\n'X' = 'x_mm'\n'Y' = 'y_mm'\n\
      'Z' = 'z_mm'\n'temp' = 'temperature_C'\n[data.format]\ndelimiter = ';'\ndecimal = ','\n";
 
-fn problem(text: &str) -> Problem {
-    Problem::parse(text, Path::new("problem.toml")).unwrap()
-}
-
-fn read(map: &str, text: &str, measured: bool) -> Result<(Measurements, Vec<Warning>), InputError> {
-    let folder = tempfile::tempdir().unwrap();
-    let files: Vec<PathBuf> = vec![folder.path().join("rows.csv")];
-    fs::write(&files[0], text).unwrap();
-    let problem = problem(&format!("{ARM}{map}"));
-    if measured {
-        Measurements::read(&files, &problem)
-    } else {
-        Measurements::read_poses(&files, &problem)
-    }
-}
-
-fn words(warnings: &[Warning]) -> String {
-    warnings.iter().flat_map(|warning| [warning.to_string(), "\n".to_owned()]).collect()
+/// Reads a table of measurements of the arm with a column map.
+fn read(map: &str, text: &str) -> Result<(Measurements, Vec<Warning>), InputError> {
+    try_table(&parse(&format!("{ARM}{map}")), text)
 }
 
 #[test]
 fn tables_with_names_of_flexcal_are_read_whatever_the_map_says() {
     let plan = "pose,q1_deg,q2_deg\n1,10.5,-20.25\n";
-    let (rows, warnings) = read(MAP, plan, false).unwrap();
+    let (rows, warnings) = try_poses(&parse(&format!("{ARM}{MAP}")), plan).unwrap();
     assert!((rows.configuration(0)[1].to_degrees() + 20.25).abs() < 1e-12);
-    assert_eq!(words(&warnings), "");
+    assert_eq!(warnings, []);
     let measured = "q1_deg,q2_deg,x_mm,y_mm,z_mm\n10.5,-20.25,1.5,2,3\n";
-    let (rows, warnings) = read(MAP, measured, true).unwrap();
+    let (rows, warnings) = read(MAP, measured).unwrap();
     assert!((rows.positions[0].x - 1.5e-3).abs() < 1e-15);
-    assert!(words(&warnings).contains("no column of"), "{}", words(&warnings));
+    assert!(matches!(warnings[0].kind, WarningKind::MapUnused { .. }), "{warnings:?}");
     // Names of both kinds: the map wins, and names of flexcal fill the rest.
     let mixed = "X;x_mm;Y;Z;q1_deg;q2_deg;temp\n1,5;9;2;3;10,5;-20,25;20\n";
-    let rows = read(MAP, mixed, true).unwrap().0;
+    let rows = read(MAP, mixed).unwrap().0;
     assert!((rows.positions[0].x - 1.5e-3).abs() < 1e-15 && rows.temperature.is_some());
     // A name that is missing is named where the table has others of the map.
-    let lacking = "A1;A2;X;Y;Z\n1;2;3;4;5\n";
-    let error = read(MAP, lacking, true).unwrap_err().to_string();
-    assert!(error.contains("data.columns.temp") && error.contains("no such column"), "{error}");
+    let error = read(MAP, "A1;A2;X;Y;Z\n1;2;3;4;5\n").unwrap_err();
+    assert_eq!(error.location.key.as_deref(), Some("data.columns.temp"));
+    assert_says(&error, &["no such column"]);
 }
 
 #[test]
 fn numbers_have_the_declared_decimal_sign() {
     let table = "A1;A2;X;Y;Z;temp\n1,5;2;3;4;5;1.500\n";
-    let error = read(MAP, table, true).unwrap_err().to_string();
-    assert!(error.contains(":2: column temp: \"1.500\" has a decimal point"), "{error}");
-    assert!(read(MAP, &table.replace("1.500", "1,500"), true).is_ok());
+    let error = read(MAP, table).unwrap_err();
+    assert_says(&error, &[":2: column temp: \"1.500\" has a decimal point"]);
+    assert!(read(MAP, &table.replace("1.500", "1,500")).is_ok());
 }
 
 #[test]
 fn dates_may_begin_with_the_day() {
     let table = |time: &str| format!("q1_deg,q2_deg,x_mm,y_mm,z_mm,time\n1,2,3,4,5,{time}\n");
-    let time = |text| read("", &table(text), true).unwrap().0.time[0].to_bits();
+    let time = |text| read("", &table(text)).unwrap().0.time[0].to_bits();
     assert_eq!(time("31.05.2024 14:03:20"), time("2024-05-31T14:03:20"));
 }
 
 #[test]
 fn words_that_spreadsheets_would_run_are_read_without_their_apostrophe() {
     let table = "q1_deg,q2_deg,x_mm,y_mm,z_mm,session\n1,2,-3,4,5,'=1+1\n1,2,3,4,5,-b\n";
-    let rows = read("", table, true).unwrap().0;
+    let rows = read("", table).unwrap().0;
     assert_eq!(rows.session.names, ["=1+1", "-b"]);
 }
 
 #[cfg(unix)]
 #[test]
 fn pipes_with_a_name_are_refused_at_once() {
-    let folder = tempfile::tempdir().unwrap();
-    let pipe = folder.path().join("rows.csv");
+    let folder = Folder::new();
+    let pipe = folder.path("rows.csv");
     let status = std::process::Command::new("mkfifo").arg(&pipe).status().unwrap();
     assert!(status.success());
-    let error =
-        Measurements::read(std::slice::from_ref(&pipe), &problem(ARM)).unwrap_err().to_string();
-    assert!(error.contains("a FIFO, socket or device; give a regular file"), "{error}");
-    assert!(Problem::read(&pipe).unwrap_err().to_string().contains("FIFO"));
-    fs::rename(&pipe, folder.path().join(".flexcal")).unwrap();
-    assert!(flexcal::files::FolderRecord::read(folder.path()).is_err());
+    let error = Measurements::read(std::slice::from_ref(&pipe), &parse(ARM)).unwrap_err();
+    assert_says(&error, &["a FIFO, socket or device; give a regular file"]);
+    assert_says(&Problem::read(&pipe).unwrap_err(), &["FIFO"]);
+    std::fs::rename(&pipe, folder.path(".flexcal")).unwrap();
+    assert!(flexcal::files::FolderRecord::read(&folder.path("")).is_err());
 }
 
 #[test]
 fn values_in_another_unit_and_tables_in_another_form_are_asked_about() {
-    let said = |text: &str| words(&problem(text).plausibility_warnings());
+    let warned = |text: &str| parse(text).plausibility_warnings();
     let rows =
         "[[joint]]\nalpha_deg = -90\nd_m = 0.1\n[[joint]]\na_m = 0.4\n[[joint]]\nd_m = 0.1\n";
-    let standard = said(&format!("name = 'arm'\n{rows}"));
-    assert!(standard.contains("problem.toml:2: ") && standard.contains("dh = \"standard\""));
+    let standard = warned(&format!("name = 'arm'\n{rows}"));
+    assert_eq!(assert_warned(&standard, &WarningKind::LooksLikeStandardForm), Some(2));
     for form in ["modified", "standard"] {
-        assert_eq!(said(&format!("name = 'arm'\ndh = '{form}'\n{rows}")), "");
+        assert_eq!(warned(&format!("name = 'arm'\ndh = '{form}'\n{rows}")), []);
     }
-    let radians = said(&format!("{ARM}alpha_deg = 1.5708\n"));
+    let radians = words(&warned(&format!("{ARM}alpha_deg = 1.5708\n")));
     assert!(radians.contains(":5: joint[2].alpha_deg: 1.5708 looks like radians of 90°"));
-    let millimetres = said(&format!("{ARM}d_m = 399.1\n"));
-    assert!(millimetres.contains("write d_mm = 399.1"), "{millimetres}");
-    assert_eq!(said(&format!("{ARM}alpha_deg = 45.55\n")), "");
-    assert_eq!(said(&format!("{ARM}alpha_deg = 90.5\nd_m = 0.3991\n")), "");
-    let wrong = "name = 'arm'\n[[joints]]\na_m = 1\n";
-    let error = Problem::parse(wrong, Path::new("problem.toml")).unwrap_err().to_string();
-    assert!(error.contains("did you mean joint?"), "{error}");
+    let millimetres = WarningKind::LooksLikeMillimetres {
+        value: "399.1".to_owned(),
+        millimetres: "d_mm".to_owned(),
+    };
+    assert_eq!(assert_warned(&warned(&format!("{ARM}d_m = 399.1\n")), &millimetres), Some(5));
+    assert_eq!(warned(&format!("{ARM}alpha_deg = 45.55\n")), []);
+    assert_eq!(warned(&format!("{ARM}alpha_deg = 90.5\nd_m = 0.3991\n")), []);
+    let wrong = problem_error("name = 'arm'\n[[joints]]\na_m = 1\n");
+    assert_says(&wrong, &["did you mean joint?"]);
     let long = format!("{ARM}[parameters]\n'joint1.{}a' = {{ free = true }}\n", "*".repeat(600));
-    let error = Problem::parse(&long, Path::new("problem.toml")).unwrap_err().to_string();
-    assert!(error.contains("characters in a pattern; at most 500"), "{error}");
+    assert_says(&problem_error(&long), &["characters in a pattern; at most 500"]);
 }
 
 /// Reads a tracker table that is joined to a log of joint coordinates.
 fn joined(by: &str, tracker: &str, log: &str) -> Result<(Measurements, Vec<Warning>), InputError> {
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("tracker.csv");
-    fs::write(&file, tracker).unwrap();
-    fs::write(folder.path().join("controller.csv"), log).unwrap();
     let text = format!(
         "{ARM}[data]\nfiles = ['tracker.csv']\njoints = {{ files = ['controller.csv'], {by} }}\n\
          [data.columns]\n'Point' = 'pose'\n'A1' = 'q1_deg'\n'A2' = 'q2_deg'\n'X' = 'x_mm'\n"
     );
-    let problem = Problem::parse(&text, &folder.path().join("problem.toml")).unwrap();
-    Measurements::read(&[file], &problem)
+    let folder =
+        Folder::with([("problem.toml", &text), ("tracker.csv", tracker), ("controller.csv", log)]);
+    let problem = Problem::read(&folder.path("problem.toml"))?;
+    Measurements::read(&problem.data.files, &problem)
 }
 
 #[test]
 fn a_joint_log_is_joined_by_name_order_or_time() {
     let tracker = "Point;X;y_mm;z_mm;time_s\nP3;3;0;0;30.2\nP1;1;0;0;10.1\nP9;9;0;0;90\n";
     let log = "time_s,Point,A1,A2,note\n10,P1,11,-1,a\n20,P2,12,-2,b\n30,P3,13,-3,c\n";
-    for (by, angles, unused) in [
-        ("by = 'name'", vec![13.0, 11.0], 1),
-        ("by = 'order'", vec![11.0, 12.0, 13.0], 0),
-        ("by = 'time', tolerance_s = 0.25", vec![13.0, 11.0], 0),
+    for (by, angles, is_log_left) in [
+        ("by = 'name'", vec![13.0, 11.0], true),
+        ("by = 'order'", vec![11.0, 12.0, 13.0], false),
+        ("by = 'time', tolerance_s = 0.25", vec![13.0, 11.0], false),
     ] {
         let (rows, warnings) = joined(by, tracker, log).unwrap();
         let found: Vec<f64> =
             (0..rows.len()).map(|row| rows.configuration(row)[0].to_degrees().round()).collect();
         assert_eq!(found, angles, "{by}");
-        let said = words(&warnings);
-        let expected = usize::from(angles.len() < 3) + unused;
-        assert_eq!(said.matches("without a partner").count(), expected, "{by}: {said}");
-        assert_eq!(said.contains("tracker.csv:4: 1 row without"), angles.len() < 3, "{said}");
-        assert_eq!(said.contains("controller.csv:3: 1 row without"), unused > 0, "{said}");
+        let left: Vec<(String, Option<usize>)> = warnings
+            .iter()
+            .filter(|warning| {
+                warning.kind == WarningKind::WithoutPartner { rows: 1, others: Vec::new() }
+            })
+            .map(|Warning { location, .. }| {
+                let name = location.file.file_name().unwrap().to_string_lossy();
+                (name.into_owned(), location.line)
+            })
+            .collect();
+        let measured = (angles.len() < 3).then(|| ("tracker.csv".to_owned(), Some(4)));
+        let logged = is_log_left.then(|| ("controller.csv".to_owned(), Some(3)));
+        let mut expected: Vec<_> = measured.into_iter().chain(logged).collect();
+        let mut left = left;
+        (left.sort(), expected.sort());
+        assert_eq!(left, expected, "{by}: {warnings:?}");
     }
     // A mistake in the log is named where it stands.
-    let wrong = joined("by = 'name'", tracker, &log.replace("11,", "x,")).unwrap_err().to_string();
-    assert!(wrong.contains("controller.csv:2: column A1: \"x\" is not a number"), "{wrong}");
-    let none = joined("by = 'name'", &tracker.replace("\nP", "\nQ"), log).unwrap_err().to_string();
-    assert!(none.contains("no row of the measurements has a partner"), "{none}");
+    let error = |tracker: &str, log: &str| joined("by = 'name'", tracker, log).unwrap_err();
+    let wrong = error(tracker, &log.replace("11,", "x,"));
+    assert_says(&wrong, &["controller.csv:2: column A1: \"x\" is not a number"]);
+    let none = error(&tracker.replace("\nP", "\nQ"), log);
+    assert_says(&none, &["no row of the measurements has a partner"]);
     let late = log.replace("\n10,", "\n50,").replace("\n30,", "\n70,");
-    let late = joined("by = 'time', tolerance_s = 0.25", tracker, &late).unwrap_err().to_string();
-    assert!(late.contains("typically 10.2 s away; check whether both clocks agree"), "{late}");
-    let twice = joined("by = 'name'", tracker, &log.replace("P2", "P1")).unwrap_err().to_string();
-    assert!(twice.contains("controller.csv:3: column Point: the pose P1 is already on line 2"));
+    let late = joined("by = 'time', tolerance_s = 0.25", tracker, &late).unwrap_err();
+    assert_says(&late, &["typically 10.2 s away; check whether both clocks agree"]);
+    let twice = error(tracker, &log.replace("P2", "P1"));
+    assert_says(&twice, &["controller.csv:3: column Point: the pose P1 is already on line 2"]);
 }
 
 /// Reads a tracker table with a joint log whose columns have other names and another format.
 #[test]
 fn the_two_tables_of_a_join_may_name_their_columns_differently() {
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("tracker.csv");
-    fs::write(&file, "Zeit;X;Y;Z\n31.05.2024 14:03:20,1;1000,5;2;3\n31.05.2024 14:03:30;4;5;6\n")
-        .unwrap();
+    let tracker = "Zeit;X;Y;Z\n31.05.2024 14:03:20,1;1000,5;2;3\n31.05.2024 14:03:30;4;5;6\n";
     let log = "Timestamp,A1,A2\n2024-05-31T14:03:20,10.5,1\n2024-05-31T14:03:30,20.25,2\n";
-    fs::write(folder.path().join("controller.csv"), log).unwrap();
     let text = format!(
         "{ARM}[data]\nfiles = ['tracker.csv']\njoints = {{ files = ['controller.csv'], by = 'time' }}\n\
          [data.columns]\n'Zeit' = 'time'\n'X' = 'x_mm'\n'Y' = 'y_mm'\n'Z' = 'z_mm'\n\
          'Timestamp' = 'time'\n'A1' = 'q1_deg'\n'A2' = 'q2_deg'\n[data.format]\ndecimal = ','\n"
     );
-    let problem = Problem::parse(&text, &folder.path().join("problem.toml")).unwrap();
-    let (rows, warnings) = Measurements::read(&[file], &problem).unwrap();
-    assert_eq!((rows.len(), words(&warnings).as_str()), (2, ""));
+    let folder =
+        Folder::with([("problem.toml", &text), ("tracker.csv", tracker), ("controller.csv", log)]);
+    let problem = Problem::read(&folder.path("problem.toml")).unwrap();
+    let (rows, warnings) = Measurements::read(&problem.data.files, &problem).unwrap();
+    assert_eq!((rows.len(), warnings), (2, Vec::new()));
     assert!((rows.positions[0].x - 1.0005).abs() < 1e-12);
     assert!((rows.configuration(1)[0].to_degrees() - 20.25).abs() < 1e-9);
     assert!((rows.time[1] - rows.time[0] - 9.9).abs() < 1e-6);
@@ -183,18 +180,14 @@ fn the_two_tables_of_a_join_may_name_their_columns_differently() {
 fn tables_in_latin_1_are_read_and_said() {
     let map = "'Winkel 1 (°)' = 'q1_deg'\n'Winkel 2 (°)' = 'q2_deg'\n'X' = 'x_mm'\n'Y' = 'y_mm'\n'Z' = 'z_mm'\n\
                'Prüfer' = 'session'\n[data.format]\ndecimal = ','\n";
-    let problem = problem(&format!("{ARM}[data.columns]\n{map}"));
+    let problem = parse(&format!("{ARM}[data.columns]\n{map}"));
     let text = "Winkel 1 (°);Winkel 2 (°);X;Y;Z;Prüfer\n1,5;2;3;4;5;Müller\n";
     let latin: Vec<u8> = text.chars().map(|c| u8::try_from(u32::from(c)).unwrap()).collect();
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("rows.csv");
-    fs::write(&file, latin).unwrap();
-    let (rows, warnings) = Measurements::read(std::slice::from_ref(&file), &problem).unwrap();
+    let (rows, warnings) = read_tables(&problem, &[("rows.csv", latin)]).unwrap();
     assert_eq!((rows.len(), rows.session.names.as_slice()), (1, &["Müller".to_owned()][..]));
-    let said = words(&warnings);
-    assert!(said.contains("rows.csv:1: not UTF-8 text; read as Windows-1252"), "{said}");
-    fs::write(&file, text).unwrap();
-    assert_eq!(words(&Measurements::read(&[file], &problem).unwrap().1), "");
+    let expected = "rows.csv:1: not UTF-8 text; read as Windows-1252";
+    assert_contains(&words(&warnings), &[expected]);
+    assert_eq!(try_table(&problem, text).unwrap().1, []);
 }
 
 #[test]
@@ -216,32 +209,27 @@ fn a_header_may_stand_behind_a_comment_mark_or_a_line_of_excel() {
                 .replace("sep=;\r", "sep=;"),
         ),
     ] {
-        let problem = problem(&format!("{ARM}{format}"));
-        let folder = tempfile::tempdir().unwrap();
-        let file = folder.path().join("rows.csv");
-        fs::write(&file, &text).unwrap();
-        let (rows, warnings) = Measurements::read(&[file], &problem).expect(&text);
+        let (rows, warnings) = read(format, &text).expect(&text);
         assert_eq!((rows.len(), words(&warnings).as_str()), (1, ""), "{text}");
         assert!((rows.configuration(0)[0].to_degrees() - 1.5).abs() < 1e-9, "{text}");
     }
     // A commented-out header does not hide the one below.
     let (rows, _) =
-        read("", "# x_mm,y_mm,z_mm,q1_deg,q2_deg\nq1_deg,q2_deg,x_mm,y_mm,z_mm\n1,2,3,4,5\n", true)
+        read("", "# x_mm,y_mm,z_mm,q1_deg,q2_deg\nq1_deg,q2_deg,x_mm,y_mm,z_mm\n1,2,3,4,5\n")
             .unwrap();
     assert!((rows.positions[0].x - 3e-3).abs() < 1e-12);
-    let units = read("", "q1_deg,q2_deg,x_mm,y_mm,z_mm\ndeg,deg,mm,mm,mm\n1,2,3,4,5\n", true);
-    let error = units.unwrap_err().to_string();
-    assert!(error.contains("rows.csv:2: column q1_deg: \"deg\" is a unit"), "{error}");
+    let units = read("", "q1_deg,q2_deg,x_mm,y_mm,z_mm\ndeg,deg,mm,mm,mm\n1,2,3,4,5\n");
+    assert_says(&units.unwrap_err(), &["rows.csv:2: column q1_deg: \"deg\" is a unit"]);
 }
 
 #[test]
 fn columns_of_results_are_passed_over_in_silence() {
     let result = "file,line,q1_deg,q2_deg,x_mm,y_mm,z_mm,predicted_x_mm,sigma_x_mm,bound95_mm,extrapolated,reached\n\
                   a.csv,2,1,2,3,4,5,3,0.1,0.2,false,true\n";
-    assert_eq!(words(&read("", result, true).unwrap().1), "");
+    assert_eq!(read("", result).unwrap().1, []);
     let other = "q1_deg,q2_deg,x_mm,y_mm,z_mm,line,reached\n1,2,3,4,5,6,true\n";
-    let said = words(&read("", other, true).unwrap().1);
-    assert!(said.contains("column line: unknown") && said.contains("column reached"), "{said}");
+    let said = words(&read("", other).unwrap().1);
+    assert_contains(&said, &["column line: unknown", "column reached"]);
 }
 
 #[test]
@@ -251,19 +239,13 @@ fn more_sessions_than_can_be_fitted_are_refused_at_once() {
         "q1_deg,q2_deg,x_mm,y_mm,z_mm,session\n".to_owned()
             + &(0..count).map(row).collect::<String>()
     };
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("rows.csv");
-    fs::write(&file, rows(1000)).unwrap();
+    let table = rows(1000);
     let arm = |rule: &str| {
-        problem(&format!(
+        parse(&format!(
             "{ARM}[parameters]\n'base.*' = {rule}\n[data]\nheld_out = {{ fraction = 0.3, seed = 1 }}\n"
         ))
     };
-    let read = |rule: &str| Dataset::read_files(std::slice::from_ref(&file), &arm(rule));
-    let error = read("{ free = true }").unwrap_err().to_string();
-    assert!(
-        error.contains("rows.csv: 1000 sessions, each with a base of its own; at most 150"),
-        "{error}"
-    );
-    assert!(read("{ fixed = true }").is_ok());
+    let error = try_dataset(&arm("{ free = true }"), &table).unwrap_err();
+    assert_says(&error, &["rows.csv: 1000 sessions, each with a base of its own; at most 150"]);
+    read_dataset(&arm("{ fixed = true }"), &table);
 }

@@ -4,32 +4,18 @@
 
 use std::f64::consts::FRAC_PI_2;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use flexcal::error::{InputError, Warning};
 use flexcal::measurement::{Measurements, Split};
 use flexcal::problem::{
     Effect, Equilibrium, FreeLength, Freedom, HeldOut, JointKind, Problem, Quantities,
 };
 use nalgebra::Vector3;
-use tempfile::TempDir;
+
+use crate::common::arms::parse;
+use crate::common::reading::{assert_says, read_table, read_tables, table_error, try_table};
 
 const CASES: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/cases");
-
-fn parse(text: &str) -> Problem {
-    Problem::parse(text, Path::new("problem.toml")).unwrap()
-}
-
-/// Reads tables given as texts.
-fn read(problem: &Problem, tables: &[&str]) -> Result<(Measurements, Vec<Warning>), InputError> {
-    let folder = TempDir::new().unwrap();
-    let files: Vec<PathBuf> =
-        (1..=tables.len()).map(|number| folder.path().join(format!("{number}.csv"))).collect();
-    for (file, table) in files.iter().zip(tables) {
-        fs::write(file, table).unwrap();
-    }
-    Measurements::read(&files, problem)
-}
 
 fn close(a: f64, b: f64) -> bool {
     (a - b).abs() <= 1e-12 * b.abs().max(1.0)
@@ -260,11 +246,9 @@ const MIXED: &str =
 #[test]
 fn fixed_joints_take_no_column() {
     let problem = parse(MIXED);
-    let by_number = read(&problem, &["q2_deg,q3_mm,x_m,y_m,z_m\n90,250,1,2,3\n"]).unwrap().0;
+    let by_number = read_table(&problem, "q2_deg,q3_mm,x_m,y_m,z_m\n90,250,1,2,3\n");
     let by_order =
-        read(&problem, &["q1_rad,q2_m,x_mm,y_m,z_m\n1.5707963267948966,0.25,1000,2,3\n"])
-            .unwrap()
-            .0;
+        read_table(&problem, "q1_rad,q2_m,x_mm,y_m,z_m\n1.5707963267948966,0.25,1000,2,3\n");
     for measurements in [by_number, by_order] {
         assert!(close(measurements.configuration(0)[1], FRAC_PI_2));
         assert_eq!(measurements.configuration(0)[2], 0.25);
@@ -276,9 +260,8 @@ fn fixed_joints_take_no_column() {
 #[test]
 fn columns_nobody_knows_are_passed_over_with_a_warning() {
     let problem = parse(MIXED);
-    let (measurements, warnings) =
-        read(&problem, &["q1_deg,q2_deg,q3_mm,x_m,y_m,z_m,time,operator,payloud_kgs,yy_m\n1,2,3,4,5,6,noon,Ada,1,1\n"])
-            .unwrap();
+    let table = "q1_deg,q2_deg,q3_mm,x_m,y_m,z_m,time,operator,payloud_kgs,yy_m\n1,2,3,4,5,6,noon,Ada,1,1\n";
+    let (measurements, warnings) = try_table(&problem, table).unwrap();
     assert!(!measurements.time_measured);
     let warnings: Vec<_> = warnings.iter().map(ToString::to_string).collect();
     let words = [
@@ -292,7 +275,8 @@ fn columns_nobody_knows_are_passed_over_with_a_warning() {
     assert_eq!(warnings.len(), words.len());
     for (warning, words) in warnings.iter().zip(words) {
         assert!(
-            warning.contains("1.csv:1: column ") && words.iter().all(|word| warning.contains(word)),
+            warning.contains("rows.csv:1: column ")
+                && words.iter().all(|word| warning.contains(word)),
             "{warning}"
         );
     }
@@ -304,7 +288,7 @@ fn sessions_and_targets_are_words() {
     let header = "session,target,pose,q1_deg,x_m,y_m,z_m,rx_deg,sigma_mm,hoist_N,temperature_C\n";
     let first = format!("{header}C, near ,1,0,1,2,3,10,0.1,60,20\nD,far,2,0,1,2,3,10,0.2,60,20\n");
     let second = format!("{header}C,far,,0,1,2,3,10,0.3,61,21\n");
-    let measurements = read(&problem, &[&first, &second]).unwrap().0;
+    let measurements = read_tables(&problem, &[("1.csv", first), ("2.csv", second)]).unwrap().0;
     assert_eq!(
         (&*measurements.session.names, &*measurements.session.of_row),
         (&["C".into(), "D".into()][..], &[0, 1, 0][..])
@@ -336,12 +320,12 @@ fn line_ends_marks_and_quotes_do_not_matter() {
         plain.replace("q1_deg,x_m", "\"q1_deg\" , x_m").replace("1,2", " 1 ,\"2\""),
     ];
     for variant in variants {
-        let measurements = read(&problem, &[&variant]).unwrap().0;
+        let measurements = read_table(&problem, &variant);
         assert_eq!(measurements.origin, [(0, 3), (0, 4)], "{variant:?}");
         assert_eq!(measurements.positions[1].x, 6.0);
     }
     let broken = plain.replace(",a", ",\"a\n\nb\"");
-    assert_eq!(read(&problem, &[&broken]).unwrap().0.origin, [(0, 3), (0, 6)]);
+    assert_eq!(read_table(&problem, &broken).origin, [(0, 3), (0, 6)]);
 }
 
 #[test]
@@ -355,7 +339,7 @@ fn a_fraction_keeps_rows_of_one_configuration_together() {
     let angle = |row: i32| f64::from(row % 25) + 0.001 * f64::from(row / 25);
     let rows: Vec<_> = (0..100).map(|row| format!("{},0,0,0\n", angle(row))).collect();
     let table = format!("q1_deg,x_m,y_m,z_m\n{}", rows.concat());
-    let measurements = read(&problem(1), &[&table]).unwrap().0;
+    let measurements = read_table(&problem(1), &table);
     let split = Split::new(&problem(1), &measurements).unwrap();
     assert_eq!(split.held_out.len(), 32);
     assert_eq!(split.identification.len(), 68);
@@ -378,7 +362,7 @@ fn a_fraction_does_not_depend_on_the_order_of_rows() {
         let held_out = |order: &dyn Fn(i32) -> i32| {
             let rows: String = (0..101).map(|k| row(order(k))).collect();
             let measurements =
-                read(&problem, &[&format!("q1_deg,x_m,y_m,z_m{columns}\n{rows}")]).unwrap().0;
+                read_table(&problem, &format!("q1_deg,x_m,y_m,z_m{columns}\n{rows}"));
             let rows = Split::new(&problem, &measurements).unwrap().held_out;
             let mut positions: Vec<f64> =
                 rows.iter().map(|&row| measurements.positions[row].x).collect();
@@ -396,25 +380,21 @@ fn a_fraction_does_not_depend_on_the_order_of_rows() {
 fn a_column_split_is_used_where_nothing_is_said() {
     let problem = parse("name = 'arm'\n[[joint]]\n");
     let table = "q1_deg,x_m,y_m,z_m,split\n1,2,3,4,validation\n1,2,3,4,identification\n";
-    let measurements = read(&problem, &[table]).unwrap().0;
+    let measurements = read_table(&problem, table);
     assert_eq!(Split::new(&problem, &measurements).unwrap().held_out, [0]);
 
     let problem = parse("name = 'arm'\n[[joint]]\n[data]\nheld_out = { column = 'use' }\n");
     let table = "q1_deg,x_m,y_m,z_m,split,use\n1,2,3,4,validation,identification\n1,2,3,4,identification,validation\n";
-    let (measurements, warnings) = read(&problem, &[table]).unwrap();
+    let (measurements, warnings) = try_table(&problem, table).unwrap();
     assert!(warnings.is_empty());
     assert_eq!(Split::new(&problem, &measurements).unwrap().held_out, [1]);
 }
 
 #[test]
 fn rows_of_one_configuration_stay_together_across_rounding() {
-    let problem = Problem::parse(
+    let problem = parse(
         "name = 'arm'\n[[joint]]\na_m = 1\n[data]\nfiles = ['rows.csv']\nheld_out = { fraction = 0.5, seed = 3 }\n",
-        Path::new("problem.toml"),
-    )
-    .unwrap();
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("rows.csv");
+    );
     // Forty configurations, each twice, 0.002° apart on either side of a multiple of 0.005°.
     let mut text = "q1_deg,x_mm,y_mm,z_mm\n".to_owned();
     for k in 0..40 {
@@ -423,8 +403,7 @@ fn rows_of_one_configuration_stay_together_across_rounding() {
             text += &[q.to_string(), ",0,0,0\n".to_owned()].concat();
         }
     }
-    fs::write(&file, text).unwrap();
-    let rows = Measurements::read(&[file], &problem).unwrap().0;
+    let rows = read_table(&problem, &text);
     let split = Split::new(&problem, &rows).unwrap();
     assert_eq!(split.held_out.len(), 40);
     for pair in 0..40 {
@@ -442,7 +421,7 @@ fn readings_stand_beside_commands_and_nests_apart() {
     let table = "time_s,nest,q1_deg,q2_deg,q1_read_deg,q2_read_deg,x_mm,y_mm,z_mm\n0,floor,,,,,1,2,3\n60,,10,20,10.5,20.5,4,5,6\n\
                  120,,30,40,30.5,40.5,7,8,9\n180,floor,,,,,1.5,2,3\n";
     let commanded = parse(text);
-    let rows = read(&commanded, &[table]).unwrap().0;
+    let rows = read_table(&commanded, table);
     assert_eq!((rows.len(), rows.nests.len()), (2, 2));
     assert!(close(rows.configuration(0)[0], 10_f64.to_radians()));
     let nest = &rows.nests[1];
@@ -451,15 +430,15 @@ fn readings_stand_beside_commands_and_nests_apart() {
     let other = rows.with_other_joint_source().unwrap();
     assert!(close(other.configuration(1)[1], 40.5_f64.to_radians()));
     let readings = parse(&format!("{text}[data]\njoints = 'read'\n"));
-    let read_rows = read(&readings, &[table]).unwrap().0;
+    let read_rows = read_table(&readings, table);
     assert_eq!(read_rows.configurations, other.configurations);
     // Readings suffice without commands if they are the source, and not otherwise.
     let alone = "q1_read_rad,q2_read_deg,x_m,y_m,z_m\n0.1,2,3,4,5\n";
-    assert!(read(&readings, &[alone]).unwrap().0.with_other_joint_source().is_none());
-    let error = read(&commanded, &[alone]).unwrap_err().to_string();
-    assert!(error.contains("column q1: missing; add q1_deg or q1_rad"), "{error}");
-    let error =
-        read(&readings, &["q1_deg,q2_deg,x_m,y_m,z_m\n1,2,3,4,5\n"]).unwrap_err().to_string();
-    assert!(error.contains("column q1_read: missing; add q1_read_deg or q1_read_rad"), "{error}");
-    assert!(read(&commanded, &["q1_deg,q2_deg,q1_read_mm,x_m,y_m,z_m\n1,2,3,4,5,6\n"]).is_err());
+    assert!(read_table(&readings, alone).with_other_joint_source().is_none());
+    assert_says(&table_error(&commanded, alone), &["column q1: missing; add q1_deg or q1_rad"]);
+    assert_says(
+        &table_error(&readings, "q1_deg,q2_deg,x_m,y_m,z_m\n1,2,3,4,5\n"),
+        &["column q1_read: missing; add q1_read_deg or q1_read_rad"],
+    );
+    table_error(&commanded, "q1_deg,q2_deg,q1_read_mm,x_m,y_m,z_m\n1,2,3,4,5,6\n");
 }

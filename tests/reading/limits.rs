@@ -1,52 +1,25 @@
 //! Inputs beyond any arm (too large, too many, too long) end at once with status 2 and a message.
 
-use std::fs;
-use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use assert_cmd::Command;
+use crate::common::program::{Folder, Run};
 
 /// Upper limit of the duration; without limits on input these cases took 8 s or did not end.
 const PATIENCE: Duration = Duration::from_secs(20);
 
-/// Temporary folder with the lunar sampler and its data.
-struct Bench(tempfile::TempDir);
-
-impl Bench {
-    fn new() -> Self {
-        let folder = tempfile::tempdir().unwrap();
-        let cases = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases");
-        for name in ["problem.toml", "a-none.csv"] {
-            fs::copy(cases.join(name), folder.path().join(name)).unwrap();
-        }
-        Self(folder)
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.0.path().join(name)
-    }
-
-    fn read(&self, name: &str) -> String {
-        fs::read_to_string(self.path(name)).unwrap()
-    }
-
-    /// Returns status and output of a command, which must end quickly.
-    fn run(&self, arguments: &str) -> (i32, String) {
-        let clock = Instant::now();
-        let mut command = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
-        let output =
-            command.current_dir(self.0.path()).args(arguments.split(' ')).output().unwrap();
-        assert!(clock.elapsed() < PATIENCE, "{arguments}: {:?}", clock.elapsed());
-        let said = String::from_utf8(output.stderr).unwrap();
-        assert!(!said.contains("panicked"), "{arguments}: {said}");
-        (output.status.code().unwrap(), said)
-    }
+/// Runs a command, which must end quickly.
+fn run(folder: &Folder, arguments: &str) -> Run {
+    let clock = Instant::now();
+    let run = folder.flexcal(arguments);
+    assert!(clock.elapsed() < PATIENCE, "{arguments}: {:?}", clock.elapsed());
+    assert!(!run.stderr.contains("panicked"), "{run:?}");
+    run
 }
 
 #[test]
 fn tables_beyond_any_size() {
-    let bench = Bench::new();
-    let table = bench.read("a-none.csv");
+    let folder = Folder::with_lunar_sampler();
+    let table = folder.read("a-none.csv");
     let widened = |columns: usize| -> String {
         let mut rows = table.lines();
         let more = (0..columns).map(|k| format!(",extra{k}")).collect::<Vec<_>>().concat();
@@ -81,22 +54,24 @@ fn tables_beyond_any_size() {
         ),
     ];
     for (name, text, status, said) in cases {
-        fs::write(bench.path(&format!("{name}.csv")), text).unwrap();
-        let (found, message) = bench.run(&format!("identify . --data {name}.csv"));
+        folder.write(format!("{name}.csv"), text);
+        let run = run(&folder, &format!("identify . --data {name}.csv"));
         assert!(
-            found == status && message.contains(said),
-            "{name}: status {found}, {message:.2000}"
+            run.status == status && run.stderr.contains(said),
+            "{name}: status {}, {:.2000}",
+            run.status,
+            run.stderr
         );
     }
     #[cfg(unix)]
     for arguments in ["identify . --data /dev/zero", "identify /dev/zero"] {
-        assert_eq!(bench.run(arguments).0, 2, "{arguments}");
+        run(&folder, arguments).code(2);
     }
 }
 
 #[test]
 fn problems_beyond_any_size() {
-    let bench = Bench::new();
+    let folder = Folder::with_lunar_sampler();
     let joint = "[[joint]]\n";
     let arm = "name = 'arm'\n[[joint]]\n";
     let effects = (1..=500)
@@ -127,8 +102,8 @@ fn problems_beyond_any_size() {
         (format!("{arm}a_m = 1e151\n"), "problem.toml:3: joint[1].a_m: 1e151 is larger than 1e150"),
     ];
     for (text, said) in cases {
-        fs::write(bench.path("problem.toml"), text).unwrap();
-        let (status, message) = bench.run("check . --poses 10");
+        folder.write("problem.toml", text);
+        let Run { status, stderr: message, .. } = run(&folder, "check . --poses 10");
         assert!(status == 2 && message.contains(said), "{said}: status {status}, {message:.500}");
         let first = message.lines().next().unwrap_or_default();
         assert!(first.len() < 3000, "{said}: a message of {} bytes", first.len());
@@ -137,8 +112,8 @@ fn problems_beyond_any_size() {
 
 #[test]
 fn a_coordinate_beyond_all_measure_is_no_panic() {
-    let bench = Bench::new();
-    let table = bench.read("a-none.csv");
+    let folder = Folder::with_lunar_sampler();
+    let table = folder.read("a-none.csv");
     let place = table.lines().next().unwrap().split(',').position(|name| name == "x_mm").unwrap();
     let line = table.lines().position(|row| row.contains("identification")).unwrap();
     for (value, statuses) in [
@@ -156,9 +131,10 @@ fn a_coordinate_beyond_all_measure_is_no_panic() {
             }
             cells.join(",") + "\n"
         });
-        fs::write(bench.path("huge.csv"), rows.collect::<String>()).unwrap();
+        folder.write("huge.csv", rows.collect::<String>());
         for command in ["identify", "trace", "loop", "compare"] {
-            let (status, message) = bench.run(&format!("{command} . --data huge.csv --out out"));
+            let run = run(&folder, &format!("{command} . --data huge.csv --out out"));
+            let Run { status, stderr: message, .. } = run;
             assert!(
                 statuses.contains(&status),
                 "{command} with {value}: status {status}, {message}"

@@ -2,6 +2,9 @@
 
 #![expect(clippy::unwrap_used, reason = "a test that fails may panic")]
 
+#[path = "../common/mod.rs"]
+mod common;
+
 mod bad_input;
 mod dialects;
 mod exchange;

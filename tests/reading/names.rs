@@ -1,10 +1,10 @@
 //! Names with special characters in terminal output, reports and figures.
 
 use std::fs;
-use std::path::PathBuf;
 
-use assert_cmd::Command;
 use flexcal::error::is_hidden;
+
+use crate::common::program::Folder;
 
 /// Invisible texts: escape sequences of both widths, a bell, a line break, a mark of writing
 /// direction, a tag, a non-character.
@@ -25,46 +25,31 @@ const ACTIVE: [&str; 8] = [
 
 const TABLE: &str = "q1_deg,q2_deg,x_mm,y_mm,z_mm,session,target,split\n";
 
-struct Bench(tempfile::TempDir);
-
-impl Bench {
-    /// Creates a planar arm with a title; its session and target have the given name.
-    fn new(title: &str, name: &str) -> Self {
-        let bench = Self(tempfile::tempdir().unwrap());
-        let quoted = |text: &str| toml::Value::String(text.to_owned()).to_string();
-        let problem = format!(
-            "name = 'arm'\ntitle = {}\n[[joint]]\nname = {}\na_m = 0.4\n[[joint]]\na_m = 0.3\n[tool]\ntarget_m = [0.5, 0, 0]\n[parameters]\n\
+/// Returns a planar arm with a title; its session and target have the given name.
+fn arm(title: &str, name: &str) -> Folder {
+    let quoted = |text: &str| toml::Value::String(text.to_owned()).to_string();
+    let problem = format!(
+        "name = 'arm'\ntitle = {}\n[[joint]]\nname = {}\na_m = 0.4\n[[joint]]\na_m = 0.3\n[tool]\ntarget_m = [0.5, 0, 0]\n[parameters]\n\
              'joint2.a' = {{ sigma_mm = 3 }}\n'tool*.y' = {{ sigma_mm = 3 }}\n[data]\nfiles = ['rows.csv']\nposition_sigma_mm = 0.1\n",
-            quoted(title),
-            quoted(title),
-        );
-        fs::write(bench.path("problem.toml"), problem).unwrap();
-        let name = format!("\"{}\"", name.replace('"', "\"\""));
-        let row = |k: i32| {
-            let (one, other) = (f64::from(k * 37 % 180), f64::from(k * 71 % 120 - 60));
-            let (a, b) = (one.to_radians(), (one + other).to_radians());
-            let (x, y) =
-                (400.0 + 301.0 * a.cos() + 500.0 * b.cos(), 301.0 * a.sin() + 500.0 * b.sin());
-            let split = if k % 3 == 0 { "validation" } else { "identification" };
-            format!("{one},{other},{x:.3},{y:.3},{}.0,{name},{name},{split}\n", k % 2)
-        };
-        fs::write(bench.path("rows.csv"), TABLE.to_owned() + &(0..30).map(row).collect::<String>())
-            .unwrap();
-        bench
-    }
+        quoted(title),
+        quoted(title),
+    );
+    let name = format!("\"{}\"", name.replace('"', "\"\""));
+    let row = |k: i32| {
+        let (one, other) = (f64::from(k * 37 % 180), f64::from(k * 71 % 120 - 60));
+        let (a, b) = (one.to_radians(), (one + other).to_radians());
+        let (x, y) = (400.0 + 301.0 * a.cos() + 500.0 * b.cos(), 301.0 * a.sin() + 500.0 * b.sin());
+        let split = if k % 3 == 0 { "validation" } else { "identification" };
+        format!("{one},{other},{x:.3},{y:.3},{}.0,{name},{name},{split}\n", k % 2)
+    };
+    let table = TABLE.to_owned() + &(0..30).map(row).collect::<String>();
+    Folder::with([("problem.toml", &problem), ("rows.csv", &table)])
+}
 
-    fn path(&self, name: &str) -> PathBuf {
-        self.0.path().join(name)
-    }
-
-    /// Returns the status and all printed output.
-    fn run(&self, arguments: &str) -> (i32, String) {
-        let mut command = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
-        let output =
-            command.current_dir(self.0.path()).args(arguments.split(' ')).output().unwrap();
-        let printed = [output.stdout, output.stderr].concat();
-        (output.status.code().unwrap(), String::from_utf8(printed).unwrap())
-    }
+/// Runs a command and returns its status and all printed output.
+fn run(folder: &Folder, arguments: &str) -> (i32, String) {
+    let run = folder.flexcal(arguments);
+    (run.status, run.stdout + &run.stderr)
 }
 
 #[test]
@@ -72,12 +57,12 @@ fn what_is_not_seen_is_refused_by_name_and_never_printed() {
     for hidden in HIDDEN {
         let (name, code) =
             (format!("A{hidden}B"), format!("U+{:04X}", u32::from(hidden.chars().next().unwrap())));
-        for (bench, place) in [
-            (Bench::new(&name, "A"), "problem.toml:2: title: "),
-            (Bench::new("arm", &name), "rows.csv:2: column session: "),
+        for (folder, place) in [
+            (arm(&name, "A"), "problem.toml:2: title: "),
+            (arm("arm", &name), "rows.csv:2: column session: "),
         ] {
             for command in ["identify", "loop", "compare"] {
-                let (status, printed) = bench.run(&format!("{command} . --json"));
+                let (status, printed) = run(&folder, &format!("{command} . --json"));
                 assert!(
                     status == 2 && printed.contains(place) && printed.contains(&code),
                     "{place}{status} {printed:?}"
@@ -86,34 +71,27 @@ fn what_is_not_seen_is_refused_by_name_and_never_printed() {
                     printed.chars().all(|letter| letter == '\n' || !is_hidden(letter)),
                     "{printed:?}"
                 );
-                assert!(!bench.path("out").exists());
+                assert!(!folder.has("out"));
             }
         }
     }
     // If the name of a file, key, column or word is itself the error, it is shown without the
     // invisible characters.
-    let bench = Bench::new("arm", "A");
+    let folder = arm("arm", "A");
     for hidden in HIDDEN.iter().filter(|hidden| **hidden != "\n") {
         let (key, column) = (format!("k{hidden}k"), format!("c{hidden}c"));
-        let problem = fs::read_to_string(bench.path("problem.toml")).unwrap();
         let quoted = toml::Value::String(key).to_string();
-        fs::write(
-            bench.path("wrong.toml"),
-            problem.replace("[tool]", &format!("[tool]\n{quoted} = 1")),
-        )
-        .unwrap();
-        let table = fs::read_to_string(bench.path("rows.csv")).unwrap();
-        fs::write(
-            bench.path(&format!("{column}.csv")),
-            table.replacen("split", &format!("split,{column}"), 1),
-        )
-        .unwrap();
+        let wrong = format!("[tool]\n{quoted} = 1");
+        folder.write("wrong.toml", folder.read("problem.toml").replace("[tool]", &wrong));
+        let header = format!("split,{column}");
+        folder
+            .write(format!("{column}.csv"), folder.read("rows.csv").replacen("split", &header, 1));
         for arguments in [
             "identify wrong.toml".to_owned(),
             format!("identify . --data {column}.csv"),
             format!("identify {column}"),
         ] {
-            let (status, printed) = bench.run(&arguments);
+            let (status, printed) = run(&folder, &arguments);
             assert!(
                 status == 2 && printed.contains("error: "),
                 "{arguments:?}: {status} {printed:?}"
@@ -129,12 +107,12 @@ fn what_is_not_seen_is_refused_by_name_and_never_printed() {
 #[test]
 fn what_is_seen_is_text_and_nothing_else() {
     for name in ACTIVE {
-        let bench = Bench::new(name, name);
-        let (status, printed) = bench.run("compare . --out compared");
+        let folder = arm(name, name);
+        let (status, printed) = run(&folder, "compare . --out compared");
         assert!(status < 2, "{name}: {printed}");
-        let (status, printed) = bench.run("identify . --out out");
+        let (status, printed) = run(&folder, "identify . --out out");
         assert!(status < 2 && printed.contains(name), "{name}: {printed}");
-        let report = fs::read_to_string(bench.path("out/report.md")).unwrap();
+        let report = folder.read("out/report.md");
         let left = ["](", "](http", "<script", "<!--", "`x`", "![", "https://", "www.e", "&lt;"];
         // Without its escapes, the report contains no markup from a name.
         let unescaped: String = report
@@ -149,8 +127,8 @@ fn what_is_seen_is_text_and_nothing_else() {
             assert!(!unescaped.contains(mark), "{name}: {mark} is active in\n{report}");
         }
         let mut drawn = 0;
-        for folder in ["out/figures", "compared/figures"] {
-            for entry in fs::read_dir(bench.path(folder)).unwrap() {
+        for figures in ["out/figures", "compared/figures"] {
+            for entry in fs::read_dir(folder.path(figures)).unwrap() {
                 let path = entry.unwrap().path();
                 let text = fs::read_to_string(&path).unwrap();
                 assert_eq!(ill_formed(&text), None, "{name}: {}\n{text}", path.display());
@@ -158,7 +136,7 @@ fn what_is_seen_is_text_and_nothing_else() {
             }
         }
         assert!(drawn > 3);
-        let page = fs::read_to_string(bench.path("out/report.html")).unwrap();
+        let page = folder.read("out/report.html");
         // The only scripts are the page's script and its data.
         assert!(page.matches("<script").count() == 2 && !page.contains("<!-- x"), "{name}");
         assert_eq!(page.matches("</script>").count(), 2, "{name}");

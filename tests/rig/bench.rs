@@ -2,19 +2,12 @@
 
 use std::path::Path;
 
+use crate::common::arms::{TABLE_2, golden_problem};
 use flexcal::problem::{Effect, PoseConditions, Problem};
 use flexcal::rig::{Cause, Rig, TrueEffect};
 use nalgebra::Vector3;
 
 pub const ROOT: &str = env!("CARGO_MANIFEST_DIR");
-
-pub fn lunar_sampler() -> Problem {
-    Problem::read(&Path::new(ROOT).join("tests/golden/problem.toml")).unwrap()
-}
-
-pub fn problem(text: &str) -> Problem {
-    Problem::parse(text, Path::new("problem.toml")).unwrap()
-}
 
 /// Creates a true effect of the catalogue.
 pub fn effect(arm: &Problem, effect: Effect, values: &[f64]) -> TrueEffect {
@@ -58,16 +51,8 @@ pub fn golden(name: &str) -> Vec<Golden> {
     reader.records().map(row).collect()
 }
 
-/// Identified α \[°\], a \[m\], θ \[°\], d \[m\], β \[°\] of each joint [Chen2021, table 2].
-const TABLE_2: [[f64; 5]; 4] = [
-    [0.019, 0.0, -0.008, 0.097, 0.304],
-    [89.996, -0.002, 0.304, -0.084, 0.007],
-    [-0.001, 1.974, 0.189, -0.095, 0.0],
-    [-0.019, 1.766, -0.790, -0.092, 0.005],
-];
-
 pub fn table_2() -> Problem {
-    let mut arm = lunar_sampler();
+    let mut arm = golden_problem();
     for (joint, [alpha, a, theta, d, beta]) in arm.joints.iter_mut().zip(TABLE_2) {
         (joint.alpha, joint.theta, joint.beta) =
             (alpha.to_radians(), theta.to_radians(), beta.to_radians());

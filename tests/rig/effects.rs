@@ -4,13 +4,14 @@ use flexcal::problem::{Effect, PoseConditions, Problem};
 use flexcal::rig::{Cause, Shape, TrueEffect};
 use nalgebra::Vector3;
 
-use super::bench::{effect, golden, lunar_sampler, position};
+use super::bench::{effect, golden, position};
+use super::common::arms::golden_problem;
 use super::common::effects::{Strong, of_lunar_sampler};
 
 /// Returns the lunar sampler as FORMAT declares it, with a rigid link, and a pose in which every
 /// effect acts.
 fn bench() -> (Problem, PoseConditions) {
-    let mut arm = lunar_sampler();
+    let mut arm = golden_problem();
     arm.joints[1].a = 0.3;
     let mut conditions = golden("equilibrium.csv").swap_remove(0).conditions;
     conditions.temperature = Some(28.0);

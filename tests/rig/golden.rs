@@ -5,7 +5,8 @@ use std::time::Instant;
 use flexcal::problem::Problem;
 use flexcal::rig::Rig;
 
-use super::bench::{Golden, golden, lunar_sampler, position, stiffer, table_2};
+use super::bench::{Golden, golden, position, stiffer, table_2};
+use super::common::arms::golden_problem;
 
 /// Returns the largest distance [mm] from vector `k` of the rows.
 fn worst(arm: &Problem, rows: &[Golden], k: usize) -> f64 {
@@ -17,7 +18,7 @@ fn worst(arm: &Problem, rows: &[Golden], k: usize) -> f64 {
 #[test]
 fn rigid_positions_agree_to_a_nanometre() {
     let rows = golden("rigid.csv");
-    let nominal = worst(&stiffer(lunar_sampler(), 0.0, 0.0, 0.0), &rows, 0);
+    let nominal = worst(&stiffer(golden_problem(), 0.0, 0.0, 0.0), &rows, 0);
     let table_2 = worst(&stiffer(table_2(), 0.0, 0.0, 0.0), &rows, 1);
     println!("rigid: nominal {nominal:.1e} mm, table 2 {table_2:.1e} mm");
     assert!(nominal < 1e-6 && table_2 < 1e-6);
@@ -26,7 +27,7 @@ fn rigid_positions_agree_to_a_nanometre() {
 #[test]
 fn small_displacements_agree_for_each_part() {
     let rows = golden("first_order.csv");
-    let straight = stiffer(lunar_sampler(), 0.0, 0.0, 0.0);
+    let straight = stiffer(golden_problem(), 0.0, 0.0, 0.0);
     // Deflections ten thousand times smaller are in the linear limit; scaled back, eleven digits
     // remain.
     let scale = 1e4;
@@ -37,7 +38,7 @@ fn small_displacements_agree_for_each_part() {
         ("all", [scale, scale, scale]),
     ];
     for (k, (name, [joints, link_a, link_b])) in parts.into_iter().enumerate() {
-        let arm = stiffer(lunar_sampler(), joints, link_a, link_b);
+        let arm = stiffer(golden_problem(), joints, link_a, link_b);
         let mut worst = 0.0_f64;
         for row in &rows {
             let at = |arm| position(arm, Vec::new(), &row.conditions);
@@ -51,7 +52,7 @@ fn small_displacements_agree_for_each_part() {
 #[test]
 fn equilibrium_positions_agree() {
     let rows = golden("equilibrium.csv");
-    let (nominal, table_2) = (worst(&lunar_sampler(), &rows, 0), worst(&table_2(), &rows, 1));
+    let (nominal, table_2) = (worst(&golden_problem(), &rows, 0), worst(&table_2(), &rows, 1));
     println!("equilibrium: nominal {nominal:.5} mm, table 2 {table_2:.5} mm");
     assert!(nominal < 0.005 && table_2 < 0.005, "{nominal} and {table_2} mm");
 }
@@ -60,7 +61,7 @@ fn equilibrium_positions_agree() {
 fn the_error_falls_with_the_square_of_the_number_of_segments() {
     let rows = golden("equilibrium.csv");
     let at = |segments: usize, row: &Golden| {
-        Rig::new(lunar_sampler(), Vec::new())
+        Rig::new(golden_problem(), Vec::new())
             .with_segments(segments)
             .position(&row.conditions)
             .unwrap()
@@ -80,7 +81,7 @@ fn the_error_falls_with_the_square_of_the_number_of_segments() {
 
 #[test]
 fn a_pose_takes_a_fraction_of_a_millisecond() {
-    let (arm, rows) = (lunar_sampler(), golden("equilibrium.csv"));
+    let (arm, rows) = (golden_problem(), golden("equilibrium.csv"));
     let rig = Rig::new(arm, Vec::new());
     let begun = Instant::now();
     for row in &rows {

@@ -3,7 +3,8 @@
 use flexcal::problem::{Effect, FreeLength, PoseConditions, Problem};
 use nalgebra::Vector3;
 
-use super::bench::{effect, position, problem};
+use super::bench::{effect, position};
+use super::common::arms::parse;
 
 const G: f64 = 9.80665;
 /// Length [m], EI and GJ [N·m²], EA [N] of the link.
@@ -14,7 +15,7 @@ const EA: f64 = 1.0e7;
 
 /// Returns a horizontal cantilever along x whose end is measured; `beam` is added to its section.
 fn cantilever(a: f64, beam: &str, tool: &str) -> Problem {
-    problem(&format!(
+    parse(&format!(
         "name = 'cantilever'\n[[joint]]\na_m = {a}\n[joint.beam]\nname = 'A'\nEA_N = {EA}\nEIy_N_m2 = {EI}\n\
          EIz_N_m2 = {EI}\nGJ_N_m2 = {GJ}\n{beam}\n[tool]\n{tool}\n[data]\nreference_temperature_C = 20\n"
     ))
@@ -22,7 +23,7 @@ fn cantilever(a: f64, beam: &str, tool: &str) -> Problem {
 
 /// Returns a rigid horizontal link of 2 m behind one joint.
 fn rigid() -> Problem {
-    problem(
+    parse(
         "name = 'rigid'\n[[joint]]\nalpha_deg = 90\n[[joint]]\na_m = 2\nkind = 'fixed'\n\
          [data]\nreference_temperature_C = 20\n",
     )
@@ -90,7 +91,7 @@ fn gravity_along_it_stretches_it_by_pl_over_ea() {
 
 #[test]
 fn a_hanging_soft_joint_comes_to_rest_and_a_column_that_buckles_does_not() {
-    let mut arm = problem(
+    let mut arm = parse(
         "name = 'pendulum'\n[[joint]]\nalpha_deg = 90\ntheta_deg = -80\nstiffness_N_m_per_rad = 20\n\
          [[joint]]\na_m = 2\nkind = 'fixed'\n",
     );

@@ -7,7 +7,8 @@ use nalgebra::Vector3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::bench::{position, problem};
+use super::bench::position;
+use super::common::arms::parse;
 
 /// Different bending stiffnesses, links along −x, prismatic and fixed joints, an inclined rope,
 /// oblique gravity.
@@ -77,7 +78,7 @@ fn closed_form(problem: &Problem, set: &PoseConditions) -> Vector3<f64> {
 
 #[test]
 fn closed_forms_and_segments_agree_on_every_kind_of_arm() {
-    let arm = problem(ARM);
+    let arm = parse(ARM);
     let mut random = ChaCha8Rng::seed_from_u64(5);
     let (mut worst, mut deflection) = (0.0_f64, 0.0_f64);
     for _ in 0..40 {

@@ -1,15 +1,15 @@
 //! Simulated measurements: reproducible for a seed, valid as input, and located errors.
 
-use std::fs;
 use std::path::Path;
 
-use assert_cmd::Command;
 use flexcal::measurement::Measurements;
 use flexcal::problem::{PoseConditions, Problem};
 use flexcal::rig::{Rig, Simulation, Truth, simulate};
-use serde_json::Value;
 
-use super::bench::{ROOT, problem};
+use super::bench::ROOT;
+use super::common::arms::parse;
+use super::common::program::{Folder, assert_contains, items, number};
+use super::common::reading::try_table;
 
 fn cases() -> (Problem, Truth) {
     let folder = Path::new(ROOT).join("tests/cases");
@@ -19,11 +19,8 @@ fn cases() -> (Problem, Truth) {
 }
 
 fn read(simulation: &Simulation, problem: &Problem) -> Measurements {
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("measurements.csv");
-    fs::write(&file, simulation.csv()).unwrap();
-    let (measurements, warnings) = Measurements::read(&[file], problem).unwrap();
-    assert!(warnings.is_empty(), "{warnings:?}");
+    let (measurements, warnings) = try_table(problem, &simulation.csv()).unwrap();
+    assert_eq!(warnings, []);
     measurements
 }
 
@@ -99,7 +96,7 @@ fn noise_has_its_spread_and_deviations_are_given_or_drawn() {
 
 #[test]
 fn prismatic_and_fixed_joints_have_their_columns() {
-    let problem = problem(
+    let problem = parse(
         "name = 'gantry'\n[[joint]]\nkind = 'prismatic'\n[[joint]]\nkind = 'fixed'\nalpha_deg = 90\n\
          [[joint]]\na_m = 0.5\n[tool]\ntarget_m = [0.3, 0, 0]\n",
     );
@@ -120,91 +117,63 @@ fn prismatic_and_fixed_joints_have_their_columns() {
     assert!((row.position.z - rest.z - q - 1e-4 * side).abs() < 1e-12);
 }
 
-fn flexcal(folder: &Path, arguments: &[&str]) -> assert_cmd::assert::Assert {
-    Command::new(assert_cmd::cargo::cargo_bin!("flexcal"))
-        .current_dir(folder)
-        .args(arguments)
-        .assert()
+/// Arguments of a simulation of the lunar sampler.
+fn simulate_cases(truth: &str, poses: usize) -> String {
+    format!("simulate {ROOT}/tests/cases --truth {truth} --poses {poses} --seed 1")
 }
 
 #[test]
 fn the_command_writes_what_identify_reads() {
-    let folder = tempfile::tempdir().unwrap();
-    let cases = format!("{ROOT}/tests/cases");
-    let truth = format!("{cases}/truth.toml");
-    let arguments = ["simulate", &cases, "--truth", &truth, "--poses", "78", "--seed", "1"];
-    let printed = flexcal(folder.path(), &arguments).success().get_output().stdout.clone();
-    let printed = String::from_utf8(printed).unwrap();
-    assert!(printed.contains("78 poses: 28 to identify, 50 held out"), "{printed}");
+    let folder = Folder::new();
+    let simulate = simulate_cases(&format!("{ROOT}/tests/cases/truth.toml"), 78);
+    let run = folder.flexcal(&simulate).success();
+    assert_contains(&run.stdout, &["78 poses: 28 to identify, 50 held out"]);
     let data = "out/lunar-sampler/measurements.csv";
-    let first = fs::read(folder.path().join(data)).unwrap();
-    let again = flexcal(folder.path(), &[&arguments[..], &["--json"]].concat()).success();
-    assert_eq!(first, fs::read(folder.path().join(data)).unwrap());
-    let told: Value = serde_json::from_slice(&again.get_output().stdout).unwrap();
-    assert_eq!((&told["poses"], &told["held_out"]), (&Value::from(78), &Value::from(50)));
-    assert_eq!(told["effects"], Value::Array(Vec::new()));
-    assert!(folder.path().join("out/lunar-sampler/truth.json").exists());
-    let quiet =
-        flexcal(folder.path(), &[&arguments[..], &["--quiet", "--out", "b"]].concat()).success();
-    assert!(
-        quiet.get_output().stdout.is_empty() && folder.path().join("b/measurements.csv").exists()
-    );
+    let first = folder.read(data);
+    let told = folder.flexcal(&format!("{simulate} --json")).success().json();
+    assert_eq!(first, folder.read(data));
+    assert_eq!([&told["poses"], &told["held_out"]], [78, 50]);
+    assert!(items(&told["effects"]).is_empty() && folder.has("out/lunar-sampler/truth.json"));
+    let run = folder.flexcal(&format!("{simulate} --quiet --out b")).success();
+    assert!(run.stdout.is_empty() && folder.has("b/measurements.csv"));
 
-    let fit = flexcal(folder.path(), &["identify", &cases, "--data", data, "--json"]).success();
-    let fit: Value = serde_json::from_slice(&fit.get_output().stdout).unwrap();
-    let rms = fit["held_out"]["rms_mm"]["norm"].as_f64().unwrap();
+    let fit = folder.flexcal(&format!("identify {ROOT}/tests/cases --data {data} --json"));
+    let rms = number(&fit.success().json()["held_out"]["rms_mm"]["norm"]);
     println!("held-out rms of the fitted simulation: {rms:.4} mm (noise alone 0.0866)");
     assert!(rms < 0.14, "{rms}");
 }
 
 #[test]
 fn mistakes_leave_nothing_behind_and_name_their_place() {
-    let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("TRUTH.toml"), "[poses]\nq1_deg = [0, 1]\nq2_deg = [1, 0]\n")
-        .unwrap();
-    let cases = format!("{ROOT}/tests/cases");
-    let arguments = ["simulate", &cases, "--truth", "TRUTH.toml", "--poses", "5", "--seed", "1"];
-    let failed = flexcal(folder.path(), &arguments).code(2);
-    let message = String::from_utf8(failed.get_output().stderr.clone()).unwrap();
-    assert!(message.contains("TRUTH.toml:3: poses.q2_deg: 1 is above 0"), "{message}");
-    fs::write(folder.path().join("TRUTH.toml"), "[poses]\nq1_deg = [0, 1]\nq2_deg = 12.5\n")
-        .unwrap();
-    let failed = flexcal(folder.path(), &arguments).code(2);
-    let message = String::from_utf8(failed.get_output().stderr.clone()).unwrap();
-    assert!(
-        message.contains("TRUTH.toml:3: poses.q2_deg: ") && message.contains("write [12.5, 12.5]"),
-        "{message}"
-    );
-    assert!(!folder.path().join("out").exists());
+    let folder = Folder::new();
+    for (range, expected) in [("[1, 0]", "1 is above 0"), ("12.5", "write [12.5, 12.5]")] {
+        folder.write("TRUTH.toml", format!("[poses]\nq1_deg = [0, 1]\nq2_deg = {range}\n"));
+        let run = folder.flexcal(&simulate_cases("TRUTH.toml", 5)).code(2);
+        assert_contains(&run.stderr, &["TRUTH.toml:3: poses.q2_deg: ", expected]);
+    }
+    assert!(!folder.has("out"));
 }
 
 #[test]
 fn measurements_that_nothing_can_be_identified_from_say_so() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = Folder::new();
     let poses = "[poses]\nq1_deg = [0, 9]\nq2_deg = [0, 9]\nq3_deg = [0, 9]\nq4_deg = [0, 9]\n";
-    let cases = format!("{ROOT}/tests/cases");
-    let arguments = ["simulate", &cases, "--truth", "TRUTH.toml", "--poses", "5", "--seed", "1"];
     for (rule, expected, useful) in [
         ("identification = 5", "no row is held out", false),
         ("held_out = 0", "no row is held out", false),
         ("identification = 4", "", true),
     ] {
-        fs::write(folder.path().join("TRUTH.toml"), format!("{poses}{rule}\n")).unwrap();
-        let run = flexcal(folder.path(), &arguments).code(0);
-        let text = |bytes: &[u8]| String::from_utf8(bytes.to_vec()).unwrap();
-        let (out, err) = (text(&run.get_output().stdout), text(&run.get_output().stderr));
-        assert!(
-            out.contains("Next: flexcal identify") == useful && err.is_empty() == useful,
-            "{out}{err}"
-        );
-        assert!(err.contains(expected), "{err}");
+        folder.write("TRUTH.toml", format!("{poses}{rule}\n"));
+        let run = folder.flexcal(&simulate_cases("TRUTH.toml", 5)).success();
+        assert_eq!(run.stdout.contains("Next: flexcal identify"), useful, "{run:?}");
+        assert!(run.stderr.is_empty() == useful && run.stderr.contains(expected), "{run:?}");
     }
 }
 
 #[test]
 fn ranges_go_by_the_names_of_joints_as_columns_do() {
     let arm = "name = 'a'\n[[joint]]\nname = 'waist'\n[[joint]]\nname = 'left arm'\nkind = 'prismatic'\n               [[joint]]\nname = 'twin'\n[[joint]]\nname = 'twin'\n[[joint]]\nname = 'hoist'\n";
-    let problem = problem(arm);
+    let problem = parse(arm);
     let read =
         |text: &str| Truth::parse(&format!("[poses]\n{text}"), Path::new("TRUTH.toml"), &problem);
     let others = "q3_deg = [0, 1]\nq4_deg = [0, 1]\nq5_deg = [0, 1]";
@@ -317,7 +286,7 @@ fn every_mistake_says_where_it_is() {
 
 #[test]
 fn too_soft_an_arm_is_an_error_with_its_pose() {
-    let problem = problem(
+    let problem = parse(
         "name = 'x'\n[[joint]]\nalpha_deg = 90\nstiffness_N_m_per_rad = 1\n[tool]\ntarget_m = [1, 0, 0]\n",
     );
     let text = "[poses]\nq1_deg = [80, 80]\npayload_kg = [1e5]\n";

@@ -1,19 +1,16 @@
 //! Replicas of the paper's experiment: results, reproducibility, and agreement with docs/paper.md.
 
-use std::path::Path;
-
-use assert_cmd::Command;
 use flexcal::results::{Document as _, MisprintResult};
 use flexcal::study::{MisprintStudy, ReplicaResults, Request, Spread, replicate};
 
+use crate::common::arms::path;
+use crate::common::program::{Folder, assert_contains, run};
+use crate::common::schema;
+
 const FILE: &str = "problems/lunar-sampler/MISPRINTS.toml";
 
-fn root() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-}
-
 fn study() -> MisprintStudy {
-    match Request::read(&root().join(FILE)).unwrap() {
+    match Request::read(&path(FILE)).unwrap() {
         Request::Misprints(study) => *study,
         Request::Fits(_) => unreachable!("it says kind = \"misprints\""),
     }
@@ -40,7 +37,7 @@ fn replicas_repeat_and_tell_readings_and_stages_apart() {
     let json = |found| MisprintResult::new(&study, found).to_json();
     let again = on(3);
     assert_eq!(json(&found), json(&again));
-    super::schema::assert_valid(&MisprintResult::schema(), &json(&found));
+    schema::assert_valid(&MisprintResult::schema(), &json(&found));
     for replica in &found.replicas {
         assert!((replica.rigid.unwrap().mean.norm / study.rigid_leaves - 1.0).abs() < 1e-3);
     }
@@ -58,11 +55,9 @@ fn replicas_repeat_and_tell_readings_and_stages_apart() {
 
 #[test]
 fn mistakes_in_a_study_of_misprints_are_named() {
-    let text = std::fs::read_to_string(root().join(FILE)).unwrap();
-    let text = text.replace(
-        "\"problem.toml\"",
-        &format!("\"{}\"", root().join("problems/lunar-sampler").display()),
-    );
+    let text = std::fs::read_to_string(path(FILE)).unwrap();
+    let text = text
+        .replace("\"problem.toml\"", &format!("\"{}\"", path("problems/lunar-sampler").display()));
     let cases = [
         ("\"misprints\"", "\"mistakes\"", "kind: \"mistakes\" is none of fits, misprints"),
         ("specimens = 8", "specimens = 0", "specimens"),
@@ -74,21 +69,15 @@ fn mistakes_in_a_study_of_misprints_are_named() {
     ];
     for (from, to, expected) in cases {
         assert!(text.contains(from), "{from}");
-        let folder = tempfile::tempdir().unwrap();
-        std::fs::write(folder.path().join("STUDY.toml"), text.replacen(from, to, 1)).unwrap();
-        let mut flexcal = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
-        let assert = flexcal.current_dir(folder.path()).args(["study", "."]).assert().code(2);
-        let message = String::from_utf8_lossy(&assert.get_output().stderr).into_owned();
-        assert!(message.contains(expected), "{to}: {expected} missing in: {message}");
-        assert!(!folder.path().join("out").exists());
+        let folder = Folder::with([("STUDY.toml", &text.replacen(from, to, 1))]);
+        let run = folder.flexcal("study .").code(2);
+        assert_contains(&run.stderr, &[expected]);
+        assert!(!folder.has("out"));
     }
-    for arguments in [&["study", FILE, "--shard", "1/2"][..], &["study", "merge", FILE]] {
-        let folder = tempfile::tempdir().unwrap();
-        let out = folder.path().display().to_string();
-        let mut flexcal = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
-        let assert =
-            flexcal.current_dir(root()).args(arguments).args(["--out", &out]).assert().code(2);
-        assert!(String::from_utf8_lossy(&assert.get_output().stderr).contains("runs in one piece"));
+    let file = path(FILE);
+    for arguments in ["--shard 1/2", "merge"] {
+        let run = Folder::new().flexcal(&format!("study {arguments} {} --out out", file.display()));
+        assert_contains(&run.code(2).stderr, &["runs in one piece"]);
     }
 }
 
@@ -96,26 +85,23 @@ fn mistakes_in_a_study_of_misprints_are_named() {
 #[test]
 #[ignore = "half a minute in a release build"]
 fn the_page_on_the_paper_shows_what_the_study_prints() {
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().display().to_string();
-    let mut flexcal = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
-    let assert =
-        flexcal.current_dir(root()).args(["study", FILE, "--out", &out]).assert().success();
-    let printed = String::from_utf8(assert.get_output().stdout.clone()).unwrap();
+    let folder = Folder::new();
+    let out = folder.path("").display().to_string();
+    let printed = run(path(""), &format!("study {FILE} --out {out}")).success().stdout;
     let (printed, _) = printed.split_once("\nWritten to").unwrap();
-    let page = root().join("docs/paper.md");
+    let page = path("docs/paper.md");
     let text = std::fs::read_to_string(&page).unwrap();
     let mark = "<!-- misprints -->\n```text\n";
     let (before, after) = text.split_once(mark).unwrap();
     let (shown, after) = after.split_once("\n```").unwrap();
-    let drawn = std::fs::read_to_string(folder.path().join("figures/misprints.svg")).unwrap();
+    let drawn = folder.read("figures/misprints.svg");
     if std::env::var_os("FLEXCAL_REFILL").is_some() {
         std::fs::write(&page, format!("{before}{mark}{}\n```{after}", printed.trim_end())).unwrap();
-        std::fs::write(root().join("docs/misprints.svg"), &drawn).unwrap();
+        std::fs::write(path("docs/misprints.svg"), &drawn).unwrap();
         return;
     }
     assert_eq!(shown, printed.trim_end(), "FLEXCAL_REFILL=1 fills it anew");
     let shapes = |svg: &str| svg.replace(|c: char| c.is_ascii_digit() || c == '.', "");
-    let kept = std::fs::read_to_string(root().join("docs/misprints.svg")).unwrap();
+    let kept = std::fs::read_to_string(path("docs/misprints.svg")).unwrap();
     assert_eq!(shapes(&kept), shapes(&drawn), "FLEXCAL_REFILL=1 draws it anew");
 }

@@ -1,8 +1,6 @@
 //! Errors in URDF files: exit status 2, a located message, no output.
 
-use std::fs;
-
-use assert_cmd::Command;
+use crate::common::program::{Folder, assert_contains};
 
 const JOINT: &str =
     "<joint name=\"j\" type=\"revolute\"><parent link=\"a\"/><child link=\"b\"/></joint>";
@@ -92,21 +90,10 @@ fn mistakes_are_named_with_their_place() {
         ("roots", with(&format!("{links}<link name=\"c\"/>"), JOINT), "several links have no parent: a, c"),
         ("nothing moves", chain("type=\"fixed\"", ""), "no joint moves between \"a\" and \"b\""),
     ];
-    let folder = tempfile::tempdir().unwrap();
     for (name, text, says) in cases {
-        let (file, out) = (folder.path().join("arm.urdf"), folder.path().join("out"));
-        fs::write(&file, text).unwrap();
-        let run = Command::cargo_bin("flexcal")
-            .unwrap()
-            .arg("init")
-            .arg(&file)
-            .arg("--out")
-            .arg(&out)
-            .output()
-            .unwrap();
-        let error = String::from_utf8_lossy(&run.stderr).into_owned();
-        assert_eq!(run.status.code(), Some(2), "{name}: {error}");
-        assert!(error.contains("arm.urdf") && error.contains(says), "{name}: {error}");
-        assert!(!out.exists(), "{name}");
+        let folder = Folder::with([("arm.urdf", &text)]);
+        let run = folder.flexcal("init arm.urdf --out out").code(2);
+        assert_contains(&run.stderr, &["arm.urdf", says]);
+        assert!(!folder.has("out"), "{name}");
     }
 }

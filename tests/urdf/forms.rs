@@ -1,14 +1,13 @@
 //! Forms of joints: xyz and rpy, standard DH, followers, the base by rpy, columns by joint names.
 
-use std::path::Path;
-
-use flexcal::measurement::Measurements;
 use flexcal::problem::{PoseConditions, Problem};
 use flexcal::rig::Rig;
 use nalgebra::{DVector, Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
 use super::common::arms::parse;
 use super::tips;
+use crate::common::program::assert_contains;
+use crate::common::reading::{assert_says, problem_error, try_table};
 
 fn turn(axis: Vector3<f64>, degrees: f64) -> Isometry3<f64> {
     Isometry3::from_parts(
@@ -95,12 +94,10 @@ fn placements_and_followers_are_the_same_in_model_and_rig() {
         ("kind = 'fixed'\nmimic = { joint = 1 }", "a fixed joint cannot follow another one"),
     ] {
         let text = format!("name = 'w'\n[[joint]]\nd_m = 1\n[[joint]]\n{wrong}\n");
-        let error = Problem::parse(&text, Path::new("problem.toml")).unwrap_err().to_string();
-        assert!(error.contains(says), "{wrong}: {error}");
+        assert_says(&problem_error(&text), &[says]);
     }
     let beam = "name = 'w'\ndh = 'standard'\n[[joint]]\na_m = 1\n[joint.beam]\nname = 'A'\n";
-    let error = Problem::parse(beam, Path::new("problem.toml")).unwrap_err().to_string();
-    assert!(error.contains("write the table in the modified form"), "{error}");
+    assert_says(&problem_error(beam), &["write the table in the modified form"]);
 }
 
 #[test]
@@ -109,11 +106,8 @@ fn columns_may_be_called_by_the_names_of_joints() {
         "name = 'named'\n[[joint]]\nname = 'shoulder_pan_joint'\n[[joint]]\nname = 'x'\nkind = 'prismatic'\n[[joint]]\nname = 'b c'\n\
          [[joint]]\nkind = 'fixed'\nname = 'mount'\n[data]\nheld_out = { fraction = 0.5 }\n",
     );
-    let folder = tempfile::tempdir().unwrap();
     let read = |header: &str| {
-        let file = folder.path().join("m.csv");
-        std::fs::write(&file, format!("{header}\n180,2,3,4,5,6\n")).unwrap();
-        Measurements::read(&[file], &problem)
+        try_table(&problem, &format!("{header}\n180,2,3,4,5,6\n"))
             .map(|(rows, warnings)| (rows.configurations, warnings.len()))
             .map_err(|error| error.to_string())
     };
@@ -139,7 +133,6 @@ fn columns_may_be_called_by_the_names_of_joints() {
             "add q1_deg or q1_rad or shoulder_pan_joint_deg or shoulder_pan_joint_rad (is it column shoulder_pan_joint_dg?)",
         ),
     ] {
-        let error = read(header).unwrap_err();
-        assert!(error.contains(says), "{header}: {error}");
+        assert_contains(&read(header).unwrap_err(), &[says]);
     }
 }

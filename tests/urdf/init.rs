@@ -3,11 +3,12 @@
 use std::path::Path;
 
 use flexcal::problem::JointKind::{self, Fixed, Prismatic, Revolute};
-use flexcal::problem::{Mimic, Problem};
+use flexcal::problem::Mimic;
 use flexcal::urdf::{Chain, Robot, describe};
 use nalgebra::{DVector, Vector3};
 
 use super::{apart, problem_of, robot, tips};
+use crate::common::arms::parse;
 
 /// Coordinates of rail, shoulder, elbow and wrist \[m, rad\], then origin, x and z axis of the link
 /// `tool` in `world`, computed by pinocchio 3 with π/2 for 1.5708.
@@ -150,8 +151,7 @@ fn a_problem_frees_what_positions_tell_apart_and_says_what_was_rounded() {
     let text = description.text;
     let held = |name: &str| text.contains(&format!("\"{name}\" = {{ fixed = true }}"));
     assert!(held("joint*.beta") && text.contains("base = \"base\""), "{text}");
-    let problem =
-        flexcal::problem::Problem::parse(&text, std::path::Path::new("problem.toml")).unwrap();
+    let problem = parse(&text);
     let q = vec![vec![0.0; problem.joints.len()]];
     let model = super::common::made::model_of(
         &problem,
@@ -243,7 +243,7 @@ const FOLLOWERS: &str = r#"<robot name="followers">
 fn a_joint_follows_the_nearest_joint_of_the_chain() {
     let robot = Robot::parse(FOLLOWERS, Path::new("followers.urdf")).unwrap();
     let described = describe(&Chain::new(&robot, None, Some("tip")).unwrap()).unwrap();
-    let mut problem = Problem::parse(&described.text, Path::new("problem.toml")).unwrap();
+    let mut problem = parse(&described.text);
     problem.parameters.clear();
     let names: Vec<&str> = problem.joints.iter().map(|joint| joint.name.as_str()).collect();
     assert_eq!(names, ["mounting frame", "mounting", "tip", "tip frame"]);

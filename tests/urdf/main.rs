@@ -14,11 +14,11 @@ mod forms;
 mod init;
 mod public;
 
-use std::path::Path;
-
+use crate::common::arms::parse;
 use common::made::model_of;
+use common::reading::read_dataset;
 use flexcal::fit::{Options, Placement, identify};
-use flexcal::measurement::{Dataset, Measurements};
+use flexcal::measurement::Dataset;
 use flexcal::problem::Problem;
 use flexcal::rig::{Truth, simulate};
 use flexcal::urdf::{Chain, Robot, describe};
@@ -31,7 +31,7 @@ pub(crate) fn robot(name: &str) -> Robot {
 
 /// Returns the problem of a chain.
 pub(crate) fn problem_of(chain: &Chain) -> Problem {
-    Problem::parse(&describe(chain).unwrap().text, Path::new("problem.toml")).unwrap()
+    parse(&describe(chain).unwrap().text)
 }
 
 /// Returns origin, x and z axis of the last frame for given configurations, with the parameters at
@@ -68,11 +68,7 @@ fn the_gallery_runs() {
     for arm in ["panda", "ur10-urdf", "scara", "gantry"] {
         let problem = Problem::read(&common::arms::path("problems").join(arm)).unwrap();
         let truth = Truth::read(&common::arms::path("problems").join(arm), &problem).unwrap();
-        let folder = tempfile::tempdir().unwrap();
-        let file = folder.path().join("measurements.csv");
-        std::fs::write(&file, simulate(&problem, &truth, 80, 1).unwrap().csv()).unwrap();
-        let rows = Measurements::read(&[file], &problem).unwrap().0;
-        let data = Dataset::from_measurements(&problem, rows).unwrap();
+        let data = read_dataset(&problem, &simulate(&problem, &truth, 80, 1).unwrap().csv());
         let fit = identify(&problem, &data, &Options::default()).unwrap();
         assert!(fit.is_trusted(), "{arm}");
         assert!(fit.fitted.held_out.mean.norm < 0.6 * fit.registered.held_out.mean.norm, "{arm}");

@@ -1,13 +1,14 @@
 //! Errors of whole problems, and unreadable files.
 
-use std::fs;
 use std::path::PathBuf;
 
 use flexcal::measurement::Measurements;
 use flexcal::problem::Problem;
-use tempfile::TempDir;
 
 use super::reading::{ARM, check, problem};
+use crate::common::arms::parse;
+use crate::common::program::Folder;
+use crate::common::reading::{problem_error, read_tables};
 
 #[test]
 fn whole_problems() {
@@ -30,18 +31,18 @@ fn whole_problems() {
         ),
     ];
     for (text, words) in mistakes {
-        check(&problem(text).expect_err(text), text, words);
+        check(&problem_error(text), text, words);
     }
 }
 
 #[test]
 fn files_that_cannot_be_read() {
-    let folder = TempDir::new().unwrap();
-    let error = Problem::read(folder.path()).unwrap_err();
+    let folder = Folder::new();
+    let error = Problem::read(&folder.path("")).unwrap_err();
     check(&error, "no problem.toml", &["problem.toml: no such file"]);
-    let file = folder.path().join("elsewhere.toml");
+    let file = folder.path("elsewhere.toml");
     check(&Problem::read(&file).unwrap_err(), "no file", &["elsewhere.toml: no such file"]);
-    fs::write(&file, b"name = 'arm'\ntitle = '\xff'\n").unwrap();
+    folder.write("elsewhere.toml", b"name = 'arm'\ntitle = '\xff'\n");
     check(&Problem::read(&file).unwrap_err(), "binary", &["elsewhere.toml:2: not UTF-8"]);
 
     let read = |text: &str| {
@@ -61,33 +62,18 @@ fn files_that_cannot_be_read() {
     let other = PathBuf::from("other.csv");
     let error = Measurements::read(std::slice::from_ref(&other), &problem).unwrap_err();
     check(&error, "missing file", &["other.csv: no such file"]);
-    let error = Measurements::read(&[folder.path().to_owned()], &problem).unwrap_err();
+    let error = Measurements::read(&[folder.path("")], &problem).unwrap_err();
     check(&error, "a folder", &["cannot be read"]);
 }
 
 #[test]
 fn files_that_differ() {
-    let folder = TempDir::new().unwrap();
-    let files = ["1.csv", "2.csv"].map(|name| folder.path().join(name));
-    let problem = problem(ARM).unwrap();
+    let problem = parse(ARM);
     let read = |first: &str, second: &str| {
-        fs::write(
-            &files[0],
-            format!(
-                "q1_deg,x_m,y_m,z_m{first}\n0,0,0,0{}\n",
-                if first.is_empty() { "" } else { ",1" }
-            ),
-        )
-        .unwrap();
-        fs::write(
-            &files[1],
-            format!(
-                "q1_rad,z_m,y_m,x_m{second}\n0,0,0,0{}\n",
-                if second.is_empty() { "" } else { ",1" }
-            ),
-        )
-        .unwrap();
-        Measurements::read(&files, &problem)
+        let cell = |column: &str| if column.is_empty() { "" } else { ",1" };
+        let first = format!("q1_deg,x_m,y_m,z_m{first}\n0,0,0,0{}\n", cell(first));
+        let second = format!("q1_rad,z_m,y_m,x_m{second}\n0,0,0,0{}\n", cell(second));
+        read_tables(&problem, &[("1.csv", first), ("2.csv", second)])
     };
     check(
         &read("", ",session").unwrap_err(),
@@ -100,20 +86,19 @@ fn files_that_differ() {
         &["2.csv:1: column hoist_N: ", "1.csv has this column, this file does not"],
     );
     assert!(read("", "").is_ok() && read(",pose", "").is_ok() && read(",note", "").is_ok());
-    let twice = [files[0].clone(), files[0].clone()];
+    let text = format!("{ARM}\n[data]\nfiles = [\"1.csv\", \"./1.csv\"]\n");
+    let table = "q1_deg,x_m,y_m,z_m\n0,0,0,0\n";
+    let folder = Folder::with([("1.csv", table), ("problem.toml", &text)]);
+    let twice = [folder.path("1.csv"), folder.path("1.csv")];
     check(
         &Measurements::read(&twice, &problem).unwrap_err(),
         "twice",
         &["1.csv: named twice on the command line"],
     );
-    let path = folder.path().join("problem.toml");
-    fs::write(&path, format!("{ARM}\n[data]\nfiles = [\"1.csv\", \"./1.csv\"]\n")).unwrap();
-    let line = fs::read_to_string(&path).unwrap().lines().count();
-    let named = Problem::read(&path).unwrap();
-    let error = Measurements::read(&named.data.files, &named).unwrap_err();
+    let named = Problem::read(&folder.path("problem.toml")).unwrap();
     check(
-        &error,
+        &Measurements::read(&named.data.files, &named).unwrap_err(),
         "twice in the problem",
-        &[&format!("problem.toml:{line}: data.files: "), "1.csv is named twice"],
+        &[&format!("problem.toml:{}: data.files: ", text.lines().count()), "1.csv is named twice"],
     );
 }

@@ -1,12 +1,13 @@
 //! Shared functions of the input tests.
 
-use std::fs;
 use std::path::Path;
 
 use flexcal::error::InputError;
-use flexcal::measurement::{Measurements, Split};
+use flexcal::measurement::Split;
 use flexcal::problem::Problem;
-use tempfile::TempDir;
+
+use crate::common::program::assert_contains;
+use crate::common::reading::{problem_error, read_tables};
 
 pub const ARM: &str = "name = 'arm'\n[[joint]]\n";
 
@@ -18,27 +19,22 @@ pub fn problem(text: &str) -> Result<Problem, InputError> {
 pub fn check(error: &InputError, mistake: &str, words: &[&str]) {
     let message = error.to_string();
     assert!(!message.contains('\n'), "{mistake}: {message}");
-    for word in words {
-        assert!(message.contains(word), "{mistake}: no `{word}` in: {message}");
-    }
+    assert_contains(&message, words);
 }
 
 /// Asserts that each piece of text, placed after the first joint, is an error whose message
 /// contains the words.
 pub fn check_problems(mistakes: &[(&str, &[&str])]) {
     for (text, words) in mistakes {
-        let error = problem(&format!("{ARM}{text}\n")).expect_err(text);
+        let error = problem_error(&format!("{ARM}{text}\n"));
         check(&error, text, &["problem.toml:"]);
         check(&error, text, words);
     }
 }
 
-/// Reads one table from a file and splits its rows.
+/// Reads one table and splits its rows.
 pub fn table(problem_text: &str, table: &[u8]) -> Result<Split, InputError> {
-    let folder = TempDir::new().unwrap();
-    let file = folder.path().join("rows.csv");
-    fs::write(&file, table).unwrap();
     let problem = problem(problem_text)?;
-    let (measurements, _) = Measurements::read(&[file], &problem)?;
+    let (measurements, _) = read_tables(&problem, &[("rows.csv", table)])?;
     Split::new(&problem, &measurements)
 }
