@@ -2,7 +2,7 @@
 
 #![expect(clippy::unwrap_used, reason = "a test that fails may panic")]
 
-use flexcal::fit::Placement;
+use flexcal::fit::{Identification, Options, Placement, identify};
 use flexcal::measurement::{Dataset, Labels, Measurements, Split};
 use flexcal::model::Model;
 use flexcal::problem::{JointKind, Problem};
@@ -11,6 +11,8 @@ use nalgebra::{DVector, Vector3};
 use rand::RngExt as _;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, StandardNormal};
+
+use super::arms::{measured, path};
 
 /// Returns `count` configurations with angles within ±`reach` [rad] and offsets within ±0.3 m,
 /// without positions.
@@ -134,4 +136,18 @@ pub fn csv(problem: &Problem, Dataset { measurements: rows, split }: &Dataset) -
 /// Returns the rows with the split of [`split_at`].
 pub fn divided(count: usize, measurements: &Measurements) -> Dataset {
     Dataset::new(measurements.clone(), split_at(count, measurements))
+}
+
+/// Reads the lunar sampler of `tests/cases` and the measurements of one case.
+pub fn lunar_case(file: &str) -> (Problem, Dataset) {
+    let problem = Problem::read(&path("tests/cases")).unwrap();
+    let rows = measured(&problem, &[&format!("tests/cases/{file}")]);
+    let data = Dataset::from_measurements(&problem, rows).unwrap();
+    (problem, data)
+}
+
+/// Identifies with the default options.
+#[track_caller]
+pub fn fit(problem: &Problem, data: &Dataset) -> Identification {
+    identify(problem, data, &Options::default()).unwrap()
 }

@@ -5,6 +5,7 @@
 pub mod arms;
 pub mod bounded;
 pub mod effects;
+pub mod golden;
 pub mod made;
 pub mod program;
 pub mod reading;

@@ -2,8 +2,8 @@
 //! sessions, gross errors without priors, and targets counted as poses.
 
 use crate::common::arms::parse;
-use crate::common::made::{at_random, divided, draw, labels, measure, model_of};
-use flexcal::fit::{FindingCode, Identification, Misreading, Options, identify};
+use crate::common::made::{at_random, divided, draw, fit, labels, measure, model_of};
+use flexcal::fit::{FindingCode, Misreading};
 use flexcal::measurement::{CommandColumn, Dataset};
 use flexcal::problem::{Problem, Robust, RobustLoss};
 use flexcal::quantity::Unit;
@@ -38,10 +38,6 @@ pub fn measured(problem: &Problem, seed: u64) -> Dataset {
     let truth = draw(&model_of(problem, &rows), size, &mut rng);
     measure(problem, &mut rows, &truth, SIGMA, &mut rng);
     divided(60, &rows)
-}
-
-fn fit(problem: &Problem, data: &Dataset) -> Identification {
-    identify(problem, data, &Options::default()).unwrap()
 }
 
 #[test]

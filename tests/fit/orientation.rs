@@ -4,6 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use crate::common::arms::{parse, path};
+use crate::common::made::fit;
 use crate::common::reading::try_poses;
 use flexcal::fit::{
     Identification, Options, Placement, compensate, identify, seen_from_base, waypoints,
@@ -42,10 +43,6 @@ fn rig(problem: &Problem, poses: usize, seed: u64, more: &str) -> (Simulation, D
         Dataset::from_measurements(problem, try_poses(problem, &simulation.csv()).unwrap().0)
             .unwrap();
     (simulation, data)
-}
-
-fn fit(problem: &Problem, data: &Dataset) -> Identification {
-    identify(problem, data, &Options::default()).unwrap()
 }
 
 #[test]

@@ -1,24 +1,15 @@
 //! Gross errors in the data of the lunar sampler, with and without a robust loss.
 
-use std::path::{Path, PathBuf};
-
 use flexcal::fit::{FindingCode, Identification, Options, identify};
-use flexcal::measurement::{Dataset, Measurements};
+use flexcal::measurement::Dataset;
 use flexcal::problem::{Effect, Problem, Robust, RobustLoss};
 use flexcal::select::{Verdict, close};
 use nalgebra::Vector3;
 
+use crate::common::made::lunar_case;
+
 /// Length of a gross error [m].
 const GROSS: f64 = 5e-3;
-
-fn lunar(case: &str) -> (Problem, Dataset) {
-    let cases = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases");
-    let problem = Problem::read(&cases).unwrap();
-    let files: [PathBuf; 1] = [cases.join(case)];
-    let (measurements, _) = Measurements::read(&files, &problem).unwrap();
-    let data = Dataset::from_measurements(&problem, measurements).unwrap();
-    (problem, data)
-}
 
 /// Moves every 33rd identification row by 5 mm in different directions; returns these rows.
 fn spoil(Dataset { measurements, split }: &mut Dataset) -> Vec<usize> {
@@ -37,7 +28,7 @@ fn rows(result: &Identification) -> Vec<usize> {
 
 #[test]
 fn a_robust_loss_keeps_gross_errors_from_ruling_the_fit() {
-    let (mut problem, mut data) = lunar("h-none-large.csv");
+    let (mut problem, mut data) = lunar_case("h-none-large.csv");
     assert_eq!(data.split.identification.len(), 200);
     let clean = identify(&problem, &data, &Options::default()).unwrap();
     assert!(clean.outliers.is_empty(), "{:?}", clean.outliers);
@@ -88,7 +79,7 @@ fn a_robust_loss_keeps_gross_errors_from_ruling_the_fit() {
 
 #[test]
 fn a_robust_loss_costs_little_on_clean_data() {
-    let (mut problem, data) = lunar("h-none-large.csv");
+    let (mut problem, data) = lunar_case("h-none-large.csv");
     let squares = identify(&problem, &data, &Options::default()).unwrap();
     problem.robust = Some(Robust { loss: RobustLoss::Huber, threshold: Some(1e3) });
     let wide = identify(&problem, &data, &Options::default()).unwrap();
@@ -101,7 +92,7 @@ fn a_robust_loss_costs_little_on_clean_data() {
 
 #[test]
 fn gross_errors_hide_no_effect_from_the_loop() {
-    let (mut problem, mut data) = lunar("b-joint-harmonic.csv");
+    let (mut problem, mut data) = lunar_case("b-joint-harmonic.csv");
     for (row, along) in [
         (data.split.identification[5], Vector3::x()),
         (data.split.identification[19], Vector3::z()),
@@ -127,7 +118,7 @@ fn gross_errors_hide_no_effect_from_the_loop() {
 
 #[test]
 fn rows_that_a_cause_selects_are_not_passed_over_as_gross_errors() {
-    let (mut problem, mut data) = lunar("h-none-large.csv");
+    let (mut problem, mut data) = lunar_case("h-none-large.csv");
     problem.robust = Some(Robust { loss: RobustLoss::L1, threshold: None });
     // The station moves by 2 mm before the last quarter of the rows.
     let late = data.measurements.len() * 3 / 4;

@@ -1,7 +1,8 @@
 //! Tests that a wrongly declared σ has no influence: priors and data are weighted by the actual
 //! scatter.
 
-use crate::common::arms::{measured, parse, path};
+use crate::common::arms::{parse, path};
+use crate::common::made::lunar_case;
 use flexcal::fit::{Identification, Options, identify};
 use flexcal::measurement::{Dataset, Split};
 use flexcal::problem::Problem;
@@ -11,10 +12,8 @@ use flexcal::select::{Verdict, close};
 
 /// Reads the lunar sampler with another declared σ [m], and the measurements of a case.
 fn case(name: &str, sigma: f64) -> (Problem, Dataset) {
-    let mut problem = Problem::read(&path("tests/cases/problem.toml")).unwrap();
+    let (mut problem, data) = lunar_case(&format!("{name}.csv"));
     problem.data.position_sigma = Some(sigma);
-    let rows = measured(&problem, &[&format!("tests/cases/{name}.csv")]);
-    let data = Dataset::from_measurements(&problem, rows).unwrap();
     (problem, data)
 }
 

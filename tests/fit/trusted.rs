@@ -1,7 +1,7 @@
 //! Fits that the data refute are not passed on: bounds along unidentifiable directions, priors and
 //! noise that the data contradict, held-out rows, orientations, planar arms, and reversed joints.
 
-use flexcal::fit::{FindingCode, Identification, Misreading, Options, identify};
+use flexcal::fit::{FindingCode, Misreading};
 use flexcal::measurement::Dataset;
 use flexcal::model::PoseResiduals;
 use flexcal::problem::Problem;
@@ -10,12 +10,8 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use crate::common::arms::parse;
-use crate::common::made::{at_random, divided, measure, model_of};
+use crate::common::made::{at_random, divided, fit, measure, model_of};
 use crate::judged::{PRIORS, SIGMA, measured, text};
-
-fn fit(problem: &Problem, data: &Dataset) -> Identification {
-    identify(problem, data, &Options::default()).unwrap()
-}
 
 /// Simulates noisy poses of the arm with these deviations, the first `fitted` for identification.
 fn simulated(problem: &Problem, truth: &[(&str, f64)], poses: [usize; 2], seed: u64) -> Dataset {

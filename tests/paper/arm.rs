@@ -4,42 +4,11 @@ use flexcal::least_squares::jacobian;
 use flexcal::model::parameter::Parameter;
 use flexcal::model::{Model, Pose, PoseResiduals};
 use flexcal::paper::{EndPoint, Mdh, Parameters, Reading};
-use flexcal::problem::{Equilibrium, Freedom, Observation, PoseView, Problem, Quantities};
+use flexcal::problem::{Equilibrium, Freedom, Observation, Problem, Quantities};
 use nalgebra::{DMatrix, DVector, Vector3};
 
-use crate::common::arms::{ODD, TABLE_2, golden, golden_problem, parse, without_elasticity};
-
-/// Row of `tests/golden`: values in m, in groups of three.
-pub struct Row {
-    pub q: Vec<f64>,
-    pub payload: f64,
-    pub hoist: f64,
-    pub values: Vec<Vector3<f64>>,
-}
-
-impl Row {
-    pub fn setup(&self) -> PoseView<'_> {
-        PoseView {
-            payload: Some(&self.payload),
-            hoist: Some(&self.hoist),
-            ..PoseView::from_configuration(&self.q)
-        }
-    }
-}
-
-pub fn rows(name: &str) -> Vec<Row> {
-    let mut reader = csv::Reader::from_path(golden(name)).unwrap();
-    let row = |record: csv::StringRecord| {
-        let v: Vec<f64> = record.iter().map(|cell| cell.parse().unwrap()).collect();
-        Row {
-            q: v[..4].iter().map(|q| q.to_radians()).collect(),
-            payload: v[4],
-            hoist: v[5],
-            values: v[6..].chunks(3).map(|v| Vector3::new(v[0], v[1], v[2]) * 1e-3).collect(),
-        }
-    };
-    reader.records().map(|record| row(record.unwrap())).collect()
-}
+use crate::common::arms::{ODD, TABLE_2, golden_problem, parse, without_elasticity};
+use crate::common::golden::{GoldenRow, golden_rows};
 
 /// Returns the lunar sampler with loads on the rigid arm; every parameter of the arm is free
 /// without prior.
@@ -72,8 +41,8 @@ pub fn rigid(problem: Problem) -> Problem {
 }
 
 /// Returns a configuration of the odd arm for each of the sampler's.
-pub fn odd_rows(name: &str) -> Vec<Row> {
-    let mut rows = rows(name);
+pub fn odd_rows(name: &str) -> Vec<GoldenRow> {
+    let mut rows = golden_rows(name);
     for row in &mut rows {
         let [a, b, c, d] = row.q[..] else { continue };
         row.q = vec![a, 0.0, b, 0.2 * c, d];
@@ -112,7 +81,7 @@ pub fn both(problem: &Problem) -> [Parameters; 2] {
 pub fn end(
     problem: &Problem,
     parameters: &Parameters,
-    row: &Row,
+    row: &GoldenRow,
     reading: impl Into<Reading>,
 ) -> EndPoint {
     EndPoint::new(problem, parameters, &row.setup(), &reading.into())
@@ -123,7 +92,7 @@ pub fn model(problem: &Problem) -> Model {
 }
 
 /// Returns ∂(position)/∂x of one pose by dual numbers, shape = (3, parameters of the model).
-pub fn dual_jacobian(model: &Model, row: &Row, x: &DVector<f64>) -> DMatrix<f64> {
+pub fn dual_jacobian(model: &Model, row: &GoldenRow, x: &DVector<f64>) -> DMatrix<f64> {
     let pose = Pose {
         setup: row.setup(),
         base: 0,

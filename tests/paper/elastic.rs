@@ -7,7 +7,8 @@ use flexcal::paper::{
 };
 use nalgebra::{DVector, Matrix4, Vector6};
 
-use super::arm::{both, dual_jacobian, end, model, odd_problem, odd_rows, problem, rows};
+use super::arm::{both, dual_jacobian, end, model, odd_problem, odd_rows, problem};
+use crate::common::golden::golden_rows;
 
 fn near(a: f64, b: f64) {
     assert!((a - b).abs() <= 1e-12 * (1.0 + b.abs()), "{a} {b}");
@@ -18,7 +19,7 @@ fn link_b_of_eq_3_to_5_from_forces_resolved_by_hand() {
     let problem = problem();
     let parameters = Parameters::nominal(&problem);
     let (g, payload) = (9.80665, 0.7);
-    let row = &rows("rigid.csv")[0];
+    let row = &golden_rows("rigid.csv")[0];
     let setup = flexcal::problem::PoseView { payload: Some(&payload), ..row.setup() };
     let chain = Chain::new(&problem, &parameters.geometry, setup.configuration);
     let loads = Loads::new(&problem, &chain, &setup);
@@ -68,7 +69,7 @@ fn link_b_of_eq_3_to_5_from_forces_resolved_by_hand() {
 fn link_a_of_eq_6_and_7_is_eq_4_without_loads_in_between() {
     let problem = problem();
     let parameters = Parameters::nominal(&problem);
-    let row = &rows("rigid.csv")[1];
+    let row = &golden_rows("rigid.csv")[1];
     let chain = Chain::new(&problem, &parameters.geometry, &row.q);
     let loads = Loads::new(&problem, &chain, &row.setup());
     let link = loads.links[2].as_ref().unwrap();
@@ -138,7 +139,7 @@ fn differential(d: &Vector6<f64>) -> Matrix4<f64> {
 fn transfers_of_eq_12_to_26_are_the_products_of_matrices_they_stand_for() {
     let problem = problem();
     let [_, parameters] = both(&problem);
-    let row = &rows("rigid.csv")[2];
+    let row = &golden_rows("rigid.csv")[2];
     let chain = Chain::new(&problem, &parameters.geometry, &row.q);
     let d = Vector6::new(0.1, -0.2, 0.3, 0.4, -0.5, 0.6);
     let same = |carried: Vector6<f64>, product: Matrix4<f64>| {
@@ -171,7 +172,7 @@ fn transfers_of_eq_12_to_26_are_the_products_of_matrices_they_stand_for() {
 fn d_f_of_eq_27_agrees_with_the_independent_simulator_only_when_corrected() {
     let problem = problem();
     let parameters = Parameters::nominal(&problem);
-    let rows = rows("first_order.csv");
+    let rows = golden_rows("first_order.csv");
     for (form, good) in [(Form::Corrected, true), (Form::Printed, false)] {
         let mut worst = [0.0_f64; 4];
         for row in &rows {
@@ -202,7 +203,7 @@ fn elastic_columns_equal_dual_numbers_in_the_limit_of_small_deflection() {
     let sampler = problem();
     let [nominal, table_2] = both(&sampler);
     let odd = odd_problem();
-    let rows = rows("first_order.csv");
+    let rows = golden_rows("first_order.csv");
     for (problem, parameters, rows) in [
         (&sampler, nominal, &rows),
         (&sampler, table_2, &rows),

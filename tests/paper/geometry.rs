@@ -4,14 +4,15 @@ use flexcal::paper::{Chain, Form, Parameters, least_squares};
 use nalgebra::{DMatrix, DVector};
 
 use super::arm::{
-    both, dual_jacobian, end, model, odd_problem, odd_rows, place_in_e, problem, rigid, rows,
-    table_2, table_2_errors,
+    both, dual_jacobian, end, model, odd_problem, odd_rows, place_in_e, problem, rigid, table_2,
+    table_2_errors,
 };
+use crate::common::golden::golden_rows;
 
 #[test]
 fn frames_of_eq_1_and_2_meet_the_independent_simulator() {
     let problem = problem();
-    for row in rows("rigid.csv") {
+    for row in golden_rows("rigid.csv") {
         for (parameters, expected) in both(&problem).iter().zip(&row.values) {
             let position = Chain::new(&problem, &parameters.geometry, &row.q).position();
             // The file has six decimals in mm.
@@ -32,7 +33,7 @@ fn j_g_of_eq_31_to_38_equals_dual_numbers() {
         }
         problem
     };
-    let rows = rows("rigid.csv");
+    let rows = golden_rows("rigid.csv");
     for (problem, rows) in
         [(sampler, &rows), (at_table_2, &rows), (rigid(odd_problem()), &odd_rows("rigid.csv"))]
     {
@@ -58,7 +59,7 @@ fn error_of_eq_39_to_41_drops_second_order_and_the_coupling() {
     let [nominal, _] = both(&problem);
     let e = table_2_errors(&problem);
     let (mut curvature, mut coupling) = ([0.0_f64; 2], [0.0_f64; 2]);
-    for row in rows("rigid.csv") {
+    for row in golden_rows("rigid.csv") {
         let at_nominal = end(&problem, &nominal, &row, Form::Corrected);
         for (k, h) in [1.0, 0.5].into_iter().enumerate() {
             let mut moved = nominal.clone();
@@ -112,7 +113,7 @@ fn the_end_point_of_eq_2_hides_theta_4_and_beta_4() {
     let mut problem = problem();
     let columns = |problem: &flexcal::problem::Problem| {
         let nominal = Parameters::nominal(problem);
-        let rows = rows("rigid.csv");
+        let rows = golden_rows("rigid.csv");
         let largest = |place: usize| {
             let norms =
                 rows.iter().map(|row| end(problem, &nominal, row, Form::Corrected).jacobian());

@@ -9,7 +9,8 @@ use flexcal::paper::{
 use flexcal::problem::Problem;
 use nalgebra::{DVector, Vector3};
 
-use super::arm::{Row, end, model, place_in_e, problem, rows, table_2_errors};
+use super::arm::{end, model, place_in_e, problem, table_2_errors};
+use crate::common::golden::{GoldenRow, golden_rows};
 
 /// Number of fitted poses; the others are held out.
 const FITTED: usize = 28;
@@ -18,7 +19,7 @@ const FITTED: usize = 28;
 /// stiffnesses multiplied by `stiffness`.
 fn measured<'a>(
     problem: &Problem,
-    rows: &'a [Row],
+    rows: &'a [GoldenRow],
     part: f64,
     stiffness: f64,
 ) -> Vec<Measured<'a>> {
@@ -42,7 +43,7 @@ fn measured<'a>(
 /// Returns the mean distance [mm] between measured and predicted positions.
 fn mean_error(
     problem: &Problem,
-    rows: &[Row],
+    rows: &[GoldenRow],
     poses: &[Measured],
     parameters: &Parameters,
     reading: Reading,
@@ -55,7 +56,7 @@ fn mean_error(
 
 struct Case<'a> {
     problem: &'a Problem,
-    rows: &'a [Row],
+    rows: &'a [GoldenRow],
     poses: Vec<Measured<'a>>,
 }
 
@@ -80,7 +81,7 @@ fn corrected(stiffness: StiffnessStage) -> Options {
 
 #[test]
 fn stiffness_first_works_where_the_geometry_is_nominal() {
-    let (problem, rows) = (problem(), rows("equilibrium.csv"));
+    let (problem, rows) = (problem(), golden_rows("equilibrium.csv"));
     let case = Case { problem: &problem, rows: &rows, poses: measured(&problem, &rows, 0.0, 0.8) };
     assert!(case.judge(&Parameters::nominal(&problem), Reading::default()) > 7.0);
     let (found, error) = case.run(corrected(StiffnessStage::Positions));
@@ -95,7 +96,7 @@ fn stiffness_first_works_where_the_geometry_is_nominal() {
 
 #[test]
 fn geometry_is_found_with_the_stiffness_known() {
-    let (problem, rows) = (problem(), rows("equilibrium.csv"));
+    let (problem, rows) = (problem(), golden_rows("equilibrium.csv"));
     let case = Case { problem: &problem, rows: &rows, poses: measured(&problem, &rows, 1.0, 1.0) };
     assert!(case.judge(&Parameters::nominal(&problem), Reading::default()) > 40.0);
     let (found, error) = case.run(corrected(StiffnessStage::Nominal));
@@ -106,7 +107,7 @@ fn geometry_is_found_with_the_stiffness_known() {
 
 #[test]
 fn untruncated_iteration_of_all_5n_parameters_diverges_and_says_so() {
-    let (problem, rows) = (problem(), rows("equilibrium.csv"));
+    let (problem, rows) = (problem(), golden_rows("equilibrium.csv"));
     let case = Case { problem: &problem, rows: &rows, poses: measured(&problem, &rows, 1.0, 1.0) };
     let mut options = corrected(StiffnessStage::Nominal);
     options.iteration.tolerance = 0.0;
@@ -116,7 +117,7 @@ fn untruncated_iteration_of_all_5n_parameters_diverges_and_says_so() {
 
 #[test]
 fn one_sweep_takes_geometric_errors_for_deflection() {
-    let (problem, rows) = (problem(), rows("equilibrium.csv"));
+    let (problem, rows) = (problem(), golden_rows("equilibrium.csv"));
     let case = Case { problem: &problem, rows: &rows, poses: measured(&problem, &rows, 1.0, 1.0) };
     let (found, error) = case.run(corrected(StiffnessStage::Positions));
     assert!((5.0..15.0).contains(&error));
@@ -129,7 +130,7 @@ fn one_sweep_takes_geometric_errors_for_deflection() {
 
 #[test]
 fn printed_forms_find_the_arm_less_well() {
-    let (problem, rows) = (problem(), rows("equilibrium.csv"));
+    let (problem, rows) = (problem(), golden_rows("equilibrium.csv"));
     let case = Case { problem: &problem, rows: &rows, poses: measured(&problem, &rows, 1.0, 1.0) };
     let (found, printed) = case.run(Options::new(Form::Printed, StiffnessStage::Nominal));
     assert!(found.iteration.termination.converged(), "what the authors can have run");
@@ -151,16 +152,16 @@ fn printed_forms_find_the_arm_less_well() {
 
 #[test]
 fn load_differences_find_the_stiffness_beside_geometric_errors() {
-    let (problem, rows) = (problem(), rows("equilibrium.csv"));
+    let (problem, rows) = (problem(), golden_rows("equilibrium.csv"));
     // Every pose is measured again under a load that lifts the arm.
-    let lifted = |row: &Row| Row {
+    let lifted = |row: &GoldenRow| GoldenRow {
         q: row.q.clone(),
         payload: 0.0,
         hoist: row.hoist + 15.0,
         values: Vec::new(),
     };
     let again = rows.iter().map(lifted);
-    let twice: Vec<Row> = again.collect();
+    let twice: Vec<GoldenRow> = again.collect();
     let poses = measured(&problem, &rows, 1.0, 0.8);
     let both = [&poses[..FITTED], &measured(&problem, &twice[..FITTED], 1.0, 0.8)].concat();
     let (case, options) = (
@@ -180,7 +181,7 @@ fn load_differences_find_the_stiffness_beside_geometric_errors() {
 #[test]
 fn poses_that_cannot_be_used_are_named() {
     let problem = problem();
-    let rows = rows("equilibrium.csv");
+    let rows = golden_rows("equilibrium.csv");
     let poses = measured(&problem, &rows, 1.0, 1.0);
     let options = corrected(StiffnessStage::Positions);
     let few = IdentifyError::TooFewPoses { unknowns: 20, needed: 7, poses: 6 };

@@ -8,12 +8,13 @@ use flexcal::least_squares::{Fit, jacobian};
 use flexcal::model::{Model, Pose, PoseResiduals};
 use nalgebra::{DVector, Vector3};
 
-use super::arm::{Row, model, problem, rigid, rows};
+use super::arm::{model, problem, rigid};
+use crate::common::golden::{GoldenRow, golden_rows};
 
 /// Returns exact poses of the rigid arm with the geometry of table 2.
-fn poses(rows: &[Row]) -> Vec<Pose<'_>> {
+fn poses(rows: &[GoldenRow]) -> Vec<Pose<'_>> {
     let pose = |row| Pose {
-        setup: Row::setup(row),
+        setup: GoldenRow::setup(row),
         base: 0,
         target: 0,
         observation: flexcal::problem::Observation::default(),
@@ -45,7 +46,7 @@ fn rms(errors: &[Vector3<f64>]) -> f64 {
 fn converges_on_identifiable_parameters() {
     let problem = rigid(problem());
     let model = model(&problem);
-    let rows = rows("rigid.csv");
+    let rows = golden_rows("rigid.csv");
     let poses = poses(&rows);
     let unknowns = identifiable(&model, &poses);
     let n = model.parameters.len();
@@ -76,7 +77,7 @@ fn converges_on_identifiable_parameters() {
 fn with_all_redundant_columns_diverges_untruncated_and_says_so() {
     let problem = rigid(problem());
     let model = model(&problem);
-    let rows = rows("rigid.csv");
+    let rows = golden_rows("rigid.csv");
     let n = model.parameters.len();
     let fit = PoseResiduals::new(&model, poses(&rows), (0..n).collect(), DVector::zeros(n));
     let start = || DVector::zeros(n);
@@ -113,7 +114,7 @@ fn with_all_redundant_columns_diverges_untruncated_and_says_so() {
 fn gauss_newton_reports_a_singular_jacobian() {
     let problem = rigid(problem());
     let model = model(&problem);
-    let rows = rows("rigid.csv");
+    let rows = golden_rows("rigid.csv");
     // With the target on axis 4, θ₄ moves nothing.
     let mut on_axis = problem.clone();
     on_axis.tool.target.fill(0.0);
@@ -140,7 +141,7 @@ fn gauss_newton_reports_a_singular_jacobian() {
 fn starts_that_cannot_be_used_are_named() {
     let problem = rigid(problem());
     let model = model(&problem);
-    let rows = rows("rigid.csv");
+    let rows = golden_rows("rigid.csv");
     let n = model.parameters.len();
     let fit = PoseResiduals::new(&model, poses(&rows), (0..n).collect(), DVector::zeros(n));
     let settings = PseudoInverseSettings {

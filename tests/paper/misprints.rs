@@ -6,15 +6,21 @@ use flexcal::paper::published::{
 use flexcal::paper::{Form, Misprint, Parameters, Reading};
 use flexcal::problem::Problem;
 
-use super::arm::{Row, both, end, problem, rows, table_2, table_2_errors};
+use super::arm::{both, end, problem, table_2, table_2_errors};
+use crate::common::golden::{GoldenRow, golden_rows};
 
 fn largest(of: impl Iterator<Item = f64>) -> f64 {
     of.fold(0.0, f64::max)
 }
 
 /// Returns the largest change [mm] of `D_f` by one misprint over the golden poses.
-fn elastic(problem: &Problem, parameters: &Parameters, rows: &[Row], misprint: Misprint) -> f64 {
-    let size = |row: &Row| {
+fn elastic(
+    problem: &Problem,
+    parameters: &Parameters,
+    rows: &[GoldenRow],
+    misprint: Misprint,
+) -> f64 {
+    let size = |row: &GoldenRow| {
         let deflection =
             |reading: Reading| end(problem, parameters, row, reading).deflection(parameters);
         let corrected = Reading::from(Form::Corrected);
@@ -24,9 +30,9 @@ fn elastic(problem: &Problem, parameters: &Parameters, rows: &[Row], misprint: M
 }
 
 /// Returns the largest change [mm] of `D_g` at table 2 by one misprint.
-fn geometric(problem: &Problem, rows: &[Row], misprint: Misprint) -> f64 {
+fn geometric(problem: &Problem, rows: &[GoldenRow], misprint: Misprint) -> f64 {
     let (nominal, e) = (Parameters::nominal(problem), table_2_errors(problem));
-    let size = |row: &Row| {
+    let size = |row: &GoldenRow| {
         let error = |reading: Reading| end(problem, &nominal, row, reading).jacobian() * &e;
         let corrected = Reading::from(Form::Corrected);
         (error(corrected.with(misprint, Form::Printed)) - error(corrected)).norm() * 1e3
@@ -37,7 +43,7 @@ fn geometric(problem: &Problem, rows: &[Row], misprint: Misprint) -> f64 {
 #[test]
 fn misprints_of_the_elastic_formulas_have_these_sizes() {
     let problem = problem();
-    let (rows, [nominal, table_2]) = (rows("first_order.csv"), both(&problem));
+    let (rows, [nominal, table_2]) = (golden_rows("first_order.csv"), both(&problem));
     let whole = largest(rows.iter().map(|row| {
         end(&problem, &nominal, row, Form::Corrected).deflection(&nominal).norm() * 1e3
     }));
@@ -70,7 +76,7 @@ fn misprints_of_the_elastic_formulas_have_these_sizes() {
 #[test]
 fn misprints_of_the_geometric_formulas_have_these_sizes() {
     let problem = problem();
-    let rows = rows("rigid.csv");
+    let rows = golden_rows("rigid.csv");
     let (nominal, e) = (Parameters::nominal(&problem), table_2_errors(&problem));
     let whole =
         largest(rows.iter().map(|row| {
@@ -95,7 +101,7 @@ fn misprints_of_the_geometric_formulas_have_these_sizes() {
 #[test]
 fn table_1_as_printed_turns_the_arm_over() {
     let mut problem = problem();
-    let row = &rows("rigid.csv")[0];
+    let row = &golden_rows("rigid.csv")[0];
     let position = |problem: &Problem, q: &[f64]| {
         flexcal::paper::Chain::new(problem, &Parameters::nominal(problem).geometry, q).position()
     };
@@ -115,7 +121,8 @@ fn table_1_as_printed_turns_the_arm_over() {
 fn lengths_of_the_tables_are_metres() {
     let problem = problem();
     let reach: f64 = table_2().iter().map(|link| link.a).sum();
-    let largest = rows("rigid.csv").iter().map(|row| row.values[0].norm()).fold(0.0, f64::max);
+    let largest =
+        golden_rows("rigid.csv").iter().map(|row| row.values[0].norm()).fold(0.0, f64::max);
     println!("tables 1 and 2: links of {reach:.3} m, not mm; errors of 49 mm need them");
     assert!(reach > 3.7 && largest < reach + 0.7);
     // Read in mm, table 2 moves the end point by micrometres, not by the 49 mm of table 3.
@@ -127,7 +134,7 @@ fn lengths_of_the_tables_are_metres() {
     let nominal = Parameters::nominal(&small);
     let angles = table_2_errors(&problem)
         .map_with_location(|k, _, e| if [0, 2, 4].contains(&(k % 5)) { e } else { 0.0 });
-    let moved = rows("rigid.csv")
+    let moved = golden_rows("rigid.csv")
         .iter()
         .map(|row| (end(&small, &nominal, row, Form::Corrected).jacobian() * &angles).norm() * 1e3)
         .fold(0.0, f64::max);

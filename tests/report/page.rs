@@ -1,7 +1,6 @@
 //! HTML report: complete, self-contained, reproducible, with all findings.
 
-use crate::common::arms::{measured, path};
-use crate::common::made::part;
+use crate::common::made::{lunar_case, part};
 use flexcal::fit::{ErrorSummary, Options, identify};
 use flexcal::measurement::Dataset;
 use flexcal::problem::{Problem, Robust, RobustLoss};
@@ -13,13 +12,6 @@ use serde_json::Value;
 
 /// Elements without an end tag.
 const VOID: [&str; 4] = ["meta", "link", "input", "!DOCTYPE"];
-
-fn case(file: &str) -> (Problem, Dataset) {
-    let problem = Problem::read(&path("tests/cases")).unwrap();
-    let measurements = measured(&problem, &[file]);
-    let data = Dataset::from_measurements(&problem, measurements).unwrap();
-    (problem, data)
-}
 
 /// Returns the first element that is not closed in order.
 fn badly_nested(text: &str) -> Option<String> {
@@ -120,7 +112,7 @@ fn check(page: &Report) {
 
 #[test]
 fn a_closed_loop_shows_what_it_found() {
-    let (problem, mut data) = case("tests/cases/a-none.csv");
+    let (problem, mut data) = lunar_case("a-none.csv");
     for row in 0..data.measurements.len() {
         let hours = data.measurements.time[row] / 3600.0;
         data.measurements.positions[row] += Vector3::new(0.4e-3, -0.3e-3, 0.5e-3) * hours;
@@ -162,7 +154,7 @@ fn a_closed_loop_shows_what_it_found() {
 
 #[test]
 fn the_picture_holds_the_errors_that_the_tables_sum_up() {
-    let (problem, data) = case("tests/cases/a-none.csv");
+    let (problem, data) = lunar_case("a-none.csv");
     let found = identify(&problem, &data, &Options::default()).unwrap();
     let shown = PlotData::of_identification(&problem, &data, &found).unwrap();
     let close = |errors: &[Vector3<f64>], summary: &ErrorSummary| {
@@ -211,7 +203,7 @@ fn the_picture_holds_the_errors_that_the_tables_sum_up() {
 
 #[test]
 fn poses_without_an_equilibrium_are_counted_and_left_out() {
-    let (problem, data) = case("tests/cases/a-none.csv");
+    let (problem, data) = lunar_case("a-none.csv");
     let mut found = identify(&problem, &data, &Options::default()).unwrap();
     let mut shown = PlotData::of_identification(&problem, &data, &found).unwrap();
     let last = shown.stages.len() - 1;
@@ -250,7 +242,7 @@ fn poses_without_an_equilibrium_are_counted_and_left_out() {
 
 #[test]
 fn the_pose_behind_the_largest_residual_is_named_and_flattens_nothing() {
-    let (problem, mut data) = case("tests/cases/a-none.csv");
+    let (problem, mut data) = lunar_case("a-none.csv");
     let row = data.split.identification[9];
     data.measurements.positions[row] += Vector3::new(0.3, 0.0, 0.0);
     let problem =
@@ -304,7 +296,7 @@ fn the_pose_behind_the_largest_residual_is_named_and_flattens_nothing() {
 
 #[test]
 fn thousands_of_poses_make_no_large_page() {
-    let (problem, few) = case("tests/cases/h-none-large.csv");
+    let (problem, few) = lunar_case("h-none-large.csv");
     let found = identify(&problem, &few, &Options::default()).unwrap();
     let many = part(&few.measurements, (0..6600).map(|k| k % few.measurements.len()));
     let many = Dataset::from_measurements(&problem, many).unwrap();

@@ -22,35 +22,6 @@ pub fn position(
     Rig::new(arm.clone(), effects).position(conditions).unwrap()
 }
 
-/// Row of `tests/golden`: conditions, and the columns of values [mm].
-pub struct Golden {
-    pub conditions: PoseConditions,
-    pub values: Vec<f64>,
-}
-
-impl Golden {
-    /// Returns vector `k` of the row [m].
-    pub fn vector(&self, k: usize) -> Vector3<f64> {
-        Vector3::from_column_slice(&self.values[3 * k..3 * k + 3]) * 1e-3
-    }
-}
-
-pub fn golden(name: &str) -> Vec<Golden> {
-    let mut reader =
-        csv::Reader::from_path(Path::new(ROOT).join("tests/golden").join(name)).unwrap();
-    let row = |record: Result<csv::StringRecord, _>| {
-        let v: Vec<f64> = record.unwrap().iter().map(|cell| cell.parse().unwrap()).collect();
-        let conditions = PoseConditions {
-            configuration: v[..4].iter().map(|q| q.to_radians()).collect(),
-            payload: Some(v[4]),
-            hoist: Some(v[5]),
-            ..PoseConditions::default()
-        };
-        Golden { conditions, values: v[6..].to_vec() }
-    };
-    reader.records().map(row).collect()
-}
-
 pub fn table_2() -> Problem {
     let mut arm = golden_problem();
     for (joint, [alpha, a, theta, d, beta]) in arm.joints.iter_mut().zip(TABLE_2) {

@@ -4,16 +4,17 @@ use flexcal::problem::{Effect, PoseConditions, Problem};
 use flexcal::rig::{Cause, Shape, TrueEffect};
 use nalgebra::Vector3;
 
-use super::bench::{effect, golden, position};
+use super::bench::{effect, position};
 use super::common::arms::golden_problem;
 use super::common::effects::{Strong, of_lunar_sampler};
+use super::common::golden::golden_rows;
 
 /// Returns the lunar sampler as FORMAT declares it, with a rigid link, and a pose in which every
 /// effect acts.
 fn bench() -> (Problem, PoseConditions) {
     let mut arm = golden_problem();
     arm.joints[1].a = 0.3;
-    let mut conditions = golden("equilibrium.csv").swap_remove(0).conditions;
+    let mut conditions = golden_rows("equilibrium.csv")[0].conditions();
     conditions.temperature = Some(28.0);
     conditions.approach = Some(vec![1.0, -1.0, 1.0, -1.0]);
     (conditions.time, conditions.elapsed) = (900.0, 840.0);

@@ -5,19 +5,21 @@ use std::time::Instant;
 use flexcal::problem::Problem;
 use flexcal::rig::Rig;
 
-use super::bench::{Golden, golden, position, stiffer, table_2};
+use super::bench::{position, stiffer, table_2};
 use super::common::arms::golden_problem;
+use super::common::golden::{GoldenRow, golden_rows};
 
 /// Returns the largest distance [mm] from vector `k` of the rows.
-fn worst(arm: &Problem, rows: &[Golden], k: usize) -> f64 {
-    let distance =
-        |row: &Golden| (position(arm, Vec::new(), &row.conditions) - row.vector(k)).norm() * 1e3;
+fn worst(arm: &Problem, rows: &[GoldenRow], k: usize) -> f64 {
+    let distance = |row: &GoldenRow| {
+        (position(arm, Vec::new(), &row.conditions()) - row.values[k]).norm() * 1e3
+    };
     rows.iter().map(distance).fold(0.0, f64::max)
 }
 
 #[test]
 fn rigid_positions_agree_to_a_nanometre() {
-    let rows = golden("rigid.csv");
+    let rows = golden_rows("rigid.csv");
     let nominal = worst(&stiffer(golden_problem(), 0.0, 0.0, 0.0), &rows, 0);
     let table_2 = worst(&stiffer(table_2(), 0.0, 0.0, 0.0), &rows, 1);
     println!("rigid: nominal {nominal:.1e} mm, table 2 {table_2:.1e} mm");
@@ -26,7 +28,7 @@ fn rigid_positions_agree_to_a_nanometre() {
 
 #[test]
 fn small_displacements_agree_for_each_part() {
-    let rows = golden("first_order.csv");
+    let rows = golden_rows("first_order.csv");
     let straight = stiffer(golden_problem(), 0.0, 0.0, 0.0);
     // Deflections ten thousand times smaller are in the linear limit; scaled back, eleven digits
     // remain.
@@ -41,8 +43,8 @@ fn small_displacements_agree_for_each_part() {
         let arm = stiffer(golden_problem(), joints, link_a, link_b);
         let mut worst = 0.0_f64;
         for row in &rows {
-            let at = |arm| position(arm, Vec::new(), &row.conditions);
-            worst = worst.max(((at(&arm) - at(&straight)) * scale - row.vector(k)).norm() * 1e3);
+            let at = |arm| position(arm, Vec::new(), &row.conditions());
+            worst = worst.max(((at(&arm) - at(&straight)) * scale - row.values[k]).norm() * 1e3);
         }
         println!("first order, {name}: {worst:.5} mm");
         assert!(worst < 0.003, "{name}: {worst} mm");
@@ -51,7 +53,7 @@ fn small_displacements_agree_for_each_part() {
 
 #[test]
 fn equilibrium_positions_agree() {
-    let rows = golden("equilibrium.csv");
+    let rows = golden_rows("equilibrium.csv");
     let (nominal, table_2) = (worst(&golden_problem(), &rows, 0), worst(&table_2(), &rows, 1));
     println!("equilibrium: nominal {nominal:.5} mm, table 2 {table_2:.5} mm");
     assert!(nominal < 0.005 && table_2 < 0.005, "{nominal} and {table_2} mm");
@@ -59,15 +61,15 @@ fn equilibrium_positions_agree() {
 
 #[test]
 fn the_error_falls_with_the_square_of_the_number_of_segments() {
-    let rows = golden("equilibrium.csv");
-    let at = |segments: usize, row: &Golden| {
+    let rows = golden_rows("equilibrium.csv");
+    let at = |segments: usize, row: &GoldenRow| {
         Rig::new(golden_problem(), Vec::new())
             .with_segments(segments)
-            .position(&row.conditions)
+            .position(&row.conditions())
             .unwrap()
     };
     let error = |segments| {
-        let distance = |row: &Golden| (at(segments, row) - at(256, row)).norm() * 1e3;
+        let distance = |row: &GoldenRow| (at(segments, row) - at(256, row)).norm() * 1e3;
         rows[..10].iter().map(distance).fold(0.0, f64::max)
     };
     let begun = Instant::now();
@@ -81,11 +83,11 @@ fn the_error_falls_with_the_square_of_the_number_of_segments() {
 
 #[test]
 fn a_pose_takes_a_fraction_of_a_millisecond() {
-    let (arm, rows) = (golden_problem(), golden("equilibrium.csv"));
+    let (arm, rows) = (golden_problem(), golden_rows("equilibrium.csv"));
     let rig = Rig::new(arm, Vec::new());
     let begun = Instant::now();
     for row in &rows {
-        rig.position(&row.conditions).unwrap();
+        rig.position(&row.conditions()).unwrap();
     }
     let each = begun.elapsed() / u32::try_from(rows.len()).unwrap();
     println!("{each:?} a pose");

@@ -1,48 +1,11 @@
 //! Positions of an independent finite-segment simulator (`tests/golden`), which shares no formula
 //! with the closed forms.
 
-use crate::common::arms::{golden, golden_problem, table_2};
+use crate::common::arms::{golden_problem, table_2};
+use crate::common::golden::{GoldenRow, golden_rows};
 use flexcal::mechanics::{Arm, StaticState, Workspace};
-use flexcal::problem::PoseView;
 use flexcal::problem::{Equilibrium, Problem};
 use nalgebra::Vector3;
-
-struct Row {
-    q: Vec<f64>,
-    payload: f64,
-    hoist: f64,
-    values: Vec<f64>,
-}
-
-impl Row {
-    fn setup(&self) -> PoseView<'_> {
-        PoseView {
-            payload: Some(&self.payload),
-            hoist: Some(&self.hoist),
-            ..PoseView::from_configuration(&self.q)
-        }
-    }
-
-    fn vector(&self, k: usize) -> Vector3<f64> {
-        Vector3::new(self.values[3 * k], self.values[3 * k + 1], self.values[3 * k + 2]) * 1e-3
-    }
-}
-
-fn rows(name: &str) -> Vec<Row> {
-    let mut reader = csv::Reader::from_path(golden(name)).unwrap();
-    reader
-        .records()
-        .map(|record| {
-            let v: Vec<f64> = record.unwrap().iter().map(|cell| cell.parse().unwrap()).collect();
-            Row {
-                q: v[..4].iter().map(|q| q.to_radians()).collect(),
-                payload: v[4],
-                hoist: v[5],
-                values: v[6..].to_vec(),
-            }
-        })
-        .collect()
-}
 
 fn rigid(mut arm: Arm<f64>) -> Arm<f64> {
     for joint in &mut arm.joints {
@@ -52,16 +15,16 @@ fn rigid(mut arm: Arm<f64>) -> Arm<f64> {
     arm
 }
 
-fn position(arm: &Arm<f64>, problem: &Problem, row: &Row) -> Vector3<f64> {
+fn position(arm: &Arm<f64>, problem: &Problem, row: &GoldenRow) -> Vector3<f64> {
     let (mut ws, mut rest) = (Workspace::default(), StaticState::default());
     arm.equilibrate(&row.setup(), &mut ws, &mut rest).unwrap();
     rest.frame.point(&problem.tool.target)
 }
 
 /// Returns the largest distance [mm] between the arm's positions and column group `k` of the rows.
-fn worst(arm: &Arm<f64>, problem: &Problem, rows: &[Row], k: usize) -> f64 {
+fn worst(arm: &Arm<f64>, problem: &Problem, rows: &[GoldenRow], k: usize) -> f64 {
     rows.iter()
-        .map(|row| (position(arm, problem, row) - row.vector(k)).norm() * 1e3)
+        .map(|row| (position(arm, problem, row) - row.values[k]).norm() * 1e3)
         .fold(0.0, f64::max)
 }
 
@@ -69,7 +32,7 @@ fn worst(arm: &Arm<f64>, problem: &Problem, rows: &[Row], k: usize) -> f64 {
 fn rigid_positions_agree_to_a_nanometre() {
     let problem = golden_problem();
     let nominal = rigid(Arm::nominal(&problem));
-    let rows = rows("rigid.csv");
+    let rows = golden_rows("rigid.csv");
     assert!(worst(&nominal, &problem, &rows, 0) < 1e-6);
     assert!(worst(&table_2(nominal.clone()), &problem, &rows, 1) < 1e-6);
 }
@@ -78,7 +41,7 @@ fn rigid_positions_agree_to_a_nanometre() {
 fn first_order_displacements_agree_for_each_part() {
     let problem = golden_problem();
     let nominal = Arm::nominal(&problem);
-    let rows = rows("first_order.csv");
+    let rows = golden_rows("first_order.csv");
     // Deflections a million times smaller are in the linear limit; scaled back, ten digits remain.
     let soft = 1e-6;
     let parts = [
@@ -109,7 +72,7 @@ fn first_order_displacements_agree_for_each_part() {
             .map(|row| {
                 let moved =
                     (position(&arm, &problem, row) - position(&straight, &problem, row)) / soft;
-                (moved - row.vector(k)).norm() * 1e3
+                (moved - row.values[k]).norm() * 1e3
             })
             .fold(0.0, f64::max);
         println!("first order, {name}: {worst:.5} mm");
@@ -120,7 +83,7 @@ fn first_order_displacements_agree_for_each_part() {
 #[test]
 fn equilibrium_positions_agree_with_one_element_and_better_with_more() {
     let problem = golden_problem();
-    let rows = rows("equilibrium.csv");
+    let rows = golden_rows("equilibrium.csv");
     for (elements, limit) in [(1, 0.02), (2, 0.006), (8, 0.003)] {
         let mut nominal = Arm::nominal(&problem);
         nominal.beam_elements = elements;
