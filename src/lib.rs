@@ -64,6 +64,9 @@
 // The command line names this library as any other program does.
 extern crate self as flexcal;
 
+#[macro_use]
+mod words;
+
 #[deny(clippy::indexing_slicing)]
 #[doc(hidden)]
 pub mod cli;

@@ -85,8 +85,9 @@ impl Method {
         match self {
             Self::LevenbergMarquardt => "levenberg-marquardt",
             Self::Bounded(bound_method) => {
-                let choice = SolverChoice::EACH
-                    .into_iter()
+                let choice = SolverChoice::SOLVERS
+                    .iter()
+                    .copied()
                     .find(|solver| solver.within() == Some(bound_method));
                 choice.map_or("bounded", SolverChoice::as_str)
             }

@@ -105,7 +105,8 @@ pub fn sequential(arm: &Lunar) -> Vec<Row> {
     let (best, ..) = cost(&joint_options);
     let is_supported =
         |solver: &SolverChoice| matches!(solver.within(), None | Some(BoundMethod::ActiveSet));
-    let each: Vec<SolverChoice> = SolverChoice::EACH.into_iter().filter(is_supported).collect();
+    let each: Vec<SolverChoice> =
+        SolverChoice::SOLVERS.iter().copied().filter(is_supported).collect();
     let solve = |k: usize| {
         cost(&Options::default().with_strategy(Strategy::Sequential).with_solver(each[k]))
     };

@@ -128,7 +128,7 @@ impl Problem {
         progress: Option<Bound<'_, PyAny>>,
     ) -> PyResult<Identification> {
         let strategy = word("strategy", strategy, &Strategy::EACH, Strategy::as_str)?;
-        let solver = word("solver", solver, &SolverChoice::CHOICES, SolverChoice::as_str)?;
+        let solver = word("solver", solver, SolverChoice::CHOICES, SolverChoice::as_str)?;
         let (problem, data) = (Arc::clone(&self.declared), Arc::clone(&data.data));
         let declared = match remainder {
             true => None,

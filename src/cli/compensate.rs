@@ -148,5 +148,5 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     if !all && common.quiet {
         diagnostic::warn("a target is not reached; without --quiet it is named");
     }
-    Ok(if all && trusted { Outcome::Done } else { Outcome::NotTrusted })
+    Ok(Outcome::trusted(all && trusted))
 }

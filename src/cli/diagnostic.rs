@@ -74,7 +74,7 @@ pub fn judged(fit: &Identification, quiet: bool) -> Outcome {
             |caution: &&Finding| fit.is_trusted() || caution.code != FindingCode::PriorsDecide;
         fit.cautions().filter(is_shown).for_each(|caution| warn(&caution.to_string()));
     }
-    if fit.is_trusted() { Outcome::Done } else { Outcome::NotTrusted }
+    Outcome::trusted(fit.is_trusted())
 }
 
 fn show(level: Level<'_>, message: &str, location: Option<&Location>) {

@@ -189,7 +189,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     if !estimates.trusted {
         diagnostic::warn("the estimate is not to be trusted, so this file is not either");
     }
-    Ok(if estimates.trusted { Outcome::Done } else { Outcome::NotTrusted })
+    Ok(Outcome::trusted(estimates.trusted))
 }
 
 /// Names of the files of `--format c`.
@@ -231,7 +231,7 @@ fn write_c(
     if !estimate.trusted {
         diagnostic::warn("the estimate is not to be trusted, so this code is not either");
     }
-    Ok(if estimate.trusted { Outcome::Done } else { Outcome::NotTrusted })
+    Ok(Outcome::trusted(estimate.trusted))
 }
 
 /// Computes the held-out errors of the whole model and of its rigid geometry.

@@ -27,7 +27,7 @@ pub struct Arguments {
     #[command(flatten)]
     common: Common,
     /// Parameters that are fitted together
-    #[arg(long, default_value = Strategy::Joint.as_str(), value_parser = words(Strategy::EACH, Strategy::as_str, Strategy::summary))]
+    #[arg(long, default_value = Strategy::Joint.as_str(), value_parser = words(&Strategy::EACH, Strategy::as_str, Strategy::summary))]
     strategy: Strategy,
     /// Solver; auto keeps bounds and constraints if there are any
     #[arg(long, default_value = SolverChoice::Auto.as_str(), value_parser = words(SolverChoice::CHOICES, SolverChoice::as_str, SolverChoice::summary))]
@@ -43,14 +43,16 @@ pub struct Arguments {
 
 /// Returns a parser of an argument that accepts one word for each value; `summary` describes the
 /// words in help.
-fn words<T: Copy + Send + Sync + 'static, const N: usize>(
-    each: [T; N],
+fn words<T: Copy + Send + Sync + 'static>(
+    each: &'static [T],
     name: fn(T) -> &'static str,
     summary: fn(T) -> &'static str,
 ) -> impl TypedValueParser<Value = T> {
-    let values = each.map(|value| PossibleValue::new(name(value)).help(summary(value)));
+    let values =
+        each.iter().map(|&value| PossibleValue::new(name(value)).help(summary(value)));
     PossibleValuesParser::new(values).try_map(move |word| {
-        each.into_iter()
+        each.iter()
+            .copied()
             .find(|&value| name(value) == word)
             .ok_or_else(|| format!("{word} stands for nothing"))
     })

@@ -12,3 +12,10 @@ pub enum Outcome {
     /// The command was interrupted and wrote incomplete results: exit status 1.
     Interrupted,
 }
+
+impl Outcome {
+    /// Returns the outcome of a command whose result is to be trusted or not.
+    pub fn trusted(is_trusted: bool) -> Self {
+        if is_trusted { Self::Done } else { Self::NotTrusted }
+    }
+}

@@ -110,5 +110,5 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         let folder = results.folder.display();
         format!("{text}\nWritten to {folder}: {}\nNext: {next}\n", names.join(", "))
     })?;
-    Ok(if trusted { Outcome::Done } else { Outcome::NotTrusted })
+    Ok(Outcome::trusted(trusted))
 }

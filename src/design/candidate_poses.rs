@@ -182,41 +182,30 @@ impl Draft {
 /// Table under construction of poses rounded to command steps.
 struct PoseTable<'a> {
     ranges: &'a PoseRanges,
-    joints: usize,
-    /// Names of the targets, if there are several.
-    names: Vec<String>,
-    target: Vec<usize>,
-    configurations: Vec<f64>,
-    payload: Vec<f64>,
-    hoist: Vec<f64>,
-    temperature: Vec<f64>,
-    covariates: Vec<f64>,
-    approach: Vec<f64>,
+    rows: Measurements,
 }
 
 impl<'a> PoseTable<'a> {
     fn new(ranges: &'a PoseRanges, problem: &Problem) -> Self {
-        let (joints, target) = (problem.joints.len(), Vec::new());
-        let names = problem.targets.iter().map(|target| target.name.clone()).collect();
-        let (configurations, payload, hoist, temperature, covariates, approach) =
-            Default::default();
-        Self {
-            ranges,
-            joints,
-            names,
-            target,
-            configurations,
-            payload,
-            hoist,
-            temperature,
-            covariates,
-            approach,
-        }
+        let names: Vec<String> = problem.targets.iter().map(|target| target.name.clone()).collect();
+        let rows = Measurements {
+            files: vec![PathBuf::from("plan.csv")],
+            joints: problem.joints.len(),
+            payload: (!ranges.payloads.is_empty()).then(Vec::new),
+            hoist: ranges.hoist.map(|_| Vec::new()),
+            temperature: ranges.temperature.map(|_| Vec::new()),
+            approach: ranges.approach.then(Vec::new),
+            session: Labels { names: vec![String::new()], of_row: Vec::new() },
+            target: (!names.is_empty()).then_some(Labels { names, of_row: Vec::new() }),
+            ..Measurements::default()
+        };
+        Self { ranges, rows }
     }
 
     fn push(&mut self, problem: &Problem, draft: &Draft) {
+        let Self { ranges, rows } = self;
         for (k, joint) in problem.joints.iter().enumerate() {
-            let ((from, to), q) = (self.ranges.joints[k], draft.joints[k]);
+            let ((from, to), q) = (ranges.joints[k], draft.joints[k]);
             let q = match joint.command_kind() {
                 JointKind::Fixed => 0.0,
                 JointKind::Prismatic => rounded(q, LENGTH_STEP, (from, to)),
@@ -225,48 +214,45 @@ impl<'a> PoseTable<'a> {
                         .to_radians()
                 }
             };
-            self.configurations.push(q);
-            self.approach.push(match joint.command_kind() {
-                JointKind::Fixed => 0.0,
-                _ if draft.sides[k] => 1.0,
-                _ => -1.0,
+            rows.configurations.push(q);
+            rows.approach.iter_mut().for_each(|column| {
+                column.push(match joint.command_kind() {
+                    JointKind::Fixed => 0.0,
+                    _ if draft.sides[k] => 1.0,
+                    _ => -1.0,
+                });
             });
         }
-        let choices = self.ranges.payloads.len();
+        let choices = ranges.payloads.len();
         #[expect(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
             reason = "rounded down to an index"
         )]
         let choice = (draft.choice * choices as f64) as usize;
-        self.payload.extend(self.ranges.payloads.get(choice.min(choices.saturating_sub(1))));
+        let payload = ranges.payloads.get(choice.min(choices.saturating_sub(1)));
         let set = |value: Option<f64>, range: Option<(f64, f64)>| {
             Some(rounded(value?, SETTING_STEP, range?))
         };
-        self.hoist.extend(set(draft.hoist, self.ranges.hoist));
-        self.temperature.extend(set(draft.temperature, self.ranges.temperature));
-        self.covariates.extend(&draft.covariates);
-        self.target.push(draft.target);
+        for (column, value) in [
+            (&mut rows.payload, payload.copied()),
+            (&mut rows.hoist, set(draft.hoist, ranges.hoist)),
+            (&mut rows.temperature, set(draft.temperature, ranges.temperature)),
+        ] {
+            column.iter_mut().for_each(|column| column.extend(value));
+        }
+        rows.covariates.extend(&draft.covariates);
+        rows.target.iter_mut().for_each(|target| target.of_row.push(draft.target));
+        rows.session.of_row.push(0);
+        rows.positions.push(Vector3::zeros());
     }
 
     fn finish(self) -> Measurements {
-        let count = self.configurations.len() / self.joints.max(1);
+        let count = self.rows.len();
         Measurements {
-            files: vec![PathBuf::from("plan.csv")],
             origin: (2_u32..).take(count).map(|line| (0, line)).collect(),
-            joints: self.joints,
-            configurations: self.configurations,
-            positions: vec![Vector3::zeros(); count],
-            payload: (!self.ranges.payloads.is_empty()).then_some(self.payload),
-            hoist: self.ranges.hoist.map(|_| self.hoist),
-            temperature: self.ranges.temperature.map(|_| self.temperature),
-            covariates: self.covariates,
             time: (0_u32..).take(count).map(f64::from).collect(),
-            approach: self.ranges.approach.then_some(self.approach),
-            session: Labels { names: vec![String::new()], of_row: vec![0; count] },
-            target: (!self.names.is_empty())
-                .then_some(Labels { names: self.names, of_row: self.target }),
-            ..Measurements::default()
+            ..self.rows
         }
     }
 }

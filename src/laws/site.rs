@@ -1,85 +1,89 @@
 //! Fields of joints, beams and the arm to which laws add.
 
-/// Field of a joint that may be free: first the parameters of [Chen2021, eq. 1], then the fields
-/// that effects change.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[expect(missing_docs, reason = "letters need no words")]
-#[non_exhaustive]
-pub enum JointField {
-    Alpha,
-    A,
-    Theta,
-    D,
-    Beta,
-    Stiffness,
-    /// Compliance in addition to the declared 1/k [rad/(N·m)].
-    Compliance,
-    /// Angle per cube of the moment [rad/(N·m)³].
-    Cubic,
-    /// Play \[rad\]: half of it to each side, by the direction of approach, or by the moment if
-    /// that is unknown.
-    Play,
-    /// Play of a prismatic joint \[m\], taken up by the direction of approach only.
-    SlidingPlay,
-    /// Flexibility about x before the joint's rotation [rad/(N·m)].
-    LateralX,
-    /// Flexibility about y before the joint's rotation [rad/(N·m)].
-    LateralY,
-    /// Flexibility 1/EI of the slide [1/(N·m²)].
-    SlideFlexibility,
-    /// Spring rate of a gravity compensator [N/m].
-    SpringRate,
-    /// Preload of a gravity compensator \[N\].
-    SpringPreload,
-    /// Coordinates of a fixed joint's placement \[m\].
-    X,
-    Y,
-    Z,
-    /// Angles of a fixed joint's placement \[rad\].
-    Roll,
-    Pitch,
-    Yaw,
-    /// Number of the small motion before the joint turns: x, y, z \[m\], rx, ry, rz \[rad\].
-    Before(usize),
-    /// Number of the small motion behind the joint: x, y, z \[m\], rx, ry, rz \[rad\].
-    After(usize),
+worded! {
+    /// Field of a joint that may be free: first the parameters of [Chen2021, eq. 1], then the
+    /// fields that effects change.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+    #[expect(missing_docs, reason = "letters need no words")]
+    #[non_exhaustive]
+    pub enum JointField: name {
+        Alpha = "alpha";
+        A = "a";
+        Theta = "theta";
+        D = "d";
+        Beta = "beta";
+        Stiffness = "stiffness";
+        /// Compliance in addition to the declared 1/k [rad/(N·m)].
+        Compliance = "compliance";
+        /// Angle per cube of the moment [rad/(N·m)³].
+        Cubic = "cubic";
+        /// Play \[rad\]: half of it to each side, by the direction of approach, or by the moment if
+        /// that is unknown.
+        Play = "play";
+        /// Play of a prismatic joint \[m\], taken up by the direction of approach only.
+        SlidingPlay = "sliding_play";
+        /// Flexibility about x before the joint's rotation [rad/(N·m)].
+        LateralX = "lateral_x";
+        /// Flexibility about y before the joint's rotation [rad/(N·m)].
+        LateralY = "lateral_y";
+        /// Flexibility 1/EI of the slide [1/(N·m²)].
+        SlideFlexibility = "slide_flexibility";
+        /// Spring rate of a gravity compensator [N/m].
+        SpringRate = "spring_rate";
+        /// Preload of a gravity compensator \[N\].
+        SpringPreload = "spring_preload";
+        /// Coordinates of a fixed joint's placement \[m\].
+        X = "x";
+        Y = "y";
+        Z = "z";
+        /// Angles of a fixed joint's placement \[rad\].
+        Roll = "roll";
+        Pitch = "pitch";
+        Yaw = "yaw";
+        /// Number of the small motion before the joint turns: x, y, z \[m\], rx, ry, rz \[rad\].
+        Before(usize),
+        /// Number of the small motion behind the joint: x, y, z \[m\], rx, ry, rz \[rad\].
+        After(usize),
+    }
 }
 
 /// Names of the numbers of a small motion.
 pub(crate) const MOTION_NAMES: [&str; 6] = ["x", "y", "z", "rx", "ry", "rz"];
 
-/// Field of a beam that may be free: rigidities, then the fields that effects change.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[non_exhaustive]
-pub enum BeamField {
-    /// Axial rigidity EA \[N\].
-    Axial,
-    /// Bending rigidity EI about both y and z, which are nominally equal [N·m²].
-    Bending,
-    /// Bending rigidity `EI_y` [N·m²].
-    BendingY,
-    /// Bending rigidity `EI_z` [N·m²].
-    BendingZ,
-    /// Torsional rigidity GJ [N·m²].
-    Twist,
-    /// Logarithm of the ratio of EI about z to the common EI of y and z.
-    Anisotropy,
-    /// Flexibility in addition to the declared 1/EI about y and z [1/(N·m²)].
-    Flexibility,
-    /// Coupling of twist with bending about y [1/(N·m²)].
-    CouplingY,
-    /// Coupling of twist with bending about z [1/(N·m²)].
-    CouplingZ,
-    /// Curvature about y without load [1/m].
-    BowY,
-    /// Curvature about z without load [1/m].
-    BowZ,
-    /// Elongation per length without load.
-    Stretch,
-    /// Point mass on the beam's axis \[kg\].
-    AddedMass,
-    /// Position of the added mass, from the beam's root \[m\].
-    AddedAt,
+worded! {
+    /// Field of a beam that may be free: rigidities, then the fields that effects change.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+    #[non_exhaustive]
+    pub enum BeamField: name {
+        /// Axial rigidity EA \[N\].
+        Axial = "EA";
+        /// Bending rigidity EI about both y and z, which are nominally equal [N·m²].
+        Bending = "EI";
+        /// Bending rigidity `EI_y` [N·m²].
+        BendingY = "EIy";
+        /// Bending rigidity `EI_z` [N·m²].
+        BendingZ = "EIz";
+        /// Torsional rigidity GJ [N·m²].
+        Twist = "GJ";
+        /// Logarithm of the ratio of EI about z to the common EI of y and z.
+        Anisotropy = "anisotropy";
+        /// Flexibility in addition to the declared 1/EI about y and z [1/(N·m²)].
+        Flexibility = "flexibility";
+        /// Coupling of twist with bending about y [1/(N·m²)].
+        CouplingY = "coupling_y";
+        /// Coupling of twist with bending about z [1/(N·m²)].
+        CouplingZ = "coupling_z";
+        /// Curvature about y without load [1/m].
+        BowY = "bow_y";
+        /// Curvature about z without load [1/m].
+        BowZ = "bow_z";
+        /// Elongation per length without load.
+        Stretch = "stretch";
+        /// Point mass on the beam's axis \[kg\].
+        AddedMass = "added_mass";
+        /// Position of the added mass, from the beam's root \[m\].
+        AddedAt = "added_at";
+    }
 }
 
 /// Quantity of the arm as a whole.
@@ -142,35 +146,6 @@ impl JointField {
     pub fn is_geometry(self) -> bool {
         Self::GEOMETRY.contains(&self) || self.placement().is_some()
     }
-
-    /// Returns the part of the parameter's name after the dot.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Alpha => "alpha",
-            Self::A => "a",
-            Self::Theta => "theta",
-            Self::D => "d",
-            Self::Beta => "beta",
-            Self::Stiffness => "stiffness",
-            Self::Compliance => "compliance",
-            Self::Cubic => "cubic",
-            Self::Play => "play",
-            Self::SlidingPlay => "sliding_play",
-            Self::LateralX => "lateral_x",
-            Self::LateralY => "lateral_y",
-            Self::SlideFlexibility => "slide_flexibility",
-            Self::SpringRate => "spring_rate",
-            Self::SpringPreload => "spring_preload",
-            Self::X => "x",
-            Self::Y => "y",
-            Self::Z => "z",
-            Self::Roll => "roll",
-            Self::Pitch => "pitch",
-            Self::Yaw => "yaw",
-            Self::Before(_) => "before",
-            Self::After(_) => "after",
-        }
-    }
 }
 
 impl BeamField {
@@ -191,25 +166,5 @@ impl BeamField {
     /// Returns true for a rigidity that a problem declares.
     pub fn is_declared(self) -> bool {
         matches!(self, Self::Axial | Self::Bending | Self::BendingY | Self::BendingZ | Self::Twist)
-    }
-
-    /// Returns the part of the parameter's name after the dot.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Axial => "EA",
-            Self::Bending => "EI",
-            Self::BendingY => "EIy",
-            Self::BendingZ => "EIz",
-            Self::Twist => "GJ",
-            Self::Anisotropy => "anisotropy",
-            Self::Flexibility => "flexibility",
-            Self::CouplingY => "coupling_y",
-            Self::CouplingZ => "coupling_z",
-            Self::BowY => "bow_y",
-            Self::BowZ => "bow_z",
-            Self::Stretch => "stretch",
-            Self::AddedMass => "added_mass",
-            Self::AddedAt => "added_at",
-        }
     }
 }

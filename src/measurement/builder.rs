@@ -61,7 +61,7 @@ pub enum DatasetError {
 
 /// Builder of a [`Dataset`]. Every method takes one value per row, and a later call replaces an
 /// earlier one.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct DatasetBuilder {
     configurations: Vec<Vec<f64>>,
     positions: Vec<Vector3<f64>>,
@@ -79,6 +79,20 @@ pub struct DatasetBuilder {
     held_out: Vec<usize>,
 }
 
+/// Declares methods that set a column of one value per row.
+macro_rules! columns {
+    ($($(#[$doc:meta])* $method:ident, $field:ident: $value:ty;)*) => {
+        $(
+            $(#[$doc])*
+            #[must_use]
+            pub fn $method(mut self, values: Vec<$value>) -> Self {
+                self.$field = Some(values);
+                self
+            }
+        )*
+    };
+}
+
 impl Dataset {
     /// Returns a builder from plain arrays.
     ///
@@ -93,17 +107,7 @@ impl Dataset {
             configurations: rows_of(configurations),
             positions: positions.into_iter().collect(),
             measured: true,
-            orientations: None,
-            sigma: None,
-            payload: None,
-            hoist: None,
-            temperature: None,
-            time: None,
-            approach: None,
-            covariates: Vec::new(),
-            session: None,
-            target: None,
-            held_out: Vec::new(),
+            ..DatasetBuilder::default()
         }
     }
 
@@ -116,47 +120,20 @@ impl Dataset {
 }
 
 impl DatasetBuilder {
-    /// Sets the measured orientations of the target, measuring frame; they are fitted if the
-    /// problem declares an `orientation_sigma`.
-    #[must_use]
-    pub fn orientation(mut self, orientations: Vec<UnitQuaternion<f64>>) -> Self {
-        self.orientations = Some(orientations);
-        self
-    }
-
-    /// Sets the standard deviation of each coordinate of a position, above 0 \[m\].
-    #[must_use]
-    pub fn sigma(mut self, sigma: Vec<f64>) -> Self {
-        self.sigma = Some(sigma);
-        self
-    }
-
-    /// Sets the payload, not negative \[kg\].
-    #[must_use]
-    pub fn payload(mut self, payload: Vec<f64>) -> Self {
-        self.payload = Some(payload);
-        self
-    }
-
-    /// Sets the hoist force \[N\].
-    #[must_use]
-    pub fn hoist(mut self, hoist: Vec<f64>) -> Self {
-        self.hoist = Some(hoist);
-        self
-    }
-
-    /// Sets the temperature [°C].
-    #[must_use]
-    pub fn temperature(mut self, temperature: Vec<f64>) -> Self {
-        self.temperature = Some(temperature);
-        self
-    }
-
-    /// Sets the time \[s\]; the default is the row number.
-    #[must_use]
-    pub fn time(mut self, time: Vec<f64>) -> Self {
-        self.time = Some(time);
-        self
+    columns! {
+        /// Sets the measured orientations of the target, measuring frame; they are fitted if the
+        /// problem declares an `orientation_sigma`.
+        orientation, orientations: UnitQuaternion<f64>;
+        /// Sets the standard deviation of each coordinate of a position, above 0 \[m\].
+        sigma, sigma: f64;
+        /// Sets the payload, not negative \[kg\].
+        payload, payload: f64;
+        /// Sets the hoist force \[N\].
+        hoist, hoist: f64;
+        /// Sets the temperature [°C].
+        temperature, temperature: f64;
+        /// Sets the time \[s\]; the default is the row number.
+        time, time: f64;
     }
 
     /// Sets the direction from which each joint approached, shape = (rows)(joints): −1, 0 (unknown)

@@ -4,40 +4,27 @@ use super::Model;
 use crate::mechanics::Flexibility;
 use crate::model::parameter::{ArmField, BeamField, ParameterSite};
 
-/// Part of the elasticity that an ablated model keeps. Loads and shape changes by effects are
-/// always kept.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Ablation {
-    /// No elasticity: geometry alone.
-    Rigid,
-    /// Elasticity of joints and of the base: rotation of revolute joints, bending of slides; rigid
-    /// links.
-    JointsOnly,
-    /// Elasticity of the links: stretch, bending and twist; rigid joints and base.
-    LinksOnly,
-    /// Bending of the links alone.
-    BendingOnly,
-    /// All of the elasticity.
-    All,
+worded! {
+    /// Part of the elasticity that an ablated model keeps. Loads and shape changes by effects are
+    /// always kept.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    #[non_exhaustive]
+    pub enum Ablation: as_str {
+        /// No elasticity: geometry alone.
+        Rigid = "rigid";
+        /// Elasticity of joints and of the base: rotation of revolute joints, bending of slides;
+        /// rigid links.
+        JointsOnly = "joints-only";
+        /// Elasticity of the links: stretch, bending and twist; rigid joints and base.
+        LinksOnly = "links-only";
+        /// Bending of the links alone.
+        BendingOnly = "bending-only";
+        /// All of the elasticity.
+        All = "all";
+    }
 }
 
 impl Ablation {
-    /// All ablations, from least to most elasticity.
-    pub const EACH: [Self; 5] =
-        [Self::Rigid, Self::JointsOnly, Self::LinksOnly, Self::BendingOnly, Self::All];
-
-    /// Returns the ablation's name as results write it.
-    pub fn as_str(self) -> &'static str {
-        match self {
-            Self::Rigid => "rigid",
-            Self::JointsOnly => "joints-only",
-            Self::LinksOnly => "links-only",
-            Self::BendingOnly => "bending-only",
-            Self::All => "all",
-        }
-    }
-
     fn keeps(self, site: ParameterSite) -> bool {
         match (self, site) {
             (Self::Rigid, site) => !site.is_elastic(),

@@ -11,63 +11,50 @@ pub enum Form {
     Corrected,
 }
 
-/// Misprint that changes a formula; each is documented at its formula.
-///
-/// `docs/paper.md` lists the displacement of the end point by each misprint and its effect on a
-/// calibration.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[non_exhaustive]
-pub enum Misprint {
-    /// Eq. 4: `F_y2` has G₄ₙ l² instead of G₄ₙ l³.
-    TipForceLever,
-    /// Eq. 4: the hoist stretches link B but does not bend it.
-    HoistBending,
-    /// Eq. 4, 5, 7: slopes are exchanged, or lack their sign.
-    SlopePlaces,
-    /// Eq. 6: q l²/(EA) instead of q l²/(2EA).
-    Stretch,
-    /// Eq. 6: link A carries the weights beyond it, but not the hoist beyond it.
-    HoistBeyond,
-    /// Eq. 10: joint 2 has the length of joint 3; no effect on the nominal arm, where both are
-    /// equal.
-    JointTwoLength,
-    /// Eq. 8-10: torsion rotates about `z_i` after Ry(β), but the joint rotates about `z_i` before
-    /// it; no effect for β = 0.
-    JointAxis,
-    /// Eq. 16: `U_i` instead of `U_{i+1}`.
-    TransferIndex,
-    /// Eq. 21: the deflection acts at the root of the link instead of its tip.
-    LinkSide,
-    /// Eq. 23, 25: the frames before the link transfer the motion to the end point, instead of
-    /// those after it.
-    LinkTransfer,
-    /// Eq. 28, 29: `dT_i` = `Δ_i` `T_i` instead of `T_i` `Δ_i`.
-    GeometricSide,
-    /// Eq. 37, 39: the end point's motion stays in the end frame, instead of being rotated into the
-    /// measuring frame.
-    EndFrame,
-    /// Eq. 45: `E_j` lacks β.
-    BetaLeftOut,
+worded! {
+    /// Misprint that changes a formula; each is documented at its formula.
+    ///
+    /// `docs/paper.md` lists the displacement of the end point by each misprint and its effect on a
+    /// calibration.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+    #[non_exhaustive]
+    pub enum Misprint: as_str, place, summary {
+        /// Eq. 4: `F_y2` has G₄ₙ l² instead of G₄ₙ l³.
+        TipForceLever = "tip-force-lever", "eq. 4", "tip force times l² for l³";
+        /// Eq. 4: the hoist stretches link B but does not bend it.
+        HoistBending = "hoist-bending", "eq. 4", "the hoist does not bend link B";
+        /// Eq. 4, 5, 7: slopes are exchanged, or lack their sign.
+        SlopePlaces = "slope-places", "eq. 4, 5, 7", "slopes exchanged, or without their sign";
+        /// Eq. 6: q l²/(EA) instead of q l²/(2EA).
+        Stretch = "stretch", "eq. 6", "stretch by the link's weight doubled";
+        /// Eq. 6: link A carries the weights beyond it, but not the hoist beyond it.
+        HoistBeyond = "hoist-beyond", "eq. 6", "link A does not carry the hoist on link B";
+        /// Eq. 10: joint 2 has the length of joint 3; no effect on the nominal arm, where both are
+        /// equal.
+        JointTwoLength = "joint-two-length", "eq. 10", "joint 2 with the length of joint 3";
+        /// Eq. 8-10: torsion rotates about `z_i` after Ry(β), but the joint rotates about `z_i`
+        /// before it; no effect for β = 0.
+        JointAxis = "joint-axis", "eq. 8-10", "joint torsion about z after Ry(β)";
+        /// Eq. 16: `U_i` instead of `U_{i+1}`.
+        TransferIndex = "transfer-index", "eq. 16", "U_i for U_{i+1}";
+        /// Eq. 21: the deflection acts at the root of the link instead of its tip.
+        LinkSide = "link-side", "eq. 21", "links deflect about their root";
+        /// Eq. 23, 25: the frames before the link transfer the motion to the end point, instead of
+        /// those after it.
+        LinkTransfer = "link-transfer",
+            "eq. 23, 25",
+            "V⁻¹ΔV: carried by the frames before the link";
+        /// Eq. 28, 29: `dT_i` = `Δ_i` `T_i` instead of `T_i` `Δ_i`.
+        GeometricSide = "geometric-side", "eq. 28, 29", "Δ_i T_i for T_i Δ_i";
+        /// Eq. 37, 39: the end point's motion stays in the end frame, instead of being rotated into
+        /// the measuring frame.
+        EndFrame = "end-frame", "eq. 37, 39", "end frame taken for the measuring frame";
+        /// Eq. 45: `E_j` lacks β.
+        BetaLeftOut = "beta-left-out", "eq. 45", "β is not identified";
+    }
 }
 
 impl Misprint {
-    /// All misprints, in the order of the paper.
-    pub const ALL: [Self; 13] = [
-        Self::TipForceLever,
-        Self::HoistBending,
-        Self::SlopePlaces,
-        Self::Stretch,
-        Self::HoistBeyond,
-        Self::JointTwoLength,
-        Self::JointAxis,
-        Self::TransferIndex,
-        Self::LinkSide,
-        Self::LinkTransfer,
-        Self::GeometricSide,
-        Self::EndFrame,
-        Self::BetaLeftOut,
-    ];
-
     /// Misprints that the paper contradicts elsewhere, so that its authors cannot have executed
     /// them.
     ///
@@ -82,56 +69,12 @@ impl Misprint {
         Self::EndFrame,
         Self::BetaLeftOut,
     ];
-
-    /// Returns the name in results, the equations and a short description.
-    const fn words(self) -> (&'static str, &'static str, &'static str) {
-        match self {
-            Self::TipForceLever => ("tip-force-lever", "eq. 4", "tip force times l² for l³"),
-            Self::HoistBending => ("hoist-bending", "eq. 4", "the hoist does not bend link B"),
-            Self::SlopePlaces => {
-                ("slope-places", "eq. 4, 5, 7", "slopes exchanged, or without their sign")
-            }
-            Self::Stretch => ("stretch", "eq. 6", "stretch by the link's weight doubled"),
-            Self::HoistBeyond => {
-                ("hoist-beyond", "eq. 6", "link A does not carry the hoist on link B")
-            }
-            Self::JointTwoLength => {
-                ("joint-two-length", "eq. 10", "joint 2 with the length of joint 3")
-            }
-            Self::JointAxis => ("joint-axis", "eq. 8-10", "joint torsion about z after Ry(β)"),
-            Self::TransferIndex => ("transfer-index", "eq. 16", "U_i for U_{i+1}"),
-            Self::LinkSide => ("link-side", "eq. 21", "links deflect about their root"),
-            Self::LinkTransfer => {
-                ("link-transfer", "eq. 23, 25", "V⁻¹ΔV: carried by the frames before the link")
-            }
-            Self::GeometricSide => ("geometric-side", "eq. 28, 29", "Δ_i T_i for T_i Δ_i"),
-            Self::EndFrame => {
-                ("end-frame", "eq. 37, 39", "end frame taken for the measuring frame")
-            }
-            Self::BetaLeftOut => ("beta-left-out", "eq. 45", "β is not identified"),
-        }
-    }
-
-    /// Returns the name in results.
-    pub const fn as_str(self) -> &'static str {
-        self.words().0
-    }
-
-    /// Returns the equations that contain the misprint.
-    pub const fn place(self) -> &'static str {
-        self.words().1
-    }
-
-    /// Returns a short description.
-    pub const fn summary(self) -> &'static str {
-        self.words().2
-    }
 }
 
 /// Choice of the form of every misprinted formula.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub struct Reading {
-    forms: [Form; Misprint::ALL.len()],
+    forms: [Form; Misprint::EACH.len()],
 }
 
 impl Reading {
@@ -157,7 +100,7 @@ impl Reading {
 /// keeps every misprint except [`Misprint::CONTRADICTED`], which apply only if chosen by name.
 impl From<Form> for Reading {
     fn from(form: Form) -> Self {
-        let uniform = Self { forms: [form; Misprint::ALL.len()] };
+        let uniform = Self { forms: [form; Misprint::EACH.len()] };
         Misprint::CONTRADICTED
             .into_iter()
             .fold(uniform, |reading, misprint| reading.with(misprint, Form::Corrected))

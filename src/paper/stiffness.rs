@@ -9,40 +9,28 @@ use crate::least_squares::solver::minimum_norm_step;
 use crate::least_squares::{Block, Triangle};
 use crate::problem::Problem;
 
-/// Source of the stiffness. The paper says that elastic parameters are calibrated first, but not
-/// how.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[non_exhaustive]
-pub enum StiffnessStage {
-    /// Rigid arm, which the paper calls ignoring elasticity.
-    Rigid,
-    /// Stiffness that the problem declares.
-    Nominal,
-    /// Linear least squares from the measured positions at nominal geometry.
-    Positions,
-    /// Linear least squares from differences between poses of one configuration under different
-    /// loads, in which the geometry cancels.
-    LoadDifferences,
+worded! {
+    /// Source of the stiffness. The paper says that elastic parameters are calibrated first, but
+    /// not how.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+    #[non_exhaustive]
+    pub enum StiffnessStage: as_str {
+        /// Rigid arm, which the paper calls ignoring elasticity.
+        Rigid = "rigid";
+        /// Stiffness that the problem declares.
+        Nominal = "nominal-stiffness";
+        /// Linear least squares from the measured positions at nominal geometry.
+        Positions = "from-positions";
+        /// Linear least squares from differences between poses of one configuration under different
+        /// loads, in which the geometry cancels.
+        LoadDifferences = "from-load-differences";
+    }
 }
 
 impl StiffnessStage {
-    /// All sources, in the order of the results.
-    pub const EACH: [Self; 4] =
-        [Self::Rigid, Self::Nominal, Self::Positions, Self::LoadDifferences];
-
     /// Fraction of the largest singular value up to which combinations of flexibilities keep their
     /// nominal value. The columns of the elastic Jacobian are scaled by the nominal flexibilities.
     pub const TOLERANCE: f64 = 1e-2;
-
-    /// Returns the name in results.
-    pub const fn as_str(self) -> &'static str {
-        match self {
-            Self::Rigid => "rigid",
-            Self::Nominal => "nominal-stiffness",
-            Self::Positions => "from-positions",
-            Self::LoadDifferences => "from-load-differences",
-        }
-    }
 }
 
 /// Returns x = A⁺ b with singular values up to `tolerance`·σ₁ dropped [Chen2021, eq. 43, 44].

@@ -164,7 +164,7 @@ pub(super) fn read(root: &mut Section<'_, '_>) -> Result<Data, InputError> {
         let (log, source) = joint_log::read(&item, folder)?;
         (joints, joint_log) = (source.unwrap_or_default(), Some(log));
         section.get("joints");
-    } else if let Some(source) = section.word("joints", JointSource::WORDS, &JointSource::ALL)? {
+    } else if let Some(source) = section.word("joints", &JointSource::WORDS, &JointSource::EACH)? {
         joints = source;
     }
     let orientation_sigma = section.positive("orientation_sigma", Unit::Angle, |value| {

@@ -58,7 +58,7 @@ pub(super) fn read(
                 .unwrap_or(DEFAULT_TOLERANCE),
         },
     };
-    let source = section.word("source", JointSource::WORDS, &JointSource::ALL)?;
+    let source = section.word("source", &JointSource::WORDS, &JointSource::EACH)?;
     section.finish()?;
     Ok((JointLog { files, by, location: item.location() }, source))
 }

@@ -125,17 +125,19 @@ const fn si(name: &'static str) -> Suffix {
     Suffix { name, to_si: std::convert::identity }
 }
 
-const fn suffix(name: &'static str, to_si: fn(f64) -> f64) -> Suffix {
-    Suffix { name, to_si }
+const fn deg(name: &'static str) -> Suffix {
+    Suffix { name, to_si: f64::to_radians }
 }
 
-const fn row(
-    noun: &'static str,
-    symbol: &'static str,
-    suffixes: &'static [Suffix],
-    shown: Shown,
-) -> Row {
-    Row { noun, symbol, suffixes, shown }
+const fn mm(name: &'static str) -> Suffix {
+    Suffix { name, to_si: |x| x / 1000.0 }
+}
+
+/// Returns a row of the table.
+macro_rules! row {
+    ($noun:literal, $symbol:literal, [$($suffix:expr),*], $shown:expr) => {
+        Row { noun: $noun, symbol: $symbol, suffixes: const { &[$($suffix),*] }, shown: $shown }
+    };
 }
 
 impl Unit {
@@ -143,95 +145,78 @@ impl Unit {
     fn row(self) -> Row {
         use Shown::{As, Plain, Prefixed};
         match self {
-            Self::Angle => row(
-                "an angle",
-                "rad",
-                const { &[suffix("deg", f64::to_radians), si("rad")] },
-                As(DEGREES, "°"),
-            ),
-            Self::Length => row(
-                "a length",
-                "m",
-                const { &[si("m"), suffix("mm", |x| x / 1000.0)] },
-                As(1e3, "mm"),
-            ),
-            Self::Pixel => row("a number of pixels", "px", const { &[si("px")] }, Plain),
-            Self::Mass => row("a mass", "kg", const { &[si("kg")] }, Plain),
-            Self::Force => row("a force", "N", const { &[si("N")] }, Plain),
-            Self::Acceleration => row("an acceleration", "m/s²", const { &[si("m_s2")] }, Plain),
-            Self::Temperature => row("a temperature", "°C", const { &[si("C")] }, Plain),
-            Self::Time => row("a time", "s", const { &[si("s")] }, Plain),
-            Self::ForcePerLength => {
-                row("a force per length", "N/m", const { &[si("N_per_m")] }, Prefixed)
-            }
+            Self::Angle => row!("an angle", "rad", [deg("deg"), si("rad")], As(DEGREES, "°")),
+            Self::Length => row!("a length", "m", [si("m"), mm("mm")], As(1e3, "mm")),
+            Self::Pixel => row!("a number of pixels", "px", [si("px")], Plain),
+            Self::Mass => row!("a mass", "kg", [si("kg")], Plain),
+            Self::Force => row!("a force", "N", [si("N")], Plain),
+            Self::Acceleration => row!("an acceleration", "m/s²", [si("m_s2")], Plain),
+            Self::Temperature => row!("a temperature", "°C", [si("C")], Plain),
+            Self::Time => row!("a time", "s", [si("s")], Plain),
+            Self::ForcePerLength => row!("a force per length", "N/m", [si("N_per_m")], Prefixed),
             Self::TorsionalStiffness => {
-                row("a stiffness", "N·m/rad", const { &[si("N_m_per_rad")] }, Prefixed)
+                row!("a stiffness", "N·m/rad", [si("N_m_per_rad")], Prefixed)
             }
-            Self::AxialRigidity => row("a force", "N", const { &[si("N")] }, Prefixed),
-            Self::FlexuralRigidity => row("a rigidity", "N·m²", const { &[si("N_m2")] }, Prefixed),
-            Self::Compliance => row(
-                "a compliance",
-                "rad/(N·m)",
-                const { &[si("rad_per_N_m")] },
-                As(1e6, "µrad/(N·m)"),
+            Self::AxialRigidity => row!("a force", "N", [si("N")], Prefixed),
+            Self::FlexuralRigidity => row!("a rigidity", "N·m²", [si("N_m2")], Prefixed),
+            Self::Compliance => {
+                row!("a compliance", "rad/(N·m)", [si("rad_per_N_m")], As(1e6, "µrad/(N·m)"))
+            }
+            Self::CubicCompliance => row!(
+                "a cubic compliance",
+                "rad/(N·m)³",
+                [si("rad_per_N3_m3")],
+                As(1e9, "nrad/(N·m)³")
             ),
-            Self::CubicCompliance => {
-                let shown = As(1e9, "nrad/(N·m)³");
-                row("a cubic compliance", "rad/(N·m)³", const { &[si("rad_per_N3_m3")] }, shown)
-            }
             Self::Flexibility => {
-                row("a flexibility", "1/(N·m²)", const { &[si("per_N_m2")] }, As(1e6, "1/(MN·m²)"))
+                row!("a flexibility", "1/(N·m²)", [si("per_N_m2")], As(1e6, "1/(MN·m²)"))
             }
-            Self::CurvaturePerDegree => row(
-                "a curvature per °C",
-                "1/(m·K)",
-                const { &[si("per_m_C")] },
-                As(1e6, "µrad/(m·K)"),
+            Self::CurvaturePerDegree => {
+                row!("a curvature per °C", "1/(m·K)", [si("per_m_C")], As(1e6, "µrad/(m·K)"))
+            }
+            Self::PerDegree => row!("a strain per °C", "1/K", [si("per_C")], As(1e6, "10⁻⁶/K")),
+            Self::AnglePerDegree => row!(
+                "an angle per °C",
+                "rad/K",
+                [deg("deg_per_C"), si("rad_per_C")],
+                As(DEGREES, "°/K")
             ),
-            Self::PerDegree => {
-                row("a strain per °C", "1/K", const { &[si("per_C")] }, As(1e6, "10⁻⁶/K"))
-            }
-            Self::AnglePerDegree => {
-                let suffixes = const { &[suffix("deg_per_C", f64::to_radians), si("rad_per_C")] };
-                row("an angle per °C", "rad/K", suffixes, As(DEGREES, "°/K"))
-            }
             Self::LengthPerDegree => {
-                let suffixes = const { &[si("m_per_C"), suffix("mm_per_C", |x| x / 1000.0)] };
-                row("a length per °C", "m/K", suffixes, As(1e3, "mm/K"))
+                row!("a length per °C", "m/K", [si("m_per_C"), mm("mm_per_C")], As(1e3, "mm/K"))
             }
-            Self::AnglePerMass => {
-                let suffixes = const { &[suffix("deg_per_kg", f64::to_radians), si("rad_per_kg")] };
-                row("an angle per kg", "rad/kg", suffixes, As(DEGREES, "°/kg"))
-            }
+            Self::AnglePerMass => row!(
+                "an angle per kg",
+                "rad/kg",
+                [deg("deg_per_kg"), si("rad_per_kg")],
+                As(DEGREES, "°/kg")
+            ),
             Self::LengthPerMass => {
-                let suffixes = const { &[si("m_per_kg"), suffix("mm_per_kg", |x| x / 1000.0)] };
-                row("a length per kg", "m/kg", suffixes, As(1e3, "mm/kg"))
+                row!("a length per kg", "m/kg", [si("m_per_kg"), mm("mm_per_kg")], As(1e3, "mm/kg"))
             }
-            Self::PerLength => row("a number per length", "1/m", const { &[si("per_m")] }, Plain),
-            Self::Speed => {
-                let suffixes = const {
-                    &[
-                        si("m_per_s"),
-                        suffix("mm_per_s", |x| x / 1000.0),
-                        suffix("mm_per_h", |x| x / 3.6e6),
-                    ]
-                };
-                row("a speed", "m/s", suffixes, As(3.6e6, "mm/h"))
-            }
-            Self::LengthPerAngle => row("a length per angle", "m/rad", &[], As(1e3, "mm/rad")),
-            Self::AnglePerLength => row("an angle per length", "rad/m", &[], As(DEGREES, "°/m")),
-            Self::AnglePerUnit => {
-                let suffixes =
-                    const { &[suffix("deg_per_unit", f64::to_radians), si("rad_per_unit")] };
-                row("an angle per unit of a covariate", "rad/unit", suffixes, As(DEGREES, "°/unit"))
-            }
-            Self::LengthPerUnit => {
-                let suffixes = const { &[si("m_per_unit"), suffix("mm_per_unit", |x| x / 1000.0)] };
-                row("a length per unit of a covariate", "m/unit", suffixes, As(1e3, "mm/unit"))
-            }
-            Self::LengthPerRow => row("a length per row", "m/row", &[], As(1e3, "mm/row")),
-            Self::Ratio => row("a ratio", "1", const { &[si("relative")] }, As(1e3, "‰")),
-            Self::Number => row("a ratio", "1", const { &[si("relative")] }, Plain),
+            Self::PerLength => row!("a number per length", "1/m", [si("per_m")], Plain),
+            Self::Speed => row!(
+                "a speed",
+                "m/s",
+                [si("m_per_s"), mm("mm_per_s"), Suffix { name: "mm_per_h", to_si: |x| x / 3.6e6 }],
+                As(3.6e6, "mm/h")
+            ),
+            Self::LengthPerAngle => row!("a length per angle", "m/rad", [], As(1e3, "mm/rad")),
+            Self::AnglePerLength => row!("an angle per length", "rad/m", [], As(DEGREES, "°/m")),
+            Self::AnglePerUnit => row!(
+                "an angle per unit of a covariate",
+                "rad/unit",
+                [deg("deg_per_unit"), si("rad_per_unit")],
+                As(DEGREES, "°/unit")
+            ),
+            Self::LengthPerUnit => row!(
+                "a length per unit of a covariate",
+                "m/unit",
+                [si("m_per_unit"), mm("mm_per_unit")],
+                As(1e3, "mm/unit")
+            ),
+            Self::LengthPerRow => row!("a length per row", "m/row", [], As(1e3, "mm/row")),
+            Self::Ratio => row!("a ratio", "1", [si("relative")], As(1e3, "‰")),
+            Self::Number => row!("a ratio", "1", [si("relative")], Plain),
         }
     }
 

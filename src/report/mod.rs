@@ -19,6 +19,7 @@ mod export;
 mod figures;
 mod findings;
 mod forecast;
+mod found_effects;
 mod identify;
 mod init;
 mod limits;

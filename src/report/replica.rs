@@ -88,7 +88,7 @@ fn shown(spread: Option<Spread>, show: impl Fn(f64) -> String) -> String {
 fn procedures(study: &MisprintStudy, found: &ReplicaResults) -> Table {
     let main = main_case(study, found);
     let row = |(place, named): (usize, &crate::study::NamedReading)| {
-        let size = Misprint::ALL
+        let size = Misprint::EACH
             .iter()
             .zip(&found.sizes)
             .find(|(misprint, _)| Some(**misprint) == named.misprint);
@@ -166,7 +166,7 @@ fn ratios(study: &MisprintStudy, found: &ReplicaResults) -> Table {
         })
         .collect();
     rows.extend(AlternativeModel::EACH.map(|rival| {
-        row(rival.words().0, rival.words().1, &|replica| replica.alternative_error(rival))
+        row(rival.as_str(), rival.summary(), &|replica| replica.alternative_error(rival))
     }));
     let [with, without] = [&WITH_ELASTICITY, &WITHOUT_ELASTICITY];
     let paper =

@@ -9,8 +9,8 @@ use super::document::Document;
 use super::summary::Summary;
 use crate::paper::Misprint;
 use crate::study::{
-    self, AlternativeModel, Case, CellResult, HeldOutError, MisprintStudy, Replica, ReplicaResults,
-    Results, Study,
+    self, AlternativeModel, Case, CellResult, HeldOutError, MisprintStudy, ParameterResult,
+    Replica, ReplicaResults, Results, Study,
 };
 
 /// Results of many fits to simulated measurements with known truth. SI units unless a key names
@@ -51,7 +51,7 @@ pub struct Cell {
     pub largest_bias: Option<LargestBias>,
     pub iterations_mean: Option<f64>,
     pub iterations_max: Option<f64>,
-    pub parameters: Vec<StudiedParameter>,
+    pub parameters: Vec<ParameterResult>,
 }
 
 /// Held-out errors over the fits of a cell.
@@ -71,21 +71,6 @@ pub struct HeldOut {
 pub struct LargestBias {
     pub parameter: String,
     pub bias_sd: f64,
-}
-
-/// Errors of the estimates of one parameter.
-#[derive(Debug, Serialize, JsonSchema)]
-pub struct StudiedParameter {
-    pub name: String,
-    pub unit: &'static str,
-    pub fits: u64,
-    pub bias: Option<f64>,
-    pub spread: Option<f64>,
-    pub rms_error: Option<f64>,
-    /// Number of fits that gave a standard error.
-    pub with_std_error: u64,
-    pub std_error: Option<f64>,
-    pub coverage: Option<f64>,
 }
 
 /// Study of the misprints of Chen et al. (2021).
@@ -176,17 +161,6 @@ impl Cell {
         let CellResult { cell, tally, .. } = result;
         let in_mm = |length: Option<f64>| length.map(|length| length * 1e3);
         let rms = &tally.held_out_rms;
-        let parameter = |result: study::ParameterResult| StudiedParameter {
-            name: result.parameter.name.clone(),
-            unit: result.unit(),
-            fits: result.fits,
-            bias: result.bias,
-            spread: result.spread,
-            rms_error: result.rms_error,
-            with_std_error: result.with_std_error,
-            std_error: result.std_error,
-            coverage: result.coverage,
-        };
         let bias = result.largest_bias(study);
         Self {
             // As it was written: 0.1 mm and not 0.10000000000000001 mm.
@@ -206,13 +180,10 @@ impl Cell {
             },
             reduced_chi2: tally.reduced_chi2.mean(),
             coverage: result.coverage(),
-            largest_bias: bias.map(|(parameter, bias_sd)| LargestBias {
-                parameter: parameter.name.clone(),
-                bias_sd,
-            }),
+            largest_bias: bias.map(|(parameter, bias_sd)| LargestBias { parameter, bias_sd }),
             iterations_mean: tally.iterations.mean(),
             iterations_max: tally.iterations.largest(),
-            parameters: result.parameters(study).map(parameter).collect(),
+            parameters: result.parameters(study).collect(),
         }
     }
 }
@@ -240,7 +211,7 @@ impl MisprintResult {
             held_out_poses: study.held_out,
             position_sigma_mm: study.truth.noise_sigma * 1e3,
             rigid_leaves_mm: study.rigid_leaves * 1e3,
-            misprints: Misprint::ALL.iter().zip(&found.sizes).map(size).collect(),
+            misprints: Misprint::EACH.iter().zip(&found.sizes).map(size).collect(),
             cases: study.cases.iter().map(case).collect(),
         }
     }
@@ -269,7 +240,7 @@ impl Specimen {
             joint_both_loads: Summary::of(&replica.joint_twice),
             readings: found.readings.iter().zip(&replica.by_reading).map(reading).collect(),
             rivals: rivals
-                .map(|(rival, error)| Rival { rival: rival.words().0, held_out: left(error) })
+                .map(|(rival, error)| Rival { rival: rival.as_str(), held_out: left(error) })
                 .collect(),
         }
     }

@@ -44,14 +44,16 @@ pub struct Study {
     pub(super) problem_text: String,
 }
 
-/// Source of the simulated measurements.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Source {
-    /// The fitted model at the true parameters, so that noise is the only error.
-    Model,
-    /// The virtual test rig, with independent physics and effects that the model may lack.
-    Rig,
+worded! {
+    /// Source of the simulated measurements.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    #[non_exhaustive]
+    pub enum Source: as_str {
+        /// The fitted model at the true parameters, so that noise is the only error.
+        Model = "model";
+        /// The virtual test rig, with independent physics and effects that the model may lack.
+        Rig = "rig";
+    }
 }
 
 /// Combination of noise level, number of poses, strategy and solver.
@@ -88,16 +90,6 @@ impl Study {
             })
         };
         (0..self.cells.len()).flat_map(of_cell).collect()
-    }
-}
-
-impl Source {
-    /// Returns the word for the source in files.
-    pub fn as_str(self) -> &'static str {
-        match self {
-            Self::Model => "model",
-            Self::Rig => "rig",
-        }
     }
 }
 

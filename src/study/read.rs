@@ -192,7 +192,7 @@ fn sigmas(root: &mut Section<'_, '_>) -> Result<Vec<f64>, InputError> {
 }
 
 fn strategy(item: &Item<'_, '_>, model: &Model) -> Result<Strategy, InputError> {
-    let strategy = word(item, &Strategy::NAMES, &Strategy::EACH)?;
+    let strategy = word(item, &Strategy::WORDS, &Strategy::EACH)?;
     let varies = |choose: &fn(&_) -> bool| {
         model.parameters.iter().any(|p| !p.site.is_placement() && choose(p))
     };
@@ -204,7 +204,7 @@ fn strategy(item: &Item<'_, '_>, model: &Model) -> Result<Strategy, InputError> 
 }
 
 fn solver(item: &Item<'_, '_>, model: &Model) -> Result<SolverChoice, InputError> {
-    let solver = word(item, &SolverChoice::NAMES, &SolverChoice::CHOICES)?.decide(model);
+    let solver = word(item, SolverChoice::NAMES, SolverChoice::CHOICES)?.decide(model);
     if !solver.keeps(model) {
         return Err(item.error(StudyErrorKind::SolverIgnoresBounds { solver: solver.as_str() }));
     }

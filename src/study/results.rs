@@ -1,8 +1,10 @@
 //! Results of a study by cell and by parameter.
 
+use schemars::JsonSchema;
+use serde::Serialize;
+
 use super::definition::{Cell, Study};
 use super::tally::{ParameterTally, Tally};
-use crate::model::parameter::Parameter;
 use crate::numeric::median;
 
 /// Results of a finished study.
@@ -23,12 +25,14 @@ pub struct CellResult {
     pub seconds: Vec<f64>,
 }
 
-/// Statistics of one parameter of a cell; its deviation x is in \[rad\], \[m\], or ln(value /
-/// nominal).
-#[derive(Debug, Clone, Copy)]
-pub struct ParameterResult<'a> {
-    /// Parameter that the statistics describe.
-    pub parameter: &'a Parameter,
+/// Errors of the estimates of one parameter of a cell; its deviation x is in \[rad\], \[m\], or
+/// ln(value / nominal).
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+#[schemars(rename = "StudiedParameter")]
+pub struct ParameterResult {
+    pub name: String,
+    /// Unit of the errors: SI, or `relative` for errors of ln(value).
+    pub unit: &'static str,
     /// Number of trusted fits whose truth is known.
     pub fits: u64,
     /// Mean of estimate − truth, in the unit of x.
@@ -56,14 +60,6 @@ pub struct Timing {
     pub total: f64,
 }
 
-impl ParameterResult<'_> {
-    /// Returns the unit of the errors: SI, or `relative` if they are errors of ln(value).
-    pub fn unit(&self) -> &'static str {
-        let unit = self.parameter.unit();
-        if unit.is_relative() { "relative" } else { unit.symbol() }
-    }
-}
-
 impl CellResult {
     /// Returns the share of fits that failed or are not trusted.
     pub fn failure_rate(&self) -> f64 {
@@ -71,11 +67,13 @@ impl CellResult {
     }
 
     /// Returns the statistics of every free parameter.
-    pub fn parameters<'a>(&'a self, study: &'a Study) -> impl Iterator<Item = ParameterResult<'a>> {
+    pub fn parameters(&self, study: &Study) -> impl Iterator<Item = ParameterResult> {
         study.parameters.iter().zip(&self.tally.parameters).map(|(parameter, tally)| {
             let ParameterTally { error, std_error, covered } = tally;
+            let unit = parameter.unit();
             ParameterResult {
-                parameter,
+                name: parameter.name.clone(),
+                unit: if unit.is_relative() { "relative" } else { unit.symbol() },
                 fits: error.count,
                 bias: error.mean(),
                 spread: error.deviation(),
@@ -94,12 +92,12 @@ impl CellResult {
         share(sum(|tally| tally.covered), sum(|tally| tally.std_error.count))
     }
 
-    /// Returns the parameter with the largest ratio of bias to standard deviation, and the signed
-    /// ratio.
-    pub fn largest_bias<'a>(&'a self, study: &'a Study) -> Option<(&'a Parameter, f64)> {
-        let ratio = |result: ParameterResult<'a>| {
+    /// Returns the name of the parameter with the largest ratio of bias to standard deviation, and
+    /// the signed ratio.
+    pub fn largest_bias(&self, study: &Study) -> Option<(String, f64)> {
+        let ratio = |result: ParameterResult| {
             let spread = result.spread.filter(|spread| *spread > 0.0)?;
-            Some((result.parameter, result.bias? / spread))
+            Some((result.name, result.bias? / spread))
         };
         self.parameters(study).filter_map(ratio).max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))
     }

@@ -18,6 +18,7 @@ const GROUND: &[&str] =
 
 /// Top-level modules from the bottom up, each with the modules that it may use.
 const STOREYS: &[(&str, &[&[&str]])] = &[
+    ("words", &[]),
     ("scalar", &[]),
     ("quantity", &[]),
     ("spatial", &[&["scalar"]]),

@@ -136,7 +136,8 @@ fn auto_is_best_where_bounds_bind() {
                 && found.x[j] <= bounded.bounds.upper()[j]));
             found
         };
-        let keeps = SolverChoice::EACH.into_iter().filter(|solver| solver.keeps(&bounded.model));
+        let keeps =
+            SolverChoice::SOLVERS.iter().copied().filter(|solver| solver.keeps(&bounded.model));
         let found: Vec<Solution> = keeps.map(solve).collect();
         assert_eq!(found.len(), solvers);
         let auto = solve(SolverChoice::Auto.decide(&bounded.model));

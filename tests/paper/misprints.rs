@@ -155,11 +155,11 @@ fn reductions_of_table_3_from_its_own_numbers() {
 #[test]
 fn readings_keep_what_they_are_told_to() {
     let printed = Reading::from(Form::Printed);
-    for misprint in Misprint::ALL {
+    for misprint in Misprint::EACH {
         assert_eq!(printed.keeps(misprint), !Misprint::CONTRADICTED.contains(&misprint));
         assert!(!Reading::default().keeps(misprint));
         assert!(Reading::from(misprint).keeps(misprint));
-        assert_eq!(Misprint::ALL[misprint as usize], misprint);
+        assert_eq!(Misprint::EACH[misprint as usize], misprint);
     }
 }
 

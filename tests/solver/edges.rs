@@ -170,8 +170,12 @@ impl Observe<State> for Watch {
 fn an_observer_sees_every_iteration_and_may_stop() {
     let seen = std::sync::Arc::new(std::sync::atomic::AtomicU64::new(0));
     let start = DVector::from_element(1, 3.0);
-    let solution =
-        minimise_observed(Fit::new(&Logarithm), start, &Settings::default(), Watch(seen.clone()));
+    let solution = minimise_observed(
+        Fit::new(&Logarithm),
+        start,
+        &Settings::default(),
+        Some(Watch(seen.clone())),
+    );
     assert_eq!(seen.load(std::sync::atomic::Ordering::Relaxed), solution.iterations);
     let problem = crate::collections::Analytic {
         unknowns: 2,
@@ -180,6 +184,7 @@ fn an_observer_sees_every_iteration_and_may_stop() {
         dual: crate::collections::functions::rosenbrock::<num_dual::Dual64>,
     };
     let start = DVector::from_vec(vec![-1.2, 1.0]);
-    let solution = minimise_observed(Fit::new(&problem), start, &Settings::default(), Watch(seen));
+    let solution =
+        minimise_observed(Fit::new(&problem), start, &Settings::default(), Some(Watch(seen)));
     assert_eq!(solution.termination, Termination::Interrupted);
 }

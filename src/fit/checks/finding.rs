@@ -5,26 +5,16 @@ use std::fmt;
 use serde::ser::{Serialize, SerializeStruct as _, Serializer};
 use serde_json::{Map, Value};
 
-/// Severity of a finding.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Severity {
-    /// Information about fit or data that needs no action.
-    Note,
-    /// Circumstance that the user should examine; the fit may still be right.
-    Warning,
-    /// Reason not to trust the fit: commands end with exit status 1.
-    Error,
-}
-
-impl Severity {
-    /// Returns the word for the severity in JSON files: `error`, `warning` or `note`.
-    #[doc(hidden)]
-    pub const fn as_str(self) -> &'static str {
-        match self {
-            Self::Note => "note",
-            Self::Warning => "warning",
-            Self::Error => "error",
-        }
+worded! {
+    /// Severity of a finding.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+    pub enum Severity: as_str {
+        /// Information about fit or data that needs no action.
+        Note = "note";
+        /// Circumstance that the user should examine; the fit may still be right.
+        Warning = "warning";
+        /// Reason not to trust the fit: commands end with exit status 1.
+        Error = "error";
     }
 }
 

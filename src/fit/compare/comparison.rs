@@ -80,8 +80,10 @@ pub fn compare(
     let tells = |solver: &SolverChoice| {
         model.is_bounded() || matches!(solver.within(), None | Some(BoundMethod::ActiveSet))
     };
-    let solvers =
-        SolverChoice::EACH.into_iter().filter(|solver| solver.keeps(&model) && tells(solver));
+    let solvers = SolverChoice::SOLVERS
+        .iter()
+        .copied()
+        .filter(|solver| solver.keeps(&model) && tells(solver));
     let mut strategies = Vec::new();
     for strategy in
         Strategy::EACH.into_iter().filter(|&strategy| elastic || strategy != Strategy::Rigid)

@@ -7,10 +7,11 @@ use crate::fit::errors::of_kind;
 use crate::fit::stages::alternation::{Alternation, Anderson, contraction};
 use crate::fit::stages::custom_solver::CustomSolver;
 use crate::fit::stages::fixture_location::locate;
+use crate::fit::stages::gauge::Gauge;
 use crate::fit::stages::noise_model::NoiseModel;
 use crate::fit::stages::placement::HeldOutOnly;
 use crate::fit::stages::registration::register;
-use crate::fit::stages::stage::{Gauge, Stage, StageEnd, StageError};
+use crate::fit::stages::stage::{Stage, StageEnd, StageError};
 use crate::fit::{
     ErrorSummary, Errors, OrientationErrors, Placement, ProgressSink, SolverChoice, Stop, Strategy,
 };

@@ -7,6 +7,7 @@ pub(super) mod constraints;
 pub(super) mod custom_solver;
 pub(super) mod fitting;
 pub(super) mod fixture_location;
+mod gauge;
 mod marker_pose;
 pub(super) mod noise_model;
 pub(super) mod parameter_size;

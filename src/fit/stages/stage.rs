@@ -6,6 +6,7 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector};
 
 use super::custom_solver::CustomSolver;
+use super::gauge::{Gauge, below};
 use crate::fit::SolverChoice;
 use crate::fit::stages::active_limits::Held;
 use crate::fit::stages::parameter_size::plausible;
@@ -15,8 +16,8 @@ use crate::least_squares::solver::{
     PseudoInverseSettings, Settings, Solution, Termination,
 };
 use crate::least_squares::{
-    Blind, Fit, LinearRows, Linearisation, LinearisationCache, Loss, Objective as _, RowsError,
-    StabilisedObjective, Triangle, UnidentifiableCombination, Weak,
+    Fit, LinearRows, Linearisation, LinearisationCache, Loss, Objective as _, RowsError,
+    StabilisedObjective,
 };
 use crate::model::parameter::Parameter;
 use crate::model::{LinearModel, Model, Pose, PoseResiduals};
@@ -86,18 +87,6 @@ pub(in crate::fit) struct StageEnd {
     pub x: DVector<f64>,
     pub solution: Solution,
     pub gauge: Gauge,
-}
-
-/// Combinations of the unknowns of a stage that data and priors leave undetermined or determine too
-/// weakly. They keep their start values.
-#[derive(Debug, Clone, Default)]
-pub(in crate::fit) struct Gauge {
-    /// Rows that span the combinations, shape = (combinations, unknowns).
-    pub rows: DMatrix<f64>,
-    /// Part of each unknown outside the combinations, 0…1.
-    pub visible: Vec<f64>,
-    /// Combinations that are determined too weakly, one by one.
-    pub weak: Vec<UnidentifiableCombination>,
 }
 
 impl<'a> Stage<'a> {
@@ -273,46 +262,7 @@ impl<'a> Stage<'a> {
         if self.parameters().all(|parameter| parameter.sigma.is_some()) {
             return Gauge { rows: DMatrix::zeros(0, n), visible: vec![1.0; n], weak: Vec::new() };
         }
-        let data = self.data_triangle(at);
-        let priors = self.priors();
-        let seen = n + priors.nrows();
-        let stacked = DMatrix::from_fn(seen + active.len(), n, |i, j| match i {
-            i if i < n => data[(i, j)],
-            i if i < seen => priors[(i - n, j)],
-            // A constraint is weighted like a measurement of each of its parameters.
-            i => {
-                active[i - seen].row[j].signum()
-                    * f64::from(active[i - seen].row[j] != 0.0)
-                    * data.column(j).norm()
-            }
-        });
-        let free: Vec<usize> = (0..n).filter(|&j| !held[j]).collect();
-        let seen = Triangle::of(&stacked.select_columns(&free));
-        let Blind { gauge: unseen, visible: outside } = Blind::in_triangle(&seen);
-        let all = self.sizes();
-        let sizes: Vec<Option<f64>> = free.iter().map(|&k| all[k]).collect();
-        let weak = Weak::of(&below(&seen, &unseen), &sizes);
-        let unidentifiable = unseen.nrows();
-        let count = unidentifiable + weak.as_ref().map_or(0, |weak| weak.rows.nrows());
-        let mut gauge =
-            Gauge { rows: DMatrix::zeros(count, n), visible: vec![0.0; n], weak: Vec::new() };
-        for (j, &k) in free.iter().enumerate() {
-            gauge.rows.view_mut((0, k), (unidentifiable, 1)).copy_from(&unseen.column(j));
-            gauge.visible[k] = outside[j];
-            if let Some(weak) = &weak {
-                gauge
-                    .rows
-                    .view_mut((unidentifiable, k), (count - unidentifiable, 1))
-                    .copy_from(&weak.rows.column(j));
-                gauge.visible[k] = outside[j].min(weak.visible[j]);
-            }
-        }
-        let renumbered = |weak: UnidentifiableCombination| UnidentifiableCombination {
-            weights: weak.weights.into_iter().map(|(j, weight)| (free[j], weight)).collect(),
-            ..weak
-        };
-        gauge.weak = weak.into_iter().flat_map(|weak| weak.combinations).map(renumbered).collect();
-        gauge
+        Gauge::of(&self.data_triangle(at), &self.priors(), &self.sizes(), held, active)
     }
 
     /// Minimises the cost from the full parameter vector `start`.
@@ -409,28 +359,22 @@ impl<'a> Stage<'a> {
                 reporter,
             ));
         }
-        Ok(match (self.solver, reporter) {
-            (SolverChoice::GaussNewton, _) => {
+        Ok(match self.solver {
+            SolverChoice::GaussNewton => {
                 let max_iterations =
                     self.max_steps.min(GaussNewtonSettings::default().max_iterations);
                 let settings =
                     GaussNewtonSettings { max_iterations, ..GaussNewtonSettings::default() };
                 solver::minimise_gauss_newton(fit, begin, &settings)
             }
-            (SolverChoice::PseudoInverse, reporter) => {
+            SolverChoice::PseudoInverse => {
                 let max_iterations =
                     self.max_steps.min(PseudoInverseSettings::default().max_iterations);
                 let settings =
                     PseudoInverseSettings { max_iterations, ..PseudoInverseSettings::default() };
-                match reporter {
-                    Some(reporter) => {
-                        solver::minimise_pseudo_inverse_observed(fit, begin, &settings, reporter)
-                    }
-                    None => solver::minimise_pseudo_inverse(fit, begin, &settings),
-                }
+                solver::minimise_pseudo_inverse_observed(fit, begin, &settings, reporter)
             }
-            (_, Some(reporter)) => solver::minimise_observed(fit, begin, &settings, reporter),
-            (_, None) => solver::minimise(fit, begin, &settings),
+            _ => solver::minimise_observed(fit, begin, &settings, reporter),
         })
     }
 
@@ -460,13 +404,4 @@ impl<'a> Stage<'a> {
         }
         rows
     }
-}
-
-/// Returns the triangular factor of `triangle` stacked on `rows`.
-fn below(triangle: &DMatrix<f64>, rows: &DMatrix<f64>) -> DMatrix<f64> {
-    let n = triangle.ncols();
-    let mut stack =
-        triangle.clone().resize_vertically((triangle.nrows() + rows.nrows()).max(n), 0.0);
-    stack.view_mut((triangle.nrows(), 0), rows.shape()).copy_from(rows);
-    if rows.nrows() == 0 { stack } else { Triangle::of(&stack) }
 }

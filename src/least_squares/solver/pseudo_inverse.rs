@@ -153,21 +153,15 @@ pub fn minimise_pseudo_inverse<O: Objective>(
     start: DVector<f64>,
     settings: &PseudoInverseSettings,
 ) -> Solution {
-    run(
-        objective,
-        start,
-        PseudoInverse::new(*settings),
-        settings.max_iterations,
-        None::<NoObserver>,
-    )
+    minimise_pseudo_inverse_observed(objective, start, settings, None::<NoObserver>)
 }
 
-/// Minimises like [`minimise_pseudo_inverse`] and calls `observer` after every iteration.
+/// Minimises like [`minimise_pseudo_inverse`] and calls `observer`, if any, after every iteration.
 pub fn minimise_pseudo_inverse_observed<O: Objective>(
     objective: O,
     start: DVector<f64>,
     settings: &PseudoInverseSettings,
-    observer: impl Observe<State> + 'static,
+    observer: Option<impl Observe<State> + 'static>,
 ) -> Solution {
-    run(objective, start, PseudoInverse::new(*settings), settings.max_iterations, Some(observer))
+    run(objective, start, PseudoInverse::new(*settings), settings.max_iterations, observer)
 }

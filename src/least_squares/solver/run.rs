@@ -57,17 +57,17 @@ const COST_ROUNDING: f64 = 1e-12;
 /// assert!((solution.x[1] - 2.0_f64.ln()).abs() < 1e-9);
 /// ```
 pub fn minimise<O: Objective>(objective: O, start: DVector<f64>, settings: &Settings) -> Solution {
-    solve(objective, start, Unconstrained::default(), settings, None::<NoObserver>)
+    minimise_observed(objective, start, settings, None::<NoObserver>)
 }
 
-/// Minimises like [`minimise`] and calls `observer` after every iteration.
+/// Minimises like [`minimise`] and calls `observer`, if any, after every iteration.
 pub fn minimise_observed<O: Objective>(
     objective: O,
     start: DVector<f64>,
     settings: &Settings,
-    observer: impl Observe<State> + 'static,
+    observer: Option<impl Observe<State> + 'static>,
 ) -> Solution {
-    solve(objective, start, Unconstrained::default(), settings, Some(observer))
+    solve(objective, start, Unconstrained::default(), settings, observer)
 }
 
 /// Runs the trust-region loop around a subproblem.

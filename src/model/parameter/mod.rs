@@ -9,6 +9,7 @@ mod inner;
 mod regressor;
 mod resolve;
 mod site;
+mod waves;
 
 pub(crate) use crate::laws::ArmField;
 pub use crate::laws::{BeamField, JointField};
@@ -17,10 +18,10 @@ pub(crate) use constraint::constrain;
 
 pub(crate) use inner::{slope_regressor, value_regressor};
 pub(crate) use regressor::Regressor;
-pub(crate) use regressor::Waves;
 pub(crate) use resolve::{EffectParameter, resolve};
 pub(crate) use resolve::{holds_all, refuses, rule_of};
 pub use site::ParameterSite;
+pub(crate) use waves::Waves;
 
 use crate::laws::expression::Per;
 use crate::quantity::Unit;

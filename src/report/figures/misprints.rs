@@ -28,7 +28,7 @@ pub fn misprints(study: &MisprintStudy, results: &ReplicaResults) -> Drawing {
         (named.name.clone(), spreads(&|replica| replica.reading_error(index, 0)))
     });
     let models = AlternativeModel::EACH.into_iter().map(|model| {
-        (model.words().0.to_owned(), spreads(&|replica| replica.alternative_error(model)))
+        (model.as_str().to_owned(), spreads(&|replica| replica.alternative_error(model)))
     });
     let rows: Vec<Row> = readings.chain(models).collect();
     let cases: Vec<String> = study.cases.iter().map(Case::name).collect();

@@ -1,8 +1,8 @@
 //! Tables of studies.
 
 use crate::files;
-use crate::results::{Cell, StudiedParameter, StudyResult};
-use crate::study::{CellResult, Results, Study};
+use crate::results::{Cell, StudyResult};
+use crate::study::{CellResult, ParameterResult, Results, Study};
 
 /// Header of the first columns of every table.
 const CELL: &str = "cell,position_sigma_mm,identification_poses,strategy,solver";
@@ -37,7 +37,7 @@ pub fn study_csv(study: &Study, results: &Results) -> String {
 pub fn study_parameters_csv(study: &Study, results: &Results) -> String {
     let header = "parameter,unit,fits,bias,spread,rms_error,with_std_error,std_error,coverage";
     csv(study, results, header, |cell, _| {
-        let line = |parameter: &StudiedParameter| {
+        let line = |parameter: &ParameterResult| {
             vec![
                 parameter.name.clone(),
                 parameter.unit.to_owned(),

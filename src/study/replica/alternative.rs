@@ -2,55 +2,31 @@
 
 use crate::problem::{Joint, Problem};
 
-/// Wrong assumption about the arm, with correct formulas.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum AlternativeModel {
-    /// Model 1.25 times as stiff as the arm.
-    QuarterTooStiff,
-    /// Model twice as stiff as the arm.
-    TwiceTooStiff,
-    /// Model two thirds as stiff as the arm.
-    TooSoft,
-    /// Model with elastic joints and rigid links.
-    JointsAlone,
-    /// Model with elastic links and rigid joints.
-    LinksAlone,
-    /// Model whose hoist force is 10 % too small.
-    HoistTooWeak,
-    /// Model without a hoist.
-    NoHoist,
-    /// Model without a payload.
-    NoPayload,
+worded! {
+    /// Wrong assumption about the arm, with correct formulas.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    #[non_exhaustive]
+    pub enum AlternativeModel: as_str, summary {
+        /// Model 1.25 times as stiff as the arm.
+        QuarterTooStiff = "quarter-too-stiff", "model 1.25 times as stiff as the arm";
+        /// Model twice as stiff as the arm.
+        TwiceTooStiff = "twice-too-stiff", "model twice as stiff as the arm";
+        /// Model two thirds as stiff as the arm.
+        TooSoft = "third-too-soft", "model two thirds as stiff as the arm";
+        /// Model with elastic joints and rigid links.
+        JointsAlone = "joints-alone", "rigid links in the model";
+        /// Model with elastic links and rigid joints.
+        LinksAlone = "links-alone", "rigid joints in the model";
+        /// Model whose hoist force is 10 % too small.
+        HoistTooWeak = "hoist-too-weak", "hoist 10 % weaker in the model";
+        /// Model without a hoist.
+        NoHoist = "no-hoist", "no hoist in the model";
+        /// Model without a payload.
+        NoPayload = "no-payload", "no payload in the model";
+    }
 }
 
 impl AlternativeModel {
-    /// All alternative models, in the order of the results.
-    pub const EACH: [Self; 8] = [
-        Self::QuarterTooStiff,
-        Self::TwiceTooStiff,
-        Self::TooSoft,
-        Self::JointsAlone,
-        Self::LinksAlone,
-        Self::HoistTooWeak,
-        Self::NoHoist,
-        Self::NoPayload,
-    ];
-
-    /// Returns the name in results and a short description.
-    pub const fn words(self) -> (&'static str, &'static str) {
-        match self {
-            Self::QuarterTooStiff => ("quarter-too-stiff", "model 1.25 times as stiff as the arm"),
-            Self::TwiceTooStiff => ("twice-too-stiff", "model twice as stiff as the arm"),
-            Self::TooSoft => ("third-too-soft", "model two thirds as stiff as the arm"),
-            Self::JointsAlone => ("joints-alone", "rigid links in the model"),
-            Self::LinksAlone => ("links-alone", "rigid joints in the model"),
-            Self::HoistTooWeak => ("hoist-too-weak", "hoist 10 % weaker in the model"),
-            Self::NoHoist => ("no-hoist", "no hoist in the model"),
-            Self::NoPayload => ("no-payload", "no payload in the model"),
-        }
-    }
-
     /// Returns the arm that this model assumes in place of the true one.
     pub(super) fn assumed(self, mut arm: Problem) -> Problem {
         match self {

@@ -33,7 +33,7 @@ pub fn readings() -> Vec<NamedReading> {
     };
     let printed = Reading::from(Form::Printed);
     let mut all_readings = vec![named("corrected", "all", "no misprint", Reading::default())];
-    all_readings.extend(Misprint::ALL.map(alone));
+    all_readings.extend(Misprint::EACH.map(alone));
     all_readings.push(NamedReading {
         reading: Reading::from(Misprint::LinkSide).with(Misprint::TransferIndex, Form::Printed),
         ..named(

@@ -38,7 +38,7 @@ pub struct Replica {
 #[derive(Debug, Clone, PartialEq)]
 pub struct ReplicaResults {
     /// Largest displacement of the end point by each misprint \[m\], in the order of
-    /// [`Misprint::ALL`](crate::paper::Misprint::ALL).
+    /// [`Misprint::EACH`](crate::paper::Misprint::EACH).
     pub sizes: Vec<f64>,
     /// Readings that were compared.
     pub readings: Vec<NamedReading>,

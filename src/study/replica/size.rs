@@ -7,7 +7,7 @@ use crate::paper::{EndPoint, Misprint, Parameters, Reading};
 use crate::rig::{Draw, draw};
 
 /// Returns the largest change \[m\] of `D_f`, or of `D_g` = `J_g` e, by each misprint, in the order
-/// of [`Misprint::ALL`].
+/// of [`Misprint::EACH`].
 ///
 /// The maximum is over the poses of the first specimen: the declared arm with its declared
 /// elasticity and the geometric errors e of the truth. For `BetaLeftOut` it is the displacement by
@@ -47,5 +47,5 @@ pub fn sizes(study: &MisprintStudy) -> Vec<f64> {
         };
         rows.iter().map(of_row).fold(0.0, f64::max)
     };
-    Misprint::ALL.into_iter().map(size).collect()
+    Misprint::EACH.into_iter().map(size).collect()
 }

@@ -1,0 +1,79 @@
+//! Combinations of the unknowns of a stage that stay where they start.
+
+use nalgebra::DMatrix;
+
+use super::active_limits::Held;
+use crate::least_squares::{Blind, Triangle, UnidentifiableCombination, Weak};
+
+/// Combinations of the unknowns of a stage that data and priors leave undetermined or determine too
+/// weakly. They keep their start values.
+#[derive(Debug, Clone, Default)]
+pub(in crate::fit) struct Gauge {
+    /// Rows that span the combinations, shape = (combinations, unknowns).
+    pub rows: DMatrix<f64>,
+    /// Part of each unknown outside the combinations, 0…1.
+    pub visible: Vec<f64>,
+    /// Combinations that are determined too weakly, one by one.
+    pub weak: Vec<UnidentifiableCombination>,
+}
+
+impl Gauge {
+    /// Finds the combinations of the unknowns not `held` that data, priors and `active` constraints
+    /// do not determine. `data` is the triangular factor of the data, `sizes` are the plausible
+    /// deviations of the unknowns.
+    pub fn of(
+        data: &DMatrix<f64>,
+        priors: &DMatrix<f64>,
+        sizes: &[Option<f64>],
+        held: &[bool],
+        active: &[Held],
+    ) -> Self {
+        let n = data.ncols();
+        let seen = n + priors.nrows();
+        let stacked = DMatrix::from_fn(seen + active.len(), n, |i, j| match i {
+            i if i < n => data[(i, j)],
+            i if i < seen => priors[(i - n, j)],
+            // A constraint is weighted like a measurement of each of its parameters.
+            i => {
+                active[i - seen].row[j].signum()
+                    * f64::from(active[i - seen].row[j] != 0.0)
+                    * data.column(j).norm()
+            }
+        });
+        let free: Vec<usize> = (0..n).filter(|&j| !held[j]).collect();
+        let seen = Triangle::of(&stacked.select_columns(&free));
+        let Blind { gauge: unseen, visible: outside } = Blind::in_triangle(&seen);
+        let sizes: Vec<Option<f64>> = free.iter().map(|&k| sizes[k]).collect();
+        let weak = Weak::of(&below(&seen, &unseen), &sizes);
+        let unidentifiable = unseen.nrows();
+        let count = unidentifiable + weak.as_ref().map_or(0, |weak| weak.rows.nrows());
+        let mut gauge =
+            Gauge { rows: DMatrix::zeros(count, n), visible: vec![0.0; n], weak: Vec::new() };
+        for (j, &k) in free.iter().enumerate() {
+            gauge.rows.view_mut((0, k), (unidentifiable, 1)).copy_from(&unseen.column(j));
+            gauge.visible[k] = outside[j];
+            if let Some(weak) = &weak {
+                gauge
+                    .rows
+                    .view_mut((unidentifiable, k), (count - unidentifiable, 1))
+                    .copy_from(&weak.rows.column(j));
+                gauge.visible[k] = outside[j].min(weak.visible[j]);
+            }
+        }
+        let renumbered = |weak: UnidentifiableCombination| UnidentifiableCombination {
+            weights: weak.weights.into_iter().map(|(j, weight)| (free[j], weight)).collect(),
+            ..weak
+        };
+        gauge.weak = weak.into_iter().flat_map(|weak| weak.combinations).map(renumbered).collect();
+        gauge
+    }
+}
+
+/// Returns the triangular factor of `triangle` stacked on `rows`.
+pub(super) fn below(triangle: &DMatrix<f64>, rows: &DMatrix<f64>) -> DMatrix<f64> {
+    let n = triangle.ncols();
+    let mut stack =
+        triangle.clone().resize_vertically((triangle.nrows() + rows.nrows()).max(n), 0.0);
+    stack.view_mut((triangle.nrows(), 0), rows.shape()).copy_from(rows);
+    if rows.nrows() == 0 { stack } else { Triangle::of(&stack) }
+}
