@@ -48,8 +48,7 @@ fn words<T: Copy + Send + Sync + 'static>(
     name: fn(T) -> &'static str,
     summary: fn(T) -> &'static str,
 ) -> impl TypedValueParser<Value = T> {
-    let values =
-        each.iter().map(|&value| PossibleValue::new(name(value)).help(summary(value)));
+    let values = each.iter().map(|&value| PossibleValue::new(name(value)).help(summary(value)));
     PossibleValuesParser::new(values).try_map(move |word| {
         each.iter()
             .copied()

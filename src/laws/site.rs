@@ -1,50 +1,48 @@
 //! Fields of joints, beams and the arm to which laws add.
 
-worded! {
-    /// Field of a joint that may be free: first the parameters of [Chen2021, eq. 1], then the
-    /// fields that effects change.
-    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-    #[expect(missing_docs, reason = "letters need no words")]
-    #[non_exhaustive]
-    pub enum JointField: name {
-        Alpha = "alpha";
-        A = "a";
-        Theta = "theta";
-        D = "d";
-        Beta = "beta";
-        Stiffness = "stiffness";
-        /// Compliance in addition to the declared 1/k [rad/(N·m)].
-        Compliance = "compliance";
-        /// Angle per cube of the moment [rad/(N·m)³].
-        Cubic = "cubic";
-        /// Play \[rad\]: half of it to each side, by the direction of approach, or by the moment if
-        /// that is unknown.
-        Play = "play";
-        /// Play of a prismatic joint \[m\], taken up by the direction of approach only.
-        SlidingPlay = "sliding_play";
-        /// Flexibility about x before the joint's rotation [rad/(N·m)].
-        LateralX = "lateral_x";
-        /// Flexibility about y before the joint's rotation [rad/(N·m)].
-        LateralY = "lateral_y";
-        /// Flexibility 1/EI of the slide [1/(N·m²)].
-        SlideFlexibility = "slide_flexibility";
-        /// Spring rate of a gravity compensator [N/m].
-        SpringRate = "spring_rate";
-        /// Preload of a gravity compensator \[N\].
-        SpringPreload = "spring_preload";
-        /// Coordinates of a fixed joint's placement \[m\].
-        X = "x";
-        Y = "y";
-        Z = "z";
-        /// Angles of a fixed joint's placement \[rad\].
-        Roll = "roll";
-        Pitch = "pitch";
-        Yaw = "yaw";
-        /// Number of the small motion before the joint turns: x, y, z \[m\], rx, ry, rz \[rad\].
-        Before(usize),
-        /// Number of the small motion behind the joint: x, y, z \[m\], rx, ry, rz \[rad\].
-        After(usize),
-    }
+/// Field of a joint that may be free: first the parameters of [Chen2021, eq. 1], then the fields
+/// that effects change.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[expect(missing_docs, reason = "letters need no words")]
+#[non_exhaustive]
+pub enum JointField {
+    Alpha,
+    A,
+    Theta,
+    D,
+    Beta,
+    Stiffness,
+    /// Compliance in addition to the declared 1/k [rad/(N·m)].
+    Compliance,
+    /// Angle per cube of the moment [rad/(N·m)³].
+    Cubic,
+    /// Play \[rad\]: half of it to each side, by the direction of approach, or by the moment if
+    /// that is unknown.
+    Play,
+    /// Play of a prismatic joint \[m\], taken up by the direction of approach only.
+    SlidingPlay,
+    /// Flexibility about x before the joint's rotation [rad/(N·m)].
+    LateralX,
+    /// Flexibility about y before the joint's rotation [rad/(N·m)].
+    LateralY,
+    /// Flexibility 1/EI of the slide [1/(N·m²)].
+    SlideFlexibility,
+    /// Spring rate of a gravity compensator [N/m].
+    SpringRate,
+    /// Preload of a gravity compensator \[N\].
+    SpringPreload,
+    /// Coordinates of a fixed joint's placement \[m\].
+    X,
+    Y,
+    Z,
+    /// Angles of a fixed joint's placement \[rad\].
+    Roll,
+    Pitch,
+    Yaw,
+    /// Number of the small motion before the joint turns: x, y, z \[m\], rx, ry, rz \[rad\].
+    Before(usize),
+    /// Number of the small motion behind the joint: x, y, z \[m\], rx, ry, rz \[rad\].
+    After(usize),
 }
 
 /// Names of the numbers of a small motion.
@@ -145,6 +143,35 @@ impl JointField {
     /// Returns true for geometry that a problem declares.
     pub fn is_geometry(self) -> bool {
         Self::GEOMETRY.contains(&self) || self.placement().is_some()
+    }
+
+    /// Returns the part of the parameter's name after the dot.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Alpha => "alpha",
+            Self::A => "a",
+            Self::Theta => "theta",
+            Self::D => "d",
+            Self::Beta => "beta",
+            Self::Stiffness => "stiffness",
+            Self::Compliance => "compliance",
+            Self::Cubic => "cubic",
+            Self::Play => "play",
+            Self::SlidingPlay => "sliding_play",
+            Self::LateralX => "lateral_x",
+            Self::LateralY => "lateral_y",
+            Self::SlideFlexibility => "slide_flexibility",
+            Self::SpringRate => "spring_rate",
+            Self::SpringPreload => "spring_preload",
+            Self::X => "x",
+            Self::Y => "y",
+            Self::Z => "z",
+            Self::Roll => "roll",
+            Self::Pitch => "pitch",
+            Self::Yaw => "yaw",
+            Self::Before(_) => "before",
+            Self::After(_) => "after",
+        }
     }
 }
 

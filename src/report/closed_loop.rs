@@ -1,12 +1,9 @@
 //! Texts of the command `loop`: summary for one screen, full text for the terminal, and report.
 
-use std::fmt::Write as _;
-
-use super::document::{Block, Column, Headline, Point, Table, code, first_of, named, some_of};
-use super::errors::{
-    NOMINAL, both_parts, header, held_out_rows, judging, measure, rows_of, unpredicted,
-};
+use super::document::{Block, Headline, Point, Table, code, first_of, named};
+use super::errors::{NOMINAL, both_parts, held_out_rows, judging, measure, rows_of, unpredicted};
 use super::figures;
+use super::found_effects::{found, rounds, sureness};
 use super::identify::{
     BEFORE, all_told, beware, fitted_parameters, mean, poses, spread, why_not_trusted,
 };
@@ -15,13 +12,11 @@ use super::parameters::parameters;
 use super::probability::percent;
 use super::render::{Report, report, text, text_within};
 use super::unexplained::{correction, places, to_declare, unexplained};
-use super::verdict::{causes, counts, stand_in, title, verdict};
+use super::verdict::{causes, counts, title, verdict};
 use super::{effect, findings, trace};
 use crate::problem::Problem;
-use crate::quantity::format::{counted, decimals, number, or_dash, p_value};
-use crate::results::{
-    FoundEffect, Gain, LoopResult, PlotData, Step, Summary, TraceResult, Witness,
-};
+use crate::quantity::format::{counted, decimals, number};
+use crate::results::{FoundEffect, Gain, LoopResult, PlotData, Summary, TraceResult};
 use crate::select::ClosedLoop;
 
 /// Maximum number of alternatives that a text names; the page names twice as many.
@@ -384,122 +379,4 @@ fn gain(closure: &ClosedLoop, result: &LoopResult) -> Block<'static> {
     arms.extend((!result.effects.is_empty()).then_some(("what was found", &after.fitted)));
     let words = [gained(closure, result), another, unpredicted(&arms)];
     Block::Text(words.into_iter().flatten().collect::<Vec<_>>().join(" "))
-}
-
-/// Lists every effect of the extended problem.
-fn found<'a>(result: &LoopResult, alternatives: usize) -> Vec<Block<'a>> {
-    if result.effects.is_empty() {
-        return Vec::new();
-    }
-    let points = result.effects.iter().map(|found| point(result, found, alternatives)).collect();
-    let mut blocks = vec![Block::heading("What was found"), Block::Ranking(points)];
-    if let Some(prior) = &result.harmonic_prior {
-        let sigmas = || prior.iter().map(|order| order.sigma_rad.to_degrees());
-        blocks.push(Block::Text(format!(
-            "Many harmonics were found. The model has every order up to the highest significant one, with one prior for all joints: \
-             1 σ of {} to {} ° by order. Its scale predicts best the poses in left-out parts of the joints' ranges.",
-            number(sigmas().fold(f64::INFINITY, f64::min), 6),
-            number(sigmas().fold(0.0, f64::max), 6)
-        )));
-    }
-    blocks
-}
-
-fn point(result: &LoopResult, found: &FoundEffect, alternatives: usize) -> Point {
-    let mut details: Vec<String> = stand_in(found).into_iter().collect();
-    details.extend(effect::values(&found.effect.effect, &found.parameters));
-    details.extend(found.claims.as_ref().map(trace::claimed));
-    details.extend(found.stability.map(|share| {
-        format!(
-            "named in {} % of refits on random 80 % subsets of the poses",
-            number(share * 100.0, 0)
-        )
-    }));
-    details.extend(found.witness.as_ref().map(witness));
-    let mut chance = format!("p {}", p_value(found.p_value));
-    chance.push_str(if found.is_only_with_others() {
-        ": not significant by itself; it is in the model together with others"
-    } else {
-        ": probability that noise alone does as well"
-    });
-    let then = found.held_out_after;
-    if then != *result.after.errors.judged() {
-        let ([mean, rms, _], unit) = then.norms();
-        let _ = write!(
-            chance,
-            "; held-out error once it was in the model: mean {} {unit}, rms {} {unit}",
-            number(mean, 4),
-            number(rms, 4)
-        );
-    }
-    details.push(chance);
-    if !found.alternatives.is_empty() {
-        let others = found.alternatives.iter().map(|other| other.description.clone());
-        let (mut others, more) = some_of(others, alternatives);
-        others.extend((more > 0).then(|| format!("{more} more in loop.json")));
-        details.push(format!("these data do not distinguish it from: {}", others.join("; ")));
-    }
-    Point { text: title(found), details, mark: None }
-}
-
-fn witness(witness: &Witness) -> String {
-    format!("{} by {}, which took no part in the fit", witness.says, witness.data)
-}
-
-/// Returns the rounds of fit, trace and refit with their errors.
-fn rounds<'a>(closure: &'a ClosedLoop, result: &LoopResult) -> Vec<Block<'a>> {
-    if result.steps.is_empty() {
-        return Vec::new();
-    }
-    let effects = |(_, step): &(usize, &Step)| match step.effects.as_slice() {
-        [] => "none".to_owned(),
-        effects => {
-            let words = effects.iter().map(|effect| closure.before.describe(effect));
-            words.collect::<Vec<_>>().join("; ")
-        }
-    };
-    let error = |name, of: fn(&Step) -> f64| {
-        Column::number(name, move |(_, step): &(usize, &Step)| number(of(step), 4))
-    };
-    let rms = ["identification rms, mm", "identification rms, °", "identification rms, px"];
-    let rms = header(&closure.after.fitted.held_out, rms);
-    let steps: Vec<(usize, &Step)> = (1..).zip(&result.steps).collect();
-    let columns = [
-        Column::number("round", |(round, _): &(usize, &Step)| round.to_string()),
-        Column::words("effects in the model", effects),
-        error(rms, |step| step.errors.identification.norms().0[1]),
-        error("held out mean", |step| step.errors.judged().norms().0[0]),
-        error("held out rms", |step| step.errors.judged().norms().0[1]),
-    ];
-    vec![
-        Block::heading("Rounds"),
-        Block::figures([figures::rounds(closure)]),
-        Block::Table(Table::of(&steps, &columns)),
-    ]
-}
-
-/// Returns the status of each effect with the evidence for it.
-fn sureness<'a>(closure: &ClosedLoop, result: &LoopResult) -> Option<Block<'a>> {
-    let share = |part: f64| format!("{} %", number(part * 100.0, 0));
-    let law = |found: &FoundEffect| {
-        or_dash(found.claims.as_ref(), |claims| share(claims.law.probability))
-    };
-    let mean = ["held out mean, mm", "held out mean, °", "held out mean, px"];
-    let mean = header(&closure.after.fitted.held_out, mean);
-    let columns = [
-        Column::words("effect", |found: &FoundEffect| found.effect.description.clone()),
-        Column::words("status", |found: &FoundEffect| found.status.as_str().to_owned()),
-        Column::number("p", |found: &FoundEffect| p_value(found.p_value)),
-        Column::number("law", law),
-        Column::number("refits", |found: &FoundEffect| or_dash(found.stability, share)),
-        Column::words("data outside the fit", |found: &FoundEffect| {
-            or_dash(found.witness.as_ref(), |check| format!("{} by {}", check.says, check.data))
-        }),
-        Column::number(mean, |found: &FoundEffect| number(found.held_out_after.norms().0[0], 4)),
-    ];
-    let note = "p: probability that noise alone does as well; law: probability of the law against \
-                every other at its place; refits: share of refits on random 80 % subsets of the \
-                poses that name it; held out mean: once it was in the model";
-    let table = Table::of(&result.effects, &columns).noted(&[note]);
-    (!result.effects.is_empty()).then_some(Block::Table(table))
 }

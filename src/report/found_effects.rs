@@ -47,7 +47,7 @@ fn point(result: &LoopResult, found: &FoundEffect, alternatives: usize) -> Point
         ": probability that noise alone does as well"
     });
     let then = found.held_out_after;
-    if then != result.after.errors.held_out {
+    if then != *result.after.errors.judged() {
         let ([mean, rms, _], unit) = then.norms();
         let _ = write!(
             chance,
@@ -92,8 +92,8 @@ pub(super) fn rounds<'a>(closure: &'a ClosedLoop, result: &LoopResult) -> Vec<Bl
         Column::number("round", |(round, _): &(usize, &Step)| round.to_string()),
         Column::words("effects in the model", effects),
         error(rms, |step| step.errors.identification.norms().0[1]),
-        error("held out mean", |step| step.errors.held_out.norms().0[0]),
-        error("held out rms", |step| step.errors.held_out.norms().0[1]),
+        error("held out mean", |step| step.errors.judged().norms().0[0]),
+        error("held out rms", |step| step.errors.judged().norms().0[1]),
     ];
     vec![
         Block::heading("Rounds"),

@@ -107,10 +107,7 @@ fn an_estimate_that_was_changed_is_refused_or_said() {
     let estimate = folder.json(ESTIMATE)["parameters"][0]["estimate"].to_string();
     folder.edit(ESTIMATE, &format!("\"estimate\": {estimate}"), "\"estimate\": 0.125");
     let changed = "out/estimate.json: parameters: changed";
-    assert_contains(
-        &predict("").code(2).stderr,
-        &[&format!("{changed} since flexcal wrote it")],
-    );
+    assert_contains(&predict("").code(2).stderr, &[&format!("{changed} since flexcal wrote it")]);
     assert_contains(&predict("--trust").success().stderr, &[changed, "all the same"]);
     for (from, to, words) in [
         (
