@@ -23,6 +23,7 @@ pub const TARGET: Vector3<f64> = Vector3::new(0.22, 0.05, -0.09);
 
 pub fn joint(a: f64) -> Joint<f64> {
     Joint {
+        motion: None,
         nonlinear: None,
         lateral: None,
         slide: None,
