@@ -129,7 +129,8 @@ fn a_joint_log_is_joined_by_name_order_or_time() {
         let left: Vec<(String, Option<usize>)> = warnings
             .iter()
             .filter(|warning| {
-                warning.kind == WarningKind::WithoutPartner { rows: 1, others: Vec::new() }
+                matches!(&warning.kind, WarningKind::WithoutPartner { rows: 1, others, .. }
+                    if others.is_empty())
             })
             .map(|Warning { location, .. }| {
                 let name = location.file.file_name().unwrap().to_string_lossy();

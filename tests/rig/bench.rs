@@ -1,7 +1,5 @@
 //! Shared arms and poses of the rig tests.
 
-use std::path::Path;
-
 use crate::common::arms::{TABLE_2, golden_problem};
 use flexcal::problem::{Effect, PoseConditions, Problem};
 use flexcal::rig::{Cause, Rig, TrueEffect};
