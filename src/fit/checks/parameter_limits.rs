@@ -10,22 +10,23 @@ use crate::quantity::Unit;
 /// σ once in two million.
 const MAX_PRIOR_SIGMAS: f64 = 5.0;
 
+/// Returns true for a declared quantity of the arm, its bases and targets; parameters of effects are
+/// none.
+pub(super) fn is_of_arm(parameter: &Parameter) -> bool {
+    let is_declared = match parameter.site {
+        ParameterSite::Joint { field, .. } => field.is_geometry() || field == JointField::Stiffness,
+        ParameterSite::Beam { .. } => parameter.site.unit().is_relative(),
+        ParameterSite::Base { .. } | ParameterSite::Target { .. } => true,
+        _ => false,
+    };
+    is_declared && parameter.regressor.is_constant()
+}
+
 /// Checks that no arm parameter deviates far beyond its prior. Parameters of effects are exempt.
 pub(super) struct WithinPriors;
 
 impl Check for WithinPriors {
     fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
-        let is_of_arm = |parameter: &Parameter| {
-            let is_declared = match parameter.site {
-                ParameterSite::Joint { field, .. } => {
-                    field.is_geometry() || field == JointField::Stiffness
-                }
-                ParameterSite::Beam { .. } => parameter.site.unit().is_relative(),
-                ParameterSite::Base { .. } | ParameterSite::Target { .. } => true,
-                _ => false,
-            };
-            is_declared && parameter.regressor.is_constant()
-        };
         let ratio = |parameter: &Parameter, x: f64| {
             Some(x.abs() / parameter.sigma.filter(|_| is_of_arm(parameter))?)
         };

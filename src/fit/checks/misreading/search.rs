@@ -6,6 +6,7 @@ use rayon::prelude::*;
 use super::Misreading;
 use super::candidates::{candidates, shift_step};
 use crate::fit::checks::checked_fit::CheckedFit;
+use crate::fit::checks::parameter_limits::is_of_arm;
 use crate::fit::stages::fitting::Fitting;
 use crate::fit::{Placement, SolverChoice};
 use crate::least_squares::{LinearisationCache, Loss};
@@ -69,6 +70,9 @@ pub(in crate::fit) fn explanations(fit: &CheckedFit) -> Explanations {
     let step = split.identification.len().div_ceil(MAX_ROWS).max(1);
     let chosen: Vec<usize> = split.identification.iter().copied().step_by(step).collect();
     let trial = Trial { fitting: fit.fitting, problem: fit.problem, chosen };
+    // Without orientations, as in all trials; a set of no joints changes nothing.
+    let as_declared = trial.rms(Misreading::Reversed { joints: 0 }, false);
+    let nominal = as_declared.map_or(nominal, |(error, _)| error.min(nominal));
     let is_position = measurements.leading().is_position();
     // Contacts with one point agree with every arm that hardly moves.
     let is_tested =
@@ -206,8 +210,10 @@ impl Trial<'_> {
     /// Returns the root mean squared error of `rows` at the full parameter vector `x` \[m\] to
     /// which the deviations from priors add like measured numbers: √((Σ e² + σ² Σ (x/σₚ)²) / n).
     fn penalised(&self, fitting: &Fitting, rows: &[usize], x: &DVector<f64>) -> f64 {
+        // Declared effects may go far beyond their priors.
         let parameters = fitting.model.parameters.iter().zip(x);
-        let squares = parameters.filter_map(|(parameter, x)| Some((x / parameter.sigma?).powi(2)));
+        let of_arm = parameters.filter(|(parameter, _)| is_of_arm(parameter));
+        let squares = of_arm.filter_map(|(parameter, x)| Some((x / parameter.sigma?).powi(2)));
         let deviations = squares.sum::<f64>() / rows.len().max(1) as f64;
         let square = self.error(fitting, rows, x).powi(2);
         (square + fitting.sigma.powi(2) * deviations).sqrt()
