@@ -128,7 +128,13 @@ pub fn close_by(
         .and_then(|evidence| Some((evidence, evidence.sure(rules.inclusion_threshold)?)));
     let mut unexplained =
         best.map_or_else(Vec::new, |best| unexplained::without_law(&fitted, &data, best));
-    let effects = found(&state, &fitted, best, (is_trusted, findings.is_structured()));
+    let of_all_rows = best.and_then(|_| evidence_with_doubtful_rows(&state, &declared, &fitted));
+    let effects = found(
+        &state,
+        &fitted,
+        (best, of_all_rows.as_ref()),
+        (is_trusted, findings.is_structured()),
+    );
     if unexplained.is_empty() {
         unexplained.extend(unexplained::nowhere(&findings));
     }
@@ -207,6 +213,23 @@ fn kept(
     } else {
         Ok((declared.clone(), None))
     }
+}
+
+/// Returns the evidence about a fit that includes the rows set aside beside the added effects but not
+/// beside the declared ones; `None` if there are none. Such rows have gross errors, or they
+/// contradict the added effects.
+fn evidence_with_doubtful_rows(
+    state: &SearchState,
+    declared: &Fitted,
+    fitted: &Fitted,
+) -> Option<Evidence> {
+    let is_aside = |row: &usize| declared.set_aside.contains(row);
+    let aside: Vec<usize> = fitted.set_aside.iter().copied().filter(is_aside).collect();
+    let added = state.reconsidered(fitted);
+    if aside.len() == fitted.set_aside.len() || added.is_empty() {
+        return None;
+    }
+    evaluate(&fitted.setting_aside(aside), state.data, &added)
 }
 
 /// Fits the declared problem with the effects of status [`Status::Found`] alone.

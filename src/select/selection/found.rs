@@ -48,11 +48,12 @@ pub struct Found {
 
 /// Returns every effect that a fit contains in addition to the declared ones, with its tests. If
 /// the fit has cautions (`is_trusted` is false), no effect is more than probable. If the
-/// residual of the fit is not noise (`is_structured`), its claims are means over subsets.
+/// residual of the fit is not noise (`is_structured`), its claims are means over subsets. No claim is
+/// surer than by the evidence `of_all_rows`, which includes rows that the effects make outliers.
 pub(super) fn found(
     state: &SearchState,
     fitted: &Fitted,
-    best: Option<(&Evidence, &HypothesisSet)>,
+    (best, of_all_rows): (Option<(&Evidence, &HypothesisSet)>, Option<&Evidence>),
     (is_trusted, is_structured): (bool, bool),
 ) -> Vec<Found> {
     let (data, rules) = (state.data, state.data.rules);
@@ -83,7 +84,15 @@ pub(super) fn found(
             let claims = claims(evidence, &effect).or_else(|| claims(evidence, &alike()?))?;
             let is_steady =
                 !is_structured && share.is_none_or(|share| share >= MIN_SHARE_OF_SUBSETS);
-            Some(if is_steady { claims } else { over_subsets(claims, &of_parts) })
+            let claims = if is_steady { claims } else { over_subsets(claims, &of_parts) };
+            Some(match of_all_rows {
+                Some(all) => {
+                    let others = self::claims(all, &effect);
+                    let others = others.map(|c| [c.place.1, c.depends_on.1, c.law.1]);
+                    no_surer_than(claims, others.unwrap_or_default())
+                }
+                None => claims,
+            })
         });
         let check = reference_check(fitted, data, &effect);
         let verdict = check.as_ref().map(|check| check.verdict);
@@ -167,14 +176,17 @@ fn claims(evidence: &Evidence, effect: &Effect) -> Option<Claims> {
 ///
 /// If no set of hypotheses describes the data, the posterior overstates the probability of the best
 /// one. Its mean over resampled data does not. [Huggins and Miller 2023]
-fn over_subsets(mut claims: Claims, of_parts: &[&SubsetEvidence]) -> Claims {
-    if let Some(part) = of_parts.iter().max_by(|a, b| a.means[2].total_cmp(&b.means[2])) {
-        let probabilities =
-            [&mut claims.place.1, &mut claims.depends_on.1, &mut claims.law.1].into_iter();
-        probabilities
-            .zip(part.means)
-            .for_each(|(probability, mean)| *probability = probability.min(mean));
+fn over_subsets(claims: Claims, of_parts: &[&SubsetEvidence]) -> Claims {
+    match of_parts.iter().max_by(|a, b| a.means[2].total_cmp(&b.means[2])) {
+        Some(part) => no_surer_than(claims, part.means),
+        None => claims,
     }
+}
+
+/// Returns the claims with probabilities of place, quantities and law no larger than others.
+fn no_surer_than(mut claims: Claims, others: [f64; 3]) -> Claims {
+    let limited = [&mut claims.place.1, &mut claims.depends_on.1, &mut claims.law.1];
+    limited.into_iter().zip(others).for_each(|(p, other)| *p = p.min(other));
     claims
 }
 
