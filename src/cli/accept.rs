@@ -91,9 +91,10 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let mut result = AcceptanceResult::new(&problem, &data.measurements, &found, &judged, &record);
     if let (Some(correction), Some(predicted)) = (correction, &predicted) {
         let held_out = fit::held_out_positions(&problem, &data)?;
-        let poses = held_out.iter().map(|&row| predicted.poses[row]).collect();
+        let poses = held_out.iter().filter_map(|&row| predicted.poses.get(row).copied()).collect();
         let bounds = Bounds::new(correction, poses, LEVEL);
-        let errors = held_out.iter().map(|&row| predicted.rows[row].position.norm());
+        let errors =
+            held_out.iter().filter_map(|&row| Some(predicted.rows.get(row)?.position.norm()));
         result = result.with_bounds(&bounds, bounds.coverage(errors), has_remainder);
     }
     let tolerance = arguments.tolerance_mm.map(|length| Tolerance {

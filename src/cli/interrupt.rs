@@ -66,8 +66,10 @@ pub fn begin_writing() {
         }
         is_over
     };
-    while is_over {
-        thread::park();
+    if is_over {
+        loop {
+            thread::park();
+        }
     }
 }
 

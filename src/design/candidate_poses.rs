@@ -239,7 +239,9 @@ impl<'a> PoseTable<'a> {
             (&mut rows.hoist, set(draft.hoist, ranges.hoist)),
             (&mut rows.temperature, set(draft.temperature, ranges.temperature)),
         ] {
-            column.iter_mut().for_each(|column| column.extend(value));
+            if let Some(column) = column {
+                column.extend(value);
+            }
         }
         rows.covariates.extend(&draft.covariates);
         rows.target.iter_mut().for_each(|target| target.of_row.push(draft.target));

@@ -156,8 +156,9 @@ pub(super) fn seed_arm(model: &Model, x: &[f64], inputs: &[&Input]) -> Arm<Dual6
                     JointField::D => joint.d += seed,
                     JointField::Beta => joint.beta = Angle::new(joint.beta.value + seed),
                     JointField::Before(_) | JointField::After(_) => {
-                        let motion = field.motion().zip(joint.motion.as_mut());
-                        motion.into_iter().for_each(|(k, motion)| motion[k] += seed);
+                        if let Some((k, motion)) = field.motion().zip(joint.motion.as_mut()) {
+                            motion[k] += seed;
+                        }
                     }
                     _ => joint.theta += seed,
                 }

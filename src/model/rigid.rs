@@ -15,6 +15,9 @@ use crate::model::parameter::{JointField, ParameterSite};
 use crate::problem::{PoseView, Tree};
 use crate::spatial::{Frame, rotate, rotated_about_x, rotated_about_y, rotated_about_z};
 
+/// Derivatives of the target with respect to the small motions on either side of a joint.
+type MotionLevers = Box<[Vector3<f64>; 2 * MOTION]>;
+
 /// Derivatives of a rigid arm, one elementary motion (rotation or translation) at a time.
 pub(super) struct Rigid {
     links: Vec<Link>,
@@ -43,7 +46,7 @@ struct Carried {
     derivatives: [Vector3<f64>; 5],
     coordinates: Coordinates<Dual64>,
     /// Derivatives with respect to the small motions, if the link has some.
-    motions: Option<Box<[Vector3<f64>; 2 * MOTION]>>,
+    motions: Option<MotionLevers>,
 }
 
 impl Rigid {
@@ -171,7 +174,7 @@ impl Link {
         at: &Coordinates<Dual64>,
         point: &Vector3<f64>,
         motion: Option<&[f64; 2 * MOTION]>,
-    ) -> ([Vector3<f64>; 5], Option<Box<[Vector3<f64>; 2 * MOTION]>>, Vector3<f64>) {
+    ) -> ([Vector3<f64>; 5], Option<MotionLevers>, Vector3<f64>) {
         let Joint { alpha, a, beta, .. } = &self.joint;
         let mut motions = motion.map(|_| Box::new([Vector3::zeros(); 2 * MOTION]));
         let mut displaced = |side: usize, point: Vector3<f64>| match (motion, &mut motions) {

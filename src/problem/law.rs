@@ -98,8 +98,9 @@ fn unit(site: &LawSite, joints: &[Joint]) -> Unit {
     };
     match site.at {
         At::Coordinate if site.joint().is_some_and(slides) => Unit::Length,
-        At::Coordinate | At::BaseTurn(_) => Unit::Angle,
-        At::Before(3..) | At::After(3..) | At::Tool(3..) => Unit::Angle,
+        At::Coordinate | At::BaseTurn(_) | At::Before(3..) | At::After(3..) | At::Tool(3..) => {
+            Unit::Angle
+        }
         At::Beam(BeamField::Stretch) => Unit::Ratio,
         At::Beam(_) => Unit::PerLength,
         _ => Unit::Length,

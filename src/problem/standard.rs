@@ -83,7 +83,7 @@ impl Problem {
             return None;
         }
         let mut joints = rows.to_vec();
-        for (joint, next) in joints.iter_mut().zip(&self.joints[1..]) {
+        for (joint, next) in joints.iter_mut().zip(self.joints.iter().skip(1)) {
             (joint.a, joint.alpha) = (next.a, next.alpha);
             let link = link((next.a, next.alpha));
             for body in &mut joint.bodies {

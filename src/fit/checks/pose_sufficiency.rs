@@ -67,7 +67,7 @@ impl PoseSufficiency {
         let held_out =
             underdetermined((model, placement), (&numbers, &of_row), (later, true), is_held_out)
                 .or_else(|| undetermined(fitting, &numbers, later, at, is_held_out))
-                .map(of_held_out);
+                .map(|finding| of_held_out(&finding));
         let several_targets =
             poses < count_distinct(&numbers, split.identification.iter().copied());
         Self { finding, held_out, coordinates, poses, several_targets }
@@ -91,7 +91,7 @@ impl Check for HeldOutPlaced {
 }
 
 /// Turns a finding about a base or tool into one about held-out rows.
-fn of_held_out(finding: Finding) -> Finding {
+fn of_held_out(finding: &Finding) -> Finding {
     let number = |name| finding.value(name).cloned().unwrap_or_default();
     let text = format!("held-out rows of {}; their errors say little", finding.text);
     let numbers = [number("of"), number("poses")];

@@ -59,7 +59,7 @@ pub(crate) fn selection(
     for (name, column) in [("payload", &table.payload), ("temperature", &table.temperature)] {
         quantities.extend(column.iter().map(|column| (name.to_owned(), pick(&|row| column[row]))));
     }
-    quantities.retain(|(_, values)| values.iter().any(|value| *value != values[0]));
+    quantities.retain(|(_, values)| values.iter().any(|value| value.total_cmp(&values[0]).is_ne()));
     let tests = 2.0 * quantities.len() as f64;
     let best = quantities
         .into_iter()
@@ -79,7 +79,9 @@ fn by_rank(values: &[f64], marked: &[bool]) -> f64 {
     let n = values.len() as f64;
     let (mut sum, mut ties, mut first) = (0.0, 0.0, 0);
     while first < order.len() {
-        let equal = order[first..].iter().take_while(|&&k| values[k] == values[order[first]]);
+        let equal = order[first..]
+            .iter()
+            .take_while(|&&k| values[k].total_cmp(&values[order[first]]).is_eq());
         let count = equal.count();
         let of_tie = order[first..first + count].iter().filter(|&&k| marked[k]).count() as f64;
         let (t, middle) = (count as f64, first as f64 + 0.5 * (count as f64 + 1.0));
@@ -97,7 +99,7 @@ fn by_rank(values: &[f64], marked: &[bool]) -> f64 {
 fn by_runs(values: &[f64], marked: &[bool]) -> f64 {
     let mut order: Vec<usize> = (0..values.len()).collect();
     order.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
-    if order.windows(2).any(|pair| values[pair[0]] == values[pair[1]]) {
+    if order.windows(2).any(|pair| values[pair[0]].total_cmp(&values[pair[1]]).is_eq()) {
         return 1.0;
     }
     let runs = 1 + order.windows(2).filter(|pair| marked[pair[0]] != marked[pair[1]]).count();

@@ -61,7 +61,9 @@ impl Fitting<'_> {
         };
         let mut errors = vec![Vector3::zeros(); rows.len()];
         let each: Vec<_> = groups.par_iter().flat_map_iter(of_group).collect();
-        each.into_iter().for_each(|(place, error)| errors[place] = error);
+        for (place, error) in each {
+            errors[place] = error;
+        }
         errors
     }
 }

@@ -87,15 +87,17 @@ impl ParameterSite {
                 | JointField::Play
                 | JointField::Roll
                 | JointField::Pitch
-                | JointField::Yaw => Unit::Angle,
+                | JointField::Yaw
+                | JointField::Before(3..)
+                | JointField::After(3..) => Unit::Angle,
                 JointField::A
                 | JointField::D
                 | JointField::SlidingPlay
                 | JointField::X
                 | JointField::Y
-                | JointField::Z => Unit::Length,
-                JointField::Before(axis) | JointField::After(axis) if axis < 3 => Unit::Length,
-                JointField::Before(_) | JointField::After(_) => Unit::Angle,
+                | JointField::Z
+                | JointField::Before(_)
+                | JointField::After(_) => Unit::Length,
                 JointField::Stiffness => Unit::TorsionalStiffness,
                 JointField::Compliance | JointField::LateralX | JointField::LateralY => {
                     Unit::Compliance

@@ -16,7 +16,7 @@ const LEVEL: f64 = 0.95;
 /// Number of commands at which the error of a joint is drawn.
 const COMMANDS: usize = 120;
 /// Seed of the random configurations.
-const SEED: u64 = 0x626f_756e_64;
+const SEED: u64 = 0x0062_6f75_6e64;
 
 /// Uncertainty of predictions over the workspace.
 #[derive(Debug, Clone, PartialEq)]

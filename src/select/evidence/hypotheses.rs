@@ -128,8 +128,7 @@ impl<'a> Hypotheses<'a> {
             _ => effect.tries(&family.collect::<Vec<_>>(), problem),
         };
         let ln_prior = grammar::ln_prior(effect, problem)
-            .map(|ln_prior| self.ln_family + ln_prior)
-            .unwrap_or_else(|| self.ln_family - tries.ln());
+            .map_or_else(|| self.ln_family - tries.ln(), |ln_prior| self.ln_family + ln_prior);
         let hypothesis = Hypothesis::of_effect(effect, problem, self.coverage);
         Some(Candidate { hypothesis, variant: 0, design, ln_prior, coefficients })
     }

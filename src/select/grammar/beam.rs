@@ -122,6 +122,7 @@ impl<'a> Beam<'a> {
         let columns: Vec<DVector<f64>> =
             sum.iter().flat_map(|term| self.terms.columns(term)).map(normed).collect();
         let span = self.site.span(&columns);
+        #[expect(clippy::cast_possible_truncation, reason = "half the width is twice as fast")]
         let weighted = span.weighted.transpose().map(|value| value as f32);
         let ln_prior = if sum.is_empty() { 0.0 } else { ln_prior(self.terms, sum) };
         State { sum: sum.clone(), ln_prior, span, weighted }
@@ -135,7 +136,7 @@ impl<'a> Beam<'a> {
         let of_chunk = |(number, chunk): (usize, &Chunk)| {
             let along = &state.weighted * &chunk.columns;
             let product = |a: usize, b: usize| {
-                let pairs = along.column(a).into_iter().zip(along.column(b).into_iter());
+                let pairs = along.column(a).into_iter().zip(along.column(b));
                 pairs.map(|(x, y)| f64::from(*x) * f64::from(*y)).sum::<f64>()
             };
             let taken = |a: usize| {

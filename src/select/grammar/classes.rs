@@ -79,20 +79,17 @@ pub fn proposals(
             let difference = &class.first.prediction - &refined.prediction;
             site.squares(&difference) < SAME.powi(2) * noise.factor
         };
-        match classes.iter_mut().find(is_same) {
-            Some(class) => {
-                class.ln_posterior = ln_add(class.ln_posterior, refined.ln_posterior);
-                // The simplest that is hardly less probable stands for the class.
-                let is_simpler = refined.ln_prior > class.first.ln_prior + 1e-9
-                    && refined.ln_posterior > class.first.ln_posterior - 0.5;
-                if is_simpler {
-                    class.first = refined;
-                }
+        if let Some(class) = classes.iter_mut().find(is_same) {
+            class.ln_posterior = ln_add(class.ln_posterior, refined.ln_posterior);
+            // The simplest that is hardly less probable stands for the class.
+            let is_simpler = refined.ln_prior > class.first.ln_prior + 1e-9
+                && refined.ln_posterior > class.first.ln_posterior - 0.5;
+            if is_simpler {
+                class.first = refined;
             }
-            None => {
-                let ln_posterior = refined.ln_posterior;
-                classes.push(Class { first: refined, ln_posterior });
-            }
+        } else {
+            let ln_posterior = refined.ln_posterior;
+            classes.push(Class { first: refined, ln_posterior });
         }
     }
     classes.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));

@@ -109,6 +109,8 @@ pub fn factors(known: &Quantities, own: usize) -> Vec<Factor> {
     }
     let families: BTreeSet<usize> = all.iter().map(|factor| factor.form.family()).collect();
     let ln_families = (families.len().max(1) as f64).ln();
-    all.iter_mut().for_each(|factor| factor.ln_prior -= ln_families);
+    for factor in &mut all {
+        factor.ln_prior -= ln_families;
+    }
     all
 }

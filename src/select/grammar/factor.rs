@@ -114,8 +114,11 @@ impl Form {
     pub fn is_catalogued(self, joint: usize) -> bool {
         match self {
             Self::Command(_) | Self::Warming | Self::Lag | Self::Covariate(_) => true,
-            Self::Harmonic { joint: of, .. } | Self::Wave { joint: of, .. } => of == joint,
-            Self::Side(of) | Self::Moment(of) | Self::CubicMoment(of) => of == joint,
+            Self::Harmonic { joint: of, .. }
+            | Self::Wave { joint: of, .. }
+            | Self::Side(of)
+            | Self::Moment(of)
+            | Self::CubicMoment(of) => of == joint,
             _ => false,
         }
     }

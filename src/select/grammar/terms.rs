@@ -65,9 +65,8 @@ impl Terms {
             .filter(|pair| all.is_new(pair))
             .collect();
         let mut chunks = all.chunks_of(single, site);
-        let pairs = all.best(all.chunks_of(pairs, site), MAX_PAIRS);
-        let extended: Vec<Product> = all
-            .best_terms(&pairs, MAX_EXTENDED)
+        let pairs = Self::best(all.chunks_of(pairs, site), MAX_PAIRS);
+        let extended: Vec<Product> = Self::best_terms(&pairs, MAX_EXTENDED)
             .into_iter()
             .flat_map(|pair| {
                 (0..count).map(move |c| {
@@ -169,6 +168,7 @@ impl Terms {
             squares: Vec::new(),
             mixed: Vec::new(),
             along: (0..columns.ncols()).map(|k| columns.column(k).dot(&site.product)).collect(),
+            #[expect(clippy::cast_possible_truncation, reason = "half the width is twice as fast")]
             columns: columns.map(|value| value as f32),
         };
         for k in 0..columns.ncols() {
@@ -183,7 +183,7 @@ impl Terms {
     }
 
     /// Returns the terms of some chunks that take most off the residual, in chunks.
-    fn best(&self, chunks: Vec<Chunk>, most: usize) -> Vec<Chunk> {
+    fn best(chunks: Vec<Chunk>, most: usize) -> Vec<Chunk> {
         let mut gains: Vec<f64> = chunks.iter().flat_map(Chunk::lone_gains).collect();
         if gains.len() <= most {
             return chunks;
@@ -194,7 +194,7 @@ impl Terms {
     }
 
     /// Returns the terms that take most off the residual.
-    fn best_terms(&self, chunks: &[Chunk], most: usize) -> Vec<Product> {
+    fn best_terms(chunks: &[Chunk], most: usize) -> Vec<Product> {
         let mut all: Vec<(f64, &Product)> =
             chunks.iter().flat_map(|chunk| chunk.lone_gains().zip(&chunk.terms)).collect();
         all.sort_by(|a, b| b.0.total_cmp(&a.0).then_with(|| a.1.cmp(b.1)));

@@ -62,7 +62,9 @@ pub fn written(
             products = products
                 .iter()
                 .flat_map(|left| {
-                    texts.iter().map(move |right| [left.as_slice(), &[right.clone()]].concat())
+                    texts
+                        .iter()
+                        .map(move |right| [left.as_slice(), std::slice::from_ref(right)].concat())
                 })
                 .collect();
         }

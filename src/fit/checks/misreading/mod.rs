@@ -171,7 +171,7 @@ impl Misreading {
             | Self::TableRadians { joint, field }
             | Self::TableDegrees { joint, field } => (joint, 0, Some(field)),
             Self::Mass { mass, .. } => (mass, 0, None),
-            Self::Reversed { joints } => (joints as usize, 0, None),
+            Self::Reversed { joints } => (usize::try_from(joints).unwrap_or(usize::MAX), 0, None),
             _ => (0, 0, None),
         };
         (std::mem::discriminant(&self), first, second, field)

@@ -246,6 +246,7 @@ impl Trial<'_> {
         let mut squares: Vec<f64> = errors.iter().map(nalgebra::Matrix::norm_squared).collect();
         if self.fitting.loss != Loss::Squares {
             squares.sort_by(f64::total_cmp);
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a count")]
             squares.truncate(((1.0 - SET_ASIDE) * squares.len() as f64).ceil() as usize);
         }
         (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()

@@ -223,7 +223,7 @@ fn scale(
 /// Changes the number of joints of each configuration; added joints are at zero.
 fn resize(rows: &mut Measurements, joints: usize) {
     let previous = rows.joints;
-    let resized = |column: &Vec<f64>| -> Vec<f64> {
+    let resized = |column: &[f64]| -> Vec<f64> {
         let row = |q: &[f64]| {
             let mut q = q.to_vec();
             q.resize(joints, 0.0);
@@ -231,8 +231,9 @@ fn resize(rows: &mut Measurements, joints: usize) {
         };
         column.chunks_exact(previous.max(1)).flat_map(row).collect()
     };
-    rows.configurations = resized(&rows.configurations);
-    rows.other_configurations = rows.other_configurations.as_ref().map(resized);
-    rows.approach = rows.approach.as_ref().map(resized);
+    let others = rows.other_configurations.iter_mut().chain(rows.approach.iter_mut());
+    for column in std::iter::once(&mut rows.configurations).chain(others) {
+        *column = resized(column);
+    }
     rows.joints = joints;
 }
