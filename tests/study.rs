@@ -195,7 +195,7 @@ fn threads_shares_and_order_change_nothing() {
     assert_eq!(expected[0].lines().count(), 1 + CELLS);
     assert_eq!(expected[2].lines().count(), 1 + CELLS * study.parameters.len());
     for (threads, shares) in [(2, 1), (3, 3), (2, 5), (1, 20)] {
-        let folder = |i: usize| bench.path(&format!("{shares}-{i}"));
+        let folder = |i: usize| bench.path(format!("{shares}-{i}"));
         let stores: Vec<Store> = (1..=shares).map(|i| Store::new(&folder(i))).collect();
         for i in (1..=shares).rev() {
             run_on(threads, &study, &stores[i - 1], Shard::new(i, shares).unwrap());

@@ -75,7 +75,9 @@ fn copies_are_named_whatever_their_number_and_time_and_repeats_are_not() {
     let (text, table) = (folder.read(DATA), folder.table(DATA));
     let line = |number: usize, changes: &[(&str, &str)]| {
         let mut row = table.rows[number - 2].clone();
-        changes.iter().for_each(|(column, cell)| row[table.place(column)] = (*cell).to_owned());
+        for (column, cell) in changes {
+            row[table.place(column)] = (*cell).to_owned();
+        }
         row.join(",")
     };
     let message = |rows: &[String]| {

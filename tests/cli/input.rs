@@ -84,7 +84,7 @@ fn bad_input_is_named_and_leaves_nothing_behind() {
             |b| {
                 b.map_rows(DATA, |n, l| {
                     Some(if n == 5 { "4,identification".into() } else { l.into() })
-                })
+                });
             },
             &["a-none.csv:5", "fields"],
         ),

@@ -129,26 +129,21 @@ fn an_interrupted_loop_tells_what_it_has_found() {
 
 #[test]
 fn an_interrupted_loop_replaces_no_finished_one() {
-    let folder = tempfile::tempdir().unwrap();
-    let folder = folder.path();
-    measured(folder);
+    let folder = measured();
     // A finished loop of few poses.
-    let table = fs::read_to_string(folder.join("data.csv")).unwrap();
+    let table = folder.read("data.csv");
     let few: Vec<&str> = table.lines().take(1).chain(table.lines().skip(POSES - 29)).collect();
-    fs::write(folder.join("few.csv"), few.join("\n") + "\n").unwrap();
-    let mut first = assert_cmd::Command::new(cargo_bin!("flexcal"));
-    first.current_dir(folder).args(["loop", ".", "--data", "few.csv", "--out", "out", "--quiet"]);
-    first.assert().success();
-    let finished = fs::read_to_string(folder.join("out/loop.json")).unwrap();
+    folder.write("few.csv", few.join("\n") + "\n");
+    folder.flexcal("loop . --data few.csv --out out --quiet").success();
+    let finished = folder.read("out/loop.json");
     for signal in ["INT", "TERM"] {
-        let mut run = Terminal::run(folder, "loop . --data data.csv --out out");
+        let mut run = Terminal::run(&folder.path(""), "loop . --data data.csv --out out");
         run.wait_for("round 2, 1 effect (last link-thermal-bending)");
         run.signal(signal);
         let (status, shown) = run.end();
         assert_eq!(status, Some(1), "{signal}: {shown}");
-        assert_eq!(fs::read_to_string(folder.join("out/loop.json")).unwrap(), finished);
-        let closed = folder.join("out/interrupted/problem.closed.toml");
-        let found = fs::read_to_string(closed).unwrap();
+        assert_eq!(folder.read("out/loop.json"), finished);
+        let found = folder.read("out/interrupted/problem.closed.toml");
         assert!(found.contains("link-thermal-bending"), "{found}");
         assert!(shown.contains("holds a finished loop, which stays"), "{shown}");
     }

@@ -23,14 +23,18 @@ impl Folder {
     /// Creates a folder with files of the given names and texts.
     pub fn with<const N: usize>(files: [(&str, &str); N]) -> Self {
         let folder = Self::new();
-        files.into_iter().for_each(|(name, text)| folder.write(name, text));
+        for (name, text) in files {
+            folder.write(name, text);
+        }
         folder
     }
 
     /// Creates a folder with copies of files of `tests/cases`.
     pub fn with_cases(names: &[&str]) -> Self {
         let folder = Self::new();
-        names.iter().for_each(|name| folder.copy(&format!("tests/cases/{name}"), name));
+        for name in names {
+            folder.copy(&format!("tests/cases/{name}"), name);
+        }
         folder
     }
 

@@ -94,5 +94,5 @@ pub fn assert_warned(warnings: &[Warning], kind: &WarningKind) -> Option<usize> 
 
 /// Returns the texts of warnings, a line each.
 pub fn words(warnings: &[Warning]) -> String {
-    warnings.iter().map(|warning| format!("{warning}\n")).collect()
+    warnings.iter().map(ToString::to_string).fold(String::new(), |text, line| text + &line + "\n")
 }

@@ -146,8 +146,9 @@ fn a_law_of_the_moment_is_a_compliance() {
         moved("law = { name = 'a', at = 'joint3', terms = ['M3'] }"),
     );
     // The compliance acts on the deflected arm, the law on the rigid one.
-    let squares =
-        |all: &[nalgebra::Vector3<f64>]| all.iter().map(|a| a.norm_squared()).sum::<f64>();
+    let squares = |all: &[nalgebra::Vector3<f64>]| {
+        all.iter().map(nalgebra::Vector3::norm_squared).sum::<f64>()
+    };
     let apart: Vec<_> = catalogued.iter().zip(&written).map(|(a, b)| a - b).collect();
     let (apart, whole) = (squares(&apart).sqrt(), squares(&catalogued).sqrt());
     assert!(whole > 0.0 && apart < 0.1 * whole, "{apart} of {whole}");

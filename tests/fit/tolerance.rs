@@ -58,7 +58,7 @@ fn wrong_verdicts_are_no_more_frequent_than_the_risk() {
             wrong[1] += usize::from(verdict(large_enough) == Verdict::Fail);
         }
     }
-    let shares = wrong.map(|count| count as f64 / (ARMS as usize * DRAWS[0]) as f64);
+    let shares = wrong.map(|count| count as f64 / (ARMS as f64 * DRAWS[0] as f64));
     println!("wrong passes {:.4}, wrong fails {:.4}", shares[0], shares[1]);
     assert!(shares.iter().all(|share| *share <= risk), "{shares:?}");
 }

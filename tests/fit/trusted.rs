@@ -201,7 +201,7 @@ fn gross_mistakes_are_fitted_and_named() {
         change(&mut problem);
         misread(&problem, &data)
     };
-    let radians = declared(&|problem| problem.joints[1].alpha = 1.5708_f64.to_radians());
+    let radians = declared(&|problem| problem.joints[1].alpha = 1.57_f64.to_radians());
     assert!(radians.contains("alpha of joint 2 that is in radians"), "{radians}");
     let long = declared(&|problem| problem.joints[3].d *= 1e3);
     assert!(long.contains("d of joint 4 that is in millimetres"), "{long}");

@@ -141,7 +141,8 @@ fn a_joint_log_is_joined_by_name_order_or_time() {
         let logged = is_log_left.then(|| ("controller.csv".to_owned(), Some(3)));
         let mut expected: Vec<_> = measured.into_iter().chain(logged).collect();
         let mut left = left;
-        (left.sort(), expected.sort());
+        left.sort();
+        expected.sort();
         assert_eq!(left, expected, "{by}: {warnings:?}");
     }
     // A mistake in the log is named where it stands.
