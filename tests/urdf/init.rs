@@ -310,7 +310,7 @@ fn a_rotation_may_be_a_quaternion() {
 #[test]
 fn the_tip_is_guessed_where_one_link_is_plainly_meant() {
     let arm = |beside: &str| {
-        let joints: String = (1..=5)
+        let joints: Vec<String> = (1..=5)
             .map(|k| {
                 format!(
                     "<link name=\"l{k}\"/><joint name=\"j{k}\" type=\"continuous\"><parent link=\"l{}\"/><child link=\"l{k}\"/>\
@@ -320,7 +320,7 @@ fn the_tip_is_guessed_where_one_link_is_plainly_meant() {
                 )
             })
             .collect();
-        format!("<robot name=\"r\"><link name=\"l0\"/>{joints}{beside}</robot>")
+        format!("<robot name=\"r\"><link name=\"l0\"/>{}{beside}</robot>", joints.concat())
     };
     let side = |parent: &str| {
         format!(
