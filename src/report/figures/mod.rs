@@ -36,7 +36,7 @@ pub(super) use uncertainty::{bounds_over_workspace, joint_errors};
 pub(super) use vectors::vectors;
 
 /// File names of all figures, except those of effects (numbered) and procedures (named).
-const NAMES: [&str; 16] = [
+const NAMES: &[&str] = &[
     "ablations",
     "bounds",
     "contributions",
