@@ -47,9 +47,7 @@ pub(super) fn candidates(problem: &Problem, table: &Measurements) -> Vec<Misread
     all.extend(of_commands(problem));
     all.extend(of_order(table));
     all.extend(of_joint_table(problem));
-    if problem.is_elastic() {
-        all.extend(of_loads(problem, table));
-    }
+    all.extend(of_loads(problem, table));
     all
 }
 
@@ -142,8 +140,11 @@ fn of_joint_table(problem: &Problem) -> Vec<Misreading> {
     all
 }
 
-/// Returns misreadings of masses, stiffnesses and gravity.
-fn of_loads(problem: &Problem, table: &Measurements) -> Vec<Misreading> {
+/// Returns misreadings of masses, stiffnesses and gravity; none for a rigid arm.
+pub(super) fn of_loads(problem: &Problem, table: &Measurements) -> Vec<Misreading> {
+    if !problem.is_elastic() {
+        return Vec::new();
+    }
     let powers = [-3, -1, 1, 3];
     let masses = masses_of(&mut problem.clone()).len();
     let single = if masses > MAX_MASSES { 0 } else { masses };

@@ -4,7 +4,7 @@ use nalgebra::DVector;
 use rayon::prelude::*;
 
 use super::Misreading;
-use super::candidates::{candidates, shift_step};
+use super::candidates::{candidates, of_loads, shift_step};
 use crate::fit::checks::checked_fit::CheckedFit;
 use crate::fit::checks::parameter_limits::is_of_arm;
 use crate::fit::stages::fitting::Fitting;
@@ -22,6 +22,9 @@ const AS_GOOD: f64 = 1.5;
 /// Largest error, as a multiple of the arm's reach, at which misreadings are tried. Millimetres
 /// read as metres give a factor of 1000.
 const MAX_REACHES: f64 = 1e4;
+/// Largest error of the nominal arm, as a multiple of the arm's reach, that no misread geometry
+/// leaves: a degree in a joint is seven times as much.
+const MAX_REACHES_OF_LOADS: f64 = 2e-3;
 /// Maximum number of rows on which misreadings are tried.
 const MAX_ROWS: usize = 120;
 /// Maximum number of moving joints of which every subset is tried as reversed.
@@ -77,8 +80,12 @@ pub(in crate::fit) fn explanations(fit: &CheckedFit) -> Explanations {
     // Contacts with one point agree with every arm that hardly moves.
     let is_tested =
         |misreading: &Misreading| is_position || matches!(misreading, Misreading::Reversed { .. });
-    let all: Vec<Misreading> =
-        candidates(fit.problem, measurements).into_iter().filter(is_tested).collect();
+    let all = if nominal < MAX_REACHES_OF_LOADS * model.reach() {
+        of_loads(fit.problem, measurements)
+    } else {
+        candidates(fit.problem, measurements)
+    };
+    let all: Vec<Misreading> = all.into_iter().filter(is_tested).collect();
     let mut errors = trial.registered(&all);
     errors.sort_by(|a, b| a.1.total_cmp(&b.1));
     let near_alone = near(&errors, nominal);
