@@ -5,7 +5,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use flexcal::measurement::Measurements;
+use flexcal::measurement::{Dataset, Measurements};
 use flexcal::mechanics::{Angle, Arm};
 use flexcal::model::parameter::{JointField, Parameter, ParameterSite};
 use flexcal::problem::Problem;
@@ -62,6 +62,14 @@ pub fn with_parameters(file: &str, rules: &str) -> Problem {
 pub fn measured(problem: &Problem, files: &[&str]) -> Measurements {
     let files: Vec<PathBuf> = files.iter().map(|file| path(file)).collect();
     Measurements::read(&files, problem).unwrap().0
+}
+
+/// Reads the lunar sampler of `tests/cases` and the measurements of one case.
+pub fn lunar_case(file: &str) -> (Problem, Dataset) {
+    let problem = Problem::read(&path("tests/cases")).unwrap();
+    let rows = measured(&problem, &[&format!("tests/cases/{file}")]);
+    let data = Dataset::from_measurements(&problem, rows).unwrap();
+    (problem, data)
 }
 
 /// Replaces the nominal geometry by that of table 2.

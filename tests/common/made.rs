@@ -12,8 +12,6 @@ use rand::RngExt as _;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, StandardNormal};
 
-use super::arms::{measured, path};
-
 /// Returns `count` configurations with angles within ±`reach` [rad] and offsets within ±0.3 m,
 /// without positions.
 pub fn at_random(
@@ -136,14 +134,6 @@ pub fn csv(problem: &Problem, Dataset { measurements: rows, split }: &Dataset) -
 /// Returns the rows with the split of [`split_at`].
 pub fn divided(count: usize, measurements: &Measurements) -> Dataset {
     Dataset::new(measurements.clone(), split_at(count, measurements))
-}
-
-/// Reads the lunar sampler of `tests/cases` and the measurements of one case.
-pub fn lunar_case(file: &str) -> (Problem, Dataset) {
-    let problem = Problem::read(&path("tests/cases")).unwrap();
-    let rows = measured(&problem, &[&format!("tests/cases/{file}")]);
-    let data = Dataset::from_measurements(&problem, rows).unwrap();
-    (problem, data)
 }
 
 /// Identifies with the default options.

@@ -6,7 +6,7 @@ use flexcal::problem::{Effect, Problem, Robust, RobustLoss};
 use flexcal::select::{Verdict, close};
 use nalgebra::Vector3;
 
-use crate::common::made::lunar_case;
+use crate::common::arms::lunar_case;
 
 /// Length of a gross error [m].
 const GROSS: f64 = 5e-3;

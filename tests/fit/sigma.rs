@@ -1,8 +1,8 @@
 //! Tests that a wrongly declared σ has no influence: priors and data are weighted by the actual
 //! scatter.
 
+use crate::common::arms::lunar_case;
 use crate::common::arms::parse;
-use crate::common::made::lunar_case;
 use flexcal::fit::{Identification, Options, identify};
 use flexcal::measurement::{Dataset, Split};
 use flexcal::problem::Problem;

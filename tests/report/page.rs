@@ -1,6 +1,7 @@
 //! HTML report: complete, self-contained, reproducible, with all findings.
 
-use crate::common::made::{lunar_case, part};
+use crate::common::arms::lunar_case;
+use crate::common::made::part;
 use flexcal::fit::{ErrorSummary, Options, identify};
 use flexcal::measurement::Dataset;
 use flexcal::problem::{Problem, Robust, RobustLoss};

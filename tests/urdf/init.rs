@@ -281,7 +281,7 @@ fn a_rotation_may_be_a_quaternion() {
     let tip = |text: &str| {
         let robot = Robot::parse(text, Path::new("r.urdf")).unwrap();
         let described = describe(&Chain::new(&robot, None, None).unwrap()).unwrap();
-        let mut problem = Problem::parse(&described.text, Path::new("problem.toml")).unwrap();
+        let mut problem = parse(&described.text);
         problem.parameters.clear();
         let moving = |joint: &flexcal::problem::Joint| joint.kind != JointKind::Fixed;
         let mut commands = [0.4, -0.7].into_iter();
