@@ -12,7 +12,7 @@ fn results_repeat_to_the_byte_but_for_the_time() {
     let folder = Folder::with_lunar_sampler();
     let run = || {
         let mut json = folder.flexcal("identify . --json").json();
-        json["seconds"] = Value::Null;
+        (json["seconds"], json["digest"]["seconds"]) = (Value::Null, Value::Null);
         json
     };
     assert_eq!(run(), run());
