@@ -133,7 +133,7 @@ impl Unfinished {
 fn is_finished(file: &Path) -> bool {
     let result: Option<Value> =
         fs::read_to_string(file).ok().and_then(|text| serde_json::from_str(&text).ok());
-    result.is_some_and(|result| result.get("interrupted") == Some(&Value::Bool(false)))
+    result.is_some_and(|result| result.get("interrupted") != Some(&Value::Bool(true)))
 }
 
 /// Returns the path of a file relative to a folder, or its absolute path if no relative one exists.

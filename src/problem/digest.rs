@@ -48,9 +48,8 @@ impl Problem {
         let _ = write!(text, " {beam_elements}");
         vectors(&mut text, &[gravity, target, payload_at, translation, rotation]);
         number(&mut text, *payload_mass);
-        // Elsewhere the place of the payload says so.
-        if !tool.payload_follows && payload_at == target {
-            text.push_str(" payload fixed");
+        if tool.payload_follows {
+            text.push_str(" payload at the identified target");
         }
         if *turned != Vector3::zeros() {
             text.push_str(" turned");

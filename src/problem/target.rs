@@ -19,7 +19,7 @@ pub struct Tool {
     pub rotation: Vector3<f64>,
     /// Position of the payload in that frame \[m\].
     pub payload_at: Vector3<f64>,
-    /// True if the payload hangs at the target, also where the target is identified.
+    /// True if the payload hangs at the identified target: `payload_at = "target"`.
     pub payload_follows: bool,
     /// Payload without a column `payload_kg` \[kg\].
     pub payload_mass: f64,
@@ -85,14 +85,18 @@ pub(super) fn tool(
     let joint = carriers.joints.len().saturating_sub(1);
     let (target, rotation, payload_at) = (Vector3::zeros(), Vector3::zeros(), Vector3::zeros());
     let mut tool =
-        Tool { joint, target, rotation, payload_at, payload_follows: true, payload_mass: 0.0 };
+        Tool { joint, target, rotation, payload_at, payload_follows: false, payload_mass: 0.0 };
     let Some(mut section) = section else { return Ok(tool) };
     tool.joint = carriers.joint(&mut section)?.unwrap_or(joint);
     tool.target = section.vector("target", Unit::Length)?.unwrap_or_default();
     tool.rotation = section.vector("rotation", Unit::Angle)?.unwrap_or_default();
-    let payload_at = section.vector("payload_at", Unit::Length)?;
-    tool.payload_follows = payload_at.is_none();
-    tool.payload_at = payload_at.unwrap_or(tool.target);
+    tool.payload_follows = section.word("payload_at", &["target"], &[()])?.is_some();
+    let declared = section.vector("payload_at", Unit::Length)?;
+    if let Some(at) = declared.filter(|_| !tool.payload_follows) {
+        tool.payload_at = at;
+    } else {
+        tool.payload_at = tool.target;
+    }
     tool.payload_mass = section.not_negative("payload", Unit::Mass)?.unwrap_or(0.0);
     section.finish()?;
     Ok(tool)

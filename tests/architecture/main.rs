@@ -38,10 +38,21 @@ const STOREYS: &[(&str, &[&[&str]])] = &[
     ("least_squares", &[&["scalar", "error", "numeric"]]),
     // Mechanics is independent of sensors; the test rig shares no mechanics.
     ("mechanics", &[&["scalar", "spatial", "error", "problem"]]),
-    // The rig reads the columns of kinds of rows, not their predictions.
+    // The rig reads the columns of kinds of rows, not their predictions, and the formulas of laws,
+    // not their regressors.
     (
         "rig",
-        &[&["scalar", "spatial", "quantity", "error", "observation", "problem", "files", "random"]],
+        &[&[
+            "scalar",
+            "spatial",
+            "quantity",
+            "error",
+            "observation",
+            "laws",
+            "problem",
+            "files",
+            "random",
+        ]],
     ),
     (
         "model",

@@ -223,7 +223,7 @@ fn a_sound_table_is_not_misread() {
 }
 
 #[test]
-fn a_payload_hangs_at_the_identified_target_unless_its_place_is_declared() {
+fn a_payload_hangs_at_the_identified_target_where_that_is_declared() {
     let elastic = |tool: &str| {
         format!(
             "name = 'arm'\n[[joint]]\nd_m = 0.4\n[[joint]]\nalpha_deg = 90\na_m = 0.15\nstiffness_N_m_per_rad = 2e4\n\
@@ -233,8 +233,7 @@ fn a_payload_hangs_at_the_identified_target_unless_its_place_is_declared() {
         )
     };
     let truth = [("tool.x", 0.02), ("tool.y", -0.01), ("tool.z", 0.03)];
-    let (follows, fixed) =
-        (parse(&elastic("")), parse(&elastic("payload_at_m = [0.05, 0.02, 0.12]\n")));
+    let (follows, fixed) = (parse(&elastic("payload_at = 'target'\n")), parse(&elastic("")));
     let data = simulated(&follows, &truth, [60, 20], 11);
     let found = fit(&follows, &data);
     for (name, value) in truth {

@@ -5,7 +5,7 @@ use std::cell::OnceCell;
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::finding::Finding;
-use super::misreading::{Explanations, explanations};
+use super::misreading::Explanations;
 use super::outliers::Outlier;
 use super::point_spread::PointSpread;
 use super::pose_sufficiency::PoseSufficiency;
@@ -73,11 +73,6 @@ pub(in crate::fit) struct CheckedFit<'a> {
 }
 
 impl CheckedFit<'_> {
-    /// Returns the misreadings of table or problem that explain the misfit.
-    pub fn explanations(&self) -> &Explanations {
-        self.explanations.get_or_init(|| explanations(self))
-    }
-
     /// Returns the identification rows grouped by what they measure, positions first; rows that do
     /// not involve the arm are left out.
     pub fn kinds(&self) -> Vec<RowKind> {

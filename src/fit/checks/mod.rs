@@ -10,6 +10,7 @@ pub(super) mod far_off;
 pub(super) mod finding;
 pub(super) mod fitted_rows;
 pub(super) mod held_out;
+mod held_out_placed;
 pub(super) mod misfit;
 mod misread;
 pub(super) mod misreading;
@@ -49,7 +50,7 @@ const CHECKS: &[&dyn Check] = &[
     &bounds::BoundsAreSeen,
     &held_out::NotRepeated,
     &held_out::WithoutOutliers,
-    &pose_sufficiency::HeldOutPlaced,
+    &held_out_placed::HeldOutPlaced,
     &set_aside::SetAsideByChance,
     &fitted_rows::SteadyPoints,
     &fitted_rows::NoOutliers,

@@ -4,7 +4,6 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::DVector;
 
-use super::checked_fit::{Check, CheckedFit};
 use super::finding::{Finding, FindingCode};
 use crate::fit::Placement;
 use crate::fit::stages::fitting::Fitting;
@@ -78,15 +77,6 @@ impl PoseSufficiency {
     pub fn judges_noise(&self, parameters: usize) -> bool {
         let is_short = |finding: &Finding| finding.code == FindingCode::TooFewEquations;
         self.coordinates >= parameters && !self.finding.as_ref().is_some_and(is_short)
-    }
-}
-
-/// Checks that held-out sessions determine their bases and tools.
-pub(super) struct HeldOutPlaced;
-
-impl Check for HeldOutPlaced {
-    fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
-        fit.poses.held_out.clone().into_iter().collect()
     }
 }
 

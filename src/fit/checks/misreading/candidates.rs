@@ -3,7 +3,6 @@
 use std::f64::consts::PI;
 
 use super::Misreading;
-use super::undo::{LONG, is_far};
 use crate::measurement::Measurements;
 use crate::model::parameter::JointField;
 use crate::problem::{Joint, JointKind, Problem};
@@ -25,6 +24,9 @@ const RATIOS: [i16; 18] =
 const MAX_SHIFT: i8 = 3;
 /// Number of places at which a shift of the rows behind is tried.
 const SHIFT_PLACES: usize = 12;
+
+/// Length beyond which a number may be in millimetres \[m\].
+pub(super) const LONG: f64 = 1.0;
 
 /// Returns every misreading that the problem and its table allow.
 pub(super) fn candidates(problem: &Problem, table: &Measurements) -> Vec<Misreading> {
@@ -49,6 +51,11 @@ pub(super) fn candidates(problem: &Problem, table: &Measurements) -> Vec<Misread
     all.extend(of_joint_table(problem));
     all.extend(of_loads(problem, table));
     all
+}
+
+/// Returns true if the target of `[tool]` is so far away that it may be in millimetres.
+pub(super) fn is_far(problem: &Problem) -> bool {
+    problem.targets.is_empty() && problem.tool.target.norm() > LONG
 }
 
 /// Returns misreadings of the joint columns: signs, exchanges, couplings, zeros and ratios.

@@ -6,11 +6,12 @@
 //! about a fit that is far off finds them.
 
 mod candidates;
+mod explanation;
 mod search;
 mod undo;
 mod words;
 
-pub(in crate::fit) use search::{Explanations, explanations};
+pub(in crate::fit) use explanation::Explanations;
 
 use crate::model::parameter::JointField;
 

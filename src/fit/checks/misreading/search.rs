@@ -5,6 +5,7 @@ use rayon::prelude::*;
 
 use super::Misreading;
 use super::candidates::{candidates, of_loads, shift_step};
+use super::explanation::{Explanation, Explanations};
 use crate::fit::checks::checked_fit::CheckedFit;
 use crate::fit::checks::parameter_limits::is_of_arm;
 use crate::fit::stages::fitting::Fitting;
@@ -36,26 +37,6 @@ const MAX_STEPS: u64 = 60;
 /// Part of the rows that a robust loss may set aside: the error is that of the others.
 const SET_ASIDE: f64 = 0.3;
 
-/// Misreading that explains the measurements after a fit in full.
-#[derive(Debug, Clone, PartialEq)]
-pub(in crate::fit) struct Explanation {
-    /// Description with the size that the fit found.
-    pub words: String,
-    /// Root mean squared error that the fit leaves \[m\], with the deviations from priors.
-    pub rms: f64,
-}
-
-/// Misreadings that explain why an arm does not fit, the best first.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub(in crate::fit) struct Explanations {
-    /// Misreadings with which the nominal arm is near.
-    pub near: Vec<Misreading>,
-    /// Misreadings with which the fit is far better than as read.
-    pub fitted: Vec<Explanation>,
-    /// Root mean squared error as read, fitted or not, with the deviations from priors \[m\].
-    pub as_read: f64,
-}
-
 /// Rows with which misreadings are tried.
 struct Trial<'a> {
     fitting: &'a Fitting<'a>,
@@ -63,8 +44,15 @@ struct Trial<'a> {
     chosen: Vec<usize>,
 }
 
+impl CheckedFit<'_> {
+    /// Returns the misreadings of table or problem that explain the misfit.
+    pub fn explanations(&self) -> &Explanations {
+        self.explanations.get_or_init(|| explanations(self))
+    }
+}
+
 /// Finds the misreadings that explain why a fit does not meet its measurements.
-pub(in crate::fit) fn explanations(fit: &CheckedFit) -> Explanations {
+fn explanations(fit: &CheckedFit) -> Explanations {
     let Fitting { split, measurements, model, .. } = fit.fitting;
     let nominal = fit.registered.identification.rms.norm;
     if nominal.is_nan() || nominal > MAX_REACHES * model.reach() {

@@ -4,21 +4,14 @@ use std::f64::consts::PI;
 
 use nalgebra::Vector3;
 
-use super::candidates::{lengths_of, masses_of, number_of, turns_in};
+use super::candidates::{LONG, is_far, lengths_of, masses_of, number_of, turns_in};
 use super::{Misreading, numbers_of};
 use crate::measurement::Measurements;
 use crate::model::parameter::JointField;
 use crate::problem::{Effect, Freedom, ParameterRule, Problem, Quantities};
 
-/// Length beyond which a number may be in millimetres \[m\].
-pub(super) const LONG: f64 = 1.0;
 /// Length of an inch \[mm\].
 const INCH: f64 = 25.4;
-
-/// Returns true if the target of `[tool]` is so far away that it may be in millimetres.
-pub(super) fn is_far(problem: &Problem) -> bool {
-    problem.targets.is_empty() && problem.tool.target.norm() > LONG
-}
 
 /// Returns ten to a power.
 fn ten(power: i8) -> f64 {
