@@ -73,7 +73,9 @@ impl PlacementFit {
     /// Returns the fraction of the variance of independent noise that remains in each coordinate of
     /// a row after the fit.
     pub fn shares_left(&self, row: usize) -> Vector3<f64> {
-        Vector3::from_fn(|axis, _| 1.0 - self.basis.row(AXES * row + axis).norm_squared())
+        Vector3::from_fn(|axis, _| {
+            (1.0 - self.basis.row(AXES * row + axis).norm_squared()).max(0.0)
+        })
     }
 
     /// Fits bases and tools to the residuals that remain after the shifts \[m\], and adds their

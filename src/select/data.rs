@@ -42,7 +42,10 @@ pub(super) struct Data<'a> {
 }
 
 /// Laws by joint, from 0, and by the names of the hypotheses beside which they were searched.
-pub(super) type Proposed = Arc<Mutex<BTreeMap<(usize, Vec<String>), Vec<Effect>>>>;
+pub(super) type Proposed = Arc<Mutex<BTreeMap<ProposalKey, Vec<Effect>>>>;
+
+/// Joint from 0, names of what acts beside it, poses left out, and names of the fitted effects.
+pub(super) type ProposalKey = (usize, Vec<String>, Vec<usize>, Vec<String>);
 
 impl<'a> Data<'a> {
     pub fn new(problem: &Problem, dataset: &'a Dataset, rules: &'a SelectionRules) -> Self {

@@ -206,7 +206,7 @@ fn wrong_units_are_told_before_anything_else() {
         std::iter::once(header).chain(lines[1..].iter().map(|line| (*line).to_owned())).collect()
     });
     let run = identify_arm(&metres).code(1);
-    assert_contains(&run.stderr, &["misses the measurements by", "check units"]);
+    assert_contains(&run.stderr, &["misses the measurements by", "correct units"]);
     // The message also appears if the fit did not converge.
     let problem = Problem::read(&metres.path("problem.toml")).unwrap();
     let fit = |table: &str, max_steps| {

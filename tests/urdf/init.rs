@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use flexcal::problem::JointKind::{self, Fixed, Prismatic, Revolute};
-use flexcal::problem::{Mimic, Problem};
+use flexcal::problem::Mimic;
 use flexcal::urdf::{Chain, Robot, describe};
 use nalgebra::{DVector, Vector3};
 

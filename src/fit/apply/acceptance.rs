@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 use crate::error::InputErrorKind;
 use crate::fit::IdentifyError;
 use crate::fit::apply::predict::Residual;
-use crate::fit::apply::tolerance::{Tolerance, ToleranceTest};
+use crate::fit::apply::tolerance::{Tolerance, ToleranceTest, Verdict};
 use crate::fit::outcome::Identification;
 use crate::fit::stages::placement::Placement;
 use crate::measurement::Dataset;
@@ -29,6 +29,11 @@ const MIN_CYCLES: usize = 3;
 pub struct Acceptance {
     /// Held-out poses; rows with equal configuration, base and target form one pose.
     pub poses: Vec<AcceptancePose>,
+    /// Number of held-out rows whose prediction is not finite: their poses are not among `poses`.
+    pub lost: usize,
+    /// True if a base or tool of held-out rows alone was fitted to them, so that they are no test of
+    /// a tolerance.
+    pub is_placed_anew: bool,
     /// Accuracy of the registered nominal arm.
     pub before: Accuracy,
     /// Accuracy of the identified arm.
@@ -36,9 +41,14 @@ pub struct Acceptance {
 }
 
 impl Acceptance {
-    /// Tests a tolerance on the accuracies AP of the identified arm.
+    /// Tests a tolerance on the accuracies AP of the identified arm. Rows without a prediction meet
+    /// no tolerance. If a base or tool was fitted to the held-out rows, nothing is decided.
     pub fn test(&self, tolerance: Tolerance) -> ToleranceTest {
-        tolerance.test(&self.poses.iter().map(|pose| pose.after).collect::<Vec<f64>>())
+        let lost = std::iter::repeat_n(f64::NAN, self.lost);
+        let errors: Vec<f64> = self.poses.iter().map(|pose| pose.after).chain(lost).collect();
+        let tested = tolerance.test(&errors);
+        let verdict = if self.is_placed_anew { Verdict::Undecided } else { tested.verdict };
+        ToleranceTest { verdict, ..tested }
     }
 }
 
@@ -118,6 +128,10 @@ pub fn acceptance(
     let held_out = held_out_positions(problem, data)?;
     let placement = Placement::of(measurements);
     let model = found.model(problem, &placement)?;
+    let later = placement.held_out_only(&model, measurements, &data.split);
+    // A number that was fitted is not exactly nominal.
+    let is_fitted = |(is_later, x): (&bool, &f64)| *is_later && x.abs() > 0.0;
+    let is_placed_anew = later.parameters.iter().zip(found.x.iter()).any(is_fitted);
     let errors = |x| placement.position_errors(&model, x, measurements, &held_out);
     let before = errors(&found.registered_x);
     let after = match corrected {
@@ -126,8 +140,10 @@ pub fn acceptance(
     };
     let numbers = measurements.pose_numbers(problem);
     let mut groups: BTreeMap<(usize, [i64; 3]), Vec<usize>> = BTreeMap::new();
+    let mut lost = 0;
     for (k, &row) in held_out.iter().enumerate() {
         if !(before[k].norm().is_finite() && after[k].norm().is_finite()) {
+            lost += 1;
             continue;
         }
         // Loads and temperature may differ in poses that are one pose for the declared arm.
@@ -163,6 +179,8 @@ pub fn acceptance(
         before: Accuracy::of(&each(|pose| pose.before)),
         after: Accuracy::of(&each(|pose| pose.after)),
         poses,
+        lost,
+        is_placed_anew,
     })
 }
 

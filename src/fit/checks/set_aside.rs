@@ -6,6 +6,7 @@
 
 use serde_json::json;
 use statrs::distribution::{ContinuousCDF as _, Normal};
+use statrs::function::factorial::ln_binomial;
 
 use super::checked_fit::{Check, CheckedFit};
 use super::finding::{Finding, FindingCode};
@@ -15,8 +16,8 @@ use crate::measurement::Measurements;
 
 /// Part of the rows up to which a loss may set rows aside without a question.
 const MAX_PART: f64 = 0.05;
-/// Number of rows up to which nothing can be said about them.
-const MIN_ROWS: usize = 4;
+/// Smallest number of rows set aside for which the normal approximation of a rank sum holds.
+const MIN_ROWS: usize = 10;
 /// Probability below which the rows follow a quantity, whatever the number of quantities.
 const IMPROBABLE: f64 = 1e-3;
 
@@ -103,11 +104,19 @@ fn by_runs(values: &[f64], marked: &[bool]) -> f64 {
         return 1.0;
     }
     let runs = 1 + order.windows(2).filter(|pair| marked[pair[0]] != marked[pair[1]]).count();
-    let (n, k) = (values.len() as f64, marked.iter().filter(|marked| **marked).count() as f64);
-    let product = 2.0 * k * (n - k);
-    let mean = product / n + 1.0;
-    let variance = product * (product - n) / (n * n * (n - 1.0));
-    upper_tail((mean - runs as f64) / variance.sqrt())
+    let marked = marked.iter().filter(|marked| **marked).count() as u64;
+    let all = values.len() as u64;
+    // Number of ways to divide `of` values into `parts` runs, as a logarithm.
+    let ways =
+        |parts: u64, of: u64| (1..=of).contains(&parts).then(|| ln_binomial(of - 1, parts - 1));
+    let both = |a: Option<f64>, b: Option<f64>| {
+        a.zip(b).map_or(0.0, |(a, b)| (a + b - ln_binomial(all, marked)).exp())
+    };
+    let exactly = |runs: u64| {
+        let (a, b) = (runs / 2, runs - runs / 2);
+        both(ways(a, marked), ways(b, all - marked)) + both(ways(b, marked), ways(a, all - marked))
+    };
+    (2..=runs as u64).map(exactly).sum::<f64>().min(1.0)
 }
 
 /// Returns the probability that a standard normal number exceeds `z`.

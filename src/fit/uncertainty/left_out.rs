@@ -27,7 +27,16 @@ impl Fitting<'_> {
         let rows = &self.split.identification;
         let stage = self.stage(rows, unknowns.to_vec());
         let (residuals, per_pose) = (stage.residuals(x), stage.coordinates());
-        let (jacobian, residual) = jacobian_and_residual(&residuals, &residuals.reduced(x));
+        let (mut jacobian, mut residual) = jacobian_and_residual(&residuals, &residuals.reduced(x));
+        // At the optimum of a robust loss the rows with these weights have no gradient.
+        let weight = |place: usize| {
+            self.loss.weight(residual.rows(per_pose * place, per_pose).norm_squared()).sqrt()
+        };
+        let weights: Vec<f64> = (0..rows.len()).map(weight).collect();
+        for (place, weight) in weights.iter().enumerate() {
+            jacobian.rows_mut(per_pose * place, per_pose).scale_mut(*weight);
+            residual.rows_mut(per_pose * place, per_pose).scale_mut(*weight);
+        }
         let mut normal = jacobian.tr_mul(&jacobian);
         for (j, &k) in unknowns.iter().enumerate() {
             let precision = self.model.parameters[k].sigma.map_or(0.0, |sigma| sigma.powi(-2));
@@ -55,7 +64,7 @@ impl Fitting<'_> {
             }
             let error = |(k, &place): (usize, &usize)| {
                 let whitened = left.fixed_rows::<3>(per_pose * k).into_owned();
-                (place, whitened * stage.poses[place].sigma)
+                (place, whitened * stage.poses[place].sigma / weights[place].max(f64::MIN_POSITIVE))
             };
             places.iter().enumerate().map(error).collect()
         };

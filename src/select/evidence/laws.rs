@@ -38,7 +38,8 @@ pub(super) fn promising(
         if products.target.stop.is_requested() {
             break;
         }
-        let key = (joint, beside(hypotheses, &rest));
+        let fitted_effects = fitted.effects().iter().map(Effect::name_and_place).collect();
+        let key = (joint, beside(hypotheses, &rest), left_out.to_vec(), fitted_effects);
         let known = || data.proposed.lock().unwrap_or_else(PoisonError::into_inner);
         let proposed = known().get(&key).cloned();
         let proposed = proposed.unwrap_or_else(|| {

@@ -87,7 +87,8 @@ pub(super) fn found(
             let claims = if is_steady { claims } else { over_subsets(claims, &of_parts) };
             Some(match of_all_rows {
                 Some(all) => {
-                    let others = self::claims(all, &effect);
+                    let others =
+                        self::claims(all, &effect).or_else(|| self::claims(all, &alike()?));
                     let others = others.map(|c| [c.place.1, c.depends_on.1, c.law.1]);
                     no_surer_than(claims, others.unwrap_or_default())
                 }
@@ -172,12 +173,18 @@ fn claims(evidence: &Evidence, effect: &Effect) -> Option<Claims> {
 }
 
 /// Returns the claims with no probability above its mean over random subsets of the configurations.
-/// If the effect has several parts, the means of the part with the most probable law are used.
+/// The means are those of the part that [`claims`] chooses.
 ///
 /// If no set of hypotheses describes the data, the posterior overstates the probability of the best
 /// one. Its mean over resampled data does not. [Huggins and Miller 2023]
 fn over_subsets(claims: Claims, of_parts: &[&SubsetEvidence]) -> Claims {
-    match of_parts.iter().max_by(|a, b| a.means[2].total_cmp(&b.means[2])) {
+    let by_law = |a: &&&SubsetEvidence, b: &&&SubsetEvidence| a.means[2].total_cmp(&b.means[2]);
+    let part = if of_parts.len() >= SEVERAL_ORDERS {
+        of_parts.iter().max_by(by_law)
+    } else {
+        of_parts.iter().min_by(by_law)
+    };
+    match part {
         Some(part) => no_surer_than(claims, part.means),
         None => claims,
     }

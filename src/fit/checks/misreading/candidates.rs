@@ -91,7 +91,7 @@ fn of_commands(problem: &Problem) -> Vec<Misreading> {
 }
 
 /// Returns shifts of the positions against the configurations.
-fn of_order(table: &Measurements) -> Vec<Misreading> {
+pub(super) fn of_order(table: &Measurements) -> Vec<Misreading> {
     let shifts = (-MAX_SHIFT..=MAX_SHIFT).filter(|&by| by != 0);
     let step = shift_step(table.len());
     let places = (0..table.len()).step_by(step).take(SHIFT_PLACES);
@@ -129,6 +129,10 @@ fn of_joint_table(problem: &Problem) -> Vec<Misreading> {
         all.extend((counts[0] > 1).then_some(Misreading::TableRadians { joint: 0, field }));
         all.extend((counts[1] > 1).then_some(Misreading::TableDegrees { joint: 0, field }));
     }
+    let count_long = |joint: &Joint| {
+        lengths_of(&mut joint.clone()).iter().filter(|length| length.abs() > LONG).count()
+    };
+    let long: usize = problem.joints.iter().map(count_long).sum();
     for (joint, declared) in (1..).zip(&problem.joints) {
         for field in [A, D, JointField::X, JointField::Y, JointField::Z] {
             let mut declared = declared.clone();
@@ -140,7 +144,9 @@ fn of_joint_table(problem: &Problem) -> Vec<Misreading> {
             let is_plausible = |power: &i8| {
                 PLAUSIBLE_LENGTHS.contains(&(length.abs() * 10.0_f64.powi((*power).into())))
             };
-            let powers = [-3, 3, -2, 2, -1, 1].into_iter().filter(is_plausible);
+            // Of a single long length this is `Misreading::ArmInMillimetres`.
+            let is_new = |power: &i8| *power != -3 || length.abs() <= LONG || long > 1;
+            let powers = [-3, 3, -2, 2, -1, 1].into_iter().filter(is_plausible).filter(is_new);
             all.extend(powers.map(|power| Misreading::Length { joint, field, power }));
         }
     }

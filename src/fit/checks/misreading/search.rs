@@ -4,7 +4,7 @@ use nalgebra::DVector;
 use rayon::prelude::*;
 
 use super::Misreading;
-use super::candidates::{candidates, of_loads, shift_step};
+use super::candidates::{candidates, of_loads, of_order, shift_step};
 use super::explanation::{Explanation, Explanations};
 use crate::fit::checks::checked_fit::CheckedFit;
 use crate::fit::checks::parameter_limits::is_of_arm;
@@ -68,8 +68,8 @@ fn explanations(fit: &CheckedFit) -> Explanations {
     // Contacts with one point agree with every arm that hardly moves.
     let is_tested =
         |misreading: &Misreading| is_position || matches!(misreading, Misreading::Reversed { .. });
-    let all = if nominal < MAX_REACHES_OF_LOADS * model.reach() {
-        of_loads(fit.problem, measurements)
+    let all = if is_position && nominal < MAX_REACHES_OF_LOADS * model.reach() {
+        [of_loads(fit.problem, measurements), of_order(measurements)].concat()
     } else {
         candidates(fit.problem, measurements)
     };
@@ -218,7 +218,9 @@ impl Trial<'_> {
     fn refined(&self, (misreading, error): (Misreading, f64)) -> (Misreading, f64) {
         let step = shift_step(self.fitting.measurements.len());
         let places = misreading.shifted_from().into_iter().flat_map(|from| {
-            (from.saturating_sub(step)..from + step).map(move |from| (from, misreading))
+            let near = from.saturating_sub(step)..from + step;
+            let rows = self.chosen.iter().copied().filter(move |row| near.contains(row));
+            rows.map(move |from| (from, misreading))
         });
         let moved: Vec<Misreading> =
             places.map(|(from, misreading)| misreading.with_shift_from(from)).collect();
