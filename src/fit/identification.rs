@@ -11,6 +11,7 @@ use crate::error::TableErrorKind;
 use crate::fit::checks::checked_fit::CheckedFit;
 use crate::fit::checks::finding::{Finding, FindingCode};
 use crate::fit::checks::fitted_rows::influential_finding;
+use crate::fit::checks::misreading::Explanations;
 use crate::fit::checks::outliers::outliers;
 use crate::fit::checks::pose_sufficiency::PoseSufficiency;
 use crate::fit::checks::required_columns::check_columns;
@@ -244,7 +245,12 @@ fn fit_rows(
             hidden: &statistics.hidden,
             prior_sizes: &prior_sizes,
             spreads: &spreads,
-            explanations: OnceCell::new(),
+            // A fit that goes on from another one of the same table asks nothing anew.
+            explanations: if options.start.is_empty() {
+                OnceCell::new()
+            } else {
+                OnceCell::from(Explanations::default())
+            },
         })
     } else {
         not_converged.into_iter().collect()
