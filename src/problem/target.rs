@@ -90,12 +90,12 @@ pub(super) fn tool(
     tool.joint = carriers.joint(&mut section)?.unwrap_or(joint);
     tool.target = section.vector("target", Unit::Length)?.unwrap_or_default();
     tool.rotation = section.vector("rotation", Unit::Angle)?.unwrap_or_default();
-    tool.payload_follows = section.word("payload_at", &["target"], &[()])?.is_some();
-    let declared = section.vector("payload_at", Unit::Length)?;
-    if let Some(at) = declared.filter(|_| !tool.payload_follows) {
+    tool.payload_at = tool.target;
+    if section.peek("payload_at").is_some_and(|item| item.text().is_ok()) {
+        section.word("payload_at", &["target"], &[()])?;
+        tool.payload_follows = true;
+    } else if let Some(at) = section.vector("payload_at", Unit::Length)? {
         tool.payload_at = at;
-    } else {
-        tool.payload_at = tool.target;
     }
     tool.payload_mass = section.not_negative("payload", Unit::Mass)?.unwrap_or(0.0);
     section.finish()?;
