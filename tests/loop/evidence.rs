@@ -483,7 +483,8 @@ fn a_function_of_a_command_that_grows_with_temperature_is_located() {
         "{:?}",
         evidence.claims(hypothesis)
     );
-    assert_eq!(stated(&evidence), Vec::<String>::new());
+    // A law that the search writes down may be the product of both.
+    assert!(stated(&evidence).iter().all(|law| law == "law"), "{hypothesis:?}");
 }
 
 #[test]

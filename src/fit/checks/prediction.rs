@@ -41,7 +41,7 @@ impl Check for PredictionHolds {
             return Vec::new();
         };
         let dof = fit.whole.count() as f64 - fit.whole.unknowns.len() as f64;
-        let is_estimated = fit.noise != Noise::Declared || fit.noise_factor > 1.0 + 1e-9;
+        let is_estimated = fit.noise != Noise::Declared || (fit.noise_factor - 1.0).abs() > 1e-9;
         let Some((p_value, limit)) = upper_tail(chi2, coordinates, is_estimated.then_some(dof))
         else {
             return Vec::new();
