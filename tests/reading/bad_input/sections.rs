@@ -189,7 +189,10 @@ fn other_sections() {
             &[":4: data.held_out.seed: -1 is not a whole number"],
         ),
         ("[data]\nheld_out = { rows = 3 }", &[":4: data.held_out.rows: unknown key"]),
-        ("[data]\nheld_out = 'split'", &[":4: data.held_out: expected a table, found text"]),
+        (
+            "[data]\nheld_out = 'split'",
+            &[":4: data.held_out: give one of column, fraction (with seed) or session"],
+        ),
     ]);
 }
 
