@@ -102,7 +102,8 @@ impl Identification {
         for joint in 0..rows.joints {
             let shifts = |step: f64| -> Result<Vec<Vector3<f64>>, IdentifyError> {
                 let mut moved = rows.clone();
-                moved.configurations.chunks_mut(rows.joints).for_each(|q| q[joint] += step);
+                let at_joint = moved.configurations.iter_mut().skip(joint).step_by(rows.joints);
+                at_joint.for_each(|q| *q += step);
                 let (_, poses) =
                     remainder::predict_identified(&self.found, &self.problem, correction, &moved)?;
                 Ok(poses.into_iter().map(|pose| pose.shift).collect())
@@ -135,7 +136,9 @@ impl Identification {
         detached(py, || {
             let mut text = report::estimate_text(&self.problem, &self.found);
             if let Some(fitted) = self.fitted()?.filter(|_| self.is_corrected) {
-                text += &format!("\n{}\n", report::remainder_text(&self.found, &fitted.outcome()));
+                text.push('\n');
+                text += &report::remainder_text(&self.found, &fitted.outcome());
+                text.push('\n');
             }
             Ok(text)
         })?

@@ -130,9 +130,10 @@ impl Problem {
         let strategy = word("strategy", strategy, &Strategy::EACH, Strategy::as_str)?;
         let solver = word("solver", solver, SolverChoice::CHOICES, SolverChoice::as_str)?;
         let (problem, data) = (Arc::clone(&self.declared), Arc::clone(&data.data));
-        let declared = match remainder {
-            true => None,
-            false => remainder::declared(&problem).map_err(|error| raised(&error))?,
+        let declared = if remainder {
+            None
+        } else {
+            remainder::declared(&problem).map_err(|error| raised(&error))?
         };
         let is_corrected = remainder || declared.is_some();
         let found = supervised(py, progress.as_ref(), {
@@ -156,10 +157,7 @@ impl Problem {
         })?;
         let (found, fitted) = found.map_err(|error| raised(&error))?;
         let identified = Identification::plain(&problem, &data, Arc::new(found));
-        Ok(match is_corrected {
-            true => identified.corrected(fitted.map(Arc::new)),
-            false => identified,
-        })
+        Ok(if is_corrected { identified.corrected(fitted.map(Arc::new)) } else { identified })
     }
 
     /// Finds the effects that the problem lacks.
