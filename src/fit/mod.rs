@@ -32,6 +32,7 @@ pub(crate) use apply::predict_saved::ErrorsBySession;
 pub use apply::predict_saved::{PredictError, Prediction, predict};
 pub use apply::predicted_covariance::PredictedPosition;
 pub use apply::saved_estimate::{SavedEstimate, SavedEstimateError};
+#[doc(hidden)]
 pub use apply::tolerance::{Tolerance, ToleranceTest, Verdict};
 pub use checks::finding::{Finding, FindingCode, Severity};
 pub use checks::outliers::{InfluentialRows, Outlier};

@@ -51,6 +51,7 @@ pub struct Outcome {
 
 impl Fitted {
     /// Summarises the search for a remainder.
+    #[doc(hidden)]
     pub fn outcome(&self) -> Outcome {
         let residuals = self.residuals.as_ref();
         Outcome {

@@ -37,6 +37,7 @@ pub struct JointErrorPoint {
 impl Correction {
     /// Returns the errors of each joint whose coordinate errs, at `count` commands over its
     /// measured range. The list is empty without a remainder.
+    #[doc(hidden)]
     pub fn joint_errors(&self, count: usize) -> Vec<JointError> {
         let sites = self.layout.sites.iter().enumerate();
         let coordinates = sites.filter(|(_, site)| site.kind == SiteKind::Coordinate);

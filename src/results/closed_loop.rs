@@ -242,6 +242,7 @@ impl LoopResult {
     }
 
     /// Returns the result with the remainder, if one was accepted in addition to the effects.
+    #[doc(hidden)]
     #[must_use]
     pub fn with_remainder(mut self, closure: &ClosedLoop, fitted: &Fitted) -> Self {
         if let Some(corrected) = &fitted.residuals {

@@ -269,6 +269,7 @@ impl PlotData {
     ///
     /// # Errors
     /// Returns an error if problem and data do not match.
+    #[doc(hidden)]
     pub fn with_uncertainty(
         self,
         (identification, problem): (&Identification, &Problem),
