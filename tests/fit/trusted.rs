@@ -206,7 +206,7 @@ fn gross_mistakes_are_fitted_and_named() {
     let radians = declared(&|problem| problem.joints[1].alpha = 1.57_f64.to_radians());
     assert!(radians.contains("alpha of joint 2 that is in radians"), "{radians}");
     let long = declared(&|problem| problem.joints[3].d *= 1e3);
-    assert!(long.contains("d of joint 4 that is in millimetres"), "{long}");
+    assert!(long.contains("lengths of joints that are in millimetres"), "{long}");
     // Rows of a standard table: a and α of a joint belong to the next one.
     let standard = declared(&|problem| {
         let next: Vec<(f64, f64)> = problem.joints.iter().map(|j| (j.a, j.alpha)).collect();
