@@ -262,7 +262,8 @@ class Identification(_Fit, Forward):
 
     def remainder_json(self) -> str | None:
         """``remainder.json`` of the command line, which ``[remainder] file`` of a problem names; None without a remainder."""
-        return self._core.remainder_json()
+        text: str | None = self._core.remainder_json()
+        return text
 
     def export_urdf(self, urdf: Path) -> Export:
         """The URDF that the problem came from, with the origins of its chain as they were identified.
