@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use super::{ColumnTable, Measurements, Split};
 use crate::error::{InputError, InputErrorKind, Location, Warning};
+use crate::problem::pattern::matches;
 use crate::problem::{Freedom, Problem};
 
 /// Maximum number of sessions, or of targets, whose bases or tools are fitted. The time of a fit
@@ -32,10 +33,13 @@ pub struct Dataset {
 
 /// Checks that not too many bases or tools are fitted.
 fn check_setups(problem: &Problem, measurements: &Measurements) -> Result<(), InputError> {
+    // The last rule that matches a parameter holds.
     let is_fitted = |name: &str| {
-        problem.parameters.iter().any(|rule| {
-            let is_meant = rule.pattern.starts_with(name) || rule.pattern.starts_with('*');
-            is_meant && !matches!(rule.freedom, Freedom::Fixed)
+        ["x", "y", "z", "rx", "ry", "rz"].iter().any(|axis| {
+            let parameter = format!("{name}.{axis}");
+            let mut rules = problem.parameters.iter().rev();
+            let rule = rules.find(|rule| matches(&rule.pattern, &parameter));
+            rule.is_some_and(|rule| !matches!(rule.freedom, Freedom::Fixed))
         })
     };
     let targets = measurements.target.as_ref().map_or(0, |target| target.names.len());
