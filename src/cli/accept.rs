@@ -49,7 +49,7 @@ pub struct Arguments {
 }
 
 /// Probability with which a bound of the record holds.
-const LEVEL: f64 = 0.95;
+const CONFIDENCE_LEVEL: f64 = 0.95;
 
 /// Reads a length that is greater than 0.
 fn length(text: &str) -> Result<f64, String> {
@@ -92,7 +92,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     if let (Some(correction), Some(predicted)) = (correction, &predicted) {
         let held_out = fit::held_out_positions(&problem, &data)?;
         let poses = held_out.iter().filter_map(|&row| predicted.poses.get(row).copied()).collect();
-        let bounds = Bounds::new(correction, poses, LEVEL);
+        let bounds = Bounds::new(correction, poses, CONFIDENCE_LEVEL);
         let errors =
             held_out.iter().filter_map(|&row| Some(predicted.rows.get(row)?.position.norm()));
         result = result.with_bounds(&bounds, bounds.coverage(errors), has_remainder);

@@ -5,7 +5,7 @@ use std::fmt;
 use flexcal::fit::{COST_TOLERANCE, Progress};
 
 /// Largest number of remaining steps for which a remaining time is stated.
-const FORESEEN: f64 = 200.0;
+const MAX_FORESEEN_STEPS: f64 = 200.0;
 
 /// Progress of a fit or loop; times are in seconds since its start.
 #[derive(Debug, Default)]
@@ -103,7 +103,7 @@ impl Step {
         let steps =
             |before: f64| ((COST_TOLERANCE * cost / gain).ln() / (gain / before).ln()).max(0.0);
         let left = self.gain.filter(|before| gain > 0.0 && gain < *before).map(steps);
-        let left = left.filter(|steps| *steps < FORESEEN).map(|steps| steps * each);
+        let left = left.filter(|steps| *steps < MAX_FORESEEN_STEPS).map(|steps| steps * each);
         Self {
             iteration,
             cost,

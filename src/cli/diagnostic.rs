@@ -15,7 +15,7 @@ use flexcal::report;
 use super::outcome::Outcome;
 
 /// Width of messages \[characters\], large enough that no line is wrapped.
-const WIDTH: usize = 1000;
+const MESSAGE_WIDTH: usize = 1000;
 
 /// Prints an error to standard error.
 pub fn print(error: &(dyn Error + 'static)) {
@@ -93,7 +93,7 @@ fn show(level: Level<'_>, message: &str, location: Option<&Location>) {
         ),
         None => Group::with_title(title),
     };
-    let text = Renderer::styled().term_width(WIDTH).render(&[group]);
+    let text = Renderer::styled().term_width(MESSAGE_WIDTH).render(&[group]);
     // A closed standard error leaves nobody to tell.
     let _ = writeln!(anstream::stderr(), "{text}");
 }

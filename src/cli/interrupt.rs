@@ -10,12 +10,12 @@ use flexcal::fit::Stop;
 
 /// Exit status after a request to end with nothing written: 128 + SIGTERM, as in shells.
 #[cfg(unix)]
-const TERMINATED: u8 = 143;
+const TERMINATED_STATUS: u8 = 143;
 /// Exit status after an interrupt with nothing written: 128 + SIGINT, as in shells.
 pub const STATUS: u8 = 130;
 /// Time after an interrupt in which a command may finish by itself, so that it ends within 2 s.
 /// Builds with debug assertions, those of the tests, may take as long as they need.
-const PATIENCE: Duration =
+const MAX_FINISHING_TIME: Duration =
     Duration::from_millis(if cfg!(debug_assertions) { 600_000 } else { 1_700 });
 
 /// Last work of a command that has not ended in time after an interrupt; it returns the exit
@@ -23,7 +23,7 @@ const PATIENCE: Duration =
 type LastWork = Box<dyn FnOnce() -> u8 + Send>;
 
 /// Lock that is held while files take their names.
-static WRITING: Mutex<()> = Mutex::new(());
+static WRITE_LOCK: Mutex<()> = Mutex::new(());
 /// True while a command watches for the request to stop.
 static IS_WATCHED: AtomicBool = AtomicBool::new(false);
 /// State of the running command.
@@ -76,7 +76,7 @@ pub fn begin_writing() {
 /// Prevents interrupts from ending the process while the returned guard is held.
 pub fn unbroken() -> MutexGuard<'static, ()> {
     install();
-    locked(&WRITING)
+    locked(&WRITE_LOCK)
 }
 
 /// Returns the stop request of this process.
@@ -105,7 +105,7 @@ pub fn watch_termination() {
         if signals.thread_block().is_ok() {
             thread::spawn(move || {
                 while signals.wait().is_ok() {
-                    end_early(TERMINATED);
+                    end_early(TERMINATED_STATUS);
                 }
             });
         }
@@ -121,7 +121,7 @@ pub fn watch_termination() {}
 fn end_early(status: u8) {
     let is_repeated = request().request();
     if is_repeated || !IS_WATCHED.load(Ordering::Relaxed) {
-        let _files = locked(&WRITING);
+        let _files = locked(&WRITE_LOCK);
         exit(i32::from(status));
     }
     thread::spawn(end_in_time);
@@ -129,7 +129,7 @@ fn end_early(status: u8) {
 
 /// Ends the process if the command has not ended in time after an interrupt.
 fn end_in_time() {
-    thread::sleep(PATIENCE);
+    thread::sleep(MAX_FINISHING_TIME);
     let work = {
         let mut state = locked(&STATE);
         if matches!(*state, State::Writing) {
@@ -147,7 +147,7 @@ fn end_in_time() {
         },
         |work| work(),
     );
-    let _files = locked(&WRITING);
+    let _files = locked(&WRITE_LOCK);
     exit(i32::from(status));
 }
 

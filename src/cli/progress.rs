@@ -9,9 +9,9 @@ use indicatif::{ProgressBar, ProgressStyle};
 use super::course::Course;
 
 /// Time after the start before which no progress is shown.
-const PATIENCE: Duration = Duration::from_millis(500);
+const DELAY_BEFORE_PROGRESS: Duration = Duration::from_millis(500);
 /// Time between two refreshes of the line.
-const TICK: Duration = Duration::from_millis(200);
+const REFRESH_INTERVAL: Duration = Duration::from_millis(200);
 
 /// Line of progress with its source.
 pub struct Line {
@@ -73,10 +73,10 @@ impl Line {
         });
     }
 
-    /// Shows a message, unless the work began less than [`PATIENCE`] ago.
+    /// Shows a message, unless the work began less than [`DELAY_BEFORE_PROGRESS`] ago.
     pub fn say(&self, message: impl FnOnce() -> String) {
-        if self.begun.elapsed() > PATIENCE && !self.bar.is_hidden() {
-            self.ticking.call_once(|| self.bar.enable_steady_tick(TICK));
+        if self.begun.elapsed() > DELAY_BEFORE_PROGRESS && !self.bar.is_hidden() {
+            self.ticking.call_once(|| self.bar.enable_steady_tick(REFRESH_INTERVAL));
             self.bar.set_message(message());
             self.bar.tick();
         }

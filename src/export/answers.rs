@@ -15,13 +15,13 @@ use crate::spatial::rotation_axes;
 /// Seed of the random poses.
 const SEED: u64 = 0x6578_706f_7274;
 /// Half-width of the range of commands without limits, \[rad\] and \[m\].
-const WIDE: (f64, f64) = (3.0, 0.5);
+const UNLIMITED_HALF_WIDTH: (f64, f64) = (3.0, 0.5);
 /// Half-width of the range of temperatures about the reference \[K\].
-const TEMPERATURES: f64 = 10.0;
+const TEMPERATURE_HALF_WIDTH: f64 = 10.0;
 /// Half-width of the range of the hoist force about the declared one, as a fraction of it.
-const HOIST_SHARE: f64 = 0.1;
+const HOIST_HALF_WIDTH: f64 = 0.1;
 /// Longest time of a pose after the first one \[s\].
-const LAST_TIME: f64 = 3600.0;
+const MAX_TIME: f64 = 3600.0;
 
 /// Poses of a test, with the results that this library computes for them.
 #[derive(Debug, Clone)]
@@ -132,7 +132,11 @@ pub(super) fn random_rows(
 ) -> Result<Measurements, ExportError> {
     let mut random = stream(SEED, 0);
     let range = |joint: &crate::problem::Joint| {
-        let wide = if joint.kind == JointKind::Prismatic { WIDE.1 } else { WIDE.0 };
+        let wide = if joint.kind == JointKind::Prismatic {
+            UNLIMITED_HALF_WIDTH.1
+        } else {
+            UNLIMITED_HALF_WIDTH.0
+        };
         let (low, high) = joint.limits;
         (low.max(-wide), high.min(wide))
     };
@@ -148,7 +152,7 @@ pub(super) fn random_rows(
         .collect();
     let mut list = |range: (f64, f64)| (0..count).map(|_| between(range)).collect::<Vec<f64>>();
     let first = estimate.first_time.unwrap_or(0.0);
-    let mut time = list((first, first + LAST_TIME));
+    let mut time = list((first, first + MAX_TIME));
     // Time counts from the first row in commands, and from the first pose of the fit in predictions.
     if let Some(time) = time.first_mut() {
         *time = first;
@@ -157,11 +161,14 @@ pub(super) fn random_rows(
     rows = rows.payload(list((0.0, problem.tool.payload_mass)));
     let hoists = || problem.joints.iter().filter_map(|joint| joint.beam.as_ref()?.hoist.as_ref());
     if let Some(hoist) = hoists().next() {
-        let spread = HOIST_SHARE * hoist.force;
+        let spread = HOIST_HALF_WIDTH * hoist.force;
         rows = rows.hoist(list((hoist.force - spread, hoist.force + spread)));
     }
     let reference = problem.data.reference_temperature.unwrap_or(20.0);
-    rows = rows.temperature(list((reference - TEMPERATURES, reference + TEMPERATURES)));
+    rows = rows.temperature(list((
+        reference - TEMPERATURE_HALF_WIDTH,
+        reference + TEMPERATURE_HALF_WIDTH,
+    )));
     if problem.effects.iter().any(|declared| declared.effect.has_sides()) {
         let columns: Vec<Vec<f64>> = problem.joints.iter().map(|_| list((-1.0, 1.0))).collect();
         let sides = |row: usize| columns.iter().map(|c| c[row].signum()).collect::<Vec<f64>>();

@@ -13,15 +13,15 @@ use crate::remainder::Correction;
 use crate::spatial::Frame;
 
 /// Number of poses to which the geometry is fitted, and number of other poses that judge it.
-const POSES: usize = 300;
+const FITTED_POSES: usize = 300;
 /// Maximum number of drawn poses for each one needed inside the workspace.
-const DRAWS: usize = 40;
+const MAX_DRAWS_PER_POSE: usize = 40;
 /// Distance of two additional points from the target, by which its orientation is fitted \[m\].
-const LEVER: f64 = 0.1;
+const ORIENTATION_LEVER: f64 = 0.1;
 /// Step of numerical derivatives with respect to a geometric parameter \[rad\] or \[m\].
-const STEP: f64 = 1e-6;
+const DIFFERENCE_STEP: f64 = 1e-6;
 /// Number of Gauss–Newton passes. Few suffice, because the problem is nearly linear.
-const PASSES: usize = 5;
+const GAUSS_NEWTON_PASSES: usize = 5;
 /// Ridge relative to the largest squared singular value. Directions with smaller singular values
 /// keep their identified values.
 const RIDGE: f64 = 1e-10;
@@ -53,7 +53,7 @@ pub fn best_rigid(
     correction: Option<&Correction>,
     workspace: &Workspace,
 ) -> Result<RigidFit, ExportError> {
-    let rows = random_rows(problem, estimate, DRAWS * POSES)?;
+    let rows = random_rows(problem, estimate, MAX_DRAWS_PER_POSE * FITTED_POSES)?;
     let placement = Placement::of(&rows);
     let model = estimate.model(Model::new(problem, &placement.bases, &placement.targets)?);
     let x = estimate.vector(problem, &model)?;
@@ -66,9 +66,12 @@ pub fn best_rigid(
         let frame = frame?;
         workspace.contains(&frame.point(&targets[pose.target])).then_some((pose, frame))
     });
-    let (poses, frames): (Vec<Pose>, Vec<Frame<f64>>) = inside.take(2 * POSES).unzip();
-    if poses.len() < 2 * POSES {
-        return Err(ExportError::Unreachable { found: poses.len(), draws: DRAWS * POSES });
+    let (poses, frames): (Vec<Pose>, Vec<Frame<f64>>) = inside.take(2 * FITTED_POSES).unzip();
+    if poses.len() < 2 * FITTED_POSES {
+        return Err(ExportError::Unreachable {
+            found: poses.len(),
+            draws: MAX_DRAWS_PER_POSE * FITTED_POSES,
+        });
     }
     let bases = model.base_frames(x.as_slice());
     let shifts: Vec<Vector3<f64>> = match correction.filter(|of| of.has_remainder()) {
@@ -81,7 +84,7 @@ pub fn best_rigid(
     };
     let points = |frame: &Frame<f64>, target: usize| {
         let at = targets[target];
-        [Vector3::zeros(), Vector3::x() * LEVER, Vector3::y() * LEVER]
+        [Vector3::zeros(), Vector3::x() * ORIENTATION_LEVER, Vector3::y() * ORIENTATION_LEVER]
             .map(|p| frame.point(&(at + p)))
     };
     let rigid =
@@ -90,7 +93,7 @@ pub fn best_rigid(
         .map(|((pose, frame), shift)| points(frame, pose.target).map(|point| point + shift))
         .collect();
     let residual = |arm: &Arm<f64>| {
-        let each = poses[..POSES].iter().zip(&wanted);
+        let each = poses[..FITTED_POSES].iter().zip(&wanted);
         let of_pose = |(pose, wanted): (&Pose, &[Vector3<f64>; 3])| {
             rigid(arm, pose)
                 .iter()
@@ -106,13 +109,13 @@ pub fn best_rigid(
         .flat_map(|joint| (0..5).map(move |field| (joint, field)))
         .collect();
     let mut arm = identified.clone();
-    for _ in 0..PASSES {
+    for _ in 0..GAUSS_NEWTON_PASSES {
         let here = residual(&arm);
         let mut slopes = DMatrix::zeros(here.len(), free.len());
         for (mut column, &(joint, field)) in slopes.column_iter_mut().zip(&free) {
             let mut moved = arm.clone();
-            change(&mut moved, joint, field, STEP);
-            column.copy_from(&((&here - residual(&moved)) / STEP));
+            change(&mut moved, joint, field, DIFFERENCE_STEP);
+            column.copy_from(&((&here - residual(&moved)) / DIFFERENCE_STEP));
         }
         let mut normal = slopes.tr_mul(&slopes);
         let ridge = RIDGE * normal.diagonal().max();
@@ -126,7 +129,7 @@ pub fn best_rigid(
     let judged = |arm: &Arm<f64>| {
         let of_pose = |(pose, wanted): (&Pose, &[Vector3<f64>; 3])| wanted[0] - rigid(arm, pose)[0];
         let errors: Vec<Vector3<f64>> =
-            poses[POSES..].iter().zip(&wanted[POSES..]).map(of_pose).collect();
+            poses[FITTED_POSES..].iter().zip(&wanted[FITTED_POSES..]).map(of_pose).collect();
         ErrorSummary::of(&errors)
     };
     Ok(RigidFit { identified: judged(&identified), best: judged(&arm), arm })

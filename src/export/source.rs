@@ -9,7 +9,7 @@ use super::error::ExportError;
 use super::formula::{array, formula, helpers, real};
 use super::numbers::{BEAM, FRAME, HOIST, JOINT, LOAD, Numbers, inner};
 use super::remainder::remainder;
-use crate::laws::RANGE;
+use crate::laws::RANGE_AXIS;
 use crate::model::parameter::{JointField, ParameterSite};
 use crate::model::{Model, ModelParts, PartSite};
 use crate::problem::{Equilibrium, JointKind, Problem};
@@ -269,7 +269,7 @@ fn terms(parts: &ModelParts, numbers: &Numbers) -> Result<String, ExportError> {
                 let beam = parts.arm.joints[..joint].iter().filter(|j| j.beam.is_some()).count();
                 format!("strain[{beam}][{which}]")
             }
-            PartSite::Shift { axis: RANGE, .. } | PartSite::Motion { .. } => {
+            PartSite::Shift { axis: RANGE_AXIS, .. } | PartSite::Motion { .. } => {
                 return Err(ExportError::NoSite { formula: term.regressor.text() });
             }
             PartSite::Shift { axis, is_error } => {

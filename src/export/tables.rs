@@ -11,9 +11,9 @@ use crate::spatial::Frame;
 use crate::urdf::{YamlFormat, joint_origins, yaml_key};
 
 /// Largest sine of the angle between two axes that count as parallel.
-const PARALLEL: f64 = 1e-12;
+const MAX_PARALLEL_SINE: f64 = 1e-12;
 /// Smallest offset along an axis at which a comment points out nearly parallel axes \[m\].
-const FAR: f64 = 10.0;
+const MIN_COMMENTED_OFFSET: f64 = 10.0;
 
 /// Returns the geometry as YAML in the form of the problem:
 /// `T_i` = Rx(α) Tx(a) Rz(θ+q) Tz(d) Ry(β).
@@ -72,7 +72,7 @@ pub fn standard_dh(problem: &Problem, arm: &Arm<f64>) -> Result<String, ExportEr
         }
         before = after;
     }
-    if far > FAR {
+    if far > MIN_COMMENTED_OFFSET {
         text.push_str("# Two axes are nearly parallel: their common normal lies far away, and rounding counts. Prefer mdh.\n");
     }
     for (name, frame) in [("base", base), ("tool", &before)] {
@@ -89,7 +89,7 @@ fn standard(link: &Frame<f64>) -> ([f64; 4], Frame<f64>) {
     let (z, p) = (link.axes[2], link.origin);
     let mut sine = z.xy().norm();
     let (mut theta, mut shift) = (p.y.atan2(p.x), 0.0);
-    if sine > PARALLEL {
+    if sine > MAX_PARALLEL_SINE {
         theta = z.x.atan2(-z.y);
         // Of both directions of the common normal, the one nearer to x.
         if theta.abs() > std::f64::consts::FRAC_PI_2 {
@@ -97,7 +97,7 @@ fn standard(link: &Frame<f64>) -> ([f64; 4], Frame<f64>) {
             sine = -sine;
         }
         shift = -(Vector3::new(-theta.sin(), theta.cos(), 0.0).dot(&p)) / sine;
-    } else if p.xy().norm() < PARALLEL {
+    } else if p.xy().norm() < MAX_PARALLEL_SINE {
         theta = 0.0;
     }
     let normal = Vector3::new(theta.cos(), theta.sin(), 0.0);

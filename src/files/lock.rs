@@ -7,7 +7,7 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 /// Pause between two attempts to take a lock.
-const PAUSE: Duration = Duration::from_millis(5);
+const RETRY_INTERVAL: Duration = Duration::from_millis(5);
 
 /// Lock of a folder; the system releases it when the value is dropped or the process ends.
 ///
@@ -32,7 +32,9 @@ impl FolderLock {
         loop {
             match open.try_lock() {
                 Ok(()) => return Ok(Self { _folder: Some(open) }),
-                Err(TryLockError::WouldBlock) if begun.elapsed() < patience => sleep(PAUSE),
+                Err(TryLockError::WouldBlock) if begun.elapsed() < patience => {
+                    sleep(RETRY_INTERVAL)
+                }
                 Err(TryLockError::WouldBlock) => return Err(io::ErrorKind::WouldBlock.into()),
                 Err(TryLockError::Error(_)) => return Ok(Self { _folder: None }),
             }
@@ -48,7 +50,7 @@ mod tests {
     fn a_second_writer_waits_and_is_refused_in_the_end() {
         let folder = tempfile::tempdir().unwrap();
         let first = FolderLock::take(folder.path(), Duration::ZERO).unwrap();
-        let refused = FolderLock::take(folder.path(), 4 * PAUSE).unwrap_err();
+        let refused = FolderLock::take(folder.path(), 4 * RETRY_INTERVAL).unwrap_err();
         assert_eq!(refused.kind(), io::ErrorKind::WouldBlock);
         drop(first);
         FolderLock::take(folder.path(), Duration::ZERO).unwrap();

@@ -20,8 +20,8 @@ use crate::fit::influential_rows::influential_rows;
 use crate::fit::outcome::{Estimate, Identification, enter};
 use crate::fit::stages::custom_solver::CustomSolver;
 use crate::fit::stages::fitting::{FitEnd, Fitting};
-use crate::fit::stages::noise_model::{LEAST_NOISE, NoiseModel};
-use crate::fit::stages::placement::UNKNOWN_SIGMA;
+use crate::fit::stages::noise_model::{MIN_SIGMA, NoiseModel};
+use crate::fit::stages::placement::ASSUMED_SIGMA;
 use crate::fit::stages::stage::StageError;
 use crate::fit::uncertainty::active_constraint::ActiveConstraint;
 use crate::fit::uncertainty::covariance::Collected;
@@ -160,7 +160,7 @@ fn fit_rows(
         stop: options.stop.as_ref(),
         max_steps: options.max_steps,
         to_be_judged: false,
-        sigma: declared.unwrap_or(UNKNOWN_SIGMA),
+        sigma: declared.unwrap_or(ASSUMED_SIGMA),
         turn_sigma: problem.data.orientation_sigma.filter(|_| problem.data.fits_orientation),
         noise_model: NoiseModel::DECLARED,
         turn_noise_model: NoiseModel::DECLARED,
@@ -316,7 +316,7 @@ fn prepared(
     };
     if !has_declared_noise {
         let scatter = registered.identification.rms.norm / fitting.measurements.leading().root();
-        fitting.sigma = scatter.max(LEAST_NOISE);
+        fitting.sigma = scatter.max(MIN_SIGMA);
     }
     if let Some(noise) = warm_start.and_then(|warm_start| warm_start.noise) {
         (fitting.noise_model, fitting.turn_noise_model) = noise;

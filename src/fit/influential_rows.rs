@@ -7,19 +7,19 @@ use crate::fit::uncertainty::noise::Noise;
 /// Ratio of the residual variance without the rows to that with them, below which the rows are
 /// influential even if a misfit remains. Rows that a single effect concerns, such as two with a
 /// payload, may be among them.
-const FAR_BETTER: f64 = 0.01;
+const MAX_DECISIVE_RATIO: f64 = 0.01;
 /// Ratio of the residual variance without the rows to that with them, below which the rows are
 /// influential if the declared σ then explains the remaining residual.
-const MOST_OF_IT: f64 = 0.5;
+const MAX_INFLUENTIAL_RATIO: f64 = 0.5;
 /// Reciprocal of the largest share of the rows that can be influential. If more are needed, the
 /// model misses all rows.
-const ONE_IN: usize = 5;
+const MIN_ROWS_PER_INFLUENTIAL: usize = 5;
 /// Reciprocal of the share of the rows that is removed in one round, at least one row. A gross
 /// error makes good rows look like outliers, so few are removed at a time.
-const ONE_A_ROUND_IN: usize = 100;
+const ROWS_PER_REMOVAL: usize = 100;
 /// Ratio of the residual variances after and before a round, above which the removed rows are not
 /// gross errors and the search ends.
-const NO_GAIN: f64 = 0.95;
+const MAX_GAINFUL_RATIO: f64 = 0.95;
 
 /// Finds the influential rows of the fit `found`; `without` fits the identification rows except the
 /// given ones.
@@ -34,7 +34,8 @@ pub(super) fn influential_rows(
         return None;
     }
     let count = found.fitted.identification.n;
-    let (most, a_round) = ((count / ONE_IN).max(1), (count / ONE_A_ROUND_IN).max(1));
+    let (most, a_round) =
+        ((count / MIN_ROWS_PER_INFLUENTIAL).max(1), (count / ROWS_PER_REMOVAL).max(1));
     let mut rows: Vec<Outlier> = Vec::new();
     let mut rest: Option<Identification> = None;
     loop {
@@ -50,7 +51,7 @@ pub(super) fn influential_rows(
         }
         let numbers: Vec<usize> = rows.iter().chain(&far).map(|outlier| outlier.row).collect();
         let Some(next) = without(&numbers).filter(|fit| fit.termination.converged()) else { break };
-        if part(&next, last) > NO_GAIN {
+        if part(&next, last) > MAX_GAINFUL_RATIO {
             break;
         }
         rows.extend(far);
@@ -59,7 +60,7 @@ pub(super) fn influential_rows(
     let rest = rest?;
     rows.sort_by_key(|outlier| outlier.row);
     let left = part(&rest, found);
-    let is_better = left < FAR_BETTER || (left < MOST_OF_IT && explains(&rest));
+    let is_better = left < MAX_DECISIVE_RATIO || (left < MAX_INFLUENTIAL_RATIO && explains(&rest));
     let Identification { reduced_chi2, sigma_taken, .. } = rest;
     is_better.then_some(InfluentialRows { rows, reduced_chi2, sigma_taken })
 }

@@ -25,7 +25,7 @@ use crate::quantity::Unit;
 pub const STRONG_CORRELATION: f64 = 0.9;
 /// Largest identified share at which a parameter has no standard error, because the data do not
 /// determine it.
-const NOTHING_LEARNED: f64 = 1e-6;
+const MAX_UNIDENTIFIED_SHARE: f64 = 1e-6;
 
 /// Free parameter after the fit; SI units.
 #[derive(Debug, Clone, PartialEq)]
@@ -277,7 +277,7 @@ pub(super) fn enter(
     covariance.enter(stage.model, &stage.unknowns, end.x.as_slice(), &statistics.covariance);
     for (j, (&k, parameter)) in stage.unknowns.iter().zip(stage.parameters()).enumerate() {
         let x = end.x[k];
-        let learned = statistics.known[j] && statistics.identified[j] > NOTHING_LEARNED;
+        let learned = statistics.known[j] && statistics.identified[j] > MAX_UNIDENTIFIED_SHARE;
         let estimate = &mut estimates[k];
         estimate.estimate = parameter.value(x);
         estimate.std_error = learned.then(|| parameter.value_error(x, statistics.errors[j]));

@@ -91,16 +91,16 @@ macro_rules! catalogue {
 }
 
 /// Prior σ of an angle or length that repeats or drifts \[rad\] or \[m\].
-const SMALL: f64 = 1e-3;
+const DRIFT_SIGMA: f64 = 1e-3;
 /// Prior σ of a relative error.
-const PERCENT: f64 = 0.01;
+const RELATIVE_SIGMA: f64 = 0.01;
 /// Prior σ of a displacement of the instrument's readings \[m\].
-const SHIFTED: f64 = 5e-3;
+const READING_SHIFT_SIGMA: f64 = 5e-3;
 /// Prior σ of the displacement \[m\] and rotation \[rad\] of an instrument that was knocked or set
 /// up again.
-const MOVED: f64 = 1e-2;
+const SETUP_SHIFT_SIGMA: f64 = 1e-2;
 /// Prior σ of a bending flexibility 1/EI [1/(N·m²)].
-const FLEXIBLE: f64 = 1e-2;
+const FLEXIBILITY_SIGMA: f64 = 1e-2;
 /// Largest plausible rotation of a joint under the largest plausible moment \[rad\].
 const MAX_TURN: f64 = 0.1;
 
@@ -116,8 +116,8 @@ catalogue! {
     /// Harmonics of integer order of a joint's command: Δθ = Σₖ aₖ sin kθ + bₖ cos kθ.
     JointHarmonic "joint-harmonic" { joint: usize = MovingJoint, orders: Vec<u32> = Orders } => Family {
         terms: &[
-            TermEntry::driven(At::Coordinate, "sin{orders}", "sin({orders}*q{joint})", SMALL),
-            TermEntry::driven(At::Coordinate, "cos{orders}", "cos({orders}*q{joint})", SMALL),
+            TermEntry::driven(At::Coordinate, "sin{orders}", "sin({orders}*q{joint})", DRIFT_SIGMA),
+            TermEntry::driven(At::Coordinate, "cos{orders}", "cos({orders}*q{joint})", DRIFT_SIGMA),
         ],
         says: "angle of joint {joint} errs with {orders:cycles} a revolution",
         only: &[Only::Turning],
@@ -129,8 +129,8 @@ catalogue! {
     /// Wave of any order k, such as the error of an inner gear stage: Δθ = a sin kθ + b cos kθ.
     JointWave "joint-wave" { joint: usize = MovingJoint, order: f64 = Order } => Family {
         terms: &[
-            TermEntry::driven(At::Coordinate, "sin", "sin({order}*q{joint})", SMALL),
-            TermEntry::driven(At::Coordinate, "cos", "cos({order}*q{joint})", SMALL),
+            TermEntry::driven(At::Coordinate, "sin", "sin({order}*q{joint})", DRIFT_SIGMA),
+            TermEntry::driven(At::Coordinate, "cos", "cos({order}*q{joint})", DRIFT_SIGMA),
         ],
         says: "joint {joint} errs in waves of order {order} (every {order:degrees}°, or {order:millimetres} mm of a slide)",
         search: Search::Declared,
@@ -139,7 +139,7 @@ catalogue! {
     };
     /// Error of the transmission ratio: Δθ = ε θ.
     GearRatio "gear-ratio" { joint: usize = MovingJoint } => Family {
-        terms: &[TermEntry::driven(At::Coordinate, "error", "q{joint}", PERCENT)],
+        terms: &[TermEntry::driven(At::Coordinate, "error", "q{joint}", RELATIVE_SIGMA)],
         says: "transmission ratio of joint {joint} is off",
         needs: &[Need::Moves("joint")],
         ..Family::PLAIN
@@ -162,7 +162,7 @@ catalogue! {
     /// Friction hysteresis: Δθ = h z with dz/dθ = (g − z)/s, where g = ±1 is the side from which
     /// the joint comes \[Dahl 1968\].
     JointHysteresis "joint-hysteresis" { joint: usize = TurningJoint, distance: f64 = Distance as "distance_rad" } => Family {
-        terms: &[TermEntry::driven(At::Coordinate, "amplitude", "friction(q{joint}, {distance_rad})", SMALL)],
+        terms: &[TermEntry::driven(At::Coordinate, "amplitude", "friction(q{joint}, {distance_rad})", DRIFT_SIGMA)],
         says: "friction pulls joint {joint} back the way on which it came",
         needs: &[Need::Moves("joint"), Need::Clock],
         search: Search::Distances,
@@ -204,14 +204,14 @@ catalogue! {
     };
     /// Thermal drift of a joint's zero: Δθ = k (T − T₀).
     JointThermalDrift "joint-thermal-drift" { joint: usize = MovingJoint } => Family {
-        terms: &[TermEntry::driven(At::Coordinate, "rate", "T", SMALL)],
+        terms: &[TermEntry::driven(At::Coordinate, "rate", "T", DRIFT_SIGMA)],
         says: "zero of joint {joint} drifts with temperature",
         needs: &[Need::Temperature],
         ..Family::PLAIN
     };
     /// Thermal drift with a lagged temperature T̃: Δθ = k (T̃ − T₀), dT̃/dt = (T − T̃)/τ.
     JointThermalDriftLag "joint-thermal-drift-lag" { joint: usize = MovingJoint, time_constant: f64 = Duration as "time_constant_s" } => Family {
-        terms: &[TermEntry::driven(At::Coordinate, "rate", "lag(T, {time_constant_s})", SMALL)],
+        terms: &[TermEntry::driven(At::Coordinate, "rate", "lag(T, {time_constant_s})", DRIFT_SIGMA)],
         says: "zero of joint {joint} drifts with a temperature that lags by {time_constant_s} s",
         needs: &[Need::Clock, Need::Temperature],
         search: Search::TimeConstants,
@@ -219,14 +219,14 @@ catalogue! {
     };
     /// Coupling of joints: Δθ of one joint = k q of another.
     JointCoupling "joint-coupling" { joint: usize = MovingJoint, from: usize = OtherJoint } => Family {
-        terms: &[TermEntry::driven(At::Coordinate, "factor", "q{from}", PERCENT)],
+        terms: &[TermEntry::driven(At::Coordinate, "factor", "q{from}", RELATIVE_SIGMA)],
         says: "joint {from} moves joint {joint} along",
         needs: &[Need::Moves("from")],
         ..Family::PLAIN
     };
     /// Bending flexibility 1/EI of a link that is declared rigid.
     LinkBending "link-bending" { joint: usize = LinkedJoint } => Family {
-        terms: &[TermEntry::at(At::Beam(BeamField::Flexibility), "flexibility", FLEXIBLE).never_negative()],
+        terms: &[TermEntry::at(At::Beam(BeamField::Flexibility), "flexibility", FLEXIBILITY_SIGMA).never_negative()],
         says: "the link before joint {joint} bends",
         only: &[Only::Link, Only::RigidLink],
         needs: &[Need::Loads],
@@ -235,7 +235,7 @@ catalogue! {
     /// Bending flexibility 1/EI of the slide of a prismatic joint, a cantilever as long as it is
     /// extended.
     SlideBending "slide-bending" { joint: usize = SlidingJoint } => Family {
-        terms: &[TermEntry::at(At::Joint(JointField::SlideFlexibility), "flexibility", FLEXIBLE).never_negative()],
+        terms: &[TermEntry::at(At::Joint(JointField::SlideFlexibility), "flexibility", FLEXIBILITY_SIGMA).never_negative()],
         says: "the slide of joint {joint} bends",
         needs: &[Need::Moves("joint"), Need::Loads],
         ..Family::PLAIN
@@ -254,8 +254,8 @@ catalogue! {
     /// Thermal bending of a beam: curvature (`k_y`, `k_z`)·(T − T₀).
     LinkThermalBending "link-thermal-bending" { link: String = Beam } => Family {
         terms: &[
-            TermEntry::driven(At::Beam(BeamField::BowY), "about_y", "T", SMALL),
-            TermEntry::driven(At::Beam(BeamField::BowZ), "about_z", "T", SMALL),
+            TermEntry::driven(At::Beam(BeamField::BowY), "about_y", "T", DRIFT_SIGMA),
+            TermEntry::driven(At::Beam(BeamField::BowZ), "about_z", "T", DRIFT_SIGMA),
         ],
         says: "link {link} bows with temperature",
         needs: &[Need::Temperature],
@@ -263,7 +263,7 @@ catalogue! {
     };
     /// Thermal expansion of a beam: strain α (T − T₀).
     LinkThermalExpansion "link-thermal-expansion" { link: String = Beam } => Family {
-        terms: &[TermEntry::driven(At::Beam(BeamField::Stretch), "strain", "T", SMALL)],
+        terms: &[TermEntry::driven(At::Beam(BeamField::Stretch), "strain", "T", DRIFT_SIGMA)],
         says: "link {link} grows with temperature",
         needs: &[Need::Temperature],
         ..Family::PLAIN
@@ -271,8 +271,8 @@ catalogue! {
     /// Thermal bending of a beam with a lagged temperature T̃: curvature (`k_y`, `k_z`)·(T̃ − T₀).
     LinkThermalBendingLag "link-thermal-bending-lag" { link: String = Beam, time_constant: f64 = Duration as "time_constant_s" } => Family {
         terms: &[
-            TermEntry::driven(At::Beam(BeamField::BowY), "about_y", "lag(T, {time_constant_s})", SMALL),
-            TermEntry::driven(At::Beam(BeamField::BowZ), "about_z", "lag(T, {time_constant_s})", SMALL),
+            TermEntry::driven(At::Beam(BeamField::BowY), "about_y", "lag(T, {time_constant_s})", DRIFT_SIGMA),
+            TermEntry::driven(At::Beam(BeamField::BowZ), "about_z", "lag(T, {time_constant_s})", DRIFT_SIGMA),
         ],
         says: "link {link} bows with a temperature that lags by {time_constant_s} s",
         needs: &[Need::Clock, Need::Temperature],
@@ -281,7 +281,7 @@ catalogue! {
     };
     /// Thermal expansion of a beam with a lagged temperature T̃: strain α (T̃ − T₀).
     LinkThermalExpansionLag "link-thermal-expansion-lag" { link: String = Beam, time_constant: f64 = Duration as "time_constant_s" } => Family {
-        terms: &[TermEntry::driven(At::Beam(BeamField::Stretch), "strain", "lag(T, {time_constant_s})", SMALL)],
+        terms: &[TermEntry::driven(At::Beam(BeamField::Stretch), "strain", "lag(T, {time_constant_s})", DRIFT_SIGMA)],
         says: "link {link} grows with a temperature that lags by {time_constant_s} s",
         needs: &[Need::Clock, Need::Temperature],
         search: Search::TimeConstants,
@@ -354,7 +354,7 @@ catalogue! {
     };
     /// Scale error of the instrument: measured positions are multiplied by 1 + s.
     TrackerScale "tracker-scale" => Family {
-        terms: &[TermEntry::at(At::Scale, "error", PERCENT)],
+        terms: &[TermEntry::at(At::Scale, "error", RELATIVE_SIGMA)],
         says: "the scale of the measurement is off",
         ..Family::PLAIN
     };
@@ -363,12 +363,12 @@ catalogue! {
     /// belongs to the base.
     FrameStrain "frame-strain" => Family {
         terms: &[
-            TermEntry::at(At::Strain(0), "xx", PERCENT),
-            TermEntry::at(At::Strain(1), "yy", PERCENT),
-            TermEntry::at(At::Strain(2), "zz", PERCENT),
-            TermEntry::at(At::Strain(3), "xy", PERCENT),
-            TermEntry::at(At::Strain(4), "xz", PERCENT),
-            TermEntry::at(At::Strain(5), "yz", PERCENT),
+            TermEntry::at(At::Strain(0), "xx", RELATIVE_SIGMA),
+            TermEntry::at(At::Strain(1), "yy", RELATIVE_SIGMA),
+            TermEntry::at(At::Strain(2), "zz", RELATIVE_SIGMA),
+            TermEntry::at(At::Strain(3), "xy", RELATIVE_SIGMA),
+            TermEntry::at(At::Strain(4), "xz", RELATIVE_SIGMA),
+            TermEntry::at(At::Strain(5), "yz", RELATIVE_SIGMA),
         ],
         says: "axes of the measuring frame are off in scale or not square",
         ..Family::PLAIN
@@ -387,9 +387,9 @@ catalogue! {
     /// Shift of the instrument: measured positions are displaced by d from a time on.
     StationShift "station-shift" { at_time: f64 = Time as "at_time_s" } => Family {
         terms: &[
-            TermEntry::driven(At::Shift(0), "x", "step(time - {at_time_s})", SHIFTED),
-            TermEntry::driven(At::Shift(1), "y", "step(time - {at_time_s})", SHIFTED),
-            TermEntry::driven(At::Shift(2), "z", "step(time - {at_time_s})", SHIFTED),
+            TermEntry::driven(At::Shift(0), "x", "step(time - {at_time_s})", READING_SHIFT_SIGMA),
+            TermEntry::driven(At::Shift(1), "y", "step(time - {at_time_s})", READING_SHIFT_SIGMA),
+            TermEntry::driven(At::Shift(2), "z", "step(time - {at_time_s})", READING_SHIFT_SIGMA),
         ],
         says: "the measuring station moved at {at_time_s} s",
         says_by_row: "the measuring station moved after row {at_time_s:row}",
@@ -400,12 +400,12 @@ catalogue! {
     /// `r_z`) about the measuring frame's origin and displaced by d.
     StationMove "station-move" { at_time: f64 = Time as "at_time_s" } => Family {
         terms: &[
-            TermEntry::driven(At::Shift(0), "x", "step(time - {at_time_s})", MOVED),
-            TermEntry::driven(At::Shift(1), "y", "step(time - {at_time_s})", MOVED),
-            TermEntry::driven(At::Shift(2), "z", "step(time - {at_time_s})", MOVED),
-            TermEntry::driven(At::Turn(0), "rx", "step(time - {at_time_s})", MOVED),
-            TermEntry::driven(At::Turn(1), "ry", "step(time - {at_time_s})", MOVED),
-            TermEntry::driven(At::Turn(2), "rz", "step(time - {at_time_s})", MOVED),
+            TermEntry::driven(At::Shift(0), "x", "step(time - {at_time_s})", SETUP_SHIFT_SIGMA),
+            TermEntry::driven(At::Shift(1), "y", "step(time - {at_time_s})", SETUP_SHIFT_SIGMA),
+            TermEntry::driven(At::Shift(2), "z", "step(time - {at_time_s})", SETUP_SHIFT_SIGMA),
+            TermEntry::driven(At::Turn(0), "rx", "step(time - {at_time_s})", SETUP_SHIFT_SIGMA),
+            TermEntry::driven(At::Turn(1), "ry", "step(time - {at_time_s})", SETUP_SHIFT_SIGMA),
+            TermEntry::driven(At::Turn(2), "rz", "step(time - {at_time_s})", SETUP_SHIFT_SIGMA),
         ],
         says: "the measuring station moved and turned at {at_time_s} s",
         says_by_row: "the measuring station moved and turned after row {at_time_s:row}",
@@ -415,9 +415,9 @@ catalogue! {
     /// Settling of the instrument: measured positions move by d (1 − exp(−(t − `t_first`)/τ)).
     TrackerSettling "tracker-settling" { time_constant: f64 = Duration as "time_constant_s" } => Family {
         terms: &[
-            TermEntry::driven(At::Shift(0), "x", "-expm1(-t/{time_constant_s})", SHIFTED),
-            TermEntry::driven(At::Shift(1), "y", "-expm1(-t/{time_constant_s})", SHIFTED),
-            TermEntry::driven(At::Shift(2), "z", "-expm1(-t/{time_constant_s})", SHIFTED),
+            TermEntry::driven(At::Shift(0), "x", "-expm1(-t/{time_constant_s})", READING_SHIFT_SIGMA),
+            TermEntry::driven(At::Shift(1), "y", "-expm1(-t/{time_constant_s})", READING_SHIFT_SIGMA),
+            TermEntry::driven(At::Shift(2), "z", "-expm1(-t/{time_constant_s})", READING_SHIFT_SIGMA),
         ],
         says: "the measuring station settles with a time constant of {time_constant_s} s",
         says_by_row: "the measuring station settles with a constant of {time_constant_s} rows",

@@ -102,7 +102,7 @@ impl TermEntry {
 }
 
 /// Axis of displacements along the line of sight from the station, the origin of the measuring frame.
-pub(crate) const RANGE: usize = 3;
+pub(crate) const RANGE_AXIS: usize = 3;
 
 /// Site of a parameter, relative to the place that the effect names.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -119,7 +119,7 @@ pub enum At {
     /// Field of the arm as a whole.
     Arm(ArmField),
     /// Displacement of every measured position along an axis of the measuring frame, 0 to 2, or
-    /// away from the station ([`RANGE`]).
+    /// away from the station ([`RANGE_AXIS`]).
     Shift(usize),
     /// Rotation of the instrument about an axis of the measuring frame, 0 to 2.
     Turn(usize),

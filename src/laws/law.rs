@@ -2,7 +2,7 @@
 
 use super::argument::Argument;
 use super::expression::{Expression, FormulaError, Names, Parsed, Vocabulary, parse};
-use super::family::{At, Prior, RANGE};
+use super::family::{At, Prior, RANGE_AXIS};
 use super::parameter::LawParameter;
 use super::site::{BeamField, MOTION_NAMES};
 use super::term::EffectTerm;
@@ -92,7 +92,7 @@ impl LawSite {
         };
         match head {
             "measurement" => {
-                let range = (field == "range").then_some(At::Shift(RANGE));
+                let range = (field == "range").then_some(At::Shift(RANGE_AXIS));
                 let at = axis(axes).map(At::Shift).or(range);
                 return whole(at, "measurement.x, .y, .z or .range");
             }
@@ -248,7 +248,7 @@ impl Law {
             At::Tool(axis) => return format!("tool.{}", moved(axis)),
             At::Before(axis) => &format!(".{}", moved(axis)),
             At::After(axis) => &format!(".after.{}", moved(axis)),
-            At::Shift(RANGE) => return "measurement.range".to_owned(),
+            At::Shift(RANGE_AXIS) => return "measurement.range".to_owned(),
             At::Shift(axis) => return format!("measurement.{}", AXES[axis.min(2)]),
             At::BaseShift(axis) => return format!("base.{}", AXES[axis.min(2)]),
             At::BaseTurn(axis) => return format!("base.r{}", AXES[axis.min(2)]),

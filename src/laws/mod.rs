@@ -24,7 +24,7 @@ pub use argument::{FreeLength, Mount};
 pub(crate) use catalogue::NAMES;
 pub use catalogue::{Effect, FAMILIES};
 pub(crate) use effect::{declaration, to_three_digits};
-pub(crate) use family::{At, Chance, Family, Need, Only, Prior, RANGE, Search};
+pub(crate) use family::{At, Chance, Family, Need, Only, Prior, RANGE_AXIS, Search};
 pub(crate) use law::LAW;
 pub(crate) use law::{Law, LawPrior, LawSite};
 pub(crate) use parameter::LawParameter;

@@ -7,12 +7,12 @@ use super::{LeastSquares, jacobian, residual_vector};
 /// Largest number of decreasing steps in one extrapolation.
 const MAX_STEPS: usize = 12;
 /// Ratio of successive difference steps in one extrapolation.
-const SHRINK: f64 = 1.4;
+const STEP_RATIO: f64 = 1.4;
 /// First steps tried, as fractions of an unknown's typical size.
-const FIRST_STEPS: [f64; 4] = [0.3, 3e-2, 3e-3, 3e-4];
+const INITIAL_STEPS: [f64; 4] = [0.3, 3e-2, 3e-3, 3e-4];
 /// Smallest denominator of a relative error, as a fraction of the largest ‖F‖ of all unknowns. It
 /// avoids division by the effect of an unknown that moves nothing.
-const NEGLIGIBLE: f64 = 1e-9;
+const MIN_RELATIVE_DENOMINATOR: f64 = 1e-9;
 
 /// Comparison of one column of the Jacobian with differences.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -65,7 +65,7 @@ pub fn check_jacobian(
         .iter()
         .enumerate()
         .map(|(j, (difference, error))| {
-            let floor = (NEGLIGIBLE * largest / step[j].abs()).max(f64::MIN_POSITIVE);
+            let floor = (MIN_RELATIVE_DENOMINATOR * largest / step[j].abs()).max(f64::MIN_POSITIVE);
             let size = difference.norm().max(floor);
             ColumnCheck {
                 relative_error: (exact.column(j) - difference).norm() / size,
@@ -86,7 +86,7 @@ fn extrapolate<P: LeastSquares>(
 ) -> (DVector<f64>, f64) {
     let rows = problem.items() * problem.rows_per_item();
     let mut best = (DVector::from_element(rows, f64::NAN), f64::INFINITY);
-    for first in FIRST_STEPS {
+    for first in INITIAL_STEPS {
         let estimate = ridders(|h| central_difference(problem, x, j, h), first * size);
         if estimate.1 < best.1 {
             best = estimate;
@@ -118,9 +118,9 @@ fn ridders(difference: impl Fn(f64) -> DVector<f64>, first: f64) -> (DVector<f64
     let mut previous = vec![difference(h)];
     let mut best = (previous[0].clone(), f64::INFINITY);
     for _ in 1..MAX_STEPS {
-        h /= SHRINK;
+        h /= STEP_RATIO;
         let mut row = vec![difference(h)];
-        let mut factor = SHRINK * SHRINK;
+        let mut factor = STEP_RATIO * STEP_RATIO;
         for order in 0..previous.len() {
             let next = (&row[order] * factor - &previous[order]) / (factor - 1.0);
             let error = (&next - &row[order]).norm().max((&next - &previous[order]).norm());
@@ -128,7 +128,7 @@ fn ridders(difference: impl Fn(f64) -> DVector<f64>, first: f64) -> (DVector<f64
                 best = (next.clone(), error);
             }
             row.push(next);
-            factor *= SHRINK * SHRINK;
+            factor *= STEP_RATIO * STEP_RATIO;
         }
         let last = row.len() - 1;
         if (&row[last] - &previous[last - 1]).norm() >= 2.0 * best.1 {

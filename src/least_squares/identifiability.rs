@@ -12,16 +12,16 @@ use super::singular::SingularValues;
 ///
 /// Exactly redundant parameters have about 1e-15; parameters that good data distinguish have more
 /// than 1e-5.
-pub const BLIND_BELOW: f64 = 1e-9;
+pub const UNIDENTIFIABLE_BELOW: f64 = 1e-9;
 /// Largest norm of a column, relative to the largest column, that counts as zero.
 const ZERO_COLUMN: f64 = 1e-14;
 /// Smallest share of a combination that makes an unknown a preferred pivot of its description.
 const PIVOT_SHARE: f64 = 0.1;
 /// Smallest entry of a combination that is not a rounding error.
-const NEGLIGIBLE: f64 = 1e-6;
-/// Smallest relative singular value that certifies full rank without an SVD: twice [`BLIND_BELOW`],
+const MAX_ROUNDING_ENTRY: f64 = 1e-6;
+/// Smallest relative singular value that certifies full rank without an SVD: twice [`UNIDENTIFIABLE_BELOW`],
 /// to allow for rounding.
-const CERTAIN_FULL_RANK: f64 = 2.0 * BLIND_BELOW;
+const CERTAIN_FULL_RANK: f64 = 2.0 * UNIDENTIFIABLE_BELOW;
 /// Relative size of a trailing pivot below which a direction is certainly unidentifiable.
 const CERTAIN_NULL: f64 = 1e-12;
 
@@ -57,7 +57,7 @@ impl Identifiability {
     pub fn of(triangle: &DMatrix<f64>) -> Self {
         let Scaled { matrix: scaled, scale } = Scaled::of(triangle);
         let SingularValues { values: singular_values, right } = SingularValues::of(&scaled);
-        let threshold = BLIND_BELOW * singular_values.first().copied().unwrap_or(0.0);
+        let threshold = UNIDENTIFIABLE_BELOW * singular_values.first().copied().unwrap_or(0.0);
         let rank = singular_values.iter().filter(|&&value| value > threshold).count();
         let null = complement(&right.columns(0, rank).into_owned());
         let Blind { gauge, visible } = Blind::of(&null, &scale);
@@ -205,12 +205,12 @@ pub(super) fn complement(basis: &DMatrix<f64>) -> DMatrix<f64> {
 /// `null`.
 ///
 /// This basis depends on the space alone and has few unknowns in each combination. Pivots are the
-/// first unknowns with a share of at least [`PIVOT_SHARE`], then those above [`NEGLIGIBLE`].
+/// first unknowns with a share of at least [`PIVOT_SHARE`], then those above [`MAX_ROUNDING_ENTRY`].
 fn named(mut null: DMatrix<f64>, scaled: &DMatrix<f64>) -> Vec<UnidentifiableCombination> {
     let (rows, n) = null.shape();
     let mut row = 0;
     let mut pivots = Vec::new();
-    for (least, column) in [PIVOT_SHARE, NEGLIGIBLE]
+    for (least, column) in [PIVOT_SHARE, MAX_ROUNDING_ENTRY]
         .into_iter()
         .flat_map(|least| (0..n).map(move |column| (least, column)))
     {
@@ -219,12 +219,14 @@ fn named(mut null: DMatrix<f64>, scaled: &DMatrix<f64>) -> Vec<UnidentifiableCom
         }
         let pivot = row + null.column(column).rows_range(row..).iamax();
         let entry = null[(pivot, column)].abs();
-        if entry < NEGLIGIBLE {
+        if entry < MAX_ROUNDING_ENTRY {
             for i in row..rows {
                 null[(i, column)] = 0.0;
             }
         }
-        if entry < least * null.row(pivot).norm() || entry < NEGLIGIBLE || pivots.contains(&column)
+        if entry < least * null.row(pivot).norm()
+            || entry < MAX_ROUNDING_ENTRY
+            || pivots.contains(&column)
         {
             continue;
         }
@@ -250,7 +252,7 @@ fn named(mut null: DMatrix<f64>, scaled: &DMatrix<f64>) -> Vec<UnidentifiableCom
                 .iter()
                 .map(|weight| weight / norm)
                 .enumerate()
-                .filter(|(_, weight)| weight.abs() > NEGLIGIBLE)
+                .filter(|(_, weight)| weight.abs() > MAX_ROUNDING_ENTRY)
                 .collect();
             let mut vector = DVector::zeros(n);
             for &(j, weight) in &weights {

@@ -15,7 +15,7 @@ use super::{Block, Linearisation, Objective, Triangle};
 /// σ.
 pub const WEAK_THRESHOLD: f64 = 5.0;
 /// Largest weight in a combination that counts as rounding.
-const NEGLIGIBLE_WEIGHT: f64 = 1e-6;
+const MAX_ROUNDING_WEIGHT: f64 = 1e-6;
 
 /// Combinations of unknowns that the data determine too weakly for a reliable estimate.
 #[derive(Debug, Clone, PartialEq)]
@@ -86,10 +86,10 @@ impl Weak {
         let combination = |row: nalgebra::RowDVector<f64>| {
             let sign = row
                 .iter()
-                .find(|weight| weight.abs() > NEGLIGIBLE_WEIGHT)
+                .find(|weight| weight.abs() > MAX_ROUNDING_WEIGHT)
                 .map_or(1.0, |weight| weight.signum());
             let weights =
-                row.iter().enumerate().filter(|(_, weight)| weight.abs() > NEGLIGIBLE_WEIGHT);
+                row.iter().enumerate().filter(|(_, weight)| weight.abs() > MAX_ROUNDING_WEIGHT);
             let weights = weights.map(|(place, weight)| (sized[place].0, sign * weight)).collect();
             UnidentifiableCombination {
                 weights,

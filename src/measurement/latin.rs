@@ -8,7 +8,7 @@ use crate::error::BYTE_ORDER_MARKS;
 
 /// Bytes 0x80 to 0x9f that occur in text, with their characters. Other bytes in this range mark
 /// binary data.
-const MARKS: [(u8, char); 9] = [
+const HIGH_CHARACTERS: [(u8, char); 9] = [
     (0x80, '€'),
     (0x85, '…'),
     (0x91, '‘'),
@@ -24,7 +24,7 @@ const SIGNS: &str = "\u{a0}§ª«°±²³´µ·¹º»¼½¾¿";
 /// First byte of the accented letters.
 const FIRST_LETTER: u8 = 0xc0;
 /// Bytes above [`FIRST_LETTER`] that hardly occur in text: Ð × Þ ð ÷ þ ÿ.
-const RARE: [u8; 7] = [0xd0, 0xd7, 0xde, 0xf0, 0xf7, 0xfe, 0xff];
+const RARE_LETTERS: [u8; 7] = [0xd0, 0xd7, 0xde, 0xf0, 0xf7, 0xfe, 0xff];
 
 /// Decodes bytes that are not UTF-8 as Windows-1252. Returns `None` if they do not look like text:
 /// they contain a control character, a rare character, or an accented letter without a letter next
@@ -32,15 +32,17 @@ const RARE: [u8; 7] = [0xd0, 0xd7, 0xde, 0xf0, 0xf7, 0xfe, 0xff];
 fn windows_1252(bytes: &[u8]) -> Option<String> {
     let is_letter = |place: Option<usize>| {
         let byte = place.and_then(|place| bytes.get(place)).copied().unwrap_or_default();
-        byte.is_ascii_alphabetic() || (byte >= FIRST_LETTER && !RARE.contains(&byte))
+        byte.is_ascii_alphabetic() || (byte >= FIRST_LETTER && !RARE_LETTERS.contains(&byte))
     };
     let character = |(place, &byte): (usize, &u8)| match byte {
         b'\t' | b'\r' | b'\n' | 0x20..=0x7e => Some(char::from(byte)),
-        0x80..=0x9f => MARKS.iter().find(|(mark, _)| *mark == byte).map(|(_, mark)| *mark),
+        0x80..=0x9f => {
+            HIGH_CHARACTERS.iter().find(|(mark, _)| *mark == byte).map(|(_, mark)| *mark)
+        }
         0xa0..=0xbf => Some(char::from(byte)).filter(|sign| SIGNS.contains(*sign)),
         FIRST_LETTER.. => {
             let has_neighbour = is_letter(place.checked_sub(1)) || is_letter(Some(place + 1));
-            (has_neighbour && !RARE.contains(&byte)).then(|| char::from(byte))
+            (has_neighbour && !RARE_LETTERS.contains(&byte)).then(|| char::from(byte))
         }
         _ => None,
     };

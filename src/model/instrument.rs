@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use crate::laws::RANGE;
+use crate::laws::RANGE_AXIS;
 use crate::model::parameter::{Parameter, ParameterSite, Regressor, value_regressor};
 use crate::problem::PoseView;
 use crate::spatial::Frame;
@@ -112,10 +112,10 @@ impl Instrument {
         position: &Vector3<f64>,
         setup: &PoseView,
     ) -> Option<Matrix3<f64>> {
-        let along = self.shifts.iter().filter(|(axis, ..)| *axis == RANGE);
+        let along = self.shifts.iter().filter(|(axis, ..)| *axis == RANGE_AXIS);
         let mut added = self.strain;
         for (_, regressor, size) in along {
-            let sight = direction(RANGE, position);
+            let sight = direction(RANGE_AXIS, position);
             let across = Matrix3::identity() - sight * sight.transpose();
             let turned = size * regressor.value(setup) / position.norm().max(f64::MIN_POSITIVE);
             *added.get_or_insert_with(Matrix3::zeros) += across * turned;
@@ -153,7 +153,7 @@ impl Instrument {
 /// Returns the direction of a displacement of readings: an axis of the measuring frame, or the line
 /// of sight from the station, its origin.
 fn direction(axis: usize, position: &Vector3<f64>) -> Vector3<f64> {
-    if axis == RANGE {
+    if axis == RANGE_AXIS {
         position.try_normalize(0.0).unwrap_or_default()
     } else {
         Vector3::ith(axis.min(2), 1.0)

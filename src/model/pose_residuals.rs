@@ -15,8 +15,8 @@ use crate::least_squares::{Block, CHUNK_ITEMS, LeastSquares};
 use crate::observation::Needs;
 
 /// Number of residuals of a row without an orientation; with one, a row has twice as many.
-const POSITION: usize = 3;
-const POSE: usize = 6;
+const POSITION_RESIDUALS: usize = 3;
+const POSE_RESIDUALS: usize = 6;
 
 /// Whitened residuals (measured − predicted) / σ of some rows as a function of some of the
 /// parameters.
@@ -48,7 +48,7 @@ impl<'a> PoseResiduals<'a> {
     ) -> Self {
         let poses = poses.into();
         let oriented = poses.iter().any(|pose| pose.orientation.is_some());
-        let residuals_per_row = if oriented { POSE } else { POSITION };
+        let residuals_per_row = if oriented { POSE_RESIDUALS } else { POSITION_RESIDUALS };
         let measures_tilts =
             poses.iter().any(|pose| pose.observation.description().needs == Needs::Frame);
         Self {
@@ -139,7 +139,7 @@ impl LeastSquares for PoseResiduals<'_> {
             self.poses[items].iter().zip(out.chunks_exact_mut(self.residuals_per_row))
         {
             let predicted = predictor.predict(pose);
-            let (position, turn) = out.split_at_mut(POSITION);
+            let (position, turn) = out.split_at_mut(POSITION_RESIDUALS);
             position.copy_from_slice(((pose.measured - predicted.numbers) / pose.sigma).as_slice());
             let sigma = pose.orientation.map_or(1.0, |orientation| orientation.sigma);
             let error = predicted.turn.unwrap_or_default() / sigma;
@@ -150,13 +150,13 @@ impl LeastSquares for PoseResiduals<'_> {
     fn linearise(&self, x: &DVector<f64>, items: Range<usize>, block: &mut Block) {
         let full = self.full(x);
         let write = |unknowns: &[usize], block: &mut Block| {
-            let kinds = (self.residuals_per_row == POSE, self.measures_tilts);
+            let kinds = (self.residuals_per_row == POSE_RESIDUALS, self.measures_tilts);
             let mut writer = JacobianWriter::new(self.model, full.as_slice(), unknowns, kinds);
             for (k, pose) in self.poses[items.clone()].iter().enumerate() {
                 writer.write(pose, block, self.residuals_per_row * k);
             }
         };
-        let usable = self.linear_model.filter(|_| self.residuals_per_row == POSITION);
+        let usable = self.linear_model.filter(|_| self.residuals_per_row == POSITION_RESIDUALS);
         let is_reused = usable.is_some_and(|linear_model| {
             let parameters = &self.model.parameters;
             linear_model.fill(

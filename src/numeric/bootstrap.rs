@@ -68,13 +68,13 @@ pub(crate) fn mean_interval(
 
 /// Returns z with Φ(z) = `probability` for the normal distribution Φ, limited to ±4.
 fn quantile(probability: f64) -> f64 {
-    const LIMIT: f64 = 4.0;
+    const MAX_SCORE: f64 = 4.0;
     if probability > 0.0 && probability < 1.0 {
-        (-std::f64::consts::SQRT_2 * erfc_inv(2.0 * probability)).clamp(-LIMIT, LIMIT)
+        (-std::f64::consts::SQRT_2 * erfc_inv(2.0 * probability)).clamp(-MAX_SCORE, MAX_SCORE)
     } else if probability > 0.0 {
-        LIMIT
+        MAX_SCORE
     } else {
-        -LIMIT
+        -MAX_SCORE
     }
 }
 

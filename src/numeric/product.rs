@@ -11,7 +11,7 @@ const BLOCK_COLUMNS: usize = 96;
 const NARROW_BLOCK_COLUMNS: usize = 8;
 /// Largest number of columns for which a product is computed by axpy and dot operations; packing
 /// the factors would take longer.
-const NARROW: usize = 5;
+const MAX_NARROW_COLUMNS: usize = 5;
 /// Number of rows that one thread processes at a time if the result has few columns.
 const BLOCK_ROWS: usize = 1024;
 /// Smallest number of entries for which a product overwrites its factor instead of allocating
@@ -24,7 +24,7 @@ const MIN_PARALLEL_WORK: usize = 1 << 20;
 
 /// Returns the product A B, computed in parallel.
 pub(crate) fn product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
-    if b.ncols() <= NARROW && a.len() * b.ncols() >= MIN_PARALLEL_WORK {
+    if b.ncols() <= MAX_NARROW_COLUMNS && a.len() * b.ncols() >= MIN_PARALLEL_WORK {
         return narrow_product(a, b);
     }
     let mut out = zeros(a.nrows(), b.ncols());
@@ -151,10 +151,10 @@ fn narrow_product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
 /// Returns AᵀB for a tall A and a B with few columns.
 pub(crate) fn transposed_narrow_product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
     let n = a.ncols();
-    if a.len() * b.ncols() < MIN_PARALLEL_WORK || a.nrows() <= NARROW {
+    if a.len() * b.ncols() < MIN_PARALLEL_WORK || a.nrows() <= MAX_NARROW_COLUMNS {
         return a.tr_mul(b);
     }
-    let width = if b.ncols() <= NARROW { NARROW_BLOCK_COLUMNS } else { BLOCK_COLUMNS };
+    let width = if b.ncols() <= MAX_NARROW_COLUMNS { NARROW_BLOCK_COLUMNS } else { BLOCK_COLUMNS };
     // BᵀA is formed instead of AᵀB: transposing the narrow side is faster.
     let transposed = transposed_view(b);
     let mut out = zeros(b.ncols(), n);
@@ -162,7 +162,7 @@ pub(crate) fn transposed_narrow_product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> D
         let (first, count) = (part * width, entries.len() / transposed.nrows());
         let mut block = DMatrixViewMut::from_slice(entries, transposed.nrows(), count);
         let a = a.columns(first, count);
-        if transposed.nrows().min(count) <= NARROW {
+        if transposed.nrows().min(count) <= MAX_NARROW_COLUMNS {
             for (mut out, column) in block.column_iter_mut().zip(a.column_iter()) {
                 out.iter_mut().zip(b.column_iter()).for_each(|(out, b)| *out = b.dot(&column));
             }
@@ -177,7 +177,7 @@ pub(crate) fn transposed_narrow_product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> D
 /// Returns AᵀA; only the upper triangle is computed, then mirrored.
 pub(crate) fn gram(a: &DMatrix<f64>) -> DMatrix<f64> {
     let (rows, n) = a.shape();
-    if rows * n * n < MIN_PARALLEL_WORK || rows <= NARROW {
+    if rows * n * n < MIN_PARALLEL_WORK || rows <= MAX_NARROW_COLUMNS {
         return a.transpose() * a;
     }
     let transposed = transposed_view(a);
@@ -186,7 +186,7 @@ pub(crate) fn gram(a: &DMatrix<f64>) -> DMatrix<f64> {
         let (first, count) = (part * BLOCK_COLUMNS, entries.len() / n);
         let mut block = DMatrixViewMut::from_slice(entries, n, count);
         let end = first + count;
-        if count <= NARROW {
+        if count <= MAX_NARROW_COLUMNS {
             block.rows_mut(0, end).gemm_tr(1.0, &a.columns(0, end), &a.columns(first, count), 0.0);
         } else {
             block.rows_mut(0, end).gemm(
@@ -218,7 +218,7 @@ pub(crate) fn gram_of_lower(lower: &DMatrix<f64>) -> DMatrix<f64> {
         let (end, filled) = (first + count, n - first);
         let right = lower.view((first, first), (filled, count));
         let left = transposed.view((0, first), (end, filled));
-        if count <= NARROW {
+        if count <= MAX_NARROW_COLUMNS {
             block.rows_mut(0, end).gemm_tr(
                 1.0,
                 &lower.view((first, 0), (filled, end)),
@@ -234,7 +234,7 @@ pub(crate) fn gram_of_lower(lower: &DMatrix<f64>) -> DMatrix<f64> {
     out
 }
 
-/// Returns a view of Aᵀ without copying. It is not for products with a size up to [`NARROW`]:
+/// Returns a view of Aᵀ without copying. It is not for products with a size up to [`MAX_NARROW_COLUMNS`]:
 /// nalgebra forms these by axpy operations that access strided columns out of bounds.
 fn transposed_view(a: &DMatrix<f64>) -> MatrixView<'_, f64, Dyn, Dyn, Dyn, Dyn> {
     let (rows, n) = a.shape();
@@ -246,7 +246,7 @@ fn transposed_view(a: &DMatrix<f64>) -> MatrixView<'_, f64, Dyn, Dyn, Dyn, Dyn> 
 pub(crate) fn transposed_product(a: &DMatrix<f64>, b: DMatrixView<f64>) -> DMatrix<f64> {
     let (rows, n) = a.shape();
     // See `transposed_view`.
-    if a.len() * b.ncols() < MIN_PARALLEL_WORK || rows.min(n).min(b.ncols()) <= NARROW {
+    if a.len() * b.ncols() < MIN_PARALLEL_WORK || rows.min(n).min(b.ncols()) <= MAX_NARROW_COLUMNS {
         return a.transpose() * b;
     }
     let transposed = transposed_view(a);

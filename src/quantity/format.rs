@@ -1,10 +1,10 @@
 //! Formats of numbers in texts and tables.
 
 /// Smallest magnitude that is written with a power of ten.
-const HUGE: f64 = 1e12;
+const MIN_SCIENTIFIC_SIZE: f64 = 1e12;
 /// Smallest p-value that is written out. A smaller one depends more on the assumed distribution
 /// than on the data.
-const LEAST_P: f64 = 1e-16;
+const MIN_WRITTEN_P: f64 = 1e-16;
 
 /// Returns the number of decimals that shows `error` with two significant digits, at most `most`.
 pub(crate) fn decimals(error: f64, most: usize) -> usize {
@@ -35,7 +35,7 @@ pub(crate) fn about_three_digits(value: f64) -> String {
 /// that are not finite as "–".
 pub(crate) fn number(value: f64, decimals: usize) -> String {
     match value.abs() {
-        size if size < HUGE => fixed(value, decimals),
+        size if size < MIN_SCIENTIFIC_SIZE => fixed(value, decimals),
         size if size.is_finite() => format!("{value:.3e}"),
         _ => "–".to_owned(),
     }
@@ -72,7 +72,7 @@ pub(crate) fn or_dash<T>(value: Option<T>, words: impl FnOnce(T) -> String) -> S
 /// Formats a p-value: `0.003`, `2e-9`, `below 1e-16`.
 pub(crate) fn p_value(p: f64) -> String {
     match p {
-        p if p < LEAST_P => "below 1e-16".to_owned(),
+        p if p < MIN_WRITTEN_P => "below 1e-16".to_owned(),
         p if p < 1e-3 => format!("{p:.0e}"),
         p => format!("{p:.3}"),
     }

@@ -16,7 +16,7 @@ use crate::problem::Problem;
 
 /// Largest change of the corrections \[m\] in one pass at which the commands have converged; far
 /// below the accuracy of any arm.
-const SETTLED: f64 = 1e-11;
+const MAX_CONVERGED_CHANGE: f64 = 1e-11;
 /// Maximum number of passes. A command that has not converged by then is returned as it is; its
 /// `miss` states how far it is off.
 const MAX_PASSES: usize = 12;
@@ -158,7 +158,7 @@ pub fn compensate(
         for (command, before) in commands.iter_mut().zip(before.iter()) {
             (command.seed_miss, command.seed_turn) = (before.seed_miss, before.seed_turn);
         }
-        if change <= SETTLED || pass >= MAX_PASSES || !correction.has_remainder() {
+        if change <= MAX_CONVERGED_CHANGE || pass >= MAX_PASSES || !correction.has_remainder() {
             return Ok(commands.into_iter().zip(poses).collect());
         }
     }

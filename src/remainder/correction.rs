@@ -21,7 +21,7 @@ const MIN_SHARE: f64 = 0.5;
 /// pose is not extrapolated.
 const RANGE_MARGIN: f64 = 0.02;
 /// Number of poses corrected at a time, which limits the matrix of features to about 10 MB.
-const CHUNK: usize = 400;
+const POSES_PER_CHUNK: usize = 400;
 
 /// Correction of the positions that an identified arm predicts, with their uncertainty.
 ///
@@ -168,7 +168,9 @@ impl Correction {
         let columns = self.columns(model, x);
         let placed = PlacementFit::of((problem, model, x), placed, poses);
         let of_chunk = |poses: &[Pose]| self.factors(&columns, (problem, model, x), poses);
-        let chunks = || poses.chunks(CHUNK).enumerate().map(|(k, poses)| (CHUNK * k, poses));
+        let chunks = || {
+            poses.chunks(POSES_PER_CHUNK).enumerate().map(|(k, poses)| (POSES_PER_CHUNK * k, poses))
+        };
         let mut taken = None;
         for (first, poses) in chunks().filter(|_| placed.has_columns()) {
             placed.add_to(&mut taken, first, &of_chunk(poses).1);

@@ -7,11 +7,11 @@ use super::scores::LeftOutError;
 /// Probability with which the tests of error and likelihood each find a gain although there is no
 /// model error. In 200 simulated data sets without model error (28 poses), no remainder passed all
 /// tests.
-const RISK: f64 = 0.02;
+const FALSE_GAIN_PROBABILITY: f64 = 0.02;
 /// Probability with which the test of the predictive density finds a gain although there is no
-/// model error. It is larger than [`RISK`] because the test of the error must pass, too. Without
+/// model error. It is larger than [`FALSE_GAIN_PROBABILITY`] because the test of the error must pass, too. Without
 /// model error, the density decreases in 94 % of data sets.
-const DENSITY_RISK: f64 = 0.1;
+const FALSE_DENSITY_GAIN_PROBABILITY: f64 = 0.1;
 
 /// Mean difference over the configurations, with its standard error.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -88,13 +88,13 @@ impl Gain {
     /// Returns the ratio of mean gain to standard error that noise alone exceeds with a probability
     /// of 2 %. It is a quantile of Student's t distribution.
     pub fn threshold(&self) -> f64 {
-        self.quantile(1.0 - RISK)
+        self.quantile(1.0 - FALSE_GAIN_PROBABILITY)
     }
 
     /// Returns the ratio of the mean density gain to its standard error that noise alone exceeds
     /// with a probability of 10 %.
     pub fn density_threshold(&self) -> f64 {
-        self.quantile(1.0 - DENSITY_RISK)
+        self.quantile(1.0 - FALSE_DENSITY_GAIN_PROBABILITY)
     }
 
     fn quantile(&self, level: f64) -> f64 {
@@ -105,7 +105,7 @@ impl Gain {
     /// Returns the smallest increase of the log evidence at which a remainder is kept: ln 50, for
     /// odds of 50 to 1 against noise alone.
     pub fn least_evidence() -> f64 {
-        -RISK.ln()
+        -FALSE_GAIN_PROBABILITY.ln()
     }
 
     /// Returns true if errors and predictive densities of left-out configurations improve

@@ -21,7 +21,7 @@ const MIN_LEVER: f64 = 1e-3;
 const MIN_SPREAD: f64 = 1e-6;
 /// 1 σ of the motion of the position that a parameter without a declared prior may cause \[m\]. It
 /// exceeds any plausible error, so that data decide.
-const WIDE_MOTION: f64 = 0.3;
+const WIDE_MOTION_SIGMA: f64 = 0.3;
 /// Largest prior 1 σ of a parameter without a declared prior, in the SI unit of the parameter.
 const MAX_SPREAD: f64 = 1e3;
 
@@ -212,7 +212,7 @@ pub(super) fn prior(
     let declared = |j: usize| model.parameters[unknowns[j]].sigma;
     let wide = |j: usize| {
         let motion = (rows.jacobian.column(j).norm_squared() / rows.len().max(1) as f64).sqrt();
-        (WIDE_MOTION / motion).min(MAX_SPREAD)
+        (WIDE_MOTION_SIGMA / motion).min(MAX_SPREAD)
     };
     let mean = |j: usize, _| if declared(j).is_some() { -x[unknowns[j]] } else { 0.0 };
     ParameterPrior {

@@ -10,7 +10,7 @@ use super::search::minimise;
 use crate::numeric::{gram, lower_factor};
 
 /// Step of ln σ and ln σ_c in central differences.
-const STEP: f64 = 1e-4;
+const DIFFERENCE_STEP: f64 = 1e-4;
 /// Maximum number of steps of the search.
 const MAX_STEPS: usize = 60;
 
@@ -112,7 +112,8 @@ pub(super) fn evidence_of_noise(
                 moved[k] += step;
                 likelihood.value(&moved)
             };
-            gradient[k] = (beside(STEP)? - beside(-STEP)?) / (2.0 * STEP);
+            gradient[k] =
+                (beside(DIFFERENCE_STEP)? - beside(-DIFFERENCE_STEP)?) / (2.0 * DIFFERENCE_STEP);
         }
         Some((value, gradient))
     };

@@ -18,7 +18,7 @@ use crate::files::{Changes, changed_key, read_limited, sealed};
 use crate::problem::Problem;
 
 /// Largest size of a `remainder.json` that is read \[MiB\].
-const LARGEST_MIB: u64 = 256;
+const MAX_FILE_MIB: u64 = 256;
 /// Name and version of the file format.
 const FORMAT: (&str, u32) = ("flexcal-remainder", 2);
 /// Value of the key `kind`: the only kind of correction that this version reads.
@@ -230,7 +230,7 @@ impl Correction {
     /// `changes` refuses that.
     pub fn read(file: &Path, changes: Changes) -> Result<Self, SavedRemainderError> {
         let unreadable = |source| SavedRemainderError::Unreadable { file: file.to_owned(), source };
-        let bytes = read_limited(file, LARGEST_MIB << 20).map_err(unreadable)?;
+        let bytes = read_limited(file, MAX_FILE_MIB << 20).map_err(unreadable)?;
         let text = String::from_utf8(bytes)
             .map_err(|_| unreadable(io::Error::from(io::ErrorKind::InvalidData)))?;
         let correction = Self::parse(&text, file)?;

@@ -4,13 +4,13 @@
 use nalgebra::{DMatrix, DVector};
 
 /// Change of the function value in one step below which the search has converged.
-const SETTLED: f64 = 5e-3;
+const CONVERGENCE_TOLERANCE: f64 = 5e-3;
 /// Largest change of a variable in one step. The variables are logarithms, so this is a factor e²
 /// in a hyperparameter.
 const MAX_STEP: f64 = 2.0;
 /// Smallest decrease that a step must reach, as a fraction of the decrease that the gradient
 /// predicts. [Armijo 1966]
-const SUFFICIENT: f64 = 1e-4;
+const ARMIJO_FRACTION: f64 = 1e-4;
 /// Maximum number of times that a step is halved before the search stops.
 const MAX_HALVINGS: usize = 12;
 
@@ -70,7 +70,7 @@ pub(super) fn minimise(
             let tried = within(&at + &step);
             let expected = gradient.dot(&(&tried - &at));
             match function(&tried) {
-                Some((reached, slope)) if reached <= value + SUFFICIENT * expected => {
+                Some((reached, slope)) if reached <= value + ARMIJO_FRACTION * expected => {
                     next = Some((tried, reached, slope));
                     break;
                 }
@@ -93,7 +93,7 @@ pub(super) fn minimise(
         }
         let gain = value - reached;
         (at, value, gradient) = (tried, reached, slope);
-        if gain < SETTLED {
+        if gain < CONVERGENCE_TOLERANCE {
             break;
         }
     }

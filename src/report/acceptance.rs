@@ -10,7 +10,7 @@ use crate::quantity::format::{about_three_digits, counted, number};
 use crate::results::{AcceptanceResult, PoseAccuracy, TestedTolerance};
 
 /// Number of cycles in each pose that ISO 9283 requires.
-const CYCLES: usize = 30;
+const ISO_CYCLES: usize = 30;
 
 /// Sentence on the scope of the reported errors.
 const SCOPE: &str = "These are errors of predicted positions. The accuracy that a controller reaches with corrected commands is not judged.";
@@ -141,12 +141,12 @@ fn judgement<'a>(result: &AcceptanceResult) -> Vec<Block<'a>> {
     let repeats = match result.repeatability_max_mm {
         Some(most) => format!(
             "Pose repeatability RP (l̄ + 3 S of the distances to the barycentre): at most {} mm \
-             over {poses} measured three times or more. ISO 9283 requires {CYCLES} cycles a pose.",
+             over {poses} measured three times or more. ISO 9283 requires {ISO_CYCLES} cycles a pose.",
             number(most, 4),
         ),
         None => format!(
             "No held-out pose was measured three times, so repeatability is not judged; ISO 9283 \
-             requires {CYCLES} cycles a pose."
+             requires {ISO_CYCLES} cycles a pose."
         ),
     };
     let bound = result.bound.as_ref().map(|bound| {

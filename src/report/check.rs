@@ -54,13 +54,13 @@ pub fn check_text(problem: &Problem, check: &Check) -> String {
 }
 
 /// Smallest difference of two identified shares at which both are shown.
-const SHOWN_DIFFERENCE: f64 = 0.05;
+const MIN_SHOWN_DIFFERENCE: f64 = 0.05;
 
 /// Returns true if a parameter is confounded with others at the nominal arm, but identified at arms
 /// drawn from the priors.
 fn is_confounded_at_nominal(expected: &ExpectedParameter) -> bool {
     let nominal = expected.identified_at_nominal;
-    nominal < Forecast::WELL_IDENTIFIED && expected.identified - nominal > SHOWN_DIFFERENCE
+    nominal < Forecast::WELL_IDENTIFIED && expected.identified - nominal > MIN_SHOWN_DIFFERENCE
 }
 
 /// Formats the expected identified share of a parameter.

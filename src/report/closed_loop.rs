@@ -20,13 +20,13 @@ use crate::results::{FoundEffect, Gain, LoopResult, PlotData, Summary, TraceResu
 use crate::select::ClosedLoop;
 
 /// Maximum number of alternatives that a text names; the page names twice as many.
-const SHOWN_ALTERNATIVES: usize = 4;
+const MAX_SHOWN_ALTERNATIVES: usize = 4;
 /// Maximum number of candidates of the ranking that a report shows.
-const SHOWN_CANDIDATES: usize = 8;
+const MAX_SHOWN_CANDIDATES: usize = 8;
 /// Maximum number of excluded rows that a text names.
-const SHOWN_ROWS: usize = 3;
+const MAX_SHOWN_ROWS: usize = 3;
 /// Maximum number of limits of the declared problem that a text names.
-const SHOWN_LIMITS: usize = 3;
+const MAX_SHOWN_LIMITS: usize = 3;
 /// Number of lines of a screen, less those for file names and next steps.
 const SCREEN_LINES: usize = 22;
 /// Name of the arm with the effects of the extended problem.
@@ -134,7 +134,7 @@ fn set_aside<'a>(problem: &Problem, result: &LoopResult) -> Option<Block<'a>> {
     let words = format!(
         "{} with gross errors took no part in the choice of effects: {}. {treatment}.",
         counted(rows.len(), "pose"),
-        first_of(rows.iter().map(location), SHOWN_ROWS, "loop.json").join(", ")
+        first_of(rows.iter().map(location), MAX_SHOWN_ROWS, "loop.json").join(", ")
     );
     (!rows.is_empty()).then_some(Block::Text(words))
 }
@@ -149,7 +149,7 @@ pub fn loop_text(problem: &Problem, closure: &ClosedLoop) -> String {
         blocks.push(Block::heading("Residual tests that the declared problem fails"));
         blocks.push(Block::list(failed));
     }
-    blocks.extend(found(result, SHOWN_ALTERNATIVES));
+    blocks.extend(found(result, MAX_SHOWN_ALTERNATIVES));
     let failed = findings::failed(&closure.findings);
     if result.unexplained.is_some() || (!failed.is_empty() && !result.effects.is_empty()) {
         blocks.push(Block::heading("What remains"));
@@ -203,14 +203,14 @@ fn blocks<'a>(
     blocks.extend(findings::blocks(&closure.before.findings));
     let traced = TraceResult::new(problem, &closure.before);
     let every = format!("{} writes them all", code("flexcal trace"));
-    let mut ranking = trace::ranking(problem, &traced, SHOWN_CANDIDATES, &every);
+    let mut ranking = trace::ranking(problem, &traced, MAX_SHOWN_CANDIDATES, &every);
     ranking.insert(1, Block::figures([figures::ranking(&closure.before)]));
     blocks.extend(ranking);
     blocks.push(Block::Page(trace::not_seen(&closure.before)));
     blocks.extend(rounds(closure, result));
     blocks.extend(sureness(closure, result));
-    blocks.push(Block::Words(found(result, SHOWN_ALTERNATIVES)));
-    blocks.push(Block::Page(found(result, 2 * SHOWN_ALTERNATIVES)));
+    blocks.push(Block::Words(found(result, MAX_SHOWN_ALTERNATIVES)));
+    blocks.push(Block::Page(found(result, 2 * MAX_SHOWN_ALTERNATIVES)));
     let causes = plots.causes.iter().zip(1..);
     blocks.push(Block::figures(
         causes.map(|(cause, number)| Some(figures::effect(cause, number, &plots.shown))),
@@ -286,7 +286,7 @@ fn cautions<'a>(closure: &ClosedLoop, result: &LoopResult) -> Vec<Block<'a>> {
         .map(|estimate| estimate.name.clone());
     let held =
         bounds.chain(before.active_constraints.iter().map(|constraint| constraint.words.clone()));
-    let held = named(held, SHOWN_LIMITS, ", ");
+    let held = named(held, MAX_SHOWN_LIMITS, ", ");
     let limits = (!held.is_empty() && !result.effects.is_empty()).then(|| {
         format!(
             "Limits are active in the declared fit ({held}). If one is wrong, an effect that was found may only compensate for it. \

@@ -7,7 +7,7 @@ use crate::problem::Effect;
 use crate::select::{Detectable, Detection, Size};
 
 /// Maximum number of effects of a family that a text lists.
-const SHOWN_EFFECTS: usize = 3;
+const MAX_SHOWN_EFFECTS: usize = 3;
 
 /// Returns the least visible effects of each family, and those that stay invisible.
 pub(super) fn blocks<'a>(detection: &Detection) -> Vec<Block<'a>> {
@@ -32,7 +32,7 @@ pub(super) fn blocks<'a>(detection: &Detection) -> Vec<Block<'a>> {
     let rows: Vec<Vec<String>> =
         families.into_iter().flat_map(|family| hardest(&visible, family)).collect();
     let mut blocks = vec![Block::Text(format!(
-        "Size from which on an effect is found in {:.0} of 100 such sets of measurements, for the {SHOWN_EFFECTS} least visible effects \
+        "Size from which on an effect is found in {:.0} of 100 such sets of measurements, for the {MAX_SHOWN_EFFECTS} least visible effects \
          of each family:",
         detection.power * 100.0
     ))];
@@ -78,7 +78,7 @@ fn hardest(shown: &[&Detectable], family: &str) -> Vec<Vec<String>> {
         places.push(place);
         new
     });
-    rows.take(SHOWN_EFFECTS)
+    rows.take(MAX_SHOWN_EFFECTS)
         .flat_map(|(effect, _)| effect.sizes.iter().map(|size| row(&effect.effect, size)))
         .collect()
 }

@@ -4,10 +4,10 @@ use super::document::{Point, code};
 use crate::laws::ArgumentKind;
 use crate::problem::Effect;
 use crate::quantity::format::{decimals, number};
-use crate::results::{MAX_COEFFICIENTS, ParameterValue, SHOWN_HARMONICS, joined};
+use crate::results::{MAX_COEFFICIENTS, MAX_SHOWN_HARMONICS, ParameterValue, joined};
 
 /// Maximum number of decimals of a value.
-const MOST: usize = 6;
+const MAX_DECIMALS: usize = 6;
 
 /// Lists the parameters of an effect with their values. For many harmonics, it lists the amplitudes
 /// of the largest.
@@ -25,9 +25,9 @@ pub(super) fn values(effect: &Effect, parameters: &[ParameterValue]) -> Vec<Stri
     waves.sort_by(|(_, a), (_, b)| b.estimate.total_cmp(&a.estimate));
     let highest = waves
         .iter()
-        .take(SHOWN_HARMONICS)
+        .take(MAX_SHOWN_HARMONICS)
         .map(|(order, wave)| line(&format!("amplitude of order {order}"), wave));
-    let lower = waves.len().saturating_sub(SHOWN_HARMONICS);
+    let lower = waves.len().saturating_sub(MAX_SHOWN_HARMONICS);
     highest.chain((lower > 0).then(|| format!("{lower} smaller ones in loop.json"))).collect()
 }
 
@@ -37,10 +37,10 @@ fn value(parameter: &ParameterValue) -> String {
     let scaled = parameter.estimate * unit.factor;
     match parameter.std_error.map(|error| error * unit.factor) {
         Some(error) => {
-            let digits = decimals(error, MOST);
+            let digits = decimals(error, MAX_DECIMALS);
             format!("{} ± {} {}", number(scaled, digits), number(error, digits), unit.symbol)
         }
-        None => format!("{} {}, no standard error", number(scaled, MOST), unit.symbol),
+        None => format!("{} {}, no standard error", number(scaled, MAX_DECIMALS), unit.symbol),
     }
 }
 

@@ -13,7 +13,7 @@ const ADVICE: &str = "If the controller uses geometry alone, a geometry fitted a
 
 /// Ratio of the mean errors of geometry alone to the whole model, above which a geometry fitted
 /// alone may be better.
-const MUCH_LARGER: f64 = 1.1;
+const MIN_WORSE_RATIO: f64 = 1.1;
 
 /// Returns the result as text.
 pub fn export_text(result: &ExportResult) -> String {
@@ -37,7 +37,7 @@ pub fn export_text(result: &ExportResult) -> String {
             words(whole),
             words(rigid)
         )));
-        if rigid.norms().0[0] > MUCH_LARGER * whole.norms().0[0] {
+        if rigid.norms().0[0] > MIN_WORSE_RATIO * whole.norms().0[0] {
             blocks.push(Block::Note(ADVICE.to_owned()));
         }
     }

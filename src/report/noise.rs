@@ -11,9 +11,9 @@ use crate::quantity::format::{counted, decimals, mm, number};
 use crate::results::{ResidualSize, rows_in};
 
 /// Maximum number of outliers that a text lists.
-const SHOWN_OUTLIERS: usize = 20;
+const MAX_SHOWN_OUTLIERS: usize = 20;
 /// Maximum number of influential rows that a text names.
-const SHOWN_INFLUENTIAL: usize = 3;
+const MAX_SHOWN_INFLUENTIAL: usize = 3;
 /// Name of the file that contains all of them.
 const FILE: &str = "estimate.json";
 
@@ -122,7 +122,7 @@ pub(super) fn outliers<'a>(problem: &Problem, found: &Identification) -> Option<
             number(outlier.distance, 1)
         )
     };
-    let points = first_of(found.outliers.iter().map(point), SHOWN_OUTLIERS, FILE);
+    let points = first_of(found.outliers.iter().map(point), MAX_SHOWN_OUTLIERS, FILE);
     let have = if n == 1 { "has a gross error" } else { "have gross errors" };
     let words = format!("{n} of {} {have} ({treatment}):", counted(all, noun(found)));
     (n > 0).then_some(Block::Lines(words, points))
@@ -150,14 +150,14 @@ pub(super) fn carried<'a>(found: &Identification) -> Option<Block<'a>> {
     Some(Block::Text(format!(
         "{} {cause} most of the residual: {}. Without {them} {left}.",
         counted(influential.rows.len(), noun(found)),
-        named(influential.rows.iter().map(row), SHOWN_INFLUENTIAL, ", ")
+        named(influential.rows.iter().map(row), MAX_SHOWN_INFLUENTIAL, ", ")
     )))
 }
 
 /// States in one line what to do about influential rows; `problem` is the problem's file.
 pub fn show_influential_rows(found: &Identification, problem: &Path) -> Option<String> {
     let rows = found.influential_rows.as_ref()?.rows.iter();
-    let rows = named(rows.map(|row| row.location.to_string()), SHOWN_INFLUENTIAL, ", ");
+    let rows = named(rows.map(|row| row.location.to_string()), MAX_SHOWN_INFLUENTIAL, ", ");
     Some(format!(
         "check {rows}; a section [robust] in {} would limit the influence of such rows",
         problem.display()

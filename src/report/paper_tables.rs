@@ -7,7 +7,7 @@ use crate::paper::{Form, StiffnessStage};
 use crate::quantity::format::{mm, number, or_dash};
 
 /// Identified share below which a parameter is marked.
-const MARKED_BELOW: f64 = 0.9;
+const MIN_UNMARKED_SHARE: f64 = 0.9;
 
 /// Header of the parameters of a joint in table 2.
 const FIELDS: [&str; 5] = ["α °", "a mm", "θ °", "d mm", "β °"];
@@ -37,7 +37,7 @@ pub(super) fn table_2(procedure: &Procedure) -> Table {
         if place.is_multiple_of(2) { number(value.to_degrees(), 3) } else { mm(value, 2) }
     };
     let marked = |entry: &TableEntry, text: String| match entry.seen {
-        Some(seen) if seen < MARKED_BELOW => format!("({text})"),
+        Some(seen) if seen < MIN_UNMARKED_SHARE => format!("({text})"),
         _ => text,
     };
     let row = |(joint, entries): &(usize, [TableEntry; 5])| {

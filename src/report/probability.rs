@@ -1,7 +1,7 @@
 //! Probabilities in words.
 
 /// Smallest probability at which a law, or a cause at a place, is more probable than not.
-pub(super) const EVEN: f64 = 0.5;
+pub(super) const MIN_PROBABLE: f64 = 0.5;
 
 /// Returns a probability in percent.
 pub(super) fn percent(probability: f64) -> String {

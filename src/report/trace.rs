@@ -20,11 +20,11 @@ use crate::results::{CommandedJoint, commanded_joints};
 use crate::select::Trace;
 
 /// Maximum number of candidates that a text lists.
-const SHOWN_CANDIDATES: usize = 6;
+const MAX_SHOWN_CANDIDATES: usize = 6;
 /// Maximum number of hypothesis sets that a text lists.
-const SHOWN_SETS: usize = 4;
+const MAX_SHOWN_SETS: usize = 4;
 /// Maximum number of confounded effects that are named for a candidate.
-const SHOWN_CONFOUNDED: usize = 3;
+const MAX_SHOWN_CONFOUNDED: usize = 3;
 
 /// Returns the trace as text, ending in a line break.
 pub fn trace_text(problem: &Problem, trace: &Trace) -> String {
@@ -36,7 +36,7 @@ pub fn trace_text(problem: &Problem, trace: &Trace) -> String {
     ];
     blocks.extend(findings::another_size(&trace.findings, trace.fit.reduced_chi2).map(Block::Text));
     blocks.extend(hypothesis_sets(&result));
-    blocks.extend(ranking(problem, &result, SHOWN_CANDIDATES, "trace.json holds them all"));
+    blocks.extend(ranking(problem, &result, MAX_SHOWN_CANDIDATES, "trace.json holds them all"));
     blocks.extend(not_seen(trace));
     text(&blocks)
 }
@@ -74,7 +74,7 @@ fn hypothesis_sets<'a>(result: &TraceResult) -> Vec<Block<'a>> {
             if causes.is_empty() { "noise alone".to_owned() } else { causes.join("; and ") };
         format!("{}: {causes}", percent(set.probability))
     };
-    let shown: Vec<String> = result.explanations.iter().take(SHOWN_SETS).map(point).collect();
+    let shown: Vec<String> = result.explanations.iter().take(MAX_SHOWN_SETS).map(point).collect();
     if shown.is_empty() {
         return Vec::new();
     }
@@ -183,7 +183,7 @@ fn point(problem: &Problem, candidate: &Candidate, unit: &str) -> Point {
             |other: &Confounded| format!("{} ({:.0}°)", other.effect.description, other.angle_deg);
         details.push(format!(
             "hard to tell from: {}",
-            named(candidate.alike.iter().map(alike), SHOWN_CONFOUNDED, "; ")
+            named(candidate.alike.iter().map(alike), MAX_SHOWN_CONFOUNDED, "; ")
         ));
     }
     if let (Some(pose), Some(first)) = (&candidate.told_apart, candidate.alike.first()) {

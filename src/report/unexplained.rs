@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::document::code;
-use super::probability::{EVEN, percent};
+use super::probability::{MIN_PROBABLE, percent};
 use crate::fit::Noise;
 use crate::model::effect::NO_REFERENCE;
 use crate::model::parameter::holds_all;
@@ -150,7 +150,7 @@ fn wrong_limits(result: &LoopResult) -> impl Iterator<Item = (&str, f64)> {
     result
         .structures()
         .filter_map(move |left| Some((left.limit.as_deref()?, limit(left))))
-        .filter(|(_, probability)| *probability >= EVEN)
+        .filter(|(_, probability)| *probability >= MIN_PROBABLE)
 }
 
 /// Describes the place and the inputs (quantities that it depends on) of one structure.

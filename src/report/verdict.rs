@@ -2,13 +2,13 @@
 //! more than a cause's status allows.
 
 use super::document::code;
-use super::probability::{EVEN, percent};
+use super::probability::{MIN_PROBABLE, percent};
 use crate::quantity::format::{counted, number};
 use crate::results::{FoundEffect, LoopResult, MAX_COEFFICIENTS, NamedEffect};
 use crate::select::{Status, Verdict};
 
 /// Smallest probability at which a law is named as a candidate.
-const LEAST_CANDIDATE: f64 = 0.005;
+const MIN_CANDIDATE_PROBABILITY: f64 = 0.005;
 
 /// States after how many rounds a search ended early.
 pub fn interrupted(rounds: usize) -> String {
@@ -177,13 +177,15 @@ fn claim(found: &FoundEffect, words: &str) -> String {
 /// Returns the claim about a cause whose law is unknown: `place` with its probability `at`, and the
 /// law's probability.
 fn located((place, at): (&str, f64), law: f64, words: &str) -> String {
-    let unknown = if at >= EVEN {
+    let unknown = if at >= MIN_PROBABLE {
         format!("{place} ({}), law not known", percent(at))
     } else {
         "place and law not known".to_owned()
     };
     match law {
-        LEAST_CANDIDATE.. => format!("{unknown}; one candidate law: {words} ({})", percent(law)),
+        MIN_CANDIDATE_PROBABILITY.. => {
+            format!("{unknown}; one candidate law: {words} ({})", percent(law))
+        }
         _ => unknown,
     }
 }
@@ -192,7 +194,7 @@ fn located((place, at): (&str, f64), law: f64, words: &str) -> String {
 /// names one.
 pub(super) fn stand_in(found: &FoundEffect) -> Option<String> {
     let law = found.claims.as_ref()?.law.probability;
-    (law < LEAST_CANDIDATE && found.status != Status::Contradicted)
+    (law < MIN_CANDIDATE_PROBABILITY && found.status != Status::Contradicted)
         .then(|| format!("the model represents it by: {}", declared(&found.effect)))
 }
 

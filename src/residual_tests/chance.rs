@@ -6,13 +6,13 @@ use crate::numeric::bisect;
 
 /// Minimum number of draws that must reach a value for their share to estimate its probability.
 /// With fewer, the tail is that of a fitted gamma distribution.
-const ENOUGH: usize = 10;
+const MIN_EXCEEDING_DRAWS: usize = 10;
 /// Smallest skewness of the fitted gamma distribution. At smaller skewness it equals a normal
 /// distribution, and its shape parameter 4 / skewness² would become too large.
-const LEAST_SKEWNESS: f64 = 0.02;
+const MIN_SKEWNESS: f64 = 0.02;
 /// Largest A² for which the p-value is computed; larger values get the same p-value. The fitted
 /// curve of [Stephens 1986] ends there.
-const LARGEST: f64 = 150.0;
+const MAX_STATISTIC: f64 = 150.0;
 
 /// Null distribution of a test statistic. Large values of the statistic are improbable.
 #[derive(Debug, Clone)]
@@ -93,7 +93,7 @@ impl Drawn {
             |power: i32| values.iter().map(|value| (value - mean).powi(power)).sum::<f64>() / n;
         let spread = moment(2).sqrt();
         let scatters = spread.is_normal() && spread > 1e-9 * mean.abs();
-        let skewness = (moment(3) / spread.powi(3)).max(LEAST_SKEWNESS);
+        let skewness = (moment(3) / spread.powi(3)).max(MIN_SKEWNESS);
         let shape = 4.0 / (skewness * skewness);
         let unit = spread / shape.sqrt();
         let tail = Gamma::new(shape, 1.0).ok().filter(|_| scatters)?;
@@ -106,15 +106,17 @@ impl Drawn {
 
     fn p_value(&self, statistic: f64) -> f64 {
         let reached = self.values.len() - self.values.partition_point(|&value| value < statistic);
-        if reached >= ENOUGH {
+        if reached >= MIN_EXCEEDING_DRAWS {
             self.share(reached)
         } else {
-            self.tail.sf(((statistic - self.origin) / self.unit).max(0.0)).min(self.share(ENOUGH))
+            self.tail
+                .sf(((statistic - self.origin) / self.unit).max(0.0))
+                .min(self.share(MIN_EXCEEDING_DRAWS))
         }
     }
 
     fn upper(&self, level: f64) -> f64 {
-        if level > self.share(ENOUGH) {
+        if level > self.share(MIN_EXCEEDING_DRAWS) {
             let reached = level * (1 + self.values.len()) as f64 - 1.0;
             // The share is one of whole draws.
             #[expect(
@@ -133,7 +135,7 @@ impl Drawn {
 /// Returns the probability of Anderson and Darling's A² or a larger value under normality [Stephens
 /// 1986, table 4.9].
 fn anderson_darling_p(statistic: f64) -> f64 {
-    let a = statistic.clamp(0.0, LARGEST);
+    let a = statistic.clamp(0.0, MAX_STATISTIC);
     let curve = |c0: f64, c1: f64, c2: f64| (c0 + c1 * a + c2 * a * a).exp();
     match a {
         _ if a < 0.2 => 1.0 - curve(-13.436, 101.14, -223.73),
@@ -145,5 +147,5 @@ fn anderson_darling_p(statistic: f64) -> f64 {
 
 /// Returns the A² that is reached with probability `level` under normality, by bisection.
 fn anderson_darling_upper(level: f64) -> f64 {
-    bisect(|statistic| anderson_darling_p(statistic) > level, (0.0, LARGEST), 60).1
+    bisect(|statistic| anderson_darling_p(statistic) > level, (0.0, MAX_STATISTIC), 60).1
 }

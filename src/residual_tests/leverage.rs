@@ -10,23 +10,23 @@ use super::outcome::Untestable;
 use crate::numeric::{gram, lower_factor, multiply_by_upper};
 
 /// Minimum number of residual degrees of freedom for any test.
-const LEAST_FREEDOM: f64 = 4.0;
+const MIN_DEGREES_OF_FREEDOM: f64 = 4.0;
 /// Smallest share of a direction's squared length in the kept poses at which the fit without the
 /// other poses is defined.
-const LEAST_DECIDED: f64 = 1e-6;
+const MIN_KEPT_SHARE: f64 = 1e-6;
 /// Smallest share of its variance that a direction of a pose must keep in the residual to be
 /// studentised. With less, the fit always meets the measurement along it.
-const LEAST_LEFT: f64 = 1e-4;
+const MIN_RESIDUAL_SHARE: f64 = 1e-4;
 /// Smallest share of a fitted direction that priors determine at which the priors' contribution to
 /// the residuals is counted.
-const LEAST_PRIOR: f64 = 1e-6;
+const MIN_PRIOR_SHARE: f64 = 1e-6;
 /// Value added to a diagonal so that a Cholesky factor exists in spite of rounding.
-const ROUNDING: f64 = 1e-10;
+const CHOLESKY_JITTER: f64 = 1e-10;
 /// Number of poses whose rows of Q are transposed together, chosen for the processor cache.
-const TOGETHER: usize = 32;
+const POSES_PER_BLOCK: usize = 32;
 /// Number of directions above which a Cholesky factor replaces eigenvectors, because it takes less
 /// time.
-const MANY: usize = 100;
+const MAX_EIGENVECTOR_DIRECTIONS: usize = 100;
 
 /// Projection I − H with H = Q Qᵀ, and the matrices that studentise each pose.
 #[derive(Debug, Clone)]
@@ -54,7 +54,7 @@ impl<'a> Leverage<'a> {
     pub fn of(fitted: Cow<'a, DMatrix<f64>>, coordinates: Vec<usize>) -> Result<Self, Untestable> {
         let gram = gram(&fitted);
         let freedom = coordinates.iter().sum::<usize>() as f64 - gram.trace();
-        if freedom < LEAST_FREEDOM {
+        if freedom < MIN_DEGREES_OF_FREEDOM {
             return Err(Untestable::NoFreedom);
         }
         let squared_freedom = freedom - gram.trace() + gram.norm_squared();
@@ -70,12 +70,12 @@ impl<'a> Leverage<'a> {
     pub fn prior_root(&self) -> DMatrix<f64> {
         let p = self.gram.nrows();
         let mut left = DMatrix::identity(p, p) - &self.gram;
-        if p < MANY || left.trace() <= LEAST_PRIOR {
+        if p < MAX_EIGENVECTOR_DIRECTIONS || left.trace() <= MIN_PRIOR_SHARE {
             return root_of_priors(left);
         }
         // Any root does; this one has a column for every direction, those that data alone decide
         // with next to nothing.
-        (0..p).for_each(|k| left[(k, k)] += ROUNDING);
+        (0..p).for_each(|k| left[(k, k)] += CHOLESKY_JITTER);
         lower_factor(left.clone()).unwrap_or_else(|| root_of_priors(left))
     }
 
@@ -105,7 +105,7 @@ fn by_poses<T: Send>(
 ) -> Vec<T> {
     let poses = fitted.nrows() / 3;
     // Evenly: no part is of one pose where others are of many.
-    let together = poses.div_ceil(poses.div_ceil(TOGETHER).max(1)).max(1);
+    let together = poses.div_ceil(poses.div_ceil(POSES_PER_BLOCK).max(1)).max(1);
     let part = |part: usize| {
         let first = part * together;
         of(first, &fitted.rows(3 * first, 3 * together.min(poses - first)).transpose())
@@ -123,11 +123,12 @@ fn products(a: &DMatrix<f64>, b: &DMatrix<f64>, pose: usize) -> Matrix3<f64> {
 /// determine.
 fn root_of_priors(left: DMatrix<f64>) -> DMatrix<f64> {
     let p = left.nrows();
-    if left.trace() <= LEAST_PRIOR {
+    if left.trace() <= MIN_PRIOR_SHARE {
         return DMatrix::zeros(p, 0);
     }
     let eigen = left.symmetric_eigen();
-    let by_priors: Vec<usize> = (0..p).filter(|&k| eigen.eigenvalues[k] > LEAST_PRIOR).collect();
+    let by_priors: Vec<usize> =
+        (0..p).filter(|&k| eigen.eigenvalues[k] > MIN_PRIOR_SHARE).collect();
     let entry = |i: usize, k: usize| {
         eigen.eigenvectors[(i, by_priors[k])] * eigen.eigenvalues[by_priors[k]].sqrt()
     };
@@ -137,8 +138,9 @@ fn root_of_priors(left: DMatrix<f64>) -> DMatrix<f64> {
 /// Returns A^(−½) of a symmetric matrix, zero along directions in which A vanishes.
 fn inverse_root(matrix: Matrix3<f64>) -> Matrix3<f64> {
     let eigen = matrix.symmetric_eigen();
-    let roots =
-        eigen.eigenvalues.map(|value| if value > LEAST_LEFT { value.sqrt().recip() } else { 0.0 });
+    let roots = eigen
+        .eigenvalues
+        .map(|value| if value > MIN_RESIDUAL_SHARE { value.sqrt().recip() } else { 0.0 });
     eigen.eigenvectors * Matrix3::from_diagonal(&roots) * eigen.eigenvectors.transpose()
 }
 
@@ -176,7 +178,7 @@ impl<'a> Kept<'a> {
         let fitted_gone = fit.fitted.select_rows(&gone);
         let mut fitted = fit.fitted.select_rows(&kept);
         let decided = Cholesky::new(DMatrix::identity(p, p) - fitted_gone.tr_mul(&fitted_gone))?;
-        if decided.l_dirty().diagonal().iter().any(|&pivot| pivot * pivot < LEAST_DECIDED) {
+        if decided.l_dirty().diagonal().iter().any(|&pivot| pivot * pivot < MIN_KEPT_SHARE) {
             return None;
         }
         let pull = decided.solve(&fitted_gone.tr_mul(&fit.residual.select_rows(&gone)));
@@ -236,8 +238,8 @@ pub(super) fn each_left_out(leverage: &Leverage, residual: &DVector<f64>) -> Vec
 /// Returns Qᵀr, summed row after row.
 fn along(fitted: &DMatrix<f64>, residual: &DVector<f64>) -> DVector<f64> {
     let mut sum = DVector::zeros(fitted.ncols());
-    for first in (0..residual.len()).step_by(3 * TOGETHER) {
-        let count = (3 * TOGETHER).min(residual.len() - first);
+    for first in (0..residual.len()).step_by(3 * POSES_PER_BLOCK) {
+        let count = (3 * POSES_PER_BLOCK).min(residual.len() - first);
         sum.gemv(1.0, &fitted.rows(first, count).transpose(), &residual.rows(first, count), 1.0);
     }
     sum

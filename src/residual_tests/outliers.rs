@@ -11,10 +11,10 @@ use super::outcome::{Test, Untestable};
 
 /// Reciprocal of the share of poses that is left out in one round, at least one pose. Large
 /// outliers distort the fit and hide smaller ones, so few are removed at a time.
-const ONE_A_ROUND_IN: usize = 100;
+const POSES_PER_REMOVAL: usize = 100;
 /// Reciprocal of the largest share of poses that can be outliers. If more have large residuals, the
 /// noise itself has heavy tails.
-const ONE_IN: usize = 5;
+const MIN_POSES_PER_OUTLIER: usize = 5;
 
 /// Result of a search for outliers.
 pub(super) struct Found<'a> {
@@ -47,7 +47,7 @@ pub(super) fn find<'a>(fit: &FitResidual<'a>, leverage: &Leverage, level: f64) -
         for number in far {
             out[pose_of(number)] = true;
         }
-        if out.iter().filter(|&&out| out).count() > (poses / ONE_IN).max(1) {
+        if out.iter().filter(|&&out| out).count() > (poses / MIN_POSES_PER_OUTLIER).max(1) {
             break;
         }
         // These make room for the next, and are formed anew where there are none.
@@ -114,6 +114,6 @@ fn too_far(distances: &[Option<Distance>], level: f64) -> Vec<usize> {
     };
     let mut far: Vec<(usize, f64)> = distances.iter().enumerate().filter_map(far).collect();
     far.sort_by(|a, b| b.1.total_cmp(&a.1));
-    far.truncate((count / ONE_A_ROUND_IN).max(1));
+    far.truncate((count / POSES_PER_REMOVAL).max(1));
     far.into_iter().map(|(number, _)| number).collect()
 }

@@ -13,15 +13,15 @@ use super::statistic::{Sample, Statistic};
 use crate::numeric::{subtract_product, transposed_product};
 
 /// Maximum number of permutation draws. Fewer are made if their product with Q takes more than
-/// `WORK` multiplications; p-values below 1 % then come from the fitted tail.
-const DRAWS: usize = 1999;
-const FEWEST: usize = 999;
-const WORK: u64 = 1 << 32;
+/// `MAX_MULTIPLICATIONS` multiplications; p-values below 1 % then come from the fitted tail.
+const MAX_DRAWS: usize = 1999;
+const MIN_DRAWS: usize = 999;
+const MAX_MULTIPLICATIONS: u64 = 1 << 32;
 /// Maximum number of draws that are fitted together, so that Q is read once for all of them. Fewer
-/// are fitted together if they contain more than `NUMBERS` numbers.
-const TOGETHER: usize = 96;
-const FEWEST_TOGETHER: usize = 16;
-const NUMBERS: usize = 1 << 21;
+/// are fitted together if they contain more than `MAX_BATCH_NUMBERS` numbers.
+const MAX_BATCH_DRAWS: usize = 96;
+const MIN_BATCH_DRAWS: usize = 16;
+const MAX_BATCH_NUMBERS: usize = 1 << 21;
 
 /// Returns the null distribution of each statistic; `None` if the statistic is constant.
 ///
@@ -46,16 +46,17 @@ pub(super) fn chances(
     if statistics.is_empty() {
         return Vec::new();
     }
-    let together = (NUMBERS / (3 * studentised.len()).max(1)).clamp(FEWEST_TOGETHER, TOGETHER);
-    let affordable = WORK / (leverage.fitted.len() as u64).max(1);
-    let draws = usize::try_from(affordable).unwrap_or(DRAWS).clamp(FEWEST, DRAWS);
+    let together = (MAX_BATCH_NUMBERS / (3 * studentised.len()).max(1))
+        .clamp(MIN_BATCH_DRAWS, MAX_BATCH_DRAWS);
+    let affordable = MAX_MULTIPLICATIONS / (leverage.fitted.len() as u64).max(1);
+    let draws = usize::try_from(affordable).unwrap_or(MAX_DRAWS).clamp(MIN_DRAWS, MAX_DRAWS);
     let prior = leverage.prior_root();
     let starts: Vec<usize> = (0..draws).step_by(together).collect();
     let values = |space: &mut DMatrix<f64>, start: usize| {
         draw((leverage, &prior), studentised, start..(start + together).min(draws), seed, space);
         values(leverage, statistics, space)
     };
-    let drawn: Vec<Vec<Vec<f64>>> = if together > FEWEST_TOGETHER {
+    let drawn: Vec<Vec<Vec<f64>>> = if together > MIN_BATCH_DRAWS {
         starts.into_par_iter().map_init(DMatrix::default, values).collect()
     } else {
         // Of draws that take much memory all threads work on the same few.

@@ -12,9 +12,9 @@ use super::leverage::Kept;
 use super::outcome::{Test, Untestable};
 
 /// Minimum number of residual coordinates for the test of normality.
-const LEAST_COORDINATES: usize = 8;
+const MIN_COORDINATES: usize = 8;
 /// Smallest distance of a probability from 0 and 1, so that its logarithm is finite.
-const EXTREME: f64 = 1e-300;
+const MIN_TAIL_PROBABILITY: f64 = 1e-300;
 
 /// Tests χ² / ν of the residuals against the declared σ, with ν = 3 N − tr H.
 ///
@@ -94,7 +94,7 @@ pub(super) fn anderson_darling(studentised: &[Vector3<f64>]) -> Tried {
 }
 
 fn squared_distance(values: &mut [f64]) -> Result<f64, Untestable> {
-    if values.len() < LEAST_COORDINATES {
+    if values.len() < MIN_COORDINATES {
         return Err(Untestable::TooFewPoses);
     }
     values.sort_by(f64::total_cmp);
@@ -106,7 +106,7 @@ fn squared_distance(values: &mut [f64]) -> Result<f64, Untestable> {
         return Err(Untestable::Constant);
     }
     let normal = Normal::standard();
-    let log = |z: f64| normal.cdf(z).max(EXTREME).ln();
+    let log = |z: f64| normal.cdf(z).max(MIN_TAIL_PROBABILITY).ln();
     let terms = values.iter().zip(values.iter().rev()).enumerate().map(|(i, (low, high))| {
         (2.0 * i as f64 + 1.0) * (log((low - mean) / spread) + log((mean - high) / spread))
     });

@@ -8,16 +8,16 @@ use super::fit_residual::FitResidual;
 use super::outcome::{Sequence, Untestable};
 
 /// Minimum number of poses for tests of order and of dependence.
-const LEAST_POSES: usize = 5;
+const MIN_POSES: usize = 5;
 /// Maximum number of lags of the autocorrelation; a session needs this many poses for each lag
 /// [Hyndman and Athanasopoulos 2018, section 5.4].
-const MOST_LAGS: usize = 10;
+const MAX_LAGS: usize = 10;
 const POSES_PER_LAG: usize = 5;
 /// Number of poses that are copied to contiguous memory before use, so that slow memory reads
 /// overlap.
-const FETCHED: usize = 64;
+const POSES_PER_FETCH: usize = 64;
 /// Range of a covariate, relative to its values, up to which it counts as constant.
-const ROUNDING: f64 = 1e-12;
+const MAX_CONSTANT_RANGE: f64 = 1e-12;
 
 /// Studentised residuals, with their mean subtracted.
 #[derive(Debug)]
@@ -108,10 +108,10 @@ impl Order {
         }
         let sessions: Vec<Vec<usize>> = by_session.into_values().collect();
         let longest = sessions.iter().map(Vec::len).max().unwrap_or(0);
-        if longest < LEAST_POSES {
+        if longest < MIN_POSES {
             return Err(Untestable::TooFewPoses);
         }
-        Ok(Self { sessions, lags: (longest / POSES_PER_LAG).min(MOST_LAGS) })
+        Ok(Self { sessions, lags: (longest / POSES_PER_LAG).min(MAX_LAGS) })
     }
 
     /// Returns the pairs of poses that are `lag` steps apart, earlier and later, of all sessions.
@@ -192,7 +192,7 @@ impl Cumulative {
         if !values.iter().all(|value| value.is_finite()) {
             return Err(Untestable::NotFinite);
         }
-        if kept.len() < LEAST_POSES {
+        if kept.len() < MIN_POSES {
             return Err(Untestable::TooFewPoses);
         }
         let x = |number: usize| values[kept[number]];
@@ -200,7 +200,7 @@ impl Cumulative {
         order.sort_by(|&a, &b| x(a).total_cmp(&x(b)));
         let (least, most) = (x(order[0]), x(order[order.len() - 1]));
         let range = most - least;
-        if range <= ROUNDING * least.abs().max(most.abs()) || !range.is_finite() {
+        if range <= MAX_CONSTANT_RANGE * least.abs().max(most.abs()) || !range.is_finite() {
             return Err(Untestable::Constant);
         }
         let sorted: Vec<f64> = order.iter().map(|&number| (x(number) - least) / range).collect();
@@ -213,8 +213,10 @@ impl Cumulative {
     pub fn correlation(&self, sample: &Sample) -> f64 {
         let mut sum = Vector3::zeros();
         let mut total = 0.0;
-        let mut near = [Vector3::zeros(); FETCHED];
-        for (numbers, weights) in self.order.chunks(FETCHED).zip(self.weights.chunks(FETCHED)) {
+        let mut near = [Vector3::zeros(); POSES_PER_FETCH];
+        for (numbers, weights) in
+            self.order.chunks(POSES_PER_FETCH).zip(self.weights.chunks(POSES_PER_FETCH))
+        {
             near.iter_mut().zip(numbers).for_each(|(near, &number)| *near = sample.at(number));
             for (centred, weight) in near.iter().zip(weights) {
                 sum += centred;

@@ -11,15 +11,15 @@ use crate::problem::Problem;
 use crate::quantity::Unit;
 
 /// Identified share above which a parameter is well identified.
-const WELL: f64 = 0.9;
+const MIN_WELL_IDENTIFIED: f64 = 0.9;
 /// Identified share above which a parameter is identified in part.
-const IN_PART: f64 = 0.1;
+const MIN_PARTLY_IDENTIFIED: f64 = 0.1;
 /// Identified share up to which a parameter is not identified at all.
-const NONE: f64 = 1e-6;
+const MAX_UNIDENTIFIED: f64 = 1e-6;
 /// Maximum number of harmonic coefficients of one joint that are listed one by one.
 pub(crate) const MAX_COEFFICIENTS: usize = 8;
 /// Number of largest harmonics of a joint that are listed if it has more coefficients.
-pub(crate) const SHOWN_HARMONICS: usize = 4;
+pub(crate) const MAX_SHOWN_HARMONICS: usize = 4;
 
 /// How well the data determine a parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -47,10 +47,12 @@ impl Knowledge {
         match (estimate.at_bound, estimate.fitted, estimate.identified) {
             (Some(bound), ..) => Self::AtBound(bound),
             (None, false, _) => Self::NotFitted,
-            (None, true, share) if share > WELL && is_vague(estimate) => Self::Vaguely,
-            (None, true, share) if share > WELL => Self::Well,
-            (None, true, share) if share > IN_PART => Self::InPart,
-            (None, true, share) if share > NONE => Self::Hardly,
+            (None, true, share) if share > MIN_WELL_IDENTIFIED && is_vague(estimate) => {
+                Self::Vaguely
+            }
+            (None, true, share) if share > MIN_WELL_IDENTIFIED => Self::Well,
+            (None, true, share) if share > MIN_PARTLY_IDENTIFIED => Self::InPart,
+            (None, true, share) if share > MAX_UNIDENTIFIED => Self::Hardly,
             _ => Self::NotAtAll,
         }
     }
@@ -165,8 +167,8 @@ impl ManyHarmonics {
         let shown = |(joint, (_, heights)): (usize, (usize, BTreeMap<u32, f64>))| {
             let mut orders: Vec<u32> = heights.keys().copied().collect();
             orders.sort_by(|a, b| heights[b].total_cmp(&heights[a]));
-            orders.truncate(SHOWN_HARMONICS);
-            (joint, (orders, heights.len().saturating_sub(SHOWN_HARMONICS)))
+            orders.truncate(MAX_SHOWN_HARMONICS);
+            (joint, (orders, heights.len().saturating_sub(MAX_SHOWN_HARMONICS)))
         };
         Self { largest: joints.into_iter().map(shown).collect(), coefficients }
     }

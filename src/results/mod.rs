@@ -41,7 +41,7 @@ pub(crate) use effect::NamedEffect;
 pub(crate) use export::Origin;
 pub use identification::IdentificationResult;
 pub(crate) use knowledge::{
-    Knowledge, MAX_COEFFICIENTS, ManyHarmonics, MissingReference, SHOWN_HARMONICS,
+    Knowledge, MAX_COEFFICIENTS, MAX_SHOWN_HARMONICS, ManyHarmonics, MissingReference,
 };
 pub use plots::PlotData;
 pub(crate) use plots::{

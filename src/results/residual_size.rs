@@ -4,7 +4,7 @@ use crate::fit::{FindingCode, Identification, Noise};
 
 /// Largest relative difference between the fit's variance and the declared σ² at which they count
 /// as equal.
-const SAME_NOISE: f64 = 1e-9;
+const MAX_EQUAL_DIFFERENCE: f64 = 1e-9;
 
 /// Verdict on the size of a residual, with its numbers.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -48,7 +48,7 @@ impl ResidualSize {
 
 /// Returns true if residuals and priors contradict the declared σ.
 fn is_contradicted(found: &Identification) -> bool {
-    found.noise == Noise::Declared && (found.noise_factor - 1.0).abs() > SAME_NOISE
+    found.noise == Noise::Declared && (found.noise_factor - 1.0).abs() > MAX_EQUAL_DIFFERENCE
 }
 
 /// Returns true if the residual is larger than the declared noise explains.

@@ -14,7 +14,7 @@ use crate::problem::{Effect, Problem};
 use crate::select::{self, TellingPose, Trace};
 
 /// Smallest probability of a hypothesis set that is written to trace.json.
-const LEAST_PROBABILITY: f64 = 0.01;
+const MIN_WRITTEN_PROBABILITY: f64 = 0.01;
 
 /// Effects that the residual of a fit points to.
 #[derive(Debug, Serialize, JsonSchema)]
@@ -151,7 +151,7 @@ impl TraceResult {
                 .collect(),
             explanations: sets
                 .iter()
-                .filter(|set| set.probability > LEAST_PROBABILITY)
+                .filter(|set| set.probability > MIN_WRITTEN_PROBABILITY)
                 .map(set)
                 .collect(),
             claims: evidence.map_or_else(Vec::new, |evidence| {

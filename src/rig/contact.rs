@@ -20,7 +20,7 @@ const MAX_STEPS: usize = 40;
 /// Largest gap between target and fixture at which a contact counts as reached \[m\].
 const CONTACT_TOLERANCE: f64 = 1e-9;
 /// Step of the numerical derivative with respect to a joint coordinate \[rad\] or \[m\].
-const DIFFERENCE: f64 = 1e-6;
+const DIFFERENCE_STEP: f64 = 1e-6;
 /// Largest change of a joint coordinate in one Newton step \[rad\] or \[m\].
 const MAX_STEP: f64 = 0.3;
 /// Smallest ratio of singular values at which a direction of joint space is moved; the others keep
@@ -151,8 +151,8 @@ impl Rig {
             let mut jacobian = DMatrix::zeros(now.len(), moving.len());
             for (column, &joint) in moving.iter().enumerate() {
                 let mut moved = conditions.clone();
-                moved.configuration[joint] += DIFFERENCE;
-                jacobian.set_column(column, &((gap(&moved)? - &now) / DIFFERENCE));
+                moved.configuration[joint] += DIFFERENCE_STEP;
+                jacobian.set_column(column, &((gap(&moved)? - &now) / DIFFERENCE_STEP));
             }
             let svd = jacobian.svd(true, true);
             let largest = svd.singular_values.max();

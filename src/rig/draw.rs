@@ -15,19 +15,19 @@ use crate::random::{normal, stream};
 
 /// Random stream of the parameter deviations. Each quantity has a separate stream, so that drawing
 /// more numbers of one kind does not change the others.
-const DEVIATIONS: u64 = 0;
+const DEVIATION_STREAM: u64 = 0;
 /// Random stream of the poses.
-const POSES: u64 = 1;
+const POSE_STREAM: u64 = 1;
 /// Random stream of the position noise.
-const NOISE: u64 = 2;
+const POSITION_NOISE_STREAM: u64 = 2;
 /// Random stream of the choice of held-out rows.
-const SPLIT: u64 = 3;
+const SPLIT_STREAM: u64 = 3;
 /// Random stream of the effect values.
-const EFFECTS: u64 = 4;
+const EFFECT_STREAM: u64 = 4;
 /// Random stream of the orientation noise.
-const TURNS: u64 = 5;
+const ORIENTATION_NOISE_STREAM: u64 = 5;
 /// First random stream of contact searches; each pose has one stream.
-const CONTACTS: u64 = 1000;
+const FIRST_CONTACT_STREAM: u64 = 1000;
 
 /// Simulated measurement of one pose.
 #[derive(Debug, Clone, PartialEq)]
@@ -111,13 +111,13 @@ pub struct Draw {
 /// More poses do not change the arm or the first poses. Another σ scales the noise and changes
 /// nothing else.
 pub fn draw(problem: &Problem, truth: &Truth, poses: usize, seed: u64) -> Draw {
-    draw_in(problem, truth, draw_poses(problem, truth, poses, stream(seed, POSES)), seed)
+    draw_in(problem, truth, draw_poses(problem, truth, poses, stream(seed, POSE_STREAM)), seed)
 }
 
 /// Draws the true arm and the noise of given poses.
 fn draw_in(problem: &Problem, truth: &Truth, mut rows: Vec<Row>, seed: u64) -> Draw {
-    let (arm, parameters) = true_arm(problem, truth, stream(seed, DEVIATIONS));
-    let mut noise = stream(seed, NOISE);
+    let (arm, parameters) = true_arm(problem, truth, stream(seed, DEVIATION_STREAM));
+    let mut noise = stream(seed, POSITION_NOISE_STREAM);
     let kinds = truth.observations(&problem.fixtures, rows.len());
     for (row, observation) in rows.iter_mut().zip(kinds) {
         row.observation = observation;
@@ -125,7 +125,7 @@ fn draw_in(problem: &Problem, truth: &Truth, mut rows: Vec<Row>, seed: u64) -> D
         row.position = Vector3::from_fn(|_, _| normal(&mut noise) * sigma);
     }
     if let Some(sigma) = truth.orientation_sigma {
-        let mut noise = stream(seed, TURNS);
+        let mut noise = stream(seed, ORIENTATION_NOISE_STREAM);
         for row in &mut rows {
             let turn = Vector3::from_fn(|_, _| normal(&mut noise) * sigma);
             row.orientation = Some(UnitQuaternion::from_scaled_axis(turn));
@@ -159,7 +159,7 @@ pub fn simulate_poses(
     poses: Vec<(PoseConditions, String)>,
     seed: u64,
 ) -> Result<Simulation, SimulationError> {
-    let mut rows = draw_poses(problem, truth, poses.len(), stream(seed, POSES));
+    let mut rows = draw_poses(problem, truth, poses.len(), stream(seed, POSE_STREAM));
     for (row, (given, target)) in rows.iter_mut().zip(poses) {
         row.target = target;
         let drawn = std::mem::take(&mut row.conditions);
@@ -189,10 +189,10 @@ fn measure(
     let Draw { arm, parameters, mut rows } = draw;
     let poses = rows.len();
     let rig = Rig::new(arm, truth.effects.clone()).with_segments(truth.segments);
-    hold_out(&mut rows, truth.held_out.count(poses), &mut stream(seed, SPLIT));
+    hold_out(&mut rows, truth.held_out.count(poses), &mut stream(seed, SPLIT_STREAM));
     let measure_row =
         |(row, stream_of): (&mut Row, u64)| rig.measure(row, truth, &mut stream(seed, stream_of));
-    let streams: Vec<u64> = (CONTACTS..).take(poses).collect();
+    let streams: Vec<u64> = (FIRST_CONTACT_STREAM..).take(poses).collect();
     let outcomes: Vec<_> = if truth.has_memory() {
         let mut past = Past::default();
         let measure_after_past = |(row, stream_of): (&mut Row, u64)| {
@@ -233,7 +233,7 @@ fn measure(
 
 /// Returns standard normal numbers for effect values, from a separate stream.
 pub(crate) fn standard_normals(count: usize, seed: u64) -> Vec<f64> {
-    let mut random = stream(seed, EFFECTS);
+    let mut random = stream(seed, EFFECT_STREAM);
     (0..count).map(|_| normal(&mut random)).collect()
 }
 

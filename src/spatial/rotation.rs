@@ -6,7 +6,7 @@ use crate::scalar::Scalar;
 
 /// Squared angle below which the exponential map uses its power series \[rad²\], which is exact to
 /// rounding there.
-const SERIES_BELOW: f64 = 0.01;
+const MAX_SERIES_ANGLE_SQUARED: f64 = 0.01;
 
 /// Rotates `vector` by the rotation vector `w` \[rad\]: exp(`[w]×`) v.
 ///
@@ -49,7 +49,7 @@ pub fn rotation_between(from: &[Vector3<f64>; 3], to: &[Vector3<f64>; 3]) -> Vec
 /// The rotation vector w \[rad\] is shorter than a turn. [Chirikjian 2012, ch. 10]
 pub fn inverse_right_jacobian(w: &Vector3<f64>) -> Matrix3<f64> {
     let squared = w.norm_squared();
-    let c = if squared < SERIES_BELOW {
+    let c = if squared < MAX_SERIES_ANGLE_SQUARED {
         1.0 / 12.0 + squared / 720.0 + squared * squared / 30_240.0 + squared.powi(3) / 1_209_600.0
     } else {
         let half = squared.sqrt() / 2.0;
@@ -88,7 +88,7 @@ fn turn<S: Scalar>((sin, cos): (S, S), u: f64, v: f64) -> (S, S) {
 
 /// Returns (sin φ / φ, (1 − cos φ) / φ²) from φ² \[rad²\].
 fn coefficients<S: Scalar>(squared: S) -> (S, S) {
-    if squared.re() < SERIES_BELOW {
+    if squared.re() < MAX_SERIES_ANGLE_SQUARED {
         let horner = |c: [f64; 5]| {
             (((squared * c[4] + S::from(c[3])) * squared + S::from(c[2])) * squared + S::from(c[1]))
                 * squared

@@ -20,7 +20,7 @@ use crate::spatial::Frame;
 
 /// Largest magnitude that counts as a rounding error of zero \[rad\] or \[m\]. Right angles written
 /// with eleven decimals have such errors.
-const ROUNDING: f64 = 1e-11;
+const MAX_ROUNDING: f64 = 1e-11;
 /// Default standard deviation of a measured coordinate, typical of a laser tracker in a workshop
 /// \[mm\].
 pub const SIGMA_MM: f64 = 0.05;
@@ -92,7 +92,7 @@ fn rows(chain: &Chain, notes: &mut Vec<String>) -> Vec<Row> {
     if let (Some(first), Some(stage)) = (steps.first_mut(), chain.stages.first())
         && [first.theta_before, first.d_before, first.beta]
             .iter()
-            .any(|value| value.abs() > ROUNDING)
+            .any(|value| value.abs() > MAX_ROUNDING)
     {
         *first = Step::default();
         rows.push(Row {
@@ -105,7 +105,7 @@ fn rows(chain: &Chain, notes: &mut Vec<String>) -> Vec<Row> {
     let lead = rows.len();
     // The transform after the last joint becomes its θ and d if possible, otherwise a fixed joint.
     let [x, _, z] = &chain.end.axes;
-    let on_axis = z.xy().norm() + chain.end.origin.xy().norm() < ROUNDING && z.z > 0.0;
+    let on_axis = z.xy().norm() + chain.end.origin.xy().norm() < MAX_ROUNDING && z.z > 0.0;
     let end =
         Step { theta_before: x.y.atan2(x.x), d_before: chain.end.origin.z, ..Step::default() };
     steps.push(if on_axis { end } else { Step::default() });
@@ -205,7 +205,7 @@ fn limit_number(value: f64) -> String {
 fn degrees(angle: f64) -> String {
     let within = angle - (angle / TAU).round() * TAU;
     let right = (within / FRAC_PI_2).round();
-    number(if (within - right * FRAC_PI_2).abs() < ROUNDING {
+    number(if (within - right * FRAC_PI_2).abs() < MAX_ROUNDING {
         right * 90.0
     } else {
         within.to_degrees()
@@ -257,7 +257,7 @@ fn arm(chain: &Chain, name: &str, rows: &[Row]) -> String {
             ("beta_deg", beta, true),
         ];
         for (key, value, is_angle) in parameters {
-            if value.abs() > ROUNDING {
+            if value.abs() > MAX_ROUNDING {
                 let _ = writeln!(
                     text,
                     "{key} = {}",

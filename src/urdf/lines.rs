@@ -86,10 +86,10 @@ fn parallel(frame: &Frame<f64>) -> Step {
 /// Reduces the angle of an undirected line to (−90°, 90°]; the sign is −1 if the direction was
 /// reversed.
 fn near_zero(angle: f64) -> (f64, f64) {
-    const ROUNDING: f64 = 1e-9;
-    if angle > FRAC_PI_2 + ROUNDING {
+    const MAX_ROUNDING: f64 = 1e-9;
+    if angle > FRAC_PI_2 + MAX_ROUNDING {
         (angle - PI, -1.0)
-    } else if angle <= ROUNDING - FRAC_PI_2 {
+    } else if angle <= MAX_ROUNDING - FRAC_PI_2 {
         (angle + PI, -1.0)
     } else {
         (angle, 1.0)

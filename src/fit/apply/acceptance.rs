@@ -17,7 +17,7 @@ use crate::problem::Problem;
 /// Number of bootstrap resamples of a confidence interval.
 const RESAMPLES: usize = 5000;
 /// Probability with which a confidence interval covers the mean.
-const COVERAGE: f64 = 0.95;
+const INTERVAL_LEVEL: f64 = 0.95;
 /// Seed of the resamples.
 const SEED: u64 = 9283;
 /// Smallest number of measurements of a pose for which a repeatability is computed.
@@ -86,7 +86,7 @@ impl Accuracy {
         let sums: Vec<(f64, f64)> = accuracies.iter().map(|accuracy| (*accuracy, 1.0)).collect();
         let squares: f64 = accuracies.iter().map(|accuracy| accuracy * accuracy).sum();
         Self {
-            mean: mean_interval(&sums, RESAMPLES, COVERAGE, SEED),
+            mean: mean_interval(&sums, RESAMPLES, INTERVAL_LEVEL, SEED),
             rms: (squares / accuracies.len().max(1) as f64).sqrt(),
             max: accuracies.iter().copied().fold(0.0, f64::max),
         }

@@ -20,17 +20,17 @@ const POSITION_WEIGHT: f64 = 1e-6;
 /// Standard deviation (1 σ) of the desired orientation \[rad\], chosen like [`POSITION_WEIGHT`].
 const ORIENTATION_WEIGHT: f64 = 1e-6;
 /// Largest change of a command in a pass at which it counts as converged \[rad\] or \[m\].
-const SETTLED: f64 = 1e-10;
+const MAX_CONVERGED_CHANGE: f64 = 1e-10;
 /// Maximum number of passes. A command that has not converged by then is returned with its
 /// remaining error.
 const MAX_PASSES: usize = 20;
 /// Largest distance to the target at which it counts as reached \[m\].
-const REACHED: f64 = 1e-6;
+const MAX_REACHED_DISTANCE: f64 = 1e-6;
 /// Largest angle to the desired orientation at which it counts as reached \[rad\].
-const REACHED_TURN: f64 = 1e-6;
+const MAX_REACHED_ANGLE: f64 = 1e-6;
 /// Number of coordinates of a rigid-body pose, which is also the smallest number of moving joints
 /// that can reach any pose in the workspace.
-const POSE: usize = 6;
+const POSE_COORDINATES: usize = 6;
 
 /// Joint command for one target.
 #[derive(Debug, Clone, PartialEq)]
@@ -59,7 +59,7 @@ impl Command {
 }
 
 fn is_reached(miss: &Vector3<f64>, turn: Option<&Vector3<f64>>) -> bool {
-    miss.norm() <= REACHED && turn.is_none_or(|turn| turn.norm() <= REACHED_TURN)
+    miss.norm() <= MAX_REACHED_DISTANCE && turn.is_none_or(|turn| turn.norm() <= MAX_REACHED_ANGLE)
 }
 
 /// Returns `rows` with the target poses that the nominal arm would reach by their commands,
@@ -98,7 +98,7 @@ pub fn waypoints(
             .filter(|(joint, _)| tree.path_contains(*joint, carrier));
         leads.filter(|(_, joint)| joint.command_kind() != JointKind::Fixed).count()
     };
-    let oriented: Vec<bool> = all.iter().map(|&row| commanded(row) >= POSE).collect();
+    let oriented: Vec<bool> = all.iter().map(|&row| commanded(row) >= POSE_COORDINATES).collect();
     targets.orientations = oriented.contains(&true).then(|| {
         let none = Vector3::from_element(f64::NAN);
         let turns = model.orientations(&poses, nominal.as_slice()).into_iter().zip(&oriented);
@@ -262,7 +262,7 @@ fn damped(
             let (min, max) = problem.joints[joint].limits;
             configuration[joint] = (configuration[joint] + step).clamp(min, max);
         }
-        if !arm.follows_commands() || step.amax() <= SETTLED {
+        if !arm.follows_commands() || step.amax() <= MAX_CONVERGED_CHANGE {
             break;
         }
     }

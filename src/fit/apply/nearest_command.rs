@@ -8,12 +8,12 @@ const WEIGHT_SQUARED: f64 = 1e-12;
 /// Maximum number of steps. Most commands take 4 to 8; near singular poses they take more.
 const MAX_STEPS: usize = 1000;
 /// Largest step at which a command counts as converged \[rad\] or \[m\].
-const SETTLED: f64 = 1e-12;
+const MAX_CONVERGED_STEP: f64 = 1e-12;
 /// Damping μ after the first rejected step, and the damping at which the search ends; both relative
 /// to the weight of the distance from the seed.
-const DAMPING: (f64, f64) = (0.3, 1e20);
+const DAMPING_RANGE: (f64, f64) = (0.3, 1e20);
 /// Factors on the damping μ after a rejected and after an accepted step.
-const FACTORS: (f64, f64) = (30.0, 0.03);
+const DAMPING_FACTORS: (f64, f64) = (30.0, 0.03);
 /// Relative increase of the cost that counts as rounding, so that the step is accepted.
 const COST_ROUNDING: f64 = 1e4 * f64::EPSILON;
 
@@ -51,13 +51,13 @@ impl Goal<'_> {
                 (q, misfit) = (next, tried);
                 slopes = (self.slopes)(&q);
                 // A damped step is shorter than what is left.
-                if step.amax() * (1.0 + damping) <= SETTLED {
+                if step.amax() * (1.0 + damping) <= MAX_CONVERGED_STEP {
                     break;
                 }
-                damping = if damping > DAMPING.0 { FACTORS.1 * damping } else { 0.0 };
+                damping = if damping > DAMPING_RANGE.0 { DAMPING_FACTORS.1 * damping } else { 0.0 };
             } else {
-                damping = if damping > 0.0 { FACTORS.0 * damping } else { DAMPING.0 };
-                if damping >= DAMPING.1 {
+                damping = if damping > 0.0 { DAMPING_FACTORS.0 * damping } else { DAMPING_RANGE.0 };
+                if damping >= DAMPING_RANGE.1 {
                     break;
                 }
             }

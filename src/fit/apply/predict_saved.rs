@@ -9,7 +9,7 @@ use crate::fit::checks::point_spread::{PointSpread, spreads};
 use crate::fit::checks::required_columns::check_columns;
 use crate::fit::errors::of_kind;
 use crate::fit::stages::fixture_location::locate;
-use crate::fit::stages::placement::UNKNOWN_SIGMA;
+use crate::fit::stages::placement::ASSUMED_SIGMA;
 use crate::fit::stages::registration::register;
 use crate::fit::stages::stage::{Stage, StageError};
 use crate::fit::uncertainty::residual_lengths::outlying;
@@ -23,7 +23,7 @@ use crate::problem::{Observation, Problem};
 
 /// Largest part of a parameter in undetermined combinations, 0…1, at which the rows count as
 /// determining it.
-const OPEN: f64 = 1e-6;
+const MAX_UNDETERMINED_SHARE: f64 = 1e-6;
 
 /// Predictions of an arm for the rows of a table.
 #[derive(Debug, Clone)]
@@ -153,7 +153,7 @@ pub fn predict(
         problem.data.position_sigma.or(estimate.and_then(|estimate| estimate.estimated_sigma));
     let all: Vec<usize> = (0..rows.len()).collect();
     let turn = problem.data.orientation_sigma.filter(|_| problem.data.fits_orientation);
-    let mut poses = placement.oriented_poses(rows, &all, (sigma.unwrap_or(UNKNOWN_SIGMA), turn));
+    let mut poses = placement.oriented_poses(rows, &all, (sigma.unwrap_or(ASSUMED_SIGMA), turn));
     if let Some(estimate) = estimate {
         estimate.count_time_in(&mut poses);
     }
@@ -287,10 +287,9 @@ fn place(
         Stage { counts_fixed: true, ..Stage::new(model, users, missing.to_vec(), solver, &cache) };
     let placed = stage.run(&x)?.x;
     let open = stage.gauge(&placed, &vec![false; missing.len()], &[]).rows;
-    let open = missing
-        .iter()
-        .enumerate()
-        .find(|(column, _)| open.column(*column).iter().any(|part| part.abs() > OPEN));
+    let open = missing.iter().enumerate().find(|(column, _)| {
+        open.column(*column).iter().any(|part| part.abs() > MAX_UNDETERMINED_SHARE)
+    });
     match open {
         Some((_, &k)) => Err(PredictError::Open { name: model.parameters[k].name.clone() }),
         None => Ok(placed),

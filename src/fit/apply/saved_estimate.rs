@@ -18,10 +18,10 @@ use crate::problem::item::MAX_MAGNITUDE;
 /// Name of the file format, and its newest version that is read.
 const FORMAT: (&str, u32) = ("flexcal-estimate", 2);
 /// Maximum size of an `estimate.json` \[MiB\].
-const LARGEST_MIB: u64 = 256;
+const MAX_FILE_MIB: u64 = 256;
 
 /// Smallest identified share of a parameter that counts as determined.
-const IDENTIFIED: f64 = 0.99;
+const MIN_IDENTIFIED_SHARE: f64 = 0.99;
 
 /// Identified arm as saved in an `estimate.json`.
 #[derive(Debug, Clone)]
@@ -117,7 +117,7 @@ pub enum SavedEstimateError {
     Twice { file: PathBuf, name: String },
     #[error("{}: {name} has a value larger than 1e150, the largest number that is accepted", file.display())]
     MagnitudeTooLarge { file: PathBuf, name: String },
-    #[error("{}: larger than {LARGEST_MIB} MiB; is it the right file?", file.display())]
+    #[error("{}: larger than {MAX_FILE_MIB} MiB; is it the right file?", file.display())]
     TooLarge { file: PathBuf },
     #[error("{}: not UTF-8 text, so no estimate.json", file.display())]
     NotUtf8 { file: PathBuf },
@@ -147,7 +147,7 @@ impl SavedEstimate {
     pub(crate) fn read_with(file: &Path, changes: Changes) -> Result<Self, SavedEstimateError> {
         let named = || file.to_owned();
         let bytes =
-            read_limited(file, LARGEST_MIB << 20).map_err(|source| match source.kind() {
+            read_limited(file, MAX_FILE_MIB << 20).map_err(|source| match source.kind() {
                 io::ErrorKind::FileTooLarge => SavedEstimateError::TooLarge { file: named() },
                 _ => SavedEstimateError::Unreadable { file: named(), source },
             })?;
@@ -290,7 +290,8 @@ impl SavedEstimate {
         let is_base =
             |entry: &&Entry| entry.name.starts_with("base.") || entry.name.starts_with("base[");
         let is_open = |entry: &Entry| {
-            entry.std_error.is_none() && entry.identified.is_some_and(|part| part < IDENTIFIED)
+            entry.std_error.is_none()
+                && entry.identified.is_some_and(|part| part < MIN_IDENTIFIED_SHARE)
         };
         self.parameters.iter().filter(is_base).any(is_open)
     }

@@ -5,7 +5,7 @@ use statrs::distribution::{Binomial, DiscreteCDF as _};
 use crate::numeric::bisect;
 
 /// Number of halvings of the interval in which the bound of a share is searched.
-const HALVINGS: usize = 50;
+const BISECTIONS: usize = 50;
 /// Maximum number of poses up to which the number that would suffice is searched.
 const MAX_POSES: usize = 1_000_000;
 
@@ -121,7 +121,7 @@ fn at_most(poses: usize, beyond: usize, probability: f64) -> f64 {
 fn lower_bound(poses: usize, within: usize, risk: f64) -> f64 {
     // P(at most n − w beyond) falls from 1 to 0 as the share of those beyond rises.
     let is_likely = |share: f64| at_most(poses, poses - within, 1.0 - share) <= risk;
-    if within == 0 { 0.0 } else { bisect(is_likely, (0.0, 1.0), HALVINGS).0 }
+    if within == 0 { 0.0 } else { bisect(is_likely, (0.0, 1.0), BISECTIONS).0 }
 }
 
 #[cfg(test)]

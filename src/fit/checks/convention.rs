@@ -9,12 +9,12 @@ use crate::problem::RotationKind;
 
 /// Largest error with another convention, relative to the error as read, at which that convention
 /// explains the orientations.
-const EXPLAINED: f64 = 0.2;
+const MAX_EXPLAINED_RATIO: f64 = 0.2;
 /// Largest ratio to the smallest error at which a convention is named in addition to the best one.
-const AS_GOOD: f64 = 1.5;
+const MAX_RATIO_TO_BEST: f64 = 1.5;
 /// Axes of rotation of the twelve Euler conventions, R = R₁(r₁) R₂(r₂) R₃(r₃). If all three axes
 /// differ, each angle is in the column of its axis.
-const ORDERS: [[usize; 3]; 12] = [
+const ROTATION_AXES: [[usize; 3]; 12] = [
     [0, 1, 2],
     [0, 2, 1],
     [1, 0, 2],
@@ -58,11 +58,15 @@ pub(super) fn fitting_conventions(fit: &CheckedFit, rms: f64) -> Vec<String> {
     let mut errors: Vec<(String, f64)> = readings
         .into_iter()
         .map(|(name, reading)| (name, misfit(&pairs, &reading)))
-        .filter(|(_, error)| *error < EXPLAINED * rms)
+        .filter(|(_, error)| *error < MAX_EXPLAINED_RATIO * rms)
         .collect();
     errors.sort_by(|a, b| a.1.total_cmp(&b.1));
     let best = errors.first().map_or(0.0, |(_, error)| *error);
-    errors.into_iter().filter(|(_, error)| *error <= AS_GOOD * best).map(|(name, _)| name).collect()
+    errors
+        .into_iter()
+        .filter(|(_, error)| *error <= MAX_RATIO_TO_BEST * best)
+        .map(|(name, _)| name)
+        .collect()
 }
 
 /// Returns every alternative convention for orientations that were read with convention `kind`,
@@ -91,7 +95,7 @@ fn readings(kind: RotationKind) -> Vec<(String, Reading)> {
             Box::new(move |q| angles(kind, q).map(UnitQuaternion::from_scaled_axis).to_vec());
         readings.push(("rotation vectors".to_owned(), of_vector));
     }
-    for order in ORDERS {
+    for order in ROTATION_AXES {
         let letters: Vec<char> = order.iter().map(|&axis| ['x', 'y', 'z'][axis]).collect();
         let [a, b, c] = [letters[0], letters[1], letters[2]];
         let of_order: Reading =
@@ -174,7 +178,7 @@ mod tests {
     fn the_convention_of_euler_angles_is_found_among_all() {
         let mut random = stream(4, 0);
         let tool = UnitQuaternion::from_scaled_axis(Vector3::new(0.3, -1.0, 0.4));
-        for meant in ORDERS {
+        for meant in ROTATION_AXES {
             let pairs: Vec<_> = (0..40)
                 .map(|_| {
                     let mut angle = || 0.6 * normal(&mut random);

@@ -12,7 +12,7 @@ use super::row_kind::{RowKind, measured, named, size};
 const MAX_NOMINAL_MISS: f64 = 0.1;
 /// Smallest spread of contacts, relative to the arm's reach, that is used as a scale. With a
 /// smaller one, all contacts are at one place, and their predicted spread is only the arm's error.
-const ONE_PLACE: f64 = 0.05;
+const MIN_RELATIVE_SPREAD: f64 = 0.05;
 
 /// Checks that the registered nominal arm is near the measurements.
 pub(super) struct NominalIsNear;
@@ -23,7 +23,8 @@ pub(super) fn is_nominal_far_off(fit: &CheckedFit) -> bool {
     let rms = fit.registered.identification.rms.norm;
     let RowKind { observation, spread, .. } = fit.kind(fit.fitting.measurements.leading());
     let is_measured_directly = observation.is_measured_directly();
-    let least = if is_measured_directly { 0.0 } else { ONE_PLACE * fit.fitting.model.reach() };
+    let least =
+        if is_measured_directly { 0.0 } else { MIN_RELATIVE_SPREAD * fit.fitting.model.reach() };
     spread > least && rms > MAX_NOMINAL_MISS * spread
 }
 

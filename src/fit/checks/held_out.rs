@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::checked_fit::{Check, CheckedFit};
 use super::finding::{Finding, FindingCode};
-use super::misfit::{BEYOND_NOISE, MAX_MISS, MIN_SPREAD};
+use super::misfit::{MAX_MISS, MAX_UNREPORTED_RESIDUAL, MIN_SPREAD};
 use super::outliers::{Outlier, places};
 use super::row_kind::{RowKind, rows as noun, size};
 use crate::fit::stages::fitting::Fitting;
@@ -19,9 +19,9 @@ use crate::observation::kind_named;
 
 /// Smallest ratio of the held-out error of the fitted arm to that of the nominal arm at which the
 /// fit is reported as worse than none.
-const WORSE: f64 = 1.5;
+const MIN_ERROR_RATIO: f64 = 1.5;
 /// Smallest multiple of the noise that the held-out error must also exceed for that report.
-const ABOVE_NOISE: f64 = 5.0;
+const MIN_NOISE_MULTIPLE: f64 = 5.0;
 
 /// Returns the held-out rows that are farther from the prediction than the σ and the covariance of
 /// the fit allow, in the order of the rows.
@@ -152,7 +152,7 @@ impl Check for HeldOutReached {
                 .filter(|(row, _)| fitting.measurements.observation(**row).kind() == kind)
                 .map(|(_, error)| error.norm());
             let median = median(lengths.filter(|length| length.is_finite())).unwrap_or(0.0);
-            let noise = declared_sigma.map_or(0.0, |sigma| BEYOND_NOISE * sigma);
+            let noise = declared_sigma.map_or(0.0, |sigma| MAX_UNREPORTED_RESIDUAL * sigma);
             let text = format!(
                 "half of the held-out {} are missed by more than {}, {:.0} % of the spread of the fitted ones",
                 noun(kind),
@@ -178,7 +178,7 @@ impl Check for BetterThanNominal {
         let row_kind = fit.kinds().into_iter().find(|row_kind| row_kind.observation.kind() == kind);
         let Some(RowKind { observation, taken_sigma, .. }) = row_kind else { return Vec::new() };
         let noise = observation.root() * taken_sigma;
-        if !(after > WORSE * before && after > ABOVE_NOISE * noise) {
+        if !(after > MIN_ERROR_RATIO * before && after > MIN_NOISE_MULTIPLE * noise) {
             return Vec::new();
         }
         let text = format!(

@@ -8,13 +8,13 @@ use super::row_kind::{RowKind, measured, named, size, spread};
 pub(super) const MAX_MISS: f64 = 0.02;
 /// Largest residual of a fit, as a multiple of σ, that is never reported, however small the spread
 /// is.
-pub(super) const BEYOND_NOISE: f64 = 100.0;
+pub(super) const MAX_UNREPORTED_RESIDUAL: f64 = 100.0;
 /// Smallest ratio of the fitted to the nominal error at which the fit counts as no better than the
 /// nominal arm.
-const NO_BETTER: f64 = 0.9;
+const MIN_UNIMPROVED_RATIO: f64 = 0.9;
 /// Smallest error, as a multiple of the declared σ, at which a fit that is no better than the
 /// nominal arm is reported.
-const FAR_BEYOND_NOISE: f64 = 1000.0;
+const MIN_REPORTED_ERROR: f64 = 1000.0;
 /// Largest ratio of the spreads of measured and predicted points, or its inverse, that one arm
 /// explains.
 const MAX_SIZE_RATIO: f64 = 2.0;
@@ -67,7 +67,7 @@ impl Check for SizeOfArm {
 /// kind; `None` if it is not.
 fn misses(kind: &RowKind, rms: f64) -> Option<Finding> {
     let RowKind { observation, spread, declared_sigma, .. } = *kind;
-    let noise = declared_sigma.map_or(0.0, |sigma| BEYOND_NOISE * sigma);
+    let noise = declared_sigma.map_or(0.0, |sigma| MAX_UNREPORTED_RESIDUAL * sigma);
     if !(spread > MIN_SPREAD && rms > MAX_MISS * spread && rms > noise) {
         return None;
     }
@@ -91,8 +91,8 @@ fn misses(kind: &RowKind, rms: f64) -> Option<Finding> {
 /// information.
 fn no_better(kind: &RowKind, before: f64, after: f64) -> Option<Finding> {
     let RowKind { observation, declared_sigma, .. } = *kind;
-    let is_far = declared_sigma.is_some_and(|sigma| after > FAR_BEYOND_NOISE * sigma);
-    if observation.is_position() || !is_far || after <= NO_BETTER * before {
+    let is_far = declared_sigma.is_some_and(|sigma| after > MIN_REPORTED_ERROR * sigma);
+    if observation.is_position() || !is_far || after <= MIN_UNIMPROVED_RATIO * before {
         return None;
     }
     let kind = observation.kind();

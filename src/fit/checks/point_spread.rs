@@ -10,10 +10,10 @@ use crate::problem::{Fixture, Observation};
 
 /// Smallest ratio of the scatter at a point to the median of all points at which the point counts
 /// as unsteady. Points that were not fitted may scatter half as much again as others.
-const UNSTEADY: f64 = 2.5;
+const MIN_UNSTEADY_RATIO: f64 = 2.5;
 /// Smallest share of the squared scatter along one direction at which a point counts as unsteady.
 /// Isotropic scatter has a third along each direction.
-const ONE_WAY: f64 = 0.7;
+const MIN_DIRECTIONAL_SHARE: f64 = 0.7;
 /// Minimum number of rows of a point whose scatter is compared.
 const MIN_ROWS: usize = 8;
 /// Minimum number of points whose scatter can be compared.
@@ -50,8 +50,9 @@ impl PointSpread {
         let Some(middle) = median(means).filter(|_| compared.len() >= MIN_POINTS) else {
             return Vec::new();
         };
-        let is_unsteady =
-            |spread: &&Self| spread.mean > UNSTEADY * middle && spread.share > ONE_WAY;
+        let is_unsteady = |spread: &&Self| {
+            spread.mean > MIN_UNSTEADY_RATIO * middle && spread.share > MIN_DIRECTIONAL_SHARE
+        };
         let unsteady = compared.into_iter().filter(is_unsteady);
         unsteady.map(|spread| (spread, spread.mean / middle)).collect()
     }

@@ -14,7 +14,7 @@ use crate::problem::{Observation, Problem};
 
 /// Number of coordinates of a rigid body. Any number of targets on it determine no more in one
 /// pose.
-const BODY: usize = 6;
+const BODY_COORDINATES: usize = 6;
 
 /// Number of independent coordinates of the identification poses, and the finding if they are too
 /// few.
@@ -122,16 +122,18 @@ fn coordinates(
         targets.entry(carrier).or_default().insert(target, of_row[row]);
     }
     let of_pose = |targets: &BTreeMap<usize, usize>| targets.values().sum::<usize>();
-    let of_poses: usize = points.values().map(|targets| of_pose(targets).min(BODY)).sum();
+    let of_poses: usize =
+        points.values().map(|targets| of_pose(targets).min(BODY_COORDINATES)).sum();
     let several = |carrier: usize| {
-        points.iter().any(|(key, targets)| key.0 == carrier && of_pose(targets) > BODY)
+        points.iter().any(|(key, targets)| key.0 == carrier && of_pose(targets) > BODY_COORDINATES)
     };
     let contacts: BTreeSet<(usize, Observation)> =
         others.iter().map(|&row| (of_arm[row], measurements.observation(row))).collect();
     let of_contacts: usize =
         contacts.iter().map(|(_, observation)| observation.coordinates()).sum();
     let of_targets = targets.iter().filter(|(carrier, _)| several(**carrier));
-    let of_targets: usize = of_targets.map(|(_, shape)| of_pose(shape).saturating_sub(BODY)).sum();
+    let of_targets: usize =
+        of_targets.map(|(_, shape)| of_pose(shape).saturating_sub(BODY_COORDINATES)).sum();
     of_poses + of_targets + of_contacts
 }
 

@@ -12,7 +12,7 @@ use crate::fit::uncertainty::noise::Noise;
 use crate::least_squares::{Block, CHUNK_ITEMS, LeastSquares as _};
 
 /// Largest probability of held-out residuals at which they contradict the prediction.
-const IMPROBABLE: f64 = 1e-3;
+const MAX_CHANCE_PROBABILITY: f64 = 1e-3;
 /// Maximum number of held-out rows that are tested together, to limit time.
 const MAX_TESTED_ROWS: usize = 2048;
 /// Smallest number of standard errors at which a mean difference of held-out errors is significant.
@@ -46,7 +46,7 @@ impl Check for PredictionHolds {
         else {
             return Vec::new();
         };
-        if p_value >= IMPROBABLE {
+        if p_value >= MAX_CHANCE_PROBABILITY {
             return Vec::new();
         }
         let text = format!(
@@ -60,7 +60,7 @@ impl Check for PredictionHolds {
 }
 
 /// Returns the probability that a valid prediction exceeds `chi2`, and the χ² that it exceeds with
-/// probability [`IMPROBABLE`]. `noise_dof` are the degrees of freedom from which the noise was
+/// probability [`MAX_CHANCE_PROBABILITY`]. `noise_dof` are the degrees of freedom from which the noise was
 /// estimated; `None` if it is declared.
 fn upper_tail(chi2: f64, coordinates: usize, noise_dof: Option<f64>) -> Option<(f64, f64)> {
     let k = coordinates as f64;
@@ -69,10 +69,13 @@ fn upper_tail(chi2: f64, coordinates: usize, noise_dof: Option<f64>) -> Option<(
     }
     if let Some(dof) = noise_dof {
         let distribution = FisherSnedecor::new(k, dof).ok()?;
-        Some((distribution.sf(chi2 / k), k * distribution.inverse_cdf(1.0 - IMPROBABLE)))
+        Some((
+            distribution.sf(chi2 / k),
+            k * distribution.inverse_cdf(1.0 - MAX_CHANCE_PROBABILITY),
+        ))
     } else {
         let distribution = ChiSquared::new(k).ok()?;
-        Some((distribution.sf(chi2), distribution.inverse_cdf(1.0 - IMPROBABLE)))
+        Some((distribution.sf(chi2), distribution.inverse_cdf(1.0 - MAX_CHANCE_PROBABILITY)))
     }
 }
 

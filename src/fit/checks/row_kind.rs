@@ -42,7 +42,7 @@ pub(super) fn spread(
 }
 
 /// Smallest length that is written with a power of ten \[m\].
-const HUGE: f64 = 1e6;
+const MIN_SCIENTIFIC_LENGTH: f64 = 1e6;
 
 /// Writes an error with its unit: degrees with one decimal more for tilts \[rad\], millimetres for
 /// others \[m\].
@@ -51,7 +51,7 @@ pub(crate) fn size(kind: &str, error: f64, decimals: usize) -> String {
         _ if !error.is_finite() => "more than numbers hold".to_owned(),
         Unit::Angle => format!("{:.*}°", decimals + 1, error.to_degrees()),
         Unit::Pixel => format!("{error:.decimals$} px"),
-        _ if error < HUGE => format!("{:.*} mm", decimals, error * 1e3),
+        _ if error < MIN_SCIENTIFIC_LENGTH => format!("{:.*} mm", decimals, error * 1e3),
         _ => format!("{:.2e} mm", error * 1e3),
     }
 }

@@ -19,7 +19,7 @@ const MAX_PART: f64 = 0.05;
 /// Smallest number of rows set aside for which the normal approximation of a rank sum holds.
 const MIN_ROWS: usize = 10;
 /// Probability below which the rows follow a quantity, whatever the number of quantities.
-const IMPROBABLE: f64 = 1e-3;
+const MAX_CHANCE_PROBABILITY: f64 = 1e-3;
 
 /// Quantity that the rows which are set aside follow.
 #[derive(Debug, Clone, PartialEq)]
@@ -69,7 +69,7 @@ pub(crate) fn selection(
             Selection { quantity, p_value }
         })
         .min_by(|a, b| a.p_value.total_cmp(&b.p_value))?;
-    (best.p_value < IMPROBABLE).then_some(best)
+    (best.p_value < MAX_CHANCE_PROBABILITY).then_some(best)
 }
 
 /// Returns the two-sided probability of the rank sum of the marked values; ties share their rank

@@ -5,13 +5,13 @@ use std::collections::VecDeque;
 use nalgebra::{DMatrix, DVector};
 
 /// Maximum number of earlier sweeps that the acceleration combines.
-const DEPTH: usize = 10;
+const MAX_COMBINED_SWEEPS: usize = 10;
 /// Relative singular value below which a difference of sweeps counts as rounding and is not used.
-const EXPLAINED: f64 = 1e-8;
+const RANK_TOLERANCE: f64 = 1e-8;
 /// Maximum number of power iterations that estimate the contraction.
-const POWERS: usize = 2000;
+const MAX_POWER_ITERATIONS: usize = 2000;
 /// Relative change of the contraction at which the power iteration counts as converged.
-const SETTLED: f64 = 1e-6;
+const CONTRACTION_TOLERANCE: f64 = 1e-6;
 
 /// Convergence of an alternating fit.
 #[doc(hidden)]
@@ -50,7 +50,7 @@ impl Anderson {
         scale: &DVector<f64>,
     ) -> Option<DVector<f64>> {
         self.sweeps.push_back((image.clone(), (image - x).component_mul(scale)));
-        if self.sweeps.len() > DEPTH + 1 {
+        if self.sweeps.len() > MAX_COMBINED_SWEEPS + 1 {
             self.sweeps.pop_front();
         }
         let pairs: Vec<_> = self.sweeps.iter().zip(self.sweeps.iter().skip(1)).collect();
@@ -63,7 +63,7 @@ impl Anderson {
             return None;
         }
         let svd = DMatrix::from_columns(&residuals).svd(true, true);
-        let weights = svd.solve(residual, EXPLAINED * svd.singular_values.max()).ok()?;
+        let weights = svd.solve(residual, RANK_TOLERANCE * svd.singular_values.max()).ok()?;
         let next = image - DMatrix::from_columns(&images) * weights;
         next.iter().all(|value| value.is_finite()).then_some(next)
     }
@@ -83,7 +83,7 @@ pub(in crate::fit) fn contraction(triangle: &DMatrix<f64>, stages: &[Vec<usize>]
     let n = triangle.ncols();
     let mut error = DVector::from_fn(n, |j, _| (1.0 + j as f64).sin() / hessian[(j, j)].sqrt());
     let mut rate = f64::INFINITY;
-    for _ in 0..POWERS {
+    for _ in 0..MAX_POWER_ITERATIONS {
         error /= (triangle * &error).norm();
         for (stage, root) in stages.iter().zip(&roots) {
             let step = root.solve(&(&hessian * &error).select_rows(stage));
@@ -93,7 +93,7 @@ pub(in crate::fit) fn contraction(triangle: &DMatrix<f64>, stages: &[Vec<usize>]
         if !next.is_finite() || next < f64::EPSILON {
             return next.is_finite().then_some(0.0);
         }
-        if (next - rate).abs() <= SETTLED * (1.0 - next) {
+        if (next - rate).abs() <= CONTRACTION_TOLERANCE * (1.0 - next) {
             return Some(next);
         }
         rate = next;

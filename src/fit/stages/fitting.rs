@@ -27,17 +27,17 @@ use crate::quantity::Unit;
 /// Maximum number of sweeps (one pass over all stages) of a sequential strategy.
 const MAX_SWEEPS: usize = 500;
 /// Relative reduction of the cost in one sweep at which a sequential strategy counts as converged.
-const SWEEP_SETTLED: f64 = 1e-7;
+const SWEEP_TOLERANCE: f64 = 1e-7;
 /// Maximum number of solver steps of each stage in a sweep that is repeated. More would be wasted,
 /// because the next stage moves the optimum.
-const SWEEP_STEPS: u64 = 2;
+const MAX_SWEEP_STEPS: u64 = 2;
 
 /// Change of ν ln ‖r‖² (ν measured coordinates) per step at which a provisional fit counts as
 /// converged. It is a thousandth of the change that decides on an effect.
-const PROVISIONAL_CHANGE: f64 = 0.01;
+const PROVISIONAL_TOLERANCE: f64 = 0.01;
 /// Relative reduction of the cost per step at which a fit stops if its declared σ is tested next.
 /// The σ is then known to half of this.
-const TESTED_NOISE_CHANGE: f64 = 1e-3;
+const TESTED_NOISE_TOLERANCE: f64 = 1e-3;
 
 /// Input that all fits of an identification share.
 pub(in crate::fit) struct Fitting<'a> {
@@ -185,12 +185,12 @@ impl<'a> Fitting<'a> {
         let stage = self.stage(&self.split.identification, unknowns);
         let max_steps = self.max_steps.unwrap_or(stage.max_steps);
         let tolerance = if self.cache.is_provisional() {
-            PROVISIONAL_CHANGE / stage.count().max(1) as f64
+            PROVISIONAL_TOLERANCE / stage.count().max(1) as f64
         } else {
             stage.cost_tolerance
         };
         let cost_tolerance =
-            if self.to_be_judged { tolerance.max(TESTED_NOISE_CHANGE) } else { tolerance };
+            if self.to_be_judged { tolerance.max(TESTED_NOISE_TOLERANCE) } else { tolerance };
         Stage { loss: self.loss, max_steps, cost_tolerance, ..stage }
     }
 
@@ -321,10 +321,10 @@ impl<'a> Fitting<'a> {
         let mut long = false;
         for sweep in 1..=MAX_SWEEPS {
             let begin = whole.reduced(&end.x);
-            let termination = self.sweep(whole, &mut end, (!long).then_some(SWEEP_STEPS))?;
+            let termination = self.sweep(whole, &mut end, (!long).then_some(MAX_SWEEP_STEPS))?;
             end.alternation = Some(Alternation { sweeps: sweep, contraction: None });
             let next = whole.cost(&end.x);
-            let settled = cost - next <= SWEEP_SETTLED * next;
+            let settled = cost - next <= SWEEP_TOLERANCE * next;
             if !next.is_finite() || (settled && long) {
                 end.termination = termination;
                 break;

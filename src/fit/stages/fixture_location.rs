@@ -12,12 +12,12 @@ use crate::spatial::plane_normal;
 
 /// Largest ratio of the spread of points normal to a plane to that within it at which they count as
 /// coplanar.
-const IN_A_PLANE: f64 = 1e-3;
+const MAX_COPLANAR_RATIO: f64 = 1e-3;
 /// Smallest difference of measured offsets at which they determine the side of a plane \[m\].
-const OFFSETS_DIFFER: f64 = 1e-4;
+const MIN_OFFSET_DIFFERENCE: f64 = 1e-4;
 /// Smallest distance of the arm's base from a plane at which the base determines the plane's side,
 /// if the offsets do not \[m\].
-const BASE_IS_OFF: f64 = 0.05;
+const MIN_BASE_DISTANCE: f64 = 0.05;
 
 /// Locates fixtures in closed form from the `poses` that measure against them and writes their
 /// parameters into the full parameter vector `x`.
@@ -156,7 +156,7 @@ fn least_squares(rows: &[(Vec<f64>, f64)]) -> Option<DVector<f64>> {
 fn anchor(contacts: &[(Vector3<f64>, f64)]) -> Vector3<f64> {
     let centre = centre(contacts);
     let axes = principal(contacts, &centre);
-    let flat = axes[2].1 < IN_A_PLANE * IN_A_PLANE * axes[1].1;
+    let flat = axes[2].1 < MAX_COPLANAR_RATIO * MAX_COPLANAR_RATIO * axes[1].1;
     let used = if flat { &axes[..2] } else { &axes[..] };
     let row = |(point, length): &(Vector3<f64>, f64)| {
         let p = point - centre;
@@ -210,11 +210,11 @@ fn plane(contacts: &[(Vector3<f64>, f64)], base: &Vector3<f64>) -> [f64; 4] {
         .sum::<f64>()
         / n;
     let differ = contacts.iter().map(|(_, measured)| (measured - offset).abs()).fold(0.0, f64::max)
-        > OFFSETS_DIFFER;
+        > MIN_OFFSET_DIFFERENCE;
     let to_base = normal.dot(&(base - middle));
     let side = match differ {
         true => along,
-        false if to_base.abs() > BASE_IS_OFF => to_base,
+        false if to_base.abs() > MIN_BASE_DISTANCE => to_base,
         false => normal.z,
     };
     let normal = if side < 0.0 { -normal } else { normal };

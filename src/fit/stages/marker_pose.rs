@@ -8,7 +8,7 @@ use nalgebra::{
 use crate::observation::{FixtureValues, slopes_of_pixel};
 
 /// Largest ratio of the smallest to the largest spread of points at which they count as coplanar.
-const IN_A_PLANE: f64 = 1e-6;
+const MAX_COPLANAR_RATIO: f64 = 1e-6;
 /// Minimum number of points that determine a pose: coplanar points, and points in space.
 const MIN_POINTS: [usize; 2] = [4, 6];
 /// Number of Gauss–Newton steps that refine the linear pose.
@@ -37,9 +37,9 @@ fn linear_pose(places: &[Vector3<f64>], slopes: &[[f64; 2]]) -> Option<Isometry3
     let mut order = [0, 1, 2];
     order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
     let [first, second, third] = order.map(|k| eigen.eigenvalues[k].max(0.0).sqrt());
-    let is_flat = third < IN_A_PLANE * first;
+    let is_flat = third < MAX_COPLANAR_RATIO * first;
     let (least, columns) = if is_flat { (MIN_POINTS[0], 3) } else { (MIN_POINTS[1], 4) };
-    if places.len() < least || second < IN_A_PLANE * first {
+    if places.len() < least || second < MAX_COPLANAR_RATIO * first {
         return None;
     }
     let [x, y] = [0, 1].map(|k| eigen.eigenvectors.column(order[k]).into_owned());

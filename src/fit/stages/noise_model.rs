@@ -3,9 +3,9 @@
 use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 
 /// Probability, under the declared σ, of a residual so extreme that the σ counts as contradicted.
-pub(in crate::fit) const IMPROBABLE: f64 = 1e-3;
+pub(in crate::fit) const MAX_CHANCE_PROBABILITY: f64 = 1e-3;
 /// Smallest σ that a fit takes \[m\], because predicted positions are exact only to rounding.
-pub(in crate::fit) const LEAST_NOISE: f64 = 1e-9;
+pub(in crate::fit) const MIN_SIGMA: f64 = 1e-9;
 
 /// Noise model √((scale σ)² + e²) of a row with declared σ.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -33,7 +33,7 @@ impl NoiseModel {
         let sum: f64 =
             declared.iter().zip(taken).map(|(sigma, taken)| (sigma / taken).powi(2)).sum();
         let largest = declared.iter().copied().fold(0.0, f64::max);
-        let least = (LEAST_NOISE / largest).min(1.0);
+        let least = (MIN_SIGMA / largest).min(1.0);
         Self { scale: (declared.len() as f64 * ratio / sum).sqrt().max(least), model_error: 0.0 }
     }
 
@@ -51,7 +51,7 @@ impl NoiseModel {
             return Self { scale: 1.0, model_error: squared.sqrt() };
         }
         let largest = declared.iter().copied().fold(0.0, f64::max);
-        let scale = (n * ratio / sum).sqrt().clamp((LEAST_NOISE / largest).min(1.0), 1.0);
+        let scale = (n * ratio / sum).sqrt().clamp((MIN_SIGMA / largest).min(1.0), 1.0);
         Self { scale, model_error: 0.0 }
     }
 }
@@ -59,8 +59,9 @@ impl NoiseModel {
 /// Returns the critical value of a likelihood-ratio statistic 2 ln λ with one degree of freedom at
 /// probability 0.001.
 pub(in crate::fit) fn by_chance() -> f64 {
-    ChiSquared::new(1.0)
-        .map_or(f64::INFINITY, |distribution| distribution.inverse_cdf(1.0 - IMPROBABLE))
+    ChiSquared::new(1.0).map_or(f64::INFINITY, |distribution| {
+        distribution.inverse_cdf(1.0 - MAX_CHANCE_PROBABILITY)
+    })
 }
 
 #[cfg(test)]

@@ -5,12 +5,12 @@ use crate::model::parameter::{Parameter, ParameterSite};
 use crate::quantity::Unit;
 
 /// Plausible deviation of an angle \[rad\], at which points move by their distance from the axis.
-const ANGLE: f64 = 1.0;
+const PLAUSIBLE_ANGLE: f64 = 1.0;
 /// Plausible deviation of the logarithm of a stiffness or rigidity: ln 100.
-const LN_STIFFNESS: f64 = 4.605_170_185_988_092;
+const PLAUSIBLE_LN_STIFFNESS: f64 = 4.605_170_185_988_092;
 /// Largest deviation of an angle \[rad\]. Beyond half a turn, an angle equals a smaller one of the
 /// other sign.
-const HALF_TURN: f64 = std::f64::consts::PI;
+const MAX_ANGLE: f64 = std::f64::consts::PI;
 
 /// Returns the plausible deviation of a parameter without a prior: the reach of the arm for a
 /// length, 1 rad for an angle, a factor of 100 for a stiffness. Returns `None` for parameters with
@@ -26,8 +26,8 @@ pub(in crate::fit) fn plausible(model: &Model, parameter: &Parameter) -> Option<
     }
     match parameter.unit() {
         Unit::Length => Some(model.reach()),
-        Unit::Angle => Some(ANGLE),
-        unit => unit.is_relative().then_some(LN_STIFFNESS),
+        Unit::Angle => Some(PLAUSIBLE_ANGLE),
+        unit => unit.is_relative().then_some(PLAUSIBLE_LN_STIFFNESS),
     }
 }
 
@@ -43,7 +43,7 @@ pub(in crate::fit) fn largest(model: &Model, parameter: &Parameter) -> Option<f6
             _,
         ) => None,
         (_, Unit::Length) => Some(model.reach()),
-        (_, Unit::Angle) => Some(HALF_TURN),
-        (_, unit) => unit.is_relative().then_some(LN_STIFFNESS),
+        (_, Unit::Angle) => Some(MAX_ANGLE),
+        (_, unit) => unit.is_relative().then_some(PLAUSIBLE_LN_STIFFNESS),
     }
 }

@@ -11,7 +11,7 @@ use crate::problem::Problem;
 
 /// Standard deviation (1 σ) of a coordinate that is assumed until one is estimated, if none is
 /// declared \[m\].
-pub(in crate::fit) const UNKNOWN_SIGMA: f64 = 1e-3;
+pub(in crate::fit) const ASSUMED_SIGMA: f64 = 1e-3;
 
 /// Assignment of the rows of a table to bases and targets.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -50,7 +50,7 @@ impl Placement {
 
     /// Returns the root mean square of the declared σ of a coordinate of `rows` \[m\].
     pub fn sigma(&self, measurements: &Measurements, rows: &[usize], problem: &Problem) -> f64 {
-        let whole = problem.data.position_sigma.unwrap_or(UNKNOWN_SIGMA);
+        let whole = problem.data.position_sigma.unwrap_or(ASSUMED_SIGMA);
         let squares = rows.iter().map(|&row| measurements.sigma_of(row).unwrap_or(whole).powi(2));
         if rows.is_empty() { whole } else { (squares.sum::<f64>() / rows.len() as f64).sqrt() }
     }

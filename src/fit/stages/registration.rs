@@ -8,7 +8,7 @@ use crate::spatial::{Frame, rotate};
 
 /// Largest ratio of the second to the first squared spread of points at which they count as
 /// collinear.
-const ON_A_LINE: f64 = 1e-12;
+const MAX_COLLINEAR_RATIO: f64 = 1e-12;
 
 /// Registers bases and targets that are free in all components, without priors and bounds, in the
 /// full parameter vector `x`.
@@ -145,7 +145,7 @@ fn rigid_motion(
     let s: Matrix3<f64> = pairs.iter().map(|(p, y)| (p - from) * (y - to).transpose()).sum();
     let mut spread = (s.transpose() * s).symmetric_eigenvalues();
     spread.as_mut_slice().sort_by(f64::total_cmp);
-    if spread[1] <= ON_A_LINE * spread[2] {
+    if spread[1] <= MAX_COLLINEAR_RATIO * spread[2] {
         return (*nominal, to - rotate(nominal, &from));
     }
     let skew = Vector3::new(s[(1, 2)] - s[(2, 1)], s[(2, 0)] - s[(0, 2)], s[(0, 1)] - s[(1, 0)]);

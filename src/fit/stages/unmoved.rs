@@ -8,7 +8,7 @@ use crate::model::Pose;
 
 /// Largest sum of squared derivatives along a direction, relative to that along the strongest one,
 /// that is only rounding. The direction then counts as not moved.
-const NOT_MOVED: f64 = 1e-15;
+const MAX_UNMOVED_RATIO: f64 = 1e-15;
 /// Number of poses that are examined first. On most arms they already move in every direction, so
 /// that the others need not be examined.
 const FIRST_POSES: usize = 32;
@@ -81,7 +81,7 @@ impl Stage<'_> {
         });
         let eigen = SymmetricEigen::new(scaled.sum::<Matrix3<f64>>());
         let largest = eigen.eigenvalues.max();
-        let is_unmoved = |k: &usize| eigen.eigenvalues[*k] <= NOT_MOVED * largest;
+        let is_unmoved = |k: &usize| eigen.eigenvalues[*k] <= MAX_UNMOVED_RATIO * largest;
         if !(largest.is_finite() && largest > 0.0) {
             return Vec::new();
         }

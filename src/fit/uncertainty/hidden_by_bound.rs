@@ -21,11 +21,11 @@ use crate::least_squares::solver::AtBound;
 /// the variance.
 const MIN_HIDDEN_RATIO: f64 = 3.0;
 /// Weight by which rows of held combinations become constraints in the least-squares problem.
-const HARD: f64 = 1e5;
+const CONSTRAINT_WEIGHT: f64 = 1e5;
 /// Exponent beyond which the posterior of u counts as zero.
 const MAX_EXPONENT: f64 = 40.0;
 /// Number of intervals of the quadrature over u; even, for Simpson's rule.
-const INTERVALS: u32 = 400;
+const QUADRATURE_INTERVALS: u32 = 400;
 
 /// Valley of the cost that leads from a bound into the interior.
 #[derive(Debug, Clone, PartialEq)]
@@ -113,7 +113,7 @@ fn along(
         stack.view_mut((0, place), (rows, 1)).copy_from(&triangle.column(k));
         stack.view_mut((rows, place), (priors.nrows(), 1)).copy_from(&priors.column(k));
         let from = rows + priors.nrows();
-        let held_rows = closed.column(k) * HARD;
+        let held_rows = closed.column(k) * CONSTRAINT_WEIGHT;
         stack.view_mut((from, place), (closed.nrows(), 1)).copy_from(&held_rows);
     }
     let factor = Triangle::of(&stack);
@@ -138,12 +138,12 @@ fn deviation(multiplier: f64, curvature: f64, width: f64) -> f64 {
     if !end.is_finite() {
         return f64::INFINITY;
     }
-    let step = end / f64::from(INTERVALS);
+    let step = end / f64::from(QUADRATURE_INTERVALS);
     let (mut total, mut squares) = (0.0, 0.0);
-    for k in 0..=INTERVALS {
+    for k in 0..=QUADRATURE_INTERVALS {
         let u = f64::from(k) * step;
         let weight = match k {
-            0 | INTERVALS => 1.0,
+            0 | QUADRATURE_INTERVALS => 1.0,
             k if k % 2 == 1 => 4.0,
             _ => 2.0,
         };

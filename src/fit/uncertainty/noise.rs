@@ -5,7 +5,7 @@ use nalgebra::DVector;
 
 use crate::fit::stages::active_limits::confine;
 use crate::fit::stages::fitting::{FitEnd, Fitting};
-use crate::fit::stages::noise_model::{LEAST_NOISE, NoiseModel, by_chance};
+use crate::fit::stages::noise_model::{MIN_SIGMA, NoiseModel, by_chance};
 use crate::fit::stages::stage::{Stage, StageError};
 use crate::fit::uncertainty::statistics::Statistics;
 use crate::least_squares::solver::Termination;
@@ -16,20 +16,20 @@ use crate::model::Pose;
 use crate::problem::Observation;
 
 /// Relative change of an estimated σ at which its search has converged, if none is declared.
-const NOISE_SETTLED: f64 = 1e-3;
+const NOISE_TOLERANCE: f64 = 1e-3;
 /// Relative change of an estimated σ at which its search has converged, if the declared one is
 /// contradicted. Standard errors need no more accuracy.
-const SCALE_SETTLED: f64 = 0.01;
+const SCALE_TOLERANCE: f64 = 0.01;
 /// Number of steps after which a declared σ is tested first in a joint fit. If it is contradicted,
 /// the optimum under it is not needed.
-const FIRST_STEPS: u64 = 30;
+const STEPS_BEFORE_NOISE_TEST: u64 = 30;
 /// Maximum number of fits in the search for σ.
 const MAX_NOISE_FITS: usize = 20;
 /// Noise models of positions and of orientations that take the declared σ.
-const AS_DECLARED: (NoiseModel, NoiseModel) = (NoiseModel::DECLARED, NoiseModel::DECLARED);
+const DECLARED_NOISE: (NoiseModel, NoiseModel) = (NoiseModel::DECLARED, NoiseModel::DECLARED);
 /// Multiple of the critical value [`by_chance`] of the likelihood-ratio statistic at which a
 /// declared σ is certainly wrong.
-const BEYOND_DOUBT: f64 = 10.0;
+const REJECTION_FACTOR: f64 = 10.0;
 
 /// Source of the σ of the measurements.
 #[doc(hidden)]
@@ -58,15 +58,18 @@ pub(in crate::fit) fn fitted(
     let mut fits = 0;
     let mut begin = start.clone();
     let mut early = fitting.whole().unknowns.len() >= MANY_UNKNOWNS;
-    let mut taken_over = (fitting.noise_model, fitting.turn_noise_model) != AS_DECLARED;
+    let mut taken_over = (fitting.noise_model, fitting.turn_noise_model) != DECLARED_NOISE;
     loop {
         fits += 1;
         let limit = fitting.max_steps;
         let assumed = (fitting.noise_model, fitting.turn_noise_model);
         let single = fitting.strategy.stages().len() == 1;
-        let first = fits == 1 && has_declared_noise && judged && single && assumed == AS_DECLARED;
+        let first =
+            fits == 1 && has_declared_noise && judged && single && assumed == DECLARED_NOISE;
         if first {
-            fitting.max_steps = Some(limit.map_or(FIRST_STEPS, |limit| limit.min(FIRST_STEPS)));
+            fitting.max_steps = Some(
+                limit.map_or(STEPS_BEFORE_NOISE_TEST, |limit| limit.min(STEPS_BEFORE_NOISE_TEST)),
+            );
             fitting.to_be_judged = std::mem::take(&mut early);
         }
         let end = fitting.run(&begin)?;
@@ -75,7 +78,7 @@ pub(in crate::fit) fn fitted(
         let whole = fitting.whole();
         if has_declared_noise {
             if taken_over && !(judged && is_beyond_doubt(&whole)) {
-                (fitting.noise_model, fitting.turn_noise_model) = AS_DECLARED;
+                (fitting.noise_model, fitting.turn_noise_model) = DECLARED_NOISE;
                 (taken_over, fits, begin) = (false, 0, end.x);
                 continue;
             }
@@ -88,7 +91,7 @@ pub(in crate::fit) fn fitted(
                         // had taken it.
                         taken_over = is_beyond_doubt(&fitting.whole());
                         if !taken_over {
-                            (fitting.noise_model, fitting.turn_noise_model) = AS_DECLARED;
+                            (fitting.noise_model, fitting.turn_noise_model) = DECLARED_NOISE;
                         }
                     }
                     // Held combinations stay where they started, and a fit that diverged under a σ
@@ -104,7 +107,10 @@ pub(in crate::fit) fn fitted(
                 None if judged_early && end.termination.converged() => {
                     begin = if end.gauge.rows.nrows() == 0 { end.x } else { start.clone() }
                 }
-                None if first && end.iterations >= FIRST_STEPS && !end.termination.converged() => {
+                None if first
+                    && end.iterations >= STEPS_BEFORE_NOISE_TEST
+                    && !end.termination.converged() =>
+                {
                     begin = end.x;
                 }
                 None => {
@@ -115,9 +121,8 @@ pub(in crate::fit) fn fitted(
             continue;
         }
         let statistics = Statistics::of(&whole, &end, None)?;
-        let next =
-            (fitting.sigma * statistics.reduced_chi2.map_or(1.0, f64::sqrt)).max(LEAST_NOISE);
-        let settled = (next - fitting.sigma).abs() < NOISE_SETTLED * fitting.sigma;
+        let next = (fitting.sigma * statistics.reduced_chi2.map_or(1.0, f64::sqrt)).max(MIN_SIGMA);
+        let settled = (next - fitting.sigma).abs() < NOISE_TOLERANCE * fitting.sigma;
         if settled || fits == MAX_NOISE_FITS {
             let noise = match statistics.reduced_chi2 {
                 Some(_) => Noise::Estimated(fitting.sigma),
@@ -139,7 +144,7 @@ fn is_beyond_doubt(stage: &Stage) -> bool {
         .map(|(pose, declared)| (pose.sigma / declared).powi(2));
     let ratio = ratios.sum::<f64>() / stage.poses.len().max(1) as f64;
     let freedom = stage.count().saturating_sub(stage.unknowns.len()) as f64;
-    freedom * (ratio - 1.0 - ratio.ln()) > BEYOND_DOUBT * by_chance()
+    freedom * (ratio - 1.0 - ratio.ln()) > REJECTION_FACTOR * by_chance()
 }
 
 /// Returns the next noise models of positions and orientations, or `None` if the `assumed` ones are
@@ -181,10 +186,10 @@ fn contradicted(
     if !ratio.is_finite() {
         return Ok(None);
     }
-    let first = assumed == AS_DECLARED;
+    let first = assumed == DECLARED_NOISE;
     let shares = shares(&whitened, stage.coordinates(), [count - turned, turned]);
     // Positions and orientations settle separately.
-    let settled = shares.iter().all(|share| ((ratio * share).sqrt() - 1.0).abs() < SCALE_SETTLED);
+    let settled = shares.iter().all(|share| ((ratio * share).sqrt() - 1.0).abs() < SCALE_TOLERANCE);
     let chance = by_chance();
     if (first && gain <= chance) || (!first && settled) {
         return Ok(None);

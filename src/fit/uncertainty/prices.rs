@@ -11,7 +11,7 @@ use crate::model::parameter::Parameter;
 
 /// Relative length of the independent part of a constraint normal below which it counts as linearly
 /// dependent.
-const DEPENDENT: f64 = 1e-10;
+const MIN_INDEPENDENT_LENGTH: f64 = 1e-10;
 
 /// Shadow prices of bounds (`None` for an unknown that rests on none) and of active constraints.
 #[derive(Debug, Clone, Default)]
@@ -56,7 +56,7 @@ impl Stage<'_> {
         let forces = if active.is_empty() {
             DVector::zeros(0)
         } else {
-            Factor::new(normals, -force, DEPENDENT).gauss_newton()
+            Factor::new(normals, -force, MIN_INDEPENDENT_LENGTH).gauss_newton()
         };
         for (held, force) in active.iter().zip(&forces) {
             held.row.iter().enumerate().for_each(|(j, coefficient)| left[j] -= coefficient * force);

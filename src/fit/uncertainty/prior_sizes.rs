@@ -22,7 +22,7 @@ const MIN_RATIO: f64 = 2.0;
 /// Maximum number of steps of the search for the widths.
 const MAX_STEPS: usize = 500;
 /// Largest change of every ln r at which the search has converged.
-const SETTLED: f64 = 1e-4;
+const CONVERGENCE_TOLERANCE: f64 = 1e-4;
 
 /// Prior width of one kind of geometry at all joints, estimated from the data.
 #[doc(hidden)]
@@ -175,7 +175,7 @@ impl GeometryLikelihood {
                 change = change.max((next / factors[g]).ln().abs());
                 factors[g] = next;
             }
-            if change < SETTLED {
+            if change < CONVERGENCE_TOLERANCE {
                 break;
             }
         }

@@ -16,7 +16,7 @@ use crate::fit::stages::stage::Stage;
 use crate::least_squares::Loss;
 
 /// Factors by which the σ of a rule is widened in turn.
-const FACTORS: [f64; 8] = [3.0, 10.0, 30.0, 100.0, 300.0, 1e3, 3e3, 1e4];
+const TRIAL_FACTORS: [f64; 8] = [3.0, 10.0, 30.0, 100.0, 300.0, 1e3, 3e3, 1e4];
 /// Largest ratio of the noise variances with the wider and with the declared prior at which the
 /// prior is the reason for the misfit.
 const MAX_VARIANCE_RATIO: f64 = 0.25;
@@ -24,15 +24,15 @@ const MAX_VARIANCE_RATIO: f64 = 0.25;
 /// the misfit.
 const MAX_VARIANCE: f64 = 1000.0;
 /// Multiple of the critical gain in 2 ln L (probability 0.001) at which a prior is refuted.
-const BEYOND_DOUBT: f64 = 10.0;
+const REJECTION_FACTOR: f64 = 10.0;
 /// Smallest ratio of the noise variance taken to the declared one at which priors are tested.
 const MIN_NOISE_FACTOR: f64 = 4.0;
 /// Number of trial noise variances at which the evidence is compared.
-const VARIANCES: u32 = 24;
+const TRIAL_VARIANCES: u32 = 24;
 /// Largest number of unknowns for which priors are tested, because the work grows with its cube.
 const MAX_UNKNOWNS: usize = 150;
 /// Precision of unknowns without a prior, relative to that of the data.
-const NO_PRIOR: f64 = 1e-12;
+const FLAT_PRIOR_PRECISION: f64 = 1e-12;
 
 /// Rule whose σ the data refute.
 #[derive(Debug, Clone, PartialEq)]
@@ -76,7 +76,8 @@ pub(in crate::fit) fn refuted_priors(
     let mut factors = vec![1.0; names.len()];
     let Some(declared) = evidence.best(&widened(&factors)) else { return Vec::new() };
     // No choice of rules leaves less than all of them widened together.
-    let widest = evidence.best(&widened(&vec![FACTORS[FACTORS.len() - 1]; names.len()]));
+    let widest =
+        evidence.best(&widened(&vec![TRIAL_FACTORS[TRIAL_FACTORS.len() - 1]; names.len()]));
     if widest.is_none_or(|best| best.variance > MAX_VARIANCE_RATIO * declared.variance) {
         return Vec::new();
     }
@@ -90,10 +91,10 @@ pub(in crate::fit) fn refuted_priors(
             trial[place] = factor;
             Some((place, factor, evidence.best(&widened(&trial))?))
         };
-        let trials = open.flat_map(|place| FACTORS.map(|factor| (place, factor)));
+        let trials = open.flat_map(|place| TRIAL_FACTORS.map(|factor| (place, factor)));
         let next = trials.filter_map(trial).min_by(|a, b| a.2.deviance.total_cmp(&b.2.deviance));
         let Some((place, factor, found)) = next else { break };
-        if best.deviance - found.deviance < BEYOND_DOUBT * by_chance() {
+        if best.deviance - found.deviance < REJECTION_FACTOR * by_chance() {
             break;
         }
         factors[place] = factor;
@@ -158,8 +159,8 @@ impl Evidence {
     /// Returns the noise variance with the largest evidence under priors of these σ, at least 1
     /// (the declared one).
     fn best(&self, sigmas: &[Option<f64>]) -> Option<Best> {
-        let step = self.max_variance.ln() / f64::from(VARIANCES - 1);
-        let variances = (0..VARIANCES).map(|k| (f64::from(k) * step).exp());
+        let step = self.max_variance.ln() / f64::from(TRIAL_VARIANCES - 1);
+        let variances = (0..TRIAL_VARIANCES).map(|k| (f64::from(k) * step).exp());
         let of = |variance| Some(Best { variance, deviance: self.deviance(sigmas, variance)? });
         variances.filter_map(of).min_by(|a, b| a.deviance.total_cmp(&b.deviance))
     }
@@ -170,7 +171,7 @@ impl Evidence {
         let n = self.free.len();
         let precision = |i: usize| match sigmas[self.free[i]] {
             Some(sigma) => sigma.powi(-2),
-            None => (NO_PRIOR * self.information[(i, i)]).max(f64::MIN_POSITIVE),
+            None => (FLAT_PRIOR_PRECISION * self.information[(i, i)]).max(f64::MIN_POSITIVE),
         };
         let mut matrix = &self.information / variance;
         (0..n).for_each(|i| matrix[(i, i)] += precision(i));

@@ -12,7 +12,7 @@ use crate::model::Pose;
 use crate::numeric::median;
 
 /// Probability that at least one of the poses is an outlier although there is only noise.
-const BY_CHANCE: f64 = 0.01;
+const FALSE_ALARM_PROBABILITY: f64 = 0.01;
 
 /// Returns two lengths \[σ\] for residuals of `coordinates` coordinates: the median √χ², and the
 /// one that any of `count` residuals exceeds with probability 0.01 \[Bonferroni\].
@@ -20,7 +20,7 @@ pub(in crate::fit) fn chance(count: usize, coordinates: usize) -> Option<(f64, f
     let squares = ChiSquared::new(coordinates as f64).ok()?;
     Some((
         squares.inverse_cdf(0.5).sqrt(),
-        squares.inverse_cdf(1.0 - BY_CHANCE / count.max(1) as f64).sqrt(),
+        squares.inverse_cdf(1.0 - FALSE_ALARM_PROBABILITY / count.max(1) as f64).sqrt(),
     ))
 }
 

@@ -5,7 +5,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 
 use crate::fit::stages::active_limits::{Held, confine};
 use crate::fit::stages::fitting::FitEnd;
-use crate::fit::stages::noise_model::{IMPROBABLE, NoiseModel};
+use crate::fit::stages::noise_model::{MAX_CHANCE_PROBABILITY, NoiseModel};
 use crate::fit::stages::stage::{Stage, StageError};
 use crate::fit::uncertainty::hidden_by_bound::{HiddenByBound, hidden_by_bounds};
 use crate::fit::uncertainty::prices::Prices;
@@ -15,7 +15,7 @@ use crate::model::Pose;
 
 /// Largest part of an unknown in unidentifiable combinations, 0…1, at which it has a standard
 /// error.
-const PARTLY_BLIND: f64 = 1e-3;
+const MAX_UNIDENTIFIABLE_SHARE: f64 = 1e-3;
 
 /// Statistics of the unknowns of a fit.
 #[derive(Debug, Clone)]
@@ -137,7 +137,9 @@ impl Statistics {
         let seen = stage.gauge(&end.x, &held, &constraints).visible;
         let known = (0..errors.len())
             .map(|j| {
-                !held[j] && !is_open(j) && seen[j].min(end.gauge.visible[j]) > 1.0 - PARTLY_BLIND
+                !held[j]
+                    && !is_open(j)
+                    && seen[j].min(end.gauge.visible[j]) > 1.0 - MAX_UNIDENTIFIABLE_SHARE
             })
             .collect();
         Ok(Self {
@@ -160,5 +162,5 @@ impl Statistics {
 fn chance(freedom: f64) -> Option<(f64, f64)> {
     let distribution = ChiSquared::new(freedom).ok().filter(|_| freedom > 0.5)?;
     let bound = |p: f64| distribution.inverse_cdf(p) / freedom;
-    Some((bound(0.5 * IMPROBABLE), bound(1.0 - 0.5 * IMPROBABLE)))
+    Some((bound(0.5 * MAX_CHANCE_PROBABILITY), bound(1.0 - 0.5 * MAX_CHANCE_PROBABILITY)))
 }

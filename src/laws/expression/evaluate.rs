@@ -91,8 +91,8 @@ fn sign(x: f64) -> f64 {
 /// Returns tanh x, with a derivative of 0 if x is so large that its exponential overflows.
 fn tanh<S: Scalar>(x: S) -> S {
     /// Smallest argument at which tanh equals ±1 to rounding.
-    const SATURATED: f64 = 20.0;
-    if x.re().abs() > SATURATED { S::from(sign(x.re())) } else { x.tanh() }
+    const SATURATED_TANH: f64 = 20.0;
+    if x.re().abs() > SATURATED_TANH { S::from(sign(x.re())) } else { x.tanh() }
 }
 
 /// Returns the uniform cubic B-spline over the intervals 0…4.

@@ -6,7 +6,7 @@ use super::AtBound;
 
 /// Distance from its limit, relative to the size of its terms and of x, up to which a row counts as
 /// active (on the limit).
-const AT_LIMIT: f64 = 1e-12;
+const MAX_ACTIVE_DISTANCE: f64 = 1e-12;
 /// Violation up to which a row counts as satisfied, relative to the size of its terms.
 const ROUNDING: f64 = 1e-14;
 
@@ -104,7 +104,7 @@ impl Inequalities {
         let (value, size) = self.value(x, i);
         let size = size + self.matrix.row(i).amax() * x.amax();
         let is_at = |limit: f64| {
-            limit.is_finite() && (value - limit).abs() <= AT_LIMIT * (size + limit.abs())
+            limit.is_finite() && (value - limit).abs() <= MAX_ACTIVE_DISTANCE * (size + limit.abs())
         };
         if is_at(self.lower[i]) {
             Some(AtBound::Lower)

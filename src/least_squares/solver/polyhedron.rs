@@ -7,7 +7,7 @@ use super::{AtBound, Bounds, Factor, Inequalities};
 
 /// Smallest length of the independent part of a unit normal; a shorter one counts as linearly
 /// dependent.
-const DEPENDENT: f64 = 1e-10;
+const MIN_INDEPENDENT_LENGTH: f64 = 1e-10;
 /// Rounding error allowed in the distance to a half-space, relative to the size of its terms.
 const ROUNDING: f64 = 1e-14;
 
@@ -163,9 +163,12 @@ impl Polyhedron {
             return (force.clone(), Vec::new());
         }
         let normals = self.normals.select_rows(&active).transpose();
-        let multipliers =
-            Factor::new(normals.select_rows(&free), -force.select_rows(&free), DEPENDENT)
-                .gauss_newton();
+        let multipliers = Factor::new(
+            normals.select_rows(&free),
+            -force.select_rows(&free),
+            MIN_INDEPENDENT_LENGTH,
+        )
+        .gauss_newton();
         (
             force - normals * &multipliers,
             active.into_iter().zip(multipliers.iter().copied()).collect(),
@@ -215,13 +218,16 @@ impl Polyhedron {
         let normals = normals.select_columns(&free);
         let qr = normals.transpose().col_piv_qr();
         let r = qr.r();
-        let rank =
-            (0..r.nrows()).filter(|&i| r[(i, i)].abs() > DEPENDENT * r[(0, 0)].abs()).count();
+        let rank = (0..r.nrows())
+            .filter(|&i| r[(i, i)].abs() > MIN_INDEPENDENT_LENGTH * r[(0, 0)].abs())
+            .count();
         let mut rotation = DMatrix::identity(free.len(), free.len());
         qr.q_tr_mul(&mut rotation);
-        let mut shortest = Factor::new(normals.clone(), -&offsets, DEPENDENT).gauss_newton();
+        let mut shortest =
+            Factor::new(normals.clone(), -&offsets, MIN_INDEPENDENT_LENGTH).gauss_newton();
         shortest +=
-            Factor::new(normals.clone(), normals * &shortest - offsets, DEPENDENT).gauss_newton();
+            Factor::new(normals.clone(), normals * &shortest - offsets, MIN_INDEPENDENT_LENGTH)
+                .gauss_newton();
         free.iter().zip(shortest.iter()).for_each(|(&j, value)| corner[j] = *value);
         (corner, Some(rotation.rows(rank, free.len() - rank).transpose()))
     }

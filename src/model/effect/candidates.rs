@@ -12,18 +12,18 @@ pub(crate) const HIGHEST_ORDER: u32 = 60;
 
 /// Longest time constant among the candidates, as a fraction of the duration of the measurement. A
 /// longer one cannot be distinguished from a linear drift.
-const LONGEST_LAG: f64 = 0.6;
+const MAX_LAG: f64 = 0.6;
 /// Shortest time constant of a lag, in typical times between two poses. A faster lag has settled
 /// before the next pose.
-const SHORTEST_LAG: f64 = 2.0;
+const MIN_LAG: f64 = 2.0;
 /// Shortest settling time among the candidates, as a fraction of the duration of the measurement. A
 /// shorter one affects only a few poses.
-const SHORTEST_SETTLING: f64 = 0.03;
+const MIN_SETTLING: f64 = 0.03;
 /// Ratio of successive time constants in the grid of candidates.
 const LAG_STEP: f64 = 1.25;
 /// Shortest and longest friction path among the candidates, as fractions of the range of the
 /// joint's commands. A shorter path acts like play, a longer one like a constant ratio.
-const PATHS: (f64, f64) = (0.1, 1.6);
+const FRICTION_PATHS: (f64, f64) = (0.1, 1.6);
 /// Ratio of successive friction paths in the grid of candidates.
 const PATH_STEP: f64 = 1.4;
 
@@ -137,14 +137,10 @@ fn searched(family: &Family, place: Arguments, data: &DataCoverage) -> Vec<Argum
         Search::Times => data.times.iter().map(|&time| Argument::Number(time)).collect(),
         Search::TimeConstants => match data.clock {
             None => vec![Argument::Number(1.0)],
-            Some((between, span)) => {
-                grid(SHORTEST_LAG * between, LONGEST_LAG * span, LAG_STEP, 1.0)
-            }
+            Some((between, span)) => grid(MIN_LAG * between, MAX_LAG * span, LAG_STEP, 1.0),
         },
         Search::SettlingTimes => match (data.times.first(), data.times.last()) {
-            (Some(first), Some(last)) => {
-                grid(SHORTEST_SETTLING, LONGEST_LAG, LAG_STEP, last - first)
-            }
+            (Some(first), Some(last)) => grid(MIN_SETTLING, MAX_LAG, LAG_STEP, last - first),
             _ => Vec::new(),
         },
         Search::Distances => {
@@ -153,7 +149,7 @@ fn searched(family: &Family, place: Arguments, data: &DataCoverage) -> Vec<Argum
                 _ => None,
             });
             let range = joint.and_then(|joint| data.ranges.get(joint));
-            let (from, to) = PATHS;
+            let (from, to) = FRICTION_PATHS;
             grid(from, to, PATH_STEP, range.map_or(0.0, |(low, high)| high - low))
         }
     };

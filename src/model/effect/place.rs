@@ -24,7 +24,7 @@ impl ParameterSite {
 
 /// Smallest moment from which sizes of priors are derived [N·m], so that joints with little load
 /// keep a wide prior.
-pub(super) const LEAST_MOMENT: f64 = 10.0;
+pub(super) const MIN_MOMENT: f64 = 10.0;
 
 /// Returns an upper estimate of the moment on a joint, counted from 1 [N·m]: weight of everything
 /// declared beyond it times the length of its longest branch.

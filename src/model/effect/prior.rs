@@ -1,6 +1,6 @@
 //! Prior sizes of effect parameters on an arm.
 
-use super::place::{LEAST_MOMENT, greatest_moment};
+use super::place::{MIN_MOMENT, greatest_moment};
 use crate::laws::{Argument, Effect, Prior};
 use crate::problem::Problem;
 
@@ -11,7 +11,7 @@ impl Effect {
     /// Returns the prior size (1 σ, SI) that `prior` gives on the arm of `problem`; `None` if the
     /// arm lacks the joint, beam or argument that the rule refers to.
     pub(super) fn size(&self, prior: Prior, problem: &Problem) -> Option<f64> {
-        let moment = || Some(greatest_moment(problem, self.joint()?).max(LEAST_MOMENT));
+        let moment = || Some(greatest_moment(problem, self.joint()?).max(MIN_MOMENT));
         let length = |key: &str| match self.argument(key) {
             Some(Argument::Point([x, y])) => Some(x.hypot(y)),
             _ => None,

@@ -10,7 +10,7 @@ use crate::results::{Stage, StageErrors, procedure_stages};
 const MAX_POSES: usize = 90;
 /// Smallest error that is drawn at its value, as a fraction of the best stage's median; smaller
 /// ones are drawn at the lower edge.
-const FLOOR: f64 = 0.03;
+const MIN_DRAWN_FRACTION: f64 = 0.03;
 
 /// Returns the name of a stage in the legend.
 fn stage_name(stage: Stage) -> &'static str {
@@ -101,7 +101,7 @@ fn draw_stages(
         best.iter().map(Vector3::norm).filter(|norm| norm.is_finite()).collect();
     sizes.sort_by(f64::total_cmp);
     let typical = sizes.get(sizes.len() / 2).copied().unwrap_or(1e-3).max(1e-9);
-    let floor = (FLOOR * typical * 1e3).log10();
+    let floor = (MIN_DRAWN_FRACTION * typical * 1e3).log10();
     let largest =
         range(stages.iter().flat_map(|stage| &stage.errors).map(|error| error.norm() * 1e3)).1;
     // Without a finite positive error the axis has another range.

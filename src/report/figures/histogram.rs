@@ -7,7 +7,7 @@ use crate::numeric::median;
 /// if that is more; values outside it are counted in the outermost bars.
 const MIN_HALF_WIDTH: f64 = 5.0;
 /// Number of values above which bars are half as wide.
-const MANY_VALUES: usize = 150;
+const MAX_WIDE_BAR_VALUES: usize = 150;
 
 /// Returns the residual coordinates of a row in units of σ.
 fn coordinates(residual: &PoseError) -> impl Iterator<Item = f64> + use<> {
@@ -25,7 +25,7 @@ pub fn histogram(data: &PlotData) -> Option<Drawing> {
     // The median absolute value is robust against a few large residuals.
     let scatter = 1.4826 * median(values.iter().map(|value| value.abs()))?;
     let reach = (4.0 * scatter).ceil().max(MIN_HALF_WIDTH);
-    let bars: usize = if values.len() < MANY_VALUES { 20 } else { 40 };
+    let bars: usize = if values.len() < MAX_WIDE_BAR_VALUES { 20 } else { 40 };
     let width = 2.0 * reach / bars as f64;
     let mut counts = vec![0_usize; bars];
     for value in &values {

@@ -4,7 +4,7 @@ use super::prelude::*;
 use crate::results::CommandedJoint;
 
 /// Number of ranges into which a joint's commands are divided.
-const RANGES: usize = 12;
+const COMMAND_RANGES: usize = 12;
 
 /// Range of a joint with its ends and the root mean square residual of the poses in it \[m\].
 struct JointRange {
@@ -21,16 +21,16 @@ fn joint_ranges(data: &PlotData, joint: usize) -> Vec<JointRange> {
     if high - low <= 0.0 || !(high - low).is_finite() {
         return Vec::new();
     }
-    let width = (high - low) / RANGES as f64;
-    let mut sums = [(0.0, 0_usize); RANGES];
+    let width = (high - low) / COMMAND_RANGES as f64;
+    let mut sums = [(0.0, 0_usize); COMMAND_RANGES];
     for pose in poses() {
         #[expect(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
             reason = "clamped to the ranges"
         )]
-        let index =
-            ((pose.configuration[joint] - low) / width).clamp(0.0, RANGES as f64 - 1.0) as usize;
+        let index = ((pose.configuration[joint] - low) / width)
+            .clamp(0.0, COMMAND_RANGES as f64 - 1.0) as usize;
         sums[index].0 += pose.error.norm_squared();
         sums[index].1 += 1;
     }
@@ -81,11 +81,11 @@ pub fn joint_map(data: &PlotData) -> Option<Drawing> {
             );
             Shape::Box { corners, paint, tag }
         });
-        let last = end(*command, ranges[RANGES - 1].ends.1);
-        boxes.chain([Shape::text((RANGES as f64, row), 6.0, last, MUTED)])
+        let last = end(*command, ranges[COMMAND_RANGES - 1].ends.1);
+        boxes.chain([Shape::text((COMMAND_RANGES as f64, row), 6.0, last, MUTED)])
     });
-    let panel =
-        Panel::of_rows(26.0, (92.0, 52.0), Axis::bare((0.0, RANGES as f64)), names).with(shapes);
+    let panel = Panel::of_rows(26.0, (92.0, 52.0), Axis::bare((0.0, COMMAND_RANGES as f64)), names)
+        .with(shapes);
     let caption = format!(
         "Root mean square residual over the poses in which a joint is in one twelfth of its \
          measured range: pale {} mm, deep {} mm; an empty box has no pose. A change along a row \

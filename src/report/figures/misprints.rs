@@ -7,7 +7,7 @@ use crate::study::{
 };
 
 /// Ends of the logarithmic axis.
-const RANGE: (f64, f64) = (0.02, 5.0);
+const AXIS_RANGE: (f64, f64) = (0.02, 5.0);
 /// Colours of the cases.
 const COLOURS: [Colour; 4] = [INK, ACCENT, FAINT, MUTED];
 
@@ -38,8 +38,8 @@ pub fn misprints(study: &MisprintStudy, results: &ReplicaResults) -> Drawing {
         .map(|(case, colour)| (case.as_str(), colour, Mark::Dot))
         .collect();
     legend.push(("the paper", WARM, Mark::Line));
-    let (low, high) = (RANGE.0.log10(), RANGE.1.log10());
-    let at = |value: f64| value.max(RANGE.0).log10().clamp(low, high);
+    let (low, high) = (AXIS_RANGE.0.log10(), AXIS_RANGE.1.log10());
+    let at = |value: f64| value.max(AXIS_RANGE.0).log10().clamp(low, high);
     let marks = rows.iter().enumerate().flat_map(|(k, (_, spreads))| {
         let row = k as f64;
         let mark = |(j, spread): (usize, &Option<Spread>)| {

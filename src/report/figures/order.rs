@@ -5,7 +5,7 @@ use super::prelude::*;
 /// Maximum number of poses in the figure.
 const MAX_POSES: usize = 300;
 /// Smallest time span that is labelled in hours \[s\].
-const HOURS_FROM: f64 = 7200.0;
+const MIN_HOURS_SPAN: f64 = 7200.0;
 
 /// Draws the residual coordinates of positions in order of time, with a band of ±2 σ.
 pub fn order(data: &PlotData) -> Option<Drawing> {
@@ -23,7 +23,7 @@ pub fn order(data: &PlotData) -> Option<Drawing> {
     let times = range(shown.iter().map(|residual| residual.time));
     let (factor, label) = match (data.time_measured, times.1 - times.0) {
         (false, _) => (1.0, "row"),
-        (true, span) if span > HOURS_FROM => (1.0 / 3600.0, "time [h]"),
+        (true, span) if span > MIN_HOURS_SPAN => (1.0 / 3600.0, "time [h]"),
         (true, _) => (1.0, "time [s]"),
     };
     let across = with_margin((times.0 * factor, times.1 * factor), 0.02);

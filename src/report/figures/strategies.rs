@@ -6,7 +6,7 @@ use crate::problem::Effect;
 use crate::select::{ClosedLoop, Round};
 
 /// Difference of the logarithms of two errors up to which they count as equal.
-const TIE: f64 = 1e-4;
+const MAX_TIE_DIFFERENCE: f64 = 1e-4;
 
 /// Row of the figure: name and mean errors of one fit or group of fits.
 struct Entry {
@@ -101,7 +101,7 @@ fn draw_entries(
         if !(fitted.is_finite() && held_out.is_finite()) {
             return vec![Shape::text((ends.0, row), 8.0, "no result", MUTED)];
         }
-        let colour = if held_out <= best + TIE { ACCENT } else { INK };
+        let colour = if held_out <= best + MAX_TIE_DIFFERENCE { ACCENT } else { INK };
         let value = means(entry)[1];
         let value = number(value, decimals(value, 4) + 1);
         vec![

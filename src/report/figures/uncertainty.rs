@@ -9,9 +9,9 @@ use crate::remainder::{JointError, JointErrorPoint};
 use crate::results::{BoundAt, CommandedJoint};
 
 /// Number of cells along the width of a view.
-const CELLS: usize = 24;
+const CELLS_PER_WIDTH: usize = 24;
 /// One in so many cells lies beyond the scale of colours.
-const DEEPEST: usize = 20;
+const CELLS_PER_SATURATED: usize = 20;
 /// Maximum height of a view in displayed pixels.
 const MAX_HEIGHT: f64 = 330.0;
 /// Height of the panel of a joint in displayed pixels.
@@ -33,13 +33,13 @@ pub fn bounds_over_workspace(data: &PlotData) -> Option<Drawing> {
     let per_pixel = (size(0) / width).max(size(1).max(size(2)) / MAX_HEIGHT);
     let middle = 0.5 * (extent(0).0 + extent(0).1);
     let across = (middle - 0.5 * width * per_pixel, middle + 0.5 * width * per_pixel);
-    let cell = (across.1 - across.0) / CELLS as f64;
+    let cell = (across.1 - across.0) / CELLS_PER_WIDTH as f64;
     let views = [(1, "y [m]", "x [m], seen from above"), (2, "z [m]", "x [m], seen from the side")];
     let cells = views.map(|(axis, ..)| cells(bounds, (axis, cell), (across.0, extent(axis).0)));
     let mut sorted: Vec<f64> = cells.iter().flatten().map(|cell| cell.bound).collect();
     sorted.sort_by(f64::total_cmp);
     // A few cells far from all poses would leave the others without contrast.
-    let deepest = sorted.len() - 1 - sorted.len() / DEEPEST;
+    let deepest = sorted.len() - 1 - sorted.len() / CELLS_PER_SATURATED;
     let (least, most) = (sorted[0], sorted[deepest]);
     let shade = |bound: f64| {
         let share = if most > least { ((bound - least) / (most - least)).min(1.0) } else { 0.5 };

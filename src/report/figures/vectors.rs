@@ -8,7 +8,7 @@ const MAX_POSES: usize = 400;
 /// Length of a large residual vector on the drawing, as a fraction of its width.
 const VECTOR_LENGTH: f64 = 0.09;
 /// Minimum and maximum height of a view in displayed pixels.
-const HEIGHTS: (f64, f64) = (150.0, 330.0);
+const HEIGHT_RANGE: (f64, f64) = (150.0, 330.0);
 
 /// Draws the residuals from above and from the side at their measured positions; `None` if no row
 /// measures a position.
@@ -30,7 +30,7 @@ pub fn vectors(data: &PlotData) -> Option<Drawing> {
     };
     // All views share one scale, so that vectors keep their directions.
     let width = WIDTH - LEFT - RIGHT;
-    let per_pixel = (size(0) / width).max(size(1).max(size(2)) / HEIGHTS.1);
+    let per_pixel = (size(0) / width).max(size(1).max(size(2)) / HEIGHT_RANGE.1);
     let across = centred(extent(0), width * per_pixel);
     let mut lengths: Vec<f64> = shown.iter().map(|pose| pose.error.norm()).collect();
     lengths.sort_by(f64::total_cmp);
@@ -39,7 +39,7 @@ pub fn vectors(data: &PlotData) -> Option<Drawing> {
     let bar = rounded(long);
     let magnification = VECTOR_LENGTH * (across.1 - across.0) / bar;
     let view = |(axis, label, below): (usize, &str, &str)| {
-        let height = (size(axis) / per_pixel).max(HEIGHTS.0).round();
+        let height = (size(axis) / per_pixel).max(HEIGHT_RANGE.0).round();
         let up = centred(extent(axis), height * per_pixel);
         let vector = |(pose, &row): (&&PoseError, &usize)| {
             let colour = if pose.held_out { INK } else { FAINT };

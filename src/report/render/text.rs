@@ -5,16 +5,16 @@ use comfy_table::{CellAlignment, presets::NOTHING};
 use crate::report::document::{Block, Mark, Point, Table};
 
 /// Maximum width of running text in columns; tables may be wider.
-const WIDTH: usize = 110;
+const MAX_TEXT_WIDTH: usize = 110;
 
 /// Renders blocks as text, ending in a line break.
 pub(in crate::report) fn text(blocks: &[Block]) -> String {
-    text_within(blocks, WIDTH)
+    text_within(blocks, MAX_TEXT_WIDTH)
 }
 
 /// Renders blocks as text; running text is wrapped to at most `columns` characters.
 pub(in crate::report) fn text_within(blocks: &[Block], columns: usize) -> String {
-    let width = columns.min(WIDTH);
+    let width = columns.min(MAX_TEXT_WIDTH);
     let mut text = String::new();
     let mut follows_heading = false;
     for block in flat(blocks) {

@@ -8,7 +8,7 @@ use crate::numeric::range;
 use crate::problem::{JointKind, Problem};
 
 /// Number of configurations at which coverage is tested.
-const TRIED: u32 = 800;
+const TESTED_CONFIGURATIONS: u32 = 800;
 /// Largest distance to a fitted pose at which a position counts as covered, as a fraction of the
 /// workspace diagonal.
 const COVERED_DISTANCE: f64 = 0.1;
@@ -61,7 +61,7 @@ pub fn of(problem: &Problem, poses: &Poses, arm: &Arm) -> Coverage {
         };
         ends.iter().zip(PRIMES.iter().cycle()).map(value).collect()
     };
-    let configurations: Vec<Vec<f64>> = (1..=TRIED).map(configuration).collect();
+    let configurations: Vec<Vec<f64>> = (1..=TESTED_CONFIGURATIONS).map(configuration).collect();
     let tried: Vec<Pose> = configurations
         .iter()
         .map(|configuration| {

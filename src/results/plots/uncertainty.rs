@@ -10,11 +10,11 @@ use crate::random::stream;
 use crate::remainder::{Bounds, Fitted, JointError, Outcome, predict_identified};
 
 /// Number of random configurations whose error bounds are drawn.
-const TRIED: usize = 1500;
+const DRAWN_CONFIGURATIONS: usize = 1500;
 /// Probability with which an error bound holds.
-const LEVEL: f64 = 0.95;
+const BOUND_LEVEL: f64 = 0.95;
 /// Number of commands at which the error of a joint is drawn.
-const COMMANDS: usize = 120;
+const DRAWN_COMMANDS: usize = 120;
 /// Seed of the random configurations.
 const SEED: u64 = 0x0062_6f75_6e64;
 
@@ -69,7 +69,7 @@ impl Uncertainty {
         if measured.is_empty() {
             return Ok(Self {
                 outcome: fitted.outcome(),
-                level: LEVEL,
+                level: BOUND_LEVEL,
                 bounds: Vec::new(),
                 joints: Vec::new(),
             });
@@ -78,8 +78,9 @@ impl Uncertainty {
         let first = table.session.of_row[measured[0]];
         let of_session: Vec<usize> =
             measured.iter().copied().filter(|&row| table.session.of_row[row] == first).collect();
-        let drawn: Vec<usize> =
-            (0..TRIED).map(|_| of_session[rng.random_range(0..of_session.len())]).collect();
+        let drawn: Vec<usize> = (0..DRAWN_CONFIGURATIONS)
+            .map(|_| of_session[rng.random_range(0..of_session.len())])
+            .collect();
         let mut rows = table.select(&drawn);
         let n = rows.joints;
         for configuration in rows.configurations.chunks_mut(n) {
@@ -93,7 +94,7 @@ impl Uncertainty {
         let correction = fitted.correction();
         let (positions, corrected) = predict_identified(found, problem, correction, &rows)?;
         let bases = found.base_frames(problem, &rows)?;
-        let bounds = Bounds::new(correction, corrected, LEVEL);
+        let bounds = Bounds::new(correction, corrected, BOUND_LEVEL);
         let at = |(pose, position): (usize, &Vector3<f64>)| {
             let base = &bases[rows.session.of_row[pose]];
             BoundAt {
@@ -106,9 +107,9 @@ impl Uncertainty {
         let bounds = positions.iter().enumerate().map(at);
         Ok(Self {
             outcome: fitted.outcome(),
-            level: LEVEL,
+            level: BOUND_LEVEL,
             bounds: bounds.filter(|at| at.bound.is_finite()).collect(),
-            joints: correction.joint_errors(COMMANDS),
+            joints: correction.joint_errors(DRAWN_COMMANDS),
         })
     }
 }

@@ -14,7 +14,7 @@ use crate::select::neighbourhood::LinearNeighbourhood;
 
 /// Displacement, in units of σ, that replaces zero as the largest plausible one, because sizes have
 /// a reciprocal.
-const SIZE_OF_ZERO: f64 = 1e-9;
+const MIN_PLAUSIBLE_SIZE: f64 = 1e-9;
 
 /// Hypothesis with its columns and the logarithm of its prior probability.
 #[derive(Clone)]
@@ -80,7 +80,7 @@ pub(super) fn even(
         largest.push(if length > 0.0 {
             most * length / ((3 * weighed) as f64).sqrt()
         } else {
-            SIZE_OF_ZERO
+            MIN_PLAUSIBLE_SIZE
         });
         if length > 0.0 {
             column /= length;

@@ -16,7 +16,7 @@ use crate::problem::{Effect, Problem};
 use crate::select::settings::{MAX_REVISED_SETS, MIN_REVISED_PROBABILITY};
 
 /// Number of trial values on either side of the present one.
-const VALUES_EACH_SIDE: i32 = 8;
+const TRIALS_PER_SIDE: i32 = 8;
 /// Ratio of the farthest trial value to the present one, in the first and in the second pass. The
 /// first exceeds the spacing of listed values; the second is the spacing of the first pass.
 const LAST_RATIOS: [f64; 2] = [1.4, 1.043];
@@ -99,9 +99,9 @@ impl Hypotheses<'_> {
     /// `farthest`, that no candidate has yet.
     fn near(&self, candidate: &Candidate, farthest: f64, problem: &Problem) -> Vec<Candidate> {
         let Some(effect) = candidate.hypothesis.effect() else { return Vec::new() };
-        let factors = (-VALUES_EACH_SIDE..=VALUES_EACH_SIDE)
+        let factors = (-TRIALS_PER_SIDE..=TRIALS_PER_SIDE)
             .filter(|step| *step != 0)
-            .map(|step| farthest.powf(f64::from(step) / f64::from(VALUES_EACH_SIDE)));
+            .map(|step| farthest.powf(f64::from(step) / f64::from(TRIALS_PER_SIDE)));
         let others = factors.filter_map(|factor| effect.scaled(factor));
         let is_new = |effect: &Effect| {
             !self.all.iter().any(|known| known.hypothesis.effect() == Some(effect))

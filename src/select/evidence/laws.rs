@@ -21,9 +21,9 @@ use crate::select::fitted::Fitted;
 use crate::select::grammar::{MAX_POSES, Noise, Proposal, Quantities, WhitenedSite, proposals};
 
 /// Minimum probability of a set in the place of whose members laws are searched.
-const WORTH_A_LOOK: f64 = 0.05;
+const MIN_SET_PROBABILITY: f64 = 0.05;
 /// Maximum number of joints and sets beside which laws are searched.
-const MOST: usize = 2;
+const MAX_SEARCHED: usize = 2;
 
 /// Returns the laws that may stand in the place of what probable sets hold at a joint.
 pub(super) fn promising(
@@ -123,13 +123,13 @@ fn places(
     let mut found: BTreeSet<(usize, Vec<usize>)> = BTreeSet::new();
     let likely = weighted
         .iter()
-        .filter(|set| set.probability > WORTH_A_LOOK && !products.has_gear(&set.members));
+        .filter(|set| set.probability > MIN_SET_PROBABILITY && !products.has_gear(&set.members));
     for set in likely {
         for joint in set.members.iter().filter_map(|&member| of(member)) {
             let mut rest: Vec<usize> =
                 set.members.iter().copied().filter(|&member| of(member) != Some(joint)).collect();
             rest.sort_unstable();
-            if found.len() < MOST {
+            if found.len() < MAX_SEARCHED {
                 found.insert((joint, rest));
             }
         }

@@ -11,13 +11,13 @@ use super::terms::{Chunk, Product, Terms};
 /// Terms of a sum at most.
 const MAX_TERMS: usize = 3;
 /// Sums of equally many terms that are extended.
-const WIDTH: usize = 8;
+const EXTENDED_SUMS: usize = 8;
 /// Sums whose terms are each exchanged.
-const EXCHANGED: usize = 4;
+const EXCHANGED_SUMS: usize = 4;
 /// Extensions of a sum that are kept, by evidence and by guide.
-const KEPT: [usize; 2] = [100, 40];
+const KEPT_EXTENSIONS: [usize; 2] = [100, 40];
 /// Difference of the predictions of two sums of the beam, in units of the noise.
-const DISTINCT: f64 = 0.7;
+const MIN_BEAM_DIFFERENCE: f64 = 0.7;
 
 /// Sum of terms.
 pub type Sum = Vec<Product>;
@@ -82,7 +82,7 @@ impl<'a> Beam<'a> {
             self.extend(&front, &mut extended, &mut next);
             if depth > 1 {
                 let exchanged: BTreeSet<Sum> = self
-                    .best(&next, EXCHANGED)
+                    .best(&next, EXCHANGED_SUMS)
                     .into_iter()
                     .flat_map(|sum| {
                         (0..sum.len()).map(move |k| [&sum[..k], &sum[k + 1..]].concat())
@@ -92,7 +92,7 @@ impl<'a> Beam<'a> {
                 let exchanged: Vec<Sum> = exchanged.into_iter().collect();
                 self.extend(&exchanged, &mut extended, &mut next);
             }
-            front = self.best(&next, WIDTH);
+            front = self.best(&next, EXTENDED_SUMS);
             known.extend(next);
         }
         known
@@ -173,11 +173,11 @@ impl<'a> Beam<'a> {
 
     /// Returns the best sums, by evidence and by guide in turn, each with another prediction.
     fn best(&self, all: &BTreeMap<Sum, Scored>, most: usize) -> Vec<Sum> {
-        const LOOKED_AT: usize = 120;
+        const MAX_COMPARED_SUMS: usize = 120;
         let by = |of: fn(&Scored) -> f64| {
             let mut sorted: Vec<(&Sum, f64)> = all.iter().map(|(sum, s)| (sum, of(s))).collect();
             sorted.sort_by(|a, b| b.1.total_cmp(&a.1));
-            sorted.truncate(LOOKED_AT);
+            sorted.truncate(MAX_COMPARED_SUMS);
             sorted
         };
         let (by_evidence, by_guide) = (by(|s| s.ln_posterior), by(|s| s.guide));
@@ -192,7 +192,8 @@ impl<'a> Beam<'a> {
             }
             let prediction = self.state(sum).span.prediction();
             let is_near = |(_, other): &(Sum, DVector<f64>)| {
-                self.site.squares(&(other - &prediction)) < DISTINCT.powi(2) * self.noise.factor
+                self.site.squares(&(other - &prediction))
+                    < MIN_BEAM_DIFFERENCE.powi(2) * self.noise.factor
             };
             if !found.iter().any(is_near) {
                 found.push((sum.clone(), prediction));
@@ -210,13 +211,13 @@ fn normed(column: DVector<f64>) -> DVector<f64> {
 
 /// Returns the best extensions by evidence and by guide.
 fn best_of(mut all: Vec<Extension>) -> Vec<Extension> {
-    if all.len() <= KEPT[0] {
+    if all.len() <= KEPT_EXTENSIONS[0] {
         return all;
     }
     all.sort_by(|a, b| b.scored.ln_posterior.total_cmp(&a.scored.ln_posterior));
-    let mut others = all.split_off(KEPT[0]);
+    let mut others = all.split_off(KEPT_EXTENSIONS[0]);
     others.sort_by(|a, b| b.scored.guide.total_cmp(&a.scored.guide));
-    others.truncate(KEPT[1]);
+    others.truncate(KEPT_EXTENSIONS[1]);
     all.extend(others);
     all
 }

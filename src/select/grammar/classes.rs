@@ -10,7 +10,7 @@ use super::terms::{Terms, product};
 use super::written::{Written, written};
 
 /// ln odds behind the best sum beyond which sums are left out.
-const LN_ODDS: f64 = 12.0;
+const MAX_LN_ODDS: f64 = 12.0;
 /// Sums that form classes at most.
 const MAX_SUMS: usize = 400;
 /// Sums whose inner parameters are refined.
@@ -18,9 +18,9 @@ const MAX_REFINED: usize = 40;
 /// Classes that become laws.
 const MAX_CLASSES: usize = 8;
 /// Difference of predictions, in units of the noise, below which sums are one class.
-const SAME: f64 = 2.0;
+const MAX_CLASS_DIFFERENCE: f64 = 2.0;
 /// Values of an inner parameter that are tried: from one step below to one step above.
-const GRID: i32 = 8;
+const TRIAL_VALUES: i32 = 8;
 
 /// Law that stands for its class.
 #[derive(Debug, Clone)]
@@ -64,7 +64,7 @@ pub fn proposals(
         beam.search().into_iter().map(|(sum, scored)| (sum, scored.ln_posterior)).collect();
     sums.sort_by(|a, b| b.1.total_cmp(&a.1));
     let Some(best) = sums.first().map(|sum| sum.1) else { return Vec::new() };
-    sums.retain(|(_, ln)| *ln > best - LN_ODDS);
+    sums.retain(|(_, ln)| *ln > best - MAX_LN_ODDS);
     sums.truncate(MAX_SUMS);
     let refiner = Refiner { terms: &terms, known, site, noise };
     let mut all: Vec<Refined> = sums
@@ -77,7 +77,7 @@ pub fn proposals(
     for refined in all {
         let is_same = |class: &&mut Class| {
             let difference = &class.first.prediction - &refined.prediction;
-            site.squares(&difference) < SAME.powi(2) * noise.factor
+            site.squares(&difference) < MAX_CLASS_DIFFERENCE.powi(2) * noise.factor
         };
         if let Some(class) = classes.iter_mut().find(is_same) {
             class.ln_posterior = ln_add(class.ln_posterior, refined.ln_posterior);
@@ -104,7 +104,7 @@ pub fn proposals(
             return None;
         }
         let is_near = |other: &DVector<f64>| {
-            site.squares(&(other - &first.prediction)) < SAME.powi(2) * noise.factor
+            site.squares(&(other - &first.prediction)) < MAX_CLASS_DIFFERENCE.powi(2) * noise.factor
         };
         let is_present = predictions.iter().any(is_near);
         let law = written((&terms, known), joint, &first.sum, &first.inner);
@@ -139,9 +139,9 @@ impl Refiner<'_> {
                 let Some((start, step)) = self.terms.factors[usize::from(factor)].inner else {
                     continue;
                 };
-                let at = |k: i32| start + step * f64::from(k) / f64::from(GRID);
+                let at = |k: i32| start + step * f64::from(k) / f64::from(TRIAL_VALUES);
                 let mut evidences = Vec::new();
-                for k in -GRID..=GRID {
+                for k in -TRIAL_VALUES..=TRIAL_VALUES {
                     inner[t][f] = at(k);
                     evidences.push((k, self.evidence(&sum, &inner)));
                 }
@@ -154,10 +154,10 @@ impl Refiner<'_> {
                 // Over the cell about the best value.
                 let cell: Vec<f64> = evidences
                     .iter()
-                    .filter(|(other, _)| (other - k).abs() <= GRID / 2)
+                    .filter(|(other, _)| (other - k).abs() <= TRIAL_VALUES / 2)
                     .map(|(_, ln)| (ln - most).exp())
                     .collect();
-                averaged += (cell.iter().sum::<f64>() / f64::from(GRID + 1)).ln();
+                averaged += (cell.iter().sum::<f64>() / f64::from(TRIAL_VALUES + 1)).ln();
             }
         }
         let columns = self.columns(&sum, &inner);

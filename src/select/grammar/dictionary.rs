@@ -8,15 +8,15 @@ use super::quantities::{Quantities, range};
 /// Highest order of a wave of a joint's command.
 const HIGHEST_ORDER: u32 = 5;
 /// Positions of a kink along the range of a joint.
-const KINKS: u32 = 9;
+const KINK_POSITIONS: u32 = 9;
 /// Times of a step along the time measured.
-const STEPS: u32 = 16;
+const STEP_TIMES: u32 = 16;
 /// Parts of the time measured at both ends without a step.
 const STEP_MARGIN: f64 = 0.04;
 /// Time constants of a settling, as parts of the time measured.
-const SETTLINGS: (f64, f64, u32) = (0.08, 0.8, 4);
+const SETTLING_TIMES: (f64, f64, u32) = (0.08, 0.8, 4);
 /// Factors a and b of sums of angles a q + b q'.
-const SUMS: [[i32; 2]; 6] = [[1, 1], [1, -1], [2, 1], [2, -1], [1, 2], [1, -2]];
+const ANGLE_FACTORS: [[i32; 2]; 6] = [[1, 1], [1, -1], [2, 1], [2, -1], [1, 2], [1, -2]];
 /// Smallest part of the poses with a moment of either sign for the sign to be a factor.
 const MIN_SIGN_SHARE: f64 = 0.1;
 
@@ -38,10 +38,10 @@ pub fn factors(known: &Quantities, own: usize) -> Vec<Factor> {
         add(Form::Command(joint), None, ln_joint);
         add(Form::Square(joint), None, ln_joint);
         let (low, high) = range(values);
-        let step = (high - low) / f64::from(KINKS);
-        for k in 0..KINKS {
+        let step = (high - low) / f64::from(KINK_POSITIONS);
+        for k in 0..KINK_POSITIONS {
             let at = low + (f64::from(k) + 0.5) * step;
-            add(Form::Kink(joint), Some((at, step)), ln_joint - f64::from(KINKS).ln());
+            add(Form::Kink(joint), Some((at, step)), ln_joint - f64::from(KINK_POSITIONS).ln());
         }
         for order in (1..=HIGHEST_ORDER).filter(|_| known.turns[joint]) {
             let ln_prior = ln_joint - (f64::from(order).powi(2) * orders).ln() - 3.0_f64.ln();
@@ -58,9 +58,9 @@ pub fn factors(known: &Quantities, own: usize) -> Vec<Factor> {
         .enumerate()
         .flat_map(|(k, &one)| turning[k + 1..].iter().map(move |&other| [one, other]))
         .collect();
-    let of_sum = -(pairs.len().max(1) as f64 * SUMS.len() as f64 * 2.0).ln();
+    let of_sum = -(pairs.len().max(1) as f64 * ANGLE_FACTORS.len() as f64 * 2.0).ln();
     for joints in pairs {
-        for factors in SUMS {
+        for factors in ANGLE_FACTORS {
             for cosine in [false, true] {
                 add(Form::OfSum { joints, factors, cosine }, None, of_sum);
             }
@@ -87,16 +87,16 @@ pub fn factors(known: &Quantities, own: usize) -> Vec<Factor> {
     }
     if known.elapsed.is_some() {
         add(Form::Elapsed, None, 0.0);
-        let (first, last, count) = SETTLINGS;
+        let (first, last, count) = SETTLING_TIMES;
         for k in 0..count {
             let part = f64::from(k) / f64::from(count - 1);
             let constant = first * (last / first).powf(part);
             add(Form::Settling, Some((constant, 0.25 * constant)), -f64::from(count).ln());
         }
-        let width = (1.0 - 2.0 * STEP_MARGIN) / f64::from(STEPS);
-        for k in 0..STEPS {
+        let width = (1.0 - 2.0 * STEP_MARGIN) / f64::from(STEP_TIMES);
+        for k in 0..STEP_TIMES {
             let at = STEP_MARGIN + (f64::from(k) + 0.5) * width;
-            add(Form::Step, Some((at, width)), -f64::from(STEPS).ln());
+            add(Form::Step, Some((at, width)), -f64::from(STEP_TIMES).ln());
         }
     }
     if known.payload.is_some() {

@@ -6,7 +6,7 @@ use crate::model::parameter::Regressor;
 use crate::problem::{JointKind, Problem};
 
 /// Time constant of the lag that is tried, as a part of the time measured.
-const LAG: f64 = 0.1;
+const LAG_FRACTION: f64 = 0.1;
 
 /// Quantities of formulas in every pose; what does not vary is left out. Joints are counted from 0.
 pub struct Quantities {
@@ -69,7 +69,7 @@ impl Quantities {
                 Vec::new()
             },
             lag: (warming.is_some() && span > 0.0)
-                .then(|| to_three_digits(LAG * span).and_then(lagged))
+                .then(|| to_three_digits(LAG_FRACTION * span).and_then(lagged))
                 .flatten(),
             warming,
             elapsed: elapsed.map(|t| (t.iter().map(|t| t / span).collect(), span)),

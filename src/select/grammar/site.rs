@@ -3,9 +3,9 @@
 use nalgebra::{DMatrix, DVector};
 
 /// Points of the table of the likelihood over the noise.
-const POINTS: usize = 400;
+const NOISE_TABLE_POINTS: usize = 400;
 /// Variances of the coefficients, relative to that of their estimates, that are equally probable.
-const VARIANCES: [f64; 3] = [300.0, 5000.0, 80_000.0];
+const COEFFICIENT_VARIANCES: [f64; 3] = [300.0, 5000.0, 80_000.0];
 /// Variance that the beam search takes.
 pub const BEAM_VARIANCE: f64 = 3000.0;
 /// Part of a column's squared length that must be left beside others for it to count.
@@ -22,19 +22,19 @@ pub struct Noise {
 impl Noise {
     /// Tabulates the density up to the squares of the residual; `freedom` are its degrees of freedom.
     pub fn new(squares: f64, freedom: f64, ln_density: impl Fn(f64) -> f64) -> Self {
-        let at = |k: usize| squares * (k as f64 / POINTS as f64).powi(2);
-        let table: Vec<f64> = (0..=POINTS).map(|k| ln_density(at(k))).collect();
+        let at = |k: usize| squares * (k as f64 / NOISE_TABLE_POINTS as f64).powi(2);
+        let table: Vec<f64> = (0..=NOISE_TABLE_POINTS).map(|k| ln_density(at(k))).collect();
         Self { squares, table, factor: (squares / freedom.max(1.0)).max(1e-12) }
     }
 
     /// Returns ln of the density where `taken` is taken off the squares, over that of the whole.
     pub fn gain(&self, taken: f64) -> f64 {
         let left = ((self.squares - taken).max(0.0) / self.squares.max(f64::MIN_POSITIVE)).sqrt();
-        let place = left * POINTS as f64;
+        let place = left * NOISE_TABLE_POINTS as f64;
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "an index")]
-        let low = (place as usize).min(POINTS - 1);
+        let low = (place as usize).min(NOISE_TABLE_POINTS - 1);
         let part = place - low as f64;
-        self.table[low] * (1.0 - part) + self.table[low + 1] * part - self.table[POINTS]
+        self.table[low] * (1.0 - part) + self.table[low + 1] * part - self.table[NOISE_TABLE_POINTS]
     }
 
     /// Returns ln of the evidence for columns of `rank` new directions that take `squares` off.
@@ -43,7 +43,7 @@ impl Noise {
             self.gain(squares * variance / (1.0 + variance))
                 - 0.5 * rank as f64 * (1.0 + variance).ln()
         };
-        let all = VARIANCES.map(at);
+        let all = COEFFICIENT_VARIANCES.map(at);
         let most = all.into_iter().fold(f64::NEG_INFINITY, f64::max);
         most + (all.iter().map(|ln| (ln - most).exp()).sum::<f64>() / all.len() as f64).ln()
     }

@@ -8,11 +8,11 @@ use super::quantities::Quantities;
 use super::site::WhitenedSite;
 
 /// Probability of one, two and three factors.
-const FACTOR_COUNTS: [f64; 3] = [0.6, 0.3, 0.1];
+const FACTOR_COUNT_PROBABILITIES: [f64; 3] = [0.6, 0.3, 0.1];
 /// Part of a column's length that must be left by the fit.
 const MIN_LEFT: f64 = 2e-3;
 /// Terms whose columns are multiplied together.
-const TOGETHER: usize = 1024;
+const TERMS_PER_PRODUCT: usize = 1024;
 /// Terms of two factors that are kept.
 const MAX_PAIRS: usize = 8_000;
 /// Terms of two factors to which a third is added.
@@ -116,7 +116,9 @@ impl Terms {
             _ => 1.0,
         };
         let factors = term.iter().map(|&k| self.factors[usize::from(k)].ln_prior);
-        FACTOR_COUNTS[term.len().clamp(1, 3) - 1].ln() + factors.sum::<f64>() + orderings.ln()
+        FACTOR_COUNT_PROBABILITIES[term.len().clamp(1, 3) - 1].ln()
+            + factors.sum::<f64>()
+            + orderings.ln()
     }
 
     /// Returns the columns of a term.
@@ -134,9 +136,9 @@ impl Terms {
             terms.into_iter().partition(|term| self.width(term) == 1);
         let chunk = |(width, terms): (usize, &[Product])| self.chunk(width, terms, site);
         let all: Vec<(usize, &[Product])> = narrow
-            .chunks(TOGETHER)
+            .chunks(TERMS_PER_PRODUCT)
             .map(|some| (1, some))
-            .chain(wide.chunks(TOGETHER).map(|some| (2, some)))
+            .chain(wide.chunks(TERMS_PER_PRODUCT).map(|some| (2, some)))
             .collect();
         all.into_par_iter().map(chunk).collect()
     }

@@ -18,7 +18,7 @@ pub struct Written {
 }
 
 /// Digits of the values of inner parameters.
-const DIGITS: i32 = 3;
+const PARAMETER_DIGITS: i32 = 3;
 
 /// Writes a sum at a joint, counted from 0, with the values of its inner parameters.
 pub fn written(
@@ -117,5 +117,5 @@ fn name(joint: usize, formulas: &[String]) -> String {
 
 /// Rounds to a few digits.
 fn digits(value: f64) -> f64 {
-    format!("{value:.*e}", usize::try_from(DIGITS).unwrap_or(3)).parse().unwrap_or(value)
+    format!("{value:.*e}", usize::try_from(PARAMETER_DIGITS).unwrap_or(3)).parse().unwrap_or(value)
 }

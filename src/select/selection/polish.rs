@@ -14,7 +14,7 @@ use crate::select::settings::{LN_ODDS_OF_ANOTHER_ARGUMENT, MAX_SHIFT_TIMES};
 /// Maximum number of moves of one argument to the best of its neighbouring values.
 const MAX_POLISHING_PASSES: usize = 8;
 /// Trial factors on a time constant, distance or order.
-const FACTORS: [f64; 10] = [0.8, 0.86, 0.91, 0.95, 0.98, 1.02, 1.05, 1.1, 1.16, 1.25];
+const TRIAL_FACTORS: [f64; 10] = [0.8, 0.86, 0.91, 0.95, 0.98, 1.02, 1.05, 1.1, 1.16, 1.25];
 
 /// Returns the fit with refined arguments. Each searched argument is replaced by the one that
 /// explains all identification rows best in the linear neighbourhood, if that is clearly better;
@@ -77,7 +77,7 @@ fn better_argument(fitted: &Fitted, data: &Data, effect: &Effect) -> Option<Effe
 fn nearby(data: &Data, effect: &Effect) -> Vec<Effect> {
     let time = match effect {
         Effect::StationShift { at_time } | Effect::StationMove { at_time } => *at_time,
-        _ => return FACTORS.iter().filter_map(|factor| effect.scaled(*factor)).collect(),
+        _ => return TRIAL_FACTORS.iter().filter_map(|factor| effect.scaled(*factor)).collect(),
     };
     let all = data.times_between_poses();
     // The evidence sees every n-th row, and the list holds every m-th time.

@@ -16,9 +16,9 @@ const MAX_PAIRED: usize = 12;
 /// Maximum number of masses that are tried one by one.
 const MAX_MASSES: usize = 12;
 /// Step of zero positions that are tried \[°\]; the fit finds what lies between.
-const ZERO_STEP: i16 = 15;
+const ZERO_POSITION_STEP: i16 = 15;
 /// Ratios that are tried, in hundredths; the fit finds what lies between.
-const RATIOS: [i16; 18] =
+const TRIAL_RATIOS: [i16; 18] =
     [1, 5, 10, 20, 25, 33, 50, 67, 80, 90, 110, 125, 150, 200, 300, 400, 500, 1000];
 /// Maximum number of rows by which positions may be shifted.
 const MAX_SHIFT: i8 = 3;
@@ -26,17 +26,16 @@ const MAX_SHIFT: i8 = 3;
 const SHIFT_PLACES: usize = 12;
 
 /// Length beyond which a number may be in millimetres \[m\].
-pub(super) const LONG: f64 = 1.0;
+pub(super) const MIN_MILLIMETRE_LENGTH: f64 = 1.0;
 
 /// Returns every misreading that the problem and its table allow.
 pub(super) fn candidates(problem: &Problem, table: &Measurements) -> Vec<Misreading> {
     let turns =
         |radians| (0..problem.joints.len()).any(|joint| turns_in(problem, table, joint, radians));
     let lengths = |metres| table.position_unit.is_none_or(|unit| (unit >= 1.0) == metres);
-    let long = problem
-        .joints
-        .iter()
-        .any(|joint| lengths_of(&mut joint.clone()).iter().any(|length| length.abs() > LONG));
+    let long = problem.joints.iter().any(|joint| {
+        lengths_of(&mut joint.clone()).iter().any(|length| length.abs() > MIN_MILLIMETRE_LENGTH)
+    });
     let mut all = Vec::new();
     all.extend(turns(true).then_some(Misreading::Degrees));
     all.extend(turns(false).then_some(Misreading::Radians));
@@ -55,7 +54,7 @@ pub(super) fn candidates(problem: &Problem, table: &Measurements) -> Vec<Misread
 
 /// Returns true if the target of `[tool]` is so far away that it may be in millimetres.
 pub(super) fn is_far(problem: &Problem) -> bool {
-    problem.targets.is_empty() && problem.tool.target.norm() > LONG
+    problem.targets.is_empty() && problem.tool.target.norm() > MIN_MILLIMETRE_LENGTH
 }
 
 /// Returns misreadings of the joint columns: signs, exchanges, couplings, zeros and ratios.
@@ -81,11 +80,14 @@ fn of_commands(problem: &Problem) -> Vec<Misreading> {
         }
     }
     for &joint in &turning {
-        let steps = (1 - 180 / ZERO_STEP..=180 / ZERO_STEP).filter(|&step| step != 0);
-        all.extend(steps.map(|step| Misreading::Zero { joint, degrees: step * ZERO_STEP }));
+        let steps =
+            (1 - 180 / ZERO_POSITION_STEP..=180 / ZERO_POSITION_STEP).filter(|&step| step != 0);
+        all.extend(
+            steps.map(|step| Misreading::Zero { joint, degrees: step * ZERO_POSITION_STEP }),
+        );
     }
     for &joint in &moving {
-        all.extend(RATIOS.map(|percent| Misreading::Ratio { joint, percent }));
+        all.extend(TRIAL_RATIOS.map(|percent| Misreading::Ratio { joint, percent }));
     }
     all
 }
@@ -130,7 +132,10 @@ fn of_joint_table(problem: &Problem) -> Vec<Misreading> {
         all.extend((counts[1] > 1).then_some(Misreading::TableDegrees { joint: 0, field }));
     }
     let count_long = |joint: &Joint| {
-        lengths_of(&mut joint.clone()).iter().filter(|length| length.abs() > LONG).count()
+        lengths_of(&mut joint.clone())
+            .iter()
+            .filter(|length| length.abs() > MIN_MILLIMETRE_LENGTH)
+            .count()
     };
     let long: usize = problem.joints.iter().map(count_long).sum();
     for (joint, declared) in (1..).zip(&problem.joints) {
@@ -145,7 +150,8 @@ fn of_joint_table(problem: &Problem) -> Vec<Misreading> {
                 PLAUSIBLE_LENGTHS.contains(&(length.abs() * 10.0_f64.powi((*power).into())))
             };
             // Of a single long length this is `Misreading::ArmInMillimetres`.
-            let is_new = |power: &i8| *power != -3 || length.abs() <= LONG || long > 1;
+            let is_new =
+                |power: &i8| *power != -3 || length.abs() <= MIN_MILLIMETRE_LENGTH || long > 1;
             let powers = [-3, 3, -2, 2, -1, 1].into_iter().filter(is_plausible).filter(is_new);
             all.extend(powers.map(|power| Misreading::Length { joint, field, power }));
         }

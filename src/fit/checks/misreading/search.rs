@@ -17,9 +17,9 @@ use crate::problem::Problem;
 
 /// Largest error with a misreading corrected, relative to the error as read, at which the
 /// misreading is an explanation.
-const EXPLAINED: f64 = 0.2;
+const MAX_EXPLAINED_RATIO: f64 = 0.2;
 /// Largest ratio to the smallest error at which a misreading is named in addition to the best one.
-const AS_GOOD: f64 = 1.5;
+const MAX_RATIO_TO_BEST: f64 = 1.5;
 /// Largest error, as a multiple of the arm's reach, at which misreadings are tried. Millimetres
 /// read as metres give a factor of 1000.
 const MAX_REACHES: f64 = 1e4;
@@ -31,11 +31,11 @@ const MAX_ROWS: usize = 120;
 /// Maximum number of moving joints of which every subset is tried as reversed.
 const MAX_REVERSED: usize = 7;
 /// Number of misreadings that are fitted in full: those with which the nominal arm is nearest.
-const FITTED: usize = 12;
+const MAX_FITTED_MISREADINGS: usize = 12;
 /// Maximum number of steps of such a fit.
 const MAX_STEPS: u64 = 60;
 /// Part of the rows that a robust loss may set aside: the error is that of the others.
-const SET_ASIDE: f64 = 0.3;
+const MAX_SET_ASIDE_SHARE: f64 = 0.3;
 
 /// Rows with which misreadings are tried.
 struct Trial<'a> {
@@ -97,7 +97,7 @@ fn explanations(fit: &CheckedFit) -> Explanations {
 /// ascending order.
 fn near(errors: &[(Misreading, f64)], nominal: f64) -> Vec<Misreading> {
     let best = errors.first().map_or(0.0, |found| found.1);
-    let limit = (EXPLAINED * nominal).min(AS_GOOD * best);
+    let limit = (MAX_EXPLAINED_RATIO * nominal).min(MAX_RATIO_TO_BEST * best);
     errors.iter().take_while(|found| found.1 <= limit).map(|(misreading, _)| *misreading).collect()
 }
 
@@ -122,7 +122,7 @@ impl Trial<'_> {
             .iter()
             .map(|(misreading, _)| *misreading)
             .filter(|misreading| is_first(misreading))
-            .take(FITTED)
+            .take(MAX_FITTED_MISREADINGS)
             .collect();
         let explanation = |&misreading: &Misreading| {
             let (rms, size) = self.rms(misreading, true)?;
@@ -137,11 +137,11 @@ impl Trial<'_> {
         let mut explained: Vec<Explanation> = explained
             .into_iter()
             .flatten()
-            .filter(|explanation| explanation.rms < EXPLAINED * as_read)
+            .filter(|explanation| explanation.rms < MAX_EXPLAINED_RATIO * as_read)
             .collect();
         explained.sort_by(|a, b| a.rms.total_cmp(&b.rms));
         let best = explained.first().map_or(0.0, |explanation| explanation.rms);
-        explained.retain(|explanation| explanation.rms <= AS_GOOD * best);
+        explained.retain(|explanation| explanation.rms <= MAX_RATIO_TO_BEST * best);
         explained
     }
 
@@ -244,7 +244,7 @@ impl Trial<'_> {
         if self.fitting.loss != Loss::Squares {
             squares.sort_by(f64::total_cmp);
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a count")]
-            squares.truncate(((1.0 - SET_ASIDE) * squares.len() as f64).ceil() as usize);
+            squares.truncate(((1.0 - MAX_SET_ASIDE_SHARE) * squares.len() as f64).ceil() as usize);
         }
         (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()
     }
@@ -269,6 +269,6 @@ impl Trial<'_> {
             Misreading::Reversed { joints } => joints.count_ones(),
             _ => 0,
         };
-        errors.into_iter().filter(|(_, error)| *error <= AS_GOOD * best).min_by_key(size)
+        errors.into_iter().filter(|(_, error)| *error <= MAX_RATIO_TO_BEST * best).min_by_key(size)
     }
 }

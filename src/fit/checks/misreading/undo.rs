@@ -4,14 +4,16 @@ use std::f64::consts::PI;
 
 use nalgebra::Vector3;
 
-use super::candidates::{LONG, is_far, lengths_of, masses_of, number_of, turns_in};
+use super::candidates::{
+    MIN_MILLIMETRE_LENGTH, is_far, lengths_of, masses_of, number_of, turns_in,
+};
 use super::{Misreading, numbers_of};
 use crate::measurement::Measurements;
 use crate::model::parameter::JointField;
 use crate::problem::{Effect, Freedom, ParameterRule, Problem, Quantities};
 
 /// Length of an inch \[mm\].
-const INCH: f64 = 25.4;
+const MM_PER_INCH: f64 = 25.4;
 
 /// Returns ten to a power.
 fn ten(power: i8) -> f64 {
@@ -39,7 +41,9 @@ impl Misreading {
             Self::TargetInMillimetres => {}
             Self::ArmInMillimetres => {
                 let lengths = problem.joints.iter_mut().flat_map(lengths_of);
-                lengths.filter(|length| length.abs() > LONG).for_each(|length| *length *= 1e-3);
+                lengths
+                    .filter(|length| length.abs() > MIN_MILLIMETRE_LENGTH)
+                    .for_each(|length| *length *= 1e-3);
             }
             Self::StandardForm => return declared.read_as_standard(),
             Self::ModifiedForm => return declared.read_as_modified(),
@@ -156,7 +160,7 @@ impl Misreading {
         match self {
             Self::Metres => rows.positions.iter_mut().for_each(|position| *position *= 1e3),
             Self::Millimetres => rows.positions.iter_mut().for_each(|position| *position *= 1e-3),
-            Self::Inches => rows.positions.iter_mut().for_each(|position| *position *= INCH),
+            Self::Inches => rows.positions.iter_mut().for_each(|position| *position *= MM_PER_INCH),
             Self::Mirrored => {
                 rows.positions.iter_mut().for_each(|position| position.swap_rows(0, 1));
             }
