@@ -218,7 +218,7 @@ impl Identification {
         let n = known.len();
         let value = |(j, k): (usize, usize)| {
             let both = known.get(j) == Some(&true) && known.get(k) == Some(&true);
-            found.covariance.of(j, k).filter(|_| both).unwrap_or(f64::NAN)
+            found.covariance.entry(j, k).filter(|_| both).unwrap_or(f64::NAN)
         };
         numbers(py, (0..n).flat_map(|j| (0..n).map(move |k| (j, k))).map(value))
     }

@@ -50,7 +50,7 @@ impl Export {
             found.strategy.model(Model::new(problem, &placement.bases, &placement.targets)?);
         let arm = model.arm(|k| found.x.get(k).copied().unwrap_or(0.0));
         let moved = export(&chain, problem, &arm)?;
-        let errors = Some(ExportedErrors::of(&model, &found.x, data, None));
+        let errors = Some(ExportedErrors::new(&model, &found.x, data, None));
         let result = ExportResult::new(problem, &model, None, Some(&moved.moved), errors);
         let (json, summary) = (result.to_json(), report::export_text(&result));
         Ok(Self { text: moved.text, json, summary })

@@ -65,7 +65,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     fit::held_out_positions(&problem, &data)?;
     let options = Options::default().with_strategy(Strategy::Joint).with_solver(SolverChoice::Auto);
     let fit = |sink| fit::identify(&problem, &data, &options.with_progress(sink));
-    let found = Line::during(common.talks(), None, fit)?;
+    let found = Line::during(common.prints_text(), None, fit)?;
     let declared = remainder::declared(&problem)?.filter(|_| !arguments.remainder);
     let fitted = if arguments.remainder {
         remainder::fit(&found, &problem, &data)?
@@ -108,7 +108,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     }
     let (json, page) = (result.to_json(), report::acceptance_page(&problem, &result));
     results.write(&[("acceptance.json", &json), ("acceptance.html", &page)])?;
-    common.tell(&json, || {
+    common.print_result(&json, || {
         let text = report::acceptance_text(&problem, &result);
         let page = results.path("acceptance.html");
         format!("{text}{}Next: print {} and sign it\n", results.written(), page.display())

@@ -58,7 +58,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let json = CheckResult::new(&problem, &check).to_json();
     results.write(&[("check.json", &json)])?;
     let written = results.path("check.json");
-    common.tell(&json, || {
+    common.print_result(&json, || {
         let problem_word = shell_word(common.problem());
         let is_measured = arguments.poses.is_none() && arguments.source.candidates.is_empty();
         let next = if check.suffices() && is_measured {

@@ -38,14 +38,14 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         let location = problem.data.held_out_location.clone();
         return Err(location.error(InputErrorKind::NoHeldOut).into());
     }
-    let comparison = Line::during(common.talks(), None, |progress| {
+    let comparison = Line::during(common.prints_text(), None, |progress| {
         fit::compare(&problem, &data, &CompareOptions { paper: arguments.paper, progress })
     })?;
     let json = ComparisonResult::new(&problem, &comparison).to_json();
     let shown = PlotData::of_comparison(&problem, &data, &comparison)?;
     let told = report::comparison_report(&problem, &comparison, &shown);
     results.write_report(&[("compare.json", &json)], &told)?;
-    common.tell(&json, || {
+    common.print_result(&json, || {
         let text = report::compare_text(&problem, &comparison);
         let lacks = exceeds_noise(&comparison.joint);
         let (command, what) = if lacks {

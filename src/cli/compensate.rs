@@ -134,7 +134,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     if let Some(bounds) = bounds {
         result = result.with_bounds(bounds);
     }
-    common.tell(&result.to_json(), || {
+    common.print_result(&result.to_json(), || {
         let written = results.path("commands.csv");
         let [problem_word, estimate] = [common.problem(), &arguments.estimate].map(shell_word);
         format!(

@@ -169,7 +169,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     };
     results.write(&[(&name, &text)])?;
     let result = ExportResult::new(&problem, &model, Some(&path), moved.as_deref(), errors);
-    flags.tell(&result.to_json(), || {
+    flags.print_result(&result.to_json(), || {
         let [problem, estimate] = [&arguments.problem, &arguments.estimate].map(|path| shell_word(path));
         let of_workspace = best.as_ref().map_or_else(String::new, |best| {
             format!(
@@ -214,7 +214,7 @@ fn write_c(
     results.write(&C_FILES.into_iter().zip(texts).collect::<Vec<_>>())?;
     let mut result = ExportResult::new(problem, &model, Some(&folder), None, None);
     result.not_held.clear();
-    flags.tell(&result.to_json(), || {
+    flags.print_result(&result.to_json(), || {
         let sources: Vec<String> =
             C_FILES.iter().skip(1).map(|name| shell_word(&folder.join(name))).collect();
         let remainder = correction.is_some_and(|correction| correction.has_remainder());
@@ -248,7 +248,7 @@ fn errors(
     let placement = Placement::of(&data.measurements);
     let model = estimates.model(Model::new(problem, &placement.bases, &placement.targets)?);
     let x = estimates.vector(problem, &model)?;
-    let mut errors = ExportedErrors::of(&model, &x, &data, Some(estimates));
+    let mut errors = ExportedErrors::new(&model, &x, &data, Some(estimates));
     let held_out = &data.split.held_out;
     let poses = placement.poses(&data.measurements, held_out, 1.0);
     if let Some(best) = best

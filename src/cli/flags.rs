@@ -28,13 +28,17 @@ pub struct Flags {
 
 impl Flags {
     /// Returns true if the output is text for people: neither JSON nor quiet.
-    pub fn talks(&self) -> bool {
+    pub fn prints_text(&self) -> bool {
         !self.json && !self.quiet
     }
 
     /// Prints a result: the text `json` if JSON is requested, else the text that `words` returns;
     /// nothing if quiet.
-    pub fn tell(&self, json: &str, words: impl FnOnce() -> String) -> Result<(), WriteError> {
+    pub fn print_result(
+        &self,
+        json: &str,
+        words: impl FnOnce() -> String,
+    ) -> Result<(), WriteError> {
         match (self.json, self.quiet) {
             (true, _) => output::print_json(json),
             (false, true) => Ok(()),

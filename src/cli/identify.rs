@@ -75,7 +75,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         .with_influential_rows()
         .with_stop(stop.clone());
     let (sources, identification) =
-        Line::during(common.talks(), stop, |sink| -> Result<_, IdentifyError> {
+        Line::during(common.prints_text(), stop, |sink| -> Result<_, IdentifyError> {
             let options = options.with_progress(sink);
             let found = fit::identify(&problem, &data, &options)?;
             // The fit that was asked for is there: an interrupt ends no more than what is told
@@ -132,14 +132,14 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     interrupt::begin_writing();
     results.write_report(&texts, &told)?;
     let sources = sources.as_ref().map(report::joint_sources_text);
-    common.tell(&json, || {
+    common.print_result(&json, || {
         let told = if arguments.verbose {
             report::estimate_text(&problem, &identification)
         } else {
             report::estimate_brief(&problem, &identification, output::columns())
         };
         let sources = sources.as_ref().map_or_else(String::new, |words| format!("\n{words}\n"));
-        let is_structured = shown.findings.is_structured();
+        let is_structured = shown.residual_tests.is_structured();
         let estimate = results.path("estimate.json");
         let next = next::after_fit(common, &identification, is_structured, &estimate);
         format!("{told}{words}{sources}{}Next: {next}\n", results.written())

@@ -44,6 +44,6 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     results.write(&[("problem.toml", &description.text)])?;
     let file = results.path("problem.toml");
     let json = InitResult::new(&chain, &description, &file).to_json();
-    flags.tell(&json, || report::init_text(&chain, &description, &results.folder))?;
+    flags.print_result(&json, || report::init_text(&chain, &description, &results.folder))?;
     Ok(Outcome::Done)
 }

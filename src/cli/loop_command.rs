@@ -59,7 +59,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     };
     let last_work = unfinished.clone();
     interrupt::at_deadline(move || last_work.write());
-    let closure = Line::during(common.talks(), stop, close)?;
+    let closure = Line::during(common.prints_text(), stop, close)?;
     let results = if closure.interrupted { unfinished.keeping_finished()? } else { results };
     let [files, joint_files] = unfinished.files_from(&results.folder)?;
     let mut shown = PlotData::of_loop(&problem, &data, &closure)?;
@@ -99,7 +99,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let told = report::loop_report(&problem, &closure, &shown);
     interrupt::begin_writing();
     results.write_report(&texts, &told)?;
-    common.tell(&json, || {
+    common.print_result(&json, || {
         let told = if arguments.verbose {
             report::loop_text(&problem, &closure)
         } else {

@@ -146,7 +146,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         Some(given)
     };
     let criterion = Criterion::from(arguments.criterion);
-    let line = common.talks().then(Line::new);
+    let line = common.prints_text().then(Line::new);
     let show = |PlanProgress { start, sweep, value }: PlanProgress| {
         if let Some(line) = &line {
             let what =
@@ -178,7 +178,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         PlanResult::new(&problem, criterion, source.seed, &plan, separated.as_ref()).to_json();
     let table = poses_csv(&problem, &plan.poses);
     results.write(&[("plan.csv", &table), ("plan.json", &json)])?;
-    common.tell(&json, || {
+    common.print_result(&json, || {
         let text = report::plan_text(&problem, criterion, &plan, separated.as_ref());
         let table = results.path("plan.csv");
         let (problem, word) = (shell_word(common.problem()), shell_word(&table));

@@ -95,7 +95,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let borrowed: Vec<(&str, &str)> =
         texts.iter().map(|(name, text)| (*name, text.as_str())).collect();
     results.write(&borrowed)?;
-    common.tell(errors.as_deref().unwrap_or(&PredictionErrors::default().to_json()), || {
+    common.print_result(errors.as_deref().unwrap_or(&PredictionErrors::default().to_json()), || {
         let arm = if estimate.is_some() { "the identified arm" } else { "the nominal arm" };
         let text = report::prediction_text(&problem, arm, &prediction, bounds);
         let names: Vec<&str> = texts.iter().map(|(name, _)| *name).collect();

@@ -62,7 +62,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     // A fraction is split when the rows are read.
     let divided = matches!(problem.data.held_out, Some(HeldOut::Fraction { .. }))
         || simulation.held_out() > 0;
-    flags.tell(&json, || {
+    flags.print_result(&json, || {
         let next = if divided { next(&arguments.problem, &table) } else { String::new() };
         summary(&simulation, &table) + &next
     })?;

@@ -163,7 +163,7 @@ fn work(common: &Common, shard: Option<Shard>) -> Result<Outcome, Box<dyn Error>
     if shard.is_none() {
         return finish(common, &study, &results, &[store]);
     }
-    if common.flags.talks() {
+    if common.flags.prints_text() {
         let (file, folder) = (shell_word(&common.study), shell_word(&results.folder));
         output::print(&format!(
             "Share done. After the last: flexcal study merge {file} --out {folder}\n"
@@ -176,14 +176,18 @@ fn work(common: &Common, shard: Option<Shard>) -> Result<Outcome, Box<dyn Error>
 fn misprints(common: &Common, study: &MisprintStudy) -> Result<Outcome, Box<dyn Error>> {
     let names = ["misprints.json", REPORT[0], REPORT[1]];
     let results = common.claim(&study.name, &study.files, &names)?;
-    let bar =
-        common.flags.talks().then(|| FitBar::new((study.specimens * study.cases.len()) as u64, 0));
+    let bar = common
+        .flags
+        .prints_text()
+        .then(|| FitBar::new((study.specimens * study.cases.len()) as u64, 0));
     let found = study::replicate(study, || bar.iter().for_each(FitBar::advance));
     bar.iter().for_each(FitBar::clear);
     let found = found?;
     let json = MisprintResult::new(study, &found).to_json();
     results.write_report(&[(names[0], &json)], &report::replica_report(study, &found))?;
-    common.flags.tell(&json, || report::replica_text(study, &found) + &results.written())?;
+    common
+        .flags
+        .print_result(&json, || report::replica_text(study, &found) + &results.written())?;
     Ok(Outcome::Done)
 }
 
@@ -192,7 +196,7 @@ fn fit(common: &Common, study: &Study, store: &Store, shard: Shard) -> Result<()
     let share = study.parts().into_iter().enumerate().filter(|(index, _)| shard.holds(*index));
     let all: usize = share.map(|(_, part)| part.repetitions.len()).sum();
     let open: usize = parts.iter().map(|part| part.repetitions.len()).sum();
-    let bar = common.flags.talks().then(|| FitBar::new(all as u64, (all - open) as u64));
+    let bar = common.flags.prints_text().then(|| FitBar::new(all as u64, (all - open) as u64));
     let done = study::run(study, store, &parts, || bar.iter().for_each(FitBar::advance));
     bar.iter().for_each(FitBar::clear);
     Ok(done?)
@@ -213,7 +217,7 @@ fn finish(
         (NAMES[3], &study_csv(study, &found)),
     ];
     results.write(&texts)?;
-    common.flags.tell(&json, || {
+    common.flags.print_result(&json, || {
         let (text, table) = (report::study_text(study, &found), results.path("study.csv"));
         format!(
             "{text}\nWritten to {}, each parameter to parameters.csv beside it\n",

@@ -30,14 +30,14 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let Input { problem, mut data, results } = common.read("trace", &["trace.json"])?;
     common.say_if_nothing_is_free(&problem);
     common.say_of_orientation(&problem, &mut data);
-    let trace = Line::during(common.talks(), None, |sink| {
+    let trace = Line::during(common.prints_text(), None, |sink| {
         select::trace(&problem, &data, &Options::default().with_progress(sink))
     })?;
     let result = TraceResult::new(&problem, &trace);
     let json = result.to_json();
     results.write(&[("trace.json", &json)])?;
     let written = results.path("trace.json");
-    common.tell(&json, || {
+    common.print_result(&json, || {
         let (text, next) =
             (report::trace_text(&problem, &trace), next::after_trace(common, &result));
         format!("{text}\nWritten to {}\nNext: {next}\n", written.display())

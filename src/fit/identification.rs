@@ -25,7 +25,7 @@ use crate::fit::stages::placement::ASSUMED_SIGMA;
 use crate::fit::stages::stage::StageError;
 use crate::fit::uncertainty::active_constraint::ActiveConstraint;
 use crate::fit::uncertainty::covariance::Collected;
-use crate::fit::uncertainty::noise::{Noise, fitted, taken};
+use crate::fit::uncertainty::noise::{Noise, assumed_noise, fitted};
 use crate::fit::uncertainty::prior_sizes::prior_sizes;
 use crate::fit::uncertainty::refuted_priors::refuted_priors;
 use crate::fit::uncertainty::statistics::Statistics;
@@ -174,7 +174,7 @@ fn fit_rows(
     let (start, registered) =
         prepared(&mut fitting, options.warm_start.as_deref(), has_declared_noise)?;
     let begin = options.begin(model, &start);
-    let enough = PoseSufficiency::of(&fitting, problem, &unknowns, &start);
+    let enough = PoseSufficiency::new(&fitting, problem, &unknowns, &start);
     let judged = enough.judges_noise(unknowns.len());
     let (mut end, statistics, noise) = fitted(&mut fitting, &begin, (has_declared_noise, judged))?;
     let errors = fitting.position_errors(&split.identification, &end.x);
@@ -201,7 +201,7 @@ fn fit_rows(
     } else {
         Vec::new()
     };
-    let (noise_factor, sigma_taken) = taken(&whole, measurements.leading());
+    let (noise_factor, sigma_taken) = assumed_noise(&whole, measurements.leading());
     let told = asked && noise != Noise::Unknown && end.termination.converged();
     let values: Vec<f64> = whole.unknowns.iter().map(|&k| end.x[k]).collect();
     let sizes = || prior_sizes(&unknowns, &values, &statistics.covariance);
@@ -361,7 +361,7 @@ fn estimated(
         let placed: FitEnd = stage.run(&end.x)?.into();
         end.iterations += placed.iterations;
         end.evaluations += placed.evaluations;
-        let statistics = Statistics::of(
+        let statistics = Statistics::new(
             &stage,
             &placed,
             (noise == Noise::Declared).then_some(fitting.noise_model),

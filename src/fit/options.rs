@@ -83,7 +83,7 @@ impl Options {
     }
 
     /// Reports progress, if there is a receiver.
-    pub(crate) fn tell(&self, progress: impl FnOnce() -> Progress) {
+    pub(crate) fn report_progress(&self, progress: impl FnOnce() -> Progress) {
         if let Some(sink) = &self.progress {
             sink(progress());
         }

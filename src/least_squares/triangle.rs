@@ -45,7 +45,7 @@ impl Triangle {
     ///
     /// Large matrices are sorted by the first non-zero column of each row, which saves work for
     /// stacks of triangular factors.
-    pub(crate) fn of(matrix: &DMatrix<f64>) -> DMatrix<f64> {
+    pub(crate) fn factor(matrix: &DMatrix<f64>) -> DMatrix<f64> {
         let (m, n) = matrix.shape();
         let mut order: Vec<usize> = (0..m).collect();
         if n >= MIN_BLOCKED_COLUMNS {
@@ -462,7 +462,7 @@ mod tests {
                 i => (i - 2 * n) as f64 * wave(j),
             };
             let matrix = DMatrix::from_fn(2 * n + 2, n, entry);
-            let triangle = Triangle::of(&matrix);
+            let triangle = Triangle::factor(&matrix);
             let gram = matrix.tr_mul(&matrix);
             assert!((triangle.tr_mul(&triangle) - &gram).amax() < 1e-13 * gram.amax());
             assert!(triangle.lower_triangle().iter().filter(|value| **value != 0.0).count() <= n);

@@ -87,7 +87,7 @@ fn inverse_normal(mut a: DMatrix<f64>) -> DMatrix<f64> {
     for (mut column, scale) in a.column_iter_mut().zip(scale.iter()) {
         column.unscale_mut(*scale);
     }
-    let triangle = Triangle::of(&a);
+    let triangle = Triangle::factor(&a);
     let mut v = regular_inverse(&triangle, WELL_CONDITIONED).unwrap_or_else(|| {
         let SingularValues { values, right: mut v } = SingularValues::of(&a);
         let largest = values[0];

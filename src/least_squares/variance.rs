@@ -46,7 +46,7 @@ impl VarianceLikelihood {
     /// `rows` is the number of data rows and `squares` their ‖r‖². `priors` holds 1 σ of each
     /// unknown's prior, `held` marks unknowns that are not estimated, and the rows of `closed` are
     /// combinations that are fixed.
-    pub fn of(
+    pub fn new(
         data: &Linearisation,
         (rows, squares): (usize, f64),
         x: &DVector<f64>,
@@ -78,7 +78,7 @@ impl VarianceLikelihood {
         stack
             .view_mut((n, width), (closed.nrows(), 1))
             .copy_from(&(closed * moved * -CONSTRAINT_WEIGHT));
-        let reduced = Triangle::of(&stack);
+        let reduced = Triangle::factor(&stack);
         let (first, k) = (free.len(), with_prior.len());
         let prior_block = reduced.view((first, first), (k, k)).into_owned();
         let y = reduced.view((first, width), (k, 1)).column(0).into_owned();
@@ -161,7 +161,7 @@ mod tests {
         triangle.absorb(&mut block);
         let closed = DMatrix::zeros(0, 2);
         let data = triangle.into_linearisation();
-        VarianceLikelihood::of(
+        VarianceLikelihood::new(
             &data,
             (rows, squares),
             &DVector::zeros(2),

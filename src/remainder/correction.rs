@@ -166,7 +166,7 @@ impl Correction {
         poses: &[Pose],
     ) -> Vec<CorrectedPose> {
         let columns = self.columns(model, x);
-        let placed = PlacementFit::of((problem, model, x), placed, poses);
+        let placed = PlacementFit::new((problem, model, x), placed, poses);
         let of_chunk = |poses: &[Pose]| self.factors(&columns, (problem, model, x), poses);
         let chunks = || {
             poses.chunks(POSES_PER_CHUNK).enumerate().map(|(k, poses)| (POSES_PER_CHUNK * k, poses))

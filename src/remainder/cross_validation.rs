@@ -28,7 +28,7 @@ pub(super) fn cross_validated(
         let hyper = search_near(training, &rows, near)?;
         let centres: Vec<usize> = (0..rows.len()).collect();
         let predicted = |hyper| {
-            let conditioned = Training::of((&rows, inputs), &training.prior, hyper, &centres)?;
+            let conditioned = Training::new((&rows, inputs), &training.prior, hyper, &centres)?;
             Some(conditioned.posterior.left_out(&left_out))
         };
         let (alone, with) = (predicted(&noise)?, predicted(&hyper)?);

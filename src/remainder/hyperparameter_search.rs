@@ -76,7 +76,7 @@ pub(super) fn search_near(
 fn left_out_error(training: &TrainingRows, rows: &Rows, hyper: &Hyperparameters) -> Option<f64> {
     let centres: Vec<usize> = (0..rows.len()).collect();
     let inputs = &training.layout.inputs;
-    let conditioned = Training::of((rows, inputs), &training.prior, hyper, &centres)?;
+    let conditioned = Training::new((rows, inputs), &training.prior, hyper, &centres)?;
     let left_out = conditioned.without_each(&rows.configuration, &centres)?;
     Some(left_out.iter().map(|row| row.error.norm()).sum::<f64>() / rows.len() as f64)
 }

@@ -41,7 +41,7 @@ pub(super) fn judge(training: &TrainingRows, is_remainder_wanted: bool) -> Optio
     let conditioned = |hyper: &Hyperparameters| {
         let centres = training.some_rows(training.centres(), 1);
         let rows = (&training.rows, &training.layout.inputs);
-        Training::of(rows, &training.prior, hyper, &centres)
+        Training::new(rows, &training.prior, hyper, &centres)
     };
     let judged_rows = training.rows.select(&training.judged);
     let configurations = judged_rows.configurations();

@@ -31,7 +31,7 @@ pub(super) struct Taken {
 impl PlacementFit {
     /// Linearises the rows `poses` in the parameters `placed` of bases and tools, with the arm at
     /// the full parameter vector `x` of `model`.
-    pub fn of(
+    pub fn new(
         (problem, model, x): (&Problem, &Model, &DVector<f64>),
         placed: &[usize],
         poses: &[Pose],

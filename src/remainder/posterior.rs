@@ -231,7 +231,7 @@ fn features(
 impl Training {
     /// Conditions on `rows`, with inducing variables at the rows with the indices `centres` and at
     /// knots. Returns `None` if a matrix is not positive definite because of rounding.
-    pub fn of(
+    pub fn new(
         (rows, inputs): (&Rows, &Inputs),
         prior: &ParameterPrior,
         hyper: &Hyperparameters,

@@ -49,7 +49,7 @@ pub fn residuals(
     let corrected = correction.at((problem, &model, &found.x), &placed, &poses);
     if correction.has_remainder() {
         let mut shifts: Vec<Vector3<f64>> = corrected.iter().map(|pose| pose.shift).collect();
-        let placement = PlacementFit::of((problem, &model, &found.x), &placed, &poses);
+        let placement = PlacementFit::new((problem, &model, &found.x), &placed, &poses);
         placement.refit(&mut shifts, &model.residuals(poses, &found.x));
         in_measuring_frame(table, &model.base_frames(found.x.as_slice()), &mut shifts);
         for (row, shift) in rows.iter_mut().zip(&shifts) {

@@ -105,7 +105,7 @@ fn the_gradient_of_the_likelihood_is_its_slope() {
 #[test]
 fn leaving_out_in_closed_form_is_fitting_again() {
     let (rows, inputs, prior, hyper) = (rows(), inputs(), prior(), hyper());
-    let training = Training::of((&rows, &inputs), &prior, &hyper, &all(&rows)).unwrap();
+    let training = Training::new((&rows, &inputs), &prior, &hyper, &all(&rows)).unwrap();
     let single = training.without_each(&rows.configuration, &all(&rows)).unwrap();
     let block: Vec<usize> = rows.configuration.iter().map(|predicted| predicted % 4).collect();
     let blocks = training.without_each(&block, &all(&rows)).unwrap();
@@ -114,7 +114,7 @@ fn leaving_out_in_closed_form_is_fitting_again() {
                  row: usize| {
         let kept: Vec<usize> = all(&rows).into_iter().filter(|&row| !left_out(row)).collect();
         let others = rows.select(&kept);
-        let again = Training::of((&others, &inputs), &prior, &hyper, &all(&others)).unwrap();
+        let again = Training::new((&others, &inputs), &prior, &hyper, &all(&others)).unwrap();
         let predicted = again.posterior.at(&rows.select(&[row]))[0];
         let measured = Vector3::from_fn(|axis, _| rows.residual[AXES * row + axis]);
         assert!((measured - predicted.mean - found.error).norm() < 1e-9, "{row}");
@@ -142,7 +142,7 @@ fn far_from_all_rows_only_the_parameters_are_corrected() {
         constant: vec![0.0; 2],
         ..hyper()
     };
-    let posterior = Training::of((&rows, &inputs), &prior, &hyper, &all(&rows)).unwrap().posterior;
+    let posterior = Training::new((&rows, &inputs), &prior, &hyper, &all(&rows)).unwrap().posterior;
     let mut far = rows.select(&[3]);
     far.inputs.fill(2.9);
     let predicted = posterior.at(&far)[0];
@@ -159,7 +159,7 @@ fn far_from_all_rows_only_the_parameters_are_corrected() {
 fn weights_of_the_centres_restore_a_posterior() {
     let (rows, inputs, prior, hyper) = (rows(), inputs(), prior(), hyper());
     let predicted =
-        Training::of((&rows, &inputs), &prior, &hyper, &[0, 2, 5, 9, 11]).unwrap().posterior;
+        Training::new((&rows, &inputs), &prior, &hyper, &[0, 2, 5, 9, 11]).unwrap().posterior;
     let again = super::posterior::Posterior::restored(
         (hyper.clone(), inputs.clone()),
         (predicted.inducing.clone(), prior.clone()),

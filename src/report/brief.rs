@@ -1,12 +1,12 @@
 //! Result of the command `identify` on one screen.
 
-use super::around::unsteady;
 use super::document::Block;
 use super::errors::noun;
 use super::identify::{errors_by_axis, headline};
 use super::noise::{carried, noise};
 use super::parameters::correlated;
 use super::render::text_within;
+use super::row_kinds::unsteady;
 use crate::fit::{Estimate, Identification, size_of_kind};
 use crate::problem::Problem;
 use crate::quantity::format::{counted, number};

@@ -5,7 +5,8 @@ use super::errors::{NOMINAL, both_parts, held_out_rows, judging, measure, rows_o
 use super::figures;
 use super::found_effects::{found, rounds, sureness};
 use super::identify::{
-    BEFORE, all_told, beware, fitted_parameters, mean, poses, spread, why_not_trusted,
+    BEFORE, beware, fitted_parameters, identifiability_with_figures, mean, poses, spread,
+    why_not_trusted,
 };
 use super::noise::{carried, expected, short, size};
 use super::parameters::parameters;
@@ -13,7 +14,7 @@ use super::probability::percent;
 use super::render::{Report, report, text, text_within};
 use super::unexplained::{correction, places, to_declare, unexplained};
 use super::verdict::{causes, counts, title, verdict};
-use super::{effect, findings, trace};
+use super::{effect, residual_tests, trace};
 use crate::problem::Problem;
 use crate::quantity::format::{counted, decimals, number};
 use crate::results::{FoundEffect, Gain, LoopResult, PlotData, Summary, TraceResult};
@@ -144,13 +145,13 @@ pub fn loop_text(problem: &Problem, closure: &ClosedLoop) -> String {
     let result = &LoopResult::new(problem, closure);
     let mut blocks = head(problem, closure, result);
     blocks.extend([Block::Table(errors(closure, result)), gain(closure, result)]);
-    let failed = findings::failed(&closure.before.findings);
+    let failed = residual_tests::failed(&closure.before.residual_tests);
     if !failed.is_empty() {
         blocks.push(Block::heading("Residual tests that the declared problem fails"));
         blocks.push(Block::list(failed));
     }
     blocks.extend(found(result, MAX_SHOWN_ALTERNATIVES));
-    let failed = findings::failed(&closure.findings);
+    let failed = residual_tests::failed(&closure.residual_tests);
     if result.unexplained.is_some() || (!failed.is_empty() && !result.effects.is_empty()) {
         blocks.push(Block::heading("What remains"));
         let unexplained = unexplained(problem, closure, result).into_iter();
@@ -200,7 +201,7 @@ fn blocks<'a>(
         Block::Poses(plots),
         Block::heading("What the declared problem leaves"),
     ]);
-    blocks.extend(findings::blocks(&closure.before.findings));
+    blocks.extend(residual_tests::blocks(&closure.before.residual_tests));
     let traced = TraceResult::new(problem, &closure.before);
     let every = format!("{} writes them all", code("flexcal trace"));
     let mut ranking = trace::ranking(problem, &traced, MAX_SHOWN_CANDIDATES, &every);
@@ -217,7 +218,10 @@ fn blocks<'a>(
     ));
     blocks.push(Block::heading("What remains"));
     let unexplained = unexplained(problem, closure, result).into_iter().map(Point::from);
-    let (tests, page) = (findings::all(&closure.findings), findings::each(&closure.findings));
+    let (tests, page) = (
+        residual_tests::all(&closure.residual_tests),
+        residual_tests::each(&closure.residual_tests),
+    );
     blocks.extend([
         Block::Words(vec![Block::List(unexplained.clone().chain(tests).collect())]),
         Block::Page(vec![Block::List(unexplained.chain(page).collect())]),
@@ -232,7 +236,7 @@ fn blocks<'a>(
     blocks.push(Block::heading("Parameters of the final fit"));
     blocks.extend(parameters(&closure.closed, after, &file));
     blocks.push(Block::figures([figures::contributions(&plots.contributions)]));
-    blocks.push(Block::Page(all_told(after, plots, &file)));
+    blocks.push(Block::Page(identifiability_with_figures(after, plots, &file)));
     blocks
 }
 
@@ -357,7 +361,7 @@ fn gained(closure: &ClosedLoop, result: &LoopResult) -> Option<String> {
 
 /// States what structure remains and where it is shown.
 fn remains(closure: &ClosedLoop, result: &LoopResult) -> Option<String> {
-    let failed = findings::failed(&closure.findings).len();
+    let failed = residual_tests::failed(&closure.residual_tests).len();
     let places = if result.size_alone().is_none() { places(result) } else { Vec::new() };
     let structure = (!places.is_empty())
         .then(|| format!("structure without a known law ({})", places.join(", ")));
@@ -370,8 +374,8 @@ fn remains(closure: &ClosedLoop, result: &LoopResult) -> Option<String> {
 /// States the gain and explains how to read the figures.
 fn gain(closure: &ClosedLoop, result: &LoopResult) -> Block<'static> {
     let (before, after) = (&closure.before, &closure.after);
-    let another = findings::another_size(&before.findings, before.fit.reduced_chi2)
-        .or_else(|| findings::another_size(&closure.findings, after.reduced_chi2));
+    let another = residual_tests::another_size(&before.residual_tests, before.fit.reduced_chi2)
+        .or_else(|| residual_tests::another_size(&closure.residual_tests, after.reduced_chi2));
     let mut arms = vec![
         ("the nominal arm", &before.fit.registered),
         ("the arm as declared, fitted", &before.fit.fitted),

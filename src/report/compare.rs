@@ -5,7 +5,7 @@ use super::document::{Block, Column, Headline, Table, code};
 use super::errors::{both_parts, header, held_out_rows, noun, unit};
 use super::figures;
 use super::identify::{
-    BEFORE, beware, counts, errors_by_axis, fitted_parameters, mean, no_errors, poses, remainder,
+    BEFORE, beware, counts, errors_by_axis, fit_details, fitted_parameters, mean, no_errors, poses,
 };
 use super::noise::size;
 use super::paper_tables::{table_2, table_3, title};
@@ -122,7 +122,7 @@ fn blocks<'a>(
     blocks.push(Block::Table(errors_by_axis(joint)));
     blocks.push(Block::figures([figures::errors(plots), figures::vectors(plots)]));
     blocks.push(Block::Poses(plots));
-    blocks.extend(remainder(
+    blocks.extend(fit_details(
         problem,
         joint,
         plots,

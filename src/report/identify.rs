@@ -1,18 +1,18 @@
 //! Texts of the command `identify`: full text for the terminal, and report on one fit.
 
-use super::around::around;
 use super::document::{Block, Headline, Table};
 use super::errors::{
     axes, brief, held_out_rows, judging, measure, rows_of, shown, unit, unpredicted,
 };
 use super::figures;
-use super::findings;
 use super::limits::{active_limits, alternation};
 use super::noise::{carried, noise, outliers, size};
 use super::parameters::{
     conditioning, correlations, more_unidentifiable, parameters, unidentifiable, weak,
 };
 use super::render::{Report, report, text};
+use super::residual_tests;
+use super::row_kinds::row_kind_tables;
 use crate::fit::{ErrorSummary, Errors, Identification, JointSources, OrientationErrors};
 use crate::problem::Problem;
 use crate::quantity::format::{counted, mm, number};
@@ -29,12 +29,12 @@ pub fn estimate_text(problem: &Problem, found: &Identification) -> String {
         Block::lines(noise(problem, found)),
     ];
     blocks.extend(carried(found));
-    blocks.extend(around(found));
+    blocks.extend(row_kind_tables(found));
     blocks.extend(orientation(found));
     blocks.extend(outliers(problem, found));
     blocks.extend(parameters(problem, found, FILE));
     blocks.extend(limits(found));
-    blocks.extend(told(found, FILE));
+    blocks.extend(identifiability_blocks(found, FILE));
     text(&blocks)
 }
 
@@ -69,11 +69,11 @@ fn blocks<'a>(problem: &Problem, found: &'a Identification, plots: &'a PlotData)
     blocks.extend(beware(found, plots));
     blocks.push(Block::Table(errors_by_axis(found)));
     blocks.extend(orientation(found));
-    blocks.extend(around(found));
+    blocks.extend(row_kind_tables(found));
     blocks.push(Block::figures([figures::errors(plots), figures::vectors(plots)]));
     blocks.push(Block::Poses(plots));
     blocks.extend(super::remainder::uncertainty(found, plots));
-    blocks.extend(remainder(problem, found, plots, FILE));
+    blocks.extend(fit_details(problem, found, plots, FILE));
     blocks
 }
 
@@ -205,7 +205,7 @@ pub(super) fn no_errors(found: &Identification) -> Option<String> {
 }
 
 /// Returns the blocks on residual, parameters and identifiability; `file` contains what they omit.
-pub(super) fn remainder<'a>(
+pub(super) fn fit_details<'a>(
     problem: &Problem,
     found: &'a Identification,
     plots: &'a PlotData,
@@ -219,13 +219,15 @@ pub(super) fn remainder<'a>(
         figures::order(plots),
         figures::joint_map(plots),
     ]));
-    blocks.extend(findings::blocks(&plots.findings));
-    blocks.extend(findings::another_size(&plots.findings, found.reduced_chi2).map(Block::Text));
+    blocks.extend(residual_tests::blocks(&plots.residual_tests));
+    blocks.extend(
+        residual_tests::another_size(&plots.residual_tests, found.reduced_chi2).map(Block::Text),
+    );
     blocks.push(Block::heading("Parameters"));
     blocks.extend(parameters(problem, found, file));
     blocks.push(Block::figures([figures::contributions(&plots.contributions)]));
     blocks.push(Block::Page(limits(found)));
-    blocks.extend(all_told(found, plots, file));
+    blocks.extend(identifiability_with_figures(found, plots, file));
     blocks
 }
 
@@ -235,16 +237,20 @@ fn limits<'a>(found: &Identification) -> Vec<Block<'a>> {
 }
 
 /// Returns the blocks on identifiability, with figures; `file` contains what they omit.
-pub(super) fn all_told<'a>(found: &Identification, plots: &PlotData, file: &str) -> Vec<Block<'a>> {
+pub(super) fn identifiability_with_figures<'a>(
+    found: &Identification,
+    plots: &PlotData,
+    file: &str,
+) -> Vec<Block<'a>> {
     let figures =
         [figures::correlation(&plots.correlations), figures::spectrum(found.identifiability())];
     let mut blocks = vec![Block::heading("Identifiability"), Block::figures(figures)];
-    blocks.extend(told(found, file));
+    blocks.extend(identifiability_blocks(found, file));
     blocks
 }
 
 /// Returns the blocks on identifiability without figures; `file` contains what they omit.
-fn told<'a>(found: &Identification, file: &str) -> Vec<Block<'a>> {
+fn identifiability_blocks<'a>(found: &Identification, file: &str) -> Vec<Block<'a>> {
     let mut blocks = vec![
         conditioning(found.identifiability(), found.unknowns.len(), found.coordinates),
         unidentifiable(found.identifiability(), &found.unknowns, file),

@@ -4,7 +4,6 @@
 //! on terminals, as Markdown and as a page; `figures` draws the figures of pages.
 
 mod acceptance;
-mod around;
 mod brief;
 mod check;
 mod closed_loop;
@@ -17,7 +16,6 @@ mod effect;
 mod errors;
 mod export;
 mod figures;
-mod findings;
 mod forecast;
 mod found_effects;
 mod identify;
@@ -32,6 +30,8 @@ mod probability;
 mod remainder;
 mod render;
 mod replica;
+mod residual_tests;
+mod row_kinds;
 mod separation;
 mod shell;
 mod study;

@@ -32,7 +32,7 @@ pub(super) fn parameters<'a>(
     found: &Identification,
     file: &str,
 ) -> Vec<Block<'a>> {
-    let harmonics = ManyHarmonics::of(problem, &found.estimates);
+    let harmonics = ManyHarmonics::new(problem, &found.estimates);
     let (mut shown, mut lower): (Vec<Line>, Vec<Line>) = Default::default();
     for (k, estimate) in found.estimates.iter().enumerate() {
         let line = (row(estimate), bar(estimate));

@@ -2,11 +2,11 @@
 
 use std::fmt::Write as _;
 
-use super::around::unsteady;
 use super::document::{Block, Table};
 use super::errors::{measure, sizes};
 use super::remainder::bounded;
 use super::render::text;
+use super::row_kinds::unsteady;
 use crate::fit::{ErrorSummary, Prediction};
 use crate::problem::Problem;
 use crate::quantity::format::counted;

@@ -8,13 +8,13 @@ use super::noise::short;
 use super::probability::percent;
 use super::render::text;
 use super::verdict::declared;
-use super::{effect, findings};
+use super::{effect, residual_tests};
 use crate::fit::Identification;
 use crate::problem::Problem;
 use crate::quantity::Unit;
 use crate::quantity::format::{counted, number, p_value};
 use crate::results::{
-    Candidate, Claims, Confounded, Hypothesis, HypothesisSet, Summary, ToldApart, TraceResult,
+    Candidate, Claims, Confounded, Hypothesis, HypothesisSet, SeparatingPose, Summary, TraceResult,
 };
 use crate::results::{CommandedJoint, commanded_joints};
 use crate::select::Trace;
@@ -32,9 +32,12 @@ pub fn trace_text(problem: &Problem, trace: &Trace) -> String {
     let mut blocks = vec![
         Block::Text(headline(problem, &trace.fit)),
         Block::heading("Tests of the residual (measured − predicted) of the identification poses"),
-        Block::List(findings::all(&trace.findings)),
+        Block::List(residual_tests::all(&trace.residual_tests)),
     ];
-    blocks.extend(findings::another_size(&trace.findings, trace.fit.reduced_chi2).map(Block::Text));
+    blocks.extend(
+        residual_tests::another_size(&trace.residual_tests, trace.fit.reduced_chi2)
+            .map(Block::Text),
+    );
     blocks.extend(hypothesis_sets(&result));
     blocks.extend(ranking(problem, &result, MAX_SHOWN_CANDIDATES, "trace.json holds them all"));
     blocks.extend(not_seen(trace));
@@ -199,7 +202,7 @@ fn point(problem: &Problem, candidate: &Candidate, unit: &str) -> Point {
 }
 
 /// Describes a pose: joints, target, payload, hoist, temperature.
-fn pose_words(problem: &Problem, pose: &ToldApart) -> String {
+fn pose_words(problem: &Problem, pose: &SeparatingPose) -> String {
     let value = |joint: CommandedJoint| {
         let unit = if joint.unit == Unit::Angle { "°" } else { " mm" };
         format!("{} {}{unit}", joint.name(), number(pose.q[joint.joint] * joint.factor(), 1))

@@ -30,7 +30,7 @@ pub enum Covariate {
     /// Measured position of the target.
     Position,
     /// Covariate that the user declares, by the name of its column, in the column's unit.
-    Own(Arc<str>),
+    Declared(Arc<str>),
 }
 
 impl Covariate {
@@ -64,7 +64,9 @@ impl Covariate {
 
     /// Returns the covariate that the problem declares with index `which`.
     pub fn declared(which: usize, problem: &Problem) -> Self {
-        Self::Own(problem.data.covariates.get(which).map_or("", |covariate| &covariate.name).into())
+        Self::Declared(
+            problem.data.covariates.get(which).map_or("", |covariate| &covariate.name).into(),
+        )
     }
 }
 
@@ -80,7 +82,7 @@ impl fmt::Display for Covariate {
             Self::Approach(joint) => write!(f, "approach{}", joint + 1),
             Self::Load => f.write_str("load"),
             Self::Position => f.write_str("position"),
-            Self::Own(name) => f.write_str(name),
+            Self::Declared(name) => f.write_str(name),
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Decision over all residual tests together, with a correction for multiple tests.
 
 use super::chance::Chance;
-use super::outcome::{Findings, Outcome, ResidualTest, Test, Untestable};
+use super::outcome::{Outcome, ResidualTest, ResidualTests, Test, Untestable};
 
 /// Test with its result before the correction for multiple tests.
 pub(super) struct Tried {
@@ -24,7 +24,7 @@ pub(super) struct Trial {
 /// Judges the tests by Holm's procedure: the smallest of m p-values fails below α / m, the next one
 /// below α / (m − 1), until one does not [Holm 1979]. α is `family_level`; `outliers` are stored in
 /// the result.
-pub(super) fn judge(tried: Vec<Tried>, family_level: f64, outliers: Vec<usize>) -> Findings {
+pub(super) fn judge(tried: Vec<Tried>, family_level: f64, outliers: Vec<usize>) -> ResidualTests {
     let p_value = |tried: &Tried| {
         tried.trial.as_ref().ok().map(|trial| trial.chance.p_value(trial.statistic))
     };
@@ -54,5 +54,5 @@ pub(super) fn judge(tried: Vec<Tried>, family_level: f64, outliers: Vec<usize>) 
         });
         ResidualTest { test, outcome, row: None }
     };
-    Findings { tests: tried.into_iter().enumerate().map(judged).collect(), outliers }
+    ResidualTests { tests: tried.into_iter().enumerate().map(judged).collect(), outliers }
 }

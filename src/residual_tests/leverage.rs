@@ -51,7 +51,7 @@ impl<'a> Leverage<'a> {
     ///
     /// # Errors
     /// Returns an error if the fit leaves too few degrees of freedom.
-    pub fn of(fitted: Cow<'a, DMatrix<f64>>, coordinates: Vec<usize>) -> Result<Self, Untestable> {
+    pub fn new(fitted: Cow<'a, DMatrix<f64>>, coordinates: Vec<usize>) -> Result<Self, Untestable> {
         let gram = gram(&fitted);
         let freedom = coordinates.iter().sum::<usize>() as f64 - gram.trace();
         if freedom < MIN_DEGREES_OF_FREEDOM {
@@ -188,7 +188,7 @@ impl<'a> Kept<'a> {
         Some(Self {
             poses,
             residual,
-            leverage: Leverage::of(Cow::Owned(fitted), coordinates).ok()?,
+            leverage: Leverage::new(Cow::Owned(fitted), coordinates).ok()?,
         })
     }
 }
@@ -211,7 +211,7 @@ pub(super) struct Others {
 /// H_bb + tr D (W − H_bb²)
 pub(super) fn each_left_out(leverage: &Leverage, residual: &DVector<f64>) -> Vec<Others> {
     let fitted = leverage.fitted.as_ref();
-    let again = fitted * along(fitted, residual);
+    let again = fitted * transposed_product(fitted, residual);
     let total = residual.norm_squared();
     by_poses(fitted, |first, rows| {
         let gram_rows = &leverage.gram * rows;
@@ -236,7 +236,7 @@ pub(super) fn each_left_out(leverage: &Leverage, residual: &DVector<f64>) -> Vec
 }
 
 /// Returns Qᵀr, summed row after row.
-fn along(fitted: &DMatrix<f64>, residual: &DVector<f64>) -> DVector<f64> {
+fn transposed_product(fitted: &DMatrix<f64>, residual: &DVector<f64>) -> DVector<f64> {
     let mut sum = DVector::zeros(fitted.ncols());
     for first in (0..residual.len()).step_by(3 * POSES_PER_BLOCK) {
         let count = (3 * POSES_PER_BLOCK).min(residual.len() - first);
@@ -262,7 +262,7 @@ mod tests {
                 p,
                 |i, j| if i < 180 { entry(i, j) } else { prior(i - 180, j) },
             );
-        Leverage::of(Cow::Owned(stacked.qr().q().rows(0, 180).into_owned()), vec![3; 60]).unwrap()
+        Leverage::new(Cow::Owned(stacked.qr().q().rows(0, 180).into_owned()), vec![3; 60]).unwrap()
     }
 
     #[test]

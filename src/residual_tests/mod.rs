@@ -26,5 +26,5 @@ mod test;
 pub use covariate::Covariate;
 pub(crate) use fit_residual::ROUNDING;
 pub use fit_residual::{CovariateValues, FitResidual};
-pub use outcome::{Findings, Outcome, ResidualTest, Sequence, Test, Untestable};
+pub use outcome::{Outcome, ResidualTest, ResidualTests, Sequence, Test, Untestable};
 pub use test::test_residual;

@@ -149,14 +149,14 @@ impl ResidualTest {
 
 /// Results of all tests of a residual.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Findings {
+pub struct ResidualTests {
     /// All tests, including those that cannot be made.
     pub tests: Vec<ResidualTest>,
     /// Poses that were left out as outliers, counted from 0.
     pub outliers: Vec<usize>,
 }
 
-impl Findings {
+impl ResidualTests {
     /// Returns true if a test of structure failed at the family-wise level.
     pub fn is_structured(&self) -> bool {
         self.strongest().is_some()

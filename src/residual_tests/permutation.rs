@@ -115,7 +115,7 @@ fn values(
         let (poses, _) = residual.as_chunks_mut();
         leverage.studentise_in_place(poses);
         let sample = Sample::of(poses);
-        statistics.iter().map(|statistic| statistic.of(&sample)).collect()
+        statistics.iter().map(|statistic| statistic.evaluate(&sample)).collect()
     };
     let rows = residuals.nrows().max(1);
     residuals.as_mut_slice().par_chunks_mut(rows).map(of_draw).collect()

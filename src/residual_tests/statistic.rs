@@ -60,7 +60,7 @@ pub(super) enum Statistic {
 
 impl Statistic {
     /// Returns the value of the statistic.
-    pub fn of(&self, sample: &Sample) -> f64 {
+    pub fn evaluate(&self, sample: &Sample) -> f64 {
         match self {
             Self::Runs(order) => order.kept_signs(sample),
             Self::LjungBox(order) => order.ljung_box(sample),
@@ -185,7 +185,7 @@ impl Cumulative {
     ///
     /// # Errors
     /// Returns an error if `values` does not have `all` entries, or if the covariate is constant.
-    pub fn of(values: &[f64], all: usize, kept: &[usize]) -> Result<Self, Untestable> {
+    pub fn new(values: &[f64], all: usize, kept: &[usize]) -> Result<Self, Untestable> {
         if values.len() != all {
             return Err(Untestable::SizeMismatch);
         }
@@ -267,7 +267,7 @@ mod tests {
                 gram += product * product;
             }
         }
-        let cumulative = Cumulative::of(&x, 6, &[0, 1, 2, 3, 4, 5]).unwrap();
+        let cumulative = Cumulative::new(&x, 6, &[0, 1, 2, 3, 4, 5]).unwrap();
         let expected = sum / (norm * gram).sqrt();
         assert!((cumulative.correlation(&sample) - expected).abs() < 1e-12);
         assert!(expected > 0.1 && expected < 1.0);

@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use super::fit_residual::{CovariateValues, FitResidual};
 use super::judgement::{Trial, Tried, judge};
 use super::leverage::{Kept, Leverage};
-use super::outcome::{Findings, Sequence, Test, Untestable};
+use super::outcome::{ResidualTests, Sequence, Test, Untestable};
 use super::outliers;
 use super::permutation;
 use super::size;
@@ -18,12 +18,12 @@ use super::statistic::{Cumulative, Sample, Statistic, sequences};
 /// of the rows, if that differs), each covariate, outliers, normality. All tests except the last
 /// two use the fit without outliers. Holm's procedure judges all tests together at that level.
 /// Outliers and normality take part in it, but are not structure, because no effect explains them.
-pub fn test_residual(fit: &FitResidual, level: f64, seed: u64) -> Findings {
+pub fn test_residual(fit: &FitResidual, level: f64, seed: u64) -> ResidualTests {
     let poses = fit.residual.len() / 3;
     let leverage = match fit
         .testable()
         .and_then(|()| {
-            Leverage::of(
+            Leverage::new(
                 Cow::Borrowed(fit.fitted),
                 (0..poses).map(|pose| fit.coordinates_of(pose)).collect(),
             )
@@ -60,7 +60,7 @@ fn permuted(fit: &FitResidual, kept: &Kept, seed: u64) -> Vec<Tried> {
             let chance = chances.next().flatten().ok_or(Untestable::NoFreedom)?;
             let shown =
                 if matches!(test, Test::Dependence { .. }) { f64::sqrt } else { |value| value };
-            Ok(Trial { statistic: statistic.of(&sample), chance, shown })
+            Ok(Trial { statistic: statistic.evaluate(&sample), chance, shown })
         });
         Tried { test: test.clone(), trial }
     });
@@ -77,7 +77,7 @@ fn statistics(fit: &FitResidual, poses: &[usize]) -> Vec<(Test, Result<Statistic
         all.push((Test::LjungBox { sequence }, order.map(Statistic::LjungBox)));
     }
     for CovariateValues { covariate, values } in fit.covariates {
-        let statistic = Cumulative::of(values, fit.residual.len() / 3, poses);
+        let statistic = Cumulative::new(values, fit.residual.len() / 3, poses);
         all.push((
             Test::Dependence { covariate: covariate.clone() },
             statistic.map(Statistic::Dependence),

@@ -209,7 +209,7 @@ impl LoopResult {
             verdict: closure.verdict,
             interrupted: closure.interrupted,
             trusted: closure.after.is_trusted(),
-            tested: closure.findings.is_testable(),
+            tested: closure.residual_tests.is_testable(),
             registered: Errors::of(&before.fit.registered),
             before: Fit::new(&before.fit),
             after: Fit::new(&closure.after),
@@ -228,8 +228,8 @@ impl LoopResult {
                 .iter()
                 .map(|round| Step::new(round, closure.after.fitted.is_left_out))
                 .collect(),
-            checks_before: ResidualTest::all(&before.findings),
-            checks_after: ResidualTest::all(&closure.findings),
+            checks_before: ResidualTest::all(&before.residual_tests),
+            checks_after: ResidualTest::all(&closure.residual_tests),
             findings: closure.after.findings.clone(),
         }
     }

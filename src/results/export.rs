@@ -80,7 +80,7 @@ impl ExportedErrors {
     /// Computes the errors on the held-out rows of `data` of the leading kind (positions, if there
     /// are any). `x` is the model's full parameter vector; `saved` is the estimate from which it
     /// was read, if any.
-    pub fn of(
+    pub fn new(
         model: &Model,
         x: &DVector<f64>,
         data: &Dataset,

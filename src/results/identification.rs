@@ -419,7 +419,7 @@ fn covariance(found: &Identification) -> Vec<Box<RawValue>> {
     let n = found.estimates.len();
     let has_error = |k: usize| found.estimates[k].std_error.is_some();
     let entry =
-        |j: usize, k: usize| found.covariance.of(j, k).filter(|_| has_error(j) && has_error(k));
+        |j: usize, k: usize| found.covariance.entry(j, k).filter(|_| has_error(j) && has_error(k));
     let rows = (0..n).map(|j| (0..n).map(|k| entry(j, k)).collect::<Vec<_>>());
     rows.filter_map(|row| to_raw_value(&row).ok()).collect()
 }

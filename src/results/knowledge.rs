@@ -140,7 +140,7 @@ pub struct ManyHarmonics {
 
 impl ManyHarmonics {
     /// Selects the harmonics that the problem declares.
-    pub fn of(problem: &Problem, estimates: &[Estimate]) -> Self {
+    pub fn new(problem: &Problem, estimates: &[Estimate]) -> Self {
         let place = |regressor: &Regressor| match *regressor {
             Regressor::Sine(joint, order) | Regressor::Cosine(joint, order) => {
                 Some((joint + 1, order))

@@ -56,7 +56,7 @@ pub(crate) use tables::{
     CommandedJoint, commanded_joints, predictions_csv, residuals_csv, study_timing_csv,
 };
 pub use trace::TraceResult;
-pub(crate) use trace::{Candidate, Confounded, HypothesisSet, ToldApart};
+pub(crate) use trace::{Candidate, Confounded, HypothesisSet, SeparatingPose};
 
 pub(crate) use effect::joined;
 // Public for the tests, the benches and the Python module only.

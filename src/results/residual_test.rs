@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::residual_tests::{self, Covariate, Findings};
+use crate::residual_tests::{self, Covariate, ResidualTests};
 
 /// Test of the residual for size or structure.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
@@ -25,7 +25,7 @@ pub struct ResidualTest {
 
 impl ResidualTest {
     /// Lists the tests in the order in which they were made.
-    pub(super) fn all(findings: &Findings) -> Vec<Self> {
+    pub(super) fn all(tests: &ResidualTests) -> Vec<Self> {
         let about = |covariate: Covariate| match covariate {
             Covariate::Row => "rows".to_owned(),
             covariate => covariate.to_string(),
@@ -43,6 +43,6 @@ impl ResidualTest {
                 words: test.to_string(),
             }
         };
-        findings.tests.iter().map(entry).collect()
+        tests.tests.iter().map(entry).collect()
     }
 }

@@ -11,7 +11,7 @@ use super::residual_test::ResidualTest;
 use super::summary::{Errors, by_unit};
 use crate::fit::{ErrorSummary, Finding};
 use crate::problem::{Effect, Problem};
-use crate::select::{self, TellingPose, Trace};
+use crate::select::{self, Trace};
 
 /// Smallest probability of a hypothesis set that is written to trace.json.
 const MIN_WRITTEN_PROBABILITY: f64 = 0.01;
@@ -78,7 +78,7 @@ pub struct Candidate {
     /// Effects that these poses hardly distinguish from the candidate.
     pub alike: Vec<Confounded>,
     /// Pose that would distinguish the effect from the first confounded one.
-    pub told_apart: Option<ToldApart>,
+    pub told_apart: Option<SeparatingPose>,
 }
 
 /// Effect that these poses hardly distinguish from a candidate.
@@ -93,7 +93,7 @@ pub struct Confounded {
 
 /// Pose at which the predictions with two effects differ most.
 #[derive(Debug, Serialize, JsonSchema)]
-pub struct ToldApart {
+pub struct SeparatingPose {
     #[schemars(with = "EffectKeys")]
     pub from: Effect,
     /// Configuration at which the effects differ \[rad\] or \[m\].
@@ -140,8 +140,8 @@ impl TraceResult {
             trusted: trace.fit.is_trusted(),
             errors: Errors::of(&trace.fit.fitted),
             reduced_chi2: trace.fit.reduced_chi2,
-            structured: trace.findings.is_structured(),
-            checks: ResidualTest::all(&trace.findings),
+            structured: trace.residual_tests.is_structured(),
+            checks: ResidualTest::all(&trace.residual_tests),
             tried: trace.tried,
             level: trace.level,
             ranking: trace
@@ -165,7 +165,7 @@ impl TraceResult {
     }
 }
 
-impl ToldApart {
+impl SeparatingPose {
     /// Returns the difference of the predictions in the unit of the errors: mm, ° or px.
     pub fn difference(&self) -> Option<f64> {
         self.difference_mm.or(self.difference_deg).or(self.difference_px)
@@ -193,9 +193,9 @@ impl Candidate {
             effect: NamedEffect::new(effect, trace),
             angle_deg: angle.to_degrees(),
         };
-        let told_apart = |pose: &TellingPose| {
+        let told_apart = |pose: &select::SeparatingPose| {
             let (difference_mm, difference_deg, difference_px) = by_unit(pose.difference);
-            ToldApart {
+            SeparatingPose {
                 from: pose.other.clone(),
                 q: pose.configuration.clone(),
                 target: pose.target.clone(),
@@ -219,7 +219,7 @@ impl Candidate {
             cross_validated_gain_deg,
             cross_validated_gain_px,
             alike: ranked.alike.iter().map(alike).collect(),
-            told_apart: ranked.telling_pose.as_ref().map(told_apart),
+            told_apart: ranked.separating_pose.as_ref().map(told_apart),
         }
     }
 }

@@ -23,7 +23,7 @@ pub(super) struct Candidates {
 }
 
 impl Candidates {
-    pub fn of(problem: &Problem, data: &Data) -> Self {
+    pub fn new(problem: &Problem, data: &Data) -> Self {
         let conditions = data.conditions(problem);
         let more = data.candidates.iter().map(|effect| Candidate {
             effect: effect.clone(),

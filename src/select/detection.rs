@@ -114,7 +114,7 @@ pub(super) fn timed(poses: &Measurements) -> Measurements {
 /// Returns the effects of the catalogue that these poses can show.
 pub(super) fn candidates(problem: &Problem, poses: &Measurements) -> Candidates {
     let split = Split { identification: (0..poses.len()).collect(), held_out: Vec::new() };
-    Candidates::of(
+    Candidates::new(
         problem,
         &Data::new(problem, &Dataset::new(poses.clone(), split), &SelectionRules::DEFAULT),
     )

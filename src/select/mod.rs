@@ -23,9 +23,9 @@ mod reference_check;
 mod rules;
 mod screening;
 mod selection;
+mod separating_pose;
 mod separation;
 mod settings;
-mod telling_pose;
 mod unexplained;
 
 #[doc(hidden)]
@@ -44,8 +44,8 @@ pub use screening::examine;
 pub use screening::{Ranked, Trace, trace, trace_by};
 pub use selection::{ClosedLoop, Found, Interval, Round, Status, Verdict, close, close_by};
 #[doc(hidden)]
-pub use separation::{Separation, Side, separation};
+pub use separating_pose::SeparatingPose;
 #[doc(hidden)]
-pub use telling_pose::TellingPose;
+pub use separation::{Separation, Side, separation};
 #[doc(hidden)]
 pub use unexplained::{Correction, Curve, PartialResidual, Unexplained};

@@ -57,7 +57,7 @@ struct Reading {
 }
 
 /// Returns v and M of one point for 3 parameters (d) or 6 (d and ω); see the module's equations.
-fn told(readings: &[Reading], parameters: usize) -> (DVector<f64>, DMatrix<f64>) {
+fn point_information(readings: &[Reading], parameters: usize) -> (DVector<f64>, DMatrix<f64>) {
     let all: f64 = readings.iter().map(|reading| reading.weight).sum();
     let place =
         readings.iter().map(|reading| reading.seen * reading.weight).sum::<Vector3<f64>>() / all;
@@ -148,7 +148,7 @@ pub(super) fn reference_check(
     }
     let found = DVector::from_fn(count, |i, _| fitted.found.x[places[i]]);
     let spread = DMatrix::from_fn(count, count, |i, j| {
-        fitted.found.covariance.of(places[i], places[j]).unwrap_or(0.0)
+        fitted.found.covariance.entry(places[i], places[j]).unwrap_or(0.0)
     });
     // A session has a place of its own for the instrument.
     let mut points: BTreeMap<(&str, &str), Vec<Reading>> = BTreeMap::new();
@@ -158,8 +158,10 @@ pub(super) fn reference_check(
         points.entry((&reading.session, &reading.name)).or_default().push(reading_of_point);
     }
     let nothing = (DVector::zeros(count), DMatrix::zeros(count, count));
-    let (told, certainty) =
-        points.values().map(|all| told(all, count)).fold(nothing, |a, b| (a.0 + b.0, a.1 + b.1));
+    let (told, certainty) = points
+        .values()
+        .map(|all| point_information(all, count))
+        .fold(nothing, |a, b| (a.0 + b.0, a.1 + b.1));
     let gain = odds(&found, &spread, (&told, &certainty))?;
     let verdict = if gain > MIN_TWICE_LN_ODDS {
         ReferenceVerdict::Corroborated
@@ -214,7 +216,7 @@ mod tests {
                     let seen = place + (moved + turned.cross(place) * turn) * f;
                     Reading { seen, moved: f, weight: 1e12 }
                 };
-                told(&[at(0.0), at(1.0), at(1.0)], 6)
+                point_information(&[at(0.0), at(1.0), at(1.0)], 6)
             };
             let sum = |a: (DVector<f64>, DMatrix<f64>), b: (DVector<f64>, DMatrix<f64>)| {
                 (a.0 + b.0, a.1 + b.1)

@@ -6,11 +6,11 @@ use super::evidence::{Evidence, evaluate};
 use super::fitted::Fitted;
 use super::neighbourhood::{Scan, Tried};
 use super::rules::SelectionRules;
-use super::telling_pose::{TellingPose, shuffled, telling_pose};
+use super::separating_pose::{SeparatingPose, separating_pose, shuffled};
 use crate::fit::{Identification, IdentifyError, Noise, Options};
 use crate::measurement::Dataset;
 use crate::problem::{Effect, Problem};
-use crate::residual_tests::{Findings, FitResidual, Test, test_residual};
+use crate::residual_tests::{FitResidual, ResidualTests, Test, test_residual};
 use crate::select::settings::{CONFOUNDED_ANGLE, MAX_COMPARED, MAX_RANKED};
 
 /// Candidate of the ranking, with its test and expected gain.
@@ -31,7 +31,7 @@ pub struct Ranked {
     /// \[rad\].
     pub alike: Vec<(Effect, f64)>,
     /// Pose that would distinguish it from the first confounded effect.
-    pub telling_pose: Option<TellingPose>,
+    pub separating_pose: Option<SeparatingPose>,
 }
 
 /// Result of `trace`: effects that the residual of the declared problem's fit points to.
@@ -40,7 +40,7 @@ pub struct Trace {
     /// Fit of the declared problem.
     pub fit: Identification,
     /// Tests of its residual.
-    pub findings: Findings,
+    pub residual_tests: ResidualTests,
     /// Candidates in order of the evidence for them, best first; only the best of each family at
     /// each place.
     pub ranking: Vec<Ranked>,
@@ -98,7 +98,7 @@ pub fn trace_by(
 /// Ranks the catalogue's effects by the residual of a fit.
 pub(super) fn trace_fit(fitted: &Fitted, data: &Data) -> Trace {
     let rules = data.rules;
-    let Candidates { testable, mut untestable } = Candidates::of(&fitted.problem, data);
+    let Candidates { testable, mut untestable } = Candidates::new(&fitted.problem, data);
     let linearised = fitted.linearised(data, &testable);
     let scan = Scan::new(&linearised, fitted.around(data), testable);
     untestable.extend(scan.refused.iter().map(|effect| (effect.clone(), NOT_FINITE)));
@@ -143,8 +143,8 @@ pub(super) fn trace_fit(fitted: &Fitted, data: &Data) -> Trace {
         // Of what remembers the poses before none tells by itself.
         let tells = |(other, _): &&(Effect, f64)| !candidate.has_memory() && !other.has_memory();
         let pair = alike.first().filter(tells).zip(there.as_ref());
-        let telling_pose = pair.and_then(|((other, _), there)| {
-            telling_pose(&scan.linear, [&linearised, there], &poses, (candidate, other))
+        let separating_pose = pair.and_then(|((other, _), there)| {
+            separating_pose(&scan.linear, [&linearised, there], &poses, (candidate, other))
         });
         Ranked {
             effect: scan.effects[tried.index].clone(),
@@ -154,14 +154,14 @@ pub(super) fn trace_fit(fitted: &Fitted, data: &Data) -> Trace {
                 - rms(scan.linear.sums().squares - tried.gain.squares),
             cross_validated,
             alike,
-            telling_pose,
+            separating_pose,
         }
     };
     let ranking = best.iter().enumerate().map(ranked).collect();
     let absorbed = scan.absorbed().into_iter().cloned().collect();
     Trace {
         fit: fitted.found.clone(),
-        findings: check_fit(fitted, data),
+        residual_tests: check_fit(fitted, data),
         ranking,
         tried: scan.effects.len(),
         level: rules.level,
@@ -181,13 +181,13 @@ pub fn examine(
     problem: &Problem,
     data: &Dataset,
     found: &Identification,
-) -> Result<Findings, IdentifyError> {
+) -> Result<ResidualTests, IdentifyError> {
     let data = Data::new(problem, data, &SelectionRules::DEFAULT);
     Ok(check_fit(&Fitted::of(problem.clone(), &data, found.clone())?, &data))
 }
 
 /// Tests the residual of a fit.
-pub(super) fn check_fit(fitted: &Fitted, data: &Data) -> Findings {
+pub(super) fn check_fit(fitted: &Fitted, data: &Data) -> ResidualTests {
     let linearised = fitted.linearised(data, &[]);
     let coordinates: Vec<usize> =
         linearised.poses().iter().map(|pose| pose.observation.coordinates()).collect();
@@ -203,17 +203,17 @@ pub(super) fn check_fit(fitted: &Fitted, data: &Data) -> Findings {
         setup: &data.setup,
         covariates: &data.covariates(&fitted.problem),
     };
-    let mut findings = test_residual(&fit, data.rules.level, data.rules.seed);
+    let mut residual_tests = test_residual(&fit, data.rules.level, data.rules.seed);
     // The tests count poses; people count rows of files.
-    for test in &mut findings.tests {
+    for test in &mut residual_tests.tests {
         if let Test::Outliers { worst: Some(pose) } = test.test {
             test.row = data.rows().get(pose).map(|&row| data.measurements.location(row));
         }
     }
     // Against the σ declared, not the smaller one that the scatter speaks for.
-    let size = findings.tests.iter_mut().find(|entry| entry.test == Test::ReducedChiSquared);
+    let size = residual_tests.tests.iter_mut().find(|entry| entry.test == Test::ReducedChiSquared);
     if let Some(outcome) = size.and_then(|test| test.outcome.as_mut().ok()) {
         outcome.statistic *= fitted.found.sigma_scale.powi(2);
     }
-    findings
+    residual_tests
 }

@@ -13,7 +13,7 @@ use super::fitted::Fitted;
 use crate::fit::ErrorSummary;
 use crate::quantity::Unit;
 use crate::residual_tests::Covariate;
-use crate::residual_tests::Findings;
+use crate::residual_tests::ResidualTests;
 
 /// Structure in the residual that no effect explains.
 #[derive(Debug, Clone)]
@@ -122,11 +122,11 @@ pub(super) fn without_law(
 
 /// Returns the structure that the residual tests detect, without a site or quantity; `None` if they
 /// detect none.
-pub(super) fn nowhere(findings: &Findings) -> Option<Unexplained> {
-    if !findings.is_structured() {
+pub(super) fn nowhere(tests: &ResidualTests) -> Option<Unexplained> {
+    if !tests.is_structured() {
         return None;
     }
-    let strongest = findings.strongest()?;
+    let strongest = tests.strongest()?;
     Some(Unexplained {
         site: None,
         depends_on: strongest.about().into_iter().collect(),

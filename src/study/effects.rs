@@ -40,7 +40,7 @@ impl Strengths {
 
     /// Returns the true value of an effect parameter, or `None` if no effect has a parameter of
     /// that name.
-    pub fn of(&self, name: &str) -> Option<f64> {
+    pub fn get(&self, name: &str) -> Option<f64> {
         self.0.iter().find(|(parameter, _)| parameter == name).map(|(_, value)| *value)
     }
 
@@ -57,7 +57,7 @@ impl Strengths {
                 return None;
             }
             let value = |name: &String| {
-                if is_in(&given, name) { 0.0 } else { self.of(name).unwrap_or(0.0) }
+                if is_in(&given, name) { 0.0 } else { self.get(name).unwrap_or(0.0) }
             };
             TrueEffect::new(
                 cause,

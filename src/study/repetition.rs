@@ -69,7 +69,7 @@ fn data(study: &Study, cell: &Cell, repetition: usize) -> Option<Data> {
             .iter()
             .find(is_same)
             .map(|truth| truth.value)
-            .or_else(|| strengths.of(&parameter.name));
+            .or_else(|| strengths.get(&parameter.name));
         Some(parameter.deviation(value?))
     });
     let true_x = true_x.collect();
@@ -99,7 +99,7 @@ fn by_model(mut arm: Problem, strengths: &Strengths, rows: &[Row]) -> Option<Vec
     // Without rules, parameters of effects are free and those of the arm fixed.
     (arm.parameters, arm.constraints) = (Vec::new(), Vec::new());
     let model = Model::new(&arm, &[String::new()], &arm.target_words()).ok()?;
-    let x = model.parameters.iter().map(|free| Some(free.deviation(strengths.of(&free.name)?)));
+    let x = model.parameters.iter().map(|free| Some(free.deviation(strengths.get(&free.name)?)));
     let x = DVector::from_vec(x.collect::<Option<Vec<f64>>>()?);
     let mut table = table(rows);
     table.positions.fill(Vector3::zeros());

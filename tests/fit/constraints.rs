@@ -206,8 +206,12 @@ fn checks_are_of_what_a_constraint_leaves() {
     let data = Dataset::from_measurements(&problem, measurements).unwrap();
     let trace = trace(&problem, &data, &Options::default()).unwrap();
     assert_eq!(trace.fit.active_constraints.len(), 1);
-    let check =
-        trace.findings.tests.iter().find(|check| check.name() == "reduced-chi-squared").unwrap();
+    let check = trace
+        .residual_tests
+        .tests
+        .iter()
+        .find(|check| check.name() == "reduced-chi-squared")
+        .unwrap();
     let (checked, fitted) =
         (check.outcome.as_ref().unwrap().statistic, trace.fit.reduced_chi2.unwrap());
     assert!(check.failed() && fitted > 100.0, "{fitted}");

@@ -34,7 +34,7 @@ fn the_covariance_is_that_of_the_standard_errors() {
             assert!(told.as_array().unwrap().iter().all(Value::is_null), "{}", estimate.name);
             continue;
         };
-        let variance = found.covariance.of(k, k).unwrap();
+        let variance = found.covariance.entry(k, k).unwrap();
         assert!(
             (variance / error.powi(2) - 1.0).abs() < 1e-12,
             "{}: {variance} and {error}",

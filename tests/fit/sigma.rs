@@ -139,7 +139,7 @@ fn a_sigma_too_large_makes_the_loop_invent_nothing() {
                 "seed {seed} × {factor}: {:?}",
                 closed.effects
             );
-            let size = closed.findings.tests.first().unwrap();
+            let size = closed.residual_tests.tests.first().unwrap();
             assert_eq!(size.to_string().contains("overstated"), factor > 1.0, "{size}");
         }
     }

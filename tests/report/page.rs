@@ -177,8 +177,8 @@ fn the_picture_holds_the_errors_that_the_tables_sum_up() {
     let page = report::identification_report(&problem, &found, &shown);
     check(&page);
     // Every test appears with its verdict on the page and in Markdown.
-    assert!(shown.findings.tests.len() > 5);
-    for check in &shown.findings.tests {
+    assert!(shown.residual_tests.tests.len() > 5);
+    for check in &shown.residual_tests.tests {
         let verdict = match (&check.outcome, check.failed()) {
             (Err(_), _) => "",
             (Ok(_), true) => "failed: ",

@@ -93,7 +93,7 @@ pub enum PredictError {
 
 impl ErrorsBySession {
     /// Summarises the errors measured − predicted of `rows` \[m\], in total and by session.
-    pub fn of(rows: &Measurements, errors: &[Vector3<f64>]) -> Self {
+    pub fn new(rows: &Measurements, errors: &[Vector3<f64>]) -> Self {
         let kinds = rows.kinds();
         let of = |chosen: &[usize], errors: &[Vector3<f64>]| {
             let first = chosen.iter().map(|&row| rows.observation(row)).min().unwrap_or_default();
@@ -209,7 +209,7 @@ pub fn predict(
     let residuals = rows.position_measured.then(|| {
         residuals((&errors, &seen), (&sigmas, &numbers), turns.as_deref().zip(turn), split)
     });
-    let errors = rows.position_measured.then(|| ErrorsBySession::of(rows, &errors));
+    let errors = rows.position_measured.then(|| ErrorsBySession::new(rows, &errors));
     let placed = if rows.position_measured { missing } else { Vec::new() };
     let placed = placed.into_iter().map(|k| model.parameters[k].name.clone()).collect();
     Ok(Prediction { positions, orientations, residuals, errors, spreads, placed, x })

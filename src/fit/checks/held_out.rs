@@ -73,7 +73,7 @@ pub(in crate::fit) fn outliers(
     let errors = fitting.position_errors(rows, x);
     let outlier = |place: usize| {
         let (row, distance) = (rows[place], lengths[place] / scatter);
-        let far = || Outlier::of(fitting.measurements, row, distance, errors[place]);
+        let far = || Outlier::new(fitting.measurements, row, distance, errors[place]);
         (distance > chances[place].1).then(far)
     };
     (0..rows.len()).filter_map(outlier).collect()

@@ -3,8 +3,8 @@
 use serde_json::json;
 
 use super::checked_fit::{Check, CheckedFit};
-use super::far_off::is_nominal_far_off;
 use super::finding::{Finding, FindingCode};
+use super::nominal_error::is_nominal_far_off;
 use super::parameter_limits::WithinPriors;
 use super::row_kind::size;
 

@@ -6,7 +6,6 @@
 pub(super) mod bounds;
 pub(super) mod checked_fit;
 mod convention;
-pub(super) mod far_off;
 pub(super) mod finding;
 pub(super) mod fitted_rows;
 pub(super) mod held_out;
@@ -14,6 +13,7 @@ mod held_out_placed;
 pub(super) mod misfit;
 mod misread;
 pub(super) mod misreading;
+pub(super) mod nominal_error;
 mod orientation;
 pub(super) mod outliers;
 pub(super) mod parameter_limits;
@@ -44,7 +44,7 @@ const CHECKS: &[&dyn Check] = &[
     &priors::NoiseIsDeclared,
     &orientation::OrientationsFit,
     &priors::DataDecide,
-    &far_off::NominalIsNear,
+    &nominal_error::NominalIsNear,
     &prediction::PredictionHolds,
     &prediction::NotWorseThanNominal,
     &bounds::BoundsAreSeen,

@@ -24,7 +24,7 @@ pub struct Outlier {
 }
 
 impl Outlier {
-    pub(in crate::fit) fn of(
+    pub(in crate::fit) fn new(
         measurements: &Measurements,
         row: usize,
         distance: f64,
@@ -58,7 +58,7 @@ pub(in crate::fit) fn outliers(
 ) -> Vec<Outlier> {
     let outlier = |((place, &row), &error): ((usize, &usize), &Vector3<f64>)| {
         let distance = lengths.outlying(place)?;
-        Some(Outlier::of(measurements, row, distance, error))
+        Some(Outlier::new(measurements, row, distance, error))
     };
     rows.iter().enumerate().zip(errors).filter_map(outlier).collect()
 }

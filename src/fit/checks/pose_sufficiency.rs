@@ -35,7 +35,7 @@ pub(in crate::fit) struct PoseSufficiency {
 
 impl PoseSufficiency {
     /// Examines the poses of a fit of `unknowns` that starts at the full parameter vector `at`.
-    pub fn of(
+    pub fn new(
         fitting: &Fitting,
         problem: &Problem,
         unknowns: &[&Parameter],

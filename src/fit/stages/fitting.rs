@@ -156,10 +156,10 @@ impl<'a> Fitting<'a> {
         for pose in &mut poses {
             // Known distances keep their σ, however much the contacts scatter.
             if pose.observation.is_of_arm() {
-                pose.sigma = self.noise_model.of(pose.sigma);
+                pose.sigma = self.noise_model.assumed_sigma(pose.sigma);
             }
             if let Some(orientation) = &mut pose.orientation {
-                orientation.sigma = self.turn_noise_model.of(orientation.sigma);
+                orientation.sigma = self.turn_noise_model.assumed_sigma(orientation.sigma);
             }
         }
         Stage {
@@ -424,7 +424,7 @@ impl<'a> Fitting<'a> {
         registered: &DVector<f64>,
         fitted: &DVector<f64>,
     ) -> Option<OrientationErrors> {
-        let sigma_taken = self.turn_noise_model.of(self.turn_sigma?);
+        let sigma_taken = self.turn_noise_model.assumed_sigma(self.turn_sigma?);
         let errors = |x: &DVector<f64>| {
             let of = |rows: &[usize]| {
                 ErrorSummary::of(&self.model.orientation_residuals(self.poses(rows), x))

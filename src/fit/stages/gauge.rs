@@ -21,7 +21,7 @@ impl Gauge {
     /// Finds the combinations of the unknowns not `held` that data, priors and `active` constraints
     /// do not determine. `data` is the triangular factor of the data, `sizes` are the plausible
     /// deviations of the unknowns.
-    pub fn of(
+    pub fn new(
         data: &DMatrix<f64>,
         priors: &DMatrix<f64>,
         sizes: &[Option<f64>],
@@ -41,7 +41,7 @@ impl Gauge {
             }
         });
         let free: Vec<usize> = (0..n).filter(|&j| !held[j]).collect();
-        let seen = Triangle::of(&stacked.select_columns(&free));
+        let seen = Triangle::factor(&stacked.select_columns(&free));
         let Blind { gauge: unseen, visible: outside } = Blind::in_triangle(&seen);
         let sizes: Vec<Option<f64>> = free.iter().map(|&k| sizes[k]).collect();
         let weak = Weak::of(&below(&seen, &unseen), &sizes);
@@ -75,5 +75,5 @@ pub(super) fn below(triangle: &DMatrix<f64>, rows: &DMatrix<f64>) -> DMatrix<f64
     let mut stack =
         triangle.clone().resize_vertically((triangle.nrows() + rows.nrows()).max(n), 0.0);
     stack.view_mut((triangle.nrows(), 0), rows.shape()).copy_from(rows);
-    if rows.nrows() == 0 { stack } else { Triangle::of(&stack) }
+    if rows.nrows() == 0 { stack } else { Triangle::factor(&stack) }
 }

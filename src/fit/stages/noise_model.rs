@@ -23,7 +23,7 @@ impl NoiseModel {
     pub const DECLARED: Self = Self { scale: 1.0, model_error: 0.0 };
 
     /// Returns the σ \[m\] that the fit takes for a declared one.
-    pub fn of(self, sigma: f64) -> f64 {
+    pub fn assumed_sigma(self, sigma: f64) -> f64 {
         if self == Self::DECLARED { sigma } else { (self.scale * sigma).hypot(self.model_error) }
     }
 
@@ -73,10 +73,11 @@ mod tests {
         let declared = [1e-5, 2e-5, 4e-5];
         let more = NoiseModel::raised(&declared, &declared, 100.0);
         let ratio: f64 =
-            declared.iter().map(|&sigma| (more.of(sigma) / sigma).powi(2)).sum::<f64>() / 3.0;
+            declared.iter().map(|&sigma| (more.assumed_sigma(sigma) / sigma).powi(2)).sum::<f64>()
+                / 3.0;
         assert!((more.scale - 1.0).abs() < 1e-15 && (ratio - 100.0).abs() < 1e-9, "{more:?}");
         let less = NoiseModel::raised(&declared, &declared, 0.01);
         assert!((less.scale - 0.1).abs() < 1e-12 && less.model_error == 0.0, "{less:?}");
-        assert!((NoiseModel::DECLARED.of(0.3) - 0.3).abs() < 1e-15);
+        assert!((NoiseModel::DECLARED.assumed_sigma(0.3) - 0.3).abs() < 1e-15);
     }
 }

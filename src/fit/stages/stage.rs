@@ -262,7 +262,7 @@ impl<'a> Stage<'a> {
         if self.parameters().all(|parameter| parameter.sigma.is_some()) {
             return Gauge { rows: DMatrix::zeros(0, n), visible: vec![1.0; n], weak: Vec::new() };
         }
-        Gauge::of(&self.data_triangle(at), &self.priors(), &self.sizes(), held, active)
+        Gauge::new(&self.data_triangle(at), &self.priors(), &self.sizes(), held, active)
     }
 
     /// Minimises the cost from the full parameter vector `start`.

@@ -71,7 +71,7 @@ impl Collected {
 impl Covariance {
     /// Returns the covariance of two parameters by their indices among the estimates; `None` where
     /// one of them has no variance.
-    pub fn of(&self, one: usize, other: usize) -> Option<f64> {
+    pub fn entry(&self, one: usize, other: usize) -> Option<f64> {
         let place = |k| self.parameters.binary_search(&k).ok();
         Some(self.matrix[(place(one)?, place(other)?)])
     }

@@ -64,7 +64,7 @@ pub(in crate::fit) fn hidden_by_bounds(
         if parameters[j].lower >= parameters[j].upper {
             return None;
         }
-        let (mut direction, curvature) = along(stage, (triangle, closed), held, j)?;
+        let (mut direction, curvature) = valley(stage, (triangle, closed), held, j)?;
         if side == AtBound::Upper {
             direction.neg_mut();
         }
@@ -99,7 +99,7 @@ pub(in crate::fit) fn hidden_by_bounds(
 ///
 /// With the columns of the free unknowns first and that of `j` last, \[R r; 0 ρ\] is the factor of
 /// data, priors and held combinations: s = −R⁻¹ r and h = ρ².
-fn along(
+fn valley(
     stage: &Stage,
     (triangle, closed): (&DMatrix<f64>, &DMatrix<f64>),
     held: &[bool],
@@ -116,7 +116,7 @@ fn along(
         let held_rows = closed.column(k) * CONSTRAINT_WEIGHT;
         stack.view_mut((from, place), (closed.nrows(), 1)).copy_from(&held_rows);
     }
-    let factor = Triangle::of(&stack);
+    let factor = Triangle::factor(&stack);
     let last = n - 1;
     let left = factor.view((0, 0), (last, last));
     let right = factor.view((0, last), (last, 1)).column(0).into_owned();

@@ -114,13 +114,13 @@ pub(in crate::fit) fn fitted(
                     begin = end.x;
                 }
                 None => {
-                    let statistics = Statistics::of(&whole, &end, Some(fitting.noise_model))?;
+                    let statistics = Statistics::new(&whole, &end, Some(fitting.noise_model))?;
                     return Ok((end, statistics, Noise::Declared));
                 }
             }
             continue;
         }
-        let statistics = Statistics::of(&whole, &end, None)?;
+        let statistics = Statistics::new(&whole, &end, None)?;
         let next = (fitting.sigma * statistics.reduced_chi2.map_or(1.0, f64::sqrt)).max(MIN_SIGMA);
         let settled = (next - fitting.sigma).abs() < NOISE_TOLERANCE * fitting.sigma;
         if settled || fits == MAX_NOISE_FITS {
@@ -157,7 +157,7 @@ fn contradicted(
     end: &FitEnd,
     assumed: (NoiseModel, NoiseModel),
 ) -> Result<Option<(NoiseModel, NoiseModel)>, StageError> {
-    let of_fit = || Statistics::of(stage, end, Some(assumed.0));
+    let of_fit = || Statistics::new(stage, end, Some(assumed.0));
     let robust = if stage.loss == Loss::Squares { None } else { Some(of_fit()?) };
     let counts =
         |place: &usize| robust.as_ref().is_none_or(|fit| fit.lengths.outlying(*place).is_none());
@@ -182,7 +182,7 @@ fn contradicted(
     let whitened = residual_vector(&residuals, &x);
     let unmoved_squares = unmoved.squares(whitened.as_slice(), stage.coordinates());
     let rows = (count, (2.0 * data.cost - unmoved_squares).max(0.0));
-    let (ratio, gain) = VarianceLikelihood::of(&data, rows, &x, &priors, &held, &closed).maximum();
+    let (ratio, gain) = VarianceLikelihood::new(&data, rows, &x, &priors, &held, &closed).maximum();
     if !ratio.is_finite() {
         return Ok(None);
     }
@@ -233,7 +233,7 @@ fn shares(whitened: &DVector<f64>, coordinates: usize, counts: [usize; 2]) -> [f
 
 /// Returns the noise variance that a stage took, relative to the declared one, and 1 σ of the rows
 /// of `kind` that it took. Known distances between points keep their σ and do not count.
-pub(in crate::fit) fn taken(stage: &Stage, kind: Observation) -> (f64, f64) {
+pub(in crate::fit) fn assumed_noise(stage: &Stage, kind: Observation) -> (f64, f64) {
     let rows =
         stage.poses.iter().zip(&stage.declared).filter(|(pose, _)| pose.observation.is_of_arm());
     let (poses, declared): (Vec<&Pose>, Vec<f64>) = rows.unzip();

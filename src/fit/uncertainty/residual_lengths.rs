@@ -75,7 +75,7 @@ impl Lengths {
     /// √`freedom`, which gross errors hardly change; √(median of χ²₃) is 1.538. With a declared σ
     /// it is at least `declared`. A model that misses some effect everywhere therefore does not
     /// turn every pose into an outlier.
-    pub fn of(
+    pub fn new(
         stage: &Stage,
         at: &DVector<f64>,
         unmoved: &Unmoved,

@@ -54,7 +54,7 @@ impl Statistics {
     ///
     /// # Errors
     /// Returns an error if a constraint is not finite, or the priors do not match the unknowns.
-    pub fn of(
+    pub fn new(
         stage: &Stage,
         end: &FitEnd,
         noise_model: Option<NoiseModel>,
@@ -71,7 +71,7 @@ impl Statistics {
         let moved = |pose: &Pose| pose.coordinates().saturating_sub(unmoved.count());
         let coordinates = stage.poses.iter().map(moved).sum::<usize>() as f64;
         let freedom = coordinates - uncertainty.effective_parameters;
-        let lengths = Lengths::of(
+        let lengths = Lengths::new(
             stage,
             &end.x,
             &unmoved,

@@ -20,7 +20,7 @@ use crate::measurement::Dataset;
 use crate::model::{CentreLine, Model, Pose};
 use crate::problem::Problem;
 use crate::remainder::Fitted;
-use crate::residual_tests::Findings;
+use crate::residual_tests::ResidualTests;
 use crate::results::tables::{CommandedJoint, commanded_joints};
 use crate::select::{ClosedLoop, Found, examine};
 
@@ -83,7 +83,7 @@ pub struct PlotData {
     pub time_measured: bool,
     /// Tests of the residual at the fitted poses.
     #[doc(hidden)]
-    pub findings: Findings,
+    pub residual_tests: ResidualTests,
     /// Warnings on ignored contents of the measurement files.
     pub warnings: Vec<Warning>,
     /// Correlations of the parameters, as in estimate.json.
@@ -113,8 +113,8 @@ impl PlotData {
             registered(&poses, &fitted, identification),
             identified(&poses, &fitted, identification),
         ];
-        let findings = examine(problem, data, identification)?;
-        Ok(Self::of(problem, &poses, stages, (&fitted, identification), findings))
+        let residual_tests = examine(problem, data, identification)?;
+        Ok(Self::new(problem, &poses, stages, (&fitted, identification), residual_tests))
     }
 
     /// Collects the data of a comparison: its joint fit, and the stages that the paper calls
@@ -132,7 +132,7 @@ impl PlotData {
         let procedure = comparison.procedures.first();
         let stages = procedure.map(|procedure| procedure_stages(&comparison.before, procedure));
         let stages = stages.unwrap_or_default();
-        Ok(Self::of(problem, &poses, stages, (&fitted, joint), examine(problem, data, joint)?))
+        Ok(Self::new(problem, &poses, stages, (&fitted, joint), examine(problem, data, joint)?))
     }
 
     /// Collects the data of a closed loop, with the partial residuals of every effect found.
@@ -171,23 +171,23 @@ impl PlotData {
                 .unexplained
                 .iter()
                 .find_map(|structure| cause::unexplained(structure, &closure.closed, poses.split)),
-            ..Self::of(
+            ..Self::new(
                 &closure.closed,
                 &poses,
                 stages,
                 (&after, &closure.after),
-                closure.findings.clone(),
+                closure.residual_tests.clone(),
             )
         })
     }
 
     /// Collects the data that all kinds of reports share; `best` is the arm of the last stage.
-    fn of(
+    fn new(
         problem: &Problem,
         poses: &Poses,
         stages: Vec<StageErrors>,
         (best, identification): (&Arm, &Identification),
-        findings: Findings,
+        residual_tests: ResidualTests,
     ) -> Self {
         let measurements = poses.measurements;
         let rows = poses.rows();
@@ -255,7 +255,7 @@ impl PlotData {
             stand_for,
             residuals,
             time_measured: measurements.time_measured,
-            findings,
+            residual_tests,
             warnings: measurements.warnings.clone(),
             correlations: identification.correlations(),
             causes: Vec::new(),

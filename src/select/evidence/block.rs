@@ -84,7 +84,11 @@ fn count(groups: &[Option<usize>]) -> usize {
 }
 
 /// Returns the product M A of row vectors M with grouped columns A, shape = (rows of M, k).
-fn along(rows: &DMatrix<f64>, levers: &DMatrix<f64>, groups: &[Option<usize>]) -> DMatrix<f64> {
+fn times_grouped(
+    rows: &DMatrix<f64>,
+    levers: &DMatrix<f64>,
+    groups: &[Option<usize>],
+) -> DMatrix<f64> {
     let count = count(groups);
     let mut all = DMatrix::zeros(rows.nrows(), levers.ncols() * count);
     for (pose, group) in
@@ -101,15 +105,16 @@ fn along(rows: &DMatrix<f64>, levers: &DMatrix<f64>, groups: &[Option<usize>]) -
 /// Returns AᵀA and Aᵀr of grouped columns, with the fitted parameters projected out.
 fn grouped(levers: &DMatrix<f64>, groups: &[Option<usize>], fit: &LinearNeighbourhood) -> Normal {
     let squares = levers.map(|value| value * value);
-    let diagonal = along(&DMatrix::repeat(1, squares.nrows(), 1.0), &squares, groups).transpose();
+    let diagonal =
+        times_grouped(&DMatrix::repeat(1, squares.nrows(), 1.0), &squares, groups).transpose();
     let residual = fit.residual().rows(0, levers.nrows()).transpose();
-    let product = along(&DMatrix::from_rows(&[residual]), levers, groups).transpose();
-    let normal = Normal::LessFew {
+    let product = times_grouped(&DMatrix::from_rows(&[residual]), levers, groups).transpose();
+    let normal = Normal::LowRankCorrection {
         diagonal: diagonal.column(0).into_owned(),
-        less: along(&fit.fitted().transpose(), levers, groups),
+        less: times_grouped(&fit.fitted().transpose(), levers, groups),
         product: product.column(0).into_owned(),
     };
-    normal.whole_if_less_work()
+    normal.dense_if_cheaper()
 }
 
 /// Columns of one hypothesis, with the fitted parameters projected out, and the logarithm of its
@@ -247,7 +252,7 @@ impl Block {
                 all.gemm(1.0, transposed, columns, 0.0);
                 all
             }
-            Columns::Grouped { levers, groups } => along(transposed, levers, groups),
+            Columns::Grouped { levers, groups } => times_grouped(transposed, levers, groups),
         }
     }
 

@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::block::Design;
 use super::candidate::{Candidate, even};
-use super::functions::{Known, basis, goes_with, growing, merge, products_of, times};
+use super::functions::{SampledCovariate, basis, goes_with, growing, merge, products_of, times};
 use super::hypothesis::Hypothesis;
 use super::marginal::Coefficients;
 use super::sites::{acts_along_axes, geometry_sites};
@@ -44,7 +44,7 @@ pub(super) struct Columns<'a, 'l> {
     /// For each candidate, its family and its share of the family's prior probability.
     shares: Vec<(String, f64)>,
     /// Covariates on which the functions depend.
-    pub covariates: Vec<Known>,
+    pub covariates: Vec<SampledCovariate>,
 }
 
 impl<'a, 'l> Columns<'a, 'l> {
@@ -59,7 +59,7 @@ impl<'a, 'l> Columns<'a, 'l> {
         (coverage, takes_gears, weighed): ((bool, bool), bool, usize),
         effects: &[(Effect, DMatrix<f64>)],
         only: Option<&'a Hypothesis>,
-    ) -> (Vec<Candidate>, Vec<Known>, f64) {
+    ) -> (Vec<Candidate>, Vec<SampledCovariate>, f64) {
         let (candidates, shares, covariates) = (Vec::new(), Vec::new(), Vec::new());
         let mut all = Self {
             problem,
@@ -205,7 +205,7 @@ impl<'a, 'l> Columns<'a, 'l> {
     }
 
     /// Returns the recorded quantities that vary, with their values in every pose.
-    fn known(&self) -> Vec<Known> {
+    fn known(&self) -> Vec<SampledCovariate> {
         let poses = self.linearised.poses();
         let mut all: Vec<(Covariate, Vec<f64>)> = Vec::new();
         let moving = self
@@ -250,7 +250,9 @@ impl<'a, 'l> Columns<'a, 'l> {
             );
         }
         all.into_iter()
-            .filter_map(|(covariate, values)| Known::of(covariate, values, self.weighed))
+            .filter_map(|(covariate, values)| {
+                SampledCovariate::new(covariate, values, self.weighed)
+            })
             .collect()
     }
 
@@ -291,7 +293,7 @@ impl<'a, 'l> Columns<'a, 'l> {
     /// It is computed as the displacement by a compliance there divided by the displacement by an
     /// angle. Each moment has an index over all joints and both axes, which does not depend on the
     /// poses.
-    fn loads(&self) -> Vec<(usize, Known)> {
+    fn loads(&self) -> Vec<(usize, SampledCovariate)> {
         let pairs = [
             (JointField::Compliance, JointField::Theta),
             (JointField::LateralX, JointField::Alpha),
@@ -305,8 +307,12 @@ impl<'a, 'l> Columns<'a, 'l> {
                 let along = gives.rows(3 * k, 3).dot(&turns.rows(3 * k, 3));
                 if lever(k) > 1e-12 * longest { along / lever(k) } else { 0.0 }
             };
-            Known::of(Covariate::Load, (0..turns.len() / 3).map(moment).collect(), self.weighed)
-                .filter(|known| known.levels > 3)
+            SampledCovariate::new(
+                Covariate::Load,
+                (0..turns.len() / 3).map(moment).collect(),
+                self.weighed,
+            )
+            .filter(|known| known.levels > 3)
         };
         let all = (0..self.problem.joints.len()).flat_map(|joint| pairs.map(|pair| (joint, pair)));
         all.enumerate().filter_map(|(k, (joint, pair))| Some((k, of(joint, pair)?))).collect()
@@ -314,7 +320,7 @@ impl<'a, 'l> Columns<'a, 'l> {
 
     /// Returns true if a candidate effect depends on this covariate alone and adds a term linear in
     /// it at `site`. If the covariate has only two values, every function of it is linear.
-    fn has_law(&self, site: ParameterSite, of: &Known) -> bool {
+    fn has_law(&self, site: ParameterSite, of: &SampledCovariate) -> bool {
         let is_line = |term: &Term| {
             let is_linear = matches!(
                 term.regressor.as_quantity(),
@@ -338,7 +344,7 @@ impl<'a, 'l> Columns<'a, 'l> {
         &mut self,
         family: &str,
         (site, at): (ParameterSite, &[&DVector<f64>]),
-        of: &Known,
+        of: &SampledCovariate,
         (lengths, first): (&[f64], usize),
     ) {
         let hypothesis = Hypothesis::smooth(site, vec![of.covariate.clone()]);
@@ -358,7 +364,7 @@ impl<'a, 'l> Columns<'a, 'l> {
             // What settles changes fast at first.
             let range = of.values[..self.weighed].iter().copied().fold(0.0, f64::max);
             let logarithm = of.values.iter().map(|t| (t.max(0.0) + range / 30.0).ln()).collect();
-            if let Some(of) = Known::of(of.covariate.clone(), logarithm, self.weighed) {
+            if let Some(of) = SampledCovariate::new(of.covariate.clone(), logarithm, self.weighed) {
                 self.add_variant(family, &hypothesis, warped, || {
                     times(at, &basis(&of.scaled, 0.25))
                 });
@@ -378,7 +384,7 @@ impl<'a, 'l> Columns<'a, 'l> {
 
     /// Adds functions of two covariates: of two commands, of a direction of approach and another
     /// quantity, or of temperature and time.
-    fn surfaces(&mut self, site: ParameterSite, at: &DVector<f64>, known: &[Known]) {
+    fn surfaces(&mut self, site: ParameterSite, at: &DVector<f64>, known: &[SampledCovariate]) {
         for (k, one) in known.iter().enumerate() {
             for other in &known[k + 1..] {
                 if goes_with(&one.covariate, &other.covariate) {
@@ -390,7 +396,7 @@ impl<'a, 'l> Columns<'a, 'l> {
 
     /// Adds functions of a joint's command whose amplitude is proportional to another quantity,
     /// such as a gear error that grows with temperature or payload.
-    fn scaled_by(&mut self, site: ParameterSite, at: &DVector<f64>, known: &[Known]) {
+    fn scaled_by(&mut self, site: ParameterSite, at: &DVector<f64>, known: &[SampledCovariate]) {
         let ParameterSite::Joint { joint, .. } = site else { return };
         let Some(command) =
             known.iter().find(|command| command.covariate == Covariate::Command(joint))
@@ -413,7 +419,7 @@ impl<'a, 'l> Columns<'a, 'l> {
         family: &str,
         site: ParameterSite,
         at: &[&DVector<f64>],
-        (one, other): (&Known, &Known),
+        (one, other): (&SampledCovariate, &SampledCovariate),
     ) {
         let mut depends_on = vec![one.covariate.clone(), other.covariate.clone()];
         depends_on.sort();
@@ -425,7 +431,7 @@ impl<'a, 'l> Columns<'a, 'l> {
 
     /// Returns the candidates with their prior probabilities. Each further hypothesis has odds of 1
     /// to 2; families have the probabilities of their weights, divided into shares within a family.
-    fn weighted(self) -> (Vec<Candidate>, Vec<Known>, f64) {
+    fn weighted(self) -> (Vec<Candidate>, Vec<SampledCovariate>, f64) {
         let mut families: Vec<(&str, f64, f64)> = Vec::new();
         for ((family, share), candidate) in self.shares.iter().zip(&self.candidates) {
             if let Some((_, _, sum)) =

@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector};
 use super::block::Design;
 use super::candidate::Candidate;
 use super::columns::Columns;
-use super::functions::{Known, products_of, rough_basis, times};
+use super::functions::{SampledCovariate, products_of, rough_basis, times};
 use super::hypothesis::{Hypothesis, HypothesisKind, Site};
 use crate::model::parameter::{BeamField, ParameterSite};
 use crate::problem::Effect;
@@ -16,7 +16,7 @@ use crate::select::settings::{ROUGH_LENGTHS, SLOW_LENGTH, SMOOTH_LENGTHS};
 
 impl Columns<'_, '_> {
     /// Adds functions of one covariate, and of the position, that displace every measured position.
-    pub(super) fn measurement(&mut self, known: &[Known]) {
+    pub(super) fn measurement(&mut self, known: &[SampledCovariate]) {
         let axes: Vec<DVector<f64>> = (0..3)
             .filter_map(|axis| self.linearised.place(ParameterSite::Shift { axis }))
             .collect();
@@ -27,19 +27,20 @@ impl Columns<'_, '_> {
         for of in known {
             self.smooth("smooth in the measurement", (site, &at), of, (&SMOOTH_LENGTHS, 0));
         }
-        let is_time = |of: &&Known| matches!(of.covariate, Covariate::Time | Covariate::Row);
+        let is_time =
+            |of: &&SampledCovariate| matches!(of.covariate, Covariate::Time | Covariate::Row);
         for of in known.iter().filter(is_time) {
             self.wandering(site, &at, of);
         }
         let poses = self.linearised.poses();
         let coordinate = |axis: usize| {
-            Known::of(
+            SampledCovariate::new(
                 Covariate::Position,
                 poses.iter().map(|p| p.measured[axis]).collect(),
                 self.weighed,
             )
         };
-        let coordinates: Vec<Known> = (0..3).filter_map(coordinate).collect();
+        let coordinates: Vec<SampledCovariate> = (0..3).filter_map(coordinate).collect();
         let linear = DMatrix::from_fn(poses.len(), coordinates.len(), |k, j| {
             let scaled = &coordinates[j].scaled;
             scaled[k] - scaled[..self.weighed].iter().sum::<f64>() / self.weighed.max(1) as f64
@@ -65,7 +66,12 @@ impl Columns<'_, '_> {
 
     /// Adds errors of the instrument that wander in time: each reading's error is close to the
     /// previous one's.
-    pub(super) fn wandering(&mut self, site: ParameterSite, at: &[&DVector<f64>], of: &Known) {
+    pub(super) fn wandering(
+        &mut self,
+        site: ParameterSite,
+        at: &[&DVector<f64>],
+        of: &SampledCovariate,
+    ) {
         let hypothesis = Hypothesis {
             kind: HypothesisKind::Wandering,
             site: Site::Measurement,
@@ -83,12 +89,13 @@ impl Columns<'_, '_> {
 
     /// Adds rotations of the base as smooth functions of quantities other than commands, such as
     /// its floor's temperature, time or load.
-    pub(super) fn base(&mut self, known: &[Known]) {
+    pub(super) fn base(&mut self, known: &[SampledCovariate]) {
         let axes: Vec<DVector<f64>> =
             (0..3).filter_map(|axis| self.linearised.place(ParameterSite::Turn { axis })).collect();
         let (site, at) = (ParameterSite::Turn { axis: 0 }, axes.iter().collect::<Vec<_>>());
-        let is_command =
-            |of: &&Known| matches!(of.covariate, Covariate::Command(_) | Covariate::Approach(_));
+        let is_command = |of: &&SampledCovariate| {
+            matches!(of.covariate, Covariate::Command(_) | Covariate::Approach(_))
+        };
         for of in known.iter().filter(|of| axes.len() == 3 && !is_command(of)) {
             self.smooth("smooth at the base", (site, &at), of, (&SMOOTH_LENGTHS[..2], 0));
         }
@@ -120,7 +127,7 @@ impl Columns<'_, '_> {
 
     /// Adds curvature and strain of beams as smooth functions of temperature and other quantities,
     /// in addition to the linear laws.
-    pub(super) fn warming(&mut self, known: &[Known]) {
+    pub(super) fn warming(&mut self, known: &[SampledCovariate]) {
         if self.problem.data.reference_temperature.is_none() {
             return;
         }

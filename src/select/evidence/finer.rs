@@ -11,7 +11,7 @@ use super::hypotheses::Hypotheses;
 use super::hypothesis::{Hypothesis, HypothesisKind};
 use super::marginal::Coefficients;
 use super::products::Products;
-use super::search::{Weighted, left_by};
+use super::search::{Weighted, reduced_by};
 use crate::problem::{Effect, Problem};
 use crate::select::settings::{MAX_REVISED_SETS, MIN_REVISED_PROBABILITY};
 
@@ -64,7 +64,7 @@ pub(super) fn finer(
             let mut rests: Vec<Vec<usize>> = vec![without_own, without_alike];
             rests.dedup();
             for rest in &rests {
-                let Some(left) = left_by(rest, products) else { continue };
+                let Some(left) = reduced_by(rest, products) else { continue };
                 let mut best: Option<Candidate> = None;
                 let mut least = left.gain(member).0
                     + products.ln_prior(&blocks[member], rest)

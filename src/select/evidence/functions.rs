@@ -67,7 +67,7 @@ impl Shape {
 }
 
 /// Covariate with its value in every pose.
-pub(super) struct Known {
+pub(super) struct SampledCovariate {
     pub covariate: Covariate,
     /// Values in every pose.
     pub values: Vec<f64>,
@@ -79,7 +79,7 @@ pub(super) struct Known {
     pub levels: usize,
 }
 
-impl Known {
+impl SampledCovariate {
     /// Returns the value at which the quantity is zero, if it is defined; for a temperature it is
     /// `reference` \[°C\].
     pub(super) fn zero(&self, reference: Option<f64>) -> Option<f64> {
@@ -94,16 +94,16 @@ impl Known {
     /// quantity: it is a temperature, load or declared covariate, and varies at least by half its
     /// largest distance from zero.
     pub(super) fn is_size(&self, reference: Option<f64>) -> bool {
-        use Covariate::{Hoist, Own, Payload, Temperature};
+        use Covariate::{Declared, Hoist, Payload, Temperature};
         let (low, high) = self.range;
         let varies = |zero: f64| 2.0 * (high - low) >= (high - zero).abs().max((low - zero).abs());
-        matches!(self.covariate, Temperature | Payload | Hoist | Own(_))
+        matches!(self.covariate, Temperature | Payload | Hoist | Declared(_))
             && self.zero(reference).is_none_or(varies)
     }
 
     /// Creates a covariate from its values; `None` if it does not vary over the first `weighed`
     /// poses.
-    pub fn of(covariate: Covariate, values: Vec<f64>, weighed: usize) -> Option<Self> {
+    pub fn new(covariate: Covariate, values: Vec<f64>, weighed: usize) -> Option<Self> {
         let low = values[..weighed].iter().copied().fold(f64::INFINITY, f64::min);
         let high = values[..weighed].iter().copied().fold(f64::NEG_INFINITY, f64::max);
         if !(high > low && (high - low).is_finite()) {
@@ -185,7 +185,7 @@ fn weights(length: f64) -> Vec<f64> {
 /// included, too.
 pub(super) fn growing(
     scaled: &[f64],
-    size: &Known,
+    size: &SampledCovariate,
     zero: Option<f64>,
     length: f64,
 ) -> DMatrix<f64> {
@@ -257,7 +257,7 @@ mod tests {
     #[test]
     fn what_hardly_varies_from_its_zero_is_no_size_to_grow_with() {
         let known = |values: &[f64]| {
-            Known::of(Covariate::Temperature, values.to_vec(), values.len()).unwrap()
+            SampledCovariate::new(Covariate::Temperature, values.to_vec(), values.len()).unwrap()
         };
         assert!(
             known(&[17.0, 20.0, 31.0]).is_size(Some(20.0)) && known(&[29.5, 30.5]).is_size(None)

@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use super::block::Design;
 use super::candidate::{Candidate, even, order_of};
 use super::columns::Columns;
-use super::functions::{Known, Shape};
+use super::functions::{SampledCovariate, Shape};
 use super::hypothesis::Hypothesis;
 use super::hypothesis_set::HypothesisSet;
 use super::limits::limits;
@@ -32,7 +32,7 @@ pub(in crate::select) struct Hypotheses<'a> {
     pub(super) weighed: usize,
     /// Log prior probability of a family of effects.
     pub(super) ln_family: f64,
-    covariates: Vec<Known>,
+    covariates: Vec<SampledCovariate>,
     /// Two flags: directions of approach are recorded; times are recorded.
     coverage: (bool, bool),
     /// Candidate times at which the instrument may have moved.
@@ -42,14 +42,14 @@ pub(in crate::select) struct Hypotheses<'a> {
 impl<'a> Hypotheses<'a> {
     /// Creates the hypotheses about the residual that the fit without the effects `added` leaves.
     /// The first `weighed` of the `rows` count for the evidence.
-    pub fn of(
+    pub fn new(
         fitted: &'a Fitted,
         data: &Data<'a>,
         added: &[Effect],
         rows: &[usize],
         weighed: usize,
     ) -> Self {
-        let candidates = Candidates::of(&fitted.problem, data).testable;
+        let candidates = Candidates::new(&fitted.problem, data).testable;
         let added: Vec<Effect> = added.iter().flat_map(Effect::parts).collect();
         let columns_of_part: Vec<Vec<usize>> =
             added.iter().map(|part| fitted.unknowns_of(part)).collect();
@@ -188,7 +188,8 @@ impl<'a> Hypotheses<'a> {
         shapes: &[Shape],
     ) -> Vec<(Shape, Candidate)> {
         let Some((.., values, lever)) = self.coordinate(hypothesis) else { return Vec::new() };
-        let Some(known) = Known::of(Covariate::Position, values.to_vec(), weighed) else {
+        let Some(known) = SampledCovariate::new(Covariate::Position, values.to_vec(), weighed)
+        else {
             return Vec::new();
         };
         let ln_prior = -(Shape::all().len() as f64).ln();
@@ -214,12 +215,12 @@ impl<'a> Hypotheses<'a> {
     }
 
     /// Returns the values of a covariate in every pose, if it varies.
-    pub(super) fn known(&self, covariate: &Covariate) -> Option<&Known> {
+    pub(super) fn known(&self, covariate: &Covariate) -> Option<&SampledCovariate> {
         self.covariates.iter().find(|known| known.covariate == *covariate)
     }
 
     /// Returns the covariates on which a hypothesis depends.
-    fn covariates(&self, hypothesis: &Hypothesis) -> impl Iterator<Item = &Known> {
+    fn covariates(&self, hypothesis: &Hypothesis) -> impl Iterator<Item = &SampledCovariate> {
         self.covariates.iter().filter(|known| hypothesis.depends_on.contains(&known.covariate))
     }
 
@@ -231,7 +232,7 @@ impl<'a> Hypotheses<'a> {
     /// Returns, for each pose from index `first` on, true if its covariates are within those
     /// ranges.
     pub fn reached(&self, hypothesis: &Hypothesis, first: usize) -> Vec<bool> {
-        let within = |known: &Known, pose: usize| {
+        let within = |known: &SampledCovariate, pose: usize| {
             (known.range.0..=known.range.1).contains(&known.values[pose])
         };
         let poses = self.linearised.poses().len();
@@ -278,7 +279,7 @@ mod tests {
         let data = Data::new(&problem, &data, &rules);
         let fitted = Fitted::new(problem.clone(), &data, &Options::default()).unwrap();
         let rows = data.evidence_rows();
-        let hypotheses = Hypotheses::of(&fitted, &data, &[], &rows, rows.len());
+        let hypotheses = Hypotheses::new(&fitted, &data, &[], &rows, rows.len());
         let of_load = |candidate: &&Candidate| {
             candidate.hypothesis.effect().is_none()
                 && candidate.hypothesis.depends_on == [Covariate::Load]

@@ -150,7 +150,7 @@ impl Hypothesis {
     }
 
     /// Returns true if two hypotheses have the same law, site and covariates.
-    pub fn says(&self, other: &Self) -> bool {
+    pub fn is_same_claim(&self, other: &Self) -> bool {
         self.kind == other.kind && self.site == other.site && self.depends_on == other.depends_on
     }
 

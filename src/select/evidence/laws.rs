@@ -9,8 +9,8 @@ use super::blocks::blocks;
 use super::candidate::Candidate;
 use super::hypotheses::Hypotheses;
 use super::hypothesis::{Hypothesis, HypothesisKind, Site};
-use super::products::{Left, Products};
-use super::search::{Weighted, left_by};
+use super::products::{Products, ReducedProblem};
+use super::search::{Weighted, reduced_by};
 use super::waves::is_free;
 use crate::laws::expression::Vocabulary;
 use crate::laws::{Law, LawSite};
@@ -159,7 +159,7 @@ impl Search<'_, '_, '_> {
         };
         let dropped: Vec<usize> = (0..poses.len()).filter(|pose| !kept.contains(pose)).collect();
         if dropped.len() == self.left_out.len() {
-            let left = left_by(rest, products);
+            let left = reduced_by(rest, products);
             return left.map_or_else(Vec::new, |left| self.beside(&left, products, &kept));
         }
         let members: Vec<&Candidate> =
@@ -171,11 +171,11 @@ impl Search<'_, '_, '_> {
         };
         let products = Products::new(&blocks, &target);
         let all: Vec<usize> = (0..blocks.len()).collect();
-        let left = left_by(&all, &products);
+        let left = reduced_by(&all, &products);
         left.map_or_else(Vec::new, |left| self.beside(&left, &products, &kept))
     }
 
-    fn beside(&self, left: &Left, products: &Products, kept: &[usize]) -> Vec<Proposal> {
+    fn beside(&self, left: &ReducedProblem, products: &Products, kept: &[usize]) -> Vec<Proposal> {
         let Self { hypotheses, fitted, data, joint, .. } = *self;
         let problem = &fitted.problem;
         let linearised = &hypotheses.linearised;
@@ -197,7 +197,7 @@ impl Search<'_, '_, '_> {
         });
         let all = linearised.poses();
         let poses: Vec<_> = kept.iter().map(|&pose| &all[pose]).collect();
-        let known = Quantities::of(problem, &poses, data.measurements.time_measured);
+        let known = Quantities::new(problem, &poses, data.measurements.time_measured);
         // The functions of present laws, from their columns along the lever.
         let is_present = |k: &usize| {
             let hypothesis = &hypotheses.all[*k].hypothesis;
@@ -224,7 +224,7 @@ impl Search<'_, '_, '_> {
 /// Returns B and p of columns along one lever, one column for each pose. With everything fitted and
 /// a set projected out, they have the products diag(|l|²) − BᵀB, and p with the residual.
 fn along_lever(
-    left: &Left,
+    left: &ReducedProblem,
     products: &Products,
     lever: &DVector<f64>,
 ) -> (DMatrix<f64>, DVector<f64>) {

@@ -78,14 +78,14 @@ pub(super) enum Normal {
     Dense { gram: DMatrix<f64>, product: DVector<f64> },
     /// Matrix G = D − LᵀL with D diagonal and L with few rows, shape = (few, k), and b. Arises for
     /// one column per pose after projection.
-    LessFew { diagonal: DVector<f64>, less: DMatrix<f64>, product: DVector<f64> },
+    LowRankCorrection { diagonal: DVector<f64>, less: DMatrix<f64>, product: DVector<f64> },
 }
 
 impl Normal {
     /// Returns b = Aᵀr.
     pub fn product(&self) -> &DVector<f64> {
         match self {
-            Self::Dense { product, .. } | Self::LessFew { product, .. } => product,
+            Self::Dense { product, .. } | Self::LowRankCorrection { product, .. } => product,
         }
     }
 
@@ -99,21 +99,24 @@ impl Normal {
                 product.gemv_tr(-1.0, along, taken, 1.0);
                 Self::Dense { gram, product }
             }
-            Self::LessFew { diagonal, less, product } => {
+            Self::LowRankCorrection { diagonal, less, product } => {
                 let mut product = product.clone();
                 product.gemv_tr(-1.0, along, taken, 1.0);
                 let (few, more) = (less.nrows(), along.nrows());
                 let mut less = less.clone().resize_vertically(few + more, 0.0);
                 less.rows_mut(few, more).copy_from(along);
-                Self::LessFew { diagonal: diagonal.clone(), less, product }.whole_if_less_work()
+                Self::LowRankCorrection { diagonal: diagonal.clone(), less, product }
+                    .dense_if_cheaper()
             }
         }
     }
 
     /// Computes G as a full matrix if L has so many rows that this takes less work.
-    pub fn whole_if_less_work(self) -> Self {
+    pub fn dense_if_cheaper(self) -> Self {
         match self {
-            Self::LessFew { diagonal, less, product } if 2 * less.nrows() > less.ncols() => {
+            Self::LowRankCorrection { diagonal, less, product }
+                if 2 * less.nrows() > less.ncols() =>
+            {
                 let mut gram = DMatrix::from_diagonal(&diagonal);
                 gram.gemm(-1.0, &less.transpose(), &less, 1.0);
                 Self::Dense { gram, product }
@@ -123,7 +126,7 @@ impl Normal {
     }
 
     /// Returns ½ ln det(1 + c² G) and bᵀ (1/c² + G)⁻¹ b for a size c.
-    fn taken(&self, size: f64) -> Option<(f64, f64)> {
+    fn shrinkage_terms(&self, size: f64) -> Option<(f64, f64)> {
         let precision = (size * size).recip();
         match self {
             Self::Dense { gram, product } => {
@@ -135,7 +138,7 @@ impl Normal {
                 }
                 Some((ln_product(&lower.diagonal(), size), taken.norm_squared()))
             }
-            Self::LessFew { diagonal, less, product } => {
+            Self::LowRankCorrection { diagonal, less, product } => {
                 // E = 1/c² + D, K = 1 − L E⁻¹ Lᵀ: det(E − LᵀL) = det E det K,
                 // (E − LᵀL)⁻¹ = E⁻¹ + E⁻¹Lᵀ K⁻¹ L E⁻¹.
                 let root = diagonal.map(|entry| (entry + precision).sqrt());
@@ -248,7 +251,9 @@ fn of_columns(
     (sizes, never_negative): (&[f64], &[bool]),
 ) -> (f64, f64) {
     let at = |size: f64| {
-        let Some((determinant, taken)) = normal.taken(size) else { return f64::NEG_INFINITY };
+        let Some((determinant, taken)) = normal.shrinkage_terms(size) else {
+            return f64::NEG_INFINITY;
+        };
         let left = (squares - taken).max(0.0);
         let signs = match normal {
             Normal::Dense { gram, product } if never_negative.contains(&true) => {

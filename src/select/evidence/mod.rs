@@ -11,9 +11,9 @@
 //! free value in every pose. A law is therefore probable only if it explains the residual better
 //! than functions that need none.
 
-mod again;
 mod block;
 mod blocks;
+mod cache;
 mod candidate;
 mod columns;
 mod elsewhere;
@@ -29,7 +29,7 @@ mod moves;
 mod periodic;
 mod posterior;
 mod products;
-mod recalled;
+mod reevaluation;
 mod sag;
 mod search;
 mod sites;
@@ -42,8 +42,6 @@ use std::collections::btree_map::Entry;
 use super::data::Data;
 use super::fitted::Fitted;
 use crate::problem::Effect;
-use again::carried_by_one;
-pub(super) use again::{SubsetEvidence, subset_evidence};
 use block::Block;
 use blocks::blocks;
 use candidate::Candidate;
@@ -53,7 +51,9 @@ pub use hypothesis::{Hypothesis, HypothesisKind, Site};
 pub use hypothesis_set::HypothesisSet;
 pub(super) use posterior::odds_against;
 pub use posterior::{Claims, Evidence};
-use products::{Known, Products};
+use products::{CachedProducts, Products};
+use reevaluation::carried_by_one;
+pub(super) use reevaluation::{SubsetEvidence, subset_evidence};
 use search::{Weighted, search};
 use waves::Waves;
 
@@ -74,7 +74,7 @@ pub(super) fn ln_posterior(
     (functions, sigma): (&[(Hypothesis, usize)], f64),
 ) -> Option<f64> {
     let rows = data.evidence_rows();
-    let hypotheses = Hypotheses::of(fitted, data, added, &rows, rows.len());
+    let hypotheses = Hypotheses::new(fitted, data, added, &rows, rows.len());
     let is_own = |candidate: &&Candidate| match candidate.hypothesis.effect() {
         Some(effect) => hypotheses.added.contains(effect),
         None => functions.iter().any(|(function, variant)| {
@@ -149,7 +149,7 @@ fn weighed_without<'a>(
     left_out: &[usize],
 ) -> Option<(Evidence, Hypotheses<'a>)> {
     let rows = data.evidence_rows();
-    let mut hypotheses = Hypotheses::of(fitted, data, added, &rows, rows.len());
+    let mut hypotheses = Hypotheses::new(fitted, data, added, &rows, rows.len());
     let (mut blocks, target) =
         blocks(fitted, data, &hypotheses, &hypotheses.all.iter().collect::<Vec<_>>(), left_out)?;
     let is_present = |candidate: &Candidate| {
@@ -158,7 +158,7 @@ fn weighed_without<'a>(
     let present: Vec<usize> =
         (0..blocks.len()).filter(|&k| is_present(&hypotheses.all[k])).collect();
     let mut explanations: Vec<HypothesisSet> = Vec::new();
-    let (mut weighted, unlisted, mut known) = {
+    let (mut weighted, unlisted, mut cache) = {
         let products = Products::new(&blocks, &target);
         let weighted = search(&products, &present);
         if data.stop.is_requested() {
@@ -176,27 +176,27 @@ fn weighed_without<'a>(
             [waves, moves].concat()
         };
         let laws = laws::promising(&hypotheses, &weighted, &products, (fitted, data, left_out));
-        (weighted, [unlisted, laws].concat(), products.into_known())
+        (weighted, [unlisted, laws].concat(), products.into_cache())
     };
     let blocks_of = |some: &[Candidate]| {
         Candidate::blocks(&some.iter().collect::<Vec<_>>(), (fitted, &target.fit), left_out)
     };
-    let again = |known: Known, blocks: &[Block]| {
-        let products = Products::knowing(known, blocks, &target);
-        (search(&products, &present), products.into_known())
+    let search_again = |cache: CachedProducts, blocks: &[Block]| {
+        let products = Products::with_cache(cache, blocks, &target);
+        (search(&products, &present), products.into_cache())
     };
     if !unlisted.is_empty() {
         blocks.extend(blocks_of(&unlisted));
         hypotheses.all.extend(unlisted);
-        (weighted, known) = again(known, &blocks);
+        (weighted, cache) = search_again(cache, &blocks);
     }
-    let products = Products::knowing(known, &blocks, &target);
+    let products = Products::with_cache(cache, &blocks, &target);
     let finer = finer::finer(&hypotheses, &weighted, &products, blocks_of, &fitted.problem);
-    known = products.into_known();
+    cache = products.into_cache();
     if !finer.is_empty() {
         blocks.extend(blocks_of(&finer));
         hypotheses.all.extend(finer);
-        (weighted, known) = again(known, &blocks);
+        (weighted, cache) = search_again(cache, &blocks);
     }
     let of = |k: usize| &hypotheses.all[k].hypothesis;
     if data.stop.is_requested() {
@@ -207,7 +207,7 @@ fn weighed_without<'a>(
         (BTreeMap::new(), Vec::new());
     let mut number = |member: usize| {
         *numbers.entry(member).or_insert_with(|| {
-            let known = distinct.iter().position(|&known| of(known).says(of(member)));
+            let known = distinct.iter().position(|&known| of(known).is_same_claim(of(member)));
             known.unwrap_or_else(|| {
                 distinct.push(member);
                 distinct.len() - 1
@@ -216,7 +216,7 @@ fn weighed_without<'a>(
     };
     let mut places: BTreeMap<Vec<usize>, usize> = BTreeMap::new();
     for Weighted { members, sizes, probability } in
-        weighted.into_iter().filter(|set| set.probability > posterior::NEGLIGIBLE)
+        weighted.into_iter().filter(|set| set.probability > posterior::MIN_KEPT_PROBABILITY)
     {
         let mut members_of_set: Vec<usize> = members.iter().map(|&member| number(member)).collect();
         members_of_set.sort_unstable();
@@ -241,7 +241,7 @@ fn weighed_without<'a>(
     if let Some(best) = evidence.sure(data.rules.inclusion_threshold)
         && best.gears().is_empty()
     {
-        let products = Products::knowing(known, &blocks, &target);
+        let products = Products::with_cache(cache, &blocks, &target);
         evidence.stand_ins = stand_ins(best, &hypotheses, &products);
     }
     Some((evidence, hypotheses))

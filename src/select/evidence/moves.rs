@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::candidate::{Candidate, HYPOTHESES_PER_PROJECTION};
 use super::hypotheses::Hypotheses;
 use super::products::Products;
-use super::search::{Weighted, left_by};
+use super::search::{Weighted, reduced_by};
 use super::waves::is_free;
 use crate::problem::Effect;
 use crate::residual_tests::Covariate;
@@ -50,7 +50,7 @@ pub(super) fn promising(
             }
         }
     }
-    let left: Vec<_> = rests.iter().filter_map(|rest| left_by(rest, products)).collect();
+    let left: Vec<_> = rests.iter().filter_map(|rest| reduced_by(rest, products)).collect();
     if left.is_empty() {
         return Vec::new();
     }

@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::block::Design;
 use super::columns::Columns;
-use super::functions::{Known, basis, times};
+use super::functions::{SampledCovariate, basis, times};
 use super::hypothesis::{Hypothesis, HypothesisKind, Site};
 use crate::model::parameter::ParameterSite;
 use crate::problem::{Effect, EffectDeclaration, JointKind};
@@ -35,7 +35,8 @@ impl Columns<'_, '_> {
         if self.problem.joints[joint].command_kind() != JointKind::Revolute {
             return;
         }
-        let Some(known) = Known::of(Covariate::Command(joint), self.command(joint), self.weighed)
+        let Some(known) =
+            SampledCovariate::new(Covariate::Command(joint), self.command(joint), self.weighed)
         else {
             return;
         };
@@ -70,7 +71,8 @@ impl Columns<'_, '_> {
         if !self.takes_gears || self.problem.effects.iter().any(held) {
             return;
         }
-        let Some(known) = Known::of(Covariate::Command(joint), self.command(joint), self.weighed)
+        let Some(known) =
+            SampledCovariate::new(Covariate::Command(joint), self.command(joint), self.weighed)
         else {
             return;
         };

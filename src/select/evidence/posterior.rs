@@ -7,7 +7,7 @@ use crate::residual_tests::Covariate;
 
 /// Smallest probability of a set that is kept. Even thousands of less probable sets are negligible
 /// together.
-pub(super) const NEGLIGIBLE: f64 = 1e-10;
+pub(super) const MIN_KEPT_PROBABILITY: f64 = 1e-10;
 /// All sets of hypotheses that were evaluated.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Evidence {
@@ -33,7 +33,7 @@ pub struct Claims {
 
 /// Returns the odds (1 − p) / p against a probability p, limited to 1.
 pub(in crate::select) fn odds_against(probability: f64) -> f64 {
-    ((1.0 - probability).max(NEGLIGIBLE) / probability.max(NEGLIGIBLE)).min(1.0)
+    ((1.0 - probability).max(MIN_KEPT_PROBABILITY) / probability.max(MIN_KEPT_PROBABILITY)).min(1.0)
 }
 
 impl Evidence {
@@ -89,7 +89,7 @@ impl Evidence {
     ) -> Vec<HypothesisSet> {
         let differ = |one: &HypothesisSet, other: &HypothesisSet| {
             let is_new = |candidate: &&Hypothesis| {
-                !other.hypotheses.iter().any(|known| known.says(candidate))
+                !other.hypotheses.iter().any(|known| known.is_same_claim(candidate))
             };
             one.hypotheses.iter().filter(is_new).cloned().collect::<Vec<Hypothesis>>()
         };

@@ -8,8 +8,8 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::block::Block;
+use super::cache::Cache;
 use super::marginal::{Noise, Normal, over_noise};
-use super::recalled::Recalled;
 use crate::fit::Stop;
 use crate::numeric::{inverse_factor, inverse_lower, lower_factor, lower_product};
 use crate::select::neighbourhood::LinearNeighbourhood;
@@ -18,7 +18,7 @@ use crate::select::neighbourhood::LinearNeighbourhood;
 const HYPOTHESES_PER_PRODUCT: usize = 16;
 
 /// Smallest size at which a member's columns, given the others, follow from Pₖₖ⁻¹ (see
-/// [`Left::of_member`]). Below it, Pₖₖ⁻¹ is 1 to rounding.
+/// [`ReducedProblem::of_member`]). Below it, Pₖₖ⁻¹ is 1 to rounding.
 const MIN_SIZE_OF_MEMBER: f64 = 1e-3;
 
 /// Residual that the hypotheses are to explain, with its degrees of freedom and the prior on its σ.
@@ -40,29 +40,29 @@ pub(super) struct Products<'a> {
     pub squares: f64,
     /// Grid of noise factors.
     grid: Vec<(f64, f64)>,
-    known: Known,
+    cache: CachedProducts,
 }
 
 /// Cached results about some hypotheses and one residual. They remain valid when more hypotheses
 /// are appended.
 #[derive(Default)]
-pub(super) struct Known {
+pub(super) struct CachedProducts {
     /// Products of each hypothesis, by its index.
     members: Vec<OnceLock<Member>>,
     /// Number of hypotheses after each extension of the list, 0 first.
-    came: Vec<usize>,
+    list_lengths: Vec<usize>,
     /// Gains of hypotheses in addition to a set.
-    gains: Recalled<Beside, Vec<(f64, f64)>>,
+    gains: Cache<GainKey, Vec<(f64, f64)>>,
     /// Converged sizes and log posterior of sets.
-    settled: Recalled<AtSizes, (Vec<f64>, f64)>,
+    settled: Cache<SizedSet, (Vec<f64>, f64)>,
 }
 
 /// Key of a set: its members with the bit patterns of their sizes, in order.
-type AtSizes = Vec<(usize, u64)>;
+type SizedSet = Vec<(usize, u64)>;
 /// Key of gains: a set, and the hypotheses tried in addition to it.
-type Beside = (AtSizes, Vec<usize>);
+type GainKey = (SizedSet, Vec<usize>);
 
-fn at_sizes(members: &[usize], sizes: &[f64]) -> AtSizes {
+fn sized_set(members: &[usize], sizes: &[f64]) -> SizedSet {
     members.iter().copied().zip(sizes.iter().map(|size| size.to_bits())).collect()
 }
 
@@ -78,26 +78,26 @@ pub(super) struct Member {
 
 impl<'a> Products<'a> {
     pub fn new(blocks: &'a [Block], target: &'a Target) -> Self {
-        Self::knowing(Known::default(), blocks, target)
+        Self::with_cache(CachedProducts::default(), blocks, target)
     }
 
     /// Creates the products for `blocks`, reusing cached results about the first of them.
-    pub fn knowing(mut known: Known, blocks: &'a [Block], target: &'a Target) -> Self {
+    pub fn with_cache(mut cache: CachedProducts, blocks: &'a [Block], target: &'a Target) -> Self {
         let squares = target.fit.residual().norm_squared();
-        for member in known.members.iter_mut().filter_map(OnceLock::get_mut) {
+        for member in cache.members.iter_mut().filter_map(OnceLock::get_mut) {
             member.products.resize_with(blocks.len(), OnceLock::new);
         }
-        known.members.resize_with(blocks.len(), OnceLock::new);
-        if known.came.is_empty() {
-            known.came.push(0);
+        cache.members.resize_with(blocks.len(), OnceLock::new);
+        if cache.list_lengths.is_empty() {
+            cache.list_lengths.push(0);
         }
-        known.came.push(blocks.len());
-        Self { blocks, target, squares, grid: target.noise.grid(), known }
+        cache.list_lengths.push(blocks.len());
+        Self { blocks, target, squares, grid: target.noise.grid(), cache }
     }
 
     /// Returns the cached results, for reuse with more hypotheses.
-    pub fn into_known(self) -> Known {
-        self.known
+    pub fn into_cache(self) -> CachedProducts {
+        self.cache
     }
 
     /// Returns ln of the density of a residual with this sum of squares, up to a constant.
@@ -121,7 +121,7 @@ impl<'a> Products<'a> {
     }
 
     fn member(&self, block: usize) -> &Member {
-        if let Some(known) = self.known.members[block].get() {
+        if let Some(known) = self.cache.members[block].get() {
             return known;
         }
         // Before the cell waits for it: a thread that helps others with this product may come to
@@ -129,7 +129,7 @@ impl<'a> Products<'a> {
         let columns = self.blocks[block].columns(&self.target.fit);
         let products = std::iter::repeat_with(OnceLock::new).take(self.blocks.len()).collect();
         let new = Member { transposed: columns.transpose(), columns, products };
-        self.known.members[block].get_or_init(|| new)
+        self.cache.members[block].get_or_init(|| new)
     }
 
     /// Returns the product AᵀC of a set member's columns A and another hypothesis' columns C.
@@ -144,21 +144,21 @@ impl<'a> Products<'a> {
     pub fn gains(&self, members: &[usize], sizes: &[f64], tried: &[usize]) -> Vec<(f64, f64)> {
         let left = OnceCell::new();
         let mut all: Vec<Option<(f64, f64)>> = vec![None; tried.len()];
-        // Cut where hypotheses came, so that a list that was tried before is found again, and what
-        // is multiplied together, whose rounding it decides, does not depend on what other threads
-        // have found by now.
-        for came in self.known.came.windows(2) {
+        // The list is cut where it was extended, so that the gains of a list that was tried before
+        // are found in the cache. The columns multiplied together, and so their rounding, then do
+        // not depend on what other threads have cached.
+        for bounds in self.cache.list_lengths.windows(2) {
             let places: Vec<usize> =
-                (0..tried.len()).filter(|&k| (came[0]..came[1]).contains(&tried[k])).collect();
+                (0..tried.len()).filter(|&k| (bounds[0]..bounds[1]).contains(&tried[k])).collect();
             if places.is_empty() {
                 continue;
             }
             let key = (
-                at_sizes(members, sizes),
+                sized_set(members, sizes),
                 places.iter().map(|&k| tried[k]).collect::<Vec<usize>>(),
             );
-            let gains = self.known.gains.recall(&key, || {
-                let left = left.get_or_init(|| self.left(members, sizes)).as_ref()?;
+            let gains = self.cache.gains.get_or_compute(&key, || {
+                let left = left.get_or_init(|| self.reduced(members, sizes)).as_ref()?;
                 Some(left.gains(&key.1)).filter(|gains| gains.len() == places.len())
             });
             places
@@ -176,11 +176,11 @@ impl<'a> Products<'a> {
         (members, sizes): (&[usize], &[f64]),
         settle: impl FnOnce() -> Option<(Vec<f64>, f64)>,
     ) -> Option<(Vec<f64>, f64)> {
-        self.known.settled.recall(&at_sizes(members, sizes), settle)
+        self.cache.settled.get_or_compute(&sized_set(members, sizes), settle)
     }
 
     /// Returns the residual problem that a set with given sizes leaves.
-    pub fn left(&self, members: &[usize], sizes: &[f64]) -> Option<Left<'_, 'a>> {
+    pub fn reduced(&self, members: &[usize], sizes: &[f64]) -> Option<ReducedProblem<'_, 'a>> {
         let mut scales = Vec::new();
         let mut begins = Vec::new();
         for (&member, &size) in members.iter().zip(sizes) {
@@ -209,7 +209,7 @@ impl<'a> Products<'a> {
         within.column_iter_mut().zip(scales).for_each(|(mut column, scale)| column *= scale);
         let squares = self.squares - taken.norm_squared();
         let without = self.over_noise(squares);
-        Some(Left {
+        Some(ReducedProblem {
             products: self,
             members: members.to_vec(),
             within,
@@ -227,7 +227,7 @@ impl<'a> Products<'a> {
 /// Residual problem that a set leaves. With A the columns of its members, D their sizes, 1 + D AᵀA
 /// D = L Lᵀ and Z = L⁻¹D Aᵀ, it leaves CᵀC − (Z C)ᵀ(Z C) and Cᵀr − (Z C)ᵀ(Z r) of further columns
 /// C.
-pub(super) struct Left<'p, 'a> {
+pub(super) struct ReducedProblem<'p, 'a> {
     products: &'p Products<'a>,
     members: Vec<usize>,
     sizes: Vec<f64>,
@@ -247,7 +247,7 @@ pub(super) struct Left<'p, 'a> {
     reach: OnceLock<DMatrix<f64>>,
 }
 
-impl Left<'_, '_> {
+impl ReducedProblem<'_, '_> {
     /// Returns ln p(r | set) at its sizes.
     pub fn ln_likelihood(&self) -> f64 {
         self.without - self.ln_determinant
@@ -264,8 +264,9 @@ impl Left<'_, '_> {
         let (block, size) = (&blocks[self.members[k]], self.sizes[k]);
         if size < MIN_SIZE_OF_MEMBER {
             let others = [&self.members[..k], &self.members[k + 1..]].concat();
-            let others =
-                self.products.left(&others, &[&self.sizes[..k], &self.sizes[k + 1..]].concat())?;
+            let others = self
+                .products
+                .reduced(&others, &[&self.sizes[..k], &self.sizes[k + 1..]].concat())?;
             let (gain, size) = others.gain(self.members[k]);
             return Some((others.ln_likelihood() + gain, size));
         }
@@ -428,7 +429,7 @@ mod tests {
         let target = Target { fit, noise, alike: 0.0, stop: Stop::default() };
         let products = Products::new(&blocks, &target);
         let (members, sizes) = ([0, 1, 2], [3.0, 0.3, 1.0]);
-        let left = products.left(&members, &sizes).unwrap();
+        let left = products.reduced(&members, &sizes).unwrap();
         let r = target.fit.residual();
         let mut covariance = DMatrix::identity(r.len(), r.len());
         for (&member, size) in members.iter().zip(sizes) {
@@ -448,10 +449,10 @@ mod tests {
             sizes[k] *= least;
             let others: Vec<usize> = (0..3).filter(|&other| other != k).collect();
             let beside = products
-                .left(&others, &others.iter().map(|&other| sizes[other]).collect::<Vec<_>>())
+                .reduced(&others, &others.iter().map(|&other| sizes[other]).collect::<Vec<_>>())
                 .unwrap();
             let (gain, size) = beside.gain(k);
-            let summed = products.left(&members, &sizes).unwrap().of_member(k).unwrap();
+            let summed = products.reduced(&members, &sizes).unwrap().of_member(k).unwrap();
             let expected = beside.ln_likelihood() + gain;
             assert!(
                 (summed.0 / expected - 1.0).abs() < 1e-9 && (summed.1 - size).abs() < 1e-12,
@@ -459,7 +460,7 @@ mod tests {
             );
         }
         // One more gains as much whether it is among the blocks or not.
-        let two = products.left(&members[..2], &sizes[..2]).unwrap();
+        let two = products.reduced(&members[..2], &sizes[..2]).unwrap();
         for (block, (gain, size)) in
             two.gains(&[2, 0, 1]).into_iter().zip([2, 0, 1]).map(|(summed, block)| (block, summed))
         {

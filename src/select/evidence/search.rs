@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use rayon::prelude::*;
 
 use super::block::Block;
-use super::products::{Left, Products};
+use super::products::{Products, ReducedProblem};
 
 /// Maximum number of coordinate-ascent passes over the sizes of the members of a set.
 const MAX_SETTLING_PASSES: usize = 4;
@@ -82,7 +82,7 @@ impl Set {
     /// Returns the converged sizes of the members and ln of the posterior at them.
     fn at_rest(&self, products: &Products) -> Option<(Vec<f64>, f64)> {
         let (members, mut sizes) = (&self.members, self.sizes.clone());
-        let mut all = products.left(members, &sizes)?;
+        let mut all = products.reduced(members, &sizes)?;
         let mut summed = vec![0.0; members.len()];
         // Beside others that stayed a size stays.
         let mut stale = vec![true; members.len()];
@@ -97,7 +97,7 @@ impl Set {
                     stale.fill(true);
                     stale[k] = false;
                     sizes[k] = size;
-                    all = products.left(members, &sizes)?;
+                    all = products.reduced(members, &sizes)?;
                 }
             }
         }
@@ -340,12 +340,12 @@ pub(super) fn ln_posterior(products: &Products) -> Option<f64> {
 }
 
 /// Returns the residual problem that a set with these members leaves at their most probable sizes.
-pub(super) fn left_by<'p, 'a>(
+pub(super) fn reduced_by<'p, 'a>(
     members: &[usize],
     products: &'p Products<'a>,
-) -> Option<Left<'p, 'a>> {
+) -> Option<ReducedProblem<'p, 'a>> {
     let set = assembled(members, products)?;
-    products.left(&set.members, &set.sizes)
+    products.reduced(&set.members, &set.sizes)
 }
 
 /// Returns, for each tried hypothesis, the gain in addition to the `others`, prior included, and
@@ -355,7 +355,7 @@ pub(super) fn gains_beside(
     tried: &[usize],
     products: &Products,
 ) -> Vec<(usize, f64, f64)> {
-    let Some(left) = left_by(others, products) else { return Vec::new() };
+    let Some(left) = reduced_by(others, products) else { return Vec::new() };
     let gain = |(&block, (gain, size)): (&usize, (f64, f64))| {
         (block, gain + products.ln_prior(&products.blocks[block], others), size)
     };
@@ -366,7 +366,7 @@ pub(super) fn gains_beside(
 fn assembled(members: &[usize], products: &Products) -> Option<Set> {
     let mut set = Set { members: Vec::new(), sizes: Vec::new(), ln_posterior: 0.0 };
     for &member in members {
-        let gain = products.left(&set.members, &set.sizes)?.gain(member);
+        let gain = products.reduced(&set.members, &set.sizes)?.gain(member);
         set = set.with(member, gain, products);
     }
     Some(set.settled(products))
@@ -465,7 +465,7 @@ mod tests {
         let (blocks, target) = three([2, 0, 1]);
         let fewer = Products::new(&blocks[..2], &target);
         assert!(!search(&fewer, &[0]).is_empty());
-        let again = search(&Products::knowing(fewer.into_known(), &blocks, &target), &[0]);
+        let again = search(&Products::with_cache(fewer.into_cache(), &blocks, &target), &[0]);
         let anew = search(&Products::new(&blocks, &target), &[0]);
         assert_eq!(again.len(), anew.len());
         for (set, other) in again.iter().zip(&anew) {

@@ -29,8 +29,8 @@ use super::candidate::{Candidate, HYPOTHESES_PER_PROJECTION, order_of};
 use super::functions::times;
 use super::hypotheses::Hypotheses;
 use super::hypothesis::{Hypothesis, HypothesisKind, Site};
-use super::products::{Left, Products};
-use super::search::{Weighted, left_by};
+use super::products::{Products, ReducedProblem};
+use super::search::{Weighted, reduced_by};
 use crate::model::effect::HIGHEST_ORDER;
 use crate::model::parameter::{ParameterSite, holds_all, refuses};
 use crate::problem::{Effect, JointKind, Problem};
@@ -108,7 +108,8 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
             ) {
                 continue;
             }
-            let left: Vec<Left> = rests.iter().filter_map(|rest| self.beside(rest)).collect();
+            let left: Vec<ReducedProblem> =
+                rests.iter().filter_map(|rest| self.beside(rest)).collect();
             let [step, finer] = PHASE_STEPS.map(|phase| phase / (high - low));
             // A wave of which less than one cycle is seen is none.
             let first = self.gains(joint, &row(TAU / (high - low), highest, step), &left);
@@ -171,8 +172,8 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
     }
 
     /// Returns the residual problem that some hypotheses leave.
-    fn beside(&self, rest: &[usize]) -> Option<Left<'w, 'a>> {
-        left_by(rest, self.products)
+    fn beside(&self, rest: &[usize]) -> Option<ReducedProblem<'w, 'a>> {
+        reduced_by(rest, self.products)
     }
 
     /// Returns true if a joint, counted from 0, is prismatic.
@@ -234,7 +235,7 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
 
     /// Returns, for each of some sets, the orders with the log odds of the set with such a wave to
     /// the set alone, best first.
-    fn gains(&self, joint: usize, orders: &[f64], left: &[Left]) -> Vec<Vec<(f64, f64)>> {
+    fn gains(&self, joint: usize, orders: &[f64], left: &[ReducedProblem]) -> Vec<Vec<(f64, f64)>> {
         let problem = &self.fitted.problem;
         let of = |orders: &[f64]| {
             if self.products.target.stop.is_requested() {
@@ -297,7 +298,7 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
 
     /// Returns the width of the likelihood about an order \[orders\], relative to its maximum, by the
     /// trapezoid rule.
-    fn spread(&self, joint: usize, order: f64, left: &Left) -> f64 {
+    fn spread(&self, joint: usize, order: f64, left: &ReducedProblem) -> f64 {
         let Some((low, high)) = self.range(joint) else { return 1.0 };
         let range = high - low;
         let away =

@@ -132,7 +132,7 @@ impl<'a> Beam<'a> {
     fn extensions(&self, state: &State) -> Vec<Extension> {
         let count = state.sum.len() as f64;
         let further = if state.sum.is_empty() { 0.0 } else { 0.5_f64.ln() + (count + 1.0).ln() };
-        let (before, rank) = (state.span.taken(), state.span.along.len());
+        let (before, rank) = (state.span.explained_squares(), state.span.along.len());
         let of_chunk = |(number, chunk): (usize, &Chunk)| {
             let along = &state.weighted * &chunk.columns;
             let product = |a: usize, b: usize| {

@@ -162,7 +162,7 @@ impl Refiner<'_> {
         }
         let columns = self.columns(&sum, &inner);
         let span = self.site.span(&columns);
-        let ln_evidence = self.noise.evidence(span.taken(), span.along.len());
+        let ln_evidence = self.noise.evidence(span.explained_squares(), span.along.len());
         Refined {
             ln_posterior: ln_evidence + averaged + ln_prior,
             prediction: span.prediction(),
@@ -175,7 +175,7 @@ impl Refiner<'_> {
 
     fn evidence(&self, sum: &Sum, inner: &[Vec<f64>]) -> f64 {
         let span = self.site.span(&self.columns(sum, inner));
-        self.noise.evidence(span.taken(), span.along.len())
+        self.noise.evidence(span.explained_squares(), span.along.len())
     }
 
     fn columns(&self, sum: &Sum, inner: &[Vec<f64>]) -> Vec<DVector<f64>> {

@@ -34,7 +34,7 @@ pub struct Quantities {
 
 impl Quantities {
     /// Evaluates the quantities of a problem in some poses.
-    pub fn of(problem: &Problem, poses: &[&Pose], time_measured: bool) -> Self {
+    pub fn new(problem: &Problem, poses: &[&Pose], time_measured: bool) -> Self {
         let values = |formula: &str| {
             let regressor = Regressor::parse(formula, problem).ok()?;
             varying(regressor.values(poses.iter().map(|pose| &pose.setup)))

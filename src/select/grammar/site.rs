@@ -131,7 +131,7 @@ impl WhitenedSite {
 
 impl Span {
     /// Returns the sum of squares taken off the residual.
-    pub fn taken(&self) -> f64 {
+    pub fn explained_squares(&self) -> f64 {
         self.along.norm_squared()
     }
 

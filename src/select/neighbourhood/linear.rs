@@ -140,7 +140,7 @@ impl LinearNeighbourhood {
         let before =
             if first == 0 { (self.rows - self.empty) as f64 } else { self.sums.data_freedom };
         let taken = new.rows(0, self.rows).norm_squared();
-        self.sums = Sums::of(&self.residual, self.rows, before - taken);
+        self.sums = Sums::new(&self.residual, self.rows, before - taken);
     }
 
     /// Decomposes columns of the data. Returns their components along the basis, the new

@@ -236,7 +236,7 @@ impl<'a> Linearised<'a> {
 
     /// Returns the columns of an effect's parameters, shape = (3 N, k).
     pub fn columns(&self, effect: &Effect) -> DMatrix<f64> {
-        self.columns_of(&Driven::of(self, std::slice::from_ref(effect)), 0)
+        self.columns_of(&Driven::new(self, std::slice::from_ref(effect)), 0)
     }
 
     /// Returns the columns of the effect with this index in `driven`.
@@ -282,7 +282,7 @@ pub(crate) struct Driven {
 
 impl Driven {
     /// Evaluates the regressors of effects in the poses of a linearised model.
-    pub fn of(linearised: &Linearised, effects: &[Effect]) -> Self {
+    pub fn new(linearised: &Linearised, effects: &[Effect]) -> Self {
         let mut regressors: Vec<Regressor> = Vec::new();
         let mut term = |Term { site, regressor, .. }: Term| {
             let place = linearised

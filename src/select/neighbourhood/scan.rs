@@ -54,7 +54,7 @@ impl<'a, 'l> Scan<'a, 'l> {
         linear: Arc<LinearNeighbourhood>,
         effects: Vec<Effect>,
     ) -> Self {
-        let driven = Driven::of(linearised, &effects);
+        let driven = Driven::new(linearised, &effects);
         let numbers: Vec<usize> = (0..effects.len()).collect();
         let scored = |numbers: &[usize]| -> Vec<Option<Score>> {
             let columns: Vec<DMatrix<f64>> =
@@ -82,7 +82,7 @@ impl<'a, 'l> Scan<'a, 'l> {
                 None => refused.push(effect),
             }
         }
-        let driven = if refused.is_empty() { driven } else { Driven::of(linearised, &known) };
+        let driven = if refused.is_empty() { driven } else { Driven::new(linearised, &known) };
         let (tries, families) = tries(&known, linearised.problem());
         let never_negative = known.iter().map(|effect| linearised.never_negative(effect)).collect();
         Self {

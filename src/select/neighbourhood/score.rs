@@ -47,7 +47,7 @@ pub(crate) struct Gain {
 impl Sums {
     /// Creates the sums of a residual, whose first `rows` rows are data and the others priors, with
     /// `data_freedom` degrees of freedom of the data.
-    pub fn of(residual: &DVector<f64>, rows: usize, data_freedom: f64) -> Self {
+    pub fn new(residual: &DVector<f64>, rows: usize, data_freedom: f64) -> Self {
         let data_squares = residual.rows(0, rows).norm_squared();
         Self { squares: residual.norm_squared(), data_squares, data_freedom }
     }

@@ -15,7 +15,7 @@ use crate::fit::{
 use crate::measurement::Dataset;
 use crate::numeric::Interval;
 use crate::problem::{Effect, Problem};
-use crate::residual_tests::Findings;
+use crate::residual_tests::ResidualTests;
 use crate::select::data::Data;
 use crate::select::evidence::{Evidence, evaluate};
 use crate::select::fitted::Fitted;
@@ -38,7 +38,7 @@ pub struct ClosedLoop {
     /// Errors with the effects of status [`Status::Found`] alone.
     pub with_found: Errors,
     /// Residual tests of the fit `after`.
-    pub findings: Findings,
+    pub residual_tests: ResidualTests,
     /// Extended problem: the declared one with the found effects declared.
     pub closed: Problem,
     /// Effects in the order in which they were found.
@@ -104,7 +104,7 @@ pub fn close_by(
     let mut state = SearchState::new(&stoppable, options, &declared);
     let result = search(&mut state, declared.clone());
     let interrupted = result.as_ref().is_err_and(IdentifyError::is_interrupted);
-    options.tell(|| Progress::Finishing);
+    options.report_progress(|| Progress::Finishing);
     state.data = &data;
     let (fitted, evidence) = if interrupted {
         state.prior = state.prior_of_latest.take();
@@ -116,7 +116,7 @@ pub fn close_by(
     };
     let (fitted, evidence) = kept(&declared, (fitted, evidence), &data, &unstoppable)?;
     let is_trusted = fitted.found.describes_arm();
-    let findings = check_fit(&fitted, &data);
+    let residual_tests = check_fit(&fitted, &data);
     // Where nothing was found before the search was stopped, no evidence is needed to say so.
     let is_wanted = is_trusted && !(interrupted && state.added(&fitted).is_empty())
         || !state.added(&fitted).is_empty();
@@ -133,10 +133,10 @@ pub fn close_by(
         &state,
         &fitted,
         (best, of_all_rows.as_ref()),
-        (is_trusted, findings.is_structured()),
+        (is_trusted, residual_tests.is_structured()),
     );
     if unexplained.is_empty() {
-        unexplained.extend(unexplained::nowhere(&findings));
+        unexplained.extend(unexplained::nowhere(&residual_tests));
     }
     let statuses: Vec<Status> = effects.iter().map(|found| found.status).collect();
     let with_found = if statuses.iter().all(|status| *status == Status::Found) {
@@ -167,7 +167,7 @@ pub fn close_by(
         before,
         after: fitted.found,
         with_found,
-        findings,
+        residual_tests,
         closed: fitted.problem,
         effects,
         rounds: state.rounds,
@@ -184,7 +184,7 @@ pub fn close_by(
 ///
 /// A found fit that has cautions is repeated from the nominal arm, for terms that were missing at
 /// first may have driven a parameter to where no step leads back from. If cautions remain, it is
-/// kept where it predicts better than the declared fit beyond chance: the cautions are findings
+/// kept where it predicts better than the declared fit beyond chance: the cautions are residual_tests
 /// about their parameters.
 fn kept(
     declared: &Fitted,

@@ -138,7 +138,7 @@ fn p_values(state: &SearchState, fitted: &Fitted, effects: &[Effect]) -> Vec<f64
         .map(|effect| if is_gear(effect) { vec![effect.clone()] } else { effect.parts() })
         .collect();
     let parts: Vec<Effect> = tested.iter().flatten().flat_map(Effect::parts).collect();
-    let mut everything = Candidates::of(&fitted.problem, state.data).testable;
+    let mut everything = Candidates::new(&fitted.problem, state.data).testable;
     let first = everything.len();
     everything.extend(parts.iter().cloned());
     let (all_tries, families) = tries(&everything, &fitted.problem);

@@ -73,7 +73,7 @@ impl<'a> SearchState<'a> {
     /// evidence.
     pub fn report_progress(&self, fit: usize, fits: usize) {
         let (round, effects) = (self.rounds.len() + 1, || self.added(&self.latest));
-        self.options.tell(|| Progress::Round { round, effects: effects(), fit, fits });
+        self.options.report_progress(|| Progress::Round { round, effects: effects(), fit, fits });
     }
 
     /// Returns those effects of a fit that the search added; harmonics of one joint form one

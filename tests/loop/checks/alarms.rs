@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use flexcal::residual_tests::{Covariate, CovariateValues, Findings, ResidualTest};
+use flexcal::residual_tests::{Covariate, CovariateValues, ResidualTest, ResidualTests};
 use nalgebra::DVector;
 use rayon::ThreadPoolBuilder;
 use rayon::prelude::*;
@@ -19,7 +19,7 @@ struct Rates {
 
 impl Rates {
     fn of(problems: u64, make: impl Fn(u64) -> (Linear, DVector<f64>) + Sync) -> Self {
-        let all: Vec<Findings> = (0..problems)
+        let all: Vec<ResidualTests> = (0..problems)
             .into_par_iter()
             .map(|seed| {
                 let (linear, residual) = make(seed);
@@ -124,12 +124,12 @@ fn rates_and_times() {
     for (poses, unknowns, size) in
         [(28, 32, 3.0), (28, 32, 6.0), (28, 20, 3.0), (60, 20, 1.0), (200, 32, 0.5)]
     {
-        let all: Vec<Findings> =
+        let all: Vec<ResidualTests> =
             (0..200).into_par_iter().map(|seed| driven(poses, unknowns, size, seed)).collect();
         let structured = all.iter().filter(|findings| findings.is_structured()).count();
         let on_q2 = all
             .iter()
-            .filter_map(Findings::strongest)
+            .filter_map(ResidualTests::strongest)
             .filter(|check| check.about() == Some(Covariate::Command(1)))
             .count();
         println!(

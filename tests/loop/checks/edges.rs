@@ -1,7 +1,9 @@
 //! Untestable data give a reason, unusual inputs are accepted, and results do not depend on
 //! threads.
 
-use flexcal::residual_tests::{Covariate, CovariateValues, Findings, Sequence, Test, Untestable};
+use flexcal::residual_tests::{
+    Covariate, CovariateValues, ResidualTests, Sequence, Test, Untestable,
+};
 use nalgebra::DVector;
 use rayon::ThreadPoolBuilder;
 
@@ -23,7 +25,7 @@ fn threads_change_nothing() {
 
 #[test]
 fn what_cannot_be_tested_says_why() {
-    let untestable = |findings: &Findings, why: Untestable| {
+    let untestable = |findings: &ResidualTests, why: Untestable| {
         assert!(!findings.is_testable() && !findings.is_structured());
         assert!(findings.tests.iter().all(|check| check.outcome == Err(why.clone())));
     };

@@ -1,7 +1,7 @@
 //! Linear fits with known structure in their residuals.
 
 use flexcal::residual_tests::{
-    Covariate, CovariateValues, Findings, FitResidual, ResidualTest, Test, test_residual,
+    Covariate, CovariateValues, FitResidual, ResidualTest, ResidualTests, Test, test_residual,
 };
 use nalgebra::{DMatrix, DVector, Vector3};
 use rand::{RngExt, SeedableRng};
@@ -93,7 +93,7 @@ impl Linear {
         data - &self.fitted * taken
     }
 
-    pub fn check(&self, residual: &DVector<f64>) -> Findings {
+    pub fn check(&self, residual: &DVector<f64>) -> ResidualTests {
         test_residual(&self.fit(residual), 0.01, 7)
     }
 
@@ -178,7 +178,7 @@ pub fn uneven(seed: u64) -> (Linear, DVector<f64>) {
 }
 
 /// Tests a smooth function of one covariate with an amplitude of `size` σ of noise.
-pub fn driven(poses: usize, unknowns: usize, size: f64, seed: u64) -> Findings {
+pub fn driven(poses: usize, unknowns: usize, size: f64, seed: u64) -> ResidualTests {
     let mut linear = Linear::new(poses, unknowns, None, 4000 + seed);
     linear.sigma_is_declared = false;
     let mut data = linear.noise();
@@ -190,11 +190,11 @@ pub fn driven(poses: usize, unknowns: usize, size: f64, seed: u64) -> Findings {
     linear.check(&residual)
 }
 
-pub fn find<'a>(findings: &'a Findings, test: &Test) -> &'a ResidualTest {
+pub fn find<'a>(findings: &'a ResidualTests, test: &Test) -> &'a ResidualTest {
     findings.tests.iter().find(|check| check.test == *test).unwrap()
 }
 
-pub fn outliers(findings: &Findings) -> &ResidualTest {
+pub fn outliers(findings: &ResidualTests) -> &ResidualTest {
     findings.tests.iter().find(|check| check.name() == "outliers").unwrap()
 }
 

@@ -1,6 +1,6 @@
 //! Outliers and heavy tails are named and do not count as structure.
 
-use flexcal::residual_tests::{Findings, Test};
+use flexcal::residual_tests::{ResidualTests, Test};
 use nalgebra::{DVector, Vector3};
 
 use super::linear::{Linear, count, find, heavy_tails, outliers};
@@ -31,7 +31,7 @@ fn outliers_are_named_and_are_not_structure() {
 fn left_out_poses_leave_no_trace() {
     let mut linear = Linear::new(60, 20, Some(0.5), 9);
     let mut data = linear.noise();
-    let p_values = |findings: &Findings| -> Vec<f64> {
+    let p_values = |findings: &ResidualTests| -> Vec<f64> {
         let rest = findings
             .tests
             .iter()

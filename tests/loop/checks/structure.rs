@@ -1,6 +1,6 @@
 //! Detection of structure in residuals.
 
-use flexcal::residual_tests::{Covariate, Findings, ResidualTest, Sequence, Test};
+use flexcal::residual_tests::{Covariate, ResidualTest, ResidualTests, Sequence, Test};
 use nalgebra::Vector3;
 use rand::RngExt as _;
 use rayon::prelude::*;
@@ -32,7 +32,7 @@ fn few_degrees_of_freedom_still_show_strong_structure() {
 }
 
 /// Tests AR(1) noise in the order of time; `shuffled` rows are in another order.
-fn following(shuffled: bool, seed: u64) -> Findings {
+fn following(shuffled: bool, seed: u64) -> ResidualTests {
     let mut linear = Linear::new(100, 20, None, 5000 + seed);
     linear.sigma_is_declared = false;
     if shuffled {
@@ -54,7 +54,7 @@ fn following(shuffled: bool, seed: u64) -> Findings {
 #[test]
 fn noise_that_follows_itself_is_found_in_its_order() {
     for shuffled in [false, true] {
-        let all: Vec<Findings> =
+        let all: Vec<ResidualTests> =
             (0..30).into_par_iter().map(|seed| following(shuffled, seed)).collect();
         let failing =
             |test: &Test| all.iter().filter(|findings| find(findings, test).failed()).count();
@@ -88,7 +88,7 @@ fn an_understated_sigma_fails_chi_squared_and_nothing_else() {
     let small = find(&overstated, &Test::ReducedChiSquared);
     println!("{small}");
     assert!(small.to_string().contains("overstated"));
-    let statistics = |findings: &Findings| -> Vec<(f64, f64)> {
+    let statistics = |findings: &ResidualTests| -> Vec<(f64, f64)> {
         let rest = findings.tests.iter().filter(|check| check.test != Test::ReducedChiSquared);
         rest.filter_map(|check| check.outcome.as_ref().ok())
             .map(|o| (o.statistic, o.p_value))

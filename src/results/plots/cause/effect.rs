@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use super::axis::slides;
 use super::figure::{Cause, Point};
 use super::terms::Rows;
-use super::view::{along, at_joint, beyond_joints};
+use super::view::{at_joint, beyond_joints, change_along};
 use crate::model::parameter::{EffectParameter, JointField, ParameterSite, value_regressor};
 use crate::numeric::range;
 use crate::problem::{Effect, Problem};
@@ -70,7 +70,7 @@ pub fn of(
     let longest = view.levers.iter().map(Vector3::norm).fold(0.0, f64::max);
     let point = |k: usize| Point {
         x: view.x[k],
-        y: along(&view.levers[k], &partial[k]),
+        y: change_along(&view.levers[k], &partial[k]),
         held_out: poses.split.held_out.binary_search(&k).is_ok(),
         row: Some(k),
     };

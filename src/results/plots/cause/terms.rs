@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::axis::Quantity;
-use crate::laws::Quantity as Known;
+use crate::laws::Quantity as LawQuantity;
 use crate::model::parameter::{ParameterSite, Regressor};
 use crate::problem::{PoseView, Problem};
 
@@ -34,7 +34,7 @@ impl Rows<'_> {
     }
 
     /// Returns the quantities on which the terms depend, without duplicates.
-    pub fn quantities(&self) -> Vec<Known> {
+    pub fn quantities(&self) -> Vec<LawQuantity> {
         let mut found = Vec::new();
         for quantity in self.terms.iter().flat_map(|(regressor, _)| regressor.quantities()) {
             if !found.contains(&quantity) {
@@ -52,7 +52,7 @@ impl Rows<'_> {
     /// Returns the axis label of a formula, with its unit.
     pub fn label(regressor: &Regressor) -> String {
         match regressor.as_quantity() {
-            Some(Known::Friction { joint, .. }) => {
+            Some(LawQuantity::Friction { joint, .. }) => {
                 format!("friction that holds joint {} back [−1 … +1]", joint + 1)
             }
             _ => format!("{} [SI]", regressor.text()),
@@ -63,20 +63,20 @@ impl Rows<'_> {
     /// function of it. `None` if the value of the quantity alone does not determine the regressors.
     pub fn over_quantity<'r>(
         &'r self,
-        quantity: Known,
+        quantity: LawQuantity,
         problem: &Problem,
     ) -> Option<(Quantity, Vec<f64>, Law<'r>)> {
         let each =
             |value: &dyn Fn(&PoseView) -> f64| self.poses.iter().map(value).collect::<Vec<f64>>();
         let reference = problem.data.reference_temperature.unwrap_or_default();
         Some(match quantity {
-            Known::Command(joint) => {
+            LawQuantity::Command(joint) => {
                 let count = self.poses.first()?.configuration.len();
                 let law = move |q: f64| self.driven(&PoseView::from_configuration(&vec![q; count]));
                 let across = Quantity::command(problem, joint + 1);
                 (across, each(&|pose| pose.configuration[joint]), Box::new(law))
             }
-            Known::Warming => {
+            LawQuantity::Warming => {
                 let law = move |t: f64| {
                     let pose = PoseView::from_configuration(&[]);
                     self.driven(&PoseView { temperature: Some(&t), ..pose })
@@ -85,14 +85,14 @@ impl Rows<'_> {
                 (Quantity::temperature(), each(&value), Box::new(law))
             }
             // The lagged temperature itself multiplies every term.
-            Known::Lagging { time_constant } if self.is_each(quantity) => {
+            LawQuantity::Lagging { time_constant } if self.is_each(quantity) => {
                 let sum: f64 = self.terms.iter().map(|term| term.1).sum();
                 let regressor = &self.terms.first()?.0;
                 let values = each(&|pose| regressor.value(pose) + reference);
                 let law = move |lagged: f64| sum * (lagged - reference);
                 (Quantity::lagging(time_constant), values, Box::new(law))
             }
-            Known::Covariate(index) => {
+            LawQuantity::Covariate(index) => {
                 let name = &problem.data.covariates.get(index)?.name;
                 let law = move |value: f64| {
                     let mut covariates = vec![0.0; index];
@@ -104,7 +104,7 @@ impl Rows<'_> {
                     |pose: &PoseView| pose.covariates.get(index).copied().unwrap_or_default();
                 (Quantity::new(name, 1.0), each(&value), Box::new(law))
             }
-            Known::Elapsed | Known::Time => {
+            LawQuantity::Elapsed | LawQuantity::Time => {
                 let elapsed = each(&|pose| pose.elapsed);
                 let last = elapsed.iter().copied().fold(0.0, f64::max);
                 let first = self.poses.first().map_or(0.0, |pose| pose.time - pose.elapsed);
@@ -119,7 +119,7 @@ impl Rows<'_> {
     }
 
     /// Returns true if every term's regressor is the quantity itself.
-    pub fn is_each(&self, quantity: Known) -> bool {
+    pub fn is_each(&self, quantity: LawQuantity) -> bool {
         self.terms.iter().all(|(regressor, _)| regressor.as_quantity() == Some(quantity))
     }
 

@@ -30,7 +30,7 @@ pub fn unexplained(structure: &Unexplained, problem: &Problem, split: &Split) ->
         Covariate::Payload => Quantity::new("payload [kg]", 1.0),
         Covariate::Hoist => Quantity::new("hoist force [N]", 1.0),
         Covariate::Command(joint) => Quantity::command(problem, joint + 1),
-        Covariate::Own(ref name) => Quantity::new(&**name, 1.0),
+        Covariate::Declared(ref name) => Quantity::new(&**name, 1.0),
         _ => return None,
     };
     let longest = correction.points.iter().map(|point| point.lever).fold(0.0, f64::max);

@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use super::axis::{Quantity, slides};
 use super::terms::{Law, Rows};
-use crate::laws::Quantity as Known;
+use crate::laws::Quantity as LawQuantity;
 use crate::model::parameter::{ArmField, BeamField, JointField, ParameterSite};
 use crate::problem::{Effect, PoseView, Problem};
 use crate::quantity::Unit;
@@ -33,7 +33,7 @@ pub struct View<'a> {
 
 /// Returns the least-squares change of a coordinate, given by its `lever` (displacement per unit),
 /// for a `displacement` \[m\].
-pub fn along(lever: &Vector3<f64>, displacement: &Vector3<f64>) -> f64 {
+pub fn change_along(lever: &Vector3<f64>, displacement: &Vector3<f64>) -> f64 {
     lever.dot(displacement) / lever.norm_squared()
 }
 
@@ -50,7 +50,8 @@ pub fn at_joint<'a>(
     let unit = if slides(problem, number) { Unit::Length } else { Unit::Angle };
     // Δθ = c M, c₃ M³: the moment follows from the law itself.
     let moments = |of: fn(f64) -> f64| -> (Quantity, Vec<f64>) {
-        let moment = |(lever, axis): (&Vector3<f64>, &Vector3<f64>)| of(along(lever, axis) / first);
+        let moment =
+            |(lever, axis): (&Vector3<f64>, &Vector3<f64>)| of(change_along(lever, axis) / first);
         let across = Quantity::new(format!("moment about joint {number} [N·m]"), 1.0);
         (across, levers.iter().zip(&rows.displacements).map(moment).collect())
     };
@@ -146,7 +147,8 @@ fn at_link<'a>(found: &Effect, problem: &Problem, rows: &'a Rows) -> Option<View
 /// for other effects. Every pose moves in the same direction.
 fn of_time<'a>(problem: &Problem, rows: &'a Rows) -> Option<View<'a>> {
     let is_shift = |site: &ParameterSite| matches!(site, ParameterSite::Shift { axis: 0..3 });
-    let &[quantity @ (Known::Elapsed | Known::Time)] = rows.quantities().as_slice() else {
+    let &[quantity @ (LawQuantity::Elapsed | LawQuantity::Time)] = rows.quantities().as_slice()
+    else {
         return None;
     };
     let (regressor, _) = rows.terms.first()?;

@@ -12,7 +12,7 @@ use crate::problem::Effect;
 
 /// Pose that would distinguish two effects.
 #[derive(Debug, Clone, PartialEq)]
-pub struct TellingPose {
+pub struct SeparatingPose {
     /// Effect from which the pose would distinguish.
     pub other: Effect,
     /// Configuration within the measured ranges, shape = (joints) \[rad\] or \[m\].
@@ -59,12 +59,12 @@ pub(super) fn shuffled(data: &Data) -> Measurements {
 
 /// Returns the one of `poses`, linearised as `there`, at which the fits with the one and with the
 /// other effect differ most.
-pub(super) fn telling_pose(
+pub(super) fn separating_pose(
     fit: &LinearNeighbourhood,
     [here, there]: [&Linearised; 2],
     poses: &Measurements,
     (one, other): (&Effect, &Effect),
-) -> Option<TellingPose> {
+) -> Option<SeparatingPose> {
     let moved = |effect: &Effect| {
         let fit = fit.with(&here.columns(effect));
         beside(there.fitted().clone(), &there.columns(effect)) * fit.step()
@@ -73,7 +73,7 @@ pub(super) fn telling_pose(
     let distance = |pose: usize| difference.rows(3 * pose, 3).norm() * there.poses()[pose].sigma;
     let best = (0..poses.len()).max_by(|&a, &b| distance(a).total_cmp(&distance(b)))?;
     let at = |column: &Option<Vec<f64>>| column.as_ref().map(|column| column[best]);
-    Some(TellingPose {
+    Some(SeparatingPose {
         other: other.clone(),
         configuration: poses.configuration(best).to_vec(),
         target: poses

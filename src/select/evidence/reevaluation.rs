@@ -16,7 +16,7 @@ use super::hypothesis::Hypothesis;
 use super::hypothesis_set::HypothesisSet;
 use super::posterior::Evidence;
 use super::products::{Products, Target};
-use super::search::{Weighted, left_by, search};
+use super::search::{Weighted, reduced_by, search};
 use crate::problem::Effect;
 
 /// Smallest probability of a set whose hypotheses are considered again without some poses.
@@ -24,7 +24,7 @@ const MIN_REPEATED_PROBABILITY: f64 = 1e-3;
 
 /// Fit with the probable hypotheses about its residual, which are evaluated again without some
 /// poses.
-struct Again<'a> {
+struct Reevaluation<'a> {
     fitted: &'a Fitted,
     data: &'a Data<'a>,
     hypotheses: &'a Hypotheses<'a>,
@@ -33,7 +33,7 @@ struct Again<'a> {
     best: &'a HypothesisSet,
 }
 
-impl<'a> Again<'a> {
+impl<'a> Reevaluation<'a> {
     fn new(
         fitted: &'a Fitted,
         data: &'a Data<'a>,
@@ -69,7 +69,9 @@ impl<'a> Again<'a> {
         let is_held = |k: &usize| {
             let candidate = candidates[*k];
             self.best.hypotheses.iter().zip(&self.best.functions).any(|(known, (variant, _))| {
-                *variant == candidate.variant && known.says(&candidate.hypothesis) && of(known)
+                *variant == candidate.variant
+                    && known.is_same_claim(&candidate.hypothesis)
+                    && of(known)
             })
         };
         (0..candidates.len()).filter(is_held).collect()
@@ -99,7 +101,7 @@ impl<'a> Again<'a> {
         let (blocks, target) = self.blocks(left_out)?;
         let products = Products::new(&blocks, &target);
         let left = |of: &dyn Fn(&Hypothesis) -> bool| {
-            Some(left_by(&self.members(of), &products)?.residual())
+            Some(reduced_by(&self.members(of), &products)?.residual())
         };
         let (with, without) = (left(&|_| true)?, left(&|known| known.effect() != Some(effect))?);
         let poses = self.hypotheses.linearised.poses().len();
@@ -128,10 +130,11 @@ pub(super) fn carried_by_one(
     if searched.is_empty() || !best.gears().is_empty() {
         return None;
     }
-    let again = Again::new(fitted, data, hypotheses, (evidence, best));
+    let reevaluation = Reevaluation::new(fitted, data, hypotheses, (evidence, best));
     let alone = |hypothesis: &Hypothesis| {
-        let pose = again.single_influential_pose(hypothesis.effect()?, &evidence.left_out)?;
-        let others = again.without(&[evidence.left_out.as_slice(), &[pose]].concat())?;
+        let pose =
+            reevaluation.single_influential_pose(hypothesis.effect()?, &evidence.left_out)?;
+        let others = reevaluation.without(&[evidence.left_out.as_slice(), &[pose]].concat())?;
         (!others.best().iter().any(|other| other.site == hypothesis.site)).then_some(pose)
     };
     searched.into_iter().find_map(alone)
@@ -164,8 +167,8 @@ pub(in crate::select) fn subset_evidence(
     if best.effects().is_empty() || count < 2 {
         return Vec::new();
     }
-    let hypotheses = Hypotheses::of(fitted, data, added, &rows, rows.len());
-    let again = Again::new(fitted, data, &hypotheses, (evidence, best));
+    let hypotheses = Hypotheses::new(fitted, data, added, &rows, rows.len());
+    let reevaluation = Reevaluation::new(fitted, data, &hypotheses, (evidence, best));
     let drawn = |seed: u64| {
         let mut order: Vec<usize> = (0..count).collect();
         order.shuffle(&mut ChaCha8Rng::seed_from_u64(data.rules.seed ^ seed));
@@ -173,7 +176,7 @@ pub(in crate::select) fn subset_evidence(
         let is_out = |&pose: &usize| {
             left_out.contains(&configurations[pose]) || evidence.left_out.contains(&pose)
         };
-        again.without(&(0..rows.len()).filter(is_out).collect::<Vec<usize>>())
+        reevaluation.without(&(0..rows.len()).filter(is_out).collect::<Vec<usize>>())
     };
     let subsets: Vec<Evidence> = (0..SUBSETS).into_par_iter().filter_map(drawn).collect();
     best.effects().into_iter().map(|effect| in_subsets(&subsets, effect)).collect()

@@ -4,17 +4,17 @@ use std::collections::BTreeMap;
 use std::sync::{Mutex, PoisonError};
 
 /// Cache of results by key.
-pub(super) struct Recalled<K, V>(Mutex<BTreeMap<K, V>>);
+pub(super) struct Cache<K, V>(Mutex<BTreeMap<K, V>>);
 
-impl<K, V> Default for Recalled<K, V> {
+impl<K, V> Default for Cache<K, V> {
     fn default() -> Self {
         Self(Mutex::default())
     }
 }
 
-impl<K: Ord + Clone, V: Clone> Recalled<K, V> {
+impl<K: Ord + Clone, V: Clone> Cache<K, V> {
     /// Returns the cached result of `key`, or computes and keeps it.
-    pub fn recall(&self, key: &K, make: impl FnOnce() -> Option<V>) -> Option<V> {
+    pub fn get_or_compute(&self, key: &K, make: impl FnOnce() -> Option<V>) -> Option<V> {
         let all = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let known = all().get(key).cloned();
         known.or_else(|| {

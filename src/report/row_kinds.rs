@@ -6,7 +6,7 @@ use crate::fit::{ErrorSummary, Identification, PointSpread};
 use crate::quantity::format::{mm, number};
 
 /// Returns tables of errors by kind of rows, if there are several, and of the spread at points.
-pub(super) fn around<'a>(found: &Identification) -> Vec<Block<'a>> {
+pub(super) fn row_kind_tables<'a>(found: &Identification) -> Vec<Block<'a>> {
     let row = |kind: &str, rows: &str, before: &ErrorSummary, after: &ErrorSummary| {
         let values = [before.rms.norm, after.rms.norm].map(|value| shown(after, value));
         [vec![kind.to_owned(), rows.to_owned(), after.n.to_string()], values.to_vec()].concat()

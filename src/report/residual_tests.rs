@@ -2,16 +2,16 @@
 
 use super::document::{Block, Mark, Point};
 use crate::quantity::format::number;
-use crate::residual_tests::{Findings, ResidualTest, Test};
+use crate::residual_tests::{ResidualTest, ResidualTests, Test};
 
 /// Describes the tests that failed.
-pub(super) fn failed(findings: &Findings) -> Vec<String> {
-    findings.tests.iter().filter(|check| check.failed()).map(ToString::to_string).collect()
+pub(super) fn failed(tests: &ResidualTests) -> Vec<String> {
+    tests.tests.iter().filter(|check| check.failed()).map(ToString::to_string).collect()
 }
 
 /// States why the tests have a χ²/ν different from the fit's, if both differ in the shown digits.
-pub(super) fn another_size(findings: &Findings, chi2: Option<f64>) -> Option<String> {
-    let size = findings
+pub(super) fn another_size(tests: &ResidualTests, chi2: Option<f64>) -> Option<String> {
+    let size = tests
         .tests
         .iter()
         .find(|check| check.test == Test::ReducedChiSquared)?
@@ -36,9 +36,9 @@ fn point(check: &ResidualTest) -> Point {
 
 /// Lists the tests: failed ones, passed ones, then those that could not be made. All covariates
 /// without dependence share one line.
-pub(super) fn all(findings: &Findings) -> Vec<Point> {
+pub(super) fn all(tests: &ResidualTests) -> Vec<Point> {
     let of = |mark: Mark| {
-        findings
+        tests
             .tests
             .iter()
             .map(|check| (check, point(check)))
@@ -58,12 +58,12 @@ pub(super) fn all(findings: &Findings) -> Vec<Point> {
 }
 
 /// Lists the tests in the order in which they were made.
-pub(super) fn each(findings: &Findings) -> Vec<Point> {
-    findings.tests.iter().map(point).collect()
+pub(super) fn each(tests: &ResidualTests) -> Vec<Point> {
+    tests.tests.iter().map(point).collect()
 }
 
 /// Returns the tests as blocks: a summary in texts, one by one on the page.
-pub(super) fn blocks<'a>(findings: &Findings) -> Vec<Block<'a>> {
-    let (brief, page) = (Block::List(all(findings)), Block::List(each(findings)));
+pub(super) fn blocks<'a>(tests: &ResidualTests) -> Vec<Block<'a>> {
+    let (brief, page) = (Block::List(all(tests)), Block::List(each(tests)));
     vec![Block::Words(vec![brief]), Block::Page(vec![page])]
 }

@@ -36,13 +36,13 @@ impl Check for NominalIsNear {
         let rms = fit.registered.identification.rms.norm;
         let RowKind { observation, spread, .. } = fit.kind(fit.fitting.measurements.leading());
         let kind = observation.kind();
-        vec![far_off(kind, rms, spread, &fit.explanations().near)]
+        vec![far_off_finding(kind, rms, spread, &fit.explanations().near)]
     }
 }
 
 /// Reports an error `rms` of the nominal arm that is large relative to the `spread` of rows of a
 /// kind \[m\] or \[rad\]. Each of `explanations`, best first, would explain it alone.
-fn far_off(kind: &str, rms: f64, spread: f64, explanations: &[Misreading]) -> Finding {
+fn far_off_finding(kind: &str, rms: f64, spread: f64, explanations: &[Misreading]) -> Finding {
     let words: Vec<String> = explanations.iter().map(Misreading::to_string).collect();
     let numbers = [kind.into(), rms.into(), spread.into(), json!(words)];
     if !rms.is_finite() {
