@@ -45,7 +45,8 @@ pub struct ErrorSummary {
 pub struct Errors {
     /// Errors on the identification rows, which are fitted.
     pub identification: ErrorSummary,
-    /// Errors on the held-out rows, which decide nothing, or of configurations that are left out.
+    /// Errors on the held-out rows, which were not fitted. If no row is held out: errors of all
+    /// rows in fits without their configuration.
     pub held_out: ErrorSummary,
     /// True if no row is held out: `held_out` then summarises all rows, each configuration
     /// predicted by a fit without it.
@@ -61,12 +62,11 @@ pub struct OrientationErrors {
     pub registered: Errors,
     /// Errors of the identified arm.
     pub fitted: Errors,
-    /// Standard deviation (1 σ) about each axis that the fit assumed for orientations \[rad\].
+    /// Standard deviation (1 σ) of orientations about each axis that the fit assumed \[rad\].
     pub sigma_taken: f64,
 }
 
-/// Summarises the errors of those of `rows` that measure the same kind of quantity as
-/// `observation`.
+/// Summarises the errors of the rows that measure the same kind of quantity as `observation`.
 pub(super) fn of_kind(
     measurements: &Measurements,
     rows: impl IntoIterator<Item = usize>,
@@ -89,7 +89,8 @@ impl ErrorSummary {
         kind_named(self.kind).unit
     }
 
-    /// Converts an error to the unit in which errors of this kind are shown: mm or °.
+    /// Converts an error from \[m\] or \[rad\] to the unit in which errors of this kind are shown:
+    /// mm or °.
     pub(crate) fn in_unit(&self, value: f64) -> f64 {
         value * self.unit().in_tables().factor
     }
@@ -100,8 +101,8 @@ impl ErrorSummary {
         Self::of_kind(Observation::Position, errors)
     }
 
-    /// Summarises the residuals measured − predicted of those of `rows` that are of the leading
-    /// kind of the table.
+    /// Summarises the residuals measured − predicted of the rows that are of the leading kind of
+    /// the table.
     pub(crate) fn of_rows(
         table: &Measurements,
         rows: impl IntoIterator<Item = usize>,
@@ -116,7 +117,7 @@ impl ErrorSummary {
         Self { at_point: Some([mean, max, rms]), ..self }
     }
 
-    /// Summarises the residuals of rows of one kind \[m\].
+    /// Summarises the residuals of rows of one kind \[m\] or \[rad\].
     pub(crate) fn of_kind(observation: Observation, errors: &[Vector3<f64>]) -> Self {
         let values: Vec<[f64; 4]> =
             errors.iter().map(|e| [e.x.abs(), e.y.abs(), e.z.abs(), e.norm()]).collect();

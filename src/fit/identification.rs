@@ -78,8 +78,8 @@ fn check_data(
     if split.identification.is_empty() { Err(IdentifyError::NoPoses) } else { Ok(()) }
 }
 
-/// Identifies as [`identify`] does, with a model of the problem that the caller has changed, as
-/// [`Strategy::model`] does for a strategy.
+/// Identifies as [`identify`] does, with a model that the caller has derived from the problem, as
+/// [`Strategy::model`] does.
 ///
 /// # Errors
 /// Returns an error if problem, data, strategy and solver do not fit each other, or if the fit was
@@ -383,7 +383,8 @@ fn estimated(
     Ok((estimates, covariance, not_converged))
 }
 
-/// Returns the pattern of the rule of `[parameters]` that gives each unknown its prior.
+/// Returns, for each unknown, the pattern of the rule of `[parameters]` that gives its prior;
+/// `None` without a prior.
 fn rules(problem: &Problem, unknowns: &[&Parameter]) -> Vec<Option<String>> {
     let rule = |parameter: &&Parameter| {
         parameter.sigma?;
@@ -411,7 +412,8 @@ fn not_converged_finding(reason: Termination) -> Finding {
     })
 }
 
-/// Returns the loss that `[robust]` declares, for the three coordinates of a position.
+/// Returns the loss that the section `[robust]` declares, scaled for the three coordinates of a
+/// position.
 fn loss(robust: Robust) -> Loss {
     match robust.loss {
         RobustLoss::Huber => {

@@ -11,11 +11,11 @@ const MAX_DECISIVE_RATIO: f64 = 0.01;
 /// Ratio of the residual variance without the rows to that with them, below which the rows are
 /// influential if the declared σ then explains the remaining residual.
 const MAX_INFLUENTIAL_RATIO: f64 = 0.5;
-/// Reciprocal of the largest share of the rows that can be influential. If more are needed, the
-/// model misses all rows.
+/// Smallest number of rows per influential row. If more rows seem influential, the model does not
+/// fit any of them.
 const MIN_ROWS_PER_INFLUENTIAL: usize = 5;
-/// Reciprocal of the share of the rows that is removed in one round, at least one row. A gross
-/// error makes good rows look like outliers, so few are removed at a time.
+/// Number of rows per row removed in one round (at least one is removed). A gross error makes good
+/// rows look like outliers, so few are removed at a time.
 const ROWS_PER_REMOVAL: usize = 100;
 /// Ratio of the residual variances after and before a round, above which the removed rows are not
 /// gross errors and the search ends.
@@ -70,7 +70,7 @@ fn explains(fit: &Identification) -> bool {
     fit.noise == Noise::Declared && fit.noise_factor <= 1.0 + 1e-9
 }
 
-/// Returns the residual variance of `fit` divided by that of `other`.
+/// Returns the ratio of the residual variance of `fit` to that of `other`.
 fn part(fit: &Identification, other: &Identification) -> f64 {
     match (fit.reduced_chi2, other.reduced_chi2) {
         (Some(chi2), Some(other)) => chi2 / other,

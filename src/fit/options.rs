@@ -38,7 +38,7 @@ pub struct Options {
     pub(crate) warm_start: Option<Arc<WarmStart>>,
     /// True if the fit is provisional: another one follows, and its result is not checked.
     pub(crate) provisional: bool,
-    /// True if influential rows are searched for by further fits.
+    /// True to search for influential rows by further fits.
     pub(crate) influential_rows: bool,
 }
 

@@ -20,8 +20,8 @@ use crate::least_squares::{Identifiability, UnidentifiableCombination};
 use crate::model::parameter::Parameter;
 use crate::quantity::Unit;
 
-/// Smallest absolute correlation at which a pair of parameters is reported. The variances of their
-/// sum and difference, each parameter in units of its σ, then differ at least by a factor of 19.
+/// Smallest absolute correlation at which a pair of parameters is reported. In units of σ, the
+/// variances of sum and difference then differ at least by a factor of 19.
 pub const STRONG_CORRELATION: f64 = 0.9;
 /// Largest identified share at which a parameter has no standard error, because the data do not
 /// determine it.
@@ -41,13 +41,13 @@ pub struct Estimate {
     /// Standard error of the value, SI. `None` if it was not fitted, rests on a bound, belongs to
     /// an undetermined combination, or if the data do not determine it.
     pub std_error: Option<f64>,
-    /// Bound on which the value rests; `None` if it is inside its bounds.
+    /// Bound at which the value lies; `None` if it is inside its bounds.
     pub at_bound: Option<AtBound>,
-    /// Shadow price of the bound on which the value rests.
+    /// Shadow price of that bound; `None` if the value is inside its bounds.
     #[doc(hidden)]
     pub shadow_price: Option<ShadowPrice>,
-    /// Identified share: part of the value that the data determine, 0…1. The remainder comes from
-    /// prior, bound, or the start of the fit along unidentifiable combinations.
+    /// Identified share: the part of the value that the data determine, 0…1. The rest comes from
+    /// the prior, a bound, or the start of the fit along unidentifiable combinations.
     pub identified: f64,
     /// True if the strategy varied the parameter.
     pub fitted: bool,
@@ -63,7 +63,7 @@ pub struct Identification {
     pub solver: SolverChoice,
     /// Reason for the choice of the solver, if `auto` chose it.
     pub solver_reason: Option<&'static str>,
-    /// Reason for which the last fit stopped.
+    /// Reason why the last fit stopped.
     pub termination: Termination,
     /// Findings of the checks, errors first; a provisional fit is only checked for convergence.
     pub findings: Vec<Finding>,
@@ -91,8 +91,8 @@ pub struct Identification {
     /// Errors of the identification rows, each configuration predicted by a fit without it \[m\];
     /// empty where rows are held out.
     pub(crate) left_out: Vec<Vector3<f64>>,
-    /// Errors of each kind of rows before and after the fit, where there are several kinds; the
-    /// first pair is `registered` and `fitted`.
+    /// Errors of each kind of rows: with the registered nominal arm and with the identified arm.
+    /// Empty if there is only one kind.
     pub kinds: Vec<(Errors, Errors)>,
     /// For each touched point, scatter of the predicted target with the registered nominal and with
     /// the identified arm, and true if all its rows are held out.
@@ -107,7 +107,7 @@ pub struct Identification {
     /// Interval in which `reduced_chi2` lies with probability 0.999 if the residual is only noise;
     /// `None` if `reduced_chi2` is.
     pub chance: Option<(f64, f64)>,
-    /// Noise variance that the fit took, relative to the declared one; 1 unless residuals and
+    /// Noise variance that the fit assumed, relative to the declared one; 1 unless residuals and
     /// priors contradict the declared σ.
     pub noise_factor: f64,
     /// Standard deviation (1 σ) of a measured coordinate that the fit assumed \[m\] (of a tilt
@@ -130,16 +130,16 @@ pub struct Identification {
     /// True if the fit is provisional: another one follows, so the identifiability and most checks
     /// are left out.
     pub(crate) provisional: bool,
-    /// Noise models of positions and of orientations that the fit took.
+    /// Noise models of positions and of orientations that the fit assumed.
     pub(super) noise_models: (NoiseModel, NoiseModel),
     /// Estimates of every free parameter, in the order of the model.
     pub estimates: Vec<Estimate>,
     /// Covariance of the estimates.
     pub covariance: Covariance,
-    /// Prior widths that the fitted deviations contradict; none for a provisional fit.
+    /// Prior widths that the fitted deviations contradict; empty for a provisional fit.
     #[doc(hidden)]
     pub prior_sizes: Vec<PriorSize>,
-    /// Constraints on whose limits the fit rests, in the order of the file.
+    /// Constraints that are active (at a limit) in the fit, in the order of the file.
     #[doc(hidden)]
     pub active_constraints: Vec<ActiveConstraint>,
     /// Identification rows whose residual is too large to be noise, in the order of the rows.
@@ -267,7 +267,7 @@ impl Estimate {
     }
 }
 
-/// Writes the result of a stage into the estimates of its unknowns and their covariance.
+/// Writes the result of a stage into the estimates and the covariance of its unknowns.
 pub(super) fn enter(
     (estimates, covariance): (&mut [Estimate], &mut Collected),
     stage: &Stage,

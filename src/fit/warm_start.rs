@@ -40,8 +40,8 @@ impl WarmStart {
 }
 
 impl Identification {
-    /// Returns the state from which the next fit starts. The noise model is included only if
-    /// `keep_noise`.
+    /// Returns the state from which the next fit starts. It contains the noise model only if
+    /// `keep_noise` is true.
     pub(crate) fn warm_start(&self, keep_noise: bool) -> WarmStart {
         let names = self.estimates.iter().map(|estimate| estimate.name.clone());
         let deviations = names.zip(self.registered_x.iter().copied());

@@ -70,7 +70,7 @@ pub(super) fn expected(found: &Identification) -> String {
     }
 }
 
-/// States the σ that the fit took, if residuals and priors contradict the declared one.
+/// States the σ that the fit assumed, if residuals and priors contradict the declared one.
 fn other_sigma(problem: &Problem, found: &Identification) -> String {
     let errors = &found.fitted.identification;
     let sigma = problem.data.position_sigma.filter(|_| errors.kind == "position");

@@ -17,9 +17,9 @@ const MAX_STATISTIC: f64 = 150.0;
 /// Null distribution of a test statistic. Large values of the statistic are improbable.
 #[derive(Debug, Clone)]
 pub(super) enum Chance {
-    /// `scale` times a variable with the χ² distribution.
+    /// Null distribution of `scale` times a χ² variable.
     ChiSquared { distribution: ChiSquared, scale: f64 },
-    /// Largest of `of` variables with the F distribution, by Bonferroni's inequality.
+    /// Null distribution of the largest of `of` F variables, by Bonferroni's inequality.
     Fisher { distribution: FisherSnedecor, of: f64 },
     /// Anderson and Darling's A² of normal variables with mean and variance estimated.
     AndersonDarling,
@@ -55,8 +55,8 @@ impl Chance {
         }
     }
 
-    /// Returns the value below which a χ² statistic falls with probability `level`; 0 for other
-    /// statistics, of which only large values are significant.
+    /// Returns the value below which a χ² statistic falls with probability `level`. It is 0 for
+    /// other statistics, because only their large values are significant.
     pub fn lower(&self, level: f64) -> f64 {
         match self {
             Self::ChiSquared { distribution, scale } => scale * distribution.inverse_cdf(level),
@@ -75,10 +75,9 @@ impl Chance {
 pub(super) struct Drawn {
     /// Drawn values, ascending.
     values: Vec<f64>,
-    /// Gamma distribution of shape k and scale 1 that describes the upper tail.
+    /// Gamma distribution of shape k and scale 1 fitted to the draws, used for the upper tail.
     tail: Gamma,
-    /// Offset and unit that convert a value of that distribution to the statistic: origin + unit ×
-    /// value.
+    /// Offset of the statistic: statistic = origin + unit × value of the gamma distribution.
     origin: f64,
     unit: f64,
 }
@@ -145,7 +144,7 @@ fn anderson_darling_p(statistic: f64) -> f64 {
     }
 }
 
-/// Returns the A² that is reached with probability `level` under normality, by bisection.
+/// Returns the value of A² that is exceeded with probability `level` under normality, by bisection.
 fn anderson_darling_upper(level: f64) -> f64 {
     bisect(|statistic| anderson_darling_p(statistic) > level, (0.0, MAX_STATISTIC), 60).1
 }

@@ -25,18 +25,18 @@ pub enum Covariate {
     Row,
     /// Side from which a joint approached the pose, −1 to 1.
     Approach(usize),
-    /// Forces and moments of the loads.
+    /// Forces and moments of the loads: payload and gravity.
     Load,
-    /// Measured position of the target.
+    /// Measured position of the target, measuring frame \[m\].
     Position,
     /// Covariate that the user declares, by the name of its column, in the column's unit.
     Declared(Arc<str>),
 }
 
 impl Covariate {
-    /// Returns the covariates on which `quantity` depends. `known` states whether times and
-    /// directions of approach are recorded. Without times, the row number replaces the time;
-    /// without directions, the commands replace them.
+    /// Returns the covariates through which `quantity` varies. `known` states whether directions of
+    /// approach are recorded, and whether times are. Without times, the row number replaces the
+    /// time; without directions, the commands replace them.
     pub fn of(quantity: Quantity, problem: &Problem, known: (bool, bool)) -> Vec<Self> {
         let (approach_known, time_measured) = known;
         match quantity {

@@ -3,7 +3,7 @@
 use super::chance::Chance;
 use super::outcome::{Outcome, ResidualTest, ResidualTests, Test, Untestable};
 
-/// Test with its result before the correction for multiple tests.
+/// Test before the correction for multiple tests.
 pub(super) struct Tried {
     /// Test that was made.
     pub test: Test,
@@ -17,7 +17,7 @@ pub(super) struct Trial {
     pub statistic: f64,
     /// Null distribution of the statistic.
     pub chance: Chance,
-    /// Increasing function that converts the statistic to the number displayed.
+    /// Increasing function from the statistic to the number shown to users.
     pub shown: fn(f64) -> f64,
 }
 

@@ -11,27 +11,27 @@ use crate::numeric::{gram, lower_factor, multiply_by_upper};
 
 /// Minimum number of residual degrees of freedom for any test.
 const MIN_DEGREES_OF_FREEDOM: f64 = 4.0;
-/// Smallest share of a direction's squared length in the kept poses at which the fit without the
-/// other poses is defined.
+/// Smallest share of a direction's squared length that must lie in the kept poses for the fit to
+/// them to be defined.
 const MIN_KEPT_SHARE: f64 = 1e-6;
-/// Smallest share of its variance that a direction of a pose must keep in the residual to be
-/// studentised. With less, the fit always meets the measurement along it.
+/// Smallest share of its noise variance that the residual must keep along a direction of a pose for
+/// studentisation. With less, the pose alone determines that direction.
 const MIN_RESIDUAL_SHARE: f64 = 1e-4;
-/// Smallest share of a fitted direction that priors determine at which the priors' contribution to
+/// Smallest share of a fitted direction determined by priors, at which the priors' contribution to
 /// the residuals is counted.
 const MIN_PRIOR_SHARE: f64 = 1e-6;
 /// Value added to a diagonal so that a Cholesky factor exists in spite of rounding.
 const CHOLESKY_JITTER: f64 = 1e-10;
 /// Number of poses whose rows of Q are transposed together, chosen for the processor cache.
 const POSES_PER_BLOCK: usize = 32;
-/// Number of directions above which a Cholesky factor replaces eigenvectors, because it takes less
-/// time.
+/// Largest number of directions for which eigenvectors are computed; a Cholesky factor of more
+/// takes less time.
 const MAX_EIGENVECTOR_DIRECTIONS: usize = 100;
 
 /// Projection I − H with H = Q Qᵀ, and the matrices that studentise each pose.
 #[derive(Debug, Clone)]
 pub(super) struct Leverage<'a> {
-    /// Q, shape = (3 N, p).
+    /// Matrix Q, shape = (3 N, p), with H = Q Qᵀ.
     pub fitted: Cow<'a, DMatrix<f64>>,
     /// Gram matrix QᵀQ, shape = (p, p).
     gram: DMatrix<f64>,
@@ -82,7 +82,7 @@ impl<'a> Leverage<'a> {
     /// Returns (I − H)_bb^(−½) r_b of each pose b: residuals with unit covariance if the noise has
     /// unit covariance [Cook and Weisberg 1982].
     ///
-    /// Directions of a pose along which the fit always meets the measurement become zero.
+    /// Components along directions that a pose alone determines are set to zero.
     pub fn studentise(&self, residual: &[f64]) -> Vec<Vector3<f64>> {
         let mut poses = residual.as_chunks().0.to_vec();
         self.studentise_in_place(&mut poses);
@@ -97,8 +97,8 @@ impl<'a> Leverage<'a> {
     }
 }
 
-/// Applies a function to chunks of poses in parallel. It receives the number of the first pose and
-/// the rows of Q as columns, three a pose.
+/// Applies a function to chunks of poses in parallel and concatenates the results. The function
+/// receives the index of the first pose and the rows of Q as columns, three a pose.
 fn by_poses<T: Send>(
     fitted: &DMatrix<f64>,
     of: impl Fn(usize, &DMatrix<f64>) -> Vec<T> + Sync,
@@ -114,12 +114,12 @@ fn by_poses<T: Send>(
     parts.into_iter().flatten().collect()
 }
 
-/// Returns A_bᵀ B_b, with A_b and B_b the three columns of pose b in both matrices.
+/// Returns A_bᵀ B_b, where A_b and B_b are the three columns that belong to pose b.
 fn products(a: &DMatrix<f64>, b: &DMatrix<f64>, pose: usize) -> Matrix3<f64> {
     Matrix3::from_fn(|i, j| a.column(3 * pose + i).dot(&b.column(3 * pose + j)))
 }
 
-/// Returns a root of I − QᵀQ (`left`) with a column for each direction that priors help to
+/// Returns S with S Sᵀ = `left` = I − QᵀQ, with one column for each direction that priors help to
 /// determine.
 fn root_of_priors(left: DMatrix<f64>) -> DMatrix<f64> {
     let p = left.nrows();
@@ -147,7 +147,7 @@ fn inverse_root(matrix: Matrix3<f64>) -> Matrix3<f64> {
 /// Subset of the poses with the residual of a linear fit to them alone.
 #[derive(Debug, Clone)]
 pub(super) struct Kept<'a> {
-    /// Numbers of the kept poses, ascending.
+    /// Indices of the kept poses, ascending.
     pub poses: Vec<usize>,
     /// Residuals of the kept poses, shape = (3 per pose).
     pub residual: DVector<f64>,
@@ -193,7 +193,7 @@ impl<'a> Kept<'a> {
     }
 }
 
-/// Sum of squared residuals of all other poses in the fit without one pose.
+/// Residual of the other poses in a fit without one pose.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Others {
     /// Sum of squared residuals of the other poses.
@@ -235,7 +235,7 @@ pub(super) fn each_left_out(leverage: &Leverage, residual: &DVector<f64>) -> Vec
     })
 }
 
-/// Returns Qᵀr, summed row after row.
+/// Returns Qᵀr, with Q = `fitted`, summed in blocks of poses.
 fn transposed_product(fitted: &DMatrix<f64>, residual: &DVector<f64>) -> DVector<f64> {
     let mut sum = DVector::zeros(fitted.ncols());
     for first in (0..residual.len()).step_by(3 * POSES_PER_BLOCK) {

@@ -79,10 +79,10 @@ pub enum Untestable {
     SizeMismatch,
 }
 
-/// Result of a test.
+/// Result of a test that was made.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Outcome {
-    /// Value of the statistic.
+    /// Value of the statistic, as shown to users.
     pub statistic: f64,
     /// Lower and upper bound of the statistic under noise alone, at the level at which Holm's
     /// procedure judges the test.
@@ -137,6 +137,7 @@ impl ResidualTest {
     }
 
     /// Returns true if a failure of the test indicates structure that an effect could explain.
+    /// Outlier and normality tests are no tests of structure.
     pub fn is_structure(&self) -> bool {
         !matches!(self.test, Test::Outliers { .. } | Test::Normality)
     }
@@ -171,8 +172,8 @@ impl ResidualTests {
         failed.min_by(|a, b| p_value(a).total_cmp(&p_value(b)))
     }
 
-    /// Returns the ratio of residual to declared σ if only the size of the residual is significant;
-    /// `None` otherwise.
+    /// Returns the ratio of the residual to the declared σ if the size of the residual is the only
+    /// significant finding; `None` otherwise.
     pub fn size_alone(&self) -> Option<f64> {
         let mut failed = self.tests.iter().filter(|test| test.is_structure() && test.failed());
         let (Some(only), None) = (failed.next(), failed.next()) else { return None };
@@ -184,8 +185,8 @@ impl ResidualTests {
         }
     }
 
-    /// Returns the ratio of residual to declared σ if it is significantly less than 1; `None`
-    /// otherwise.
+    /// Returns the ratio of the residual to the declared σ if it is significantly less than 1;
+    /// `None` otherwise.
     pub fn overstated_sigma(&self) -> Option<f64> {
         let size = self.tests.iter().filter(|test| test.test == Test::ReducedChiSquared);
         let mut sizes = size.filter_map(|test| test.outcome.as_ref().ok());

@@ -9,7 +9,7 @@ use super::judgement::{Trial, Tried};
 use super::leverage::{Kept, Leverage, Others, each_left_out};
 use super::outcome::{Test, Untestable};
 
-/// Reciprocal of the share of poses that is left out in one round, at least one pose. Large
+/// Reciprocal of the share of the poses that is removed in one round (at least one pose). Large
 /// outliers distort the fit and hide smaller ones, so few are removed at a time.
 const POSES_PER_REMOVAL: usize = 100;
 /// Reciprocal of the largest share of poses that can be outliers. If more have large residuals, the
@@ -90,7 +90,7 @@ fn distances(leverage: &Leverage, residual: &DVector<f64>) -> Vec<Option<Distanc
         .collect()
 }
 
-/// Returns the test of the pose with the largest distance.
+/// Returns the outlier test, whose statistic is the largest distance.
 fn test(distances: &[Option<Distance>]) -> Tried {
     let testable = distances
         .iter()
@@ -104,7 +104,7 @@ fn test(distances: &[Option<Distance>]) -> Tried {
     Tried { test: Test::Outliers { worst: Some(worst) }, trial: Ok(trial) }
 }
 
-/// Returns the poses that are outliers, the farthest first, at most as many as one round removes.
+/// Returns the outliers, the farthest first, at most as many as one round removes.
 fn too_far(distances: &[Option<Distance>], level: f64) -> Vec<usize> {
     let count = distances.len();
     let far = |(number, distance): (usize, &Option<Distance>)| {

@@ -13,7 +13,7 @@ const MIN_POSES: usize = 5;
 /// [Hyndman and Athanasopoulos 2018, section 5.4].
 const MAX_LAGS: usize = 10;
 const POSES_PER_LAG: usize = 5;
-/// Number of poses that are copied to contiguous memory before use, so that slow memory reads
+/// Number of poses that are copied to contiguous memory at a time, so that slow memory reads
 /// overlap.
 const POSES_PER_FETCH: usize = 64;
 /// Range of a covariate, relative to its values, up to which it counts as constant.
@@ -47,12 +47,13 @@ impl<'a> Sample<'a> {
     }
 }
 
-/// Statistic that grows with one kind of structure; independent of the unit of the residuals.
+/// Statistic that grows with one kind of structure in the residuals. It does not depend on their
+/// unit.
 #[derive(Debug)]
 pub(super) enum Statistic {
-    /// Share of steps at which a coordinate keeps its sign.
+    /// Share of steps from pose to pose at which a coordinate keeps its sign.
     Runs(Arc<Order>),
-    /// Ljung and Box's Q.
+    /// Ljung and Box's Q of the autocorrelation.
     LjungBox(Arc<Order>),
     /// Squared distance correlation with a covariate.
     Dependence(Cumulative),
@@ -69,15 +70,16 @@ impl Statistic {
     }
 }
 
-/// Poses of each session in an order; poses of different sessions are not compared.
+/// Indices of the poses of each session in a certain order. Poses of different sessions are not
+/// compared.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Order {
     sessions: Vec<Vec<usize>>,
     lags: usize,
 }
 
-/// Returns the poses `kept` (renumbered from 0) in the order of time, and also in the order of the
-/// rows if that differs.
+/// Returns the poses `kept`, renumbered from 0, in the order of time, and in the order of the rows
+/// if that differs.
 pub(super) fn sequences(
     fit: &FitResidual,
     kept: &[usize],
@@ -124,8 +126,8 @@ impl Order {
         self.sessions.iter().flat_map(within).map(|(&a, &b)| (sample.at(a), sample.at(b)))
     }
 
-    /// Returns the share of steps at which a coordinate keeps its sign: few runs, many kept signs
-    /// [Wald and Wolfowitz 1940].
+    /// Returns the share of steps at which a coordinate keeps its sign. Many kept signs mean few
+    /// runs [Wald and Wolfowitz 1940].
     pub fn kept_signs(&self, sample: &Sample) -> f64 {
         let (mut steps, mut kept) = (0_u32, 0_u32);
         for (a, b) in self.pairs(sample, 1) {

@@ -86,7 +86,7 @@ fn statistics(fit: &FitResidual, poses: &[usize]) -> Vec<(Test, Result<Statistic
     all
 }
 
-/// Returns all tests, each with the same reason why it cannot be made.
+/// Returns all tests as impossible for the reason `why`.
 fn all_untestable(fit: &FitResidual, why: &Untestable) -> Vec<Tried> {
     let sequence = Sequence::Time;
     let mut tests = vec![

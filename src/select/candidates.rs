@@ -8,11 +8,12 @@ use crate::problem::{Effect, Problem};
 /// Reason why an effect is not tried: the rules of the problem fix its parameters at zero.
 pub const HELD_FIXED: &str = "[parameters] holds it fixed";
 
-/// Reason why an effect is not tried: a rule of the problem that matches it gives a quantity in
-/// another unit.
+/// Reason why an effect is not tried: the unit in a rule of `[parameters]` that matches its
+/// parameters is not theirs.
 pub const REFUSED: &str = "a rule of [parameters] speaks of it in another unit";
 
-/// Reason why an effect is not tried: its derivative is not finite in these poses.
+/// Reason why an effect is not tried: the derivative of the residuals with respect to it is not
+/// finite in these poses.
 pub const NOT_FINITE: &str = "its derivative is not a finite number in these poses";
 
 /// Catalogue effects that the problem does not declare: those that the data can show, and the
@@ -47,7 +48,8 @@ impl Candidates {
     }
 }
 
-/// Returns the effects with one more. A harmonic of a joint that has one is merged into it.
+/// Returns `effects` with the effect `new` appended. A harmonic of a joint that has one already is
+/// merged into that one.
 pub(super) fn joined(effects: &[Effect], new: &Effect) -> Vec<Effect> {
     let mut all = effects.to_vec();
     match all.iter_mut().find_map(|known| Some((known.joined(new)?, known))) {

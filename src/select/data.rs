@@ -25,26 +25,28 @@ pub(super) struct Data<'a> {
     pub measurements: &'a Measurements,
     pub split: &'a Split,
     pub rules: &'a SelectionRules,
-    /// Identifier of the conditions of each identification row. Rows with equal identifiers are
-    /// repeats.
+    /// Number of the measuring conditions (configuration, loads, temperature) of each
+    /// identification row. Rows with equal numbers are repeats.
     pub setup: Vec<usize>,
-    /// Cross-validation block of each identification row; repeats are in one block.
+    /// Number of the cross-validation block to which each identification row belongs; repeats
+    /// belong to one block.
     pub block: Vec<usize>,
     /// Effects that the search considers in addition to those of the catalogue.
     pub candidates: &'a [Effect],
-    /// True if the harmonics of all joints may have a common prior.
+    /// True if one prior σ for each order may hold for the harmonics of all joints.
     pub takes_gears: bool,
     /// Request to stop the search early.
     pub stop: Stop,
-    /// Laws that the grammar proposed, by joint and by what acts beside: evidence about the next fit
-    /// needs no new search.
+    /// Laws that the search over formulas proposed, cached by joint and by the other hypotheses
+    /// assumed.
     pub proposed: Proposed,
 }
 
-/// Laws by joint, from 0, and by the names of the hypotheses beside which they were searched.
+/// Cached laws by key.
 pub(super) type Proposed = Arc<Mutex<BTreeMap<ProposalKey, Vec<Effect>>>>;
 
-/// Joint from 0, names of what acts beside it, poses left out, and names of the fitted effects.
+/// Key of cached laws: joint from 0, names of the other hypotheses assumed, poses left out, and
+/// names of the fitted effects.
 pub(super) type ProposalKey = (usize, Vec<String>, Vec<usize>, Vec<String>);
 
 impl<'a> Data<'a> {
@@ -114,8 +116,8 @@ impl<'a> Data<'a> {
         self.rows().iter().map(|&row| self.measurements.session.of_row[row]).collect()
     }
 
-    /// Collects what the identification rows record and vary, which decides the effects that they
-    /// can show. Ranges are those of commands and payloads.
+    /// Collects which quantities the identification rows record, and their ranges; these decide
+    /// which effects the rows can show.
     pub fn conditions(&self, problem: &Problem) -> DataCoverage {
         fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
             values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
@@ -225,7 +227,8 @@ impl<'a> Data<'a> {
     }
 }
 
-/// Returns the bit patterns of the conditions of one row; equal patterns mean repeats.
+/// Returns the bit patterns of all measuring conditions of one row. Equal patterns mean repeated
+/// measurements.
 fn conditions_of(measurements: &Measurements, row: usize) -> Vec<u64> {
     let mut key = bits(measurements.configuration(row));
     let n = measurements.joints;
@@ -259,8 +262,8 @@ pub(super) fn number<K: Ord>(keys: impl Iterator<Item = K>) -> Vec<usize> {
     .collect()
 }
 
-/// Returns a number near the middle of two numbers, written with few decimals: within a twentieth
-/// of their distance from the middle.
+/// Returns a number with few decimals between `low` and `high`, at most a twentieth of their
+/// distance from the middle.
 fn half_way(low: f64, high: f64) -> f64 {
     let middle = 0.5 * (low + high);
     let unit = 10.0_f64.powf(((high - low) / 10.0).log10().floor());

@@ -28,7 +28,7 @@ pub struct Detection {
     pub effects: Vec<Detectable>,
     /// Candidates that these poses cannot test, with the reason.
     pub untestable: Vec<(Effect, &'static str)>,
-    /// True if the poses have no times; they are then assumed to be measured a minute apart.
+    /// True if the poses have no times; one minute is then assumed between consecutive poses.
     pub times_assumed: bool,
 }
 
@@ -51,8 +51,8 @@ pub struct Size {
     pub parameters: Vec<String>,
     /// Unit of the parameters.
     pub unit: Unit,
-    /// Standard deviation (1 σ) of the catalogue's prior, SI. Realistic effects are not much
-    /// larger.
+    /// Standard deviation (1 σ) of the catalogue's prior on these parameters, SI. Real effects are
+    /// rarely much larger.
     pub prior: f64,
     /// Size in the direction (phase, axis) that is hardest to detect, SI. `None` if the fitted
     /// parameters can reproduce it completely, or if hardly any degrees of freedom remain.

@@ -17,7 +17,7 @@ use crate::model::parameter::{BeamField, ParameterSite, Regressor};
 use crate::model::{Model, Pose};
 use crate::problem::{Effect, EffectDeclaration, Problem};
 
-/// Factor on σ by which an outlier gets practically no weight.
+/// Factor on σ that gives an outlier practically no weight.
 const SIGMA_FACTOR_OF_OUTLIERS: f64 = 1e6;
 
 /// Median of |r|² for one, two and three normal coordinates with unit variance.
@@ -40,7 +40,7 @@ pub(super) struct Fitted {
     pub problem: Problem,
     pub model: Model,
     pub found: Identification,
-    /// Indices of the parameters that were fitted and rest on no bound.
+    /// Indices of the fitted parameters that are not at a bound.
     pub unknowns: Vec<usize>,
     /// Coefficients of the active constraints, shape = (constraints, unknowns).
     active: DMatrix<f64>,
@@ -161,7 +161,7 @@ impl Fitted {
         squares.sqrt() > MAX_UNSETTLED * self.sigma * (3.0 * here.len() as f64).sqrt()
     }
 
-    /// Returns options that start a fit where this one ended.
+    /// Returns options for a fit of the same problem that starts where this one ended.
     pub fn onwards(&self, options: &Options) -> Options {
         let values =
             self.found.estimates.iter().map(|estimate| (estimate.name.clone(), estimate.estimate));
@@ -190,7 +190,7 @@ impl Fitted {
         problem
     }
 
-    /// Returns the declared effects.
+    /// Returns the effects of the fitted problem, declared ones included.
     pub fn effects(&self) -> Vec<Effect> {
         self.problem.effects.iter().map(|declared| declared.effect.clone()).collect()
     }
@@ -206,7 +206,7 @@ impl Fitted {
         poses
     }
 
-    /// Returns the rows of the active constraints, shape = (constraints, unknowns).
+    /// Returns the coefficients of the active constraints, shape = (constraints, unknowns).
     pub fn active(&self) -> &DMatrix<f64> {
         &self.active
     }
@@ -305,12 +305,12 @@ impl Fitted {
         quantile.is_ok_and(|t| mean > t.inverse_cdf(0.975) * (variance / count).sqrt())
     }
 
-    /// Returns the fit with no rows excluded as outliers.
+    /// Returns this fit with no row treated as an outlier.
     pub fn with_all_rows(&self) -> Self {
         self.setting_aside(Vec::new())
     }
 
-    /// Returns the fit with other rows excluded, in its linear neighbourhood.
+    /// Returns this fit with `rows` treated as outliers, in its linear neighbourhood.
     pub fn setting_aside(&self, rows: Vec<usize>) -> Self {
         Self {
             set_aside: rows,
@@ -320,8 +320,8 @@ impl Fitted {
         }
     }
 
-    /// Returns the linear neighbourhood with priors weighted as in the fit, whose σ may be larger
-    /// than the declared one.
+    /// Returns the linear neighbourhood with the same weight of priors as in the fit, which may
+    /// have estimated a larger σ than declared.
     pub fn neighbourhood_as_fitted(&self, linearised: Linearised) -> LinearNeighbourhood {
         let unknowns =
             self.unknowns_without(&linearised, &[], self.found.noise_factor.max(1.0).sqrt());

@@ -15,17 +15,17 @@ const MAX_NONCENTRALITY: f64 = 1024.0;
 /// Without an effect, the share follows Beta(k/2, (ν − k)/2).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct ScanTest {
-    /// Half of the number of new directions, k / 2.
+    /// Half the number of additional columns, k / 2.
     new: f64,
-    /// Half of the residual degrees of freedom, (ν − k) / 2.
+    /// Half the residual degrees of freedom, (ν − k) / 2.
     left: f64,
-    /// Smallest share that the candidate must gain to be found.
+    /// Smallest share of the sum of squares that the candidate must gain to be found.
     threshold: f64,
 }
 
 impl ScanTest {
-    /// Creates the test of a candidate with `k` new directions and ν = `freedom` degrees of freedom
-    /// at `level` / `tries`. Returns `None` if no degrees of freedom would remain.
+    /// Creates the F test of a candidate with `k` additional columns, ν = `freedom` degrees of
+    /// freedom, at `level` / `tries`. Returns `None` if no degree of freedom would remain.
     ///
     /// The share must be significant at level / tries, and must improve the information criterion ν
     /// ln(1 − share) + k ln ν + 2 ln(tries).
@@ -55,7 +55,8 @@ impl ScanTest {
         sum
     }
 
-    /// Returns the uncorrected p-value at the mean gain for a noncentrality.
+    /// Returns the p-value, not corrected for the number of tries, of the mean gain at a
+    /// noncentrality.
     pub fn expected_p(&self, noncentrality: f64) -> f64 {
         let gained = 2.0 * self.new + noncentrality;
         beta_reg(self.left, self.new, 2.0 * self.left / (2.0 * self.left + gained))

@@ -50,7 +50,7 @@ pub struct ReferenceCheck {
 struct Reading {
     /// Measured position z of the point, measuring frame \[m\].
     seen: Vector3<f64>,
-    /// Value f(t) of the motion's time function at the reading.
+    /// Value f(t) of the motion's time function at the reading; the motion is (d, ω) f(t).
     moved: f64,
     /// Weight 1/σ² of a coordinate [1/m²].
     weight: f64,
@@ -80,8 +80,8 @@ fn point_information(readings: &[Reading], parameters: usize) -> (DVector<f64>, 
     (moves.tr_mul(&sum), moves.tr_mul(&moves) * certainty)
 }
 
-/// Returns twice the log odds of θ ∼ N(θ̂, C) against θ = 0; `None` if no point was read at
-/// different f.
+/// Returns twice the log odds of θ ∼ N(θ̂, C) against θ = 0, with θ̂ = `found`, C = `spread` and
+/// the v and M of all points. `None` if no point was read at different f.
 fn odds(
     found: &DVector<f64>,
     spread: &DMatrix<f64>,

@@ -9,8 +9,8 @@ pub struct SelectionRules {
     /// Probability that noise alone makes at least one residual test fail, and of a false alarm of
     /// the ranking. One false alarm in a hundred data sets is rare enough to be examined.
     pub level: f64,
-    /// Corrected p-value of the F test above which an effect without evidence is not reported as
-    /// found.
+    /// Corrected p-value of the F test up to which an effect is reported as found if no evidence
+    /// about it was evaluated.
     pub leaving_level: f64,
     /// Smallest probability that there are at least as many effects as a set has, at which the loop
     /// fits the set. One half selects the single model that predicts best [Barbieri and Berger

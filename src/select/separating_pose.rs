@@ -10,10 +10,10 @@ use super::neighbourhood::{LinearNeighbourhood, Linearised};
 use crate::measurement::Measurements;
 use crate::problem::Effect;
 
-/// Pose that would distinguish two effects.
+/// Pose whose measurement would distinguish two effects.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SeparatingPose {
-    /// Effect from which the pose would distinguish.
+    /// Second of the two effects.
     pub other: Effect,
     /// Configuration within the measured ranges, shape = (joints) \[rad\] or \[m\].
     pub configuration: Vec<f64>,
@@ -57,8 +57,9 @@ pub(super) fn shuffled(data: &Data) -> Measurements {
     poses
 }
 
-/// Returns the one of `poses`, linearised as `there`, at which the fits with the one and with the
-/// other effect differ most.
+/// Returns the pose among `poses` at which the fits with the one and with the other effect differ
+/// most. `here` is linearised at the measured poses, `there` at `poses`. `None` if there are no
+/// poses.
 pub(super) fn separating_pose(
     fit: &LinearNeighbourhood,
     [here, there]: [&Linearised; 2],

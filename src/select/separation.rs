@@ -10,7 +10,7 @@ use crate::measurement::Measurements;
 use crate::problem::{Effect, Problem};
 use crate::select::settings::POWER;
 
-/// How well some poses distinguish two effects.
+/// Measure of how well some poses distinguish two effects.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Separation {
     /// Largest principal angle \[rad\] between the displacements by the two effects, with all free
@@ -24,11 +24,11 @@ pub struct Separation {
 /// Detectability of one of two effects.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Side {
-    /// Smallest size at which a scan of the whole catalogue finds it, for its parameters with the
-    /// unit of the first one.
+    /// Smallest size at which a scan of the whole catalogue finds the effect. It concerns the
+    /// parameters that have the unit of the first parameter.
     pub found: Size,
-    /// Smallest size at which the other effect is ruled out as an explanation, at the level of the
-    /// loop.
+    /// Smallest size of the effect at which the other effect is ruled out as the cause, at the
+    /// level of the loop.
     pub told: Size,
     test: Option<ScanTest>,
 }
@@ -86,7 +86,7 @@ pub fn separation(
     })
 }
 
-/// Returns the size of those parameters of an effect that are listed first.
+/// Returns the entry for the first unit of an effect's parameters.
 fn first(sizes: Vec<Size>) -> Size {
     let none = Size {
         parameters: Vec::new(),

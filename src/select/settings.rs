@@ -3,8 +3,8 @@
 
 // Prior probabilities.
 
-/// Prior weight of a family of functions without a law, relative to a family of effects: most
-/// causes are in the catalogue.
+/// Prior weight of a family of functions without a law, relative to a family of effects. The
+/// catalogue contains most causes.
 pub(super) const PRIOR_OF_FUNCTIONS: f64 = 0.25;
 /// Prior weight of the bending of links that are declared rigid, relative to another family of
 /// effects: most of an arm's compliance is in its joints.
@@ -20,7 +20,8 @@ pub(super) const MAX_PLAUSIBLE: f64 = 3.0;
 /// Half-width of the Cauchy prior on ln(true σ / declared σ): a declared σ is mostly right to a
 /// tenth.
 pub(super) const SPREAD_OF_DECLARED_NOISE: f64 = 0.1;
-/// Half-width of that prior for a σ that was estimated from the same residual.
+/// Half-width of the Cauchy prior on ln(true σ / estimated σ), for a σ that was estimated from the
+/// same residual.
 pub(super) const SPREAD_OF_ESTIMATED_NOISE: f64 = 1.0;
 
 // Functions without a law.
@@ -49,8 +50,8 @@ pub(super) const MAX_SHIFT_TIMES: usize = 200;
 /// Highest order of a wave, integer or not. It is about the number of teeth of a strain-wave gear,
 /// twice its ratio.
 pub(super) const MAX_WAVE_ORDER: f64 = 320.0;
-/// Log odds at which another order or time becomes a hypothesis in addition to a known one: 20 to
-/// 1.
+/// Log odds of 20 to 1 at which another value of an argument (order or time) is added as a
+/// hypothesis besides a listed one.
 pub(super) const LN_ODDS_OF_ANOTHER_ARGUMENT: f64 = 3.0;
 
 // Beam search over sets of hypotheses.
@@ -85,7 +86,7 @@ pub(super) const MAX_STAND_INS: usize = 3;
 /// Maximum number of poses, each of which alone supports an effect, that are left out of the
 /// evidence.
 pub(super) const MAX_SINGLE_POSES: usize = 3;
-/// Smallest squared distance |r|² of an outlier, in units of the variance of the others'
+/// Smallest squared distance |r|² of an outlier, in units of the variance of the other rows'
 /// coordinates: ten standard deviations. Effects displace single poses by less, wrong readings by
 /// more.
 pub(super) const OUTLIER_DISTANCE: f64 = 100.0;
@@ -95,8 +96,8 @@ pub(super) const MAX_OUTLIER_SHARE: f64 = 0.1;
 
 // Ranking and what is stated of an effect.
 
-/// Smallest new share of its columns' length at which a candidate is detectable. With less, the
-/// fitted parameters can reproduce it within the accuracy of the linear neighbourhood.
+/// Smallest share of a candidate's column length that the fitted parameters cannot reproduce, at
+/// which it is detectable. The linear neighbourhood is not more accurate.
 pub(super) const MIN_NEW_LENGTH: f64 = 1e-4;
 /// Number of standard errors below zero at which a parameter that cannot be negative is rejected:
 /// one in 700 for normal errors.

@@ -39,7 +39,7 @@ pub struct Correction {
     /// Range of each covariate over the identification poses, in its unit. Beyond it the correction
     /// is constant.
     pub ranges: Vec<(Covariate, (f64, f64))>,
-    /// Number of held-out poses beyond these ranges.
+    /// Number of held-out poses with a covariate outside these ranges.
     pub beyond: usize,
     /// Root mean squared error of identification poses, each left out in turn, without and with the
     /// correction \[m\].
@@ -61,10 +61,10 @@ pub struct Curve {
     pub points: Vec<PartialResidual>,
 }
 
-/// Partial residual of one pose: the correction there plus the component along the lever that the
-/// corrected fit leaves.
+/// Partial residual of one pose: the correction there plus the coordinate error that the corrected
+/// fit leaves.
 ///
-/// f(x) + l·r / |l|²   with the pose's lever l = ∂p/∂(coordinate) and its residual r after the
+/// f(x) + l·r / |l|² with the pose's lever l = ∂p/∂(coordinate) and its residual r after the
 /// corrected fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PartialResidual {
@@ -120,8 +120,8 @@ pub(super) fn without_law(
     all.into_iter().map(|(_, found)| found).collect()
 }
 
-/// Returns the structure that the residual tests detect, without a site or quantity; `None` if they
-/// detect none.
+/// Returns the structure that the residual tests detect, with unknown site and quantities; `None`
+/// if they detect none.
 pub(super) fn nowhere(tests: &ResidualTests) -> Option<Unexplained> {
     if !tests.is_structured() {
         return None;
@@ -136,8 +136,8 @@ pub(super) fn nowhere(tests: &ResidualTests) -> Option<Unexplained> {
     })
 }
 
-/// Applies the most probable function of a hypothesis to the held-out poses; `None` if left-out
-/// poses gain too little.
+/// Returns the correction by the most probable function of a hypothesis, applied to the held-out
+/// poses. `None` if it improves the prediction of left-out poses too little.
 fn correction(
     fitted: &Fitted,
     data: &Data,

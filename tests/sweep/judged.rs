@@ -113,7 +113,7 @@ impl LoopVerdict {
         let closure = &self.closure;
         let cause = closure.unexplained.first().map_or_else(String::new, located);
         let failed: Vec<String> = closure
-            .findings
+            .residual_tests
             .tests
             .iter()
             .filter(|check| check.failed())

@@ -29,10 +29,10 @@ const MIN_CYCLES: usize = 3;
 pub struct Acceptance {
     /// Held-out poses; rows with equal configuration, base and target form one pose.
     pub poses: Vec<AcceptancePose>,
-    /// Number of held-out rows whose prediction is not finite: their poses are not among `poses`.
+    /// Number of held-out rows without a finite prediction. Their poses are missing in `poses`.
     pub lost: usize,
-    /// True if a base or tool of held-out rows alone was fitted to them, so that they are no test of
-    /// a tolerance.
+    /// True if held-out rows alone use a base or tool, which was then fitted to them. They are then
+    /// no test of a tolerance.
     pub is_placed_anew: bool,
     /// Accuracy of the registered nominal arm.
     pub before: Accuracy,
@@ -41,8 +41,9 @@ pub struct Acceptance {
 }
 
 impl Acceptance {
-    /// Tests a tolerance on the accuracies AP of the identified arm. Rows without a prediction meet
-    /// no tolerance. If a base or tool was fitted to the held-out rows, nothing is decided.
+    /// Tests a tolerance on the accuracies AP of the identified arm. Rows without a prediction
+    /// count as beyond the tolerance. If a base or tool was fitted to the held-out rows, the
+    /// verdict is undecided.
     pub fn test(&self, tolerance: Tolerance) -> ToleranceTest {
         let lost = std::iter::repeat_n(f64::NAN, self.lost);
         let errors: Vec<f64> = self.poses.iter().map(|pose| pose.after).chain(lost).collect();
@@ -58,10 +59,11 @@ impl Acceptance {
 pub struct AcceptancePose {
     /// Rows of the pose in the measurements, ascending.
     pub rows: Vec<usize>,
-    /// Accuracy AP of the nominal arm: distance from the predicted position to the barycentre of
-    /// the measured ones \[m\].
+    /// Accuracy AP of the registered nominal arm: distance from the predicted position to the
+    /// barycentre of the measured positions \[m\].
     pub before: f64,
-    /// Accuracy AP of the identified arm \[m\].
+    /// Accuracy AP of the identified arm: distance from the predicted position to the barycentre of
+    /// the measured positions \[m\].
     pub after: f64,
     /// Repeatability RP = l̄ + 3 `S_l` of the distances l from the measured positions to their
     /// barycentre \[m\]; `None` for less than three measurements, since two positions are equally

@@ -21,8 +21,8 @@ const POSITION_WEIGHT: f64 = 1e-6;
 const ORIENTATION_WEIGHT: f64 = 1e-6;
 /// Largest change of a command in a pass at which it counts as converged \[rad\] or \[m\].
 const MAX_CONVERGED_CHANGE: f64 = 1e-10;
-/// Maximum number of passes. A command that has not converged by then is returned with its
-/// remaining error.
+/// Maximum number of passes over all targets. A command that has not converged by then is returned
+/// with its remaining error.
 const MAX_PASSES: usize = 20;
 /// Largest distance to the target at which it counts as reached \[m\].
 const MAX_REACHED_DISTANCE: f64 = 1e-6;
@@ -113,19 +113,22 @@ pub fn waypoints(
     }
 }
 
-/// Converts targets from the base frame of the arm to the measuring frame.
+/// Transforms target positions and orientations from the base frame of the arm to the measuring
+/// frame.
 pub fn seen_from_base(model: &Model, x: &DVector<f64>, targets: &Measurements) -> Measurements {
     moved(targets, &model.base_frames(x.as_slice()))
 }
 
-/// Converts positions and orientations from the measuring frame to the base frame of the arm.
+/// Transforms target positions and orientations from the measuring frame to the base frame of the
+/// arm.
 pub fn seen_in_base(model: &Model, x: &DVector<f64>, targets: &Measurements) -> Measurements {
     let bases: Vec<Frame<f64>> =
         model.base_frames(x.as_slice()).iter().map(Frame::inverse).collect();
     moved(targets, &bases)
 }
 
-/// Transforms positions and orientations by the frame that `bases` holds for the base of each row.
+/// Transforms the position and orientation of each row by the frame in `bases` that belongs to the
+/// row's base.
 fn moved(targets: &Measurements, bases: &[Frame<f64>]) -> Measurements {
     let placement = Placement::of(targets);
     let base = |row: usize| &bases[placement.base_of(row)];
@@ -230,9 +233,9 @@ pub fn compensate(
     Ok(commands)
 }
 
-/// Computes the command of one pose by Levenberg–Marquardt steps, for targets that Newton steps do
-/// not reach. Effects that depend on the command are evaluated at the command of the previous pass.
-/// `serving` are the joints that may move.
+/// Computes the configuration for one target by Levenberg–Marquardt steps, if Newton steps do not
+/// reach it. Effects that depend on the command are evaluated at the command of the previous pass.
+/// Only the joints `serving` move.
 fn damped(
     problem: &Problem,
     (arm, led): (&Model, &Model),

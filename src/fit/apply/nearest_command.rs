@@ -5,11 +5,12 @@ use nalgebra::{DMatrix, DVector};
 /// Weight of the squared distance from the seed [rad² or m²] against the squared misfit [m² or
 /// rad²]. Such a small weight lets the misfit decide.
 const WEIGHT_SQUARED: f64 = 1e-12;
-/// Maximum number of steps. Most commands take 4 to 8; near singular poses they take more.
+/// Maximum number of steps for one target. Most targets take 4 to 8; near singular poses they take
+/// more.
 const MAX_STEPS: usize = 1000;
 /// Largest step at which a command counts as converged \[rad\] or \[m\].
 const MAX_CONVERGED_STEP: f64 = 1e-12;
-/// Damping μ after the first rejected step, and the damping at which the search ends; both relative
+/// Damping μ after the first rejected step, and damping at which the search gives up; both relative
 /// to the weight of the distance from the seed.
 const DAMPING_RANGE: (f64, f64) = (0.3, 1e20);
 /// Factors on the damping μ after a rejected and after an accepted step.
@@ -17,11 +18,13 @@ const DAMPING_FACTORS: (f64, f64) = (30.0, 0.03);
 /// Relative increase of the cost that counts as rounding, so that the step is accepted.
 const COST_ROUNDING: f64 = 1e4 * f64::EPSILON;
 
-/// Target pose of a command, with the prediction near it.
+/// Target of an inverse-kinematics search, as functions of the commands q.
 pub(super) struct Goal<'a> {
-    /// Misfit desired − predicted at commands q, shape = (3 or 6) \[m, rad\]; NaN without equilibrium.
+    /// Function that returns the misfit desired − predicted, shape = (3 or 6) \[m, rad\]; NaN
+    /// without equilibrium.
     pub misfit: &'a dyn Fn(&DVector<f64>) -> DVector<f64>,
-    /// Derivatives J of the prediction with respect to the commands, shape = (3 or 6, commands).
+    /// Function that returns the derivatives J of the prediction with respect to q, shape = (3 or
+    /// 6, commands).
     pub slopes: &'a dyn Fn(&DVector<f64>) -> DMatrix<f64>,
     /// Lower and upper limit of each command \[rad\] or \[m\].
     pub limits: &'a [(f64, f64)],
@@ -65,7 +68,8 @@ impl Goal<'_> {
         q
     }
 
-    /// Returns a step within the limits, by an active-set method.
+    /// Returns the step of [`nearest`](Self::nearest) at the commands `q`, limited by an active-set
+    /// method.
     fn step(
         &self,
         (q, seed): (&DVector<f64>, &DVector<f64>),

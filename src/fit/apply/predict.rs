@@ -22,11 +22,11 @@ pub struct Residual {
     pub row: usize,
     /// True if the row is held out.
     pub held_out: bool,
-    /// Prediction \[m\]: position of the target in the measuring frame, also for contacts with a
-    /// point, or a distance.
+    /// Predicted position of the target, measuring frame \[m\], also for contacts with a point; a
+    /// predicted distance is along x \[m\].
     pub predicted: Vector3<f64>,
-    /// Measured − predicted position, measuring frame, or distance \[m\]; NaN if the identified arm
-    /// has no equilibrium.
+    /// Measured − predicted position, measuring frame \[m\]; a distance is along x. NaN if the
+    /// identified arm has no equilibrium.
     pub position: Vector3<f64>,
     /// Residual `position` divided by 1 σ of a coordinate \[1\].
     pub whitened: Vector3<f64>,
@@ -50,7 +50,7 @@ impl Residual {
 }
 
 impl Identification {
-    /// Returns the model that the strategy fits, with the bases and targets of a placement.
+    /// Returns the model that the strategy fitted, for the bases and targets of a placement.
     pub(crate) fn model(
         &self,
         problem: &Problem,
@@ -167,8 +167,8 @@ impl Identification {
         Ok(Some(model.orientation_residuals(self.poses(rows, Some(1.0)), &self.vector(model)?)))
     }
 
-    /// Returns every row as a pose; orientations have 1 σ `turn` \[rad\]. Elapsed time counts from
-    /// the first pose of the identification.
+    /// Returns every row as a pose; `turn` is 1 σ of its orientation \[rad\]. Elapsed time counts
+    /// from the first pose of the identification.
     pub(in crate::fit) fn poses<'a>(
         &self,
         rows: &'a Measurements,
@@ -182,8 +182,8 @@ impl Identification {
         poses
     }
 
-    /// Returns the full parameter vector of `model` from the identified parameters of the same
-    /// names.
+    /// Returns the full parameter vector of `model`, with the estimates of the parameters of the
+    /// same names.
     pub(crate) fn vector(&self, model: &Model) -> Result<DVector<f64>, IdentifyError> {
         let x = model.parameters.iter().map(|parameter| {
             let place = self.estimates.iter().position(|estimate| estimate.name == parameter.name);
@@ -206,8 +206,8 @@ impl Identification {
     }
 }
 
-/// Returns prediction and residual of a row in the measuring frame \[m\]. For a contact with a
-/// point, they are those of the target's position.
+/// Returns predicted position and residual of a row, measuring frame \[m\]. For a contact with a
+/// point, both are those of the target.
 pub(in crate::fit) fn in_space(
     rows: &Measurements,
     row: usize,

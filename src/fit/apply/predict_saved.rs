@@ -21,8 +21,8 @@ use crate::model::{Model, Pose};
 use crate::observation::Needs;
 use crate::problem::{Observation, Problem};
 
-/// Largest part of a parameter in undetermined combinations, 0…1, at which the rows count as
-/// determining it.
+/// Largest share of a parameter in undetermined combinations, 0…1, at which the rows determine the
+/// parameter.
 const MAX_UNDETERMINED_SHARE: f64 = 1e-6;
 
 /// Predictions of an arm for the rows of a table.
@@ -31,12 +31,13 @@ const MAX_UNDETERMINED_SHARE: f64 = 1e-6;
 pub struct Prediction {
     /// Predicted position of each row, measuring frame \[m\]; NaN where the arm has no equilibrium.
     pub positions: Vec<Vector3<f64>>,
-    /// Predicted orientation of each row, a rotation vector, measuring frame \[rad\], where
-    /// orientation is fitted.
+    /// Predicted orientation of each row, a rotation vector, measuring frame \[rad\]; `None` if
+    /// orientation is not fitted.
     pub orientations: Option<Vec<Vector3<f64>>>,
     /// Residuals of the rows; `None` if the rows contain no measurements.
     pub residuals: Option<Vec<Residual>>,
-    /// Summaries of the residuals; `None` if the rows contain no measurements.
+    /// Summaries of the residuals, in total and by session; `None` if the rows contain no
+    /// measurements.
     #[doc(hidden)]
     pub errors: Option<ErrorsBySession>,
     /// Scatter of the predicted target at each point that the rows touch.
@@ -53,10 +54,10 @@ pub struct Prediction {
 pub struct ErrorsBySession {
     /// Errors of all rows of the leading kind: positions, if the table has any.
     pub all: ErrorSummary,
-    /// Errors of each kind of rows, where there are several.
+    /// Errors of each kind of rows; empty if there is only one kind.
     pub kinds: Vec<ErrorSummary>,
     /// Name and errors of each session, in the order of the rows, for the first kind of its rows;
-    /// empty where there are no sessions.
+    /// empty without sessions.
     pub sessions: Vec<(String, ErrorSummary)>,
 }
 
@@ -215,7 +216,7 @@ pub fn predict(
     Ok(Prediction { positions, orientations, residuals, errors, spreads, placed, x })
 }
 
-/// Creates the error of an estimate that lacks a parameter, or of a missing estimate.
+/// Returns the error that the `estimate` lacks the parameter `name`, or that there is no estimate.
 fn lacking(estimate: Option<&SavedEstimate>, name: &str) -> PredictError {
     let name = name.to_owned();
     match estimate {
@@ -226,7 +227,7 @@ fn lacking(estimate: Option<&SavedEstimate>, name: &str) -> PredictError {
     }
 }
 
-/// Creates the error of rows that do not determine a parameter which the estimate lacks.
+/// Returns the error that the rows do not determine the parameter `name`, which the estimate lacks.
 fn open(estimate: Option<&SavedEstimate>, name: String) -> PredictError {
     match estimate {
         Some(_) => PredictError::Open { name },
@@ -296,9 +297,8 @@ fn place(
     }
 }
 
-/// Creates the residuals of every row from position errors \[m\] and `seen` predictions \[m\], and
-/// from orientation errors with their σ \[rad\]. Whitened values are NaN if the σ of a row is not
-/// known.
+/// Creates the residuals of all rows from position errors \[m\], predictions `seen` \[m\], and
+/// orientation errors with their σ \[rad\]. Whitened values are NaN if the σ of a row is not known.
 fn residuals(
     (errors, seen): (&[Vector3<f64>], &[Vector3<f64>]),
     (sigmas, coordinates): (&[Option<f64>], &[usize]),

@@ -21,11 +21,11 @@ pub struct PredictedPosition {
 }
 
 impl Identification {
-    /// Predicts the positions of `rows` with the covariance that the estimates give them.
+    /// Predicts the positions of `rows` with their covariance J C Jᵀ.
     ///
-    /// J are the derivatives of the position by the estimates with a variance, and C is their
-    /// covariance. `problem` is the one that was identified; `rows` as for
-    /// [`predict`](Self::predict).
+    /// J are the derivatives of the position with respect to the estimates that have a variance,
+    /// and C is the covariance of these estimates. `problem` is the one that was identified; `rows`
+    /// as for [`predict`](Self::predict).
     ///
     /// # Errors
     /// Returns the errors of [`predict`](Self::predict).

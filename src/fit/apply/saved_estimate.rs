@@ -15,7 +15,7 @@ use crate::model::{Model, Pose};
 use crate::problem::Problem;
 use crate::problem::item::MAX_MAGNITUDE;
 
-/// Name of the file format, and its newest version that is read.
+/// Name of the file format, and the newest version that can be read.
 const FORMAT: (&str, u32) = ("flexcal-estimate", 2);
 /// Maximum size of an `estimate.json` \[MiB\].
 const MAX_FILE_MIB: u64 = 256;
@@ -34,17 +34,17 @@ pub struct SavedEstimate {
     pub changed_key: Option<String>,
     /// True if the fit was trusted.
     pub trusted: bool,
-    /// Standard deviation (1 σ) of a coordinate, estimated from the scatter of the fit \[m\];
-    /// `None` if the problem declares σ.
+    /// Standard deviation (1 σ) of a measured coordinate, estimated from the scatter of the fit
+    /// \[m\]; `None` if the problem declares σ.
     pub estimated_sigma: Option<f64>,
     /// Start time of the time-dependent terms \[s\]; older versions did not write it.
     pub first_time: Option<f64>,
-    /// Name of the `remainder.json` in the same folder, if a remainder was fitted and accepted.
+    /// Name of the `remainder.json` in the same folder; `None` if no remainder was accepted.
     pub remainder: Option<String>,
-    /// Uncertainty of predictions as JSON text; older versions did not write it.
+    /// Uncertainty of predictions as JSON text; `None` in files of older versions.
     pub prediction: Option<String>,
     problem: String,
-    /// Digest of the declared arm; older versions did not write it.
+    /// Digest of the declared arm; `None` in files of older versions.
     arm_digest: Option<String>,
     strategy: Strategy,
     parameters: Vec<Entry>,
@@ -124,7 +124,8 @@ pub enum SavedEstimateError {
 }
 
 impl SavedEstimate {
-    /// Returns the estimate without those fitted parameters for whose names `is_left_out` is true.
+    /// Returns the estimate without the fitted parameters for whose name `is_left_out` returns
+    /// true.
     pub(crate) fn without_fitted(&self, is_left_out: impl Fn(&str) -> bool) -> Self {
         let mut estimate = self.clone();
         estimate.parameters.retain(|entry| entry.fitted != Some(true) || !is_left_out(&entry.name));
@@ -232,7 +233,7 @@ impl SavedEstimate {
         })
     }
 
-    /// Returns the model that was fitted: `declared` as reduced by the saved strategy.
+    /// Returns the model that the saved strategy fitted, derived from the `declared` model.
     #[must_use]
     pub(crate) fn model(&self, declared: Model) -> Model {
         self.strategy.model(declared)
@@ -296,8 +297,8 @@ impl SavedEstimate {
         self.parameters.iter().filter(is_base).any(is_open)
     }
 
-    /// Returns the names in brackets behind `of` (`base` or `tool`) in parameter names, in the
-    /// order of the file; one empty name if there are no brackets.
+    /// Returns the names of bases or tools (`of`) in the saved parameter names, in the order of the
+    /// file. Parameters without brackets have the empty name.
     pub(crate) fn words(&self, of: &str) -> Vec<String> {
         let mut words: Vec<String> = Vec::new();
         for entry in &self.parameters {

@@ -4,9 +4,9 @@ use statrs::distribution::{Binomial, DiscreteCDF as _};
 
 use crate::numeric::bisect;
 
-/// Number of halvings of the interval in which the bound of a share is searched.
+/// Number of bisections that locate the confidence bound of a share.
 const BISECTIONS: usize = 50;
-/// Maximum number of poses up to which the number that would suffice is searched.
+/// Largest number of poses considered in the search for the number that would suffice.
 const MAX_POSES: usize = 1_000_000;
 
 /// Requirement on the accuracy of an arm: a given share of its poses has an error of at most a
@@ -25,10 +25,10 @@ pub struct Tolerance {
 /// Result of the test of a tolerance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
-    /// The required share of poses is within the tolerance; this is wrong with at most the
+    /// At least the required share of all poses is within the tolerance; wrong at most with the
     /// probability `risk`.
     Pass,
-    /// A smaller share of poses is within the tolerance; this is wrong with at most the probability
+    /// A smaller share of all poses is within the tolerance; wrong at most with the probability
     /// `risk`.
     Fail,
     /// There are too few poses to decide.
@@ -60,8 +60,8 @@ pub struct ToleranceTest {
     /// Lower and upper confidence bound of the share of all poses that are within the tolerance.
     /// Each bound is wrong with at most the probability `risk`. [Clopper & Pearson 1934]
     pub share_within: [f64; 2],
-    /// Number of poses that would pass with as many poses beyond the tolerance as were found;
-    /// `None` above [`MAX_POSES`].
+    /// Number of poses at which the test would pass if no more poses were beyond the tolerance than
+    /// now; `None` above [`MAX_POSES`].
     pub poses_to_pass: Option<usize>,
 }
 
@@ -107,7 +107,7 @@ impl Tolerance {
 }
 
 /// Returns the binomial probability that at most `beyond` of `poses` are beyond the tolerance, if
-/// each is with `probability`.
+/// each one is with `probability`.
 fn at_most(poses: usize, beyond: usize, probability: f64) -> f64 {
     if beyond >= poses {
         return 1.0;
@@ -116,8 +116,8 @@ fn at_most(poses: usize, beyond: usize, probability: f64) -> f64 {
         .map_or(1.0, |distribution| distribution.cdf(beyond as u64))
 }
 
-/// Returns the lower confidence bound of a share, if `within` of `poses` were found within the
-/// tolerance. The bound is too high with at most the probability `risk`.
+/// Returns the lower confidence bound of a share if `within` of `poses` are within the tolerance.
+/// It is above the true share at most with the probability `risk`.
 fn lower_bound(poses: usize, within: usize, risk: f64) -> f64 {
     // P(at most n − w beyond) falls from 1 to 0 as the share of those beyond rises.
     let is_likely = |share: f64| at_most(poses, poses - within, 1.0 - share) <= risk;

@@ -10,7 +10,7 @@ use crate::least_squares::solver::AtBound;
 /// Maximum number of parameters that the text of the finding names.
 const MAX_NAMED_PARTNERS: usize = 5;
 
-/// Checks that no parameter rests on a bound along a direction that the data hardly determine.
+/// Checks that no parameter is at a bound that hides the uncertainty of other parameters.
 pub(super) struct BoundsAreSeen;
 
 impl Check for BoundsAreSeen {

@@ -26,13 +26,13 @@ pub(in crate::fit) trait Check: Sync {
     fn check(&self, fit: &CheckedFit) -> Vec<Finding>;
 }
 
-/// Fit that the checks look at.
+/// Fit to which the checks are applied, with the data that they need.
 pub(in crate::fit) struct CheckedFit<'a> {
     pub fitting: &'a Fitting<'a>,
     pub problem: &'a Problem,
     /// Full parameter vector of the registered nominal arm.
     pub registered_x: &'a DVector<f64>,
-    /// Point where the fit ended.
+    /// Result of the fit: parameters and active bounds at its end.
     pub end: &'a FitEnd,
     /// Errors of the registered nominal arm.
     pub registered: &'a Errors,
@@ -42,22 +42,22 @@ pub(in crate::fit) struct CheckedFit<'a> {
     pub outliers: &'a [Outlier],
     /// Held-out rows that are too far from the prediction.
     pub held_out_outliers: &'a [Outlier],
-    /// Stage with all unknowns and identification rows, with the declared σ and those that the fit
-    /// took.
+    /// Stage with all unknowns and identification rows, with both the declared σ and those that the
+    /// fit assumed.
     pub whole: &'a Stage<'a>,
     /// True if the problem or the table declares the σ of positions.
     pub has_declared_noise: bool,
     /// Source of the σ of positions.
     pub noise: Noise,
-    /// Noise variance that the fit took, relative to the declared one.
+    /// Noise variance that the fit assumed, relative to the declared one.
     pub noise_factor: f64,
-    /// 1 σ of a coordinate that the fit took \[m\] or \[rad\].
+    /// 1 σ of a coordinate that the fit assumed \[m\] or \[rad\].
     pub sigma_taken: f64,
     /// Covariance of the unknowns of `whole`, shape = (unknowns, unknowns); 0 for held unknowns.
     pub covariance: &'a DMatrix<f64>,
     /// Rules of `[parameters]` whose σ the data refute.
     pub refuted_priors: &'a [RefutedPrior],
-    /// Number of different poses, and the finding if they are too few for the unknowns.
+    /// Number of different poses, with a finding if they are too few for the unknowns.
     pub poses: &'a PoseSufficiency,
     /// Finding that the fit did not converge; `None` if it did.
     pub not_converged: Option<&'a Finding>,
@@ -66,9 +66,9 @@ pub(in crate::fit) struct CheckedFit<'a> {
     /// Prior widths that the fitted deviations contradict.
     pub prior_sizes: &'a [PriorSize],
     /// For each touched point, scatter of the prediction with the nominal and with the fitted arm,
-    /// and true if all its rows are held out.
+    /// and a flag that is true if all rows of the point are held out.
     pub spreads: &'a [(PointSpread, PointSpread, bool)],
-    /// Misreadings that explain the misfit, searched at first use.
+    /// Misreadings of the input that would explain the misfit; they are searched at first use.
     pub explanations: OnceCell<Explanations>,
 }
 

@@ -7,10 +7,10 @@ use nalgebra::{Matrix4, Quaternion, UnitQuaternion, Vector3};
 use super::checked_fit::CheckedFit;
 use crate::problem::RotationKind;
 
-/// Largest error with another convention, relative to the error as read, at which that convention
-/// explains the orientations.
+/// Largest ratio of the orientation error with another convention to that as declared, at which the
+/// other convention is an explanation.
 const MAX_EXPLAINED_RATIO: f64 = 0.2;
-/// Largest ratio to the smallest error at which a convention is named in addition to the best one.
+/// Largest ratio to the smallest error at which a convention is named as well as the best one.
 const MAX_RATIO_TO_BEST: f64 = 1.5;
 /// Axes of rotation of the twelve Euler conventions, R = R₁(r₁) R₂(r₂) R₃(r₃). If all three axes
 /// differ, each angle is in the column of its axis.
@@ -29,12 +29,12 @@ const ROTATION_AXES: [[usize; 3]; 12] = [
     [2, 1, 2],
 ];
 
-/// Function from an orientation as read to the orientations that were possibly meant.
+/// Function from a rotation as read to the rotations that the table may have meant.
 type Reading = Box<dyn Fn(&UnitQuaternion<f64>) -> Vec<UnitQuaternion<f64>>>;
 
-/// Returns the names of the conventions in which the measured orientations fit the predicted ones,
-/// best first. `rms` is the error in the declared convention \[rad\]. A constant rotation of the
-/// tool is fitted in each case.
+/// Returns the names of the conventions with which the measured orientations agree with the
+/// predicted ones, best first. `rms` is the error with the declared convention \[rad\]. A constant
+/// rotation of the tool is fitted for each convention.
 pub(super) fn fitting_conventions(fit: &CheckedFit, rms: f64) -> Vec<String> {
     let fitting = fit.fitting;
     let rows: Vec<usize> = fitting

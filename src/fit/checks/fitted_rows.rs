@@ -7,7 +7,7 @@ use super::finding::{Finding, FindingCode};
 use super::outliers::{InfluentialRows, places};
 use super::point_spread::PointSpread;
 
-/// Reports identification rows whose residual is too large to be noise.
+/// Checks that no identification row has a residual too large to be noise.
 pub(super) struct NoOutliers;
 
 impl Check for NoOutliers {

@@ -18,16 +18,16 @@ use crate::numeric::median;
 use crate::observation::kind_named;
 
 /// Smallest ratio of the held-out error of the fitted arm to that of the nominal arm at which the
-/// fit is reported as worse than none.
+/// fit is reported as worse than the nominal arm.
 const MIN_ERROR_RATIO: f64 = 1.5;
-/// Smallest multiple of the noise that the held-out error must also exceed for that report.
+/// Smallest held-out error, as a multiple of the noise, at which such a fit is reported.
 const MIN_NOISE_MULTIPLE: f64 = 5.0;
 
 /// Returns the held-out rows that are farther from the prediction than the σ and the covariance of
 /// the fit allow, in the order of the rows.
 ///
 /// A row is an outlier where P(χ²ₖ > s²) < 0.01 / N with s² = rᵀ (I + J C Jᵀ)⁻¹ r / scatter², r and
-/// J whitened by the σ that the fit took, C the covariance of its `unknowns` at `x`. The scatter is
+/// J whitened by the σ that the fit assumed, C the covariance of its `unknowns` at `x`. The scatter is
 /// the median of s / √(median of χ²ₖ), at least 1, so that a model which misses an effect
 /// everywhere does not make every row an outlier.
 pub(in crate::fit) fn outliers(
@@ -192,7 +192,7 @@ impl Check for BetterThanNominal {
     }
 }
 
-/// Reports held-out rows whose prediction error is too large to be noise.
+/// Checks that no held-out row has a prediction error too large to be noise.
 pub(super) struct WithoutOutliers;
 
 impl Check for WithoutOutliers {

@@ -4,10 +4,11 @@ use super::checked_fit::{Check, CheckedFit};
 use super::finding::{Finding, FindingCode};
 use super::row_kind::{RowKind, measured, named, size, spread};
 
-/// Largest residual of a fit, relative to the spread of the measurements, that is not reported.
+/// Largest residual of a fit, relative to the spread of the measurements, that is not reported as a
+/// misfit.
 pub(super) const MAX_MISS: f64 = 0.02;
-/// Largest residual of a fit, as a multiple of σ, that is never reported, however small the spread
-/// is.
+/// Largest residual of a fit, as a multiple of σ, that is not reported, however small the spread of
+/// the measurements is.
 pub(super) const MAX_UNREPORTED_RESIDUAL: f64 = 100.0;
 /// Smallest ratio of the fitted to the nominal error at which the fit counts as no better than the
 /// nominal arm.
@@ -15,8 +16,7 @@ const MIN_UNIMPROVED_RATIO: f64 = 0.9;
 /// Smallest error, as a multiple of the declared σ, at which a fit that is no better than the
 /// nominal arm is reported.
 const MIN_REPORTED_ERROR: f64 = 1000.0;
-/// Largest ratio of the spreads of measured and predicted points, or its inverse, that one arm
-/// explains.
+/// Largest ratio between the spreads of measured and predicted points that is not reported.
 const MAX_SIZE_RATIO: f64 = 2.0;
 /// Smallest spread of points from which the size of an arm is judged \[m\], or of tilts from which
 /// rotations are judged \[rad\].

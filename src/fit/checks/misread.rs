@@ -8,15 +8,18 @@ use super::nominal_error::is_nominal_far_off;
 use super::parameter_limits::WithinPriors;
 use super::row_kind::size;
 
-/// Multiple of the declared σ up to which a residual needs no other reading of the table.
+/// Largest residual, as a multiple of the declared σ, for which misreadings of the table are not
+/// searched.
 const MIN_SIGMAS: f64 = 10.0;
-/// Part of the spread of the points above which a residual without a declared σ is looked at.
+/// Smallest residual, relative to the spread of the points, for which misreadings are searched if
+/// no σ is declared.
 const MIN_PART: f64 = 0.01;
 
-/// Number of explanations that a text names.
+/// Maximum number of explanations that a text names.
 const MAX_NAMED: usize = 4;
 
-/// Checks that no other reading of table or problem explains the measurements far better.
+/// Checks that no misreading of table or problem (unit, sign, order, convention) explains the
+/// measurements far better.
 pub(super) struct ReadAsMeant;
 
 impl Check for ReadAsMeant {

@@ -35,7 +35,8 @@ impl Outlier {
     }
 }
 
-/// Few rows that cause most of the misfit: without them, the fit explains the others much better.
+/// Few rows that cause most of the misfit: without them, the fit explains the other rows much
+/// better.
 #[doc(hidden)]
 #[derive(Debug, Clone, PartialEq)]
 pub struct InfluentialRows {
@@ -63,7 +64,7 @@ pub(in crate::fit) fn outliers(
     rows.iter().enumerate().zip(errors).filter_map(outlier).collect()
 }
 
-/// Returns rows as numbers of a finding: file, line and distance \[σ\] of each.
+/// Returns rows as a JSON value of a finding: file, line and distance \[σ\] of each.
 pub(super) fn places(rows: &[Outlier]) -> Value {
     let place = |row: &Outlier| {
         let Location { file, line, .. } = &row.location;

@@ -10,8 +10,8 @@ use crate::quantity::Unit;
 /// σ once in two million.
 const MAX_PRIOR_SIGMAS: f64 = 5.0;
 
-/// Returns true for a declared quantity of the arm, its bases and targets; parameters of effects are
-/// none.
+/// Returns true if the parameter is a declared quantity of the arm, a base or a target, not of an
+/// effect.
 pub(super) fn is_of_arm(parameter: &Parameter) -> bool {
     let is_declared = match parameter.site {
         ParameterSite::Joint { field, .. } => field.is_geometry() || field == JointField::Stiffness,
@@ -22,7 +22,7 @@ pub(super) fn is_of_arm(parameter: &Parameter) -> bool {
     is_declared && parameter.regressor.is_constant()
 }
 
-/// Checks that no arm parameter deviates far beyond its prior. Parameters of effects are exempt.
+/// Checks that no parameter of the arm deviates by more than [`MAX_PRIOR_SIGMAS`] σ of its prior.
 pub(super) struct WithinPriors;
 
 impl Check for WithinPriors {
@@ -41,7 +41,8 @@ impl Check for WithinPriors {
     }
 }
 
-/// Checks that no parameter deviates by more than is possible on an arm of this size.
+/// Checks that no parameter deviates by more than is possible on an arm of this size (its reach,
+/// half a turn).
 pub(super) struct WithinArmSize;
 
 impl Check for WithinArmSize {

@@ -9,7 +9,7 @@ use crate::numeric::median;
 use crate::problem::{Fixture, Observation};
 
 /// Smallest ratio of the scatter at a point to the median of all points at which the point counts
-/// as unsteady. Points that were not fitted may scatter half as much again as others.
+/// as unsteady. Points that were not fitted may scatter 1.5 times as much as others.
 const MIN_UNSTEADY_RATIO: f64 = 2.5;
 /// Smallest share of the squared scatter along one direction at which a point counts as unsteady.
 /// Isotropic scatter has a third along each direction.

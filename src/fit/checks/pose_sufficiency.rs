@@ -12,11 +12,10 @@ use crate::model::Model;
 use crate::model::parameter::{Parameter, ParameterSite};
 use crate::problem::{Observation, Problem};
 
-/// Number of coordinates of a rigid body. Any number of targets on it determine no more in one
-/// pose.
+/// Number of coordinates of a rigid body: the most that targets on one body determine in one pose.
 const BODY_COORDINATES: usize = 6;
 
-/// Number of independent coordinates of the identification poses, and the finding if they are too
+/// Number of independent coordinates of the identification poses, with a finding if they are too
 /// few.
 pub(in crate::fit) struct PoseSufficiency {
     /// Finding that the poses are too few for some unknowns, regardless of priors; `None` if they
@@ -29,7 +28,7 @@ pub(in crate::fit) struct PoseSufficiency {
     /// Number of different poses of the arm among the identification rows; several targets in one
     /// pose count once.
     pub poses: usize,
-    /// True if some pose of the arm shows several targets.
+    /// True if several targets are measured in one pose of the arm.
     pub several_targets: bool,
 }
 
@@ -72,15 +71,16 @@ impl PoseSufficiency {
         Self { finding, held_out, coordinates, poses, several_targets }
     }
 
-    /// Returns true if there are enough independent coordinates, given the number of `parameters`,
-    /// to judge the declared σ.
+    /// Returns true if the independent coordinates exceed the number of `parameters` enough to
+    /// judge the declared σ.
     pub fn judges_noise(&self, parameters: usize) -> bool {
         let is_short = |finding: &Finding| finding.code == FindingCode::TooFewEquations;
         self.coordinates >= parameters && !self.finding.as_ref().is_some_and(is_short)
     }
 }
 
-/// Turns a finding about a base or tool into one about held-out rows.
+/// Returns the finding about a base or tool that only held-out rows use, made from one about
+/// identification rows.
 fn of_held_out(finding: &Finding) -> Finding {
     let number = |name| finding.value(name).cloned().unwrap_or_default();
     let text = format!("held-out rows of {}; their errors say little", finding.text);
@@ -88,7 +88,7 @@ fn of_held_out(finding: &Finding) -> Finding {
     Finding::new(FindingCode::HeldOutBaseNotDetermined, numbers, text)
 }
 
-/// Reports that `of`, the fit, a base or a tool, has fewer measured coordinates than parameters
+/// Reports that the fit, a base or a tool (`of`) has fewer measured coordinates than parameters
 /// without a prior.
 fn too_few(of: String, coordinates: usize, parameters: usize) -> Finding {
     let text = format!(
@@ -100,9 +100,9 @@ fn too_few(of: String, coordinates: usize, parameters: usize) -> Finding {
 
 /// Returns the number of independent measured coordinates of `rows`.
 ///
-/// Each different point counts, but at most six coordinates for a pose of the frame that carries
-/// the targets. Contacts and distances are added, and the coordinates beyond six of a frame's
-/// targets once, because they determine the targets' relative positions.
+/// Different points count, but at most six coordinates for each pose of the frame that carries the
+/// targets. Contacts and distances are added. The coordinates beyond six of a frame's targets are
+/// added once, because they determine the targets' relative positions.
 fn coordinates(
     fitting: &Fitting,
     (numbers, of_arm): (&[usize], &[usize]),
@@ -142,8 +142,8 @@ fn label(what: &str, word: &str) -> String {
     if word.is_empty() { what.to_owned() } else { format!("{what}[{word}]") }
 }
 
-/// Reports the first base whose pose the points of `rows` do not determine; only those of its
-/// parameters count that are `varied` and have no prior.
+/// Reports the first base whose pose the points of `rows` do not determine; `None` if there is
+/// none. Only its parameters without a prior for which `varied` is true count.
 fn undetermined(
     fitting: &Fitting,
     numbers: &[usize],

@@ -15,14 +15,15 @@ use crate::least_squares::{Block, CHUNK_ITEMS, LeastSquares as _};
 const MAX_CHANCE_PROBABILITY: f64 = 1e-3;
 /// Maximum number of held-out rows that are tested together, to limit time.
 const MAX_TESTED_ROWS: usize = 2048;
-/// Smallest number of standard errors at which a mean difference of held-out errors is significant.
+/// Smallest ratio of a mean difference of held-out errors to its standard error at which it is
+/// significant.
 const MIN_DIFFERENCE: f64 = 2.0;
 /// Minimum number of held-out rows from which a mean difference is judged.
 const MIN_ROWS: usize = 6;
 
 /// Checks that the held-out residuals are as large as the fit predicts.
 ///
-/// r ∼ N(0, Σ + J C Jᵀ) with the Σ that the fit took and the covariance C of its unknowns:
+/// r ∼ N(0, Σ + J C Jᵀ) with the Σ that the fit assumed and the covariance C of its unknowns:
 /// χ² = rᵀ(Σ + J C Jᵀ)⁻¹ r, over its number of coordinates, follows F where Σ is estimated. Rows
 /// that are reported as outliers are left out.
 pub(super) struct PredictionHolds;
@@ -79,7 +80,7 @@ fn upper_tail(chi2: f64, coordinates: usize, noise_dof: Option<f64>) -> Option<(
     }
 }
 
-/// Returns χ² = rᵀ(I + J C Jᵀ)⁻¹ r of the positions of `rows`, whitened by the σ that the fit took,
+/// Returns χ² = rᵀ(I + J C Jᵀ)⁻¹ r of the positions of `rows`, whitened by the σ that the fit assumed,
 /// and its number of coordinates.
 ///
 /// With N = JᵀJ and v = Jᵀr it is r·r − vᵀ C (I + N C)⁻¹ v, by the Woodbury identity, with the unknowns in units

@@ -7,7 +7,8 @@ use super::finding::{Finding, FindingCode};
 use crate::fit::uncertainty::noise::Noise;
 use crate::fit::uncertainty::refuted_priors::RefutedPrior;
 
-/// Checks that the poses measure at least as many coordinates as there are fitted parameters.
+/// Checks that the poses measure at least as many independent coordinates as there are fitted
+/// parameters.
 pub(super) struct DataDecide;
 
 impl Check for DataDecide {
@@ -27,7 +28,8 @@ impl Check for DataDecide {
     }
 }
 
-/// Reports rules of `[parameters]` whose σ the fitted deviations contradict.
+/// Checks that no common prior width (σ of `[parameters]`) is contradicted by the fitted
+/// deviations.
 pub(super) struct PriorWidths;
 
 impl Check for PriorWidths {
@@ -65,13 +67,13 @@ impl Check for PriorsHold {
     }
 }
 
-/// Largest ratio of the noise variance to the declared one that may be noise: a σ about 30 times
-/// too small.
+/// Largest ratio of the noise variance to the declared one that counts as noise. Above it, σ would
+/// be 30 times too small.
 const MAX_NOISE_FACTOR: f64 = 1000.0;
 /// Ratios of estimated to declared σ that suggest a σ in metres declared as millimetres.
 const UNIT_RATIOS: std::ops::Range<f64> = 600.0..1600.0;
 
-/// Checks that the σ that the fit took is not far above the declared one.
+/// Checks that the σ that the fit assumed is not far above the declared one.
 pub(super) struct NoiseIsDeclared;
 
 impl Check for NoiseIsDeclared {

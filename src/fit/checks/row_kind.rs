@@ -16,7 +16,7 @@ pub(in crate::fit) struct RowKind {
     pub spread: f64,
     /// Declared standard deviation (1 σ) of a coordinate; `None` if there is none.
     pub declared_sigma: Option<f64>,
-    /// 1 σ of a coordinate that the fit took.
+    /// 1 σ of a coordinate that the fit assumed.
     pub taken_sigma: f64,
 }
 
@@ -44,8 +44,8 @@ pub(super) fn spread(
 /// Smallest length that is written with a power of ten \[m\].
 const MIN_SCIENTIFIC_LENGTH: f64 = 1e6;
 
-/// Writes an error with its unit: degrees with one decimal more for tilts \[rad\], millimetres for
-/// others \[m\].
+/// Formats an error of rows of a kind with its unit: tilts \[rad\] in degrees with one more
+/// decimal, others \[m\] in millimetres.
 pub(crate) fn size(kind: &str, error: f64, decimals: usize) -> String {
     match kind_named(kind).unit {
         _ if !error.is_finite() => "more than numbers hold".to_owned(),
@@ -56,12 +56,12 @@ pub(crate) fn size(kind: &str, error: f64, decimals: usize) -> String {
     }
 }
 
-/// Returns the noun for rows of a kind.
+/// Returns the word for rows of a kind.
 pub(crate) fn rows(kind: &str) -> &'static str {
     kind_named(kind).row.1
 }
 
-/// Returns the noun for the quantity that rows of a kind measure.
+/// Returns the word for the quantity that rows of a kind measure.
 pub(in crate::fit) fn measured(kind: &str) -> &'static str {
     kind_named(kind).measured
 }

@@ -14,14 +14,15 @@ use super::outliers::Outlier;
 use crate::least_squares::Loss;
 use crate::measurement::Measurements;
 
-/// Part of the rows up to which a loss may set rows aside without a question.
+/// Largest share of the rows that a robust loss may treat as outliers without a check of the cause.
 const MAX_PART: f64 = 0.05;
-/// Smallest number of rows set aside for which the normal approximation of a rank sum holds.
+/// Smallest number of outliers for which the normal approximation of a rank sum holds.
 const MIN_ROWS: usize = 10;
-/// Probability below which the rows follow a quantity, whatever the number of quantities.
+/// Probability below which the outliers are not a random choice, after correction for the number of
+/// quantities tested.
 const MAX_CHANCE_PROBABILITY: f64 = 1e-3;
 
-/// Quantity that the rows which are set aside follow.
+/// Quantity that decides which rows are outliers.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Selection {
     /// Name of the quantity: `time`, `joint 2`, `session B`, …
@@ -30,7 +31,7 @@ pub(crate) struct Selection {
     pub p_value: f64,
 }
 
-/// Returns the quantity that decides which of `rows` are outliers; `None` where there are few or
+/// Returns the quantity that decides which of `rows` are outliers; `None` if there are few or
 /// chance explains them.
 pub(crate) fn selection(
     table: &Measurements,
@@ -72,8 +73,8 @@ pub(crate) fn selection(
     (best.p_value < MAX_CHANCE_PROBABILITY).then_some(best)
 }
 
-/// Returns the two-sided probability of the rank sum of the marked values; ties share their rank
-/// [Mann & Whitney 1947].
+/// Returns the two-sided p-value of the rank sum of the marked values; ties share their rank [Mann
+/// & Whitney 1947].
 fn by_rank(values: &[f64], marked: &[bool]) -> f64 {
     let mut order: Vec<usize> = (0..values.len()).collect();
     order.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
@@ -96,7 +97,7 @@ fn by_rank(values: &[f64], marked: &[bool]) -> f64 {
 }
 
 /// Returns the probability of so few runs of marked and other values in ascending order [Wald &
-/// Wolfowitz 1940]; 1 where values are equal, whose order says nothing.
+/// Wolfowitz 1940]; 1 if values are equal.
 fn by_runs(values: &[f64], marked: &[bool]) -> f64 {
     let mut order: Vec<usize> = (0..values.len()).collect();
     order.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
@@ -124,7 +125,7 @@ fn upper_tail(z: f64) -> f64 {
     Normal::new(0.0, 1.0).map_or(1.0, |normal| normal.sf(z))
 }
 
-/// Checks that no cause selects the rows that a robust loss sets aside.
+/// Checks that no quantity decides which rows a robust loss treats as outliers.
 pub(super) struct SetAsideByChance;
 
 impl Check for SetAsideByChance {

@@ -24,18 +24,18 @@ pub struct Baseline {
     pub errors: Errors,
     /// Errors measured − predicted of the held-out poses, measuring frame \[m\].
     pub held_out: Vec<Vector3<f64>>,
-    /// Number of steps of the iteration of eq. 45.
+    /// Number of steps of the iteration [Chen2021, eq. 45].
     pub iterations: u64,
     /// Number of evaluations of the residual.
     pub evaluations: u64,
     /// Duration of the iteration \[s\].
     pub seconds: f64,
-    /// Reason for which the iteration stopped.
+    /// Reason why the iteration stopped.
     pub termination: Termination,
 }
 
 impl Baseline {
-    /// Returns the name in the list of strategies.
+    /// Returns the name by which lists of strategies show the procedure.
     pub fn name(&self) -> String {
         paper_name(self.form, self.stage)
     }
@@ -78,7 +78,7 @@ pub(in crate::fit) fn baselines(problem: &Problem, data: &Dataset) -> Vec<Baseli
         .collect()
 }
 
-/// Returns `rows` in the form that the procedure takes.
+/// Returns `rows` as measured poses for the paper's procedure.
 fn poses<'a>(data: &'a Measurements, rows: &[usize]) -> Vec<Measured<'a>> {
     let first = data.first_time();
     rows.iter()

@@ -34,7 +34,7 @@ pub struct Comparison {
     pub procedures: Vec<Procedure>,
     /// Errors before calibration as the paper defines them: those of the rigid nominal arm.
     pub before: Before,
-    /// True if the problem declares the arm of the paper, so that published figures apply.
+    /// True if the problem declares the arm of the paper, so that the published figures apply.
     pub is_papers_arm: bool,
 }
 

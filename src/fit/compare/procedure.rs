@@ -6,7 +6,7 @@ use crate::fit::{Identification, Strategy};
 use crate::paper::{Form, StiffnessStage};
 use crate::problem::{Joint, Problem};
 
-/// Geometric parameter of table 2 \[m\] or \[rad\].
+/// Geometric parameter of a joint, as in table 2 of the paper \[m\] or \[rad\].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TableEntry {
     /// Value that the problem declares \[m\] or \[rad\].
@@ -63,7 +63,7 @@ impl Procedure {
         Self { paper: None, geometry, after, ignoring }
     }
 
-    /// Returns the name in the list of strategies.
+    /// Returns the name by which lists of strategies show the procedure.
     pub fn name(&self) -> String {
         self.paper.map_or_else(
             || Strategy::Joint.as_str().to_owned(),

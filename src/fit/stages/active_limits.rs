@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 
 use crate::least_squares::solver::AtBound;
 
-/// Active constraint on the unknowns of a stage.
+/// Active constraint of a stage, as a row of coefficients of its unknowns.
 #[derive(Debug, Clone)]
 pub(in crate::fit) struct Held {
     /// Index of the constraint in the model.
@@ -15,8 +15,8 @@ pub(in crate::fit) struct Held {
     pub row: Vec<f64>,
 }
 
-/// Returns the rows of `gauge` and of active `constraints`, scaled to unit length in unknowns that
-/// are scaled by the column norms of `triangle`.
+/// Returns the rows of `gauge` and of active `constraints`, shape = (rows, unknowns). They have
+/// unit length in unknowns that are scaled by the column norms of `triangle`.
 ///
 /// A constraint on a single unknown that is not yet held acts as a bound: the unknown is marked in
 /// `held`.

@@ -19,8 +19,8 @@ const CONTRACTION_TOLERANCE: f64 = 1e-6;
 pub struct Alternation {
     /// Number of sweeps over all stages.
     pub sweeps: usize,
-    /// Factor by which a sweep without acceleration multiplies the error near the optimum, measured
-    /// by the change of the predictions; `None` if data and priors leave a combination
+    /// Factor by which one sweep without acceleration multiplies the error near the optimum,
+    /// measured by the change of the predictions. `None` if data and priors leave a combination
     /// undetermined.
     pub contraction: Option<f64>,
 }
@@ -69,8 +69,8 @@ impl Anderson {
     }
 }
 
-/// Returns the factor by which a sweep finally multiplies ‖R e‖ of an error e, by power iteration.
-/// Each of `stages` minimises ‖R e‖ over its unknowns in turn.
+/// Returns the asymptotic factor by which one sweep multiplies ‖R e‖ of an error e, by power
+/// iteration. Each of `stages` minimises ‖R e‖ over its unknowns in turn.
 ///
 /// `triangle` is the factor R of data and priors.
 pub(in crate::fit) fn contraction(triangle: &DMatrix<f64>, stages: &[Vec<usize>]) -> Option<f64> {

@@ -7,8 +7,8 @@ use crate::fit::stages::stage::{Stage, StageError};
 use crate::least_squares::solver::{Inequalities, InequalitiesError};
 
 impl Stage<'_> {
-    /// Returns the indices and the rows of the model's constraints on the unknowns, with all other
-    /// parameters at their values in `at`.
+    /// Returns the indices of the model's constraints on the unknowns, and the constraints as
+    /// inequalities in the unknowns. All other parameters have their values in `at`.
     ///
     /// # Errors
     /// Returns an error if a row or limit is not finite.

@@ -28,8 +28,8 @@ use crate::quantity::Unit;
 const MAX_SWEEPS: usize = 500;
 /// Relative reduction of the cost in one sweep at which a sequential strategy counts as converged.
 const SWEEP_TOLERANCE: f64 = 1e-7;
-/// Maximum number of solver steps of each stage in a sweep that is repeated. More would be wasted,
-/// because the next stage moves the optimum.
+/// Maximum number of solver steps of each stage in a repeated sweep. More would be wasted, because
+/// the next stage moves the optimum.
 const MAX_SWEEP_STEPS: u64 = 2;
 
 /// Change of ν ln ‖r‖² (ν measured coordinates) per step at which a provisional fit counts as
@@ -57,7 +57,7 @@ pub(in crate::fit) struct Fitting<'a> {
     pub stop: Option<&'a Stop>,
     /// Maximum number of steps of a stage of the strategy.
     pub max_steps: Option<u64>,
-    /// True if the fit may stop early, because its σ is tested before it continues.
+    /// True if the fit may stop early because its declared σ is tested next.
     pub to_be_judged: bool,
     /// Standard deviation (1 σ) of a coordinate in rows that state none, declared or assumed \[m\].
     pub sigma: f64,
@@ -139,7 +139,7 @@ impl<'a> Fitting<'a> {
         self.placement.oriented_poses(self.measurements, rows, (self.sigma, self.turn_sigma))
     }
 
-    /// Returns the same input with the declared σ instead of those of the noise models.
+    /// Returns the same input with the declared σ instead of the σ of the noise models.
     pub fn with_declared_noise(&self) -> Self {
         Self {
             noise_model: NoiseModel::DECLARED,
@@ -149,7 +149,7 @@ impl<'a> Fitting<'a> {
         }
     }
 
-    /// Creates a stage on `rows` with the σ that the fit takes.
+    /// Creates a stage on `rows` with the σ of the noise models.
     pub fn stage(&self, rows: &[usize], unknowns: Vec<usize>) -> Stage<'a> {
         let mut poses = self.poses(rows);
         let declared = poses.iter().map(|pose| pose.sigma).collect();
@@ -210,8 +210,8 @@ impl<'a> Fitting<'a> {
         (!unknowns.is_empty()).then(|| Stage { counts_fixed: true, ..self.placing(rows, unknowns) })
     }
 
-    /// Returns the error of the first row that the nominal arm cannot predict: its pose has no
-    /// equilibrium, or a point is behind its camera.
+    /// Returns an error about the first row that the nominal arm cannot predict, because its pose
+    /// has no equilibrium or a point is behind its camera. `None` if there is none.
     pub fn unpredictable(&self) -> Option<InputError> {
         let is_of_camera = |row: &usize| {
             let kind = self.measurements.observation(*row).description();
@@ -372,7 +372,8 @@ impl<'a> Fitting<'a> {
         Ok(termination)
     }
 
-    /// Adds to `end` the combinations of unknowns that are not determined there.
+    /// Completes `end` with the combinations of unknowns that data and priors do not determine
+    /// there.
     fn gauged(whole: &Stage, mut end: FitEnd) -> Result<FitEnd, StageError> {
         let held: Vec<bool> = end.at_bound.iter().map(Option::is_some).collect();
         end.gauge = whole.gauge(&end.x, &held, &whole.held(&end.x)?);

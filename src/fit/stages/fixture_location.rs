@@ -10,13 +10,13 @@ use crate::problem::FixtureKind;
 use crate::problem::fixture::lean;
 use crate::spatial::plane_normal;
 
-/// Largest ratio of the spread of points normal to a plane to that within it at which they count as
-/// coplanar.
+/// Largest ratio of the spread of points normal to a plane to their spread within it at which they
+/// count as coplanar.
 const MAX_COPLANAR_RATIO: f64 = 1e-3;
 /// Smallest difference of measured offsets at which they determine the side of a plane \[m\].
 const MIN_OFFSET_DIFFERENCE: f64 = 1e-4;
-/// Smallest distance of the arm's base from a plane at which the base determines the plane's side,
-/// if the offsets do not \[m\].
+/// Smallest distance of the arm's base from a plane at which the base decides to which side the
+/// normal points, if the offsets do not \[m\].
 const MIN_BASE_DISTANCE: f64 = 0.05;
 
 /// Locates fixtures in closed form from the `poses` that measure against them and writes their
@@ -98,9 +98,9 @@ fn locate_cameras(
     }
 }
 
-/// Returns the parameters of a fixture that fit its contacts best: pairs of predicted point and
-/// measured distance or offset \[m\]. Points and `base`, the arm's base, are in the measuring
-/// frame. `None` if there are no contacts, or for cameras and markers.
+/// Returns the parameters of a fixture that fit its contacts best. A contact is a predicted point
+/// and the measured distance or offset \[m\]. Points and `base`, the arm's base, are in the
+/// measuring frame. `None` if there are no contacts, or for cameras and markers.
 fn found(
     kind: FixtureKind,
     contacts: &[(Vector3<f64>, f64)],

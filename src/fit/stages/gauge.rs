@@ -13,7 +13,7 @@ pub(in crate::fit) struct Gauge {
     pub rows: DMatrix<f64>,
     /// Part of each unknown outside the combinations, 0…1.
     pub visible: Vec<f64>,
-    /// Combinations that are determined too weakly, one by one.
+    /// Weak combinations, one by one.
     pub weak: Vec<UnidentifiableCombination>,
 }
 
@@ -69,7 +69,7 @@ impl Gauge {
     }
 }
 
-/// Returns the triangular factor of `triangle` stacked on `rows`.
+/// Returns the triangular factor of `triangle` with `rows` appended below.
 pub(super) fn below(triangle: &DMatrix<f64>, rows: &DMatrix<f64>) -> DMatrix<f64> {
     let n = triangle.ncols();
     let mut stack =

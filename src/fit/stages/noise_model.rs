@@ -1,16 +1,17 @@
-//! Noise model: from the declared σ of each row to the one that a fit takes.
+//! Noise model: from the declared σ of each row to the one that a fit assumed.
 
 use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 
-/// Probability, under the declared σ, of a residual so extreme that the σ counts as contradicted.
+/// Probability of a residual under the declared σ below which the declared σ counts as
+/// contradicted.
 pub(in crate::fit) const MAX_CHANCE_PROBABILITY: f64 = 1e-3;
-/// Smallest σ that a fit takes \[m\], because predicted positions are exact only to rounding.
+/// Smallest σ that a fit assumes \[m\]: predicted positions have rounding errors of this size.
 pub(in crate::fit) const MIN_SIGMA: f64 = 1e-9;
 
 /// Noise model √((scale σ)² + e²) of a row with declared σ.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::fit) struct NoiseModel {
-    /// Factor on the declared σ: 1, less where it is too large, more where rows of several kinds
+    /// Factor on the declared σ: usually 1; less if σ is too large, more if rows of several kinds
     /// scatter more than declared.
     pub scale: f64,
     /// Standard deviation (1 σ) e of the model's error, which is added to the noise in quadrature
@@ -22,13 +23,13 @@ impl NoiseModel {
     /// Noise model that takes every σ as declared.
     pub const DECLARED: Self = Self { scale: 1.0, model_error: 0.0 };
 
-    /// Returns the σ \[m\] that the fit takes for a declared one.
+    /// Returns the σ \[m\] that the fit assumed for a declared one.
     pub fn assumed_sigma(self, sigma: f64) -> f64 {
         if self == Self::DECLARED { sigma } else { (self.scale * sigma).hypot(self.model_error) }
     }
 
-    /// Creates the model that scales all `declared` σ together, so that the mean variance of rows
-    /// weighted by `taken` grows by the factor `ratio`.
+    /// Creates the model that scales all `declared` σ by one factor. The mean variance of rows,
+    /// weighted by the σ `taken` in the last fit, grows by the factor `ratio`.
     pub fn scaled(declared: &[f64], taken: &[f64], ratio: f64) -> Self {
         let sum: f64 =
             declared.iter().zip(taken).map(|(sigma, taken)| (sigma / taken).powi(2)).sum();
@@ -37,10 +38,11 @@ impl NoiseModel {
         Self { scale: (declared.len() as f64 * ratio / sum).sqrt().max(least), model_error: 0.0 }
     }
 
-    /// Creates the model with which the mean variance of poses that a fit weighted by `taken` grows
-    /// by the factor `ratio`; `declared` holds their σ.
+    /// Creates the model that adds a model error e to all `declared` σ. The mean variance of poses,
+    /// weighted by the σ `taken` in the last fit, grows by the factor `ratio`.
     ///
-    /// Solves Σ (σ² + e²) / taken² = N ratio for e; where no e ≥ 0 does, all σ are scaled together.
+    /// Solves Σ (σ² + e²) / taken² = N ratio for e; if no e ≥ 0 does, all σ are scaled by one
+    /// factor.
     pub fn raised(declared: &[f64], taken: &[f64], ratio: f64) -> Self {
         let n = declared.len() as f64;
         let sum: f64 =

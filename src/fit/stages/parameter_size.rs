@@ -4,7 +4,7 @@ use crate::model::Model;
 use crate::model::parameter::{Parameter, ParameterSite};
 use crate::quantity::Unit;
 
-/// Plausible deviation of an angle \[rad\], at which points move by their distance from the axis.
+/// Plausible deviation of an angle \[rad\]: points then move by their distance from the axis.
 const PLAUSIBLE_ANGLE: f64 = 1.0;
 /// Plausible deviation of the logarithm of a stiffness or rigidity: ln 100.
 const PLAUSIBLE_LN_STIFFNESS: f64 = 4.605_170_185_988_092;

@@ -9,8 +9,7 @@ use crate::model::parameter::ParameterSite;
 use crate::model::{MeasuredOrientation, Model, Pose};
 use crate::problem::Problem;
 
-/// Standard deviation (1 σ) of a coordinate that is assumed until one is estimated, if none is
-/// declared \[m\].
+/// Standard deviation (1 σ) of a coordinate \[m\] that is assumed at first if none is declared.
 pub(in crate::fit) const ASSUMED_SIGMA: f64 = 1e-3;
 
 /// Assignment of the rows of a table to bases and targets.
@@ -48,14 +47,14 @@ impl Placement {
         self.target_of_row[row]
     }
 
-    /// Returns the root mean square of the declared σ of a coordinate of `rows` \[m\].
+    /// Returns the root mean square of the declared σ of one coordinate over `rows` \[m\].
     pub fn sigma(&self, measurements: &Measurements, rows: &[usize], problem: &Problem) -> f64 {
         let whole = problem.data.position_sigma.unwrap_or(ASSUMED_SIGMA);
         let squares = rows.iter().map(|&row| measurements.sigma_of(row).unwrap_or(whole).powi(2));
         if rows.is_empty() { whole } else { (squares.sum::<f64>() / rows.len() as f64).sqrt() }
     }
 
-    /// Returns `rows` as poses; `sigma` \[m\] applies to rows that state none.
+    /// Returns `rows` as poses; `sigma` \[m\] is the σ of rows that state none.
     pub fn poses<'a>(
         &self,
         measurements: &'a Measurements,

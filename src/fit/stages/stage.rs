@@ -70,7 +70,7 @@ pub(in crate::fit) struct Stage<'a> {
     pub cost_tolerance: f64,
     /// Loss of the residual of a pose.
     pub loss: Loss,
-    /// True to apply constraints that also involve free parameters which do not vary in this stage.
+    /// True if constraints apply that also involve free parameters which do not vary in this stage.
     pub counts_fixed: bool,
     /// Linearisations shared by fits of the same data.
     pub cache: &'a LinearisationCache,
@@ -164,7 +164,7 @@ impl<'a> Stage<'a> {
         Fit::new(residuals).with_loss(loss).with_cache(self.cache, self.digest(at), self.unit())
     }
 
-    /// Returns 1 σ of the first pose \[m\], the unit of cached linearisations.
+    /// Returns 1 σ of the first pose \[m\]: the unit in which cached linearisations are stored.
     fn unit(&self) -> f64 {
         self.poses.first().map_or(1.0, |pose| pose.sigma)
     }
@@ -215,7 +215,7 @@ impl<'a> Stage<'a> {
         self.linearised(at, Loss::Squares).triangle
     }
 
-    /// Returns the plausible deviation of each unknown without a prior.
+    /// Returns, for each unknown, its plausible deviation if it has no prior, else `None`.
     fn sizes(&self) -> Vec<Option<f64>> {
         self.parameters().map(|parameter| plausible(self.model, parameter)).collect()
     }
@@ -313,8 +313,8 @@ impl<'a> Stage<'a> {
         }
     }
 
-    /// Minimises the cost from the unknowns `begin`; combinations of `gauge` keep their values in
-    /// `hold`.
+    /// Minimises the cost from the unknowns `begin`. The combinations of `gauge` keep the values
+    /// that they have in `hold`.
     fn solve(
         &self,
         residuals: &PoseResiduals<'a>,

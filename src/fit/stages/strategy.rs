@@ -26,8 +26,8 @@ worded! {
 }
 
 impl Strategy {
-    /// Returns the model that is fitted: `declared`, or `declared` without elasticity and its
-    /// parameters.
+    /// Returns the model that the strategy fits: `declared`, or `declared` without elasticity if
+    /// the strategy ignores it.
     #[must_use]
     #[doc(hidden)]
     pub fn model(self, declared: Model) -> Model {

@@ -7,7 +7,7 @@ use crate::least_squares::{Block, CHUNK_ITEMS, LeastSquares as _};
 use crate::model::Pose;
 
 /// Largest sum of squared derivatives along a direction, relative to that along the strongest one,
-/// that is only rounding. The direction then counts as not moved.
+/// that counts as rounding. No unknown moves a pose along such a direction.
 const MAX_UNMOVED_RATIO: f64 = 1e-15;
 /// Number of poses that are examined first. On most arms they already move in every direction, so
 /// that the others need not be examined.

@@ -15,9 +15,9 @@ pub struct ActiveConstraint {
     pub constraint: usize,
     /// Limit in words, such as `ln A.EI − ln B.EI ≥ 0`.
     pub words: String,
-    /// Lower or upper limit on which the fit rests.
+    /// Limit (lower or upper) that is active.
     pub side: AtBound,
-    /// Shadow price of moving the limit outwards by one of its unit.
+    /// Shadow price of moving the limit outwards, per unit of the limit.
     pub shadow_price: ShadowPrice,
     /// Unit of the terms; stiffnesses and rigidities enter by their logarithms.
     pub unit: Unit,
@@ -26,7 +26,8 @@ pub struct ActiveConstraint {
 }
 
 impl ActiveConstraint {
-    /// Describes the `held` constraints of a stage, with their prices, in terms of the problem.
+    /// Describes the active constraints `held` of a stage, with their shadow prices, in words of
+    /// the problem file.
     pub(in crate::fit) fn all(held: &[Held], prices: &[ShadowPrice], model: &Model) -> Vec<Self> {
         let of = |(held, shadow_price): (&Held, &ShadowPrice)| {
             let constraint = &model.constraints[held.constraint];

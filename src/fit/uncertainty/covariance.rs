@@ -5,7 +5,7 @@ use nalgebra::DMatrix;
 use crate::model::Model;
 
 /// Covariance of the estimates, consistent with their standard errors: it includes priors, active
-/// constraints, the weights of a robust loss and the noise that the fit took.
+/// constraints, the weights of a robust loss and the noise that the fit assumed.
 ///
 /// Unidentifiable combinations keep their start values: their parameters have a variance here, but
 /// no standard error. Parameters of sessions or targets that only held-out rows use are fitted with
@@ -69,8 +69,8 @@ impl Collected {
 }
 
 impl Covariance {
-    /// Returns the covariance of two parameters by their indices among the estimates; `None` where
-    /// one of them has no variance.
+    /// Returns the covariance of two parameters, given by their indices among the estimates
+    /// \[product of their SI units\]; `None` if one of them has no variance.
     pub fn entry(&self, one: usize, other: usize) -> Option<f64> {
         let place = |k| self.parameters.binary_search(&k).ok();
         Some(self.matrix[(place(one)?, place(other)?)])

@@ -16,18 +16,18 @@ use crate::fit::stages::stage::Stage;
 use crate::least_squares::Triangle;
 use crate::least_squares::solver::AtBound;
 
-/// Smallest ratio of a partner's deviation along the valley to its standard error with the unknown
-/// held at the bound, at which the bound hides its uncertainty. At 3, the valley has nine tenths of
-/// the variance.
+/// Smallest ratio of an unknown's deviation along the valley to its standard error with the other
+/// unknown held at its bound, at which the bound hides its uncertainty. At 3, the valley has nine
+/// tenths of the variance.
 const MIN_HIDDEN_RATIO: f64 = 3.0;
-/// Weight by which rows of held combinations become constraints in the least-squares problem.
+/// Weight of the rows that hold combinations constant in a least-squares problem.
 const CONSTRAINT_WEIGHT: f64 = 1e5;
-/// Exponent beyond which the posterior of u counts as zero.
+/// Largest exponent of the posterior of u that counts; beyond it the posterior is zero.
 const MAX_EXPONENT: f64 = 40.0;
 /// Number of intervals of the quadrature over u; even, for Simpson's rule.
 const QUADRATURE_INTERVALS: u32 = 400;
 
-/// Valley of the cost that leads from a bound into the interior.
+/// Direction in which the cost hardly rises if an unknown moves away from its bound.
 #[derive(Debug, Clone, PartialEq)]
 pub(in crate::fit) struct HiddenByBound {
     /// Index of the unknown that rests on its bound.
@@ -37,8 +37,8 @@ pub(in crate::fit) struct HiddenByBound {
     /// Deviation √(E u²) of the unknown from its bound \[unit of x\]; infinite if neither data nor
     /// other bounds limit it.
     pub deviation: f64,
-    /// Direction s of the valley in all unknowns: 1 for the unknown itself, if its bound is a lower
-    /// one, and −1 otherwise.
+    /// Direction s of the valley in all unknowns. Its component of the unknown itself is 1 at a
+    /// lower bound, −1 at an upper one.
     pub direction: DVector<f64>,
     /// Indices of the partners: unknowns whose uncertainty the bound hides.
     pub partners: Vec<usize>,

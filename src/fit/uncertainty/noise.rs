@@ -1,4 +1,4 @@
-//! Search for the σ that a fit takes: the declared one, or the restricted maximum likelihood
+//! Search for the σ that a fit assumed: the declared one, or the restricted maximum likelihood
 //! estimate if residuals and priors contradict the declared one.
 
 use nalgebra::DVector;
@@ -27,7 +27,7 @@ const STEPS_BEFORE_NOISE_TEST: u64 = 30;
 const MAX_NOISE_FITS: usize = 20;
 /// Noise models of positions and of orientations that take the declared σ.
 const DECLARED_NOISE: (NoiseModel, NoiseModel) = (NoiseModel::DECLARED, NoiseModel::DECLARED);
-/// Multiple of the critical value [`by_chance`] of the likelihood-ratio statistic at which a
+/// Multiple of the critical value [`by_chance`] of the likelihood-ratio statistic, above which a
 /// declared σ is certainly wrong.
 const REJECTION_FACTOR: f64 = 10.0;
 
@@ -216,7 +216,7 @@ fn contradicted(
 }
 
 /// Returns the mean squares of the whitened residuals of positions and of orientations, each
-/// relative to that of all. Both are 1 if only positions are fitted.
+/// divided by that of all. Both are 1 if only positions are fitted.
 fn shares(whitened: &DVector<f64>, coordinates: usize, counts: [usize; 2]) -> [f64; 2] {
     if coordinates == 3 {
         return [1.0; 2];
@@ -231,8 +231,9 @@ fn shares(whitened: &DVector<f64>, coordinates: usize, counts: [usize; 2]) -> [f
     if all > 0.0 { [position / all, turn / all] } else { [1.0; 2] }
 }
 
-/// Returns the noise variance that a stage took, relative to the declared one, and 1 σ of the rows
-/// of `kind` that it took. Known distances between points keep their σ and do not count.
+/// Returns the noise variance that a stage assumed, relative to the declared one, and the σ that it
+/// assumed for the rows of `kind` (root mean square). Known distances between points keep their
+/// declared σ and do not count.
 pub(in crate::fit) fn assumed_noise(stage: &Stage, kind: Observation) -> (f64, f64) {
     let rows =
         stage.poses.iter().zip(&stage.declared).filter(|(pose, _)| pose.observation.is_of_arm());

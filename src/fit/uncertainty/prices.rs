@@ -9,11 +9,11 @@ use crate::least_squares::solver::{AtBound, Factor};
 use crate::least_squares::{Fit, LinearRows, Objective as _};
 use crate::model::parameter::Parameter;
 
-/// Relative length of the independent part of a constraint normal below which it counts as linearly
-/// dependent.
+/// Smallest length of the independent part of a constraint normal, relative to its length, at which
+/// it counts as linearly independent.
 const MIN_INDEPENDENT_LENGTH: f64 = 1e-10;
 
-/// Shadow prices of bounds (`None` for an unknown that rests on none) and of active constraints.
+/// Shadow prices of bounds (`None` for an unknown inside its bounds) and of active constraints.
 #[derive(Debug, Clone, Default)]
 pub(in crate::fit) struct Prices {
     pub bounds: Vec<Option<ShadowPrice>>,

@@ -21,10 +21,11 @@ const MIN_DETERMINED: f64 = 3.0;
 const MIN_RATIO: f64 = 2.0;
 /// Maximum number of steps of the search for the widths.
 const MAX_STEPS: usize = 500;
-/// Largest change of every ln r at which the search has converged.
+/// Change of every ln r in one step below which the search for the widths has converged.
 const CONVERGENCE_TOLERANCE: f64 = 1e-4;
 
-/// Prior width of one kind of geometry at all joints, estimated from the data.
+/// Prior width (σ) of one kind of geometric parameter, common to all joints, as estimated from the
+/// data.
 #[doc(hidden)]
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
@@ -102,7 +103,7 @@ pub(in crate::fit) fn prior_sizes(
     (0..groups.len()).filter(contradicted).map(size).collect()
 }
 
-/// Returns the kinds with enough parameters whose declared σ are all equal.
+/// Returns the kinds of parameters with enough members whose declared σ are all equal.
 fn groups(seen: &[(usize, JointField, f64)]) -> Vec<Group> {
     let fields = JointField::GEOMETRY.into_iter().chain(JointField::PLACEMENT);
     let group = |field: JointField| {
@@ -115,7 +116,7 @@ fn groups(seen: &[(usize, JointField, f64)]) -> Vec<Group> {
 }
 
 impl GeometryLikelihood {
-    /// Creates the likelihood of some unknowns with all others integrated out; `None` where their
+    /// Creates the likelihood of some unknowns with all others integrated out; `None` if their
     /// covariance is singular.
     fn of(seen: &[(usize, JointField, f64)], x: &[f64], covariance: &DMatrix<f64>) -> Option<Self> {
         let n = seen.len();

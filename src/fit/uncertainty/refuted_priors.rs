@@ -17,15 +17,16 @@ use crate::least_squares::Loss;
 
 /// Factors by which the σ of a rule is widened in turn.
 const TRIAL_FACTORS: [f64; 8] = [3.0, 10.0, 30.0, 100.0, 300.0, 1e3, 3e3, 1e4];
-/// Largest ratio of the noise variances with the wider and with the declared prior at which the
-/// prior is the reason for the misfit.
+/// Largest ratio of the noise variance with a wider prior to that with the declared one, at which
+/// the prior explains the misfit.
 const MAX_VARIANCE_RATIO: f64 = 0.25;
 /// Largest noise variance with wider priors, relative to the declared one, at which priors explain
 /// the misfit.
 const MAX_VARIANCE: f64 = 1000.0;
-/// Multiple of the critical gain in 2 ln L (probability 0.001) at which a prior is refuted.
+/// Multiple of the critical gain in 2 ln L (probability 0.001) above which a prior is refuted.
 const REJECTION_FACTOR: f64 = 10.0;
-/// Smallest ratio of the noise variance taken to the declared one at which priors are tested.
+/// Smallest ratio of the noise variance that the fit assumed to the declared one, at which priors
+/// are tested.
 const MIN_NOISE_FACTOR: f64 = 4.0;
 /// Number of trial noise variances at which the evidence is compared.
 const TRIAL_VARIANCES: u32 = 24;
@@ -120,7 +121,7 @@ struct Best {
     deviance: f64,
 }
 
-/// Data of the evidence, linearised about the fit.
+/// Linearised data from which the evidence of priors is computed.
 struct Evidence {
     /// Information RᵀR of the free unknowns.
     information: DMatrix<f64>,

@@ -24,7 +24,7 @@ pub(in crate::fit) fn chance(count: usize, coordinates: usize) -> Option<(f64, f
     ))
 }
 
-/// Returns the result of [`chance`] for each residual, given its number of coordinates.
+/// Returns, for each residual with this number of coordinates, the two lengths of [`chance`] \[σ\].
 pub(in crate::fit) fn chances(coordinates: &[usize]) -> Vec<(f64, f64)> {
     let mut by_count: BTreeMap<usize, (f64, f64)> = BTreeMap::new();
     let of = |&count: &usize| {
@@ -42,8 +42,8 @@ pub(in crate::fit) fn scatter(lengths: &[f64], chances: &[(f64, f64)]) -> f64 {
     median(ratios.filter(|ratio| ratio.is_finite())).unwrap_or(0.0)
 }
 
-/// Returns for each whitened residual length whether it is an outlier, given the numbers of
-/// `coordinates`. The scatter is the median of the lengths, but at least 1 σ.
+/// Returns, for each whitened residual length, true if the residual is an outlier, given its number
+/// of `coordinates`. The scatter is the median of the lengths, but at least 1 σ.
 pub(in crate::fit) fn outlying(lengths: &[f64], coordinates: &[usize]) -> Vec<bool> {
     let chances = chances(coordinates);
     let scatter = scatter(lengths, &chances).max(1.0);
@@ -55,19 +55,19 @@ pub(in crate::fit) fn outlying(lengths: &[f64], coordinates: &[usize]) -> Vec<bo
 pub(in crate::fit) struct Lengths {
     /// Length ‖r‖ of each pose in units of its declared σ.
     pub values: Vec<f64>,
-    /// Length ‖r‖ of each pose in units of the σ that the fit took.
+    /// Length ‖r‖ of each pose in units of the σ that the fit assumed.
     pub weighed: Vec<f64>,
-    /// Standard deviation (1 σ) of the scatter, relative to the assumed one.
+    /// Scatter (1 σ) of the residuals, relative to the assumed σ.
     pub scatter: f64,
     /// Length of each pose, relative to the scatter, above which it is an outlier.
     limits: Vec<f64>,
 }
 
 impl Lengths {
-    /// Computes the lengths of a stage at the full parameter vector `at`.
+    /// Computes the lengths of a stage's residuals at the full parameter vector `x`.
     ///
     /// `freedom` is the share of its coordinates that are degrees of freedom, 0…1. `declared` is
-    /// the ratio of the noise σ that the fit took to the declared one, if one was declared.
+    /// the ratio of the noise σ that the fit assumed to the declared one, if one was declared.
     /// Components of residuals along `unmoved` directions do not count.
     ///
     /// A pose is an outlier if P(χ²ₖ > s²) < 0.01 / N, with s = ‖r‖ / scatter, k measured numbers
@@ -112,8 +112,8 @@ impl Lengths {
         Self { values, weighed, scatter: scatter.max(least), limits }
     }
 
-    /// Returns the length of the residual of pose `place`, relative to the scatter, if it is an
-    /// outlier.
+    /// Returns the length of the residual of the pose with index `place`, relative to the scatter,
+    /// if it is an outlier; else `None`.
     pub fn outlying(&self, place: usize) -> Option<f64> {
         let (length, limit) = (self.values[place], self.limits[place]);
         (self.scatter > 0.0 && length > limit * self.scatter).then(|| length / self.scatter)

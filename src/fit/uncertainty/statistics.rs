@@ -13,8 +13,8 @@ use crate::fit::uncertainty::residual_lengths::Lengths;
 use crate::least_squares::{Blind, Loss, Uncertainty};
 use crate::model::Pose;
 
-/// Largest part of an unknown in unidentifiable combinations, 0…1, at which it has a standard
-/// error.
+/// Largest share of an unknown in unidentifiable combinations, 0…1, at which it still has a
+/// standard error.
 const MAX_UNIDENTIFIABLE_SHARE: f64 = 1e-3;
 
 /// Statistics of the unknowns of a fit.
@@ -34,7 +34,7 @@ pub(in crate::fit) struct Statistics {
     pub reduced_chi2: Option<f64>,
     /// Interval in which `reduced_chi2` lies with probability 0.999 if the residual is only noise.
     pub chance: Option<(f64, f64)>,
-    /// Active constraints.
+    /// Constraints that are active at the end of the fit.
     pub constraints: Vec<Held>,
     /// Prices of bounds and constraints.
     pub prices: Prices,
@@ -46,7 +46,7 @@ pub(in crate::fit) struct Statistics {
 
 impl Statistics {
     /// Computes the statistics of a stage that ended at `end`; `noise_model` converts the declared
-    /// σ to the one that the fit took; `None` if none is declared.
+    /// σ to the one that the fit assumed; `None` if none is declared.
     ///
     /// With a robust loss the covariance is that of the weighted Jacobian, times
     /// [`Loss::variance_factor`]. Active constraints confine it to the directions that they leave

@@ -11,8 +11,8 @@ use super::marginal::{Coefficients, Normal, of_block};
 use crate::least_squares::kernel::products;
 use crate::select::neighbourhood::LinearNeighbourhood;
 
-/// Smallest number of columns for which a product of tall matrices is computed row by row, which is
-/// then faster.
+/// Smallest number of columns at which products of tall matrices are computed row by row, because
+/// that is faster.
 const MIN_COLUMNS_BY_ROWS: usize = 24;
 
 /// Columns A of a hypothesis: derivatives of the whitened residuals with respect to its
@@ -28,7 +28,7 @@ pub(super) enum Design {
 }
 
 impl Design {
-    /// Creates one column for every pose, along one lever.
+    /// Creates the design with one column for every pose: the `lever` in that pose, 0 elsewhere.
     pub fn per_pose(lever: &DVector<f64>) -> Self {
         let levers = DMatrix::from_columns(std::slice::from_ref(lever));
         Self::Grouped { levers, groups: (0..lever.len() / 3).map(Some).collect() }
@@ -47,8 +47,8 @@ impl Design {
         }
     }
 
-    /// Scales all columns by one factor to root mean square 1 over the first `poses` poses; `None`
-    /// if they are zero there.
+    /// Scales all columns by one factor, so that their root mean square over the first `poses`
+    /// poses is 1; `None` if they are zero there.
     pub fn scaled(mut self, poses: usize) -> Option<Self> {
         let first = self.values().rows(0, 3 * poses);
         let size = (first.norm_squared() / first.nrows().max(1) as f64).sqrt();
@@ -83,7 +83,7 @@ fn count(groups: &[Option<usize>]) -> usize {
     groups.iter().flatten().max().map_or(0, |last| last + 1)
 }
 
-/// Returns the product M A of row vectors M with grouped columns A, shape = (rows of M, k).
+/// Returns the product M A of the matrix M (`rows`) with grouped columns A, shape = (rows of M, k).
 fn times_grouped(
     rows: &DMatrix<f64>,
     levers: &DMatrix<f64>,
@@ -126,15 +126,16 @@ pub(super) struct Block {
     normal: Normal,
     pub ln_prior: f64,
     coefficients: Coefficients,
-    /// True for a function of several covariates.
+    /// True if the hypothesis is a function of several covariates.
     pub is_surface: bool,
-    /// True for a periodic error with many orders under one prior.
+    /// True if the hypothesis is a periodic error with many orders under one prior.
     pub is_gear: bool,
     /// Name of its effect's family; `None` for a function without a law.
     pub family: Option<String>,
-    /// Joint, from 0, whose angle its effect changes.
+    /// Joint, from 0, whose command error the effect describes; `None` for other hypotheses.
     pub joint: Option<usize>,
-    /// True for a law of the grammar: it is all that acts at its joint.
+    /// True if the hypothesis is a formula found by the search for laws. It excludes all other
+    /// hypotheses at its joint.
     pub is_whole_law: bool,
 }
 
@@ -203,8 +204,8 @@ impl Block {
         designs.into_iter().map(of).collect()
     }
 
-    /// Returns true if this and another block cannot act together: a law of the grammar is all that
-    /// acts at its joint.
+    /// Returns true if two blocks cannot act together: one is a formula found by the search for
+    /// laws, and the other acts at the same joint.
     pub fn excludes(&self, other: &Self) -> bool {
         let is_same_joint = self.joint.is_some() && self.joint == other.joint;
         is_same_joint && (self.is_whole_law || other.is_whole_law)
@@ -222,7 +223,7 @@ impl Block {
             || matches!(&self.columns, Columns::Grouped { levers, groups } if levers.ncols() * count(groups) > MAX_WIDE_COLUMNS)
     }
 
-    /// Returns A with the fitted parameters projected out.
+    /// Returns the columns A of the hypothesis, with the fitted parameters projected out.
     pub fn columns(&self, fit: &LinearNeighbourhood) -> Arc<DMatrix<f64>> {
         match &self.columns {
             Columns::Dense(columns) => Arc::clone(columns),
@@ -233,13 +234,13 @@ impl Block {
         }
     }
 
-    /// Returns Aᵀr.
+    /// Returns the product Aᵀr of the projected columns with the residual.
     pub fn product(&self) -> &DVector<f64> {
         self.normal.product()
     }
 
-    /// Returns MᵀA with other columns M, from which the fitted parameters are projected out. M is
-    /// given together with its transpose.
+    /// Returns MᵀA for columns M from which the fitted parameters are projected out. `others` holds
+    /// M and its transpose.
     pub fn times(&self, (others, transposed): (&DMatrix<f64>, &DMatrix<f64>)) -> DMatrix<f64> {
         match &self.columns {
             Columns::Dense(columns)

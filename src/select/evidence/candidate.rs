@@ -12,15 +12,16 @@ use crate::problem::Effect;
 use crate::select::fitted::Fitted;
 use crate::select::neighbourhood::LinearNeighbourhood;
 
-/// Displacement, in units of σ, that replaces zero as the largest plausible one, because sizes have
-/// a reciprocal.
+/// Smallest value of the largest plausible displacement by a coefficient, in units of σ. It avoids
+/// division by zero.
 const MIN_PLAUSIBLE_SIZE: f64 = 1e-9;
 
 /// Hypothesis with its columns and the logarithm of its prior probability.
 #[derive(Clone)]
 pub(super) struct Candidate {
     pub hypothesis: Hypothesis,
-    /// Index among the functions of that hypothesis, which differ for example in smoothness.
+    /// Index of the candidate among the functions of its hypothesis, which differ in smoothness,
+    /// for example.
     pub variant: usize,
     /// Columns, scaled together to root mean square 1.
     pub design: Design,
@@ -66,8 +67,8 @@ pub(super) fn order_of(effect: &Effect) -> Option<(usize, f64)> {
 }
 
 /// Scales the columns of an effect to equal length over the first `weighed` poses. Also returns,
-/// for each parameter, the root mean square displacement, in units of σ, that its largest plausible
-/// value causes.
+/// for each parameter, the root mean square displacement by its largest plausible value, in units
+/// of σ.
 pub(super) fn even(
     mut columns: DMatrix<f64>,
     terms: &[Term],

@@ -19,12 +19,13 @@ use crate::problem::{Effect, JointKind, Observation, Problem};
 use crate::residual_tests::Covariate;
 use crate::select::neighbourhood::{Linearised, tries};
 
-/// Displacement of the target, in units of σ, up to which commands that touch the same point may
-/// differ by noise alone.
+/// Displacement of the target, in units of σ, up to which a difference between commands that touch
+/// the same point may be noise.
 const MAX_NOISE_DISPLACEMENT: f64 = 3.0;
-/// Number of variant indices reserved for the functions of each load.
+/// Number of candidate indices ([`Candidate::variant`]) reserved for the functions of each load.
 const VARIANTS_PER_LOAD: usize = 4;
-/// Command error \[rad\] or \[m\] above which a contact does not determine the command.
+/// Command error \[rad\] or \[m\], caused by 1 σ of a contact, above which the contact does not
+/// determine the command.
 const MIN_UNDETERMINED_COMMAND: f64 = 0.02;
 
 /// Builder of all hypotheses about a residual, with their columns.
@@ -35,8 +36,8 @@ pub(super) struct Columns<'a, 'l> {
     pub coverage: (bool, bool),
     /// True if the harmonics of all joints may have a common prior.
     pub takes_gears: bool,
-    /// Number of first poses on which evidence is evaluated; functions are only predicted at the
-    /// others.
+    /// Number of poses on which evidence is evaluated, the first ones. At the other poses,
+    /// functions are only predicted.
     pub weighed: usize,
     /// Only hypothesis whose functions are built; `None` builds all.
     only: Option<&'a Hypothesis>,
@@ -123,8 +124,8 @@ impl<'a, 'l> Columns<'a, 'l> {
         }
     }
 
-    /// Adds one of the functions of a hypothesis under the fixed index `variant`, so that the index
-    /// does not depend on which functions exist.
+    /// Adds one function of a hypothesis under the index `variant`. The index is fixed, whether or
+    /// not the other functions exist.
     pub(super) fn add_variant(
         &mut self,
         family: &str,
@@ -194,7 +195,8 @@ impl<'a, 'l> Columns<'a, 'l> {
         self.covariates.extend(known);
     }
 
-    /// Returns true if a site is the coordinate that a joint's command moves.
+    /// Returns true if a parameter site is the coordinate that a joint's command moves: θ or, for a
+    /// prismatic joint, d.
     fn moving(&self, site: ParameterSite) -> bool {
         let ParameterSite::Joint { joint, field } = site else { return false };
         match self.problem.joints[joint].kind {
@@ -204,7 +206,8 @@ impl<'a, 'l> Columns<'a, 'l> {
         }
     }
 
-    /// Returns the recorded quantities that vary, with their values in every pose.
+    /// Returns the recorded quantities that vary, such as commands, temperature, loads and time,
+    /// with their values in every pose.
     fn known(&self) -> Vec<SampledCovariate> {
         let poses = self.linearised.poses();
         let mut all: Vec<(Covariate, Vec<f64>)> = Vec::new();
@@ -256,7 +259,7 @@ impl<'a, 'l> Columns<'a, 'l> {
             .collect()
     }
 
-    /// Returns the command of a joint in every pose, as functions of the command use it.
+    /// Returns the values of a joint's command in every pose for functions of the command.
     ///
     /// In contacts the noise is in the command, not in the measured quantity. If the target cannot
     /// reach the point without the joint, the joint's commands at one point differ by noise alone.
@@ -290,8 +293,8 @@ impl<'a, 'l> Columns<'a, 'l> {
     }
 
     /// Returns the moment of the loads about each joint's axis and about its α axis, in every pose.
-    /// It is computed as the displacement by a compliance there divided by the displacement by an
-    /// angle. Each moment has an index over all joints and both axes, which does not depend on the
+    /// The moment is the displacement by a compliance there divided by the displacement by an
+    /// angle. The index of each moment counts all joints and both axes; it does not depend on the
     /// poses.
     fn loads(&self) -> Vec<(usize, SampledCovariate)> {
         let pairs = [
@@ -318,8 +321,9 @@ impl<'a, 'l> Columns<'a, 'l> {
         all.enumerate().filter_map(|(k, (joint, pair))| Some((k, of(joint, pair)?))).collect()
     }
 
-    /// Returns true if a candidate effect depends on this covariate alone and adds a term linear in
-    /// it at `site`. If the covariate has only two values, every function of it is linear.
+    /// Returns true if a candidate effect adds a term linear in this covariate at `site`, and
+    /// depends on nothing else. If the covariate has only two values, every function of it is
+    /// linear.
     fn has_law(&self, site: ParameterSite, of: &SampledCovariate) -> bool {
         let is_line = |term: &Term| {
             let is_linear = matches!(
@@ -338,8 +342,8 @@ impl<'a, 'l> Columns<'a, 'l> {
         self.candidates.iter().any(acts)
     }
 
-    /// Adds smooth functions of one covariate along the columns `at`, one for each length, and a
-    /// straight line unless an effect is one. Their variant indices begin at `first`.
+    /// Adds smooth functions of one covariate along the columns `at`, one for each of `lengths`.
+    /// Adds a straight line, too, unless an effect is one. The candidate indices begin at `first`.
     pub(super) fn smooth(
         &mut self,
         family: &str,
@@ -383,7 +387,7 @@ impl<'a, 'l> Columns<'a, 'l> {
     }
 
     /// Adds functions of two covariates: of two commands, of a direction of approach and another
-    /// quantity, or of temperature and time.
+    /// quantity, or of temperature and time, all at `site`.
     fn surfaces(&mut self, site: ParameterSite, at: &DVector<f64>, known: &[SampledCovariate]) {
         for (k, one) in known.iter().enumerate() {
             for other in &known[k + 1..] {
@@ -429,8 +433,9 @@ impl<'a, 'l> Columns<'a, 'l> {
         });
     }
 
-    /// Returns the candidates with their prior probabilities. Each further hypothesis has odds of 1
-    /// to 2; families have the probabilities of their weights, divided into shares within a family.
+    /// Returns the candidates with their prior probabilities. The odds of each further hypothesis
+    /// are 1 to 2. The probability is divided between families by weight, and within a family by
+    /// share.
     fn weighted(self) -> (Vec<Candidate>, Vec<SampledCovariate>, f64) {
         let mut families: Vec<(&str, f64, f64)> = Vec::new();
         for ((family, share), candidate) in self.shares.iter().zip(&self.candidates) {

@@ -15,7 +15,8 @@ use crate::select::data::{bits, number};
 use crate::select::settings::{ROUGH_LENGTHS, SLOW_LENGTH, SMOOTH_LENGTHS};
 
 impl Columns<'_, '_> {
-    /// Adds functions of one covariate, and of the position, that displace every measured position.
+    /// Adds hypotheses about the instrument: functions of one covariate, and of the measured
+    /// position, that displace every measured position.
     pub(super) fn measurement(&mut self, known: &[SampledCovariate]) {
         let axes: Vec<DVector<f64>> = (0..3)
             .filter_map(|axis| self.linearised.place(ParameterSite::Shift { axis }))
@@ -64,8 +65,8 @@ impl Columns<'_, '_> {
         self.covariates.extend(coordinates);
     }
 
-    /// Adds errors of the instrument that wander in time: each reading's error is close to the
-    /// previous one's.
+    /// Adds errors that wander in time at `site`: the error of each reading is close to that of the
+    /// previous reading.
     pub(super) fn wandering(
         &mut self,
         site: ParameterSite,
@@ -88,7 +89,7 @@ impl Columns<'_, '_> {
     }
 
     /// Adds rotations of the base as smooth functions of quantities other than commands, such as
-    /// its floor's temperature, time or load.
+    /// temperature, time or load.
     pub(super) fn base(&mut self, known: &[SampledCovariate]) {
         let axes: Vec<DVector<f64>> =
             (0..3).filter_map(|axis| self.linearised.place(ParameterSite::Turn { axis })).collect();

@@ -18,13 +18,14 @@ use crate::select::settings::{MAX_REVISED_SETS, MIN_REVISED_PROBABILITY};
 /// Number of trial values on either side of the present one.
 const TRIALS_PER_SIDE: i32 = 8;
 /// Ratio of the farthest trial value to the present one, in the first and in the second pass. The
-/// first exceeds the spacing of listed values; the second is the spacing of the first pass.
+/// first exceeds the spacing of listed values; the second equals the trial spacing of the first
+/// pass.
 const LAST_RATIOS: [f64; 2] = [1.4, 1.043];
-/// Log odds by which another value must be better than the listed one.
+/// Log odds by which another value of an argument must be better than the listed one to be added.
 const MIN_LN_ODDS_OF_FINER: f64 = 0.5;
 
-/// Returns effects with argument values between the listed ones that are more probable than the
-/// members of probable sets that they would replace.
+/// Returns effects whose argument lies between the listed values. Each is more probable than the
+/// member of a probable set that it would replace.
 pub(super) fn finer(
     hypotheses: &Hypotheses,
     weighted: &[Weighted],
@@ -95,8 +96,8 @@ pub(super) fn finer(
 }
 
 impl Hypotheses<'_> {
-    /// Returns the candidate with other values of its searched argument, up to the ratio
-    /// `farthest`, that no candidate has yet.
+    /// Returns copies of the candidate with neighbouring values of its searched argument, up to the
+    /// ratio `farthest`. Values of other candidates are left out.
     fn near(&self, candidate: &Candidate, farthest: f64, problem: &Problem) -> Vec<Candidate> {
         let Some(effect) = candidate.hypothesis.effect() else { return Vec::new() };
         let factors = (-TRIALS_PER_SIDE..=TRIALS_PER_SIDE)
@@ -109,7 +110,8 @@ impl Hypotheses<'_> {
         others.filter(is_new).filter_map(|effect| self.like(candidate, effect, problem)).collect()
     }
 
-    /// Returns the candidate with another effect, which differs in the value of its argument.
+    /// Returns a copy of the candidate for `effect`, which differs only in the value of its
+    /// argument.
     fn like(&self, candidate: &Candidate, effect: Effect, problem: &Problem) -> Option<Candidate> {
         let columns = self.linearised.columns(&effect);
         let (columns, largest) = even(columns, &effect.terms(problem), self.weighed);

@@ -16,16 +16,16 @@ const MIN_BASIS_VARIANCE: f64 = 1e-3;
 /// first one, at which it is kept. Smaller ones are negligible relative to the noise.
 const MIN_ROUGH_VARIANCE: f64 = 0.1;
 
-/// Largest width of a cluster of values, as a multiple of the largest gap that noise may cause,
-/// that noise alone may cause.
+/// Largest width of a cluster of values that noise alone may cause, as a multiple of the largest
+/// gap that noise may cause.
 const MAX_GAPS_OF_NOISE: f64 = 4.0;
 
 /// Number of trial centres of single bumps and steps along the range.
 const SHAPE_CENTRES: u32 = 16;
 /// Trial widths of single bumps and steps, as fractions of the range.
 const SHAPE_WIDTHS: [f64; 5] = [0.04, 0.07, 0.12, 0.2, 0.35];
-/// Refinement about a shape: shifts of the centre as fractions of the width, and factors on the
-/// width.
+/// Trial shapes about a given shape: shifts of the centre as fractions of the width, and factors on
+/// the width.
 const FINER_SHAPES: ([f64; 9], [f64; 5]) =
     ([-0.6, -0.4, -0.2, -0.1, 0.0, 0.1, 0.2, 0.4, 0.6], [0.7, 0.85, 1.0, 1.2, 1.4]);
 
@@ -80,8 +80,8 @@ pub(super) struct SampledCovariate {
 }
 
 impl SampledCovariate {
-    /// Returns the value at which the quantity is zero, if it is defined; for a temperature it is
-    /// `reference` \[°C\].
+    /// Returns the value of the covariate at which its effects vanish: `reference` \[°C\] for a
+    /// temperature, 0 for loads, `None` for others.
     pub(super) fn zero(&self, reference: Option<f64>) -> Option<f64> {
         match self.covariate {
             Covariate::Temperature => reference,
@@ -90,9 +90,8 @@ impl SampledCovariate {
         }
     }
 
-    /// Returns true if the amplitude of functions of a command may be proportional to this
-    /// quantity: it is a temperature, load or declared covariate, and varies at least by half its
-    /// largest distance from zero.
+    /// Returns true if an error may grow in proportion to this quantity: it is a temperature, load
+    /// or declared covariate, and varies at least by half its largest distance from zero.
     pub(super) fn is_size(&self, reference: Option<f64>) -> bool {
         use Covariate::{Declared, Hoist, Payload, Temperature};
         let (low, high) = self.range;
@@ -135,7 +134,7 @@ pub(super) fn merge(values: &mut [f64], mut some: Vec<usize>, apart: f64) {
     }
 }
 
-/// Returns true if functions of both covariates together are hypotheses of the search.
+/// Returns true if the search has hypotheses that are functions of these two covariates together.
 pub(super) fn goes_with(one: &Covariate, other: &Covariate) -> bool {
     use Covariate::{Approach, Command, Row, Temperature, Time};
     match (one, other) {
@@ -154,8 +153,9 @@ pub(super) fn basis(scaled: &[f64], length: f64) -> DMatrix<f64> {
 }
 
 /// Returns basis functions of a Gaussian process with exponential covariance exp(−|Δ|/length),
-/// which describes a station that wanders and noise that is correlated from reading to reading.
-/// `None` if too many functions would be needed for the number of `levels`.
+/// shape = (poses, functions). It describes an instrument that wanders, and noise that is
+/// correlated from reading to reading. `None` if `levels` values do not determine so many
+/// functions.
 pub(super) fn rough_basis(scaled: &[f64], length: f64, levels: usize) -> Option<DMatrix<f64>> {
     // Of the constant alone the mean square is 1 and not a half.
     let of_constant = |k: usize| if k == 0 { 0.5 } else { 1.0 };
@@ -172,7 +172,8 @@ fn cosine(k: usize, u: f64) -> f64 {
     (PI * k as f64 * (u + RANGE_MARGIN) / (1.0 + 2.0 * RANGE_MARGIN)).cos()
 }
 
-/// Returns the prior standard deviations along the cosines, down to [`MIN_BASIS_VARIANCE`].
+/// Returns the prior standard deviation of each cosine of the basis, down to
+/// [`MIN_BASIS_VARIANCE`].
 fn weights(length: f64) -> Vec<f64> {
     let variance =
         |k: usize| (-0.5 * (PI * k as f64 * length / (1.0 + 2.0 * RANGE_MARGIN)).powi(2)).exp();
@@ -180,9 +181,9 @@ fn weights(length: f64) -> Vec<f64> {
     (0..count).map(|k| variance(k).sqrt()).collect()
 }
 
-/// Returns functions of one covariate whose amplitude is proportional to another quantity (`size`):
-/// basis functions times the quantity. If its `zero` is not known, the basis functions alone are
-/// included, too.
+/// Returns functions of a covariate (`scaled`) whose amplitude is proportional to a quantity
+/// (`size`): basis functions times the quantity. If its `zero` is unknown, the basis functions
+/// alone are included, too. Shape = (poses, functions).
 pub(super) fn growing(
     scaled: &[f64],
     size: &SampledCovariate,

@@ -23,9 +23,10 @@ use crate::select::neighbourhood::Linearised;
 /// Fit linearised at some rows, with all hypotheses about its residual.
 pub(in crate::select) struct Hypotheses<'a> {
     pub linearised: Linearised<'a>,
-    /// Effects that are removed from the fit and evaluated as hypotheses, part by part.
+    /// Effects that the search added earlier. They are removed from the fit and evaluated as
+    /// hypotheses, term by term.
     pub added: Vec<Effect>,
-    /// Indices of their columns among those of the fit.
+    /// Indices of the parameters of the `added` effects among the columns of the fit.
     pub unknowns: Vec<usize>,
     pub(super) all: Vec<Candidate>,
     /// Number of first poses on which evidence is evaluated.
@@ -107,8 +108,8 @@ impl<'a> Hypotheses<'a> {
         hypotheses
     }
 
-    /// Returns the candidate for an effect whose argument no list contains, such as a wave or a
-    /// move, with its columns.
+    /// Returns the candidate for an effect with the given `columns`, whose argument is not among
+    /// the listed values, such as a wave or a station move.
     pub(super) fn entered(
         &self,
         effect: &Effect,
@@ -151,7 +152,8 @@ impl<'a> Hypotheses<'a> {
         Self { linearised, added, unknowns, all, weighed, ln_family, covariates, coverage, times }
     }
 
-    /// Returns the candidate for a hypothesis of a set, with the function that the set contains.
+    /// Returns the candidate for a hypothesis that is a member of a set, with the function that the
+    /// set contains.
     pub(super) fn candidate(
         &self,
         explanation: &HypothesisSet,
@@ -214,7 +216,7 @@ impl<'a> Hypotheses<'a> {
         shapes.iter().filter_map(one).collect()
     }
 
-    /// Returns the values of a covariate in every pose, if it varies.
+    /// Returns the values of a covariate in every pose; `None` if it does not vary.
     pub(super) fn known(&self, covariate: &Covariate) -> Option<&SampledCovariate> {
         self.covariates.iter().find(|known| known.covariate == *covariate)
     }
@@ -229,8 +231,8 @@ impl<'a> Hypotheses<'a> {
         self.covariates(hypothesis).map(|known| (known.covariate.clone(), known.range)).collect()
     }
 
-    /// Returns, for each pose from index `first` on, true if its covariates are within those
-    /// ranges.
+    /// Returns, for each pose from index `first` on, true if all covariates of the hypothesis are
+    /// within their ranges over the poses of the evidence.
     pub fn reached(&self, hypothesis: &Hypothesis, first: usize) -> Vec<bool> {
         let within = |known: &SampledCovariate, pose: usize| {
             (known.range.0..=known.range.1).contains(&known.values[pose])
@@ -241,8 +243,8 @@ impl<'a> Hypotheses<'a> {
             .collect()
     }
 
-    /// Returns covariate, site, values and lever of a function of a single covariate at one joint
-    /// coordinate; `None` for other functions.
+    /// Returns covariate, site, values and lever of the hypothesis if it is a function of one
+    /// covariate at one joint coordinate; `None` otherwise.
     pub fn coordinate(
         &self,
         hypothesis: &Hypothesis,
@@ -255,7 +257,8 @@ impl<'a> Hypotheses<'a> {
     }
 }
 
-/// Returns two flags: directions of approach of some poses are recorded; times are recorded.
+/// Returns two flags: true if some poses record directions of approach, and true if times are
+/// recorded.
 fn coverage(linearised: &Linearised, data: &Data) -> (bool, bool) {
     let has_approach = linearised.poses().iter().any(|pose| pose.setup.approach.is_some());
     (has_approach, data.measurements.time_measured)

@@ -28,7 +28,7 @@ pub enum Site {
 }
 
 impl Site {
-    /// Returns the site of a parameter.
+    /// Returns the part of the arm or measurement to which a parameter site belongs.
     pub fn of(site: ParameterSite) -> Self {
         match site {
             ParameterSite::Joint { joint, field: JointField::Alpha | JointField::A }
@@ -95,13 +95,13 @@ pub enum HypothesisKind {
     Linear,
     /// Deflection under the weight of links whose masses are not declared.
     Sag,
-    /// Limit (bound or constraint) of the declared problem that is wrong although the fit rests on
-    /// it; contains its description.
+    /// Limit (bound or constraint) of the declared problem that is active in the fit, but wrong;
+    /// contains its description.
     Limit(String),
 }
 
 impl HypothesisKind {
-    /// Returns true if both have the same law, regardless of the value of a searched argument.
+    /// Returns true if two kinds have the same law, whatever the value of a searched argument.
     pub(super) fn is_of(&self, other: &Self) -> bool {
         match (self, other) {
             (Self::Effect(effect), Self::Effect(other)) => effect.is_but_for_search(other),
@@ -115,12 +115,12 @@ impl HypothesisKind {
 pub struct Hypothesis {
     /// Law of the error, or kind of function.
     pub kind: HypothesisKind,
-    /// Site at which the error acts.
+    /// Part of the arm or of the measurement at which the error acts.
     pub site: Site,
-    /// Coordinate to which a smooth, periodic, pose-wise or wandering function adds, if it is a
-    /// single one. `None` for effects, limits and other functions.
+    /// Coordinate to which the function adds, if it is a single one. `None` for effects, limits,
+    /// and functions at several coordinates.
     pub coordinate: Option<ParameterSite>,
-    /// Quantities on which it depends, ascending.
+    /// Quantities on which the error depends, in ascending order.
     pub depends_on: Vec<Covariate>,
 }
 

@@ -15,13 +15,13 @@ pub struct HypothesisSet {
 }
 
 impl HypothesisSet {
-    /// Returns those effects that are members of the set.
+    /// Returns the members of the set that are effects, those with a law.
     pub fn effects(&self) -> Vec<Effect> {
         self.hypotheses.iter().filter_map(Hypothesis::effect).cloned().collect()
     }
 
-    /// Returns the periodic errors of the set: joint (from 1), highest order, and 1 σ of the
-    /// coefficients, given as root mean square displacement of all columns together in units of σ.
+    /// Returns the periodic errors of the set: joint (from 1), highest order, and size. The size is
+    /// the prior root mean square displacement by all coefficients, in units of σ.
     pub(in crate::select) fn gears(&self) -> Vec<(usize, u32, f64)> {
         let gear =
             |(member, (_, size)): (&Hypothesis, &(usize, f64))| match (&member.kind, member.site) {
@@ -33,7 +33,8 @@ impl HypothesisSet {
         self.hypotheses.iter().zip(&self.functions).filter_map(gear).collect()
     }
 
-    /// Returns the functions without a law, each with its index among those of its hypothesis.
+    /// Returns the members that are functions without a law, each with the index of the function
+    /// chosen for it.
     pub(in crate::select) fn without_law(&self) -> Vec<(Hypothesis, usize)> {
         let all = self
             .hypotheses

@@ -20,12 +20,12 @@ use crate::select::data::Data;
 use crate::select::fitted::Fitted;
 use crate::select::grammar::{MAX_POSES, Noise, Proposal, Quantities, WhitenedSite, proposals};
 
-/// Minimum probability of a set in the place of whose members laws are searched.
+/// Smallest probability of a set at which laws are searched in place of its members.
 const MIN_SET_PROBABILITY: f64 = 0.05;
-/// Maximum number of joints and sets beside which laws are searched.
+/// Maximum number of pairs of a joint and a set for which laws are searched.
 const MAX_SEARCHED: usize = 2;
 
-/// Returns the laws that may stand in the place of what probable sets hold at a joint.
+/// Returns formulas that may replace the members of probable sets at one joint.
 pub(super) fn promising(
     hypotheses: &Hypotheses,
     weighted: &[Weighted],
@@ -65,7 +65,8 @@ pub(super) fn promising(
     laws
 }
 
-/// Returns the columns of the coefficients of a law, without those of parameters inside.
+/// Returns the columns of the coefficients of a law, without those of the parameters inside its
+/// formulas.
 fn coefficients(effect: &Effect, hypotheses: &Hypotheses, problem: &Problem) -> DMatrix<f64> {
     let columns = hypotheses.linearised.columns(effect);
     let count = match effect {
@@ -75,7 +76,7 @@ fn coefficients(effect: &Effect, hypotheses: &Hypotheses, problem: &Problem) -> 
     columns.columns(0, count).into_owned()
 }
 
-/// Returns the names of some hypotheses.
+/// Returns the names of the `members`, which key the cache of laws.
 fn beside(hypotheses: &Hypotheses, members: &[usize]) -> Vec<String> {
     let name = |&member: &usize| {
         let hypothesis = &hypotheses.all[member].hypothesis;
@@ -89,7 +90,8 @@ fn beside(hypotheses: &Hypotheses, members: &[usize]) -> Vec<String> {
     names
 }
 
-/// Returns a proposed law as an effect.
+/// Returns a proposed formula at a joint, counted from 0, as an effect; `None` if the formula is
+/// not valid.
 fn effect(problem: &Problem, joint: usize, proposal: &Proposal) -> Option<Effect> {
     let (slides, covariates) = (problem.slides(), problem.covariate_names());
     let vocabulary =
@@ -101,7 +103,8 @@ fn effect(problem: &Problem, joint: usize, proposal: &Proposal) -> Option<Effect
     Some(Effect::Law(law.ok()?.described(proposal.ln_prior)))
 }
 
-/// Returns the joint, from 0, at whose coordinate a hypothesis acts, or about whose axis.
+/// Returns the joint, counted from 0, at whose command coordinate or about whose axis a hypothesis
+/// acts; `None` for others.
 fn joint_of(hypothesis: &Hypothesis, problem: &Problem) -> Option<usize> {
     let Site::Joint(joint) = hypothesis.site else { return None };
     let is_there = match &hypothesis.kind {
@@ -112,7 +115,8 @@ fn joint_of(hypothesis: &Hypothesis, problem: &Problem) -> Option<usize> {
     is_there.then_some(joint)
 }
 
-/// Returns the joints at which laws are searched, each with the members beside.
+/// Returns the joints, counted from 0, at which laws are searched, each with the other members of a
+/// probable set.
 fn places(
     hypotheses: &Hypotheses,
     weighted: &[Weighted],
@@ -137,7 +141,7 @@ fn places(
     found
 }
 
-/// Search for laws at one joint.
+/// Search for formulas at one joint.
 struct Search<'s, 'h, 'd> {
     hypotheses: &'s Hypotheses<'h>,
     fitted: &'s Fitted,
@@ -147,7 +151,7 @@ struct Search<'s, 'h, 'd> {
 }
 
 impl Search<'_, '_, '_> {
-    /// Returns the laws beside some members.
+    /// Returns the formulas that best explain the residual that the members `rest` leave.
     fn proposals(&self, rest: &[usize], products: &Products) -> Vec<Proposal> {
         let poses = self.hypotheses.linearised.poses();
         let kept: Vec<usize> =
@@ -221,8 +225,9 @@ impl Search<'_, '_, '_> {
     }
 }
 
-/// Returns B and p of columns along one lever, one column for each pose. With everything fitted and
-/// a set projected out, they have the products diag(|l|²) − BᵀB, and p with the residual.
+/// Returns B and p of columns along one lever l, one column for each pose, with the fitted
+/// parameters and a set projected out. The products of the columns are diag(|l|²) − BᵀB; p are
+/// their products with the residual.
 fn along_lever(
     left: &ReducedProblem,
     products: &Products,

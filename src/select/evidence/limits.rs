@@ -20,8 +20,8 @@ use crate::select::neighbourhood::Linearised;
 /// Smallest singular value at which rows of constraints count as independent.
 const MIN_SINGULAR_VALUE: f64 = 1e-9;
 
-/// Returns, for each limit on which the fit rests, the hypothesis that it is wrong. All of them
-/// together have the prior probability of one family.
+/// Returns the hypotheses that a limit (bound or constraint) is wrong, one for each limit that is
+/// active in the fit. Together they have the prior probability of one family.
 pub(super) fn limits(
     fitted: &Fitted,
     linearised: &Linearised,

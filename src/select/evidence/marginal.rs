@@ -16,28 +16,30 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::numeric::lower_factor;
 
-/// Half-width of the grid of ln f, a factor of 33 in either direction. Its step is
-/// [`MAX_LN_NOISE_STEP`], or less: half the width 1/√(2ν) of the likelihood with ν degrees of
-/// freedom.
+/// Largest |ln f| of the grid over the noise factor f, a factor of 33 in either direction. The step
+/// of the grid is [`MAX_LN_NOISE_STEP`], or half the width 1/√(2ν) of the likelihood with ν degrees
+/// of freedom if that is less.
 const MAX_LN_NOISE_FACTOR: f64 = 3.5;
 const MAX_LN_NOISE_STEP: f64 = 0.05;
 /// Smallest step of the grid, which limits its size; no data set has so many degrees of freedom.
 const MIN_LN_NOISE_STEP: f64 = 1e-4;
 
-/// Log odds to the largest term of a sum beyond which a term is negligible (e⁴⁰).
+/// Log odds to the largest term of a sum at which a term is neglected (e⁻⁴⁰).
 const NEGLIGIBLE_LN_ODDS: f64 = 40.0;
 
-/// Degrees of freedom ν of a residual, and half-width (`trust`) of the Cauchy prior on ln f.
+/// Degrees of freedom ν of a residual, and the prior on its noise factor f = true σ / assumed σ:
+/// Cauchy in ln f, with half-width `trust`.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Noise {
     pub freedom: f64,
     pub trust: f64,
-    /// Smallest ln f, 0 for a declared σ: an instrument with that σ cannot show smaller effects.
+    /// Smallest ln f considered, 0 for a declared σ: an instrument with that σ cannot show smaller
+    /// effects.
     pub least: f64,
 }
 
 impl Noise {
-    /// Returns, for each noise factor f of the grid, ln of its prior times f^−ν, and 1 / (2 f²).
+    /// Returns, for each noise factor f of the grid, ln(prior(f) f^−ν) and 1 / (2 f²).
     pub fn grid(self) -> Vec<(f64, f64)> {
         let step = MAX_LN_NOISE_STEP.min(0.5 / (2.0 * self.freedom).sqrt()).max(MIN_LN_NOISE_STEP);
         let least = self.least.clamp(-MAX_LN_NOISE_FACTOR, MAX_LN_NOISE_FACTOR);
@@ -89,7 +91,7 @@ impl Normal {
         }
     }
 
-    /// Returns the products after the residual and the columns were reduced by a set: by Z A =
+    /// Returns the products after a set is projected out of columns and residual, given Z A =
     /// `along` and Z r = `taken`.
     pub fn beside(&self, along: &DMatrix<f64>, taken: &DVector<f64>) -> Self {
         match self {
@@ -125,7 +127,8 @@ impl Normal {
         }
     }
 
-    /// Returns ½ ln det(1 + c² G) and bᵀ (1/c² + G)⁻¹ b for a size c.
+    /// Returns ½ ln det(1 + c² G) and bᵀ (1/c² + G)⁻¹ b for coefficients with prior σ c = `size`;
+    /// `None` if a factor does not exist.
     fn shrinkage_terms(&self, size: f64) -> Option<(f64, f64)> {
         let precision = (size * size).recip();
         match self {
@@ -159,7 +162,7 @@ impl Normal {
     }
 }
 
-/// Returns 1/c² + G for a precision 1/c².
+/// Returns G + 1/c² on the diagonal, given the `precision` 1/c².
 fn with_prior(gram: &DMatrix<f64>, precision: f64) -> DMatrix<f64> {
     let mut inner = gram.clone();
     for j in 0..inner.nrows() {
@@ -168,8 +171,8 @@ fn with_prior(gram: &DMatrix<f64>, precision: f64) -> DMatrix<f64> {
     inner
 }
 
-/// Returns ln Π c dⱼ. It multiplies a few factors at a time, so that their product does not
-/// overflow.
+/// Returns ln Π c dⱼ, given c = `size` and the factors dⱼ. A few factors are multiplied at a time,
+/// so that no product overflows.
 fn ln_product(diagonal: &DVector<f64>, size: f64) -> f64 {
     let all: Vec<f64> = diagonal.iter().map(|entry| entry * size).collect();
     all.chunks(16).map(|some| some.iter().product::<f64>().ln()).sum()
@@ -180,7 +183,7 @@ fn ln_product(diagonal: &DVector<f64>, size: f64) -> f64 {
 pub(super) struct Coefficients {
     /// True for coefficients that cannot be negative; empty if there are none.
     pub never_negative: Vec<bool>,
-    /// True if each coefficient may differ from zero without the others.
+    /// True if a single coefficient may differ from zero while the others are zero.
     pub alone: bool,
     /// Root mean square displacement, in units of σ, by the largest plausible value of each
     /// coefficient; empty if any value is plausible.
@@ -188,8 +191,8 @@ pub(super) struct Coefficients {
 }
 
 impl Coefficients {
-    /// Returns the trial `sizes` for the coefficients `of`, with those above the largest plausible
-    /// size replaced by it. `column` is the root mean square of the columns.
+    /// Returns the trial `sizes` for the coefficients `of`, each limited to the largest plausible
+    /// size. `column` is the root mean square of the columns.
     fn plausible(&self, sizes: &[f64], of: impl Iterator<Item = usize>, column: f64) -> Vec<f64> {
         let largest = of
             .filter_map(|j| self.largest.get(j))

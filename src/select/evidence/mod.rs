@@ -141,7 +141,8 @@ pub(super) fn evaluate(fitted: &Fitted, data: &Data, added: &[Effect]) -> Option
     }
 }
 
-/// Evaluates the evidence without the poses `left_out`; also returns the hypotheses.
+/// Evaluates the evidence without the poses `left_out`. Also returns the hypotheses that were
+/// evaluated.
 fn weighed_without<'a>(
     fitted: &'a Fitted,
     data: &Data<'a>,
@@ -247,8 +248,9 @@ fn weighed_without<'a>(
     Some((evidence, hypotheses))
 }
 
-/// Returns, for each member of a set, the effects that would replace it best, at most one of a
-/// family at each site. They must gain at least half as much as the member.
+/// Returns pairs of a member of the set `best` and an effect that may replace it, the best ones
+/// first. Each effect gains at least half as much as the member; of each family there is one at a
+/// site.
 fn stand_ins(
     best: &HypothesisSet,
     hypotheses: &Hypotheses,

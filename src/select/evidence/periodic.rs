@@ -13,12 +13,12 @@ use crate::residual_tests::Covariate;
 use crate::select::harmonic_prior::{MIN_GEAR_ORDERS, is_gear_of};
 use crate::select::settings::{GEAR_ORDERS, MAX_NEAR_ORDER, SLOW_LENGTH};
 
-/// Number of different commands, for each order, at which a periodic error can be distinguished
-/// from any other function. It is twice the number of coefficients.
+/// Number of different commands per order that distinguish a periodic error from other functions:
+/// twice its number of coefficients.
 const LEVELS_PER_ORDER: usize = 4;
 
 impl Columns<'_, '_> {
-    /// Adds a free value of the coordinate in every pose.
+    /// Adds the hypothesis that the coordinate `site` has a free error in every pose.
     pub(super) fn per_pose(&mut self, site: ParameterSite, at: &DVector<f64>) {
         let hypothesis = Hypothesis {
             kind: HypothesisKind::PerPose,

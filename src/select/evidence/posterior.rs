@@ -31,7 +31,7 @@ pub struct Claims {
     pub law: (Hypothesis, f64),
 }
 
-/// Returns the odds (1 − p) / p against a probability p, limited to 1.
+/// Returns the odds (1 − p) / p against a claim of probability p, at most 1.
 pub(in crate::select) fn odds_against(probability: f64) -> f64 {
     ((1.0 - probability).max(MIN_KEPT_PROBABILITY) / probability.max(MIN_KEPT_PROBABILITY)).min(1.0)
 }
@@ -42,7 +42,7 @@ impl Evidence {
         self.sets.first().map_or(&[], |best| &best.hypotheses)
     }
 
-    /// Returns the probability that at least one hypothesis acts for which `of` is true.
+    /// Returns the probability that at least one hypothesis acts for which `of` returns true.
     pub fn probability(&self, of: impl Fn(&Hypothesis) -> bool) -> f64 {
         let holds = |explanation: &&HypothesisSet| explanation.hypotheses.iter().any(&of);
         self.sets
@@ -58,29 +58,29 @@ impl Evidence {
         self.probability(|hypothesis| hypothesis.gear_joint() == Some(joint - 1))
     }
 
-    /// Returns the most probable set whose number of members is supported: at least that many
-    /// hypotheses act with probability `level`.
+    /// Returns the most probable set whose number of members is certain enough: at least so many
+    /// hypotheses act with probability `level` or more. `None` if there is none.
     pub fn sure(&self, level: f64) -> Option<&HypothesisSet> {
         self.sets.iter().find(|explanation| self.as_many(explanation) >= level)
     }
 
-    /// Returns the probability that at least as many hypotheses act as a set has members.
+    /// Returns the probability that at least as many hypotheses act as `as_in` has members.
     pub(in crate::select) fn as_many(&self, as_in: &HypothesisSet) -> f64 {
         let holds =
             |explanation: &&HypothesisSet| explanation.hypotheses.len() >= as_in.hypotheses.len();
         self.sets.iter().filter(holds).map(|explanation| explanation.probability).sum()
     }
 
-    /// Returns an upper limit of the probability that noise and fewer hypotheses cause such
-    /// evidence. A likelihood ratio exceeds B at most with probability 1/B [Ville 1939].
+    /// Returns an upper limit of the probability that noise and fewer hypotheses than in `best`
+    /// cause such evidence. A likelihood ratio exceeds B at most with probability 1/B [Ville 1939].
     pub fn chance(&self, best: &HypothesisSet) -> f64 {
         let is_fewer = |known: &&HypothesisSet| known.hypotheses.len() < best.hypotheses.len();
         let fewer: f64 = self.sets.iter().filter(is_fewer).map(|known| known.probability).sum();
         odds_against(1.0 - fewer)
     }
 
-    /// Returns sets in which an effect replaces one member of `best`: at most `most` of the most
-    /// probable ones, and those with the best replacement of each member. Wrong limits are not
+    /// Returns sets in which an effect replaces one member of `best`: the `most` most probable
+    /// ones, and the best replacement of each member. Hypotheses about wrong limits are not
     /// replaced.
     pub(in crate::select) fn exchanged(
         &self,
@@ -117,8 +117,8 @@ impl Evidence {
         all
     }
 
-    /// Replaces the odds of some sets by their ln odds to `best`, each computed at a fit of that
-    /// set.
+    /// Returns the evidence with the odds of some sets replaced by `odds`: ln odds to `best`, each
+    /// computed at a fit of that set.
     pub(in crate::select) fn corrected(
         mut self,
         best: &HypothesisSet,
@@ -195,14 +195,15 @@ impl Evidence {
         instead.into_iter().map(|(effect, _)| effect).collect()
     }
 
-    /// Returns the claims about an effect; `None` if no set contains it.
+    /// Returns place, quantities and law of an effect with their probabilities; `None` if no set
+    /// contains the effect.
     pub fn claims_of(&self, effect: &Effect) -> Option<Claims> {
         let mut all = self.sets.iter().flat_map(|explanation| &explanation.hypotheses);
         all.find(|hypothesis| hypothesis.effect() == Some(effect))
             .map(|hypothesis| self.claims(hypothesis))
     }
 
-    /// Returns the claims about a hypothesis.
+    /// Returns place, quantities and law of a hypothesis with their probabilities.
     ///
     /// A hypothesis with another value of its searched argument counts as the same, unless the most
     /// probable set contains both.

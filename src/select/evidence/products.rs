@@ -26,7 +26,7 @@ const MIN_SIZE_OF_MEMBER: f64 = 1e-3;
 pub(super) struct Target {
     pub fit: LinearNeighbourhood,
     pub noise: Noise,
-    /// Log factor on the prior of a further effect whose family the set already contains.
+    /// Log factor on the prior of a hypothesis if the set already contains one of its family.
     pub alike: f64,
     /// Request to stop the search early.
     pub stop: Stop,
@@ -51,7 +51,7 @@ pub(super) struct CachedProducts {
     members: Vec<OnceLock<Member>>,
     /// Number of hypotheses after each extension of the list, 0 first.
     list_lengths: Vec<usize>,
-    /// Gains of hypotheses in addition to a set.
+    /// Gains of hypotheses when added to a set, by set and hypotheses.
     gains: Cache<GainKey, Vec<(f64, f64)>>,
     /// Converged sizes and log posterior of sets.
     settled: Cache<SizedSet, (Vec<f64>, f64)>,
@@ -179,7 +179,8 @@ impl<'a> Products<'a> {
         self.cache.settled.get_or_compute(&sized_set(members, sizes), settle)
     }
 
-    /// Returns the residual problem that a set with given sizes leaves.
+    /// Returns the residual problem that a set with given sizes leaves; `None` if its matrix has no
+    /// factor.
     pub fn reduced(&self, members: &[usize], sizes: &[f64]) -> Option<ReducedProblem<'_, 'a>> {
         let mut scales = Vec::new();
         let mut begins = Vec::new();

@@ -19,11 +19,11 @@ use super::products::{Products, Target};
 use super::search::{Weighted, reduced_by, search};
 use crate::problem::Effect;
 
-/// Smallest probability of a set whose hypotheses are considered again without some poses.
+/// Smallest probability of a set whose hypotheses are evaluated again without some poses.
 const MIN_REPEATED_PROBABILITY: f64 = 1e-3;
 
-/// Fit with the probable hypotheses about its residual, which are evaluated again without some
-/// poses.
+/// Fit with the probable hypotheses about its residual. They are evaluated again with some poses
+/// left out.
 struct Reevaluation<'a> {
     fitted: &'a Fitted,
     data: &'a Data<'a>,
@@ -62,8 +62,8 @@ impl<'a> Reevaluation<'a> {
         self.probable.iter().map(|&k| &self.hypotheses.all[k]).collect()
     }
 
-    /// Returns the positions, in the list of probable hypotheses, of those members of the best set
-    /// for which `of` is true.
+    /// Returns the indices, in the list of probable hypotheses, of the best set's members for which
+    /// `of` returns true.
     fn members(&self, of: impl Fn(&Hypothesis) -> bool) -> Vec<usize> {
         let candidates = self.probable_candidates();
         let is_held = |k: &usize| {

@@ -29,7 +29,8 @@ pub(super) fn weight_is_unknown(problem: &Problem) -> bool {
 }
 
 impl Columns<'_, '_> {
-    /// Adds the sag of each revolute joint, and of all of them together.
+    /// Adds the hypotheses that single revolute joints, or all of them, sag under a weight that is
+    /// not declared.
     pub(super) fn sag(&mut self) {
         if !weight_is_unknown(self.problem) {
             return;

@@ -50,8 +50,8 @@ impl Set {
         }
     }
 
-    /// Returns true if a member is a periodic error or has more than `MAX_WIDE_COLUMNS` columns
-    /// that belong to single poses, so that the set is not extended.
+    /// Returns true if the set is not extended: a member is a periodic error, or has more than
+    /// `MAX_WIDE_COLUMNS` columns for single poses.
     fn has_wide(&self, blocks: &[Block]) -> bool {
         self.members.iter().any(|&member| blocks[member].is_wide())
     }
@@ -362,7 +362,8 @@ pub(super) fn gains_beside(
     tried.iter().zip(left.gains(tried)).map(gain).collect()
 }
 
-/// Creates a set with these members, adding one after the other.
+/// Creates a set from these members. The size of each is the most probable one when it is added to
+/// the earlier members.
 fn assembled(members: &[usize], products: &Products) -> Option<Set> {
     let mut set = Set { members: Vec::new(), sizes: Vec::new(), ln_posterior: 0.0 };
     for &member in members {

@@ -5,8 +5,8 @@ use crate::model::effect::Term;
 use crate::model::parameter::{BeamField, JointField, ParameterSite, Regressor};
 use crate::problem::Problem;
 
-/// Returns the parameter sites whose columns the hypotheses need in addition to those of the
-/// effects.
+/// Returns the parameter sites of hypotheses without a law, for which derivatives are needed in
+/// addition to those of the effects.
 pub(super) fn hypothesis_sites(problem: &Problem) -> Vec<ParameterSite> {
     let mut sites: Vec<ParameterSite> = geometry_sites(problem).collect();
     sites.extend(

@@ -51,8 +51,8 @@ const MIN_LEAD: f64 = 0.002;
 /// Ratio of successive distances from an order in the grid over which its likelihood is integrated.
 const DISTANCE_RATIO: f64 = 1.3;
 
-/// Returns the joint, counted from 0, whose error is a function of its own command according to the
-/// hypothesis, or has a free value in every pose; `None` for other hypotheses.
+/// Returns the joint, counted from 0, at which a hypothesis is a function of that joint's command,
+/// or a free value in every pose; `None` for others.
 fn own_function(of: &Hypothesis, problem: &Problem) -> Option<usize> {
     let Site::Joint(joint) = of.site else { return None };
     let at_coordinate = of.coordinate == Some(ParameterSite::coordinate(problem, joint + 1));
@@ -79,7 +79,7 @@ fn row(low: f64, high: f64, step: f64) -> Vec<f64> {
     all.take_while(|order| *order <= high).take(MAX_SCANNED_ORDERS).collect()
 }
 
-/// Search for waves of any order, in addition to the other hypotheses about a fit.
+/// Search for waves of any order at the joints, in addition to the other hypotheses about a fit.
 #[derive(Clone, Copy)]
 pub(super) struct Waves<'w, 'h, 'a> {
     pub hypotheses: &'w Hypotheses<'h>,
@@ -159,8 +159,8 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
         found
     }
 
-    /// Returns, for each wave among some hypotheses, its index and ln of the factor on its prior:
-    /// each wave represents all orders near its order.
+    /// Returns index and log prior factor of each wave among `effects`. A wave represents all
+    /// orders near its order.
     pub fn spreads(&self, numbers: &[usize], effects: &[&Effect]) -> Vec<(usize, f64)> {
         let one = |(&number, effect): (&usize, &&Effect)| {
             let (joint, order) = order_of(effect)?;
@@ -171,7 +171,7 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
         numbers.iter().zip(effects).filter_map(one).collect()
     }
 
-    /// Returns the residual problem that some hypotheses leave.
+    /// Returns the residual problem that the hypotheses `rest` leave.
     fn beside(&self, rest: &[usize]) -> Option<ReducedProblem<'w, 'a>> {
         reduced_by(rest, self.products)
     }
@@ -181,14 +181,14 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
         self.fitted.problem.joints[joint].command_kind() == JointKind::Prismatic
     }
 
-    /// Returns the highest order of a wave that is searched for at a joint [cycles per revolution],
-    /// for a prismatic joint \[rad/m\].
+    /// Returns the highest order that is searched at a joint: [cycles per revolution], for a
+    /// prismatic joint \[rad/m\].
     fn highest(&self, joint: usize) -> f64 {
         if self.slides(joint) { TAU / MIN_LEAD } else { MAX_WAVE_ORDER }
     }
 
-    /// Returns the smallest and largest command of a joint \[rad\] or \[m\]; `None` if it does not
-    /// move.
+    /// Returns the smallest and largest command of a joint \[rad\] or \[m\]; `None` if the joint
+    /// does not move.
     fn range(&self, joint: usize) -> Option<(f64, f64)> {
         self.hypotheses.known(&Covariate::Command(joint)).map(|entry| entry.range)
     }
@@ -233,8 +233,8 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
         all
     }
 
-    /// Returns, for each of some sets, the orders with the log odds of the set with such a wave to
-    /// the set alone, best first.
+    /// Returns, for each of the residual problems `left`, the orders with the log odds that a wave
+    /// of that order acts, best first.
     fn gains(&self, joint: usize, orders: &[f64], left: &[ReducedProblem]) -> Vec<Vec<(f64, f64)>> {
         let problem = &self.fitted.problem;
         let of = |orders: &[f64]| {
@@ -267,9 +267,11 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
         (0..left.len()).map(of_set).collect()
     }
 
-    /// Returns the wave with the best non-integer order, unless an order in `taken` is about as
-    /// good, and unlisted harmonics that are about as good as the best. `gains` contains orders
-    /// with their log odds, best first.
+    /// Returns effects for the best orders. `gains` contains orders with their log odds, best
+    /// first.
+    ///
+    /// They are the wave with the best non-integer order, unless an order in `taken` is about as
+    /// good, and the harmonics that are not listed and about as good as the best.
     fn another(&self, joint: usize, gains: &[(f64, f64)], taken: &[f64]) -> Vec<Effect> {
         let Some(&(_, most)) = gains.first().filter(|(_, most)| *most > 0.0) else {
             return Vec::new();
@@ -296,8 +298,8 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
         all
     }
 
-    /// Returns the width of the likelihood about an order \[orders\], relative to its maximum, by the
-    /// trapezoid rule.
+    /// Returns the width of the likelihood about an order \[orders\]: its integral over its
+    /// maximum, by the trapezoid rule.
     fn spread(&self, joint: usize, order: f64, left: &ReducedProblem) -> f64 {
         let Some((low, high)) = self.range(joint) else { return 1.0 };
         let range = high - low;
@@ -329,7 +331,7 @@ fn written(order: f64, digits: usize) -> f64 {
 }
 
 impl Hypotheses<'_> {
-    /// Returns the candidate for an effect that is a wave of its joint's command.
+    /// Returns the candidate for an effect that is a wave of its joint's command, with its columns.
     fn function_of(&self, effect: &Effect, problem: &Problem) -> Option<Candidate> {
         let (joint, order) = match effect {
             Effect::JointHarmonic { joint, orders } => (joint - 1, f64::from(*orders.first()?)),

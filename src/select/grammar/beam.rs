@@ -8,57 +8,61 @@ use rayon::prelude::*;
 use super::site::{BEAM_VARIANCE, Noise, Span, WhitenedSite};
 use super::terms::{Chunk, Product, Terms};
 
-/// Terms of a sum at most.
+/// Maximum number of terms of a sum.
 const MAX_TERMS: usize = 3;
-/// Sums of equally many terms that are extended.
+/// Number of best sums of each length that are extended by a further term.
 const EXTENDED_SUMS: usize = 8;
-/// Sums whose terms are each exchanged.
+/// Number of best sums in which each term is exchanged in turn.
 const EXCHANGED_SUMS: usize = 4;
-/// Extensions of a sum that are kept, by evidence and by guide.
+/// Maximum number of extensions of a sum that are kept: by posterior, and by the guide
+/// [`Scored::guide`].
 const KEPT_EXTENSIONS: [usize; 2] = [100, 40];
-/// Difference of the predictions of two sums of the beam, in units of the noise.
+/// Smallest difference between the predictions of two sums that are both kept, in units of the
+/// noise.
 const MIN_BEAM_DIFFERENCE: f64 = 0.7;
 
-/// Sum of terms.
+/// Sum of products of factors: the terms of a formula.
 pub type Sum = Vec<Product>;
 
-/// Evidence of a sum.
+/// Scores of a sum.
 #[derive(Debug, Clone, Copy)]
 pub struct Scored {
-    /// ln of evidence and prior.
+    /// ln of the posterior: evidence times prior.
     pub ln_posterior: f64,
-    /// The same where what is not explained yet counts as noise: simple terms come first.
+    /// ln of the posterior if all that the sum leaves unexplained counts as noise. It prefers
+    /// simple terms first.
     guide: f64,
 }
 
-/// Sum that is extended.
+/// Sum that is extended, with the span of its columns.
 struct State {
     sum: Sum,
     ln_prior: f64,
     span: Span,
-    /// Weighted columns transposed, shape = (k, poses).
+    /// Columns of the sum times the weights W, transposed, shape = (k, poses).
     weighted: DMatrix<f32>,
 }
 
-/// Term that extends a sum, with its place.
+/// Term that extends a sum, with its index and scores.
 struct Extension {
     place: (usize, usize),
     scored: Scored,
 }
 
-/// Search at one joint.
+/// Beam search for the formula of an error at one joint.
 pub struct Beam<'a> {
-    /// All terms.
+    /// Terms from which sums are built.
     pub terms: &'a Terms,
-    /// Products at the joint.
+    /// Products of columns at the joint's coordinate, with the fit projected out.
     pub site: &'a WhitenedSite,
-    /// Likelihood over the noise.
+    /// Likelihood of a residual, integrated over the noise scale.
     pub noise: &'a Noise,
-    /// Sum of squares that a free value in each pose explains.
+    /// Sum of squares that one free value per pose would explain.
     explainable: f64,
 }
 
-/// Returns ln of the prior probability of a sum: each further term halves it, terms have no order.
+/// Returns ln of the prior probability of a sum. Each further term halves it; the order of terms
+/// does not count.
 pub fn ln_prior(terms: &Terms, sum: &Sum) -> f64 {
     let count = sum.len().max(1);
     let orderings: f64 = (1..=count).map(|k| k as f64).product();
@@ -67,12 +71,12 @@ pub fn ln_prior(terms: &Terms, sum: &Sum) -> f64 {
 }
 
 impl<'a> Beam<'a> {
-    /// Creates the search.
+    /// Creates the search at one joint.
     pub fn new(terms: &'a Terms, site: &'a WhitenedSite, noise: &'a Noise) -> Self {
         Self { terms, site, noise, explainable: site.explainable() }
     }
 
-    /// Returns all sums that were evaluated.
+    /// Returns all sums that were evaluated, with their scores.
     pub fn search(&self) -> BTreeMap<Sum, Scored> {
         let mut known: BTreeMap<Sum, Scored> = BTreeMap::new();
         let mut extended: BTreeSet<Sum> = BTreeSet::new();
@@ -98,7 +102,8 @@ impl<'a> Beam<'a> {
         known
     }
 
-    /// Extends sums by every term.
+    /// Extends each of `sums` by every term, and adds the new sums to `next` with their scores.
+    /// `extended` holds the sums extended before.
     fn extend(&self, sums: &[Sum], extended: &mut BTreeSet<Sum>, next: &mut BTreeMap<Sum, Scored>) {
         for sum in sums {
             extended.insert(sum.clone());
@@ -128,7 +133,7 @@ impl<'a> Beam<'a> {
         State { sum: sum.clone(), ln_prior, span, weighted }
     }
 
-    /// Returns the best extensions of a sum.
+    /// Returns the extensions of a sum with the best scores.
     fn extensions(&self, state: &State) -> Vec<Extension> {
         let count = state.sum.len() as f64;
         let further = if state.sum.is_empty() { 0.0 } else { 0.5_f64.ln() + (count + 1.0).ln() };
@@ -171,7 +176,8 @@ impl<'a> Beam<'a> {
         }
     }
 
-    /// Returns the best sums, by evidence and by guide in turn, each with another prediction.
+    /// Returns the best `most` sums, alternately by posterior and by guide. Their predictions
+    /// differ by at least `MIN_BEAM_DIFFERENCE`.
     fn best(&self, all: &BTreeMap<Sum, Scored>, most: usize) -> Vec<Sum> {
         const MAX_COMPARED_SUMS: usize = 120;
         let by = |of: fn(&Scored) -> f64| {
@@ -203,13 +209,13 @@ impl<'a> Beam<'a> {
     }
 }
 
-/// Returns a column of length 1.
+/// Returns the column scaled to length 1.
 fn normed(column: DVector<f64>) -> DVector<f64> {
     let norm = column.norm();
     if norm > 0.0 { column / norm } else { column }
 }
 
-/// Returns the best extensions by evidence and by guide.
+/// Returns the best extensions by posterior and by guide, at most [`KEPT_EXTENSIONS`] of each.
 fn best_of(mut all: Vec<Extension>) -> Vec<Extension> {
     if all.len() <= KEPT_EXTENSIONS[0] {
         return all;

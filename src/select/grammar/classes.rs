@@ -9,34 +9,35 @@ use super::site::{Noise, WhitenedSite};
 use super::terms::{Terms, product};
 use super::written::{Written, written};
 
-/// ln odds behind the best sum beyond which sums are left out.
+/// Log odds to the best sum beyond which sums are dropped.
 const MAX_LN_ODDS: f64 = 12.0;
-/// Sums that form classes at most.
+/// Maximum number of sums that are grouped into classes.
 const MAX_SUMS: usize = 400;
-/// Sums whose inner parameters are refined.
+/// Maximum number of sums whose inner parameters are refined.
 const MAX_REFINED: usize = 40;
-/// Classes that become laws.
+/// Maximum number of classes that are proposed as laws.
 const MAX_CLASSES: usize = 8;
-/// Difference of predictions, in units of the noise, below which sums are one class.
+/// Largest difference between the predictions of two sums of one class, in units of the noise.
 const MAX_CLASS_DIFFERENCE: f64 = 2.0;
-/// Values of an inner parameter that are tried: from one step below to one step above.
+/// Number of trial values of an inner parameter on either side of its listed value, within one grid
+/// step.
 const TRIAL_VALUES: i32 = 8;
 
-/// Law that stands for its class.
+/// Formula proposed for a class of sums with nearly equal predictions.
 #[derive(Debug, Clone)]
 pub struct Proposal {
-    /// Formulas and parameters of the simplest law of the class.
+    /// Formulas and parameters of the simplest sum of the class.
     pub law: Written,
-    /// ln of the prior probability of the class, its likelihood being that of this law.
+    /// ln of the prior probability of the class if its likelihood is that of the proposed formula.
     pub ln_prior: f64,
-    /// True if a law that the fit holds belongs to the class.
+    /// True if a law that the fit contains belongs to the class.
     pub is_present: bool,
 }
 
-/// Sum with the values of its inner parameters.
+/// Sum with refined values of its inner parameters.
 struct Refined {
     sum: Sum,
-    /// For each term the value of the parameter inside of each factor.
+    /// Values of the inner parameters: one list for each term, with one value for each factor.
     inner: Vec<Vec<f64>>,
     ln_posterior: f64,
     ln_evidence: f64,
@@ -46,12 +47,12 @@ struct Refined {
 
 struct Class {
     first: Refined,
-    /// ln of the sum of the posteriors.
+    /// ln of the summed posteriors of the class.
     ln_posterior: f64,
 }
 
-/// Returns the most probable laws at the coordinate of a joint, counted from 0; `present` are the
-/// columns of laws that the fit holds.
+/// Returns the most probable formulas of the error at a joint, counted from 0. `present` holds the
+/// columns of laws that the fit contains.
 pub fn proposals(
     known: &Quantities,
     joint: usize,
@@ -114,7 +115,7 @@ pub fn proposals(
     classes.into_iter().filter_map(proposal).take(MAX_CLASSES).collect()
 }
 
-/// Refinement of parameters inside of sums.
+/// Refinement of the inner parameters of sums, such as time constants and kink positions.
 struct Refiner<'a> {
     terms: &'a Terms,
     known: &'a Quantities,
@@ -123,8 +124,8 @@ struct Refiner<'a> {
 }
 
 impl Refiner<'_> {
-    /// Returns a sum with its inner parameters at their best values, averaged over the cell of the
-    /// grid that each stands for.
+    /// Returns a sum with the best values of its inner parameters. Its evidence is averaged over
+    /// the grid cell of each parameter.
     fn refined(&self, sum: Sum, is_refined: bool) -> Refined {
         let starts = |term: &Vec<u16>| {
             term.iter()

@@ -5,26 +5,27 @@ use std::collections::BTreeSet;
 use super::factor::{Factor, Form};
 use super::quantities::{Quantities, range};
 
-/// Highest order of a wave of a joint's command.
+/// Highest order of sin(kq) and cos(kq) of a joint's command.
 const HIGHEST_ORDER: u32 = 5;
-/// Positions of a kink along the range of a joint.
+/// Number of trial positions of a kink over the range of a joint.
 const KINK_POSITIONS: u32 = 9;
-/// Times of a step along the time measured.
+/// Number of trial times of a step over the measured duration.
 const STEP_TIMES: u32 = 16;
-/// Parts of the time measured at both ends without a step.
+/// Fraction of the measured duration at either end in which no step is tried.
 const STEP_MARGIN: f64 = 0.04;
-/// Time constants of a settling, as parts of the time measured.
+/// Smallest and largest time constant of a settling, as fractions of the measured duration, and
+/// number of trial values.
 const SETTLING_TIMES: (f64, f64, u32) = (0.08, 0.8, 4);
-/// Factors a and b of sums of angles a q + b q'.
+/// Factors a and b of the trial angle sums a q + b q'.
 const ANGLE_FACTORS: [[i32; 2]; 6] = [[1, 1], [1, -1], [2, 1], [2, -1], [1, 2], [1, -2]];
-/// Smallest part of the poses with a moment of either sign for the sign to be a factor.
+/// Smallest share of the poses that must have a moment of either sign for the sign to be a factor.
 const MIN_SIGN_SHARE: f64 = 0.1;
 
-/// Returns all factors at the coordinate of a joint.
+/// Returns all factors of formulas at the coordinate of the joint `own`, counted from 0.
 ///
-/// All kinds of factors are as probable. Half of a kind belongs to the joint itself, the other half
-/// to the other joints; order k has 1/k² of order 1; a parameter inside costs the number of values
-/// tried.
+/// All kinds of factors have the same prior probability. Half of it belongs to the joint itself,
+/// the other half to the other joints. Order k has 1/k² of the probability of order 1. The
+/// probability is divided by the number of trial values of an inner parameter.
 pub fn factors(known: &Quantities, own: usize) -> Vec<Factor> {
     let mut all: Vec<Factor> = Vec::new();
     let mut add = |form: Form, inner: Option<(f64, f64)>, ln_prior: f64| {

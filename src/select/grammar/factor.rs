@@ -2,81 +2,82 @@
 
 use super::quantities::{Quantities, quoted};
 
-/// Function of what is known of a pose; joints are counted from 0.
+/// Function of one quantity of a pose, from which formulas are built; joints are counted from 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Form {
-    /// q.
+    /// Command q of a joint.
     Command(usize),
-    /// q².
+    /// Squared command q² of a joint.
     Square(usize),
-    /// |q − c|.
+    /// Kink |q − c| in the command of a joint at an inner parameter c.
     Kink(usize),
-    /// sin kq or cos kq.
+    /// Single wave sin(kq) or cos(kq) of a joint's command.
     Wave {
-        /// The joint.
+        /// Joint, counted from 0.
         joint: usize,
         /// Order k.
         order: u32,
         /// True for a cosine.
         cosine: bool,
     },
-    /// sin kq and cos kq, each with a coefficient.
+    /// Pair sin(kq) and cos(kq), each with a coefficient.
     Harmonic {
-        /// The joint.
+        /// Joint, counted from 0.
         joint: usize,
         /// Order k.
         order: u32,
     },
-    /// sin or cos of a q + b q'.
+    /// Wave sin(a q + b q') or cos(a q + b q') of two joints' commands.
     OfSum {
-        /// The joints.
+        /// Joints of q and q', counted from 0.
         joints: [usize; 2],
         /// Factors a and b.
         factors: [i32; 2],
         /// True for a cosine.
         cosine: bool,
     },
-    /// Side from which a joint came.
+    /// Side from which a joint approached the pose, −1 or 1.
     Side(usize),
-    /// Moment of the loads about a joint's axis.
+    /// Moment of the loads about a joint's axis \[N·m\].
     Moment(usize),
-    /// Cube of that moment.
+    /// Cube of the moment of the loads about a joint's axis.
     CubicMoment(usize),
-    /// Sign of that moment.
+    /// Sign of the moment of the loads about a joint's axis, −1 or 1.
     MomentSign(usize),
-    /// Temperature above the reference.
+    /// Temperature above the reference \[K\].
     Warming,
-    /// Its square.
+    /// Square of the temperature above the reference.
     WarmingSquare,
-    /// Lagged temperature above the reference.
+    /// Temperature above the reference, lagged by a first-order filter \[K\].
     Lag,
-    /// Time since the first pose.
+    /// Time since the first pose, as a fraction of the measured duration.
     Elapsed,
-    /// 1 − exp(−t/τ).
+    /// Settling 1 − exp(−t/τ) with an inner parameter τ.
     Settling,
-    /// 1 from a time on.
+    /// Step in time: 0 before and 1 after an inner parameter.
     Step,
-    /// Payload.
+    /// Mass of the payload \[kg\].
     Payload,
-    /// Its square.
+    /// Square of the payload's mass.
     PayloadSquare,
-    /// Covariate, by its place among those that vary.
+    /// Declared covariate, by its index among those that vary.
     Covariate(usize),
 }
 
-/// A form with the value of the parameter inside and its prior probability.
+/// Form with the value of its inner parameter and its prior probability.
 #[derive(Debug, Clone)]
 pub struct Factor {
-    /// The function.
+    /// Function of the pose.
     pub form: Form,
-    /// Value of the parameter inside and its distance from the next value tried.
+    /// Value of the inner parameter and distance to the next trial value; `None` if the form has
+    /// none.
     pub inner: Option<(f64, f64)>,
     /// ln of its prior probability among all factors.
     pub ln_prior: f64,
 }
 
 impl Form {
-    /// Returns a number that forms of one kind share, for their prior.
+    /// Returns the index of the form's kind, by which prior probabilities are shared.
     pub fn family(self) -> usize {
         match self {
             Self::Command(_) => 0,
@@ -100,17 +101,19 @@ impl Form {
         }
     }
 
-    /// Returns the number of columns.
+    /// Returns the number of columns of the form: 2 for a harmonic, else 1.
     pub fn width(self) -> usize {
         if matches!(self, Self::Harmonic { .. }) { 2 } else { 1 }
     }
 
-    /// Returns true if a product with itself says nothing new: of signs and steps.
+    /// Returns true if the square of the form is a constant or the form itself, as of signs and
+    /// steps. A product with itself is then redundant.
     pub fn is_idempotent(self) -> bool {
         matches!(self, Self::Side(_) | Self::MomentSign(_) | Self::Step)
     }
 
-    /// Returns true if the catalogue has an effect of this form alone at the coordinate of `joint`.
+    /// Returns true if the catalogue contains this form alone as an effect at the coordinate of
+    /// `joint`.
     pub fn is_catalogued(self, joint: usize) -> bool {
         match self {
             Self::Command(_) | Self::Warming | Self::Lag | Self::Covariate(_) => true,
@@ -123,7 +126,8 @@ impl Form {
         }
     }
 
-    /// Returns the columns with `inner` as the parameter inside.
+    /// Returns the values of the form in every pose, one list for each column, with `inner` as its
+    /// inner parameter.
     pub fn columns(self, known: &Quantities, inner: f64) -> Vec<Vec<f64>> {
         let of = |all: &[(usize, Vec<f64>)], joint: usize, f: &dyn Fn(f64) -> f64| {
             let values = all.iter().find(|(known, _)| *known == joint);
@@ -173,8 +177,8 @@ impl Form {
         }]
     }
 
-    /// Returns the formulas of its columns; `inner` is the name or the number of the parameter
-    /// inside.
+    /// Returns the formula of each column as text. `inner` is the name or the value of the inner
+    /// parameter.
     pub fn texts(self, known: &Quantities, inner: &str) -> Vec<String> {
         let q = |joint: usize| format!("q{}", joint + 1);
         let angle = |joint: usize, order: u32| match order {

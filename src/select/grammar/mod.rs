@@ -25,5 +25,6 @@ pub(super) use prior::ln_prior;
 pub(super) use quantities::Quantities;
 pub(super) use site::{Noise, WhitenedSite};
 
-/// Poses on which laws are searched at most; the laws found are evaluated on those of the evidence.
+/// Maximum number of poses on which formulas are searched. The formulas found are then evaluated on
+/// all poses of the evidence.
 pub(super) const MAX_POSES: usize = 160;

@@ -6,7 +6,7 @@ use crate::problem::{Effect, Joint, JointKind, Problem};
 /// are some twenty families of formulas, each rarer than what the catalogue holds.
 const PRIOR_OF_GRAMMAR: f64 = 8.0;
 
-/// Returns ln of the prior probability of a law that the search wrote down, relative to a family of
+/// Returns ln of the prior probability of a formula from the search, relative to a family of
 /// effects; `None` for other effects.
 pub fn ln_prior(effect: &Effect, problem: &Problem) -> Option<f64> {
     let Effect::Law(law) = effect else { return None };

@@ -5,16 +5,17 @@ use crate::model::Pose;
 use crate::model::parameter::Regressor;
 use crate::problem::{JointKind, Problem};
 
-/// Time constant of the lag that is tried, as a part of the time measured.
+/// Time constant of the trial temperature lag, as a fraction of the measured duration.
 const LAG_FRACTION: f64 = 0.1;
 
-/// Quantities of formulas in every pose; what does not vary is left out. Joints are counted from 0.
+/// Quantities from which formulas are built, with their values in every pose. Quantities that do
+/// not vary are left out. Joints are counted from 0.
 pub struct Quantities {
-    /// Joints with their commands \[rad\] or \[m\].
+    /// Joints that move, with their commands \[rad\] or \[m\].
     pub commands: Vec<(usize, Vec<f64>)>,
-    /// For each joint, whether it turns.
+    /// True for each joint that is revolute.
     pub turns: Vec<bool>,
-    /// Joints with the sides from which they came.
+    /// Joints with the side from which they approached each pose, −1 to 1.
     pub sides: Vec<(usize, Vec<f64>)>,
     /// Joints with the moments of the loads about their axes [N·m].
     pub moments: Vec<(usize, Vec<f64>)>,
@@ -22,13 +23,13 @@ pub struct Quantities {
     pub warming: Option<Vec<f64>>,
     /// Time constant \[s\] and lagged temperature above the reference \[K\].
     pub lag: Option<(f64, Vec<f64>)>,
-    /// Time since the first pose, as a part of the time measured; that time \[s\].
+    /// Time since the first pose, as a fraction of the measured duration, and that duration \[s\].
     pub elapsed: Option<(Vec<f64>, f64)>,
     /// Payload \[kg\].
     pub payload: Option<Vec<f64>>,
-    /// Numbers and values of covariates.
+    /// Indices of the declared covariates that vary, with their values in their units.
     pub covariates: Vec<(usize, Vec<f64>)>,
-    /// Names of the covariates.
+    /// Names of all declared covariates.
     pub names: Vec<String>,
 }
 
@@ -81,19 +82,19 @@ impl Quantities {
     }
 }
 
-/// Returns the name of a covariate as formulas write it.
+/// Returns the name of a covariate as formulas write it, quoted if necessary.
 pub(super) fn quoted(name: &str) -> String {
     format!("`{name}`")
 }
 
-/// Returns values that are finite and not all the same.
+/// Returns the values if they are finite and not all equal, else `None`.
 fn varying(values: Vec<f64>) -> Option<Vec<f64>> {
     let (low, high) = range(&values);
     let scale = low.abs().max(high.abs());
     (values.iter().all(|value| value.is_finite()) && high - low > 1e-9 * scale).then_some(values)
 }
 
-/// Returns the smallest and the greatest of some values.
+/// Returns the smallest and the largest value.
 pub(super) fn range(values: &[f64]) -> (f64, f64) {
     values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &value| {
         (low.min(value), high.max(value))

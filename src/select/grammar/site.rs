@@ -2,32 +2,36 @@
 
 use nalgebra::{DMatrix, DVector};
 
-/// Points of the table of the likelihood over the noise.
+/// Number of points of the table of the likelihood, which is integrated over the noise.
 const NOISE_TABLE_POINTS: usize = 400;
-/// Variances of the coefficients, relative to that of their estimates, that are equally probable.
+/// Trial prior variances of the coefficients, relative to the variance of their estimates; equally
+/// probable a priori.
 const COEFFICIENT_VARIANCES: [f64; 3] = [300.0, 5000.0, 80_000.0];
-/// Variance that the beam search takes.
+/// Prior variance of the coefficients in the beam search, relative to the variance of their
+/// estimates.
 pub const BEAM_VARIANCE: f64 = 3000.0;
-/// Part of a column's squared length that must be left beside others for it to count.
+/// Smallest share of a column's squared length, outside the span of other columns, at which the
+/// column counts as independent.
 const MIN_LEFT: f64 = 1e-4;
 
-/// ln of the density of a residual by its sum of squares, integrated over the noise.
+/// Table of ln p(residual) by its sum of squares, integrated over the noise.
 pub struct Noise {
     squares: f64,
     table: Vec<f64>,
-    /// Estimate of the noise factor's square where all that is left is noise.
+    /// Squared noise factor f² estimated if all that remains is noise.
     pub factor: f64,
 }
 
 impl Noise {
-    /// Tabulates the density up to the squares of the residual; `freedom` are its degrees of freedom.
+    /// Tabulates the density from 0 to `squares`, the sum of squares of the residual with `freedom`
+    /// degrees of freedom.
     pub fn new(squares: f64, freedom: f64, ln_density: impl Fn(f64) -> f64) -> Self {
         let at = |k: usize| squares * (k as f64 / NOISE_TABLE_POINTS as f64).powi(2);
         let table: Vec<f64> = (0..=NOISE_TABLE_POINTS).map(|k| ln_density(at(k))).collect();
         Self { squares, table, factor: (squares / freedom.max(1.0)).max(1e-12) }
     }
 
-    /// Returns ln of the density where `taken` is taken off the squares, over that of the whole.
+    /// Returns the gain in ln p(residual) if columns reduce the sum of squares by `taken`.
     pub fn gain(&self, taken: f64) -> f64 {
         let left = ((self.squares - taken).max(0.0) / self.squares.max(f64::MIN_POSITIVE)).sqrt();
         let place = left * NOISE_TABLE_POINTS as f64;
@@ -37,7 +41,8 @@ impl Noise {
         self.table[low] * (1.0 - part) + self.table[low + 1] * part - self.table[NOISE_TABLE_POINTS]
     }
 
-    /// Returns ln of the evidence for columns of `rank` new directions that take `squares` off.
+    /// Returns the log evidence of columns with `rank` independent directions that reduce the sum
+    /// of squares by `squares`.
     pub fn evidence(&self, squares: f64, rank: usize) -> f64 {
         let at = |variance: f64| {
             self.gain(squares * variance / (1.0 + variance))
@@ -49,29 +54,30 @@ impl Noise {
     }
 }
 
-/// Products of columns at one coordinate: the column of a function f of the pose has the squares
-/// fᵀWf and the product fᵀp with the residual, W = diag(d) − BᵀB.
+/// Products of columns at one coordinate, with the fit projected out. The column of a function f of
+/// the pose has the squared length fᵀWf and the product fᵀp with the residual, W = diag(d) − BᵀB.
 pub struct WhitenedSite {
-    /// d, shape = (poses).
+    /// Vector d: squared length of the lever in each pose, shape = (poses).
     pub diagonal: DVector<f64>,
-    /// B, shape = (directions, poses).
+    /// Matrix B, shape = (directions, poses).
     pub less: DMatrix<f64>,
-    /// p, shape = (poses).
+    /// Vector p, shape = (poses).
     pub product: DVector<f64>,
 }
 
-/// Columns that are orthonormal in W, with what they take off the residual.
+/// Functions of the pose that are orthonormal in W, with their products with the residual.
 pub struct Span {
-    /// Functions of the pose, shape = (poses, k).
+    /// Orthonormal functions of the pose, shape = (poses, k).
     pub functions: DMatrix<f64>,
-    /// W times these functions.
+    /// Weight matrix W times these functions, shape = (poses, k).
     pub weighted: DMatrix<f64>,
-    /// Their products with the residual.
+    /// Products of the functions with the residual; their squares sum to the explained sum of
+    /// squares.
     pub along: DVector<f64>,
 }
 
 impl WhitenedSite {
-    /// Returns W times a function.
+    /// Returns the weight matrix W times a function of the pose.
     pub fn times(&self, function: &DVector<f64>) -> DVector<f64> {
         let mut out = self.diagonal.component_mul(function);
         let along = &self.less * function;
@@ -79,7 +85,8 @@ impl WhitenedSite {
         out
     }
 
-    /// Returns the largest sum of squares that functions of the pose take off the residual.
+    /// Returns the largest sum of squares that functions of the pose can explain: that of one free
+    /// value per pose.
     pub fn explainable(&self) -> f64 {
         let n = self.diagonal.len();
         let mut gram = DMatrix::from_diagonal(&self.diagonal);
@@ -90,7 +97,8 @@ impl WhitenedSite {
         solved.map_or(0.0, |solved| solved.dot(&self.product))
     }
 
-    /// Returns the span of some functions; those that the others or the fit take up are left out.
+    /// Returns the span of some functions of the pose. Functions that depend linearly on earlier
+    /// ones or on the fit are left out.
     pub fn span(&self, functions: &[DVector<f64>]) -> Span {
         let n = self.diagonal.len();
         let mut span = Span {
@@ -123,14 +131,14 @@ impl WhitenedSite {
         span
     }
 
-    /// Returns the squared length of a function's column in units of the noise.
+    /// Returns the squared length fᵀWf of a function's column, in units of the noise.
     pub fn squares(&self, function: &DVector<f64>) -> f64 {
         function.dot(&self.times(function))
     }
 }
 
 impl Span {
-    /// Returns the sum of squares taken off the residual.
+    /// Returns the sum of squares of the residual that the span explains.
     pub fn explained_squares(&self) -> f64 {
         self.along.norm_squared()
     }

@@ -7,23 +7,23 @@ use super::factor::Factor;
 use super::quantities::Quantities;
 use super::site::WhitenedSite;
 
-/// Probability of one, two and three factors.
+/// Prior probability that a term has one, two or three factors.
 const FACTOR_COUNT_PROBABILITIES: [f64; 3] = [0.6, 0.3, 0.1];
-/// Part of a column's length that must be left by the fit.
+/// Smallest share of a term's squared length that the fitted parameters must leave.
 const MIN_LEFT: f64 = 2e-3;
-/// Terms whose columns are multiplied together.
+/// Number of terms whose columns are multiplied together in one matrix product.
 const TERMS_PER_PRODUCT: usize = 1024;
-/// Terms of two factors that are kept.
+/// Maximum number of terms with two factors that are kept, the best ones.
 const MAX_PAIRS: usize = 8_000;
-/// Terms of two factors to which a third is added.
+/// Maximum number of terms with two factors to which a third factor is added.
 const MAX_EXTENDED: usize = 40;
 
-/// Numbers of the factors of a term, ascending.
+/// Product of factors, given by their indices in ascending order.
 pub type Product = Vec<u16>;
 
-/// Terms of one width with their columns.
+/// Terms with the same number of columns, with these columns.
 pub struct Chunk {
-    /// Columns of one term.
+    /// Number of columns of each term.
     pub width: usize,
     /// Factors of each term.
     pub terms: Vec<Product>,
@@ -31,25 +31,26 @@ pub struct Chunk {
     pub ln_prior: Vec<f64>,
     /// Columns, shape = (poses, terms × width).
     pub columns: DMatrix<f32>,
-    /// Squares of each column.
+    /// Squared length of each column, in units of the noise.
     pub squares: Vec<f64>,
-    /// Product of the two columns of each term of width 2.
+    /// Inner product of the two columns of each term of width 2.
     pub mixed: Vec<f64>,
-    /// Product of each column with the residual.
+    /// Inner product of each column with the residual.
     pub along: Vec<f64>,
 }
 
-/// All terms that are searched at one joint.
+/// Terms that the search for formulas at one joint combines.
 pub struct Terms {
     /// Factors with their columns.
     pub factors: Vec<Factor>,
     values: Vec<Vec<DVector<f64>>>,
-    /// Terms by width.
+    /// Terms in groups of equal width.
     pub chunks: Vec<Chunk>,
 }
 
 impl Terms {
-    /// Creates all factors, the products of two that do best, and products of three from these.
+    /// Creates the terms: all single factors, the best products of two, and products of three that
+    /// extend the best pairs.
     pub fn new(factors: Vec<Factor>, known: &Quantities, site: &WhitenedSite) -> Self {
         let columns = |factor: &Factor| {
             let columns = factor.form.columns(known, factor.inner.map_or(0.0, |inner| inner.0));
@@ -86,7 +87,7 @@ impl Terms {
         all
     }
 
-    /// Returns true if a product says something that fewer or other factors do not.
+    /// Returns true if no product of fewer or other factors is the same function.
     fn is_new(&self, term: &Product) -> bool {
         let of = |k: u16| &self.factors[usize::from(k)];
         let wide = term.iter().filter(|k| of(**k).form.width() > 1).count();
@@ -121,7 +122,7 @@ impl Terms {
             + orderings.ln()
     }
 
-    /// Returns the columns of a term.
+    /// Returns the columns of a term, one value per pose.
     pub fn columns(&self, term: &[u16]) -> Vec<DVector<f64>> {
         let all = term.iter().map(|&k| &self.values[usize::from(k)]);
         product(all.map(Vec::as_slice)).unwrap_or_default()
@@ -184,7 +185,7 @@ impl Terms {
         chunk
     }
 
-    /// Returns the terms of some chunks that take most off the residual, in chunks.
+    /// Returns the `most` terms that alone reduce the residual most, in chunks.
     fn best(chunks: Vec<Chunk>, most: usize) -> Vec<Chunk> {
         let mut gains: Vec<f64> = chunks.iter().flat_map(Chunk::lone_gains).collect();
         if gains.len() <= most {
@@ -195,7 +196,7 @@ impl Terms {
         chunks.into_iter().map(|chunk| chunk.above(least)).collect()
     }
 
-    /// Returns the terms that take most off the residual.
+    /// Returns the `most` terms that alone reduce the residual most.
     fn best_terms(chunks: &[Chunk], most: usize) -> Vec<Product> {
         let mut all: Vec<(f64, &Product)> =
             chunks.iter().flat_map(|chunk| chunk.lone_gains().zip(&chunk.terms)).collect();
@@ -205,13 +206,14 @@ impl Terms {
 }
 
 impl Chunk {
-    /// Returns what each term takes off the residual alone.
+    /// Returns the sum of squares that each term alone explains.
     fn lone_gains(&self) -> impl Iterator<Item = f64> + '_ {
         (0..self.terms.len()).map(|term| self.gain(term, |_, _| 0.0, |_| 0.0).0)
     }
 
-    /// Returns what a term takes off the residual and its number of new directions, where `less`
-    /// are the products of its columns that others take, and `taken` those with the residual.
+    /// Returns the sum of squares that a term explains in addition to a span, and its number of
+    /// independent directions. `less` returns the products of the term's columns within the span,
+    /// `taken` those with the residual.
     pub fn gain(
         &self,
         term: usize,
@@ -240,7 +242,7 @@ impl Chunk {
         ((b.1 * p * p - 2.0 * mixed * p * q + a.1 * q * q) / determinant, 2)
     }
 
-    /// Returns the terms that take more than `least` off the residual.
+    /// Keeps the terms that alone explain more than the sum of squares `least`.
     fn above(self, least: f64) -> Self {
         let gains: Vec<f64> = self.lone_gains().collect();
         let kept: Vec<usize> = (0..gains.len()).filter(|&k| gains[k] > least).collect();
@@ -262,7 +264,8 @@ impl Chunk {
     }
 }
 
-/// Returns the products of columns, one of each factor.
+/// Returns the products of the factors' columns: one column for each choice of one column from
+/// every factor.
 pub fn product<'a>(factors: impl Iterator<Item = &'a [DVector<f64>]>) -> Option<Vec<DVector<f64>>> {
     factors.map(<[DVector<f64>]>::to_vec).reduce(|left, right| {
         left.iter()

@@ -6,21 +6,22 @@ use super::quantities::Quantities;
 use super::terms::Terms;
 use crate::laws::LawParameter;
 
-/// Formulas of a law with the parameters inside.
+/// Formulas of a law with its inner parameters.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Written {
-    /// Name: joint and quantities, without numbers.
+    /// Name of the law: joint and quantities, without numbers.
     pub name: String,
-    /// Formulas, one for each coefficient.
+    /// Formulas as text, one for each coefficient.
     pub formulas: Vec<String>,
-    /// Parameters inside.
+    /// Inner parameters of the formulas.
     pub parameters: Vec<LawParameter>,
 }
 
-/// Digits of the values of inner parameters.
+/// Number of significant digits of inner parameters.
 const PARAMETER_DIGITS: i32 = 3;
 
-/// Writes a sum at a joint, counted from 0, with the values of its inner parameters.
+/// Writes a sum as a law of the joint with index `joint`, with the values `inner` of its inner
+/// parameters.
 pub fn written(
     (terms, known): (&Terms, &Quantities),
     joint: usize,
@@ -73,7 +74,7 @@ pub fn written(
     Written { name: name(joint, &formulas), formulas, parameters }
 }
 
-/// Joins factors by signs of multiplication; powers of one quantity become one.
+/// Joins factors by `*`; repeated factors become powers.
 fn joined(factors: &[String]) -> String {
     let mut powers: Vec<(&str, u32)> = Vec::new();
     for factor in factors {
@@ -94,7 +95,7 @@ fn joined(factors: &[String]) -> String {
     written.collect::<Vec<_>>().join("*")
 }
 
-/// Returns the name of a law: its joint, and its formulas without values that are searched.
+/// Returns the name of a law: its joint and its formulas, without the values of inner parameters.
 fn name(joint: usize, formulas: &[String]) -> String {
     let mut name = format!("joint{}", joint + 1);
     for formula in formulas {
@@ -115,7 +116,7 @@ fn name(joint: usize, formulas: &[String]) -> String {
     name
 }
 
-/// Rounds to a few digits.
+/// Rounds a value to [`PARAMETER_DIGITS`] significant digits.
 fn digits(value: f64) -> f64 {
     format!("{value:.*e}", usize::try_from(PARAMETER_DIGITS).unwrap_or(3)).parse().unwrap_or(value)
 }

@@ -40,7 +40,7 @@ pub(crate) struct Unknowns {
 /// depend linearly on earlier columns have zero rows in T and keep their values.
 #[derive(Debug)]
 pub(crate) struct LinearNeighbourhood {
-    /// Whitened residual at the optimum, with the priors' rows below.
+    /// Whitened residual at the optimum, followed by the rows of the priors.
     residual: DVector<f64>,
     /// Basis Q, shape = (3 N + priors, rank).
     basis: DMatrix<f64>,
@@ -129,7 +129,7 @@ impl LinearNeighbourhood {
         fit
     }
 
-    /// Moves to the optimum along the basis directions from index `first` on.
+    /// Moves the unknowns to the optimum along the basis directions from index `first` on.
     fn settle(&mut self, first: usize) {
         let new = self.basis.columns_range(first..);
         let along = new.tr_mul(&self.residual);
@@ -259,8 +259,8 @@ impl LinearNeighbourhood {
         self.share_within(unknowns).map(|(_, part)| part.norm_squared())
     }
 
-    /// Returns columns of the data, shape = (3 N, k), with the fitted parameters projected out,
-    /// shape = (3 N + priors, k).
+    /// Returns columns of the data, shape = (3 N, k), after the fitted parameters are projected
+    /// out, shape = (3 N + priors, k).
     pub fn left_of(&self, columns: &DMatrix<f64>) -> DMatrix<f64> {
         let mut left = columns.clone().resize_vertically(self.residual.len(), 0.0);
         // Below the data there is nothing at first.
@@ -280,8 +280,8 @@ impl LinearNeighbourhood {
         left
     }
 
-    /// Subtracts from columns their components along the basis. Rows from `filled` on are zero on
-    /// entry.
+    /// Subtracts from the columns `left` their components along the basis. Rows from `filled` on
+    /// are zero on entry.
     fn take_off(&self, left: &mut DMatrix<f64>, filled: usize) {
         if left.ncols() > MAX_SEQUENTIAL_COLUMNS {
             // The narrow side is transposed: this is the product that is fast.
@@ -296,7 +296,7 @@ impl LinearNeighbourhood {
         }
     }
 
-    /// Returns the whitened residual at the optimum, with the priors' rows below.
+    /// Returns the whitened residual at the optimum, followed by the rows of the priors.
     pub fn residual(&self) -> &DVector<f64> {
         &self.residual
     }
@@ -373,16 +373,16 @@ impl LinearNeighbourhood {
     }
 }
 
-/// Returns true if at least [`MIN_PART_OF_ONE_PROJECTION`] of the length of every column remains
-/// after a projection.
+/// Returns true if a projection leaves at least [`MIN_PART_OF_ONE_PROJECTION`] of the length of
+/// every column.
 fn most_is_left(left: &DMatrix<f64>, lengths: &[f64]) -> bool {
     left.column_iter()
         .zip(lengths)
         .all(|(column, length)| column.norm() >= MIN_PART_OF_ONE_PROJECTION * length)
 }
 
-/// Solves a system with a symmetric matrix with eigenvalues from 0 to 1. The solution is zero along
-/// eigenvalues near 0.
+/// Solves M x = `right` for a symmetric M with eigenvalues from 0 to 1. Components along
+/// eigenvalues near 0 are zero.
 fn decided(matrix: DMatrix<f64>, right: &DVector<f64>) -> DVector<f64> {
     if let Some(root) = inverse_factor(&matrix)
         && root.diagonal().iter().all(|value| (value * value).recip() > MIN_DETERMINED_ELSEWHERE)

@@ -12,8 +12,9 @@ use crate::model::parameter::{BeamField, Parameter, ParameterSite, Regressor};
 use crate::model::{LinearModel, Model, Pose, PoseResiduals};
 use crate::problem::{Effect, Problem};
 
-/// Mass at which the derivative by the position of an added mass is taken \[kg\]. Without a mass
-/// the position has no influence; so small a mass changes nothing else.
+/// Mass at which the derivative with respect to the position of an added mass is taken \[kg\]. With
+/// a mass of 0, the position would have no influence; this mass is too small to change anything
+/// else.
 const MASS_OF_DERIVATIVE: f64 = 1e-4;
 
 /// Model linearised at some poses, with derivatives at every site where effects may enter.
@@ -34,7 +35,8 @@ pub(in crate::select) struct Derivatives {
     sigma: Vec<f64>,
     /// Prior σ of relaxed parameters: those that the problem holds equal and that may differ here.
     relaxed: Vec<Option<f64>>,
-    /// Site of each additional column, with its index; the columns of `fitted` are counted first.
+    /// Site of each additional column and the column's index, counted after the columns of
+    /// `fitted`.
     places: Vec<(ParameterSite, usize)>,
     others: Vec<Arc<DVector<f64>>>,
 }
@@ -194,7 +196,8 @@ impl<'a> Linearised<'a> {
         &self.derivatives.fitted
     }
 
-    /// Returns those columns and the whitened residual, copied only if they are shared.
+    /// Returns the columns of [`fitted`](Self::fitted) and the whitened residual. They are copied
+    /// only if they are shared.
     pub fn into_fitted(self) -> (DMatrix<f64>, DVector<f64>) {
         let Derivatives { fitted, residual, .. } = Arc::unwrap_or_clone(self.derivatives);
         (Arc::unwrap_or_clone(fitted), Arc::unwrap_or_clone(residual))

@@ -101,8 +101,9 @@ fn independent(gram: &DMatrix<f64>, norms: &[f64], lengths: &[f64]) -> (Vec<usiz
     (kept, lower)
 }
 
-/// Returns Z with A D⁻¹ Z = 0 and ZᵀZ = I, for the rows A of active constraints, shape =
-/// (constraints, n), and the scale D of the unknowns. `None` if there are no constraints.
+/// Returns a basis Z of the directions that the active constraints leave free: A D⁻¹ Z = 0 and ZᵀZ
+/// = I, for constraint rows A = `active`, shape = (constraints, n), and the scale D of the
+/// unknowns. `None` if there are no constraints.
 pub(super) fn open(active: &DMatrix<f64>, scale: &[f64]) -> Option<DMatrix<f64>> {
     let mut rows =
         DMatrix::from_fn(active.nrows(), active.ncols(), |i, j| active[(i, j)] / scale[j]);
@@ -122,8 +123,8 @@ pub(super) fn open(active: &DMatrix<f64>, scale: &[f64]) -> Option<DMatrix<f64>>
     Some(eigen.eigenvectors.select_columns(&left))
 }
 
-/// Returns Q and T for the Jacobian with rows `below` it, each with one entry, restricted to the
-/// directions that the constraints `active` leave free.
+/// Returns Q and T of [`orthonormal`] for the Jacobian with additional rows `below`, each with one
+/// entry. Only directions that the constraints `active` leave free count.
 pub(super) fn held(
     jacobian: &DMatrix<f64>,
     below: &[(usize, f64)],

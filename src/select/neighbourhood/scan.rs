@@ -19,10 +19,10 @@ pub(crate) struct Scan<'a, 'l> {
     /// Candidates that were scored.
     pub effects: Vec<Effect>,
     driven: Driven,
-    /// Candidates that cannot be scored, because a derivative is not finite.
+    /// Candidates that are not scored, because a derivative with respect to them is not finite.
     pub refused: Vec<Effect>,
     scores: Vec<Score>,
-    /// Effective number of tries (Bonferroni factor within its family) of each candidate.
+    /// Effective number of candidates tried in its family, for each candidate (Bonferroni factor).
     tries: Vec<f64>,
     /// Number of families.
     families: usize,
@@ -33,7 +33,7 @@ pub(crate) struct Scan<'a, 'l> {
 /// Number of candidates whose columns are projected in one matrix product.
 const CANDIDATES_PER_PROJECTION: usize = 48;
 
-/// Candidate with its gain.
+/// Candidate of the scan with its gain and corrected p-value.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Tried {
     /// Index of the candidate in the scan's list.
@@ -144,7 +144,8 @@ impl<'a, 'l> Scan<'a, 'l> {
     }
 }
 
-/// Returns the number of tries of each candidate within its family, and the number of families.
+/// Returns the effective number of candidates tried within the family of each candidate, and the
+/// number of families.
 pub(crate) fn tries(effects: &[Effect], problem: &Problem) -> (Vec<f64>, usize) {
     let mut families: BTreeMap<&str, Vec<&Effect>> = BTreeMap::new();
     for effect in effects {

@@ -39,8 +39,8 @@ pub(crate) struct Gain {
     pub f: f64,
     /// Probability of an F at least as large under noise alone, uncorrected for other candidates.
     pub p: f64,
-    /// Information criterion: change of ν ln(squares) + k ln ν, without correction for the number
-    /// of candidates.
+    /// Information criterion: change of ν ln(squares) + k ln ν by the candidate. It is not
+    /// corrected for the number of candidates.
     pub criterion: f64,
 }
 
@@ -122,8 +122,8 @@ impl Score {
         self.lengths.iter().map(|length| if *length > 0.0 { length.sqrt() } else { 1.0 }).collect()
     }
 
-    /// Returns eigenvalue and eigenvector of G for unit-length columns, with bᵀ along each;
-    /// directions that the fitted parameters reproduce are left out.
+    /// Returns eigenvalue, eigenvector and bᵀ along it for each direction of G (columns scaled to
+    /// unit length) that the fitted parameters do not reproduce.
     fn seen(&self) -> Vec<(f64, DVector<f64>, f64)> {
         let (k, scale) = (self.lengths.len(), self.scale());
         let product = DVector::from_fn(k, |i, _| self.product[i] / scale[i]);

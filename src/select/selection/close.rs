@@ -58,7 +58,8 @@ pub struct ClosedLoop {
 }
 
 impl ClosedLoop {
-    /// Returns the held-out error after the round that added an effect, if later rounds added more.
+    /// Returns the held-out error after the round that added the effect, if later rounds added more
+    /// effects; else `None`.
     pub fn held_out_once(&self, found: &Found) -> Option<ErrorSummary> {
         Some(found.held_out_after).filter(|then| *then != self.after.fitted.held_out)
     }
@@ -179,13 +180,12 @@ pub fn close_by(
     })
 }
 
-/// Returns the fit that the loop ends with: the one found, or the declared one where that predicts
-/// poses that were left out better.
+/// Returns the fit with which the loop ends: the one found, or the declared one if that predicts
+/// left-out poses better.
 ///
-/// A found fit that has cautions is repeated from the nominal arm, for terms that were missing at
-/// first may have driven a parameter to where no step leads back from. If cautions remain, it is
-/// kept where it predicts better than the declared fit beyond chance: the cautions are residual_tests
-/// about their parameters.
+/// A found fit with cautions is repeated from the nominal arm, because terms that were missing at
+/// first may have driven a parameter to a wrong optimum. If cautions remain, it is kept only if it
+/// predicts significantly better than the declared fit.
 fn kept(
     declared: &Fitted,
     (fitted, evidence): (Fitted, Option<Evidence>),
@@ -215,9 +215,9 @@ fn kept(
     }
 }
 
-/// Returns the evidence about a fit that includes the rows set aside beside the added effects but not
-/// beside the declared ones; `None` if there are none. Such rows have gross errors, or they
-/// contradict the added effects.
+/// Returns the evidence about a fit including the rows that are outliers only of the fit with the
+/// added effects; `None` if there are none. Such rows have gross errors, or they contradict the
+/// added effects.
 fn evidence_with_doubtful_rows(
     state: &SearchState,
     declared: &Fitted,

@@ -16,8 +16,8 @@ use crate::select::harmonic_prior::is_gear;
 use crate::select::neighbourhood::tries;
 use crate::select::reference_check::{ReferenceCheck, reference_check};
 
-/// Smallest number of orders of one harmonic at which the claim is that some of them act, not that
-/// each does.
+/// Smallest number of orders of one harmonic from which the claim is only that some of the orders
+/// act.
 const SEVERAL_ORDERS: usize = 3;
 
 /// Effect that the loop added, with its status and tests.
@@ -190,14 +190,16 @@ fn over_subsets(claims: Claims, of_parts: &[&SubsetEvidence]) -> Claims {
     }
 }
 
-/// Returns the claims with probabilities of place, quantities and law no larger than others.
+/// Returns the claims with each probability (of place, quantities and law) limited to the one in
+/// `others`.
 fn no_surer_than(mut claims: Claims, others: [f64; 3]) -> Claims {
     let limited = [&mut claims.place.1, &mut claims.depends_on.1, &mut claims.law.1];
     limited.into_iter().zip(others).for_each(|(p, other)| *p = p.min(other));
     claims
 }
 
-/// Returns effects that may replace `effect`, only the most probable of each family at a place.
+/// Returns effects that may replace `effect` in a model with the effects `held`; of each family at
+/// a place, only the most probable. Each is at least `beside` times as probable as `effect`.
 fn alternatives(evidence: &Evidence, effect: &Effect, held: &[Effect], beside: f64) -> Vec<Effect> {
     let mut by_place: BTreeMap<String, usize> = BTreeMap::new();
     let mut found: Vec<Effect> = Vec::new();

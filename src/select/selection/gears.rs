@@ -42,14 +42,14 @@ fn coefficients(fitted: &Fitted) -> Vec<(usize, u32)> {
 /// Criterion by which the scale of the prior is chosen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum ScaleBy {
-    /// Chooses the scale that maximises the evidence.
+    /// Chooses the scale with the largest evidence.
     Evidence,
-    /// Predicts left-out parts of the joints' ranges best.
+    /// Chooses the scale that predicts left-out parts of the joints' ranges best.
     LeftOutRanges,
 }
 
-/// Returns the prior whose spectrum is estimated from the coefficients of a fit under the prior
-/// `first`. The scale is best by a criterion, in the linear neighbourhood of the fit.
+/// Returns the prior whose σₖ are estimated from the coefficients of a fit under the prior `first`.
+/// Its scale is chosen by `criterion` in the linear neighbourhood of the fit.
 pub(super) fn estimated_prior(
     fitted: &Fitted,
     data: &Data,

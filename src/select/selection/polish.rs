@@ -13,7 +13,7 @@ use crate::select::settings::{LN_ODDS_OF_ANOTHER_ARGUMENT, MAX_SHIFT_TIMES};
 
 /// Maximum number of moves of one argument to the best of its neighbouring values.
 const MAX_POLISHING_PASSES: usize = 8;
-/// Trial factors on a time constant, distance or order.
+/// Factors by which a time constant, distance or order is multiplied for its trial values.
 const TRIAL_FACTORS: [f64; 10] = [0.8, 0.86, 0.91, 0.95, 0.98, 1.02, 1.05, 1.1, 1.16, 1.25];
 
 /// Returns the fit with refined arguments. Each searched argument is replaced by the one that
@@ -41,8 +41,8 @@ pub(super) fn polished(
     if effects == added { Ok(None) } else { state.fit(fitted, &effects).map(Some) }
 }
 
-/// Returns the effect with the argument that explains all rows best, `None` unless that is clearly
-/// better than the present one. The argument moves from neighbour to neighbour, at most
+/// Returns the effect with the argument that explains all rows best; `None` if it is not clearly
+/// better than the present one. The argument moves to the best neighbouring value at most
 /// `MAX_POLISHING_PASSES` times.
 fn better_argument(fitted: &Fitted, data: &Data, effect: &Effect) -> Option<Effect> {
     let sums = fitted.around(data).sums();
@@ -72,8 +72,8 @@ fn better_argument(fitted: &Fitted, data: &Data, effect: &Effect) -> Option<Effe
     (best.0 > gain_of_present + LN_ODDS_OF_ANOTHER_ARGUMENT).then_some(best.1)
 }
 
-/// Returns the effect with neighbouring arguments: times between poses up to the neighbouring
-/// listed times, or multiples of the present value.
+/// Returns the effect with neighbouring values of its argument. Times move to times between poses,
+/// up to the next listed times; others are multiplied by [`TRIAL_FACTORS`].
 fn nearby(data: &Data, effect: &Effect) -> Vec<Effect> {
     let time = match effect {
         Effect::StationShift { at_time } | Effect::StationMove { at_time } => *at_time,

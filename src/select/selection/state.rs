@@ -12,8 +12,8 @@ use crate::select::fitted::Fitted;
 use crate::select::harmonic_prior::{HarmonicPrior, is_gear};
 use crate::select::settings::MAX_RECONSIDERED;
 
-/// Number of steps of an intermediate fit for each fit of its size that the budget `fit_work`
-/// allows.
+/// Number of solver steps that an intermediate fit may take for each fit of its size allowed by the
+/// budget `fit_work`.
 const STEPS_PER_PAID_FIT: u64 = 4;
 
 /// Result of one round of the loop.
@@ -35,12 +35,12 @@ pub(super) struct SearchState<'a> {
     pub declared: Vec<Effect>,
     /// Parameter rules that the problem itself declares.
     declared_rules: Vec<ParameterRule>,
-    /// Common prior of the harmonics of the next fit, if a joint has many orders.
+    /// Common prior of the harmonics for the next fit; `None` if no joint has many orders.
     pub prior: Option<HarmonicPrior>,
     /// Common prior of the harmonics in the latest fit.
     pub prior_of_latest: Option<HarmonicPrior>,
-    /// Probability of each joint's periodic error when it was added to the fit; joints count from
-    /// 1.
+    /// Probability, by joint counted from 1, of the joint's periodic error when it was added to the
+    /// fit.
     pub gear_probability: BTreeMap<usize, f64>,
     pub rounds: Vec<Round>,
     /// Fit of the latest round; before the first round, that of the declared problem.
@@ -228,7 +228,7 @@ impl<'a> SearchState<'a> {
         self.evidence = None;
     }
 
-    /// Returns true if the effects of a fit were not fitted together before, and records them.
+    /// Returns true if these effects were not fitted together before, and records that they were.
     pub fn is_new(&mut self, fitted: &Fitted) -> bool {
         let effects = fitted.effects();
         let is_same = |known: &Vec<Effect>| {

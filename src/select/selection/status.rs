@@ -17,7 +17,7 @@ pub enum Status {
     Found,
     /// The probability of its law is above one half, but below that of `found`.
     Probable,
-    /// At most the place of the cause is established; the law is one of several candidates.
+    /// At most the place of the cause is established: the law is one of several candidates.
     Located,
     /// Measurements that are independent of the fit contradict the effect.
     Contradicted,

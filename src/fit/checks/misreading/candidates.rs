@@ -7,25 +7,26 @@ use crate::measurement::Measurements;
 use crate::model::parameter::JointField;
 use crate::problem::{Joint, JointKind, Problem};
 
-/// Angle of a joint table in degrees, read as such, from which on it may be meant in radians.
+/// Smallest number of the joint table, declared in degrees, that may be meant in radians.
 const MIN_RADIANS: f64 = 0.3;
-/// Lengths between which a length of the joint table is plausible \[m\].
+/// Plausible lengths of a joint \[m\]; others may be in another unit.
 const PLAUSIBLE_LENGTHS: std::ops::Range<f64> = 0.01..3.0;
-/// Maximum number of joints of which every pair is tried.
+/// Maximum number of joints for which every pair is tried as exchanged or coupled.
 const MAX_PAIRED: usize = 12;
 /// Maximum number of masses that are tried one by one.
 const MAX_MASSES: usize = 12;
-/// Step of zero positions that are tried \[°\]; the fit finds what lies between.
+/// Step between trial zero positions \[°\]. A fit in full finds the values between them.
 const ZERO_POSITION_STEP: i16 = 15;
-/// Ratios that are tried, in hundredths; the fit finds what lies between.
+/// Trial ratios between motion and command, in hundredths. A fit in full finds the values between
+/// them.
 const TRIAL_RATIOS: [i16; 18] =
     [1, 5, 10, 20, 25, 33, 50, 67, 80, 90, 110, 125, 150, 200, 300, 400, 500, 1000];
 /// Maximum number of rows by which positions may be shifted.
 const MAX_SHIFT: i8 = 3;
-/// Number of places at which a shift of the rows behind is tried.
+/// Number of rows, evenly spaced, from which a shift of positions may begin.
 const SHIFT_PLACES: usize = 12;
 
-/// Length beyond which a number may be in millimetres \[m\].
+/// Smallest length that may be a number in millimetres declared in metres \[m\].
 pub(super) const MIN_MILLIMETRE_LENGTH: f64 = 1.0;
 
 /// Returns every misreading that the problem and its table allow.
@@ -57,7 +58,8 @@ pub(super) fn is_far(problem: &Problem) -> bool {
     problem.targets.is_empty() && problem.tool.target.norm() > MIN_MILLIMETRE_LENGTH
 }
 
-/// Returns misreadings of the joint columns: signs, exchanges, couplings, zeros and ratios.
+/// Returns the misreadings of the joint columns: signs, exchanged columns, couplings, zero
+/// positions and ratios.
 fn of_commands(problem: &Problem) -> Vec<Misreading> {
     let kind = |joint: usize| problem.joints[joint - 1].command_kind();
     let moving: Vec<usize> = (1..=problem.joints.len().min(64))
@@ -92,7 +94,7 @@ fn of_commands(problem: &Problem) -> Vec<Misreading> {
     all
 }
 
-/// Returns shifts of the positions against the configurations.
+/// Returns the misreadings in which positions are shifted by rows against the configurations.
 pub(super) fn of_order(table: &Measurements) -> Vec<Misreading> {
     let shifts = (-MAX_SHIFT..=MAX_SHIFT).filter(|&by| by != 0);
     let step = shift_step(table.len());
@@ -101,7 +103,7 @@ pub(super) fn of_order(table: &Measurements) -> Vec<Misreading> {
     places.flat_map(of_place).collect()
 }
 
-/// Returns the distance of the places at which a shift is tried, for a number of rows.
+/// Returns the distance between trial rows at which a shift may begin, given the number of rows.
 pub(super) fn shift_step(rows: usize) -> usize {
     (rows / SHIFT_PLACES).max(1)
 }
@@ -180,8 +182,8 @@ pub(super) fn of_loads(problem: &Problem, table: &Measurements) -> Vec<Misreadin
     all
 }
 
-/// Returns true if a joint is revolute and its column may be in radians, or else in degrees; both
-/// may be where the unit is not known.
+/// Returns true if a joint is revolute and its column may be in radians (`radians`), or else in
+/// degrees. Both are possible if the unit is not known.
 pub(super) fn turns_in(
     problem: &Problem,
     table: &Measurements,
@@ -200,7 +202,8 @@ pub(super) fn lengths_of(joint: &mut Joint) -> Vec<&mut f64> {
     [&mut joint.a, &mut joint.d].into_iter().chain(placement.into_iter().flatten()).collect()
 }
 
-/// Returns a number of the joint table \[rad\] or \[m\].
+/// Returns the entry of a field in the joint table \[rad\] or \[m\]; `None` if the joint has no
+/// such entry.
 pub(super) fn number_of(joint: &mut Joint, field: JointField) -> Option<&mut f64> {
     let placement = joint.placement.as_mut();
     match field {
@@ -216,8 +219,8 @@ pub(super) fn number_of(joint: &mut Joint, field: JointField) -> Option<&mut f64
     }
 }
 
-/// Returns the declared masses along the arm \[kg\]: of each joint its beam, what the beam carries,
-/// and its bodies.
+/// Returns the declared masses along the arm \[kg\], joint by joint: its beam, the load on the
+/// beam, and its bodies.
 pub(super) fn masses_of(problem: &mut Problem) -> Vec<&mut f64> {
     let mut masses = Vec::new();
     for joint in &mut problem.joints {

@@ -2,22 +2,22 @@
 
 use super::Misreading;
 
-/// Misreading that explains the measurements after a fit in full.
+/// Misreading with which a full fit explains the measurements.
 #[derive(Debug, Clone, PartialEq)]
 pub(in crate::fit) struct Explanation {
-    /// Description with the size that the fit found.
+    /// Description of the misreading, with the size that the fit found.
     pub words: String,
     /// Root mean squared error that the fit leaves \[m\], with the deviations from priors.
     pub rms: f64,
 }
 
-/// Misreadings that explain why an arm does not fit, the best first.
+/// Misreadings that would explain the misfit, best first.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(in crate::fit) struct Explanations {
-    /// Misreadings with which the nominal arm is near.
+    /// Misreadings with which the nominal arm is near the measurements.
     pub near: Vec<Misreading>,
-    /// Misreadings with which the fit is far better than as read.
+    /// Misreadings with which a full fit is far better than without.
     pub fitted: Vec<Explanation>,
-    /// Root mean squared error as read, fitted or not, with the deviations from priors \[m\].
+    /// Root mean squared error without a misreading, deviations from priors included \[m\].
     pub as_read: f64,
 }

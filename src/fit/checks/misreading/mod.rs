@@ -33,9 +33,9 @@ pub enum Misreading {
     /// Positions are in a left-handed frame: two coordinates are exchanged, or one has the wrong
     /// sign.
     Mirrored,
-    /// Joints whose measured angle has the opposite sign.
+    /// The measured angles of some joints have the opposite sign.
     Reversed {
-        /// Set of joints: bit k is joint k + 1.
+        /// Set of joints as bits: bit k is joint k + 1.
         joints: u64,
     },
     /// The columns of two joints, by number, are exchanged.
@@ -45,34 +45,35 @@ pub enum Misreading {
         /// Second joint.
         with: usize,
     },
-    /// The angle of a joint, by number, contains that of another one.
+    /// The angle of a joint contains the command of another joint (mechanical coupling). Joints are
+    /// counted from 1.
     Coupled {
-        /// Joint whose angle changes.
+        /// Number of the joint whose angle changes.
         joint: usize,
-        /// Joint whose command is added.
+        /// Number of the joint whose command is added.
         from: usize,
         /// True if the command is subtracted.
         is_opposite: bool,
     },
     /// Positions belong to the configuration of another row.
     Shifted {
-        /// Number of rows by which a position stands too late.
+        /// Number of rows by which a position comes too late.
         by: i8,
         /// First row that is shifted, counted from 0.
         from: usize,
     },
-    /// The zero position of a joint, by number, is off.
+    /// The zero position of a joint, counted from 1, is wrong.
     Zero {
-        /// Joint.
+        /// Number of the joint.
         joint: usize,
-        /// Angle that is to be added to the command \[°\].
+        /// Angle that must be added to the command \[°\].
         degrees: i16,
     },
-    /// A joint, by number, turns by a multiple of its command.
+    /// A joint, counted from 1, turns by a multiple of its command.
     Ratio {
-        /// Joint.
+        /// Number of the joint.
         joint: usize,
-        /// Multiple in hundredths.
+        /// Ratio of motion to command, in hundredths.
         percent: i16,
     },
     /// The joint table is in standard DH form, declared as modified.
@@ -81,32 +82,32 @@ pub enum Misreading {
     ModifiedForm,
     /// An angle of the joint table is in radians, declared in degrees.
     TableRadians {
-        /// Joint, by number; all joints if 0.
+        /// Number of the joint, from 1; 0 for all joints.
         joint: usize,
-        /// Angle.
+        /// Angle of the joint table.
         field: JointField,
     },
     /// An angle of the joint table is in degrees, declared in radians.
     TableDegrees {
-        /// Joint, by number; all joints if 0.
+        /// Number of the joint, from 1; 0 for all joints.
         joint: usize,
-        /// Angle.
+        /// Angle of the joint table.
         field: JointField,
     },
     /// A number of the joint table has the other sign.
     Sign {
-        /// Joint, by number.
+        /// Number of the joint, from 1.
         joint: usize,
-        /// Number with that sign.
+        /// Entry of the joint table with the wrong sign.
         field: JointField,
     },
     /// A length of the joint table is in another unit or has a misplaced decimal point.
     Length {
-        /// Joint, by number.
+        /// Number of the joint, from 1.
         joint: usize,
-        /// Length.
+        /// Length of the joint table.
         field: JointField,
-        /// Power of ten by which it is to be multiplied.
+        /// Exponent of the power of ten by which the length must be multiplied.
         power: i8,
     },
     /// The target of `[tool]` is in millimetres, declared as metres.
@@ -115,37 +116,39 @@ pub enum Misreading {
     ArmInMillimetres,
     /// A declared mass is in another unit or has a misplaced decimal point.
     Mass {
-        /// Mass, counted along the arm from 1; all masses if 0.
+        /// Number of the mass, counted along the arm from 1; 0 for all masses.
         mass: usize,
-        /// Power of ten by which it is to be multiplied.
+        /// Exponent of the power of ten by which the mass must be multiplied.
         power: i8,
     },
     /// The payloads of the table are in another unit.
     Payload {
-        /// Power of ten by which they are to be multiplied.
+        /// Exponent of the power of ten by which the payloads must be multiplied.
         power: i8,
     },
     /// Stiffnesses of joints are in another unit.
     Stiffness {
-        /// Power of ten by which they are to be multiplied; per degree instead of per radian if 0.
+        /// Exponent of the power of ten by which stiffnesses must be multiplied; 0 if they are per
+        /// degree instead of per radian.
         power: i8,
     },
     /// Gravity points along another axis of the base frame.
     Gravity {
-        /// Axis, 0…2.
+        /// Axis along which gravity points, 0…2 for x, y, z.
         axis: usize,
-        /// True if it points in the negative direction.
+        /// True if gravity points in the negative direction of the axis.
         is_negative: bool,
     },
 }
 
 impl Misreading {
-    /// Creates the misreading that these joints, by number, count the other way.
+    /// Creates the misreading that the angles of these joints, counted from 1, have the opposite
+    /// sign.
     pub fn reversed(joints: &[usize]) -> Self {
         Self::Reversed { joints: joints.iter().map(|joint| 1 << (joint - 1)).sum() }
     }
 
-    /// Returns the first row that is shifted, where rows are.
+    /// Returns the first row that is shifted; `None` for other misreadings.
     fn shifted_from(self) -> Option<usize> {
         match self {
             Self::Shifted { from, .. } => Some(from),
@@ -153,7 +156,8 @@ impl Misreading {
         }
     }
 
-    /// Returns the same shift of the rows from another one on.
+    /// Returns a shift by as many rows that begins at the row `from`; other misreadings stay as
+    /// they are.
     fn with_shift_from(self, from: usize) -> Self {
         match self {
             Self::Shifted { by, .. } => Self::Shifted { by, from },
@@ -161,7 +165,8 @@ impl Misreading {
         }
     }
 
-    /// Returns the group of misreadings that differ in size only, of which one is fitted in full.
+    /// Returns the key of misreadings that differ only in size. Of each key, one misreading is
+    /// fitted in full.
     fn group(self) -> (std::mem::Discriminant<Self>, usize, usize, Option<JointField>) {
         let (first, second, field) = match self {
             Self::Zero { joint, .. } | Self::Ratio { joint, .. } => (joint, 0, None),
@@ -179,7 +184,7 @@ impl Misreading {
     }
 }
 
-/// Returns the numbers of the joints in a set.
+/// Returns the numbers, from 1, of the joints in a set of bits.
 fn numbers_of(joints: u64) -> impl Iterator<Item = usize> {
     (0..64).filter(move |joint| joints >> joint & 1 == 1).map(|joint| joint + 1)
 }

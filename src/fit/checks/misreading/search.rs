@@ -15,29 +15,31 @@ use crate::measurement::{Measurements, Split};
 use crate::model::Model;
 use crate::problem::Problem;
 
-/// Largest error with a misreading corrected, relative to the error as read, at which the
+/// Largest ratio of the error with a misreading corrected to the error without, at which the
 /// misreading is an explanation.
 const MAX_EXPLAINED_RATIO: f64 = 0.2;
-/// Largest ratio to the smallest error at which a misreading is named in addition to the best one.
+/// Largest ratio to the smallest error at which a misreading is named as well as the best one.
 const MAX_RATIO_TO_BEST: f64 = 1.5;
-/// Largest error, as a multiple of the arm's reach, at which misreadings are tried. Millimetres
+/// Largest error, as a multiple of the arm's reach, for which misreadings are searched. Millimetres
 /// read as metres give a factor of 1000.
 const MAX_REACHES: f64 = 1e4;
-/// Largest error of the nominal arm, as a multiple of the arm's reach, that no misread geometry
-/// leaves: a degree in a joint is seven times as much.
+/// Largest error of the nominal arm, as a multiple of the arm's reach, for which only misread loads
+/// are searched. A joint angle that is wrong by one degree causes seven times as much.
 const MAX_REACHES_OF_LOADS: f64 = 2e-3;
 /// Maximum number of rows on which misreadings are tried.
 const MAX_ROWS: usize = 120;
-/// Maximum number of moving joints of which every subset is tried as reversed.
+/// Maximum number of moving joints for which every subset is tried as reversed.
 const MAX_REVERSED: usize = 7;
-/// Number of misreadings that are fitted in full: those with which the nominal arm is nearest.
+/// Maximum number of misreadings that are fitted in full: those with which the nominal arm is
+/// nearest.
 const MAX_FITTED_MISREADINGS: usize = 12;
-/// Maximum number of steps of such a fit.
+/// Maximum number of solver steps of a full fit with a misreading.
 const MAX_STEPS: u64 = 60;
-/// Part of the rows that a robust loss may set aside: the error is that of the others.
+/// Largest share of the rows that a robust loss may exclude; the error is then that of the other
+/// rows.
 const MAX_SET_ASIDE_SHARE: f64 = 0.3;
 
-/// Rows with which misreadings are tried.
+/// Rows and problem with which misreadings are tried.
 struct Trial<'a> {
     fitting: &'a Fitting<'a>,
     problem: &'a Problem,
@@ -51,7 +53,7 @@ impl CheckedFit<'_> {
     }
 }
 
-/// Finds the misreadings that explain why a fit does not meet its measurements.
+/// Finds the misreadings that explain why the fit does not agree with its measurements.
 fn explanations(fit: &CheckedFit) -> Explanations {
     let Fitting { split, measurements, model, .. } = fit.fitting;
     let nominal = fit.registered.identification.rms.norm;
@@ -93,8 +95,8 @@ fn explanations(fit: &CheckedFit) -> Explanations {
     explanations
 }
 
-/// Returns the misreadings with which the nominal arm is far nearer than `nominal`, of errors in
-/// ascending order.
+/// Returns the misreadings with which the nominal arm is far nearer than with the error `nominal`.
+/// `errors` is in ascending order.
 fn near(errors: &[(Misreading, f64)], nominal: f64) -> Vec<Misreading> {
     let best = errors.first().map_or(0.0, |found| found.1);
     let limit = (MAX_EXPLAINED_RATIO * nominal).min(MAX_RATIO_TO_BEST * best);
@@ -102,15 +104,15 @@ fn near(errors: &[(Misreading, f64)], nominal: f64) -> Vec<Misreading> {
 }
 
 impl Trial<'_> {
-    /// Returns the error of the registered nominal arm with each misreading undone \[m\].
+    /// Returns the error of the registered nominal arm with each misreading corrected \[m\].
     fn registered(&self, misreadings: &[Misreading]) -> Vec<(Misreading, f64)> {
         let error = |&misreading: &Misreading| Some((misreading, self.rms(misreading, false)?.0));
         let errors: Vec<_> = misreadings.par_iter().map(error).collect();
         errors.into_iter().flatten().collect()
     }
 
-    /// Fits the best misreadings in full; returns those that leave far less than `as_read`, the
-    /// best first.
+    /// Fits the most promising misreadings in full. Returns those that leave far less than
+    /// `as_read` \[m\], best first.
     fn fitted(&self, errors: &[(Misreading, f64)], as_read: f64) -> Vec<Explanation> {
         let mut groups = Vec::new();
         let mut is_first = |misreading: &Misreading| {
@@ -145,8 +147,9 @@ impl Trial<'_> {
         explained
     }
 
-    /// Returns the error that is left with a misreading undone \[m\], of the registered nominal arm
-    /// or, if `is_fitted`, of a fit in full, with the size of the misreading that the fit found.
+    /// Returns the remaining error \[m\] with a misreading corrected: that of the registered
+    /// nominal arm or, if `is_fitted`, of a full fit. Also returns the size of the misreading that
+    /// the fit found. `None` if it cannot be corrected or fitted.
     fn rms(&self, misreading: Misreading, is_fitted: bool) -> Option<(f64, Option<f64>)> {
         let Fitting { model, measurements, .. } = *self.fitting;
         let needs_problem = misreading.rewritten(self.problem);
@@ -202,8 +205,8 @@ impl Trial<'_> {
         error.is_finite().then_some((error, size.filter(|_| is_fitted)))
     }
 
-    /// Returns the root mean squared error of `rows` at the full parameter vector `x` \[m\] to
-    /// which the deviations from priors add like measured numbers: √((Σ e² + σ² Σ (x/σₚ)²) / n).
+    /// Returns the root mean squared error of `rows` at the full parameter vector `x` \[m\].
+    /// Deviations from priors count like measured numbers: √((Σ e² + σ² Σ (x/σₚ)²) / n).
     fn penalised(&self, fitting: &Fitting, rows: &[usize], x: &DVector<f64>) -> f64 {
         // Declared effects may go far beyond their priors.
         let parameters = fitting.model.parameters.iter().zip(x);
@@ -214,7 +217,8 @@ impl Trial<'_> {
         (square + fitting.sigma.powi(2) * deviations).sqrt()
     }
 
-    /// Moves the place from which rows are shifted to the one that leaves the smallest error.
+    /// Returns a shift of rows with the first shifted row that leaves the smallest error; other
+    /// misreadings stay as they are.
     fn refined(&self, (misreading, error): (Misreading, f64)) -> (Misreading, f64) {
         let step = shift_step(self.fitting.measurements.len());
         let places = misreading.shifted_from().into_iter().flat_map(|from| {
@@ -232,8 +236,8 @@ impl Trial<'_> {
             .unwrap_or((misreading, error))
     }
 
-    /// Returns the root mean squared error of `rows` at the full parameter vector `x` \[m\]; with a
-    /// robust loss, of the rows that are left when the farthest ones are set aside.
+    /// Returns the root mean squared error of `rows` at the full parameter vector `x` \[m\]. With a
+    /// robust loss, the rows with the largest errors are excluded.
     fn error(&self, fitting: &Fitting, rows: &[usize], x: &DVector<f64>) -> f64 {
         let measurements: &Measurements = fitting.measurements;
         let kind = measurements.leading().kind();
@@ -249,8 +253,8 @@ impl Trial<'_> {
         (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()
     }
 
-    /// Returns the set of two and more joints which, taken to count the other way, leave the
-    /// smallest error, with that error; of sets that do about as well, the smallest.
+    /// Returns the set of two or more joints that, if reversed, leave the smallest error, with that
+    /// error \[m\]. Of sets that are about as good, it is the smallest.
     fn several_reversed(&self, singles: &[Misreading]) -> Option<(Misreading, f64)> {
         let joint = |misreading: &Misreading| match misreading {
             Misreading::Reversed { joints } => Some(*joints),

@@ -15,13 +15,13 @@ use crate::problem::{Effect, Freedom, ParameterRule, Problem, Quantities};
 /// Length of an inch \[mm\].
 const MM_PER_INCH: f64 = 25.4;
 
-/// Returns ten to a power.
+/// Returns 10 to the given power.
 fn ten(power: i8) -> f64 {
     10.0_f64.powi(power.into())
 }
 
 impl Misreading {
-    /// Returns true if the misreading is one of the problem, not of the table.
+    /// Returns true if the misreading concerns the problem file, not the table.
     pub(super) fn concerns_problem(self) -> bool {
         matches!(
             self,
@@ -34,7 +34,8 @@ impl Misreading {
         )
     }
 
-    /// Returns the problem as it should have been written, if the misreading concerns the problem.
+    /// Returns the problem with the misreading corrected; `None` if it concerns the table or
+    /// corrects nothing.
     pub(super) fn rewritten(self, declared: &Problem) -> Option<Problem> {
         let mut problem = declared.clone();
         match self {
@@ -92,8 +93,8 @@ impl Misreading {
         Some(problem)
     }
 
-    /// Returns the problem in which the size of the misreading is free without a prior, where it
-    /// has one.
+    /// Returns the problem with the size of the misreading as a free parameter without a prior;
+    /// `None` if it has no size.
     pub(super) fn with_free_size(self, problem: &Problem) -> Option<Problem> {
         let (pattern, _) = self.size(0.0)?;
         let mut problem = match self {
@@ -112,7 +113,8 @@ impl Misreading {
         Some(problem)
     }
 
-    /// Returns the parameter that holds the size of the misreading, and the size for its value x.
+    /// Returns the name of the parameter for the size of the misreading, and the size if that
+    /// parameter has the value `x`; `None` if it has no size.
     pub(super) fn size(self, x: f64) -> Option<(String, f64)> {
         match self {
             Self::Ratio { joint, percent } => {
@@ -130,8 +132,8 @@ impl Misreading {
         }
     }
 
-    /// Returns the chosen rows of a table as they should have been read; `joints` is the number of
-    /// joints of the problem as it should have been written.
+    /// Returns the chosen rows of a table with the misreading corrected. `joints` is the number of
+    /// joints of the corrected problem.
     pub(super) fn undone(
         self,
         table: &Measurements,
@@ -172,7 +174,7 @@ impl Misreading {
         rows
     }
 
-    /// Changes a configuration to what it should have been read as.
+    /// Corrects a configuration `q` by the misreading.
     fn undo_command(self, q: &mut [f64], problem: &Problem, table: &Measurements) {
         match self {
             Self::Degrees | Self::Radians => {
@@ -196,8 +198,8 @@ impl Misreading {
     }
 }
 
-/// Multiplies a number of one joint, or of all, by `factor` where `applies`; `None` if it applies
-/// nowhere.
+/// Multiplies an entry of one joint, or of all if `joint` is 0, by `factor` if `applies` returns
+/// true for it. `None` if it does for none.
 fn scale(
     problem: &mut Problem,
     joint: usize,
@@ -217,7 +219,7 @@ fn scale(
     (count > 0).then_some(())
 }
 
-/// Changes the number of joints of each configuration; added joints are at zero.
+/// Sets the number of joints of each configuration; added joints are at zero.
 fn resize(rows: &mut Measurements, joints: usize) {
     let previous = rows.joints;
     let resized = |column: &[f64]| -> Vec<f64> {

@@ -5,7 +5,7 @@ use std::fmt;
 use super::{Misreading, numbers_of};
 use crate::model::parameter::JointField;
 
-/// Returns the number of the joint table that a misreading is about: `alpha of joint 3`.
+/// Returns the name of an entry of the joint table, such as `alpha of joint 3`.
 fn number(joint: usize, field: JointField) -> String {
     match joint {
         0 => format!("{} of all joints", field.name()),
@@ -13,14 +13,14 @@ fn number(joint: usize, field: JointField) -> String {
     }
 }
 
-/// Returns a power of ten as a factor: `0.001`.
+/// Returns a power of ten as a number, such as `0.001`.
 fn factor(power: i8) -> f64 {
     10.0_f64.powi(power.into())
 }
 
 impl Misreading {
-    /// Describes the misreading with the size that a fit found for it, where it has one: an angle
-    /// \[rad\] or a ratio.
+    /// Describes the misreading, with the size that a fit found if there is one: an angle \[rad\]
+    /// or a ratio.
     pub(super) fn described(self, size: Option<f64>) -> String {
         match (self, size) {
             (Self::Zero { joint, .. }, Some(size)) => {
