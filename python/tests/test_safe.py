@@ -71,9 +71,9 @@ def test_correlation(identified: flexcal.Identification) -> None:
 
 def test_results_cannot_be_changed(identified: flexcal.Identification) -> None:
     with pytest.raises(AttributeError, match="cannot be changed"):
-        identified.parameters = None  # type: ignore[assignment]
+        identified.parameters = None
     with pytest.raises(AttributeError, match="cannot be changed"):
-        identified.note = "mine"  # type: ignore[attr-defined]
+        identified.note = "mine"
     with pytest.raises(ValueError, match="read-only"):
         identified.covariance[0, 0] = 1.0
     table = identified.parameters
