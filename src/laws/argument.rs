@@ -2,16 +2,16 @@
 
 use serde::Serialize;
 
-/// Part of the arm that a covariate displaces: a joint, counted from 1, or the base.
+/// Part of the arm that a covariate displaces: a joint or the base.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Mount {
-    /// Joint that takes a command.
+    /// Joint that takes a command, counted from 1.
     Joint(usize),
     /// Base of the arm.
     Base,
 }
 
-/// Length of a spring at which it pulls with its preload alone \[m\].
+/// Length at which a spring pulls with its preload alone \[m\].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FreeLength(pub f64);
 
@@ -56,14 +56,13 @@ pub enum ArgumentKind {
 }
 
 impl ArgumentKind {
-    /// Returns true if the search determines the value. Effects that differ only in it count as one
-    /// effect with an undetermined value.
+    /// Returns true if the search determines the value of the argument. Effects that differ only in
+    /// it count as one effect with an undetermined value.
     pub fn is_searched(self) -> bool {
         matches!(self, Self::Order | Self::Time | Self::Duration | Self::Distance)
     }
 
-    /// Returns true if the data can distinguish values between those of the candidates, so that the
-    /// value can be refined.
+    /// Returns true if the search may refine the value between those of the listed candidates.
     pub fn is_scalable(self) -> bool {
         matches!(self, Self::Duration | Self::Distance)
     }
@@ -84,11 +83,11 @@ pub enum Argument {
     Number(f64),
     /// Point in a plane \[m\].
     Point([f64; 2]),
-    /// Length that is not part of the effect's place \[m\].
+    /// Length that does not identify the effect \[m\].
     Length(f64),
     /// The base, written as `true`.
     Base(bool),
-    /// Text that is not part of the effect's place.
+    /// Text that does not identify the effect.
     Text(String),
     /// List of formulas.
     Texts(Vec<String>),
@@ -126,8 +125,8 @@ impl Argument {
         }
     }
 
-    /// Returns the argument's part of the effect's place, which parameter names contain in
-    /// brackets; `None` if it has none.
+    /// Returns the text by which the argument identifies the effect in the brackets of parameter
+    /// names; `None` if it does not.
     pub(crate) fn place(&self) -> Option<String> {
         match self {
             Self::Joint(joint) => Some(joint.to_string()),

@@ -90,9 +90,10 @@ macro_rules! catalogue {
     };
 }
 
-/// Prior σ of an angle or length that repeats or drifts \[rad\] or \[m\].
+/// Prior σ of the amplitude or drift of a joint's coordinate or a beam's strain \[rad\] or \[m\]
+/// per unit of the regressor.
 const DRIFT_SIGMA: f64 = 1e-3;
-/// Prior σ of a relative error.
+/// Prior σ of a relative error, such as a ratio or scale.
 const RELATIVE_SIGMA: f64 = 0.01;
 /// Prior σ of a displacement of the instrument's readings \[m\].
 const READING_SHIFT_SIGMA: f64 = 5e-3;

@@ -192,7 +192,7 @@ impl Effect {
         self.follows(Quantity::has_memory)
     }
 
-    /// Returns the joint, counted from 1, that a gravity compensator relieves; `None` for other
+    /// Returns the joint, counted from 1, that a gravity compensator supports; `None` for other
     /// effects.
     pub(crate) fn compensated(&self) -> Option<usize> {
         self.acts_at(At::Joint(JointField::SpringRate)).then(|| self.joint()).flatten()
@@ -278,7 +278,8 @@ impl Effect {
         self.key_of(ArgumentKind::is_searched).map(|(key, _)| key)
     }
 
-    /// Returns kind and value of the argument that the search determines: a time, an order, a path.
+    /// Returns kind and value of the argument that the search determines, such as a time, an order
+    /// or a path; `None` if there is none.
     pub(crate) fn searched_value(&self) -> Option<(ArgumentKind, f64)> {
         let (key, kind) = self.key_of(ArgumentKind::is_searched)?;
         match self.argument(key)? {
@@ -303,13 +304,13 @@ impl Effect {
         self.searched().is_some() || self.is_described()
     }
 
-    /// Returns true for a law that a search wrote down.
+    /// Returns true for a law whose formula a search composed.
     pub(crate) fn is_described(&self) -> bool {
         matches!(self, Self::Law(law) if law.description().is_some())
     }
 
-    /// Returns true if all that it does is to change the coordinate of a joint, or to let it turn
-    /// about its axis.
+    /// Returns true if the effect only changes the coordinate of a joint or its rotation about its
+    /// axis.
     pub(crate) fn acts_at_joint(&self) -> bool {
         let is_there = |at: At| {
             matches!(
@@ -345,7 +346,8 @@ impl Effect {
         self.with(key, &Argument::Number(to_three_digits(factor * number)?))
     }
 
-    /// Returns the effect with another value of the argument `key`.
+    /// Returns the effect with another value of the argument `key`; `None` if it has no such
+    /// argument.
     fn with(&self, key: &str, value: &Argument) -> Option<Self> {
         let arguments = self.arguments();
         Self::build(self.name(), |wanted| {
@@ -372,8 +374,8 @@ impl Effect {
         }
     }
 
-    /// Returns the parts of the effect that are tested separately: the single orders of a harmonic,
-    /// or the effect itself.
+    /// Returns the parts of the effect that are tested separately: each order of a harmonic, or
+    /// else the effect itself.
     pub(crate) fn parts(&self) -> Vec<Self> {
         let Some((key, orders)) = self.orders() else { return vec![self.clone()] };
         let one = |order: u32| self.with(key, &Argument::Orders(vec![order]));

@@ -3,7 +3,7 @@
 use super::argument::ArgumentKind;
 use super::site::{ArmField, BeamField, JointField};
 
-/// Family of effects: the law of an effect, with place and numbers left open.
+/// Family of effects: a law whose place and numbers are arguments.
 ///
 /// Texts contain keys of arguments in braces, which are replaced by their values:
 /// `"sin({orders}*q{joint})"`.
@@ -17,20 +17,21 @@ pub struct Family {
     /// Parameters. If a formula or name contains a list argument, there is one parameter for each
     /// element.
     pub terms: &'static [TermEntry],
-    /// Description of the effect in words: "transmission ratio of joint {joint} is off".
+    /// Statement about the effect in words: "transmission ratio of joint {joint} is off".
     pub says: &'static str,
-    /// Description if times were not measured, with row numbers, counted from 1, instead of times;
-    /// empty if it is the same.
+    /// Statement for data without times, with row numbers (from 1) instead of times; empty if it is
+    /// the same.
     pub says_by_row: &'static str,
-    /// Description if the effect acts on the base instead of a joint.
+    /// Statement for an effect that acts on the base instead of a joint.
     pub says_of_base: &'static str,
     /// Conditions on the arm under which the effect is a candidate.
     pub only: &'static [Only],
-    /// Conditions under which data can show the effect; the first unmet one is the reason given.
+    /// Conditions under which data can show the effect. The first one that is not met is reported
+    /// as the reason.
     pub needs: &'static [Need],
     /// Values of arguments that are candidates of the search for effects.
     pub search: Search,
-    /// Rule for the share of the family's prior probability that one member has.
+    /// Rule by which the family's prior probability is shared among its members.
     pub chance: Chance,
 }
 
@@ -54,23 +55,24 @@ impl Family {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct TermEntry {
-    /// Part of its name after the dot.
+    /// Last part of the parameter's name, after the dot.
     pub name: &'static str,
-    /// Site of the model where it enters.
+    /// Site of the model at which the parameter acts.
     pub at: At,
-    /// Formula that multiplies it there; empty if it is itself the quantity of its site.
+    /// Formula that multiplies the parameter; empty if the parameter replaces the quantity at its
+    /// site.
     pub formula: &'static str,
-    /// Size that no realistic effect exceeds by much: 1 σ of its prior.
+    /// Rule for 1 σ of the parameter's prior, a size that realistic effects hardly exceed.
     pub prior: Prior,
     /// Value at which the effect vanishes, as a prior size; `None` for 0.
     pub nominal: Option<Prior>,
-    /// True if a negative value is physically impossible. An effect whose fit needs one is rejected
-    /// as a cause.
+    /// True if a negative value is physically impossible. The effect is rejected as a cause if its
+    /// fit needs one.
     pub never_negative: bool,
 }
 
 impl TermEntry {
-    /// Creates a parameter that is itself the quantity of its site; `size` is 1 σ of its prior
+    /// Creates a parameter that replaces the quantity at its site; `size` is 1 σ of its prior
     /// \[SI\].
     pub const fn at(at: At, name: &'static str, size: f64) -> Self {
         Self::driven(at, name, "", size)
@@ -112,9 +114,9 @@ pub enum At {
     Coordinate,
     /// Field of the joint.
     Joint(JointField),
-    /// Field of the joint: the first one for a revolute, the second one for a prismatic joint.
+    /// Two fields of the joint: the first applies to a revolute, the second to a prismatic joint.
     JointOrSlide(JointField, JointField),
-    /// Field of the link's beam, or of the beam before the joint.
+    /// Field of the link's beam; if a joint is named, of the beam before that joint.
     Beam(BeamField),
     /// Field of the arm as a whole.
     Arm(ArmField),
@@ -143,78 +145,78 @@ pub enum At {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum Prior {
-    /// Size that is the same on every arm; infinite if any size is plausible.
+    /// Size that is the same on every arm; infinite for a flat prior.
     Size(f64),
-    /// Coefficient c₃ at which the cube of the largest plausible moment rotates the joint by this
-    /// angle \[rad\].
+    /// Size of a coefficient c₃ in θ = c₃ M³ at which the largest plausible moment M rotates the
+    /// joint by this angle \[rad\].
     OfCubedMoment(f64),
-    /// Rate of a spring that balances the largest plausible moment.
+    /// Size of a spring rate at which the spring balances the largest plausible moment.
     SpringRate,
-    /// Preload of a spring that balances the largest plausible moment.
+    /// Size of a preload at which the spring balances the largest plausible moment.
     SpringPreload,
-    /// Largest coupling of twist with bending about y or z at which the strain energy stays
-    /// positive.
+    /// Size of the coupling of twist with bending about y or z: the largest one with a positive
+    /// strain energy.
     TwistCoupling {
         /// True for bending about z.
         about_z: bool,
     },
-    /// Half the length of the link.
+    /// Size of half the length of the link.
     HalfLength,
 }
 
-/// Condition on the arm for an effect. If it is not met, the effect is no candidate, or its
+/// Condition on the arm. If it is not met, the effect is no candidate of the search, or its
 /// declaration is refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Only {
-    /// The joint is revolute and takes a command; otherwise the effect is no candidate.
+    /// Requires a revolute joint that takes a command; otherwise the effect is no candidate.
     Turning,
-    /// The joint takes a command; otherwise the effect is no candidate.
+    /// Requires a joint that takes a command; otherwise the effect is no candidate.
     Commanded,
-    /// The joint has no stiffness; otherwise the effect is no candidate.
+    /// Requires a joint without declared stiffness; otherwise the effect is no candidate.
     RigidJoint,
-    /// The link has a length; otherwise the effect is refused.
+    /// Requires a link with a length; otherwise the effect is refused.
     Link,
-    /// The link does not bend; otherwise the effect is no candidate.
+    /// Requires a link without declared bending; otherwise the effect is no candidate.
     RigidLink,
-    /// Loads act on the rigid arm; otherwise the effect is refused.
+    /// Requires that loads act on the undeflected arm; otherwise the effect is refused.
     Undeflected,
-    /// A beam has a hoist; otherwise the effect is refused.
+    /// Requires a beam with a hoist; otherwise the effect is refused.
     Hoisted,
 }
 
-/// Condition on the data without which they cannot show an effect.
+/// Condition that data must meet to show an effect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Need {
-    /// Gravity is not zero.
+    /// Requires gravity, so that masses load the arm.
     Loads,
-    /// The joint named by the argument with this key moves.
+    /// Requires that the joint named by the argument with this key moves.
     Moves(&'static str),
-    /// The temperature is recorded and varies, and its reference is declared.
+    /// Requires a recorded temperature that varies, and a declared reference temperature.
     Temperature,
-    /// Times are recorded, so that the order of the poses is known.
+    /// Requires recorded times, so that the order of the poses is known.
     Clock,
-    /// There are enough poses before and after some time.
+    /// Requires a time with enough poses before and after it.
     Times,
-    /// Some poses have a payload, and gravity is not zero.
+    /// Requires gravity and poses with a payload.
     Payload,
-    /// The payload varies, and joints approach from both sides.
+    /// Requires a payload that varies, and joints that approach from both sides.
     PayloadFromBothSides,
-    /// The joint is approached from both sides. If the table records no sides, loads must exert a
-    /// moment on the joint instead.
+    /// Requires a joint that is approached from both sides. If no sides are recorded, loads must
+    /// exert a moment on the joint instead.
     Play,
-    /// The covariate is recorded and varies.
+    /// Requires a recorded covariate that varies.
     Covariate,
 }
 
-/// Values of the searched or listed argument that become candidates.
+/// Rule for the trial values of an effect's searched or listed argument.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Search {
     /// One candidate at each place; the effect has no searched argument.
     Places,
-    /// No candidates: the effect is only declared, or found by a separate search.
+    /// No candidates: the effect must be declared, or another search finds it.
     Declared,
     /// Each integer order up to 60.
     Orders,
@@ -224,11 +226,11 @@ pub enum Search {
     TimeConstants,
     /// Time constants that are fractions of the measured duration.
     SettlingTimes,
-    /// Paths that are fractions of the range of the joint.
+    /// Friction paths that are fractions of the range of the joint.
     Distances,
 }
 
-/// Rule for the share of a family's prior probability that one of its members has.
+/// Rule by which the prior probability of a family is shared among its members.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Chance {

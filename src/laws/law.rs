@@ -23,7 +23,7 @@ pub struct Law {
     terms: Vec<Parsed>,
     parameters: Vec<LawParameter>,
     covariates: Vec<String>,
-    /// ln of the prior probability of a law that a search wrote down.
+    /// Log prior probability of a law that a search composed; `None` for a declared one.
     description: Option<f64>,
 }
 
@@ -35,7 +35,7 @@ pub enum LawPlace {
     Joint(usize),
     /// Link, by the name of its beam.
     Link(String),
-    /// Base or measurement.
+    /// Base or measurement as a whole.
     Whole,
 }
 
@@ -181,14 +181,14 @@ impl Law {
         })
     }
 
-    /// Returns the law as a search wrote it down, with ln of its prior probability among all laws
-    /// that the search could write at its site.
+    /// Returns the law marked as composed by a search, with ln of its prior probability among all
+    /// laws that the search could compose at its site.
     #[must_use]
     pub fn described(self, ln_prior: f64) -> Self {
         Self { description: Some(ln_prior), ..self }
     }
 
-    /// Returns ln of the prior probability of a law that a search wrote down; `None` for a declared
+    /// Returns ln of the prior probability of a law that a search composed; `None` for a declared
     /// one.
     pub fn description(&self) -> Option<f64> {
         self.description

@@ -1,6 +1,6 @@
 //! Parameters inside formulas.
 
-/// Named parameter inside the formulas of a law.
+/// Named parameter inside the formulas of a law, such as a time constant.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LawParameter {
     /// Name in formulas.

@@ -321,7 +321,7 @@ impl Columns {
         Ok(())
     }
 
-    /// Returns true if rows may measure quantities other than positions.
+    /// Returns true if the table has columns of quantities other than positions.
     pub fn observes(&self) -> bool {
         let is_other = |role: &Role| matches!(role, Role::Field(_)) && !POSITION.contains(role);
         self.read.iter().map(|column| &column.role).chain(&self.file).any(is_other)
@@ -423,14 +423,14 @@ pub(super) fn is_filled(table: &Table, place: usize) -> bool {
     table.text(place).is_ok_and(|cell| !cell.is_empty())
 }
 
-/// Returns flexcal's name of a column, followed by the table's name if that differs.
+/// Returns flexcal's name of a column, followed by the name in the table if that differs.
 fn display_name(name: &str, theirs: Option<&String>) -> String {
     let theirs = theirs.filter(|theirs| *theirs != name).map(|theirs| format!(" ({theirs})"));
     name.to_owned() + &theirs.unwrap_or_default()
 }
 
-/// Returns the error for a missing column `name`. If a rule of `[data.columns]` assigned that name
-/// to another column, the message states the rule as the cause.
+/// Returns the error for a missing column `name`. If a rule of `[data.columns]` gave that name to
+/// another column, the message names the rule as the cause.
 fn blame_rule(error: InputError, (rule, name): (&ColumnRule, &str)) -> InputError {
     match *error.kind {
         InputErrorKind::Table(TableErrorKind::MissingColumn { write, .. }) => rule

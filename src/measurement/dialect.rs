@@ -191,10 +191,10 @@ pub(super) struct NormalizedText<R> {
     spaces: bool,
     /// True if the text passes through unchanged.
     is_unchanged: bool,
-    /// Text that is ready for the caller.
+    /// Normalised text that the caller has not yet taken.
     ready: Vec<u8>,
     given: usize,
-    /// Text read beyond the last line.
+    /// Text that was read beyond the end of the last normalised line.
     unread: Vec<u8>,
     ended: bool,
 }

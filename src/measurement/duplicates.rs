@@ -7,7 +7,8 @@ use crate::error::{Warning, WarningKind};
 
 /// Maximum number of copies that the warning names in addition to the first.
 const MAX_NAMED_COPIES: usize = 3;
-/// Resolution of the readings, in units of σ, below which equal readings are unlikely to be chance.
+/// Resolution of the readings, in units of σ, below which equal readings are unlikely to occur by
+/// chance.
 const FINE_RESOLUTION: f64 = 0.1;
 /// Resolution below which equal readings are unlikely if σ is unknown \[m\].
 const FINE_RESOLUTION_WITHOUT_SIGMA: f64 = 1e-6;
@@ -61,8 +62,8 @@ impl Measurements {
         RESOLUTIONS.into_iter().find(|step| is_whole(*step))
     }
 
-    /// Returns the bit patterns of everything measured in a row, by which rows are compared. A
-    /// measured time is included if `by_time` is true.
+    /// Returns the bit patterns of all measured numbers of a row, by which rows are compared. The
+    /// time is included if it was measured and `by_time` is true.
     fn bits(&self, row: usize, by_time: bool) -> Vec<u64> {
         let columns =
             [&self.sigma, &self.payload, &self.hoist, &self.temperature].into_iter().flatten();

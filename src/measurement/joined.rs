@@ -27,7 +27,7 @@ pub(super) struct JoinedLog {
     of_name: HashMap<String, usize>,
     /// Row indices in the order of their times, for a join by time.
     by_time: Vec<usize>,
-    /// Indices of the joint table's columns that are appended to the current table.
+    /// Indices of the joint table's columns that are appended to the current table of positions.
     appended: Vec<usize>,
     /// Column of the key in the current table, and its conversion to seconds.
     key: Option<Key>,
@@ -36,7 +36,8 @@ pub(super) struct JoinedLog {
     unpaired: Vec<Location>,
     paired: usize,
     decoding_warnings: Vec<Warning>,
-    /// For rows without a partner in a join by time, the time to the nearest row of the log \[s\].
+    /// Time from each row without a partner to the nearest row of the log \[s\]; empty unless
+    /// joined by time.
     gaps: Vec<f64>,
 }
 

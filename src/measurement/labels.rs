@@ -25,8 +25,8 @@ impl LabelsBuilder {
     }
 }
 
-/// Names of poses: numbers if all names are numbers, otherwise words; incomplete if a row has no
-/// name.
+/// Names of poses collected so far: numbers if all names are numbers, otherwise words. Incomplete
+/// if a row has no name.
 pub(super) enum PoseNames {
     Numbers(Vec<f64>),
     Words(LabelsBuilder),

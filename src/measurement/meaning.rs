@@ -48,7 +48,8 @@ impl Numbering {
         self.joints.iter().position(|&index| index == joint).unwrap_or(joint) + 1
     }
 
-    /// Suggests the column that an unknown name probably means, out of those missing in the table.
+    /// Returns the column name that an unknown name probably means, among those that the table
+    /// lacks; `None` if none is similar.
     pub fn meant(&self, name: &str, present: &BTreeSet<&str>, problem: &Problem) -> Option<String> {
         let moving = || {
             problem
@@ -200,8 +201,7 @@ fn by_joint_name(name: &str, problem: &Problem) -> Option<Result<Meaning, InputE
     }
 }
 
-/// Returns true if results depend on the column with the name `meant`. Names of poses do not affect
-/// the fit.
+/// Returns true if the fit uses the column with the name `meant`. Names of poses have no influence.
 pub(super) fn affects_results(meant: &str) -> bool {
     let base = split_unit(meant).0;
     base != "pose"

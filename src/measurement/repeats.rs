@@ -14,7 +14,7 @@ const LENGTH_STEP: f64 = 1e-4;
 const LOAD_STEP: f64 = 0.01;
 /// Difference up to which temperatures count as equal \[K\].
 const TEMPERATURE_STEP: f64 = 1.0;
-/// Difference below which integer codes of words and directions count as equal.
+/// Difference below which integer codes of words and directions count as equal: less than one.
 const WORD_STEP: f64 = 0.5;
 
 impl Measurements {

@@ -309,7 +309,7 @@ impl RowsBuilder {
     }
 }
 
-/// Sets element `place` of a list, if it exists.
+/// Sets the element at index `place` of a list if it exists; an empty list stays empty.
 fn set(list: &mut [f64], place: usize, value: f64) {
     if let Some(element) = list.get_mut(place) {
         *element = value;

@@ -10,16 +10,16 @@ worded! {
     #[derive(Debug, Clone, Copy, PartialEq, Eq)]
     #[non_exhaustive]
     pub enum Ablation: as_str {
-        /// No elasticity: geometry alone.
+        /// Keeps no elasticity: the arm is rigid.
         Rigid = "rigid";
-        /// Elasticity of joints and of the base: rotation of revolute joints, bending of slides;
-        /// rigid links.
+        /// Keeps the elasticity of joints and base (rotation of revolute joints, bending of
+        /// slides), with rigid links.
         JointsOnly = "joints-only";
-        /// Elasticity of the links: stretch, bending and twist; rigid joints and base.
+        /// Keeps the elasticity of the links (stretch, bending, twist), with rigid joints and base.
         LinksOnly = "links-only";
-        /// Bending of the links alone.
+        /// Keeps the bending of the links alone.
         BendingOnly = "bending-only";
-        /// All of the elasticity.
+        /// Keeps the whole elasticity.
         All = "all";
     }
 }

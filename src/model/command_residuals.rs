@@ -16,7 +16,8 @@ pub struct CommandResiduals<'a> {
     /// the mimic joints.
     joints: PoseResiduals<'a>,
     commands: usize,
-    /// Column of the leader's correction, and ratio, of each mimic joint.
+    /// For each mimic joint, the column of its leader's correction and the ratio of its motion to
+    /// the leader's.
     followers: Vec<(usize, f64)>,
 }
 

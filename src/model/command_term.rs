@@ -10,7 +10,7 @@ use crate::problem::{Mimic, Problem};
 pub(super) enum TermSite {
     /// Coordinate of a joint.
     Joint(usize),
-    /// Strain of a joint's beam without load: elongation or a curvature.
+    /// Strain that a joint's beam has without load: elongation or a curvature.
     Strain {
         /// Index of the joint.
         joint: usize,
@@ -21,7 +21,8 @@ pub(super) enum TermSite {
     Motion {
         /// Index of the joint.
         joint: usize,
-        /// Index 0 to 5 before the joint turns, 6 to 11 behind it.
+        /// Index of the motion: 0 to 5 before the joint's rotation, 6 to 11 behind it (x, y, z, rx,
+        /// ry, rz).
         which: usize,
     },
 }
@@ -63,8 +64,8 @@ impl CommandTerm {
 }
 
 impl TermSite {
-    /// Returns the joint coordinate or the beam strain that a parameter at `site` adds to; `None`
-    /// for every other site.
+    /// Returns the coordinate, strain or motion to which a parameter at `site` adds; `None` for
+    /// every other site.
     fn of(site: ParameterSite) -> Option<Self> {
         match site {
             ParameterSite::Joint { joint, field: JointField::Theta | JointField::D } => {

@@ -9,7 +9,7 @@ use crate::problem::{JointOffsets, PoseView};
 #[derive(Debug, Clone, Default)]
 pub(super) struct CommandTerms {
     series: Vec<HarmonicSum>,
-    /// Terms that no [`HarmonicSum`] contains.
+    /// Terms that are evaluated one by one, because no [`HarmonicSum`] contains them.
     others: Vec<CommandTerm>,
     configuration: Vec<f64>,
     offsets: Vec<JointOffsets>,

@@ -15,28 +15,30 @@ use crate::spatial::{Frame, rotation_axes};
 pub(super) struct Base {
     /// Frame of the base, measuring frame.
     pub frame: Frame<f64>,
-    /// Unit vectors along which its translation coordinates x, y and z move it, measuring frame.
+    /// Unit vectors along which the translation coordinates x, y and z move the base, measuring
+    /// frame.
     pub directions: [Vector3<f64>; 3],
-    /// Derivatives of its axes with respect to its rotation vector.
+    /// Derivatives of the base's axes with respect to its rotation vector.
     rotation_slopes: [Frame<f64>; 3],
-    /// Jacobian columns of effects that rotate it about the measuring frame's origin, each with the
-    /// derivative of that rotation.
+    /// Jacobian columns of effects that rotate the base about the measuring frame's origin, each
+    /// with the derivative of the base frame.
     effect_slopes: Vec<(usize, Frame<f64>)>,
-    /// Jacobian columns of its translation and its rotation vector; `None` for fixed coordinates.
+    /// Jacobian columns of the base's translation and rotation vector; `None` for fixed
+    /// coordinates.
     pub columns: [Option<usize>; 6],
 }
 
 /// Target with its derivatives, and the Jacobian column of each of its six coordinates.
 pub(super) struct Target {
-    /// Index of the joint whose frame carries it.
+    /// Index of the joint whose frame carries the target.
     pub joint: usize,
-    /// Position in the joint's frame \[m\].
+    /// Position of the target in the joint's frame \[m\].
     pub position: Vector3<f64>,
-    /// Unit vectors of its axes, joint's frame.
+    /// Unit vectors of the target's axes, joint's frame.
     pub axes: [Vector3<f64>; 3],
-    /// Derivatives of the axes with respect to its rotation vector.
+    /// Derivatives of the target's axes with respect to its rotation vector.
     rotation_slopes: [Frame<f64>; 3],
-    /// Jacobian columns of its position and its rotation vector; `None` for fixed coordinates.
+    /// Jacobian columns of the target's position and rotation vector; `None` for fixed coordinates.
     pub columns: [Option<usize>; 6],
 }
 
@@ -130,8 +132,8 @@ impl Target {
         }
     }
 
-    /// Returns, for each free coordinate of its rotation vector, its column and the derivatives of
-    /// the target's axes, in the frame that carries it.
+    /// Returns, for each free coordinate of the target's rotation vector, its column and the
+    /// derivatives of the target's axes, joint's frame.
     pub fn axis_slopes(&self) -> impl Iterator<Item = (usize, &[Vector3<f64>; 3])> {
         let columns = self.columns[3..].iter().zip(&self.rotation_slopes);
         columns.filter_map(|(column, slope)| Some(((*column)?, &slope.axes)))

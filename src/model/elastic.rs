@@ -28,7 +28,7 @@ pub(super) struct Elastic {
     ws: Workspace<Dual64>,
 }
 
-/// Parameters that act on a single segment, with their segment and direction index in it.
+/// Parameters that act on a single segment, with the segment and the index of the derivative in it.
 struct SegmentInputs {
     sensitivity: Sensitivity,
     inputs: Vec<(Input, Segment, usize)>,

@@ -10,8 +10,8 @@ const LANES: usize = 4;
 /// Minimum number of harmonics from which a sum by recurrence is faster than separate evaluation
 /// (timed).
 const MIN_HARMONICS: usize = 8;
-/// Minimum average number of sines and cosines in a group of [`LANES`] orders, below which most
-/// lanes would multiply zeros.
+/// Smallest average number of sines and cosines in a group of [`LANES`] orders at which a sum is
+/// used. With fewer, most lanes would multiply zeros.
 const MIN_DENSITY: usize = 2;
 /// Largest order k in a sum; it limits the memory of a sum with few high orders.
 const MAX_ORDER: u32 = 1024;

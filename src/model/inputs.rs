@@ -4,13 +4,13 @@
 use super::Model;
 use crate::model::parameter::{ParameterSite, Regressor, slope_regressor};
 
-/// Scalar of the arm with the Jacobian columns of the parameters that act on it.
+/// Scalar quantity of the arm, with the Jacobian columns of the parameters that act on it.
 #[derive(Debug, Clone)]
 pub(super) struct Input {
     pub site: ParameterSite,
-    /// Index of the parameter that equals this scalar, if one does and is unknown.
+    /// Index of the unknown parameter that equals this scalar; `None` if there is none.
     pub parameter: Option<usize>,
-    /// Jacobian column of that parameter.
+    /// Jacobian column of the parameter that equals this scalar; `None` if there is none.
     pub column: Option<usize>,
     /// Jacobian columns of the parameters that add to the scalar, each with the regressor that
     /// multiplies it.

@@ -55,8 +55,8 @@ impl Instrument {
         [&self.shifts, &self.rotations]
     }
 
-    /// Returns the six entries of the strain, in the order of [`ParameterSite::Strain`]; zeros
-    /// without a strain.
+    /// Returns the six entries of the instrument's strain, in the order of
+    /// [`ParameterSite::Strain`]; zeros without a strain.
     pub fn strain_entries(&self) -> [f64; 6] {
         self.strain.map_or([0.0; 6], |strain| STRAIN_PLACES.map(|place| strain[place]))
     }

@@ -12,7 +12,7 @@ use crate::least_squares::kernel::sum_of_squares;
 use crate::model::parameter::Parameter;
 
 /// Largest relative difference at which two numbers, or two residual vectors, count as equal. It is
-/// far above rounding and far below any change of a fit.
+/// far above rounding errors and far below any significant change.
 const MAX_RELATIVE_DIFFERENCE: f64 = 1e-9;
 
 /// Whitened residuals of some rows and their derivatives at a point, by parameter name; three

@@ -13,7 +13,7 @@ use crate::spatial::{Frame, inverse_right_jacobian, rotation_between};
 /// Number of derivative rows of four points: the target and the ends of its three axes, 1 m long.
 pub(super) const POINT_ROWS: usize = 12;
 
-/// Everything at which the orientation of one pose is differentiated.
+/// Pose, base and target at which an orientation is differentiated.
 pub(super) struct Place<'a> {
     /// Pose with the commands as given, and with the corrections that terms add to them.
     pub setups: (&'a PoseView<'a>, &'a PoseView<'a>),

@@ -22,7 +22,7 @@ pub enum PartSite {
     Motion {
         /// Index of the joint.
         joint: usize,
-        /// Index of the number.
+        /// Index of the motion, 0 to 11.
         which: usize,
     },
     /// Displacement of the position along an axis of the measuring frame.
@@ -41,7 +41,7 @@ pub enum PartSite {
     },
 }
 
-/// Term: value × regressor adds to the quantity of a site.
+/// Term of a prediction: value × regressor adds to the quantity of a site.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PartTerm {
     /// Quantity that the term adds to.

@@ -29,7 +29,7 @@ pub struct PoseResiduals<'a> {
     poses: Arc<Vec<Pose<'a>>>,
     /// Indices of the unknown parameters.
     unknowns: Vec<usize>,
-    /// Full parameter vector, with the values of the parameters that are not unknown.
+    /// Full parameter vector. Parameters that are not unknown keep these values.
     fixed: DVector<f64>,
     residuals_per_row: usize,
     measures_tilts: bool,

@@ -30,13 +30,13 @@ pub(super) struct Rigid {
     placed: Vec<[Vector3<f64>; 6]>,
 }
 
-/// Link whose parameters are dual-number variables, with the index of the input of each: five
-/// motions, and six numbers of the placement.
+/// Link whose parameters are dual-number variables, with the index of the input for each motion:
+/// five of the geometry, and six of the placement.
 struct Link {
     joint: Joint<Dual64>,
     inputs: [Option<usize>; 5],
     placing: [Option<usize>; 6],
-    /// Inputs of the small motions.
+    /// Index of the input for each small motion on either side of the joint; `None` for fixed ones.
     moving: [Option<usize>; 2 * MOTION],
 }
 
@@ -160,7 +160,7 @@ impl Link {
         }
     }
 
-    /// Returns the small motions in a pose; `None` if the link has none.
+    /// Returns the link's small motions in a pose; `None` if the link has none.
     fn motion(&self, of_pose: Option<&[f64; 2 * MOTION]>) -> Option<[f64; 2 * MOTION]> {
         self.joint.motion.as_ref()?;
         Some(of_pose.copied().unwrap_or_default())
@@ -227,7 +227,7 @@ impl Link {
     }
 }
 
-/// Motion of a link: one of its geometry, or a small motion on one side of the joint.
+/// Elementary motion of a link: one of its geometry, or a small motion on one side of the joint.
 #[derive(Clone, Copy)]
 enum Place {
     Geometry(usize),

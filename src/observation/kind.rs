@@ -17,7 +17,7 @@ pub struct Kind {
     pub fields: &'static [Field],
     /// Declaration in `problem.toml` that gives the columns their meaning; empty if none is needed.
     pub declared_by: &'static str,
-    /// Noun for the numbers that an unmeasured row lacks, in messages.
+    /// Noun for the measured numbers, used in messages about planned rows that lack them.
     pub lacking: &'static str,
     /// Group and columns of the residuals in tables of results.
     pub residuals: (&'static str, &'static [&'static str]),

@@ -147,7 +147,8 @@ impl Observation {
         self.description().numbers
     }
 
-    /// Returns the square root of [`Observation::coordinates`].
+    /// Returns √k for a row of k measured scalars ([`Observation::coordinates`]), the expected norm
+    /// of a whitened residual.
     pub(crate) fn root(self) -> f64 {
         (self.coordinates() as f64).sqrt()
     }

@@ -17,8 +17,8 @@ use crate::problem::Problem;
 /// Largest change of the corrections \[m\] in one pass at which the commands have converged; far
 /// below the accuracy of any arm.
 const MAX_CONVERGED_CHANGE: f64 = 1e-11;
-/// Maximum number of passes. A command that has not converged by then is returned as it is; its
-/// `miss` states how far it is off.
+/// Maximum number of passes. A command that has not converged by then is returned with its
+/// remaining distance `miss` to the target.
 const MAX_PASSES: usize = 12;
 
 /// Prediction of rows by an arm with its correction.
@@ -100,9 +100,8 @@ pub fn predict_identified(
     Ok((positions, corrected))
 }
 
-/// Returns the rows with `shifts` \[m\] subtracted from their measured positions: what an arm
-/// without these errors would have measured. A shift with NaN, from an arm without equilibrium, is
-/// skipped.
+/// Returns the rows with `shifts` \[m\] subtracted from their measured positions, as an arm without
+/// these errors would have been measured. A NaN shift (no equilibrium) is skipped.
 fn shifted(rows: &Measurements, shifts: &[Vector3<f64>]) -> Measurements {
     let mut rows = rows.clone();
     let of_rows = rows.positions.iter_mut().zip(shifts);

@@ -56,7 +56,7 @@ fn point(inputs: &[f64], kinds: &Inputs) -> Vec<f64> {
     .collect()
 }
 
-/// Returns the index of the centre nearest to a point.
+/// Returns the index of the centre that is nearest to a point.
 fn nearest(point: &[f64], centres: &[Vec<f64>]) -> usize {
     let distance = |centre: &Vec<f64>| -> f64 {
         centre.iter().zip(point).map(|(a, b)| (a - b) * (a - b)).sum()

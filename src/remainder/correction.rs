@@ -15,7 +15,8 @@ use crate::model::parameter::Parameter;
 use crate::model::{Model, Pose};
 use crate::problem::{PoseView, Problem};
 
-/// Share of the correction that is applied, 0 to 1, below which a pose counts as extrapolated.
+/// Smallest applied share of the correction, 0 to 1, at which a pose does not count as
+/// extrapolated.
 const MIN_SHARE: f64 = 0.5;
 /// Margin on either side of an input's measured range, as a fraction of the range, within which a
 /// pose is not extrapolated.
@@ -44,7 +45,7 @@ pub struct Correction {
     pub(crate) scores: Scores,
 }
 
-/// Free parameter, with the value about which the arm was linearised.
+/// Free parameter, with its value in the linearisation of the arm.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Linearised {
     pub name: String,
@@ -54,12 +55,12 @@ pub(super) struct Linearised {
     pub estimate: f64,
 }
 
-/// Parameters of a correction that exist in a model.
+/// Parameters of a correction that a model contains.
 struct Columns {
     /// Column of the posterior, and index in the model, of each of these parameters.
     found: Vec<(usize, usize)>,
-    /// Difference between the deviation in the model and the one about which the correction was
-    /// linearised, for every column.
+    /// Difference, for every column, between the deviation in the model and the one in the
+    /// linearisation of the correction.
     moved: DVector<f64>,
 }
 
@@ -68,14 +69,15 @@ struct Columns {
 pub struct CorrectedPose {
     /// Vector that is added to the predicted position, measuring frame \[m\].
     pub shift: Vector3<f64>,
-    /// Covariance of measured − predicted in the measuring frame \[m²\]. It is the sum for
-    /// parameters and remainder, for noise, and for the part of the correction that is not applied.
+    /// Covariance of measured − predicted, measuring frame \[m²\]. It adds the covariances of
+    /// parameters and remainder, of the noise, and of the part of the correction that is not
+    /// applied.
     pub covariance: Matrix3<f64>,
-    /// Expected root mean square of the error length ‖measured − predicted‖ \[m\]. Its product with
-    /// [`Scores::quantile`] is an error bound.
+    /// Expected root mean square of the error length ‖measured − predicted‖ \[m\]. Multiplied by
+    /// [`Scores::quantile`], it is an error bound.
     pub size: f64,
-    /// True if the pose lies outside the measured range, or too far from measured poses to apply
-    /// half of the correction.
+    /// True if an input of the pose is outside its measured range, or if less than half of the
+    /// correction is applied because measured poses are far.
     pub is_extrapolated: bool,
 }
 
@@ -158,7 +160,7 @@ impl Correction {
     /// `model`. They are NaN for poses without equilibrium.
     ///
     /// The parameters `placed` of bases and tools are fitted to the corrected poses that use them.
-    /// The part of the correction that this fit can reproduce is removed from mean and covariance.
+    /// The part of the correction that this fit reproduces is removed from mean and covariance.
     pub(crate) fn at(
         &self,
         (problem, model, x): (&Problem, &Model, &DVector<f64>),
@@ -189,8 +191,8 @@ impl Correction {
         chunks().flat_map(corrected).collect()
     }
 
-    /// Finds the parameters of the correction in `model`, and their changes since the
-    /// linearisation.
+    /// Finds the parameters of the correction in `model`, and how far they moved from the values of
+    /// the linearisation.
     fn columns(&self, model: &Model, x: &DVector<f64>) -> Columns {
         let places: HashMap<&str, usize> = model
             .parameters

@@ -7,14 +7,14 @@ use super::scores::{LeftOutError, left_out_errors};
 use super::search::Minimum;
 use super::training_rows::TrainingRows;
 
-/// Maximum number of configurations for which every fold gets its own hyperparameters. With more
-/// configurations, the about 25 hyperparameters hardly depend on any one of them.
+/// Largest number of configurations for which hyperparameters are fitted anew without each fold.
+/// With more configurations, no single one has much influence on the about 25 hyperparameters.
 pub(super) const MAX_CONFIGURATIONS: usize = 100;
-/// Maximum number of folds.
+/// Maximum number of folds of the cross-validation.
 const FOLDS: usize = 10;
 
-/// Returns the error of each row predicted from the other folds: first with the parameters alone,
-/// then with a remainder. `near` is the optimum of the hyperparameters on all rows. Returns `None`
+/// Returns the prediction error of each row by a fit to the other folds: first with the parameters
+/// alone, then with a remainder. `near` is the optimum of the hyperparameters on all rows. `None`
 /// if a matrix is not positive definite because of rounding.
 pub(super) fn cross_validated(
     training: &TrainingRows,

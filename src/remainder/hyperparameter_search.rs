@@ -21,7 +21,7 @@ const MAX_STEPS: [usize; 2] = [60, 20];
 pub(super) struct Searched {
     pub hyper: Hyperparameters,
     pub minimum: Minimum,
-    /// Increase of the logarithm of the marginal likelihood over that of noise alone.
+    /// Increase of the log marginal likelihood over that of a model with noise alone.
     pub evidence: f64,
 }
 
@@ -54,7 +54,8 @@ pub(super) fn search(training: &TrainingRows) -> Option<Searched> {
     Some(Searched { hyper, minimum, evidence })
 }
 
-/// Returns the optimum for `rows` near the optimum `near`, which was found on `count` other rows.
+/// Returns the optimum for `rows`, searched from the optimum `near` that was found on `count` other
+/// rows.
 fn refine(training: &TrainingRows, rows: &Rows, near: &Minimum, count: usize) -> Option<Minimum> {
     let refined = likelihood(training, rows);
     let inverse = &near.inverse * (count as f64 / rows.len() as f64);

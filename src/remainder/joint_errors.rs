@@ -28,7 +28,7 @@ pub struct JointError {
 pub struct JointErrorPoint {
     /// Command \[rad\] or \[m\].
     pub command: f64,
-    /// Mean error as motion of the position, that is error times the joint's lever \[m\].
+    /// Mean error as a motion of the position: error times the joint's lever \[m\].
     pub mean: f64,
     /// 1 σ of the error, as motion of the position \[m\].
     pub sigma: f64,
@@ -103,8 +103,8 @@ impl Correction {
         })
     }
 
-    /// Returns the root mean square motion of the position at the centres \[m\] by the processes
-    /// whose amplitudes in `part` are not 0.
+    /// Returns the root mean square motion of the position at the centres \[m\] by those processes
+    /// whose amplitude in `part` is not 0.
     fn motion(&self, part: &Hyperparameters) -> f64 {
         let inducing = &self.posterior.inducing;
         let cross = inducing.cross(part, &self.layout.inputs, &inducing.centres);
@@ -113,7 +113,7 @@ impl Correction {
     }
 }
 
-/// Returns a list in which the amplitude at `place` is kept and all others are 0.
+/// Returns the amplitudes with all except the one at `place` set to 0.
 fn only(amplitudes: &[f64], place: usize) -> Vec<f64> {
     amplitudes.iter().enumerate().map(|(k, a)| if k == place { *a } else { 0.0 }).collect()
 }

@@ -188,8 +188,9 @@ pub(super) fn covariance(
     out
 }
 
-/// Maps covariances c of the site errors to the position. For each pair of axes a and b it calls
-/// `enter` with Σ A₁ₐ c A₂ᵦ, summed over the sites. A₁ and A₂ are the site columns of the two rows.
+/// Adds up the covariances of the site errors as motions of the position. For each pair of axes a
+/// and b, it calls `enter` with Σ A₁ₐ c A₂ᵦ, summed over the sites with covariance c. A₁ and A₂ are
+/// the site columns of the two rows.
 #[inline]
 pub(super) fn carry(
     sites: &[f64],

@@ -62,7 +62,7 @@ enum Function {
     Constant,
 }
 
-/// Correlations between one row and itself and all later rows.
+/// Correlations between one row and each row from it on (itself and all later ones).
 struct PairColumn {
     /// For each pair and site, the correlation of uⱼ and its derivative with respect to ln ℓᵤⱼ.
     single: Vec<(f64, f64)>,
@@ -276,8 +276,8 @@ impl<'a> MarginalLikelihood<'a> {
         }
     }
 
-    /// Calls `visit` with the indices of each pair of coordinates that share noise, in both orders,
-    /// and of each coordinate with itself.
+    /// Calls `visit` with the row and column indices of all entries of the noise covariance that
+    /// may differ from 0.
     fn each_shared(&self, mut visit: impl FnMut(usize, usize)) {
         for group in self.rows.configurations() {
             for &first in &group {

@@ -8,8 +8,8 @@ use super::rows::AXES;
 use crate::model::{Model, Pose};
 use crate::problem::Problem;
 
-/// Smallest eigenvalue of CᵀC, relative to the largest, that counts as a direction in which bases
-/// and tools can move. C holds their derivatives, scaled to unit columns.
+/// Smallest eigenvalue of CᵀC, relative to the largest, whose direction is fitted. C holds the
+/// derivatives with respect to bases and tools, scaled to unit columns.
 const RANK_TOLERANCE: f64 = 1e-9;
 
 /// Linear least-squares fit of those bases, tools and points that are no parameters of the
@@ -22,7 +22,8 @@ pub(super) struct PlacementFit {
     basis: DMatrix<f64>,
 }
 
-/// Products of Qᵀ with the mean and with the covariance factor of the corrections of all rows.
+/// Products of Qᵀ with the corrections of all rows: with their mean and with their covariance
+/// factor.
 pub(super) struct Taken {
     mean: DVector<f64>,
     spread: DMatrix<f64>,
@@ -44,7 +45,7 @@ impl PlacementFit {
         Self { basis: orthonormal(linearisation.jacobian(poses.to_vec())) }
     }
 
-    /// Returns true if at least one direction is fitted.
+    /// Returns true if at least one direction of bases or tools is fitted.
     pub fn has_columns(&self) -> bool {
         self.basis.ncols() > 0
     }

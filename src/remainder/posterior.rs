@@ -77,7 +77,8 @@ impl RowFactors {
     }
 }
 
-/// Returns F Fᵀ, with F the first `columns` columns of the three coordinates of a row.
+/// Returns F Fᵀ for the three coordinates of a row, with F the first `columns` columns of the
+/// matrix `of`.
 fn outer_block(of: &DMatrix<f64>, row: usize, columns: usize) -> Matrix3<f64> {
     let block = of.view((AXES * row, 0), (AXES, columns));
     let product = block * block.transpose();
@@ -170,8 +171,8 @@ impl Posterior {
         self.factors_of(&self.hyper, rows)
     }
 
-    /// Returns mean and covariance factor of the correction by a part of the processes. `part`
-    /// contains the hyperparameters, with the amplitudes of all other processes set to 0.
+    /// Returns mean and covariance factor of the correction by some of the processes. `part` holds
+    /// the hyperparameters with the amplitudes of all other processes set to 0.
     pub fn factors_of(&self, part: &Hyperparameters, rows: &Rows) -> RowFactors {
         let inducing = (&self.inducing, &self.inverse);
         let features = features(part, &self.inputs, inducing, &self.prior, rows);

@@ -91,7 +91,7 @@ impl Scores {
         Self { configurations, single: thinned(single), blocks: thinned(blocks) }
     }
 
-    /// Multiplies all scores by `factor`.
+    /// Multiplies all scores by `factor`, which widens or narrows the bounds.
     pub(super) fn scale(&mut self, factor: f64) {
         self.single.iter_mut().chain(&mut self.blocks).for_each(|score| *score *= factor);
     }

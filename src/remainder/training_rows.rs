@@ -7,8 +7,8 @@ use super::prior::ParameterPrior;
 use super::rows::{AXES, Layout, Rows};
 use crate::random::stream;
 
-/// Smallest variance σ² within configurations, as a fraction of the residuals' variance; it keeps
-/// the noise covariance invertible.
+/// Smallest variance σ² within configurations that is assumed, as a fraction of the residuals'
+/// variance. It keeps the noise covariance invertible.
 const MIN_NOISE_SHARE: f64 = 1e-4;
 /// Maximum number of rows for which the processes are exact, with every row a centre.
 const MAX_EXACT_ROWS: usize = 500;

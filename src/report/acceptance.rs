@@ -120,7 +120,7 @@ pub fn tolerance_text(test: &TestedTolerance) -> String {
     }
 }
 
-/// Returns the accuracy AP before and after identification, the poses to which the numbers apply,
+/// Returns the blocks of the record on accuracy AP before and after identification, on the poses,
 /// the error bounds, and the repeatability.
 fn judgement<'a>(result: &AcceptanceResult) -> Vec<Block<'a>> {
     let row = |name: &str, of: &PoseAccuracy| {

@@ -25,7 +25,7 @@ pub fn estimate_brief(problem: &Problem, found: &Identification, columns: usize)
     text_within(&blocks, columns)
 }
 
-/// Returns true if the data determine no parameter.
+/// Returns true if the data determine no parameter of the fit.
 pub fn tells_little(found: &Identification) -> bool {
     !found.estimates.iter().any(|estimate| Knowledge::of(estimate).is_identified())
 }
@@ -49,7 +49,8 @@ fn parameters(estimates: &[Estimate]) -> String {
     )
 }
 
-/// Lists remarks that the full text explains.
+/// Lists short remarks on what the full text explains: outliers, undetermined combinations, active
+/// limits.
 fn worth_a_look(found: &Identification) -> Vec<String> {
     let mut points = Vec::new();
     if let Some(orientation) = &found.orientation {

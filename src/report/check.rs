@@ -10,7 +10,7 @@ use crate::fit::rows_of_kind;
 use crate::problem::Problem;
 use crate::quantity::format::{counted, mm};
 
-/// Returns the check as text, ending in a line break.
+/// Returns the forecast of the command `check` as text, ending in a line break.
 pub fn check_text(problem: &Problem, check: &Check) -> String {
     let forecast = &check.forecast;
     let names: Vec<String> =
@@ -53,7 +53,8 @@ pub fn check_text(problem: &Problem, check: &Check) -> String {
     text(&blocks)
 }
 
-/// Smallest difference of two identified shares at which both are shown.
+/// Smallest difference between the identified shares at the nominal and at drawn arms at which both
+/// are shown.
 const MIN_SHOWN_DIFFERENCE: f64 = 0.05;
 
 /// Returns true if a parameter is confounded with others at the nominal arm, but identified at arms
@@ -74,7 +75,7 @@ fn share(expected: &ExpectedParameter) -> String {
     }
 }
 
-/// States in one line why the poses do not suffice.
+/// States in one line why the checked poses do not suffice.
 pub fn why_not_sufficient(check: &Check) -> String {
     let (forecast, different) = (&check.forecast, check.different);
     let (of, parameters) = (forecast.poses, check.without_prior);
@@ -119,7 +120,7 @@ fn prediction(check: &Check) -> String {
     )
 }
 
-/// Returns true if the poses measure positions.
+/// Returns true if at least one of the poses measures a position.
 fn positions(check: &Check) -> bool {
     check.noise_of == "position"
 }

@@ -28,7 +28,7 @@ const MAX_SHOWN_CANDIDATES: usize = 8;
 const MAX_SHOWN_ROWS: usize = 3;
 /// Maximum number of limits of the declared problem that a text names.
 const MAX_SHOWN_LIMITS: usize = 3;
-/// Number of lines of a screen, less those for file names and next steps.
+/// Number of screen lines available for the summary, after file names and next steps.
 const SCREEN_LINES: usize = 22;
 /// Name of the arm with the effects of the extended problem.
 const EXTENDED: &str = "with what was found";
@@ -98,7 +98,7 @@ fn without_effect(value: &str) -> String {
     value.replacen(name, parameter, 1)
 }
 
-/// Returns the beginning of the text: title, rows, verdict, and cautions that matter for the
+/// Returns the beginning of the text: title, counts of rows, verdict, and cautions that concern the
 /// causes.
 fn head<'a>(problem: &Problem, closure: &ClosedLoop, result: &LoopResult) -> Vec<Block<'a>> {
     let mut blocks = vec![
@@ -109,7 +109,7 @@ fn head<'a>(problem: &Problem, closure: &ClosedLoop, result: &LoopResult) -> Vec
     blocks
 }
 
-/// Returns cautions that matter for the causes: missing declarations, influential rows, findings,
+/// Returns the cautions that concern the causes: missing declarations, influential rows, findings,
 /// and excluded rows.
 fn to_know<'a>(problem: &Problem, closure: &ClosedLoop, result: &LoopResult) -> Vec<Block<'a>> {
     let declare = to_declare(problem, closure, result).into_iter().map(Block::Note);
@@ -300,7 +300,7 @@ fn cautions<'a>(closure: &ClosedLoop, result: &LoopResult) -> Vec<Block<'a>> {
     untrusted.into_iter().chain(limits).map(Block::Note).collect()
 }
 
-/// Returns the errors of the nominal arm, of the declared and of the extended problem.
+/// Returns the table of errors with the nominal arm, the declared problem and the extended problem.
 fn errors(closure: &ClosedLoop, result: &LoopResult) -> Table {
     let LoopResult { registered, before, after, .. } = result;
     let row = |rows: &str, arm: &str, summary: &Summary, chi2: Option<f64>| {

@@ -40,12 +40,12 @@ pub fn compare_text(problem: &Problem, comparison: &Comparison) -> String {
     text(&blocks)
 }
 
-/// Returns true if every row measures a position.
+/// Returns true if every row of the data measures a position.
 fn of_positions(found: &Identification) -> bool {
     noun(found) == "pose"
 }
 
-/// Returns tables 2 and 3 of the paper with the results of each procedure.
+/// Returns the results of each procedure in the form of tables 2 and 3 of the paper.
 fn in_the_papers_shape(comparison: &Comparison) -> Vec<Block<'_>> {
     let tables = |procedure| {
         [
@@ -139,7 +139,7 @@ fn strategies(comparison: &Comparison, is_timed: bool) -> Table {
     side_by_side(comparison, "strategy", &named, is_timed)
 }
 
-/// Returns the table with a row for each part of the elasticity.
+/// Returns the table of the fits without some part of the elasticity, one row for each part.
 fn parts(comparison: &Comparison, is_timed: bool) -> Table {
     let named = comparison.ablations.iter();
     let named: Vec<NamedFit> =

@@ -9,7 +9,8 @@ use crate::select::{Detectable, Detection, Size};
 /// Maximum number of effects of a family that a text lists.
 const MAX_SHOWN_EFFECTS: usize = 3;
 
-/// Returns the least visible effects of each family, and those that stay invisible.
+/// Returns the effects of each family that are hardest to detect, and those that the poses cannot
+/// show.
 pub(super) fn blocks<'a>(detection: &Detection) -> Vec<Block<'a>> {
     let seen = |effect: &&Detectable| effect.sizes.iter().any(Size::is_within_prior);
     let (mut visible, mut hidden): (Vec<&Detectable>, Vec<&Detectable>) =
@@ -60,7 +61,8 @@ pub(super) fn blocks<'a>(detection: &Detection) -> Vec<Block<'a>> {
     blocks
 }
 
-/// Returns table rows of a family: for each place its least visible effect, in order of visibility.
+/// Returns table rows of a family: for each place, the effect that is hardest to detect; the
+/// easiest place first.
 fn hardest(shown: &[&Detectable], family: &str) -> Vec<Vec<String>> {
     let mut members: Vec<(&Detectable, f64)> = Vec::new();
     for effect in shown.iter().filter(|effect| effect.effect.name() == family) {

@@ -29,18 +29,18 @@ pub(super) enum Block<'a> {
     Table(Table),
     /// Labelled lines to fill in by hand; on the page alone.
     Blanks(Vec<&'static str>),
-    /// Summary of the outcome; on the page alone.
+    /// Errors and facts at the top of the page; on the page alone.
     Headline(Headline),
     /// Figures side by side; on the page alone.
     Figures(Vec<Drawing>),
     /// List of all drawn poses; on the page alone.
     Poses(&'a PlotData),
-    /// Title and blocks of a section that the page unfolds on request, and a sentence that refers a
-    /// printed page to them; on the page alone.
+    /// Section that the page shows on request: title, blocks, and the sentence that stands for them
+    /// in print; on the page alone.
     Folded(String, Vec<Block<'a>>, String),
-    /// Blocks on the page alone.
+    /// Blocks that only the page shows.
     Page(Vec<Block<'a>>),
-    /// Blocks for every output except the page.
+    /// Blocks that all outputs except the page show.
     Words(Vec<Block<'a>>),
 }
 
@@ -115,7 +115,7 @@ pub(super) struct Headline {
     pub states: Vec<(&'static str, String)>,
     /// Unit of the errors.
     pub unit: &'static str,
-    /// Description of the rows to which the errors belong.
+    /// Description of the rows over which the errors are averaged.
     pub of: String,
     pub facts: Vec<(&'static str, String)>,
 }

@@ -44,7 +44,7 @@ fn value(parameter: &ParameterValue) -> String {
     }
 }
 
-/// Groups effects by family and reason, and returns a list item per group: the effects, then the
+/// Groups effects by family and reason. Returns a list item for each group: the effects, then the
 /// reason.
 pub(super) fn reasons<'a>(effects: impl IntoIterator<Item = (Effect, &'a str)>) -> Vec<Point> {
     grouped(effects)
@@ -80,7 +80,7 @@ fn grouped<R: Copy + PartialEq>(
     groups.into_iter().map(|(members, reason)| (group(&members), reason)).collect()
 }
 
-/// Describes effects with many time constants or distances by their places alone.
+/// Describes effects that differ in time constants or distances by their places alone.
 fn of_places(members: &[Effect]) -> String {
     let mut places: Vec<String> = Vec::new();
     for place in members

@@ -77,7 +77,8 @@ pub(super) fn both_parts(found: &Identification) -> String {
     format!("{} to identify, {held_out} held out", rows_of(found, |errors| errors.identification))
 }
 
-/// Returns the word for rows that judge: held out, or left out where none is held out.
+/// Returns "held out", or "left out" if no row is held out and configurations are left out of the
+/// fit in turn.
 pub(super) fn judging(errors: &Errors) -> &'static str {
     if errors.is_left_out { "left out" } else { "held out" }
 }

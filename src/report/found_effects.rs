@@ -10,7 +10,8 @@ use crate::quantity::format::{number, or_dash, p_value};
 use crate::results::{FoundEffect, LoopResult, Step, Witness};
 use crate::select::ClosedLoop;
 
-/// Lists every effect of the extended problem.
+/// Lists every effect of the extended problem with its status, at most `alternatives` alternatives
+/// each.
 pub(super) fn found<'a>(result: &LoopResult, alternatives: usize) -> Vec<Block<'a>> {
     if result.effects.is_empty() {
         return Vec::new();

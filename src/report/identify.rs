@@ -91,7 +91,7 @@ pub(super) fn headline<'a>(problem: &Problem, found: &Identification) -> Block<'
     Block::lines(format!("{}\n{}, {seconds:.3} s", problem.title, fitted(found, "\n")))
 }
 
-/// States which parameters were fitted to which rows, and how the fit ended.
+/// States the number of fitted parameters and rows, strategy and solver, and how the fit ended.
 pub(super) fn counts(found: &Identification) -> String {
     let warning = if found.is_trusted() {
         String::new()
@@ -101,7 +101,7 @@ pub(super) fn counts(found: &Identification) -> String {
     format!("{}.{warning}", fitted(found, "; "))
 }
 
-/// States counts, strategy and solver, and after `separator` how the fit ended.
+/// States counts, strategy and solver, then after `separator` how the fit ended.
 fn fitted(found: &Identification, separator: &str) -> String {
     let reason = found.solver_reason.map(|reason| format!(" (auto: {reason})")).unwrap_or_default();
     format!(
@@ -120,7 +120,8 @@ fn fitted(found: &Identification, separator: &str) -> String {
     )
 }
 
-/// Lists the warnings that the terminal shows, except that a fit is not trusted.
+/// Returns the warnings of the fit that the terminal shows, except the one that a fit is not
+/// trusted.
 pub(super) fn beware<'a>(found: &Identification, plots: &PlotData) -> Option<Block<'a>> {
     let points: Vec<String> =
         plots.warnings.iter().map(ToString::to_string).chain(found.reasons_to_ask()).collect();

@@ -6,7 +6,7 @@ use std::path::Path;
 use super::shell::shell_word;
 use crate::urdf::{Chain, Description, HELD_OUT, SIGMA_MM};
 
-/// Returns a description of the problem that was made, and the next steps.
+/// Returns a description of the problem that was made from a URDF, and the next steps.
 pub fn init_text(chain: &Chain, description: &Description, folder: &Path) -> String {
     let (base, tip) = chain.ends();
     let joints = chain.joint_names();

@@ -6,7 +6,7 @@ use crate::paper::published::{BEFORE, Published, WITH_ELASTICITY, WITHOUT_ELASTI
 use crate::paper::{Form, StiffnessStage};
 use crate::quantity::format::{mm, number, or_dash};
 
-/// Identified share below which a parameter is marked.
+/// Smallest identified share at which a parameter is shown without a mark.
 const MIN_UNMARKED_SHARE: f64 = 0.9;
 
 /// Header of the parameters of a joint in table 2.

@@ -81,7 +81,7 @@ pub(super) fn parameters<'a>(
     blocks
 }
 
-/// States the prior sizes that the estimated deviations suggest, if they contradict the declared
+/// States the prior widths that the estimated deviations suggest if they contradict the declared
 /// ones.
 fn sizes(sizes: &[PriorSize]) -> Option<String> {
     let rule = |size: &PriorSize| {

@@ -9,7 +9,8 @@ use crate::quantity::format::{counted, mm, number};
 use crate::remainder::{Bounds, Gain, JointError, Outcome};
 use crate::results::PlotData;
 
-/// Returns one sentence about the search for a remainder; `found` contains the errors without it.
+/// Returns one sentence on the result of the search for a remainder; `found` contains the errors
+/// without it.
 pub fn remainder_text(found: &Identification, outcome: &Outcome) -> String {
     let before = number(found.fitted.held_out.mean.norm * 1e3, 4);
     let after = outcome.held_out.map(|error| number(error * 1e3, 4));

@@ -26,7 +26,7 @@ const MAX_SHOWN_SETS: usize = 4;
 /// Maximum number of confounded effects that are named for a candidate.
 const MAX_SHOWN_CONFOUNDED: usize = 3;
 
-/// Returns the trace as text, ending in a line break.
+/// Returns the result of the command `trace` as text, ending in a line break.
 pub fn trace_text(problem: &Problem, trace: &Trace) -> String {
     let result = TraceResult::new(problem, trace);
     let mut blocks = vec![

@@ -66,7 +66,7 @@ pub(super) fn to_declare(
     declarations
 }
 
-/// Returns the places of structure without a law, without duplicates.
+/// Returns the places of all structure whose law is unknown, without duplicates.
 pub(super) fn places(result: &LoopResult) -> Vec<&str> {
     let mut places: Vec<&str> = Vec::new();
     for left in result.structures() {

@@ -19,8 +19,8 @@ pub fn interrupted(rounds: usize) -> String {
     format!("interrupted {rounds}: there may be more to find")
 }
 
-/// States the outcome in one to three sentences. `takes_less` is true if the fit took a smaller σ
-/// than the declared one.
+/// States the outcome of the loop in one to three sentences. `takes_less` is true if the fit
+/// assumed a smaller σ than the declared one.
 pub(super) fn verdict(result: &LoopResult, takes_less: bool) -> String {
     let rounds = result.steps.len();
     let end = if result.interrupted {
@@ -49,7 +49,7 @@ pub(super) fn counts(result: &LoopResult) -> String {
     }
 }
 
-/// Iterates over the effects that are causes of their own accord, not only together with others.
+/// Iterates over the effects that are causes by themselves, not only together with others.
 pub(super) fn causes(result: &LoopResult) -> impl Iterator<Item = &FoundEffect> {
     result.effects.iter().filter(|found| !found.is_only_with_others())
 }
@@ -129,7 +129,8 @@ fn found(result: &LoopResult) -> String {
     }
 }
 
-/// States that nothing was found, although the ratio of residual to declared σ is less than 1.
+/// States that no effect was found, although the residual is smaller than the declared σ explains
+/// (`ratio` < 1). `takes_less` is true if the fit assumed a smaller σ.
 fn nothing_below(ratio: f64, takes_less: bool) -> String {
     let consequence = if takes_less {
         ", which is too large; causes are judged by the scatter of the residual instead"
@@ -150,13 +151,13 @@ pub(super) fn declared(effect: &NamedEffect) -> String {
     }
 }
 
-/// Returns the title of a cause: its status, the claim that the status allows, and the line that
+/// Returns the title of a cause: its status, what may be claimed about it, and the line that
 /// declares it.
 pub(super) fn title(found: &FoundEffect) -> String {
     claim(found, &declared(&found.effect))
 }
 
-/// States the status of an effect and the claim that it allows; `words` describe the effect.
+/// States the status of an effect and what may be claimed about it; `words` describe the effect.
 fn claim(found: &FoundEffect, words: &str) -> String {
     let status = found.status.as_str();
     match (found.status, &found.claims) {
@@ -190,8 +191,8 @@ fn located((place, at): (&str, f64), law: f64, words: &str) -> String {
     }
 }
 
-/// Names the effect that the model uses for a cause whose title names no law; `None` if the title
-/// names one.
+/// Returns the name of the effect by which the model represents a cause of unknown law; `None` if
+/// the law is known.
 pub(super) fn stand_in(found: &FoundEffect) -> Option<String> {
     let law = found.claims.as_ref()?.law.probability;
     (law < MIN_CANDIDATE_PROBABILITY && found.status != Status::Contradicted)

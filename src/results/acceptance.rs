@@ -16,7 +16,7 @@ use crate::problem::{HeldOut, Problem};
 use crate::quantity::format::number;
 use crate::remainder::Bounds;
 
-/// Input files of an acceptance record, and facts that the caller provides.
+/// Input files of an acceptance record, and facts from the command line.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct AcceptanceRecord {
     /// Each input file with its SHA-256; `None` if it cannot be read a second time.
@@ -83,14 +83,14 @@ pub struct TestedTolerance {
     pub tolerance_mm: f64,
     /// Share of the poses that must be within the tolerance.
     pub share: f64,
-    /// Largest acceptable probability of a wrong pass, and of a wrong fail.
+    /// Largest acceptable probability of a wrong pass, which is also that of a wrong fail.
     pub risk: f64,
     pub poses: usize,
     /// Number of tested poses with an error above the tolerance.
     pub beyond: usize,
     /// Bounds of the share of all poses within the tolerance; each is wrong with at most `risk`.
     pub share_within: [f64; 2],
-    /// Number of poses that would pass with as many poses beyond the tolerance.
+    /// Number of poses at which the test would pass with no more poses beyond the tolerance.
     pub poses_to_pass: Option<usize>,
 }
 

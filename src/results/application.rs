@@ -115,7 +115,7 @@ impl Document for InitResult {
 }
 
 impl CompensationResult {
-    /// Counts the targets that are reached, and averages over them.
+    /// Counts the targets that are reached, and averages the distances over them.
     pub fn new(problem: &Problem, commands: &[Command]) -> Self {
         let (reached, missed): (Vec<&Command>, Vec<&Command>) =
             commands.iter().partition(|command| command.is_reached());

@@ -48,8 +48,8 @@ pub struct Claims {
     pub place: Claim<String>,
     /// Claim that the cause depends on exactly these quantities.
     pub depends_on: Claim<Vec<String>>,
-    /// Claim that this is the cause's law, and that no function of unknown law acts at the place.
-    /// The claim is null if no law is known.
+    /// Claim that the cause has this law and that no function of unknown law acts at the place;
+    /// null if no law is known.
     pub law: Claim<Option<String>>,
     pub description: String,
 }

@@ -55,7 +55,8 @@ pub struct LoopResult {
     pub set_aside: Vec<Row>,
     /// Other structure whose law is unknown, most probable first.
     pub further: Vec<Structure>,
-    /// Common prior of the harmonics of all joints, order by order.
+    /// Common prior of the harmonics of all joints, one entry for each order; null if there is
+    /// none.
     pub harmonic_prior: Option<Vec<OrderPrior>>,
     /// Rounds of the search.
     pub steps: Vec<Step>,
@@ -98,11 +99,12 @@ pub struct FoundEffect {
     pub status: Status,
     /// Claims about the cause; null if no evidence was evaluated.
     pub claims: Option<Claims>,
-    /// Share of refits, each on random 80 % of the configurations, that find the effect again.
+    /// Share of 20 refits, each on random 80 % of the configurations, that find the effect again.
     pub stability: Option<f64>,
     /// Verdict of measurements that are independent of the fit.
     pub witness: Option<Witness>,
-    /// Probability that noise alone gains as much, corrected for the number of candidates.
+    /// Probability that noise alone reduces the residual as much, corrected for the number of
+    /// candidates.
     pub p_value: f64,
     pub parameters: Vec<ParameterValue>,
     /// Effects that these data cannot distinguish from the found one, most probable first.
@@ -140,7 +142,8 @@ pub struct Structure {
     /// Kind of function, for example `smooth`, `sag`, `wandering` or `limit`; null if only the
     /// residual tests detect the structure.
     pub law: Option<String>,
-    /// Limit of the declared problem (bound or prior) that is wrong, or that hides a cause.
+    /// Limit of the declared problem (bound or prior) that is wrong or hides a cause; null for
+    /// other structure.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub limit: Option<String>,
     pub claims: Option<Claims>,
@@ -166,7 +169,7 @@ pub struct Correction {
     pub cross_validated_rms_px: Option<[f64; 2]>,
 }
 
-/// Row of a measurement file.
+/// Row of a measurement file, by file and line.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct Row {
     pub file: String,

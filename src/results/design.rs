@@ -18,7 +18,7 @@ pub struct CheckResult {
     pub poses: usize,
     pub sufficient: bool,
     pub rank: usize,
-    /// Number of parameter combinations that a long series of such poses determines.
+    /// Number of parameter combinations that a long series of poses of this kind determines.
     pub attainable_rank: usize,
     #[serde(flatten)]
     pub conditioning: Conditioning,
@@ -28,10 +28,10 @@ pub struct CheckResult {
     /// measured.
     pub noise_mm: Option<f64>,
     pub prediction: JudgedPrediction,
-    /// Forecast for fewer and for more such poses.
+    /// Forecast for smaller and larger numbers of such poses.
     pub growth: Vec<GrowthStep>,
-    /// Smallest number of poses that identify all parameters and predict as accurately as one
-    /// measurement.
+    /// Smallest number of poses that identify all parameters and predict with an error no larger
+    /// than that of one measurement.
     pub enough: Option<usize>,
     /// Smallest size of each effect that would be found.
     pub detectable: Detectable,
@@ -53,7 +53,7 @@ pub struct PlanResult {
     pub given: usize,
     pub candidates: usize,
     pub sufficient: bool,
-    /// Logarithm of the criterion that each start reached.
+    /// Logarithm of the criterion that each start of the exchange reached.
     pub starts: Vec<f64>,
     /// Logarithm of the criterion of the plan.
     pub value: f64,
@@ -127,7 +127,7 @@ pub struct JudgedPrediction {
 pub struct GrowthStep {
     pub poses: usize,
     pub rank: usize,
-    /// Number of parameter combinations that remain undetermined.
+    /// Number of parameter combinations that these poses leave undetermined.
     pub open: usize,
     /// Number of parameters with an identified share of 90 % or more.
     pub well_identified: usize,

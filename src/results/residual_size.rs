@@ -19,11 +19,10 @@ pub enum ResidualSize {
     TooFewRows,
     /// χ²/ν, the value, is inside its interval for noise alone.
     Expected(f64),
-    /// χ²/ν, the value, is outside its interval for noise alone, without clear evidence for another
-    /// σ.
+    /// χ²/ν, the value, is outside its interval for noise alone, but no other σ is clearly better.
     Unclear(f64),
-    /// Residuals and priors contradict the declared σ, and the fit takes another one. The value is
-    /// χ²/ν.
+    /// Residuals and priors contradict the declared σ, and the fit assumes another one. The value
+    /// is χ²/ν.
     Contradicted(f64),
 }
 

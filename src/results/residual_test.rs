@@ -10,7 +10,7 @@ use crate::residual_tests::{self, Covariate, ResidualTests};
 pub struct ResidualTest {
     /// Name of the test.
     pub check: &'static str,
-    /// Quantity on which the test looks for dependence, or in whose order; null if there is none.
+    /// Quantity whose influence is tested, or that orders the poses; null if there is none.
     pub about: Option<String>,
     /// True if a failure indicates structure that an effect could explain.
     pub structure: bool,

@@ -41,7 +41,7 @@ pub struct Cell {
     pub fits: u64,
     pub failed: u64,
     pub failure_rate: f64,
-    /// Number of fits that are not trusted, by reason.
+    /// Number of fits that are not trusted, by the code of the first error.
     pub failures: BTreeMap<String, u64>,
     pub held_out_mm: HeldOut,
     /// Mean reduced χ² over the fits.

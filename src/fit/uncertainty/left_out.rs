@@ -6,8 +6,8 @@ use rayon::prelude::*;
 use crate::fit::stages::fitting::Fitting;
 use crate::least_squares::jacobian_and_residual;
 
-/// Part of the squared length of a column that is added to it: directions that only one
-/// configuration determines then stay where the fit has them.
+/// Ridge on the normal matrix, as a fraction of the squared length of each column. It keeps
+/// directions that only one configuration determines at their fitted values.
 const RIDGE: f64 = 1e-9;
 
 impl Fitting<'_> {

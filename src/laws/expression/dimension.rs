@@ -34,7 +34,7 @@ pub enum Per {
     Mass,
     /// Time \[s\].
     Second,
-    /// [N·m]
+    /// Torque [N·m].
     Torque,
     /// Unit of a covariate.
     Covariate,
@@ -51,7 +51,7 @@ impl Dimension {
     pub(super) const MASS: Self = Self::base(3);
     pub(super) const SECOND: Self = Self::base(4);
     pub(super) const FORCE: Self = Self::base(5);
-    /// N·m.
+    /// Unit of torque, N·m.
     pub(super) const TORQUE: Self = Self { powers: [0, 1, 0, 0, 0, 1, 0], ..Self::base(5) };
     pub(super) const COVARIATE: Self = Self { flexible: true, ..Self::base(6) };
 
@@ -76,8 +76,8 @@ impl Dimension {
         known.into_iter().find(|(of, _)| is(*of)).map_or(Per::Number, |(_, per)| per)
     }
 
-    /// Returns true if the expression may be the argument of a function: it has no unit, an angle,
-    /// or an undetermined one.
+    /// Returns true if a function such as `sin` accepts the expression: it has no unit, is an
+    /// angle, or its unit is undetermined.
     pub(super) fn is_plain(self) -> bool {
         self.flexible || self.powers[1..].iter().all(|power| *power == 0)
     }

@@ -8,9 +8,9 @@ use thiserror::Error;
 #[derive(Debug, Clone, PartialEq, Error)]
 #[error("column {}: {mistake}", .column)]
 pub struct FormulaError {
-    /// First character of that part, counted from 1.
+    /// Position of the first character of the wrong part, counted from 1.
     pub column: usize,
-    /// Byte range of that part in the formula.
+    /// Byte range of the wrong part in the formula.
     pub span: std::ops::Range<usize>,
     /// Kind of the mistake, with details.
     pub mistake: Mistake,

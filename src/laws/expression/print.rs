@@ -26,8 +26,8 @@ impl Expression {
         Named { expression: self, names }
     }
 
-    /// Returns the binding strength: 1 sum, 2 product, 3 sign, 4 power, 5 for everything that needs
-    /// no parentheses.
+    /// Returns the binding strength of the outermost operator: 1 sum, 2 product, 3 sign, 4 power, 5
+    /// for expressions that need no parentheses.
     fn strength(&self) -> u8 {
         match self {
             Self::Binary(Operator::Add | Operator::Subtract, _) => 1,

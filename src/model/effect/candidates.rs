@@ -13,8 +13,8 @@ pub(crate) const HIGHEST_ORDER: u32 = 60;
 /// Longest time constant among the candidates, as a fraction of the duration of the measurement. A
 /// longer one cannot be distinguished from a linear drift.
 const MAX_LAG: f64 = 0.6;
-/// Shortest time constant of a lag, in typical times between two poses. A faster lag has settled
-/// before the next pose.
+/// Shortest time constant of a lag among the candidates, as a multiple of the typical time between
+/// two poses. A faster lag settles before the next pose.
 const MIN_LAG: f64 = 2.0;
 /// Shortest settling time among the candidates, as a fraction of the duration of the measurement. A
 /// shorter one affects only a few poses.
@@ -30,7 +30,7 @@ const PATH_STEP: f64 = 1.4;
 /// Effect that a search may add, with the reason if the data cannot show it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Candidate {
-    /// Effect that the search may add, with its site and its law.
+    /// Effect that the search may add, with its place and arguments.
     pub effect: Effect,
     /// Reason why these data cannot show it; `None` if they can.
     pub untestable: Option<&'static str>,
@@ -61,8 +61,8 @@ pub fn candidates(problem: &Problem, data: &DataCoverage) -> Vec<Candidate> {
 
 type Arguments = Vec<(&'static str, Argument)>;
 
-/// Returns the places on an arm where the effects of a family act: all its argument lists, without
-/// the argument that the search varies.
+/// Returns the places on an arm where the effects of a family act, each as a list of arguments. The
+/// argument that the search varies is left out.
 fn places(family: &Family, problem: &Problem) -> Vec<Arguments> {
     let mut all: Vec<Arguments> = vec![Vec::new()];
     for &(key, kind) in family.arguments {
@@ -191,7 +191,7 @@ impl Effect {
             .or_else(|| self.terms(problem).is_empty().then_some("the arm does not have the site"))
     }
 
-    /// Returns true if the arm satisfies `only`, the condition under which the effect is a
+    /// Returns true if the arm satisfies the condition `only`, under which the effect is a
     /// candidate.
     fn meets(&self, only: Only, problem: &Problem) -> bool {
         let joint = || problem.joints.get(self.joint()?.checked_sub(1)?);

@@ -11,8 +11,8 @@ use crate::problem::{Joint, JointKind, Problem};
 /// have integer tooth counts, so most errors repeat an integer number of times a revolution; those
 /// of an inner gear stage need not.
 const FRACTIONAL_SHARE: f64 = 0.2;
-/// ln(longest / shortest) lead of a screw or pitch of a rack that is considered. The prior is
-/// uniform in ln(lead).
+/// Natural logarithm of the ratio of longest to shortest lead of a screw (or pitch of a rack) that
+/// is considered. The prior is uniform in ln(lead).
 const LOG_LEAD_RANGE: f64 = 7.0;
 
 impl Effect {

@@ -22,8 +22,8 @@ impl ParameterSite {
     }
 }
 
-/// Smallest moment from which sizes of priors are derived [N·m], so that joints with little load
-/// keep a wide prior.
+/// Smallest moment from which the prior size of a compliance is derived [N·m]. Joints with little
+/// load thereby keep a wide prior.
 pub(super) const MIN_MOMENT: f64 = 10.0;
 
 /// Returns an upper estimate of the moment on a joint, counted from 1 [N·m]: weight of everything

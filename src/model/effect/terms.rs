@@ -9,22 +9,23 @@ use crate::problem::{JointKind, Problem};
 /// Parameter of an effect on an arm, with the site where it enters the model.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Term {
-    /// Part of its name after the dot: `error` of `gear-ratio[3].error`.
+    /// Last part of the parameter's name: `error` of `gear-ratio[3].error`.
     pub name: String,
-    /// Site of the model where it enters.
+    /// Site of the model at which the parameter acts.
     pub site: ParameterSite,
     /// Function of the pose that multiplies the parameter at its site.
     pub regressor: Regressor,
     /// Value at which the effect vanishes, SI.
     pub nominal: f64,
-    /// Size that no realistic effect exceeds by much, SI: 1 σ of its prior.
+    /// Standard deviation (1 σ) of the parameter's prior, SI: a size that realistic effects hardly
+    /// exceed.
     pub size: f64,
-    /// True if a negative value is physically impossible. An effect whose fit needs one is rejected
-    /// as a cause.
+    /// True if a negative value is physically impossible. The effect is rejected as a cause if its
+    /// fit needs one.
     pub never_negative: bool,
-    /// Smallest value that it may have, SI.
+    /// Smallest value that the parameter may have, SI.
     pub lower: f64,
-    /// Greatest value that it may have, SI.
+    /// Largest value that the parameter may have, SI.
     pub upper: f64,
 }
 
@@ -34,8 +35,8 @@ pub fn parameters(problem: &Problem) -> Vec<EffectParameter> {
 }
 
 impl Effect {
-    /// Returns its parameters, each with its site and regressor in the model of `problem`.
-    /// Parameters at a joint or beam that the arm does not have are left out.
+    /// Returns the parameters of the effect, each with its site and regressor in the model of
+    /// `problem`. Parameters at a joint or beam that the arm does not have are left out.
     #[doc(hidden)]
     pub fn terms(&self, problem: &Problem) -> Vec<Term> {
         let (slides, covariates) = (problem.slides(), problem.covariate_names());
@@ -126,7 +127,7 @@ impl Effect {
         law.parameters().iter().map(named).collect()
     }
 
-    /// Returns its parameters with full names, such as `gear-ratio[3].error`.
+    /// Returns the parameters of the effect with full names, such as `gear-ratio[3].error`.
     #[doc(hidden)]
     pub fn parameters(&self, problem: &Problem) -> Vec<EffectParameter> {
         let place = self.place();

@@ -21,7 +21,7 @@ pub struct LinearConstraint {
     pub upper: f64,
     /// Text of the sum: `ln A.EI − ln B.EI`.
     pub sum: String,
-    /// Text of the lower and upper limit: `≥ 0`.
+    /// Text of the lower and of the upper limit, such as `≥ 0`.
     pub limits: [Option<String>; 2],
     /// Location in the problem file.
     pub location: Location,

@@ -31,17 +31,18 @@ use crate::quantity::Unit;
 pub struct Parameter {
     /// Name as in the problem file: `joint2.alpha`, `A.EI`, `base[B].rx`.
     pub name: String,
-    /// Site in the model.
+    /// Site of the model at which the parameter acts.
     pub site: ParameterSite,
     /// Function of the pose that multiplies the parameter at its site.
     pub regressor: Regressor,
     /// Nominal value, in SI units.
     pub nominal: f64,
-    /// 1 σ of the Gaussian prior on x about 0.
+    /// Standard deviation (1 σ) of the Gaussian prior on the deviation x about 0; `None` without a
+    /// prior.
     pub sigma: Option<f64>,
-    /// Lower bound on x; −∞ without a bound.
+    /// Lower bound on the deviation x; −∞ without a bound.
     pub lower: f64,
-    /// Upper bound on x; +∞ without a bound.
+    /// Upper bound on the deviation x; +∞ without a bound.
     pub upper: f64,
 }
 

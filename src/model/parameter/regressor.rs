@@ -16,10 +16,9 @@ use crate::problem::{PoseView, Problem, ThermalLag};
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum Regressor {
-    /// Factor 1 of a parameter that is itself the quantity of its site (it replaces the nominal
-    /// value).
+    /// Factor 1 of a parameter that replaces the quantity at its site.
     Constant,
-    /// Factor 1 of a parameter that adds to the quantity of its site.
+    /// Factor 1 of a parameter that is added to the quantity at its site.
     Unit,
     /// Function sin kq of a joint's command q and an order k.
     Sine(usize, u32),
@@ -69,7 +68,7 @@ pub struct Formula {
     hoist: f64,
     /// Full names and values of the parameters inside the formula.
     parameters: Vec<(String, f64)>,
-    /// Loads of the arm, where the formula takes their moments.
+    /// Moments of the arm's loads; `None` if the formula does not use them.
     moments: Option<Arc<AxisMoments<f64>>>,
     /// True if the term displaces the base itself, false if it is an error of the instrument's
     /// readings.
@@ -259,7 +258,7 @@ impl Regressor {
         self.expression().display(Names { covariates, parameters: &parameters }).to_string()
     }
 
-    /// Returns the quantities of a pose that it depends on.
+    /// Returns the quantities of a pose that the regressor depends on.
     pub fn quantities(&self) -> Vec<Quantity> {
         match self {
             Self::Constant | Self::Unit | Self::Inner | Self::Slope(_) => Vec::new(),
@@ -294,7 +293,7 @@ impl Regressor {
         }
     }
 
-    /// Returns its value in each of some poses. Harmonics are faster if many follow one another.
+    /// Returns the regressor's value in each pose. Consecutive harmonics are evaluated faster.
     pub(crate) fn values<'p>(&self, poses: impl Iterator<Item = &'p PoseView<'p>>) -> Vec<f64> {
         let (Self::Formula(formula), Some(Quantity::Lagging { time_constant })) =
             (self, self.as_quantity())
@@ -309,7 +308,7 @@ impl Regressor {
         poses.map(felt).map(|warming| warming.unwrap_or(0.0)).collect()
     }
 
-    /// Returns its value in a pose.
+    /// Returns the regressor's value in a pose.
     pub fn value(&self, setup: &PoseView) -> f64 {
         match self {
             Self::Constant | Self::Unit => 1.0,
@@ -321,7 +320,8 @@ impl Regressor {
         }
     }
 
-    /// Returns the derivative of its value with respect to the command of a joint, counted from 0.
+    /// Returns the derivative of the regressor's value with respect to the command of a joint,
+    /// counted from 0.
     pub fn slope(&self, setup: &PoseView, joint: usize) -> f64 {
         let order = |order: u32| f64::from(order);
         match self {
@@ -344,20 +344,20 @@ impl Regressor {
         }
     }
 
-    /// Returns true if it depends on the commands of joints.
+    /// Returns true if the regressor depends on the commands of joints.
     pub fn follows_commands(&self) -> bool {
         let follows =
             |quantity: &Quantity| quantity.commanded_joint().is_some() || follows_loads(quantity);
         self.quantities().iter().any(follows)
     }
 
-    /// Returns true if the parameter is itself the quantity of its site.
+    /// Returns true if the parameter replaces the quantity at its site.
     pub fn is_constant(&self) -> bool {
         *self == Self::Constant
     }
 }
 
-/// Returns true for the moments of the loads.
+/// Returns true if the quantity is a moment of the loads.
 fn follows_loads(quantity: &Quantity) -> bool {
     matches!(quantity, Quantity::Moment(_))
 }

@@ -11,8 +11,8 @@ use crate::quantity::Unit;
 /// Scalar of the model that a rule may free.
 pub(super) struct Candidate {
     pub(super) name: String,
-    /// Name without the session or target in brackets, which the patterns of rules may match as
-    /// well.
+    /// Name without the session or target in brackets. Patterns of rules may match it as well as
+    /// the full name.
     plain: String,
     pub(super) site: ParameterSite,
     pub(super) regressor: Regressor,
@@ -43,7 +43,7 @@ pub struct EffectParameter {
     pub name: String,
     /// Name without the place in brackets: `gear-ratio.error`.
     pub plain: String,
-    /// Site in the model.
+    /// Site of the model at which the parameter acts.
     pub site: ParameterSite,
     /// Factor that multiplies the parameter at its site.
     pub regressor: Regressor,
@@ -52,14 +52,14 @@ pub struct EffectParameter {
     pub nominal: f64,
     /// Standard deviation (1 σ) of a prior wide enough for every realistic size, in SI units or ln.
     pub sigma: f64,
-    /// Smallest value that it may have, SI.
+    /// Smallest value that the parameter may have, SI.
     pub lower: f64,
-    /// Greatest value that it may have, SI.
+    /// Largest value that the parameter may have, SI.
     pub upper: f64,
 }
 
 impl EffectParameter {
-    /// Returns the unit of its value.
+    /// Returns the unit of the parameter's value.
     pub fn unit(&self) -> Unit {
         unit(self.site, &self.regressor)
     }

@@ -29,7 +29,7 @@ pub enum ParameterSite {
     Base {
         /// Index of the base.
         base: usize,
-        /// Index 0 to 5 of the coordinate in that order.
+        /// Index of the coordinate: 0 to 5 for x, y, z, rx, ry, rz.
         axis: usize,
     },
     /// Coordinate of a target in the frame that carries it: position x, y, z, then rotation vector
@@ -37,7 +37,7 @@ pub enum ParameterSite {
     Target {
         /// Index of the target.
         target: usize,
-        /// Coordinate 0 to 5.
+        /// Index of the coordinate: 0 to 5 for x, y, z, rx, ry, rz.
         axis: usize,
     },
     /// Number of a fixture, such as a coordinate of a point or the focal length of a camera, in the
@@ -47,7 +47,7 @@ pub enum ParameterSite {
         fixture: usize,
         /// Kind of the fixture.
         kind: FixtureKind,
-        /// Index of the number.
+        /// Index of the number among the fixture's numbers.
         axis: usize,
     },
     /// Displacement of every measured position, measuring frame.

@@ -10,7 +10,7 @@ const INNER_FRACTION: f64 = 0.95;
 const OUTLIER_RATIO: f64 = 2.5;
 /// Ratio of the axis limit to the largest inner value, if outlying values are left outside.
 const INNER_MARGIN: f64 = 1.8;
-/// Tick values within a decade; the sets are in order of decreasing number.
+/// Tick values within a decade. The first set whose number of ticks is small enough is used.
 const STEPS: [&[f64]; 4] =
     [&[1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0], &[1.0, 2.0, 5.0], &[1.0, 3.0], &[1.0]];
 
@@ -70,7 +70,7 @@ impl Axis {
         Self::new((low, high), label, ticks)
     }
 
-    /// Creates a vertical axis of names; row k is at the value k, the first at the top.
+    /// Creates a vertical axis of row names; name k is at the value k, with k = 0 at the top.
     pub fn names(names: impl IntoIterator<Item = (String, Colour)>) -> Self {
         let tick =
             |(k, (text, colour)): (usize, (String, Colour))| Tick { at: k as f64, text, colour };

@@ -38,8 +38,8 @@ pub fn sheet<'a>(
     csv(header.into_iter().map(str::to_owned).collect(), rows)
 }
 
-/// Returns plotted data of poses as CSV text: file and line, held out or not, and the given
-/// columns.
+/// Returns plotted data of poses as CSV text: file and line, whether the pose is held out, and the
+/// given columns.
 pub fn pose_sheet<'a>(
     columns: &[&str],
     rows: impl IntoIterator<Item = (&'a PoseError, Vec<f64>)>,

@@ -85,8 +85,8 @@ pub fn of_procedure(before: &Before, procedure: &Procedure) -> Drawing {
     draw_stages((&format!("held-out-errors-{name}"), &title), &stages, &poses, &[], data)
 }
 
-/// Draws the errors of all stages. `candidates` are the indices of held-out poses that may be
-/// drawn, `rows` the rows of all held-out poses if the page knows them.
+/// Draws the held-out errors of all stages. `candidates` are the indices of the held-out poses that
+/// may be drawn; `rows` are the rows of all held-out poses, empty if the page does not know them.
 fn draw_stages(
     titles: (&str, &str),
     stages: &[StageErrors],

@@ -10,7 +10,7 @@ use crate::results::{BoundAt, CommandedJoint};
 
 /// Number of cells along the width of a view.
 const CELLS_PER_WIDTH: usize = 24;
-/// One in so many cells lies beyond the scale of colours.
+/// Number of cells for each cell that may exceed the end of the colour scale.
 const CELLS_PER_SATURATED: usize = 20;
 /// Maximum height of a view in displayed pixels.
 const MAX_HEIGHT: f64 = 330.0;
@@ -90,7 +90,8 @@ struct Cell {
     extrapolated: usize,
 }
 
-/// Returns those cells of a view, spanned by x and `axis`, that contain a configuration.
+/// Returns the cells of a view that contain at least one configuration. The view is spanned by x
+/// and `axis`.
 fn cells(bounds: &[BoundAt], (axis, cell): (usize, f64), (left, bottom): (f64, f64)) -> Vec<Cell> {
     let mut cells: BTreeMap<(i64, i64), Cell> = BTreeMap::new();
     for at in bounds {

@@ -35,7 +35,7 @@ fn themes() -> String {
     text
 }
 
-/// Returns rules that replace the colours in the drawings by `colour(name, dark value)`.
+/// Returns style rules that replace each colour of the drawings by `colour(name, dark value)`.
 fn replaced_colours(colour: impl Fn(&'static str, &'static str) -> String) -> String {
     let mut text = String::new();
     for (light, name, dark) in COLOURS {

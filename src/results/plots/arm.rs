@@ -21,7 +21,7 @@ pub struct Poses<'a> {
     pub placement: Placement,
 }
 
-/// Arm with its full parameter vector.
+/// Model of an arm with its full parameter vector.
 #[derive(Debug, Clone)]
 pub struct Arm {
     pub model: Model,

@@ -7,7 +7,7 @@ use crate::problem::Problem;
 
 /// Maximum number of poses over which contributions are averaged.
 const MAX_POSES: usize = 200;
-/// Contribution of a parameter, or of an effect with all its parameters.
+/// Influence of a parameter, or of an effect with all its parameters, on predicted positions.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Contribution {
     /// Name of the parameter or effect.
@@ -19,7 +19,8 @@ pub struct Contribution {
     pub moved: f64,
 }
 
-/// Computes the contribution of every free parameter and effect of `problem` over some of the rows.
+/// Computes the contribution of every free parameter and effect of `problem` \[m\], averaged over
+/// at most [`MAX_POSES`] of the `rows`.
 pub fn of(
     problem: &Problem,
     poses: &Poses,

@@ -64,10 +64,10 @@ pub struct PlotData {
     /// Residual of the best arm in each row.
     #[doc(hidden)]
     pub residuals: Vec<PoseError>,
-    /// Rows that figures may draw, in ascending order: all rows whose target has a position, or a
-    /// sample of them with the largest residuals.
+    /// Rows that figures may draw, in ascending order: those whose target has a position. If there
+    /// are too many, a sample of them that includes the largest residuals.
     pub shown: Vec<usize>,
-    /// Number of rows that each row of `shown` represents, as the weight of a sample.
+    /// Number of rows that each row of `shown` represents: its weight in the sample.
     pub stand_for: Vec<f64>,
     /// Joints that take a command.
     pub commands: Vec<CommandedJoint>,
@@ -280,7 +280,7 @@ impl PlotData {
         Ok(Self { uncertainty: Some(uncertainty), ..self })
     }
 
-    /// Returns the number of rows whose target has a position, which figures could draw.
+    /// Returns the number of rows whose target has a position.
     pub(crate) fn placed(&self) -> usize {
         self.residuals.iter().filter(|residual| residual.has_place()).count()
     }

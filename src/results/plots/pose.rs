@@ -36,8 +36,7 @@ impl PoseError {
     }
 }
 
-/// Ratio of the sample size to the number of rows that are included because of their large
-/// residual.
+/// Number of sampled rows per row that is included because of its large residual.
 const SAMPLE_PER_LARGEST: usize = 10;
 
 /// Returns at most `limit` of some rows in ascending order: those with the largest `size`, and an

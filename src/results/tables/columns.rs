@@ -100,7 +100,8 @@ pub(super) fn names(problem: &Problem, rows: &Measurements, picked: &[usize]) ->
     columns
 }
 
-/// Group of columns: its name, the residual vector, and the rotation vector if there is one.
+/// Group of columns of one kind of residual: its name, the residual vector of a row, and its
+/// rotation vector if there is one.
 type Part<'a> =
     (&'static str, fn(&Residual) -> Vector3<f64>, &'a dyn Fn(&Residual) -> Option<Vector3<f64>>);
 

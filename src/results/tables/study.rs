@@ -4,7 +4,7 @@ use crate::files;
 use crate::results::{Cell, StudyResult};
 use crate::study::{CellResult, ParameterResult, Results, Study};
 
-/// Header of the first columns of every table.
+/// Names of the first columns of every table, which identify the cell.
 const CELL: &str = "cell,position_sigma_mm,identification_poses,strategy,solver";
 
 /// Returns `study.csv` with a line for each cell.

@@ -6,7 +6,7 @@ use crate::quantity::Unit;
 /// Number of degrees in a radian.
 const DEGREES: f64 = 180.0 / std::f64::consts::PI;
 
-/// Quantity along an axis, with its label and the factor from SI to the displayed unit.
+/// Quantity along an axis: its label and the factor from SI to the unit shown.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Quantity {
     /// Label with the unit, for example `temperature [°C]`.

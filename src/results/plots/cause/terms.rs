@@ -18,7 +18,7 @@ pub struct Rows<'a> {
     pub sites: Vec<ParameterSite>,
 }
 
-/// Function from a value of the regressor to the ordinate of the fitted law.
+/// Function from the value of a regressor to the ordinate of the fitted law.
 pub type Law<'a> = Box<dyn Fn(f64) -> f64 + 'a>;
 
 impl Rows<'_> {
@@ -28,7 +28,7 @@ impl Rows<'_> {
         others.iter().all(|site| site == first).then_some(*first)
     }
 
-    /// Returns true if every term is multiplied by a formula.
+    /// Returns true if every term has a regressor, so that the effect varies from pose to pose.
     pub fn is_driven(&self) -> bool {
         self.terms.iter().all(|(regressor, _)| !regressor.is_constant())
     }
@@ -44,7 +44,7 @@ impl Rows<'_> {
         found
     }
 
-    /// Returns Σ value × regressor over the terms in a pose.
+    /// Returns Σ value × regressor over the terms of the effect in one pose.
     pub fn driven(&self, pose: &PoseView) -> f64 {
         self.terms.iter().map(|(regressor, value)| value * regressor.value(pose)).sum()
     }
@@ -118,13 +118,13 @@ impl Rows<'_> {
         })
     }
 
-    /// Returns true if every term's regressor is the quantity itself.
+    /// Returns true if the regressor of every term is this quantity itself.
     pub fn is_each(&self, quantity: LawQuantity) -> bool {
         self.terms.iter().all(|(regressor, _)| regressor.as_quantity() == Some(quantity))
     }
 
-    /// Returns the effect's displacement in each row divided by the row's `sizes` entry; zero if
-    /// that is 0.
+    /// Returns the effect's displacement in each row divided by the row's entry of `sizes` \[m per
+    /// unit\]; zero if that entry is 0.
     pub fn over(&self, sizes: impl Iterator<Item = f64>) -> Vec<Vector3<f64>> {
         let lever = |(lever_at_pose, size): (&Vector3<f64>, f64)| {
             if size == 0.0 { Vector3::zeros() } else { lever_at_pose / size }

@@ -31,8 +31,8 @@ pub struct View<'a> {
     pub reading: &'static str,
 }
 
-/// Returns the least-squares change of a coordinate, given by its `lever` (displacement per unit),
-/// for a `displacement` \[m\].
+/// Returns the change of a coordinate that best explains a `displacement` \[m\] by least squares.
+/// `lever` is the displacement per unit of the coordinate.
 pub fn change_along(lever: &Vector3<f64>, displacement: &Vector3<f64>) -> f64 {
     lever.dot(displacement) / lever.norm_squared()
 }
