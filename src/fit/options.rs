@@ -34,9 +34,10 @@ pub struct Options {
     /// Effects of the caller (from [`Problem::effect`](crate::problem::Problem::effect)) that trace
     /// and loop search for in addition to the catalogue. A fit alone does not use them.
     pub candidates: Vec<Effect>,
-    /// State of an earlier fit of the same data with other effects, from which this one starts.
+    /// State of an earlier fit of the same data with other effects, from which the fit starts;
+    /// `None` for a cold start.
     pub(crate) warm_start: Option<Arc<WarmStart>>,
-    /// True if the fit is provisional: another one follows, and its result is not checked.
+    /// True if the fit is provisional: another fit follows, so the result is not checked.
     pub(crate) provisional: bool,
     /// True to search for influential rows by further fits.
     pub(crate) influential_rows: bool,

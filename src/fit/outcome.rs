@@ -43,7 +43,7 @@ pub struct Estimate {
     pub std_error: Option<f64>,
     /// Bound at which the value lies; `None` if it is inside its bounds.
     pub at_bound: Option<AtBound>,
-    /// Shadow price of that bound; `None` if the value is inside its bounds.
+    /// Shadow price of the bound at which the value lies; `None` if the value is inside its bounds.
     #[doc(hidden)]
     pub shadow_price: Option<ShadowPrice>,
     /// Identified share: the part of the value that the data determine, 0…1. The rest comes from
@@ -113,7 +113,7 @@ pub struct Identification {
     /// Standard deviation (1 σ) of a measured coordinate that the fit assumed \[m\] (of a tilt
     /// \[rad\]): root mean square over the identification rows of the leading kind.
     pub sigma_taken: f64,
-    /// Factor on the declared σ, less than 1 if they are too large.
+    /// Factor on the declared σ that the fit assumed: 1, or less if the declared σ are too large.
     pub sigma_scale: f64,
     /// Combinations of `unknowns` that the data determine too weakly, which keep their start
     /// values. Weights are in units of the arm's reach for lengths, 1 rad for angles and a factor

@@ -18,7 +18,7 @@ pub enum DatasetError {
         row: usize,
         /// Number of joints in the first row.
         expected: usize,
-        /// Number of joints in this row.
+        /// Number of joints in the row at fault.
         found: usize,
     },
     /// A column has another length than the configurations.

@@ -153,8 +153,8 @@ impl Numbering {
     }
 }
 
-/// Checks that the name of a file may fill this role; only roles whose values are words can be
-/// filled so.
+/// Returns the role if the name of a file may stand in for its column: roles whose values are
+/// words. Returns an error for other roles.
 pub(super) fn word_of_row(role: Role) -> Result<Role, InputErrorKind> {
     match role {
         Role::Session | Role::Target | POINT => Ok(role),

@@ -149,7 +149,8 @@ pub struct NestReading {
     pub position: Vector3<f64>,
     /// Time \[s\], if there is a column.
     pub time: Option<f64>,
-    /// Number of arm rows before this measurement, which replaces a missing time.
+    /// Number of rows of the arm before this measurement of a fixed point, which replaces a missing
+    /// time.
     pub after: usize,
     /// Session; empty without a column.
     pub session: String,

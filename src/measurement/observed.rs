@@ -81,7 +81,7 @@ pub(super) fn of_row(
 /// Filled cell of the current row.
 struct Cell<'a> {
     field: &'static Field,
-    /// Index of its column; `None` if the name of the file is its value.
+    /// Index of the cell's column; `None` if the name of the file is the value.
     place: Option<usize>,
     /// Name of the file without extension.
     stem: &'a str,

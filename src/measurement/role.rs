@@ -10,7 +10,7 @@ pub(super) enum Role {
     Joint(usize),
     /// Encoder reading of a joint.
     Reading(usize),
-    /// Column with this name, which belongs to a kind of rows.
+    /// Column, given by its name, that belongs to a kind of rows.
     Field(&'static str),
     Sigma,
     Payload,

@@ -24,7 +24,7 @@ pub struct Arm<S> {
     pub tree: Tree,
     /// Index of the joint whose frame carries the payload; the last joint if `None`.
     pub payload_on: Option<usize>,
-    /// Position of the payload in that frame \[m\].
+    /// Position of the payload in the frame that carries it \[m\].
     pub payload_at: Vector3<S>,
     /// Payload mass of poses that give none \[kg\].
     pub payload_mass: f64,

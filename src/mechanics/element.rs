@@ -10,7 +10,7 @@ use crate::spatial::{Frame, rotate};
 /// Force on a beam.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct LinkLoad<S> {
-    /// Number of the element that carries it.
+    /// Index of the element that carries the load.
     pub element: usize,
     /// Position in the beam's frame \[m\].
     pub at: Vector3<S>,

@@ -56,17 +56,17 @@ pub(super) struct LinearisedSegment {
     pub root: Frame<f64>,
     pub tip: Frame<f64>,
     pub rotates: bool,
-    /// Indices of the unknown moments that deflect it.
+    /// Indices of the unknown moments that deflect the segment.
     pub unknowns: Range<usize>,
     pub moment_direction: usize,
     /// First direction that belongs to a parameter, and number of all directions.
     pub parameter_direction: usize,
     pub directions: usize,
-    /// Events of the forward pass that are its loads.
+    /// Events of the forward pass that are the segment's loads.
     pub events: Range<usize>,
-    /// Event of its axis, if it is a joint that deflects about it.
+    /// Event of the joint's axis; `None` if the segment is no joint that deflects about it.
     pub axis: Option<usize>,
-    /// Indices of its loads, twists and moves, set by [`LinearisedArm::push_segment`].
+    /// Indices of the segment's loads, twists and moves, set by [`LinearisedArm::push_segment`].
     pub loads: Range<usize>,
     pub first_column: usize,
     pub first_move: usize,

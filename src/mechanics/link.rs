@@ -12,7 +12,7 @@ use crate::scalar::Scalar;
 pub struct PointMass {
     /// Size of the mass \[kg\].
     pub mass: f64,
-    /// Position in the frame that carries it \[m\].
+    /// Position in the frame that carries the mass \[m\].
     pub at: Vector3<f64>,
 }
 

@@ -46,12 +46,13 @@ impl FixtureKind {
         }
     }
 
-    /// Returns true if its first six numbers are a pose in the frame that carries it.
+    /// Returns true if the first six numbers of the fixture are a pose in the frame that carries
+    /// it.
     pub fn has_pose(self) -> bool {
         matches!(self, Self::Camera | Self::Fisheye | Self::Marker)
     }
 
-    /// Returns the names of its numbers, which are the last part of parameter names.
+    /// Returns the names of the fixture's numbers, which are the last part of parameter names.
     pub fn fields(self) -> &'static [&'static str] {
         match self {
             Self::Point | Self::Anchor => &["x", "y", "z"],
@@ -96,7 +97,7 @@ impl FixtureKind {
 pub struct FixtureValues<S> {
     /// Kind of the fixture.
     pub kind: FixtureKind,
-    /// Values of its numbers.
+    /// Values of the fixture's numbers, in the order of [`FixtureKind::fields`].
     pub numbers: [S; MAX_NUMBERS],
 }
 
@@ -118,7 +119,8 @@ impl FixtureValues<f64> {
 }
 
 impl<S: Scalar> FixtureValues<S> {
-    /// Returns its position \[m\], for a sphere the centre. Not meaningful for a plane.
+    /// Returns the position of the fixture \[m\], for a sphere the centre. Not meaningful for a
+    /// plane.
     pub fn position(&self) -> Vector3<S> {
         let [x, y, z, ..] = self.numbers;
         Vector3::new(x, y, z)

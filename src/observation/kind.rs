@@ -9,7 +9,7 @@ pub struct Kind {
     pub name: &'static str,
     /// Number of scalars that a row measures, at most three.
     pub numbers: usize,
-    /// Unit of these scalars: a length, an angle or pixels.
+    /// Unit of the measured scalars: a length, an angle or pixels.
     pub unit: Unit,
     /// Parts of the scene from which a row is predicted.
     pub needs: Needs,
@@ -36,7 +36,7 @@ pub struct Kind {
 pub struct Field {
     /// Name of the column, without the suffix of its unit.
     pub name: &'static str,
-    /// Noun with its article, for messages.
+    /// Noun for the cell's content, with its article, for messages.
     pub noun: &'static str,
     /// Type of the cells.
     pub content: Content,
@@ -62,13 +62,13 @@ pub enum Content {
 /// Parts of a [`Scene`](super::Scene) from which a row is predicted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Needs {
-    /// Fixtures alone: the prediction does not depend on the arm's configuration.
+    /// Requires fixtures alone: the prediction does not depend on the arm's configuration.
     Fixtures,
-    /// Target, base and fixtures.
+    /// Requires the target, the base and fixtures.
     Target,
-    /// Frame of the arm and gravity.
+    /// Requires a frame of the arm, and gravity.
     Frame,
-    /// Fixtures, the frames that carry them, and a point of the second fixture.
+    /// Requires fixtures, the frames that carry them, and a point of the second fixture.
     Carriers,
 }
 
@@ -95,7 +95,7 @@ impl Field {
         Self { name, noun, content, required: true }
     }
 
-    /// Makes the cells optional.
+    /// Returns the column with optional cells.
     pub(super) const fn optional(self) -> Self {
         Self { required: false, ..self }
     }

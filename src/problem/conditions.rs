@@ -55,7 +55,8 @@ pub struct PoseView<'a> {
     pub offsets: Option<&'a Vec<JointOffsets>>,
 }
 
-/// What effects add to a joint in one pose besides its coordinate.
+/// Offsets that effects add to a joint in one pose besides its coordinate: strains and small
+/// motions.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct JointOffsets {
     /// Stress-free strain of the joint's beam: elongation, then curvatures about y and z [1/m].

@@ -69,7 +69,7 @@ pub struct DeclaredCovariate {
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum HeldOut {
-    /// Holds out the rows whose cell in this column is `validation`.
+    /// Holds out the rows whose cell in the column of this name is `validation`.
     Column(String),
     /// Holds out a random fraction; rows of one joint configuration stay together.
     Fraction {

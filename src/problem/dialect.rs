@@ -61,9 +61,9 @@ pub struct ColumnRule {
 /// Selector of a table column.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum ColumnSelector {
-    /// Column with this name in the header.
+    /// Column given by its name in the header.
     Name(String),
-    /// Column at this place, counted from 1: `"#7"`.
+    /// Column given by its place, counted from 1: `"#7"`.
     Place(usize),
     /// Name of the file as the value of every row: `"#file"`.
     File,
@@ -81,9 +81,9 @@ pub enum Delimiter {
 /// Marker of a row in which nothing was measured.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Missing {
-    /// Position with these three numbers, in the unit of the table.
+    /// Marks a missing position by three numbers, in the unit of the table.
     Position([f64; 3]),
-    /// Position of which a cell is this word; the word may be empty.
+    /// Marks a missing position by a word in one of its cells; the word may be empty.
     Word(String),
 }
 

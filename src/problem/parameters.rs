@@ -21,7 +21,7 @@ pub struct ParameterRule {
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub enum Freedom {
-    /// Held at its nominal value.
+    /// The parameter is held at its nominal value.
     Fixed,
     /// Free, with optional prior and bounds.
     Free {

@@ -13,11 +13,12 @@ use crate::quantity::Unit;
 pub struct Tool {
     /// Index of the joint whose frame carries the tool, by default the last.
     pub joint: usize,
-    /// Measured point in that frame \[m\].
+    /// Measured point in the frame of the joint that carries the tool \[m\].
     pub target: Vector3<f64>,
-    /// Orientation of the target in that frame, a rotation vector \[rad\].
+    /// Orientation of the target in the frame of the joint that carries the tool, a rotation vector
+    /// \[rad\].
     pub rotation: Vector3<f64>,
-    /// Position of the payload in that frame \[m\].
+    /// Position of the payload in the frame of the joint that carries the tool \[m\].
     pub payload_at: Vector3<f64>,
     /// True if the payload hangs at the identified target: `payload_at = "target"`.
     pub payload_follows: bool,
@@ -30,11 +31,11 @@ pub struct Tool {
 pub struct Target {
     /// Name of the target, as used in the column.
     pub name: String,
-    /// Index of the joint whose frame carries it.
+    /// Index of the joint whose frame carries the target.
     pub joint: usize,
-    /// Position in that frame \[m\].
+    /// Position of the target in the frame of the joint that carries it \[m\].
     pub at: Vector3<f64>,
-    /// Orientation in that frame, a rotation vector \[rad\].
+    /// Orientation of the target in the frame of the joint that carries it, a rotation vector \[rad\].
     pub rotation: Vector3<f64>,
     /// Place in the file, for errors.
     pub location: Location,

@@ -71,7 +71,7 @@ pub enum Unit {
 /// Unit suffix of a key or column, written after an underscore: `deg` in `alpha_deg`.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Suffix {
-    /// Suffix without its underscore.
+    /// Suffix of column names and keys for the unit, without its underscore.
     pub name: &'static str,
     /// Converts a value in this unit to SI.
     pub to_si: fn(f64) -> f64,
@@ -89,7 +89,7 @@ pub struct Display {
 /// Unit of measured numbers in tables and messages.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct TableUnit {
-    /// Factor that converts an SI value to this unit.
+    /// Factor that converts an SI value to the displayed unit.
     pub factor: f64,
     /// Suffix in names of columns and keys: `mm`, `deg`.
     pub suffix: &'static str,

@@ -57,7 +57,7 @@ pub(super) struct Linearised {
 
 /// Parameters of a correction that a model contains.
 struct Columns {
-    /// Column of the posterior, and index in the model, of each of these parameters.
+    /// For each parameter in both, its column in the posterior and its index in the model.
     found: Vec<(usize, usize)>,
     /// Difference, for every column, between the deviation in the model and the one in the
     /// linearisation of the correction.

@@ -62,7 +62,7 @@ impl Source {
     /// Inputs that are conditions of a pose, not commands.
     pub const CONDITIONS: [Self; 3] = [Self::Temperature, Self::Payload, Self::Hoist];
 
-    /// Returns the value at a pose; `None` if the pose does not state it.
+    /// Returns the value of the quantity in a pose; `None` if the pose does not state it.
     pub fn value(self, setup: &PoseView) -> Option<f64> {
         match self {
             Self::Command(joint) => setup.configuration.get(joint).copied(),
@@ -82,7 +82,7 @@ impl Source {
         }
     }
 
-    /// Parses a name from a file; `None` if it is unknown.
+    /// Parses the name of a quantity from a file; `None` if it is unknown.
     pub fn parse(name: &str) -> Option<Self> {
         if let Some(condition) = Self::CONDITIONS.into_iter().find(|of| of.name() == name) {
             return Some(condition);

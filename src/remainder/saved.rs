@@ -60,7 +60,8 @@ struct SavedSite {
     lever: f64,
     /// 1 σ of the error that is a function of the joint's own command, as motion of the position.
     single_amplitude_m: f64,
-    /// Length ℓᵤ of that function: rad for angles, standard deviations for other inputs.
+    /// Length ℓᵤ of the function of the joint's own command: rad for angles, standard deviations
+    /// for other inputs.
     single_length: f64,
     /// 1 σ of the error that is a function of all inputs, as motion of the position.
     joint_amplitude_m: f64,
@@ -87,7 +88,7 @@ struct Parameter {
     name: String,
     /// Estimated value about which the arm is linearised, SI.
     estimate: f64,
-    /// Deviation of that value from nominal, SI.
+    /// Deviation of the estimated value from nominal, SI.
     deviation: f64,
     /// Change of the parameter when it is fitted together with the remainder, SI.
     change: f64,

@@ -13,7 +13,8 @@ use crate::model::Model;
 pub struct SiteTable {
     /// Index of the joint, counted from 0.
     pub joint: usize,
-    /// True if the error is in the compliance of the joint, false if it is in its coordinate.
+    /// True if the error is in the compliance of the joint, false if it is in the joint's
+    /// coordinate.
     pub is_compliance: bool,
     /// Lever that divides the derivative of the position: \[m/rad\], \[1\] or \[N·m²/rad\].
     pub lever: f64,

@@ -115,7 +115,7 @@ pub(super) struct Headline {
     pub states: Vec<(&'static str, String)>,
     /// Unit of the errors.
     pub unit: &'static str,
-    /// Description of the rows over which the errors are averaged.
+    /// Description of the rows over which the headline's errors are averaged.
     pub of: String,
     pub facts: Vec<(&'static str, String)>,
 }

@@ -14,7 +14,7 @@ use crate::results::{ResidualSize, rows_in};
 const MAX_SHOWN_OUTLIERS: usize = 20;
 /// Maximum number of influential rows that a text names.
 const MAX_SHOWN_INFLUENTIAL: usize = 3;
-/// Name of the file that contains all of them.
+/// Name of the file that contains all outliers and influential rows.
 const FILE: &str = "estimate.json";
 
 /// States the size of the residual relative to the declared noise.

@@ -124,7 +124,8 @@ fn bar(estimate: &Estimate) -> Bar {
     }
 }
 
-/// Returns the identified share of a parameter, with a word for it.
+/// Returns the identified share of a parameter in percent, with a word for how well it is
+/// identified.
 fn identified(estimate: &Estimate) -> String {
     let share = format!("{:3.0} %", estimate.identified * 100.0);
     match Knowledge::of(estimate) {

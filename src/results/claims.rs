@@ -44,9 +44,9 @@ pub struct Claim<T> {
 /// Claims about a cause, from the weakest to the strongest.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Claims {
-    /// Claim that a cause acts at this place.
+    /// Claim that a cause acts at the stated place.
     pub place: Claim<String>,
-    /// Claim that the cause depends on exactly these quantities.
+    /// Claim that the cause depends on exactly the stated quantities.
     pub depends_on: Claim<Vec<String>>,
     /// Claim that the cause has this law and that no function of unknown law acts at the place;
     /// null if no law is known.

@@ -107,7 +107,7 @@ pub struct FoundEffect {
     /// candidates.
     pub p_value: f64,
     pub parameters: Vec<ParameterValue>,
-    /// Effects that these data cannot distinguish from the found one, most probable first.
+    /// Effects that the data cannot distinguish from the found one, most probable first.
     pub alternatives: Vec<NamedEffect>,
     /// Held-out errors after the first round with the effect.
     pub held_out_after: Summary,
@@ -158,7 +158,7 @@ pub struct Structure {
 pub struct Correction {
     /// Range of each input, SI units. Beyond it the correction is constant.
     pub ranges: Vec<(String, (f64, f64))>,
-    /// Number of held-out rows outside these ranges.
+    /// Number of held-out rows at which an input is outside its range.
     pub held_out_beyond: usize,
     /// Rms error of poses, each left out of the fit in turn, without and with the correction.
     #[serde(skip_serializing_if = "Option::is_none")]

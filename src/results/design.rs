@@ -127,7 +127,7 @@ pub struct JudgedPrediction {
 pub struct GrowthStep {
     pub poses: usize,
     pub rank: usize,
-    /// Number of parameter combinations that these poses leave undetermined.
+    /// Number of parameter combinations that the poses leave undetermined.
     pub open: usize,
     /// Number of parameters with an identified share of 90 % or more.
     pub well_identified: usize,
@@ -138,7 +138,7 @@ pub struct GrowthStep {
 /// Smallest sizes of effects that would be found, SI units.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct Detectable {
-    /// Probability with which an effect of that size is found.
+    /// Probability with which an effect of the stated size is found.
     pub power: f64,
     pub level: f64,
     /// True if the poses have no times, so that equal time steps were assumed.

@@ -23,7 +23,7 @@ pub struct NamedEffect {
     pub effect: Effect,
     /// Description of the effect in words.
     pub description: String,
-    /// Line that declares it in an `[[effect]]` of problem.toml.
+    /// Line that declares the effect in an `[[effect]]` of problem.toml.
     pub declaration: String,
 }
 
@@ -38,7 +38,7 @@ impl NamedEffect {
     }
 }
 
-/// Effect that these data cannot show.
+/// Effect that the data cannot show.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Untestable {
     #[serde(flatten)]

@@ -98,7 +98,7 @@ pub(super) struct FindingKeys {
     code: String,
     /// `error`, `warning` or `note`.
     severity: String,
-    /// Numbers and words of this case, SI units.
+    /// Numbers and words of the finding, SI units.
     numbers: BTreeMap<String, serde_json::Value>,
     text: String,
     remedy: String,

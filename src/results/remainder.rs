@@ -15,7 +15,7 @@ pub const REMAINDER_FILE: &str = "remainder.json";
 /// Remainder (smooth correction of errors that no law explains) that corrects predictions.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct Remainder {
-    /// Name of its file in the same folder; null if the problem declares the remainder.
+    /// Name of the remainder's file in the same folder; null if the problem declares the remainder.
     pub file: Option<&'static str>,
     /// Joints whose errors the remainder describes.
     pub sites: Vec<String>,

@@ -75,13 +75,13 @@ pub struct Candidate {
     pub cross_validated_gain_deg: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cross_validated_gain_px: Option<f64>,
-    /// Effects that these poses hardly distinguish from the candidate.
+    /// Effects that the measured poses hardly distinguish from the candidate.
     pub alike: Vec<Confounded>,
     /// Pose that would distinguish the effect from the first confounded one.
     pub told_apart: Option<SeparatingPose>,
 }
 
-/// Effect that these poses hardly distinguish from a candidate.
+/// Effect that the measured poses hardly distinguish from a candidate.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct Confounded {
     #[serde(flatten)]

@@ -75,7 +75,7 @@ pub struct RandomRule {
 pub enum HeldOutRows {
     /// Share of the rows, rounded to at least one row and fewer than all.
     Share(f64),
-    /// All rows but this many.
+    /// Number of rows that are not held out; all others are.
     AllBut(usize),
 }
 

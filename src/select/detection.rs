@@ -24,9 +24,9 @@ pub struct Detection {
     pub power: f64,
     /// Probability of a false alarm: that noise makes any effect significant.
     pub level: f64,
-    /// Candidates that these poses can test, in the order of the catalogue.
+    /// Effects that the poses can test, in the order of the catalogue, with their detectable sizes.
     pub effects: Vec<Detectable>,
-    /// Candidates that these poses cannot test, with the reason.
+    /// Effects that the poses cannot test, with the reason.
     pub untestable: Vec<(Effect, &'static str)>,
     /// True if the poses have no times; one minute is then assumed between consecutive poses.
     pub times_assumed: bool,
@@ -37,7 +37,7 @@ pub struct Detection {
 pub struct Detectable {
     /// Effect whose detectable size is computed.
     pub effect: Effect,
-    /// Sizes of its parameters; parameters with the same unit form one entry.
+    /// Detectable sizes of the effect's parameters; parameters with the same unit form one entry.
     pub sizes: Vec<Size>,
 }
 
@@ -51,7 +51,7 @@ pub struct Size {
     pub parameters: Vec<String>,
     /// Unit of the parameters.
     pub unit: Unit,
-    /// Standard deviation (1 σ) of the catalogue's prior on these parameters, SI. Real effects are
+    /// Standard deviation (1 σ) of the catalogue's prior on the parameters, SI. Real effects are
     /// rarely much larger.
     pub prior: f64,
     /// Size in the direction (phase, axis) that is hardest to detect, SI. `None` if the fitted

@@ -27,10 +27,10 @@ pub struct Ranked {
     /// Reduction of the root mean squared error of identification poses, each left out of the fit
     /// in turn \[m\]; `None` if it was not computed.
     pub cross_validated: Option<f64>,
-    /// Effects of the ranking that are confounded with it, with the largest principal angle to each
-    /// \[rad\].
+    /// Effects of the ranking that are confounded with this candidate, with the largest principal
+    /// angle to each \[rad\].
     pub alike: Vec<(Effect, f64)>,
-    /// Pose that would distinguish it from the first confounded effect.
+    /// Pose that would distinguish this candidate from the first confounded effect.
     pub separating_pose: Option<SeparatingPose>,
 }
 
@@ -39,7 +39,7 @@ pub struct Ranked {
 pub struct Trace {
     /// Fit of the declared problem.
     pub fit: Identification,
-    /// Tests of its residual.
+    /// Tests of the residual of that fit.
     pub residual_tests: ResidualTests,
     /// Candidates in order of the evidence for them, best first; only the best of each family at
     /// each place.
@@ -48,7 +48,7 @@ pub struct Trace {
     pub tried: usize,
     /// Largest corrected p-value at which a candidate is significant.
     pub level: f64,
-    /// Candidates that these data cannot show, with the reason.
+    /// Candidates that the data cannot show, with the reason.
     pub untestable: Vec<(Effect, &'static str)>,
     /// Candidates that the fitted parameters can reproduce completely, so that they cannot be
     /// detected.

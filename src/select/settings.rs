@@ -64,15 +64,15 @@ pub(super) const MAX_REVISED_SETS: usize = 6;
 pub(super) const MAX_EFFECTS: usize = 4;
 /// Number of sets of equal size that are extended by a further hypothesis (beam width).
 pub(super) const BEAM_WIDTH: usize = 8;
-/// Number of hypotheses that may extend a set other than the best one: those with the largest
-/// gains.
+/// Maximum number of hypotheses by which a set other than the best one is extended: those with the
+/// largest gains.
 pub(super) const MAX_EXTENDING: usize = 80;
 /// Largest number of columns for single poses at which a set with such a hypothesis is extended,
 /// because the work grows with their cube.
 pub(super) const MAX_WIDE_COLUMNS: usize = 240;
 /// Log odds to the best set beyond which larger sets are not searched.
 pub(super) const LOG_ODDS_CUTOFF: f64 = 12.0;
-/// Largest number of added effects at which they are removed from the fit and evaluated again.
+/// Largest number of added effects for which they are removed from the fit and evaluated again.
 pub(super) const MAX_RECONSIDERED: usize = 16;
 /// Maximum number of rival sets that are fitted, in addition to the best replacements of each
 /// member.
@@ -123,7 +123,7 @@ pub(super) const SUBSETS: u64 = 20;
 /// Smallest share of these subsets that must contain an effect for its probability to be that on
 /// all rows. With a smaller share, the mean over the subsets is stated.
 pub(super) const MIN_SHARE_OF_SUBSETS: f64 = 0.75;
-/// Reciprocal of the share of configurations that each of these subsets leaves out.
+/// Reciprocal of the share of configurations that each random subset leaves out.
 pub(super) const SUBSET_PARTS: usize = 5;
 /// Number of resamples of the bootstrap interval of the gain.
 pub(super) const RESAMPLES: usize = 2000;

@@ -18,9 +18,9 @@ use crate::residual_tests::ResidualTests;
 /// Structure in the residual that no effect explains.
 #[derive(Debug, Clone)]
 pub struct Unexplained {
-    /// Site of the structure; `None` if it is not known.
+    /// Part of the arm or measurement at which the structure arises; `None` if unknown.
     pub site: Option<Site>,
-    /// Quantities on which it depends.
+    /// Quantities on which the structure depends.
     pub depends_on: Vec<Covariate>,
     /// Upper limit of the probability that noise alone causes the structure, for all hypotheses
     /// together.
@@ -36,10 +36,10 @@ pub struct Unexplained {
 /// depends.
 #[derive(Debug, Clone)]
 pub struct Correction {
-    /// Range of each covariate over the identification poses, in its unit. Beyond it the correction
-    /// is constant.
+    /// Range of each covariate over the identification poses, in the covariate's unit. Beyond it
+    /// the correction is constant.
     pub ranges: Vec<(Covariate, (f64, f64))>,
-    /// Number of held-out poses with a covariate outside these ranges.
+    /// Number of held-out poses at which a covariate is outside its identification range.
     pub beyond: usize,
     /// Root mean squared error of identification poses, each left out in turn, without and with the
     /// correction \[m\].
@@ -70,7 +70,7 @@ pub struct Curve {
 pub struct PartialResidual {
     /// Value of the covariate, in its unit.
     pub covariate: f64,
-    /// Value of the correction there \[rad\] or \[m\].
+    /// Value of the correction at this pose \[rad\] or \[m\].
     pub correction: f64,
     /// Error of the coordinate according to this pose alone \[rad\] or \[m\].
     pub value: f64,

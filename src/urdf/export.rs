@@ -39,9 +39,9 @@ pub struct MovedOrigin {
     pub xyz: Vector3<f64>,
     /// Roll, pitch and yaw \[rad\], as written to the file.
     pub rpy: Vector3<f64>,
-    /// Distance by which it moved \[m\].
+    /// Distance by which the origin moved \[m\].
     pub distance: f64,
-    /// Angle by which it turned \[rad\].
+    /// Angle by which the origin turned \[rad\].
     pub angle: f64,
 }
 

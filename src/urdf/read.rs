@@ -69,7 +69,7 @@ pub(super) struct Joint {
     /// Error of a `<mimic>` that names no joint or is invalid. It is reported only if the chain
     /// needs the joint.
     pub broken_mimic: Option<(Location, UrdfErrorKind)>,
-    /// Byte range of its element in the text.
+    /// Byte range of the joint's element in the text.
     pub span: Range<usize>,
 }
 

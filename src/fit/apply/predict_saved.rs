@@ -42,10 +42,10 @@ pub struct Prediction {
     pub errors: Option<ErrorsBySession>,
     /// Scatter of the predicted target at each point that the rows touch.
     pub spreads: Vec<PointSpread>,
-    /// Names of base and tool parameters that the estimate lacks. They were fitted to these rows,
-    /// with the arm's parameters fixed.
+    /// Names of base and tool parameters that the estimate lacks. They were fitted to the predicted
+    /// rows, with the arm's parameters fixed.
     pub placed: Vec<String>,
-    /// Full parameter vector of the model of these rows, with the fitted bases and tools.
+    /// Full parameter vector of the model of the predicted rows, with the fitted bases and tools.
     pub x: DVector<f64>,
 }
 

@@ -37,7 +37,7 @@ pub struct SavedEstimate {
     /// Standard deviation (1 σ) of a measured coordinate, estimated from the scatter of the fit
     /// \[m\]; `None` if the problem declares σ.
     pub estimated_sigma: Option<f64>,
-    /// Start time of the time-dependent terms \[s\]; older versions did not write it.
+    /// Start time of the time-dependent terms \[s\]; `None` in files of older versions.
     pub first_time: Option<f64>,
     /// Name of the `remainder.json` in the same folder; `None` if no remainder was accepted.
     pub remainder: Option<String>,

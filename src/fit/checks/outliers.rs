@@ -42,10 +42,11 @@ impl Outlier {
 pub struct InfluentialRows {
     /// Influential rows, in the order of the table.
     pub rows: Vec<Outlier>,
-    /// Reduced χ² (χ² over its degrees of freedom) of the fit without these rows; `None` if the
-    /// noise is estimated.
+    /// Reduced χ² (χ² over its degrees of freedom) of the fit without the influential rows; `None`
+    /// if the noise is estimated.
     pub reduced_chi2: Option<f64>,
-    /// 1 σ of a coordinate that the fit without these rows takes \[m\], for tilts \[rad\].
+    /// Standard deviation (1 σ) of a coordinate that the fit without the influential rows assumes
+    /// \[m\], for tilts \[rad\].
     pub sigma_taken: f64,
 }
 

@@ -20,7 +20,7 @@ pub struct Baseline {
     pub stage: StiffnessStage,
     /// Table 2 of the paper: α, a, θ, d, β of each joint.
     pub geometry: Vec<[TableEntry; 5]>,
-    /// Errors of the identified arm, predicted by these closed forms.
+    /// Errors of the identified arm, predicted by the paper's closed forms.
     pub errors: Errors,
     /// Errors measured − predicted of the held-out poses, measuring frame \[m\].
     pub held_out: Vec<Vector3<f64>>,

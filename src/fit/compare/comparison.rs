@@ -43,7 +43,7 @@ pub struct Comparison {
 pub struct Before {
     /// Errors measured − predicted of the held-out poses, measuring frame \[m\].
     pub errors: Vec<Vector3<f64>>,
-    /// True if base or tool were fitted first, because they are free without a prior.
+    /// True if base or tool were fitted before, because they are free without a prior.
     pub registered: bool,
 }
 

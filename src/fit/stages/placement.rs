@@ -158,8 +158,8 @@ impl Placement {
 /// Bases, targets and fixtures that only held-out rows use.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(in crate::fit) struct HeldOutOnly {
-    /// True for each parameter of the model that belongs to one of these.
+    /// True for each parameter of the model that belongs to such a base, target or fixture.
     pub parameters: Vec<bool>,
-    /// Held-out rows that use one of these.
+    /// Held-out rows that use such a base, target or fixture.
     pub rows: Vec<usize>,
 }

@@ -78,8 +78,8 @@ fn axes(pose: &Pose) -> Option<[Vector3<f64>; 3]> {
     pose.orientation?.axes()
 }
 
-/// Registers in `x` the orientations of the targets for which `turns` is true. Each pose comes with
-/// the frame that carries its target, arm base frame.
+/// Registers in `x` the orientations of the targets for which `turns` returns true. Each pose is
+/// paired with the frame that carries its target, arm base frame.
 fn turn_targets(
     model: &Model,
     poses: &[(&Pose, Frame<f64>)],

@@ -30,9 +30,9 @@ const QUADRATURE_INTERVALS: u32 = 400;
 /// Direction in which the cost hardly rises if an unknown moves away from its bound.
 #[derive(Debug, Clone, PartialEq)]
 pub(in crate::fit) struct HiddenByBound {
-    /// Index of the unknown that rests on its bound.
+    /// Index of the unknown that is at its bound.
     pub unknown: usize,
-    /// Bound on which it rests.
+    /// Bound (lower or upper) at which the unknown is.
     pub side: AtBound,
     /// Deviation √(E u²) of the unknown from its bound \[unit of x\]; infinite if neither data nor
     /// other bounds limit it.

@@ -40,7 +40,7 @@ const FLAT_PRIOR_PRECISION: f64 = 1e-12;
 pub(in crate::fit) struct RefutedPrior {
     /// Pattern of the rule.
     pub rule: String,
-    /// Factor by which its σ is too narrow.
+    /// Factor by which the declared σ of the rule is too small.
     pub factor: f64,
     /// Ratio of the σ of the residual with wider priors to that with the declared ones.
     pub sigma_ratio: f64,
@@ -157,8 +157,8 @@ impl Evidence {
         }
     }
 
-    /// Returns the noise variance with the largest evidence under priors of these σ, at least 1
-    /// (the declared one).
+    /// Returns the noise variance with the largest evidence for priors with these σ. The variance
+    /// is relative to the declared one, and at least 1.
     fn best(&self, sigmas: &[Option<f64>]) -> Option<Best> {
         let step = self.max_variance.ln() / f64::from(TRIAL_VARIANCES - 1);
         let variances = (0..TRIAL_VARIANCES).map(|k| (f64::from(k) * step).exp());

@@ -53,7 +53,7 @@ pub(in crate::fit) fn outlying(lengths: &[f64], coordinates: &[usize]) -> Vec<bo
 /// Lengths of the whitened residuals of some poses, and their outlier limits.
 #[derive(Debug, Clone)]
 pub(in crate::fit) struct Lengths {
-    /// Length ‖r‖ of each pose in units of its declared σ.
+    /// Length ‖r‖ of the residual of each pose, in units of the declared σ.
     pub values: Vec<f64>,
     /// Length ‖r‖ of each pose in units of the σ that the fit assumed.
     pub weighed: Vec<f64>,

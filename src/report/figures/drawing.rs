@@ -4,7 +4,7 @@ use crate::files::csv;
 use crate::quantity::format::fixed;
 use crate::results::PoseError;
 
-/// Figure with its title, caption and data.
+/// Figure of a report: title, caption, drawing and plotted data.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Drawing {
     /// File name without extension.

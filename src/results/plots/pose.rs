@@ -7,7 +7,7 @@ use crate::problem::Observation;
 /// Pose with its residual.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PoseError {
-    /// File and line of its row, without the folder if the file names are unique.
+    /// File and line of the pose's row, without the folder if the file names are unique.
     pub place: String,
     /// Joint commands, or encoder readings, shape = (joints) \[rad\] or \[m\]; 0 for fixed joints.
     pub configuration: Vec<f64>,

@@ -24,7 +24,7 @@ impl CommandedJoint {
         self.unit.display(1.0).symbol
     }
 
-    /// Returns the name of its column, for example `q2_deg` or `q3_mm`.
+    /// Returns the name of the command's column in tables, for example `q2_deg` or `q3_mm`.
     pub(crate) fn column(self) -> String {
         format!("{}_{}", self.name(), if self.unit == Unit::Angle { "deg" } else { "mm" })
     }

@@ -130,7 +130,7 @@ pub(super) struct Block {
     pub is_surface: bool,
     /// True if the hypothesis is a periodic error with many orders under one prior.
     pub is_gear: bool,
-    /// Name of its effect's family; `None` for a function without a law.
+    /// Name of the family of the hypothesis' effect; `None` for a function without a law.
     pub family: Option<String>,
     /// Joint, from 0, whose command error the effect describes; `None` for other hypotheses.
     pub joint: Option<usize>,

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::{Mutex, PoisonError};
 
-/// Cache of results by key.
+/// Cache of computed results by key, shared by several threads.
 pub(super) struct Cache<K, V>(Mutex<BTreeMap<K, V>>);
 
 impl<K, V> Default for Cache<K, V> {

@@ -249,7 +249,7 @@ pub(super) struct ReducedProblem<'p, 'a> {
 }
 
 impl ReducedProblem<'_, '_> {
-    /// Returns ln p(r | set) at its sizes.
+    /// Returns ln p(r | set) for the sizes of the set's members.
     pub fn ln_likelihood(&self) -> f64 {
         self.without - self.ln_determinant
     }

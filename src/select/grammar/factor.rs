@@ -72,7 +72,7 @@ pub struct Factor {
     /// Value of the inner parameter and distance to the next trial value; `None` if the form has
     /// none.
     pub inner: Option<(f64, f64)>,
-    /// ln of its prior probability among all factors.
+    /// Log prior probability of the factor among all factors.
     pub ln_prior: f64,
 }
 

@@ -69,7 +69,7 @@ pub struct WhitenedSite {
 pub struct Span {
     /// Orthonormal functions of the pose, shape = (poses, k).
     pub functions: DMatrix<f64>,
-    /// Weight matrix W times these functions, shape = (poses, k).
+    /// Weight matrix W times the orthonormal functions, shape = (poses, k).
     pub weighted: DMatrix<f64>,
     /// Products of the functions with the residual; their squares sum to the explained sum of
     /// squares.

@@ -21,7 +21,7 @@ const MAX_EXTENDED: usize = 40;
 /// Product of factors, given by their indices in ascending order.
 pub type Product = Vec<u16>;
 
-/// Terms with the same number of columns, with these columns.
+/// Group of terms that have the same number of columns, with the columns.
 pub struct Chunk {
     /// Number of columns of each term.
     pub width: usize,

@@ -266,7 +266,7 @@ impl<'a> Linearised<'a> {
         effect.terms(self.problem).iter().map(|term| term.never_negative).collect()
     }
 
-    /// Returns the column of a site, length 3 N; `None` if no effect enters there.
+    /// Returns the column of a site, length 3 N; `None` if no column was computed for it.
     pub fn place(&self, site: ParameterSite) -> Option<DVector<f64>> {
         let &(_, place) = self.derivatives.places.iter().find(|(known, _)| *known == site)?;
         Some(self.derivatives.column(place).into_owned())

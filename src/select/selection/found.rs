@@ -32,9 +32,9 @@ pub struct Found {
     pub claims: Option<Claims>,
     /// Probability that chance alone gains as much, corrected for the candidates tried.
     pub p_value: f64,
-    /// Estimates of its parameters.
+    /// Estimates of the effect's parameters.
     pub estimates: Vec<Estimate>,
-    /// Effects that these data cannot distinguish from it, best first.
+    /// Effects that the data cannot distinguish from the found one, best first.
     pub alternatives: Vec<Effect>,
     /// Share of refits on random 80 % of the configurations that find the effect again; `None` if
     /// no evidence was evaluated.

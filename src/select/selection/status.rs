@@ -15,7 +15,7 @@ pub enum Status {
     /// An effect with this law acts: the probability of the law is at least
     /// [`stated`](crate::select::SelectionRules::stated).
     Found,
-    /// The probability of its law is above one half, but below that of `found`.
+    /// The probability of the effect's law is above one half, but below that of `found`.
     Probable,
     /// At most the place of the cause is established: the law is one of several candidates.
     Located,

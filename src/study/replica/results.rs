@@ -13,7 +13,7 @@ pub type HeldOutError = Option<ErrorSummary>;
 pub struct Replica {
     /// Case that the specimen belongs to.
     pub case: Case,
-    /// Factor by which the declared flexibilities of this specimen are multiplied.
+    /// Factor by which the specimen's declared flexibilities are multiplied.
     pub scale: f64,
     /// Errors of the nominal arm without elasticity.
     pub before: ErrorSummary,

@@ -66,7 +66,8 @@ pub struct Load {
 }
 
 impl Load {
-    /// Returns the conditions of a pose under this load.
+    /// Returns the conditions of a pose with this load (payload and hoist force) instead of the
+    /// pose's own.
     pub(super) fn put_on(self, conditions: &PoseConditions) -> PoseConditions {
         let (payload, hoist) =
             (self.payload.or(conditions.payload), self.hoist.or(conditions.hoist));

@@ -156,8 +156,8 @@ impl Misreading {
         }
     }
 
-    /// Returns a shift by as many rows that begins at the row `from`; other misreadings stay as
-    /// they are.
+    /// Returns a shift by the same number of rows that begins at the row `from`; other misreadings
+    /// stay as they are.
     fn with_shift_from(self, from: usize) -> Self {
         match self {
             Self::Shifted { by, .. } => Self::Shifted { by, from },

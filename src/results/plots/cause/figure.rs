@@ -5,9 +5,9 @@ use super::axis::Quantity;
 /// Partial residual of one pose, SI.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Point {
-    /// Value of the regressor in this pose, SI.
+    /// Value of the regressor in the pose, SI.
     pub x: f64,
-    /// Partial residual of this pose, SI.
+    /// Partial residual of the pose, SI.
     pub y: f64,
     /// True for a held-out pose.
     pub held_out: bool,
