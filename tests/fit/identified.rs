@@ -228,8 +228,8 @@ fn an_estimate_applies_to_another_session_without_a_refit() {
     assert!(max("A") < 0.1 && (max("B") - 0.6).abs() < 0.2, "{errors}");
     let residuals = folder.read("there/residuals.csv");
     let (header, rows) = residuals.split_once('\n').unwrap();
-    let expected = "file,line,pose,session,target,predicted_x_mm,predicted_y_mm,predicted_z_mm,residual_x_mm,residual_y_mm,\
-                    residual_z_mm,whitened,outlier,held_out";
+    let expected = "file,line,pose,session,target,q1_deg,q2_deg,q3_deg,predicted_x_mm,predicted_y_mm,predicted_z_mm,\
+                    residual_x_mm,residual_y_mm,residual_z_mm,whitened,outlier,held_out";
     assert_eq!(header, expected);
     let outliers: Vec<&str> =
         rows.lines().filter(|line| line.split(',').rev().nth(1) == Some("true")).collect();

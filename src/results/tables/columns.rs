@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use nalgebra::{UnitQuaternion, Vector3};
 
-use super::commanded::{sessions, word};
+use super::commanded::{commanded_joints, sessions, word};
 use crate::files::csv;
 use crate::fit::Residual;
 use crate::measurement::{Labels, Measurements};
@@ -41,6 +41,9 @@ impl Column {
         }
     }
 }
+
+/// Number of decimals of commands in mm and °.
+pub(super) const COMMAND_DECIMALS: usize = 7;
 
 /// Columns and their names, in the order of the table.
 pub type Columns = Vec<(String, Column)>;
@@ -105,8 +108,8 @@ pub(super) fn names(problem: &Problem, rows: &Measurements, picked: &[usize]) ->
 type Part<'a> =
     (&'static str, fn(&Residual) -> Vector3<f64>, &'a dyn Fn(&Residual) -> Option<Vector3<f64>>);
 
-/// Returns the table of residuals. Its columns identify the row and give predicted values and
-/// residuals in mm and ° of every kind of rows. Further columns are `whitened` (length in units of
+/// Returns the table of residuals. Its columns identify the row and give the commands, predicted
+/// values and residuals in mm and ° of every kind of rows. Further columns are `whitened` (length in units of
 /// σ), `outlier` and `held_out`.
 pub fn residual_columns(problem: &Problem, rows: &Measurements, residuals: &[Residual]) -> Columns {
     let picked: Vec<usize> = residuals.iter().map(|residual| residual.row).collect();
@@ -124,6 +127,15 @@ pub fn residual_columns(problem: &Problem, rows: &Measurements, residuals: &[Res
     let mut add = |name: String, decimals, cell: &dyn Fn(&Residual) -> f64| {
         columns.push((name, Column::Numbers(residuals.iter().map(cell).collect(), Some(decimals))));
     };
+    for joint in commanded_joints(problem) {
+        // A distance between two points is measured without the arm.
+        let cell = |residual: &Residual| {
+            let is_of_arm = rows.observation(residual.row).is_of_arm();
+            let command = rows.configuration(residual.row)[joint.joint] * joint.factor();
+            if is_of_arm { command } else { f64::NAN }
+        };
+        add(joint.column(), COMMAND_DECIMALS, &cell);
+    }
     for (word, value, turn) in both {
         for kind in &kinds {
             let (group, axes) = kind.residuals;

@@ -1,6 +1,6 @@
 //! Tables of predictions and of commands.
 
-use super::columns::{self, Column, Columns};
+use super::columns::{self, COMMAND_DECIMALS, Column, Columns};
 use super::commanded::{commanded_joints, sessions, word};
 use crate::files::csv;
 use crate::fit::{Command, Prediction};
@@ -25,7 +25,9 @@ pub fn predictions_csv(
         ));
     };
     for joint in commanded_joints(problem) {
-        add(joint.column(), 7, &|row| rows.configuration(row)[joint.joint] * joint.factor());
+        add(joint.column(), COMMAND_DECIMALS, &|row| {
+            rows.configuration(row)[joint.joint] * joint.factor()
+        });
     }
     for (k, axis) in ["x", "y", "z"].into_iter().enumerate() {
         add(format!("predicted_{axis}_mm"), 6, &|row| prediction.positions[row][k] * 1e3);
