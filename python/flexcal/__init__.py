@@ -14,21 +14,39 @@ otherwise (``x_mm``, ``mean_mm``, ``temperature_C``).
 from __future__ import annotations
 
 from ._forward import Prediction
-from ._problem import Problem
+from ._least_squares import LeastSquares
+from ._problem import Problem, study
 from ._progress import Progress
-from ._results import Check, ClosedLoop, Export, Identification, Plan, Trace
+from ._results import (
+    Check,
+    ClosedLoop,
+    Comparison,
+    Compensation,
+    Export,
+    Identification,
+    Plan,
+    Simulation,
+    Study,
+    Trace,
+)
 from .errors import FlexcalWarning, InputError
 
 __all__ = [
     "Check",
     "ClosedLoop",
+    "Comparison",
+    "Compensation",
     "Export",
     "FlexcalWarning",
     "Identification",
     "InputError",
+    "LeastSquares",
     "Plan",
     "Prediction",
     "Problem",
     "Progress",
+    "Simulation",
+    "Study",
     "Trace",
+    "study",
 ]

@@ -90,14 +90,17 @@ class Forward:
     _forward: _Predicts
     _reader: _core.Problem
 
-    def predict(self, q: Any, **columns: Any) -> Array:
+    def predict(self, q: Any = None, *, q_rad: Any = None, q_deg: Any = None, **columns: Any) -> Array:
         """Positions of the measured point, measuring frame [m].
 
         Parameters
         ----------
         q
-            Configurations, shape (poses, joints) or (joints,), [rad] and of joints that slide [m]; joints are those that move, or
-            all. Or a table of poses, as for data: a path, a DataFrame or a dict of arrays with their columns and units.
+            A table of poses, as for data: a path, a DataFrame or a dict of arrays with their columns and units. Or an array, as
+            ``q_rad``.
+        q_rad, q_deg
+            Configurations instead, shape (poses, joints) or (joints,), [rad] or [°], of joints that slide [m]; joints are those that
+            move, or all.
         columns
             What else is known of the poses, by the names of columns: ``payload_kg``, ``hoist_N``, ``temperature_C``, ``time_s``,
             ``session``, ``target``, ``approach`` …; one value a pose, or one for all.
@@ -111,11 +114,11 @@ class Forward:
         InputError
             A mistake in the poses; a session or target of which nothing is known.
         """
-        poses, shape = self._poses(q, columns)
+        poses, shape = self._poses((q, q_rad, q_deg), columns)
         positions = np.frombuffer(self._forward.predict(poses), dtype=np.float64).reshape(-1, 3)
         return positions[0] if shape.single else positions
 
-    def jacobian(self, q: Any, **columns: Any) -> Array:
+    def jacobian(self, q: Any = None, *, q_rad: Any = None, q_deg: Any = None, **columns: Any) -> Array:
         """Derivatives of the positions by the configuration, measuring frame [m/rad], of joints that slide [m/m].
 
         Parameters are those of :meth:`predict`. Loads and effects that follow the configuration are differentiated through; the
@@ -123,18 +126,25 @@ class Forward:
 
         Returns
         -------
-        Shape (poses, 3, joints), or (3, joints) for one configuration; joints that move, or all if ``q`` is an array
-        with all of them (0 at fixed ones); NaN where the arm has no equilibrium.
+        Shape (poses, 3, joints), or (3, joints) for one configuration; joints that move, or all if an array has columns for
+        all of them (0 at fixed ones); NaN where the arm has no equilibrium.
         """
-        poses, shape = self._poses(q, columns)
+        poses, shape = self._poses((q, q_rad, q_deg), columns)
         units = self._reader.units
         whole = np.frombuffer(self._forward.jacobian(poses), dtype=np.float64).reshape(-1, 3, len(units))
         if not shape.every_joint:
             whole = whole[:, :, [k for k, unit in enumerate(units) if unit is not None]]
         return whole[0] if shape.single else whole
 
-    def _poses(self, q: Any, columns: dict[str, Any]) -> tuple[_core.Poses, Shape]:
-        source, shape = configurations(q, self._reader.units, columns)
+    def _poses(self, given: tuple[Any, Any, Any], columns: dict[str, Any]) -> tuple[_core.Poses, Shape]:
+        named = [(name, value) for name, value in zip(("q", "q_rad", "q_deg"), given, strict=True) if value is not None]
+        if len(named) != 1:
+            raise TypeError("configurations: one of q, q_rad and q_deg is needed")
+        ((name, q),) = named
+        units: list[str | None] = list(self._reader.units)
+        if name == "q_deg":
+            units = ["deg" if unit == "rad" else unit for unit in units]
+        source, shape = configurations(q, units, columns)
         poses = self._reader.poses(source)
         warn(poses.warnings, stacklevel=3)
         return poses, shape

@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 import os
+import tempfile
+from collections.abc import Callable
 from typing import Literal, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
 
 from . import _core
 from ._forward import Forward
+from ._least_squares import LeastSquares
 from ._progress import Told, told
-from ._results import Check, ClosedLoop, Identification, Plan, Trace
+from ._results import Check, ClosedLoop, Comparison, Identification, Plan, Simulation, Study, Trace
 from ._restored import Spec
 from ._tables import Data, Path, Source, count, source, warn
 
@@ -28,6 +34,8 @@ Criterion: TypeAlias = Literal["S", "A", "D", "E"]
 MOST_POSES = 10_000
 """Poses that a check or a plan takes at most, as on the command line."""
 MOST_SEED = 2**64 - 1
+MOST_SIMULATED = 1_000_000
+"""Poses that a simulation takes at most, as on the command line."""
 
 TEXT = "<text>"
 """What messages call a problem in memory."""
@@ -85,6 +93,7 @@ class Problem(Forward):
         self._core = core
         self._forward = core
         self._reader = core
+        self._functions: dict[Strategy, LeastSquares] = {}
 
     @property
     def notes(self) -> list[str]:
@@ -182,6 +191,75 @@ class Problem(Forward):
         result.fit._warn(stacklevel=2)
         return result
 
+    def compare(self, data: Data | None = None, *, paper: bool = False, progress: Told = False) -> Comparison:
+        """Fits with every strategy and solver, and without parts of the elasticity.
+
+        Parameters
+        ----------
+        data, progress
+            As for :meth:`identify`.
+        paper
+            Include the procedure of Chen et al. (2021); always included for the paper's arm.
+        """
+        given = self._given_data(data)
+        read = self._read(given)
+        with told(progress) as step:
+            core = self._core.compare(read, paper, step)
+        result = Comparison(core, self, Spec("compare", self, given, paper=paper))
+        result._warn(stacklevel=2)
+        return result
+
+    def least_squares(self, data: Data | None = None, strategy: Strategy = "joint") -> LeastSquares:
+        """Residuals and their Jacobian by parameters as functions of arrays, for a solver of one's own.
+
+        Parameters
+        ----------
+        data
+            As for :meth:`identify`; it is read once.
+        strategy
+            Which parameters vary.
+        """
+        given = self._given_data(data)
+        return LeastSquares(self._core.least_squares(self._read(given), strategy), self, given, strategy)
+
+    def residuals(self, x: npt.ArrayLike, strategy: Strategy = "joint") -> npt.NDArray[np.float64]:
+        """Whitened residuals of the problem's own data at the deviations ``x`` of the unknowns, shape (residuals,).
+
+        Names, units and order of ``x`` are those of ``least_squares().unknowns``; :meth:`least_squares` takes other data. The data are
+        read with the first call.
+        """
+        return self._function(strategy).residuals(x)
+
+    def jacobian_by_parameters(self, x: npt.ArrayLike, strategy: Strategy = "joint") -> npt.NDArray[np.float64]:
+        """Derivatives of :meth:`residuals` by ``x``, shape (residuals, unknowns). (:meth:`jacobian` differentiates positions by the
+        configuration.)"""
+        return self._function(strategy).jacobian(x)
+
+    def _function(self, strategy: Strategy) -> LeastSquares:
+        if strategy not in self._functions:
+            self._functions[strategy] = self.least_squares(None, strategy)
+        return self._functions[strategy]
+
+    def simulate(self, truth: Path, poses: int | None = None, *, data: Data | None = None, seed: int = 1) -> Simulation:
+        """Measures a true arm on the virtual test rig (docs/truth.md).
+
+        Parameters
+        ----------
+        truth
+            A TRUTH.toml, or the folder that holds one: how the true arm deviates from the problem, and where poses lie.
+        poses
+            Number of random poses.
+        data
+            A table of poses to measure instead, such as ``plan.poses``; positions in it do not count.
+        seed
+            Of every random number.
+        """
+        if (poses is None) == (data is None):
+            raise TypeError("poses or data: one of the two is needed")
+        number = 0 if poses is None else count("poses", poses, 1, MOST_SIMULATED)
+        seed = count("seed", seed, 0, MOST_SEED)
+        return Simulation(_core.simulated(self._core, truth, number, self._given(data), seed))
+
     def check(
         self,
         data: Data | None = None,
@@ -268,6 +346,33 @@ class Problem(Forward):
         poses = self._core.poses(table)  # type: ignore[arg-type]
         warn(poses.warnings, stacklevel=4)
         return poses
+
+
+def study(
+    study: Path, folder: Path | None = None, *, progress: Callable[[int, int], object] | None = None
+) -> Study:
+    """Runs a STUDY.toml: many fits to simulated measurements whose truth is known (docs/study.md). Studies of misprints are for the command
+    line.
+
+    Parameters
+    ----------
+    study
+        A STUDY.toml, or the folder that holds one.
+    folder
+        Where finished parts are kept, so that an interrupted study goes on where it stopped; nowhere by default.
+    progress
+        A function that is called after each fit with the number of fits done and of those to do.
+
+    Raises
+    ------
+    InputError
+        A mistake in the study or in the files that it names.
+    """
+    step = None if progress is None else (lambda done, fits, _poses, _cost: progress(done, fits))
+    if folder is not None:
+        return Study(_core.studied(study, folder, step))
+    with tempfile.TemporaryDirectory() as kept:
+        return Study(_core.studied(study, kept, step))
 
 
 def _parsed(text: str, file: str, notes: list[str]) -> Problem:

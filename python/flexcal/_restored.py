@@ -20,19 +20,25 @@ class Spec(NamedTuple):
     strategy: str = "joint"
     solver: str = "auto"
     remainder: bool = False
+    paper: bool = False
 
     def part(self, name: str) -> Spec:
-        """The call that gives a fit of the result, ``"before"`` or ``"after"`` a loop or the ``"fit"`` of a trace."""
+        """The call that gives a fit of the result, ``"before"`` or ``"after"`` a loop, the ``"fit"`` of a trace or the
+        ``"joint"`` one of a comparison."""
         return self._replace(call=f"{self.call}.{name}")
 
     def calculate(self) -> Any:
         """The result of the extension module; the same to the last bit for the same data."""
         core = self.problem._core
         data = core.data(self.data)
+        whole: Any
         call, _, part = self.call.partition(".")
         if call == "identify":
             return core.identify(data, self.strategy, self.solver, self.remainder, None)
-        whole = core.close(data, None) if call == "loop" else core.trace(data, None)
+        if call == "compare":
+            whole = core.compare(data, self.paper, None)
+        else:
+            whole = core.close(data, None) if call == "loop" else core.trace(data, None)
         return getattr(whole, part)() if part else whole
 
 
@@ -58,9 +64,9 @@ class Restored:
         return (lambda: said) if name in METHODS else said
 
 
-METHODS = ("json", "summary", "report", "covariance", "residuals", "closed_problem", "csv")
+METHODS = ("json", "summary", "report", "covariance", "priors", "residuals", "closed_problem", "csv", "parameters_csv")
 """What the extension module says when it is called."""
-PROPERTIES = ("why_not_trusted", "cautions", "why_not_sufficient", "suffices", "text")
+PROPERTIES = ("why_not_trusted", "cautions", "why_not_sufficient", "suffices", "text", "warnings")
 """What it says without a call."""
 
 

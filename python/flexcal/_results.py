@@ -7,18 +7,19 @@ import pathlib
 import tempfile
 from collections.abc import Callable
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, Literal, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
-from . import _html
+from . import _html, _plots
 from ._forward import _Bounded, Forward, Prediction
 from ._restored import Restored, Spec, said
-from ._tables import Path, table, warn
+from ._tables import Data, Path, source, table, warn
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.axes import Axes
 
     from . import _core
     from ._problem import Problem
@@ -145,12 +146,22 @@ class _Fit(_Result):
         names = self.parameters.index
         return pd.DataFrame(values, index=names, columns=names)
 
+    def plot_correlation(self, axes: Axes | None = None) -> Axes:
+        """Draws :attr:`correlation` as a map of colours; needs matplotlib. Returns the axes: the given ones, or those of a new
+        figure."""
+        return _plots.correlation(self.correlation, axes)
+
+    def plot_parameters(self, axes: Axes | None = None) -> Axes:
+        """Draws the estimates with their 95 % intervals beside their priors, as a forest plot in units of 1 σ of each prior; needs
+        matplotlib. Parameters without a prior or a standard error are left out. Returns the axes."""
+        return _plots.forest(self.parameters, self._fit.priors(), axes)
+
     @_once
     def residuals(self) -> pd.DataFrame:
         """What the fit leaves, a row for each row of the data, in their order.
 
         Columns: ``file``, ``line`` and what else names the row (``pose``, ``session``, ``target``, ``point``, ``anchor``,
-        ``surface``); ``predicted_x_mm`` …; ``residual_x_mm`` …: measured − predicted, measuring frame [mm]; where orientation is
+        ``surface``); the commands ``q1_deg`` … (``q1_mm`` of joints that slide); ``predicted_x_mm`` …; ``residual_x_mm`` …: measured − predicted, measuring frame [mm]; where orientation is
         fitted ``predicted_rx_deg`` … and ``residual_rx_deg`` … [°]; where rows measure them ``…_distance_mm``, ``…_offset_mm`` (of a
         surface) and ``…_tilt_x_deg`` …, NaN in rows of another kind; ``whitened``: length of all that is left over 1 σ of each
         part; ``outlier``; ``held_out``.
@@ -196,7 +207,7 @@ class _Fit(_Result):
     @property
     def figures(self) -> dict[str, str]:
         """The figures of the report as SVG, by name (``"held-out-errors"``, ``"effect-1"`` …)."""
-        return self._report[2]
+        return dict(self._report[2])
 
     @property
     def markdown(self) -> str:
@@ -229,7 +240,7 @@ class Identification(_Fit, Forward):
         self._forward = self._fit
         self._reader = self._problem._core
 
-    def predict(self, q: Any, **columns: Any) -> Prediction:
+    def predict(self, q: Any = None, *, q_rad: Any = None, q_deg: Any = None, **columns: Any) -> Prediction:
         """Positions of the measured point with their uncertainty, measuring frame [m]; corrected where a remainder was fitted.
 
         Parameters are those of :meth:`Problem.predict`.
@@ -239,7 +250,7 @@ class Identification(_Fit, Forward):
         An array of shape (poses, 3), or (3,) for one configuration, with ``covariance``, ``sigma``, ``bound95``, ``bound(level)``
         and ``extrapolated``; NaN where the arm has no equilibrium.
         """
-        poses, shape = self._poses(q, columns)
+        poses, shape = self._poses((q, q_rad, q_deg), columns)
         positions = np.frombuffer(self._forward.predict(poses), dtype=np.float64).reshape(-1, 3)
 
         @lru_cache(maxsize=4)
@@ -257,13 +268,37 @@ class Identification(_Fit, Forward):
     def remainder(self) -> dict[str, Any] | None:
         """What the remainder is and gains: ``sites``, ``inputs``, ``left_out_without_mm``, ``left_out_mm``,
         ``held_out_without`` … (docs/results.md); None without one."""
-        found: dict[str, Any] | None = self._document.get("remainder")
+        found: dict[str, Any] | None = self.to_dict().get("remainder")
         return found
 
     def remainder_json(self) -> str | None:
         """``remainder.json`` of the command line, which ``[remainder] file`` of a problem names; None without a remainder."""
         text: str | None = self._core.remainder_json()
         return text
+
+    def compensate(
+        self, targets: Data, *, frame: Literal["measuring", "base"] = "measuring", level: float = 0.95
+    ) -> Compensation:
+        """Finds the commands that bring the identified arm to targets, corrected by its remainder.
+
+        Parameters
+        ----------
+        targets
+            A table like measurements: ``x_mm``, ``y_mm``, ``z_mm`` are where the arm should be, ``q1_deg`` … where to start from. Without
+            positions the arm is brought to where the nominal arm would have been; with an orientation that is kept too.
+        frame
+            Frame of the targets: the ``"measuring"`` frame, or that of the arm's ``"base"``.
+        level
+            Probability with which the bound of an error holds.
+
+        Raises
+        ------
+        InputError
+            A mistake in the targets; a session or target of which nothing is known.
+        """
+        core = self._core.compensate(source(targets), frame, level)
+        warn(core.warnings, stacklevel=2)
+        return Compensation(core)
 
     def export_urdf(self, urdf: Path) -> Export:
         """The URDF that the problem came from, with the origins of its chain as they were identified.
@@ -312,7 +347,7 @@ class ClosedLoop(_Fit):
     def remainder(self) -> dict[str, Any] | None:
         """What the remainder beside the effects is and gains; None without one. :attr:`after` predicts with it, and
         ``after.remainder_json()`` is its file."""
-        found: dict[str, Any] | None = self._document.get("remainder")
+        found: dict[str, Any] | None = self.to_dict().get("remainder")
         return found
 
     @property
@@ -434,6 +469,114 @@ class Export(_Result):
         return _html.words(self.summary())
 
 
+class Compensation(_Result):
+    """Commands that bring an identified arm to targets."""
+
+    def __init__(self, core: _core.Compensation) -> None:
+        self._core = core
+
+    @_once
+    def commands(self) -> pd.DataFrame:
+        """The commands, a row each, with the columns of ``commands.csv``: what the targets were called, ``q1_deg`` …, how far the arm
+        stays from them (``miss_mm``), and the bound of the error."""
+        return table(self._core.csv())
+
+    @property
+    def reached(self) -> bool:
+        """Whether every target is reached."""
+        return bool(self._document["reached"] == self._document["targets"])
+
+    def _repr_html_(self) -> str:
+        return _html.words(self.summary())
+
+
+class Simulation(_Result):
+    """Measurements of the virtual test rig, and what is true of its arm."""
+
+    def __init__(self, core: _core.Simulation) -> None:
+        self._core = core
+
+    @_once
+    def measurements(self) -> pd.DataFrame:
+        """The table of measurements: data for every call of a :class:`Problem`."""
+        return table(self._core.csv())
+
+    @_once
+    def truth(self) -> pd.DataFrame:
+        """The parameters by their names: ``unit``, ``nominal`` and ``true`` value; SI."""
+        return _named(self._document["parameters"])
+
+    @property
+    def effects(self) -> list[dict[str, Any]]:
+        """The true effects, with their values."""
+        return list(self.to_dict()["effects"])
+
+    def summary(self) -> str:
+        """The number of poses, and the true effects."""
+        names = [str(effect.get("effect", effect)) for effect in self.effects] or ["none"]
+        held_out = self._document["held_out"]
+        return f"{self._document['poses']} poses, {held_out} of them held out; true effects: {', '.join(names)}"
+
+    def _repr_html_(self) -> str:
+        return _html.words(self.summary())
+
+
+class Comparison(_Fit):
+    """All strategies and solvers side by side; ``parameters``, ``covariance`` and ``residuals`` are those of the joint fit."""
+
+    def __init__(self, core: _core.Comparison, problem: Problem, spec: Spec) -> None:
+        self._core = core
+        self._fit = core.joint()
+        self._problem = problem
+        self._spec = spec
+
+    def _fit_of(self, words: dict[str, Any]) -> Any:
+        return Restored(words, self._spec.part("joint"))
+
+    @_once
+    def fits(self) -> pd.DataFrame:
+        """The fits, a row each: ``strategy``, ``solver``, mean error on the rows fitted and held out [mm], ``iterations``,
+        ``evaluations``, ``seconds``, ``termination``, ``trusted``, ``reduced_chi2``, ``condition_number``."""
+        return _compared(self._document["rows"])
+
+    @_once
+    def ablations(self) -> pd.DataFrame:
+        """Joint fits with parts of the elasticity left out, by ``elasticity``, the part that is kept; columns as of :attr:`fits`."""
+        return _compared(self._document["ablations"], "elasticity", "parameters")
+
+    @_once
+    def errors(self) -> pd.DataFrame:
+        """Errors of the nominal arm and of the joint fit [mm]; see :attr:`Identification.errors`."""
+        joint = json.loads(self._fit.json())
+        return _errors({"registered": self._document["registered"]} | {part: joint[part] for part in ("identification", "held_out")})
+
+    def _repr_html_(self) -> str:
+        return _html.words(self.summary())
+
+
+class Study(_Result):
+    """Results of many fits to simulated measurements whose truth is known."""
+
+    def __init__(self, core: _core.Study) -> None:
+        self._core = core
+
+    @_once
+    def cells(self) -> pd.DataFrame:
+        """A row for each noise, number of poses, strategy and solver, with the columns of ``study.csv``."""
+        return table(self._core.csv())
+
+    @_once
+    def parameters(self) -> pd.DataFrame:
+        """A row for each parameter in each cell, with the columns of ``parameters.csv``: bias, scatter, coverage; SI."""
+        return table(self._core.parameters_csv())
+
+    def __repr__(self) -> str:
+        return f"<flexcal.Study {self._document['study']!r}>"
+
+    def _repr_html_(self) -> str:
+        return _html.words(self.summary())
+
+
 class Check(_Result):
     """What measurements in some poses will tell."""
 
@@ -497,6 +640,20 @@ def _parameters(entries: list[dict[str, Any]]) -> pd.DataFrame:
 
     numbers = ["nominal", "estimate", "std_error", "identified"]
     return pd.DataFrame(entries).set_index("name").astype(dict.fromkeys(numbers, np.float64))
+
+
+def _compared(entries: list[dict[str, Any]], *first: str) -> pd.DataFrame:
+    import pandas as pd
+
+    names = [*first, "strategy", "solver"]
+    rest = ["iterations", "evaluations", "seconds", "termination", "trusted", "reduced_chi2", "condition_number"]
+    rows = [
+        [entry[name] for name in names]
+        + [entry[part]["mean_mm"]["norm"] for part in ("identification", "held_out")]
+        + [entry[name] for name in rest]
+        for entry in entries
+    ]
+    return pd.DataFrame(rows, columns=[*names, "identification_mean_mm", "held_out_mean_mm", *rest])
 
 
 def _residuals(columns: dict[str, bytearray | tuple[bytearray, list[str]]]) -> pd.DataFrame:

@@ -62,7 +62,10 @@ def configurations(q: Any, units: Sequence[str | None], columns: Mapping[str, An
         if columns:
             raise TypeError("columns go into the table of poses itself")
         return source(q), Shape(single=False, every_joint=False)
-    values = _plain("q", q, "q").astype(np.float64)
+    values = _plain("q", q, "q")
+    if values.dtype.kind not in "fiu":
+        raise _no_numbers("q", str(values.dtype), "q")
+    values = values.astype(np.float64)
     single = values.ndim == 1
     values = np.atleast_2d(values)
     moving = [unit for unit in units if unit is not None]
@@ -76,7 +79,7 @@ def configurations(q: Any, units: Sequence[str | None], columns: Mapping[str, An
     # Without their numbers joints go by their order among those that move.
     table: dict[str, Any] = {f"q{k + 1}_{unit}": values[:, k] for k, unit in enumerate(moving)}
     for name, value in columns.items():
-        one_each = np.ndim(value) > 0
+        one_each = np.ndim(_plain(name, value, "q")) > 0
         table[name] = value if one_each else np.full(len(values), value)
     return source(table), Shape(single, every_joint)
 

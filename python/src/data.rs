@@ -25,7 +25,7 @@ pub struct Poses {
     pub rows: Arc<Measurements>,
     /// What was passed over.
     #[pyo3(get)]
-    warnings: Vec<String>,
+    pub warnings: Vec<String>,
 }
 
 /// Where a table comes from.

@@ -4,13 +4,17 @@
 //! written in Python.
 
 mod array;
+mod comparison;
+mod compensation;
 mod data;
 mod design;
 mod error;
+mod least_squares;
 mod outcome;
 mod pool;
 mod problem;
 mod residuals;
+mod simulation;
 mod supervise;
 mod urdf;
 
@@ -24,13 +28,21 @@ mod _core {
     #[pymodule_export]
     use super::command_line;
     #[pymodule_export]
+    use super::comparison::Comparison;
+    #[pymodule_export]
+    use super::compensation::Compensation;
+    #[pymodule_export]
     use super::data::{Data, Poses};
     #[pymodule_export]
     use super::design::{Check, Plan, check, plan};
     #[pymodule_export]
+    use super::least_squares::LeastSquares;
+    #[pymodule_export]
     use super::outcome::{ClosedLoop, Identification, Trace};
     #[pymodule_export]
     use super::problem::Problem;
+    #[pymodule_export]
+    use super::simulation::{Simulation, Study, simulated, studied};
     #[pymodule_export]
     use super::urdf::Export;
 }

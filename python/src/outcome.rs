@@ -3,8 +3,10 @@
 use std::path::PathBuf;
 use std::sync::{Arc, OnceLock};
 
-use flexcal::fit::{self, IdentifyError};
+use flexcal::fit::{self, IdentifyError, Placement};
 use flexcal::measurement::{Dataset, Measurements};
+use flexcal::model::Model;
+use flexcal::model::parameter::Parameter;
 use flexcal::nalgebra::{DMatrix, Vector3};
 use flexcal::problem::Problem;
 use flexcal::remainder::{self, Bounds, Correction, Fitted};
@@ -15,14 +17,15 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::array::{Array, derivatives, numbers, points};
-use crate::data::Poses;
+use crate::compensation::Compensation;
+use crate::data::{Poses, Source};
 use crate::error::raised;
 use crate::pool::detached;
 use crate::residuals;
 use crate::urdf::Export;
 
 /// Markdown, page, and name and SVG text of each figure.
-type Pages = (String, String, Vec<(String, String)>);
+pub type Pages = (String, String, Vec<(String, String)>);
 
 /// An identified arm.
 #[pyclass(frozen, module = "flexcal._core")]
@@ -223,6 +226,32 @@ impl Identification {
         numbers(py, (0..n).flat_map(|j| (0..n).map(move |k| (j, k))).map(value))
     }
 
+    /// Returns name and 1 σ of the prior of each parameter, and whether it is that of
+    /// ln(value / nominal).
+    fn priors(&self) -> PyResult<Vec<(String, Option<f64>, bool)>> {
+        let placement = Placement::of(&self.data.measurements);
+        let model = Model::new(&self.problem, &placement.bases, &placement.targets)
+            .map_err(|error| raised(&error))?;
+        let prior =
+            |known: Parameter| (known.name.clone(), known.sigma, known.unit().is_relative());
+        Ok(model.parameters.into_iter().map(prior).collect())
+    }
+
+    /// Finds the commands that bring the arm to targets, corrected by its remainder.
+    fn compensate(
+        &self,
+        py: Python<'_>,
+        targets: Source,
+        frame: &str,
+        level: f64,
+    ) -> PyResult<Compensation> {
+        let estimate = self.json(py)?;
+        let fitted = self.fitted().map_err(|error| raised(&error))?;
+        let correction = self.remainder().or_else(|| fitted.map(|fitted| &fitted.alone));
+        let estimate = (estimate.as_str(), correction);
+        Compensation::new(py, &self.problem, estimate, targets, (frame, level))
+    }
+
     /// Columns of the residual table.
     fn residuals<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let corrected = self.remainder().and(self.fitted.get()).and_then(Option::as_ref);
@@ -349,6 +378,6 @@ pub fn closed_text(
     report::closed_problem(text, problem, closure, files).map_err(|error| error.to_string())
 }
 
-fn pages(report: Report) -> Pages {
+pub fn pages(report: Report) -> Pages {
     (report.markdown, report.html, report.figures)
 }

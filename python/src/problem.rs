@@ -3,7 +3,10 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use flexcal::fit::{self, IdentifyError, Options, Placement, SolverChoice, Strategy};
+use flexcal::fit::{
+    self, CompareOptions, IdentifyError, Options, Placement, ResidualFunction, SolverChoice,
+    Strategy,
+};
 use flexcal::model::Model;
 use flexcal::nalgebra::DVector;
 use flexcal::problem::{Joint, JointKind};
@@ -13,8 +16,10 @@ use flexcal::urdf::{Chain, Description, Robot, describe};
 use pyo3::prelude::*;
 
 use crate::array::{Array, derivatives, points};
+use crate::comparison::Comparison;
 use crate::data::{Data, Poses, Source};
 use crate::error::{of_argument, raised};
+use crate::least_squares::LeastSquares;
 use crate::outcome::{ClosedLoop, Identification, Trace, closed_text};
 use crate::pool::detached;
 use crate::supervise::supervised;
@@ -212,6 +217,30 @@ impl Problem {
         })?;
         let trace = trace.map_err(|error| raised(&error))?;
         Ok(Trace { problem, data, found: Arc::new(trace) })
+    }
+
+    /// Compares all strategies and solvers.
+    fn compare(
+        &self,
+        py: Python<'_>,
+        data: &Data,
+        paper: bool,
+        progress: Option<Bound<'_, PyAny>>,
+    ) -> PyResult<Comparison> {
+        let (problem, data) = (Arc::clone(&self.declared), Arc::clone(&data.data));
+        let compared = supervised(py, progress.as_ref(), move |sink| {
+            Comparison::new(problem, data, &CompareOptions { paper, progress: Some(sink) })
+        })?;
+        compared.map_err(|error| raised(&error))
+    }
+
+    /// Returns the residuals as a function of the parameters that a strategy varies.
+    fn least_squares(&self, py: Python<'_>, data: &Data, strategy: &str) -> PyResult<LeastSquares> {
+        let strategy = word("strategy", strategy, &Strategy::EACH, Strategy::as_str)?;
+        let data = Arc::clone(&data.data);
+        let function =
+            detached(py, || ResidualFunction::new(&self.declared, Arc::clone(&data), strategy))?;
+        Ok(LeastSquares { function: function.map_err(|error| raised(&error))?, data })
     }
 
     /// Positions of the nominal arm, shape = (poses, 3), measuring frame [m].

@@ -4,12 +4,10 @@ use std::error::Error;
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use flexcal::error::InputErrorKind;
 use flexcal::fit;
 use flexcal::measurement::Measurements;
-use flexcal::model::Model;
 use flexcal::problem::Problem;
-use flexcal::remainder::{self, Bounds};
+use flexcal::remainder::{self, Compensation, TargetFrame};
 use flexcal::report::{self, shell_word};
 use flexcal::results::{CompensationResult, Document as _, commands_csv};
 
@@ -54,6 +52,15 @@ enum Frame {
     Base,
 }
 
+impl From<Frame> for TargetFrame {
+    fn from(frame: Frame) -> Self {
+        match frame {
+            Frame::Measuring => Self::Measuring,
+            Frame::Base => Self::Base,
+        }
+    }
+}
+
 /// Error of missing targets: no table of targets is named.
 #[derive(Debug, thiserror::Error)]
 #[error("no targets; name them with --data")]
@@ -75,62 +82,34 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         &["commands.csv"],
     )?;
     let (targets, warnings) = Measurements::read_poses(common.data(), &problem)?;
-    let targets = targets.arm_rows();
-    if let Some(row) = (0..targets.len()).find(|&row| !targets.observation(row).is_position()) {
-        return Err(targets.location(row).error(InputErrorKind::NoTarget).into());
-    }
     common.warn(&warnings);
     // Targets may be waypoints without positions.
     for missing in fit::missing_target_columns(&problem, &targets).iter().filter(|_| !common.quiet)
     {
         diagnostic::warn(&format!("{missing}; commands leave out what depends on it"));
     }
-    let placement = fit::Placement::of(&targets);
-    let model = Model::new(&problem, &placement.bases, &placement.targets)?;
     let estimate = arguments.trust.read(&arguments.estimate)?;
-    let model = estimate.model(model);
-    let (x, trusted) = (estimate.vector(&problem, &model)?, estimate.trusted);
+    let trusted = estimate.trusted;
     if !trusted {
         diagnostic::warn("the estimate is not to be trusted, so the commands are not either");
     }
-    // Waypoints move with the base.
-    let is_seen = targets.position_measured && matches!(arguments.frame, Frame::Measuring);
-    if is_seen && estimate.leaves_base_open() && !common.quiet {
+    let correction = remainder::of_estimate(&problem, &estimate);
+    let fitted = (&estimate, correction.as_ref().ok().and_then(Option::as_ref));
+    let found =
+        Compensation::new(&problem, fitted, targets, arguments.frame.into(), arguments.level)?;
+    // After the errors of the estimate, which say more.
+    correction?;
+    if found.is_base_open && !common.quiet {
         diagnostic::warn(
             "the estimate does not know where the arm's base is in the measuring frame, so targets in that frame are reached as far as it \
              happens to be assumed; --frame base takes them in the frame of the base",
         );
     }
-    // Targets as shown, and as sought in the measuring frame.
-    let (targets, sought) = match (targets.position_measured, arguments.frame) {
-        (false, _) => {
-            let waypoints = fit::waypoints(&problem, &model, &x, &targets)?;
-            let shown = match arguments.frame {
-                Frame::Measuring => waypoints.clone(),
-                Frame::Base => fit::seen_in_base(&model, &x, &waypoints),
-            };
-            (shown, waypoints)
-        }
-        (true, Frame::Measuring) => (targets.clone(), targets),
-        (true, Frame::Base) => {
-            let sought = fit::seen_from_base(&model, &x, &targets);
-            (targets, sought)
-        }
-    };
-    let correction = remainder::of_estimate(&problem, &estimate)?;
-    let (commands, bounds) = match &correction {
-        Some(correction) => {
-            let fitted = (&estimate, &x);
-            let found = remainder::compensate(&problem, &model, fitted, &sought, correction)?;
-            let (commands, poses) = found.into_iter().unzip();
-            (commands, Some(Bounds::new(correction, poses, arguments.level)))
-        }
-        None => (fit::compensate(&problem, &model, &x, &sought)?, None),
-    };
+    let Compensation { targets, commands, bounds, .. } = &found;
     let bounds = bounds.as_ref();
-    let table = commands_csv(&problem, &targets, &commands, bounds);
+    let table = commands_csv(&problem, targets, commands, bounds);
     results.write(&[("commands.csv", &table)])?;
-    let mut result = CompensationResult::new(&problem, &commands);
+    let mut result = CompensationResult::new(&problem, commands);
     if let Some(bounds) = bounds {
         result = result.with_bounds(bounds);
     }
@@ -140,11 +119,11 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         format!(
             "{}\nWritten to {}\n\
              Next: measure with these commands, then flexcal predict {problem_word} --estimate {estimate} --data MEASURED.csv judges them\n",
-            report::commands_text(&problem, &targets, &commands, bounds),
+            report::commands_text(&problem, targets, commands, bounds),
             written.display()
         )
     })?;
-    let all = commands.iter().all(fit::Command::is_reached);
+    let all = found.reaches_all();
     if !all && common.quiet {
         diagnostic::warn("a target is not reached; without --quiet it is named");
     }

@@ -4,9 +4,8 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, value_parser};
-use flexcal::error::InputError;
 use flexcal::measurement::Measurements;
-use flexcal::problem::{HeldOut, PoseConditions, Problem};
+use flexcal::problem::{HeldOut, Problem};
 use flexcal::report::shell_word;
 use flexcal::rig::{Simulation, Truth, simulate, simulate_poses};
 
@@ -55,7 +54,12 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         flags.claim("simulate", &problem.name, inputs, &["measurements.csv", "truth.json"])?;
     let simulation = match arguments.poses {
         Some(poses) => simulate(&problem, &truth, poses as usize, arguments.seed)?,
-        None => simulate_poses(&problem, &truth, poses_of(arguments, &problem)?, arguments.seed)?,
+        None => {
+            let (rows, warnings) = Measurements::read_poses(&arguments.data, &problem)?;
+            flags.warn(&warnings);
+            let poses = rows.poses_to_simulate(&problem);
+            simulate_poses(&problem, &truth, poses, arguments.seed)?
+        }
     };
     let (json, table) = (simulation.truth_json(), results.path("measurements.csv"));
     results.write(&[("measurements.csv", &simulation.csv()), ("truth.json", &json)])?;
@@ -73,27 +77,6 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         );
     }
     Ok(Outcome::Done)
-}
-
-/// Reads the conditions of each row of the tables, with the name of its target.
-fn poses_of(
-    arguments: &Arguments,
-    problem: &Problem,
-) -> Result<Vec<(PoseConditions, String)>, InputError> {
-    let (rows, warnings) = Measurements::read_poses(&arguments.data, problem)?;
-    arguments.flags.warn(&warnings);
-    let target = rows.target.as_ref().filter(|_| !problem.targets.is_empty());
-    let word = |row: usize| {
-        target
-            .and_then(|labels| labels.names.get(*labels.of_row.get(row)?).cloned())
-            .unwrap_or_default()
-    };
-    Ok(rows
-        .conditions_without_past()
-        .into_iter()
-        .enumerate()
-        .map(|(row, conditions)| (conditions, word(row)))
-        .collect())
 }
 
 fn summary(simulation: &Simulation, table: &Path) -> String {

@@ -17,6 +17,7 @@ mod identify_error;
 mod influential_rows;
 mod options;
 mod outcome;
+mod residual_function;
 mod stages;
 mod uncertainty;
 mod warm_start;
@@ -37,11 +38,13 @@ pub use apply::tolerance::{Tolerance, ToleranceTest, Verdict};
 pub use checks::finding::{Finding, FindingCode, Severity};
 pub use checks::outliers::{InfluentialRows, Outlier};
 pub use checks::point_spread::PointSpread;
-pub(crate) use checks::required_columns::{check_columns, missing_target_columns};
+pub(crate) use checks::required_columns::check_columns;
+#[doc(hidden)]
+pub use checks::required_columns::missing_target_columns;
 pub(crate) use checks::row_kind::{rows as rows_of_kind, size as size_of_kind};
 pub(crate) use checks::set_aside::selection as selection_of_outliers;
 pub(crate) use compare::baseline::Baseline;
-pub(crate) use compare::comparison::{Before, CompareOptions, Comparison};
+pub(crate) use compare::comparison::Before;
 pub(crate) use compare::procedure::{Procedure, TableEntry};
 pub use errors::{AxisValues, ErrorSummary, Errors, OrientationErrors};
 pub use identification::identify;
@@ -67,7 +70,8 @@ pub use self::{
     apply::compensate::{seen_from_base, seen_in_base, waypoints},
     checks::finding::FindingEntry,
     checks::misreading::Misreading,
-    compare::comparison::compare,
+    compare::comparison::{CompareOptions, Comparison, compare},
     identification::identify_model,
+    residual_function::{ResidualFunction, ResidualOrigin},
     stages::placement::Placement,
 };

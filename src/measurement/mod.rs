@@ -275,6 +275,19 @@ impl Measurements {
         (0..self.len()).map(alone).collect()
     }
 
+    /// Returns the conditions of all rows as poses to simulate, each with the name of its target,
+    /// which is empty if `problem` declares none.
+    #[doc(hidden)]
+    pub fn poses_to_simulate(&self, problem: &Problem) -> Vec<(PoseConditions, String)> {
+        let target = self.target.as_ref().filter(|_| !problem.targets.is_empty());
+        let name = |row: usize| {
+            let name = target.and_then(|labels| labels.names.get(*labels.of_row.get(row)?));
+            name.cloned().unwrap_or_default()
+        };
+        let conditions = self.conditions_without_past().into_iter().enumerate();
+        conditions.map(|(row, conditions)| (conditions, name(row))).collect()
+    }
+
     /// Returns the time of the first pose \[s\].
     pub(crate) fn first_time(&self) -> f64 {
         self.time.iter().copied().fold(f64::INFINITY, f64::min)

@@ -9,6 +9,7 @@
 mod apply;
 mod blocks;
 mod bounds;
+mod compensation;
 mod correction;
 mod cross_validation;
 mod declared;
@@ -47,6 +48,7 @@ pub(crate) use residuals::residuals;
 pub use self::{
     apply::{compensate, predict_identified},
     bounds::Bounds,
+    compensation::{Compensation, CompensationError, TargetFrame},
     declared::{declared, of_estimate},
     fit::uncertainty,
 };

@@ -42,8 +42,6 @@ mod verdict;
 pub(crate) use acceptance::{acceptance_page, acceptance_text, tolerance_text};
 pub(crate) use brief::{estimate_brief, tells_little};
 pub use closed_loop::{loop_report, loop_text};
-pub(crate) use compare::{compare_text, comparison_report};
-pub(crate) use compensate::commands_text;
 pub(crate) use identify::joint_sources_text;
 pub use identify::{estimate_text, identification_report};
 pub(crate) use init::init_text;
@@ -52,7 +50,6 @@ pub(crate) use predict::prediction_text;
 pub use render::Report;
 pub(crate) use replica::{replica_report, replica_text};
 pub(crate) use shell::shell_word;
-pub(crate) use study::study_text;
 pub(crate) use verdict::interrupted;
 // Public for the tests, the benches and the Python module only.
 #[doc(hidden)]
@@ -60,10 +57,13 @@ pub use self::{
     check::{check_text, why_not_sufficient},
     closed_loop::loop_brief,
     closed_problem::closed_problem,
+    compare::{compare_text, comparison_report},
+    compensate::commands_text,
     export::export_text,
     figures::is_figure,
     identify::why_not_trusted,
     plan::plan_text,
     remainder::remainder_text,
+    study::study_text,
     trace::trace_text,
 };

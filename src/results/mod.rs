@@ -30,11 +30,11 @@ pub(crate) mod tables;
 mod trace;
 
 pub(crate) use acceptance::{AcceptanceRecord, AcceptanceResult, PoseAccuracy, TestedTolerance};
-pub(crate) use application::{CompensationResult, InitResult, PredictionErrors};
+pub(crate) use application::{InitResult, PredictionErrors};
 pub(crate) use claims::Claims;
 pub use closed_loop::LoopResult;
 pub(crate) use closed_loop::{Gain, ParameterValue, Step, Structure, Witness};
-pub(crate) use comparison::{ComparedFit, ComparisonResult};
+pub(crate) use comparison::ComparedFit;
 pub(crate) use design::SeparationResult;
 pub use document::Document;
 pub(crate) use effect::NamedEffect;
@@ -62,8 +62,10 @@ pub(crate) use effect::joined;
 // Public for the tests, the benches and the Python module only.
 #[doc(hidden)]
 pub use self::{
+    application::CompensationResult,
     claims::Hypothesis,
     closed_loop::{Correction, Fit, FoundEffect, Row},
+    comparison::ComparisonResult,
     design::{CheckResult, ExpectedParameter, PlanResult},
     document::{FORMAT_VERSION, PROGRAM},
     effect::Untestable,

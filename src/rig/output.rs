@@ -140,7 +140,8 @@ impl Simulation {
     }
 
     /// Returns the text of `truth.json`.
-    pub(crate) fn truth_json(&self) -> String {
+    #[doc(hidden)]
+    pub fn truth_json(&self) -> String {
         let document = Document {
             format: serde_json::json!({ "name": "flexcal-truth", "version": 2 }),
             program: concat!("flexcal ", env!("CARGO_PKG_VERSION")),

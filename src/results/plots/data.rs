@@ -122,7 +122,8 @@ impl PlotData {
     ///
     /// # Errors
     /// Returns an error if problem and data do not match.
-    pub(crate) fn of_comparison(
+    #[doc(hidden)]
+    pub fn of_comparison(
         problem: &Problem,
         data: &Dataset,
         comparison: &Comparison,

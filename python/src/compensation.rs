@@ -1,0 +1,99 @@
+//! Commands that bring an identified arm to targets.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use flexcal::fit::{SavedEstimate, missing_target_columns};
+use flexcal::problem::Problem;
+use flexcal::remainder::{self, Correction, TargetFrame};
+use flexcal::report;
+use flexcal::results::{CompensationResult, Document as _, commands_csv};
+use pyo3::prelude::*;
+
+use crate::data::{Poses, Source};
+use crate::error::{of_argument, raised};
+use crate::pool::detached;
+
+/// Commands for a table of targets.
+#[pyclass(frozen, module = "flexcal._core")]
+pub struct Compensation {
+    problem: Problem,
+    found: remainder::Compensation,
+    /// Remarks on the targets.
+    #[pyo3(get)]
+    warnings: Vec<String>,
+}
+
+#[pymethods]
+impl Compensation {
+    /// Returns the result that `flexcal compensate --json` prints.
+    fn json(&self) -> String {
+        let result = CompensationResult::new(&self.problem, &self.found.commands);
+        match &self.found.bounds {
+            Some(bounds) => result.with_bounds(bounds).to_json(),
+            None => result.to_json(),
+        }
+    }
+
+    /// Returns the text that the command line prints.
+    fn summary(&self) -> String {
+        let remainder::Compensation { targets, commands, bounds, .. } = &self.found;
+        report::commands_text(&self.problem, targets, commands, bounds.as_ref())
+    }
+
+    /// Returns commands.csv.
+    fn csv(&self) -> String {
+        let remainder::Compensation { targets, commands, bounds, .. } = &self.found;
+        commands_csv(&self.problem, targets, commands, bounds.as_ref())
+    }
+}
+
+impl Compensation {
+    /// Finds commands for targets with the estimate.json `estimate` and its correction.
+    pub fn new(
+        py: Python<'_>,
+        problem: &Problem,
+        (estimate, correction): (&str, Option<&Correction>),
+        source: Source,
+        (frame, level): (&str, f64),
+    ) -> PyResult<Self> {
+        let frame = match frame {
+            "measuring" => TargetFrame::Measuring,
+            "base" => TargetFrame::Base,
+            _ => {
+                let message = format!("frame: \"{frame}\" is none of measuring, base");
+                return Err(of_argument("frame", message));
+            }
+        };
+        if !(0.0 < level && level < 1.0) {
+            let message = "level: a probability between 0 and 1 is needed".to_owned();
+            return Err(of_argument("level", message));
+        }
+        let input = source.owned()?;
+        let mut problem = problem.clone();
+        // Every row is a target.
+        problem.data.held_out = None;
+        let poses = detached(py, || Poses::read(input, &problem))?;
+        let Poses { rows, mut warnings } = poses.map_err(|error| raised(&error))?;
+        let missing = missing_target_columns(&problem, &rows);
+        let text = |missing| format!("{missing}; commands leave out what depends on it");
+        warnings.extend(missing.iter().map(text));
+        let estimate = SavedEstimate::parse(estimate, Path::new("estimate.json"))
+            .map_err(|error| raised(&error))?;
+        let found = detached(py, || {
+            let targets = Arc::unwrap_or_clone(rows);
+            let fitted = (&estimate, correction);
+            remainder::Compensation::new(&problem, fitted, targets, frame, level)
+        })?;
+        let found = found.map_err(|error| raised(&error))?;
+        if found.is_base_open {
+            warnings.push(
+                "the estimate does not know where the arm's base is in the measuring frame, so targets \
+                 in that frame are reached as far as it happens to be assumed; frame=\"base\" takes them \
+                 in the frame of the base"
+                    .to_owned(),
+            );
+        }
+        Ok(Self { problem, found, warnings })
+    }
+}

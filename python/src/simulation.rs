@@ -1,0 +1,134 @@
+//! Simulated measurements, and studies of many fits to them.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use flexcal::error::InputError;
+use flexcal::fit::Progress;
+use flexcal::report;
+use flexcal::results::{Document as _, StudyResult, study_csv, study_parameters_csv};
+use flexcal::rig::{SimulationError, Truth, simulate, simulate_poses};
+use flexcal::study::{self, Results, Shard, Store};
+use pyo3::prelude::*;
+
+use crate::data::Poses;
+use crate::error::raised;
+use crate::problem::Problem;
+use crate::supervise::supervised;
+
+/// Simulated measurements with their truth.
+#[pyclass(frozen, module = "flexcal._core")]
+pub struct Simulation {
+    csv: String,
+    json: String,
+}
+
+#[pymethods]
+impl Simulation {
+    /// Returns truth.json.
+    fn json(&self) -> &str {
+        &self.json
+    }
+
+    /// Returns measurements.csv.
+    fn csv(&self) -> &str {
+        &self.csv
+    }
+}
+
+/// Error of a simulation.
+#[derive(Debug)]
+enum Failure {
+    Input(InputError),
+    Simulation(SimulationError),
+}
+
+/// Measures the true arm of TRUTH.toml on the virtual test rig, in `count` random poses or in the
+/// given ones.
+#[pyfunction]
+pub fn simulated(
+    py: Python<'_>,
+    problem: &Problem,
+    truth: PathBuf,
+    count: usize,
+    given: Option<&Poses>,
+    seed: u64,
+) -> PyResult<Simulation> {
+    let declared = Arc::clone(&problem.declared);
+    let given = given.map(|poses| Arc::clone(&poses.rows));
+    let made = supervised(py, None, move |_| {
+        let truth = Truth::read(&truth, &declared).map_err(Failure::Input)?;
+        let simulation = match given {
+            Some(rows) => {
+                simulate_poses(&declared, &truth, rows.poses_to_simulate(&declared), seed)
+            }
+            None => simulate(&declared, &truth, count, seed),
+        };
+        let simulation = simulation.map_err(Failure::Simulation)?;
+        Ok(Simulation { csv: simulation.csv(), json: simulation.truth_json() })
+    })?;
+    made.map_err(|error| match error {
+        Failure::Input(error) => raised(&error),
+        Failure::Simulation(error) => raised(&error),
+    })
+}
+
+/// Results of a study.
+#[pyclass(frozen, module = "flexcal._core")]
+pub struct Study {
+    study: Arc<study::Study>,
+    found: Results,
+}
+
+#[pymethods]
+impl Study {
+    /// Returns study.json.
+    fn json(&self) -> String {
+        StudyResult::new(&self.study, &self.found).to_json()
+    }
+
+    /// Returns the table that the command line prints.
+    fn summary(&self) -> String {
+        report::study_text(&self.study, &self.found)
+    }
+
+    /// Returns study.csv.
+    fn csv(&self) -> String {
+        study_csv(&self.study, &self.found)
+    }
+
+    /// Returns parameters.csv.
+    fn parameters_csv(&self) -> String {
+        study_parameters_csv(&self.study, &self.found)
+    }
+}
+
+/// Runs the fits of a STUDY.toml that are not finished in `folder`; `progress` is called with the
+/// number of fits done and of all.
+#[pyfunction]
+pub fn studied(
+    py: Python<'_>,
+    file: PathBuf,
+    folder: PathBuf,
+    progress: Option<Bound<'_, PyAny>>,
+) -> PyResult<Study> {
+    let study = study::Study::read(&file).map_err(|error| raised(&error))?;
+    let (study, store) = (Arc::new(study), Store::new(&folder));
+    let parts = study::pending(&study, &store, Shard::WHOLE).map_err(|error| raised(&error))?;
+    let fits: usize = parts.iter().map(|part| part.repetitions.len()).sum();
+    let found = supervised(py, progress.as_ref(), {
+        let study = Arc::clone(&study);
+        move |sink| {
+            let done = AtomicU64::new(0);
+            let fitted = || {
+                let iteration = done.fetch_add(1, Ordering::Relaxed) + 1;
+                sink(Progress::Step { iteration, unknowns: fits, poses: 0, cost: f64::NAN });
+            };
+            study::run(&study, &store, &parts, fitted)?;
+            study::collect(&study, &[store])
+        }
+    })?;
+    let found = found.map_err(|error| raised(&error))?;
+    Ok(Study { study, found })
+}

@@ -1,0 +1,106 @@
+//! Commands of an identified arm for a table of targets.
+
+use super::apply::compensate;
+use super::bounds::Bounds;
+use super::correction::Correction;
+use crate::error::{InputError, InputErrorKind};
+use crate::fit::{self, Command, Placement, SavedEstimate, SavedEstimateError, StageError};
+use crate::measurement::Measurements;
+use crate::model::Model;
+use crate::problem::Problem;
+
+/// Frame of the targets.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TargetFrame {
+    /// Measuring frame, as measurements.
+    Measuring,
+    /// Frame of the arm's base.
+    Base,
+}
+
+/// Commands that bring the identified arm to targets.
+#[derive(Debug, Clone)]
+pub struct Compensation {
+    /// Targets in the frame in which they were given.
+    pub targets: Measurements,
+    /// Command for each target.
+    pub commands: Vec<Command>,
+    /// Bounds of the errors that remain, if the estimate holds the uncertainty of predictions.
+    pub bounds: Option<Bounds>,
+    /// True if the targets depend on the pose of the base, which the estimate does not determine.
+    pub is_base_open: bool,
+}
+
+/// Error of targets for which no commands can be found.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum CompensationError {
+    /// The targets and the problem do not fit each other.
+    #[error(transparent)]
+    Input(#[from] InputError),
+    /// The estimate is of another problem.
+    #[error(transparent)]
+    Estimate(#[from] SavedEstimateError),
+    /// The search for a command cannot be set up.
+    #[error(transparent)]
+    Stage(#[from] StageError),
+}
+
+impl Compensation {
+    /// Finds the commands for `targets`. Targets without positions are waypoints: the arm is
+    /// brought to where the nominal arm would have been. `correction` corrects predictions and
+    /// bounds errors with probability `level`.
+    ///
+    /// # Errors
+    /// Returns an error if a row is no position, the estimate is of another problem, or the nominal
+    /// arm has no equilibrium at a waypoint.
+    pub fn new(
+        problem: &Problem,
+        (estimate, correction): (&SavedEstimate, Option<&Correction>),
+        targets: Measurements,
+        frame: TargetFrame,
+        level: f64,
+    ) -> Result<Self, CompensationError> {
+        let targets = targets.arm_rows();
+        if let Some(row) = (0..targets.len()).find(|&row| !targets.observation(row).is_position()) {
+            return Err(targets.location(row).error(InputErrorKind::NoTarget).into());
+        }
+        let placement = Placement::of(&targets);
+        let model = estimate.model(Model::new(problem, &placement.bases, &placement.targets)?);
+        let x = estimate.vector(problem, &model)?;
+        // Waypoints move with the base.
+        let is_seen = targets.position_measured && frame == TargetFrame::Measuring;
+        // Targets as shown, and as sought in the measuring frame.
+        let (targets, sought) = match (targets.position_measured, frame) {
+            (false, _) => {
+                let waypoints = fit::waypoints(problem, &model, &x, &targets)?;
+                let shown = match frame {
+                    TargetFrame::Measuring => waypoints.clone(),
+                    TargetFrame::Base => fit::seen_in_base(&model, &x, &waypoints),
+                };
+                (shown, waypoints)
+            }
+            (true, TargetFrame::Measuring) => (targets.clone(), targets),
+            (true, TargetFrame::Base) => {
+                let sought = fit::seen_from_base(&model, &x, &targets);
+                (targets, sought)
+            }
+        };
+        let (commands, bounds) = match correction {
+            Some(correction) => {
+                let fitted = (estimate, &x);
+                let found = compensate(problem, &model, fitted, &sought, correction)?;
+                let (commands, poses) = found.into_iter().unzip();
+                (commands, Some(Bounds::new(correction, poses, level)))
+            }
+            None => (fit::compensate(problem, &model, &x, &sought)?, None),
+        };
+        let is_base_open = is_seen && estimate.leaves_base_open();
+        Ok(Self { targets, commands, bounds, is_base_open })
+    }
+
+    /// Returns true if every target is reached.
+    pub fn reaches_all(&self) -> bool {
+        self.commands.iter().all(Command::is_reached)
+    }
+}
