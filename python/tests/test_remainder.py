@@ -52,7 +52,7 @@ def test_a_remainder_corrects_and_bounds_predictions(problem: flexcal.Problem, c
     remainder = corrected.remainder
     assert remainder is not None and {"joint 2", "joint 4"} <= set(remainder["sites"])
     assert remainder["left_out_mm"] < remainder["left_out_without_mm"]
-    assert "Remainder at" in corrected.summary()
+    assert "remainder (smooth correction) at" in corrected.summary()
     file = corrected.remainder_json()
     assert file is not None and json.loads(file)["format"]["name"] == "flexcal-remainder"
     held_out = slice(1, None, 2)

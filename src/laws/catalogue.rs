@@ -156,7 +156,7 @@ catalogue! {
     /// Play proportional to the payload m: Δθ = (w m / 2)·approach.
     PayloadBacklash "payload-backlash" { joint: usize = MovingJoint } => Family {
         terms: &[TermEntry::driven(At::Coordinate, "width", "0.5*payload*approach{joint}", 0.01)],
-        says: "play in joint {joint} that opens with the payload",
+        says: "play in joint {joint} that grows with the payload",
         needs: &[Need::PayloadFromBothSides],
         ..Family::PLAIN
     };
@@ -164,7 +164,7 @@ catalogue! {
     /// the joint comes \[Dahl 1968\].
     JointHysteresis "joint-hysteresis" { joint: usize = TurningJoint, distance: f64 = Distance as "distance_rad" } => Family {
         terms: &[TermEntry::driven(At::Coordinate, "amplitude", "friction(q{joint}, {distance_rad})", DRIFT_SIGMA)],
-        says: "friction pulls joint {joint} back the way on which it came",
+        says: "friction holds joint {joint} back towards the side from which it came",
         needs: &[Need::Moves("joint"), Need::Clock],
         search: Search::Distances,
         ..Family::PLAIN

@@ -22,11 +22,11 @@ pub fn check_text(problem: &Problem, check: &Check) -> String {
     });
     let header = ["parameter", "nominal", "prior ± 1 σ", "± 1 σ", "unit", "identified"];
     let mut notes = vec![
-        "± 1 σ: expected standard error; identified: share of the information from the data, the remainder is prior or choice",
+        "± 1 σ: expected standard error; identified: share of the information that comes from the data; the rest comes from the prior or the start value",
     ];
     if forecast.expected.iter().any(is_confounded_at_nominal) {
         notes.push(
-            "a share with “to”: at the nominal arm, where the parameter is confounded with others (below), and over arms drawn from the priors",
+            "two shares: the first at the nominal arm, where the parameter is confounded with others (below), the second over arms drawn from the priors",
         );
     }
     let mut blocks = vec![

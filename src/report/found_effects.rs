@@ -22,7 +22,8 @@ pub(super) fn found<'a>(result: &LoopResult, alternatives: usize) -> Vec<Block<'
         let sigmas = || prior.iter().map(|order| order.sigma_rad.to_degrees());
         blocks.push(Block::Text(format!(
             "Many harmonics were found. The model has every order up to the highest significant one, with one prior for all joints: \
-             1 σ of {} to {} ° by order. Its scale predicts best the poses in left-out parts of the joints' ranges.",
+             1 σ of {} to {} ° by order. The scale of this prior is the one that best predicts poses in parts of the joints' ranges \
+             that are left out of the fit.",
             number(sigmas().fold(f64::INFINITY, f64::min), 6),
             number(sigmas().fold(0.0, f64::max), 6)
         )));
@@ -36,7 +37,7 @@ fn point(result: &LoopResult, found: &FoundEffect, alternatives: usize) -> Point
     details.extend(found.claims.as_ref().map(trace::claimed));
     details.extend(found.stability.map(|share| {
         format!(
-            "named in {} % of refits on random 80 % subsets of the poses",
+            "found in {} % of refits on random 80 % subsets of the poses",
             number(share * 100.0, 0)
         )
     }));
@@ -52,7 +53,7 @@ fn point(result: &LoopResult, found: &FoundEffect, alternatives: usize) -> Point
         let ([mean, rms, _], unit) = then.norms();
         let _ = write!(
             chance,
-            "; held-out error once it was in the model: mean {} {unit}, rms {} {unit}",
+            "; held-out error after the round that added it: mean {} {unit}, rms {} {unit}",
             number(mean, 4),
             number(rms, 4)
         );
@@ -122,9 +123,9 @@ pub(super) fn sureness<'a>(closure: &ClosedLoop, result: &LoopResult) -> Option<
         }),
         Column::number(mean, |found: &FoundEffect| number(found.held_out_after.norms().0[0], 4)),
     ];
-    let note = "p: probability that noise alone does as well; law: probability of the law against \
-                every other at its place; refits: share of refits on random 80 % subsets of the \
-                poses that name it; held out mean: once it was in the model";
+    let note = "p: probability that noise alone does as well; law: probability of this law, \
+                and of no other, at its place; refits: share of refits on random 80 % subsets of the \
+                poses that find the effect; held out mean: error after the round that added it";
     let table = Table::of(&result.effects, &columns).noted(&[note]);
     (!result.effects.is_empty()).then_some(Block::Table(table))
 }

@@ -94,7 +94,7 @@ fn other_sigma(problem: &Problem, found: &Identification) -> String {
         None => "so that σ is too small or the model lacks something".to_owned(),
     };
     format!(
-        "The scatter is {size} × the declared σ{declared}, {cause}. Fit and standard errors take {taken}, estimated from residuals and \
+        "The scatter is {size} × the declared σ{declared}, {cause}. Fit and standard errors assume {taken}, estimated from residuals and \
          priors."
     )
 }

@@ -66,8 +66,8 @@ pub(super) fn parameters<'a>(
         );
     }
     notes.push(
-        "identified: share of the information that comes from the data or from priors of related parameters; the remainder comes from \
-         its prior, a bound, or the choice within unidentifiable combinations"
+        "identified: share of the information that comes from the data or from priors of related parameters; the rest comes from the \
+         parameter's prior, a bound, or the start value along unidentifiable combinations"
             .to_owned(),
     );
     notes.extend(sizes(&found.prior_sizes));
@@ -93,7 +93,7 @@ fn sizes(sizes: &[PriorSize]) -> Option<String> {
     let rules: Vec<String> = sizes.iter().map(rule).collect();
     (!rules.is_empty()).then(|| {
         format!(
-            "priors: the estimated deviations suggest another 1 σ: {}; a prior of the right size may predict better if poses are few",
+            "priors: the estimated deviations suggest other values of σ: {}; with few poses, priors of this size may predict better",
             rules.join(", ")
         )
     })

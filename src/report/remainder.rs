@@ -26,12 +26,12 @@ pub fn remainder_text(found: &Identification, outcome: &Outcome) -> String {
     let [without, with] = [gain.without, gain.with].map(|error| number(error * 1e3, 4));
     match after {
         Some(after) => format!(
-            "Remainder at {}, kept: mean error of configurations left out {without} mm without it, \
+            "A remainder (smooth correction) at {} is kept: mean error of left-out configurations {without} mm without it, \
              {with} mm with it; of held-out poses {before} mm and {after} mm.",
             counted(outcome.joints, "joint"),
         ),
         None => format!(
-            "No remainder is kept: mean error of configurations left out {without} mm without it, \
+            "No remainder (smooth correction) is kept: mean error of left-out configurations {without} mm without it, \
              {with} mm with it, a gain of {} standard errors (more than {} are needed); the log \
              predictive density changes by {} per row, {} standard errors (more than {} are needed), \
              the log likelihood by {} (more than {} is needed).",
@@ -55,7 +55,7 @@ pub(super) fn uncertainty<'a>(found: &Identification, plots: &'a PlotData) -> Ve
     } else {
         format!(
             "Predictions are not corrected. {} fits a remainder if at least 20 configurations are \
-             measured, and keeps it if configurations left out gain by it.",
+             measured, and keeps it if it predicts left-out configurations better.",
             code("flexcal identify --remainder")
         )
     };

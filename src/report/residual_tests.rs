@@ -19,8 +19,8 @@ pub(super) fn another_size(tests: &ResidualTests, chi2: Option<f64>) -> Option<S
         .as_ref()
         .ok()?;
     (number(size.statistic, 2) != number(chi2?, 2)).then(|| {
-        "The χ²/ν of the residual tests differs from that of the fit: they leave outliers out, and let stiffnesses differ that the \
-         problem holds equal."
+        "The tests have another χ²/ν than the fit, because they leave out outliers and fit stiffnesses separately that the problem \
+         holds equal."
             .to_owned()
     })
 }

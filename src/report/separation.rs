@@ -30,8 +30,8 @@ pub(super) fn blocks<'a>(separated: &PairSeparation) -> Vec<Block<'a>> {
         Block::Text(
             "The angle is between the two effects after all parameters are fitted: at 0° nothing tells them apart, at 90° they have \
              nothing in common. An effect of the given size is found, or told apart from the other, in 80 of 100 such sets of \
-             measurements. p is the expected p-value with the other effect in its place. Random: median over as many random poses, \
-             drawn repeatedly."
+             measurements. “p beside the other” is the p-value expected for an effect of this size if the other one is fitted, too. Random: median over sets of \
+             as many random poses."
                 .to_owned(),
         ),
     ]

@@ -89,7 +89,7 @@ fn hypothesis_sets<'a>(result: &TraceResult) -> Vec<Block<'a>> {
     ];
     if !result.claims.is_empty() {
         blocks.push(Block::heading(
-            "Claims about the most probable set: that something acts at a place, what it depends on, and its law",
+            "Probabilities of claims about the most probable set: the place of a cause, what it depends on, and its law",
         ));
         blocks.push(Block::list(result.claims.iter().map(claimed)));
     }
@@ -100,16 +100,16 @@ fn hypothesis_sets<'a>(result: &TraceResult) -> Vec<Block<'a>> {
 pub(super) fn claimed(claims: &Claims) -> String {
     let Claims { place, depends_on, law, .. } = claims;
     let words = match &law.value {
-        Some(name) => format!("law {name} {}", percent(law.probability)),
+        Some(name) => format!("law {name}: {}", percent(law.probability)),
         None => "law not known".to_owned(),
     };
     let inputs = if depends_on.value.is_empty() {
         String::new()
     } else {
         let inputs = depends_on.value.join(" and ");
-        format!("; acts there and depends on {inputs} {}", percent(depends_on.probability))
+        format!("; depends on {inputs}: {}", percent(depends_on.probability))
     };
-    format!("acts at {} {}{inputs}; {words}", place.value, percent(place.probability))
+    format!("acts at {}: {}{inputs}; {words}", place.value, percent(place.probability))
 }
 
 /// Lists at most `most` significant candidates and explains how to read them; `where_all` states
@@ -145,8 +145,8 @@ pub(super) fn ranking<'a>(
     let points = shown.iter().map(|candidate| point(problem, candidate, unit)).collect();
     let mut notes = format!(
         "{tried} candidates were tried one by one. p is the probability that noise alone does as well, corrected for their number; \
-         below {level} a candidate is significant. One cause makes its neighbours significant too: the first is the best explanation, \
-         not every entry a finding."
+         below {level} a candidate is significant. One cause makes similar effects significant, too: the first entry is the best explanation, \
+             and the others need not be present."
     );
     if significant.len() > most {
         let more = significant.len() - most;
@@ -154,8 +154,8 @@ pub(super) fn ranking<'a>(
     }
     if shown.iter().any(|candidate| !candidate.alike.is_empty()) {
         notes.push_str(
-            " The angle between two effects is taken after all parameters are fitted: at 0° nothing tells them apart on these poses, \
-             at 90° they have nothing in common. A pose where they would differ lies within the measured ranges.",
+            " In brackets: the angle between the displacements by the two effects after all parameters are fitted; at 0° these \
+             poses do not distinguish them, at 90° they are unrelated. The pose to measure is within the measured ranges.",
         );
     }
     vec![
@@ -185,17 +185,17 @@ fn point(problem: &Problem, candidate: &Candidate, unit: &str) -> Point {
         let alike =
             |other: &Confounded| format!("{} ({:.0}°)", other.effect.description, other.angle_deg);
         details.push(format!(
-            "hard to tell from: {}",
+            "hardly distinguishable from: {}",
             named(candidate.alike.iter().map(alike), MAX_SHOWN_CONFOUNDED, "; ")
         ));
     }
     if let (Some(pose), Some(first)) = (&candidate.told_apart, candidate.alike.first()) {
         let difference = pose.difference().unwrap_or(f64::NAN);
         details.push(format!(
-            "“{}” would differ by {} at {}",
+            "to distinguish “{}”, measure at {}: the predictions differ by {}",
             first.effect.description,
-            show(difference),
-            pose_words(problem, pose)
+            pose_words(problem, pose),
+            show(difference)
         ));
     }
     Point { text: declared(&candidate.effect), details, mark: None }

@@ -104,7 +104,7 @@ pub(super) fn unexplained(
         return sentences;
     }
     let mut catalogue =
-        "No effect of the catalogue explains it better than a function without a law".to_owned();
+        "No effect of the catalogue explains it better than a function of unknown law".to_owned();
     for (why, words) in [
         (HELD_FIXED, "[parameters] holds them fixed"),
         (REFUSED, "[parameters] gives them another unit"),
@@ -128,8 +128,8 @@ pub(super) fn unexplained(
     sentences.push(catalogue + ".");
     match correction(closure) {
         None => sentences.push(
-            "No smooth correction is given: none takes 5 % or more off the error of poses left out of its fit, or the fit \
-             has cautions."
+            "No smooth correction is given, because none reduces the error of left-out poses by 5 % or more, or because the \
+             fit has cautions."
                 .to_owned(),
         ),
         Some(correction) => sentences.extend(corrected(problem, closure, correction)),
@@ -192,7 +192,7 @@ fn corrected(problem: &Problem, closure: &ClosedLoop, correction: &Correction) -
     let [without, with] = [*without, *with].map(|error| held_out.in_unit(error));
     let show = |value: f64| number(value, 4);
     let mut sentences = vec![format!(
-        "A smooth correction there {improves} the prediction of held-out poses: mean {} to {} {unit}, rms {} to {} {unit}. For \
+        "A smooth correction at this place {improves} the prediction of held-out poses: mean {} to {} {unit}, rms {} to {} {unit}. For \
          identification poses left out in turn the rms changes from {} to {} {unit}. The correction names no cause and is not part \
          of {}.",
         show(mean_before),
@@ -212,7 +212,8 @@ fn corrected(problem: &Problem, closure: &ClosedLoop, correction: &Correction) -
         ranges.iter().filter(|(of, _)| *of != Covariate::Position).map(range).collect();
     if !ranges.is_empty() {
         sentences.push(format!(
-            "It holds for {}, the range of the identification poses; outside it keeps its last value ({beyond} of {} held-out poses).",
+            "The correction is valid for {}, the range of the identification poses; outside, it keeps its last value ({beyond} of {} \
+             held-out poses).",
             ranges.join(", "),
             held_out.n
         ));

@@ -68,8 +68,8 @@ pub enum Untestable {
     /// The residual is below a thousandth of σ.
     #[error("the residual is below a thousandth of σ: rounding")]
     Rounding,
-    /// No setup was measured repeatedly.
-    #[error("no setup was measured twice")]
+    /// No pose was measured twice under the same conditions.
+    #[error("no pose was measured twice under the same conditions")]
     NoRepeats,
     /// A value is not a finite number.
     #[error("a value is not a finite number")]
@@ -237,12 +237,11 @@ fn tested(
             )
         }
         Test::Runs { sequence } => {
-            let sign =
-                if *failed { "keep their sign" } else { "do not keep their sign significantly" };
+            let sign = if *failed { "keep their sign too often" } else { "change sign like noise" };
             let percent = (100.0 * statistic, 100.0 * to);
             write!(
                 f,
-                "residuals {sign} {} (at {:.0} % of the steps, expected up to {:.0} %)",
+                "residuals {sign} {} (the sign stays at {:.0} % of the steps, expected up to {:.0} %)",
                 order(*sequence),
                 percent.0,
                 percent.1
@@ -266,13 +265,12 @@ fn tested(
         }
         Test::Outliers { worst } => {
             let pose = match (row, worst) {
-                (Some(row), _) => format!("{row} "),
-                (None, Some(pose)) => format!("pose {} ", pose + 1),
+                (Some(row), _) => format!("{row} has "),
+                (None, Some(pose)) => format!("pose {} has ", pose + 1),
                 (None, None) => String::new(),
             };
-            let far =
-                if *failed { "has a gross error" } else { "is farthest off, not significantly" };
-            write!(f, "{pose}{far} ({statistic:.1} × the scatter, expected up to {to:.1})")
+            let size = if *failed { "a gross error" } else { "the largest residual, no outlier" };
+            write!(f, "{pose}{size} ({statistic:.1} × the scatter, expected up to {to:.1})")
         }
         Test::Normality => {
             let normal = if *failed { "are not" } else { "may be" };
@@ -294,7 +292,7 @@ fn order(sequence: Sequence) -> &'static str {
 fn untested(test: &Test) -> String {
     match test {
         Test::ReducedChiSquared => "size against σ".to_owned(),
-        Test::LackOfFit => "size against repeats".to_owned(),
+        Test::LackOfFit => "size against repeated poses".to_owned(),
         Test::Runs { sequence } => format!("signs {}", order(*sequence)),
         Test::LjungBox { sequence } => format!("autocorrelation {}", order(*sequence)),
         Test::Dependence { covariate } => format!("dependence on {covariate}"),

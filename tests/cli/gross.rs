@@ -64,7 +64,8 @@ fn a_test_of_outliers_names_the_row_of_the_file() {
     let trace = folder.json("out/trace.json");
     let test = entry(&trace["checks"], |check| check["check"] == "outliers");
     assert_eq!(test["failed"], false);
-    let (place, _) = test["words"].as_str().unwrap().split_once(" is farthest off").unwrap();
+    let (place, _) =
+        test["words"].as_str().unwrap().split_once(" has the largest residual").unwrap();
     let line = place.strip_prefix("./a-none.csv:").unwrap().parse::<usize>().unwrap();
     assert_eq!(folder.table(DATA).column("split")[line - 2], "identification", "{place}");
 }
