@@ -94,6 +94,6 @@ fn show(level: Level<'_>, message: &str, location: Option<&Location>) {
         None => Group::with_title(title),
     };
     let text = Renderer::styled().term_width(MESSAGE_WIDTH).render(&[group]);
-    // A closed standard error leaves nobody to tell.
+    // If standard error is closed, nobody can read the message.
     let _ = writeln!(anstream::stderr(), "{text}");
 }

@@ -78,8 +78,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         Line::during(common.prints_text(), stop, |sink| -> Result<_, IdentifyError> {
             let options = options.with_progress(sink);
             let found = fit::identify(&problem, &data, &options)?;
-            // The fit that was asked for is there: an interrupt ends no more than what is told
-            // beside it.
+            // The requested fit is complete, so an interrupt only skips the comparison of joint
+            // sources.
             match fit::joint_sources(&problem, &data, &options, &found) {
                 Err(error) if error.is_interrupted() => Ok((None, found)),
                 sources => Ok((sources?, found)),

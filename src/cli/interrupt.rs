@@ -88,7 +88,7 @@ fn request() -> &'static Stop {
 /// Installs the handler of interrupts once and returns the stop request that it makes.
 fn install() -> Stop {
     static INSTALLED: Once = Once::new();
-    // Where there is a handler already, its program decides.
+    // If the process already has a handler, that one decides what an interrupt does.
     INSTALLED.call_once(|| _ = ctrlc::try_set_handler(|| end_early(STATUS)));
     request().clone()
 }

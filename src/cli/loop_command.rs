@@ -145,7 +145,7 @@ enum NoName {
 fn nameable(file: &Path) -> Result<(), NoName> {
     let name = || file.to_owned();
     match file.canonicalize() {
-        // One that is not there is a mistake of its own.
+        // A missing file is reported elsewhere.
         Err(_) if file.symlink_metadata().is_err() => Ok(()),
         Ok(real) if real.is_file() || real.is_dir() => {
             if real.to_str().is_some() {

@@ -30,7 +30,7 @@ pub fn after_fit(
                 "{look}; if they are right, flexcal loop {named} looks for what the model lacks"
             )
         }
-        // Of a fit that says so little neither a cause nor a correction follows.
+        // If the priors contradict the fit, neither a cause nor a correction follows from it.
         None if found.has(FindingCode::PriorContradicted) => {
             let rule = found
                 .finding(FindingCode::PriorContradicted)

@@ -169,8 +169,8 @@ impl Results {
             record.add(self.command, name, text);
         }
         let _unbroken = interrupt::unbroken();
-        // Before the files, with what stands in their place now: they are known whenever this is
-        // interrupted.
+        // The record is written before the files, with the digests of the files that it replaces.
+        // If the command is interrupted here, flexcal still knows all files as its own.
         self.write_record(&record)?;
         for (file, path) in ready {
             file.commit().map_err(|source| WriteError::Io { path, source })?;

@@ -91,7 +91,7 @@ fn standard(link: &Frame<f64>) -> ([f64; 4], Frame<f64>) {
     let (mut theta, mut shift) = (p.y.atan2(p.x), 0.0);
     if sine > MAX_PARALLEL_SINE {
         theta = z.x.atan2(-z.y);
-        // Of both directions of the common normal, the one nearer to x.
+        // The common normal has two directions; the one nearer to x is used.
         if theta.abs() > std::f64::consts::FRAC_PI_2 {
             theta -= std::f64::consts::PI.copysign(theta);
             sine = -sine;

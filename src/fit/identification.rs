@@ -245,7 +245,8 @@ fn fit_rows(
             hidden: &statistics.hidden,
             prior_sizes: &prior_sizes,
             spreads: &spreads,
-            // A fit that goes on from another one of the same table asks nothing anew.
+            // A fit that starts from another fit of the same table does not search misreadings
+            // again.
             explanations: if options.start.is_empty() {
                 OnceCell::new()
             } else {

@@ -427,7 +427,7 @@ pub(crate) fn declaration(name: &str, arguments: &[(&str, String)]) -> String {
 pub(crate) fn to_three_digits(number: f64) -> Option<f64> {
     let step = 10_f64.powf(number.log10().floor() - 2.0);
     let rounded = (number / step).round() * step;
-    // As written with three digits, not as the product has it.
+    // The number is rounded as a text, so that it prints with three digits.
     let written = if step < 1.0 { format!("{rounded:.6}").parse().ok()? } else { rounded.round() };
     (written > 0.0).then_some(written)
 }

@@ -143,7 +143,7 @@ impl Base {
         let rows: usize = self.chunks.iter().map(|chunk| chunk.block.rows()).sum();
         let tolerated = (MAX_LINEARISATION_ERROR * MAX_LINEARISATION_ERROR * change)
             .max(squares / (scale * scale * rows as f64));
-        // The comparison alone would accept an infinite error beside an infinite residual.
+        // If error and residual are both infinite, the comparison alone would accept the error.
         if !(error.is_finite() && error <= tolerated) {
             return None;
         }

@@ -3,8 +3,8 @@
 /// Maximum number of earlier differences of passes that are combined (the depth m of Anderson
 /// acceleration).
 const MAX_PAIRS: usize = 4;
-/// Smallest squared part of a difference, relative to its square, that counts as independent of the
-/// others. A smaller one is rounding.
+/// Smallest squared length of the part of a difference that is orthogonal to earlier ones, relative
+/// to its squared length, at which the difference is used. A smaller part is a rounding error.
 const MIN_INDEPENDENT_PART: f64 = 1e-20;
 /// Largest ratio of residuals of two passes that counts as a contraction. Slower passes are not
 /// accelerated.

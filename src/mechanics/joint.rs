@@ -71,7 +71,7 @@ impl<S: Scalar> Placement<S> {
 pub struct Joint<S> {
     /// Motion by the command q: rotation, translation or none.
     pub kind: JointKind,
-    /// Constant transform before all others.
+    /// Constant transform between the parent's frame and the joint; `None` if there is none.
     pub placement: Option<Placement<S>>,
     /// Twist angle α of the link.
     pub alpha: Angle<S>,

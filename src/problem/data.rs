@@ -139,7 +139,7 @@ pub(super) fn read(root: &mut Section<'_, '_>) -> Result<Data, InputError> {
         files_location = item.location();
     }
     let mut kind_sigmas = BTreeMap::new();
-    // The σ of a known distance stands beside the distance, that of a pixel beside the camera.
+    // The σ of a known distance is declared with the distance, that of a pixel with the camera.
     let beside = [Needs::Fixtures, Needs::Carriers];
     for kind in kinds().filter(|kind| !beside.contains(&kind.needs)) {
         let not_positive = |value| InputErrorKind::NotPositive { value };

@@ -178,7 +178,7 @@ fn mistake(item: &Item, text: &str, error: FormulaError) -> InputError {
     let FormulaError { column, span, mistake } = error;
     let kind = InputErrorKind::Formula { column, mistake: mistake.to_string() };
     let start = item.span.start + 1;
-    // A text with escapes stands in the file in another spelling.
+    // A text with escapes differs from its spelling in the file, so columns cannot be located.
     let is_verbatim = item.document.text.get(start..start + text.len()) == Some(text);
     if is_verbatim && !span.is_empty() {
         let span = start + span.start..start + span.end;

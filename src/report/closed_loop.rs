@@ -57,7 +57,7 @@ pub fn loop_brief(problem: &Problem, closure: &ClosedLoop, columns: usize) -> St
     let rest = text(&blocks).lines().count() + end.lines().count();
     let room = SCREEN_LINES.saturating_sub(rest);
     let fits = |count: &usize| {
-        // One line is for where the others are.
+        // One line is reserved for the note that tells where the other entries are listed.
         let note = usize::from(*count < points.len());
         height(&points[..*count]) + note <= room
     };

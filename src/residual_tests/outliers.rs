@@ -50,7 +50,8 @@ pub(super) fn find<'a>(fit: &FitResidual<'a>, leverage: &Leverage, level: f64) -
         if out.iter().filter(|&&out| out).count() > (poses / MIN_POSES_PER_OUTLIER).max(1) {
             break;
         }
-        // These make room for the next, and are formed anew where there are none.
+        // The previous fit is dropped first to free its memory; it is formed again if no fit
+        // without the outliers exists.
         let had_some = kept.take().is_some();
         let Some(rest) = Kept::without(fit, &out) else {
             kept = had_some.then(|| Kept::without(fit, &before)).flatten();

@@ -59,7 +59,7 @@ pub(super) fn chances(
     let drawn: Vec<Vec<Vec<f64>>> = if together > MIN_BATCH_DRAWS {
         starts.into_par_iter().map_init(DMatrix::default, values).collect()
     } else {
-        // Of draws that take much memory all threads work on the same few.
+        // If draws take much memory, all threads work on the same few draws.
         let mut space = DMatrix::default();
         starts.into_iter().map(|start| values(&mut space, start)).collect()
     };

@@ -163,7 +163,7 @@ impl Cell {
         let rms = &tally.held_out_rms;
         let bias = result.largest_bias(study);
         Self {
-            // As it was written: 0.1 mm and not 0.10000000000000001 mm.
+            // Rounding restores the declared number: 0.1 mm, not 0.10000000000000001 mm.
             position_sigma_mm: (cell.sigma * 1e15).round() / 1e12,
             identification_poses: cell.poses,
             strategy: cell.strategy.as_str(),

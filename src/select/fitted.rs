@@ -359,7 +359,8 @@ impl Fitted {
     ) -> LinearNeighbourhood {
         let (columns, n) = (linearised.fitted(), self.unknowns.len());
         let mut residual = linearised.residual().clone();
-        // Of two parameters that are multiplied together one brings it down to nothing.
+        // If two parameters are multiplied by each other, one of them at zero leaves the other
+        // without influence.
         let is_place = |site: ParameterSite| {
             matches!(site, ParameterSite::Beam { field: BeamField::AddedAt, .. })
         };
@@ -491,7 +492,8 @@ fn distances(fitted: &Fitted, linearised: &Linearised, aside: &[usize]) -> Vec<f
         .map(|(pose, square)| square / MEDIAN_OF_SQUARES[numbers(pose) - 1])
         .collect();
     ratios.sort_by(|a, b| b.total_cmp(a));
-    // No less than a σ that was declared: beside rounding everything is far off.
+    // The scatter is at least the declared σ; relative to rounding errors alone, every row would
+    // be an outlier.
     let least = if fitted.found.noise == Noise::Declared { 1.0 } else { 0.0 };
     let scatter = ratios.get(ratios.len() / 2).copied().unwrap_or(0.0).max(least);
     squares.into_iter().map(|square| if scatter > 0.0 { square / scatter } else { 0.0 }).collect()

@@ -90,7 +90,7 @@ fn odds(
     if certainty.trace() <= 0.0 {
         return None;
     }
-    // Of what is all but certain a combination may have next to no variance.
+    // If some parameters are almost certain, C may be singular to rounding.
     let eigen = spread.clone().symmetric_eigen();
     let mut root = eigen.eigenvectors;
     root.column_iter_mut()
@@ -229,8 +229,7 @@ mod tests {
             let (told, certainty) = all(turn);
             super::odds(&found, &spread, (&told, &certainty)).unwrap()
         };
-        // The places that were seen are off by the motion itself: next to nothing of what they
-        // tell.
+        // The measured places are off by the motion itself, which hardly changes the estimate.
         let (told, certainty) = all(1.0);
         let read = certainty.cholesky().unwrap().solve(&told);
         assert!((read - &found).norm() < 1e-3 * found.norm());

@@ -140,7 +140,7 @@ pub(super) fn trace_fit(fitted: &Fitted, data: &Data) -> Trace {
         };
         let alike: Vec<(Effect, f64)> = alike.filter_map(angle).collect();
         let candidate = &scan.effects[tried.index];
-        // Of what remembers the poses before none tells by itself.
+        // For effects that depend on earlier poses, no single pose distinguishes them.
         let tells = |(other, _): &&(Effect, f64)| !candidate.has_memory() && !other.has_memory();
         let pair = alike.first().filter(tells).zip(there.as_ref());
         let separating_pose = pair.and_then(|((other, _), there)| {
@@ -191,7 +191,7 @@ pub(super) fn check_fit(fitted: &Fitted, data: &Data) -> ResidualTests {
     let linearised = fitted.linearised(data, &[]);
     let coordinates: Vec<usize> =
         linearised.poses().iter().map(|pose| pose.observation.coordinates()).collect();
-    // Of millions of rows there is room for one such matrix, not for several.
+    // With millions of rows, memory holds one such matrix, not several.
     let (columns, residual) = fitted.neighbourhood_as_fitted(linearised).into_fitted();
     let fit = FitResidual {
         residual: &residual,
@@ -210,7 +210,7 @@ pub(super) fn check_fit(fitted: &Fitted, data: &Data) -> ResidualTests {
             test.row = data.rows().get(pose).map(|&row| data.measurements.location(row));
         }
     }
-    // Against the σ declared, not the smaller one that the scatter speaks for.
+    // χ² refers to the declared σ, not to the smaller σ estimated from the scatter.
     let size = residual_tests.tests.iter_mut().find(|entry| entry.test == Test::ReducedChiSquared);
     if let Some(outcome) = size.and_then(|test| test.outcome.as_mut().ok()) {
         outcome.statistic *= fitted.found.sigma_scale.powi(2);

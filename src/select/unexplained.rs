@@ -108,8 +108,8 @@ pub(super) fn without_law(
     }
     let place = |found: &Unexplained| found.claims.as_ref().map_or(0.0, |claims| claims.place.1);
     all.sort_by(|a, b| place(&b.1).total_cmp(&place(&a.1)));
-    // What misses the arm altogether is no prediction to improve: a function of the measured
-    // position would hold the answer itself. Nor is a limit that is wrong a function to add.
+    // An error with a free value per pose cannot be predicted, and a wrong limit is no function:
+    // neither has a correction.
     let first = all.iter().position(|(hypothesis, _)| {
         !matches!(hypothesis.kind, HypothesisKind::PerPose | HypothesisKind::Limit(_))
     });
@@ -144,8 +144,8 @@ fn correction(
     best: &HypothesisSet,
     hypothesis: &Hypothesis,
 ) -> Option<Correction> {
-    // The peak of what is narrow may have been set aside; poses that are left out tell a peak from
-    // an outlier.
+    // The peak of a narrow function may have been treated as outliers; left-out poses distinguish
+    // a peak from outliers.
     let bends = fitted.problem.robust.is_none() && !fitted.set_aside.is_empty();
     let whole = bends.then(|| fitted.with_all_rows());
     let fitted = whole.as_ref().unwrap_or(fitted);
@@ -181,8 +181,8 @@ fn correction(
     let moved = held_out.fitted() * parameters + beyond * coefficients;
     let reached = hypotheses.reached(hypothesis, here.len());
     let mut errors = fitted.errors(data, there);
-    // What was fitted beside the function holds everywhere; beyond its range the function keeps its
-    // last value.
+    // Parameters fitted together with the function apply everywhere. Beyond its range the function
+    // keeps its last value.
     for (pose, error) in errors.iter_mut().enumerate() {
         *error += moved.fixed_rows::<3>(3 * pose) * held_out.poses()[pose].sigma;
     }

@@ -257,7 +257,7 @@ fn too_few(model: &Model, poses: &[Pose], missing: &[usize]) -> Option<usize> {
         let measured = users.iter().map(|pose| pose.coordinates()).sum::<usize>();
         let unknown =
             open.iter().filter(|&&other| users.iter().any(|pose| uses(model, pose, other))).count();
-        // As many contacts as unknowns would meet a point exactly.
+        // With as many contacts as unknowns, the fixture would fit its contacts exactly.
         let placed_exactly = matches!(model.parameters[k].site, ParameterSite::Fixture { .. })
             && measured == unknown;
         measured < unknown || placed_exactly

@@ -61,7 +61,7 @@ impl PoseSufficiency {
                 underdetermined((model, placement), (&numbers, &of_row), (rows, false), is_fitted)
             })
             .or_else(|| undetermined(fitting, &numbers, rows, at, is_fitted));
-        // A session that is held out says nothing about the arm, whatever its points determine.
+        // A held-out session gives no information on the arm, whatever its points determine.
         let held_out =
             underdetermined((model, placement), (&numbers, &of_row), (later, true), is_held_out)
                 .or_else(|| undetermined(fitting, &numbers, later, at, is_held_out))

@@ -61,7 +61,7 @@ impl Stage<'_> {
         for (held, force) in active.iter().zip(&forces) {
             held.row.iter().enumerate().for_each(|(j, coefficient)| left[j] -= coefficient * force);
         }
-        // Of the rows of the first kind alone: millimetres and degrees have no common mean.
+        // Only rows of the first kind count, because millimetres and degrees have no common mean.
         let leading = self.poses.first().map(|pose| pose.observation.kind());
         let is_leading = |place: &usize| Some(self.poses[*place].observation.kind()) == leading;
         let places: Vec<usize> = (0..self.poses.len()).filter(is_leading).collect();
@@ -71,7 +71,7 @@ impl Stage<'_> {
         let rms = (errors.iter().map(nalgebra::Matrix::norm_squared).sum::<f64>() / count).sqrt();
         let variance =
             places.iter().map(|&place| self.poses[place].sigma.powi(2)).sum::<f64>() / count;
-        // Where both limits coincide, either side may push.
+        // If both limits of a constraint are equal, either side may be active.
         let parameters: Vec<&Parameter> = self.parameters().collect();
         let is_equality = |held: &Held| {
             let limits = &self.model.constraints[held.constraint];

@@ -86,7 +86,8 @@ pub(in crate::fit) fn prior_sizes(
         if factors[*g].max(1.0 / factors[*g]) <= MIN_RATIO || decided[*g] < MIN_DETERMINED {
             return false;
         }
-        // The other kinds have the best widths beside this one as declared.
+        // For the declared width of this kind, the other kinds have the widths that fit best with
+        // it.
         let declared = likelihood.evidence(&groups, &likelihood.widths(&groups, Some(*g)).0);
         best.zip(declared).is_some_and(|(best, declared)| 2.0 * (best - declared) > by_chance())
     };

@@ -40,7 +40,7 @@ impl Axis {
     /// Creates a linear axis with about `count` numbers.
     pub fn linear(range: (f64, f64), label: &str, count: usize) -> Self {
         let (low, high) = widened(range);
-        // That many numbers divide the axis into one part more.
+        // `count` numbers divide the axis into `count` + 1 parts.
         let parts = (count + 1) as f64;
         let step = if count > 0 { round_step((high - low) / parts) } else { f64::INFINITY };
         let digits = whole((-step.log10()).ceil());

@@ -43,7 +43,8 @@ impl Candidate {
         let design = |candidate: &&Self| {
             let mut coefficients = candidate.coefficients.clone();
             if fitted.found.noise != Noise::Declared {
-                // A σ from a residual that holds the effect says nothing of how large that is.
+                // If σ was estimated from a residual that contains the effect, σ gives no scale
+                // for its size.
                 coefficients.largest.fill(f64::INFINITY);
             }
             (candidate.design.clone().without(left_out), candidate.ln_prior, coefficients)

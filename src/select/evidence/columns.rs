@@ -353,7 +353,7 @@ impl<'a, 'l> Columns<'a, 'l> {
     ) {
         let hypothesis = Hypothesis::smooth(site, vec![of.covariate.clone()]);
         let [warped, line] = [first + lengths.len(), first + lengths.len() + 1];
-        // Of few values the longest alone.
+        // With few different values, only the longest length is used.
         let told = match of.levels {
             ..3 => 0,
             3 => 1,
@@ -365,7 +365,7 @@ impl<'a, 'l> Columns<'a, 'l> {
             });
         }
         if matches!(of.covariate, Covariate::Time | Covariate::Row) && of.levels > 2 {
-            // What settles changes fast at first.
+            // A settling quantity changes fast at first, so functions of log time are tried, too.
             let range = of.values[..self.weighed].iter().copied().fold(0.0, f64::max);
             let logarithm = of.values.iter().map(|t| (t.max(0.0) + range / 30.0).ln()).collect();
             if let Some(of) = SampledCovariate::new(of.covariate.clone(), logarithm, self.weighed) {
@@ -374,7 +374,7 @@ impl<'a, 'l> Columns<'a, 'l> {
                 });
             }
         }
-        // Of two values any function is a line.
+        // With two different values, every function is a straight line.
         let is_of_arm = matches!(
             of.covariate,
             Covariate::Command(_) | Covariate::Approach(_) | Covariate::Load

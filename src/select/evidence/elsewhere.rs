@@ -52,7 +52,7 @@ impl Columns<'_, '_> {
             coordinate: None,
             depends_on: vec![Covariate::Position],
         };
-        // Where the strain of the frame is looked for, that is the linear law.
+        // If the strain of the frame is a candidate, it is the linear law of the position.
         let strain =
             |candidate: &Candidate| candidate.hypothesis.effect() == Some(&Effect::FrameStrain);
         if !self.candidates.iter().any(strain) {

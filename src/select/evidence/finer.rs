@@ -50,8 +50,8 @@ pub(super) fn finer(
             {
                 continue;
             }
-            // Beside everything else, and beside what is no such effect of that place: one may do
-            // for two.
+            // The other members of the set stay, first all of them, then all except effects of the
+            // same family at the same place: one value may replace two members.
             let place =
                 |k: usize| hypotheses.all[k].hypothesis.effect().map(Effect::name_and_place);
             let without_own =

@@ -157,7 +157,7 @@ pub(super) fn basis(scaled: &[f64], length: f64) -> DMatrix<f64> {
 /// correlated from reading to reading. `None` if `levels` values do not determine so many
 /// functions.
 pub(super) fn rough_basis(scaled: &[f64], length: f64, levels: usize) -> Option<DMatrix<f64>> {
-    // Of the constant alone the mean square is 1 and not a half.
+    // The mean square of the constant is 1, that of the cosines ½.
     let of_constant = |k: usize| if k == 0 { 0.5 } else { 1.0 };
     let variance = |k: usize| {
         of_constant(k) / (1.0 + (PI * k as f64 * length / (1.0 + 2.0 * RANGE_MARGIN)).powi(2))

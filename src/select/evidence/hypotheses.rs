@@ -59,7 +59,8 @@ impl<'a> Hypotheses<'a> {
             fitted.linearised_with(data, rows, &candidates, &hypothesis_sites(&fitted.problem));
         let fit = linearised.fitted();
         let known = added.iter().zip(&columns_of_part).map(|(part, columns_of_part)| {
-            // Of a law the coefficients: what stands inside of it keeps its value.
+            // Only the coefficients of a law are removed from the fit; inner parameters keep their
+            // values.
             let inner = if let Effect::Law(law) = part { law.parameters().len() } else { 0 };
             let count = columns_of_part.len().saturating_sub(inner);
             (part.clone(), fit.select_columns(&columns_of_part[..count]))

@@ -44,7 +44,7 @@ pub(super) fn promising(
         let proposed = known().get(&key).cloned();
         let proposed = proposed.unwrap_or_else(|| {
             let search = Search { hypotheses, fitted, data, left_out, joint };
-            // Of a class that a law of the fit belongs to, that law stands for it.
+            // A class that contains a law of the fit is represented by that law.
             let new = search.proposals(&rest, products).into_iter().filter(|law| !law.is_present);
             let new: Vec<Effect> =
                 new.filter_map(|proposal| effect(problem, joint, &proposal)).collect();

@@ -65,7 +65,7 @@ pub(super) fn limits(
     });
     let fitted_columns = linearised.fitted().columns(0, fitted.unknowns.len()).into_owned();
     let active = fitted.active();
-    // Of no row there is no decomposition.
+    // A matrix without rows has no singular value decomposition.
     let directions = if active.is_empty() {
         None
     } else {

@@ -165,7 +165,8 @@ fn weighed_without<'a>(
         if data.stop.is_requested() {
             return None;
         }
-        // A periodic error of many orders is fitted before arguments are searched beside it.
+        // A periodic error with many orders is fitted before arguments of other effects are
+        // searched.
         let has_gear = weighted.first().is_some_and(|set| products.has_gear(&set.members));
         let unlisted = if has_gear {
             Vec::new()

@@ -150,16 +150,16 @@ impl Evidence {
     /// Returns effects that may replace `effect` in a model with the effects `held`, best first.
     /// Each is at least `beside` times as probable as `effect`.
     pub fn alternatives(&self, effect: &Effect, held: &[Effect], beside: f64) -> Vec<Effect> {
-        // Of very many effects in a model most are in no explanation: nothing else need be looked
-        // at.
+        // If a model has very many effects, most are in no set, and the search below is not
+        // needed.
         let mut all = self.sets.iter().flat_map(|explanation| &explanation.hypotheses);
         if !all.by_ref().filter_map(Hypothesis::effect).any(|known| known.is_but_for_search(effect))
         {
             return Vec::new();
         }
         let others: Vec<&Effect> = held.iter().filter(|other| *other != effect).collect();
-        // What an explanation holds beside these; of one that is searched another value stands for
-        // it where that is not there.
+        // Effects of a set that are not held. A held effect may have another value of its searched
+        // argument in the set.
         let beside_others = |explanation: &HypothesisSet| {
             let mut rest = explanation.effects();
             for other in &others {
@@ -211,7 +211,7 @@ impl Evidence {
         let most = self.sets.iter().map(|known| &known.hypotheses).find(|known| known.contains(of));
         let is_beside =
             |other: &Hypothesis| other != of && most.is_some_and(|most| most.contains(other));
-        // Where a limit is wrong nothing need act.
+        // If a limit is wrong, no other error at the site is needed.
         let is_there =
             |other: &Hypothesis| other.site == of.site && (of.is_limit() || !other.is_limit());
         let place = self.probability(is_there);

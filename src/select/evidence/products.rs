@@ -124,8 +124,8 @@ impl<'a> Products<'a> {
         if let Some(known) = self.cache.members[block].get() {
             return known;
         }
-        // Before the cell waits for it: a thread that helps others with this product may come to
-        // the same member.
+        // The columns are computed before the cell is locked: a thread that helps with this
+        // product may need the same member.
         let columns = self.blocks[block].columns(&self.target.fit);
         let products = std::iter::repeat_with(OnceLock::new).take(self.blocks.len()).collect();
         let new = Member { transposed: columns.transpose(), columns, products };
@@ -271,7 +271,7 @@ impl ReducedProblem<'_, '_> {
             let (gain, size) = others.gain(self.members[k]);
             return Some((others.ln_likelihood() + gain, size));
         }
-        // Of the lower L⁻¹D, columns of k have rows from the first of these on.
+        // L⁻¹D is lower triangular, so the columns of member k are zero above row `first`.
         let (first, count) = (self.begins[k], block.product().len());
         let rows = self.within.view((first, first), (self.within.nrows() - first, count)) / size;
         let lower = lower_factor(rows.transpose() * &rows)?;
@@ -308,7 +308,7 @@ impl ReducedProblem<'_, '_> {
             let mut first = 0;
             for &member in &self.members {
                 let transposed = &self.products.member(member).transposed;
-                // Of a lower triangle.
+                // The factor is lower triangular, so that only its rows below `first` contribute.
                 let below = self.within.nrows() - first;
                 let block_of_within = self.within.view((first, first), (below, transposed.nrows()));
                 all.rows_range_mut(first..).gemm(1.0, &block_of_within, transposed, 1.0);
@@ -443,8 +443,8 @@ mod tests {
         assert!((left.squares / r.dot(&solved) - 1.0).abs() < 1e-9);
         let ln_determinant: f64 = factor.l().diagonal().iter().map(|value| value.ln()).sum();
         assert!((left.ln_determinant - ln_determinant).abs() < 1e-9);
-        // Of all together one is told from the others as of the others alone, also of next to no
-        // size.
+        // The result for one member of a set equals the gain of adding it to the other members,
+        // even for a size near zero.
         for (k, least) in [(0, 1.0), (1, 1.0), (2, 1.0), (1, 1e-6)] {
             let mut sizes = sizes;
             sizes[k] *= least;
@@ -460,7 +460,7 @@ mod tests {
                 "{summed:?} {expected} {size}"
             );
         }
-        // One more gains as much whether it is among the blocks or not.
+        // The gain of a hypothesis does not depend on whether it is in the list of blocks.
         let two = products.reduced(&members[..2], &sizes[..2]).unwrap();
         for (block, (gain, size)) in
             two.gains(&[2, 0, 1]).into_iter().zip([2, 0, 1]).map(|(summed, block)| (block, summed))

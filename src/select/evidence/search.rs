@@ -84,7 +84,7 @@ impl Set {
         let (members, mut sizes) = (&self.members, self.sizes.clone());
         let mut all = products.reduced(members, &sizes)?;
         let mut summed = vec![0.0; members.len()];
-        // Beside others that stayed a size stays.
+        // A size stays converged while the sizes of the other members do not change.
         let mut stale = vec![true; members.len()];
         for _ in 0..MAX_SETTLING_PASSES {
             for k in 0..members.len() {
@@ -126,7 +126,8 @@ pub(super) fn search(products: &Products, present: &[usize]) -> Vec<Weighted> {
             known.insert(sorted(&set.members), set);
         }
     }
-    // What holds more than the search goes to is judged as it is, and with one more.
+    // A set with more members than the search allows is evaluated as it is, and with one more
+    // member.
     let (longer, front): (usize, Vec<Set>) = match known.get(&sorted(present)) {
         Some(all) if present.len() > MAX_EFFECTS => (1, vec![all.clone()]),
         _ => (MAX_EFFECTS, known.values().cloned().collect()),
@@ -145,8 +146,9 @@ pub(super) fn search(products: &Products, present: &[usize]) -> Vec<Weighted> {
                 }
             }
         }
-        // A set that cannot grow says nothing of what larger sets of other hypotheses come to; but
-        // periodic errors of many orders are fitted first, and others searched beside them.
+        // A set that cannot grow does not limit larger sets of other hypotheses. Periodic errors
+        // with many orders count nevertheless, because they are fitted before other hypotheses are
+        // searched.
         let is_limit = |set: &&Set| !set.has_wide(blocks) || products.has_gear(&set.members);
         let can_grow = known.values().filter(is_limit);
         let best_known = can_grow.map(|set| set.ln_posterior).fold(f64::NEG_INFINITY, f64::max);
@@ -210,7 +212,8 @@ fn with_gears(known: &mut BTreeMap<Vec<usize>, Set>, products: &Products) {
         let mut next = Some(start);
         while let Some(set) = next {
             let longer = extended(&set, &gears, products).into_iter().max_by(by_posterior);
-            // Beside the errors of other joints the first would be held too tightly.
+            // The sizes converge together; otherwise the errors of other joints would constrain
+            // the first one too tightly.
             let longer = longer.map(|longer| longer.settled_whole(products));
             next = longer.filter(|longer| longer.ln_posterior > set.ln_posterior);
             known.extend(next.clone().map(|longer| (sorted(&longer.members), longer)));
@@ -239,8 +242,8 @@ fn changed(known: &mut BTreeMap<Vec<usize>, Set>, products: &Products) {
         every.iter().copied().filter(|&block| is_of(&blocks[block])).collect()
     };
     let (plain, laws) = (of(&|block| !block.is_surface), of(&|block| block.is_law()));
-    // What is tried first and second in the place of a function of several covariates, of any other
-    // hypothesis, and of two.
+    // Hypotheses tried as first and second replacement of a function of several covariates, of any
+    // other hypothesis, and of two hypotheses.
     let instead: [[&[usize]; 2]; 3] = [[&every, &plain], [&every, &laws], [&laws, &laws]];
     let mut tried: BTreeSet<(Vec<usize>, usize)> = BTreeSet::new();
     for _ in 0..MAX_EXCHANGES {
@@ -314,7 +317,7 @@ fn replaced(
     let two: Vec<Set> = narrow.flat_map(longer).collect();
     let mut new: Vec<Set> = one.into_iter().chain(two).collect();
     new.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
-    // At settled sizes a set may be far more probable than with its members taken one after the
+    // With converged sizes, a set may be far more probable than with sizes found one after the
     // other.
     let rest_of_new = new.split_off(new.len().min(BEAM_WIDTH));
     let settled: Vec<Set> = new.into_par_iter().map(|set| set.settled(products)).collect();
@@ -430,8 +433,7 @@ mod tests {
             "{first} {}",
             of([1, 0, 2], &[0, 1])
         );
-        // Beside two strong effects, each of the size that it has, one that is not there gains
-        // nothing.
+        // In addition to two strong effects at their sizes, an absent effect gains nothing.
         assert!(of([0, 1, 2], &[0, 1, 2]) < first - 4.0);
     }
 

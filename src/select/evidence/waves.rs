@@ -116,7 +116,7 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
             let tens = std::iter::successors(Some(1.0), |digit| Some(digit / 10.0));
             let digits = tens.take_while(|digit| *digit >= 2.0 * finer).count();
             for (left, first) in left.iter().zip(first) {
-                // One wave stands for all orders about it, whatever explanation it was found in.
+                // One wave represents all orders near its order, in whatever set it was found.
                 let known = || {
                     self.hypotheses
                         .all
@@ -320,7 +320,7 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
         let between = |pair: &[(f64, f64)]| {
             0.5 * (weight(pair[0].1) + weight(pair[1].1)) * (pair[1].0 - pair[0].0)
         };
-        // An order that no neighbour comes near is told to a step.
+        // If the likelihood is zero at both neighbours, its width is taken as one step.
         gains.windows(2).map(between).sum::<f64>().max(PHASE_STEPS[1] / range)
     }
 }

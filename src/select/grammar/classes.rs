@@ -82,7 +82,7 @@ pub fn proposals(
         };
         if let Some(class) = classes.iter_mut().find(is_same) {
             class.ln_posterior = ln_add(class.ln_posterior, refined.ln_posterior);
-            // The simplest that is hardly less probable stands for the class.
+            // The simplest sum that is hardly less probable represents the class.
             let is_simpler = refined.ln_prior > class.first.ln_prior + 1e-9
                 && refined.ln_posterior > class.first.ln_posterior - 0.5;
             if is_simpler {

@@ -158,7 +158,7 @@ mod tests {
 
     #[test]
     fn what_is_open_keeps_every_constraint() {
-        // The third row follows from the others, the last says nothing.
+        // The third row depends linearly on the others; the last one is zero.
         let active = DMatrix::from_row_slice(
             4,
             4,

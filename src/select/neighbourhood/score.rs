@@ -78,7 +78,7 @@ impl Sums {
         }
         let part = (squares / total).clamp(0.0, 1.0 - 1e-15);
         let f = part / (1.0 - part) * left / freedom as f64;
-        // Of squares that overflow nothing can be said.
+        // If the squares overflow, p is 1.
         let chance = FisherSnedecor::new(freedom as f64, left).ok().filter(|_| !f.is_nan());
         let p = chance.map_or(1.0, |chance| chance.sf(f)).max(f64::MIN_POSITIVE);
         let criterion = degrees * (-part).ln_1p() + freedom as f64 * degrees.ln();

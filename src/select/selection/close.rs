@@ -93,7 +93,7 @@ pub fn close_by(
     rules: &SelectionRules,
 ) -> Result<ClosedLoop, IdentifyError> {
     rules.check()?;
-    // What was found is finished in any case: the search alone is stopped.
+    // A stop request ends only the search; the effects found so far are still fitted and tested.
     let data = Data::new(problem, data, rules).with_candidates(&options.candidates);
     let (stoppable, unstoppable) = (
         data.clone().with_stop(options.stop.clone().unwrap_or_default()),
@@ -118,7 +118,7 @@ pub fn close_by(
     let (fitted, evidence) = kept(&declared, (fitted, evidence), &data, &unstoppable)?;
     let is_trusted = fitted.found.describes_arm();
     let residual_tests = check_fit(&fitted, &data);
-    // Where nothing was found before the search was stopped, no evidence is needed to say so.
+    // If the search was stopped before it found anything, no evidence is needed.
     let is_wanted = is_trusted && !(interrupted && state.added(&fitted).is_empty())
         || !state.added(&fitted).is_empty();
     let evidence = evidence.or_else(|| {

@@ -103,7 +103,7 @@ pub(super) fn found(
             }
             _ => None,
         };
-        // What was evaluated and is in no probable set has no claim.
+        // An effect that was evaluated and is in no probable set has no claim.
         let is_evaluated = best.is_some() && reconsidered.iter().any(|known| effect.covers(known));
         let law = claims.as_ref().map(|claims| claims.law.1).or(gear);
         let law = law.or_else(|| is_evaluated.then_some(0.0));

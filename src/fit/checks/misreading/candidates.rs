@@ -151,7 +151,7 @@ fn of_joint_table(problem: &Problem) -> Vec<Misreading> {
             let is_plausible = |power: &i8| {
                 PLAUSIBLE_LENGTHS.contains(&(length.abs() * 10.0_f64.powi((*power).into())))
             };
-            // Of a single long length this is `Misreading::ArmInMillimetres`.
+            // If only one length is long, [`Misreading::ArmInMillimetres`] covers the case.
             let is_new =
                 |power: &i8| *power != -3 || length.abs() <= MIN_MILLIMETRE_LENGTH || long > 1;
             let powers = [-3, 3, -2, 2, -1, 1].into_iter().filter(is_plausible).filter(is_new);
