@@ -44,7 +44,7 @@ pub fn after_fit(
         None if found.has(FindingCode::NoiseBeyondDeclared) => {
             format!("flexcal loop {named} looks for what the model lacks")
         }
-        None if !found.is_trusted() || report::tells_little(found) => {
+        None if !found.is_trusted() || report::determines_nothing(found) => {
             format!("flexcal check {named} says what the poses can tell")
         }
         None if found.has(FindingCode::PriorsDecide) => {

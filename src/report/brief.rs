@@ -3,7 +3,7 @@
 use super::document::Block;
 use super::errors::noun;
 use super::identify::{errors_by_axis, headline};
-use super::noise::{carried, noise};
+use super::noise::{influential_rows, noise};
 use super::parameters::correlated;
 use super::render::text_within;
 use super::row_kinds::unsteady;
@@ -20,13 +20,13 @@ pub fn estimate_brief(problem: &Problem, found: &Identification, columns: usize)
         Block::Table(errors_by_axis(found)),
         Block::lines(noise(problem, found)),
     ];
-    blocks.extend(carried(found));
-    blocks.push(Block::Lines(parameters(&found.estimates), worth_a_look(found)));
+    blocks.extend(influential_rows(found));
+    blocks.push(Block::Lines(parameters(&found.estimates), remarks(found)));
     text_within(&blocks, columns)
 }
 
 /// Returns true if the data determine no parameter of the fit.
-pub fn tells_little(found: &Identification) -> bool {
+pub fn determines_nothing(found: &Identification) -> bool {
     !found.estimates.iter().any(|estimate| Knowledge::of(estimate).is_identified())
 }
 
@@ -51,7 +51,7 @@ fn parameters(estimates: &[Estimate]) -> String {
 
 /// Lists short remarks on what the full text explains: outliers, undetermined combinations, active
 /// limits.
-fn worth_a_look(found: &Identification) -> Vec<String> {
+fn remarks(found: &Identification) -> Vec<String> {
     let mut points = Vec::new();
     if let Some(orientation) = &found.orientation {
         let mean = |of: &crate::fit::Errors| number(of.held_out.mean.norm.to_degrees(), 4);

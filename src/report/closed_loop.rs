@@ -3,12 +3,12 @@
 use super::document::{Block, Headline, Point, Table, code, first_of, named};
 use super::errors::{NOMINAL, both_parts, held_out_rows, judging, measure, rows_of, unpredicted};
 use super::figures;
-use super::found_effects::{found, rounds, sureness};
+use super::found_effects::{found, rounds, status_table};
 use super::identify::{
-    BEFORE, beware, fitted_parameters, identifiability_with_figures, mean, poses, spread,
+    BEFORE, fit_warnings, fitted_parameters, identifiability_with_figures, mean, poses, spread,
     why_not_trusted,
 };
-use super::noise::{carried, expected, short, size};
+use super::noise::{expected, influential_rows, short, size};
 use super::parameters::parameters;
 use super::probability::percent;
 use super::render::{Report, report, text, text_within};
@@ -45,8 +45,8 @@ pub fn loop_brief(problem: &Problem, closure: &ClosedLoop, columns: usize) -> St
     table.header.pop();
     table.rows.iter_mut().for_each(|row| _ = row.pop());
     blocks.push(Block::Table(table));
-    blocks.extend(gained(closure, result).map(Block::Text));
-    let end = remains(closure, result)
+    blocks.extend(gain_sentence(closure, result).map(Block::Text));
+    let end = remaining_structure(closure, result)
         .map_or_else(String::new, |words| format!("\n{}", text(&[Block::Text(words)])));
     let points: Vec<Point> = causes(result).map(cause).collect();
     if points.is_empty() {
@@ -105,16 +105,20 @@ fn head<'a>(problem: &Problem, closure: &ClosedLoop, result: &LoopResult) -> Vec
         Block::Text(format!("{}\n{}", problem.title, both_parts(&closure.before.fit))),
         Block::Text(verdict(result, closure.after.sigma_scale < 1.0)),
     ];
-    blocks.extend(to_know(problem, closure, result));
+    blocks.extend(cautions_on_causes(problem, closure, result));
     blocks
 }
 
 /// Returns the cautions that concern the causes: missing declarations, influential rows, findings,
 /// and excluded rows.
-fn to_know<'a>(problem: &Problem, closure: &ClosedLoop, result: &LoopResult) -> Vec<Block<'a>> {
+fn cautions_on_causes<'a>(
+    problem: &Problem,
+    closure: &ClosedLoop,
+    result: &LoopResult,
+) -> Vec<Block<'a>> {
     let declare = to_declare(problem, closure, result).into_iter().map(Block::Note);
     let mut blocks: Vec<Block> = declare.collect();
-    blocks.extend(carried(&closure.before.fit));
+    blocks.extend(influential_rows(&closure.before.fit));
     blocks.extend(cautions(closure, result));
     blocks.extend(set_aside(problem, result));
     blocks
@@ -192,8 +196,8 @@ fn blocks<'a>(
         Block::Text(verdict(result, after.sigma_scale < 1.0)),
         Block::Text(counts),
     ];
-    blocks.extend(to_know(problem, closure, result));
-    blocks.extend(beware(after, plots));
+    blocks.extend(cautions_on_causes(problem, closure, result));
+    blocks.extend(fit_warnings(after, plots));
     blocks.extend([
         Block::Table(errors(closure, result)),
         gain(closure, result),
@@ -207,9 +211,9 @@ fn blocks<'a>(
     let mut ranking = trace::ranking(problem, &traced, MAX_SHOWN_CANDIDATES, &every);
     ranking.insert(1, Block::figures([figures::ranking(&closure.before)]));
     blocks.extend(ranking);
-    blocks.push(Block::Page(trace::not_seen(&closure.before)));
+    blocks.push(Block::Page(trace::undetectable_effects(&closure.before)));
     blocks.extend(rounds(closure, result));
-    blocks.extend(sureness(closure, result));
+    blocks.extend(status_table(closure, result));
     blocks.push(Block::Words(found(result, MAX_SHOWN_ALTERNATIVES)));
     blocks.push(Block::Page(found(result, 2 * MAX_SHOWN_ALTERNATIVES)));
     let causes = plots.causes.iter().zip(1..);
@@ -332,7 +336,7 @@ fn known_gain(result: &LoopResult) -> Option<Gain> {
 }
 
 /// States the gain on the held-out rows with its interval, and the size of the residual.
-fn gained(closure: &ClosedLoop, result: &LoopResult) -> Option<String> {
+fn gain_sentence(closure: &ClosedLoop, result: &LoopResult) -> Option<String> {
     let after = &closure.after;
     let gain = known_gain(result).map(|Gain { mean, interval_95: [low, high] }| {
         let (_, unit) = result.after.errors.judged().norms();
@@ -360,7 +364,7 @@ fn gained(closure: &ClosedLoop, result: &LoopResult) -> Option<String> {
 }
 
 /// States what structure remains and where it is shown.
-fn remains(closure: &ClosedLoop, result: &LoopResult) -> Option<String> {
+fn remaining_structure(closure: &ClosedLoop, result: &LoopResult) -> Option<String> {
     let failed = residual_tests::failed(&closure.residual_tests).len();
     let places = if result.size_alone().is_none() { places(result) } else { Vec::new() };
     let structure = (!places.is_empty())
@@ -374,13 +378,16 @@ fn remains(closure: &ClosedLoop, result: &LoopResult) -> Option<String> {
 /// States the gain and explains how to read the figures.
 fn gain(closure: &ClosedLoop, result: &LoopResult) -> Block<'static> {
     let (before, after) = (&closure.before, &closure.after);
-    let another = residual_tests::another_size(&before.residual_tests, before.fit.reduced_chi2)
-        .or_else(|| residual_tests::another_size(&closure.residual_tests, after.reduced_chi2));
+    let another =
+        residual_tests::other_reduced_chi2(&before.residual_tests, before.fit.reduced_chi2)
+            .or_else(|| {
+                residual_tests::other_reduced_chi2(&closure.residual_tests, after.reduced_chi2)
+            });
     let mut arms = vec![
         ("the nominal arm", &before.fit.registered),
         ("the arm as declared, fitted", &before.fit.fitted),
     ];
     arms.extend((!result.effects.is_empty()).then_some(("what was found", &after.fitted)));
-    let words = [gained(closure, result), another, unpredicted(&arms)];
+    let words = [gain_sentence(closure, result), another, unpredicted(&arms)];
     Block::Text(words.into_iter().flatten().collect::<Vec<_>>().join(" "))
 }

@@ -5,7 +5,8 @@ use super::document::{Block, Column, Headline, Table, code};
 use super::errors::{both_parts, header, held_out_rows, noun, unit};
 use super::figures;
 use super::identify::{
-    BEFORE, beware, counts, errors_by_axis, fit_details, fitted_parameters, mean, no_errors, poses,
+    BEFORE, counts, errors_by_axis, fit_details, fit_warnings, fitted_parameters, mean, no_errors,
+    poses,
 };
 use super::noise::size;
 use super::paper_tables::{table_2, table_3, title};
@@ -28,7 +29,7 @@ pub fn compare_text(problem: &Problem, comparison: &Comparison) -> String {
         both_parts(joint)
     };
     let mut blocks = vec![Block::lines(format!("{}\n{parts_of}", problem.title))];
-    blocks.extend(in_the_papers_shape(comparison));
+    blocks.extend(as_paper_tables(comparison));
     blocks.extend(no_errors(joint).map(|words| Block::lines(format!("  –: {words}"))));
     blocks.push(Block::Table(strategies(comparison, true)));
     if !comparison.paper.is_empty() && !problem.effects.is_empty() {
@@ -46,7 +47,7 @@ fn of_positions(found: &Identification) -> bool {
 }
 
 /// Returns the results of each procedure in the form of tables 2 and 3 of the paper.
-fn in_the_papers_shape(comparison: &Comparison) -> Vec<Block<'_>> {
+fn as_paper_tables(comparison: &Comparison) -> Vec<Block<'_>> {
     let tables = |procedure| {
         [
             Block::heading(&title(procedure)),
@@ -91,7 +92,7 @@ fn blocks<'a>(
         ],
     };
     let mut blocks = vec![Block::Headline(head), Block::Text(counts(joint))];
-    blocks.extend(beware(joint, plots));
+    blocks.extend(fit_warnings(joint, plots));
     blocks.extend([
         Block::heading("Strategies and solvers side by side"),
         Block::Figures(vec![figures::strategies(comparison)]),

@@ -105,7 +105,7 @@ pub(super) fn rounds<'a>(closure: &'a ClosedLoop, result: &LoopResult) -> Vec<Bl
 }
 
 /// Returns the status of each effect with the evidence for it.
-pub(super) fn sureness<'a>(closure: &ClosedLoop, result: &LoopResult) -> Option<Block<'a>> {
+pub(super) fn status_table<'a>(closure: &ClosedLoop, result: &LoopResult) -> Option<Block<'a>> {
     let share = |part: f64| format!("{} %", number(part * 100.0, 0));
     let law = |found: &FoundEffect| {
         or_dash(found.claims.as_ref(), |claims| share(claims.law.probability))

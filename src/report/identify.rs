@@ -6,7 +6,7 @@ use super::errors::{
 };
 use super::figures;
 use super::limits::{active_limits, alternation};
-use super::noise::{carried, noise, outliers, size};
+use super::noise::{influential_rows, noise, outliers, size};
 use super::parameters::{
     conditioning, correlations, more_unidentifiable, parameters, unidentifiable, weak,
 };
@@ -28,7 +28,7 @@ pub fn estimate_text(problem: &Problem, found: &Identification) -> String {
         Block::Table(errors_by_axis(found)),
         Block::lines(noise(problem, found)),
     ];
-    blocks.extend(carried(found));
+    blocks.extend(influential_rows(found));
     blocks.extend(row_kind_tables(found));
     blocks.extend(orientation(found));
     blocks.extend(outliers(problem, found));
@@ -66,7 +66,7 @@ fn blocks<'a>(problem: &Problem, found: &'a Identification, plots: &'a PlotData)
         ],
     };
     let mut blocks = vec![Block::Headline(head), Block::Text(counts(found))];
-    blocks.extend(beware(found, plots));
+    blocks.extend(fit_warnings(found, plots));
     blocks.push(Block::Table(errors_by_axis(found)));
     blocks.extend(orientation(found));
     blocks.extend(row_kind_tables(found));
@@ -122,7 +122,7 @@ fn fitted(found: &Identification, separator: &str) -> String {
 
 /// Returns the warnings of the fit that the terminal shows, except the one that a fit is not
 /// trusted.
-pub(super) fn beware<'a>(found: &Identification, plots: &PlotData) -> Option<Block<'a>> {
+pub(super) fn fit_warnings<'a>(found: &Identification, plots: &PlotData) -> Option<Block<'a>> {
     let points: Vec<String> =
         plots.warnings.iter().map(ToString::to_string).chain(found.reasons_to_ask()).collect();
     (!points.is_empty()).then(|| Block::Lines("Warnings:".to_owned(), points))
@@ -213,7 +213,7 @@ pub(super) fn fit_details<'a>(
     file: &str,
 ) -> Vec<Block<'a>> {
     let mut blocks = vec![Block::heading("Residual"), Block::lines(noise(problem, found))];
-    blocks.extend(carried(found));
+    blocks.extend(influential_rows(found));
     blocks.extend(outliers(problem, found));
     blocks.push(Block::figures([
         figures::histogram(plots),
@@ -222,7 +222,8 @@ pub(super) fn fit_details<'a>(
     ]));
     blocks.extend(residual_tests::blocks(&plots.residual_tests));
     blocks.extend(
-        residual_tests::another_size(&plots.residual_tests, found.reduced_chi2).map(Block::Text),
+        residual_tests::other_reduced_chi2(&plots.residual_tests, found.reduced_chi2)
+            .map(Block::Text),
     );
     blocks.push(Block::heading("Parameters"));
     blocks.extend(parameters(problem, found, file));

@@ -40,7 +40,7 @@ mod unexplained;
 mod verdict;
 
 pub(crate) use acceptance::{acceptance_page, acceptance_text, tolerance_text};
-pub(crate) use brief::{estimate_brief, tells_little};
+pub(crate) use brief::{determines_nothing, estimate_brief};
 pub use closed_loop::{loop_report, loop_text};
 pub(crate) use identify::joint_sources_text;
 pub use identify::{estimate_text, identification_report};

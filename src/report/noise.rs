@@ -129,7 +129,7 @@ pub(super) fn outliers<'a>(problem: &Problem, found: &Identification) -> Option<
 }
 
 /// Names the influential rows and the size of the residual without them, if there are any.
-pub(super) fn carried<'a>(found: &Identification) -> Option<Block<'a>> {
+pub(super) fn influential_rows<'a>(found: &Identification) -> Option<Block<'a>> {
     let influential = found.influential_rows.as_ref()?;
     let row = |row: &Outlier| {
         format!("{} ({})", row.location, size_of_kind(row.kind, row.error.norm(), 3))

@@ -10,7 +10,7 @@ pub(super) fn failed(tests: &ResidualTests) -> Vec<String> {
 }
 
 /// States why the tests have a χ²/ν different from the fit's, if both differ in the shown digits.
-pub(super) fn another_size(tests: &ResidualTests, chi2: Option<f64>) -> Option<String> {
+pub(super) fn other_reduced_chi2(tests: &ResidualTests, chi2: Option<f64>) -> Option<String> {
     let size = tests
         .tests
         .iter()

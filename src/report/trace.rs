@@ -35,12 +35,12 @@ pub fn trace_text(problem: &Problem, trace: &Trace) -> String {
         Block::List(residual_tests::all(&trace.residual_tests)),
     ];
     blocks.extend(
-        residual_tests::another_size(&trace.residual_tests, trace.fit.reduced_chi2)
+        residual_tests::other_reduced_chi2(&trace.residual_tests, trace.fit.reduced_chi2)
             .map(Block::Text),
     );
     blocks.extend(hypothesis_sets(&result));
     blocks.extend(ranking(problem, &result, MAX_SHOWN_CANDIDATES, "trace.json holds them all"));
-    blocks.extend(not_seen(trace));
+    blocks.extend(undetectable_effects(trace));
     text(&blocks)
 }
 
@@ -216,7 +216,7 @@ fn pose_words(problem: &Problem, pose: &SeparatingPose) -> String {
 }
 
 /// Lists the effects that these data cannot show.
-pub(super) fn not_seen<'a>(trace: &Trace) -> Vec<Block<'a>> {
+pub(super) fn undetectable_effects<'a>(trace: &Trace) -> Vec<Block<'a>> {
     let mut blocks = Vec::new();
     if !trace.untestable.is_empty() {
         blocks.push(Block::heading("Effects that these data cannot show"));

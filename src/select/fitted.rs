@@ -145,12 +145,12 @@ impl Fitted {
         if self.found.termination.converged() && !self.found.provisional {
             return Ok(self);
         }
-        let onwards = if self.found.provisional {
+        let continuing = if self.found.provisional {
             self.succeeding(options, true)
         } else {
-            self.onwards(options)
+            self.continuing(options)
         };
-        self.next(self.problem.clone(), data, &onwards)
+        self.next(self.problem.clone(), data, &continuing)
     }
 
     /// Returns true if the residuals of another fit of the same effects differ by more than
@@ -162,7 +162,7 @@ impl Fitted {
     }
 
     /// Returns options for a fit of the same problem that starts where this one ended.
-    pub fn onwards(&self, options: &Options) -> Options {
+    pub fn continuing(&self, options: &Options) -> Options {
         let values =
             self.found.estimates.iter().map(|estimate| (estimate.name.clone(), estimate.estimate));
         Options { start: values.collect(), influential_rows: false, ..options.clone() }
@@ -176,7 +176,7 @@ impl Fitted {
         let linear_model =
             derivatives.map(|derivatives| derivatives.linear_model(at, &self.unknowns));
         let warm_start = self.found.warm_start(alike).with_linear_model(linear_model);
-        Options { warm_start: Some(Arc::new(warm_start)), ..self.onwards(options) }
+        Options { warm_start: Some(Arc::new(warm_start)), ..self.continuing(options) }
     }
 
     /// Returns the problem with other effects declared.
@@ -307,11 +307,11 @@ impl Fitted {
 
     /// Returns this fit with no row treated as an outlier.
     pub fn with_all_rows(&self) -> Self {
-        self.setting_aside(Vec::new())
+        self.with_outliers(Vec::new())
     }
 
     /// Returns this fit with `rows` treated as outliers, in its linear neighbourhood.
-    pub fn setting_aside(&self, rows: Vec<usize>) -> Self {
+    pub fn with_outliers(&self, rows: Vec<usize>) -> Self {
         Self {
             set_aside: rows,
             around: OnceLock::new(),

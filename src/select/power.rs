@@ -35,7 +35,7 @@ impl ScanTest {
             return None;
         }
         let level = level / tries;
-        let chance = halved(|part| beta_reg(left, new, 1.0 - part) > level, (0.0, 1.0));
+        let chance = bisected(|part| beta_reg(left, new, 1.0 - part) > level, (0.0, 1.0));
         let better = -(-(k as f64 * freedom.ln() + 2.0 * tries.ln()) / freedom).exp_m1();
         Some(Self { new, left, threshold: chance.max(better) })
     }
@@ -72,12 +72,12 @@ impl ScanTest {
             }
             most *= 2.0;
         }
-        Some(halved(|lambda| self.power(lambda) < power, (0.0, most)))
+        Some(bisected(|lambda| self.power(lambda) < power, (0.0, most)))
     }
 }
 
 /// Returns the midpoint of the interval in which `is_below` changes from true to false.
-fn halved(is_below: impl Fn(f64) -> bool, range: (f64, f64)) -> f64 {
+fn bisected(is_below: impl Fn(f64) -> bool, range: (f64, f64)) -> f64 {
     let (low, high) = bisect(is_below, range, MAX_BISECTIONS);
     0.5 * (low + high)
 }

@@ -82,7 +82,7 @@ fn point_information(readings: &[Reading], parameters: usize) -> (DVector<f64>, 
 
 /// Returns twice the log odds of θ ∼ N(θ̂, C) against θ = 0, with θ̂ = `found`, C = `spread` and
 /// the v and M of all points. `None` if no point was read at different f.
-fn odds(
+fn twice_ln_odds(
     found: &DVector<f64>,
     spread: &DMatrix<f64>,
     (told, certainty): (&DVector<f64>, &DMatrix<f64>),
@@ -107,7 +107,7 @@ fn odds(
 
 /// Returns the function of time f(t) by which an effect moves the instrument; `None` for other
 /// effects.
-fn course(effect: &Effect, problem: &Problem) -> Option<Regressor> {
+fn time_function(effect: &Effect, problem: &Problem) -> Option<Regressor> {
     let mut terms = effect.terms(problem).into_iter();
     let first = terms.next()?;
     let is_of_instrument = |site: ParameterSite| {
@@ -129,7 +129,7 @@ pub(super) fn reference_check(
     effect: &Effect,
 ) -> Option<ReferenceCheck> {
     let measurements = data.measurements;
-    let course = course(effect, &fitted.problem)?;
+    let course = time_function(effect, &fitted.problem)?;
     let first = measurements.time.iter().copied().fold(f64::INFINITY, f64::min);
     let moves = |reading: &NestReading| -> Option<f64> {
         // Where rows are the time, a reading lies between those before and behind it.
@@ -162,7 +162,7 @@ pub(super) fn reference_check(
         .values()
         .map(|all| point_information(all, count))
         .fold(nothing, |a, b| (a.0 + b.0, a.1 + b.1));
-    let gain = odds(&found, &spread, (&told, &certainty))?;
+    let gain = twice_ln_odds(&found, &spread, (&told, &certainty))?;
     let verdict = if gain > MIN_TWICE_LN_ODDS {
         ReferenceVerdict::Corroborated
     } else if gain < -MIN_TWICE_LN_ODDS {
@@ -189,7 +189,7 @@ mod tests {
         let (sure, unsure) = (&identity * 1e-8, &identity * 0.09);
         let odds = |spread: &DMatrix<f64>, part: f64| {
             let certainty = &identity * 1e4;
-            super::odds(&found, spread, (&(&found * part * 1e4), &certainty)).unwrap()
+            super::twice_ln_odds(&found, spread, (&(&found * part * 1e4), &certainty)).unwrap()
         };
         // Sharp readings of less than half of what was found with an error of 0.3: a motion all the
         // same.
@@ -199,7 +199,10 @@ mod tests {
         // Twice ln of N(0; 1, 0.09 + 1e-4) of each coordinate over that of N(0; 0, 1e-4), by hand.
         let expected = -1.0 / 0.0901 - 3.0 * (901.0_f64).ln();
         assert!((odds(&unsure, 0.0) - expected).abs() < 1e-6);
-        assert_eq!(super::odds(&found, &unsure, (&DVector::zeros(3), &DMatrix::zeros(3, 3))), None);
+        assert_eq!(
+            super::twice_ln_odds(&found, &unsure, (&DVector::zeros(3), &DMatrix::zeros(3, 3))),
+            None
+        );
     }
 
     #[test]
@@ -227,7 +230,7 @@ mod tests {
         let spread = DMatrix::identity(6, 6) * 1e-12;
         let odds = |turn: f64| {
             let (told, certainty) = all(turn);
-            super::odds(&found, &spread, (&told, &certainty)).unwrap()
+            super::twice_ln_odds(&found, &spread, (&told, &certainty)).unwrap()
         };
         // The measured places are off by the motion itself, which hardly changes the estimate.
         let (told, certainty) = all(1.0);

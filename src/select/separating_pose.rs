@@ -68,7 +68,7 @@ pub(super) fn separating_pose(
 ) -> Option<SeparatingPose> {
     let moved = |effect: &Effect| {
         let fit = fit.with(&here.columns(effect));
-        beside(there.fitted().clone(), &there.columns(effect)) * fit.step()
+        side_by_side(there.fitted().clone(), &there.columns(effect)) * fit.step()
     };
     let difference: DVector<f64> = moved(one) - moved(other);
     let distance = |pose: usize| difference.rows(3 * pose, 3).norm() * there.poses()[pose].sigma;
@@ -88,7 +88,7 @@ pub(super) fn separating_pose(
     })
 }
 
-fn beside(left: DMatrix<f64>, right: &DMatrix<f64>) -> DMatrix<f64> {
+fn side_by_side(left: DMatrix<f64>, right: &DMatrix<f64>) -> DMatrix<f64> {
     let first = left.ncols();
     let mut both = left.resize_horizontally(first + right.ncols(), 0.0);
     both.columns_mut(first, right.ncols()).copy_from(right);

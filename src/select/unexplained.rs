@@ -90,7 +90,7 @@ pub(super) fn without_law(
     (evidence, best): (&Evidence, &HypothesisSet),
 ) -> Vec<Unexplained> {
     let mut all: Vec<(&Hypothesis, Unexplained)> = Vec::new();
-    let are_all_sure = evidence.as_many(best) >= data.rules.located;
+    let are_all_sure = evidence.probability_of_as_many(best) >= data.rules.located;
     for hypothesis in best.hypotheses.iter().filter(|hypothesis| hypothesis.effect().is_none()) {
         let claims = evidence.claims(hypothesis);
         let is_known = all.iter().any(|(known, _)| known.site == hypothesis.site);
@@ -122,7 +122,7 @@ pub(super) fn without_law(
 
 /// Returns the structure that the residual tests detect, with unknown site and quantities; `None`
 /// if they detect none.
-pub(super) fn nowhere(tests: &ResidualTests) -> Option<Unexplained> {
+pub(super) fn unlocated(tests: &ResidualTests) -> Option<Unexplained> {
     if !tests.is_structured() {
         return None;
     }
@@ -179,7 +179,7 @@ fn correction(
     );
     let held_out = fitted.linearised_at(data, there, &[]);
     let moved = held_out.fitted() * parameters + beyond * coefficients;
-    let reached = hypotheses.reached(hypothesis, here.len());
+    let reached = hypotheses.is_in_range(hypothesis, here.len());
     let mut errors = fitted.errors(data, there);
     // Parameters fitted together with the function apply everywhere. Beyond its range the function
     // keeps its last value.

@@ -14,7 +14,7 @@ pub(super) fn problem_of(
     item: &Item<'_, '_>,
     folder: &Path,
 ) -> Result<(Problem, String, PathBuf), InputError> {
-    let mut file = beside(item, folder)?;
+    let mut file = path_beside(item, folder)?;
     if file.is_dir() {
         file.push("problem.toml");
     }
@@ -27,7 +27,7 @@ pub(super) fn problem_of(
 }
 
 /// Returns the path of a file that the study names, relative to its folder.
-pub(super) fn beside(item: &Item<'_, '_>, folder: &Path) -> Result<PathBuf, InputError> {
+pub(super) fn path_beside(item: &Item<'_, '_>, folder: &Path) -> Result<PathBuf, InputError> {
     let path = folder.join(item.text()?);
     if path.exists() { Ok(path) } else { Err(item.error(StudyErrorKind::FileMissing { path })) }
 }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::definition::{Cell, Source, Study};
 use super::effects;
-use super::input::{beside, count, distinct, problem_of};
+use super::input::{count, distinct, path_beside, problem_of};
 use super::replica::MisprintStudy;
 use crate::error::{InputError, InputErrorKind, Location, StudyErrorKind};
 use crate::fit::{SolverChoice, Strategy};
@@ -89,7 +89,7 @@ fn study(mut root: Section<'_, '_>, file: &Path) -> Result<Study, InputError> {
     let draws_effects = root.peek("truth").is_none();
     let mut files = [&[file.to_owned(), problem_file], problem.data.files.as_slice()].concat();
     if let Some(item) = root.peek("truth") {
-        files.push(truth_file(beside(&item, folder)?));
+        files.push(truth_file(path_beside(&item, folder)?));
     }
     root.finish()?;
     effects::check(&problem, &truth, source, || {
@@ -144,7 +144,7 @@ fn truth(
     folder: &Path,
 ) -> Result<Truth, InputError> {
     let mut truth = if let Some(item) = root.get("truth") {
-        Truth::read(&beside(&item, folder)?, problem)?
+        Truth::read(&path_beside(&item, folder)?, problem)?
     } else {
         if let Some(poses) = root.peek("poses") {
             let poses = poses.section()?;

@@ -171,7 +171,7 @@ impl Block {
         all.column_iter_mut()
             .zip(columns)
             .for_each(|(mut target, column)| target.copy_from(&column));
-        let left = fit.left_of(&all);
+        let left = fit.projected_out(&all);
         let mut first = 0;
         let of = |(design, ln_prior, coefficients): (Design, f64, Coefficients)| {
             let (columns, normal) = match design {
@@ -229,7 +229,7 @@ impl Block {
             Columns::Dense(columns) => Arc::clone(columns),
             Columns::Grouped { levers, groups } => {
                 let design = Design::Grouped { levers: levers.clone(), groups: groups.clone() };
-                Arc::new(fit.left_of(&design.columns()))
+                Arc::new(fit.projected_out(&design.columns()))
             }
         }
     }
@@ -269,7 +269,9 @@ impl Block {
     ) -> (f64, f64) {
         let (with, size) = match set {
             None => self.over_sizes(&self.normal, left, grid),
-            Some((along, taken)) => self.over_sizes(&self.normal.beside(along, taken), left, grid),
+            Some((along, taken)) => {
+                self.over_sizes(&self.normal.reduced_by(along, taken), left, grid)
+            }
         };
         (with - without, size)
     }
@@ -303,7 +305,7 @@ mod tests {
         };
         let fit = LinearNeighbourhood::new(&jacobian, &residual, &unknowns, 0);
         let (within, grid) = (
-            fit.left_of(&matrix(36, 9).columns(7, 2).into_owned()).transpose() * 0.2,
+            fit.projected_out(&matrix(36, 9).columns(7, 2).into_owned()).transpose() * 0.2,
             [(0.0, 0.5), (-1.0, 0.2)],
         );
         let taken = &within * fit.residual();

@@ -107,12 +107,20 @@ impl Hypotheses<'_> {
         let is_new = |effect: &Effect| {
             !self.all.iter().any(|known| known.hypothesis.effect() == Some(effect))
         };
-        others.filter(is_new).filter_map(|effect| self.like(candidate, effect, problem)).collect()
+        others
+            .filter(is_new)
+            .filter_map(|effect| self.with_effect(candidate, effect, problem))
+            .collect()
     }
 
     /// Returns a copy of the candidate for `effect`, which differs only in the value of its
     /// argument.
-    fn like(&self, candidate: &Candidate, effect: Effect, problem: &Problem) -> Option<Candidate> {
+    fn with_effect(
+        &self,
+        candidate: &Candidate,
+        effect: Effect,
+        problem: &Problem,
+    ) -> Option<Candidate> {
         let columns = self.linearised.columns(&effect);
         let (columns, largest) = even(columns, &effect.terms(problem), self.weighed);
         let design = Design::Dense(columns).scaled(self.weighed)?;

@@ -234,7 +234,7 @@ impl<'a> Hypotheses<'a> {
 
     /// Returns, for each pose from index `first` on, true if all covariates of the hypothesis are
     /// within their ranges over the poses of the evidence.
-    pub fn reached(&self, hypothesis: &Hypothesis, first: usize) -> Vec<bool> {
+    pub fn is_in_range(&self, hypothesis: &Hypothesis, first: usize) -> Vec<bool> {
         let within = |known: &SampledCovariate, pose: usize| {
             (known.range.0..=known.range.1).contains(&known.values[pose])
         };

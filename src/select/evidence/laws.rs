@@ -39,7 +39,7 @@ pub(super) fn promising(
             break;
         }
         let fitted_effects = fitted.effects().iter().map(Effect::name_and_place).collect();
-        let key = (joint, beside(hypotheses, &rest), left_out.to_vec(), fitted_effects);
+        let key = (joint, member_names(hypotheses, &rest), left_out.to_vec(), fitted_effects);
         let known = || data.proposed.lock().unwrap_or_else(PoisonError::into_inner);
         let proposed = known().get(&key).cloned();
         let proposed = proposed.unwrap_or_else(|| {
@@ -77,7 +77,7 @@ fn coefficients(effect: &Effect, hypotheses: &Hypotheses, problem: &Problem) -> 
 }
 
 /// Returns the names of the `members`, which key the cache of laws.
-fn beside(hypotheses: &Hypotheses, members: &[usize]) -> Vec<String> {
+fn member_names(hypotheses: &Hypotheses, members: &[usize]) -> Vec<String> {
     let name = |&member: &usize| {
         let hypothesis = &hypotheses.all[member].hypothesis;
         hypothesis.effect().map_or_else(
@@ -164,7 +164,7 @@ impl Search<'_, '_, '_> {
         let dropped: Vec<usize> = (0..poses.len()).filter(|pose| !kept.contains(pose)).collect();
         if dropped.len() == self.left_out.len() {
             let left = reduced_by(rest, products);
-            return left.map_or_else(Vec::new, |left| self.beside(&left, products, &kept));
+            return left.map_or_else(Vec::new, |left| self.proposals_after(&left, products, &kept));
         }
         let members: Vec<&Candidate> =
             rest.iter().map(|&member| &self.hypotheses.all[member]).collect();
@@ -176,10 +176,15 @@ impl Search<'_, '_, '_> {
         let products = Products::new(&blocks, &target);
         let all: Vec<usize> = (0..blocks.len()).collect();
         let left = reduced_by(&all, &products);
-        left.map_or_else(Vec::new, |left| self.beside(&left, &products, &kept))
+        left.map_or_else(Vec::new, |left| self.proposals_after(&left, &products, &kept))
     }
 
-    fn beside(&self, left: &ReducedProblem, products: &Products, kept: &[usize]) -> Vec<Proposal> {
+    fn proposals_after(
+        &self,
+        left: &ReducedProblem,
+        products: &Products,
+        kept: &[usize],
+    ) -> Vec<Proposal> {
         let Self { hypotheses, fitted, data, joint, .. } = *self;
         let problem = &fitted.problem;
         let linearised = &hypotheses.linearised;

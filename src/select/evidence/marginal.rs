@@ -93,7 +93,7 @@ impl Normal {
 
     /// Returns the products after a set is projected out of columns and residual, given Z A =
     /// `along` and Z r = `taken`.
-    pub fn beside(&self, along: &DMatrix<f64>, taken: &DVector<f64>) -> Self {
+    pub fn reduced_by(&self, along: &DMatrix<f64>, taken: &DVector<f64>) -> Self {
         match self {
             Self::Dense { gram, product } => {
                 let (mut gram, mut product) = (gram.clone(), product.clone());

@@ -52,7 +52,7 @@ pub use hypothesis_set::HypothesisSet;
 pub(super) use posterior::odds_against;
 pub use posterior::{Claims, Evidence};
 use products::{CachedProducts, Products};
-use reevaluation::carried_by_one;
+use reevaluation::single_supporting_pose;
 pub(super) use reevaluation::{SubsetEvidence, subset_evidence};
 use search::{Weighted, search};
 use waves::Waves;
@@ -134,7 +134,7 @@ pub(super) fn evaluate(fitted: &Fitted, data: &Data, added: &[Effect]) -> Option
     let mut left_out = Vec::new();
     loop {
         let (evidence, hypotheses) = weighed_without(fitted, data, added, &left_out)?;
-        match carried_by_one(fitted, data, (&evidence, &hypotheses)) {
+        match single_supporting_pose(fitted, data, (&evidence, &hypotheses)) {
             Some(pose) if left_out.len() < MAX_SINGLE_POSES => left_out.push(pose),
             _ => return Some(evidence),
         }
@@ -240,7 +240,7 @@ fn weighed_without<'a>(
     explanations.sort_by(|a, b| b.probability.total_cmp(&a.probability));
     let mut evidence =
         Evidence { sets: explanations, stand_ins: Vec::new(), left_out: left_out.to_vec() };
-    if let Some(best) = evidence.sure(data.rules.inclusion_threshold)
+    if let Some(best) = evidence.certain_set(data.rules.inclusion_threshold)
         && best.gears().is_empty()
     {
         let products = Products::with_cache(cache, &blocks, &target);

@@ -60,12 +60,12 @@ impl Evidence {
 
     /// Returns the most probable set whose number of members is certain enough: at least so many
     /// hypotheses act with probability `level` or more. `None` if there is none.
-    pub fn sure(&self, level: f64) -> Option<&HypothesisSet> {
-        self.sets.iter().find(|explanation| self.as_many(explanation) >= level)
+    pub fn certain_set(&self, level: f64) -> Option<&HypothesisSet> {
+        self.sets.iter().find(|explanation| self.probability_of_as_many(explanation) >= level)
     }
 
     /// Returns the probability that at least as many hypotheses act as `as_in` has members.
-    pub(in crate::select) fn as_many(&self, as_in: &HypothesisSet) -> f64 {
+    pub(in crate::select) fn probability_of_as_many(&self, as_in: &HypothesisSet) -> f64 {
         let holds =
             |explanation: &&HypothesisSet| explanation.hypotheses.len() >= as_in.hypotheses.len();
         self.sets.iter().filter(holds).map(|explanation| explanation.probability).sum()

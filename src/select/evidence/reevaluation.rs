@@ -114,12 +114,12 @@ impl<'a> Reevaluation<'a> {
 
 /// Returns a pose that alone supports an effect with a searched argument: without the pose, the
 /// most probable set has no hypothesis at the effect's site. `None` if there is none.
-pub(super) fn carried_by_one(
+pub(super) fn single_supporting_pose(
     fitted: &Fitted,
     data: &Data,
     (evidence, hypotheses): (&Evidence, &Hypotheses),
 ) -> Option<usize> {
-    let best = evidence.sure(data.rules.inclusion_threshold)?;
+    let best = evidence.certain_set(data.rules.inclusion_threshold)?;
     let searched: Vec<&Hypothesis> = best
         .hypotheses
         .iter()

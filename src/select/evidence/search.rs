@@ -64,15 +64,16 @@ impl Set {
     /// (ln p(r | the others, k) − l), with l at the sizes of all members, and the size of k summed
     /// over.
     fn settled(self, products: &Products) -> Self {
-        if self.has_wide(products.blocks) { self } else { self.settled_whole(products) }
+        if self.has_wide(products.blocks) { self } else { self.with_converged_sizes(products) }
     }
 
     /// Returns the set with converged sizes, regardless of how many columns its members have.
-    fn settled_whole(mut self, products: &Products) -> Self {
+    fn with_converged_sizes(mut self, products: &Products) -> Self {
         if self.members.len() < 2 {
             return self;
         }
-        let settled = products.settled((&self.members, &self.sizes), || self.at_rest(products));
+        let settled =
+            products.settled((&self.members, &self.sizes), || self.converged_sizes(products));
         if let Some((sizes, ln_posterior)) = settled {
             (self.sizes, self.ln_posterior) = (sizes, ln_posterior);
         }
@@ -80,7 +81,7 @@ impl Set {
     }
 
     /// Returns the converged sizes of the members and ln of the posterior at them.
-    fn at_rest(&self, products: &Products) -> Option<(Vec<f64>, f64)> {
+    fn converged_sizes(&self, products: &Products) -> Option<(Vec<f64>, f64)> {
         let (members, mut sizes) = (&self.members, self.sizes.clone());
         let mut all = products.reduced(members, &sizes)?;
         let mut summed = vec![0.0; members.len()];
@@ -214,7 +215,7 @@ fn with_gears(known: &mut BTreeMap<Vec<usize>, Set>, products: &Products) {
             let longer = extended(&set, &gears, products).into_iter().max_by(by_posterior);
             // The sizes converge together; otherwise the errors of other joints would constrain
             // the first one too tightly.
-            let longer = longer.map(|longer| longer.settled_whole(products));
+            let longer = longer.map(|longer| longer.with_converged_sizes(products));
             next = longer.filter(|longer| longer.ln_posterior > set.ln_posterior);
             known.extend(next.clone().map(|longer| (sorted(&longer.members), longer)));
         }

@@ -53,7 +53,7 @@ const DISTANCE_RATIO: f64 = 1.3;
 
 /// Returns the joint, counted from 0, at which a hypothesis is a function of that joint's command,
 /// or a free value in every pose; `None` for others.
-fn own_function(of: &Hypothesis, problem: &Problem) -> Option<usize> {
+fn function_of_command(of: &Hypothesis, problem: &Problem) -> Option<usize> {
     let Site::Joint(joint) = of.site else { return None };
     let at_coordinate = of.coordinate == Some(ParameterSite::coordinate(problem, joint + 1));
     let is_own = match &of.kind {
@@ -109,7 +109,7 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
                 continue;
             }
             let left: Vec<ReducedProblem> =
-                rests.iter().filter_map(|rest| self.beside(rest)).collect();
+                rests.iter().filter_map(|rest| self.reduced_by_set(rest)).collect();
             let [step, finer] = PHASE_STEPS.map(|phase| phase / (high - low));
             // A wave of which less than one cycle is seen is none.
             let first = self.gains(joint, &row(TAU / (high - low), highest, step), &left);
@@ -166,13 +166,13 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
             let (joint, order) = order_of(effect)?;
             let rest: Vec<usize> =
                 numbers.iter().copied().filter(|&other| other != number).collect();
-            Some((number, self.spread(joint, order, &self.beside(&rest)?).ln()))
+            Some((number, self.spread(joint, order, &self.reduced_by_set(&rest)?).ln()))
         };
         numbers.iter().zip(effects).filter_map(one).collect()
     }
 
     /// Returns the residual problem that the hypotheses `rest` leave.
-    fn beside(&self, rest: &[usize]) -> Option<ReducedProblem<'w, 'a>> {
+    fn reduced_by_set(&self, rest: &[usize]) -> Option<ReducedProblem<'w, 'a>> {
         reduced_by(rest, self.products)
     }
 
@@ -199,7 +199,7 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
     fn places(&self, weighted: &[Weighted]) -> BTreeMap<usize, Vec<Vec<usize>>> {
         let mut all: BTreeMap<usize, Vec<Vec<usize>>> = BTreeMap::new();
         let of = |member: usize| {
-            own_function(&self.hypotheses.all[member].hypothesis, &self.fitted.problem)
+            function_of_command(&self.hypotheses.all[member].hypothesis, &self.fitted.problem)
         };
         let sliding: Vec<usize> =
             (0..self.fitted.problem.joints.len()).filter(|&joint| self.slides(joint)).collect();

@@ -154,7 +154,7 @@ impl LinearNeighbourhood {
             let more = transposed_narrow_product(&self.basis, &left);
             left -= product(&self.basis, &more);
             along += more;
-            if most_is_left(&left, &lengths) {
+            if keeps_length(&left, &lengths) {
                 break;
             }
         }
@@ -261,17 +261,17 @@ impl LinearNeighbourhood {
 
     /// Returns columns of the data, shape = (3 N, k), after the fitted parameters are projected
     /// out, shape = (3 N + priors, k).
-    pub fn left_of(&self, columns: &DMatrix<f64>) -> DMatrix<f64> {
+    pub fn projected_out(&self, columns: &DMatrix<f64>) -> DMatrix<f64> {
         let mut left = columns.clone().resize_vertically(self.residual.len(), 0.0);
         // Below the data there is nothing at first.
-        self.take_off(&mut left, self.rows);
+        self.subtract_components(&mut left, self.rows);
         let is_short = |k: &usize| {
             left.column(*k).norm() < MIN_PART_OF_ONE_PROJECTION * columns.column(*k).norm()
         };
         let short: Vec<usize> = (0..columns.ncols()).filter(is_short).collect();
         if !short.is_empty() {
             let mut again = left.select_columns(&short);
-            self.take_off(&mut again, self.residual.len());
+            self.subtract_components(&mut again, self.residual.len());
             short
                 .iter()
                 .zip(again.column_iter())
@@ -282,7 +282,7 @@ impl LinearNeighbourhood {
 
     /// Subtracts from the columns `left` their components along the basis. Rows from `filled` on
     /// are zero on entry.
-    fn take_off(&self, left: &mut DMatrix<f64>, filled: usize) {
+    fn subtract_components(&self, left: &mut DMatrix<f64>, filled: usize) {
         if left.ncols() > MAX_SEQUENTIAL_COLUMNS {
             // The narrow side is transposed: this is the product that is fast.
             let along = (left.rows(0, filled).transpose() * self.basis.rows(0, filled)).transpose();
@@ -365,7 +365,7 @@ impl LinearNeighbourhood {
             let (basis, residual) =
                 (self.basis.select_rows(&rows), self.residual.select_rows(&rows));
             let inner = DMatrix::identity(n, n) - gram(&basis);
-            let step = decided(inner, &basis.tr_mul(&residual));
+            let step = solve_projected(inner, &basis.tr_mul(&residual));
             (residual + basis * step).norm_squared()
         };
         let sums: Vec<f64> = (0..blocks).into_par_iter().map(left_out).collect();
@@ -375,7 +375,7 @@ impl LinearNeighbourhood {
 
 /// Returns true if a projection leaves at least [`MIN_PART_OF_ONE_PROJECTION`] of the length of
 /// every column.
-fn most_is_left(left: &DMatrix<f64>, lengths: &[f64]) -> bool {
+fn keeps_length(left: &DMatrix<f64>, lengths: &[f64]) -> bool {
     left.column_iter()
         .zip(lengths)
         .all(|(column, length)| column.norm() >= MIN_PART_OF_ONE_PROJECTION * length)
@@ -383,7 +383,7 @@ fn most_is_left(left: &DMatrix<f64>, lengths: &[f64]) -> bool {
 
 /// Solves M x = `right` for a symmetric M with eigenvalues from 0 to 1. Components along
 /// eigenvalues near 0 are zero.
-fn decided(matrix: DMatrix<f64>, right: &DVector<f64>) -> DVector<f64> {
+fn solve_projected(matrix: DMatrix<f64>, right: &DVector<f64>) -> DVector<f64> {
     if let Some(root) = inverse_factor(&matrix)
         && root.diagonal().iter().all(|value| (value * value).recip() > MIN_DETERMINED_ELSEWHERE)
     {

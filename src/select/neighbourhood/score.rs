@@ -92,7 +92,7 @@ impl Score {
     pub fn estimates(&self) -> Vec<(f64, f64)> {
         let scale = self.scale();
         let (mut estimates, mut variances) = (vec![0.0; scale.len()], vec![0.0; scale.len()]);
-        for (value, vector, along) in self.seen() {
+        for (value, vector, along) in self.detectable_directions() {
             for (i, scale) in scale.iter().enumerate() {
                 estimates[i] -= vector[i] * along / value / scale;
                 variances[i] += vector[i] * vector[i] / value / (scale * scale);
@@ -107,13 +107,13 @@ impl Score {
 
     /// Returns the number of new directions that the columns add.
     pub fn rank(&self) -> usize {
-        self.seen().len()
+        self.detectable_directions().len()
     }
 
     /// Returns bᵀ G⁺ b and the rank of G; `None` if the fitted parameters reproduce the columns
     /// completely.
     fn reduction(&self) -> Option<(f64, usize)> {
-        let seen = self.seen();
+        let seen = self.detectable_directions();
         let sum = seen.iter().map(|(value, _, along)| along * along / value).sum();
         (!seen.is_empty()).then_some((sum, seen.len()))
     }
@@ -124,7 +124,7 @@ impl Score {
 
     /// Returns eigenvalue, eigenvector and bᵀ along it for each direction of G (columns scaled to
     /// unit length) that the fitted parameters do not reproduce.
-    fn seen(&self) -> Vec<(f64, DVector<f64>, f64)> {
+    fn detectable_directions(&self) -> Vec<(f64, DVector<f64>, f64)> {
         let (k, scale) = (self.lengths.len(), self.scale());
         let product = DVector::from_fn(k, |i, _| self.product[i] / scale[i]);
         let eigen = DMatrix::from_fn(k, k, |i, j| self.gram[(i, j)] / (scale[i] * scale[j]))

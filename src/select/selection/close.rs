@@ -126,7 +126,7 @@ pub fn close_by(
     });
     let best = evidence
         .as_ref()
-        .and_then(|evidence| Some((evidence, evidence.sure(rules.inclusion_threshold)?)));
+        .and_then(|evidence| Some((evidence, evidence.certain_set(rules.inclusion_threshold)?)));
     let mut unexplained =
         best.map_or_else(Vec::new, |best| unexplained::without_law(&fitted, &data, best));
     let of_all_rows = best.and_then(|_| evidence_with_doubtful_rows(&state, &declared, &fitted));
@@ -137,7 +137,7 @@ pub fn close_by(
         (is_trusted, residual_tests.is_structured()),
     );
     if unexplained.is_empty() {
-        unexplained.extend(unexplained::nowhere(&residual_tests));
+        unexplained.extend(unexplained::unlocated(&residual_tests));
     }
     let statuses: Vec<Status> = effects.iter().map(|found| found.status).collect();
     let with_found = if statuses.iter().all(|status| *status == Status::Found) {
@@ -229,7 +229,7 @@ fn evidence_with_doubtful_rows(
     if aside.len() == fitted.set_aside.len() || added.is_empty() {
         return None;
     }
-    evaluate(&fitted.setting_aside(aside), state.data, &added)
+    evaluate(&fitted.with_outliers(aside), state.data, &added)
 }
 
 /// Fits the declared problem with the effects of status [`Status::Found`] alone.
@@ -244,7 +244,7 @@ fn fit_with_found(
     let problem = state.problem(fitted, &sure);
     // Its errors are stated, nothing else: a fit of many unknowns need not be checked.
     let options = if state.paid_fits(fitted) > 1 {
-        fitted.onwards(options)
+        fitted.continuing(options)
     } else {
         Options { provisional: true, ..fitted.succeeding(options, true) }
     };

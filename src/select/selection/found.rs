@@ -90,7 +90,7 @@ pub(super) fn found(
                     let others =
                         self::claims(all, &effect).or_else(|| self::claims(all, &alike()?));
                     let others = others.map(|c| [c.place.1, c.depends_on.1, c.law.1]);
-                    no_surer_than(claims, others.unwrap_or_default())
+                    limited_to(claims, others.unwrap_or_default())
                 }
                 None => claims,
             })
@@ -185,14 +185,14 @@ fn over_subsets(claims: Claims, of_parts: &[&SubsetEvidence]) -> Claims {
         of_parts.iter().min_by(by_law)
     };
     match part {
-        Some(part) => no_surer_than(claims, part.means),
+        Some(part) => limited_to(claims, part.means),
         None => claims,
     }
 }
 
 /// Returns the claims with each probability (of place, quantities and law) limited to the one in
 /// `others`.
-fn no_surer_than(mut claims: Claims, others: [f64; 3]) -> Claims {
+fn limited_to(mut claims: Claims, others: [f64; 3]) -> Claims {
     let limited = [&mut claims.place.1, &mut claims.depends_on.1, &mut claims.law.1];
     limited.into_iter().zip(others).for_each(|(p, other)| *p = p.min(other));
     claims

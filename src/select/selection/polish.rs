@@ -50,7 +50,8 @@ fn better_argument(fitted: &Fitted, data: &Data, effect: &Effect) -> Option<Effe
     let mut without: Option<LinearNeighbourhood> = None;
     let (mut best, mut gain_of_present) = ((f64::NEG_INFINITY, effect.clone()), f64::INFINITY);
     for _ in 0..MAX_POLISHING_PASSES {
-        let tried: Vec<Effect> = [vec![best.1.clone()], nearby(data, &best.1)].concat();
+        let tried: Vec<Effect> =
+            [vec![best.1.clone()], neighbouring_arguments(data, &best.1)].concat();
         let linearised = fitted.linearised_at(data, data.rows(), &tried);
         let fit = without.get_or_insert_with(|| {
             fitted.neighbourhood_without(&linearised, &fitted.unknowns_of(effect))
@@ -74,7 +75,7 @@ fn better_argument(fitted: &Fitted, data: &Data, effect: &Effect) -> Option<Effe
 
 /// Returns the effect with neighbouring values of its argument. Times move to times between poses,
 /// up to the next listed times; others are multiplied by [`TRIAL_FACTORS`].
-fn nearby(data: &Data, effect: &Effect) -> Vec<Effect> {
+fn neighbouring_arguments(data: &Data, effect: &Effect) -> Vec<Effect> {
     let time = match effect {
         Effect::StationShift { at_time } | Effect::StationMove { at_time } => *at_time,
         _ => return TRIAL_FACTORS.iter().filter_map(|factor| effect.scaled(*factor)).collect(),

@@ -50,7 +50,7 @@ fn settled_set(
     while state.rounds.len() < rules.max_rounds {
         state.report_progress(0, 0);
         let Some(evidence) = state.evaluate(&fitted)? else { return Ok((fitted, None)) };
-        let Some(best) = evidence.sure(rules.inclusion_threshold) else {
+        let Some(best) = evidence.certain_set(rules.inclusion_threshold) else {
             return Ok((fitted, Some(evidence)));
         };
         let open = state.reconsidered(&fitted);
@@ -136,7 +136,7 @@ fn refitted(
     let (data, rules) = (state.data, state.data.rules);
     let open = state.reconsidered(fitted);
     let held = evidence
-        .sure(rules.inclusion_threshold)
+        .certain_set(rules.inclusion_threshold)
         .filter(|best| !best.hypotheses.is_empty() && is_held(best, &open, Effect::eq));
     let Some(best) = held.cloned() else { return Ok((evidence, None)) };
     let left_out = evidence.left_out.clone();
@@ -161,7 +161,7 @@ fn refitted(
         let aside: BTreeSet<usize> =
             fitted.set_aside.iter().chain(&next.set_aside).copied().collect();
         let of = |fit: &Fitted, functions: &[(Hypothesis, usize)]| {
-            let fit = fit.setting_aside(aside.iter().copied().collect());
+            let fit = fit.with_outliers(aside.iter().copied().collect());
             ln_posterior_of(&fit, functions, fitted.sigma)
         };
         let here = match of_held.get(&aside) {
@@ -202,7 +202,7 @@ fn is_confirmed(
     let open = state.reconsidered(fitted);
     let evidence = unless_stopped(state.data, || evaluate(fitted, state.data, &open))?;
     let threshold = state.data.rules.inclusion_threshold;
-    let best = evidence.as_ref().and_then(|evidence| evidence.sure(threshold));
+    let best = evidence.as_ref().and_then(|evidence| evidence.certain_set(threshold));
     Ok(best.is_some_and(|best| {
         is_held(best, &open, Effect::eq) && best.without_law().len() <= functions
     }))

@@ -164,7 +164,7 @@ impl<'a> SearchState<'a> {
         let options = if provisional {
             from.succeeding(self.options, false)
         } else {
-            from.onwards(self.options)
+            from.continuing(self.options)
         };
         let options = Options { max_steps, provisional, ..options };
         from.next(problem, self.data, &options)
