@@ -8,7 +8,7 @@ use flexcal::error::InputError;
 use flexcal::fit::Progress;
 use flexcal::report;
 use flexcal::results::{Document as _, StudyResult, study_csv, study_parameters_csv};
-use flexcal::rig::{SimulationError, Truth, simulate, simulate_poses};
+use flexcal::rig::{SimulatedPoses, SimulationError, Truth, simulate_counted};
 use flexcal::study::{self, Results, Shard, Store};
 use pyo3::prelude::*;
 
@@ -57,14 +57,14 @@ pub fn simulated(
 ) -> PyResult<Simulation> {
     let declared = Arc::clone(&problem.declared);
     let given = given.map(|poses| Arc::clone(&poses.rows));
-    let made = supervised(py, None, move |_| {
+    let made = supervised(py, None, move |sink| {
         let truth = Truth::read(&truth, &declared).map_err(Failure::Input)?;
-        let simulation = match given {
-            Some(rows) => {
-                simulate_poses(&declared, &truth, rows.poses_to_simulate(&declared), seed)
-            }
-            None => simulate(&declared, &truth, count, seed),
-        };
+        let poses = given.map_or(SimulatedPoses::Random(count), |rows| {
+            SimulatedPoses::Given(rows.poses_to_simulate(&declared))
+        });
+        // A pose is a step at which an interrupt ends the work.
+        let step = || sink(Progress::Step { iteration: 1, unknowns: 0, poses: 1, cost: 0.0 });
+        let simulation = simulate_counted(&declared, &truth, poses, seed, &step);
         let simulation = simulation.map_err(Failure::Simulation)?;
         Ok(Simulation { csv: simulation.csv(), json: simulation.truth_json() })
     })?;

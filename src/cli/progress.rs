@@ -88,23 +88,24 @@ impl Line {
     }
 }
 
-/// Progress bar of the finished fits of a study, with the remaining time.
-pub struct FitBar(ProgressBar);
+/// Progress bar of finished items (fits, poses) with the remaining time.
+pub struct CountBar(ProgressBar);
 
-impl FitBar {
-    /// Creates a bar of `fits` fits, of which `kept` were finished in an earlier run.
-    pub fn new(fits: u64, kept: u64) -> Self {
-        let bar = ProgressBar::new(fits);
-        let shown = "{wide_bar} {human_pos} of {human_len} fits, {eta} left";
+impl CountBar {
+    /// Creates a bar of `count` items called `noun`, of which `kept` were finished in an earlier
+    /// run.
+    pub fn new(noun: &str, count: u64, kept: u64) -> Self {
+        let bar = ProgressBar::new(count);
+        let shown = format!("{{wide_bar}} {{human_pos}} of {{human_len}} {noun}, {{eta}} left");
         bar.set_style(
-            ProgressStyle::with_template(shown).unwrap_or_else(|_| ProgressStyle::default_bar()),
+            ProgressStyle::with_template(&shown).unwrap_or_else(|_| ProgressStyle::default_bar()),
         );
         bar.set_position(kept);
         bar.reset_eta();
         Self(bar)
     }
 
-    /// Counts one more fit.
+    /// Counts one more item.
     pub fn advance(&self) {
         self.0.inc(1);
     }

@@ -7,11 +7,12 @@ use clap::{Args, value_parser};
 use flexcal::measurement::Measurements;
 use flexcal::problem::{HeldOut, Problem};
 use flexcal::report::shell_word;
-use flexcal::rig::{Simulation, Truth, simulate, simulate_poses};
+use flexcal::rig::{SimulatedPoses, Simulation, Truth, simulate_counted};
 
 use super::diagnostic;
 use super::flags::Flags;
 use super::outcome::Outcome;
+use super::progress::CountBar;
 
 /// Arguments of `flexcal simulate`.
 #[derive(Debug, Args)]
@@ -52,15 +53,23 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let flags = &arguments.flags;
     let results =
         flags.claim("simulate", &problem.name, inputs, &["measurements.csv", "truth.json"])?;
-    let simulation = match arguments.poses {
-        Some(poses) => simulate(&problem, &truth, poses as usize, arguments.seed)?,
+    let poses = match arguments.poses {
+        Some(poses) => SimulatedPoses::Random(poses as usize),
         None => {
             let (rows, warnings) = Measurements::read_poses(&arguments.data, &problem)?;
             flags.warn(&warnings);
-            let poses = rows.poses_to_simulate(&problem);
-            simulate_poses(&problem, &truth, poses, arguments.seed)?
+            SimulatedPoses::Given(rows.poses_to_simulate(&problem))
         }
     };
+    let count = match &poses {
+        SimulatedPoses::Random(count) => *count,
+        SimulatedPoses::Given(poses) => poses.len(),
+    };
+    let bar = flags.prints_text().then(|| CountBar::new("poses", count as u64, 0));
+    let advance = || bar.iter().for_each(CountBar::advance);
+    let simulation = simulate_counted(&problem, &truth, poses, arguments.seed, &advance);
+    bar.iter().for_each(CountBar::clear);
+    let simulation = simulation?;
     let (json, table) = (simulation.truth_json(), results.path("measurements.csv"));
     results.write(&[("measurements.csv", &simulation.csv()), ("truth.json", &json)])?;
     // A fraction is split when the rows are read.

@@ -16,7 +16,7 @@ use super::diagnostic;
 use super::flags::Flags;
 use super::outcome::Outcome;
 use super::output::{self, REPORT, Results, WriteError};
-use super::progress::FitBar;
+use super::progress::CountBar;
 
 /// Arguments of `flexcal study`.
 #[derive(Debug, Args)]
@@ -179,9 +179,9 @@ fn misprints(common: &Common, study: &MisprintStudy) -> Result<Outcome, Box<dyn 
     let bar = common
         .flags
         .prints_text()
-        .then(|| FitBar::new((study.specimens * study.cases.len()) as u64, 0));
-    let found = study::replicate(study, || bar.iter().for_each(FitBar::advance));
-    bar.iter().for_each(FitBar::clear);
+        .then(|| CountBar::new("fits", (study.specimens * study.cases.len()) as u64, 0));
+    let found = study::replicate(study, || bar.iter().for_each(CountBar::advance));
+    bar.iter().for_each(CountBar::clear);
     let found = found?;
     let json = MisprintResult::new(study, &found).to_json();
     results.write_report(&[(names[0], &json)], &report::replica_report(study, &found))?;
@@ -196,9 +196,10 @@ fn fit(common: &Common, study: &Study, store: &Store, shard: Shard) -> Result<()
     let share = study.parts().into_iter().enumerate().filter(|(index, _)| shard.holds(*index));
     let all: usize = share.map(|(_, part)| part.repetitions.len()).sum();
     let open: usize = parts.iter().map(|part| part.repetitions.len()).sum();
-    let bar = common.flags.prints_text().then(|| FitBar::new(all as u64, (all - open) as u64));
-    let done = study::run(study, store, &parts, || bar.iter().for_each(FitBar::advance));
-    bar.iter().for_each(FitBar::clear);
+    let bar =
+        common.flags.prints_text().then(|| CountBar::new("fits", all as u64, (all - open) as u64));
+    let done = study::run(study, store, &parts, || bar.iter().for_each(CountBar::advance));
+    bar.iter().for_each(CountBar::clear);
     Ok(done?)
 }
 

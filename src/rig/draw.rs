@@ -145,7 +145,37 @@ pub fn simulate(
     poses: usize,
     seed: u64,
 ) -> Result<Simulation, SimulationError> {
-    measure(problem, truth, draw(problem, truth, poses, seed), seed)
+    simulate_counted(problem, truth, SimulatedPoses::Random(poses), seed, &|| ())
+}
+
+/// Poses of a simulation.
+#[derive(Debug, Clone)]
+pub enum SimulatedPoses {
+    /// This many random poses.
+    Random(usize),
+    /// Given poses, each with the name of its target.
+    Given(Vec<(PoseConditions, String)>),
+}
+
+/// Measures the true arm as [`simulate`] and [`simulate_poses`] do, and calls `measured` after each
+/// pose.
+///
+/// # Errors
+/// Returns an error if a pose has no equilibrium, or if the arm does not reach a fixture.
+pub fn simulate_counted(
+    problem: &Problem,
+    truth: &Truth,
+    poses: SimulatedPoses,
+    seed: u64,
+    measured: &(dyn Fn() + Sync),
+) -> Result<Simulation, SimulationError> {
+    let drawn = match poses {
+        SimulatedPoses::Random(poses) => draw(problem, truth, poses, seed),
+        SimulatedPoses::Given(poses) => {
+            draw_in(problem, truth, given_rows(problem, truth, poses, seed), seed)
+        }
+    };
+    measure(problem, truth, drawn, seed, measured)
 }
 
 /// Measures the true arm in given poses, each with the name of its target, one after the other.
@@ -159,6 +189,16 @@ pub fn simulate_poses(
     poses: Vec<(PoseConditions, String)>,
     seed: u64,
 ) -> Result<Simulation, SimulationError> {
+    simulate_counted(problem, truth, SimulatedPoses::Given(poses), seed, &|| ())
+}
+
+/// Returns given poses as rows, with drawn temperatures and approach sides where they lack them.
+fn given_rows(
+    problem: &Problem,
+    truth: &Truth,
+    poses: Vec<(PoseConditions, String)>,
+    seed: u64,
+) -> Vec<Row> {
     let mut rows = draw_poses(problem, truth, poses.len(), stream(seed, POSE_STREAM));
     for (row, (given, target)) in rows.iter_mut().zip(poses) {
         row.target = target;
@@ -176,22 +216,26 @@ pub fn simulate_poses(
             ..given
         };
     }
-    measure(problem, truth, draw_in(problem, truth, rows, seed), seed)
+    rows
 }
 
-/// Measures a drawn arm in the drawn poses.
+/// Measures a drawn arm in the drawn poses; calls `measured` after each pose.
 fn measure(
     problem: &Problem,
     truth: &Truth,
     draw: Draw,
     seed: u64,
+    measured: &(dyn Fn() + Sync),
 ) -> Result<Simulation, SimulationError> {
     let Draw { arm, parameters, mut rows } = draw;
     let poses = rows.len();
     let rig = Rig::new(arm, truth.effects.clone()).with_segments(truth.segments);
     hold_out(&mut rows, truth.held_out.count(poses), &mut stream(seed, SPLIT_STREAM));
-    let measure_row =
-        |(row, stream_of): (&mut Row, u64)| rig.measure(row, truth, &mut stream(seed, stream_of));
+    let measure_row = |(row, stream_of): (&mut Row, u64)| {
+        let outcome = rig.measure(row, truth, &mut stream(seed, stream_of));
+        measured();
+        outcome
+    };
     let streams: Vec<u64> = (FIRST_CONTACT_STREAM..).take(poses).collect();
     let outcomes: Vec<_> = if truth.has_memory() {
         let mut past = Past::default();

@@ -44,7 +44,7 @@ pub use truth::Truth;
 // Public for the tests, the benches and the Python module only.
 #[doc(hidden)]
 pub use self::{
-    draw::{Row, draw, simulate_poses},
+    draw::{Row, SimulatedPoses, draw, simulate_counted, simulate_poses},
     effect::{Cause, Shape, TrueEffect},
     truth::HeldOutRows,
 };
