@@ -99,7 +99,7 @@ impl<'a> Sentinel<'a> {
     }
 }
 
-/// Error of a missing folder of shares.
+/// Error of an option `--from` whose folder does not exist.
 #[derive(Debug, thiserror::Error)]
 #[error("--from {}: no such folder", folder.display())]
 struct NoFolder {

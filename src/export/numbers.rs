@@ -79,7 +79,7 @@ pub(super) const FRAME: &[(&str, &str)] = &[
     ("Z", "m"),
 ];
 
-/// Numbers of a model, in the order of the generated table.
+/// Constants of an identified model for the generated C code, in the order of its table of numbers.
 #[derive(Debug, Default)]
 pub(super) struct Numbers {
     pub values: Vec<f64>,

@@ -47,7 +47,7 @@ pub enum ArgumentKind {
     Time,
     /// Duration, above zero \[s\].
     Duration,
-    /// Path of a joint, above zero \[rad\].
+    /// Length of a joint's path, above zero \[rad\].
     Distance,
     /// Point in the plane normal to a joint's axis \[m\].
     Point,

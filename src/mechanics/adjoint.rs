@@ -190,7 +190,8 @@ impl LinearisedArm {
     }
 }
 
-/// Quantity that an adjoint sweep writes: the image of Λ, or the derivatives of the position.
+/// Result that an adjoint sweep writes: the image of the adjoint variables Λ, or the derivatives of
+/// the position.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum SweepResult {
     Influence,

@@ -62,12 +62,14 @@ enum Function {
     Constant,
 }
 
-/// Correlations between one row and each row from it on (itself and all later ones).
+/// Correlations of the error functions between one row and each row from it on. A pair is that row
+/// with itself or with a later row.
 struct PairColumn {
-    /// For each pair and site, the correlation of uⱼ and its derivative with respect to ln ℓᵤⱼ.
+    /// For each pair and site j, the correlation of the function uⱼ of the site's own command, and
+    /// its derivative with respect to ln ℓᵤⱼ.
     single: Vec<(f64, f64)>,
-    /// For each pair, the correlation of vⱼ and its derivative with respect to −½ d², with d the
-    /// scaled distance.
+    /// For each pair, the correlation of the functions vⱼ of all inputs, and its derivative with
+    /// respect to −½ d²; d is the distance of both rows in units of the lengths ℓᵥ.
     joint: Vec<(f64, f64)>,
 }
 

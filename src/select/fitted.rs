@@ -211,7 +211,7 @@ impl Fitted {
         &self.active
     }
 
-    /// Returns the residuals of some rows in the measuring frame \[m\].
+    /// Returns measured − predicted of the rows with the indices `rows`, measuring frame \[m\].
     pub fn errors(&self, data: &Data, rows: &[usize]) -> Vec<Vector3<f64>> {
         self.model.residuals(self.poses(data, rows), &self.found.x)
     }

@@ -38,8 +38,8 @@ impl Strengths {
         Self(parameters.into_iter().zip(normals).map(value).collect())
     }
 
-    /// Returns the true value of an effect parameter, or `None` if no effect has a parameter of
-    /// that name.
+    /// Returns the true value of an effect parameter in SI units, or `None` if no effect has a
+    /// parameter of that name.
     pub fn get(&self, name: &str) -> Option<f64> {
         self.0.iter().find(|(parameter, _)| parameter == name).map(|(_, value)| *value)
     }
@@ -70,7 +70,8 @@ impl Strengths {
     }
 }
 
-/// Draws a value from the prior of a parameter; returns `None` if it has no prior.
+/// Returns the value of a parameter that lies `normal` standard deviations of its prior from the
+/// nominal value; `None` if it has no prior.
 fn drawn(parameter: &Parameter, normal: f64) -> Option<f64> {
     Some(parameter.value(parameter.sigma? * normal))
 }

@@ -94,7 +94,8 @@ fn repetition_seed(study: &Study, repetition: usize) -> u64 {
     stream(study.seed, repetition as u64).next_u64()
 }
 
-/// Returns the positions that the model predicts for an arm with the true effect values \[m\].
+/// Returns the position that the model predicts in each row for an arm with the true effect values,
+/// measuring frame \[m\]; `None` without equilibrium or if a parameter has no true value.
 fn by_model(mut arm: Problem, strengths: &Strengths, rows: &[Row]) -> Option<Vec<Vector3<f64>>> {
     // Without rules, parameters of effects are free and those of the arm fixed.
     (arm.parameters, arm.constraints) = (Vec::new(), Vec::new());
@@ -108,7 +109,8 @@ fn by_model(mut arm: Problem, strengths: &Strengths, rows: &[Row]) -> Option<Vec
     errors.into_iter().map(|error| error.iter().all(|x| x.is_finite()).then_some(-error)).collect()
 }
 
-/// Returns the positions that the virtual test rig measures, without noise \[m\].
+/// Returns the position that the virtual test rig measures in each row, without noise, measuring
+/// frame \[m\]; `None` without equilibrium.
 fn by_rig(
     arm: Problem,
     effects: Vec<TrueEffect>,

@@ -7,7 +7,7 @@ use super::finding::{Finding, FindingCode};
 use crate::fit::uncertainty::hidden_by_bound::HiddenByBound;
 use crate::least_squares::solver::AtBound;
 
-/// Maximum number of parameters that the text of the finding names.
+/// Maximum number of parameters hidden by a bound that the text of the finding names.
 const MAX_NAMED_PARTNERS: usize = 5;
 
 /// Checks that no parameter is at a bound that hides the uncertainty of other parameters.

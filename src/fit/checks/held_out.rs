@@ -20,7 +20,8 @@ use crate::observation::kind_named;
 /// Smallest ratio of the held-out error of the fitted arm to that of the nominal arm at which the
 /// fit is reported as worse than the nominal arm.
 const MIN_ERROR_RATIO: f64 = 1.5;
-/// Smallest held-out error, as a multiple of the noise, at which such a fit is reported.
+/// Smallest held-out error, as a multiple of the noise, at which a fit is reported as worse than
+/// the nominal arm.
 const MIN_NOISE_MULTIPLE: f64 = 5.0;
 
 /// Returns the held-out rows that are farther from the prediction than the σ and the covariance of

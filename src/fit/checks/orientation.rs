@@ -9,7 +9,8 @@ use super::finding::{Finding, FindingCode};
 /// Smallest root mean squared error of orientation at which another convention or frame is
 /// suspected \[rad\]: 2°.
 const MAX_TURN: f64 = 0.035;
-/// Multiple of the declared σ of orientation that such an error must also exceed.
+/// Smallest root mean squared error of orientation, as a multiple of the declared σ of orientation,
+/// at which another convention or frame is suspected.
 const MIN_SIGMAS: f64 = 20.0;
 
 /// Checks that the fitted orientations are near the measured ones.

@@ -56,7 +56,8 @@ impl Stage<'_> {
         Unmoved(self.unmoved_in(at, self.poses.len()))
     }
 
-    /// Finds the directions in which no unknown moves the first `count` poses.
+    /// Returns unit vectors along which no unknown moves any of the first `count` poses, measuring
+    /// frame.
     fn unmoved_in(&self, at: &DVector<f64>, count: usize) -> Vec<Vector3<f64>> {
         let residuals = self.residuals(at);
         let (x, n) = (residuals.reduced(at), self.unknowns.len());

@@ -68,13 +68,13 @@ impl<'a> Poses<'a> {
         at
     }
 
-    /// Returns the errors measured − predicted of some rows, measuring frame \[m\].
+    /// Returns measured − predicted of the rows with the indices `rows`, measuring frame \[m\].
     pub fn errors(&self, arm: &Arm, rows: &[usize]) -> Vec<Vector3<f64>> {
         self.placement.position_errors(&arm.model, &arm.x, self.measurements, rows)
     }
 
-    /// Returns the levers of all rows: derivatives of the target's position with respect to the
-    /// quantity at each parameter site \[m/rad\] or \[m/m\].
+    /// Returns, for each parameter site, the lever of every row: the derivative of the target's
+    /// position with respect to the quantity at the site, measuring frame \[m/rad\] or \[m/m\].
     pub fn levers(&self, arm: &Arm, sites: &[ParameterSite]) -> Vec<Vec<Vector3<f64>>> {
         let (first, count) = (arm.x.len(), sites.len());
         if sites.is_empty() {
