@@ -82,6 +82,8 @@ pub mod fit;
 #[doc(hidden)]
 pub mod laws;
 pub mod least_squares;
+#[doc(hidden)]
+pub mod life;
 pub mod measurement;
 #[doc(hidden)]
 pub mod mechanics;

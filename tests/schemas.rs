@@ -41,7 +41,15 @@ fn every_command_writes_what_its_schema_says() {
     let lunar = full("problems/lunar-sampler");
     let case = format!("{} --data {}", full("tests/cases"), full("tests/cases/d-backlash.csv"));
     let estimated = format!("{lunar} --estimate out/lunar-sampler/estimate.json");
-    let commands: [(&str, String); 11] = [
+    let watched = format!(
+        "watch {} --estimate out/a-none/estimate.json --data {}",
+        full("tests/cases"),
+        full("tests/cases/a-none.csv")
+    );
+    let first =
+        format!("identify {} --data {}", full("tests/cases"), full("tests/cases/a-none.csv"));
+    folder.flexcal(&format!("{first} --out out/a-none")).success();
+    let commands: [(&str, String); 12] = [
         ("flexcal-estimate", format!("identify {lunar}")),
         ("flexcal-loop", format!("loop {case} --out loop")),
         ("flexcal-trace", format!("trace {lunar}")),
@@ -49,6 +57,7 @@ fn every_command_writes_what_its_schema_says() {
         ("flexcal-check", format!("check {lunar}")),
         ("flexcal-plan", format!("plan {lunar} --truth {lunar} --poses 8")),
         ("flexcal-errors", format!("predict {estimated}")),
+        ("flexcal-watch", format!("{watched} --out watch")),
         ("flexcal-compensate", format!("compensate {estimated} --data {lunar}/targets.csv")),
         ("flexcal-export", format!("export {estimated} --format ros-yaml")),
         ("flexcal-acceptance", format!("accept {lunar}")),

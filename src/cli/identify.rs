@@ -1,16 +1,19 @@
 //! Arguments and work of `flexcal identify`.
 
 use std::error::Error;
+use std::path::PathBuf;
 
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-use flexcal::fit::{self, IdentifyError, Options, SolverChoice, Strategy};
+use flexcal::fit::{self, Options, SolverChoice, Strategy};
+use flexcal::life::{PriorError, identify_with_prior};
 use flexcal::remainder::{self, Correction, Fitted};
 use flexcal::report;
 use flexcal::results::{
     Document as _, IdentificationResult, PlotData, REMAINDER_FILE, residuals_csv,
 };
 
+use super::estimate::Trust;
 use super::input::{Common, Input};
 use super::outcome::Outcome;
 use super::output::REPORT;
@@ -36,6 +39,15 @@ pub struct Arguments {
     /// remainder.json
     #[arg(long)]
     remainder: bool,
+    /// Take the estimate.json of an earlier identification of the same arm as prior; rows that it
+    /// was fitted to are left out
+    #[arg(long, value_name = "ESTIMATE.json", conflicts_with = "remainder")]
+    prior: Option<PathBuf>,
+    /// Days since the earlier identification, by whose drift the prior is widened
+    #[arg(long, value_name = "DAYS", default_value_t = 0.0, requires = "prior", value_parser = days)]
+    drift: f64,
+    #[command(flatten)]
+    trust: Trust,
     /// Print every table: parameters, outliers, what the poses can tell
     #[arg(short, long, conflicts_with_all = ["quiet", "json"])]
     verbose: bool,
@@ -57,6 +69,12 @@ fn words<T: Copy + Send + Sync + 'static>(
     })
 }
 
+/// Parses a number of days, at least 0.
+pub(super) fn days(text: &str) -> Result<f64, String> {
+    let days = text.parse::<f64>().ok().filter(|days| days.is_finite() && *days >= 0.0);
+    days.ok_or_else(|| "a number of days, at least 0, is expected".to_owned())
+}
+
 /// Identifies, writes `estimate.json`, `residuals.csv`, `report.md` and `report.html`, and prints
 /// the result.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
@@ -65,7 +83,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     if arguments.remainder {
         names.push(REMAINDER_FILE);
     }
-    let Input { problem, data, results } = common.read("identify", &names)?;
+    let Input { problem, data, results } =
+        common.read_beside("identify", arguments.prior.as_slice(), &names)?;
+    let prior = arguments.prior.as_deref().map(|file| arguments.trust.read(file)).transpose()?;
     let declared = remainder::declared(&problem)?.filter(|_| !arguments.remainder);
     common.say_if_nothing_is_free(&problem);
     let stop = interrupt::stop();
@@ -75,17 +95,24 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         .with_influential_rows()
         .with_stop(stop.clone());
     let (sources, identification) =
-        Line::during(common.prints_text(), stop, |sink| -> Result<_, IdentifyError> {
+        Line::during(common.prints_text(), stop, |sink| -> Result<_, PriorError> {
             let options = options.with_progress(sink);
+            if let Some(prior) = &prior {
+                let days = arguments.drift;
+                return Ok((None, identify_with_prior(&problem, &data, &options, prior, days)?));
+            }
             let found = fit::identify(&problem, &data, &options)?;
             // The requested fit is complete, so an interrupt only skips the comparison of joint
             // sources.
             match fit::joint_sources(&problem, &data, &options, &found) {
                 Err(error) if error.is_interrupted() => Ok((None, found)),
-                sources => Ok((sources?, found)),
+                sources => Ok((sources.map_err(PriorError::from)?, found)),
             }
         })?;
-    let fitted = if arguments.remainder {
+    // The uncertainty of predictions would count the new rows alone.
+    let fitted = if prior.is_some() {
+        None
+    } else if arguments.remainder {
         remainder::fit(&identification, &problem, &data)?
     } else {
         remainder::uncertainty(&identification, &problem, &data)?

@@ -78,8 +78,18 @@ impl Common {
     /// Claims the file names `names` for results of a `command`, then reads the problem and its
     /// measurements.
     pub fn read(&self, command: &'static str, names: &[&str]) -> Result<Input, Box<dyn Error>> {
+        self.read_beside(command, &[], names)
+    }
+
+    /// Does the same as [`read`](Self::read) for a command that also reads the files `others`.
+    pub fn read_beside(
+        &self,
+        command: &'static str,
+        others: &[PathBuf],
+        names: &[&str],
+    ) -> Result<Input, Box<dyn Error>> {
         let problem = Problem::read(self.problem())?;
-        let results = self.results(command, &problem, &[], names)?;
+        let results = self.results(command, &problem, others, names)?;
         let data = self.measurements(&problem)?;
         Ok(Input { problem, data, results })
     }

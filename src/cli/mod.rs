@@ -31,11 +31,13 @@ mod study;
 mod threads;
 mod trace;
 mod unfinished;
+mod watch;
 
 use std::ffi::OsString;
 
 use clap::{CommandFactory as _, Parser, Subcommand};
 use flexcal::fit::IdentifyError;
+use flexcal::life::PriorError;
 
 use outcome::Outcome;
 
@@ -50,7 +52,8 @@ use outcome::Outcome;
   flexcal identify problems/lunar-sampler
   flexcal help identify
 
-Exit status: 0 done; 1 the result is not to be trusted; 2 bad input; 130 interrupted."
+Exit status: 0 done; 1 the result is not to be trusted; 2 bad input; 3 the arm has changed (watch);
+130 interrupted."
 )]
 struct Cli {
     #[command(subcommand)]
@@ -72,6 +75,8 @@ enum Command {
     /// Predict where an identified arm will be, and its error against measurements, without another
     /// fit.
     Predict(predict::Arguments),
+    /// Test whether an arm has changed since its estimate, and what.
+    Watch(watch::Arguments),
     /// Find the joint commands that bring the arm, as identified, to desired positions.
     Compensate(compensate::Arguments),
     /// Record to sign: accuracy of predictions before and after, counted as ISO 9283 does, with
@@ -95,7 +100,7 @@ enum Command {
 }
 
 /// Runs the command line; `arguments` begin with the name of the program. Returns the exit status:
-/// 0 done, 1 the fit is not to be trusted or the arm does not pass a tolerance, 2 bad input, 130 interrupted with nothing written.
+/// 0 done, 1 the fit is not to be trusted or the arm does not pass a tolerance, 2 bad input, 3 the arm has changed since its estimate, 130 interrupted with nothing written.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let cli = match Cli::try_parse_from(arguments) {
         Ok(cli) => cli,
@@ -119,6 +124,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Command::Trace(arguments) => trace::run(&arguments),
         Command::Loop(arguments) => loop_command::run(&arguments),
         Command::Predict(arguments) => predict::run(&arguments),
+        Command::Watch(arguments) => watch::run(&arguments),
         Command::Compensate(arguments) => compensate::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
         Command::Plan(arguments) => plan::run(&arguments),
@@ -130,13 +136,12 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     match outcome {
         Ok(Outcome::Done) => 0,
         Ok(Outcome::NotTrusted | Outcome::NotPassed | Outcome::Interrupted) => 1,
+        Ok(Outcome::Changed) => 3,
         Err(error) => {
             diagnostic::print(error.as_ref());
-            if error.downcast_ref().is_some_and(IdentifyError::is_interrupted) {
-                interrupt::STATUS
-            } else {
-                2
-            }
+            let is_interrupted = error.downcast_ref().is_some_and(IdentifyError::is_interrupted)
+                || error.downcast_ref().is_some_and(PriorError::is_interrupted);
+            if is_interrupted { interrupt::STATUS } else { 2 }
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Outcome of a command, which decides its exit status.
 
-/// Outcome of a command: success, or a reason for exit status 1.
+/// Outcome of a command: success, or a reason for another exit status.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Outcome {
     /// The command is done: exit status 0.
@@ -9,6 +9,8 @@ pub enum Outcome {
     NotTrusted,
     /// An arm does not pass the tolerance that it is tested for: exit status 1.
     NotPassed,
+    /// The arm has changed since its estimate: exit status 3.
+    Changed,
     /// The command was interrupted and wrote incomplete results: exit status 1.
     Interrupted,
 }

@@ -169,13 +169,15 @@ fn fit_rows(
             .warm_start
             .as_ref()
             .and_then(|warm_start| warm_start.linear_model.as_ref()),
+        earlier: options.earlier.as_deref(),
     };
     let unknowns = fitted_parameters(&fitting)?;
     let (start, registered) =
         prepared(&mut fitting, options.warm_start.as_deref(), has_declared_noise)?;
     let begin = options.begin(model, &start);
     let enough = PoseSufficiency::new(&fitting, problem, &unknowns, &start);
-    let judged = enough.judges_noise(unknowns.len());
+    // Few new rows cannot tell a larger noise from a change since the earlier data.
+    let judged = options.earlier.is_none() && enough.judges_noise(unknowns.len());
     let (mut end, statistics, noise) = fitted(&mut fitting, &begin, (has_declared_noise, judged))?;
     let errors = fitting.position_errors(&split.identification, &end.x);
     let outliers = outliers(&statistics.lengths, &split.identification, &errors, measurements);
@@ -202,7 +204,10 @@ fn fit_rows(
         Vec::new()
     };
     let (noise_factor, sigma_taken) = assumed_noise(&whole, measurements.leading());
-    let told = asked && noise != Noise::Unknown && end.termination.converged();
+    let told = options.earlier.is_none()
+        && asked
+        && noise != Noise::Unknown
+        && end.termination.converged();
     let values: Vec<f64> = whole.unknowns.iter().map(|&k| end.x[k]).collect();
     let sizes = || prior_sizes(&unknowns, &values, &statistics.covariance);
     let prior_sizes = if told { sizes() } else { Vec::new() };
@@ -215,7 +220,7 @@ fn fit_rows(
     let findings = if asked {
         let held: Vec<bool> = end.at_bound.iter().map(Option::is_some).collect();
         let refuted_priors = match (noise, fitting.loss) {
-            (Noise::Declared, Loss::Squares) => refuted_priors(
+            (Noise::Declared, Loss::Squares) if options.earlier.is_none() => refuted_priors(
                 &fitting.with_declared_noise().whole(),
                 &end.x,
                 &held,
@@ -298,6 +303,12 @@ fn fit_rows(
         influential_rows: None,
         x: end.x,
         registered_x: start,
+        prior: None,
+        fitted_rows: if asked {
+            split.identification.iter().map(|&row| measurements.row_digest(row)).collect()
+        } else {
+            Vec::new()
+        },
         first_time: measurements.time.iter().copied().fold(f64::INFINITY, f64::min),
         sigma: fitting.sigma,
         seconds: clock.elapsed().as_secs_f64(),

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::DVector;
 
+use super::stages::earlier_data::EarlierData;
 use super::warm_start::WarmStart;
 use super::{CustomSolver, Progress, ProgressSink, SolverChoice, Stop, Strategy};
 use crate::model::Model;
@@ -37,6 +38,8 @@ pub struct Options {
     /// State of an earlier fit of the same data with other effects, from which the fit starts;
     /// `None` for a cold start.
     pub(crate) warm_start: Option<Arc<WarmStart>>,
+    /// Earlier data that join the fit.
+    pub(crate) earlier: Option<Arc<EarlierData>>,
     /// True if the fit is provisional: another fit follows, so the result is not checked.
     pub(crate) provisional: bool,
     /// True to search for influential rows by further fits.
@@ -81,6 +84,12 @@ impl Options {
     #[must_use]
     pub fn with_stop(self, stop: impl Into<Option<Stop>>) -> Self {
         Self { stop: stop.into(), ..self }
+    }
+
+    /// Sets earlier data that join the fit.
+    #[must_use]
+    pub(crate) fn with_earlier(self, earlier: Arc<EarlierData>) -> Self {
+        Self { earlier: Some(earlier), ..self }
     }
 
     /// Reports progress, if there is a receiver.

@@ -13,7 +13,7 @@ use crate::fit::uncertainty::noise::Noise;
 use crate::fit::uncertainty::statistics::Statistics;
 use crate::fit::{
     ActiveConstraint, Alternation, Errors, InfluentialRows, OrientationErrors, Outlier,
-    PointSpread, PriorSize, ShadowPrice, SolverChoice, Strategy,
+    PointSpread, PriorComparison, PriorSize, ShadowPrice, SolverChoice, Strategy,
 };
 use crate::least_squares::solver::{AtBound, Termination};
 use crate::least_squares::{Identifiability, UnidentifiableCombination};
@@ -51,6 +51,10 @@ pub struct Estimate {
     pub identified: f64,
     /// True if the strategy varied the parameter.
     pub fitted: bool,
+    /// Standard deviation (1 σ) of the declared prior of the deviation, SI or of the logarithm;
+    /// `None` without a prior.
+    #[doc(hidden)]
+    pub prior_sigma: Option<f64>,
 }
 
 /// Identified arm: estimates with their uncertainty, errors, and the findings of the checks.
@@ -156,6 +160,10 @@ pub struct Identification {
     pub x: DVector<f64>,
     /// Full parameter vector of the registered nominal arm, whose errors are `registered`.
     pub registered_x: DVector<f64>,
+    /// Comparison with the earlier estimate that was the prior; `None` without one.
+    pub(crate) prior: Option<PriorComparison>,
+    /// Digests of the identification rows; empty for a provisional fit.
+    pub(crate) fitted_rows: Vec<String>,
     /// Start time of the time-dependent terms \[s\]: that of the first pose.
     pub first_time: f64,
     /// Standard deviation (1 σ) of a coordinate in rows that state none, declared or estimated
@@ -263,6 +271,7 @@ impl Estimate {
             shadow_price: None,
             identified: 0.0,
             fitted: false,
+            prior_sigma: parameter.sigma,
         }
     }
 }

@@ -54,6 +54,7 @@ use std::path::PathBuf;
 use nalgebra::{UnitQuaternion, Vector3};
 
 use crate::error::{Location, Warning};
+use crate::problem::digest::hexadecimal;
 use crate::problem::{LazyPast, Observation, PoseConditions, PoseView, Problem};
 
 pub use builder::{DatasetBuilder, DatasetError};
@@ -318,6 +319,19 @@ impl Measurements {
     pub fn covariates_of(&self, row: usize) -> &[f64] {
         let n = self.covariates.len() / self.len().max(1);
         &self.covariates[row * n..(row + 1) * n]
+    }
+
+    /// Returns a digest of joints and measured numbers of a row, 16 hexadecimal digits. It is the
+    /// same in every file and for equal values in other units.
+    pub(crate) fn row_digest(&self, row: usize) -> String {
+        let orientation = self.orientation(row).map(|turn| turn.scaled_axis());
+        let turn = orientation.iter().flat_map(|turn| turn.iter());
+        let numbers = self.configuration(row).iter().chain(&self.positions[row]).chain(turn);
+        // Adding 0 turns −0 into 0; a change of unit keeps ten digits.
+        let text = numbers.fold(format!("{:?}", self.observation(row)), |text, number| {
+            format!("{text} {:.9e}", number + 0.0)
+        });
+        hexadecimal(&text).chars().take(16).collect()
     }
 
     /// Returns the configuration of a row, shape = (joints) \[rad\] or \[m\].

@@ -1,5 +1,6 @@
 //! Digest of a declared arm, which shows whether an estimate still belongs to it.
 
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use nalgebra::Vector3;
@@ -10,6 +11,9 @@ use super::{
     BasePose, Beam, Body, Effect, Equilibrium, Hoist, Joint, JointKind, Mimic, Placement, Problem,
     Statics, Target, Tool,
 };
+
+/// Name of the part of an arm that is neither a joint nor an effect.
+const WHOLE: &str = "gravity, statics, tool or base";
 
 impl Problem {
     /// Returns a digest of everything declared that predictions depend on, as 64 hexadecimal
@@ -37,6 +41,29 @@ impl Problem {
     /// Display names, joint limits, `[parameters]`, constraints, data and noise do not enter.
     #[doc(hidden)]
     pub fn digest(&self) -> String {
+        hexadecimal(&self.canonical_text())
+    }
+
+    /// Returns the name of each part of the declared arm with its digest, 16 hexadecimal digits:
+    /// the whole (gravity, statics, tool, base), each target, each joint, and each effect.
+    pub(crate) fn digest_parts(&self) -> BTreeMap<String, String> {
+        let text = self.canonical_text();
+        let mut joints = 0;
+        let mut name = |(place, line): (usize, &str)| match line.split(' ').next() {
+            _ if place == 0 => WHOLE.to_owned(),
+            Some("revolute" | "prismatic" | "fixed") => {
+                joints += 1;
+                format!("joint {joints}")
+            }
+            // The reference temperature stands behind the last effect.
+            _ => line.rsplit_once('}').map_or(line, |(declared, _)| declared).to_owned(),
+        };
+        let short = |line: &str| hexadecimal(line).chars().take(16).collect::<String>();
+        text.split('\n').enumerate().map(|(k, line)| (name((k, line)), short(line))).collect()
+    }
+
+    /// Returns the text whose digest is [`digest`](Self::digest).
+    fn canonical_text(&self) -> String {
         let Self { gravity, statics, joints, tool, targets, base, effects, data, .. } = self;
         let Statics { equilibrium, beam_elements } = statics;
         let Tool { joint: carrier, target, rotation: turned, payload_at, payload_mass, .. } = tool;
@@ -76,7 +103,7 @@ impl Problem {
         ) {
             number(&mut text, reference);
         }
-        hexadecimal(&text)
+        text
     }
 }
 

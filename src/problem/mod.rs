@@ -66,7 +66,7 @@ pub use self::{
     data::{Data, DeclaredCovariate, HeldOut},
     effect::EffectDeclaration,
     joint::{Beam, Hoist, Joint, JointKind, Mimic, Placement},
-    parameters::{Freedom, Quantities},
+    parameters::{DriftRule, Freedom, Quantities},
     robust::{Robust, RobustLoss},
     target::Target,
     tree::Tree,
@@ -115,6 +115,9 @@ pub struct Problem {
     /// Rules for free parameters in the order of the file; a later rule overrides an earlier one.
     #[doc(hidden)]
     pub parameters: Vec<ParameterRule>,
+    /// Rules for the change of parameters with time, in the order of the file.
+    #[doc(hidden)]
+    pub drift: Vec<DriftRule>,
     /// Linear inequalities between parameters.
     #[doc(hidden)]
     pub constraints: Vec<Constraint>,

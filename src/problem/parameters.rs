@@ -36,6 +36,17 @@ pub enum Freedom {
     },
 }
 
+/// Rule of `[drift]`: a pattern of names, and the random change of the matching parameters.
+#[derive(Debug, Clone)]
+pub struct DriftRule {
+    /// Pattern of parameter names, in which `*` matches any run of characters.
+    pub pattern: String,
+    /// Standard deviation (1 σ) of the change after one day; it grows with the root of the time.
+    pub sigma: Quantities,
+    /// Place in the file, for errors.
+    pub location: Location,
+}
+
 /// Prior width or bound for each kind of parameter that a pattern may match.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Quantities {
@@ -47,6 +58,19 @@ pub struct Quantities {
     pub pixel: Option<f64>,
     /// Value relative to nominal; as a standard deviation, that of ln(value / nominal).
     pub relative: Option<f64>,
+}
+
+impl Quantities {
+    /// Returns the value for parameters with this unit; `None` if there is none.
+    pub(crate) fn of_kind(&self, unit: Unit) -> Option<f64> {
+        match unit {
+            Unit::Angle => self.angle,
+            Unit::Length => self.length,
+            Unit::Pixel => self.pixel,
+            unit if unit.is_relative() => self.relative,
+            _ => None,
+        }
+    }
 }
 
 /// Maximum number of rules in `[parameters]`.
@@ -66,6 +90,25 @@ pub(super) fn read(root: &mut Section<'_, '_>) -> Result<Vec<ParameterRule>, Inp
         item.check_count("rules", section.len(), MAX_RULES)?;
     }
     section.entries().into_iter().map(|(pattern, item)| rule(pattern, &item)).collect()
+}
+
+/// Reads the rules of `[drift]` in the order of the file.
+pub(super) fn drift(root: &mut Section<'_, '_>) -> Result<Vec<DriftRule>, InputError> {
+    let Some(section) = root.section("drift")? else { return Ok(Vec::new()) };
+    let rule = |(pattern, item): (&str, Item<'_, '_>)| {
+        let mut section = item.section()?;
+        let sigma = Spread::read(&mut section, "sigma")?;
+        section.finish()?;
+        if section.len() == 0 {
+            return Err(item.error(InputErrorKind::EmptyRule));
+        }
+        if let Some((value, place)) = sigma.0.iter().flatten().find(|(value, _)| *value < 0.0) {
+            return Err(place.error(InputErrorKind::NotPositive { value: *value }));
+        }
+        let (pattern, sigma) = (pattern.to_owned(), sigma.quantities());
+        Ok(DriftRule { pattern, sigma, location: item.location() })
+    };
+    section.entries().into_iter().map(rule).collect()
 }
 
 fn rule(pattern: &str, item: &Item<'_, '_>) -> Result<ParameterRule, InputError> {

@@ -102,6 +102,7 @@ fn problem(mut root: Section<'_, '_>) -> Result<Problem, InputError> {
     let (fixtures, distances) =
         fixture::read(&mut root, Carriers { joints: &joints, tool: tool.joint })?;
     let parameters = parameters::read(&mut root)?;
+    let drift = parameters::drift(&mut root)?;
     let constraints = constraints::read(&mut root)?;
     let data = data::read(&mut root)?;
     let effects = effects::read(&mut root, &joints, &data)?;
@@ -123,6 +124,7 @@ fn problem(mut root: Section<'_, '_>) -> Result<Problem, InputError> {
         fixtures,
         distances,
         parameters,
+        drift,
         constraints,
         data,
         robust,

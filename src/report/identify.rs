@@ -10,6 +10,7 @@ use super::noise::{influential_rows, noise, outliers, size};
 use super::parameters::{
     conditioning, correlations, more_unidentifiable, parameters, unidentifiable, weak,
 };
+use super::prior::prior;
 use super::render::{Report, report, text};
 use super::residual_tests;
 use super::row_kinds::row_kind_tables;
@@ -29,6 +30,7 @@ pub fn estimate_text(problem: &Problem, found: &Identification) -> String {
         Block::lines(noise(problem, found)),
     ];
     blocks.extend(influential_rows(found));
+    blocks.extend(prior(found));
     blocks.extend(row_kind_tables(found));
     blocks.extend(orientation(found));
     blocks.extend(outliers(problem, found));
@@ -69,6 +71,7 @@ fn blocks<'a>(problem: &Problem, found: &'a Identification, plots: &'a PlotData)
     blocks.extend(fit_warnings(found, plots));
     blocks.push(Block::Table(errors_by_axis(found)));
     blocks.extend(orientation(found));
+    blocks.extend(prior(found));
     blocks.extend(row_kind_tables(found));
     blocks.push(Block::figures([figures::errors(plots), figures::vectors(plots)]));
     blocks.push(Block::Poses(plots));

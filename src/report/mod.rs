@@ -26,6 +26,7 @@ mod paper_tables;
 mod parameters;
 mod plan;
 mod predict;
+mod prior;
 mod probability;
 mod remainder;
 mod render;
@@ -38,6 +39,7 @@ mod study;
 mod trace;
 mod unexplained;
 mod verdict;
+mod watch;
 
 pub(crate) use acceptance::{acceptance_page, acceptance_text, tolerance_text};
 pub(crate) use brief::{determines_nothing, estimate_brief};
@@ -51,6 +53,7 @@ pub use render::Report;
 pub(crate) use replica::{replica_report, replica_text};
 pub(crate) use shell::shell_word;
 pub(crate) use verdict::interrupted;
+pub(crate) use watch::watch_text;
 // Public for the tests, the benches and the Python module only.
 #[doc(hidden)]
 pub use self::{

@@ -7,6 +7,7 @@ use serde::Serialize;
 use serde_json::value::{RawValue, to_raw_value};
 
 use super::document::Document;
+use super::prior::PriorUse;
 use super::remainder::{self, Remainder};
 use super::summary::{Errors, KindErrors, by_unit};
 use crate::fit::{
@@ -26,6 +27,8 @@ pub struct IdentificationResult {
     pub problem: String,
     /// SHA-256 digest of all declarations on which predictions depend.
     pub arm_digest: String,
+    /// Digest of each part of the declared arm.
+    pub arm_parts: BTreeMap<String, String>,
     pub strategy: &'static str,
     pub solver: &'static str,
     /// Reason for which `auto` chose the solver; null if the user named it.
@@ -81,6 +84,12 @@ pub struct IdentificationResult {
     /// Findings of the checks of the fit.
     #[schemars(with = "Vec<FindingKeys>")]
     pub findings: Vec<Finding>,
+    /// Comparison with the earlier estimate that was the prior.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub prior: Option<PriorUse>,
+    /// Digest of each fitted row, by which a later identification leaves it out.
+    #[schemars(with = "Vec<String>")]
+    pub fitted_rows: Option<Box<RawValue>>,
     /// Remainder that corrects predictions; errors of the identified arm include it.
     pub remainder: Option<Remainder>,
     /// Uncertainty of predictions without a remainder, in the form of remainder.json.
@@ -148,6 +157,9 @@ pub struct Parameter {
     /// Identified share, 0 to 1: part of the value that the data determine.
     pub identified: f64,
     pub fitted: bool,
+    /// Standard deviation of the declared prior of the deviation, SI or of the logarithm; null
+    /// without a prior.
+    pub prior_sigma: Option<f64>,
 }
 
 /// Shadow price of an active limit.
@@ -279,6 +291,7 @@ impl IdentificationResult {
         Self {
             problem: problem.name.clone(),
             arm_digest: problem.digest(),
+            arm_parts: problem.digest_parts(),
             strategy: found.strategy.as_str(),
             solver: found.solver.as_str(),
             solver_reason: found.solver_reason,
@@ -319,6 +332,8 @@ impl IdentificationResult {
             misfit_carried_by: found.influential_rows.as_ref().map(InfluentialRowSet::new),
             cautions: found.reasons_to_ask(),
             findings: found.findings.clone(),
+            prior: found.prior.as_ref().map(PriorUse::new),
+            fitted_rows: to_raw_value(&found.fitted_rows).ok(),
             remainder: None,
             prediction: None,
         }
@@ -352,6 +367,7 @@ impl Parameter {
             shadow_price: estimate.shadow_price.map(|price| Price::new(price, estimate.unit)),
             identified: estimate.identified,
             fitted: estimate.fitted,
+            prior_sigma: estimate.prior_sigma,
         }
     }
 }

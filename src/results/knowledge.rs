@@ -203,6 +203,7 @@ mod tests {
             at_bound: None,
             shadow_price: None,
             fitted: true,
+            prior_sigma: None,
         }
     }
 

@@ -21,6 +21,7 @@ mod export;
 mod identification;
 mod knowledge;
 pub(crate) mod plots;
+mod prior;
 mod remainder;
 mod residual_size;
 mod residual_test;
@@ -28,6 +29,7 @@ mod study;
 mod summary;
 pub(crate) mod tables;
 mod trace;
+mod watch;
 
 pub(crate) use acceptance::{AcceptanceRecord, AcceptanceResult, PoseAccuracy, TestedTolerance};
 pub(crate) use application::{InitResult, PredictionErrors};
@@ -57,6 +59,8 @@ pub(crate) use tables::{
 };
 pub use trace::TraceResult;
 pub(crate) use trace::{Candidate, Confounded, HypothesisSet, SeparatingPose};
+#[doc(hidden)]
+pub use watch::WatchResult;
 
 pub(crate) use effect::joined;
 // Public for the tests, the benches and the Python module only.
@@ -98,5 +102,6 @@ pub fn schemas() -> Vec<(&'static str, String)> {
         PredictionErrors,
         StudyResult,
         TraceResult,
+        WatchResult,
     ]
 }

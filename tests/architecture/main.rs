@@ -73,6 +73,8 @@ const STOREYS: &[(&str, &[&[&str]])] = &[
     ("fit", &[GROUND, BELOW_FIT, &["files"]]),
     // Corrections of an identified arm know fits, and no search for effects.
     ("remainder", &[GROUND, BELOW_FIT, &["fit", "files"]]),
+    // Earlier estimates as priors, and changes since.
+    ("life", &[GROUND, BELOW_FIT, &["fit", "remainder"]]),
     // Statistical tests of a residual are independent of arms and fits.
     ("residual_tests", &[&["error", "laws", "problem", "model", "numeric"]]),
     ("select", &[GROUND, BELOW_FIT, &["fit", "residual_tests"]]),
@@ -102,7 +104,17 @@ const STOREYS: &[(&str, &[&[&str]])] = &[
         &[
             GROUND,
             BELOW_FIT,
-            &["fit", "remainder", "residual_tests", "select", "design", "study", "files", "urdf"],
+            &[
+                "fit",
+                "remainder",
+                "life",
+                "residual_tests",
+                "select",
+                "design",
+                "study",
+                "files",
+                "urdf",
+            ],
         ],
     ),
     (
@@ -113,6 +125,7 @@ const STOREYS: &[(&str, &[&[&str]])] = &[
             &[
                 "fit",
                 "remainder",
+                "life",
                 "residual_tests",
                 "select",
                 "design",
@@ -131,6 +144,7 @@ const STOREYS: &[(&str, &[&[&str]])] = &[
             &[
                 "fit",
                 "remainder",
+                "life",
                 "export",
                 "residual_tests",
                 "select",

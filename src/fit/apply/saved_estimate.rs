@@ -1,16 +1,17 @@
 //! Reader of `estimate.json`, to apply an identified arm without another fit.
 
-use std::collections::HashSet;
+use std::collections::{BTreeMap, HashSet};
 use std::io;
 use std::path::{Path, PathBuf};
 
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 use serde::Deserialize;
 use serde_json::value::RawValue;
 
 use crate::error::one_line;
 use crate::files::{Changes, changed_key, read_limited};
 use crate::fit::Strategy;
+use crate::model::parameter::Parameter;
 use crate::model::{Model, Pose};
 use crate::problem::Problem;
 use crate::problem::item::MAX_MAGNITUDE;
@@ -46,8 +47,24 @@ pub struct SavedEstimate {
     problem: String,
     /// Digest of the declared arm; `None` in files of older versions.
     arm_digest: Option<String>,
+    /// Digest of each part of the declared arm; older versions did not write them.
+    arm_parts: BTreeMap<String, String>,
     strategy: Strategy,
     parameters: Vec<Entry>,
+    posterior: SavedPosterior,
+}
+
+/// Uncertainty of a saved estimate, as the next identification of the arm needs it.
+#[derive(Debug, Clone)]
+pub(crate) struct SavedPosterior {
+    /// Covariance of the values of all parameters, SI; NaN where it was not written.
+    pub covariance: DMatrix<f64>,
+    /// Standard deviation (1 σ) of a position's coordinate that the fit took \[m\].
+    pub sigma_taken: Option<f64>,
+    /// Noise variance that the fit took, relative to the declared one.
+    pub noise_factor: f64,
+    /// Digests of the rows that were fitted.
+    pub fitted_rows: HashSet<String>,
 }
 
 #[derive(Debug, Clone, Deserialize)]
@@ -58,6 +75,9 @@ struct Entry {
     /// Standard error of the value, SI; `None` if it has none, or in files of older versions.
     std_error: Option<f64>,
     identified: Option<f64>,
+    /// Standard deviation of the declared prior of the deviation; `None` without a prior, or in
+    /// files of older versions.
+    prior_sigma: Option<f64>,
     /// False if the strategy held the parameter fixed; `None` in files of older versions.
     fitted: Option<bool>,
 }
@@ -81,6 +101,11 @@ struct Document {
     parameters: Vec<Entry>,
     remainder: Option<RemainderEntry>,
     prediction: Option<Box<RawValue>>,
+    arm_parts: Option<BTreeMap<String, String>>,
+    covariance: Option<Vec<Vec<Option<f64>>>>,
+    sigma_taken_mm: Option<f64>,
+    noise_factor: Option<f64>,
+    fitted_rows: Option<HashSet<String>>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -111,6 +136,10 @@ pub enum SavedEstimateError {
     OtherNominal { file: PathBuf, name: String, found: f64, expected: f64 },
     #[error("{}: was identified with another declared arm (a fixed value, a mass, gravity or an effect has changed since); identify again", file.display())]
     OtherArm { file: PathBuf },
+    #[error("{}: {part} is declared differently in the problem; identify again without the earlier estimate", file.display())]
+    OtherPart { file: PathBuf, part: String },
+    #[error("{}: has no estimate of {name}, which is free in the problem; identify again without the earlier estimate", file.display())]
+    LacksParameter { file: PathBuf, name: String },
     #[error("{}: {name} was identified, but is not free in the problem; give the problem that was identified (after loop, problem.closed.toml)", file.display())]
     NotFree { file: PathBuf, name: String },
     #[error("{}: {name} stands there twice; keep one of the two", file.display())]
@@ -179,6 +208,11 @@ impl SavedEstimate {
             mut parameters,
             remainder,
             prediction,
+            arm_parts,
+            covariance,
+            sigma_taken_mm,
+            noise_factor,
+            fitted_rows,
         } = match serde_json::from_str(text) {
             Ok(document) => document,
             Err(source) => return Err(SavedEstimateError::Syntax { file, source }),
@@ -228,7 +262,17 @@ impl SavedEstimate {
             prediction: prediction.map(|result| result.get().to_owned()),
             problem,
             arm_digest,
+            arm_parts: arm_parts.unwrap_or_default(),
             strategy,
+            posterior: SavedPosterior {
+                covariance: DMatrix::from_fn(parameters.len(), parameters.len(), |i, j| {
+                    let entry = covariance.as_ref().and_then(|rows| rows.get(i)?.get(j).copied());
+                    entry.flatten().unwrap_or(f64::NAN)
+                }),
+                sigma_taken: sigma_taken_mm.map(|sigma| sigma * 1e-3),
+                noise_factor: noise_factor.unwrap_or(1.0),
+                fitted_rows: fitted_rows.unwrap_or_default(),
+            },
             parameters,
         })
     }
@@ -319,6 +363,53 @@ impl SavedEstimate {
     /// lacks it.
     pub(crate) fn value(&self, name: &str) -> Option<f64> {
         self.parameters.iter().find(|entry| entry.name == name).map(|entry| entry.estimate)
+    }
+
+    /// Returns the uncertainty of the estimate.
+    pub(crate) fn posterior(&self) -> &SavedPosterior {
+        &self.posterior
+    }
+
+    /// Returns name, value and prior σ of every parameter, in the order of the covariance.
+    pub(crate) fn entries(&self) -> impl Iterator<Item = (&str, f64, Option<f64>)> {
+        self.parameters.iter().map(|entry| (&*entry.name, entry.estimate, entry.prior_sigma))
+    }
+
+    /// Returns the strategy of the fit.
+    pub(crate) fn strategy(&self) -> Strategy {
+        self.strategy
+    }
+
+    /// Checks that the estimate is of the arm and the laws of `problem`, as [`check`](Self::check)
+    /// does, and that it has a value of every parameter of the model but bases, tools and fixtures.
+    ///
+    /// # Errors
+    /// Returns an error that names what differs.
+    pub(crate) fn check_same_arm(
+        &self,
+        problem: &Problem,
+        model: &Model,
+    ) -> Result<(), SavedEstimateError> {
+        let checked = self.check(problem, model);
+        if !matches!(checked, Ok(()) | Err(SavedEstimateError::OtherArm { .. })) {
+            return checked;
+        }
+        let lacks = |parameter: &&Parameter| {
+            !parameter.site.is_placement() && self.value(&parameter.name).is_none()
+        };
+        if let Some(parameter) = model.parameters.iter().find(lacks) {
+            let (file, name) = (self.file.clone(), parameter.name.clone());
+            return Err(SavedEstimateError::LacksParameter { file, name });
+        }
+        let parts = problem.digest_parts();
+        let differs = |name: &&String| parts.get(*name) != self.arm_parts.get(*name);
+        match self.arm_parts.keys().chain(parts.keys()).find(differs) {
+            Some(part) if !self.arm_parts.is_empty() => {
+                let (file, part) = (self.file.clone(), part.clone());
+                Err(SavedEstimateError::OtherPart { file, part })
+            }
+            _ => checked,
+        }
     }
 
     /// Returns the full parameter vector of a model of `problem`.

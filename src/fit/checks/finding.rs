@@ -118,6 +118,9 @@ finding_codes! {
     NominalFarOff: Warning "nominal-far-off" ["kind", "rms", "spread", "explanations"]
         "The nominal arm misses the measurements by more than a tenth of their spread.",
         "check units, signs of joints, and whether the numbers are of this convention of frames";
+    EarlierEstimateContradicted: Warning "earlier-estimate-contradicted" ["cause", "probability", "widened"]
+        "New rows contradict the earlier estimate that is the prior, with a false alarm in at most one of 100 fits.",
+        "look for what happened to the arm since; flexcal watch says more";
     HeldOutRepeated: Warning "held-out-repeated" ["rows", "of"]
         "Some held-out rows are identification rows again.",
         "hold out rows that were not fitted";
@@ -169,7 +172,7 @@ pub struct Finding {
 impl Finding {
     /// Creates a finding with the default remedy of its code; `numbers` are in the order of
     /// [`FindingEntry::numbers`].
-    pub(in crate::fit) fn new<const N: usize>(
+    pub(crate) fn new<const N: usize>(
         code: FindingCode,
         numbers: [Value; N],
         text: String,

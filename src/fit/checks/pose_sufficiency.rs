@@ -51,9 +51,13 @@ impl PoseSufficiency {
         };
         let of_row: Vec<usize> = (0..measurements.len()).map(of_row).collect();
         let coordinates = coordinates(fitting, (&numbers, &of_arm), &split.identification, &of_row);
-        let without_prior = unknowns.iter().filter(|parameter| parameter.sigma.is_none()).count();
+        let is_open = |parameter: &&&Parameter| {
+            parameter.sigma.is_none()
+                && !fitting.earlier.is_some_and(|earlier| earlier.covers(&parameter.name))
+        };
+        let without_prior = unknowns.iter().filter(is_open).count();
         let (rows, later) = (&split.identification, &held_out_only.rows);
-        let is_fitted = |k: usize| !held_out_only.parameters[k];
+        let is_fitted = |k: usize| !held_out_only.parameters[k] && !fitting.is_covered(k);
         let is_held_out = |k: usize| held_out_only.parameters[k];
         let finding = (coordinates < without_prior)
             .then(|| too_few("the fit".to_owned(), coordinates, without_prior))

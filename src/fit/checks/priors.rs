@@ -15,7 +15,7 @@ impl Check for DataDecide {
     fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
         let (poses, coordinates) = (fit.poses.poses, fit.poses.coordinates);
         let parameters = fit.whole.unknowns.len();
-        if coordinates >= parameters {
+        if coordinates >= parameters || fit.fitting.earlier.is_some() {
             return Vec::new();
         }
         let noun = if poses == 1 { "pose measures" } else { "different poses measure" };

@@ -6,6 +6,7 @@ use crate::error::{InputError, InputErrorKind};
 use crate::fit::errors::of_kind;
 use crate::fit::stages::alternation::{Alternation, Anderson, contraction};
 use crate::fit::stages::custom_solver::CustomSolver;
+use crate::fit::stages::earlier_data::EarlierData;
 use crate::fit::stages::fixture_location::locate;
 use crate::fit::stages::gauge::Gauge;
 use crate::fit::stages::noise_model::NoiseModel;
@@ -71,6 +72,8 @@ pub(in crate::fit) struct Fitting<'a> {
     pub cache: &'a LinearisationCache,
     /// Jacobian at the optimum of an earlier fit, reused if this fit starts there.
     pub linear_model: Option<&'a LinearModel>,
+    /// Earlier data that join the stages of the strategy.
+    pub earlier: Option<&'a EarlierData>,
 }
 
 /// Result of a fit of the strategy.
@@ -134,6 +137,11 @@ impl<'a> Fitting<'a> {
         self.choose(|parameter| parameter.site.is_placement())
     }
 
+    /// Returns true if earlier data inform on parameter `k`.
+    pub fn is_covered(&self, k: usize) -> bool {
+        self.earlier.is_some_and(|earlier| earlier.covers(&self.model.parameters[k].name))
+    }
+
     /// Returns `rows` as poses with their declared σ.
     pub fn poses(&self, rows: &[usize]) -> Vec<Pose<'a>> {
         self.placement.oriented_poses(self.measurements, rows, (self.sigma, self.turn_sigma))
@@ -191,7 +199,8 @@ impl<'a> Fitting<'a> {
         };
         let cost_tolerance =
             if self.to_be_judged { tolerance.max(TESTED_NOISE_TOLERANCE) } else { tolerance };
-        Stage { loss: self.loss, max_steps, cost_tolerance, ..stage }
+        let earlier = self.earlier;
+        Stage { loss: self.loss, max_steps, cost_tolerance, earlier, ..stage }
     }
 
     /// Creates the stage of all parameters that the strategy varies together, on the identification

@@ -5,6 +5,7 @@ pub(super) mod alternation;
 mod camera_start;
 pub(super) mod constraints;
 pub(super) mod custom_solver;
+pub(super) mod earlier_data;
 pub(super) mod fitting;
 pub(super) mod fixture_location;
 mod gauge;

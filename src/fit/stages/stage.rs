@@ -9,6 +9,7 @@ use super::custom_solver::CustomSolver;
 use super::gauge::{Gauge, below};
 use crate::fit::SolverChoice;
 use crate::fit::stages::active_limits::Held;
+use crate::fit::stages::earlier_data::EarlierData;
 use crate::fit::stages::parameter_size::plausible;
 use crate::fit::stages::progress::{ProgressSink, Reporter, Stop};
 use crate::least_squares::solver::{
@@ -77,6 +78,8 @@ pub(in crate::fit) struct Stage<'a> {
     /// Jacobian at the optimum of an earlier fit of the identification rows, reused if this stage
     /// starts there.
     pub linear_model: Option<&'a LinearModel>,
+    /// Earlier data that join the fit.
+    pub earlier: Option<&'a EarlierData>,
     pub progress: Option<&'a ProgressSink>,
     pub stop: Option<&'a Stop>,
 }
@@ -112,6 +115,7 @@ impl<'a> Stage<'a> {
             counts_fixed: false,
             cache,
             linear_model: None,
+            earlier: None,
             progress: None,
             stop: None,
         }
@@ -210,9 +214,18 @@ impl<'a> Stage<'a> {
         digest.finish()
     }
 
-    /// Returns the triangular factor R of the whitened data at `at`, without priors.
+    /// Returns the triangular factor R of the whitened data at `at`, earlier data included, without
+    /// priors.
     pub fn data_triangle(&self, at: &DVector<f64>) -> DMatrix<f64> {
-        self.linearised(at, Loss::Squares).triangle
+        self.with_earlier(self.linearised(at, Loss::Squares).triangle, at)
+    }
+
+    /// Returns the triangular factor of `triangle` stacked on the rows of earlier data.
+    fn with_earlier(&self, triangle: DMatrix<f64>, at: &DVector<f64>) -> DMatrix<f64> {
+        match self.earlier {
+            Some(_) => below(&triangle, &self.earlier_rows(at).matrix),
+            None => triangle,
+        }
     }
 
     /// Returns, for each unknown, its plausible deviation if it has no prior, else `None`.
@@ -220,9 +233,10 @@ impl<'a> Stage<'a> {
         self.parameters().map(|parameter| plausible(self.model, parameter)).collect()
     }
 
-    /// Returns the factor R of the data at `at` with each pose weighted by the loss.
+    /// Returns the factor R of the data at `at` with each pose weighted by the loss, earlier data
+    /// included.
     pub fn weighted_triangle(&self, at: &DVector<f64>) -> DMatrix<f64> {
-        self.linearised(at, self.loss).triangle
+        self.with_earlier(self.linearised(at, self.loss).triangle, at)
     }
 
     /// Returns the factor R of weighted data and priors at `at`.
@@ -328,10 +342,8 @@ impl<'a> Stage<'a> {
         let fit = self
             .cached(residuals, &residuals.full(&begin), self.loss)
             .with_rows(LinearRows { matrix: priors, constant: none })?
-            .with_rows(LinearRows {
-                matrix: gauge.rows.clone(),
-                constant: -(&gauge.rows * hold),
-            })?;
+            .with_rows(LinearRows { matrix: gauge.rows.clone(), constant: -(&gauge.rows * hold) })?
+            .with_rows(self.earlier_rows(&residuals.full(hold)))?;
         let sizes = self.sizes();
         let fit = StabilisedObjective { objective: fit, sizes: &sizes };
         let settings = Settings {
@@ -388,7 +400,14 @@ impl<'a> Stage<'a> {
         let residuals = self.residuals(at);
         let x = residuals.reduced(at);
         Fit::new(&residuals).with_loss(self.loss).cost(&x)
-            + 0.5 * (self.priors() * x).norm_squared()
+            + 0.5 * (self.priors() * &x).norm_squared()
+            + 0.5 * self.earlier_squares(at, &x)
+    }
+
+    /// Returns the squared length of the rows of earlier data at the unknowns `x`.
+    fn earlier_squares(&self, at: &DVector<f64>, x: &DVector<f64>) -> f64 {
+        let rows = self.earlier_rows(at);
+        (rows.matrix * x + rows.constant).norm_squared()
     }
 
     /// Returns the rows x / σ of the priors, shape = (priors, unknowns).

@@ -42,6 +42,10 @@ impl Fitting<'_> {
             let precision = self.model.parameters[k].sigma.map_or(0.0, |sigma| sigma.powi(-2));
             normal[(j, j)] += precision + RIDGE * normal[(j, j)] + f64::MIN_POSITIVE;
         }
+        if let Some(earlier) = self.earlier {
+            let rows = earlier.on(self.model, unknowns, x).matrix;
+            normal += rows.tr_mul(&rows);
+        }
         let mut groups: Vec<Vec<usize>> = Vec::new();
         let mut group_of = std::collections::BTreeMap::new();
         for (place, &row) in rows.iter().enumerate() {

@@ -44,7 +44,8 @@ impl Stage<'_> {
         let constant = DVector::zeros(priors.nrows());
         let fit = Fit::new(&residuals)
             .with_loss(self.loss)
-            .with_rows(LinearRows { matrix: priors, constant })?;
+            .with_rows(LinearRows { matrix: priors, constant })?
+            .with_rows(self.earlier_rows(at))?;
         let found = fit.linearise(&x);
         let mut left = found.triangle.tr_mul(&found.projected);
         let free: Vec<usize> = (0..n).filter(|&j| at_bound[j].is_none()).collect();

@@ -70,7 +70,15 @@ impl Statistics {
         let unmoved = stage.unmoved(&end.x);
         let moved = |pose: &Pose| pose.coordinates().saturating_sub(unmoved.count());
         let coordinates = stage.poses.iter().map(moved).sum::<usize>() as f64;
-        let freedom = coordinates - uncertainty.effective_parameters;
+        // Earlier data are rows of the triangle, but not among the coordinates.
+        let effective_parameters = match stage.earlier {
+            Some(_) => {
+                let data = stage.linearised(&end.x, stage.loss).triangle;
+                (&uncertainty.covariance * data.tr_mul(&data)).trace()
+            }
+            None => uncertainty.effective_parameters,
+        };
+        let freedom = coordinates - effective_parameters;
         let lengths = Lengths::new(
             stage,
             &end.x,

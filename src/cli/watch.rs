@@ -1,0 +1,78 @@
+//! Arguments and work of `flexcal watch`.
+
+use std::error::Error;
+use std::path::PathBuf;
+
+use clap::Args;
+use flexcal::life;
+use flexcal::measurement::Measurements;
+use flexcal::problem::Problem;
+use flexcal::report::{self, shell_word};
+use flexcal::results::{Document as _, WatchResult};
+
+use super::diagnostic;
+use super::estimate::Trust;
+use super::identify::days;
+use super::input::Common;
+use super::outcome::Outcome;
+
+/// Arguments of `flexcal watch`.
+#[derive(Debug, Args)]
+#[command(after_help = "Exit status: 0 unchanged, 3 changed.
+
+Examples:
+  flexcal watch problems/lunar-sampler --estimate out/lunar-sampler/estimate.json --data tomorrow.csv")]
+pub struct Arguments {
+    #[command(flatten)]
+    common: Common,
+    /// The estimate.json of an identification of the same arm
+    #[arg(long, value_name = "ESTIMATE.json")]
+    estimate: PathBuf,
+    /// Days since the estimate, whose drift counts as no change
+    #[arg(long, value_name = "DAYS", default_value_t = 0.0, value_parser = days)]
+    drift: f64,
+    /// Probability of an alarm at any row if nothing has changed
+    #[arg(long, value_name = "P", default_value_t = 0.01, value_parser = probability)]
+    false_alarms: f64,
+    #[command(flatten)]
+    trust: Trust,
+}
+
+/// Parses a probability between 0 and 0.5.
+fn probability(text: &str) -> Result<f64, String> {
+    let number = text.parse::<f64>().ok().filter(|number| *number > 0.0 && *number <= 0.5);
+    number.ok_or_else(|| "a probability above 0 and up to 0.5 is expected".to_owned())
+}
+
+/// Tests the rows, writes `watch.json` and prints the verdict.
+pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
+    let common = &arguments.common;
+    let problem = Problem::read(common.problem())?;
+    let others = std::slice::from_ref(&arguments.estimate);
+    let results = common.results("watch", &problem, others, &["watch.json"])?;
+    let (rows, warnings) = Measurements::read(common.files(&problem), &problem)?;
+    common.warn(&warnings);
+    let estimate = arguments.trust.read(&arguments.estimate)?;
+    if !estimate.trusted {
+        diagnostic::warn("the estimate is not to be trusted, so the verdict is not either");
+    }
+    let settings = (arguments.drift, arguments.false_alarms);
+    let watch = life::watch(&problem, &estimate, &rows.arm_rows(), settings)?;
+    let named = arguments.estimate.display().to_string();
+    let json = WatchResult::new(&problem, &named, arguments.drift, &watch).to_json();
+    results.write(&[("watch.json", &json)])?;
+    common.tell(&json, || {
+        let [problem_word, estimate] = [common.problem(), &arguments.estimate].map(shell_word);
+        let next = if watch.is_changed() {
+            format!(
+                "flexcal identify {} --prior {estimate} takes the change over into an estimate",
+                common.named()
+            )
+        } else {
+            format!("flexcal compensate {problem_word} --estimate {estimate} --data TARGETS.csv corrects commands")
+        };
+        let text = report::watch_text(&problem, &watch);
+        format!("{text}{}Next: {next}\n", results.written())
+    })?;
+    Ok(if watch.is_changed() { Outcome::Changed } else { Outcome::Done })
+}

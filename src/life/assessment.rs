@@ -1,0 +1,157 @@
+//! Sequential test of "unchanged" against a mixture of causes.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::causes::{Cause, CauseKind};
+use super::evidence::{NOISE_RATIOS, Unchanged, ln_sum};
+use super::rows::{SensitiveRows, Sums};
+
+/// Rows at which the sequential test looks; more rows are looked at in equal steps.
+const MAX_LOOKS: usize = 400;
+
+/// Result of the test after all rows.
+pub(super) struct Assessment {
+    /// ln of the mixture's likelihood ratio after each look, and the number of rows then.
+    pub looks: Vec<(usize, f64)>,
+    /// Causes, the most probable first.
+    pub causes: Vec<AssessedCause>,
+    /// Squared length rᵀ S⁻¹ r of all residuals: χ² with `coordinates` degrees of freedom if
+    /// nothing changed.
+    pub chi2: f64,
+    pub coordinates: f64,
+}
+
+/// Cause with its probability and amplitudes, given the rows.
+#[derive(Debug, Clone)]
+pub(super) struct AssessedCause {
+    /// Index among the causes that were tried.
+    pub cause: usize,
+    /// Row, if the cause is a gross row.
+    pub row: Option<usize>,
+    /// Probability among all causes, given that something changed.
+    pub probability: f64,
+    /// Sizes (1 σ) of largest evidence.
+    pub sizes: Vec<f64>,
+    /// Posterior mean of the amplitudes with these sizes; the noise ratio for larger noise.
+    pub mean: DVector<f64>,
+    /// Posterior covariance of the amplitudes.
+    pub covariance: DMatrix<f64>,
+}
+
+/// Weighted ln LR of a cause or of a gross row, with the amplitudes of the best size.
+struct Weighted {
+    cause: usize,
+    row: Option<usize>,
+    ln_share: f64,
+    sizes: Vec<f64>,
+    mean: DVector<f64>,
+    covariance: DMatrix<f64>,
+}
+
+/// Tests rows in their order. `factor` is F with F Fᵀ the covariance of the estimate, one row for
+/// each column of the sensitivities. Only the last look is computed if `is_sequential` is false.
+///
+/// Returns `None` if a number is not finite.
+pub(super) fn assess(
+    rows: &SensitiveRows,
+    factor: &DMatrix<f64>,
+    causes: &[Cause],
+    is_sequential: bool,
+) -> Option<Assessment> {
+    let mut sums = Sums::new(rows.sensitivity.ncols());
+    let step = rows.len().div_ceil(MAX_LOOKS).max(1);
+    let mut looks = Vec::new();
+    let mut last = None;
+    for row in 0..rows.len() {
+        sums.add(rows, row, 1.0);
+        let is_last = row + 1 == rows.len();
+        if !is_last && !(is_sequential && (row + 1) % step == 0) {
+            continue;
+        }
+        let unchanged = Unchanged::new(&sums, factor)?;
+        let weighted = ratios(rows, row + 1, (&sums, factor), &unchanged, causes);
+        // Rows to come are as likely to be gross as these; they change nothing yet.
+        let to_come = causes.iter().find(|cause| cause.kind == CauseKind::Row);
+        let to_come = to_come.map(|cause| cause.ln_weight - (row as f64 + 2.0).ln());
+        let evidence = ln_sum(weighted.iter().map(|entry| entry.ln_share).chain(to_come));
+        looks.push((row + 1, evidence));
+        if is_last {
+            last = Some((weighted, unchanged.squares));
+        }
+    }
+    let (weighted, chi2) = last?;
+    let all = ln_sum(weighted.iter().map(|entry| entry.ln_share));
+    let mut causes: Vec<AssessedCause> = weighted
+        .into_iter()
+        .map(|entry| AssessedCause {
+            cause: entry.cause,
+            row: entry.row,
+            probability: (entry.ln_share - all).exp(),
+            sizes: entry.sizes,
+            mean: entry.mean,
+            covariance: entry.covariance,
+        })
+        .collect();
+    causes.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+    Some(Assessment { looks, causes, chi2, coordinates: sums.coordinates })
+}
+
+/// Computes the weighted likelihood ratio of each cause, and of each of the first `count` rows as a
+/// gross one.
+fn ratios(
+    rows: &SensitiveRows,
+    count: usize,
+    (sums, factor): (&Sums, &DMatrix<f64>),
+    unchanged: &Unchanged,
+    causes: &[Cause],
+) -> Vec<Weighted> {
+    let plain = |cause, row, ln_share, mean: Vec<f64>| Weighted {
+        cause,
+        row,
+        ln_share,
+        sizes: Vec::new(),
+        covariance: DMatrix::zeros(mean.len(), mean.len()),
+        mean: DVector::from_vec(mean),
+    };
+    let mut weighted = Vec::new();
+    for (index, cause) in causes.iter().enumerate() {
+        match cause.kind {
+            CauseKind::Noise => {
+                let ratio = |&ratio: &f64| Some((unchanged.noise(sums, factor, ratio)?, ratio));
+                let found: Vec<(f64, f64)> = NOISE_RATIOS.iter().filter_map(ratio).collect();
+                let best = found.iter().copied().max_by(|a, b| a.0.total_cmp(&b.0));
+                let share = ln_sum(found.iter().map(|entry| entry.0))
+                    - (NOISE_RATIOS.len() as f64).ln()
+                    + cause.ln_weight;
+                weighted.extend(best.map(|(_, ratio)| plain(index, None, share, vec![ratio])));
+            }
+            // Row i has the prior probability 1 / (i (i + 1)), which sums to 1 over all i.
+            CauseKind::Row => weighted.extend((0..count).filter_map(|row| {
+                let number = row as f64 + 1.0;
+                let share = unchanged.gross_row(rows, row, factor)? + cause.ln_weight
+                    - (number * (number + 1.0)).ln();
+                Some(plain(index, Some(row), share, Vec::new()))
+            })),
+            _ => {
+                let tried: Vec<_> = cause
+                    .sizes
+                    .iter()
+                    .filter_map(|sizes| Some((unchanged.cause(&cause.columns, sizes)?, sizes)))
+                    .collect();
+                let share = ln_sum(tried.iter().map(|((ratio, ..), _)| *ratio))
+                    - (cause.sizes.len() as f64).ln()
+                    + cause.ln_weight;
+                let best = tried.into_iter().max_by(|a, b| a.0.0.total_cmp(&b.0.0));
+                weighted.extend(best.map(|((_, mean, covariance), sizes)| Weighted {
+                    cause: index,
+                    row: None,
+                    ln_share: share,
+                    sizes: sizes.clone(),
+                    mean,
+                    covariance,
+                }));
+            }
+        }
+    }
+    weighted
+}

@@ -1,0 +1,361 @@
+//! Possible causes of a change: what may have moved, and by how much.
+
+use nalgebra::DVector;
+
+use super::rows::SensitiveRows;
+use crate::model::Model;
+use crate::model::parameter::{BeamField, JointField, Parameter, ParameterSite};
+use crate::problem::{JointKind, Problem};
+use crate::quantity::Unit;
+
+/// Sizes of a moved zero, 1 σ \[°\] or \[mm\], each as probable as the others.
+const ZERO_SIZES: [f64; 5] = [0.005, 0.02, 0.08, 0.3, 1.2];
+/// Sizes of a moved point, 1 σ on each axis \[mm\].
+const LENGTH_SIZES: [f64; 5] = [0.03, 0.1, 0.4, 1.5, 6.0];
+/// Sizes of a bent link: 1 σ of its lengths \[mm\] and of its angles \[°\].
+const LINK_SIZES: [(f64, f64); 3] = [(0.05, 0.005), (0.2, 0.02), (1.0, 0.1)];
+/// Sizes of a change of ln stiffness, 1 σ.
+const STIFFNESS_SIZES: [f64; 3] = [0.05, 0.2, 0.7];
+/// Sizes of a change of a law, as parts of the σ of its prior.
+const LAW_SIZES: [f64; 3] = [0.05, 0.3, 1.0];
+/// Sizes of the strain of a warmed arm, 1 σ: steel warmer by 3, 10 and 30 K.
+const STRAIN_SIZES: [f64; 3] = [3.6e-5, 1.2e-4, 3.6e-4];
+/// Sizes of a joint's angle per kelvin, 1 σ \[rad/K\].
+const JOINT_THERMAL_SIZES: [f64; 3] = [1e-6, 5e-6, 3e-5];
+/// Temperature difference from the reference \[K\] above which temperature is a probable cause.
+const WARM: f64 = 3.0;
+/// Factor on the prior probability of temperature as the cause, for rows at another temperature.
+const MORE_IF_WARM: f64 = 20.0;
+
+worded! {
+    /// Kind of a cause.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    pub enum CauseKind: as_str {
+        /// Zero of a joint.
+        Zero = "joint-zero";
+        /// Geometry of a link, except the zero of its joint.
+        Link = "link";
+        /// Measured point in the last frame.
+        Tool = "tool";
+        /// Pose of the base in the measuring frame.
+        Base = "base";
+        /// Point, anchor, surface, camera or marker.
+        Fixture = "fixture";
+        /// Stiffness of a joint or rigidity of a beam.
+        Stiffness = "stiffness";
+        /// Amplitude of a declared law.
+        Law = "law";
+        /// Temperature of the arm.
+        Temperature = "temperature";
+        /// Noise of the measurement.
+        Noise = "noise";
+        /// Gross error of one row.
+        Row = "row";
+    }
+}
+
+impl CauseKind {
+    /// Kinds with the prior probability of each, given a change; temperature is 20 times as probable
+    /// if the rows are warmer or colder than the reference.
+    const WEIGHTS: [(Self, f64); 10] = [
+        (Self::Zero, 0.26),
+        (Self::Tool, 0.18),
+        (Self::Base, 0.14),
+        (Self::Noise, 0.12),
+        (Self::Row, 0.10),
+        (Self::Link, 0.06),
+        (Self::Stiffness, 0.05),
+        (Self::Temperature, 0.04),
+        (Self::Law, 0.03),
+        (Self::Fixture, 0.02),
+    ];
+}
+
+/// Possible cause of a change.
+#[derive(Debug, Clone)]
+pub(super) struct Cause {
+    pub kind: CauseKind,
+    /// Name for people, such as "zero of joint 2".
+    pub label: String,
+    /// Columns of the sensitivities that it moves.
+    pub columns: Vec<usize>,
+    /// Name and unit of each amplitude.
+    pub amplitudes: Vec<(String, Unit)>,
+    /// Sizes (1 σ) of the amplitudes that are tried.
+    pub sizes: Vec<Vec<f64>>,
+    /// Logarithm of the prior probability.
+    pub ln_weight: f64,
+}
+
+/// Model with a free parameter at every site that may have changed.
+pub(super) struct Extended {
+    pub model: Model,
+    /// Full parameter vector of that model.
+    pub x: DVector<f64>,
+    /// Number of parameters of the model without the added ones.
+    pub declared: usize,
+    /// Names of the added parameters.
+    names: Vec<String>,
+}
+
+impl Extended {
+    /// Adds a parameter at each zero, each geometry of a link, each stiffness, base and target that
+    /// is not free in `model`; `x` is its full parameter vector.
+    pub fn new(problem: &Problem, model: &Model, x: &DVector<f64>, words: [&[String]; 2]) -> Self {
+        let mut sites: Vec<(ParameterSite, f64, String)> = Vec::new();
+        let mut add = |site, nominal, name: String| {
+            let is_free =
+                |parameter: &Parameter| parameter.site == site && parameter.regressor.is_constant();
+            if !model.parameters.iter().any(is_free) {
+                sites.push((site, nominal, name));
+            }
+        };
+        for (joint, declared) in problem.joints.iter().enumerate() {
+            if declared.kind == JointKind::Fixed || declared.mimic.is_some() {
+                continue;
+            }
+            for field in JointField::GEOMETRY {
+                let name = format!("joint{}.{}", joint + 1, field.name());
+                add(ParameterSite::Joint { joint, field }, 0.0, name);
+            }
+        }
+        for (what, words, axes) in [("base", words[0], 6), ("tool", words[1], 3)] {
+            for (place, word) in words.iter().enumerate() {
+                for axis in 0..axes {
+                    let site = if what == "base" {
+                        ParameterSite::Base { base: place, axis }
+                    } else {
+                        ParameterSite::Target { target: place, axis }
+                    };
+                    let label =
+                        if word.is_empty() { what.to_owned() } else { format!("{what}[{word}]") };
+                    let suffix = ["x", "y", "z", "rx", "ry", "rz"][axis];
+                    add(site, 0.0, format!("{label}.{suffix}"));
+                }
+            }
+        }
+        let probes: Vec<(ParameterSite, f64)> =
+            sites.iter().map(|&(site, nominal, _)| (site, nominal)).collect();
+        let extended = model.with_probes(&probes);
+        let x =
+            DVector::from_fn(extended.parameters.len(), |k, _| x.get(k).copied().unwrap_or(0.0));
+        let names = sites.into_iter().map(|(.., name)| name).collect();
+        Self { declared: model.parameters.len(), model: extended, x, names }
+    }
+
+    /// Returns the name of a parameter.
+    fn name(&self, k: usize) -> String {
+        match k.checked_sub(self.declared) {
+            Some(added) => self.names[added].clone(),
+            None => self.model.parameters[k].name.clone(),
+        }
+    }
+
+    /// Returns the unit of a parameter's deviation at its site.
+    fn unit(&self, k: usize) -> Unit {
+        if k < self.declared {
+            self.model.parameters[k].unit()
+        } else {
+            self.model.parameters[k].site.unit()
+        }
+    }
+
+    /// Lists the causes for rows of this model. `warmth` is the difference from the reference
+    /// temperature of each row \[K\], if the rows state one; columns for temperature are added to
+    /// `rows`.
+    pub fn causes(
+        &self,
+        problem: &Problem,
+        rows: &mut SensitiveRows,
+        warmth: Option<&[f64]>,
+    ) -> Vec<Cause> {
+        let mut causes = Vec::new();
+        let of = |choose: &dyn Fn(ParameterSite, &Parameter) -> bool| -> Vec<usize> {
+            let all = self.model.parameters.iter().enumerate();
+            all.filter(|(_, parameter)| choose(parameter.site, parameter)).map(|(k, _)| k).collect()
+        };
+        let mut push = |kind, label: String, columns: Vec<usize>, sizes: Vec<Vec<f64>>| {
+            if !columns.is_empty() {
+                let amplitudes = columns.iter().map(|&k| (self.name(k), self.unit(k))).collect();
+                causes.push(Cause { kind, label, columns, amplitudes, sizes, ln_weight: 0.0 });
+            }
+        };
+        let mixed = |columns: &[usize], length_mm: f64, angle_deg: f64| -> Vec<f64> {
+            let size = |&k: &usize| match self.unit(k) {
+                Unit::Angle => angle_deg.to_radians(),
+                _ => length_mm * 1e-3,
+            };
+            columns.iter().map(size).collect()
+        };
+        let is_geometry = |k: usize, joint: usize, is_zero: bool| {
+            let added = k >= self.declared;
+            let parameter = &self.model.parameters[k];
+            let ParameterSite::Joint { joint: of, field } = parameter.site else { return false };
+            let zero = match problem.joints[joint].kind {
+                JointKind::Prismatic => JointField::D,
+                _ => JointField::Theta,
+            };
+            of == joint
+                && field.is_geometry()
+                && (added || parameter.regressor.is_constant())
+                && (field == zero) == is_zero
+        };
+        let count = self.model.parameters.len();
+        for joint in 0..problem.joints.len() {
+            let chosen = |is_zero| -> Vec<usize> {
+                (0..count).filter(|&k| is_geometry(k, joint, is_zero)).collect()
+            };
+            let (zero, link) = (chosen(true), chosen(false));
+            if problem.joints[joint].kind != JointKind::Fixed {
+                let sizes = ZERO_SIZES.iter().map(|&size| mixed(&zero, size, size)).collect();
+                push(CauseKind::Zero, format!("zero of joint {}", joint + 1), zero, sizes);
+            }
+            let sizes = LINK_SIZES.iter().map(|&(mm, deg)| mixed(&link, mm, deg)).collect();
+            push(CauseKind::Link, format!("link of joint {}", joint + 1), link, sizes);
+        }
+        let is_stiff = |site, _: &Parameter| match site {
+            ParameterSite::Joint { field, .. } => field == JointField::Stiffness,
+            ParameterSite::Beam { field, .. } => matches!(
+                field,
+                BeamField::Axial
+                    | BeamField::Bending
+                    | BeamField::BendingY
+                    | BeamField::BendingZ
+                    | BeamField::Twist
+            ),
+            _ => false,
+        };
+        for k in of(&is_stiff) {
+            let sizes = STIFFNESS_SIZES.iter().map(|&size| vec![size]).collect();
+            push(CauseKind::Stiffness, self.name(k), vec![k], sizes);
+        }
+        let label =
+            |k: usize| self.name(k).rsplit_once('.').map_or(String::new(), |n| n.0.to_owned());
+        let mut grouped = |kind, columns: Vec<usize>, sizes: &dyn Fn(&[usize]) -> Vec<Vec<f64>>| {
+            let mut labels: Vec<String> = columns.iter().map(|&k| label(k)).collect();
+            labels.sort();
+            labels.dedup();
+            for name in labels {
+                let group: Vec<usize> =
+                    columns.iter().copied().filter(|&k| label(k) == name).collect();
+                let tried = sizes(&group);
+                push(kind, name, group, tried);
+            }
+        };
+        let placed = |group: &[usize]| -> Vec<Vec<f64>> {
+            LENGTH_SIZES.iter().map(|&size| mixed(group, size, size / 10.0)).collect()
+        };
+        grouped(
+            CauseKind::Tool,
+            of(&|site, _| matches!(site, ParameterSite::Target { .. })),
+            &placed,
+        );
+        grouped(
+            CauseKind::Base,
+            of(&|site, _| matches!(site, ParameterSite::Base { .. })),
+            &placed,
+        );
+        let fixtures = of(&|site, _| matches!(site, ParameterSite::Fixture { .. }));
+        grouped(CauseKind::Fixture, fixtures, &placed);
+        let is_law = |site: ParameterSite, parameter: &Parameter| {
+            let is_of_arm = matches!(site, ParameterSite::Joint { field, .. } if field.is_geometry())
+                && parameter.regressor.is_constant();
+            parameter.sigma.is_some()
+                && !is_of_arm
+                && !is_stiff(site, parameter)
+                && !site.is_placement()
+        };
+        let laws: Vec<usize> = of(&is_law).into_iter().filter(|&k| k < self.declared).collect();
+        grouped(CauseKind::Law, laws, &|group| {
+            let sigma = |k: &usize| self.model.parameters[*k].sigma.unwrap_or(0.0);
+            LAW_SIZES.iter().map(|part| group.iter().map(|k| part * sigma(k)).collect()).collect()
+        });
+        causes.extend(self.thermal_causes(problem, rows, warmth));
+        let none = |kind, label: &str| Cause {
+            kind,
+            label: label.to_owned(),
+            columns: Vec::new(),
+            amplitudes: Vec::new(),
+            sizes: Vec::new(),
+            ln_weight: 0.0,
+        };
+        causes.push(none(CauseKind::Noise, "noise of the measurement"));
+        causes.push(none(CauseKind::Row, "one gross row"));
+        weigh(&mut causes, warmth);
+        causes
+    }
+
+    /// Lists the causes by temperature: all links expand, and where the rows state temperatures the
+    /// zeros move with them.
+    fn thermal_causes(
+        &self,
+        problem: &Problem,
+        rows: &mut SensitiveRows,
+        warmth: Option<&[f64]>,
+    ) -> Vec<Cause> {
+        let column = |joint: usize, field: JointField| {
+            let site = ParameterSite::Joint { joint, field };
+            let mut all = self.model.parameters.iter().enumerate();
+            all.find(|(k, parameter)| {
+                parameter.site == site && (*k >= self.declared || parameter.regressor.is_constant())
+            })
+            .map(|(k, _)| k)
+        };
+        let lengths = problem.joints.iter().enumerate().flat_map(|(joint, declared)| {
+            [(JointField::A, declared.a), (JointField::D, declared.d)]
+                .into_iter()
+                .filter_map(move |(field, length)| Some((column(joint, field)?, length)))
+        });
+        let lengths: Vec<(usize, f64)> = lengths.filter(|(_, length)| *length != 0.0).collect();
+        let of_row = |row: usize| warmth.map_or(1.0, |warmth| warmth[row]);
+        let is_warm = warmth.is_none_or(|warmth| warmth.iter().any(|t| t.abs() >= 1.0));
+        if lengths.is_empty() || !is_warm {
+            return Vec::new();
+        }
+        // Sizes are of strains; with temperatures the amplitude is per 10 K.
+        let (unit, part) = match warmth {
+            Some(_) => (Unit::PerDegree, 0.1),
+            None => (Unit::Ratio, 1.0),
+        };
+        let thermal = |label: String, column, amplitude, sizes: &[f64]| Cause {
+            kind: CauseKind::Temperature,
+            label,
+            columns: vec![column],
+            amplitudes: vec![amplitude],
+            sizes: sizes.iter().map(|&size| vec![size]).collect(),
+            ln_weight: 0.0,
+        };
+        let all = rows.add_column(&lengths, of_row);
+        let sizes = STRAIN_SIZES.map(|size| part * size);
+        let expansion = ("strain of all links".to_owned(), unit);
+        let mut causes =
+            vec![thermal("temperature: all links expand".to_owned(), all, expansion, &sizes)];
+        for joint in (0..problem.joints.len()).filter(|_| warmth.is_some()) {
+            let Some(zero) = column(joint, JointField::Theta) else { continue };
+            let column = rows.add_column(&[(zero, 1.0)], of_row);
+            let number = joint + 1;
+            let amplitude = (format!("joint{number}.theta per kelvin"), Unit::AnglePerDegree);
+            let label = format!("temperature: zero of joint {number} follows it");
+            causes.push(thermal(label, column, amplitude, &JOINT_THERMAL_SIZES));
+        }
+        causes
+    }
+}
+
+/// Sets the prior probabilities of the causes; they sum to 1.
+fn weigh(causes: &mut [Cause], warmth: Option<&[f64]>) {
+    let is_warm = warmth.is_some_and(|warmth| warmth.iter().any(|t| t.abs() >= WARM));
+    let count = |kind| causes.iter().filter(|cause| cause.kind == kind).count() as f64;
+    let weight = |kind: CauseKind| {
+        let all =
+            CauseKind::WEIGHTS.iter().find(|(of, _)| *of == kind).map_or(0.0, |entry| entry.1);
+        // Where the rows are warm, each zero competes with the same zero that follows temperature.
+        let factor = if kind == CauseKind::Temperature && is_warm { MORE_IF_WARM } else { 1.0 };
+        factor * all / count(kind).max(1.0)
+    };
+    let weights: Vec<f64> = causes.iter().map(|cause| weight(cause.kind)).collect();
+    let sum: f64 = weights.iter().sum();
+    for (cause, weight) in causes.iter_mut().zip(weights) {
+        cause.ln_weight = (weight / sum).ln();
+    }
+}

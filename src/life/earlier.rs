@@ -1,0 +1,109 @@
+//! Earlier knowledge of an arm as a Gaussian on the parameters of a model.
+
+use std::collections::HashSet;
+use std::path::PathBuf;
+
+use nalgebra::{DMatrix, DVector};
+
+use super::drift;
+use super::error::PriorError;
+use crate::fit::{EarlierData, SavedEstimate, Strategy};
+use crate::model::Model;
+use crate::problem::Problem;
+
+/// Gaussian on some parameters of a model, from an earlier estimate and widened by drift.
+#[derive(Debug, Clone)]
+pub(super) struct Earlier {
+    pub file: PathBuf,
+    /// Names of the parameters.
+    pub names: Vec<String>,
+    /// Index of each parameter in the model.
+    pub places: Vec<usize>,
+    /// Mean of the deviations from nominal.
+    pub mean: DVector<f64>,
+    /// Covariance of the deviations.
+    pub covariance: DMatrix<f64>,
+    /// Digests of the rows that were fitted.
+    pub fitted_rows: HashSet<String>,
+    /// Standard deviation (1 σ) of a coordinate to assume in new rows \[m\], where it is larger
+    /// than declared or none is declared.
+    pub sigma: Option<f64>,
+}
+
+impl Earlier {
+    /// Returns the Gaussian that an earlier estimate gives on the parameters of a model, `days`
+    /// days later.
+    ///
+    /// # Errors
+    /// Returns an error if the estimate is of another arm or has other laws, was made by another
+    /// strategy than joint, or has no covariance; or if a rule of `[drift]` matches nothing.
+    pub fn of_estimate(
+        estimate: &SavedEstimate,
+        problem: &Problem,
+        model: &Model,
+        days: f64,
+    ) -> Result<Self, PriorError> {
+        let file = estimate.file.clone();
+        if estimate.strategy() != Strategy::Joint {
+            return Err(PriorError::Strategy { file, found: estimate.strategy().as_str() });
+        }
+        estimate.check_same_arm(problem, model)?;
+        let drift = drift::variances(problem, model, days)?;
+        let saved = estimate.posterior();
+        let entries: Vec<(usize, usize, f64)> = estimate
+            .entries()
+            .enumerate()
+            .filter_map(|(row, (name, value, _))| {
+                let k = model.parameters.iter().position(|parameter| parameter.name == name)?;
+                (saved.covariance[(row, row)] > 0.0).then_some((row, k, value))
+            })
+            .collect();
+        if entries.is_empty() {
+            return Err(PriorError::NoCovariance { file });
+        }
+        let deviation = |&(_, k, value): &(usize, usize, f64)| model.parameters[k].deviation(value);
+        let mean = DVector::from_iterator(entries.len(), entries.iter().map(deviation));
+        let slope =
+            |i: usize| model.parameters[entries[i].1].value_error(mean[i], 1.0).abs().recip();
+        let covariance = DMatrix::from_fn(entries.len(), entries.len(), |i, j| {
+            let entry = saved.covariance[(entries[i].0, entries[j].0)] * slope(i) * slope(j);
+            let drifted = if i == j { drift[entries[i].1] } else { 0.0 };
+            (if entry.is_finite() { entry } else { 0.0 }) + drifted
+        });
+        let declared = problem.data.position_sigma;
+        let is_larger = saved.noise_factor > 1.0 || declared.is_none();
+        Ok(Self {
+            file,
+            names: entries.iter().map(|&(_, k, _)| model.parameters[k].name.clone()).collect(),
+            places: entries.iter().map(|&(_, k, _)| k).collect(),
+            mean,
+            covariance,
+            fitted_rows: saved.fitted_rows.clone(),
+            sigma: saved.sigma_taken.or(estimate.estimated_sigma).filter(|_| is_larger),
+        })
+    }
+
+    /// Returns the Gaussian as rows that join a fit, without what the declared priors state.
+    ///
+    /// # Errors
+    /// Returns an error if the covariance is not positive.
+    pub fn data(&self, model: &Model) -> Result<EarlierData, PriorError> {
+        let precision = |k: &usize| model.parameters[*k].sigma.map_or(0.0, |sigma| sigma.powi(-2));
+        let precision =
+            DVector::from_iterator(self.places.len(), self.places.iter().map(precision));
+        EarlierData::new(self.names.clone(), &self.mean, &self.covariance, &precision)
+            .ok_or_else(|| PriorError::NoCovariance { file: self.file.clone() })
+    }
+
+    /// Returns the position of a model's parameter in the Gaussian; `None` if it is not part of it.
+    pub fn place_of(&self, parameter: usize) -> Option<usize> {
+        self.places.iter().position(|&k| k == parameter)
+    }
+
+    /// Adds variance to the deviation of a model's parameter; no effect on other parameters.
+    pub fn widen(&mut self, parameter: usize, variance: f64) {
+        if let Some(place) = self.place_of(parameter) {
+            self.covariance[(place, place)] += variance;
+        }
+    }
+}

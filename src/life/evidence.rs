@@ -1,0 +1,152 @@
+//! Evidence for causes of a change, against "unchanged".
+//!
+//! Unchanged: the whitened residuals r of all rows are N(0, S) with S = I + K C Kᵀ, where C is the
+//! covariance of the estimate. A cause adds columns V of K with independent normal amplitudes of
+//! size D: r ~ N(0, S + V D² Vᵀ). With A = Vᵀ S⁻¹ V and b = Vᵀ S⁻¹ r its likelihood ratio is
+//!
+//! ln LR = −½ ln det(I + D A D) + ½ bᵀ D (I + D A D)⁻¹ D b            [Bishop 2006, §2.3]
+//!
+//! Larger noise: r ~ N(0, κ² I + K C Kᵀ). One gross row i: S + λ² on the coordinates of row i.
+//!
+//! Each ratio is a density of all rows so far over that of "unchanged", so it is a martingale while
+//! the arm is unchanged, and so is a mixture of them. It exceeds 1/α at any time with a probability
+//! of at most α [Ville 1939; Grünwald, de Heide & Koolen 2024].
+
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+
+use super::rows::{SensitiveRows, Sums};
+
+/// Ratios of the noise to the assumed one that are tried.
+pub(super) const NOISE_RATIOS: [f64; 4] = [1.5, 2.0, 3.0, 5.0];
+/// Errors of a gross row that are tried, in units of its σ.
+const GROSS_SIZES: [f64; 3] = [10.0, 50.0, 500.0];
+/// Smallest eigenvalue of a correlation matrix, relative to the largest, that counts.
+const ROUNDING: f64 = 1e-13;
+
+/// Density of the rows if nothing changed, with everything that the ratios need.
+pub(super) struct Unchanged {
+    /// Matrix A = Kᵀ S⁻¹ K of all columns.
+    pub information: DMatrix<f64>,
+    /// Vector b = Kᵀ S⁻¹ r of all columns.
+    pub vector: DVector<f64>,
+    /// Squared length rᵀ S⁻¹ r.
+    pub squares: f64,
+    /// Cholesky factor L of I + Fᵀ G F.
+    lower: DMatrix<f64>,
+    /// Vector L⁻¹ Fᵀ g.
+    along: DVector<f64>,
+}
+
+/// Returns F with F Fᵀ = C for a covariance matrix C, columns of variance zero left out.
+pub(super) fn factor(covariance: &DMatrix<f64>) -> DMatrix<f64> {
+    let scale = covariance.diagonal().map(|variance| variance.max(0.0).sqrt());
+    let free: Vec<usize> = (0..scale.len()).filter(|&k| scale[k] > 0.0).collect();
+    let correlation = DMatrix::from_fn(free.len(), free.len(), |i, j| {
+        covariance[(free[i], free[j])] / (scale[free[i]] * scale[free[j]])
+    });
+    let eigen = correlation.symmetric_eigen();
+    let largest = if free.is_empty() { 0.0 } else { eigen.eigenvalues.amax() };
+    let kept: Vec<usize> =
+        (0..free.len()).filter(|&k| eigen.eigenvalues[k] > ROUNDING * largest).collect();
+    let mut factor = DMatrix::zeros(scale.len(), kept.len());
+    for (column, &k) in kept.iter().enumerate() {
+        let root = eigen.eigenvalues[k].sqrt();
+        for (i, &row) in free.iter().enumerate() {
+            factor[(row, column)] = scale[row] * root * eigen.eigenvectors[(i, k)];
+        }
+    }
+    factor
+}
+
+/// Returns the Cholesky factorisation of `variance` I + Fᵀ G F.
+fn inner(sums: &Sums, factor: &DMatrix<f64>, variance: f64) -> Option<Cholesky<f64, Dyn>> {
+    let mut matrix = factor.tr_mul(&(&sums.information * factor));
+    for k in 0..matrix.nrows() {
+        matrix[(k, k)] += variance;
+    }
+    matrix.cholesky()
+}
+
+impl Unchanged {
+    /// Computes the density of rows with these sums, for an estimate with the covariance F Fᵀ.
+    /// Returns `None` if a number is not finite.
+    pub fn new(sums: &Sums, factor: &DMatrix<f64>) -> Option<Self> {
+        let lower = inner(sums, factor, 1.0)?.unpack();
+        let carried = lower.solve_lower_triangular(&factor.tr_mul(&sums.information))?;
+        let along = lower.solve_lower_triangular(&factor.tr_mul(&sums.vector))?;
+        Some(Self {
+            information: &sums.information - carried.tr_mul(&carried),
+            vector: &sums.vector - carried.tr_mul(&along),
+            squares: sums.squares - along.norm_squared(),
+            lower,
+            along,
+        })
+    }
+
+    /// Returns ln LR of a cause with these columns and sizes, and the posterior mean and covariance
+    /// of its amplitudes.
+    pub fn cause(
+        &self,
+        columns: &[usize],
+        sizes: &[f64],
+    ) -> Option<(f64, DVector<f64>, DMatrix<f64>)> {
+        let n = columns.len();
+        let scaled = DMatrix::from_fn(n, n, |i, j| {
+            sizes[i] * self.information[(columns[i], columns[j])] * sizes[j]
+                + f64::from(u8::from(i == j))
+        });
+        let pull = DVector::from_fn(n, |i, _| sizes[i] * self.vector[columns[i]]);
+        let solved = scaled.cholesky()?;
+        let mean = solved.solve(&pull);
+        let ln_det: f64 = solved.l_dirty().diagonal().iter().map(|d| 2.0 * d.ln()).sum();
+        let ratio = 0.5 * (pull.dot(&mean) - ln_det);
+        let inverse = solved.inverse();
+        let covariance = DMatrix::from_fn(n, n, |i, j| sizes[i] * inverse[(i, j)] * sizes[j]);
+        Some((ratio, DVector::from_fn(n, |i, _| sizes[i] * mean[i]), covariance))
+    }
+
+    /// Returns ln LR of noise that is `ratio` times the assumed one.
+    pub fn noise(&self, sums: &Sums, factor: &DMatrix<f64>, ratio: f64) -> Option<f64> {
+        let variance = ratio * ratio;
+        let solved = inner(sums, factor, variance)?;
+        let pull = factor.tr_mul(&sums.vector);
+        let squares = (sums.squares - pull.dot(&solved.solve(&pull))) / variance;
+        let ln_det =
+            |lower: &DMatrix<f64>| -> f64 { lower.diagonal().iter().map(|d| 2.0 * d.ln()).sum() };
+        let rank = factor.ncols() as f64;
+        let with = ln_det(&solved.unpack()) + (sums.coordinates - rank) * variance.ln();
+        Some(0.5 * (ln_det(&self.lower) - with + self.squares - squares))
+    }
+
+    /// Returns ln LR of one gross row, averaged over the sizes of its error.
+    pub fn gross_row(
+        &self,
+        rows: &SensitiveRows,
+        row: usize,
+        factor: &DMatrix<f64>,
+    ) -> Option<f64> {
+        let carried =
+            self.lower.solve_lower_triangular(&(rows.of_row(row) * factor).transpose())?;
+        let measured: Vec<usize> = (0..rows.coordinates[row]).collect();
+        let carried = carried.select_columns(&measured);
+        let n = measured.len();
+        let information = DMatrix::identity(n, n) - carried.tr_mul(&carried);
+        let vector = rows.residual_of(row).select_rows(&measured) - carried.tr_mul(&self.along);
+        let ratios = GROSS_SIZES.iter().filter_map(|size| {
+            let solved = (DMatrix::identity(n, n) + &information * (size * size)).cholesky()?;
+            let ln_det: f64 = solved.l_dirty().diagonal().iter().map(|d| 2.0 * d.ln()).sum();
+            Some(0.5 * (vector.dot(&solved.solve(&vector)) * size * size - ln_det))
+        });
+        Some(ln_sum(ratios) - (GROSS_SIZES.len() as f64).ln())
+    }
+}
+
+/// Returns ln Σ exp(x) without overflow; −∞ for no numbers.
+pub(super) fn ln_sum(numbers: impl IntoIterator<Item = f64>) -> f64 {
+    let numbers: Vec<f64> = numbers.into_iter().collect();
+    let largest = numbers.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    if largest == f64::NEG_INFINITY {
+        return largest;
+    }
+    largest + numbers.iter().map(|number| (number - largest).exp()).sum::<f64>().ln()
+}

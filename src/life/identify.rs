@@ -1,0 +1,263 @@
+//! Identification with an earlier estimate as prior.
+
+use std::sync::Arc;
+
+use nalgebra::DMatrix;
+use serde_json::json;
+use statrs::distribution::{ChiSquared, ContinuousCDF as _};
+
+use super::assessment::{Assessment, assess};
+use super::causes::{Cause, CauseKind, Extended};
+use super::earlier::Earlier;
+use super::error::PriorError;
+use super::evidence::factor;
+use super::rows::SensitiveRows;
+use crate::fit::{
+    self, ComparedParameter, Finding, FindingCode, Identification, Options, Placement,
+    PriorComparison, SavedEstimate, Strategy,
+};
+use crate::measurement::{Dataset, Measurements, Split};
+use crate::model::Model;
+use crate::problem::Problem;
+use crate::quantity::Unit;
+
+/// Likelihood ratio at which new rows contradict the earlier estimate: a false alarm in at most
+/// one of a hundred identifications.
+const CONTRADICTION: f64 = 100.0;
+/// Maximum number of causes for which the prior is widened, one after the other.
+const MAX_CAUSES: usize = 4;
+/// Factor on the size of a change to which the prior of its parameters is widened.
+const WIDENING: f64 = 3.0;
+/// Smallest part of the prior variance that new rows must remove for their own estimate to be
+/// stated.
+const LEAST_LEARNED: f64 = 1e-3;
+/// Standard deviation (1 σ) of the deviation of a parameter without any prior: \[m\], \[rad\], or
+/// of a logarithm.
+const WIDE: f64 = 1.0;
+
+/// Fits the identification rows of `data` with the posterior of an earlier estimate as prior,
+/// widened by the drift of `days` days.
+///
+/// Rows that the earlier estimate was fitted to are left out, because the prior contains them.
+/// Where the new rows contradict the prior, the parameters that explain it best get a wide prior,
+/// and the fit is repeated.
+///
+/// # Errors
+/// Returns an error if the estimate is of another arm or has other laws, if no row is new, or if
+/// the fit fails.
+pub fn identify_with_prior(
+    problem: &Problem,
+    data: &Dataset,
+    options: &Options,
+    estimate: &SavedEstimate,
+    days: f64,
+) -> Result<Identification, PriorError> {
+    if options.strategy != Strategy::Joint {
+        let (file, found) = (estimate.file.clone(), options.strategy.as_str());
+        return Err(PriorError::Strategy { file, found });
+    }
+    let placement = Placement::of(&data.measurements);
+    let model = Model::new(problem, &placement.bases, &placement.targets)?;
+    let original = Earlier::of_estimate(estimate, problem, &model, days)?;
+    let is_new = |row: &usize| !original.fitted_rows.contains(&data.measurements.row_digest(*row));
+    let identification: Vec<usize> =
+        data.split.identification.iter().copied().filter(is_new).collect();
+    let left_out = data.split.identification.len() - identification.len();
+    if identification.is_empty() && left_out > 0 {
+        return Err(PriorError::NothingNew { file: original.file, rows: left_out });
+    }
+    let split = Split { identification, held_out: data.split.held_out.clone() };
+    let data = Dataset::new(data.measurements.clone(), split);
+    let mut problem = problem.clone();
+    if let Some(sigma) = original.sigma {
+        let declared = problem.data.position_sigma.unwrap_or(0.0);
+        problem.data.position_sigma = Some(sigma.max(declared));
+    }
+    let mut prior = original.clone();
+    let (mut causes, mut chi2) = (Vec::new(), None);
+    loop {
+        let options = options.clone().with_earlier(Arc::new(prior.data(&model)?));
+        let mut found = fit::identify(&problem, &data, &options)?;
+        let (cause, now) = contradiction(&problem, &model, (&data, &placement), &found, &prior);
+        chi2 = chi2.or(now);
+        let is_new_cause = cause.as_ref().is_some_and(|cause: &Contradiction| {
+            causes.iter().all(|earlier: &Contradiction| earlier.label != cause.label)
+        });
+        let cause = cause.filter(|_| is_new_cause && causes.len() < MAX_CAUSES);
+        let Some(cause) = cause else {
+            found.findings.extend(causes.iter().map(|cause| cause.finding(estimate)));
+            found.fitted_rows.extend(original.fitted_rows.iter().cloned());
+            found.fitted_rows.sort();
+            found.fitted_rows.dedup();
+            let labels = causes.into_iter().map(|cause| cause.label).collect();
+            found.prior = Some(compare(&model, &found, (&original, &prior), |comparison| {
+                PriorComparison { days, left_out, chi2, causes: labels, ..comparison }
+            }));
+            return Ok(found);
+        };
+        for &(parameter, size) in &cause.widened {
+            prior.widen(parameter, (WIDENING * size).powi(2));
+        }
+        if let Some(ratio) = cause.noise_ratio {
+            problem.data.position_sigma = problem.data.position_sigma.map(|sigma| sigma * ratio);
+        }
+        causes.push(cause);
+    }
+}
+
+/// Cause for which new rows contradict the earlier estimate.
+struct Contradiction {
+    label: String,
+    probability: f64,
+    /// Parameters of the model whose prior is widened, with the size of their change.
+    widened: Vec<(usize, f64)>,
+    /// Ratio of the noise to the assumed one, if it is larger.
+    noise_ratio: Option<f64>,
+}
+
+impl Contradiction {
+    fn finding(&self, estimate: &SavedEstimate) -> Finding {
+        let treatment = match (self.widened.is_empty(), self.noise_ratio) {
+            (false, _) => "; the prior of its parameters was widened",
+            (true, Some(_)) => "; the fit took the larger noise",
+            (true, None) => "",
+        };
+        let text = format!(
+            "the new rows contradict {} (error of this statement below 1 %); most probable cause: {} ({:.0} %){treatment}",
+            estimate.file.display(),
+            self.label,
+            100.0 * self.probability
+        );
+        let numbers = [json!(self.label), self.probability.into(), json!(!self.widened.is_empty())];
+        Finding::new(FindingCode::EarlierEstimateContradicted, numbers, text)
+    }
+}
+
+/// Tests whether the identification rows contradict the prior. Returns the most probable cause if
+/// they do, and χ² of the rows under the prior with its degrees of freedom and p-value.
+fn contradiction(
+    problem: &Problem,
+    model: &Model,
+    (data, placement): (&Dataset, &Placement),
+    found: &Identification,
+    prior: &Earlier,
+) -> (Option<Contradiction>, Option<(f64, f64, f64)>) {
+    let mut x = found.x.clone();
+    for (place, &k) in prior.places.iter().enumerate() {
+        x[k] = prior.mean[place];
+    }
+    let extended = Extended::new(problem, model, &x, [&placement.bases, &placement.targets]);
+    let rows = &data.split.identification;
+    let turn = problem.data.orientation_sigma.filter(|_| problem.data.fits_orientation);
+    let poses = placement.oriented_poses(&data.measurements, rows, (found.sigma, turn));
+    let mut sensitive = SensitiveRows::new(&extended.model, poses, &extended.x);
+    let warmth = warmth(problem, &data.measurements, rows);
+    let causes = extended.causes(problem, &mut sensitive, warmth.as_deref());
+    let covariance = covariance(&extended, prior, sensitive.sensitivity.ncols());
+    let assessed = assess(&sensitive, &factor(&covariance), &causes, false);
+    let Some(assessed) = assessed else { return (None, None) };
+    let p_value = ChiSquared::new(assessed.coordinates)
+        .map_or(f64::NAN, |distribution| distribution.sf(assessed.chi2));
+    let chi2 = Some((assessed.chi2, assessed.coordinates, p_value));
+    (most_probable(&assessed, &causes, extended.declared), chi2)
+}
+
+/// Returns the most probable cause if the rows contradict the prior.
+fn most_probable(
+    assessed: &Assessment,
+    causes: &[Cause],
+    declared: usize,
+) -> Option<Contradiction> {
+    let (_, evidence) = *assessed.looks.last()?;
+    let first = assessed.causes.first().filter(|_| evidence > CONTRADICTION.ln())?;
+    let cause = &causes[first.cause];
+    let size = |i: usize| first.sizes[i].max(first.mean[i].abs());
+    let widened = cause.columns.iter().enumerate().filter(|(_, k)| **k < declared);
+    Some(Contradiction {
+        label: match first.row {
+            Some(row) => format!("row {} is off", row + 1),
+            None => cause.label.clone(),
+        },
+        probability: first.probability,
+        widened: widened.map(|(i, &k)| (k, size(i))).collect(),
+        noise_ratio: (cause.kind == CauseKind::Noise).then(|| first.mean[0]),
+    })
+}
+
+/// Returns the difference of the temperature of `rows` from the reference \[K\], if the table
+/// states both.
+pub(super) fn warmth(
+    problem: &Problem,
+    measurements: &Measurements,
+    rows: &[usize],
+) -> Option<Vec<f64>> {
+    let (temperature, reference) =
+        (measurements.temperature.as_ref()?, problem.data.reference_temperature?);
+    Some(rows.iter().map(|&row| temperature[row] - reference).collect())
+}
+
+/// Returns the covariance of the deviations of all columns: that of the earlier estimate, declared
+/// priors where it has none, and 0 for added columns.
+pub(super) fn covariance(extended: &Extended, prior: &Earlier, columns: usize) -> DMatrix<f64> {
+    let mut covariance = DMatrix::zeros(columns, columns);
+    for (i, &k) in prior.places.iter().enumerate() {
+        for (j, &l) in prior.places.iter().enumerate() {
+            covariance[(k, l)] = prior.covariance[(i, j)];
+        }
+    }
+    for k in (0..extended.declared).filter(|&k| prior.place_of(k).is_none()) {
+        let parameter = &extended.model.parameters[k];
+        let is_wide = matches!(parameter.unit(), Unit::Length | Unit::Angle)
+            || parameter.unit().is_relative();
+        let wide = if is_wide { WIDE } else { 0.0 };
+        covariance[(k, k)] = parameter.sigma.unwrap_or(wide).powi(2);
+    }
+    covariance
+}
+
+/// Compares the posterior of a fit with the prior; `prior` is that of the earlier estimate and as
+/// it was widened for the fit.
+fn compare(
+    model: &Model,
+    found: &Identification,
+    (original, widened): (&Earlier, &Earlier),
+    with: impl FnOnce(PriorComparison) -> PriorComparison,
+) -> PriorComparison {
+    let variance = |k: usize| found.covariance.of(k, k).unwrap_or(0.0);
+    let compared = |(place, &k): (usize, &usize)| {
+        let (parameter, estimate) = (&model.parameters[k], &found.estimates[k]);
+        let slope = parameter.value_error(found.x[k], 1.0).abs();
+        let posterior = variance(k) / slope.powi(2);
+        let (mean, prior) = (original.mean[place], original.covariance[(place, place)]);
+        let fitted = widened.covariance[(place, place)];
+        // The information of the new rows: that of the posterior less that of the prior.
+        let learned = posterior.recip() - fitted.recip();
+        let data = (learned * fitted > LEAST_LEARNED).then(|| {
+            let value = (found.x[k] / posterior - mean / fitted) / learned;
+            (value, learned.recip())
+        });
+        let value = |x: f64, variance: f64| {
+            (parameter.value(x), parameter.value_error(x, variance.sqrt()).abs())
+        };
+        ComparedParameter {
+            name: estimate.name.clone(),
+            unit: estimate.unit,
+            prior: value(mean, prior),
+            data: data.map(|(x, variance)| value(x, variance)),
+            posterior: (estimate.estimate, variance(k).sqrt()),
+            difference: data.map(|(x, variance)| (x - mean) / (variance + prior).sqrt()),
+        }
+    };
+    let file = original.file.clone();
+    let parameters = original.places.iter().enumerate().map(compared).collect();
+    let sigma = original.sigma;
+    with(PriorComparison {
+        file,
+        days: 0.0,
+        left_out: 0,
+        sigma,
+        chi2: None,
+        causes: Vec::new(),
+        parameters,
+    })
+}

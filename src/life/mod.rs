@@ -1,0 +1,25 @@
+//! Life of an arm: an earlier estimate as the prior of a new one, and its change since.
+//!
+//! [`identify_with_prior`] fits new rows with the posterior of an earlier estimate as prior. The
+//! earlier rows are not counted again. The prior is widened by drift, and where the new rows
+//! contradict it. [`watch()`] tests new rows one after the other for a change since the estimate.
+
+mod assessment;
+mod causes;
+mod drift;
+mod earlier;
+mod error;
+mod evidence;
+mod identify;
+mod rows;
+mod watch;
+
+#[doc(hidden)]
+pub use causes::CauseKind;
+#[doc(hidden)]
+pub use error::PriorError;
+#[doc(hidden)]
+pub use identify::identify_with_prior;
+pub(crate) use watch::NAMED;
+#[doc(hidden)]
+pub use watch::{Change, Watch, WatchedCause, watch};

@@ -1,0 +1,345 @@
+//! Watch: has an arm changed since its estimate, and what?
+
+use nalgebra::{DMatrix, DVector};
+use statrs::distribution::{ChiSquared, ContinuousCDF as _};
+
+use super::assessment::{AssessedCause, assess};
+use super::causes::{Cause, CauseKind, Extended};
+use super::earlier::Earlier;
+use super::error::PriorError;
+use super::evidence::{Unchanged, factor};
+use super::identify::{covariance, warmth};
+use super::rows::{SensitiveRows, Sums};
+use crate::fit::{self, Placement, SavedEstimate};
+use crate::measurement::Measurements;
+use crate::model::{Model, Pose};
+use crate::observation::kind_named;
+use crate::problem::Problem;
+use crate::quantity::Unit;
+
+/// Largest number of causes that are reported.
+const MAX_CAUSES: usize = 6;
+/// Smallest probability of a cause that is reported beside the first.
+const LEAST_PROBABILITY: f64 = 0.005;
+/// Probability from which a cause is named; below it is one of several.
+pub(crate) const NAMED: f64 = 0.9;
+/// Largest number of groups of rows that are left out in turn.
+const MAX_GROUPS: usize = 60;
+/// Smallest evidence of a pose for one cause against another, in nats, that tells them apart.
+const LEAST_DIFFERENCE: f64 = 1e-3;
+/// Standard deviation (1 σ) of a coordinate if nothing is known of it \[m\].
+const UNKNOWN_SIGMA: f64 = 1e-3;
+
+/// Verdict on an arm since its estimate.
+#[derive(Debug, Clone)]
+pub struct Watch {
+    /// Probability of a false alarm at any look.
+    pub false_alarm_rate: f64,
+    /// Number of rows that were tested.
+    pub rows: usize,
+    /// Number of rows that were left out, because the estimate was fitted to them.
+    pub left_out: usize,
+    /// ln of the evidence for a change after each look, with the number of rows then.
+    pub looks: Vec<(usize, f64)>,
+    /// Number of rows at the first look with an alarm; `None` if the arm is unchanged.
+    pub changed_at: Option<usize>,
+    /// χ² of all rows under "unchanged", its degrees of freedom, and its p-value.
+    pub chi2: (f64, f64, f64),
+    /// Root mean square error of the rows as the estimate predicts them \[m\] or \[rad\].
+    pub error: f64,
+    /// Unit of the errors: that of the first kind of rows.
+    pub unit: Unit,
+    /// Standard deviation (1 σ) of a coordinate of these rows: noise and known misfit.
+    pub sigma: f64,
+    /// Causes of a change, the most probable first.
+    pub causes: Vec<WatchedCause>,
+}
+
+/// Cause of a change with its probability and size.
+#[derive(Debug, Clone)]
+pub struct WatchedCause {
+    /// Kind of the cause.
+    pub kind: CauseKind,
+    /// Name for people, such as "zero of joint 2".
+    pub label: String,
+    /// Gross row, counted from 0, if that is the cause.
+    pub row: Option<usize>,
+    /// Probability among all causes, given that something changed.
+    pub probability: f64,
+    /// Changes of what the cause moves; the ratio of the noise for larger noise.
+    pub changes: Vec<Change>,
+    /// Root mean square error of each row, predicted with this cause as estimated without the row
+    /// \[m\] or \[rad\]; `None` for noise.
+    pub left_out_error: Option<f64>,
+    /// Number of further poses like these after which this cause and the next one are expected to
+    /// be told apart; `None` if no number of them would, or there is no other.
+    pub poses_to_tell_apart: Option<usize>,
+}
+
+/// Change of one parameter since the estimate.
+#[derive(Debug, Clone)]
+pub struct Change {
+    /// Name of the parameter.
+    pub parameter: String,
+    /// Unit of the change.
+    pub unit: Unit,
+    /// Change, SI; of the logarithm for stiffnesses.
+    pub change: f64,
+    /// Standard error of the change.
+    pub std_error: f64,
+}
+
+impl Watch {
+    /// Returns true if the arm, or its measurement, has changed.
+    pub fn is_changed(&self) -> bool {
+        self.changed_at.is_some()
+    }
+
+    /// Returns the most probable cause if the arm has changed and no other is likely.
+    pub fn named(&self) -> Option<&WatchedCause> {
+        self.causes.first().filter(|cause| self.is_changed() && cause.probability >= NAMED)
+    }
+}
+
+/// Tests measured rows, in their order, against an estimate that is `days` days old.
+///
+/// The residuals of an unchanged arm are normal with the covariance of noise, known misfit and
+/// estimate. Their density is compared with a mixture of densities, one for each cause and size of
+/// a change. The ratio exceeds 1 / `false_alarm_rate` at any look with at most that probability if
+/// nothing changed. Rows that the estimate was fitted to are left out.
+///
+/// # Errors
+/// Returns an error if the estimate is of another arm or has other laws, or if no row is new.
+pub fn watch(
+    problem: &Problem,
+    estimate: &SavedEstimate,
+    measurements: &Measurements,
+    (days, false_alarm_rate): (f64, f64),
+) -> Result<Watch, PriorError> {
+    let fitted = &estimate.posterior().fitted_rows;
+    let new: Vec<usize> = (0..measurements.len())
+        .filter(|&row| !fitted.contains(&measurements.row_digest(row)))
+        .collect();
+    let left_out = measurements.len() - new.len();
+    if new.is_empty() {
+        return Err(PriorError::NothingNew { file: estimate.file.clone(), rows: left_out });
+    }
+    let kept = if left_out > 0 { measurements.select(&new) } else { measurements.clone() };
+    let placement = Placement::of(&kept);
+    let model = Model::new(problem, &placement.bases, &placement.targets)?;
+    let earlier = Earlier::of_estimate(estimate, problem, &model, days)?;
+    let x = fit::predict(problem, Some(estimate), &kept, None)?.x;
+    let extended = Extended::new(problem, &model, &x, [&placement.bases, &placement.targets]);
+    let every_row: Vec<usize> = (0..kept.len()).collect();
+    let turn = problem.data.orientation_sigma.filter(|_| problem.data.fits_orientation);
+    let (sigma, noise) = noise(problem, estimate);
+    let mut poses = placement.oriented_poses(&kept, &every_row, (sigma, turn));
+    estimate.count_time_in(&mut poses);
+    for pose in &mut poses {
+        noise.raise(pose);
+    }
+    let leading = kept.leading();
+    let leads: Vec<bool> =
+        every_row.iter().map(|&row| kept.observation(row).kind() == leading.kind()).collect();
+    let mut rows = SensitiveRows::new(&extended.model, poses, &extended.x);
+    let warmth = warmth(problem, &kept, &every_row);
+    let causes = extended.causes(problem, &mut rows, warmth.as_deref());
+    let factor = factor(&covariance(&extended, &earlier, rows.sensitivity.ncols()));
+    let assessed = assess(&rows, &factor, &causes, true)
+        .ok_or(PriorError::NotFinite { file: estimate.file.clone() })?;
+    let threshold = -false_alarm_rate.ln();
+    let changed_at = assessed.looks.iter().find(|look| look.1 >= threshold).map(|look| look.0);
+    let p_value = ChiSquared::new(assessed.coordinates)
+        .map_or(f64::NAN, |distribution| distribution.sf(assessed.chi2));
+    let report = Reporter { rows: &rows, factor: &factor, causes: &causes, leads: &leads };
+    let reported: Vec<&AssessedCause> = assessed
+        .causes
+        .iter()
+        .enumerate()
+        .filter(|(k, cause)| *k == 0 || cause.probability >= LEAST_PROBABILITY)
+        .map(|(_, cause)| cause)
+        .take(MAX_CAUSES)
+        .collect();
+    let in_file = |row: usize| new[row];
+    let causes = (0..reported.len())
+        .map(|k| WatchedCause {
+            row: reported[k].row.map(in_file),
+            ..report.cause(reported[k], reported.get(usize::from(k == 0)).copied())
+        })
+        .collect();
+    Ok(Watch {
+        false_alarm_rate,
+        rows: kept.len(),
+        left_out,
+        looks: assessed.looks,
+        changed_at,
+        chi2: (assessed.chi2, assessed.coordinates, p_value),
+        error: report.rms(|row| rows.residual_of(row)),
+        unit: kind_named(leading.kind()).unit,
+        sigma: leads.iter().position(|leads| *leads).map_or(f64::NAN, |first| rows.sigma[first]),
+        causes,
+    })
+}
+
+/// Noise beyond the declared one that the earlier fit found.
+struct KnownNoise {
+    /// Standard deviation (1 σ) of the misfit of a position's coordinate \[m\].
+    misfit: f64,
+    /// Factor on the σ of other kinds of rows.
+    factor: f64,
+}
+
+impl KnownNoise {
+    /// Adds the known misfit to the σ of a row.
+    fn raise(&self, pose: &mut Pose) {
+        if pose.observation.is_position() {
+            pose.sigma = pose.sigma.hypot(self.misfit);
+        } else {
+            pose.sigma *= self.factor;
+        }
+        if let Some(orientation) = &mut pose.orientation {
+            orientation.sigma *= self.factor;
+        }
+    }
+}
+
+/// Returns σ of a position's coordinate in rows that state none \[m\], and the noise beyond it that
+/// the earlier fit found: the larger of the σ that it took, and of the noise of its predictions.
+fn noise(problem: &Problem, estimate: &SavedEstimate) -> (f64, KnownNoise) {
+    let saved = estimate.posterior();
+    let declared = problem.data.position_sigma.or(estimate.estimated_sigma);
+    let sigma = declared.unwrap_or(UNKNOWN_SIGMA);
+    let taken = if saved.noise_factor > 1.0 { saved.sigma_taken } else { None };
+    let of_predictions = || {
+        let text = estimate.prediction.as_ref()?;
+        let prediction: serde_json::Value = serde_json::from_str(text).ok()?;
+        let number = |key: &str| prediction.get(key)?.as_f64();
+        Some(number("noise_m")?.hypot(number("configuration_noise_m")?))
+    };
+    let largest = taken.unwrap_or(0.0).max(of_predictions().unwrap_or(0.0));
+    let misfit = (largest * largest - sigma * sigma).max(0.0).sqrt();
+    (sigma, KnownNoise { misfit, factor: saved.noise_factor.max(1.0).sqrt() })
+}
+
+/// Rows and causes from which the report of a cause is computed.
+struct Reporter<'a> {
+    rows: &'a SensitiveRows,
+    factor: &'a DMatrix<f64>,
+    causes: &'a [Cause],
+    /// True for rows of the first kind, whose errors are reported.
+    leads: &'a [bool],
+}
+
+impl Reporter<'_> {
+    /// Reports a cause; `rival` is the most probable other one.
+    fn cause(&self, assessed: &AssessedCause, rival: Option<&AssessedCause>) -> WatchedCause {
+        let cause = &self.causes[assessed.cause];
+        let changes = cause.amplitudes.iter().enumerate().map(|(i, (name, unit))| Change {
+            parameter: name.clone(),
+            unit: *unit,
+            change: assessed.mean[i],
+            std_error: assessed.covariance[(i, i)].sqrt(),
+        });
+        let mut changes: Vec<Change> = changes.collect();
+        if cause.kind == CauseKind::Noise {
+            let (parameter, unit) = ("ratio of the noise".to_owned(), Unit::Number);
+            changes.push(Change { parameter, unit, change: assessed.mean[0], std_error: f64::NAN });
+        }
+        let rival = rival.filter(|rival| rival.cause != assessed.cause);
+        WatchedCause {
+            kind: cause.kind,
+            label: match assessed.row {
+                Some(row) => format!("row {} is off", row + 1),
+                None => cause.label.clone(),
+            },
+            row: assessed.row,
+            probability: assessed.probability,
+            changes,
+            left_out_error: match (cause.kind, assessed.row) {
+                (CauseKind::Noise, _) => None,
+                (_, Some(off)) => {
+                    Some(self.rms_of(|row| row != off, |row| self.rows.residual_of(row)))
+                }
+                _ => self.left_out_error(cause, assessed),
+            },
+            poses_to_tell_apart: rival.and_then(|rival| self.poses_to_tell_apart(assessed, rival)),
+        }
+    }
+
+    /// Returns the root mean square length of residuals of the first kind of rows \[m\] or \[rad\].
+    fn rms(&self, residual: impl Fn(usize) -> DVector<f64>) -> f64 {
+        self.rms_of(|_| true, residual)
+    }
+
+    fn rms_of(
+        &self,
+        counts: impl Fn(usize) -> bool,
+        residual: impl Fn(usize) -> DVector<f64>,
+    ) -> f64 {
+        let chosen: Vec<usize> =
+            (0..self.rows.len()).filter(|&row| self.leads[row] && counts(row)).collect();
+        let square = |&row: &usize| {
+            let numbers = residual(row);
+            numbers.rows(0, numbers.len().min(3)).norm_squared() * self.rows.sigma[row].powi(2)
+        };
+        (chosen.iter().map(square).sum::<f64>() / chosen.len().max(1) as f64).sqrt()
+    }
+
+    /// Returns the error of each row if only the cause is updated, as estimated without the row and
+    /// its group.
+    fn left_out_error(&self, cause: &Cause, assessed: &AssessedCause) -> Option<f64> {
+        let (rows, columns) = (self.rows, self.rows.sensitivity.ncols());
+        let mut sums = Sums::new(columns);
+        (0..rows.len()).for_each(|row| sums.add(rows, row, 1.0));
+        let groups = rows.len().min(MAX_GROUPS);
+        let means: Option<Vec<DVector<f64>>> = (0..groups)
+            .map(|group| {
+                let mut others = sums.clone();
+                (group..rows.len()).step_by(groups).for_each(|row| others.add(rows, row, -1.0));
+                let unchanged = Unchanged::new(&others, self.factor)?;
+                Some(unchanged.cause(&cause.columns, &assessed.sizes)?.1)
+            })
+            .collect();
+        let means = means?;
+        Some(self.rms(|row| {
+            let columns = rows.of_row(row).select_columns(&cause.columns);
+            rows.residual_of(row) - columns * &means[row % groups]
+        }))
+    }
+
+    /// Returns the number of further poses like these after which a cause is expected to be nine
+    /// times as probable as its rival, if it is the true one.
+    fn poses_to_tell_apart(
+        &self,
+        assessed: &AssessedCause,
+        rival: &AssessedCause,
+    ) -> Option<usize> {
+        let (cause, other) = (&self.causes[assessed.cause], &self.causes[rival.cause]);
+        let wanted = (NAMED / (1.0 - NAMED)).ln() - (assessed.probability / rival.probability).ln();
+        if wanted <= 0.0 {
+            return Some(0);
+        }
+        if cause.columns.is_empty() || other.columns.is_empty() {
+            return None;
+        }
+        let mut sums = Sums::new(self.rows.sensitivity.ncols());
+        (0..self.rows.len()).for_each(|row| sums.add(self.rows, row, 1.0));
+        let unchanged = Unchanged::new(&sums, self.factor)?;
+        let part = |a: &[usize], b: &[usize]| {
+            DMatrix::from_fn(a.len(), b.len(), |i, j| unchanged.information[(a[i], b[j])])
+        };
+        // The part of the change that the rival cannot imitate.
+        let shown = part(&cause.columns, &cause.columns) * &assessed.mean;
+        let seen = part(&other.columns, &cause.columns) * &assessed.mean;
+        let mut matrix = part(&other.columns, &other.columns);
+        for (i, size) in rival.sizes.iter().enumerate() {
+            matrix[(i, i)] += size.powi(-2);
+        }
+        let imitated = seen.dot(&matrix.cholesky()?.solve(&seen));
+        let nats = 0.5 * (assessed.mean.dot(&shown) - imitated).max(0.0);
+        let of_pose = nats / self.rows.len() as f64;
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "small, ≥ 0")]
+        let poses = (wanted / of_pose).ceil() as usize;
+        (of_pose > LEAST_DIFFERENCE).then_some(poses)
+    }
+}

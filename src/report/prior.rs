@@ -1,0 +1,71 @@
+//! Prior, new data and posterior of a fit with an earlier estimate, in words.
+
+use super::document::{Block, Table};
+use crate::fit::{ComparedParameter, Identification, PriorComparison};
+use crate::quantity::format::{counted, decimals, number, or_dash, p_value};
+
+/// Header of the table of parameters.
+const HEADER: [&str; 7] =
+    ["parameter", "earlier", "± 1 σ", "new rows", "± 1 σ", "posterior", "± 1 σ"];
+/// Maximum number of decimals of a value.
+const MAX_DECIMALS: usize = 6;
+
+/// Returns the comparison with the earlier estimate: a summary, and a table of all parameters that
+/// it informs on; nothing without one.
+pub(super) fn prior<'a>(found: &Identification) -> Vec<Block<'a>> {
+    let Some(comparison) = &found.prior else { return Vec::new() };
+    let rows = comparison.parameters.iter().map(row).collect();
+    let note =
+        "new rows: what they say together with the earlier estimate of the other parameters; \
+                –: they say less than a thousandth of what was known"
+            .to_owned();
+    let table = Table { notes: vec![note], ..Table::new(&HEADER, rows, &[0]) };
+    vec![
+        Block::Heading("Earlier estimate as prior".to_owned()),
+        Block::Text(summary(comparison)),
+        Block::Table(table),
+    ]
+}
+
+/// States whether the new rows agree with the earlier estimate.
+pub(super) fn summary(comparison: &PriorComparison) -> String {
+    let mut text = format!("Prior: {}", comparison.file.display());
+    if comparison.days > 0.0 {
+        text += &format!(", widened by the drift of {}", counted_days(comparison.days));
+    }
+    if comparison.left_out > 0 {
+        let rows = counted(comparison.left_out, "row");
+        text += &format!("; {rows} that it was fitted to left out");
+    }
+    if let Some((chi2, coordinates, p)) = comparison.chi2 {
+        text += &format!(
+            ". New rows against it: χ² {} of {coordinates:.0} coordinates, p {}",
+            number(chi2, 1),
+            p_value(p)
+        );
+    }
+    text += &match comparison.causes.as_slice() {
+        [] => ". They agree.".to_owned(),
+        causes => format!(". They disagree: {}.", causes.join("; ")),
+    };
+    text
+}
+
+fn counted_days(days: f64) -> String {
+    format!("{days} {}", if days > 1.0 { "days" } else { "day" })
+}
+
+fn row(compared: &ComparedParameter) -> Vec<String> {
+    let unit = compared.unit.display(compared.prior.0);
+    let digits = decimals(compared.posterior.1 * unit.factor, MAX_DECIMALS);
+    let show = |value: f64| number(value * unit.factor, digits);
+    vec![
+        format!("{} [{}]", compared.name, unit.symbol),
+        show(compared.prior.0),
+        show(compared.prior.1),
+        or_dash(compared.data, |data| show(data.0)),
+        or_dash(compared.data, |data| show(data.1)),
+        show(compared.posterior.0),
+        show(compared.posterior.1),
+    ]
+}

@@ -1,0 +1,79 @@
+//! Comparison with an earlier estimate that was the prior, in estimate.json.
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use crate::fit::{ComparedParameter, PriorComparison};
+
+/// Use of an earlier estimate as prior.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct PriorUse {
+    pub file: String,
+    pub drift_days: f64,
+    /// Number of rows that were left out, because the earlier estimate was fitted to them.
+    pub rows_left_out: usize,
+    /// Standard deviation (1 σ) of a coordinate taken from the earlier fit; null if that is the
+    /// declared one.
+    pub sigma_mm: Option<f64>,
+    /// χ² of the new rows under the prior.
+    pub chi2: Option<f64>,
+    pub coordinates: Option<f64>,
+    pub p_value: Option<f64>,
+    /// Causes for which the new rows contradict the prior.
+    pub contradicted_by: Vec<String>,
+    pub parameters: Vec<PriorParameter>,
+}
+
+/// Parameter with its prior, what the new rows say of it, and its posterior.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct PriorParameter {
+    pub name: String,
+    pub unit: &'static str,
+    /// Earlier estimate, widened by drift.
+    pub prior: Value,
+    /// Estimate by the new rows, with the prior of the other parameters; null if they say nothing.
+    pub data: Option<Value>,
+    pub posterior: Value,
+    /// Difference of data and prior, in units of its standard deviation.
+    pub difference_sigmas: Option<f64>,
+}
+
+/// Value with its standard error.
+#[derive(Debug, Serialize, JsonSchema)]
+#[schemars(rename = "ValueWithError")]
+pub struct Value {
+    pub estimate: f64,
+    pub std_error: f64,
+}
+
+impl PriorUse {
+    /// Converts a comparison.
+    pub(super) fn new(comparison: &PriorComparison) -> Self {
+        let chi2 = comparison.chi2;
+        Self {
+            file: comparison.file.display().to_string(),
+            drift_days: comparison.days,
+            rows_left_out: comparison.left_out,
+            sigma_mm: comparison.sigma.map(|sigma| sigma * 1e3),
+            chi2: chi2.map(|(chi2, ..)| chi2),
+            coordinates: chi2.map(|(_, coordinates, _)| coordinates),
+            p_value: chi2.map(|(.., p_value)| p_value),
+            contradicted_by: comparison.causes.clone(),
+            parameters: comparison.parameters.iter().map(PriorParameter::new).collect(),
+        }
+    }
+}
+
+impl PriorParameter {
+    fn new(compared: &ComparedParameter) -> Self {
+        let value = |(estimate, std_error)| Value { estimate, std_error };
+        Self {
+            name: compared.name.clone(),
+            unit: compared.unit.symbol(),
+            prior: value(compared.prior),
+            data: compared.data.map(value),
+            posterior: value(compared.posterior),
+            difference_sigmas: compared.difference,
+        }
+    }
+}

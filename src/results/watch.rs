@@ -1,0 +1,129 @@
+//! Result of the command `watch`: watch.json.
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::document::Document;
+use crate::life::{Change, Watch, WatchedCause};
+use crate::problem::Problem;
+use crate::quantity::Unit;
+
+/// Verdict on an arm since its estimate.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct WatchResult {
+    pub problem: String,
+    pub estimate: String,
+    pub changed: bool,
+    /// Probability of an alarm at any look if nothing has changed.
+    pub false_alarm_rate: f64,
+    /// Days of drift that "unchanged" allows for.
+    pub drift_days: f64,
+    pub rows: usize,
+    /// Number of rows that were left out, because the estimate was fitted to them.
+    pub rows_left_out: usize,
+    /// Number of rows at the first look with an alarm; null without one.
+    pub changed_at_row: Option<usize>,
+    /// Number of rows after each look.
+    pub look_rows: Vec<usize>,
+    /// Common logarithm of the evidence for a change after each look; an alarm at
+    /// −log10 of the false-alarm rate.
+    pub log10_evidence: Vec<f64>,
+    /// χ² of all rows if nothing has changed.
+    pub chi2: f64,
+    pub coordinates: f64,
+    pub p_value: f64,
+    /// Root mean square error of the rows as the estimate predicts them, in `unit`.
+    pub error: f64,
+    /// Standard deviation (1 σ) of a coordinate: noise and known misfit, in `unit`.
+    pub sigma: f64,
+    pub unit: &'static str,
+    /// Causes of a change, the most probable first.
+    pub causes: Vec<CauseResult>,
+}
+
+/// Cause of a change.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct CauseResult {
+    /// Kind of the cause, such as `joint-zero`, `tool`, `noise` or `row`.
+    pub kind: &'static str,
+    pub label: String,
+    /// Gross row, counted from 1, if that is the cause.
+    pub row: Option<usize>,
+    /// Probability among all causes, given that something changed.
+    pub probability: f64,
+    pub changes: Vec<ChangeResult>,
+    /// Root mean square error of each row with this cause as estimated without it, in `unit`.
+    pub left_out_error: Option<f64>,
+    /// Number of further poses after which this cause and the next one are expected to be told
+    /// apart; null if no number of such poses would.
+    pub poses_to_tell_apart: Option<usize>,
+}
+
+/// Change of a parameter since the estimate, SI; of the logarithm for stiffnesses.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct ChangeResult {
+    pub parameter: String,
+    pub unit: &'static str,
+    pub change: f64,
+    pub std_error: Option<f64>,
+}
+
+impl Document for WatchResult {
+    const FORMAT: &'static str = "flexcal-watch";
+}
+
+impl WatchResult {
+    /// Converts a verdict on an `estimate` that is `days` days old.
+    pub fn new(problem: &Problem, estimate: &str, days: f64, watch: &Watch) -> Self {
+        let unit = watch.unit.display(0.0);
+        let (chi2, coordinates, p_value) = watch.chi2;
+        Self {
+            problem: problem.name.clone(),
+            estimate: estimate.to_owned(),
+            changed: watch.is_changed(),
+            false_alarm_rate: watch.false_alarm_rate,
+            drift_days: days,
+            rows: watch.rows,
+            rows_left_out: watch.left_out,
+            changed_at_row: watch.changed_at,
+            look_rows: watch.looks.iter().map(|look| look.0).collect(),
+            log10_evidence: watch.looks.iter().map(|look| look.1 / 10_f64.ln()).collect(),
+            chi2,
+            coordinates,
+            p_value,
+            error: watch.error * unit.factor,
+            sigma: watch.sigma * unit.factor,
+            unit: match watch.unit {
+                Unit::Angle => "deg",
+                Unit::Pixel => "px",
+                _ => "mm",
+            },
+            causes: watch.causes.iter().map(|cause| CauseResult::new(cause, unit.factor)).collect(),
+        }
+    }
+}
+
+impl CauseResult {
+    fn new(cause: &WatchedCause, factor: f64) -> Self {
+        Self {
+            kind: cause.kind.as_str(),
+            label: cause.label.clone(),
+            row: cause.row.map(|row| row + 1),
+            probability: cause.probability,
+            changes: cause.changes.iter().map(ChangeResult::new).collect(),
+            left_out_error: cause.left_out_error.map(|error| error * factor),
+            poses_to_tell_apart: cause.poses_to_tell_apart,
+        }
+    }
+}
+
+impl ChangeResult {
+    fn new(change: &Change) -> Self {
+        Self {
+            parameter: change.parameter.clone(),
+            unit: if change.unit.is_relative() { "ln" } else { change.unit.symbol() },
+            change: change.change,
+            std_error: Some(change.std_error).filter(|error| error.is_finite()),
+        }
+    }
+}

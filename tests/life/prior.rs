@@ -1,0 +1,114 @@
+//! Identification with an earlier estimate as prior.
+
+use flexcal::fit::{FindingCode, Identification, Options};
+use flexcal::life::{PriorError, identify_with_prior};
+use flexcal::measurement::{Dataset, Split};
+
+use crate::bench::{Bench, whole, with_zero};
+use crate::common::program::{Folder, assert_contains};
+
+/// Poses of a full calibration.
+const FULL: usize = 40;
+
+/// Returns the error of the full calibration, and the fit of new poses of a changed arm with it as
+/// prior, with its error [m].
+pub fn again(bench: &Bench, seed: u64, poses: usize, zero: f64) -> (f64, f64, Identification) {
+    let arm = bench.arm(seed);
+    let rows = bench.measure(&arm, FULL, 1000 + seed, 1.0);
+    let full = bench.calibrate(&rows);
+    let estimate = bench.saved(&full, &rows);
+    let changed = with_zero(&arm, 2, zero);
+    let rows = bench.measure(&changed, poses, 5000 + seed, 1.0);
+    let options = Options::default();
+    let found =
+        identify_with_prior(&bench.problem, &whole(&rows), &options, &estimate, 1.0).unwrap();
+    (bench.error(&full, &arm), bench.error(&found, &changed), found)
+}
+
+#[test]
+fn five_poses_with_the_earlier_estimate_do_as_well_as_forty() {
+    let bench = Bench::new();
+    let (mut full, mut prior, mut alone) = (0.0, 0.0, 0.0);
+    for seed in 0..4 {
+        let (of_full, of_prior, found) = again(&bench, seed, 5, 0.0);
+        assert!(found.is_trusted(), "{:?}", found.findings);
+        assert!(!found.has(FindingCode::EarlierEstimateContradicted));
+        let arm = bench.arm(seed);
+        let rows = bench.measure(&arm, 5, 5000 + seed, 1.0);
+        let few = bench.calibrate(&rows);
+        full += of_full;
+        prior += of_prior;
+        alone += bench.error(&few, &arm);
+    }
+    println!("full {full:.2e}, prior {prior:.2e}, alone {alone:.2e}");
+    assert!(prior < 1.15 * full && alone > 2.0 * full, "{full} {prior} {alone}");
+}
+
+#[test]
+fn a_moved_zero_is_named_and_fitted() {
+    let bench = Bench::new();
+    let (full, prior, found) = again(&bench, 3, 8, 0.05);
+    let finding = found.finding(FindingCode::EarlierEstimateContradicted).unwrap();
+    assert_eq!(finding.word("cause"), Some("zero of joint 2"), "{finding}");
+    println!("full {full:.2e}, prior {prior:.2e}");
+    assert!(prior < 1.6 * full, "{full} {prior}");
+}
+
+#[test]
+fn earlier_rows_are_not_counted_twice() {
+    let bench = Bench::new();
+    let arm = bench.arm(1);
+    let rows = bench.measure(&arm, FULL + 5, 77, 1.0);
+    let split = Split { identification: (0..FULL).collect(), held_out: Vec::new() };
+    let data = Dataset::new(rows.clone(), split);
+    let full = flexcal::fit::identify(&bench.problem, &data, &Options::default()).unwrap();
+    let estimate = bench.saved(&full, &rows.select(&(0..FULL).collect::<Vec<_>>()));
+    let run = |data: &Dataset| {
+        identify_with_prior(&bench.problem, data, &Options::default(), &estimate, 0.0)
+    };
+    let new = rows.select(&(FULL..FULL + 5).collect::<Vec<_>>());
+    let (all, only_new) = (run(&whole(&rows)).unwrap(), run(&whole(&new)).unwrap());
+    for (a, b) in all.estimates.iter().zip(&only_new.estimates) {
+        let error = b.std_error.unwrap();
+        assert!((a.estimate - b.estimate).abs() < 1e-3 * error, "{}", a.name);
+    }
+    // All rows at once say the same as the earlier ones and the new ones in turn.
+    let at_once = bench.calibrate(&rows);
+    for (a, b) in at_once.estimates.iter().zip(&only_new.estimates) {
+        let error = a.std_error.unwrap();
+        assert!((a.estimate - b.estimate).abs() < 0.3 * error, "{}: {a:?} {b:?}", a.name);
+        let ratio = b.std_error.unwrap() / error;
+        assert!((0.8..1.25).contains(&ratio), "{}: {ratio}", a.name);
+    }
+    assert!(matches!(run(&data), Err(PriorError::NothingNew { rows: FULL, .. })));
+}
+
+#[test]
+fn the_command_names_what_differs_and_shows_prior_data_and_posterior() {
+    let folder = Folder::with_lunar_sampler();
+    folder.flexcal("identify problem.toml --data a-none.csv --out first").success();
+    let text = folder.read("a-none.csv");
+    // A second table: the held-out rows of the first one, as rows to identify from.
+    let header = text.lines().next().unwrap();
+    let others = text.lines().filter(|line| line.contains("validation"));
+    let marked = others.take(14).enumerate().map(|(k, line)| match k {
+        0..10 => line.replace("validation", "identification"),
+        _ => line.to_owned(),
+    });
+    let rows: Vec<String> = [header.to_owned()].into_iter().chain(marked).collect();
+    folder.write("second.csv", rows.join("\n") + "\n");
+    let run = "identify problem.toml --data second.csv --prior first/estimate.json --out second";
+    let shown = folder.flexcal(&format!("{run} --drift 2 -v")).success();
+    assert_contains(&shown.stdout, &["Earlier estimate as prior", "drift of 2 days", "They agree"]);
+    let json = folder.flexcal(&format!("{run} --json")).json();
+    assert_eq!(json["prior"]["rows_left_out"], 0);
+    assert!(json["prior"]["parameters"].as_array().unwrap().len() > 10);
+    let again = "identify problem.toml --data a-none.csv --prior first/estimate.json --out third";
+    assert_contains(&folder.flexcal(again).code(2).stderr, &["nothing is new"]);
+    let problem = folder.read("problem.toml");
+    folder.write("problem.toml", problem.replacen("mass_kg = ", "mass_kg = 1", 1));
+    assert_contains(&folder.flexcal(run).code(2).stderr, &["joint ", "declared differently"]);
+    folder.write("problem.toml", problem + "\n[[effect]]\ngear-ratio = { joint = 3 }\n");
+    let said = folder.flexcal(run).code(2).stderr;
+    assert_contains(&said, &["has no estimate of gear-ratio[3].error"]);
+}

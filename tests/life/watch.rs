@@ -1,0 +1,106 @@
+//! Changes since an estimate.
+
+use flexcal::fit::SavedEstimate;
+use flexcal::life::{CauseKind, Watch, watch};
+use flexcal::measurement::Measurements;
+use flexcal::problem::Problem;
+use nalgebra::Vector3;
+
+use crate::bench::{Bench, warmed, with_tool, with_zero};
+use crate::common::program::{Folder, assert_contains};
+
+/// Poses of the calibration.
+const FULL: usize = 40;
+
+/// Returns a true arm, and its estimate.
+pub fn calibrated(bench: &Bench, seed: u64) -> (Problem, SavedEstimate) {
+    let arm = bench.arm(seed);
+    let rows = bench.measure(&arm, FULL, 1000 + seed, 1.0);
+    let found = bench.calibrate(&rows);
+    let estimate = bench.saved(&found, &rows);
+    (arm, estimate)
+}
+
+pub fn judged(bench: &Bench, estimate: &SavedEstimate, rows: &Measurements) -> Watch {
+    watch(&bench.problem, estimate, rows, (0.0, 0.01)).unwrap()
+}
+
+#[test]
+fn an_unchanged_arm_is_unchanged() {
+    let bench = Bench::new();
+    for seed in 0..5 {
+        let (arm, estimate) = calibrated(&bench, seed);
+        let rows = bench.measure(&arm, 20, 3000 + seed, 1.0);
+        let verdict = judged(&bench, &estimate, &rows);
+        assert!(!verdict.is_changed() && verdict.chi2.2 > 1e-3, "{verdict:?}");
+        assert_eq!((verdict.rows, verdict.looks.len()), (20, 20));
+    }
+}
+
+#[test]
+fn a_moved_zero_and_a_moved_tool_are_named_with_their_size() {
+    let bench = Bench::new();
+    let (arm, estimate) = calibrated(&bench, 2);
+    let rows = bench.measure(&with_zero(&arm, 2, 0.02), 8, 4002, 1.0);
+    let verdict = judged(&bench, &estimate, &rows);
+    let cause = &verdict.causes[0];
+    assert_eq!((cause.kind, &*cause.label), (CauseKind::Zero, "zero of joint 2"), "{verdict:?}");
+    let change = &cause.changes[0];
+    let off = change.change - 0.02_f64.to_radians();
+    assert!(off.abs() < 4.0 * change.std_error && change.std_error < 1e-4, "{change:?}");
+    assert!(cause.left_out_error.unwrap() < 0.8 * verdict.error, "{verdict:?}");
+
+    let moved = Vector3::new(0.2e-3, -0.1e-3, 0.2e-3);
+    let rows = bench.measure(&with_tool(&arm, moved), 8, 4003, 1.0);
+    let verdict = judged(&bench, &estimate, &rows);
+    assert!(verdict.is_changed() && verdict.causes[0].kind == CauseKind::Tool, "{verdict:?}");
+    for (change, truth) in verdict.causes[0].changes.iter().zip(&moved) {
+        assert!((change.change - truth).abs() < 4.0 * change.std_error, "{change:?}");
+    }
+}
+
+#[test]
+fn noise_a_gross_row_and_a_warm_arm_are_no_change_of_geometry() {
+    let bench = Bench::new();
+    let (arm, estimate) = calibrated(&bench, 4);
+    let first = |rows: &Measurements| judged(&bench, &estimate, rows);
+    let noisy = first(&bench.measure(&arm, 20, 4005, 3.0));
+    assert!(noisy.is_changed() && noisy.named().unwrap().kind == CauseKind::Noise, "{noisy:?}");
+    let mut rows = bench.measure(&arm, 12, 4006, 1.0);
+    rows.positions[7].y += 2e-3;
+    let gross = first(&rows);
+    assert_eq!(gross.named().map(|cause| cause.row), Some(Some(7)), "{gross:?}");
+    let warm = first(&bench.measure(&warmed(&arm, 3e-4), 12, 4007, 1.0));
+    assert!(warm.is_changed() && warm.causes[0].kind == CauseKind::Temperature, "{warm:?}");
+    // With a temperature in the table, a zero that moved with it is not called a moved zero.
+    let rows = bench.measure_at(&with_zero(&arm, 2, 0.03), Some(32.0), (12, 4008, 1.0));
+    let warm = first(&rows);
+    assert!(warm.is_changed() && warm.causes[0].kind == CauseKind::Temperature, "{warm:?}");
+}
+
+#[test]
+fn the_command_has_exit_status_3_for_a_changed_arm() {
+    let folder = Folder::with_lunar_sampler();
+    folder.flexcal("identify problem.toml --data a-none.csv --out first").success();
+    let run = "watch problem.toml --estimate first/estimate.json --out watch";
+    let same = folder.flexcal(&format!("{run} --data a-none.csv")).success();
+    assert_contains(
+        &same.stdout,
+        &["50 rows against the estimate", "Unchanged", "28 rows left out"],
+    );
+    // Every position lies 5 mm higher.
+    let text = folder.read("a-none.csv");
+    let place = text.lines().next().unwrap().split(',').position(|name| name == "z_mm").unwrap();
+    let moved = text.lines().map(|line| {
+        let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+        if let Ok(z) = cells[place].parse::<f64>() {
+            cells[place] = (z + 5.0).to_string();
+        }
+        cells.join(",")
+    });
+    folder.write("moved.csv", moved.collect::<Vec<_>>().join("\n") + "\n");
+    let changed = folder.flexcal(&format!("{run} --data moved.csv")).code(3);
+    assert_contains(&changed.stdout, &["Changed, seen after", "Next: flexcal identify"]);
+    let json = folder.json("watch/watch.json");
+    assert_eq!(json["changed"], true);
+}
