@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use flexcal::fit::{self, Options, SolverChoice, Strategy};
-use flexcal::life::{PriorError, identify_with_prior};
+use flexcal::life::{FleetPrior, PriorError, PriorSource, identify_with_prior};
 use flexcal::remainder::{self, Correction, Fitted};
 use flexcal::report;
 use flexcal::results::{
@@ -39,9 +39,9 @@ pub struct Arguments {
     /// remainder.json
     #[arg(long)]
     remainder: bool,
-    /// Take the estimate.json of an earlier identification of the same arm as prior; rows that it
-    /// was fitted to are left out
-    #[arg(long, value_name = "ESTIMATE.json", conflicts_with = "remainder")]
+    /// Take the estimate.json of an earlier identification of the same arm as prior, rows that it
+    /// was fitted to left out; or the PRIOR.toml of its siblings (flexcal fleet)
+    #[arg(long, value_name = "ESTIMATE.json|PRIOR.toml", conflicts_with = "remainder")]
     prior: Option<PathBuf>,
     /// Days since the earlier identification, by whose drift the prior is widened
     #[arg(long, value_name = "DAYS", default_value_t = 0.0, requires = "prior", value_parser = days)]
@@ -85,7 +85,13 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     }
     let Input { problem, data, results } =
         common.read_beside("identify", arguments.prior.as_slice(), &names)?;
-    let prior = arguments.prior.as_deref().map(|file| arguments.trust.read(file)).transpose()?;
+    let prior = match arguments.prior.as_deref() {
+        Some(file) if file.extension().is_some_and(|ending| ending == "toml") => {
+            Some(PriorSource::Fleet(FleetPrior::read(file)?))
+        }
+        Some(file) => Some(PriorSource::Estimate(Box::new(arguments.trust.read(file)?))),
+        None => None,
+    };
     let declared = remainder::declared(&problem)?.filter(|_| !arguments.remainder);
     common.say_if_nothing_is_free(&problem);
     let stop = interrupt::stop();

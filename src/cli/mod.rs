@@ -12,6 +12,7 @@ mod diagnostic;
 mod estimate;
 mod export;
 mod flags;
+mod fleet;
 mod identify;
 mod init;
 mod input;
@@ -77,6 +78,8 @@ enum Command {
     Predict(predict::Arguments),
     /// Test whether an arm has changed since its estimate, and what.
     Watch(watch::Arguments),
+    /// Find what the estimates of several arms of one type say of the next one.
+    Fleet(fleet::Arguments),
     /// Find the joint commands that bring the arm, as identified, to desired positions.
     Compensate(compensate::Arguments),
     /// Record to sign: accuracy of predictions before and after, counted as ISO 9283 does, with
@@ -125,6 +128,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Command::Loop(arguments) => loop_command::run(&arguments),
         Command::Predict(arguments) => predict::run(&arguments),
         Command::Watch(arguments) => watch::run(&arguments),
+        Command::Fleet(arguments) => fleet::run(&arguments),
         Command::Compensate(arguments) => compensate::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
         Command::Plan(arguments) => plan::run(&arguments),

@@ -61,7 +61,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let named = arguments.estimate.display().to_string();
     let json = WatchResult::new(&problem, &named, arguments.drift, &watch).to_json();
     results.write(&[("watch.json", &json)])?;
-    common.tell(&json, || {
+    common.print_result(&json, || {
         let [problem_word, estimate] = [common.problem(), &arguments.estimate].map(shell_word);
         let next = if watch.is_changed() {
             format!(

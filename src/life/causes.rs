@@ -9,9 +9,9 @@ use crate::problem::{JointKind, Problem};
 use crate::quantity::Unit;
 
 /// Sizes of a moved zero, 1 σ \[°\] or \[mm\], each as probable as the others.
-const ZERO_SIZES: [f64; 5] = [0.005, 0.02, 0.08, 0.3, 1.2];
+const ZERO_SIZES: [f64; 4] = [0.01, 0.05, 0.25, 1.2];
 /// Sizes of a moved point, 1 σ on each axis \[mm\].
-const LENGTH_SIZES: [f64; 5] = [0.03, 0.1, 0.4, 1.5, 6.0];
+const LENGTH_SIZES: [f64; 4] = [0.05, 0.2, 1.0, 5.0];
 /// Sizes of a bent link: 1 σ of its lengths \[mm\] and of its angles \[°\].
 const LINK_SIZES: [(f64, f64); 3] = [(0.05, 0.005), (0.2, 0.02), (1.0, 0.1)];
 /// Sizes of a change of ln stiffness, 1 σ.
@@ -58,11 +58,11 @@ impl CauseKind {
     /// Kinds with the prior probability of each, given a change; temperature is 20 times as probable
     /// if the rows are warmer or colder than the reference.
     const WEIGHTS: [(Self, f64); 10] = [
-        (Self::Zero, 0.26),
-        (Self::Tool, 0.18),
-        (Self::Base, 0.14),
-        (Self::Noise, 0.12),
-        (Self::Row, 0.10),
+        (Self::Zero, 0.32),
+        (Self::Tool, 0.20),
+        (Self::Base, 0.12),
+        (Self::Noise, 0.08),
+        (Self::Row, 0.08),
         (Self::Link, 0.06),
         (Self::Stiffness, 0.05),
         (Self::Temperature, 0.04),

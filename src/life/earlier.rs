@@ -7,6 +7,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::drift;
 use super::error::PriorError;
+use super::fleet_file::FleetPrior;
 use crate::fit::{EarlierData, SavedEstimate, Strategy};
 use crate::model::Model;
 use crate::problem::Problem;
@@ -80,6 +81,50 @@ impl Earlier {
             covariance,
             fitted_rows: saved.fitted_rows.clone(),
             sigma: saved.sigma_taken.or(estimate.estimated_sigma).filter(|_| is_larger),
+        })
+    }
+
+    /// Returns the Gaussian that the siblings of an arm give on the parameters of a model, widened
+    /// by the drift of `days` days.
+    ///
+    /// # Errors
+    /// Returns an error that names what differs, or a rule of `[drift]` that matches nothing.
+    pub fn of_fleet(
+        prior: &FleetPrior,
+        problem: &Problem,
+        model: &Model,
+        days: f64,
+    ) -> Result<Self, PriorError> {
+        let file = prior.file.clone();
+        if prior.problem != problem.name {
+            let (found, expected) = (prior.problem.clone(), problem.name.clone());
+            return Err(PriorError::OtherProblem { file, found, expected });
+        }
+        let parts = problem.digest_parts();
+        let differs = |name: &&String| parts.get(*name) != prior.arm_parts.get(*name);
+        if let Some(part) = prior.arm_parts.keys().chain(parts.keys()).find(differs) {
+            return Err(PriorError::OtherPart { file, part: part.clone() });
+        }
+        let drift = drift::variances(problem, model, days)?;
+        let mut places = Vec::new();
+        for name in prior.parameters.keys() {
+            match model.parameters.iter().position(|parameter| parameter.name == *name) {
+                Some(k) => places.push(k),
+                None => return Err(PriorError::NotFree { file, name: name.clone() }),
+            }
+        }
+        let count = places.len();
+        let entries = prior.parameters.values();
+        let variance =
+            entries.clone().zip(&places).map(|((_, sigma), &k)| sigma * sigma + drift[k]);
+        Ok(Self {
+            file,
+            names: prior.parameters.keys().cloned().collect(),
+            mean: DVector::from_iterator(count, entries.map(|(mean, _)| *mean)),
+            covariance: DMatrix::from_diagonal(&DVector::from_iterator(count, variance)),
+            places,
+            fitted_rows: HashSet::new(),
+            sigma: None,
         })
     }
 

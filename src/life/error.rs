@@ -27,6 +27,20 @@ pub enum PriorError {
         file.display()
     )]
     Strategy { file: PathBuf, found: &'static str },
+    #[error("{arms} estimates are too few for a fleet; give those of at least {least} arms")]
+    FewArms { arms: usize, least: usize },
+    #[error("{}: is of another type of arm than {}: {part} differs", file.display(), other.display())]
+    OtherType { file: PathBuf, other: PathBuf, part: String },
+    #[error("{}: cannot be read: {source}", file.display())]
+    Unreadable { file: PathBuf, source: std::io::Error },
+    #[error("{}: not a PRIOR.toml of flexcal fleet: {reason}", file.display())]
+    Syntax { file: PathBuf, reason: String },
+    #[error("{}: {part} is declared differently in the problem; a prior is of arms with the same declaration", file.display())]
+    OtherPart { file: PathBuf, part: String },
+    #[error("{}: is of problem {found}, not {expected}", file.display())]
+    OtherProblem { file: PathBuf, found: String, expected: String },
+    #[error("{}: {name} is part of the prior, but not free in the problem", file.display())]
+    NotFree { file: PathBuf, name: String },
     #[error("{}: the arm it describes has no prediction in some pose of the table", file.display())]
     NotFinite { file: PathBuf },
     #[error("{}: all {rows} rows of the table were fitted there already, so nothing is new", file.display())]

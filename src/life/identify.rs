@@ -1,5 +1,6 @@
 //! Identification with an earlier estimate as prior.
 
+use std::path::Path;
 use std::sync::Arc;
 
 use nalgebra::DMatrix;
@@ -11,6 +12,7 @@ use super::causes::{Cause, CauseKind, Extended};
 use super::earlier::Earlier;
 use super::error::PriorError;
 use super::evidence::factor;
+use super::fleet_file::FleetPrior;
 use super::rows::SensitiveRows;
 use crate::fit::{
     self, ComparedParameter, Finding, FindingCode, Identification, Options, Placement,
@@ -35,8 +37,27 @@ const LEAST_LEARNED: f64 = 1e-3;
 /// of a logarithm.
 const WIDE: f64 = 1.0;
 
-/// Fits the identification rows of `data` with the posterior of an earlier estimate as prior,
-/// widened by the drift of `days` days.
+/// Source of the prior of an identification.
+#[derive(Debug, Clone)]
+pub enum PriorSource {
+    /// Earlier estimate of the same arm.
+    Estimate(Box<SavedEstimate>),
+    /// Siblings of the arm.
+    Fleet(FleetPrior),
+}
+
+impl PriorSource {
+    /// Returns the path of the file.
+    fn file(&self) -> &Path {
+        match self {
+            Self::Estimate(estimate) => &estimate.file,
+            Self::Fleet(prior) => &prior.file,
+        }
+    }
+}
+
+/// Fits the identification rows of `data` with the posterior of an earlier estimate, or
+/// what is known of its siblings, as prior, widened by the drift of `days` days.
 ///
 /// Rows that the earlier estimate was fitted to are left out, because the prior contains them.
 /// Where the new rows contradict the prior, the parameters that explain it best get a wide prior,
@@ -49,16 +70,19 @@ pub fn identify_with_prior(
     problem: &Problem,
     data: &Dataset,
     options: &Options,
-    estimate: &SavedEstimate,
+    source: &PriorSource,
     days: f64,
 ) -> Result<Identification, PriorError> {
     if options.strategy != Strategy::Joint {
-        let (file, found) = (estimate.file.clone(), options.strategy.as_str());
+        let (file, found) = (source.file().to_owned(), options.strategy.as_str());
         return Err(PriorError::Strategy { file, found });
     }
     let placement = Placement::of(&data.measurements);
     let model = Model::new(problem, &placement.bases, &placement.targets)?;
-    let original = Earlier::of_estimate(estimate, problem, &model, days)?;
+    let original = match source {
+        PriorSource::Estimate(estimate) => Earlier::of_estimate(estimate, problem, &model, days)?,
+        PriorSource::Fleet(prior) => Earlier::of_fleet(prior, problem, &model, days)?,
+    };
     let is_new = |row: &usize| !original.fitted_rows.contains(&data.measurements.row_digest(*row));
     let identification: Vec<usize> =
         data.split.identification.iter().copied().filter(is_new).collect();
@@ -85,7 +109,7 @@ pub fn identify_with_prior(
         });
         let cause = cause.filter(|_| is_new_cause && causes.len() < MAX_CAUSES);
         let Some(cause) = cause else {
-            found.findings.extend(causes.iter().map(|cause| cause.finding(estimate)));
+            found.findings.extend(causes.iter().map(|cause| cause.finding(source.file())));
             found.fitted_rows.extend(original.fitted_rows.iter().cloned());
             found.fitted_rows.sort();
             found.fitted_rows.dedup();
@@ -116,7 +140,7 @@ struct Contradiction {
 }
 
 impl Contradiction {
-    fn finding(&self, estimate: &SavedEstimate) -> Finding {
+    fn finding(&self, file: &Path) -> Finding {
         let treatment = match (self.widened.is_empty(), self.noise_ratio) {
             (false, _) => "; the prior of its parameters was widened",
             (true, Some(_)) => "; the fit took the larger noise",
@@ -124,7 +148,7 @@ impl Contradiction {
         };
         let text = format!(
             "the new rows contradict {} (error of this statement below 1 %); most probable cause: {} ({:.0} %){treatment}",
-            estimate.file.display(),
+            file.display(),
             self.label,
             100.0 * self.probability
         );
@@ -223,7 +247,7 @@ fn compare(
     (original, widened): (&Earlier, &Earlier),
     with: impl FnOnce(PriorComparison) -> PriorComparison,
 ) -> PriorComparison {
-    let variance = |k: usize| found.covariance.of(k, k).unwrap_or(0.0);
+    let variance = |k: usize| found.covariance.entry(k, k).unwrap_or(0.0);
     let compared = |(place, &k): (usize, &usize)| {
         let (parameter, estimate) = (&model.parameters[k], &found.estimates[k]);
         let slope = parameter.value_error(found.x[k], 1.0).abs();

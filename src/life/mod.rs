@@ -3,6 +3,8 @@
 //! [`identify_with_prior`] fits new rows with the posterior of an earlier estimate as prior. The
 //! earlier rows are not counted again. The prior is widened by drift, and where the new rows
 //! contradict it. [`watch()`] tests new rows one after the other for a change since the estimate.
+//! [`fleet()`] finds mean and spread of the parameters of several arms of one type, which serve as
+//! the prior of the next one.
 
 mod assessment;
 mod causes;
@@ -10,6 +12,8 @@ mod drift;
 mod earlier;
 mod error;
 mod evidence;
+mod fleet;
+mod fleet_file;
 mod identify;
 mod rows;
 mod watch;
@@ -19,7 +23,11 @@ pub use causes::CauseKind;
 #[doc(hidden)]
 pub use error::PriorError;
 #[doc(hidden)]
-pub use identify::identify_with_prior;
+pub use fleet::{Fleet, FleetArm, FleetParameter, fleet};
+#[doc(hidden)]
+pub use fleet_file::FleetPrior;
+#[doc(hidden)]
+pub use identify::{PriorSource, identify_with_prior};
 pub(crate) use watch::NAMED;
 #[doc(hidden)]
 pub use watch::{Change, Watch, WatchedCause, watch};

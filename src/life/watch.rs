@@ -27,6 +27,9 @@ pub(crate) const NAMED: f64 = 0.9;
 const MAX_GROUPS: usize = 60;
 /// Smallest evidence of a pose for one cause against another, in nats, that tells them apart.
 const LEAST_DIFFERENCE: f64 = 1e-3;
+/// Number of standard errors by which the noise of predictions exceeds the declared one for the
+/// difference to be misfit.
+const BEYOND_SCATTER: f64 = 2.0;
 /// Standard deviation (1 σ) of a coordinate if nothing is known of it \[m\].
 const UNKNOWN_SIGMA: f64 = 1e-3;
 
@@ -204,7 +207,8 @@ impl KnownNoise {
 }
 
 /// Returns σ of a position's coordinate in rows that state none \[m\], and the noise beyond it that
-/// the earlier fit found: the larger of the σ that it took, and of the noise of its predictions.
+/// the earlier fit found: the larger of the σ that it took, and of the noise of its predictions where that is certainly
+/// larger than declared.
 fn noise(problem: &Problem, estimate: &SavedEstimate) -> (f64, KnownNoise) {
     let saved = estimate.posterior();
     let declared = problem.data.position_sigma.or(estimate.estimated_sigma);
@@ -214,7 +218,11 @@ fn noise(problem: &Problem, estimate: &SavedEstimate) -> (f64, KnownNoise) {
         let text = estimate.prediction.as_ref()?;
         let prediction: serde_json::Value = serde_json::from_str(text).ok()?;
         let number = |key: &str| prediction.get(key)?.as_f64();
-        Some(number("noise_m")?.hypot(number("configuration_noise_m")?))
+        let noise = number("noise_m")?.hypot(number("configuration_noise_m")?);
+        // Known to the scatter of its own estimate, of about half the coordinates that were fitted.
+        let configurations = prediction.get("scores")?.get("configurations")?.as_f64()?;
+        let scatter = (2.0 / (1.5 * configurations).max(1.0)).sqrt();
+        Some(noise).filter(|noise| (noise / sigma).powi(2) > 1.0 + BEYOND_SCATTER * scatter)
     };
     let largest = taken.unwrap_or(0.0).max(of_predictions().unwrap_or(0.0));
     let misfit = (largest * largest - sigma * sigma).max(0.0).sqrt();

@@ -18,6 +18,7 @@ mod design;
 mod document;
 mod effect;
 mod export;
+mod fleet;
 mod identification;
 mod knowledge;
 pub(crate) mod plots;
@@ -74,6 +75,7 @@ pub use self::{
     document::{FORMAT_VERSION, PROGRAM},
     effect::Untestable,
     export::{ExportResult, ExportedErrors},
+    fleet::FleetResult,
     identification::{Parameter, Spread},
     plots::{Cause, Quantity},
     residual_test::ResidualTest,
@@ -94,6 +96,7 @@ pub fn schemas() -> Vec<(&'static str, String)> {
         ComparisonResult,
         CompensationResult,
         ExportResult,
+        FleetResult,
         IdentificationResult,
         InitResult,
         LoopResult,

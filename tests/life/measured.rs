@@ -136,3 +136,19 @@ fn alarms_of_watch() {
     assert!([zeros[1], tools[1]].iter().all(|(seen, right)| *seen >= 0.95 && *right >= 0.9));
     assert!(noises.iter().chain([&warms]).all(|(_, wrong)| *wrong <= 0.05));
 }
+
+#[test]
+#[ignore = "a minute in release"]
+fn errors_with_the_fleet_as_prior() {
+    let bench = Bench::new();
+    let runs: Vec<(f64, f64)> =
+        (0..20).into_par_iter().map(|number| crate::fleet::errors(&bench, number, 20)).collect();
+    let (fleet, sheet) = (rms(runs.iter().map(|r| r.0)), rms(runs.iter().map(|r| r.1)));
+    println!(
+        "6 poses of a new arm: data sheet {:.4} mm, fleet of 20 {:.4} mm, ratio {:.3}",
+        1e3 * sheet,
+        1e3 * fleet,
+        fleet / sheet
+    );
+    assert!(fleet <= 0.5 * sheet);
+}

@@ -1,7 +1,7 @@
 //! Identification with an earlier estimate as prior.
 
 use flexcal::fit::{FindingCode, Identification, Options};
-use flexcal::life::{PriorError, identify_with_prior};
+use flexcal::life::{PriorError, PriorSource, identify_with_prior};
 use flexcal::measurement::{Dataset, Split};
 
 use crate::bench::{Bench, whole, with_zero};
@@ -16,12 +16,11 @@ pub fn again(bench: &Bench, seed: u64, poses: usize, zero: f64) -> (f64, f64, Id
     let arm = bench.arm(seed);
     let rows = bench.measure(&arm, FULL, 1000 + seed, 1.0);
     let full = bench.calibrate(&rows);
-    let estimate = bench.saved(&full, &rows);
+    let prior = PriorSource::Estimate(Box::new(bench.saved(&full, &rows)));
     let changed = with_zero(&arm, 2, zero);
     let rows = bench.measure(&changed, poses, 5000 + seed, 1.0);
     let options = Options::default();
-    let found =
-        identify_with_prior(&bench.problem, &whole(&rows), &options, &estimate, 1.0).unwrap();
+    let found = identify_with_prior(&bench.problem, &whole(&rows), &options, &prior, 1.0).unwrap();
     (bench.error(&full, &arm), bench.error(&found, &changed), found)
 }
 
@@ -63,8 +62,9 @@ fn earlier_rows_are_not_counted_twice() {
     let data = Dataset::new(rows.clone(), split);
     let full = flexcal::fit::identify(&bench.problem, &data, &Options::default()).unwrap();
     let estimate = bench.saved(&full, &rows.select(&(0..FULL).collect::<Vec<_>>()));
+    let prior = PriorSource::Estimate(Box::new(estimate));
     let run = |data: &Dataset| {
-        identify_with_prior(&bench.problem, data, &Options::default(), &estimate, 0.0)
+        identify_with_prior(&bench.problem, data, &Options::default(), &prior, 0.0)
     };
     let new = rows.select(&(FULL..FULL + 5).collect::<Vec<_>>());
     let (all, only_new) = (run(&whole(&rows)).unwrap(), run(&whole(&new)).unwrap());

@@ -75,6 +75,8 @@ struct Entry {
     /// Standard error of the value, SI; `None` if it has none, or in files of older versions.
     std_error: Option<f64>,
     identified: Option<f64>,
+    /// Symbol of the SI unit.
+    unit: Option<String>,
     /// Standard deviation of the declared prior of the deviation; `None` without a prior, or in
     /// files of older versions.
     prior_sigma: Option<f64>,
@@ -373,6 +375,37 @@ impl SavedEstimate {
     /// Returns name, value and prior σ of every parameter, in the order of the covariance.
     pub(crate) fn entries(&self) -> impl Iterator<Item = (&str, f64, Option<f64>)> {
         self.parameters.iter().map(|entry| (&*entry.name, entry.estimate, entry.prior_sigma))
+    }
+
+    /// Returns the nominal value of a parameter, SI; `None` if the estimate lacks it.
+    pub(crate) fn nominal_of(&self, name: &str) -> Option<f64> {
+        self.parameters.iter().find(|entry| entry.name == name).map(|entry| entry.nominal)
+    }
+
+    /// Returns the symbol of the SI unit of a parameter.
+    pub(crate) fn unit_of(&self, name: &str) -> Option<&str> {
+        self.parameters.iter().find(|entry| entry.name == name)?.unit.as_deref()
+    }
+
+    /// Returns the name of the problem.
+    pub(crate) fn problem_name(&self) -> &str {
+        &self.problem
+    }
+
+    /// Returns the digest of each part of the declared arm; empty in files of older versions.
+    pub(crate) fn arm_parts(&self) -> &BTreeMap<String, String> {
+        &self.arm_parts
+    }
+
+    /// Returns the first part of the declared arm, or the first free parameter of the arm, in which
+    /// two estimates differ.
+    pub(crate) fn differing_part(&self, other: &Self) -> Option<String> {
+        let (parts, others) = (&self.arm_parts, &other.arm_parts);
+        let differs = |name: &&String| parts.get(*name) != others.get(*name);
+        let part = parts.keys().chain(others.keys()).find(differs).cloned();
+        part.or_else(|| {
+            (self.arm_digest != other.arm_digest).then(|| "the declared arm".to_owned())
+        })
     }
 
     /// Returns the strategy of the fit.

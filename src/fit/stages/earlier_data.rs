@@ -2,7 +2,6 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::stage::Stage;
 use crate::least_squares::LinearRows;
 use crate::model::Model;
 
@@ -93,19 +92,5 @@ impl EarlierData {
             }
         }
         rows
-    }
-}
-
-impl Stage<'_> {
-    /// Returns the rows of earlier data on the unknowns, with all other parameters at their values
-    /// in `at`; no rows without earlier data.
-    pub fn earlier_rows(&self, at: &DVector<f64>) -> LinearRows {
-        match self.earlier {
-            Some(earlier) => earlier.on(self.model, &self.unknowns, at),
-            None => LinearRows {
-                matrix: DMatrix::zeros(0, self.unknowns.len()),
-                constant: DVector::zeros(0),
-            },
-        }
     }
 }

@@ -404,6 +404,16 @@ impl<'a> Stage<'a> {
             + 0.5 * self.earlier_squares(at, &x)
     }
 
+    /// Returns the rows of earlier data on the unknowns, with all other parameters at their values
+    /// in `at`; no rows without earlier data.
+    pub fn earlier_rows(&self, at: &DVector<f64>) -> LinearRows {
+        let n = self.unknowns.len();
+        match self.earlier {
+            Some(earlier) => earlier.on(self.model, &self.unknowns, at),
+            None => LinearRows { matrix: DMatrix::zeros(0, n), constant: DVector::zeros(0) },
+        }
+    }
+
     /// Returns the squared length of the rows of earlier data at the unknowns `x`.
     fn earlier_squares(&self, at: &DVector<f64>, x: &DVector<f64>) -> f64 {
         let rows = self.earlier_rows(at);

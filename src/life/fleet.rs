@@ -1,0 +1,296 @@
+//! Fleet: what estimates of several arms of one type say of the next one.
+//!
+//! Arm i has deviations θᵢ ~ N(μ, T) with T diagonal: mean μ and spread τ of each parameter. Its
+//! estimate is divided by its declared prior, so that its rows alone count: information matrix Λᵢ
+//! and vector hᵢ. μ has the declared prior N(0, s²). τ² has a scaled inverse χ² prior about s² with
+//! half a degree of freedom, which shrinks it towards the data sheet where few arms say little. Both are
+//! found by expectation maximisation                                   [Gelman et al. 2013, §15]
+//!
+//! mᵢ = (Λᵢ + T⁻¹)⁻¹ (hᵢ + T⁻¹ μ),   Vᵢ = (Λᵢ + T⁻¹)⁻¹,   τ² = (Σ (mᵢ − μ)² + Vᵢ + ν s²) / (n + ν)
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use nalgebra::{DMatrix, DVector};
+use statrs::distribution::{ContinuousCDF as _, Normal};
+
+use super::error::PriorError;
+use crate::fit::SavedEstimate;
+
+/// Degrees of freedom ν of the prior of each variance τ², about the declared σ².
+const PRIOR_ARMS: f64 = 0.5;
+/// Maximum number of steps of expectation maximisation.
+const MAX_STEPS: usize = 500;
+/// Steps of expectation maximisation without one arm, from the result with it.
+const STEPS_WITHOUT_ONE: usize = 40;
+/// Relative change of every spread at which it has converged.
+const SETTLED: f64 = 1e-4;
+/// Deviation of a parameter without a declared prior, 1 σ, SI or of the logarithm.
+const WIDE: f64 = 1.0;
+/// Probability with which an arm like its siblings is called unlike them.
+const UNLIKE: f64 = 0.01;
+/// Smallest part of the fleet's variance that the rows of an arm must remove for a comparison.
+const LEAST_LEARNED: f64 = 0.05;
+/// Minimum number of arms.
+const MIN_ARMS: usize = 3;
+/// Last parts of the names of parameters whose deviation is a logarithm.
+const RELATIVE: [&str; 6] = ["stiffness", "EA", "EI", "EIy", "EIz", "GJ"];
+/// First parts of the names of parameters of the set-up, which say nothing of the arm.
+const SET_UP: [&str; 7] = ["base", "tool", "point", "anchor", "surface", "camera", "marker"];
+
+/// Mean and spread of the parameters of arms of one type.
+#[derive(Debug, Clone)]
+pub struct Fleet {
+    /// Name of the problem.
+    pub problem: String,
+    /// Digest of each part of the declared arm.
+    pub arm_parts: BTreeMap<String, String>,
+    pub parameters: Vec<FleetParameter>,
+    pub arms: Vec<FleetArm>,
+}
+
+/// Parameter of the arms of a fleet; deviations from nominal, SI, or logarithms of stiffnesses.
+#[derive(Debug, Clone)]
+pub struct FleetParameter {
+    pub name: String,
+    /// Symbol of the SI unit of its value.
+    pub unit: String,
+    /// Nominal value, SI.
+    pub nominal: f64,
+    /// Mean of the deviations.
+    pub mean: f64,
+    /// Standard error of the mean.
+    pub mean_error: f64,
+    /// Standard deviation of the deviations from arm to arm.
+    pub spread: f64,
+    /// Declared 1 σ; `None` without a prior.
+    pub declared: Option<f64>,
+}
+
+/// Arm of a fleet, compared with the others.
+#[derive(Debug, Clone)]
+pub struct FleetArm {
+    pub file: PathBuf,
+    /// Parameter that deviates most from what the other arms say, and by how many of its standard
+    /// deviations; `None` if the rows say nothing.
+    pub most: Option<(String, f64)>,
+    /// True if that is improbable for an arm like its siblings.
+    pub is_unlike: bool,
+}
+
+/// Information of the rows of one arm on the parameters of the fleet.
+struct Likelihood {
+    information: DMatrix<f64>,
+    vector: DVector<f64>,
+}
+
+/// Mean and variance of each parameter, and the variance of the mean.
+struct Model {
+    mean: DVector<f64>,
+    variance: DVector<f64>,
+    mean_variance: DVector<f64>,
+}
+
+/// Returns true if the deviation of a parameter is a logarithm.
+fn is_relative(name: &str) -> bool {
+    RELATIVE.contains(&name.rsplit('.').next().unwrap_or_default())
+}
+
+/// Returns true for a parameter of the arm, false for one of the set-up.
+fn is_of_arm(name: &str) -> bool {
+    !SET_UP.contains(&name.split(['.', '[']).next().unwrap_or_default())
+}
+
+/// Finds mean and spread of the parameters of several arms, from their estimates.
+///
+/// Bases, tools and fixtures are left out.
+///
+/// # Errors
+/// Returns an error if there are fewer than three arms, or if they differ in their declaration or
+/// in what is free.
+pub fn fleet(estimates: &[SavedEstimate]) -> Result<Fleet, PriorError> {
+    let Some(first) = estimates.first().filter(|_| estimates.len() >= MIN_ARMS) else {
+        return Err(PriorError::FewArms { arms: estimates.len(), least: MIN_ARMS });
+    };
+    for estimate in estimates {
+        if let Some(part) = first.differing_part(estimate) {
+            let (file, other) = (estimate.file.clone(), first.file.clone());
+            return Err(PriorError::OtherType { file, other, part });
+        }
+    }
+    let chosen: Vec<usize> = first
+        .entries()
+        .enumerate()
+        .filter(|(k, (name, ..))| is_of_arm(name) && first.posterior().covariance[(*k, *k)] > 0.0)
+        .map(|(k, _)| k)
+        .collect();
+    if chosen.is_empty() {
+        return Err(PriorError::NoCovariance { file: first.file.clone() });
+    }
+    let all: Vec<(&str, f64, Option<f64>)> = first.entries().collect();
+    let names: Vec<&str> = chosen.iter().map(|&k| all[k].0).collect();
+    let declared: Vec<Option<f64>> = chosen.iter().map(|&k| all[k].2).collect();
+    let likelihoods = estimates
+        .iter()
+        .map(|estimate| likelihood(estimate, &names, &declared))
+        .collect::<Result<Vec<_>, _>>()?;
+    let sheet = DVector::from_iterator(names.len(), declared.iter().map(|s| s.unwrap_or(WIDE)));
+    let every: Vec<&Likelihood> = likelihoods.iter().collect();
+    let start = (DVector::zeros(names.len()), sheet.component_mul(&sheet));
+    let model = maximised(&every, &sheet, start, MAX_STEPS);
+    let parameters = names.iter().enumerate().map(|(k, name)| FleetParameter {
+        name: (*name).to_owned(),
+        unit: first.unit_of(name).unwrap_or_default().to_owned(),
+        nominal: first.nominal_of(name).unwrap_or_default(),
+        mean: model.mean[k],
+        mean_error: model.mean_variance[k].sqrt(),
+        spread: model.variance[k].sqrt(),
+        declared: declared[k],
+    });
+    let limit = {
+        let tests = (names.len() * estimates.len()) as f64;
+        Normal::standard().inverse_cdf(1.0 - 0.5 * UNLIKE / tests)
+    };
+    let arms = estimates.iter().enumerate().map(|(arm, estimate)| {
+        let others: Vec<&Likelihood> =
+            every.iter().enumerate().filter(|(k, _)| *k != arm).map(|(_, other)| *other).collect();
+        let start = (model.mean.clone(), model.variance.clone());
+        let without = maximised(&others, &sheet, start, STEPS_WITHOUT_ONE);
+        let most = most_different(&likelihoods[arm], &without);
+        FleetArm {
+            file: estimate.file.clone(),
+            is_unlike: most.is_some_and(|(_, sigmas)| sigmas.abs() > limit),
+            most: most.map(|(k, sigmas)| (names[k].to_owned(), sigmas)),
+        }
+    });
+    Ok(Fleet {
+        problem: first.problem_name().to_owned(),
+        arm_parts: first.arm_parts().clone(),
+        parameters: parameters.collect(),
+        arms: arms.collect(),
+    })
+}
+
+/// Returns what the rows of an arm say of the parameters `names`: its posterior divided by the
+/// declared prior.
+fn likelihood(
+    estimate: &SavedEstimate,
+    names: &[&str],
+    declared: &[Option<f64>],
+) -> Result<Likelihood, PriorError> {
+    let place = |name: &&str| estimate.entries().position(|(other, ..)| other == *name);
+    let places: Option<Vec<usize>> = names.iter().map(place).collect();
+    let places = places.ok_or(PriorError::NoCovariance { file: estimate.file.clone() })?;
+    let values: Vec<f64> = estimate.entries().map(|(_, value, _)| value).collect();
+    let nominal = |name: &str| estimate.nominal_of(name).unwrap_or_default();
+    let deviation = |i: usize| {
+        let (value, nominal) = (values[places[i]], nominal(names[i]));
+        if is_relative(names[i]) { (value / nominal).ln() } else { value - nominal }
+    };
+    let slope =
+        |i: usize| if is_relative(names[i]) { values[places[i]].abs().recip() } else { 1.0 };
+    let n = names.len();
+    let covariance = DMatrix::from_fn(n, n, |i, j| {
+        estimate.posterior().covariance[(places[i], places[j])] * slope(i) * slope(j)
+    });
+    let scale = covariance.diagonal().map(f64::sqrt);
+    let correlation = DMatrix::from_fn(n, n, |i, j| covariance[(i, j)] / (scale[i] * scale[j]));
+    let inverse = correlation
+        .cholesky()
+        .map(|factor| factor.inverse())
+        .ok_or(PriorError::NoCovariance { file: estimate.file.clone() })?;
+    let total = DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] / (scale[i] * scale[j]));
+    let vector = &total * DVector::from_fn(n, |i, _| deviation(i));
+    let prior = |i: usize| declared[i].map_or(0.0, |sigma| sigma.powi(-2));
+    let mut scaled = DMatrix::from_fn(n, n, |i, j| {
+        let entry = total[(i, j)] - if i == j { prior(i) } else { 0.0 };
+        entry * scale[i] * scale[j]
+    });
+    // Rounding must not make the information negative.
+    let eigen = scaled.clone().symmetric_eigen();
+    let positive = eigen.eigenvalues.map(|value| value.max(0.0));
+    scaled =
+        &eigen.eigenvectors * DMatrix::from_diagonal(&positive) * eigen.eigenvectors.transpose();
+    let information = DMatrix::from_fn(n, n, |i, j| scaled[(i, j)] / (scale[i] * scale[j]));
+    Ok(Likelihood { information, vector })
+}
+
+/// Returns mean and covariance of the deviations of one arm, given mean and variance of the fleet.
+fn conditioned(
+    arm: &Likelihood,
+    mean: &DVector<f64>,
+    variance: &DVector<f64>,
+) -> Option<(DVector<f64>, DMatrix<f64>)> {
+    let n = mean.len();
+    // In units of the spread: (I + τ Λ τ) z = τ (h − Λ μ).
+    let spread = variance.map(f64::sqrt);
+    let matrix = DMatrix::from_fn(n, n, |i, j| {
+        spread[i] * arm.information[(i, j)] * spread[j] + f64::from(u8::from(i == j))
+    });
+    let pull = (&arm.vector - &arm.information * mean).component_mul(&spread);
+    let factor = matrix.cholesky()?;
+    let moved = factor.solve(&pull).component_mul(&spread);
+    let inverse = factor.inverse();
+    let covariance = DMatrix::from_fn(n, n, |i, j| spread[i] * inverse[(i, j)] * spread[j]);
+    Some((mean + moved, covariance))
+}
+
+/// Finds mean and spread by expectation maximisation from a mean and a variance; `sheet` holds the
+/// declared 1 σ.
+fn maximised(
+    arms: &[&Likelihood],
+    sheet: &DVector<f64>,
+    (mut mean, mut variance): (DVector<f64>, DVector<f64>),
+    max_steps: usize,
+) -> Model {
+    let (n, count) = (sheet.len(), arms.len() as f64);
+    let declared = sheet.component_mul(sheet);
+    let mut mean_variance = DVector::zeros(n);
+    for _ in 0..max_steps {
+        let found: Vec<_> =
+            arms.iter().filter_map(|arm| conditioned(arm, &mean, &variance)).collect();
+        // The mean, given the arms: its prior is the data sheet.
+        let mut sum = DVector::zeros(n);
+        let mut inside = DVector::zeros(n);
+        for (arm_mean, covariance) in &found {
+            sum += arm_mean;
+            inside += covariance.diagonal();
+        }
+        let mut next = DVector::zeros(n);
+        for k in 0..n {
+            let precision = count / variance[k] + declared[k].recip();
+            next[k] = sum[k] / variance[k] / precision;
+            // Arms that say little of the parameter say little of its mean.
+            let informed = (count - inside[k] / variance[k]).max(0.0);
+            mean_variance[k] = (informed / variance[k] + declared[k].recip()).recip();
+        }
+        let mut change = 0.0_f64;
+        for k in 0..n {
+            let around: f64 = found.iter().map(|(arm, _)| (arm[k] - next[k]).powi(2)).sum();
+            let now = (around + inside[k] + PRIOR_ARMS * declared[k]) / (count + PRIOR_ARMS);
+            change = change.max((now / variance[k] - 1.0).abs());
+            variance[k] = now;
+        }
+        mean = next;
+        if change < SETTLED {
+            break;
+        }
+    }
+    Model { mean, variance, mean_variance }
+}
+
+/// Returns the parameter in which the rows of an arm differ most from the fleet, and by how many
+/// standard deviations.
+fn most_different(arm: &Likelihood, fleet: &Model) -> Option<(usize, f64)> {
+    let prior = &fleet.variance + &fleet.mean_variance;
+    let (mean, covariance) = conditioned(arm, &fleet.mean, &prior)?;
+    let differences = (0..mean.len()).filter_map(|k| {
+        let learned = covariance[(k, k)].recip() - prior[k].recip();
+        if learned * prior[k] < LEAST_LEARNED {
+            return None;
+        }
+        let data = (mean[k] / covariance[(k, k)] - fleet.mean[k] / prior[k]) / learned;
+        Some((k, (data - fleet.mean[k]) / (learned.recip() + prior[k]).sqrt()))
+    });
+    differences.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))
+}

@@ -1,0 +1,72 @@
+//! Result of the command `fleet`, printed with `--json`.
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::document::Document;
+use crate::life::{Fleet, FleetArm, FleetParameter};
+
+/// Mean and spread of the parameters of arms of one type.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct FleetResult {
+    pub problem: String,
+    pub parameters: Vec<FleetParameterResult>,
+    pub arms: Vec<FleetArmResult>,
+}
+
+/// Parameter of the fleet: deviations from nominal, SI, or logarithms of stiffnesses.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct FleetParameterResult {
+    pub name: String,
+    /// SI unit of the value.
+    pub unit: String,
+    pub nominal: f64,
+    pub mean: f64,
+    pub mean_error: f64,
+    /// Standard deviation from arm to arm.
+    pub spread: f64,
+    /// Declared 1 σ of the prior; null without a prior.
+    pub declared: Option<f64>,
+}
+
+/// Arm of the fleet, compared with the others.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct FleetArmResult {
+    pub file: String,
+    /// True if the arm is unlike the others (probability below 1 % for any arm like them).
+    pub unlike: bool,
+    /// Parameter that deviates most from the other arms.
+    pub parameter: Option<String>,
+    /// Its deviation, in standard deviations.
+    pub sigmas: Option<f64>,
+}
+
+impl Document for FleetResult {
+    const FORMAT: &'static str = "flexcal-fleet";
+}
+
+impl FleetResult {
+    /// Converts a fleet.
+    pub fn new(fleet: &Fleet) -> Self {
+        let parameter = |parameter: &FleetParameter| FleetParameterResult {
+            name: parameter.name.clone(),
+            unit: parameter.unit.clone(),
+            nominal: parameter.nominal,
+            mean: parameter.mean,
+            mean_error: parameter.mean_error,
+            spread: parameter.spread,
+            declared: parameter.declared,
+        };
+        let arm = |arm: &FleetArm| FleetArmResult {
+            file: arm.file.display().to_string(),
+            unlike: arm.is_unlike,
+            parameter: arm.most.as_ref().map(|most| most.0.clone()),
+            sigmas: arm.most.as_ref().map(|most| most.1),
+        };
+        Self {
+            problem: fleet.problem.clone(),
+            parameters: fleet.parameters.iter().map(parameter).collect(),
+            arms: fleet.arms.iter().map(arm).collect(),
+        }
+    }
+}

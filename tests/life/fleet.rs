@@ -1,0 +1,104 @@
+//! What the estimates of several arms of one type say of the next one.
+
+use std::path::Path;
+
+use flexcal::fit::{Options, SavedEstimate};
+use flexcal::life::{FleetPrior, PriorSource, fleet, identify_with_prior};
+use flexcal::problem::Problem;
+
+use crate::bench::{Bench, whole, with_zero};
+use crate::common::program::{Folder, assert_contains};
+
+/// Poses to which each arm of the fleet was calibrated.
+const FULL: usize = 40;
+/// Spread from arm to arm, as a part of the deviation that all arms share.
+const SPREAD: f64 = 0.2;
+
+/// Returns arm number `number` of fleet `fleet`: what all arms share, and a smaller part of its
+/// own. Base and tool are those of the set-up, drawn anew.
+pub fn sibling(bench: &Bench, fleet: u64, number: u64) -> Problem {
+    let (shared, single) = (bench.arm(7000 + fleet), bench.arm(100 * fleet + number));
+    let nominal = &bench.problem;
+    let mut arm = single.clone();
+    for (k, joint) in arm.joints.iter_mut().enumerate() {
+        let (a, b, n) = (&shared.joints[k], &single.joints[k], &nominal.joints[k]);
+        let mixed = |a: f64, b: f64, n: f64| n + (a - n) + SPREAD * (b - n);
+        joint.alpha = mixed(a.alpha, b.alpha, n.alpha);
+        joint.theta = mixed(a.theta, b.theta, n.theta);
+        joint.a = mixed(a.a, b.a, n.a);
+        joint.d = mixed(a.d, b.d, n.d);
+        if let (Some(a), Some(b), Some(n)) = (a.stiffness, b.stiffness, n.stiffness) {
+            joint.stiffness = Some(n * (a / n) * (b / n).powf(SPREAD));
+        }
+    }
+    arm
+}
+
+pub fn estimate(bench: &Bench, arm: &Problem, seed: u64) -> SavedEstimate {
+    let rows = bench.measure(arm, FULL, 40_000 + seed, 1.0);
+    let found = bench.calibrate(&rows);
+    let mut saved = bench.saved(&found, &rows);
+    saved.file = format!("arm-{seed}.json").into();
+    saved
+}
+
+/// Returns the errors of a new arm with 6 poses: with the prior of the fleet, and with that of the
+/// data sheet [m].
+pub fn errors(bench: &Bench, number: u64, arms: u64) -> (f64, f64) {
+    let estimates: Vec<SavedEstimate> =
+        (0..arms).map(|k| estimate(bench, &sibling(bench, number, k), 1000 * number + k)).collect();
+    let file = std::env::temp_dir().join(format!("PRIOR-{}-{number}.toml", std::process::id()));
+    std::fs::write(&file, fleet(&estimates).unwrap().to_toml()).unwrap();
+    let prior = PriorSource::Fleet(FleetPrior::read(&file).unwrap());
+    std::fs::remove_file(&file).unwrap();
+    let arm = sibling(bench, number, 99);
+    let rows = bench.measure(&arm, 6, 60_000 + number, 1.0);
+    let options = Options::default();
+    let found = identify_with_prior(&bench.problem, &whole(&rows), &options, &prior, 0.0).unwrap();
+    (bench.error(&found, &arm), bench.error(&bench.calibrate(&rows), &arm))
+}
+
+#[test]
+fn a_new_arm_learns_from_its_siblings() {
+    let bench = Bench::new();
+    let (with, without) = errors(&bench, 1, 8);
+    println!("{with:.2e} {without:.2e}");
+    assert!(with < 0.7 * without, "{with} {without}");
+}
+
+#[test]
+fn an_arm_unlike_its_siblings_is_named() {
+    let bench = Bench::new();
+    let mut estimates: Vec<SavedEstimate> =
+        (0..7).map(|k| estimate(&bench, &sibling(&bench, 2, k), k)).collect();
+    assert!(fleet(&estimates).unwrap().arms.iter().all(|arm| !arm.is_unlike));
+    let odd = with_zero(&sibling(&bench, 2, 8), 3, 1.0);
+    estimates.push(estimate(&bench, &odd, 8));
+    let found = fleet(&estimates).unwrap();
+    let unlike: Vec<_> = found.arms.iter().filter(|arm| arm.is_unlike).collect();
+    assert_eq!(unlike.len(), 1, "{:?}", found.arms);
+    assert_eq!(
+        (&*unlike[0].file, &*unlike[0].most.as_ref().unwrap().0),
+        (Path::new("arm-8.json"), "joint3.theta")
+    );
+}
+
+#[test]
+fn the_command_writes_a_prior_that_identify_takes() {
+    let folder = Folder::with_lunar_sampler();
+    for case in ["a-none", "h-none-large", "c-link-thermal-bending"] {
+        folder.copy(&format!("tests/cases/{case}.csv"), &format!("{case}.csv"));
+        folder.flexcal(&format!("identify problem.toml --data {case}.csv --out {case}"));
+    }
+    let two = folder.flexcal("fleet a-none/estimate.json h-none-large/estimate.json").code(2);
+    assert_contains(&two.stderr, &["at least 3 arms"]);
+    let files =
+        "a-none/estimate.json h-none-large/estimate.json c-link-thermal-bending/estimate.json";
+    let shown = folder.flexcal(&format!("fleet {files} --out PRIOR.toml")).success();
+    assert_contains(&shown.stdout, &["3 arms", "spread", "PRIOR.toml takes them as the prior"]);
+    let run = "identify problem.toml --data a-none.csv --prior PRIOR.toml --out with -v";
+    assert_contains(
+        &folder.flexcal(run).success().stdout,
+        &["Earlier estimate as prior", "PRIOR.toml"],
+    );
+}
