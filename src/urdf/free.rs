@@ -70,8 +70,8 @@ pub(super) fn distinguishable_parameters(problem: &Problem) -> Result<Vec<String
     Ok(chosen.iter().filter_map(|&k| Some(model.parameters.get(k)?.name.clone())).collect())
 }
 
-/// Returns the rank of a parameter in the order of choice, lowest first; equal ranks follow the
-/// order of the arm.
+/// Returns the rank by which parameters are chosen to be free, lowest first: those of base and
+/// target, then α, a, θ, d, β, then others. Equal ranks follow the order of the arm.
 fn priority(parameter: &Parameter) -> usize {
     let field = parameter.name.rsplit('.').next().unwrap_or_default();
     let fields = ["alpha", "a", "theta", "d", "beta"];

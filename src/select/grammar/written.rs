@@ -17,7 +17,7 @@ pub struct Written {
     pub parameters: Vec<LawParameter>,
 }
 
-/// Number of significant digits of inner parameters.
+/// Number of significant digits with which parameters inside a formula are written.
 const PARAMETER_DIGITS: i32 = 3;
 
 /// Writes a sum as a law of the joint with index `joint`, with the values `inner` of its inner
