@@ -62,6 +62,7 @@ pub use stages::solver_choice::SolverChoice;
 pub(crate) use stages::stage::COST_TOLERANCE;
 pub use stages::stage::StageError;
 pub use stages::strategy::Strategy;
+pub(crate) use stages::unmoved::Unmoved;
 pub use uncertainty::active_constraint::ActiveConstraint;
 pub use uncertainty::covariance::{Correlations, Covariance};
 pub use uncertainty::noise::Noise;

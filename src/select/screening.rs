@@ -190,7 +190,7 @@ pub fn examine(
 pub(super) fn check_fit(fitted: &Fitted, data: &Data) -> ResidualTests {
     let linearised = fitted.linearised(data, &[]);
     let coordinates: Vec<usize> =
-        linearised.poses().iter().map(|pose| pose.observation.coordinates()).collect();
+        (0..linearised.poses().len()).map(|pose| linearised.coordinates(pose)).collect();
     // With millions of rows, memory holds one such matrix, not several.
     let (columns, residual) = fitted.neighbourhood_as_fitted(linearised).into_fitted();
     let fit = FitResidual {

@@ -16,12 +16,24 @@ const FIRST_POSES: usize = 32;
 /// Orthonormal directions of the measuring frame in which no unknown moves any pose. Coordinates
 /// along them do not depend on the unknowns, and do not count as degrees of freedom.
 #[derive(Debug, Clone, Default)]
-pub(in crate::fit) struct Unmoved(Vec<Vector3<f64>>);
+pub(crate) struct Unmoved(Vec<Vector3<f64>>);
 
 impl Unmoved {
     /// Returns the number of directions.
     pub fn count(&self) -> usize {
         self.0.len()
+    }
+
+    /// Finds the directions in which none of several unknowns moves any pose, from the derivatives of
+    /// positions: one column per unknown, with `per_pose` rows per pose of which the first three are
+    /// the position. There are none if no unknown moves anything.
+    pub fn from_columns<'a>(columns: impl Iterator<Item = &'a [f64]>, per_pose: usize) -> Self {
+        let square = |column: &[f64]| -> Matrix3<f64> {
+            let slopes =
+                column.chunks_exact(per_pose).map(|row| Vector3::new(row[0], row[1], row[2]));
+            slopes.map(|slope| slope * slope.transpose()).sum()
+        };
+        Self(unmoved_by(columns.map(square)))
     }
 
     /// Returns the sum of squares of whitened residuals along the directions. Each pose has
@@ -75,17 +87,23 @@ impl Stage<'_> {
                 }
             }
         }
-        // Each unknown in units of its effect: angles and lengths do not compare.
-        let scaled = squares.iter().map(|square| match square.trace() {
-            trace if trace > 0.0 => square / trace,
-            _ => Matrix3::zeros(),
-        });
-        let eigen = SymmetricEigen::new(scaled.sum::<Matrix3<f64>>());
-        let largest = eigen.eigenvalues.max();
-        let is_unmoved = |k: &usize| eigen.eigenvalues[*k] <= MAX_UNMOVED_RATIO * largest;
-        if !(largest.is_finite() && largest > 0.0) {
-            return Vec::new();
-        }
-        (0..3).filter(is_unmoved).map(|k| eigen.eigenvectors.column(k).into_owned()).collect()
+        unmoved_by(squares.into_iter())
     }
+}
+
+/// Finds the directions in which no unknown moves any pose. `squares` holds, for each unknown, the
+/// sum over poses of the outer products of its derivatives.
+fn unmoved_by(squares: impl Iterator<Item = Matrix3<f64>>) -> Vec<Vector3<f64>> {
+    // Each unknown in units of its effect: angles and lengths do not compare.
+    let scaled = squares.map(|square| match square.trace() {
+        trace if trace > 0.0 => square / trace,
+        _ => Matrix3::zeros(),
+    });
+    let eigen = SymmetricEigen::new(scaled.sum::<Matrix3<f64>>());
+    let largest = eigen.eigenvalues.max();
+    let is_unmoved = |k: &usize| eigen.eigenvalues[*k] <= MAX_UNMOVED_RATIO * largest;
+    if !(largest.is_finite() && largest > 0.0) {
+        return Vec::new();
+    }
+    (0..3).filter(is_unmoved).map(|k| eigen.eigenvectors.column(k).into_owned()).collect()
 }

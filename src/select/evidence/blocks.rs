@@ -47,9 +47,9 @@ pub(super) fn blocks(
     let is_aside = |&(pose, row): &(usize, &usize)| {
         !left_out.contains(&pose) && fitted.set_aside.contains(row)
     };
-    let numbers = |row: usize| data.measurements.observation(row).coordinates();
-    let without_weight = left_out.iter().map(|&pose| numbers(rows[pose])).sum::<usize>()
-        + rows.iter().enumerate().filter(is_aside).map(|(_, &row)| numbers(row)).sum::<usize>();
+    let numbers = |pose: usize| hypotheses.linearised.coordinates(pose);
+    let without_weight = left_out.iter().map(|&pose| numbers(pose)).sum::<usize>()
+        + rows.iter().enumerate().filter(is_aside).map(|(pose, _)| numbers(pose)).sum::<usize>();
     let noise = marginal::Noise {
         freedom: (neighbourhood.sums().freedom() - without_weight as f64).max(1.0),
         trust: if holds { SPREAD_OF_DECLARED_NOISE } else { SPREAD_OF_ESTIMATED_NOISE },

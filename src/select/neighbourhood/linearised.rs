@@ -6,6 +6,7 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DMatrixView, DVector, DVectorView};
 use rayon::prelude::*;
 
+use crate::fit::Unmoved;
 use crate::least_squares::{MANY_UNKNOWNS, jacobian_and_residual};
 use crate::model::effect::Term;
 use crate::model::parameter::{BeamField, Parameter, ParameterSite, Regressor};
@@ -16,6 +17,9 @@ use crate::problem::{Effect, Problem};
 /// a mass of 0, the position would have no influence; this mass is too small to change anything
 /// else.
 const MASS_OF_DERIVATIVE: f64 = 1e-4;
+/// Number of poses that are first examined for directions that nothing moves; most arms move in
+/// every direction within them.
+const MAX_POSES_OF_FIRST_PASS: usize = 32;
 
 /// Model linearised at some poses, with derivatives at every site where effects may enter.
 #[derive(Clone)]
@@ -23,6 +27,8 @@ pub(crate) struct Linearised<'a> {
     problem: &'a Problem,
     poses: Arc<Vec<Pose<'a>>>,
     derivatives: Arc<Derivatives>,
+    /// Number of directions of the measuring frame in which no fitted parameter moves any pose.
+    unmoved: usize,
 }
 
 /// Derivatives and residual of a model in some poses, which later linearisations reuse.
@@ -166,7 +172,16 @@ impl<'a> Linearised<'a> {
                 derivatives.places.push(place);
             }
         }
-        Self { problem, poses, derivatives: Arc::new(derivatives) }
+        let unmoved = unmoved(&poses, &derivatives.fitted);
+        if unmoved.count() > 0 {
+            let residual = Arc::make_mut(&mut derivatives.residual);
+            for pose in 0..poses.len() {
+                let mut here = residual.fixed_rows_mut::<3>(3 * pose);
+                let moved = unmoved.moved_part(here.clone_owned());
+                here.copy_from(&moved);
+            }
+        }
+        Self { problem, poses, derivatives: Arc::new(derivatives), unmoved: unmoved.count() }
     }
 
     /// Returns the derivatives for reuse by another linearisation.
@@ -226,10 +241,16 @@ impl<'a> Linearised<'a> {
         &self.derivatives.residual
     }
 
-    /// Returns the number of residual rows that are 0, because their poses measure fewer than three
-    /// numbers.
+    /// Returns the number of residual coordinates of a pose that count: those that it measures, less
+    /// the directions in which no fitted parameter moves any pose.
+    pub fn coordinates(&self, pose: usize) -> usize {
+        self.poses[pose].observation.coordinates() - self.unmoved
+    }
+
+    /// Returns the number of residual coordinates that do not count, because their poses measure
+    /// fewer than three numbers or because no fitted parameter moves them.
     pub fn empty(&self) -> usize {
-        self.poses.iter().map(|pose| 3 - pose.observation.coordinates()).sum()
+        (0..self.poses.len()).map(|pose| 3 - self.coordinates(pose)).sum()
     }
 
     /// Returns the poses about which the model is linearised.
@@ -271,6 +292,21 @@ impl<'a> Linearised<'a> {
         let &(_, place) = self.derivatives.places.iter().find(|(known, _)| *known == site)?;
         Some(self.derivatives.column(place).into_owned())
     }
+}
+
+/// Finds the directions in which no fitted parameter moves any pose, such as z of a planar arm. The
+/// residual along them says nothing about the fit. There are none unless every pose measures a
+/// position.
+fn unmoved(poses: &[Pose], fitted: &DMatrix<f64>) -> Unmoved {
+    if fitted.ncols() == 0 || !poses.iter().all(|pose| pose.observation.coordinates() == 3) {
+        return Unmoved::default();
+    }
+    let first = |count: usize| {
+        let columns = fitted.as_slice().chunks_exact(fitted.nrows());
+        Unmoved::from_columns(columns.map(|column| &column[..3 * count]), 3)
+    };
+    let few = first(poses.len().min(MAX_POSES_OF_FIRST_PASS));
+    if few.count() == 0 { few } else { first(poses.len()) }
 }
 
 /// Effects with the site and regressor of each of their terms. Each regressor is evaluated once in

@@ -116,26 +116,16 @@ pub fn close_by(
         result?
     };
     let (fitted, evidence) = kept(&declared, (fitted, evidence), &data, &unstoppable)?;
-    let is_trusted = fitted.found.describes_arm();
-    let residual_tests = check_fit(&fitted, &data);
-    // If the search was stopped before it found anything, no evidence is needed.
-    let is_wanted = is_trusted && !(interrupted && state.added(&fitted).is_empty())
-        || !state.added(&fitted).is_empty();
-    let evidence = evidence.or_else(|| {
-        if is_wanted { evaluate(&fitted, &data, &state.reconsidered(&fitted)) } else { None }
-    });
-    let best = evidence
-        .as_ref()
-        .and_then(|evidence| Some((evidence, evidence.certain_set(rules.inclusion_threshold)?)));
-    let mut unexplained =
-        best.map_or_else(Vec::new, |best| unexplained::without_law(&fitted, &data, best));
-    let of_all_rows = best.and_then(|_| evidence_with_doubtful_rows(&state, &declared, &fitted));
-    let effects = found(
-        &state,
-        &fitted,
-        (best, of_all_rows.as_ref()),
-        (is_trusted, residual_tests.is_structured()),
-    );
+    let mut conclusion = concluded(&state, &declared, (fitted, evidence), interrupted);
+    // Effects none of which is sure are used only if they predict poses that were left out better.
+    let is_sure = |found: &Found| found.status == Status::Found;
+    if !conclusion.effects.is_empty()
+        && !conclusion.effects.iter().any(is_sure)
+        && !conclusion.fitted.predicts_better_in_mean_than(&declared, &data)
+    {
+        conclusion = concluded(&state, &declared, (declared.clone(), None), interrupted);
+    }
+    let Conclusion { fitted, evidence, residual_tests, effects, mut unexplained } = conclusion;
     if unexplained.is_empty() {
         unexplained.extend(unexplained::unlocated(&residual_tests));
     }
@@ -180,8 +170,45 @@ pub fn close_by(
     })
 }
 
-/// Returns the fit with which the loop ends: the one found, or the declared one if that predicts
-/// left-out poses better.
+/// Fit that the loop ends with, and what is claimed about it.
+struct Conclusion {
+    fitted: Fitted,
+    evidence: Option<Evidence>,
+    residual_tests: Findings,
+    effects: Vec<Found>,
+    unexplained: Vec<Unexplained>,
+}
+
+/// Tests the residual of a fit and collects the claims about the effects that it contains, and about
+/// structure without a law. Evidence that is missing is evaluated first.
+fn concluded(
+    state: &SearchState,
+    declared: &Fitted,
+    (fitted, evidence): (Fitted, Option<Evidence>),
+    interrupted: bool,
+) -> Conclusion {
+    let data = state.data;
+    let is_trusted = fitted.found.describes_arm();
+    let residual_tests = check_fit(&fitted, data);
+    // If the search was stopped before it found anything, no evidence is needed.
+    let is_wanted = is_trusted && !(interrupted && state.added(&fitted).is_empty())
+        || !state.added(&fitted).is_empty();
+    let evidence = evidence.or_else(|| {
+        if is_wanted { evaluate(&fitted, data, &state.reconsidered(&fitted)) } else { None }
+    });
+    let best = evidence
+        .as_ref()
+        .and_then(|evidence| Some((evidence, evidence.certain_set(data.rules.inclusion_threshold)?)));
+    let unexplained =
+        best.map_or_else(Vec::new, |best| unexplained::without_law(&fitted, data, best));
+    let of_all_rows = best.and_then(|_| evidence_with_doubtful_rows(state, declared, &fitted));
+    let effects =
+        found(state, &fitted, (best, of_all_rows.as_ref()), (is_trusted, findings.is_structured()));
+    Conclusion { fitted, evidence, findings, effects, unexplained }
+}
+
+/// Returns the fit that the loop ends with: the one found, or the declared one where that predicts
+/// poses that were left out better.
 ///
 /// A found fit with cautions is repeated from the nominal arm, because terms that were missing at
 /// first may have driven a parameter to a wrong optimum. If cautions remain, it is kept only if it
