@@ -3,6 +3,11 @@
 use super::Block;
 use super::kernel::{norm, sum_of_squares};
 
+/// Number of lengths at which the moments of a loss are summed.
+const MOMENT_STEPS: u32 = 2000;
+/// Largest length of a normal residual of a few numbers that counts in such sums \[σ\].
+const MAX_LENGTH: f64 = 10.0;
+
 /// Loss function of an item (a pose). Its cost is ½ρ(s²), where s = ‖r‖ is the whitened residual
 /// length \[σ\].
 ///
@@ -116,6 +121,25 @@ impl Loss {
         Some(sum)
     }
 
+    /// Returns the mean curvature of the loss and the mean square of its slope, each over all
+    /// directions, for normal residuals of `coordinates` numbers with 1 σ = `scale`.
+    ///
+    /// E[(k − 1) ρ′(s) + ∂(ρ′ s)/∂s] / k and E[(ρ′ s)²] / k with s² / scale² ~ χ²ₖ [Huber &
+    /// Ronchetti 2009, sec. 7.6].
+    pub fn normal_moments(self, coordinates: usize, scale: f64) -> (f64, f64) {
+        let k = coordinates as f64;
+        let (mut total, mut curvature, mut square) = (0.0, 0.0, 0.0);
+        for step in 0..MOMENT_STEPS {
+            let s = (f64::from(step) + 0.5) / f64::from(MOMENT_STEPS) * MAX_LENGTH;
+            let density = s.powf(k - 1.0) * (-0.5 * s * s).exp();
+            let (weight, length) = (self.weight(s * scale), s * scale);
+            total += density;
+            curvature += density * ((k - 1.0) * weight + self.curvature(length)) / k;
+            square += density * (weight * length).powi(2) / k;
+        }
+        (curvature / total, square / total)
+    }
+
     /// Returns the factor A w̄ / B² by which the covariance of an M-estimate exceeds (JᵀWJ)⁻¹.
     ///
     /// A = Σ‖ρ′ r‖²/ν, w̄ is the mean of ρ′, and B is the mean curvature ∂²(½ρ)/∂r² over all
@@ -142,6 +166,17 @@ impl Loss {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn moments_of_absolute_lengths_are_those_of_normal_residuals() {
+        // E[1/s] = √(2/π) for three coordinates.
+        let loss = Loss::L1 { slope: Loss::L1_POSITION, smoothing: 1e-3 };
+        let (curvature, square) = loss.normal_moments(3, 1.0);
+        let expected = 2.0 * 2.0 / 3.0 * (2.0 / std::f64::consts::PI).sqrt();
+        assert!((curvature / expected - 1.0).abs() < 1e-3, "{curvature} {expected}");
+        assert!((square / (4.0 / 3.0) - 1.0).abs() < 1e-3, "{square}");
+        assert_eq!(Loss::Squares.normal_moments(3, 1.0).0, 1.0);
+    }
 
     /// Compares the factor with closed forms of A / B² for normal residuals of one and of two
     /// coordinates, at thresholds that most residuals exceed.

@@ -1,6 +1,6 @@
 //! Statistics of a fit: standard errors, identified parts, χ² and outliers.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 
 use crate::fit::stages::active_limits::{Held, confine};
@@ -48,8 +48,8 @@ impl Statistics {
     /// Computes the statistics of a stage that ended at `end`; `noise_model` converts the declared
     /// σ to the one that the fit assumed; `None` if none is declared.
     ///
-    /// With a robust loss the covariance is that of the weighted Jacobian, times
-    /// [`Loss::variance_factor`]. Active constraints confine it to the directions that they leave
+    /// With Huber's loss the covariance is that of the weighted Jacobian, times
+    /// [`Loss::variance_factor`]; with absolute lengths it is that of [`sandwich`]. Active constraints confine it to the directions that they leave
     /// open.
     ///
     /// # Errors
@@ -94,7 +94,14 @@ impl Statistics {
         let left_out = aside.map(|place| moved(&stage.poses[place]) as f64).sum::<f64>();
         if robust {
             let each: Vec<usize> = stage.poses.iter().map(moved).collect();
-            uncertainty = of(stage.loss.variance_factor(&lengths.weighed, &each, freedom));
+            uncertainty = if let Loss::L1 { .. } = stage.loss {
+                let kept = (1.0 - left_out / coordinates.max(1.0)).max(MIN_SHARE_KEPT);
+                let declared = noise_model.map_or(1.0, |model| model.scale);
+                let scale = if lengths.scatter > 0.0 { lengths.scatter / declared } else { 1.0 };
+                sandwich(stage, &end.x, (&each, scale, kept), (&closed, &held))
+            } else {
+                of(stage.loss.variance_factor(&lengths.weighed, &each, freedom))
+            };
         }
         let freedom = freedom - left_out;
         let prices = stage.prices(&end.x, &end.at_bound, &constraints)?;
@@ -163,6 +170,46 @@ impl Statistics {
             lengths,
         })
     }
+}
+
+/// Smallest share of residual coordinates for which normal residuals are assumed, where nearly all
+/// rows are outliers.
+const MIN_SHARE_KEPT: f64 = 0.1;
+
+/// Returns the covariance of a fit of absolute lengths, A⁻¹ B A⁻¹ with A = a JᵀJ + Λ and B = b JᵀJ
+/// + Λ [Huber & Ronchetti 2009, sec. 7.6].
+///
+/// Such a fit meets some rows exactly, whose weights say nothing about the uncertainty. The mean
+/// curvature a and the mean square b of the slope are therefore those of normal residuals with 1 σ
+/// = `scale`, for the share `kept` of the rows. `each` are the coordinates of the poses.
+fn sandwich(
+    stage: &Stage,
+    at: &DVector<f64>,
+    (each, scale, kept): (&[usize], f64, f64),
+    (closed, held): (&DMatrix<f64>, &[bool]),
+) -> Uncertainty {
+    let total = each.iter().sum::<usize>().max(1) as f64;
+    let (mut curvature, mut square) = (0.0, 0.0);
+    for coordinates in 1..=each.iter().copied().max().unwrap_or(0) {
+        let count = each.iter().filter(|count| **count == coordinates).count() * coordinates;
+        if count > 0 {
+            let (a, b) = stage.loss.normal_moments(coordinates, scale);
+            curvature += kept * a * count as f64 / total;
+            square += b * count as f64 / total;
+        }
+    }
+    let triangle = stage.linearised(at, Loss::Squares).triangle * curvature.sqrt();
+    let priors: Vec<Option<f64>> = stage.parameters().map(|parameter| parameter.sigma).collect();
+    let mut uncertainty = Uncertainty::of(&triangle, &priors, closed, held, 1.0);
+    let inverse = &uncertainty.covariance;
+    let ratio = square / curvature;
+    let mut weighted = inverse.clone();
+    for (mut row, sigma) in weighted.row_iter_mut().zip(&priors) {
+        row *= sigma.map_or(0.0, |sigma| sigma.powi(-2));
+    }
+    let from_priors = inverse * weighted;
+    uncertainty.covariance = inverse * ratio + from_priors * (1.0 - ratio);
+    uncertainty
 }
 
 /// Returns the interval in which χ² / ν of pure noise lies with probability 0.999, with ν =
