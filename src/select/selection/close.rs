@@ -174,7 +174,7 @@ pub fn close_by(
 struct Conclusion {
     fitted: Fitted,
     evidence: Option<Evidence>,
-    residual_tests: Findings,
+    residual_tests: ResidualTests,
     effects: Vec<Found>,
     unexplained: Vec<Unexplained>,
 }
@@ -202,9 +202,13 @@ fn concluded(
     let unexplained =
         best.map_or_else(Vec::new, |best| unexplained::without_law(&fitted, data, best));
     let of_all_rows = best.and_then(|_| evidence_with_doubtful_rows(state, declared, &fitted));
-    let effects =
-        found(state, &fitted, (best, of_all_rows.as_ref()), (is_trusted, findings.is_structured()));
-    Conclusion { fitted, evidence, findings, effects, unexplained }
+    let effects = found(
+        state,
+        &fitted,
+        (best, of_all_rows.as_ref()),
+        (is_trusted, residual_tests.is_structured()),
+    );
+    Conclusion { fitted, evidence, residual_tests, effects, unexplained }
 }
 
 /// Returns the fit that the loop ends with: the one found, or the declared one where that predicts
