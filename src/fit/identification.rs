@@ -13,6 +13,7 @@ use crate::fit::checks::finding::{Finding, FindingCode};
 use crate::fit::checks::fitted_rows::influential_finding;
 use crate::fit::checks::misreading::Explanations;
 use crate::fit::checks::outliers::outliers;
+use crate::fit::checks::payload_place::payload_finding;
 use crate::fit::checks::pose_sufficiency::PoseSufficiency;
 use crate::fit::checks::required_columns::check_columns;
 use crate::fit::checks::{findings, held_out};
@@ -113,6 +114,14 @@ pub fn identify_model(
         };
         found.influential_rows = influential_rows(&found, without);
         found.findings.extend(found.influential_rows.as_ref().map(influential_finding));
+    }
+    if options.influential_rows && !options.provisional {
+        let values =
+            found.estimates.iter().map(|estimate| (estimate.name.clone(), estimate.estimate));
+        let start = values.collect();
+        let other = Options { progress: None, provisional: true, start, ..options.clone() };
+        let fit = |problem: &Problem| identify(problem, data, &other);
+        found.findings.extend(payload_finding(problem, data, &found, fit));
     }
     Ok(found)
 }

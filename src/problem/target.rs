@@ -22,6 +22,8 @@ pub struct Tool {
     pub payload_at: Vector3<f64>,
     /// True if the payload hangs at the identified target: `payload_at = "target"`.
     pub payload_follows: bool,
+    /// True if the problem declares where the payload hangs.
+    pub payload_is_declared: bool,
     /// Payload without a column `payload_kg` \[kg\].
     pub payload_mass: f64,
 }
@@ -85,8 +87,15 @@ pub(super) fn tool(
 ) -> Result<Tool, InputError> {
     let joint = carriers.joints.len().saturating_sub(1);
     let (target, rotation, payload_at) = (Vector3::zeros(), Vector3::zeros(), Vector3::zeros());
-    let mut tool =
-        Tool { joint, target, rotation, payload_at, payload_follows: false, payload_mass: 0.0 };
+    let mut tool = Tool {
+        joint,
+        target,
+        rotation,
+        payload_at,
+        payload_follows: false,
+        payload_is_declared: false,
+        payload_mass: 0.0,
+    };
     let Some(mut section) = section else { return Ok(tool) };
     tool.joint = carriers.joint(&mut section)?.unwrap_or(joint);
     tool.target = section.vector("target", Unit::Length)?.unwrap_or_default();
@@ -94,9 +103,9 @@ pub(super) fn tool(
     tool.payload_at = tool.target;
     if section.peek("payload_at").is_some_and(|item| item.text().is_ok()) {
         section.word("payload_at", &["target"], &[()])?;
-        tool.payload_follows = true;
+        (tool.payload_follows, tool.payload_is_declared) = (true, true);
     } else if let Some(at) = section.vector("payload_at", Unit::Length)? {
-        tool.payload_at = at;
+        (tool.payload_at, tool.payload_is_declared) = (at, true);
     }
     tool.payload_mass = section.not_negative("payload", Unit::Mass)?.unwrap_or(0.0);
     section.finish()?;

@@ -1,7 +1,7 @@
 //! Fits that the data refute are not passed on: bounds along unidentifiable directions, priors and
 //! noise that the data contradict, held-out rows, orientations, planar arms, and reversed joints.
 
-use flexcal::fit::{FindingCode, Misreading};
+use flexcal::fit::{FindingCode, Misreading, Options, identify};
 use flexcal::measurement::Dataset;
 use flexcal::model::PoseResiduals;
 use flexcal::problem::Problem;
@@ -246,6 +246,14 @@ fn a_payload_hangs_at_the_identified_target_where_that_is_declared() {
     let chi2 = |problem| fit(problem, &data).reduced_chi2.unwrap();
     assert!(chi2(&follows) < 1.5 && chi2(&fixed) > 3.0, "{} {}", chi2(&follows), chi2(&fixed));
     assert_ne!(follows.digest(), fixed.digest());
+    // Where its place is not declared and matters so much, the fit is not trusted.
+    let at_target = |problem| {
+        let options = Options::default().with_influential_rows();
+        let found = identify(problem, &data, &options).unwrap();
+        found.has(FindingCode::PayloadAtTarget)
+    };
+    let declared = parse(&elastic("payload_at_m = [0.05, 0.02, 0.12]\n"));
+    assert!(at_target(&fixed) && !at_target(&follows) && !at_target(&declared));
     // Derivatives with respect to the target contain those of the load.
     let model = model_of(&follows, &data.measurements);
     let placement = flexcal::fit::Placement::of(&data.measurements);

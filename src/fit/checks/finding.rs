@@ -109,6 +109,9 @@ finding_codes! {
     NoiseBeyondDeclared: Error "noise-beyond-declared" ["noise_factor", "sigma_taken"]
         "Residuals and priors speak for a noise variance of more than 1000 times the declared one.",
         "look for what the model lacks with flexcal loop, or check the unit of the declared σ";
+    PayloadAtTarget: Error "payload-at-target" ["before", "after"]
+        "The measurements speak for a payload at the identified target, where the problem leaves its place open.",
+        "declare payload_at = \"target\" in [tool], or its place as payload_at_m";
     OrientationMisfit: Error "orientation-misfit" ["rms", "sigma", "conventions"]
         "The fitted arm misses the measured orientations by more than 2° and 20 σ.",
         "check the convention of the orientation columns and their frames";

@@ -17,6 +17,7 @@ pub(super) mod nominal_error;
 mod orientation;
 pub(super) mod outliers;
 pub(super) mod parameter_limits;
+pub(super) mod payload_place;
 pub(super) mod point_spread;
 pub(super) mod pose_sufficiency;
 mod prediction;

@@ -196,9 +196,9 @@ fn concluded(
     let evidence = evidence.or_else(|| {
         if is_wanted { evaluate(&fitted, data, &state.reconsidered(&fitted)) } else { None }
     });
-    let best = evidence
-        .as_ref()
-        .and_then(|evidence| Some((evidence, evidence.certain_set(data.rules.inclusion_threshold)?)));
+    let best = evidence.as_ref().and_then(|evidence| {
+        Some((evidence, evidence.certain_set(data.rules.inclusion_threshold)?))
+    });
     let unexplained =
         best.map_or_else(Vec::new, |best| unexplained::without_law(&fitted, data, best));
     let of_all_rows = best.and_then(|_| evidence_with_doubtful_rows(state, declared, &fitted));
