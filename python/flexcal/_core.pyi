@@ -32,6 +32,24 @@ def simulated(
     problem: Problem, truth: str | PathLike[str], count: int, given: Poses | None, seed: int
 ) -> Simulation: ...
 def studied(file: str | PathLike[str], folder: str | PathLike[str], progress: Step | None) -> Study: ...
+def next(
+    problem: Problem,
+    data: Data,
+    poses: int,
+    pool: Poses | None,
+    purpose: str,
+    explanations: str | PathLike[str] | None,
+    tolerance_mm: float | None,
+    level: float,
+    remainder: bool,
+    truth: str | PathLike[str] | None,
+    seed: int,
+) -> Next: ...
+
+class Next:
+    def json(self) -> str: ...
+    def summary(self) -> str: ...
+    def csv(self) -> str: ...
 
 class Data:
     @property

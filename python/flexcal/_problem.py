@@ -14,7 +14,7 @@ from . import _core
 from ._forward import Forward
 from ._least_squares import LeastSquares
 from ._progress import Told, told
-from ._results import Check, ClosedLoop, Comparison, Identification, Plan, Simulation, Study, Trace
+from ._results import Check, ClosedLoop, Comparison, Identification, Next, Plan, Simulation, Study, Trace
 from ._restored import Spec
 from ._tables import Data, Path, Source, count, source, warn
 
@@ -29,7 +29,8 @@ Solver: TypeAlias = Literal[
     "reflective",
     "clamped",
 ]
-Criterion: TypeAlias = Literal["S", "A", "D", "E"]
+Criterion: TypeAlias = Literal["S", "A", "D", "E", "I"]
+Purpose: TypeAlias = Literal["accuracy", "causes", "both"]
 
 MOST_POSES = 10_000
 """Poses that a check or a plan takes at most, as on the command line."""
@@ -319,7 +320,8 @@ class Problem(Forward):
             A table of poses to take; otherwise they are sought within the limits of the joints.
         criterion
             What to make small: the geometric mean of the standard errors (``"S"``), the mean variance (``"A"``), the volume of the
-            confidence ellipsoid (``"D"``) or the largest variance of any combination (``"E"``).
+            confidence ellipsoid (``"D"``), the largest variance of any combination (``"E"``) or the mean variance of predicted
+            positions (``"I"``).
         separate
             Two effects to tell apart, each as a problem declares it: ``"gear-ratio = { joint = 3 }"``.
         truth
@@ -330,6 +332,52 @@ class Problem(Forward):
         poses, seed = count("poses", poses, 1, MOST_POSES), count("seed", seed, 0, MOST_SEED)
         given, table = self._given(data), self._given(candidates)
         return Plan(_core.plan(self._core, poses, given, table, criterion, separate, truth, seed))
+
+    def next(
+        self,
+        poses: int = 5,
+        data: Data | None = None,
+        *,
+        pool: Data | None = None,
+        purpose: Purpose = "accuracy",
+        explanations: Path | None = None,
+        tolerance_mm: float | None = None,
+        level: float = 0.95,
+        remainder: bool = False,
+        truth: Path | None = None,
+        seed: int = 1,
+    ) -> Next:
+        """Chooses the poses to measure next, or says that there are enough (docs/plan.md).
+
+        Parameters
+        ----------
+        poses
+            Number of poses to choose.
+        data
+            Measured poses instead of those of the files that the problem names.
+        pool
+            A table of poses to choose from; predictions are judged there. Otherwise poses lie within the limits of the joints.
+        purpose
+            ``"accuracy"`` lowers the error of predictions, ``"causes"`` tells the effects of ``explanations`` apart.
+        explanations
+            The loop.json with the effects to tell apart.
+        tolerance_mm
+            Poses are enough when errors stay below it with the probability ``level``.
+        level
+            Probability with which errors stay below the bound.
+        remainder
+            Judge predictions with a remainder, as ``identify(remainder=True)`` makes them.
+        truth
+            A TRUTH.toml whose ``[poses]`` say where poses may lie, instead of the limits of the joints.
+        seed
+            Seed of all random numbers.
+        """
+        poses, seed = count("poses", poses, 1, MOST_POSES), count("seed", seed, 0, MOST_SEED)
+        read, table = self._read(self._given_data(data)), self._given(pool)
+        core = _core.next(
+            self._core, read, poses, table, purpose, explanations, tolerance_mm, level, remainder, truth, seed
+        )
+        return Next(core)
 
     def _given_data(self, data: Data | None) -> Source:
         return self.files if data is None else source(data)

@@ -629,6 +629,38 @@ class Plan(_Result):
         return _html.words(self.summary())
 
 
+class Next(_Result):
+    """Poses to measure next, with the error over the workspace now and after each of them."""
+
+    def __init__(self, core: _core.Next) -> None:
+        self._core = core
+
+    @_once
+    def poses(self) -> pd.DataFrame:
+        """The poses in the order of measurement, with the columns of measurements but for the positions."""
+        return table(self._core.csv())
+
+    @property
+    def enough(self) -> bool:
+        """Whether the bound over the workspace is below the tolerance."""
+        return bool(self._document["stop"] == "enough")
+
+    @property
+    def stop(self) -> str | None:
+        """Why fewer poses are named than asked for; None if there is no reason."""
+        reason: str | None = self._document["stop"]
+        return reason
+
+    @property
+    def bound_mm(self) -> float | None:
+        """Length that errors in the workspace do not exceed now; None with fewer than ten measured configurations."""
+        now = self._document["now"]
+        return None if now is None else float(now["bound_mm"])
+
+    def _repr_html_(self) -> str:
+        return _html.words(self.summary())
+
+
 def _named(entries: list[dict[str, Any]]) -> pd.DataFrame:
     import pandas as pd
 

@@ -4,17 +4,18 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use flexcal::design::{
-    self, Candidates, CheckedPoses, Criterion, DesignError, EffectPair, PlanOptions, PlanProgress,
+    self, Candidates, CheckedPoses, Criterion, DesignError, EffectPair, Explanations, NextOptions,
+    PlanOptions, PlanProgress, Purpose,
 };
-use flexcal::fit::Progress;
+use flexcal::fit::{Options, Progress};
 use flexcal::measurement::{Dataset, Measurements};
 use flexcal::problem::{PoseRanges, Problem as Declared};
 use flexcal::report;
-use flexcal::results::{CheckResult, Document as _, PlanResult, poses_csv};
+use flexcal::results::{CheckResult, Document as _, NextResult, PlanResult, poses_csv};
 use flexcal::rig::Truth;
 use pyo3::prelude::*;
 
-use crate::data::Poses;
+use crate::data::{Data, Poses};
 use crate::error::{of_argument, raised};
 use crate::problem::Problem;
 use crate::supervise::supervised;
@@ -34,6 +35,32 @@ pub struct Plan {
     separated: Option<design::PairSeparation>,
     criterion: Criterion,
     seed: u64,
+}
+
+/// Poses to measure next, and the error over the workspace now and after each of them.
+#[pyclass(frozen, module = "flexcal._core")]
+pub struct Next {
+    json: String,
+    summary: String,
+    csv: String,
+}
+
+#[pymethods]
+impl Next {
+    /// Returns next.json.
+    fn json(&self) -> String {
+        self.json.clone()
+    }
+
+    /// Returns the text that the command line prints.
+    fn summary(&self) -> String {
+        self.summary.clone()
+    }
+
+    /// Returns next.csv.
+    fn csv(&self) -> String {
+        self.csv.clone()
+    }
 }
 
 #[pymethods]
@@ -233,6 +260,63 @@ pub fn plan(
     Ok(Plan { problem, found, separated, criterion, seed })
 }
 
+/// Chooses the poses to measure next, after a fit to the measured ones.
+#[pyfunction]
+#[expect(clippy::too_many_arguments, reason = "keywords of Python")]
+pub fn next(
+    py: Python<'_>,
+    problem: &Problem,
+    data: &Data,
+    poses: usize,
+    pool: Option<&Poses>,
+    purpose: &str,
+    explanations: Option<PathBuf>,
+    tolerance_mm: Option<f64>,
+    level: f64,
+    remainder: bool,
+    truth: Option<PathBuf>,
+    seed: u64,
+) -> PyResult<Next> {
+    let purpose = match purpose {
+        "accuracy" => Purpose::Accuracy,
+        "causes" => Purpose::Causes,
+        "both" => Purpose::Both,
+        word => {
+            let message = format!("purpose: \"{word}\" is none of accuracy, causes, both");
+            return Err(of_argument("purpose", message));
+        }
+    };
+    let declared = Arc::clone(&problem.declared);
+    let explanations = explanations.map(|file| Explanations::read(&file, &declared));
+    let explanations = explanations.transpose().map_err(|error| raised(&error))?;
+    let (data, pool) = (Arc::clone(&data.data), rows(pool));
+    let chosen = supervised(py, None, move |sink| {
+        let candidates = match (pool, known_ranges(&declared, truth.as_deref())?) {
+            (Some(rows), _) => Candidates::Rows(Box::new(rows.as_ref().clone())),
+            (None, Some(ranges)) => Candidates::Within(ranges.relevant_to(&declared)),
+            (None, None) => Candidates::Within(PoseRanges::measured(&declared, &data.measurements)),
+        };
+        let options = NextOptions {
+            poses,
+            purpose,
+            tolerance: tolerance_mm.map(|length| length * 1e-3),
+            level,
+            seed,
+            workspace: None,
+            explanations: explanations.as_ref(),
+            remainder,
+            fit: Options::default().with_progress(sink),
+        };
+        let next = design::next(&declared, &data, &candidates, &options)?;
+        Ok::<_, design::NextError>(Next {
+            json: NextResult::new(&declared, &options, &next).to_json(),
+            summary: report::next_text(&declared, &options, &next),
+            csv: poses_csv(&declared, &next.poses),
+        })
+    })?;
+    chosen.map_err(|error| raised(&error))
+}
+
 fn rows(poses: Option<&Poses>) -> Option<Arc<Measurements>> {
     poses.map(|poses| Arc::clone(&poses.rows))
 }
@@ -243,6 +327,9 @@ fn criterion_of(word: &str) -> PyResult<Criterion> {
         "A" => Ok(Criterion::A),
         "D" => Ok(Criterion::D),
         "E" => Ok(Criterion::E),
-        _ => Err(of_argument("criterion", format!("criterion: \"{word}\" is none of S, A, D, E"))),
+        "I" => Ok(Criterion::I),
+        _ => {
+            Err(of_argument("criterion", format!("criterion: \"{word}\" is none of S, A, D, E, I")))
+        }
     }
 }

@@ -34,7 +34,7 @@ mod _core {
     #[pymodule_export]
     use super::data::{Data, Poses};
     #[pymodule_export]
-    use super::design::{Check, Plan, check, plan};
+    use super::design::{Check, Next, Plan, check, next, plan};
     #[pymodule_export]
     use super::least_squares::LeastSquares;
     #[pymodule_export]

@@ -21,7 +21,7 @@ use super::estimate::Trust;
 use super::flags::Flags;
 use super::outcome::Outcome;
 use super::output::Results;
-use super::plan::numbers;
+use super::region::numbers;
 
 /// Arguments of `flexcal export`.
 #[derive(Debug, Args)]

@@ -18,7 +18,7 @@ use super::input::{Common, Input};
 use super::outcome::Outcome;
 use super::output::REPORT;
 use super::progress::Line;
-use super::{diagnostic, interrupt, next, output};
+use super::{advice, diagnostic, interrupt, output};
 
 /// Arguments of `flexcal identify`.
 #[derive(Debug, Args)]
@@ -174,7 +174,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         let sources = sources.as_ref().map_or_else(String::new, |words| format!("\n{words}\n"));
         let is_structured = shown.residual_tests.is_structured();
         let estimate = results.path("estimate.json");
-        let next = next::after_fit(common, &identification, is_structured, &estimate);
+        let next = advice::after_fit(common, &identification, is_structured, &estimate);
         format!("{told}{words}{sources}{}Next: {next}\n", results.written())
     })?;
     if let (Some(words), true, false) = (&sources, common.json, common.quiet) {

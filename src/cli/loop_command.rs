@@ -17,7 +17,7 @@ use super::outcome::Outcome;
 use super::output::REPORT;
 use super::progress::Line;
 use super::unfinished::Unfinished;
-use super::{diagnostic, interrupt, next, output};
+use super::{advice, diagnostic, interrupt, output};
 
 /// Arguments of `flexcal loop`.
 #[derive(Debug, Args)]
@@ -105,7 +105,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         } else {
             report::loop_brief(&problem, &closure, output::columns())
         };
-        let next = next::after_loop(common, &problem, &closure.before.fit, &result, &results);
+        let next = advice::after_loop(common, &problem, &closure.before.fit, &result, &results);
         format!("{told}{words}{}Next: {next}\n", results.written())
     })?;
     let outcome = diagnostic::judged(&closure.after, common.quiet);

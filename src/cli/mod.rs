@@ -3,6 +3,7 @@
 #![allow(rustdoc::invalid_html_tags, reason = "<name> in a help text is for the terminal")]
 
 mod accept;
+mod advice;
 mod check;
 mod compare;
 mod compensate;
@@ -26,6 +27,7 @@ mod plan;
 mod poses;
 mod predict;
 mod progress;
+mod region;
 mod remainder;
 mod simulate;
 mod study;
@@ -92,6 +94,8 @@ enum Command {
     Check(check::Arguments),
     /// Choose the poses that identify best.
     Plan(plan::Arguments),
+    /// Choose the poses to measure next, or say that there are enough.
+    Next(next::Arguments),
     /// Simulate measurements of a known arm on the virtual test rig.
     Simulate(simulate::Arguments),
     /// Compare strategies over many fits to simulated measurements whose truth is known.
@@ -132,6 +136,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Command::Compensate(arguments) => compensate::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
         Command::Plan(arguments) => plan::run(&arguments),
+        Command::Next(arguments) => next::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),
         Command::Study(arguments) => study::run(&arguments),
         Command::Completions(arguments) => completions::run(&arguments, Cli::command()),

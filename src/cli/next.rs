@@ -1,131 +1,161 @@
-//! Suggestion of the next command after a result.
+//! Arguments and work of `flexcal next`.
 
-use std::path::Path;
+use std::error::Error;
+use std::path::PathBuf;
 
-use flexcal::fit::{FindingCode, Identification};
-use flexcal::problem::{PoseRanges, Problem};
+use clap::{Args, ValueEnum, value_parser};
+use flexcal::design::{self, Candidates, Explanations, NextOptions, Purpose, StopReason};
+use flexcal::fit::Options;
+use flexcal::problem::PoseRanges;
 use flexcal::report::{self, shell_word};
-use flexcal::results::{LoopResult, TraceResult, exceeds_noise};
-use flexcal::select::Verdict;
+use flexcal::results::{Document as _, NextResult, poses_csv};
 
-use super::input::Common;
-use super::output::Results;
-use super::plan;
+use super::input::{Common, Input};
+use super::outcome::Outcome;
+use super::poses::Source;
+use super::progress::Line;
+use super::region::Region;
+use super::{diagnostic, interrupt};
 
-/// Number of poses that a suggested plan has to distinguish two effects.
-const SEPARATING_POSES: usize = 12;
+/// Arguments of `flexcal next`.
+#[derive(Debug, Args)]
+#[command(
+    mut_arg("candidates", |arg| arg.long("pool").alias("candidates").help(
+        "Tables of poses to choose from, with the columns of measurements; positions are not needed. Predictions are judged there"
+    )),
+    after_help = "Fits the measured poses, then chooses those that lower the error of predictions in the workspace most: the limits of the \
+joints (measured ranges where there are none), the ranges of a TRUTH.toml, or the rows of --pool. Writes next.csv and next.json. Exit \
+status 1: further poses gain nothing and the tolerance is not met.
 
-/// Returns the command to run after a fit. `is_structured` is true if the residual has structure;
-/// `estimate` is the file written.
-pub fn after_fit(
-    common: &Common,
-    found: &Identification,
-    is_structured: bool,
-    estimate: &Path,
-) -> String {
-    let named = common.named();
-    match report::show_influential_rows(found, &common.problem_file()) {
-        Some(look) => {
-            format!(
-                "{look}; if they are right, flexcal loop {named} looks for what the model lacks"
-            )
-        }
-        // If the priors contradict the fit, neither a cause nor a correction follows from it.
-        None if found.has(FindingCode::PriorContradicted) => {
-            let rule = found
-                .finding(FindingCode::PriorContradicted)
-                .and_then(|finding| finding.word("rule"));
-            format!(
-                "give \"{}\" in {} a larger σ, or check what it limits",
-                rule.unwrap_or_default(),
-                common.problem_file().display()
-            )
-        }
-        None if found.has(FindingCode::NoiseBeyondDeclared) => {
-            format!("flexcal loop {named} looks for what the model lacks")
-        }
-        None if !found.is_trusted() || report::determines_nothing(found) => {
-            format!("flexcal check {named} says what the poses can tell")
-        }
-        None if found.has(FindingCode::PriorsDecide) => {
-            format!("flexcal plan {named} --poses N chooses poses to measure that tell more")
-        }
-        None if is_structured
-            || exceeds_noise(found)
-            || found.has(FindingCode::HeldOutBeyondPrediction)
-            || found.has(FindingCode::RowsSetAside) =>
-        {
-            format!("flexcal loop {named} looks for what the model lacks")
-        }
-        None if found.has(FindingCode::HeldOutNotBetter) => {
-            format!("flexcal check {named} says what the poses can tell")
-        }
-        None => {
-            let [problem, estimate] = [common.problem(), estimate].map(shell_word);
-            format!(
-                "flexcal compensate {problem} --estimate {estimate} --data TARGETS.csv corrects commands"
-            )
+Examples:
+  flexcal next my-arm --poses 10
+  flexcal next my-arm --pool reachable.csv --tolerance-mm 0.3
+  flexcal next my-arm --for causes --poses 12
+  flexcal next my-arm --workspace-mm=-800,800,-800,800,100,1200 --keep-out-mm 1,0,0,250"
+)]
+pub struct Arguments {
+    #[command(flatten)]
+    common: Common,
+    /// Number of poses to choose
+    #[arg(long, value_name = "K", default_value_t = 5, value_parser = value_parser!(u32).range(1..=10_000))]
+    poses: u32,
+    /// Say "enough" once errors in the workspace are below this, with the probability of --level
+    #[arg(long, value_name = "MM", value_parser = positive)]
+    tolerance_mm: Option<f64>,
+    /// Aim of the poses
+    #[arg(long = "for", value_enum, default_value_t = PurposeArgument::Accuracy)]
+    purpose: PurposeArgument,
+    /// The loop.json with the explanations to tell apart [default: the one in the folder of results]
+    #[arg(long, value_name = "LOOP.json")]
+    explanations: Option<PathBuf>,
+    /// Probability with which errors stay below the bound
+    #[arg(long, value_name = "P", default_value_t = 0.95, value_parser = super::remainder::level)]
+    level: f64,
+    /// Judge predictions with a remainder fitted to the measured poses, as identify --remainder
+    /// makes them
+    #[arg(long)]
+    remainder: bool,
+    #[command(flatten)]
+    region: Region,
+    #[command(flatten)]
+    source: Source,
+}
+
+/// Parses a positive number.
+fn positive(text: &str) -> Result<f64, String> {
+    let number = text.parse::<f64>().ok().filter(|number| *number > 0.0 && number.is_finite());
+    number.ok_or_else(|| "a positive number is needed".to_owned())
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum PurposeArgument {
+    /// Small errors of predictions in the workspace
+    Accuracy,
+    /// To tell apart the effects among which the loop did not decide
+    Causes,
+    /// Both, with equal weight
+    Both,
+}
+
+impl From<PurposeArgument> for Purpose {
+    fn from(argument: PurposeArgument) -> Self {
+        match argument {
+            PurposeArgument::Accuracy => Self::Accuracy,
+            PurposeArgument::Causes => Self::Causes,
+            PurposeArgument::Both => Self::Both,
         }
     }
 }
 
-/// Returns the command to run after a loop, which wrote its `results`.
-pub fn after_loop(
-    common: &Common,
-    problem: &Problem,
-    fit: &Identification,
-    result: &LoopResult,
-    results: &Results,
-) -> String {
-    let named = common.named();
-    if let Some(look) = report::show_influential_rows(fit, &common.problem_file()) {
-        return look;
-    }
-    if result.interrupted {
-        return "the same command again, to search to the end".to_owned();
-    }
-    if !result.trusted {
-        return format!("flexcal identify {named} -v, once the input is corrected");
-    }
-    if result.structures().any(|left| left.limit.is_some()) {
-        return format!(
-            "flexcal identify {named} -v shows the cost of each limit; then move it out"
-        );
-    }
-    // A plan separates effects within known ranges, unless they depend on time.
-    let doubted = result.effects.iter().filter(|found| found.is_doubted());
-    let mut pairs = doubted.filter_map(|found| {
-        let rival = found.alternatives.first()?;
-        Some([found.effect.declaration.clone(), rival.declaration.clone()])
-    });
-    let can_be_planned =
-        |pair: &[String; 2]| PoseRanges::of(problem).is_ok() && plan::pair(pair, problem).is_ok();
-    if let Some([effect, rival]) = pairs.find(can_be_planned) {
-        return format!(
-            "flexcal plan {named} --poses {SEPARATING_POSES} --separate '{effect}' '{rival}' chooses poses that tell the two apart"
-        );
-    }
-    let closed = shell_word(&results.path("problem.closed.toml"));
-    match result.verdict {
-        Verdict::Unexplained => {
-            format!("flexcal trace {named} ranks candidates and names what these data cannot show")
-        }
-        Verdict::NothingFound => format!("flexcal identify {named} writes the estimate to apply"),
-        Verdict::Explained => {
-            format!(
-                "flexcal identify {closed} writes the estimate to apply; -v lists its parameters"
-            )
-        }
-    }
-}
-
-/// Returns the command to run after a trace.
-pub fn after_trace(common: &Common, result: &TraceResult) -> String {
-    let is_pointed =
-        result.ranking.first().is_some_and(|candidate| candidate.p_value < result.level);
-    if is_pointed || result.structured {
-        format!("flexcal loop {} adds what is missing and fits again", common.named())
+/// Chooses poses, writes `next.csv` and `next.json`, and prints what they are expected to give.
+pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
+    let (common, source) = (&arguments.common, &arguments.source);
+    let Input { problem, data, results } =
+        common.read_beside("next", &source.files(), &["next.csv", "next.json"])?;
+    let candidates = match source.table(&problem, common)? {
+        Some(rows) => Candidates::Rows(Box::new(rows)),
+        None => Candidates::Within(match source.known_ranges(&problem)? {
+            Some(ranges) => ranges.relevant_to(&problem),
+            None => PoseRanges::measured(&problem, &data.measurements),
+        }),
+    };
+    let explanations = if arguments.purpose == PurposeArgument::Accuracy {
+        None
     } else {
-        format!("flexcal identify {} writes the estimate to apply", common.named())
+        let file = arguments.explanations.clone().unwrap_or_else(|| results.path("loop.json"));
+        Some(Explanations::read(&file, &problem)?)
+    };
+    let workspace = arguments.region.workspace()?;
+    let stop = interrupt::stop();
+    let found = |fit: Options| {
+        let options = NextOptions {
+            poses: arguments.poses as usize,
+            purpose: arguments.purpose.into(),
+            tolerance: arguments.tolerance_mm.map(|length| length * 1e-3),
+            level: arguments.level,
+            seed: source.seed,
+            workspace: workspace.as_ref(),
+            explanations: explanations.as_ref(),
+            remainder: arguments.remainder,
+            fit,
+        };
+        design::next(&problem, &data, &candidates, &options).map(|next| (next, options))
+    };
+    let (next, options) = Line::during(common.talks(), stop.clone(), |sink| {
+        found(Options::default().with_stop(stop).with_progress(sink))
+    })?;
+    let json = NextResult::new(&problem, &options, &next).to_json();
+    let table = poses_csv(&problem, &next.poses);
+    interrupt::begin_writing();
+    let mut texts = vec![("next.json", json.as_str())];
+    if !next.poses.is_empty() {
+        texts.push(("next.csv", table.as_str()));
     }
+    results.write(&texts)?;
+    common.tell(&json, || {
+        let text = report::next_text(&problem, &options, &next);
+        let named = common.named();
+        if next.poses.is_empty() {
+            let file = results.path("next.json");
+            return format!("{text}\nWritten to {}\nNext: flexcal identify {named}\n", file.display());
+        }
+        let file = results.path("next.csv");
+        format!(
+            "{text}\nWritten to {}, what it promises to next.json beside it\n\
+             Next: measure these poses, add the columns x_mm, y_mm, z_mm, then flexcal next {named} --data with {} among the files\n",
+            file.display(),
+            shell_word(&file)
+        )
+    })?;
+    if !next.found.is_trusted() && !common.quiet {
+        diagnostic::warn(
+            "the fit to the measured poses is not to be trusted: flexcal identify says why",
+        );
+    }
+    let is_met = next.error.zip(options.tolerance).is_none_or(|(error, most)| error.bound <= most);
+    Ok(if next.stop == Some(StopReason::GainBelowNoise) && !is_met {
+        Outcome::NotPassed
+    } else {
+        Outcome::Done
+    })
 }

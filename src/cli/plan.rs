@@ -4,11 +4,8 @@ use std::error::Error;
 use std::path::Path;
 
 use clap::{Args, ValueEnum, value_parser};
-use flexcal::design::{
-    self, Candidates, Criterion, EffectPair, PlanOptions, PlanProgress, Workspace,
-};
+use flexcal::design::{self, Candidates, Criterion, EffectPair, PlanOptions, PlanProgress};
 use flexcal::measurement::Measurements;
-use flexcal::nalgebra::Vector3;
 use flexcal::problem::Problem;
 use flexcal::report::{self, shell_word};
 use flexcal::results::{Document as _, PlanResult, poses_csv};
@@ -18,6 +15,7 @@ use super::input::Common;
 use super::outcome::Outcome;
 use super::poses::Source;
 use super::progress::Line;
+use super::region::Region;
 
 /// Arguments of `flexcal plan`.
 #[derive(Debug, Args)]
@@ -46,54 +44,10 @@ pub struct Arguments {
     /// declares it
     #[arg(long, value_name = "EFFECT", num_args = 2, conflicts_with = "criterion")]
     separate: Vec<String>,
-    /// Box that the nominal target stays in, frame of the arm's base
-    #[arg(long, value_name = "X0,X1,Y0,Y1,Z0,Z1", value_parser = numbers::<6>, allow_hyphen_values = true)]
-    workspace_mm: Option<[f64; 6]>,
-    /// Plane that the nominal target stays beyond, frame of the arm's base: N·p ≥ D for a normal N
-    #[arg(long, value_name = "NX,NY,NZ,D", value_parser = numbers::<4>, allow_hyphen_values = true)]
-    keep_out_mm: Vec<[f64; 4]>,
+    #[command(flatten)]
+    region: Region,
     #[command(flatten)]
     source: Source,
-}
-
-/// Parses `N` finite numbers with commas between them.
-pub(super) fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
-    let numbers = text
-        .split(',')
-        .map(|word| word.trim().parse().ok().filter(|number: &f64| number.is_finite()));
-    let numbers: Option<Vec<f64>> = numbers.collect();
-    numbers
-        .and_then(|numbers| numbers.try_into().ok())
-        .ok_or_else(|| format!("not {N} numbers with commas between them"))
-}
-
-/// Returns the workspace of the arguments, if they restrict it.
-fn workspace(arguments: &Arguments) -> Result<Option<Workspace>, WorkspaceError> {
-    let room = match arguments.workspace_mm.map(|room| room.map(|x| x * 1e-3)) {
-        Some([x0, x1, y0, y1, z0, z1]) if x0 < x1 && y0 < y1 && z0 < z1 => {
-            Some([Vector3::new(x0, y0, z0), Vector3::new(x1, y1, z1)])
-        }
-        Some(_) => return Err(WorkspaceError::Empty),
-        None => None,
-    };
-    let plane = |[x, y, z, least]: [f64; 4]| {
-        let normal = Vector3::new(x, y, z).try_normalize(0.0).ok_or(WorkspaceError::NoNormal)?;
-        Ok((normal, least * 1e-3))
-    };
-    let planes = arguments.keep_out_mm.iter().copied().map(plane).collect::<Result<Vec<_>, _>>()?;
-    let said = room.is_some() || !planes.is_empty();
-    Ok(said.then_some(Workspace { corners: room, planes }))
-}
-
-/// Error of workspace arguments that are invalid.
-#[derive(Debug, thiserror::Error)]
-enum WorkspaceError {
-    #[error(
-        "--workspace-mm: the box is empty; write X0,X1,Y0,Y1,Z0,Z1, the lesser of each pair first"
-    )]
-    Empty,
-    #[error("--keep-out-mm: 0,0,0 is no normal of a plane")]
-    NoNormal,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -110,6 +64,9 @@ enum CriterionArgument {
     /// The largest variance of any combination, in units of what average poses leave of it
     #[value(name = "E")]
     E,
+    /// The mean variance of predicted positions in the ranges, with a misfit as large as the noise
+    #[value(name = "I")]
+    I,
 }
 
 impl From<CriterionArgument> for Criterion {
@@ -119,6 +76,7 @@ impl From<CriterionArgument> for Criterion {
             CriterionArgument::A => Self::A,
             CriterionArgument::D => Self::D,
             CriterionArgument::E => Self::E,
+            CriterionArgument::I => Self::I,
         }
     }
 }
@@ -154,7 +112,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
             line.say(|| format!("{what}, sweep {sweep}: ln of the criterion {value:.4}"));
         }
     };
-    let workspace = workspace(arguments)?;
+    let workspace = arguments.region.workspace()?;
     let options = PlanOptions {
         workspace: workspace.as_ref(),
         poses: arguments.poses as usize,

@@ -10,7 +10,7 @@ use flexcal::{report, select};
 use super::input::{Common, Input};
 use super::outcome::Outcome;
 use super::progress::Line;
-use super::{diagnostic, next};
+use super::{advice, diagnostic};
 
 /// Arguments of `flexcal trace`.
 #[derive(Debug, Args)]
@@ -39,7 +39,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let written = results.path("trace.json");
     common.print_result(&json, || {
         let (text, next) =
-            (report::trace_text(&problem, &trace), next::after_trace(common, &result));
+            (report::trace_text(&problem, &trace), advice::after_trace(common, &result));
         format!("{text}\nWritten to {}\nNext: {next}\n", written.display())
     })?;
     Ok(diagnostic::judged(&trace.fit, common.quiet))

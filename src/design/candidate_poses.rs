@@ -8,7 +8,8 @@ use rand_chacha::ChaCha8Rng;
 
 use super::DesignError;
 use crate::measurement::{Labels, Measurements};
-use crate::problem::{JointKind, PoseRanges, Problem};
+use crate::numeric::range;
+use crate::problem::{Joint, JointKind, PoseRanges, Problem};
 use crate::random;
 
 /// Resolution to which commanded angles are rounded [°].
@@ -47,6 +48,23 @@ impl PoseRanges {
         }
         let joints = problem.joints.iter().map(|joint| joint.limits).collect();
         Ok(Self { joints, ..Self::default() })
+    }
+
+    /// Returns the joint limits that the problem declares, and the measured ranges of joints that
+    /// lack one; payloads are those of the measured rows.
+    #[doc(hidden)]
+    pub fn measured(problem: &Problem, rows: &Measurements) -> Self {
+        let of_joint = |(k, joint): (usize, &Joint)| {
+            let values = (0..rows.len()).map(|row| rows.configuration(row)[k]);
+            let (low, high) = range(values);
+            let (from, to) = joint.limits;
+            if from.is_finite() && to.is_finite() { (from, to) } else { (low, high) }
+        };
+        let mut payloads = rows.payload.clone().unwrap_or_default();
+        payloads.sort_by(f64::total_cmp);
+        payloads.dedup();
+        let joints = problem.joints.iter().enumerate().map(of_joint).collect();
+        Self { joints, payloads, ..Self::default() }
     }
 
     /// Draws `count` poses from the ranges; positions are zero. A larger count leaves the first

@@ -2,8 +2,6 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::model::parameter::Parameter;
-
 /// Smallest share of the prior in the information on a combination at which the prior, not the
 /// data, determines it.
 const PRIOR_DOMINATED: f64 = 0.5;
@@ -28,6 +26,9 @@ pub enum Criterion {
     /// Largest variance of a combination relative to C̄, among the combinations that average
     /// candidates determine more than the priors do.
     E,
+    /// Mean variance of predicted positions in the workspace, with a smooth misfit of the joints
+    /// among the unknowns (I-optimality). [Atkinson, Donev & Tobias 2007, ch. 10]
+    I,
     /// Determinant of the block of C of these parameters (indices in the model), with all others
     /// estimated (D_s).
     Subset(Vec<usize>),
@@ -54,6 +55,8 @@ pub(super) enum Measure {
     Product,
     /// Weighted sum Σ w_k C_kk over all unknowns; w_k = 0 for nuisance unknowns.
     Trace(DVector<f64>),
+    /// Trace tr(C M) with the weights M of all unknowns.
+    Mean(DMatrix<f64>),
     /// Largest eigenvalue of F C Fᵀ; F has shape = (combinations, unknowns).
     Eigenvalue(DMatrix<f64>),
 }
@@ -67,27 +70,26 @@ impl Criterion {
             Self::A => "A",
             Self::E => "E",
             Self::S => "S",
+            Self::I => "I",
             Self::Subset(_) => "subset",
             Self::Each(_) => "S of a subset",
         }
     }
 
     /// Prepares the criterion for information matrices in scaled unknowns. `average` is the
-    /// information of average poses, `prior` that of the priors alone.
+    /// information of average poses, `prior` that of the priors alone. `placements` is true for
+    /// unknowns of bases and targets. `goal` is the matrix M of the criterion I.
     pub(super) fn scaled(
         &self,
-        parameters: &[Parameter],
-        average: &DMatrix<f64>,
-        prior: &DMatrix<f64>,
+        placements: &[bool],
+        (average, prior): (&DMatrix<f64>, &DMatrix<f64>),
+        goal: Option<DMatrix<f64>>,
     ) -> Option<ScaledCriterion> {
-        let n = parameters.len();
+        let n = placements.len();
         let is_wanted = |k: usize| match self {
             Self::Subset(columns) | Self::Each(columns) => columns.contains(&k),
             // If only bases or targets are free, their errors count.
-            _ => {
-                !parameters[k].site.is_placement()
-                    || parameters.iter().all(|p| p.site.is_placement())
-            }
+            _ => !placements[k] || placements.iter().all(|placement| *placement),
         };
         let (wanted, nuisance): (Vec<usize>, Vec<usize>) = (0..n).partition(|&k| is_wanted(k));
         let measure = match self {
@@ -101,6 +103,7 @@ impl Criterion {
                 Measure::Trace(weights)
             }
             Self::S | Self::Each(_) => Measure::Product,
+            Self::I => Measure::Mean(goal?),
             Self::E => Measure::Eigenvalue(data_determined(average, prior, &wanted)?),
         };
         Some(ScaledCriterion { wanted, nuisance, measure })
@@ -126,6 +129,7 @@ impl ScaledCriterion {
                     / self.wanted.len() as f64
             }
             Measure::Trace(weights) => cholesky.inverse().diagonal().dot(weights).ln(),
+            Measure::Mean(goal) => cholesky.inverse().dot(goal).ln(),
             Measure::Eigenvalue(combinations) => {
                 let covariance = combinations * cholesky.inverse() * combinations.transpose();
                 covariance.symmetric_eigenvalues().max().ln()

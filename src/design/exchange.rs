@@ -2,7 +2,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::criterion::{Criterion, ScaledCriterion};
+use super::criterion::{Criterion, Measure, ScaledCriterion};
+use super::greedy::Greedy;
 use super::scan::CandidateScan;
 use super::sensitivity::Sensitivity;
 use crate::least_squares::Identifiability;
@@ -35,6 +36,33 @@ pub struct Exchange {
     criterion: ScaledCriterion,
 }
 
+/// Properties of the unknowns of a design: the free parameters, and further ones that only predict.
+#[derive(Debug, Clone)]
+pub(super) struct Unknowns {
+    /// Standard deviation of the prior of each unknown; `None` without a prior.
+    pub sigmas: Vec<Option<f64>>,
+    /// True for parameters of bases and targets, whose errors do not count unless all are such.
+    pub placements: Vec<bool>,
+}
+
+impl Unknowns {
+    /// Returns the properties of the free parameters.
+    pub fn of(parameters: &[Parameter]) -> Self {
+        Self {
+            sigmas: parameters.iter().map(|parameter| parameter.sigma).collect(),
+            placements: parameters.iter().map(|of| of.site.is_placement()).collect(),
+        }
+    }
+
+    /// Adds `count` unknowns with standard normal priors.
+    #[must_use]
+    pub fn and_standard(mut self, count: usize) -> Self {
+        self.sigmas.resize(self.sigmas.len() + count, Some(1.0));
+        self.placements.resize(self.placements.len() + count, false);
+        self
+    }
+}
+
 /// Set of poses that exchanging any single pose does not improve.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ExchangeResult {
@@ -63,10 +91,22 @@ impl Exchange {
         poses: usize,
         criterion: &Criterion,
     ) -> Option<Self> {
-        let n = parameters.len();
+        Self::of(&Unknowns::of(parameters), candidates, given, poses, (criterion, None))
+    }
+
+    /// Prepares the exchange as [`new`](Self::new) does, for parameters and further unknowns. The
+    /// criterion I minimises tr(C M) with the matrix M `goal`, in the units of the unknowns.
+    pub(super) fn of(
+        unknowns: &Unknowns,
+        candidates: &Sensitivity,
+        given: Option<&Sensitivity>,
+        poses: usize,
+        (criterion, goal): (&Criterion, Option<&DMatrix<f64>>),
+    ) -> Option<Self> {
+        let n = unknowns.sigmas.len();
         let prior = DMatrix::from_diagonal(&DVector::from_iterator(
             n,
-            parameters.iter().map(|parameter| parameter.sigma.map_or(0.0, |sigma| sigma.powi(-2))),
+            unknowns.sigmas.iter().map(|sigma| sigma.map_or(0.0, |sigma| sigma.powi(-2))),
         ));
         let mut average =
             candidates.information() * (poses as f64 / candidates.len().max(1) as f64);
@@ -106,7 +146,10 @@ impl Exchange {
         let fixing = unidentifiable.transpose() * &unidentifiable * FIXING_INFORMATION;
         base += &fixing;
         total += &fixing;
-        let criterion = criterion.scaled(parameters, &total, &scaled_prior)?;
+        // A unit of a scaled unknown is `scale` units of the unknown.
+        let goal =
+            goal.map(|goal| DMatrix::from_fn(n, n, |i, j| goal[(i, j)] / (scale[i] * scale[j])));
+        let criterion = criterion.scaled(&unknowns.placements, (&total, &scaled_prior), goal)?;
         Some(Self {
             candidates: rows,
             coordinates: candidates.coordinates,
@@ -124,6 +167,20 @@ impl Exchange {
             coordinates: candidates.coordinates,
             ..self.clone()
         }
+    }
+
+    /// Starts a choice of poses one after the other, by the criterion I. Returns `None` for another
+    /// criterion, or if the information is singular.
+    pub(super) fn greedy(&self) -> Option<Greedy<'_>> {
+        let Measure::Mean(goal) = &self.criterion.measure else { return None };
+        Greedy::new((&self.candidates, self.coordinates), goal, &self.base_information)
+    }
+
+    /// Returns the matrix M of a goal tr(C M) in scaled unknowns.
+    pub(super) fn scaled(&self, goal: &DMatrix<f64>) -> DMatrix<f64> {
+        DMatrix::from_fn(goal.nrows(), goal.ncols(), |i, j| {
+            goal[(i, j)] / (self.scale[i] * self.scale[j])
+        })
     }
 
     /// Returns the number of candidates.

@@ -10,14 +10,20 @@ mod coordinates;
 mod criterion;
 mod error;
 mod exchange;
+mod explanations;
 mod forecast;
+mod greedy;
 mod growth;
+mod misfit;
+mod next;
 mod plan;
 mod scan;
 mod sensitivity;
 mod separate;
 mod site;
+mod travel;
 mod workspace;
+mod workspace_error;
 
 pub(crate) use check::PredictionPoses;
 pub use check::{Check, CheckedPoses, check};
@@ -34,9 +40,12 @@ pub use self::{
     candidate_poses::Extremes,
     check::{predictable_rows, random_rows},
     exchange::Exchange,
+    explanations::Explanations,
+    next::{NextError, NextOptions, NextPoses, NextStep, Purpose, StopReason, next},
     plan::PlanProgress,
     sensitivity::Sensitivity,
     separate::{EffectPair, PairSeparation, separate},
     site::Site,
     workspace::Workspace,
+    workspace_error::WorkspaceError,
 };

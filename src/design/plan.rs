@@ -1,10 +1,14 @@
 //! Plan of poses: the best of several exchanges, compared with random poses.
 
+use nalgebra::DMatrix;
 use rand::Rng;
 use rand::seq::SliceRandom as _;
 use rayon::prelude::*;
 
 use super::coordinates::{coordinates, first_rows};
+use super::exchange::Unknowns;
+use super::misfit::Misfit;
+use super::next::mean_square;
 use super::{
     Criterion, DesignError, Exchange, ExchangeResult, Extremes, Forecast, Sensitivity, Site,
     Workspace,
@@ -34,6 +38,8 @@ pub(super) const UNIFORM_STREAM: u64 = 0;
 const EXTREMES_STREAM: u64 = 1;
 /// First random stream of the refinement rounds.
 const REFINEMENT_STREAM: u64 = 2;
+/// Maximum number of poses over which the criterion I averages the variance of predictions.
+const MAX_WORKSPACE_POSES: usize = 500;
 /// First random stream of the starts.
 const START_STREAM: u64 = 100;
 /// First random stream of the random sets.
@@ -171,8 +177,23 @@ pub fn plan(
     }
     let unavoidable = undetermined.saturating_sub(untouched(parameters, &[Some(&sensitivity)]));
     let (attainable_rank, least_poses) = attainable_rank(parameters, given.as_ref(), &sensitivity);
-    let exchange = Exchange::new(parameters, &sensitivity, given.as_ref(), poses, criterion)
-        .ok_or(DesignError::NoEquilibrium)?;
+    let goal = (*criterion == Criterion::I)
+        .then(|| WorkspaceGoal::new(&site, &table, uniform.len(), seed));
+    let exchange = match &goal {
+        Some(goal) => {
+            let given = given_table.as_ref().zip(given.as_ref());
+            let given = given.map(|(table, given)| goal.misfit.extend(&site, table, given, None));
+            Exchange::of(
+                &Unknowns::of(parameters).and_standard(goal.misfit.weights()),
+                &goal.misfit.extend(&site, &table, &sensitivity, None),
+                given.as_ref(),
+                poses,
+                (criterion, Some(&goal.mean_square)),
+            )
+        }
+        None => Exchange::new(parameters, &sensitivity, given.as_ref(), poses, criterion),
+    };
+    let exchange = exchange.ok_or(DesignError::NoEquilibrium)?;
     let (results, starts) = starts(&exchange, options);
     let selection = |result: &ExchangeResult| Selection {
         poses: table.select(&result.chosen),
@@ -186,7 +207,7 @@ pub fn plan(
             .enumerate()
             .map(|(number, result)| {
                 let options = (options, number as u64);
-                selection(result).refined(problem, &site, ranges, &exchange, options)
+                selection(result).refined(&site, (ranges, goal.as_ref()), &exchange, options)
             })
             .collect(),
         Candidates::Rows(_) => results.iter().take(1).map(selection).collect(),
@@ -285,6 +306,28 @@ fn untouched(parameters: &[Parameter], rows: &[Option<&Sensitivity>]) -> usize {
     (0..parameters.len()).filter(|&k| is_free(&parameters[k]) && !is_informed(k)).count()
 }
 
+/// Goal of the criterion I: the mean variance of predictions over the workspace.
+struct WorkspaceGoal {
+    /// Misfit of the size of the noise, which no measurement shows before it is made.
+    misfit: Misfit,
+    /// Matrix M with tr(C M) = mean variance.
+    mean_square: DMatrix<f64>,
+}
+
+impl WorkspaceGoal {
+    /// Takes the first `count` poses of a table as the workspace.
+    fn new(site: &Site, table: &Measurements, count: usize, seed: u64) -> Self {
+        let step = count.div_ceil(MAX_WORKSPACE_POSES).max(1);
+        let workspace = table.select(&(0..count).step_by(step).collect::<Vec<_>>());
+        let sigmas = site.sigmas(&workspace, None);
+        let noise = median(sigmas).unwrap_or(0.0);
+        let misfit = Misfit::new(site, &workspace, noise, seed);
+        let sensitivity = site.sensitivity(&workspace, Some(1.0));
+        let sensitivity = misfit.extend(site, &workspace, &sensitivity, Some(1.0));
+        Self { misfit, mean_square: mean_square(&sensitivity) }
+    }
+}
+
 impl PlanOptions<'_> {
     fn report(&self, start: Option<usize>, sweep: usize, value: f64) {
         if let Some(progress) = self.progress {
@@ -326,9 +369,8 @@ impl Selection {
     /// Refines the poses in rounds of exchanges with candidates ever closer to them.
     fn refined(
         mut self,
-        problem: &Problem,
         site: &Site,
-        ranges: &PoseRanges,
+        (ranges, goal): (&PoseRanges, Option<&WorkspaceGoal>),
         exchange: &Exchange,
         (options, number): (&PlanOptions, u64),
     ) -> Self {
@@ -336,7 +378,7 @@ impl Selection {
         for (round, reach) in (0..).zip(REFINEMENT_REACHES) {
             let stream = REFINEMENT_STREAM + number * REFINEMENT_REACHES.len() as u64 + round;
             let streams = (options.seed, stream);
-            let varied = ranges.vary(problem, &self.poses, variations, reach, streams);
+            let varied = ranges.vary(site.problem(), &self.poses, variations, reach, streams);
             let sensitivity = site.sensitivity(&varied, None);
             let inside: Vec<usize> = match options.workspace {
                 Some(workspace) => site.inside(&varied, workspace),
@@ -349,8 +391,10 @@ impl Selection {
                 (0..varied.len()).filter(|&k| is_present(k) || is_usable(k)).collect();
             let present = (0..kept.len()).filter(|&k| is_present(kept[k])).collect();
             let sensitivity = sensitivity.select(&kept);
+            let extended = goal
+                .map(|goal| goal.misfit.extend(site, &varied.select(&kept), &sensitivity, None));
             let result = exchange
-                .with_candidates(&sensitivity)
+                .with_candidates(extended.as_ref().unwrap_or(&sensitivity))
                 .improve(present, |sweep, value| options.report(None, sweep, value));
             self.tried += kept.len() - options.poses;
             self.value = result.value();

@@ -34,6 +34,10 @@ enum State<'a> {
         weights: &'a DVector<f64>,
         before: f64,
     },
+    Mean {
+        goal: &'a DMatrix<f64>,
+        before: f64,
+    },
     /// Eigenvalues Λ of F C Fᵀ = Q Λ Qᵀ, and Qᵀ F.
     Eigenvalue {
         values: DVector<f64>,
@@ -53,6 +57,7 @@ impl<'a> CandidateScan<'a> {
             Measure::Trace(weights) => {
                 State::Trace { weights, before: covariance.diagonal().dot(weights) }
             }
+            Measure::Mean(goal) => State::Mean { goal, before: covariance.dot(goal) },
             Measure::Eigenvalue(combinations) => {
                 let eigen =
                     (combinations * &covariance * combinations.transpose()).symmetric_eigen();
@@ -126,6 +131,7 @@ impl<'a> CandidateScan<'a> {
             State::Trace { weights, .. } => {
                 DMatrix::from_fn(w_all.nrows(), w_all.ncols(), |i, k| weights[i] * w_all[(i, k)])
             }
+            State::Mean { goal, .. } => *goal * &w_all,
             State::Eigenvalue { rotated, .. } => rotated * &w_all,
         };
         for k in (0..range.len()).filter(|&k| may(range.start + k)) {
@@ -138,7 +144,9 @@ impl<'a> CandidateScan<'a> {
                     self.value - ratio.ln() / self.criterion.wanted.len() as f64
                 }
                 State::Product => self.product(&w, &s),
-                State::Trace { before, .. } => (before - trace(&w, &s, &products)).ln(),
+                State::Trace { before, .. } | State::Mean { before, .. } => {
+                    (before - trace(&w, &s, &products)).ln()
+                }
                 State::Eigenvalue { values, .. } => largest(values, &products, &s, limit),
             };
             if value < limit {

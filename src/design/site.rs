@@ -2,17 +2,18 @@
 
 use std::collections::BTreeSet;
 
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::{DesignError, Sensitivity, Workspace};
 use crate::error::InputErrorKind;
-use crate::fit::{Placement, locate};
+use crate::fit::{Identification, Placement, locate};
 use crate::measurement::Measurements;
 use crate::model::parameter::{BeamField, Parameter, ParameterSite};
 use crate::model::{MeasuredOrientation, Model, Pose};
-use crate::problem::{Observation, Problem};
+use crate::problem::{JointKind, Observation, Problem};
 use crate::random;
+use crate::remainder::Correction;
 
 /// Mass assumed for a declared `unmodelled-mass` \[kg\]. With a mass of 0, its position would have
 /// no influence.
@@ -149,6 +150,54 @@ impl<'a> Site<'a> {
                 .map(|sigma| MeasuredOrientation { measured: None, sigma });
         }
         Sensitivity::of(&self.model, &poses, at)
+    }
+
+    /// Returns the problem of the site.
+    pub(super) fn problem(&self) -> &Problem {
+        self.problem
+    }
+
+    /// Moves the point of linearisation to the values of an identification. Parameters that it
+    /// lacks stay at their values.
+    pub(super) fn at(&mut self, found: &Identification) {
+        for (value, parameter) in self.nominal.iter_mut().zip(&self.model.parameters) {
+            let place = found.estimates.iter().position(|of| of.name == parameter.name);
+            if let Some(estimated) = place.and_then(|place| found.x.get(place)) {
+                *value = *estimated;
+            }
+        }
+    }
+
+    /// Returns ∂p/∂q of the predicted positions, shape = (3, joints) for each pose; 0 where the arm
+    /// has no equilibrium.
+    pub(super) fn command_slopes(&self, table: &Measurements) -> Vec<DMatrix<f64>> {
+        let poses = self.poses(table, &Placement::of(table));
+        let mut slopes = self.model.command_jacobian(self.problem, poses, &self.nominal);
+        for value in slopes.iter_mut().flat_map(|slope| slope.iter_mut()) {
+            if !value.is_finite() {
+                *value = 0.0;
+            }
+        }
+        slopes
+    }
+
+    /// Returns the expected length of measured − predicted at the poses of a table \[m\], without
+    /// poses in which the arm has no equilibrium.
+    pub(super) fn expected_sizes(&self, correction: &Correction, table: &Measurements) -> Vec<f64> {
+        let poses = self.poses(table, &Placement::of(table));
+        let corrected = correction.at((self.problem, &self.model, &self.nominal), &[], &poses);
+        corrected.iter().map(|pose| pose.size).filter(|size| size.is_finite()).collect()
+    }
+
+    /// Returns σ of every row of a table \[m\], or `unit` if given.
+    pub(super) fn sigmas(&self, table: &Measurements, unit: Option<f64>) -> Vec<f64> {
+        let poses = self.poses(table, &Placement::of(table));
+        poses.iter().map(|pose| unit.unwrap_or(pose.sigma)).collect()
+    }
+
+    /// Returns true if the command of a joint is an angle.
+    pub(super) fn is_angle(&self, joint: usize) -> bool {
+        self.problem.joints[joint].kind == JointKind::Revolute
     }
 
     /// Returns the rows of a table as poses of the model.

@@ -123,6 +123,23 @@ impl Correction {
         self.posterior.hyper.sites() > 0
     }
 
+    /// Returns the root mean square ratio of the errors of left-out configurations to their
+    /// expected lengths; `None` if none was left out.
+    pub(crate) fn left_out_scale(&self) -> Option<f64> {
+        self.scores.scale()
+    }
+
+    /// Returns the error bound over poses with the expected error lengths `sizes` \[m\], as
+    /// [`Scores::pooled_bound`] does.
+    pub(crate) fn pooled_bound(
+        &self,
+        sizes: &[f64],
+        level: f64,
+        certainty: (f64, f64),
+    ) -> Option<f64> {
+        self.scores.pooled_bound(sizes, level, certainty)
+    }
+
     /// Returns the names of the free parameters of those bases and tools of `model` that no fitted
     /// row depends on, because their sessions or targets were not fitted.
     pub(super) fn unseen_placements<'a>(&self, model: &'a Model) -> HashSet<&'a str> {

@@ -82,7 +82,7 @@ pub(super) fn judge(training: &TrainingRows, is_remainder_wanted: bool) -> Optio
     let inflation = inflation(configurations.len(), minimum.at.len());
     let remainder = gain.is_significant().then(|| {
         let mut conditioned = with_scores(with, &single, &blocks);
-        conditioned.scores.scale(inflation);
+        conditioned.scores.multiply(inflation);
         conditioned
     });
     Some(Judged { remainder, gain: Some(gain), ..without })

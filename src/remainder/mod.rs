@@ -51,5 +51,6 @@ pub use self::{
     compensation::{Compensation, CompensationError, TargetFrame},
     declared::{declared, of_estimate},
     fit::uncertainty,
+    saved::SavedRemainderError,
 };
 pub(crate) use tables::{CorrectionTables, InputSource, InputTable, SiteTable};

@@ -29,6 +29,7 @@ const KERNEL: &str = "matern-5/2";
 /// Reason why a `remainder.json` cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
+#[expect(missing_docs, reason = "the message of each variant says what it stands for")]
 pub enum SavedRemainderError {
     #[error("{}: cannot be read: {source}", file.display())]
     Unreadable { file: PathBuf, source: io::Error },

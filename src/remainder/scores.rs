@@ -8,9 +8,15 @@ use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 use super::kernel::{Hyperparameters, variance};
 use super::posterior::LeftOut;
 use super::rows::{AXES, Rows};
+use crate::numeric::bisect;
 
 /// Maximum number of scores kept; quantiles up to 1 − 1/1000 remain exact.
 const MAX_SCORES: usize = 1000;
+
+/// Minimum number of configurations from which the tail of the scores is judged.
+const MIN_FOR_TAIL: usize = 40;
+/// Number of halvings of the interval in which a bound is searched.
+const HALVINGS: usize = 50;
 
 /// Returns the share of a correction that is applied: 1 if the data determine the remainder, 0 if
 /// they do not.
@@ -92,7 +98,7 @@ impl Scores {
     }
 
     /// Multiplies all scores by `factor`, which widens or narrows the bounds.
-    pub(super) fn scale(&mut self, factor: f64) {
+    pub(super) fn multiply(&mut self, factor: f64) {
         self.single.iter_mut().chain(&mut self.blocks).for_each(|score| *score *= factor);
     }
 
@@ -121,6 +127,44 @@ impl Scores {
         };
         let beyond = if part > 1.0 { length(level) / length(count / (count + 1.0)) } else { 1.0 };
         beyond * of(&self.single).max(of(&self.blocks))
+    }
+
+    /// Returns the root mean square of the scores of single configurations; 1 if expected errors
+    /// are right. `None` without scores.
+    pub(super) fn scale(&self) -> Option<f64> {
+        let count = self.single.len() as f64;
+        let squares: f64 = self.single.iter().map(|score| score * score).sum();
+        (count > 0.0 && squares > 0.0).then(|| (squares / count).sqrt())
+    }
+
+    /// Returns the length that the errors of poses with the expected lengths `sizes` do not exceed
+    /// with probability `level`, over all poses together. The length is too small with at most the
+    /// probability 1 − `confidence`, if the scores have `freedom` degrees of freedom.
+    ///
+    /// Errors are normal vectors whose scale the scores give, stretched if the scores have a longer
+    /// tail than such vectors.
+    pub(super) fn pooled_bound(
+        &self,
+        sizes: &[f64],
+        level: f64,
+        (confidence, freedom): (f64, f64),
+    ) -> Option<f64> {
+        let scale = self.scale()?;
+        let squares = ChiSquared::new(AXES as f64).ok()?;
+        let lowest = ChiSquared::new(freedom).ok()?.inverse_cdf(1.0 - confidence);
+        let normal = length(level) / (AXES as f64).sqrt();
+        let tail = if self.configurations < MIN_FOR_TAIL {
+            1.0
+        } else {
+            (self.quantile(level) / (scale * normal)).max(1.0)
+        };
+        let unit = scale * tail * (freedom / lowest).sqrt() / (AXES as f64).sqrt();
+        let within = |bound: f64| {
+            let shares = sizes.iter().map(|size| squares.cdf((bound / (unit * size)).powi(2)));
+            shares.sum::<f64>() / sizes.len() as f64
+        };
+        let largest = sizes.iter().copied().fold(0.0, f64::max) * unit * 10.0;
+        Some(bisect(|bound| within(bound) < level, (0.0, largest), HALVINGS).1)
     }
 }
 

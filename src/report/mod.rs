@@ -22,6 +22,7 @@ mod found_effects;
 mod identify;
 mod init;
 mod limits;
+mod next;
 mod noise;
 mod paper_tables;
 mod parameters;
@@ -67,6 +68,7 @@ pub use self::{
     export::export_text,
     figures::is_figure,
     identify::why_not_trusted,
+    next::next_text,
     plan::plan_text,
     remainder::remainder_text,
     study::study_text,

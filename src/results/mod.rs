@@ -21,6 +21,7 @@ mod export;
 mod fleet;
 mod identification;
 mod knowledge;
+mod next;
 pub(crate) mod plots;
 mod prior;
 mod remainder;
@@ -77,6 +78,7 @@ pub use self::{
     export::{ExportResult, ExportedErrors},
     fleet::FleetResult,
     identification::{Parameter, Spread},
+    next::NextResult,
     plots::{Cause, Quantity},
     residual_test::ResidualTest,
     study::{HeldOut, MisprintResult, Reading, StudyResult},
@@ -101,6 +103,7 @@ pub fn schemas() -> Vec<(&'static str, String)> {
         InitResult,
         LoopResult,
         MisprintResult,
+        NextResult,
         PlanResult,
         PredictionErrors,
         StudyResult,

@@ -1,0 +1,131 @@
+//! Suggestion of the next command after a result.
+
+use std::path::Path;
+
+use flexcal::fit::{FindingCode, Identification};
+use flexcal::problem::{PoseRanges, Problem};
+use flexcal::report::{self, shell_word};
+use flexcal::results::{LoopResult, TraceResult, exceeds_noise};
+use flexcal::select::Verdict;
+
+use super::input::Common;
+use super::output::Results;
+use super::plan;
+
+/// Number of poses that a suggested plan has to distinguish two effects.
+const SEPARATING_POSES: usize = 12;
+
+/// Returns the command to run after a fit. `is_structured` is true if the residual has structure;
+/// `estimate` is the file written.
+pub fn after_fit(
+    common: &Common,
+    found: &Identification,
+    is_structured: bool,
+    estimate: &Path,
+) -> String {
+    let named = common.named();
+    match report::show_influential_rows(found, &common.problem_file()) {
+        Some(look) => {
+            format!(
+                "{look}; if they are right, flexcal loop {named} looks for what the model lacks"
+            )
+        }
+        // If the priors contradict the fit, neither a cause nor a correction follows from it.
+        None if found.has(FindingCode::PriorContradicted) => {
+            let rule = found
+                .finding(FindingCode::PriorContradicted)
+                .and_then(|finding| finding.word("rule"));
+            format!(
+                "give \"{}\" in {} a larger σ, or check what it limits",
+                rule.unwrap_or_default(),
+                common.problem_file().display()
+            )
+        }
+        None if found.has(FindingCode::NoiseBeyondDeclared) => {
+            format!("flexcal loop {named} looks for what the model lacks")
+        }
+        None if !found.is_trusted() || report::determines_nothing(found) => {
+            format!("flexcal check {named} says what the poses can tell")
+        }
+        None if found.has(FindingCode::PriorsDecide) => {
+            format!("flexcal plan {named} --poses N chooses poses to measure that tell more")
+        }
+        None if is_structured
+            || exceeds_noise(found)
+            || found.has(FindingCode::HeldOutBeyondPrediction)
+            || found.has(FindingCode::RowsSetAside) =>
+        {
+            format!("flexcal loop {named} looks for what the model lacks")
+        }
+        None if found.has(FindingCode::HeldOutNotBetter) => {
+            format!("flexcal check {named} says what the poses can tell")
+        }
+        None => {
+            let [problem, estimate] = [common.problem(), estimate].map(shell_word);
+            format!(
+                "flexcal compensate {problem} --estimate {estimate} --data TARGETS.csv corrects commands"
+            )
+        }
+    }
+}
+
+/// Returns the command to run after a loop, which wrote its `results`.
+pub fn after_loop(
+    common: &Common,
+    problem: &Problem,
+    fit: &Identification,
+    result: &LoopResult,
+    results: &Results,
+) -> String {
+    let named = common.named();
+    if let Some(look) = report::show_influential_rows(fit, &common.problem_file()) {
+        return look;
+    }
+    if result.interrupted {
+        return "the same command again, to search to the end".to_owned();
+    }
+    if !result.trusted {
+        return format!("flexcal identify {named} -v, once the input is corrected");
+    }
+    if result.structures().any(|left| left.limit.is_some()) {
+        return format!(
+            "flexcal identify {named} -v shows the cost of each limit; then move it out"
+        );
+    }
+    // A plan separates effects within known ranges, unless they depend on time.
+    let doubted = result.effects.iter().filter(|found| found.is_doubted());
+    let mut pairs = doubted.filter_map(|found| {
+        let rival = found.alternatives.first()?;
+        Some([found.effect.declaration.clone(), rival.declaration.clone()])
+    });
+    let can_be_planned =
+        |pair: &[String; 2]| PoseRanges::of(problem).is_ok() && plan::pair(pair, problem).is_ok();
+    if let Some([effect, rival]) = pairs.find(can_be_planned) {
+        return format!(
+            "flexcal plan {named} --poses {SEPARATING_POSES} --separate '{effect}' '{rival}' chooses poses that tell the two apart"
+        );
+    }
+    let closed = shell_word(&results.path("problem.closed.toml"));
+    match result.verdict {
+        Verdict::Unexplained => {
+            format!("flexcal trace {named} ranks candidates and names what these data cannot show")
+        }
+        Verdict::NothingFound => format!("flexcal identify {named} writes the estimate to apply"),
+        Verdict::Explained => {
+            format!(
+                "flexcal identify {closed} writes the estimate to apply; -v lists its parameters"
+            )
+        }
+    }
+}
+
+/// Returns the command to run after a trace.
+pub fn after_trace(common: &Common, result: &TraceResult) -> String {
+    let is_pointed =
+        result.ranking.first().is_some_and(|candidate| candidate.p_value < result.level);
+    if is_pointed || result.structured {
+        format!("flexcal loop {} adds what is missing and fits again", common.named())
+    } else {
+        format!("flexcal identify {} writes the estimate to apply", common.named())
+    }
+}

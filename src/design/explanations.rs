@@ -1,0 +1,125 @@
+//! Explanations of the residual that a loop leaves undecided, as read from its loop.json.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+
+use crate::error::InputError;
+use crate::files::read_limited;
+use crate::problem::{Effect, EffectDeclaration, Problem};
+
+/// Maximum size of a loop.json \[MiB\].
+const LARGEST_MIB: u64 = 256;
+/// Maximum number of alternatives of one effect that are considered, the most probable first.
+const MAX_ALTERNATIVES: usize = 3;
+
+/// Effects of a loop.json, with those among which the data do not decide.
+#[derive(Debug, Clone, Default)]
+pub struct Explanations {
+    /// Effects that the extended problem declares and that stand without doubt.
+    settled: Vec<EffectDeclaration>,
+    /// Effects that are still to be told apart: doubted ones and their alternatives.
+    open: Vec<EffectDeclaration>,
+}
+
+/// Error of a loop.json that cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum ExplanationsError {
+    #[error("{}: cannot be read: {source}; flexcal loop writes it", file.display())]
+    Unreadable { file: PathBuf, source: io::Error },
+    #[error("{}: not a loop.json: {source}", file.display())]
+    Syntax { file: PathBuf, source: serde_json::Error },
+    #[error("{}: is of problem {found}, not of {expected}", file.display())]
+    OtherProblem { file: PathBuf, found: String, expected: String },
+    #[error(transparent)]
+    Effect(#[from] InputError),
+}
+
+#[derive(Deserialize)]
+struct Document {
+    problem: String,
+    effects: Vec<Found>,
+}
+
+#[derive(Deserialize)]
+struct Found {
+    declaration: String,
+    status: String,
+    #[serde(default)]
+    alternatives: Vec<Alternative>,
+}
+
+#[derive(Deserialize)]
+struct Alternative {
+    declaration: String,
+}
+
+impl Explanations {
+    /// Reads the loop.json of `problem`.
+    ///
+    /// # Errors
+    /// Returns an error if the file cannot be read, is no loop.json, or belongs to another problem.
+    pub fn read(file: &Path, problem: &Problem) -> Result<Self, ExplanationsError> {
+        let named = || file.to_owned();
+        let unreadable = |source| ExplanationsError::Unreadable { file: named(), source };
+        let bytes = read_limited(file, LARGEST_MIB << 20).map_err(unreadable)?;
+        let document: Document = serde_json::from_slice(&bytes)
+            .map_err(|source| ExplanationsError::Syntax { file: named(), source })?;
+        if document.problem != problem.name {
+            let (found, expected) = (document.problem, problem.name.clone());
+            return Err(ExplanationsError::OtherProblem { file: named(), found, expected });
+        }
+        let mut explanations = Self::default();
+        for found in &document.effects {
+            let effect = problem.effect(&found.declaration, file)?;
+            let alternatives = found.alternatives.iter().take(MAX_ALTERNATIVES);
+            let alternatives = alternatives.map(|of| problem.effect(&of.declaration, file));
+            let alternatives: Vec<EffectDeclaration> = alternatives.collect::<Result<_, _>>()?;
+            match found.status.as_str() {
+                "contradicted" => {}
+                "found" if alternatives.is_empty() => explanations.settled.push(effect),
+                _ => {
+                    explanations.open.push(effect);
+                    explanations.open.extend(alternatives);
+                }
+            }
+        }
+        let is_new = |of: &EffectDeclaration| {
+            let is_declared =
+                |declared: &EffectDeclaration| declared.effect.describe() == of.effect.describe();
+            !problem.effects.iter().any(is_declared)
+        };
+        explanations.settled.retain(is_new);
+        // The choice of poses cannot separate what follows the time of measurement.
+        explanations.open.retain(|of| is_new(of) && !of.effect.follows_time());
+        let mut names = Vec::new();
+        explanations.open.retain(|of| {
+            let name = of.effect.describe();
+            let is_first = !names.contains(&name);
+            names.push(name);
+            is_first
+        });
+        Ok(explanations)
+    }
+
+    /// Returns the effects that are still to be told apart.
+    pub fn open(&self) -> impl Iterator<Item = &Effect> {
+        self.open.iter().map(|declared| &declared.effect)
+    }
+
+    /// Returns the problem with all effects declared.
+    pub(super) fn declared(&self, problem: &Problem) -> Problem {
+        let mut declared = problem.clone();
+        declared.effects.extend(self.settled.iter().chain(&self.open).cloned());
+        declared
+    }
+
+    /// Returns the names of the parameters whose errors decide among the effects: those that are 0
+    /// without the effect.
+    pub(super) fn parameters(&self, declared: &Problem) -> Vec<String> {
+        let parameters = self.open().flat_map(|effect| effect.parameters(declared));
+        let sized = parameters.filter(|parameter| parameter.nominal == 0.0);
+        sized.map(|parameter| parameter.name).collect()
+    }
+}

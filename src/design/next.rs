@@ -1,0 +1,375 @@
+//! Choice of the next poses to measure, given all poses that are measured.
+
+use nalgebra::DMatrix;
+
+use super::exchange::Unknowns;
+use super::explanations::{Explanations, ExplanationsError};
+use super::greedy::Greedy;
+use super::misfit::Misfit;
+use super::travel::Travel;
+use super::workspace_error::{MisfitSize, WorkspaceError};
+use super::{Candidates, Criterion, DesignError, Exchange, Extremes, Sensitivity, Site, Workspace};
+use crate::fit::{self, Identification, IdentifyError, Options};
+use crate::measurement::{Dataset, Measurements};
+use crate::problem::{Effect, Problem};
+use crate::remainder::{self, SavedRemainderError};
+
+/// Number of candidates drawn from ranges: uniformly, and with emphasis on the limits.
+const DRAWN_CANDIDATES: [usize; 2] = [500, 1500];
+/// Maximum number of poses over which the variance of predictions is averaged.
+const WORKSPACE_POSES: usize = 500;
+/// Random stream of the uniform candidates, of those at the limits, and of the workspace.
+const STREAMS: [u64; 3] = [400, 401, 402];
+/// Share of the largest gain above which candidates count as equal; the least travel then decides.
+const EQUAL_GAIN: f64 = 0.98;
+/// Multiplications for one unknown of one candidate when a pose is chosen.
+const OPERATIONS: f64 = 90.0;
+/// Maximum number of multiplications of a request; some ten minutes on one core.
+const MAX_OPERATIONS: f64 = 2e12;
+/// Maximum number of entries of the matrices of all candidates, 3 GB.
+const MAX_ENTRIES: f64 = 4e8;
+
+/// Aim of the next poses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Purpose {
+    /// Small errors of predictions in the workspace.
+    #[default]
+    Accuracy,
+    /// Small errors of the effects among which the loop did not decide.
+    Causes,
+    /// Both aims, with equal weight.
+    Both,
+}
+
+/// Reason for which no or no further poses are chosen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum StopReason {
+    /// The bound over the workspace is below the tolerance.
+    Enough,
+    /// All that further poses can gain is less than the uncertainty of the error itself.
+    GainBelowNoise,
+    /// All candidates are measured or chosen.
+    NoCandidates,
+}
+
+/// Settings of the choice of the next poses.
+#[derive(Clone)]
+pub struct NextOptions<'a> {
+    /// Number of poses to choose.
+    pub poses: usize,
+    /// Aim of the poses.
+    pub purpose: Purpose,
+    /// Largest acceptable error bound over the workspace \[m\]; `None` without a limit.
+    pub tolerance: Option<f64>,
+    /// Probability with which an error stays below the bound.
+    pub level: f64,
+    /// Seed of all random numbers.
+    pub seed: u64,
+    /// Region for the target; `None` is unlimited.
+    pub workspace: Option<&'a Workspace>,
+    /// Effects that poses for causes tell apart.
+    pub explanations: Option<&'a Explanations>,
+    /// True if predictions use a remainder that is fitted to the measured poses.
+    pub remainder: bool,
+    /// Settings of the fit to the measured poses.
+    pub fit: Options,
+}
+
+/// Chosen pose with the expectation after its measurement.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NextStep {
+    /// Largest move of a joint from the pose before, as a share of the joint's range, 0 to 1.
+    pub travel: f64,
+    /// Decrease of the goal by the pose, as a share of its present value.
+    pub gain: f64,
+    /// Expected error over the workspace after this pose; `None` if it is unknown now.
+    pub error: Option<WorkspaceError>,
+}
+
+/// Next poses to measure, with the error over the workspace now and after each of them.
+#[derive(Debug, Clone)]
+pub struct NextPoses {
+    /// Chosen poses in the order of measurement.
+    pub poses: Measurements,
+    /// Expectation after each pose.
+    pub steps: Vec<NextStep>,
+    /// Number of rows that are measured and fitted.
+    pub measured: usize,
+    /// Number of candidates.
+    pub candidates: usize,
+    /// Number of poses over which predictions are judged.
+    pub workspace_poses: usize,
+    /// Size of the misfit along each axis, root mean square \[m\].
+    pub misfit: f64,
+    /// 1 σ of the noise of one coordinate \[m\].
+    pub noise: f64,
+    /// Error over the workspace now; `None` with fewer than ten configurations.
+    pub error: Option<WorkspaceError>,
+    /// Expected error over the workspace after any number of poses \[m\]; `None` if it is unknown.
+    pub attainable: Option<f64>,
+    /// Reason for which fewer poses were chosen than requested.
+    pub stop: Option<StopReason>,
+    /// Effects that the poses tell apart.
+    pub effects: Vec<Effect>,
+    /// Fit to the measured poses.
+    pub found: Identification,
+}
+
+impl NextPoses {
+    /// Returns the number of poses after which the bound is expected to be below `tolerance` \[m\].
+    pub(crate) fn enough_after(&self, tolerance: Option<f64>) -> Option<usize> {
+        let is_below =
+            |step: &NextStep| step.error.zip(tolerance).is_some_and(|(of, most)| of.bound <= most);
+        self.steps.iter().position(is_below).map(|step| step + 1)
+    }
+}
+
+/// Error that prevents the choice of the next poses.
+#[derive(Debug, thiserror::Error)]
+pub enum NextError {
+    /// Problem, poses or ranges do not suffice for a design.
+    #[error(transparent)]
+    Design(#[from] DesignError),
+    /// The measured poses cannot be fitted.
+    #[error(transparent)]
+    Identify(#[from] IdentifyError),
+    /// The loop.json cannot be used.
+    #[error(transparent)]
+    Explanations(#[from] ExplanationsError),
+    /// The declared remainder cannot be read.
+    #[error(transparent)]
+    Remainder(#[from] SavedRemainderError),
+    /// No effects are to be told apart.
+    #[error(
+        "no explanation is left to decide between: loop.json has no doubted effect and no alternative; use --for accuracy"
+    )]
+    NothingToSeparate,
+    /// The request would take too long, or too much memory.
+    #[error(
+        "{poses} poses out of {candidates} candidates with {unknowns} unknowns are too many: ask for fewer poses at a time, or thin out \
+         the pool"
+    )]
+    TooLarge {
+        /// Number of poses requested.
+        poses: usize,
+        /// Number of candidates.
+        candidates: usize,
+        /// Number of unknowns.
+        unknowns: usize,
+    },
+}
+
+/// Chooses the next poses to measure, after a fit to the identification rows of `data`.
+///
+/// The goal is tr(C M), with C the covariance of parameters and misfit after all measured and
+/// chosen poses. For accuracy it is the mean variance of predictions over the workspace. This is
+/// the table of candidates, or poses drawn from the ranges. The result depends on the seed, not on
+/// the number of threads.
+///
+/// # Errors
+/// Returns an error if the measured poses cannot be fitted, no candidate remains, no effect is to be
+/// told apart, or the request is too large.
+pub fn next(
+    problem: &Problem,
+    data: &Dataset,
+    candidates: &Candidates,
+    options: &NextOptions,
+) -> Result<NextPoses, NextError> {
+    let (seed, poses) = (options.seed, options.poses);
+    if poses == 0 {
+        return Err(DesignError::NoPoses.into());
+    }
+    let found = fit::identify(problem, data, &options.fit)?;
+    let explanations = options.explanations.filter(|_| options.purpose != Purpose::Accuracy);
+    if options.purpose != Purpose::Accuracy
+        && explanations.is_none_or(|of| of.open().next().is_none())
+    {
+        return Err(NextError::NothingToSeparate);
+    }
+    let mut plain = problem.clone();
+    let has_declared_noise = data.measurements.has_declared_noise(problem);
+    plain.data.position_sigma = plain.data.position_sigma.or(Some(found.sigma));
+    let designed = explanations.map_or_else(|| plain.clone(), |of| of.declared(&plain));
+    let rows: Vec<usize> = data.split.identification.clone();
+    let measured = data.measurements.select(&rows);
+    let mut site = Site::new(&designed, &[&measured])?;
+    site.at(&found);
+    let inside = |table: Measurements| match options.workspace {
+        Some(workspace) => table.select(&site.inside(&table, workspace)),
+        None => table,
+    };
+    let (pool, reference) = match candidates {
+        Candidates::Rows(rows) => {
+            let rows = inside(rows.as_ref().clone().arm_rows());
+            let step = rows.len().div_ceil(WORKSPACE_POSES).max(1);
+            let some: Vec<usize> = (0..rows.len()).step_by(step).collect();
+            (rows.select(&unmeasured(&rows, &measured)), rows.select(&some))
+        }
+        Candidates::Within(ranges) => {
+            let drawn = |count: usize, extremes, stream| {
+                inside(ranges.draw(&designed, count, extremes, seed, STREAMS[stream]))
+            };
+            let [uniform, often] = DRAWN_CANDIDATES.map(|count| count.max(poses));
+            let pool = drawn(uniform, Extremes::No, 0);
+            let pool = pool.concatenate(&drawn(often, Extremes::Often, 1));
+            (pool, drawn(WORKSPACE_POSES, Extremes::No, 2))
+        }
+    };
+    let (pool, sensitivity) = site.in_equilibrium(&pool);
+    if pool.is_empty() || reference.is_empty() {
+        return Err(DesignError::NoEquilibrium.into());
+    }
+    let size = MisfitSize::of(&found, has_declared_noise);
+    let misfit = Misfit::new(&site, &reference, size.misfit, seed);
+    let unknowns = Unknowns::of(&site.model.parameters).and_standard(misfit.weights());
+    check_size(poses, (pool.len(), sensitivity.coordinates), unknowns.sigmas.len())?;
+    let (given_rows, given) = site.in_equilibrium(&measured);
+    let given = misfit.extend(&site, &given_rows, &given, None);
+    let sensitivity = misfit.extend(&site, &pool, &sensitivity, None);
+    let prediction = mean_square(&misfit.extend(
+        &site,
+        &reference,
+        &site.sensitivity(&reference, Some(1.0)),
+        Some(1.0),
+    ));
+    let cause = explanations.map(|of| cause_goal(&site, &of.parameters(&designed), &prediction));
+    let fitted_alone = remainder::declared(problem)?;
+    let correction = match fitted_alone {
+        Some(declared) => Some(declared),
+        None if options.remainder => {
+            remainder::fit(&found, problem, data)?.map(|fitted| fitted.correction().clone())
+        }
+        None => remainder::uncertainty(&found, problem, data)?.map(|fitted| fitted.alone),
+    };
+    let mut plain_site = Site::new(&plain, &[&measured])?;
+    plain_site.at(&found);
+    let error = correction.as_ref().and_then(|correction| {
+        WorkspaceError::of(correction, &plain_site, &reference, (options.level, size.freedom))
+    });
+    let exchange = |goal: &DMatrix<f64>| {
+        Exchange::of(&unknowns, &sensitivity, Some(&given), poses, (&Criterion::I, Some(goal)))
+            .ok_or(NextError::Design(DesignError::NoEquilibrium))
+    };
+    // With equal weight, each goal counts in units of its present value.
+    let goal = match (&cause, options.purpose) {
+        (Some(cause), Purpose::Causes) => cause.clone(),
+        (Some(cause), Purpose::Both) => {
+            let value = |goal: &DMatrix<f64>| -> Result<f64, NextError> {
+                Ok(exchange(goal)?.greedy().map_or(1.0, |greedy| greedy.value()))
+            };
+            &prediction / value(&prediction)? + cause / value(cause)?
+        }
+        _ => prediction.clone(),
+    };
+    let exchange = exchange(&goal)?;
+    let mut greedy = exchange.greedy().ok_or(DesignError::NoEquilibrium)?;
+    let scaled = exchange.scaled(&prediction);
+    let parameters = site.model.parameters.len();
+    let left = |greedy: &Greedy| {
+        let view = |of: &DMatrix<f64>| of.view((0, 0), (parameters, parameters)).into_owned();
+        view(&greedy.covariance).dot(&view(&scaled)).max(0.0)
+    };
+    let before = left(&greedy);
+    let attainable = error.map(|error| error.without(before).expected);
+    let stop = match (error, attainable) {
+        (Some(error), _) if options.tolerance.is_some_and(|most| error.bound <= most) => {
+            Some(StopReason::Enough)
+        }
+        (Some(error), Some(attainable))
+            if options.purpose == Purpose::Accuracy
+                && error.expected - attainable < error.expected_sigma =>
+        {
+            Some(StopReason::GainBelowNoise)
+        }
+        _ => None,
+    };
+    let mut result = NextPoses {
+        poses: pool.select(&[]),
+        steps: Vec::new(),
+        measured: measured.len(),
+        candidates: pool.len(),
+        workspace_poses: reference.len(),
+        misfit: size.misfit,
+        noise: size.noise,
+        error,
+        attainable,
+        stop,
+        effects: explanations.map_or_else(Vec::new, |of| of.open().cloned().collect()),
+        found,
+    };
+    if stop.is_some() {
+        return Ok(result);
+    }
+    let travel = Travel::of(&pool);
+    let mut last = measured.configuration(measured.len() - 1).to_vec();
+    let (mut chosen, mut is_chosen) = (Vec::new(), vec![false; pool.len()]);
+    let first = greedy.value();
+    while chosen.len() < poses {
+        let gains = greedy.gains();
+        let free = || (0..pool.len()).filter(|&k| !is_chosen[k]);
+        let largest = free().map(|k| gains[k]).fold(0.0, f64::max);
+        let move_to = |k: usize| travel.between(&last, pool.configuration(k));
+        let equal = free().filter(|&k| gains[k] >= EQUAL_GAIN * largest);
+        let nearest = equal.min_by(|&a, &b| move_to(a).total_cmp(&move_to(b)));
+        let Some(pose) = nearest else {
+            result.stop = Some(StopReason::NoCandidates);
+            break;
+        };
+        let moved = move_to(pose);
+        greedy.take(pose);
+        let gained = before - left(&greedy);
+        result.steps.push(NextStep {
+            travel: moved,
+            gain: gains[pose] / first,
+            error: error.map(|error| error.without(gained)),
+        });
+        is_chosen[pose] = true;
+        chosen.push(pose);
+        last = pool.configuration(pose).to_vec();
+    }
+    result.poses = pool.select(&chosen);
+    Ok(result)
+}
+
+/// Returns M with tr(C M) = mean over the poses of tr(J C Jᵀ).
+pub(super) fn mean_square(sensitivity: &Sensitivity) -> DMatrix<f64> {
+    let finite: Vec<usize> =
+        (0..sensitivity.len()).filter(|&pose| sensitivity.is_finite(pose)).collect();
+    sensitivity.select(&finite).information() / finite.len().max(1) as f64
+}
+
+/// Returns M with tr(C M) = Σ C_kk / σ_k² over the parameters `names`, σ_k their priors.
+fn cause_goal(site: &Site, names: &[String], like: &DMatrix<f64>) -> DMatrix<f64> {
+    let mut goal = DMatrix::zeros(like.nrows(), like.ncols());
+    for (k, parameter) in site.model.parameters.iter().enumerate() {
+        if names.contains(&parameter.name) {
+            goal[(k, k)] = parameter.sigma.map_or(1.0, |sigma| sigma.powi(-2));
+        }
+    }
+    goal
+}
+
+/// Returns the rows of `table` whose commands and payload no row of `measured` has.
+fn unmeasured(table: &Measurements, measured: &Measurements) -> Vec<usize> {
+    let key = |of: &Measurements, row: usize| -> Vec<u64> {
+        let payload = of.payload.as_ref().map(|payload| payload[row]);
+        of.configuration(row).iter().copied().chain(payload).map(f64::to_bits).collect()
+    };
+    let known: std::collections::HashSet<Vec<u64>> =
+        (0..measured.len()).map(|row| key(measured, row)).collect();
+    (0..table.len()).filter(|&row| !known.contains(&key(table, row))).collect()
+}
+
+/// Checks that the request takes neither too long nor too much memory.
+fn check_size(
+    poses: usize,
+    (candidates, coordinates): (usize, usize),
+    unknowns: usize,
+) -> Result<(), NextError> {
+    let entries = 3.0 * (candidates * coordinates) as f64 * unknowns as f64;
+    let operations = OPERATIONS / 9.0 * entries * poses as f64 + entries * unknowns as f64;
+    if entries > MAX_ENTRIES || operations > MAX_OPERATIONS {
+        return Err(NextError::TooLarge { poses, candidates, unknowns });
+    }
+    Ok(())
+}

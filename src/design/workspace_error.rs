@@ -1,0 +1,88 @@
+//! Error of predictions over the workspace, now and after further poses.
+
+use super::Site;
+use crate::fit::Identification;
+use crate::measurement::Measurements;
+use crate::remainder::Correction;
+
+/// Smallest misfit that is assumed, as a share of the noise. No real arm is free of misfit.
+const LEAST_MISFIT: f64 = 0.5;
+/// Degrees of freedom of the assumption that misfit and noise are equal. It decides while the
+/// measured poses are few.
+const PRIOR_FREEDOM: f64 = 10.0;
+/// Probability with which the bound over the workspace is not too low.
+const CONFIDENCE: f64 = 0.9;
+
+/// Sizes of noise and misfit, from the scatter of a fit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct MisfitSize {
+    /// 1 σ of the noise of one coordinate \[m\].
+    pub noise: f64,
+    /// Size of the misfit along each axis, root mean square \[m\].
+    pub misfit: f64,
+    /// Degrees of freedom of the scatter: coordinates without the identified parameters.
+    pub freedom: f64,
+}
+
+impl MisfitSize {
+    /// Splits the scatter of a fit. The misfit is what exceeds a declared noise. Without one, noise
+    /// and misfit count as equal.
+    pub fn of(found: &Identification, has_declared_noise: bool) -> Self {
+        let identified: f64 = found
+            .estimates
+            .iter()
+            .filter(|estimate| estimate.fitted)
+            .map(|estimate| estimate.identified)
+            .sum();
+        let coordinates = found.coordinates as f64;
+        let freedom = (coordinates - identified).max(0.0);
+        let sum = found.fitted.identification.rms.norm.powi(2) / 3.0 * coordinates;
+        let noise = if has_declared_noise { found.sigma } else { found.sigma / 2_f64.sqrt() };
+        let variance = noise * noise;
+        let scatter = (sum + PRIOR_FREEDOM * 2.0 * variance) / (freedom + PRIOR_FREEDOM);
+        let misfit = (scatter - variance).max((LEAST_MISFIT * noise).powi(2)).sqrt();
+        Self { noise, misfit, freedom }
+    }
+}
+
+/// Error measured − predicted over the workspace.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WorkspaceError {
+    /// Expected error, root mean square of the length, measurement noise included \[m\].
+    pub expected: f64,
+    /// 1 σ of the expected error \[m\].
+    pub expected_sigma: f64,
+    /// Length that errors in the workspace do not exceed with the requested probability \[m\].
+    pub bound: f64,
+}
+
+impl WorkspaceError {
+    /// Judges predictions at the poses of `table` by the errors of configurations that were left
+    /// out of the fit. `freedom` is the number of degrees of freedom of the scatter.
+    pub(super) fn of(
+        correction: &Correction,
+        site: &Site,
+        table: &Measurements,
+        (level, freedom): (f64, f64),
+    ) -> Option<Self> {
+        let sizes = site.expected_sizes(correction, table);
+        let freedom = freedom.max(3.0);
+        let scale = correction.left_out_scale()?;
+        let bound = correction.pooled_bound(&sizes, level, (CONFIDENCE, freedom))?;
+        let squares: f64 = sizes.iter().map(|size| size * size).sum();
+        let expected = scale * (squares / sizes.len() as f64).sqrt();
+        Some(Self { expected, expected_sigma: expected / (2.0 * freedom).sqrt(), bound })
+    }
+
+    /// Returns the error after the mean square error has fallen by `gained` \[m²\].
+    pub(super) fn without(self, gained: f64) -> Self {
+        let square = self.expected * self.expected;
+        // What left-out poses show is never less than the model's own share.
+        let ratio = ((square - gained).max(0.0) / square).sqrt();
+        Self {
+            expected: self.expected * ratio,
+            expected_sigma: self.expected_sigma * ratio,
+            bound: self.bound * ratio,
+        }
+    }
+}

@@ -1,0 +1,112 @@
+//! Result of the command `next`: next.json.
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::document::Document;
+use super::effect::EffectKeys;
+use crate::design::{self, NextOptions, NextPoses, Purpose, StopReason};
+use crate::problem::{Effect, Problem};
+
+/// Next poses to measure, with the error over the workspace now and after each of them.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct NextResult {
+    pub problem: String,
+    /// Aim of the poses: `accuracy`, `causes` or `both`.
+    #[serde(rename = "for")]
+    pub purpose: &'static str,
+    pub seed: u64,
+    /// Number of rows that are measured and fitted.
+    pub measured: usize,
+    pub candidates: usize,
+    /// Number of poses over which predictions are judged.
+    pub workspace_poses: usize,
+    /// 1 σ of the noise of one coordinate.
+    pub noise_mm: f64,
+    /// Root mean square misfit of the model along each axis that the choice allows for.
+    pub misfit_mm: f64,
+    /// Probability with which an error in the workspace stays below the bound.
+    pub level: f64,
+    pub tolerance_mm: Option<f64>,
+    /// Error over the workspace; null with fewer than ten measured configurations.
+    pub now: Option<WorkspaceError>,
+    /// Expected error after any number of further poses.
+    pub attainable_mm: Option<f64>,
+    /// Reason for which fewer poses are named than requested: `enough`, `gain-below-noise` or
+    /// `no-candidates`; null if there is none.
+    pub stop: Option<&'static str>,
+    /// Number of these poses after which the bound is expected to be below the tolerance.
+    pub enough_after: Option<usize>,
+    /// Effects that the poses tell apart.
+    #[schemars(with = "Vec<EffectKeys>")]
+    pub effects: Vec<Effect>,
+    /// Poses in the order of next.csv.
+    pub poses: Vec<NextStep>,
+}
+
+impl Document for NextResult {
+    const FORMAT: &'static str = "flexcal-next";
+}
+
+/// Error measured − predicted over the workspace.
+#[derive(Debug, Clone, Copy, Serialize, JsonSchema)]
+pub struct WorkspaceError {
+    /// Root mean square of the error length, measurement noise included.
+    pub expected_mm: f64,
+    pub expected_sigma_mm: f64,
+    /// Length that errors do not exceed with the probability `level`.
+    pub bound_mm: f64,
+}
+
+/// One pose to measure.
+#[derive(Debug, Clone, Copy, Serialize, JsonSchema)]
+pub struct NextStep {
+    /// Largest move of a joint from the pose before, as a share of its range.
+    pub travel: f64,
+    /// Decrease of the goal by this pose, as a share of its present value.
+    pub gain: f64,
+    /// Expected error after this pose.
+    pub after: Option<WorkspaceError>,
+}
+
+impl NextResult {
+    /// Collects the result of a choice of poses.
+    pub fn new(problem: &Problem, options: &NextOptions, next: &NextPoses) -> Self {
+        let error = |error: design::WorkspaceError| WorkspaceError {
+            expected_mm: error.expected * 1e3,
+            expected_sigma_mm: error.expected_sigma * 1e3,
+            bound_mm: error.bound * 1e3,
+        };
+        let step = |step: &design::NextStep| NextStep {
+            travel: step.travel,
+            gain: step.gain,
+            after: step.error.map(error),
+        };
+        Self {
+            problem: problem.name.clone(),
+            purpose: match options.purpose {
+                Purpose::Accuracy => "accuracy",
+                Purpose::Causes => "causes",
+                Purpose::Both => "both",
+            },
+            seed: options.seed,
+            measured: next.measured,
+            candidates: next.candidates,
+            workspace_poses: next.workspace_poses,
+            noise_mm: next.noise * 1e3,
+            misfit_mm: next.misfit * 1e3,
+            level: options.level,
+            tolerance_mm: options.tolerance.map(|tolerance| tolerance * 1e3),
+            now: next.error.map(error),
+            attainable_mm: next.attainable.map(|length| length * 1e3),
+            stop: next.stop.map(|stop| match stop {
+                StopReason::Enough => "enough",
+                StopReason::GainBelowNoise => "gain-below-noise",
+                StopReason::NoCandidates => "no-candidates",
+            }),
+            enough_after: next.enough_after(options.tolerance),
+            effects: next.effects.clone(),
+            poses: next.steps.iter().map(step).collect(),
+        }
+    }
+}
