@@ -17,5 +17,7 @@ mod detection;
 mod exchange;
 #[path = "design/forecast.rs"]
 mod forecast;
+#[path = "design/next.rs"]
+mod next;
 #[path = "design/separate.rs"]
 mod separate;

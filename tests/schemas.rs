@@ -49,13 +49,14 @@ fn every_command_writes_what_its_schema_says() {
     let first =
         format!("identify {} --data {}", full("tests/cases"), full("tests/cases/a-none.csv"));
     folder.flexcal(&format!("{first} --out out/a-none")).success();
-    let commands: [(&str, String); 12] = [
+    let commands: [(&str, String); 13] = [
         ("flexcal-estimate", format!("identify {lunar}")),
         ("flexcal-loop", format!("loop {case} --out loop")),
         ("flexcal-trace", format!("trace {lunar}")),
         ("flexcal-compare", format!("compare {case} --out compare")),
         ("flexcal-check", format!("check {lunar}")),
         ("flexcal-plan", format!("plan {lunar} --truth {lunar} --poses 8")),
+        ("flexcal-next", format!("next {lunar} --truth {lunar} --poses 3 --out next")),
         ("flexcal-errors", format!("predict {estimated}")),
         ("flexcal-watch", format!("{watched} --out watch")),
         ("flexcal-compensate", format!("compensate {estimated} --data {lunar}/targets.csv")),

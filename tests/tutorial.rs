@@ -1,4 +1,4 @@
-//! Test of docs/tutorial.md, docs/laws.md and docs/life.md: their files are written, their commands
+//! Test of docs/tutorial.md, docs/laws.md, docs/life.md and docs/next.md: their files are written, their commands
 //! run, and the lines they show
 //! compared.
 //!
@@ -112,6 +112,11 @@ fn the_page_of_laws_shows_what_happens() {
 #[test]
 fn the_page_of_the_life_of_an_arm_shows_what_happens() {
     shows_what_happens("life", 8);
+}
+
+#[test]
+fn the_page_of_next_poses_shows_what_happens() {
+    shows_what_happens("next", 4);
 }
 
 /// Runs the commands of a page and compares its blocks with what they print, or refills them.

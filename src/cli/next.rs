@@ -121,7 +121,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         };
         design::next(&problem, &data, &candidates, &options).map(|next| (next, options))
     };
-    let (next, options) = Line::during(common.talks(), stop.clone(), |sink| {
+    let (next, options) = Line::during(common.prints_text(), stop.clone(), |sink| {
         found(Options::default().with_stop(stop).with_progress(sink))
     })?;
     let json = NextResult::new(&problem, &options, &next).to_json();
@@ -132,19 +132,25 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         texts.push(("next.csv", table.as_str()));
     }
     results.write(&texts)?;
-    common.tell(&json, || {
+    common.print_result(&json, || {
         let text = report::next_text(&problem, &options, &next);
         let named = common.named();
         if next.poses.is_empty() {
             let file = results.path("next.json");
-            return format!("{text}\nWritten to {}\nNext: flexcal identify {named}\n", file.display());
+            return format!(
+                "{text}\nWritten to {}\nNext: flexcal identify {named}\n",
+                file.display()
+            );
         }
-        let file = results.path("next.csv");
+        let (file, named) = (results.path("next.csv"), shell_word(common.problem()));
+        let files: Vec<String> =
+            common.files(&problem).iter().map(|file| shell_word(file)).collect();
         format!(
-            "{text}\nWritten to {}, what it promises to next.json beside it\n\
-             Next: measure these poses, add the columns x_mm, y_mm, z_mm, then flexcal next {named} --data with {} among the files\n",
-            file.display(),
-            shell_word(&file)
+            "{text}\nWritten to {0}, what it promises to next.json beside it\n\
+             Next: measure these poses, add the columns x_mm, y_mm, z_mm, then\n\
+             flexcal next {named} --data {1} {0}\n",
+            shell_word(&file),
+            files.join(" "),
         )
     })?;
     if !next.found.is_trusted() && !common.quiet {

@@ -270,7 +270,7 @@ pub fn next(
         view(&greedy.covariance).dot(&view(&scaled)).max(0.0)
     };
     let before = left(&greedy);
-    let attainable = error.map(|error| error.without(before).expected);
+    let attainable = error.map(|error| error.least);
     let stop = match (error, attainable) {
         (Some(error), _) if options.tolerance.is_some_and(|most| error.bound <= most) => {
             Some(StopReason::Enough)
@@ -317,11 +317,11 @@ pub fn next(
         };
         let moved = move_to(pose);
         greedy.take(pose);
-        let gained = before - left(&greedy);
+        let share = if before > 0.0 { left(&greedy) / before } else { 1.0 };
         result.steps.push(NextStep {
             travel: moved,
             gain: gains[pose] / first,
-            error: error.map(|error| error.without(gained)),
+            error: error.map(|error| error.with_parameters(share)),
         });
         is_chosen[pose] = true;
         chosen.push(pose);

@@ -54,6 +54,9 @@ pub struct WorkspaceError {
     pub expected_sigma: f64,
     /// Length that errors in the workspace do not exceed with the requested probability \[m\].
     pub bound: f64,
+    /// Part of the expected error that no estimate of the parameters removes: noise and misfit
+    /// \[m\].
+    pub least: f64,
 }
 
 impl WorkspaceError {
@@ -71,18 +74,20 @@ impl WorkspaceError {
         let bound = correction.pooled_bound(&sizes, level, (CONFIDENCE, freedom))?;
         let squares: f64 = sizes.iter().map(|size| size * size).sum();
         let expected = scale * (squares / sizes.len() as f64).sqrt();
-        Some(Self { expected, expected_sigma: expected / (2.0 * freedom).sqrt(), bound })
+        let least = (scale * correction.noise_length()).min(expected);
+        Some(Self { expected, expected_sigma: expected / (2.0 * freedom).sqrt(), bound, least })
     }
 
-    /// Returns the error after the mean square error has fallen by `gained` \[m²\].
-    pub(super) fn without(self, gained: f64) -> Self {
-        let square = self.expected * self.expected;
-        // What left-out poses show is never less than the model's own share.
-        let ratio = ((square - gained).max(0.0) / square).sqrt();
+    /// Returns the error after the variance that the parameters cause has fallen to a `share` of its
+    /// present value.
+    pub(super) fn with_parameters(self, share: f64) -> Self {
+        let (square, least) = (self.expected * self.expected, self.least * self.least);
+        let ratio = ((least + (square - least) * share) / square).sqrt();
         Self {
             expected: self.expected * ratio,
             expected_sigma: self.expected_sigma * ratio,
             bound: self.bound * ratio,
+            least: self.least,
         }
     }
 }

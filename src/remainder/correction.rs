@@ -129,6 +129,12 @@ impl Correction {
         self.scores.scale()
     }
 
+    /// Returns the expected length of the noise of one position \[m\]. It contains the misfit that
+    /// the correction does not describe.
+    pub(crate) fn noise_length(&self) -> f64 {
+        (AXES as f64 * self.posterior.hyper.noise_variance_of(1.0)).sqrt()
+    }
+
     /// Returns the error bound over poses with the expected error lengths `sizes` \[m\], as
     /// [`Scores::pooled_bound`] does.
     pub(crate) fn pooled_bound(

@@ -14,7 +14,7 @@ use crate::numeric::bisect;
 const MAX_SCORES: usize = 1000;
 
 /// Minimum number of configurations from which the tail of the scores is judged.
-const MIN_FOR_TAIL: usize = 40;
+const MIN_FOR_TAIL: usize = 20;
 /// Number of halvings of the interval in which a bound is searched.
 const HALVINGS: usize = 50;
 
