@@ -53,13 +53,12 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let flags = &arguments.flags;
     let results =
         flags.claim("simulate", &problem.name, inputs, &["measurements.csv", "truth.json"])?;
-    let poses = match arguments.poses {
-        Some(poses) => SimulatedPoses::Random(poses as usize),
-        None => {
-            let (rows, warnings) = Measurements::read_poses(&arguments.data, &problem)?;
-            flags.warn(&warnings);
-            SimulatedPoses::Given(rows.poses_to_simulate(&problem))
-        }
+    let poses = if let Some(poses) = arguments.poses {
+        SimulatedPoses::Random(poses as usize)
+    } else {
+        let (rows, warnings) = Measurements::read_poses(&arguments.data, &problem)?;
+        flags.warn(&warnings);
+        SimulatedPoses::Given(rows.poses_to_simulate(&problem))
     };
     let count = match &poses {
         SimulatedPoses::Random(count) => *count,

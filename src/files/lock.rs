@@ -33,7 +33,7 @@ impl FolderLock {
             match open.try_lock() {
                 Ok(()) => return Ok(Self { _folder: Some(open) }),
                 Err(TryLockError::WouldBlock) if begun.elapsed() < patience => {
-                    sleep(RETRY_INTERVAL)
+                    sleep(RETRY_INTERVAL);
                 }
                 Err(TryLockError::WouldBlock) => return Err(io::ErrorKind::WouldBlock.into()),
                 Err(TryLockError::Error(_)) => return Ok(Self { _folder: None }),

@@ -65,7 +65,7 @@ pub(super) fn assess(
     for row in 0..rows.len() {
         sums.add(rows, row, 1.0);
         let is_last = row + 1 == rows.len();
-        if !is_last && !(is_sequential && (row + 1) % step == 0) {
+        if !(is_last || is_sequential && (row + 1) % step == 0) {
             continue;
         }
         let unchanged = Unchanged::new(&sums, factor)?;

@@ -324,7 +324,7 @@ impl Measurements {
     /// Returns a digest of joints and measured numbers of a row, 16 hexadecimal digits. It is the
     /// same in every file and for equal values in other units.
     pub(crate) fn row_digest(&self, row: usize) -> String {
-        let orientation = self.orientation(row).map(|turn| turn.scaled_axis());
+        let orientation = self.orientation(row).map(UnitQuaternion::scaled_axis);
         let turn = orientation.iter().flat_map(|turn| turn.iter());
         let numbers = self.configuration(row).iter().chain(&self.positions[row]).chain(turn);
         // Adding 0 turns −0 into 0; a change of unit keeps ten digits.

@@ -1,5 +1,7 @@
 //! Prior, new data and posterior of a fit with an earlier estimate, in words.
 
+use std::fmt::Write as _;
+
 use super::document::{Block, Table};
 use crate::fit::{ComparedParameter, Identification, PriorComparison};
 use crate::quantity::format::{counted, decimals, number, or_dash, p_value};
@@ -31,24 +33,25 @@ pub(super) fn prior<'a>(found: &Identification) -> Vec<Block<'a>> {
 pub(super) fn summary(comparison: &PriorComparison) -> String {
     let mut text = format!("Prior: {}", comparison.file.display());
     if comparison.days > 0.0 {
-        text += &format!(", widened by the drift of {}", counted_days(comparison.days));
+        let _ = write!(text, ", widened by the drift of {}", counted_days(comparison.days));
     }
     if comparison.left_out > 0 {
         let rows = counted(comparison.left_out, "row");
-        text += &format!("; {rows} that it was fitted to left out");
+        let _ = write!(text, "; {rows} that it was fitted to left out");
     }
     if let Some((chi2, coordinates, p)) = comparison.chi2 {
-        text += &format!(
+        let _ = write!(
+            text,
             ". New rows against it: χ² {} of {coordinates:.0} coordinates, p {}",
             number(chi2, 1),
             p_value(p)
         );
     }
-    text += &match comparison.causes.as_slice() {
+    let verdict = match comparison.causes.as_slice() {
         [] => ". They agree.".to_owned(),
         causes => format!(". They disagree: {}.", causes.join("; ")),
     };
-    text
+    text + &verdict
 }
 
 fn counted_days(days: f64) -> String {
