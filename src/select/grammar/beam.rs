@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::site::{BEAM_VARIANCE, Noise, Span, WhitenedSite};
+use super::site::{BEAM_VARIANCE, Noise, Span, Weighted, WhitenedSite};
 use super::terms::{Chunk, Product, Terms};
 
 /// Maximum number of terms of a sum.
@@ -123,10 +123,16 @@ impl<'a> Beam<'a> {
         }
     }
 
+    /// Returns the columns of a term, each of length 1, with W times them.
+    fn weighted(&self, term: &Product) -> Vec<Weighted> {
+        self.site.weighted(self.terms.columns(term).into_iter().map(normed).collect())
+    }
+
     fn state(&self, sum: &Sum) -> State {
-        let columns: Vec<DVector<f64>> =
-            sum.iter().flat_map(|term| self.terms.columns(term)).map(normed).collect();
-        let span = self.site.span(&columns);
+        let mut span = self.site.empty_span();
+        for term in sum {
+            span.extend(&self.weighted(term), &self.site.product);
+        }
         #[expect(clippy::cast_possible_truncation, reason = "half the width is twice as fast")]
         let weighted = span.weighted.transpose().map(|value| value as f32);
         let ln_prior = if sum.is_empty() { 0.0 } else { ln_prior(self.terms, sum) };
@@ -188,7 +194,8 @@ impl<'a> Beam<'a> {
         };
         let (by_evidence, by_guide) = (by(|s| s.ln_posterior), by(|s| s.guide));
         let in_turn = by_evidence.iter().zip(&by_guide).flat_map(|(a, b)| [a.0, b.0]);
-        let mut found: Vec<(Sum, DVector<f64>)> = Vec::new();
+        let mut found: Vec<(Sum, Weighted)> = Vec::new();
+        let mut of_terms: BTreeMap<&Product, Vec<Weighted>> = BTreeMap::new();
         for sum in in_turn {
             if found.len() >= most {
                 break;
@@ -196,9 +203,14 @@ impl<'a> Beam<'a> {
             if found.iter().any(|(known, _)| known == sum) {
                 continue;
             }
-            let prediction = self.state(sum).span.prediction();
-            let is_near = |(_, other): &(Sum, DVector<f64>)| {
-                self.site.squares(&(other - &prediction))
+            let mut span = self.site.empty_span();
+            for term in sum {
+                let columns = of_terms.entry(term).or_insert_with(|| self.weighted(term));
+                span.extend(columns, &self.site.product);
+            }
+            let prediction = span.prediction();
+            let is_near = |(_, other): &(Sum, Weighted)| {
+                other.squared_distance(&prediction)
                     < MIN_BEAM_DIFFERENCE.powi(2) * self.noise.factor
             };
             if !found.iter().any(is_near) {
@@ -220,10 +232,26 @@ fn best_of(mut all: Vec<Extension>) -> Vec<Extension> {
     if all.len() <= KEPT_EXTENSIONS[0] {
         return all;
     }
-    all.sort_by(|a, b| b.scored.ln_posterior.total_cmp(&a.scored.ln_posterior));
-    let mut others = all.split_off(KEPT_EXTENSIONS[0]);
-    others.sort_by(|a, b| b.scored.guide.total_cmp(&a.scored.guide));
-    others.truncate(KEPT_EXTENSIONS[1]);
+    let mut others = split_best(&mut all, KEPT_EXTENSIONS[0], |scored| scored.ln_posterior);
+    split_best(&mut others, KEPT_EXTENSIONS[1], |scored| scored.guide);
     all.extend(others);
     all
+}
+
+/// Keeps the `most` extensions with the highest value of `of`, sorted, and returns the others. Of
+/// equal values the earlier place comes first.
+fn split_best(
+    all: &mut Vec<Extension>,
+    most: usize,
+    of: impl Fn(&Scored) -> f64,
+) -> Vec<Extension> {
+    let order = |a: &Extension, b: &Extension| {
+        of(&b.scored).total_cmp(&of(&a.scored)).then_with(|| a.place.cmp(&b.place))
+    };
+    if all.len() > most {
+        all.select_nth_unstable_by(most, order);
+    }
+    let others = all.split_off(all.len().min(most));
+    all.sort_unstable_by(order);
+    others
 }

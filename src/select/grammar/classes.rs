@@ -5,7 +5,7 @@ use nalgebra::DVector;
 use super::beam::{Beam, Sum, ln_prior};
 use super::dictionary::factors;
 use super::quantities::Quantities;
-use super::site::{Noise, WhitenedSite};
+use super::site::{Noise, Span, Weighted, WhitenedSite};
 use super::terms::{Terms, product};
 use super::written::{Written, written};
 
@@ -42,7 +42,7 @@ struct Refined {
     ln_posterior: f64,
     ln_evidence: f64,
     ln_prior: f64,
-    prediction: DVector<f64>,
+    prediction: Weighted,
 }
 
 struct Class {
@@ -77,8 +77,8 @@ pub fn proposals(
     let mut classes: Vec<Class> = Vec::new();
     for refined in all {
         let is_same = |class: &&mut Class| {
-            let difference = &class.first.prediction - &refined.prediction;
-            site.squares(&difference) < MAX_CLASS_DIFFERENCE.powi(2) * noise.factor
+            class.first.prediction.squared_distance(&refined.prediction)
+                < MAX_CLASS_DIFFERENCE.powi(2) * noise.factor
         };
         if let Some(class) = classes.iter_mut().find(is_same) {
             class.ln_posterior = ln_add(class.ln_posterior, refined.ln_posterior);
@@ -94,8 +94,8 @@ pub fn proposals(
         }
     }
     classes.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
-    let predictions: Vec<DVector<f64>> =
-        present.iter().map(|columns| site.span(columns).prediction()).collect();
+    let predictions: Vec<Weighted> =
+        present.iter().map(|columns| site.span(columns.clone()).prediction()).collect();
     let proposal = |class: Class| {
         let first = &class.first;
         let is_catalogued = first.sum.iter().all(|term| {
@@ -104,8 +104,8 @@ pub fn proposals(
         if is_catalogued {
             return None;
         }
-        let is_near = |other: &DVector<f64>| {
-            site.squares(&(other - &first.prediction)) < MAX_CLASS_DIFFERENCE.powi(2) * noise.factor
+        let is_near = |other: &Weighted| {
+            other.squared_distance(&first.prediction) < MAX_CLASS_DIFFERENCE.powi(2) * noise.factor
         };
         let is_present = predictions.iter().any(is_near);
         let law = written((&terms, known), joint, &first.sum, &first.inner);
@@ -135,8 +135,12 @@ impl Refiner<'_> {
         let mut inner: Vec<Vec<f64>> = sum.iter().map(starts).collect();
         let ln_prior = ln_prior(self.terms, &sum);
         let mut averaged = 0.0;
-        for (t, term) in sum.iter().enumerate().filter(|_| is_refined) {
-            for (f, &factor) in term.iter().enumerate() {
+        let mut columns: Vec<Vec<Weighted>> =
+            sum.iter().zip(&inner).map(|(term, inner)| self.columns(term, inner)).collect();
+        // Functions of earlier terms do not change any more.
+        let mut earlier = self.site.empty_span();
+        for (t, term) in sum.iter().enumerate() {
+            for (f, &factor) in term.iter().enumerate().filter(|_| is_refined) {
                 let Some((start, step)) = self.terms.factors[usize::from(factor)].inner else {
                     continue;
                 };
@@ -144,7 +148,10 @@ impl Refiner<'_> {
                 let mut evidences = Vec::new();
                 for k in -TRIAL_VALUES..=TRIAL_VALUES {
                     inner[t][f] = at(k);
-                    evidences.push((k, self.evidence(&sum, &inner)));
+                    columns[t] = self.columns(term, &inner[t]);
+                    let span = self.span(earlier.clone(), &columns[t..]);
+                    let evidence = self.noise.evidence(span.explained_squares(), span.along.len());
+                    evidences.push((k, evidence));
                 }
                 let best = evidences
                     .iter()
@@ -152,6 +159,7 @@ impl Refiner<'_> {
                     .max_by(|a, b| a.1.total_cmp(&b.1).then_with(|| b.0.abs().cmp(&a.0.abs())));
                 let (k, most) = best.unwrap_or((0, 0.0));
                 inner[t][f] = at(k);
+                columns[t] = self.columns(term, &inner[t]);
                 // Over the cell about the best value.
                 let cell: Vec<f64> = evidences
                     .iter()
@@ -160,13 +168,12 @@ impl Refiner<'_> {
                     .collect();
                 averaged += (cell.iter().sum::<f64>() / f64::from(TRIAL_VALUES + 1)).ln();
             }
+            earlier.extend(&columns[t], &self.site.product);
         }
-        let columns = self.columns(&sum, &inner);
-        let span = self.site.span(&columns);
-        let ln_evidence = self.noise.evidence(span.explained_squares(), span.along.len());
+        let ln_evidence = self.noise.evidence(earlier.explained_squares(), earlier.along.len());
         Refined {
             ln_posterior: ln_evidence + averaged + ln_prior,
-            prediction: span.prediction(),
+            prediction: earlier.prediction(),
             ln_evidence,
             ln_prior,
             inner,
@@ -174,21 +181,22 @@ impl Refiner<'_> {
         }
     }
 
-    fn evidence(&self, sum: &Sum, inner: &[Vec<f64>]) -> f64 {
-        let span = self.site.span(&self.columns(sum, inner));
-        self.noise.evidence(span.explained_squares(), span.along.len())
+    /// Returns a span extended by the columns of further terms.
+    fn span(&self, mut span: Span, terms: &[Vec<Weighted>]) -> Span {
+        for columns in terms {
+            span.extend(columns, &self.site.product);
+        }
+        span
     }
 
-    fn columns(&self, sum: &Sum, inner: &[Vec<f64>]) -> Vec<DVector<f64>> {
-        let of_term = |(term, inner): (&Vec<u16>, &Vec<f64>)| {
-            let of_factor = |(&k, &x): (&u16, &f64)| {
-                let form = self.terms.factors[usize::from(k)].form;
-                form.columns(self.known, x).into_iter().map(DVector::from_vec).collect::<Vec<_>>()
-            };
-            let factors: Vec<Vec<DVector<f64>>> = term.iter().zip(inner).map(of_factor).collect();
-            product(factors.iter().map(Vec::as_slice)).unwrap_or_default()
+    /// Returns the columns of a term with values of its inner parameters, and W times them.
+    fn columns(&self, term: &[u16], inner: &[f64]) -> Vec<Weighted> {
+        let of_factor = |(&k, &x): (&u16, &f64)| {
+            let form = self.terms.factors[usize::from(k)].form;
+            form.columns(self.known, x).into_iter().map(DVector::from_vec).collect::<Vec<_>>()
         };
-        sum.iter().zip(inner).flat_map(of_term).collect()
+        let factors: Vec<Vec<DVector<f64>>> = term.iter().zip(inner).map(of_factor).collect();
+        self.site.weighted(product(factors.iter().map(Vec::as_slice)).unwrap_or_default())
     }
 }
 

@@ -65,7 +65,17 @@ pub struct WhitenedSite {
     pub product: DVector<f64>,
 }
 
+/// Function of the pose with the weight matrix W times it.
+#[derive(Clone)]
+pub struct Weighted {
+    /// Values of the function, shape = (poses).
+    pub values: DVector<f64>,
+    /// Weight matrix W times these values.
+    pub times: DVector<f64>,
+}
+
 /// Functions of the pose that are orthonormal in W, with their products with the residual.
+#[derive(Clone)]
 pub struct Span {
     /// Orthonormal functions of the pose, shape = (poses, k).
     pub functions: DMatrix<f64>,
@@ -78,7 +88,7 @@ pub struct Span {
 
 impl WhitenedSite {
     /// Returns the weight matrix W times a function of the pose.
-    pub fn times(&self, function: &DVector<f64>) -> DVector<f64> {
+    fn times(&self, function: &DVector<f64>) -> DVector<f64> {
         let mut out = self.diagonal.component_mul(function);
         let along = &self.less * function;
         out.gemv_tr(-1.0, &self.less, &along, 1.0);
@@ -97,54 +107,77 @@ impl WhitenedSite {
         solved.map_or(0.0, |solved| solved.dot(&self.product))
     }
 
-    /// Returns the span of some functions of the pose. Functions that depend linearly on earlier
-    /// ones or on the fit are left out.
-    pub fn span(&self, functions: &[DVector<f64>]) -> Span {
+    /// Returns functions of the pose together with W times each of them.
+    pub fn weighted(&self, functions: Vec<DVector<f64>>) -> Vec<Weighted> {
+        let weighted = |values: DVector<f64>| Weighted { times: self.times(&values), values };
+        functions.into_iter().map(weighted).collect()
+    }
+
+    /// Returns the span of no function.
+    pub fn empty_span(&self) -> Span {
         let n = self.diagonal.len();
-        let mut span = Span {
+        Span {
             functions: DMatrix::zeros(n, 0),
             weighted: DMatrix::zeros(n, 0),
             along: DVector::zeros(0),
-        };
-        for function in functions {
-            let mut left = function.clone();
-            let mut weighted = self.times(&left);
+        }
+    }
+
+    /// Returns the span of some functions of the pose. Functions that depend linearly on earlier
+    /// ones or on the fit are left out.
+    pub fn span(&self, functions: Vec<DVector<f64>>) -> Span {
+        let mut span = self.empty_span();
+        span.extend(&self.weighted(functions), &self.product);
+        span
+    }
+}
+
+impl Weighted {
+    /// Returns the squared length (f − g)ᵀW(f − g) of the difference to another function g, in
+    /// units of the noise.
+    pub fn squared_distance(&self, other: &Self) -> f64 {
+        let pairs = self.values.iter().zip(&other.values);
+        let weighted = self.times.iter().zip(&other.times);
+        pairs.zip(weighted).map(|((f, g), (wf, wg))| (f - g) * (wf - wg)).sum()
+    }
+}
+
+impl Span {
+    /// Adds functions to the span; those that depend linearly on earlier ones or on the fit are left
+    /// out. `product` is the vector p of the site.
+    pub fn extend(&mut self, functions: &[Weighted], product: &DVector<f64>) {
+        for Weighted { values, times } in functions {
+            let (mut left, mut weighted) = (values.clone(), times.clone());
             let whole = left.dot(&weighted);
             for _ in 0..2 {
-                let along = span.functions.tr_mul(&weighted);
-                left -= &span.functions * &along;
-                weighted -= &span.weighted * along;
+                let along = self.functions.tr_mul(&weighted);
+                left.gemv(-1.0, &self.functions, &along, 1.0);
+                weighted.gemv(-1.0, &self.weighted, &along, 1.0);
             }
             let length = left.dot(&weighted);
             if length.is_nan() || length <= MIN_LEFT * whole || whole <= 0.0 {
                 continue;
             }
             let scale = length.sqrt().recip();
-            let k = span.along.len();
-            span.functions = span.functions.insert_column(k, 0.0);
-            span.functions.set_column(k, &(left * scale));
-            span.weighted = span.weighted.insert_column(k, 0.0);
-            span.weighted.set_column(k, &(weighted * scale));
-            let along = span.functions.column(k).dot(&self.product);
-            span.along = span.along.push(along);
+            let k = self.along.len();
+            let add = |matrix: &mut DMatrix<f64>, column: DVector<f64>| {
+                *matrix = std::mem::take(matrix).resize_horizontally(k + 1, 0.0);
+                matrix.set_column(k, &(column * scale));
+            };
+            add(&mut self.functions, left);
+            add(&mut self.weighted, weighted);
+            let along = self.functions.column(k).dot(product);
+            self.along = std::mem::take(&mut self.along).push(along);
         }
-        span
     }
 
-    /// Returns the squared length fᵀWf of a function's column, in units of the noise.
-    pub fn squares(&self, function: &DVector<f64>) -> f64 {
-        function.dot(&self.times(function))
-    }
-}
-
-impl Span {
     /// Returns the sum of squares of the residual that the span explains.
     pub fn explained_squares(&self) -> f64 {
         self.along.norm_squared()
     }
 
     /// Returns the function of the pose that fits the residual best.
-    pub fn prediction(&self) -> DVector<f64> {
-        &self.functions * &self.along
+    pub fn prediction(&self) -> Weighted {
+        Weighted { values: &self.functions * &self.along, times: &self.weighted * &self.along }
     }
 }

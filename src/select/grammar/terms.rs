@@ -6,6 +6,7 @@ use rayon::prelude::*;
 use super::factor::Factor;
 use super::quantities::Quantities;
 use super::site::WhitenedSite;
+use crate::least_squares::kernel::{dot, sum_of_squares};
 
 /// Prior probability that a term has one, two or three factors.
 const FACTOR_COUNT_PROBABILITIES: [f64; 3] = [0.6, 0.3, 0.1];
@@ -13,6 +14,8 @@ const FACTOR_COUNT_PROBABILITIES: [f64; 3] = [0.6, 0.3, 0.1];
 const MIN_LEFT: f64 = 2e-3;
 /// Number of terms whose columns are multiplied together in one matrix product.
 const TERMS_PER_PRODUCT: usize = 1024;
+/// Number of such products that are formed at a time: a bound of memory.
+const CHUNKS_AT_ONCE: usize = 8;
 /// Maximum number of terms with two factors that are kept, the best ones.
 const MAX_PAIRS: usize = 8_000;
 /// Maximum number of terms with two factors to which a third factor is added.
@@ -65,9 +68,9 @@ impl Terms {
             .flat_map(|a| (a..count).map(move |b| vec![number(a), number(b)]))
             .filter(|pair| all.is_new(pair))
             .collect();
-        let mut chunks = all.chunks_of(single, site);
-        let pairs = Self::best(all.chunks_of(pairs, site), MAX_PAIRS);
-        let extended: Vec<Product> = Self::best_terms(&pairs, MAX_EXTENDED)
+        let mut chunks = all.chunks_of(&single, site);
+        let pairs = all.best_of(&pairs, MAX_PAIRS, site);
+        let mut extended: Vec<Product> = Self::best_terms(&pairs, MAX_EXTENDED)
             .into_iter()
             .flat_map(|pair| {
                 (0..count).map(move |c| {
@@ -78,11 +81,10 @@ impl Terms {
             })
             .filter(|term| all.is_new(term))
             .collect();
-        let mut extended = extended;
         extended.sort_unstable();
         extended.dedup();
         chunks.extend(pairs);
-        chunks.extend(all.chunks_of(extended, site));
+        chunks.extend(all.chunks_of(&extended, site));
         all.chunks = chunks;
         all
     }
@@ -132,57 +134,82 @@ impl Terms {
         term.iter().map(|&k| self.factors[usize::from(k)].form.width()).product()
     }
 
-    fn chunks_of(&self, terms: Vec<Product>, site: &WhitenedSite) -> Vec<Chunk> {
-        let (narrow, wide): (Vec<Product>, Vec<Product>) =
-            terms.into_iter().partition(|term| self.width(term) == 1);
-        let chunk = |(width, terms): (usize, &[Product])| self.chunk(width, terms, site);
-        let all: Vec<(usize, &[Product])> = narrow
-            .chunks(TERMS_PER_PRODUCT)
-            .map(|some| (1, some))
-            .chain(wide.chunks(TERMS_PER_PRODUCT).map(|some| (2, some)))
-            .collect();
-        all.into_par_iter().map(chunk).collect()
+    /// Returns all of `terms` with their columns, in chunks.
+    fn chunks_of(&self, terms: &[Product], site: &WhitenedSite) -> Vec<Chunk> {
+        let chunk = |(width, terms): &(usize, Vec<&Product>)| self.chunk(*width, terms, site);
+        self.groups(terms).par_iter().map(chunk).collect()
     }
 
-    fn chunk(&self, width: usize, terms: &[Product], site: &WhitenedSite) -> Chunk {
+    /// Returns the `most` of `terms` that alone reduce the residual most, in chunks. A few chunks are
+    /// formed at a time, so that memory does not grow with the number of terms.
+    fn best_of(&self, terms: &[Product], most: usize, site: &WhitenedSite) -> Vec<Chunk> {
+        let chunk = |(width, terms): &(usize, Vec<&Product>)| self.chunk(*width, terms, site);
+        let mut all: Vec<Chunk> = Vec::new();
+        for some in self.groups(terms).chunks(CHUNKS_AT_ONCE) {
+            all.extend(some.par_iter().map(chunk).collect::<Vec<Chunk>>());
+            all = Self::best(all, most);
+        }
+        all
+    }
+
+    /// Returns terms in groups of one width.
+    fn groups<'t>(&self, terms: &'t [Product]) -> Vec<(usize, Vec<&'t Product>)> {
+        let (narrow, wide): (Vec<&Product>, Vec<&Product>) =
+            terms.iter().partition(|term| self.width(term) == 1);
+        let groups = |width: usize, terms: Vec<&'t Product>| -> Vec<(usize, Vec<&'t Product>)> {
+            terms.chunks(TERMS_PER_PRODUCT).map(|some| (width, some.to_vec())).collect()
+        };
+        [groups(1, narrow), groups(2, wide)].concat()
+    }
+
+    fn chunk(&self, width: usize, terms: &[&Product], site: &WhitenedSite) -> Chunk {
         let n = site.diagonal.len();
         let mut columns = DMatrix::<f64>::zeros(n, terms.len() * width);
-        for (k, term) in terms.iter().enumerate() {
-            for (j, values) in self.columns(term).iter().enumerate().take(width) {
-                columns.set_column(k * width + j, values);
+        for (k, target) in columns.as_mut_slice().chunks_exact_mut(n.max(1)).enumerate() {
+            target.fill(1.0);
+            for &factor in terms[k / width] {
+                let values = &self.values[usize::from(factor)];
+                // At most one factor of a term has two columns.
+                let values = values[(k % width).min(values.len() - 1)].as_slice();
+                target.iter_mut().zip(values).for_each(|(value, factor)| *value *= factor);
             }
-        }
-        // To one length: powers of large numbers would leave the range of single precision.
-        for mut column in columns.column_iter_mut() {
-            let norm = column.norm();
-            column /= if norm > 0.0 { norm } else { 1.0 };
+            // To one length: powers of large numbers would leave the range of single precision.
+            let norm = sum_of_squares(target).sqrt();
+            let scale = if norm > 0.0 { norm } else { 1.0 };
+            target.iter_mut().for_each(|value| *value /= scale);
         }
         let less = &site.less * &columns;
-        let dot = |a: usize, b: usize| {
-            let (x, y) = (columns.column(a), columns.column(b));
-            let whole: f64 =
-                x.iter().zip(y.iter()).zip(site.diagonal.iter()).map(|((x, y), d)| x * y * d).sum();
-            (whole, whole - less.column(a).dot(&less.column(b)))
+        let mut weighted = vec![0.0; n];
+        let mut inner = |a: usize, b: usize| {
+            let pairs = column(&columns, a).iter().zip(site.diagonal.as_slice());
+            weighted.iter_mut().zip(pairs).for_each(|(value, (x, d))| *value = x * d);
+            let whole = dot(&weighted, column(&columns, b));
+            (whole, whole - dot(column(&less, a), column(&less, b)))
         };
-        let mut chunk = Chunk {
+        let mut squares = Vec::with_capacity(columns.ncols());
+        for k in 0..columns.ncols() {
+            let (whole, left) = inner(k, k);
+            let is_seen = left.is_finite() && left > MIN_LEFT * MIN_LEFT * whole;
+            squares.push(if is_seen { left } else { 0.0 });
+        }
+        let mixed = if width == 2 {
+            (0..terms.len()).map(|k| inner(2 * k, 2 * k + 1).1).collect()
+        } else {
+            Vec::new()
+        };
+        let along = (0..columns.ncols())
+            .map(|k| dot(column(&columns, k), site.product.as_slice()))
+            .collect();
+        Chunk {
             width,
-            terms: terms.to_vec(),
+            terms: terms.iter().map(|&term| term.clone()).collect(),
             ln_prior: terms.iter().map(|term| self.ln_prior(term)).collect(),
-            squares: Vec::new(),
-            mixed: Vec::new(),
-            along: (0..columns.ncols()).map(|k| columns.column(k).dot(&site.product)).collect(),
+            squares,
+            mixed,
+            along,
             #[expect(clippy::cast_possible_truncation, reason = "half the width is twice as fast")]
             columns: columns.map(|value| value as f32),
-        };
-        for k in 0..columns.ncols() {
-            let (whole, left) = dot(k, k);
-            let is_seen = left.is_finite() && left > MIN_LEFT * MIN_LEFT * whole;
-            chunk.squares.push(if is_seen { left } else { 0.0 });
         }
-        if width == 2 {
-            chunk.mixed = (0..terms.len()).map(|k| dot(2 * k, 2 * k + 1).1).collect();
-        }
-        chunk
     }
 
     /// Returns the `most` terms that alone reduce the residual most, in chunks.
@@ -191,8 +218,7 @@ impl Terms {
         if gains.len() <= most {
             return chunks;
         }
-        gains.sort_by(|a, b| b.total_cmp(a));
-        let least = gains[most];
+        let (_, &mut least, _) = gains.select_nth_unstable_by(most, |a, b| b.total_cmp(a));
         chunks.into_iter().map(|chunk| chunk.above(least)).collect()
     }
 
@@ -200,8 +226,15 @@ impl Terms {
     fn best_terms(chunks: &[Chunk], most: usize) -> Vec<Product> {
         let mut all: Vec<(f64, &Product)> =
             chunks.iter().flat_map(|chunk| chunk.lone_gains().zip(&chunk.terms)).collect();
-        all.sort_by(|a, b| b.0.total_cmp(&a.0).then_with(|| a.1.cmp(b.1)));
-        all.into_iter().take(most).map(|(_, term)| term.clone()).collect()
+        let order = |a: &(f64, &Product), b: &(f64, &Product)| {
+            b.0.total_cmp(&a.0).then_with(|| a.1.cmp(b.1))
+        };
+        if all.len() > most {
+            all.select_nth_unstable_by(most, order);
+            all.truncate(most);
+        }
+        all.sort_unstable_by(order);
+        all.into_iter().map(|(_, term)| term.clone()).collect()
     }
 }
 
@@ -246,6 +279,9 @@ impl Chunk {
     fn above(self, least: f64) -> Self {
         let gains: Vec<f64> = self.lone_gains().collect();
         let kept: Vec<usize> = (0..gains.len()).filter(|&k| gains[k] > least).collect();
+        if kept.len() == gains.len() {
+            return self;
+        }
         let columns: Vec<usize> =
             kept.iter().flat_map(|k| (0..self.width).map(move |j| k * self.width + j)).collect();
         Self {
@@ -262,6 +298,12 @@ impl Chunk {
             along: columns.iter().map(|&k| self.along[k]).collect(),
         }
     }
+}
+
+/// Returns a column of a matrix.
+fn column(matrix: &DMatrix<f64>, k: usize) -> &[f64] {
+    let rows = matrix.nrows();
+    &matrix.as_slice()[k * rows..(k + 1) * rows]
 }
 
 /// Returns the products of the factors' columns: one column for each choice of one column from
