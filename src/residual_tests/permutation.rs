@@ -22,6 +22,10 @@ const MAX_MULTIPLICATIONS: u64 = 1 << 32;
 const MAX_BATCH_DRAWS: usize = 96;
 const MIN_BATCH_DRAWS: usize = 16;
 const MAX_BATCH_NUMBERS: usize = 1 << 21;
+/// Number of draws whose statistics are computed side by side, in vector registers.
+const DRAWS_SIDE_BY_SIDE: usize = 8;
+/// Largest number of rows of a draw at which draws are copied side by side: a bound of memory.
+const MAX_ROWS_SIDE_BY_SIDE: usize = 1 << 18;
 
 /// Returns the null distribution of each statistic; `None` if the statistic is constant.
 ///
@@ -111,12 +115,27 @@ fn values(
     statistics: &[&Statistic],
     residuals: &mut DMatrix<f64>,
 ) -> Vec<Vec<f64>> {
-    let of_draw = |residual: &mut [f64]| {
-        let (poses, _) = residual.as_chunks_mut();
-        leverage.studentise_in_place(poses);
-        let sample = Sample::of(poses);
-        statistics.iter().map(|statistic| statistic.evaluate(&sample)).collect()
-    };
     let rows = residuals.nrows().max(1);
-    residuals.as_mut_slice().par_chunks_mut(rows).map(of_draw).collect()
+    let of_draws = |residuals: &mut [f64]| -> Vec<Vec<f64>> {
+        let mut draws: Vec<&mut [[f64; 3]]> =
+            residuals.chunks_mut(rows).map(|residual| residual.as_chunks_mut().0).collect();
+        draws.iter_mut().for_each(|poses| leverage.studentise_in_place(poses));
+        let draws: Vec<&[[f64; 3]]> = draws.into_iter().map(|poses| &*poses).collect();
+        match <[&[[f64; 3]]; DRAWS_SIDE_BY_SIDE]>::try_from(draws) {
+            Ok(draws) => evaluated(draws, statistics),
+            Err(draws) => {
+                draws.into_iter().flat_map(|draw| evaluated([draw], statistics)).collect()
+            }
+        }
+    };
+    let count = if rows > MAX_ROWS_SIDE_BY_SIDE { 1 } else { DRAWS_SIDE_BY_SIDE };
+    residuals.as_mut_slice().par_chunks_mut(count * rows).flat_map_iter(of_draws).collect()
+}
+
+/// Returns the statistics of each draw from its studentised residuals.
+fn evaluated<const L: usize>(draws: [&[[f64; 3]]; L], statistics: &[&Statistic]) -> Vec<Vec<f64>> {
+    let sample = Sample::of(draws);
+    let values: Vec<[f64; L]> =
+        statistics.iter().map(|statistic| statistic.evaluate(&sample)).collect();
+    (0..L).map(|l| values.iter().map(|values| values[l]).collect()).collect()
 }

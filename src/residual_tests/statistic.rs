@@ -13,38 +13,42 @@ const MIN_POSES: usize = 5;
 /// [Hyndman and Athanasopoulos 2018, section 5.4].
 const MAX_LAGS: usize = 10;
 const POSES_PER_LAG: usize = 5;
-/// Number of poses that are copied to contiguous memory at a time, so that slow memory reads
-/// overlap.
-const POSES_PER_FETCH: usize = 64;
 /// Range of a covariate, relative to its values, up to which it counts as constant.
 const MAX_CONSTANT_RANGE: f64 = 1e-12;
 
-/// Studentised residuals, with their mean subtracted.
+/// Studentised residuals of L draws side by side, each with its mean subtracted.
 #[derive(Debug)]
-pub(super) struct Sample<'a> {
-    /// Centred residual y of each pose, with Σ y = 0.
-    centred: &'a [[f64; 3]],
-    /// Sum of outer products Σ y yᵀ.
-    squares: Matrix3<f64>,
+pub(super) struct Sample<const L: usize> {
+    /// Centred residual y of each pose, with Σ y = 0: coordinate by coordinate the values of all
+    /// draws.
+    centred: Vec<[[f64; L]; 3]>,
+    /// Sum of outer products Σ y yᵀ of each draw.
+    squares: [Matrix3<f64>; L],
 }
 
-impl<'a> Sample<'a> {
-    /// Centres studentised residuals in place.
-    pub fn of(values: &'a mut [[f64; 3]]) -> Self {
-        let mean = values.iter().copied().map(Vector3::from).sum::<Vector3<f64>>()
-            / values.len().max(1) as f64;
-        let mut squares = Matrix3::zeros();
-        for value in &mut *values {
-            let centred = Vector3::from(*value) - mean;
-            squares += centred * centred.transpose();
-            *value = centred.into();
+impl<const L: usize> Sample<L> {
+    /// Centres the studentised residuals of each draw.
+    pub fn of(draws: [&[[f64; 3]]; L]) -> Self {
+        let poses = draws.first().map_or(0, |values| values.len());
+        let mut centred = vec![[[0.0; L]; 3]; poses];
+        let mut squares = [Matrix3::zeros(); L];
+        for (l, values) in draws.into_iter().enumerate() {
+            let mean = values.iter().copied().map(Vector3::from).sum::<Vector3<f64>>()
+                / values.len().max(1) as f64;
+            for (target, value) in centred.iter_mut().zip(values) {
+                let value = Vector3::from(*value) - mean;
+                squares[l] += value * value.transpose();
+                (0..3).for_each(|k| target[k][l] = value[k]);
+            }
         }
-        Self { centred: values, squares }
+        Self { centred, squares }
     }
+}
 
-    fn at(&self, pose: usize) -> Vector3<f64> {
-        self.centred[pose].into()
-    }
+/// Returns the scalar product of two residuals of each draw.
+#[inline]
+fn dot<const L: usize>(a: &[[f64; L]; 3], b: &[[f64; L]; 3]) -> [f64; L] {
+    std::array::from_fn(|l| a[0][l] * b[0][l] + a[1][l] * b[1][l] + a[2][l] * b[2][l])
 }
 
 /// Statistic that grows with one kind of structure in the residuals. It does not depend on their
@@ -60,8 +64,8 @@ pub(super) enum Statistic {
 }
 
 impl Statistic {
-    /// Returns the value of the statistic.
-    pub fn evaluate(&self, sample: &Sample) -> f64 {
+    /// Returns the value of the statistic for each draw.
+    pub fn evaluate<const L: usize>(&self, sample: &Sample<L>) -> [f64; L] {
         match self {
             Self::Runs(order) => order.kept_signs(sample),
             Self::LjungBox(order) => order.ljung_box(sample),
@@ -117,24 +121,25 @@ impl Order {
     }
 
     /// Returns the pairs of poses that are `lag` steps apart, earlier and later, of all sessions.
-    fn pairs<'a>(
-        &'a self,
-        sample: &'a Sample,
-        lag: usize,
-    ) -> impl Iterator<Item = (Vector3<f64>, Vector3<f64>)> {
-        let within = move |session: &'a Vec<usize>| session.iter().zip(session.iter().skip(lag));
-        self.sessions.iter().flat_map(within).map(|(&a, &b)| (sample.at(a), sample.at(b)))
+    fn pairs(&self, lag: usize) -> impl Iterator<Item = (usize, usize)> {
+        self.sessions
+            .iter()
+            .flat_map(move |session| session.iter().copied().zip(session.iter().skip(lag).copied()))
     }
 
     /// Returns the share of steps at which a coordinate keeps its sign. Many kept signs mean few
     /// runs [Wald and Wolfowitz 1940].
-    pub fn kept_signs(&self, sample: &Sample) -> f64 {
-        let (mut steps, mut kept) = (0_u32, 0_u32);
-        for (a, b) in self.pairs(sample, 1) {
+    pub fn kept_signs<const L: usize>(&self, sample: &Sample<L>) -> [f64; L] {
+        let (mut steps, mut kept) = (0_u32, [0_u32; L]);
+        for (a, b) in self.pairs(1) {
             steps += 3;
-            kept += (0..3).map(|k| u32::from((a[k] > 0.0) == (b[k] > 0.0))).sum::<u32>();
+            for (x, y) in sample.centred[a].iter().zip(&sample.centred[b]) {
+                for l in 0..L {
+                    kept[l] += u32::from((x[l] > 0.0) == (y[l] > 0.0));
+                }
+            }
         }
-        f64::from(kept) / f64::from(steps.max(1))
+        kept.map(|kept| f64::from(kept) / f64::from(steps.max(1)))
     }
 
     /// Returns Ljung and Box's Q = 3 n (n + 2) Σₖ ρₖ² / nₖ,  ρₖ = Σ yₜ·yₜ₊ₖ / Σ |yₜ|²
@@ -143,22 +148,25 @@ impl Order {
     /// The sum is over lags k with nₖ pairs among n poses, all sessions together. The scalar
     /// products add the autocovariances of the three coordinates, hence the factor 3. Q is
     /// approximately χ² with as many degrees of freedom as lags.
-    pub fn ljung_box(&self, sample: &Sample) -> f64 {
+    pub fn ljung_box<const L: usize>(&self, sample: &Sample<L>) -> [f64; L] {
         let n = sample.centred.len() as f64;
-        let variance = sample.squares.trace();
-        let of_lag = |lag: usize| {
-            let (mut pairs, mut sum) = (0.0, 0.0);
-            for (a, b) in self.pairs(sample, lag) {
+        let mut totals = [0.0; L];
+        for lag in 1..=self.lags {
+            let (mut pairs, mut sums) = (0.0, [0.0; L]);
+            for (a, b) in self.pairs(lag) {
                 pairs += 1.0;
-                sum += a.dot(&b);
+                let products = dot(&sample.centred[a], &sample.centred[b]);
+                (0..L).for_each(|l| sums[l] += products[l]);
             }
-            (sum / variance).powi(2) / f64::max(pairs, 1.0)
-        };
-        if variance > 0.0 {
-            3.0 * n * (n + 2.0) * (1..=self.lags).map(of_lag).sum::<f64>()
-        } else {
-            0.0
+            for l in 0..L {
+                let variance = sample.squares[l].trace();
+                totals[l] += (sums[l] / variance).powi(2) / f64::max(pairs, 1.0);
+            }
         }
+        std::array::from_fn(|l| {
+            let is_varying = sample.squares[l].trace() > 0.0;
+            if is_varying { 3.0 * n * (n + 2.0) * totals[l] } else { 0.0 }
+        })
     }
 }
 
@@ -211,22 +219,20 @@ impl Cumulative {
         Ok(Self { order, weights })
     }
 
-    /// Returns the squared distance correlation ρ² of a sample.
-    pub fn correlation(&self, sample: &Sample) -> f64 {
-        let mut sum = Vector3::zeros();
-        let mut total = 0.0;
-        let mut near = [Vector3::zeros(); POSES_PER_FETCH];
-        for (numbers, weights) in
-            self.order.chunks(POSES_PER_FETCH).zip(self.weights.chunks(POSES_PER_FETCH))
-        {
-            near.iter_mut().zip(numbers).for_each(|(near, &number)| *near = sample.at(number));
-            for (centred, weight) in near.iter().zip(weights) {
-                sum += centred;
-                total += weight * sum.norm_squared();
+    /// Returns the squared distance correlation ρ² of each draw.
+    pub fn correlation<const L: usize>(&self, sample: &Sample<L>) -> [f64; L] {
+        let (mut sum, mut totals) = ([[0.0; L]; 3], [0.0; L]);
+        for (&pose, weight) in self.order.iter().zip(&self.weights) {
+            for (sum, values) in sum.iter_mut().zip(&sample.centred[pose]) {
+                (0..L).for_each(|l| sum[l] += values[l]);
             }
+            let squares = dot(&sum, &sum);
+            (0..L).for_each(|l| totals[l] += weight * squares[l]);
         }
-        let norm = sample.squares.norm();
-        if norm > 0.0 { total / norm } else { 0.0 }
+        std::array::from_fn(|l| {
+            let norm = sample.squares[l].norm();
+            if norm > 0.0 { totals[l] / norm } else { 0.0 }
+        })
     }
 }
 
@@ -254,16 +260,17 @@ mod tests {
     #[test]
     fn both_forms_agree() {
         let x = [0.3, -1.2, 2.5, 0.3, 0.9, -0.4];
-        let mut y: Vec<[f64; 3]> =
+        let y: Vec<[f64; 3]> =
             (0..6).map(f64::from).map(|k| [(3.0 * k).sin(), k * k, 1.0 / (k + 1.0)]).collect();
-        let sample = Sample::of(&mut y);
+        let sample = Sample::of([&y]);
+        let at = |pose: usize| Vector3::from(sample.centred[pose].map(|[value]| value));
         let distance = |i: usize, j: usize| -> f64 { f64::abs(x[i] - x[j]) };
         let mean = |i: usize| (0..6).map(|j| distance(i, j)).sum::<f64>() / 6.0;
         let all = (0..6).map(mean).sum::<f64>() / 6.0;
         let (mut sum, mut norm, mut gram) = (0.0, 0.0, 0.0);
         for i in 0..6 {
             for j in 0..6 {
-                let product = sample.at(i).dot(&sample.at(j));
+                let product = at(i).dot(&at(j));
                 sum -= distance(i, j) * product;
                 norm += (distance(i, j) - mean(i) - mean(j) + all).powi(2);
                 gram += product * product;
@@ -271,7 +278,7 @@ mod tests {
         }
         let cumulative = Cumulative::new(&x, 6, &[0, 1, 2, 3, 4, 5]).unwrap();
         let expected = sum / (norm * gram).sqrt();
-        assert!((cumulative.correlation(&sample) - expected).abs() < 1e-12);
+        assert!((cumulative.correlation(&sample)[0] - expected).abs() < 1e-12);
         assert!(expected > 0.1 && expected < 1.0);
     }
 }

@@ -53,14 +53,15 @@ fn permuted(fit: &FitResidual, kept: &Kept, seed: u64) -> Vec<Tried> {
     let studentised = kept.leverage.studentise(kept.residual.as_slice());
     let mut chances =
         permutation::chances(&kept.leverage, &studentised, &working, seed).into_iter();
-    let mut coordinates: Vec<[f64; 3]> = studentised.into_iter().map(Into::into).collect();
-    let sample = Sample::of(&mut coordinates);
+    let coordinates: Vec<[f64; 3]> = studentised.into_iter().map(Into::into).collect();
+    let sample = Sample::of([&coordinates]);
     let tried = statistics.iter().map(|(test, statistic)| {
         let trial = statistic.as_ref().map_err(Clone::clone).and_then(|statistic| {
             let chance = chances.next().flatten().ok_or(Untestable::NoFreedom)?;
             let shown =
                 if matches!(test, Test::Dependence { .. }) { f64::sqrt } else { |value| value };
-            Ok(Trial { statistic: statistic.evaluate(&sample), chance, shown })
+            let [statistic] = statistic.evaluate(&sample);
+            Ok(Trial { statistic, chance, shown })
         });
         Tried { test: test.clone(), trial }
     });

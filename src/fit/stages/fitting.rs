@@ -12,7 +12,7 @@ use crate::fit::stages::gauge::Gauge;
 use crate::fit::stages::noise_model::NoiseModel;
 use crate::fit::stages::placement::HeldOutOnly;
 use crate::fit::stages::registration::register;
-use crate::fit::stages::stage::{Stage, StageEnd, StageError};
+use crate::fit::stages::stage::{COST_TOLERANCE, Stage, StageEnd, StageError};
 use crate::fit::{
     ErrorSummary, Errors, OrientationErrors, Placement, ProgressSink, SolverChoice, Stop, Strategy,
 };
@@ -272,10 +272,17 @@ impl<'a> Fitting<'a> {
     /// Returns the full parameter vector of the registered nominal arm, with free bases and targets
     /// fitted.
     pub fn registered(&self) -> Result<DVector<f64>, StageError> {
+        self.registered_to(COST_TOLERANCE)
+    }
+
+    /// Registers the nominal arm as [`Self::registered`] does, until a step reduces the cost by less
+    /// than `cost_tolerance`, relative to the cost.
+    pub fn registered_to(&self, cost_tolerance: f64) -> Result<DVector<f64>, StageError> {
         let mut x = self.located();
         let placements = self.placements();
         if !placements.is_empty() {
-            x = self.placing(&self.split.identification, placements).run(&x)?.x;
+            let stage = self.placing(&self.split.identification, placements);
+            x = Stage { cost_tolerance, ..stage }.run(&x)?.x;
         }
         match self.held_out_stage() {
             Some(stage) => Ok(stage.run(&x)?.x),

@@ -35,6 +35,9 @@ const MAX_REVERSED: usize = 7;
 const MAX_FITTED_MISREADINGS: usize = 12;
 /// Maximum number of solver steps of a full fit with a misreading.
 const MAX_STEPS: u64 = 60;
+/// Relative reduction of the cost per step at which a registration without a full fit ends. Its
+/// error is then known far better than [`MAX_RATIO_TO_BEST`] asks.
+const TRIAL_TOLERANCE: f64 = 1e-4;
 /// Largest share of the rows that a robust loss may exclude; the error is then that of the other
 /// rows.
 const MAX_SET_ASIDE_SHARE: f64 = 0.3;
@@ -189,7 +192,9 @@ impl Trial<'_> {
             linear_model: None,
             ..self.fitting.with_declared_noise()
         };
-        let registered = fitting.registered().ok()?;
+        let registered =
+            if is_fitted { fitting.registered() } else { fitting.registered_to(TRIAL_TOLERANCE) };
+        let registered = registered.ok()?;
         let x = if is_fitted { fitting.run(&registered).ok()?.x } else { registered };
         let error = if is_fitted {
             self.penalised(&fitting, &split.identification, &x)
