@@ -12,7 +12,7 @@ use super::{Candidates, Criterion, DesignError, Exchange, Extremes, Sensitivity,
 use crate::fit::{self, Identification, IdentifyError, Options};
 use crate::measurement::{Dataset, Measurements};
 use crate::problem::{Effect, Problem};
-use crate::remainder::{self, SavedRemainderError};
+use crate::remainder::{self, Correction, SavedRemainderError};
 
 /// Number of candidates drawn from ranges: uniformly, and with emphasis on the limits.
 const DRAWN_CANDIDATES: [usize; 2] = [500, 1500];
@@ -175,7 +175,7 @@ pub fn next(
     candidates: &Candidates,
     options: &NextOptions,
 ) -> Result<NextPoses, NextError> {
-    let (seed, poses) = (options.seed, options.poses);
+    let NextOptions { seed, poses, .. } = *options;
     if poses == 0 {
         return Err(DesignError::NoPoses.into());
     }
@@ -194,27 +194,7 @@ pub fn next(
     let measured = data.measurements.select(&rows);
     let mut site = Site::new(&designed, &[&measured])?;
     site.at(&found);
-    let inside = |table: Measurements| match options.workspace {
-        Some(workspace) => table.select(&site.inside(&table, workspace)),
-        None => table,
-    };
-    let (pool, reference) = match candidates {
-        Candidates::Rows(rows) => {
-            let rows = inside(rows.as_ref().clone().arm_rows());
-            let step = rows.len().div_ceil(WORKSPACE_POSES).max(1);
-            let some: Vec<usize> = (0..rows.len()).step_by(step).collect();
-            (rows.select(&unmeasured(&rows, &measured)), rows.select(&some))
-        }
-        Candidates::Within(ranges) => {
-            let drawn = |count: usize, extremes, stream| {
-                inside(ranges.draw(&designed, count, extremes, seed, STREAMS[stream]))
-            };
-            let [uniform, often] = DRAWN_CANDIDATES.map(|count| count.max(poses));
-            let pool = drawn(uniform, Extremes::No, 0);
-            let pool = pool.concatenate(&drawn(often, Extremes::Often, 1));
-            (pool, drawn(WORKSPACE_POSES, Extremes::No, 2))
-        }
-    };
+    let (pool, reference) = pool_and_workspace(&designed, candidates, &site, &measured, options);
     let (pool, sensitivity) = site.in_equilibrium(&pool);
     if pool.is_empty() || reference.is_empty() {
         return Err(DesignError::NoEquilibrium.into());
@@ -233,14 +213,7 @@ pub fn next(
         Some(1.0),
     ));
     let cause = explanations.map(|of| cause_goal(&site, &of.parameters(&designed), &prediction));
-    let fitted_alone = remainder::declared(problem)?;
-    let correction = match fitted_alone {
-        Some(declared) => Some(declared),
-        None if options.remainder => {
-            remainder::fit(&found, problem, data)?.map(|fitted| fitted.correction().clone())
-        }
-        None => remainder::uncertainty(&found, problem, data)?.map(|fitted| fitted.alone),
-    };
+    let correction = correction(problem, data, &found, options)?;
     let mut plain_site = Site::new(&plain, &[&measured])?;
     plain_site.at(&found);
     let error = correction.as_ref().and_then(|correction| {
@@ -270,19 +243,7 @@ pub fn next(
         view(&greedy.covariance).dot(&view(&scaled)).max(0.0)
     };
     let before = left(&greedy);
-    let attainable = error.map(|error| error.least);
-    let stop = match (error, attainable) {
-        (Some(error), _) if options.tolerance.is_some_and(|most| error.bound <= most) => {
-            Some(StopReason::Enough)
-        }
-        (Some(error), Some(attainable))
-            if options.purpose == Purpose::Accuracy
-                && error.expected - attainable < error.expected_sigma =>
-        {
-            Some(StopReason::GainBelowNoise)
-        }
-        _ => None,
-    };
+    let stop = error.and_then(|error| stop_reason(&error, options));
     let mut result = NextPoses {
         poses: pool.select(&[]),
         steps: Vec::new(),
@@ -292,7 +253,7 @@ pub fn next(
         misfit: size.misfit,
         noise: size.noise,
         error,
-        attainable,
+        attainable: error.map(|error| error.least),
         stop,
         effects: explanations.map_or_else(Vec::new, |of| of.open().cloned().collect()),
         found,
@@ -329,6 +290,66 @@ pub fn next(
     }
     result.poses = pool.select(&chosen);
     Ok(result)
+}
+
+/// Returns the candidates that are not measured yet, and the poses of the workspace.
+fn pool_and_workspace(
+    problem: &Problem,
+    candidates: &Candidates,
+    site: &Site,
+    measured: &Measurements,
+    options: &NextOptions,
+) -> (Measurements, Measurements) {
+    let inside = |table: Measurements| match options.workspace {
+        Some(workspace) => table.select(&site.inside(&table, workspace)),
+        None => table,
+    };
+    match candidates {
+        Candidates::Rows(rows) => {
+            let rows = inside(rows.as_ref().clone().arm_rows());
+            let step = rows.len().div_ceil(WORKSPACE_POSES).max(1);
+            let some: Vec<usize> = (0..rows.len()).step_by(step).collect();
+            (rows.select(&unmeasured(&rows, measured)), rows.select(&some))
+        }
+        Candidates::Within(ranges) => {
+            let drawn = |count: usize, extremes, stream| {
+                inside(ranges.draw(problem, count, extremes, options.seed, STREAMS[stream]))
+            };
+            let [uniform, often] = DRAWN_CANDIDATES.map(|count| count.max(options.poses));
+            let pool = drawn(uniform, Extremes::No, 0);
+            let pool = pool.concatenate(&drawn(often, Extremes::Often, 1));
+            (pool, drawn(WORKSPACE_POSES, Extremes::No, 2))
+        }
+    }
+}
+
+/// Returns the uncertainty of predictions by the fit `found`: with the declared remainder, with one
+/// that is fitted now, or without any. `None` if the data are too few to estimate it.
+fn correction(
+    problem: &Problem,
+    data: &Dataset,
+    found: &Identification,
+    options: &NextOptions,
+) -> Result<Option<Correction>, NextError> {
+    if let Some(declared) = remainder::declared(problem)? {
+        return Ok(Some(declared));
+    }
+    Ok(if options.remainder {
+        remainder::fit(found, problem, data)?.map(|fitted| fitted.correction().clone())
+    } else {
+        remainder::uncertainty(found, problem, data)?.map(|fitted| fitted.alone)
+    })
+}
+
+/// Returns the reason to measure no further poses: the bound is within the tolerance, or all that
+/// they can gain is less than the uncertainty of the error.
+fn stop_reason(error: &WorkspaceError, options: &NextOptions) -> Option<StopReason> {
+    if options.tolerance.is_some_and(|most| error.bound <= most) {
+        return Some(StopReason::Enough);
+    }
+    let is_below_noise =
+        options.purpose == Purpose::Accuracy && error.expected - error.least < error.expected_sigma;
+    is_below_noise.then_some(StopReason::GainBelowNoise)
 }
 
 /// Returns M with tr(C M) = mean over the poses of tr(J C Jᵀ).

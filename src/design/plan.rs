@@ -182,14 +182,7 @@ pub fn plan(
     let exchange = match &goal {
         Some(goal) => {
             let given = given_table.as_ref().zip(given.as_ref());
-            let given = given.map(|(table, given)| goal.misfit.extend(&site, table, given, None));
-            Exchange::of(
-                &Unknowns::of(parameters).and_standard(goal.misfit.weights()),
-                &goal.misfit.extend(&site, &table, &sensitivity, None),
-                given.as_ref(),
-                poses,
-                (criterion, Some(&goal.mean_square)),
-            )
+            goal.exchange(&site, (&table, &sensitivity), given, poses)
         }
         None => Exchange::new(parameters, &sensitivity, given.as_ref(), poses, criterion),
     };
@@ -213,24 +206,18 @@ pub fn plan(
         Candidates::Rows(_) => results.iter().take(1).map(selection).collect(),
     };
     let tried = tried + selections.iter().map(|selection| selection.tried).sum::<usize>();
-    // Among equal values the first selection counts.
-    let best = selections
-        .into_iter()
-        .reduce(|best, next| if next.value < best.value { next } else { best });
     let Selection { poses: chosen, sensitivity: planned, value, .. } =
-        best.ok_or(DesignError::NoEquilibrium)?;
+        Selection::best(selections).ok_or(DesignError::NoEquilibrium)?;
     let forecast = |added: &Sensitivity| match &given {
         Some(given) => Forecast::new(parameters, &given.and(added)),
         None => Forecast::new(parameters, added),
     };
     let of_position = sensitivity.coordinates;
-    let random = (0..RANDOM_SETS)
-        .into_par_iter()
-        .map(|set| {
-            let stream = RANDOM_SET_STREAM + set as u64;
-            forecast(&uniform.select(&choose(uniform.len(), poses, seed, stream)))
-        })
-        .collect();
+    let random_set = |set: usize| {
+        let stream = RANDOM_SET_STREAM + set as u64;
+        forecast(&uniform.select(&choose(uniform.len(), poses, seed, stream)))
+    };
+    let random = (0..RANDOM_SETS).into_par_iter().map(random_set).collect();
     let undetermined_now = |forecast: &Forecast| {
         forecast
             .undetermined
@@ -244,21 +231,19 @@ pub fn plan(
     let all_rows = |table: &Measurements| coordinates(table, of_position, 0..table.len());
     let coordinates = given_table.as_ref().map_or(0, all_rows) + all_rows(&chosen);
     let without_prior = parameters.iter().filter(|parameter| parameter.sigma.is_none()).count();
-    let suffices =
-        undetermined_now(&planned_forecast) <= unavoidable && distinct_coordinates >= without_prior;
-    let given = given_arm_rows.map_or(0, |rows| rows.len());
     Ok(Plan {
         poses: chosen,
-        given,
+        given: given_arm_rows.map_or(0, |rows| rows.len()),
         candidates: tried,
         starts,
         value,
+        suffices: undetermined_now(&planned_forecast) <= unavoidable
+            && distinct_coordinates >= without_prior,
         planned: planned_forecast,
         attainable_rank,
         least_poses,
         coordinates,
         random,
-        suffices,
     })
 }
 
@@ -326,6 +311,25 @@ impl WorkspaceGoal {
         let sensitivity = misfit.extend(site, &workspace, &sensitivity, Some(1.0));
         Self { misfit, mean_square: mean_square(&sensitivity) }
     }
+
+    /// Creates the exchange of `poses` candidates, with the misfit among the unknowns. Candidates and
+    /// given poses come with their sensitivities.
+    fn exchange(
+        &self,
+        site: &Site,
+        (table, sensitivity): (&Measurements, &Sensitivity),
+        given: Option<(&Measurements, &Sensitivity)>,
+        poses: usize,
+    ) -> Option<Exchange> {
+        let given = given.map(|(table, given)| self.misfit.extend(site, table, given, None));
+        Exchange::of(
+            &Unknowns::of(&site.model.parameters).and_standard(self.misfit.weights()),
+            &self.misfit.extend(site, table, sensitivity, None),
+            given.as_ref(),
+            poses,
+            (&Criterion::I, Some(&self.mean_square)),
+        )
+    }
 }
 
 impl PlanOptions<'_> {
@@ -366,6 +370,13 @@ struct Selection {
 }
 
 impl Selection {
+    /// Returns the selection with the smallest value, the first of equal ones.
+    fn best(selections: Vec<Self>) -> Option<Self> {
+        selections
+            .into_iter()
+            .reduce(|best, next| if next.value < best.value { next } else { best })
+    }
+
     /// Refines the poses in rounds of exchanges with candidates ever closer to them.
     fn refined(
         mut self,

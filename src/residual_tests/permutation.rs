@@ -119,7 +119,9 @@ fn values(
     let of_draws = |residuals: &mut [f64]| -> Vec<Vec<f64>> {
         let mut draws: Vec<&mut [[f64; 3]]> =
             residuals.chunks_mut(rows).map(|residual| residual.as_chunks_mut().0).collect();
-        draws.iter_mut().for_each(|poses| leverage.studentise_in_place(poses));
+        for poses in &mut draws {
+            leverage.studentise_in_place(poses);
+        }
         let draws: Vec<&[[f64; 3]]> = draws.into_iter().map(|poses| &*poses).collect();
         match <[&[[f64; 3]]; DRAWS_SIDE_BY_SIDE]>::try_from(draws) {
             Ok(draws) => evaluated(draws, statistics),

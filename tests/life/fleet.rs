@@ -87,7 +87,7 @@ fn an_arm_unlike_its_siblings_is_named() {
 fn the_command_writes_a_prior_that_identify_takes() {
     let folder = Folder::with_lunar_sampler();
     for case in ["a-none", "h-none-large", "c-link-thermal-bending"] {
-        folder.copy(&format!("tests/cases/{case}.csv"), &format!("{case}.csv"));
+        folder.copy(&format!("tests/cases/{case}.csv"), format!("{case}.csv"));
         folder.flexcal(&format!("identify problem.toml --data {case}.csv --out {case}"));
     }
     let two = folder.flexcal("fleet a-none/estimate.json h-none-large/estimate.json").code(2);

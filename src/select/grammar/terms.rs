@@ -176,7 +176,9 @@ impl Terms {
             // To one length: powers of large numbers would leave the range of single precision.
             let norm = sum_of_squares(target).sqrt();
             let scale = if norm > 0.0 { norm } else { 1.0 };
-            target.iter_mut().for_each(|value| *value /= scale);
+            for value in target {
+                *value /= scale;
+            }
         }
         let less = &site.less * &columns;
         let mut weighted = vec![0.0; n];
