@@ -286,6 +286,14 @@ pub fn next(
             return Err(of_argument("purpose", message));
         }
     };
+    if !(0.0 < level && level < 1.0) {
+        let message = "level: a probability between 0 and 1 is needed".to_owned();
+        return Err(of_argument("level", message));
+    }
+    if tolerance_mm.is_some_and(|length| !(length.is_finite() && length > 0.0)) {
+        let message = "tolerance_mm: a positive length is needed".to_owned();
+        return Err(of_argument("tolerance_mm", message));
+    }
     let declared = Arc::clone(&problem.declared);
     let explanations = explanations.map(|file| Explanations::read(&file, &declared));
     let explanations = explanations.transpose().map_err(|error| raised(&error))?;

@@ -153,10 +153,11 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
             files.join(" "),
         )
     })?;
-    if !next.found.is_trusted() && !common.quiet {
+    if !next.found.is_trusted() {
         diagnostic::warn(
             "the fit to the measured poses is not to be trusted: flexcal identify says why",
         );
+        return Ok(Outcome::NotTrusted);
     }
     let is_met = next.error.zip(options.tolerance).is_none_or(|(error, most)| error.bound <= most);
     Ok(if next.stop == Some(StopReason::GainBelowNoise) && !is_met {

@@ -243,7 +243,8 @@ pub fn next(
         view(&greedy.covariance).dot(&view(&scaled)).max(0.0)
     };
     let before = left(&greedy);
-    let stop = error.and_then(|error| stop_reason(&error, options));
+    let is_trusted = found.is_trusted();
+    let stop = error.filter(|_| is_trusted).and_then(|error| stop_reason(&error, options));
     let mut result = NextPoses {
         poses: pool.select(&[]),
         steps: Vec::new(),
@@ -323,18 +324,17 @@ fn pool_and_workspace(
     }
 }
 
-/// Returns the uncertainty of predictions by the fit `found`: with the declared remainder, with one
-/// that is fitted now, or without any. `None` if the data are too few to estimate it.
+/// Returns the uncertainty of predictions by the fit `found`, with a remainder that is fitted to the
+/// rows at hand if the problem declares one or the options ask for it. `None` if the data are too
+/// few to estimate it.
 fn correction(
     problem: &Problem,
     data: &Dataset,
     found: &Identification,
     options: &NextOptions,
 ) -> Result<Option<Correction>, NextError> {
-    if let Some(declared) = remainder::declared(problem)? {
-        return Ok(Some(declared));
-    }
-    Ok(if options.remainder {
+    let is_corrected = options.remainder || remainder::declared(problem)?.is_some();
+    Ok(if is_corrected {
         remainder::fit(found, problem, data)?.map(|fitted| fitted.correction().clone())
     } else {
         remainder::uncertainty(found, problem, data)?.map(|fitted| fitted.alone)
@@ -342,8 +342,12 @@ fn correction(
 }
 
 /// Returns the reason to measure no further poses: the bound is within the tolerance, or all that
-/// they can gain is less than the uncertainty of the error.
+/// they can gain is less than the uncertainty of the error. Poses that tell causes apart have no such
+/// limit.
 fn stop_reason(error: &WorkspaceError, options: &NextOptions) -> Option<StopReason> {
+    if options.purpose == Purpose::Causes {
+        return None;
+    }
     if options.tolerance.is_some_and(|most| error.bound <= most) {
         return Some(StopReason::Enough);
     }

@@ -115,7 +115,7 @@ pub fn identify_model(
         found.influential_rows = influential_rows(&found, without);
         found.findings.extend(found.influential_rows.as_ref().map(influential_finding));
     }
-    if options.influential_rows && !options.provisional {
+    if options.influential_rows && !options.provisional && options.earlier.is_none() {
         let values =
             found.estimates.iter().map(|estimate| (estimate.name.clone(), estimate.estimate));
         let start = values.collect();

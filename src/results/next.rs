@@ -16,6 +16,8 @@ pub struct NextResult {
     #[serde(rename = "for")]
     pub purpose: &'static str,
     pub seed: u64,
+    /// True if no check contradicts the fit to the measured rows. Otherwise no pose is called enough.
+    pub trusted: bool,
     /// Number of rows that are measured and fitted.
     pub measured: usize,
     pub candidates: usize,
@@ -90,6 +92,7 @@ impl NextResult {
                 Purpose::Both => "both",
             },
             seed: options.seed,
+            trusted: next.found.is_trusted(),
             measured: next.measured,
             candidates: next.candidates,
             workspace_poses: next.workspace_poses,

@@ -5,7 +5,6 @@ use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use nalgebra::{DMatrix, Matrix3, Vector3};
-use statrs::distribution::{ContinuousCDF as _, StudentsT};
 
 use super::data::Data;
 use super::neighbourhood::{Derivatives, LinearNeighbourhood, Linearised, Unknowns};
@@ -286,35 +285,6 @@ impl Fitted {
         }
         let new = Arc::new(self.neighbourhood(&self.linearised(data, &[])));
         Arc::clone(self.around.get_or_init(|| new))
-    }
-
-    /// Returns true if this fit predicts left-out blocks of poses significantly better than another
-    /// fit of the same rows: one-sided t test over the blocks at 2.5 %.
-    pub fn predicts_better_than(&self, other: &Self, data: &Data) -> bool {
-        let Some(gains) = self.left_out_gains(other, data) else { return false };
-        let count = gains.len() as f64;
-        let mean = gains.iter().sum::<f64>() / count;
-        let variance = gains.iter().map(|gain| (gain - mean).powi(2)).sum::<f64>() / (count - 1.0);
-        let quantile = StudentsT::new(0.0, 1.0, (count - 1.0).max(1.0));
-        quantile.is_ok_and(|t| mean > t.inverse_cdf(0.975) * (variance / count).sqrt())
-    }
-
-    /// Returns true if this fit predicts left-out blocks of poses better than another fit of the same
-    /// rows: the sum of squared errors over all blocks is smaller.
-    pub fn predicts_better_in_mean_than(&self, other: &Self, data: &Data) -> bool {
-        self.left_out_gains(other, data).is_some_and(|gains| gains.iter().sum::<f64>() > 0.0)
-    }
-
-    /// Returns, for each block of poses, by how much its sum of squared errors is smaller than by
-    /// another fit \[m²\], each fit without the block.
-    fn left_out_gains(&self, other: &Self, data: &Data) -> Option<Vec<f64>> {
-        let squares = |fitted: &Self| {
-            let fit = fitted.with_all_rows().around(data);
-            let blocks = fit.left_out_squares(&data.block)?;
-            Some(blocks.into_iter().map(|sum| sum * fitted.sigma.powi(2)).collect::<Vec<f64>>())
-        };
-        let (before, after) = squares(other).zip(squares(self))?;
-        Some(before.iter().zip(&after).map(|(before, after)| before - after).collect())
     }
 
     /// Returns this fit with no row treated as an outlier.

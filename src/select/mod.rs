@@ -16,6 +16,7 @@ mod evidence;
 mod fitted;
 mod grammar;
 mod harmonic_prior;
+mod left_out_gain;
 mod neighbourhood;
 mod power;
 

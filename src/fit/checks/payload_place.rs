@@ -32,6 +32,7 @@ pub(in crate::fit) fn payload_finding(
     if problem.tool.payload_is_declared
         || !(is_carried && problem.is_elastic() && problem.targets.is_empty())
         || problem.robust.is_some()
+        || problem.data.fits_orientation
         || !found.unknowns.iter().any(is_of_target)
     {
         return None;

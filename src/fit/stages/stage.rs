@@ -221,7 +221,7 @@ impl<'a> Stage<'a> {
     }
 
     /// Returns the triangular factor of `triangle` stacked on the rows of earlier data.
-    fn with_earlier(&self, triangle: DMatrix<f64>, at: &DVector<f64>) -> DMatrix<f64> {
+    pub fn with_earlier(&self, triangle: DMatrix<f64>, at: &DVector<f64>) -> DMatrix<f64> {
         match self.earlier {
             Some(_) => below(&triangle, &self.earlier_rows(at).matrix),
             None => triangle,

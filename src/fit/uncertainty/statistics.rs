@@ -177,7 +177,7 @@ impl Statistics {
 const MIN_SHARE_KEPT: f64 = 0.1;
 
 /// Returns the covariance of a fit of absolute lengths, A⁻¹ B A⁻¹ with A = a JᵀJ + Λ and B = b JᵀJ
-/// + Λ [Huber & Ronchetti 2009, sec. 7.6].
+/// + Λ [Huber & Ronchetti 2009, sec. 7.6]. Λ holds the precision of priors and earlier data.
 ///
 /// Such a fit meets some rows exactly, whose weights say nothing about the uncertainty. The mean
 /// curvature a and the mean square b of the slope are therefore those of normal residuals with 1 σ
@@ -199,6 +199,7 @@ fn sandwich(
         }
     }
     let triangle = stage.linearised(at, Loss::Squares).triangle * curvature.sqrt();
+    let triangle = stage.with_earlier(triangle, at);
     let priors: Vec<Option<f64>> = stage.parameters().map(|parameter| parameter.sigma).collect();
     let mut uncertainty = Uncertainty::of(&triangle, &priors, closed, held, 1.0);
     let inverse = &uncertainty.covariance;
@@ -206,6 +207,10 @@ fn sandwich(
     let mut weighted = inverse.clone();
     for (mut row, sigma) in weighted.row_iter_mut().zip(&priors) {
         row *= sigma.map_or(0.0, |sigma| sigma.powi(-2));
+    }
+    if stage.earlier.is_some() {
+        let earlier = stage.earlier_rows(at).matrix;
+        weighted += earlier.tr_mul(&(&earlier * inverse));
     }
     let from_priors = inverse * weighted;
     uncertainty.covariance = inverse * ratio + from_priors * (1.0 - ratio);

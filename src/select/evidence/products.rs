@@ -489,9 +489,7 @@ mod tests {
         let target = Target { fit: fit.clone(), noise, alike: 1.5, stop: Stop::default() };
         let products = Products::new(&blocks, &target);
         let of = |block: usize, others: &[usize]| products.ln_prior(&blocks[block], others);
-        let is = |value: f64, expected: f64| {
-            assert!((value - expected).abs() < 1e-12, "{value} {expected}");
-        };
+        let is = |value: f64, expected: f64| assert!((value - expected).abs() < 1e-12, "{value}");
         is(of(1, &[]), -3.0);
         is(of(1, &[2, 3]), -3.0);
         is(of(1, &[2, 0]), -1.5);

@@ -174,11 +174,14 @@ impl<'a> Linearised<'a> {
         }
         let unmoved = unmoved(&poses, &derivatives.fitted);
         if unmoved.count() > 0 {
-            let residual = Arc::make_mut(&mut derivatives.residual);
-            for pose in 0..poses.len() {
-                let mut here = residual.fixed_rows_mut::<3>(3 * pose);
-                let moved = unmoved.moved_part(here.clone_owned());
-                here.copy_from(&moved);
+            // Neither counts there: a constant residual contradicts no effect.
+            for column in derivatives.others.iter_mut().chain([&mut derivatives.residual]) {
+                let column = Arc::make_mut(column);
+                for pose in 0..poses.len() {
+                    let mut here = column.fixed_rows_mut::<3>(3 * pose);
+                    let moved = unmoved.moved_part(here.clone_owned());
+                    here.copy_from(&moved);
+                }
             }
         }
         Self { problem, poses, derivatives: Arc::new(derivatives), unmoved: unmoved.count() }

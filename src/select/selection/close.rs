@@ -20,6 +20,7 @@ use crate::select::data::Data;
 use crate::select::evidence::{Evidence, evaluate};
 use crate::select::fitted::Fitted;
 use crate::select::harmonic_prior::{HarmonicPrior, is_gear};
+use crate::select::left_out_gain::LeftOutGain;
 use crate::select::rules::SelectionRules;
 use crate::select::screening::{Trace, check_fit, trace_fit};
 use crate::select::unexplained::{self, Unexplained};
@@ -121,7 +122,8 @@ pub fn close_by(
     let is_sure = |found: &Found| found.status == Status::Found;
     if !conclusion.effects.is_empty()
         && !conclusion.effects.iter().any(is_sure)
-        && !conclusion.fitted.predicts_better_in_mean_than(&declared, &data)
+        && !LeftOutGain::new(&conclusion.fitted, &declared, &data)
+            .is_some_and(|gain| gain.is_positive())
     {
         conclusion = concluded(&state, &declared, (declared.clone(), None), interrupted);
     }
@@ -224,7 +226,10 @@ fn kept(
     options: &Options,
 ) -> Result<(Fitted, Option<Evidence>), IdentifyError> {
     let is_extended = fitted.problem.effects.len() > declared.problem.effects.len();
-    if is_extended && declared.predicts_better_than(&fitted, data) {
+    let is_better = |new: &Fitted, old: &Fitted| {
+        LeftOutGain::new(new, old, data).is_some_and(|gain| gain.is_significant())
+    };
+    if is_extended && is_better(declared, &fitted) {
         return Ok((declared.clone(), None));
     }
     if fitted.found.describes_arm() {
@@ -234,12 +239,11 @@ fn kept(
     if anew.found.describes_arm() {
         return Ok((anew, None));
     }
-    let is_better = |other: &Fitted| {
-        other.found.termination.converged() && other.predicts_better_than(declared, data)
-    };
-    if is_better(&fitted) {
+    let is_kept =
+        |other: &Fitted| other.found.termination.converged() && is_better(other, declared);
+    if is_kept(&fitted) {
         Ok((fitted, evidence))
-    } else if is_better(&anew) {
+    } else if is_kept(&anew) {
         Ok((anew, None))
     } else {
         Ok((declared.clone(), None))
