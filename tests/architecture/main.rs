@@ -92,8 +92,9 @@ const STOREYS: &[(&str, &[&[&str]])] = &[
             "random",
         ]],
     ),
-    // Choice of poses, and forecasts of their measurement, with the uncertainty of predictions.
-    ("design", &[GROUND, BELOW_FIT, &["fit", "remainder", "select"]]),
+    // Choice of poses, and forecasts of their measurement, with the uncertainty of predictions and
+    // the explanations that a loop left open, which it reads.
+    ("design", &[GROUND, BELOW_FIT, &["fit", "remainder", "select", "files"]]),
     // Identified models as code, with the corrections of their remainders, and rigid tables.
     ("export", &[GROUND, BELOW_FIT, &["fit", "remainder", "urdf", "design"]]),
     // Monte Carlo studies with data from the model or the rig.
