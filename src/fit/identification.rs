@@ -36,7 +36,7 @@ use crate::least_squares::solver::Termination;
 use crate::least_squares::{LinearisationCache, Loss};
 use crate::measurement::{Dataset, Measurements, Split};
 use crate::model::Model;
-use crate::model::parameter::Parameter;
+use crate::model::parameter::{Parameter, ParameterSite};
 use crate::problem::{HeldOut, ParameterRule, Problem, Robust, RobustLoss, pattern};
 
 /// Identifies the free parameters of `problem` from the identification rows of `data`. Held-out
@@ -312,6 +312,7 @@ fn fit_rows(
         influential_rows: None,
         x: end.x,
         registered_x: start,
+        registered_parts: registered_parts(model),
         prior: None,
         fitted_rows: if asked {
             split.identification.iter().map(|&row| measurements.row_digest(row)).collect()
@@ -322,6 +323,20 @@ fn fit_rows(
         sigma: fitting.sigma,
         seconds: clock.elapsed().as_secs_f64(),
     })
+}
+
+/// Returns the parts that registration fits, because some of their parameters are free.
+fn registered_parts(model: &Model) -> Vec<&'static str> {
+    let placed = || model.parameters.iter().map(|parameter| parameter.site);
+    let has = |is_part: fn(ParameterSite) -> bool| {
+        placed().any(|site| site.is_placement() && is_part(site))
+    };
+    let parts = [
+        ("base", has(|site| matches!(site, ParameterSite::Base { .. }))),
+        ("tool", has(|site| matches!(site, ParameterSite::Target { .. }))),
+        ("fixtures", has(|site| matches!(site, ParameterSite::Fixture { .. }))),
+    ];
+    parts.into_iter().filter(|(_, is_free)| *is_free).map(|(part, _)| part).collect()
 }
 
 /// Returns the full parameter vector of the registered nominal arm and its errors. Also sets the σ

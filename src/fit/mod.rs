@@ -67,6 +67,7 @@ pub use uncertainty::active_constraint::ActiveConstraint;
 pub use uncertainty::covariance::{Correlations, Covariance};
 pub use uncertainty::noise::Noise;
 pub use uncertainty::prior_sizes::PriorSize;
+pub(crate) use uncertainty::residual_lengths::TypicalScatter;
 pub use uncertainty::shadow_price::ShadowPrice;
 // Public for the tests, the benches and the Python module only.
 #[doc(hidden)]

@@ -160,6 +160,9 @@ pub struct Identification {
     pub x: DVector<f64>,
     /// Full parameter vector of the registered nominal arm, whose errors are `registered`.
     pub registered_x: DVector<f64>,
+    /// Parts that were fitted in the registered nominal arm: "base", "tool", "fixtures"; those that
+    /// are not free are left out.
+    pub(crate) registered_parts: Vec<&'static str>,
     /// Comparison with the earlier estimate that was the prior; `None` without one.
     pub(crate) prior: Option<PriorComparison>,
     /// Digests of the identification rows; empty for a provisional fit.

@@ -64,7 +64,7 @@ pub struct TermEntry {
     pub formula: &'static str,
     /// Rule for 1 σ of the parameter's prior, a size that realistic effects hardly exceed.
     pub prior: Prior,
-    /// Value at which the effect vanishes, as a prior size; `None` for 0.
+    /// Rule for the nominal value of the parameter, at which the effect vanishes; `None` for 0.
     pub nominal: Option<Prior>,
     /// True if a negative value is physically impossible. The effect is rejected as a cause if its
     /// fit needs one.
@@ -90,7 +90,7 @@ impl TermEntry {
         Self { prior, ..self }
     }
 
-    /// Replaces the value at which the effect vanishes.
+    /// Sets the rule for the nominal value of the parameter, at which the effect vanishes.
     #[must_use]
     pub const fn nominal(self, nominal: Prior) -> Self {
         Self { nominal: Some(nominal), ..self }
@@ -226,7 +226,8 @@ pub enum Search {
     TimeConstants,
     /// Time constants that are fractions of the measured duration.
     SettlingTimes,
-    /// Friction paths that are fractions of the range of the joint.
+    /// Trial values of the sliding distance of the Dahl friction model: fixed fractions of the
+    /// joint's range.
     Distances,
 }
 

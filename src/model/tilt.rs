@@ -23,8 +23,8 @@ pub(super) struct TiltDerivatives {
 }
 
 impl TiltDerivatives {
-    /// Creates the derivatives with respect to `inputs`; `arm` is that of the model at the full
-    /// parameter vector `x`.
+    /// Prepares the differentiation with respect to `inputs`. `x` is the full parameter vector of
+    /// `model`, and `arm` the arm with these values.
     pub fn new(model: &Model, x: &[f64], arm: Arm<f64>, inputs: Vec<Input>) -> Self {
         let seeded = |input: Input| {
             let arm = seed_arm(model, x, &[&input]);

@@ -1,7 +1,6 @@
 //! Record of the command `accept`, to be signed: accuracy before and after, conditions and inputs.
 
 use super::document::{Block, Headline, Table};
-use super::errors::NOMINAL;
 use super::identify::BEFORE;
 use super::render::{report, text};
 use crate::fit::Verdict;
@@ -130,7 +129,7 @@ fn judgement<'a>(result: &AcceptanceResult) -> Vec<Block<'a>> {
     };
     let header = ["pose accuracy AP, mm", "mean", "95 % from", "to", "rms", "max"];
     let after = if result.remainder { "identified and corrected" } else { "as identified" };
-    let rows = vec![row(NOMINAL, &result.before), row(after, &result.after)];
+    let rows = vec![row(&result.nominal_arm, &result.before), row(after, &result.after)];
     let note = "AP: distance from the predicted position to the barycentre of those measured in \
                 the same pose, after ISO 9283; the interval is of the mean, by bootstrap over poses";
     let table = Table::new(&header, rows, &[0]).noted(&[note]);

@@ -1,7 +1,7 @@
 //! Texts of the command `loop`: summary for one screen, full text for the terminal, and report.
 
 use super::document::{Block, Headline, Point, Table, code, first_of, named};
-use super::errors::{NOMINAL, both_parts, held_out_rows, judging, measure, rows_of, unpredicted};
+use super::errors::{both_parts, held_out_rows, judging, measure, rows_of, unpredicted};
 use super::figures;
 use super::found_effects::{found, rounds, status_table};
 use super::identify::{
@@ -17,7 +17,7 @@ use super::verdict::{causes, counts, title, verdict};
 use super::{effect, residual_tests, trace};
 use crate::problem::Problem;
 use crate::quantity::format::{counted, decimals, number};
-use crate::results::{FoundEffect, Gain, LoopResult, PlotData, Summary, TraceResult};
+use crate::results::{FoundEffect, Gain, LoopResult, PlotData, Summary, TraceResult, nominal_arm};
 use crate::select::ClosedLoop;
 
 /// Maximum number of alternatives that a text names; the page names twice as many.
@@ -137,7 +137,8 @@ fn set_aside<'a>(problem: &Problem, result: &LoopResult) -> Option<Block<'a>> {
         None => row.file.clone(),
     };
     let words = format!(
-        "{} with gross errors took no part in the choice of effects: {}. {treatment}.",
+        "{} took no part in the choice of effects, as far from the others as gross errors are: {}. \
+         {treatment}.",
         counted(rows.len(), "pose"),
         first_of(rows.iter().map(location), MAX_SHOWN_ROWS, "loop.json").join(", ")
     );
@@ -314,12 +315,12 @@ fn errors(closure: &ClosedLoop, result: &LoopResult) -> Table {
         [vec![rows.to_owned(), arm.to_owned()], norms.to_vec(), vec![chi2]].concat()
     };
     let (fitted, extended) = (&before.errors, &after.errors);
-    let declared = "as declared, fitted";
+    let (nominal, declared) = (nominal_arm(&closure.before.fit), "as declared, fitted");
     let mut rows = vec![
-        row(judging(&closure.after.fitted), NOMINAL, registered.judged(), None),
+        row(judging(&closure.after.fitted), &nominal, registered.judged(), None),
         row("", declared, fitted.judged(), None),
         row("", EXTENDED, extended.judged(), None),
-        row("identification", NOMINAL, &registered.identification, None),
+        row("identification", &nominal, &registered.identification, None),
         row("", declared, &fitted.identification, before.reduced_chi2),
         row("", EXTENDED, &extended.identification, after.reduced_chi2),
     ];

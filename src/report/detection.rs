@@ -8,6 +8,8 @@ use crate::select::{Detectable, Detection, Size};
 
 /// Maximum number of effects of a family that a text lists.
 const MAX_SHOWN_EFFECTS: usize = 3;
+/// Note on the columns of the table.
+const COLUMNS: &str = "found from: in the hardest direction of its parameters (axis, phase); at best: in the easiest; –: not found in the hardest direction at any size";
 
 /// Returns the effects of each family that are hardest to detect, and those that the poses cannot
 /// show.
@@ -39,7 +41,7 @@ pub(super) fn blocks<'a>(detection: &Detection) -> Vec<Block<'a>> {
     ))];
     if !rows.is_empty() {
         let header = ["effect", "found from", "at best", "prior ± 1 σ", "unit", "parameters"];
-        blocks.push(Block::Table(Table::new(&header, rows, &[0, 4, 5])));
+        blocks.push(Block::Table(Table::new(&header, rows, &[0, 4, 5]).noted(&[COLUMNS])));
     }
     if !if_timed.is_empty() {
         let list = effect::listed(if_timed).join("; ");

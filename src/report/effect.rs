@@ -134,16 +134,20 @@ fn group(members: &[Effect]) -> String {
         None => return code(name),
     };
     let orders = match members[0].harmonic_orders().as_deref() {
-        Some([one]) => format!(", order {one}"),
-        Some(all @ [first, .., last]) if (last - first) as usize + 1 == all.len() => {
-            format!(", orders {first} to {last}")
-        }
-        Some(all) => {
-            format!(", orders {}", all.iter().map(u32::to_string).collect::<Vec<_>>().join(", "))
-        }
+        Some([order]) => format!(", order {order}"),
+        Some(orders) => format!(", orders {}", ranges(orders)),
         None => String::new(),
     };
     format!("{} {of}{places}{orders}", code(name))
+}
+
+/// Lists increasing numbers, with three or more successive ones as a range: "1, 3–6, 8–60".
+fn ranges(numbers: &[u32]) -> String {
+    let run = |run: &[u32]| match run {
+        [first, _, .., last] if run.len() > 2 => format!("{first}–{last}"),
+        _ => run.iter().map(u32::to_string).collect::<Vec<_>>().join(", "),
+    };
+    numbers.chunk_by(|a, b| *b == a + 1).map(run).collect::<Vec<_>>().join(", ")
 }
 
 #[cfg(test)]
@@ -159,10 +163,11 @@ mod tests {
         let lines = grouped(harmonics.chain(others).map(|effect| (effect, ())));
         let words: Vec<String> = lines.into_iter().map(|(words, ())| words).collect();
         let expected = [
-            format!("{} of joints 1, 2, orders 1 to 60", code("joint-harmonic")),
+            format!("{} of joints 1, 2, orders 1–60", code("joint-harmonic")),
             format!("{} of joint 3", code("backlash")),
             format!("{} of joint 2 by 1", code("joint-coupling")),
         ];
         assert_eq!(words, expected);
+        assert_eq!(ranges(&[1, 3, 4, 5, 6, 8, 9, 11, 12, 13]), "1, 3–6, 8, 9, 11–13");
     }
 }

@@ -6,9 +6,6 @@ use crate::quantity::Unit;
 use crate::quantity::format::{about_three_digits, counted, number};
 use crate::results::measured_kinds;
 
-/// Name of the arm before identification.
-pub(super) const NOMINAL: &str = "nominal arm, base and tool fitted";
-
 /// Returns the table header for errors of a kind of rows, with the unit.
 pub(super) fn measure(of: &ErrorSummary) -> &'static str {
     kind_named(of.kind).error_label

@@ -17,7 +17,7 @@ use super::row_kinds::row_kind_tables;
 use crate::fit::{ErrorSummary, Errors, Identification, JointSources, OrientationErrors};
 use crate::problem::Problem;
 use crate::quantity::format::{counted, mm, number};
-use crate::results::{PlotData, rows_in};
+use crate::results::{PlotData, nominal_arm, rows_in};
 
 /// Name of the file with the complete result.
 const FILE: &str = "estimate.json";
@@ -155,12 +155,11 @@ pub(super) fn errors_by_axis(found: &Identification) -> Table {
     let of = &found.fitted.held_out;
     let sizes =
         if axes(of) > 0 { ["mean norm", "rms norm", "max norm"] } else { ["mean", "rms", "max"] };
-    let header = [&[measure(of), ""], &["mean x", "mean y", "mean z"][..axes(of)], &sizes].concat();
+    let header =
+        [&[measure(of), ""], &["mean |x|", "mean |y|", "mean |z|"][..axes(of)], &sizes].concat();
     let minor = (2..2 + axes(of)).collect();
     let mut table = Table { minor, ..Table::new(&header, rows, &[0, 1]) };
-    table
-        .notes
-        .push("before: nominal arm, with its base and tool fitted if they are free".to_owned());
+    table.notes.push(format!("before: {}", nominal_arm(found)));
     if found.fitted.is_left_out {
         table.notes.push("left out: each configuration predicted by a fit without it".to_owned());
     }

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use super::document::{Block, first_of, named};
 use super::errors::{brief, noun, unit, with_unit};
-use crate::fit::{Identification, Noise, Outlier, size_of_kind};
+use crate::fit::{Identification, Noise, Outlier, TypicalScatter, size_of_kind};
 use crate::problem::Problem;
 use crate::quantity::format::{counted, decimals, mm, number};
 use crate::results::{ResidualSize, rows_in};
@@ -88,8 +88,13 @@ fn other_sigma(problem: &Problem, found: &Identification) -> String {
     let cause = match &found.influential_rows {
         _ if !is_larger => "so the declared σ is too large".to_owned(),
         Some(influential) => {
-            let rows = influential.rows.len();
-            format!("mostly because of {} with gross errors", counted(rows, noun(found)))
+            let cause = match influential.rows.len() {
+                _ if others_agree_with_sigma(found) => "with gross errors",
+                1 => "that stands out from the others",
+                _ => "that stand out from the others",
+            };
+            let rows = counted(influential.rows.len(), noun(found));
+            format!("mostly because of {rows} {cause}")
         }
         None => "so that σ is too small or the model lacks something".to_owned(),
     };
@@ -104,28 +109,71 @@ pub(super) fn short(chi2: f64) -> String {
     number(chi2, decimals(chi2, 6).clamp(2, 6))
 }
 
-/// Lists the rows with gross errors, if there are any.
+/// Returns true if the declared σ explains the residual of all rows, or of the rows that are not
+/// influential. Outliers may then be called gross errors.
+fn others_agree_with_sigma(found: &Identification) -> bool {
+    match &found.influential_rows {
+        Some(influential) => influential
+            .reduced_chi2
+            .zip(found.chance)
+            .is_some_and(|(chi2, (_, highest))| chi2 <= highest),
+        None => matches!(ResidualSize::of(found), ResidualSize::Expected(_)),
+    }
+}
+
+/// Lists the rows that stand out from the others, if there are any.
 pub(super) fn outliers<'a>(problem: &Problem, found: &Identification) -> Option<Block<'a>> {
     let treatment = if problem.robust.is_some() {
-        "the robust loss limits their influence"
+        "the robust loss limits their influence; flexcal loop looks for a cause"
     } else {
-        "they count in full; a section [robust] would limit them"
+        "they count in full; a section [robust] would limit them, flexcal loop looks for a cause"
     };
     let known = found.outliers.iter().filter(|outlier| outlier.kind == "known distance").count();
     let (n, all) = (found.outliers.len(), rows_in(found, |errors| errors.identification) + known);
     let point = |outlier: &Outlier| {
         let known = if outlier.kind == "known distance" { " (known distance)" } else { "" };
         format!(
-            "{}{known}: {}, {} σ of the scatter",
+            "{}{known}: {}, {} × the typical scatter{}",
             outlier.location,
             size_of_kind(outlier.kind, outlier.error.norm(), 3),
-            number(outlier.distance, 1)
+            number(outlier.distance, 1),
+            outlier.scatter.map_or_else(String::new, |scatter| scatter_size(outlier.kind, scatter))
         )
     };
     let points = first_of(found.outliers.iter().map(point), MAX_SHOWN_OUTLIERS, FILE);
-    let have = if n == 1 { "has a gross error" } else { "have gross errors" };
-    let words = format!("{n} of {} {have} ({treatment}):", counted(all, noun(found)));
+    let is_influential = |outlier: &Outlier| {
+        found.influential_rows.as_ref().is_none_or(|influential| {
+            influential.rows.iter().any(|influential| influential.row == outlier.row)
+        })
+    };
+    let noun = noun(found);
+    let are_gross = others_agree_with_sigma(found) && found.outliers.iter().all(is_influential);
+    let have = match (are_gross, n) {
+        (true, 1) => "has a gross error".to_owned(),
+        (true, _) => "have gross errors".to_owned(),
+        (false, 1) => {
+            format!(
+                "stands out from the others: a gross error, or an effect that acts in few {noun}s"
+            )
+        }
+        (false, _) => {
+            format!(
+                "stand out from the others: gross errors, or an effect that acts in few {noun}s"
+            )
+        }
+    };
+    let words = format!("{n} of {} {have} ({treatment}):", counted(all, noun));
     (n > 0).then_some(Block::Lines(words, points))
+}
+
+/// States the size of the typical scatter for rows of a kind, and its source: " (0.197 mm, from the
+/// median)".
+fn scatter_size(kind: &str, scatter: TypicalScatter) -> String {
+    let (size, source) = match scatter {
+        TypicalScatter::Median(size) => (size, "the median"),
+        TypicalScatter::Declared(size) => (size, "the declared σ"),
+    };
+    format!(" ({}, from {source})", size_of_kind(kind, size, 3))
 }
 
 /// Names the influential rows and the size of the residual without them, if there are any.

@@ -5,6 +5,7 @@ use crate::fit::{AxisValues, Comparison, ErrorSummary, Procedure, TableEntry};
 use crate::paper::published::{BEFORE, Published, WITH_ELASTICITY, WITHOUT_ELASTICITY};
 use crate::paper::{Form, StiffnessStage};
 use crate::quantity::format::{mm, number, or_dash};
+use crate::results::registered_parts;
 
 /// Smallest identified share at which a parameter is shown without a mark.
 const MIN_UNMARKED_SHARE: f64 = 0.9;
@@ -89,16 +90,14 @@ pub(super) fn table_3(comparison: &Comparison, procedure: &Procedure) -> Table {
             rows.push(row);
         }
     }
-    let mut notes = vec![match (elastic, comparison.before.registered) {
-        (true, false) => "before: nominal arm without elasticity, base and tool as declared",
-        (false, false) => "before: nominal arm, base and tool as declared",
-        (true, true) => {
-            "before: nominal arm without elasticity, base and tool fitted first, since the problem leaves them open"
-        }
-        (false, true) => {
-            "before: nominal arm, base and tool fitted first, since the problem leaves them open"
-        }
-    }];
+    let fitted = registered_parts(&comparison.rigid).filter(|_| comparison.before.registered);
+    let placement = match fitted {
+        Some(parts) => format!("{parts} fitted first, since the problem leaves this open"),
+        None => "base and tool as declared".to_owned(),
+    };
+    let elasticity = if elastic { " without elasticity" } else { "" };
+    let before = format!("before: nominal arm{elasticity}, {placement}");
+    let mut notes = vec![before.as_str()];
     notes.extend(beside.then_some(
         "paper: published in [Chen2021, table 3], measured on another specimen, under other loads",
     ));

@@ -92,7 +92,8 @@ fn outcome(result: &LoopResult, takes_less: bool) -> String {
             } else {
                 let apart = match result.set_aside.len() {
                     0 => String::new(),
-                    rows => format!("apart from {} with gross errors, ", counted(rows, "pose")),
+                    1 => "apart from 1 pose that stands out, ".to_owned(),
+                    rows => format!("apart from {rows} poses that stand out, "),
                 };
                 format!("Nothing found: {apart}what the declared problem leaves looks like noise.")
             }

@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::document::Document;
 use super::remainder::BoundSummary;
-use super::summary::rows_in;
+use super::summary::{nominal_arm, rows_in};
 use super::tables::commanded_joints;
 use crate::fit::{Acceptance, Accuracy, Identification, ToleranceTest};
 use crate::measurement::Measurements;
@@ -50,7 +50,10 @@ pub struct AcceptanceResult {
     pub held_out_rows: usize,
     /// Number of held-out poses; one pose may be measured several times.
     pub poses: usize,
-    /// Accuracy of the nominal arm.
+    /// Description of the nominal arm, with the parts that were fitted to the rows.
+    #[serde(skip)]
+    pub(crate) nominal_arm: String,
+    /// Accuracy of the nominal arm, with base and tool fitted if they are free.
     pub before: PoseAccuracy,
     /// Accuracy of the identified arm.
     pub after: PoseAccuracy,
@@ -129,13 +132,17 @@ pub struct Condition {
     pub range: (f64, f64),
 }
 
-/// Pose accuracy AP over the held-out poses.
+/// Pose accuracy AP over the held-out poses. The AP of a pose is the distance from the predicted
+/// position to the barycentre of the positions measured in this pose \[ISO 9283\].
 #[derive(Debug, Clone, Copy, Serialize, JsonSchema)]
 pub struct PoseAccuracy {
+    /// Mean of the AP over the held-out poses.
     pub mean_mm: f64,
-    /// Bootstrap interval of the mean (95 %).
+    /// Bootstrap interval of `mean_mm` (95 %), over poses.
     pub interval_95_mm: [f64; 2],
+    /// Root mean square of the AP over the held-out poses.
     pub rms_mm: f64,
+    /// Largest AP of a held-out pose.
     pub max_mm: f64,
 }
 
@@ -181,6 +188,7 @@ impl AcceptanceResult {
             identification_rows: rows_in(found, |errors| errors.identification),
             held_out_rows: found.fitted.held_out.n,
             poses: judged.poses.len(),
+            nominal_arm: nominal_arm(found),
             before: (&judged.before).into(),
             after: (&judged.after).into(),
             repeated_poses: repeatabilities().count(),

@@ -51,7 +51,8 @@ pub struct LoopResult {
     pub remainder: Option<Remainder>,
     /// Strongest structure whose law is unknown.
     pub unexplained: Option<Structure>,
-    /// Rows with gross errors, which were excluded from the choice of effects.
+    /// Identification rows too far from the others to be noise, which were excluded from the choice
+    /// of effects.
     pub set_aside: Vec<Row>,
     /// Other structure whose law is unknown, most probable first.
     pub further: Vec<Structure>,
@@ -83,9 +84,11 @@ pub struct Fit {
     pub kinds: Vec<KindErrors>,
 }
 
-/// Decrease of the mean error on held-out rows.
+/// Decrease of the mean error on held-out rows by all added effects together, in the unit of the
+/// errors: mm, ° or px.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct Gain {
+    /// Mean error with the declared problem minus that with the added effects.
     pub mean: f64,
     /// Bootstrap interval over configurations, 95 %.
     pub interval_95: [f64; 2],

@@ -135,7 +135,8 @@ pub struct Conditioning {
 }
 
 impl Conditioning {
-    /// Computes the indices for a number of measured `coordinates`.
+    /// Summarises an identifiability analysis: its condition number, and the observability indices
+    /// of the analysed parameters for a number of measured `coordinates`.
     pub(super) fn new(found: &Identifiability, coordinates: usize) -> Self {
         let names = ["O1", "O2", "O3", "O4", "O5"];
         let observability = names.into_iter().zip(found.observability(coordinates)).collect();
@@ -224,7 +225,8 @@ pub struct OutlierRow {
     pub error_deg: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error_px: Option<f64>,
-    /// Length of the whitened residual, as a multiple of the scatter of all rows.
+    /// Length of the whitened residual, as a multiple of the typical scatter of all rows (their
+    /// median, but at least the declared σ).
     pub sigmas: f64,
 }
 

@@ -55,7 +55,7 @@ pub(crate) use plots::{
 pub(crate) use remainder::REMAINDER_FILE;
 pub(crate) use residual_size::{ResidualSize, exceeds_noise};
 pub(crate) use study::Cell;
-pub(crate) use summary::{Summary, measured_kinds, rows_in};
+pub(crate) use summary::{Summary, measured_kinds, nominal_arm, registered_parts, rows_in};
 pub(crate) use tables::{
     CommandedJoint, commanded_joints, predictions_csv, residuals_csv, study_timing_csv,
 };

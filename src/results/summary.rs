@@ -170,6 +170,25 @@ pub(super) fn by_unit(unit: Unit, value: f64) -> (Option<f64>, Option<f64>, Opti
     (only(Unit::Length), only(Unit::Angle), only(Unit::Pixel))
 }
 
+/// Describes the nominal arm before identification with the parts that were fitted to the rows:
+/// "nominal arm, base and tool fitted".
+pub(crate) fn nominal_arm(found: &Identification) -> String {
+    match registered_parts(found) {
+        Some(parts) => format!("nominal arm, {parts} fitted"),
+        None => "nominal arm".to_owned(),
+    }
+}
+
+/// Lists the parts that were fitted in the nominal arm: "base and tool"; `None` if there are none.
+pub(crate) fn registered_parts(found: &Identification) -> Option<String> {
+    let (last, first) = found.registered_parts.split_last()?;
+    Some(if first.is_empty() {
+        (*last).to_owned()
+    } else {
+        format!("{} and {last}", first.join(", "))
+    })
+}
+
 /// Returns the number of rows of all kinds in one part of the data (identification or held out).
 pub(crate) fn rows_in(found: &Identification, part: fn(&fit::Errors) -> ErrorSummary) -> usize {
     measured_kinds(found, part).map(|of| of.n).sum()

@@ -22,7 +22,8 @@ pub(super) struct Poses {
     /// Range of the time between poses \[s\].
     pub time_step: (f64, f64),
     pub held_out: HeldOutRows,
-    /// Number of first rows that measure positions; rows of other kinds follow.
+    /// Number of rows at the start of the table that measure positions; the rows after them
+    /// measure the fixtures and the tilts in turn.
     pub positions: usize,
     /// Frames whose tilts are measured.
     pub tilts: Vec<usize>,

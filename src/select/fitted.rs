@@ -160,7 +160,8 @@ impl Fitted {
         squares.sqrt() > MAX_UNSETTLED * self.sigma * (3.0 * here.len() as f64).sqrt()
     }
 
-    /// Returns options for a fit of the same problem that starts where this one ended.
+    /// Returns options for a fit of the same problem that starts where this one ended and does not
+    /// search for influential rows.
     pub fn continuing(&self, options: &Options) -> Options {
         let values =
             self.found.estimates.iter().map(|estimate| (estimate.name.clone(), estimate.estimate));

@@ -144,11 +144,14 @@ fn euler(order: [usize; 3], angles: &Vector3<f64>) -> UnitQuaternion<f64> {
     turn(0) * turn(1) * turn(2)
 }
 
-/// Returns the root mean squared angle \[rad\] between predictions and readings, after the constant
-/// rotation of the tool that fits best.
+/// Returns the root mean squared angle \[rad\] between predicted and measured orientations if the
+/// file's numbers follow another convention of rotations.
 ///
-/// The rotation is the eigenvector of Σ q qᵀ of the differences  [Markley et al. 2007]; of several
-/// readings of a row the nearest counts.
+/// `pairs` holds the predicted and the measured orientation of each row. `reading` returns the
+/// orientations that the numbers of a measured one may mean in the other convention. A constant
+/// rotation of the tool is fitted first: the eigenvector of Σ q qᵀ of the differences q between
+/// prediction and first reading  [Markley et al. 2007]. If a row has several readings, the nearest
+/// counts.
 fn misfit(pairs: &[(UnitQuaternion<f64>, UnitQuaternion<f64>)], reading: &Reading) -> f64 {
     let differences: Vec<Vec<UnitQuaternion<f64>>> = pairs
         .iter()

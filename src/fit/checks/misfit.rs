@@ -24,8 +24,9 @@ pub(super) const MIN_SPREAD: f64 = 0.01;
 /// Minimum number of different poses from which the spread of their points is judged.
 const MIN_POSES: usize = 4;
 
-/// Checks that the residual of the fitted arm is not large relative to the spread of the rows of
-/// each kind.
+/// Reports each kind of rows whose rms error after the fit exceeds [`MAX_MISS`] times the spread of
+/// the rows and [`MAX_UNREPORTED_RESIDUAL`] σ. Reports other rows than positions also if the fit is
+/// no better than the nominal arm and the error exceeds [`MIN_REPORTED_ERROR`] σ.
 pub(super) struct Misfit;
 
 impl Check for Misfit {

@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 use serde_json::{Value, json};
 
 use crate::error::Location;
-use crate::fit::uncertainty::residual_lengths::Lengths;
+use crate::fit::uncertainty::residual_lengths::{Lengths, TypicalScatter};
 use crate::measurement::Measurements;
 
 /// Row whose residual is too large to be noise.
@@ -16,8 +16,11 @@ pub struct Outlier {
     pub location: Location,
     /// Kind of the row ([`Observation::kind`](crate::problem::Observation::kind)).
     pub kind: &'static str,
-    /// Length of the whitened residual, as a multiple of the scatter (1 σ) of all rows.
+    /// Length of the whitened residual, as a multiple of the typical scatter (1 σ) of all rows.
     pub distance: f64,
+    /// Typical scatter that `distance` refers to; `None` for held-out rows, whose distance refers
+    /// to the uncertainty of their prediction.
+    pub(crate) scatter: Option<TypicalScatter>,
     /// Residual measured − predicted, measuring frame \[m\], for tilts \[rad\]; a single number is
     /// along x.
     pub error: Vector3<f64>,
@@ -31,7 +34,8 @@ impl Outlier {
         error: Vector3<f64>,
     ) -> Self {
         let kind = measurements.observation(row).kind();
-        Self { row, location: measurements.location(row), kind, distance, error }
+        let location = measurements.location(row);
+        Self { row, location, kind, distance, scatter: None, error }
     }
 }
 
@@ -60,7 +64,8 @@ pub(in crate::fit) fn outliers(
 ) -> Vec<Outlier> {
     let outlier = |((place, &row), &error): ((usize, &usize), &Vector3<f64>)| {
         let distance = lengths.outlying(place)?;
-        Some(Outlier::new(measurements, row, distance, error))
+        let scatter = Some(lengths.typical_scatter(place));
+        Some(Outlier { scatter, ..Outlier::new(measurements, row, distance, error) })
     };
     rows.iter().enumerate().zip(errors).filter_map(outlier).collect()
 }

@@ -123,7 +123,7 @@ fn found(
     all.iter().all(|number| number.is_finite()).then_some(all)
 }
 
-/// Returns the centre of the predicted points.
+/// Returns the centroid (mean position) of the predicted points of some contacts \[m\].
 fn centre(contacts: &[(Vector3<f64>, f64)]) -> Vector3<f64> {
     contacts.iter().map(|(point, _)| point).sum::<Vector3<f64>>() / contacts.len() as f64
 }

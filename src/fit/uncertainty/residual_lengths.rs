@@ -50,6 +50,15 @@ pub(in crate::fit) fn outlying(lengths: &[f64], coordinates: &[usize]) -> Vec<bo
     lengths.iter().zip(&chances).map(|(length, (_, limit))| *length > limit * scatter).collect()
 }
 
+/// Typical scatter (1 σ) of a measured coordinate of a row \[m\], for tilts \[rad\].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum TypicalScatter {
+    /// Median scatter of the residuals of all rows.
+    Median(f64),
+    /// Declared σ, which exceeds the median scatter.
+    Declared(f64),
+}
+
 /// Lengths of the whitened residuals of some poses, and their outlier limits.
 #[derive(Debug, Clone)]
 pub(in crate::fit) struct Lengths {
@@ -57,8 +66,12 @@ pub(in crate::fit) struct Lengths {
     pub values: Vec<f64>,
     /// Length ‖r‖ of each pose in units of the σ that the fit assumed.
     pub weighed: Vec<f64>,
-    /// Scatter (1 σ) of the residuals, relative to the assumed σ.
+    /// Scatter (1 σ) of the residuals, relative to the declared σ.
     pub scatter: f64,
+    /// True if `scatter` is the lower limit that the declared σ sets, since the median is smaller.
+    is_limited: bool,
+    /// Declared 1 σ of a coordinate of each pose \[m\], for tilts \[rad\].
+    declared: Vec<f64>,
     /// Length of each pose, relative to the scatter, above which it is an outlier.
     limits: Vec<f64>,
 }
@@ -109,7 +122,15 @@ impl Lengths {
         let chances = chances(&stage.poses.iter().map(moved).collect::<Vec<_>>());
         let scatter = scatter(&values, &chances) / freedom.clamp(0.01, 1.0).sqrt();
         let limits = chances.into_iter().map(|(_, limit)| limit).collect();
-        Self { values, weighed, scatter: scatter.max(least), limits }
+        let is_limited = scatter < least;
+        let scatter = scatter.max(least);
+        Self { values, weighed, scatter, is_limited, declared: stage.declared.clone(), limits }
+    }
+
+    /// Returns the scatter as that of a coordinate of the pose with index `place`.
+    pub fn typical_scatter(&self, place: usize) -> TypicalScatter {
+        let size = self.scatter * self.declared[place];
+        if self.is_limited { TypicalScatter::Declared(size) } else { TypicalScatter::Median(size) }
     }
 
     /// Returns the length of the residual of the pose with index `place`, relative to the scatter,
