@@ -133,7 +133,7 @@ pub struct Condition {
 }
 
 /// Pose accuracy AP over the held-out poses. The AP of a pose is the distance from the predicted
-/// position to the barycentre of the positions measured in this pose \[ISO 9283\].
+/// position to the barycentre of the positions measured in this pose, after ISO 9283.
 #[derive(Debug, Clone, Copy, Serialize, JsonSchema)]
 pub struct PoseAccuracy {
     /// Mean of the AP over the held-out poses.

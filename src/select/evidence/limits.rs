@@ -22,8 +22,8 @@ const MIN_SINGULAR_VALUE: f64 = 1e-9;
 
 /// Returns the hypotheses that a limit (bound or constraint) is wrong, one for each limit that is
 /// active in the fit `fitted`. The column of each is the change of the residual if that limit is
-/// dropped, from the derivatives in `linearised`. The first `weighed` rows are those of the
-/// identification data. Together the hypotheses have the prior probability exp(`ln_family`).
+/// dropped, from the derivatives in `linearised`. The first `weighed` rows count for the evidence.
+/// Together the hypotheses have the prior probability exp(`ln_family`).
 pub(super) fn limits(
     fitted: &Fitted,
     linearised: &Linearised,
