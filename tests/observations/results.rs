@@ -332,7 +332,7 @@ fn every_kind_is_told_in_its_own_terms() {
     let small = AROUND.replace("0.05", "0.01").replace("0.002", "0.0004");
     let folder = bench(&small, &["distance", "tilt"], 60);
     let printed = folder.flexcal("identify . --out fit -v").success().words();
-    assert_contains(&printed, &["take every declared σ times", "distance, mm mean rms max"]);
+    assert_contains(&printed, &["assume every declared σ times", "distance, mm mean rms max"]);
     assert!(!printed.contains("mean y"), "{printed}");
     let estimate = folder.json("fit/estimate.json");
     let taken = number(&estimate["sigma_taken_mm"]) / 0.01;
