@@ -321,16 +321,26 @@ impl Measurements {
         &self.covariates[row * n..(row + 1) * n]
     }
 
-    /// Returns a digest of joints and measured numbers of a row, 16 hexadecimal digits. It is the
-    /// same in every file and for equal values in other units.
+    /// Returns a digest of a row, 16 hexadecimal digits: joints, measured numbers, and session,
+    /// target, payload and time where the table states them. It is the same in every file and for
+    /// equal values in other units.
     pub(crate) fn row_digest(&self, row: usize) -> String {
         let orientation = self.orientation(row).map(UnitQuaternion::scaled_axis);
         let turn = orientation.iter().flat_map(|turn| turn.iter());
         let numbers = self.configuration(row).iter().chain(&self.positions[row]).chain(turn);
+        let payload = self.payload.as_ref().map(|payload| (&payload[row], "payload"));
+        let time = self.time_measured.then(|| (&self.time[row], "time"));
+        let words = [Some(&self.session), self.target.as_ref()].into_iter().flatten();
         // Adding 0 turns −0 into 0; a change of unit keeps ten digits.
         let text = numbers.fold(format!("{:?}", self.observation(row)), |text, number| {
             format!("{text} {:.9e}", number + 0.0)
         });
+        let text = payload
+            .into_iter()
+            .chain(time)
+            .fold(text, |text, (number, name)| format!("{text} {name} {:.9e}", number + 0.0));
+        let words = words.filter_map(|labels| labels.names.get(*labels.of_row.get(row)?));
+        let text = words.fold(text, |text, word| format!("{text}\n{word}"));
         hexadecimal(&text).chars().take(16).collect()
     }
 
