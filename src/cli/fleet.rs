@@ -8,6 +8,7 @@ use flexcal::life;
 use flexcal::report::{self, shell_word};
 use flexcal::results::{Document as _, FleetResult};
 
+use super::diagnostic;
 use super::estimate::Trust;
 use super::outcome::Outcome;
 use super::output::{self, Results};
@@ -47,6 +48,12 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let flags = (*force, *quiet);
     let results = Results::claim("fleet", folder, estimates.clone(), &[&name], flags)?;
     let read = estimates.iter().map(|file| trust.read(file)).collect::<Result<Vec<_>, _>>()?;
+    for estimate in read.iter().filter(|estimate| !estimate.trusted) {
+        let file = estimate.file.display();
+        diagnostic::warn(&format!(
+            "{file}: its fit was not trusted; see its findings, or leave the arm out"
+        ));
+    }
     let fleet = life::fleet(&read)?;
     results.write(&[(&name, &fleet.to_toml())])?;
     if *json {

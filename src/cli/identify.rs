@@ -89,7 +89,13 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         Some(file) if file.extension().is_some_and(|ending| ending == "toml") => {
             Some(PriorSource::Fleet(FleetPrior::read(file)?))
         }
-        Some(file) => Some(PriorSource::Estimate(Box::new(arguments.trust.read(file)?))),
+        Some(file) => {
+            let estimate = arguments.trust.read(file)?;
+            if !estimate.trusted {
+                return Err(PriorError::Untrusted { file: file.to_owned() }.into());
+            }
+            Some(PriorSource::Estimate(Box::new(estimate)))
+        }
         None => None,
     };
     let declared = remainder::declared(&problem)?.filter(|_| !arguments.remainder);

@@ -38,6 +38,16 @@ pub(super) struct AssessedCause {
     pub covariance: DMatrix<f64>,
 }
 
+impl AssessedCause {
+    /// Returns the name of the cause; `location` names a row by its file and line.
+    pub fn label(&self, causes: &[Cause], location: impl Fn(usize) -> String) -> String {
+        match self.row {
+            Some(row) => format!("{} is off", location(row)),
+            None => causes[self.cause].label.clone(),
+        }
+    }
+}
+
 /// Weighted ln LR of a cause or of a gross row, with the amplitudes of the best size.
 struct Weighted {
     cause: usize,
@@ -58,18 +68,21 @@ pub(super) fn assess(
     causes: &[Cause],
     is_sequential: bool,
 ) -> Option<Assessment> {
-    let mut sums = Sums::new(rows.sensitivity.ncols());
+    let columns = rows.sensitivity.ncols();
+    let mut sums = Sums::new(columns, 1.0);
+    let mut noisier = NOISE_RATIOS.map(|ratio| Sums::new(columns, ratio));
     let step = rows.len().div_ceil(MAX_LOOKS).max(1);
     let mut looks = Vec::new();
     let mut last = None;
     for row in 0..rows.len() {
         sums.add(rows, row, 1.0);
+        noisier.iter_mut().for_each(|noisier| noisier.add(rows, row, 1.0));
         let is_last = row + 1 == rows.len();
         if !(is_last || is_sequential && (row + 1) % step == 0) {
             continue;
         }
         let unchanged = Unchanged::new(&sums, factor)?;
-        let weighted = ratios(rows, row + 1, (&sums, factor), &unchanged, causes);
+        let weighted = ratios(rows, row + 1, (&sums, &noisier, factor), &unchanged, causes);
         // Rows to come are as likely to be gross as these; they change nothing yet.
         let to_come = causes.iter().find(|cause| cause.kind == CauseKind::Row);
         let to_come = to_come.map(|cause| cause.ln_weight - (row as f64 + 2.0).ln());
@@ -97,11 +110,11 @@ pub(super) fn assess(
 }
 
 /// Computes the weighted likelihood ratio of each cause, and of each of the first `count` rows as a
-/// gross one.
+/// gross one. `noisier` are the sums with each of [`NOISE_RATIOS`].
 fn ratios(
     rows: &SensitiveRows,
     count: usize,
-    (sums, factor): (&Sums, &DMatrix<f64>),
+    (sums, noisier, factor): (&Sums, &[Sums], &DMatrix<f64>),
     unchanged: &Unchanged,
     causes: &[Cause],
 ) -> Vec<Weighted> {
@@ -117,8 +130,11 @@ fn ratios(
     for (index, cause) in causes.iter().enumerate() {
         match cause.kind {
             CauseKind::Noise => {
-                let ratio = |&ratio: &f64| Some((unchanged.noise(sums, factor, ratio)?, ratio));
-                let found: Vec<(f64, f64)> = NOISE_RATIOS.iter().filter_map(ratio).collect();
+                let ratio = |(sums, ratio): (&Sums, f64)| {
+                    Some((unchanged.against(&Unchanged::new(sums, factor)?), ratio))
+                };
+                let found: Vec<(f64, f64)> =
+                    noisier.iter().zip(NOISE_RATIOS).filter_map(ratio).collect();
                 let best = found.iter().copied().max_by(|a, b| a.0.total_cmp(&b.0));
                 let share = ln_sum(found.iter().map(|entry| entry.0))
                     - (NOISE_RATIOS.len() as f64).ln()
@@ -128,7 +144,7 @@ fn ratios(
             // Row i has the prior probability 1 / (i (i + 1)), which sums to 1 over all i.
             CauseKind::Row => weighted.extend((0..count).filter_map(|row| {
                 let number = row as f64 + 1.0;
-                let share = unchanged.gross_row(rows, row, factor)? + cause.ln_weight
+                let share = unchanged.gross_row(rows, row, (sums, factor))? + cause.ln_weight
                     - (number * (number + 1.0)).ln();
                 Some(plain(index, Some(row), share, Vec::new()))
             })),

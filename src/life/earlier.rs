@@ -12,6 +12,9 @@ use crate::fit::{EarlierData, SavedEstimate, Strategy};
 use crate::model::Model;
 use crate::problem::Problem;
 
+/// Relative difference up to which two σ are equal.
+pub(super) const EQUAL_SIGMA: f64 = 1e-6;
+
 /// Gaussian on some parameters of a model, from an earlier estimate and widened by drift.
 #[derive(Debug, Clone)]
 pub(super) struct Earlier {
@@ -29,6 +32,8 @@ pub(super) struct Earlier {
     /// Standard deviation (1 σ) of a coordinate to assume in new rows \[m\], where it is larger
     /// than declared or none is declared.
     pub sigma: Option<f64>,
+    /// True if the Gaussian contains the prior of a fleet.
+    pub includes_fleet: bool,
 }
 
 impl Earlier {
@@ -72,7 +77,8 @@ impl Earlier {
             (if entry.is_finite() { entry } else { 0.0 }) + drifted
         });
         let declared = problem.data.position_sigma;
-        let is_larger = saved.noise_factor > 1.0 || declared.is_none();
+        let is_larger =
+            |sigma: &f64| declared.is_none_or(|declared| *sigma > declared * (1.0 + EQUAL_SIGMA));
         Ok(Self {
             file,
             names: entries.iter().map(|&(_, k, _)| model.parameters[k].name.clone()).collect(),
@@ -80,7 +86,8 @@ impl Earlier {
             mean,
             covariance,
             fitted_rows: saved.fitted_rows.clone(),
-            sigma: saved.sigma_taken.or(estimate.estimated_sigma).filter(|_| is_larger),
+            sigma: saved.sigma_taken.or(estimate.estimated_sigma).filter(is_larger),
+            includes_fleet: saved.includes_fleet,
         })
     }
 
@@ -125,6 +132,7 @@ impl Earlier {
             places,
             fitted_rows: HashSet::new(),
             sigma: None,
+            includes_fleet: true,
         })
     }
 

@@ -43,6 +43,26 @@ pub enum PriorError {
     NotFree { file: PathBuf, name: String },
     #[error("{}: the arm it describes has no prediction in some pose of the table", file.display())]
     NotFinite { file: PathBuf },
+    #[error(
+        "{}: neither it nor the problem states σ of a measured position; declare position_sigma_mm in [data], or a column sigma_mm",
+        file.display()
+    )]
+    NoSigma { file: PathBuf },
+    #[error(
+        "{}: shares {rows} fitted rows with {}; give one estimate of each arm",
+        file.display(), other.display()
+    )]
+    SameRows { file: PathBuf, other: PathBuf, rows: usize },
+    #[error(
+        "{}: was identified with a prior from siblings, which would count twice; identify its rows without --prior",
+        file.display()
+    )]
+    HasFleetPrior { file: PathBuf },
+    #[error(
+        "{}: its fit was not trusted, so it is no prior; see its findings, and identify its rows together with the new ones",
+        file.display()
+    )]
+    Untrusted { file: PathBuf },
     #[error("{}: all {rows} rows of the table were fitted there already, so nothing is new", file.display())]
     NothingNew { file: PathBuf, rows: usize },
 }

@@ -1,18 +1,19 @@
 //! Evidence for causes of a change, against "unchanged".
 //!
-//! Unchanged: the whitened residuals r of all rows are N(0, S) with S = I + K C Kᵀ, where C is the
-//! covariance of the estimate. A cause adds columns V of K with independent normal amplitudes of
+//! Unchanged: the whitened residuals r of all rows are N(0, S) with S = Σ + K C Kᵀ. C is the
+//! covariance of the estimate. Σ is that of the noise, I, and of the misfit that the rows of one
+//! configuration share ([`Sums`]). A cause adds columns V of K with independent normal amplitudes of
 //! size D: r ~ N(0, S + V D² Vᵀ). With A = Vᵀ S⁻¹ V and b = Vᵀ S⁻¹ r its likelihood ratio is
 //!
 //! ln LR = −½ ln det(I + D A D) + ½ bᵀ D (I + D A D)⁻¹ D b            [Bishop 2006, §2.3]
 //!
-//! Larger noise: r ~ N(0, κ² I + K C Kᵀ). One gross row i: S + λ² on the coordinates of row i.
+//! Larger noise: its part of Σ becomes κ² I. One gross row i: S + λ² on the coordinates of row i.
 //!
 //! Each ratio is a density of all rows so far over that of "unchanged", so it is a martingale while
 //! the arm is unchanged, and so is a mixture of them. It exceeds 1/α at any time with a probability
 //! of at most α [Ville 1939; Grünwald, de Heide & Koolen 2024].
 
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use nalgebra::{DMatrix, DVector};
 
 use super::rows::{SensitiveRows, Sums};
 
@@ -31,6 +32,8 @@ pub(super) struct Unchanged {
     pub vector: DVector<f64>,
     /// Squared length rᵀ S⁻¹ r.
     pub squares: f64,
+    /// Logarithm of the determinant of S.
+    ln_det: f64,
     /// Cholesky factor L of I + Fᵀ G F.
     lower: DMatrix<f64>,
     /// Vector L⁻¹ Fᵀ g.
@@ -58,26 +61,23 @@ pub(super) fn factor(covariance: &DMatrix<f64>) -> DMatrix<f64> {
     factor
 }
 
-/// Returns the Cholesky factorisation of `variance` I + Fᵀ G F.
-fn inner(sums: &Sums, factor: &DMatrix<f64>, variance: f64) -> Option<Cholesky<f64, Dyn>> {
-    let mut matrix = factor.tr_mul(&(&sums.information * factor));
-    for k in 0..matrix.nrows() {
-        matrix[(k, k)] += variance;
-    }
-    matrix.cholesky()
-}
-
 impl Unchanged {
     /// Computes the density of rows with these sums, for an estimate with the covariance F Fᵀ.
     /// Returns `None` if a number is not finite.
     pub fn new(sums: &Sums, factor: &DMatrix<f64>) -> Option<Self> {
-        let lower = inner(sums, factor, 1.0)?.unpack();
+        let mut matrix = factor.tr_mul(&(&sums.information * factor));
+        for k in 0..matrix.nrows() {
+            matrix[(k, k)] += 1.0;
+        }
+        let lower = matrix.cholesky()?.unpack();
+        let ln_inner: f64 = lower.diagonal().iter().map(|d| 2.0 * d.ln()).sum();
         let carried = lower.solve_lower_triangular(&factor.tr_mul(&sums.information))?;
         let along = lower.solve_lower_triangular(&factor.tr_mul(&sums.vector))?;
         Some(Self {
             information: &sums.information - carried.tr_mul(&carried),
             vector: &sums.vector - carried.tr_mul(&along),
             squares: sums.squares - along.norm_squared(),
+            ln_det: sums.ln_det + ln_inner,
             lower,
             along,
         })
@@ -105,17 +105,9 @@ impl Unchanged {
         Some((ratio, DVector::from_fn(n, |i, _| sizes[i] * mean[i]), covariance))
     }
 
-    /// Returns ln LR of noise that is `ratio` times the assumed one.
-    pub fn noise(&self, sums: &Sums, factor: &DMatrix<f64>, ratio: f64) -> Option<f64> {
-        let variance = ratio * ratio;
-        let solved = inner(sums, factor, variance)?;
-        let pull = factor.tr_mul(&sums.vector);
-        let squares = (sums.squares - pull.dot(&solved.solve(&pull))) / variance;
-        let ln_det =
-            |lower: &DMatrix<f64>| -> f64 { lower.diagonal().iter().map(|d| 2.0 * d.ln()).sum() };
-        let rank = factor.ncols() as f64;
-        let with = ln_det(&solved.unpack()) + (sums.coordinates - rank) * variance.ln();
-        Some(0.5 * (ln_det(&self.lower) - with + self.squares - squares))
+    /// Returns ln LR of the density `other` of the same rows against this one.
+    pub fn against(&self, other: &Self) -> f64 {
+        0.5 * (self.ln_det - other.ln_det + self.squares - other.squares)
     }
 
     /// Returns ln LR of one gross row, averaged over the sizes of its error.
@@ -123,15 +115,13 @@ impl Unchanged {
         &self,
         rows: &SensitiveRows,
         row: usize,
-        factor: &DMatrix<f64>,
+        (sums, factor): (&Sums, &DMatrix<f64>),
     ) -> Option<f64> {
-        let carried =
-            self.lower.solve_lower_triangular(&(rows.of_row(row) * factor).transpose())?;
-        let measured: Vec<usize> = (0..rows.coordinates[row]).collect();
-        let carried = carried.select_columns(&measured);
-        let n = measured.len();
-        let information = DMatrix::identity(n, n) - carried.tr_mul(&carried);
-        let vector = rows.residual_of(row).select_rows(&measured) - carried.tr_mul(&self.along);
+        let (sensitivity, residual, diagonal) = sums.of_row(rows, row);
+        let carried = self.lower.solve_lower_triangular(&(sensitivity * factor).transpose())?;
+        let n = residual.len();
+        let information = DMatrix::from_diagonal(&diagonal) - carried.tr_mul(&carried);
+        let vector = residual - carried.tr_mul(&self.along);
         let ratios = GROSS_SIZES.iter().filter_map(|size| {
             let solved = (DMatrix::identity(n, n) + &information * (size * size)).cholesky()?;
             let ln_det: f64 = solved.l_dirty().diagonal().iter().map(|d| 2.0 * d.ln()).sum();

@@ -2,9 +2,10 @@
 //!
 //! Arm i has deviations θᵢ ~ N(μ, T) with T diagonal: mean μ and spread τ of each parameter. Its
 //! estimate is divided by its declared prior, so that its rows alone count: information matrix Λᵢ
-//! and vector hᵢ. μ has the declared prior N(0, s²). τ² has a scaled inverse χ² prior about s² with
-//! half a degree of freedom, which shrinks it towards the data sheet where few arms say little. Both are
-//! found by expectation maximisation                                   [Gelman et al. 2013, §15]
+//! and vector hᵢ. μ has the declared prior N(0, s²). τ² has a scaled inverse χ² prior with half a
+//! degree of freedom. It shrinks τ towards the data sheet where few arms say little, so τ is a prior
+//! of the next arm and no measured spread. The prior of τ² is about s², or without a declared s about
+//! the mean variance of the estimates of the arms. Both are found by expectation maximisation                                   [Gelman et al. 2013, §15]
 //!
 //! mᵢ = (Λᵢ + T⁻¹)⁻¹ (hᵢ + T⁻¹ μ),   Vᵢ = (Λᵢ + T⁻¹)⁻¹,   τ² = (Σ (mᵢ − μ)² + Vᵢ + ν s²) / (n + ν)
 
@@ -17,7 +18,7 @@ use statrs::distribution::{ContinuousCDF as _, Normal};
 use super::error::PriorError;
 use crate::fit::SavedEstimate;
 
-/// Degrees of freedom ν of the prior of each variance τ², about the declared σ².
+/// Degrees of freedom ν of the prior of each variance τ².
 const PRIOR_ARMS: f64 = 0.5;
 /// Maximum number of steps of expectation maximisation.
 const MAX_STEPS: usize = 500;
@@ -46,6 +47,8 @@ pub struct Fleet {
     /// Digest of each part of the declared arm.
     pub arm_parts: BTreeMap<String, String>,
     pub parameters: Vec<FleetParameter>,
+    /// Names of parameters of the arm that have no variance in some estimate, and are left out.
+    pub left_out: Vec<String>,
     pub arms: Vec<FleetArm>,
 }
 
@@ -61,7 +64,7 @@ pub struct FleetParameter {
     pub mean: f64,
     /// Standard error of the mean.
     pub mean_error: f64,
-    /// Standard deviation of the deviations from arm to arm.
+    /// Standard deviation of the deviation of the next arm about the mean.
     pub spread: f64,
     /// Declared 1 σ; `None` without a prior.
     pub declared: Option<f64>,
@@ -82,6 +85,32 @@ pub struct FleetArm {
 struct Likelihood {
     information: DMatrix<f64>,
     vector: DVector<f64>,
+    /// Variance of each parameter's estimate, the declared prior included.
+    variance: DVector<f64>,
+}
+
+/// Variances of the priors of mean and spread of each parameter.
+struct DataSheet {
+    /// Variance of the mean.
+    mean: DVector<f64>,
+    /// Variance about which τ² has its prior.
+    spread: DVector<f64>,
+}
+
+impl DataSheet {
+    /// Returns the declared variances, and for parameters without one a wide mean and the mean
+    /// variance of the estimates.
+    fn new(declared: &[Option<f64>], likelihoods: &[Likelihood]) -> Self {
+        let count = likelihoods.len().max(1) as f64;
+        let of_estimates =
+            |k: usize| likelihoods.iter().map(|arm| arm.variance[k]).sum::<f64>() / count;
+        let of = |other: &dyn Fn(usize) -> f64| {
+            DVector::from_fn(declared.len(), |k, _| {
+                declared[k].map_or_else(|| other(k), |sigma| sigma * sigma)
+            })
+        };
+        Self { mean: of(&|_| WIDE * WIDE), spread: of(&of_estimates) }
+    }
 }
 
 /// Mean and variance of each parameter, and the variance of the mean.
@@ -103,40 +132,48 @@ fn is_of_arm(name: &str) -> bool {
 
 /// Finds mean and spread of the parameters of several arms, from their estimates.
 ///
-/// Bases, tools and fixtures are left out.
+/// Bases, tools and fixtures are left out, and so are parameters without a variance in some
+/// estimate, as at a bound.
 ///
 /// # Errors
-/// Returns an error if there are fewer than three arms, or if they differ in their declaration or
-/// in what is free.
+/// Returns an error if there are fewer than three arms, if they differ in their declaration, if two
+/// estimates share fitted rows, or if one has the prior of a fleet.
 pub fn fleet(estimates: &[SavedEstimate]) -> Result<Fleet, PriorError> {
     let Some(first) = estimates.first().filter(|_| estimates.len() >= MIN_ARMS) else {
         return Err(PriorError::FewArms { arms: estimates.len(), least: MIN_ARMS });
     };
-    for estimate in estimates {
+    for (number, estimate) in estimates.iter().enumerate() {
+        let file = || estimate.file.clone();
         if let Some(part) = first.differing_part(estimate) {
-            let (file, other) = (estimate.file.clone(), first.file.clone());
-            return Err(PriorError::OtherType { file, other, part });
+            return Err(PriorError::OtherType { file: file(), other: first.file.clone(), part });
+        }
+        if estimate.posterior().includes_fleet {
+            return Err(PriorError::HasFleetPrior { file: file() });
+        }
+        let rows = &estimate.posterior().fitted_rows;
+        for other in &estimates[..number] {
+            let shared = other.posterior().fitted_rows.intersection(rows).count();
+            if shared > 0 {
+                let other = other.file.clone();
+                return Err(PriorError::SameRows { file: file(), other, rows: shared });
+            }
         }
     }
-    let chosen: Vec<usize> = first
-        .entries()
-        .enumerate()
-        .filter(|(k, (name, ..))| is_of_arm(name) && first.posterior().covariance[(*k, *k)] > 0.0)
-        .map(|(k, _)| k)
-        .collect();
-    if chosen.is_empty() {
+    let (names, left_out) = with_variance(estimates);
+    if names.is_empty() {
         return Err(PriorError::NoCovariance { file: first.file.clone() });
     }
-    let all: Vec<(&str, f64, Option<f64>)> = first.entries().collect();
-    let names: Vec<&str> = chosen.iter().map(|&k| all[k].0).collect();
-    let declared: Vec<Option<f64>> = chosen.iter().map(|&k| all[k].2).collect();
+    let declared_of = |name: &&str| {
+        first.entries().find(|(other, ..)| other == name).and_then(|(_, _, sigma)| sigma)
+    };
+    let declared: Vec<Option<f64>> = names.iter().map(declared_of).collect();
     let likelihoods = estimates
         .iter()
         .map(|estimate| likelihood(estimate, &names, &declared))
         .collect::<Result<Vec<_>, _>>()?;
-    let sheet = DVector::from_iterator(names.len(), declared.iter().map(|s| s.unwrap_or(WIDE)));
+    let sheet = DataSheet::new(&declared, &likelihoods);
     let every: Vec<&Likelihood> = likelihoods.iter().collect();
-    let start = (DVector::zeros(names.len()), sheet.component_mul(&sheet));
+    let start = (DVector::zeros(names.len()), sheet.mean.clone());
     let model = maximised(&every, &sheet, start, MAX_STEPS);
     let parameters = names.iter().enumerate().map(|(k, name)| FleetParameter {
         name: (*name).to_owned(),
@@ -167,8 +204,29 @@ pub fn fleet(estimates: &[SavedEstimate]) -> Result<Fleet, PriorError> {
         problem: first.problem_name().to_owned(),
         arm_parts: first.arm_parts().clone(),
         parameters: parameters.collect(),
+        left_out,
         arms: arms.collect(),
     })
+}
+
+/// Returns the names of the arm's parameters that have a variance in every estimate, and of those
+/// that have one in some.
+fn with_variance(estimates: &[SavedEstimate]) -> (Vec<&str>, Vec<String>) {
+    let has_variance = |estimate: &SavedEstimate, name: &str| {
+        let place = estimate.entries().position(|(other, ..)| other == name);
+        place.is_some_and(|k| estimate.posterior().covariance[(k, k)] > 0.0)
+    };
+    let mut names: Vec<&str> = Vec::new();
+    for (name, ..) in estimates.iter().flat_map(SavedEstimate::entries) {
+        if is_of_arm(name) && !names.contains(&name) {
+            names.push(name);
+        }
+    }
+    names.retain(|name| estimates.iter().any(|estimate| has_variance(estimate, name)));
+    let (kept, left_out): (Vec<&str>, Vec<&str>) = names
+        .into_iter()
+        .partition(|name| estimates.iter().all(|estimate| has_variance(estimate, name)));
+    (kept, left_out.into_iter().map(str::to_owned).collect())
 }
 
 /// Returns what the rows of an arm say of the parameters `names`: its posterior divided by the
@@ -212,7 +270,7 @@ fn likelihood(
     scaled =
         &eigen.eigenvectors * DMatrix::from_diagonal(&positive) * eigen.eigenvectors.transpose();
     let information = DMatrix::from_fn(n, n, |i, j| scaled[(i, j)] / (scale[i] * scale[j]));
-    Ok(Likelihood { information, vector })
+    Ok(Likelihood { information, vector, variance: covariance.diagonal() })
 }
 
 /// Returns mean and covariance of the deviations of one arm, given mean and variance of the fleet.
@@ -235,16 +293,14 @@ fn conditioned(
     Some((mean + moved, covariance))
 }
 
-/// Finds mean and spread by expectation maximisation from a mean and a variance; `sheet` holds the
-/// declared 1 σ.
+/// Finds mean and spread by expectation maximisation from a mean and a variance.
 fn maximised(
     arms: &[&Likelihood],
-    sheet: &DVector<f64>,
+    sheet: &DataSheet,
     (mut mean, mut variance): (DVector<f64>, DVector<f64>),
     max_steps: usize,
 ) -> Model {
-    let (n, count) = (sheet.len(), arms.len() as f64);
-    let declared = sheet.component_mul(sheet);
+    let (n, count) = (mean.len(), arms.len() as f64);
     let mut mean_variance = DVector::zeros(n);
     for _ in 0..max_steps {
         let found: Vec<_> =
@@ -258,16 +314,16 @@ fn maximised(
         }
         let mut next = DVector::zeros(n);
         for k in 0..n {
-            let precision = count / variance[k] + declared[k].recip();
+            let precision = count / variance[k] + sheet.mean[k].recip();
             next[k] = sum[k] / variance[k] / precision;
             // Arms that say little of the parameter say little of its mean.
             let informed = (count - inside[k] / variance[k]).max(0.0);
-            mean_variance[k] = (informed / variance[k] + declared[k].recip()).recip();
+            mean_variance[k] = (informed / variance[k] + sheet.mean[k].recip()).recip();
         }
         let mut change = 0.0_f64;
         for k in 0..n {
             let around: f64 = found.iter().map(|(arm, _)| (arm[k] - next[k]).powi(2)).sum();
-            let now = (around + inside[k] + PRIOR_ARMS * declared[k]) / (count + PRIOR_ARMS);
+            let now = (around + inside[k] + PRIOR_ARMS * sheet.spread[k]) / (count + PRIOR_ARMS);
             change = change.max((now / variance[k] - 1.0).abs());
             variance[k] = now;
         }

@@ -33,6 +33,8 @@ const WIDENING: f64 = 3.0;
 /// Smallest part of the prior variance that new rows must remove for their own estimate to be
 /// stated.
 const LEAST_LEARNED: f64 = 1e-3;
+/// Number of standard deviations of the prior beyond which a bound contradicts it.
+const BOUND_SIGMAS: f64 = 3.0;
 /// Standard deviation (1 σ) of the deviation of a parameter without any prior: \[m\], \[rad\], or
 /// of a logarithm.
 const WIDE: f64 = 1.0;
@@ -59,7 +61,8 @@ impl PriorSource {
 /// Fits the identification rows of `data` with the posterior of an earlier estimate, or
 /// what is known of its siblings, as prior, widened by the drift of `days` days.
 ///
-/// Rows that the earlier estimate was fitted to are left out, because the prior contains them.
+/// Rows that the earlier estimate was fitted to are left out, held-out rows too, because the prior
+/// contains them.
 /// Where the new rows contradict the prior, the parameters that explain it best get a wide prior,
 /// and the fit is repeated.
 ///
@@ -86,12 +89,15 @@ pub fn identify_with_prior(
     let is_new = |row: &usize| !original.fitted_rows.contains(&data.measurements.row_digest(*row));
     let identification: Vec<usize> =
         data.split.identification.iter().copied().filter(is_new).collect();
+    let held_out: Vec<usize> = data.split.held_out.iter().copied().filter(is_new).collect();
     let left_out = data.split.identification.len() - identification.len();
     if identification.is_empty() && left_out > 0 {
         return Err(PriorError::NothingNew { file: original.file, rows: left_out });
     }
-    let split = Split { identification, held_out: data.split.held_out.clone() };
+    let left_out = left_out + data.split.held_out.len() - held_out.len();
+    let split = Split { identification, held_out };
     let data = Dataset::new(data.measurements.clone(), split);
+    let declared_problem = problem;
     let mut problem = problem.clone();
     if let Some(sigma) = original.sigma {
         let declared = problem.data.position_sigma.unwrap_or(0.0);
@@ -109,14 +115,25 @@ pub fn identify_with_prior(
         });
         let cause = cause.filter(|_| is_new_cause && causes.len() < MAX_CAUSES);
         let Some(cause) = cause else {
+            causes.extend(contradicting_bound(&model, &found, &original));
             found.findings.extend(causes.iter().map(|cause| cause.finding(source.file())));
             found.fitted_rows.extend(original.fitted_rows.iter().cloned());
             found.fitted_rows.sort();
             found.fitted_rows.dedup();
             let labels = causes.into_iter().map(|cause| cause.label).collect();
-            found.prior = Some(compare(&model, &found, (&original, &prior), |comparison| {
-                PriorComparison { days, left_out, chi2, causes: labels, ..comparison }
-            }));
+            found.prior =
+                Some(compare(&model, &found, (&original, &prior), |comparison| PriorComparison {
+                    days,
+                    left_out,
+                    variance_ratio: variance_ratio([declared_problem, &problem], &data),
+                    estimated_sigma: problem
+                        .data
+                        .position_sigma
+                        .filter(|_| declared_problem.data.position_sigma.is_none()),
+                    chi2,
+                    causes: labels,
+                    ..comparison
+                }));
             return Ok(found);
         };
         for &(parameter, size) in &cause.widened {
@@ -127,6 +144,42 @@ pub fn identify_with_prior(
         }
         causes.push(cause);
     }
+}
+
+/// Returns the mean variance of the measured positions that `problems[1]` assumes, relative to
+/// that of `problems[0]`; 1 without a declared one.
+fn variance_ratio(problems: [&Problem; 2], data: &Dataset) -> f64 {
+    let rows = &data.split.identification;
+    let variance = |problem: &Problem| -> Option<f64> {
+        let sigma = |&row: &usize| data.measurements.sigma_of(row).or(problem.data.position_sigma);
+        rows.iter().map(|row| Some(sigma(row)?.powi(2))).sum()
+    };
+    let [declared, taken] = problems.map(variance);
+    declared.zip(taken).filter(|(declared, _)| *declared > 0.0).map_or(1.0, |(a, b)| b / a)
+}
+
+/// Returns the parameter at a bound that contradicts the prior most, if one does.
+fn contradicting_bound(
+    model: &Model,
+    found: &Identification,
+    prior: &Earlier,
+) -> Option<Contradiction> {
+    let sigmas = |(place, &k): (usize, &usize)| {
+        found.estimates[k].at_bound?;
+        let sigma = prior.covariance[(place, place)].sqrt();
+        Some((k, ((found.x[k] - prior.mean[place]) / sigma).abs()))
+    };
+    let held = prior.places.iter().enumerate().filter_map(sigmas);
+    let (k, sigmas) = held.max_by(|a, b| a.1.total_cmp(&b.1))?;
+    (sigmas > BOUND_SIGMAS).then(|| Contradiction {
+        label: format!(
+            "bound of {}, {sigmas:.1} σ from the earlier estimate",
+            model.parameters[k].name
+        ),
+        probability: 1.0,
+        widened: Vec::new(),
+        noise_ratio: None,
+    })
 }
 
 /// Cause for which new rows contradict the earlier estimate.
@@ -183,13 +236,14 @@ fn contradiction(
     let p_value = ChiSquared::new(assessed.coordinates)
         .map_or(f64::NAN, |distribution| distribution.sf(assessed.chi2));
     let chi2 = Some((assessed.chi2, assessed.coordinates, p_value));
-    (most_probable(&assessed, &causes, extended.declared), chi2)
+    let location = |row: usize| data.measurements.location(rows[row]).to_string();
+    (most_probable(&assessed, (&causes, location), extended.declared), chi2)
 }
 
 /// Returns the most probable cause if the rows contradict the prior.
 fn most_probable(
     assessed: &Assessment,
-    causes: &[Cause],
+    (causes, location): (&[Cause], impl Fn(usize) -> String),
     declared: usize,
 ) -> Option<Contradiction> {
     let (_, evidence) = *assessed.looks.last()?;
@@ -198,10 +252,7 @@ fn most_probable(
     let size = |i: usize| first.sizes[i].max(first.mean[i].abs());
     let widened = cause.columns.iter().enumerate().filter(|(_, k)| **k < declared);
     Some(Contradiction {
-        label: match first.row {
-            Some(row) => format!("row {} is off", row + 1),
-            None => cause.label.clone(),
-        },
+        label: first.label(causes, location),
         probability: first.probability,
         widened: widened.map(|(i, &k)| (k, size(i))).collect(),
         noise_ratio: (cause.kind == CauseKind::Noise).then(|| first.mean[0]),
@@ -247,18 +298,18 @@ fn compare(
     (original, widened): (&Earlier, &Earlier),
     with: impl FnOnce(PriorComparison) -> PriorComparison,
 ) -> PriorComparison {
-    let variance = |k: usize| found.covariance.entry(k, k).unwrap_or(0.0);
+    let variance = |k: usize| found.covariance.entry(k, k).filter(|variance: &f64| *variance > 0.0);
     let compared = |(place, &k): (usize, &usize)| {
         let (parameter, estimate) = (&model.parameters[k], &found.estimates[k]);
         let slope = parameter.value_error(found.x[k], 1.0).abs();
-        let posterior = variance(k) / slope.powi(2);
+        let posterior = variance(k).map(|variance| variance / slope.powi(2));
         let (mean, prior) = (original.mean[place], original.covariance[(place, place)]);
         let fitted = widened.covariance[(place, place)];
         // The information of the new rows: that of the posterior less that of the prior.
-        let learned = posterior.recip() - fitted.recip();
-        let data = (learned * fitted > LEAST_LEARNED).then(|| {
+        let data = posterior.and_then(|posterior| {
+            let learned = posterior.recip() - fitted.recip();
             let value = (found.x[k] / posterior - mean / fitted) / learned;
-            (value, learned.recip())
+            (learned * fitted > LEAST_LEARNED).then(|| (value, learned.recip()))
         });
         let value = |x: f64, variance: f64| {
             (parameter.value(x), parameter.value_error(x, variance.sqrt()).abs())
@@ -268,7 +319,7 @@ fn compare(
             unit: estimate.unit,
             prior: value(mean, prior),
             data: data.map(|(x, variance)| value(x, variance)),
-            posterior: (estimate.estimate, variance(k).sqrt()),
+            posterior: (estimate.estimate, variance(k).map(f64::sqrt)),
             difference: data.map(|(x, variance)| (x - mean) / (variance + prior).sqrt()),
         }
     };
@@ -280,6 +331,9 @@ fn compare(
         days: 0.0,
         left_out: 0,
         sigma,
+        variance_ratio: 1.0,
+        estimated_sigma: None,
+        includes_fleet: original.includes_fleet,
         chi2: None,
         causes: Vec::new(),
         parameters,

@@ -1,5 +1,7 @@
 //! Measured rows, linearised about an estimate, and their sums.
 
+use std::collections::BTreeMap;
+
 use nalgebra::{DMatrix, DVector};
 
 use crate::least_squares::jacobian_and_residual;
@@ -17,17 +19,52 @@ pub(super) struct SensitiveRows {
     pub stride: usize,
     /// Number of coordinates that each row measures.
     pub coordinates: Vec<usize>,
-    /// Standard deviation (1 σ) of a coordinate of each row \[m\] or \[rad\].
+    /// Standard deviation (1 σ) of the noise of a coordinate of each row \[m\] or \[rad\].
     pub sigma: Vec<f64>,
+    /// Misfit that rows share; `None` if all errors are independent noise.
+    misfit: Option<SharedMisfit>,
 }
 
-/// Sums over rows: G = KᵀK, g = Kᵀr, ‖r‖², and the number of coordinates.
+/// Misfit of the estimate that all rows of one configuration share, independent in each coordinate.
+#[derive(Debug, Clone)]
+pub(super) struct SharedMisfit {
+    /// Number of the configuration of each row.
+    pub configuration: Vec<usize>,
+    /// Standard deviation (1 σ) of the misfit of each residual in units of its noise,
+    /// shape = (rows × stride); 0 where a row measures nothing.
+    pub sigma: DVector<f64>,
+}
+
+/// Sums over rows, weighted by the inverse of Σ, the covariance of noise and shared misfit:
+/// G = KᵀΣ⁻¹K, g = KᵀΣ⁻¹r and rᵀΣ⁻¹r.
+///
+/// The rows of one configuration have Σ = κ² I + m mᵀ in each coordinate, with κ the ratio of the
+/// noise to the assumed one and m the misfit in units of the noise. Its inverse is
+/// κ⁻² (I − m mᵀ / (κ² + mᵀm)), and its determinant κ²ⁿ (1 + mᵀm / κ²).
 #[derive(Debug, Clone)]
 pub(super) struct Sums {
+    /// Matrix G.
     pub information: DMatrix<f64>,
+    /// Vector g.
     pub vector: DVector<f64>,
+    /// Squared length rᵀΣ⁻¹r.
     pub squares: f64,
+    /// Number of coordinates.
     pub coordinates: f64,
+    /// Logarithm of the determinant of Σ.
+    pub ln_det: f64,
+    /// Variance κ² of the noise, relative to the assumed one.
+    variance: f64,
+    /// Sums of each configuration and coordinate that has a misfit.
+    configurations: BTreeMap<(usize, usize), ConfigurationSums>,
+}
+
+/// Sums over the rows of one configuration in one coordinate: mᵀK, mᵀr and mᵀm.
+#[derive(Debug, Clone)]
+struct ConfigurationSums {
+    sensitivity: DVector<f64>,
+    residual: f64,
+    squares: f64,
 }
 
 impl SensitiveRows {
@@ -39,7 +76,26 @@ impl SensitiveRows {
         let residuals = PoseResiduals::new(model, poses, unknowns, x.clone());
         let (jacobian, residual) = jacobian_and_residual(&residuals, x);
         let stride = residual.len() / sigma.len().max(1);
-        Self { sensitivity: -jacobian, residual, stride, coordinates, sigma }
+        Self { sensitivity: -jacobian, residual, stride, coordinates, sigma, misfit: None }
+    }
+
+    /// Adds a misfit that the rows of one configuration share.
+    pub fn share(&mut self, misfit: SharedMisfit) {
+        self.misfit = Some(misfit);
+    }
+
+    /// Returns the standard deviation (1 σ) of the first coordinate of a row, noise and misfit
+    /// together \[m\] or \[rad\].
+    pub fn total_sigma(&self, row: usize) -> f64 {
+        let misfit = self.misfit.as_ref().map_or(0.0, |misfit| misfit.sigma[row * self.stride]);
+        self.sigma[row] * misfit.hypot(1.0)
+    }
+
+    /// Returns the configuration of a row and the misfit of one of its coordinates, if it has one.
+    fn misfit_of(&self, row: usize, coordinate: usize) -> Option<(usize, f64)> {
+        let misfit = self.misfit.as_ref()?;
+        let sigma = misfit.sigma[row * self.stride + coordinate];
+        (sigma > 0.0).then(|| (misfit.configuration[row], sigma))
     }
 
     /// Returns the number of rows.
@@ -75,18 +131,80 @@ impl SensitiveRows {
 }
 
 impl Sums {
-    /// Creates the sums of no rows, for `columns` columns.
-    pub fn new(columns: usize) -> Self {
-        let (information, vector) = (DMatrix::zeros(columns, columns), DVector::zeros(columns));
-        Self { information, vector, squares: 0.0, coordinates: 0.0 }
+    /// Creates the sums of no rows, for `columns` columns and noise that is `ratio` times the
+    /// assumed one.
+    pub fn new(columns: usize, ratio: f64) -> Self {
+        Self {
+            information: DMatrix::zeros(columns, columns),
+            vector: DVector::zeros(columns),
+            squares: 0.0,
+            coordinates: 0.0,
+            ln_det: 0.0,
+            variance: ratio * ratio,
+            configurations: BTreeMap::new(),
+        }
     }
 
     /// Adds one row, `weight` times; −1 removes it.
     pub fn add(&mut self, rows: &SensitiveRows, row: usize, weight: f64) {
         let (sensitivity, residual) = (rows.of_row(row), rows.residual_of(row));
-        self.information += sensitivity.tr_mul(&sensitivity) * weight;
-        self.vector += sensitivity.tr_mul(&residual) * weight;
-        self.squares += residual.norm_squared() * weight;
-        self.coordinates += rows.coordinates[row] as f64 * weight;
+        let coordinates = rows.coordinates[row] as f64 * weight;
+        let precision = weight / self.variance;
+        self.information += sensitivity.tr_mul(&sensitivity) * precision;
+        self.vector += sensitivity.tr_mul(&residual) * precision;
+        self.squares += residual.norm_squared() * precision;
+        self.coordinates += coordinates;
+        self.ln_det += coordinates * self.variance.ln();
+        for coordinate in 0..rows.coordinates[row] {
+            let Some((configuration, misfit)) = rows.misfit_of(row, coordinate) else { continue };
+            let place = (configuration, coordinate);
+            let none = || ConfigurationSums {
+                sensitivity: DVector::zeros(self.vector.len()),
+                residual: 0.0,
+                squares: 0.0,
+            };
+            let mut sums = self.configurations.remove(&place).unwrap_or_else(none);
+            self.add_configuration(&sums, -1.0);
+            sums.sensitivity += sensitivity.row(coordinate).transpose() * (weight * misfit);
+            sums.residual += weight * misfit * residual[coordinate];
+            sums.squares += weight * misfit * misfit;
+            self.add_configuration(&sums, 1.0);
+            self.configurations.insert(place, sums);
+        }
+    }
+
+    /// Adds the part of a configuration by which Σ⁻¹ differs from κ⁻² I; −1 removes it.
+    fn add_configuration(&mut self, sums: &ConfigurationSums, weight: f64) {
+        let factor = -weight / (self.variance * (self.variance + sums.squares));
+        let ConfigurationSums { sensitivity, residual, squares } = sums;
+        self.information.ger(factor, sensitivity, sensitivity, 1.0);
+        self.vector.axpy(factor * residual, sensitivity, 1.0);
+        self.squares += factor * residual * residual;
+        self.ln_det += weight * (squares / self.variance).ln_1p();
+    }
+
+    /// Returns the measured coordinates e of one row of these sums: eᵀΣ⁻¹K, eᵀΣ⁻¹r, and the
+    /// diagonal of eᵀΣ⁻¹e.
+    pub fn of_row(
+        &self,
+        rows: &SensitiveRows,
+        row: usize,
+    ) -> (DMatrix<f64>, DVector<f64>, DVector<f64>) {
+        let measured = rows.coordinates[row];
+        let mut sensitivity = rows.of_row(row).rows(0, measured) / self.variance;
+        let mut residual = rows.residual_of(row).rows(0, measured) / self.variance;
+        let mut diagonal = DVector::from_element(measured, self.variance.recip());
+        for coordinate in 0..measured {
+            let Some((configuration, misfit)) = rows.misfit_of(row, coordinate) else { continue };
+            let Some(sums) = self.configurations.get(&(configuration, coordinate)) else {
+                continue;
+            };
+            let factor = misfit / (self.variance * (self.variance + sums.squares));
+            let mut line = sensitivity.row_mut(coordinate);
+            line -= sums.sensitivity.transpose() * factor;
+            residual[coordinate] -= factor * sums.residual;
+            diagonal[coordinate] -= factor * misfit;
+        }
+        (sensitivity, residual, diagonal)
     }
 }

@@ -5,11 +5,11 @@ use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 
 use super::assessment::{AssessedCause, assess};
 use super::causes::{Cause, CauseKind, Extended};
-use super::earlier::Earlier;
+use super::earlier::{EQUAL_SIGMA, Earlier};
 use super::error::PriorError;
 use super::evidence::{Unchanged, factor};
 use super::identify::{covariance, warmth};
-use super::rows::{SensitiveRows, Sums};
+use super::rows::{SensitiveRows, SharedMisfit, Sums};
 use crate::fit::{self, Placement, SavedEstimate};
 use crate::measurement::Measurements;
 use crate::model::{Model, Pose};
@@ -30,14 +30,14 @@ const LEAST_DIFFERENCE: f64 = 1e-3;
 /// Number of standard errors by which the noise of predictions exceeds the declared one for the
 /// difference to be misfit.
 const BEYOND_SCATTER: f64 = 2.0;
-/// Standard deviation (1 σ) of a coordinate if nothing is known of it \[m\].
-const UNKNOWN_SIGMA: f64 = 1e-3;
 
 /// Verdict on an arm since its estimate.
 #[derive(Debug, Clone)]
 pub struct Watch {
     /// Probability of a false alarm at any look.
     pub false_alarm_rate: f64,
+    /// True if the fit of the estimate was trusted.
+    pub estimate_trusted: bool,
     /// Number of rows that were tested.
     pub rows: usize,
     /// Number of rows that were left out, because the estimate was fitted to them.
@@ -65,7 +65,7 @@ pub struct WatchedCause {
     pub kind: CauseKind,
     /// Name for people, such as "zero of joint 2".
     pub label: String,
-    /// Gross row, counted from 0, if that is the cause.
+    /// Gross row, counted from 0 among all rows of the table, if that is the cause.
     pub row: Option<usize>,
     /// Probability among all causes, given that something changed.
     pub probability: f64,
@@ -107,12 +107,13 @@ impl Watch {
 /// Tests measured rows, in their order, against an estimate that is `days` days old.
 ///
 /// The residuals of an unchanged arm are normal with the covariance of noise, known misfit and
-/// estimate. Their density is compared with a mixture of densities, one for each cause and size of
-/// a change. The ratio exceeds 1 / `false_alarm_rate` at any look with at most that probability if
+/// estimate. The misfit is the same in all rows of one configuration. Their density is compared with
+/// a mixture of densities, one for each cause and size of a change. The ratio exceeds 1 / `false_alarm_rate` at any look with at most that probability if
 /// nothing changed. Rows that the estimate was fitted to are left out.
 ///
 /// # Errors
-/// Returns an error if the estimate is of another arm or has other laws, or if no row is new.
+/// Returns an error if the estimate is of another arm or has other laws, if no row is new, or if
+/// rows have no σ.
 pub fn watch(
     problem: &Problem,
     estimate: &SavedEstimate,
@@ -135,16 +136,24 @@ pub fn watch(
     let extended = Extended::new(problem, &model, &x, [&placement.bases, &placement.targets]);
     let every_row: Vec<usize> = (0..kept.len()).collect();
     let turn = problem.data.orientation_sigma.filter(|_| problem.data.fits_orientation);
-    let (sigma, noise) = noise(problem, estimate);
+    let known = KnownNoise::of(problem, estimate);
+    if known.sigma.is_none() && !kept.has_sigma_in_every_row() && measures_positions(&kept) {
+        return Err(PriorError::NoSigma { file: estimate.file.clone() });
+    }
+    let sigma = known.sigma.unwrap_or(f64::NAN);
     let mut poses = placement.oriented_poses(&kept, &every_row, (sigma, turn));
     estimate.count_time_in(&mut poses);
-    for pose in &mut poses {
-        noise.raise(pose);
-    }
+    let misfit = known.misfit_of(&poses);
     let leading = kept.leading();
     let leads: Vec<bool> =
         every_row.iter().map(|&row| kept.observation(row).kind() == leading.kind()).collect();
     let mut rows = SensitiveRows::new(&extended.model, poses, &extended.x);
+    if let Some(misfit) = misfit {
+        let coordinate = |place: usize| misfit[place / rows.stride].get(place % rows.stride);
+        let sigma = (0..rows.residual.len()).map(|k| coordinate(k).copied().unwrap_or(0.0));
+        let sigma = DVector::from_iterator(rows.residual.len(), sigma);
+        rows.share(SharedMisfit { configuration: kept.pose_numbers(problem), sigma });
+    }
     let warmth = warmth(problem, &kept, &every_row);
     let causes = extended.causes(problem, &mut rows, warmth.as_deref());
     let factor = factor(&covariance(&extended, &earlier, rows.sensitivity.ncols()));
@@ -163,15 +172,17 @@ pub fn watch(
         .map(|(_, cause)| cause)
         .take(MAX_CAUSES)
         .collect();
-    let in_file = |row: usize| new[row];
-    let causes = (0..reported.len())
+    let location = |row: usize| kept.location(row).to_string();
+    let watched = (0..reported.len())
         .map(|k| WatchedCause {
-            row: reported[k].row.map(in_file),
+            row: reported[k].row.map(|row| new[row]),
+            label: reported[k].label(&causes, location),
             ..report.cause(reported[k], reported.get(usize::from(k == 0)).copied())
         })
         .collect();
     Ok(Watch {
         false_alarm_rate,
+        estimate_trusted: estimate.trusted,
         rows: kept.len(),
         left_out,
         looks: assessed.looks,
@@ -179,54 +190,75 @@ pub fn watch(
         chi2: (assessed.chi2, assessed.coordinates, p_value),
         error: report.rms(|row| rows.residual_of(row)),
         unit: kind_named(leading.kind()).unit,
-        sigma: leads.iter().position(|leads| *leads).map_or(f64::NAN, |first| rows.sigma[first]),
-        causes,
+        sigma: leads
+            .iter()
+            .position(|leads| *leads)
+            .map_or(f64::NAN, |first| rows.total_sigma(first)),
+        causes: watched,
     })
 }
 
-/// Noise beyond the declared one that the earlier fit found.
+/// Noise of new rows, and the misfit that the earlier fit found beyond it.
 struct KnownNoise {
+    /// Standard deviation (1 σ) of a position's coordinate in rows that state none \[m\]; `None`
+    /// if nothing states it.
+    sigma: Option<f64>,
     /// Standard deviation (1 σ) of the misfit of a position's coordinate \[m\].
     misfit: f64,
-    /// Factor on the σ of other kinds of rows.
-    factor: f64,
+    /// Standard deviation (1 σ) of the misfit of other coordinates, in units of their noise.
+    other_misfit: f64,
 }
 
 impl KnownNoise {
-    /// Adds the known misfit to the σ of a row.
-    fn raise(&self, pose: &mut Pose) {
-        if pose.observation.is_position() {
-            pose.sigma = pose.sigma.hypot(self.misfit);
-        } else {
-            pose.sigma *= self.factor;
+    /// Returns the declared noise, or else that of the earlier fit. The misfit is what exceeds it
+    /// in the larger of two: the σ that the earlier fit took, and the noise of its predictions
+    /// where that is certainly larger than declared.
+    fn of(problem: &Problem, estimate: &SavedEstimate) -> Self {
+        let saved = estimate.posterior();
+        let declared = problem.data.position_sigma.or(estimate.estimated_sigma);
+        // Rows that were fitted with the σ of a column: that of the fit without its misfit.
+        let of_rows = |taken: f64| taken / saved.noise_factor.max(1.0).sqrt();
+        let sigma = declared.or(saved.sigma_taken.map(of_rows));
+        let of_predictions = |sigma: f64| {
+            let text = estimate.prediction.as_ref()?;
+            let prediction: serde_json::Value = serde_json::from_str(text).ok()?;
+            let number = |key: &str| prediction.get(key)?.as_f64();
+            let noise = number("noise_m")?.hypot(number("configuration_noise_m")?);
+            // Known to the scatter of its own estimate, of about half the fitted coordinates.
+            let configurations = prediction.get("scores")?.get("configurations")?.as_f64()?;
+            let scatter = (2.0 / (1.5 * configurations).max(1.0)).sqrt();
+            Some(noise).filter(|noise| (noise / sigma).powi(2) > 1.0 + BEYOND_SCATTER * scatter)
+        };
+        let misfit = sigma.map_or(0.0, |sigma| {
+            let taken = saved.sigma_taken.filter(|taken| *taken > sigma * (1.0 + EQUAL_SIGMA));
+            let largest = taken.unwrap_or(0.0).max(of_predictions(sigma).unwrap_or(0.0));
+            (largest * largest - sigma * sigma).max(0.0).sqrt()
+        });
+        let excess = saved.noise_factor - 1.0;
+        let other_misfit = if excess > EQUAL_SIGMA { excess.sqrt() } else { 0.0 };
+        Self { sigma, misfit, other_misfit }
+    }
+
+    /// Returns the misfit of each coordinate of each pose in units of its noise; `None` without a
+    /// misfit.
+    fn misfit_of(&self, poses: &[Pose]) -> Option<Vec<Vec<f64>>> {
+        if self.misfit == 0.0 && self.other_misfit == 0.0 {
+            return None;
         }
-        if let Some(orientation) = &mut pose.orientation {
-            orientation.sigma *= self.factor;
-        }
+        let of_pose = |pose: &Pose| {
+            let is_position = pose.observation.is_position();
+            let first = if is_position { self.misfit / pose.sigma } else { self.other_misfit };
+            let mut misfit = vec![first; pose.observation.coordinates()];
+            misfit.resize(pose.coordinates(), self.other_misfit);
+            misfit
+        };
+        Some(poses.iter().map(of_pose).collect())
     }
 }
 
-/// Returns σ of a position's coordinate in rows that state none \[m\], and the noise beyond it that
-/// the earlier fit found: the larger of the σ that it took, and of the noise of its predictions where that is certainly
-/// larger than declared.
-fn noise(problem: &Problem, estimate: &SavedEstimate) -> (f64, KnownNoise) {
-    let saved = estimate.posterior();
-    let declared = problem.data.position_sigma.or(estimate.estimated_sigma);
-    let sigma = declared.unwrap_or(UNKNOWN_SIGMA);
-    let taken = if saved.noise_factor > 1.0 { saved.sigma_taken } else { None };
-    let of_predictions = || {
-        let text = estimate.prediction.as_ref()?;
-        let prediction: serde_json::Value = serde_json::from_str(text).ok()?;
-        let number = |key: &str| prediction.get(key)?.as_f64();
-        let noise = number("noise_m")?.hypot(number("configuration_noise_m")?);
-        // Known to the scatter of its own estimate, of about half the coordinates that were fitted.
-        let configurations = prediction.get("scores")?.get("configurations")?.as_f64()?;
-        let scatter = (2.0 / (1.5 * configurations).max(1.0)).sqrt();
-        Some(noise).filter(|noise| (noise / sigma).powi(2) > 1.0 + BEYOND_SCATTER * scatter)
-    };
-    let largest = taken.unwrap_or(0.0).max(of_predictions().unwrap_or(0.0));
-    let misfit = (largest * largest - sigma * sigma).max(0.0).sqrt();
-    (sigma, KnownNoise { misfit, factor: saved.noise_factor.max(1.0).sqrt() })
+/// Returns true if a row measures a position.
+fn measures_positions(measurements: &Measurements) -> bool {
+    (0..measurements.len()).any(|row| measurements.observation(row).is_position())
 }
 
 /// Rows and causes from which the report of a cause is computed.
@@ -256,10 +288,7 @@ impl Reporter<'_> {
         let rival = rival.filter(|rival| rival.cause != assessed.cause);
         WatchedCause {
             kind: cause.kind,
-            label: match assessed.row {
-                Some(row) => format!("row {} is off", row + 1),
-                None => cause.label.clone(),
-            },
+            label: cause.label.clone(),
             row: assessed.row,
             probability: assessed.probability,
             changes,
@@ -297,7 +326,7 @@ impl Reporter<'_> {
     /// its group.
     fn left_out_error(&self, cause: &Cause, assessed: &AssessedCause) -> Option<f64> {
         let (rows, columns) = (self.rows, self.rows.sensitivity.ncols());
-        let mut sums = Sums::new(columns);
+        let mut sums = Sums::new(columns, 1.0);
         (0..rows.len()).for_each(|row| sums.add(rows, row, 1.0));
         let groups = rows.len().min(MAX_GROUPS);
         let means: Option<Vec<DVector<f64>>> = (0..groups)
@@ -330,7 +359,7 @@ impl Reporter<'_> {
         if cause.columns.is_empty() || other.columns.is_empty() {
             return None;
         }
-        let mut sums = Sums::new(self.rows.sensitivity.ncols());
+        let mut sums = Sums::new(self.rows.sensitivity.ncols(), 1.0);
         (0..self.rows.len()).for_each(|row| sums.add(self.rows, row, 1.0));
         let unchanged = Unchanged::new(&sums, self.factor)?;
         let part = |a: &[usize], b: &[usize]| {

@@ -1,5 +1,7 @@
 //! Text of the command `fleet`.
 
+use std::fmt::Write as _;
+
 use super::document::{Block, Table};
 use super::render::text;
 use crate::life::{Fleet, FleetArm, FleetParameter};
@@ -19,10 +21,16 @@ pub fn fleet_text(fleet: &Fleet) -> String {
         0 => "no arm is unlike the others".to_owned(),
         count => format!("{} unlike the others", counted(count, "arm")),
     };
-    let head = format!("{}: {}, {verdict}", fleet.problem, counted(fleet.arms.len(), "arm"));
+    let mut head = format!("{}: {}, {verdict}", fleet.problem, counted(fleet.arms.len(), "arm"));
+    if !fleet.left_out.is_empty() {
+        let names = fleet.left_out.join(", ");
+        let _ = write!(head, "\nLeft out, without a variance in some estimate: {names}");
+    }
     let parameters = fleet.parameters.iter().map(parameter).collect();
     let arms = fleet.arms.iter().map(arm).collect();
-    let notes = ["deviations from nominal; spread: 1 σ from arm to arm; data sheet: declared 1 σ"];
+    let notes = [
+        "deviations from nominal; spread: 1 σ of the next arm about the mean; data sheet: declared 1 σ",
+    ];
     text(&[
         Block::lines(head),
         Block::Table(Table::new(&PARAMETERS, parameters, &[0]).noted(&notes)),

@@ -9,6 +9,8 @@ use crate::quantity::format::{counted, decimals, number, or_dash, p_value};
 /// Header of the table of parameters.
 const HEADER: [&str; 7] =
     ["parameter", "earlier", "± 1 σ", "new rows", "± 1 σ", "posterior", "± 1 σ"];
+/// p-value of χ² below which new rows do not agree with the prior.
+const LEAST_P: f64 = 0.001;
 /// Maximum number of decimals of a value.
 const MAX_DECIMALS: usize = 6;
 
@@ -19,7 +21,7 @@ pub(super) fn prior<'a>(found: &Identification) -> Vec<Block<'a>> {
     let rows = comparison.parameters.iter().map(row).collect();
     let note =
         "new rows: what they say together with the earlier estimate of the other parameters; \
-                –: they say less than a thousandth of what was known"
+                –: they say less than a thousandth of what was known, or the parameter is at a bound"
             .to_owned();
     let table = Table { notes: vec![note], ..Table::new(&HEADER, rows, &[0]) };
     vec![
@@ -48,7 +50,11 @@ pub(super) fn summary(comparison: &PriorComparison) -> String {
         );
     }
     let verdict = match comparison.causes.as_slice() {
-        [] => ". They agree.".to_owned(),
+        [] => match comparison.chi2 {
+            Some((.., p)) if p >= LEAST_P => ". They agree.".to_owned(),
+            Some(_) => ". That is improbable, but no single cause explains it.".to_owned(),
+            None => ". Their agreement could not be tested.".to_owned(),
+        },
         causes => format!(". They disagree: {}.", causes.join("; ")),
     };
     text + &verdict
@@ -60,7 +66,8 @@ fn counted_days(days: f64) -> String {
 
 fn row(compared: &ComparedParameter) -> Vec<String> {
     let unit = compared.unit.display(compared.prior.0);
-    let digits = decimals(compared.posterior.1 * unit.factor, MAX_DECIMALS);
+    let error = compared.posterior.1.unwrap_or(compared.prior.1);
+    let digits = decimals(error * unit.factor, MAX_DECIMALS);
     let show = |value: f64| number(value * unit.factor, digits);
     vec![
         format!("{} [{}]", compared.name, unit.symbol),
@@ -69,6 +76,6 @@ fn row(compared: &ComparedParameter) -> Vec<String> {
         or_dash(compared.data, |data| show(data.0)),
         or_dash(compared.data, |data| show(data.1)),
         show(compared.posterior.0),
-        show(compared.posterior.1),
+        or_dash(compared.posterior.1, show),
     ]
 }

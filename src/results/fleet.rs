@@ -11,6 +11,8 @@ use crate::life::{Fleet, FleetArm, FleetParameter};
 pub struct FleetResult {
     pub problem: String,
     pub parameters: Vec<FleetParameterResult>,
+    /// Names of parameters that have no variance in some estimate, and are left out.
+    pub parameters_left_out: Vec<String>,
     pub arms: Vec<FleetArmResult>,
 }
 
@@ -23,7 +25,8 @@ pub struct FleetParameterResult {
     pub nominal: f64,
     pub mean: f64,
     pub mean_error: f64,
-    /// Standard deviation from arm to arm.
+    /// Standard deviation of the next arm about the mean: the spread of the arms, shrunk towards
+    /// the data sheet.
     pub spread: f64,
     /// Declared 1 σ of the prior; null without a prior.
     pub declared: Option<f64>,
@@ -66,6 +69,7 @@ impl FleetResult {
         Self {
             problem: fleet.problem.clone(),
             parameters: fleet.parameters.iter().map(parameter).collect(),
+            parameters_left_out: fleet.left_out.clone(),
             arms: fleet.arms.iter().map(arm).collect(),
         }
     }

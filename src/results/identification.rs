@@ -311,11 +311,14 @@ impl IdentificationResult {
             reduced_chi2: found.reduced_chi2,
             first_time_s: found.first_time,
             estimated_sigma_mm: match found.noise {
-                Noise::Declared | Noise::Unknown => None,
-                Noise::Estimated(sigma) => Some(sigma * 1e3),
-            },
+                Noise::Declared => found.prior.as_ref().and_then(|prior| prior.estimated_sigma),
+                Noise::Unknown => None,
+                Noise::Estimated(sigma) => Some(sigma),
+            }
+            .map(|sigma| sigma * 1e3),
             chance: found.chance,
-            noise_factor: found.noise_factor,
+            noise_factor: found.noise_factor
+                * found.prior.as_ref().map_or(1.0, |prior| prior.variance_ratio),
             sigma_taken_mm,
             sigma_taken_deg,
             sigma_taken_px,

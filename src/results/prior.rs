@@ -10,11 +10,14 @@ use crate::fit::{ComparedParameter, PriorComparison};
 pub struct PriorUse {
     pub file: String,
     pub drift_days: f64,
-    /// Number of rows that were left out, because the earlier estimate was fitted to them.
+    /// Number of rows that were left out, held-out rows included, because the earlier estimate was
+    /// fitted to them.
     pub rows_left_out: usize,
     /// Standard deviation (1 σ) of a coordinate taken from the earlier fit; null if that is the
     /// declared one.
     pub sigma_mm: Option<f64>,
+    /// True if the prior contains that of a fleet.
+    pub includes_fleet: bool,
     /// χ² of the new rows under the prior.
     pub chi2: Option<f64>,
     pub coordinates: Option<f64>,
@@ -31,7 +34,8 @@ pub struct PriorParameter {
     pub unit: &'static str,
     /// Earlier estimate, widened by drift.
     pub prior: Value,
-    /// Estimate by the new rows, with the prior of the other parameters; null if they say nothing.
+    /// Estimate by the new rows, with the prior of the other parameters; null if they say nothing,
+    /// or if the parameter is at a bound.
     pub data: Option<Value>,
     pub posterior: Value,
     /// Difference of data and prior, in units of its standard deviation.
@@ -43,7 +47,8 @@ pub struct PriorParameter {
 #[schemars(rename = "ValueWithError")]
 pub struct Value {
     pub estimate: f64,
-    pub std_error: f64,
+    /// Null at a bound.
+    pub std_error: Option<f64>,
 }
 
 impl PriorUse {
@@ -54,6 +59,7 @@ impl PriorUse {
             file: comparison.file.display().to_string(),
             drift_days: comparison.days,
             rows_left_out: comparison.left_out,
+            includes_fleet: comparison.includes_fleet,
             sigma_mm: comparison.sigma.map(|sigma| sigma * 1e3),
             chi2: chi2.map(|(chi2, ..)| chi2),
             coordinates: chi2.map(|(_, coordinates, _)| coordinates),
@@ -66,13 +72,13 @@ impl PriorUse {
 
 impl PriorParameter {
     fn new(compared: &ComparedParameter) -> Self {
-        let value = |(estimate, std_error)| Value { estimate, std_error };
+        let value = |(estimate, error)| Value { estimate, std_error: Some(error) };
         Self {
             name: compared.name.clone(),
             unit: compared.unit.symbol(),
             prior: value(compared.prior),
             data: compared.data.map(value),
-            posterior: value(compared.posterior),
+            posterior: Value { estimate: compared.posterior.0, std_error: compared.posterior.1 },
             difference_sigmas: compared.difference,
         }
     }

@@ -13,6 +13,8 @@ use crate::quantity::Unit;
 pub struct WatchResult {
     pub problem: String,
     pub estimate: String,
+    /// True if the fit of the estimate was trusted.
+    pub estimate_trusted: bool,
     pub changed: bool,
     /// Probability of an alarm at any look if nothing has changed.
     pub false_alarm_rate: f64,
@@ -47,7 +49,7 @@ pub struct CauseResult {
     /// Kind of the cause, such as `joint-zero`, `tool`, `noise` or `row`.
     pub kind: &'static str,
     pub label: String,
-    /// Gross row, counted from 1, if that is the cause.
+    /// Gross row, counted from 1 among all rows of the table, if that is the cause.
     pub row: Option<usize>,
     /// Probability among all causes, given that something changed.
     pub probability: f64,
@@ -80,6 +82,7 @@ impl WatchResult {
         Self {
             problem: problem.name.clone(),
             estimate: estimate.to_owned(),
+            estimate_trusted: watch.estimate_trusted,
             changed: watch.is_changed(),
             false_alarm_rate: watch.false_alarm_rate,
             drift_days: days,

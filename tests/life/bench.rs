@@ -57,6 +57,32 @@ impl Bench {
         rows
     }
 
+    /// Measures an arm whose joint 2 turns by `amplitude` sin 6q more than its encoder shows, which
+    /// no parameter describes [rad]; each of the `configurations` is measured once.
+    pub fn measure_bent(
+        &self,
+        arm: &Problem,
+        configurations: &[Vec<f64>],
+        (amplitude, seed): (f64, u64),
+    ) -> Measurements {
+        let rig = Rig::new(arm.clone(), Vec::new());
+        let drawn = draw(&self.problem, &self.truth, configurations.len(), seed).rows;
+        let measured = |(row, shown): (&flexcal::rig::Row, &Vec<f64>)| {
+            let mut configuration = shown.clone();
+            configuration[1] += amplitude * (6.0 * shown[1]).sin();
+            let conditions = PoseConditions { configuration, ..row.conditions.clone() };
+            rig.position(&conditions).unwrap() + row.position
+        };
+        let positions: Vec<Vector3<f64>> = drawn.iter().zip(configurations).map(measured).collect();
+        Dataset::builder(configurations.iter().cloned(), positions).measurements().unwrap()
+    }
+
+    /// Returns random configurations.
+    pub fn configurations(&self, poses: usize, seed: u64) -> Vec<Vec<f64>> {
+        let rows = draw(&self.problem, &self.truth, poses, seed).rows;
+        rows.into_iter().map(|row| row.conditions.configuration).collect()
+    }
+
     /// Fits all rows.
     pub fn calibrate(&self, rows: &Measurements) -> Identification {
         identify(&self.problem, &whole(rows), &Options::default()).unwrap()

@@ -3,8 +3,9 @@
 use std::path::Path;
 
 use flexcal::fit::{Options, SavedEstimate};
-use flexcal::life::{FleetPrior, PriorSource, fleet, identify_with_prior};
+use flexcal::life::{FleetPrior, PriorError, PriorSource, fleet, identify_with_prior};
 use flexcal::problem::Problem;
+use flexcal::results::Document as _;
 
 use crate::bench::{Bench, whole, with_zero};
 use crate::common::program::{Folder, assert_contains};
@@ -84,6 +85,36 @@ fn an_arm_unlike_its_siblings_is_named() {
 }
 
 #[test]
+fn an_arm_counts_once_and_the_order_of_files_does_not_matter() {
+    let bench = Bench::new();
+    let estimates: Vec<SavedEstimate> =
+        (0..3).map(|k| estimate(&bench, &sibling(&bench, 3, k), 300 + k)).collect();
+    let twice = [&estimates[..], &estimates[..1]].concat();
+    assert!(matches!(fleet(&twice), Err(PriorError::SameRows { rows: FULL, .. })));
+    let backwards: Vec<SavedEstimate> = estimates.iter().rev().cloned().collect();
+    let (a, b) = (fleet(&estimates).unwrap(), fleet(&backwards).unwrap());
+    for (a, b) in a.parameters.iter().zip(&b.parameters) {
+        assert!(a.name == b.name && (a.spread / b.spread - 1.0).abs() < 1e-9, "{a:?} {b:?}");
+    }
+    // Without a variance in one arm, a parameter is left out, whichever arm it is.
+    let found = bench.calibrate(&bench.measure(&sibling(&bench, 3, 4), FULL, 77, 1.0));
+    let text = flexcal::results::IdentificationResult::new(&bench.problem, &found).to_json();
+    let mut document: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let names = document["parameters"].as_array().unwrap();
+    let k = names.iter().position(|entry| entry["name"] == "joint3.a").unwrap();
+    document["covariance"][k][k] = serde_json::Value::Null;
+    document.as_object_mut().unwrap().remove("digest");
+    let held = SavedEstimate::parse(&document.to_string(), Path::new("held.json")).unwrap();
+    for place in [0, 3] {
+        let mut arms = estimates.clone();
+        arms.insert(place, held.clone());
+        let found = fleet(&arms).unwrap();
+        assert_eq!(found.left_out, ["joint3.a"]);
+        assert!(found.parameters.iter().all(|parameter| parameter.name != "joint3.a"));
+    }
+}
+
+#[test]
 fn the_command_writes_a_prior_that_identify_takes() {
     let folder = Folder::with_lunar_sampler();
     for case in ["a-none", "h-none-large", "c-link-thermal-bending"] {
@@ -101,4 +132,7 @@ fn the_command_writes_a_prior_that_identify_takes() {
         &folder.flexcal(run).success().stdout,
         &["Earlier estimate as prior", "PRIOR.toml"],
     );
+    let again = files.replace("a-none", "with");
+    let twice = folder.flexcal(&format!("fleet {again} --out TWICE.toml")).code(2);
+    assert_contains(&twice.stderr, &["prior from siblings"]);
 }

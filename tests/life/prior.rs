@@ -1,8 +1,11 @@
 //! Identification with an earlier estimate as prior.
 
-use flexcal::fit::{FindingCode, Identification, Options};
+use std::path::Path;
+
+use flexcal::fit::{FindingCode, Identification, Options, SavedEstimate};
 use flexcal::life::{PriorError, PriorSource, identify_with_prior};
 use flexcal::measurement::{Dataset, Split};
+use flexcal::results::{Document as _, IdentificationResult};
 
 use crate::bench::{Bench, whole, with_zero};
 use crate::common::program::{Folder, assert_contains};
@@ -81,6 +84,51 @@ fn earlier_rows_are_not_counted_twice() {
         assert!((0.8..1.25).contains(&ratio), "{}: {ratio}", a.name);
     }
     assert!(matches!(run(&data), Err(PriorError::NothingNew { rows: FULL, .. })));
+    // Earlier rows are not held out either.
+    let held_out = Split { identification: (FULL..FULL + 5).collect(), held_out: (0..9).collect() };
+    let found = run(&Dataset::new(rows, held_out)).unwrap();
+    assert_eq!(found.fitted.held_out.n, 0);
+    let json: serde_json::Value =
+        serde_json::from_str(&IdentificationResult::new(&bench.problem, &found).to_json()).unwrap();
+    assert_eq!(json["prior"]["rows_left_out"], 9);
+}
+
+#[test]
+fn the_noise_of_the_first_fit_is_kept() {
+    let bench = Bench::new();
+    let arm = bench.arm(2);
+    let amplitude = 0.05_f64.to_radians();
+    let measured = |poses, seed| {
+        let configurations = bench.configurations(poses, seed);
+        bench.measure_bent(&arm, &configurations, (amplitude, seed + 1))
+    };
+    let rows = measured(FULL, 500);
+    let first = bench.calibrate(&rows);
+    assert!(first.noise_factor > 1.5, "{}", first.noise_factor);
+    let mut problem = bench.problem.clone();
+    for declared in [problem.data.position_sigma, None] {
+        problem.data.position_sigma = declared;
+        let first = flexcal::fit::identify(&problem, &whole(&rows), &Options::default()).unwrap();
+        let text = IdentificationResult::new(&problem, &first).to_json();
+        let estimate = SavedEstimate::parse(&text, Path::new("first.json")).unwrap();
+        let prior = PriorSource::Estimate(Box::new(estimate));
+        let new = whole(&measured(6, 600));
+        let found = identify_with_prior(&problem, &new, &Options::default(), &prior, 0.0).unwrap();
+        let text = IdentificationResult::new(&problem, &found).to_json();
+        let [first, second] = [first.sigma_taken, found.sigma_taken];
+        assert!(second > 0.999 * first, "{first} {second}");
+        let json: serde_json::Value = serde_json::from_str(&text).unwrap();
+        match declared {
+            Some(sigma) => {
+                let factor = json["noise_factor"].as_f64().unwrap();
+                assert!((factor - (second / sigma).powi(2)).abs() < 1e-6 * factor, "{factor}");
+            }
+            None => {
+                let sigma = json["estimated_sigma_mm"].as_f64().unwrap();
+                assert!((sigma - 1e3 * second).abs() < 1e-6 * sigma, "{sigma}");
+            }
+        }
+    }
 }
 
 #[test]

@@ -38,6 +38,29 @@ fn an_unchanged_arm_is_unchanged() {
 }
 
 #[test]
+fn misfit_that_repeats_with_the_pose_is_no_change() {
+    let bench = Bench::new();
+    let amplitude = 0.02_f64.to_radians();
+    for seed in 0..4 {
+        let arm = bench.arm(seed);
+        let poses = bench.configurations(FULL, 1000 + seed);
+        let rows = bench.measure_bent(&arm, &poses, (amplitude, 2000 + seed));
+        let estimate = bench.saved(&bench.calibrate(&rows), &rows);
+        let pose = bench.configurations(1, 3000 + seed).remove(0);
+        let visits = vec![pose; 40];
+        let rows = bench.measure_bent(&arm, &visits, (amplitude, 4000 + seed));
+        let verdict = judged(&bench, &estimate, &rows);
+        assert!(!verdict.is_changed(), "{seed}: {verdict:?}");
+        assert!(verdict.sigma > 0.05e-3, "{verdict:?}");
+        // A change that other poses show is still seen.
+        let moved = with_zero(&arm, 2, 0.1);
+        let poses = bench.configurations(12, 5000 + seed);
+        let rows = bench.measure_bent(&moved, &poses, (amplitude, 6000 + seed));
+        assert!(judged(&bench, &estimate, &rows).is_changed(), "{seed}");
+    }
+}
+
+#[test]
 fn a_moved_zero_and_a_moved_tool_are_named_with_their_size() {
     let bench = Bench::new();
     let (arm, estimate) = calibrated(&bench, 2);
@@ -69,7 +92,8 @@ fn noise_a_gross_row_and_a_warm_arm_are_no_change_of_geometry() {
     let mut rows = bench.measure(&arm, 12, 4006, 1.0);
     rows.positions[7].y += 2e-3;
     let gross = first(&rows);
-    assert_eq!(gross.named().map(|cause| cause.row), Some(Some(7)), "{gross:?}");
+    let named = gross.named().map(|cause| (cause.row, &*cause.label));
+    assert_eq!(named, Some((Some(7), "arrays:8 is off")), "{gross:?}");
     let warm = first(&bench.measure(&warmed(&arm, 3e-4), 12, 4007, 1.0));
     assert!(warm.is_changed() && warm.causes[0].kind == CauseKind::Temperature, "{warm:?}");
     // With a temperature in the table, a zero that moved with it is not called a moved zero.

@@ -65,6 +65,8 @@ pub(crate) struct SavedPosterior {
     pub noise_factor: f64,
     /// Digests of the rows that were fitted.
     pub fitted_rows: HashSet<String>,
+    /// True if the prior of the fit contains that of a fleet.
+    pub includes_fleet: bool,
 }
 
 #[derive(Debug, Clone, Deserialize)]
@@ -108,6 +110,12 @@ struct Document {
     sigma_taken_mm: Option<f64>,
     noise_factor: Option<f64>,
     fitted_rows: Option<HashSet<String>>,
+    prior: Option<PriorEntry>,
+}
+
+#[derive(Debug, Deserialize)]
+struct PriorEntry {
+    includes_fleet: Option<bool>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -215,6 +223,7 @@ impl SavedEstimate {
             sigma_taken_mm,
             noise_factor,
             fitted_rows,
+            prior,
         } = match serde_json::from_str(text) {
             Ok(document) => document,
             Err(source) => return Err(SavedEstimateError::Syntax { file, source }),
@@ -274,6 +283,7 @@ impl SavedEstimate {
                 sigma_taken: sigma_taken_mm.map(|sigma| sigma * 1e-3),
                 noise_factor: noise_factor.unwrap_or(1.0),
                 fitted_rows: fitted_rows.unwrap_or_default(),
+                includes_fleet: prior.and_then(|prior| prior.includes_fleet).unwrap_or(false),
             },
             parameters,
         })
