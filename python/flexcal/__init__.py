@@ -13,6 +13,7 @@ otherwise (``x_mm``, ``mean_mm``, ``temperature_C``).
 
 from __future__ import annotations
 
+from ._fleet import fleet
 from ._forward import Prediction
 from ._least_squares import LeastSquares
 from ._problem import Problem, study
@@ -50,5 +51,6 @@ __all__ = [
     "Simulation",
     "Study",
     "Trace",
+    "fleet",
     "study",
 ]

@@ -4,11 +4,13 @@ from os import PathLike
 from typing import Literal, TypeAlias
 
 from ._progress import Step
+from ._restored import Prior
 from ._tables import Source
 
 _Pages: TypeAlias = tuple[str, str, list[tuple[str, str]]]
 
 def command_line(arguments: list[str]) -> int: ...
+def fleet(estimates: list[PathLike[str]]) -> tuple[str, str]: ...
 def check(
     problem: Problem,
     measured: Poses | None,
@@ -83,7 +85,14 @@ class Problem:
     def data(self, source: Source) -> Data: ...
     def poses(self, source: Source) -> Poses: ...
     def identify(
-        self, data: Data, strategy: str, solver: str, remainder: bool, progress: Step | None
+        self,
+        data: Data,
+        strategy: str,
+        solver: str,
+        remainder: bool,
+        prior: Prior | None,
+        drift_days: float,
+        progress: Step | None,
     ) -> Identification: ...
     def close(self, data: Data, progress: Step | None) -> ClosedLoop: ...
     def trace(self, data: Data, progress: Step | None) -> Trace: ...
@@ -125,6 +134,7 @@ class Compensation:
 
 class Identification:
     def json(self) -> str: ...
+    def watch(self, data: Data, days: float, false_alarms: float) -> str: ...
     def summary(self) -> str: ...
     def report(self) -> _Pages: ...
     @property

@@ -15,7 +15,7 @@ from ._forward import Forward
 from ._least_squares import LeastSquares
 from ._progress import Told, told
 from ._results import Check, ClosedLoop, Comparison, Identification, Next, Plan, Simulation, Study, Trace
-from ._restored import Spec
+from ._restored import Prior, Spec
 from ._tables import Data, Path, Source, count, source, warn
 
 Strategy: TypeAlias = Literal["joint", "sequential", "sequential-one-sweep", "geometry-only", "stiffness-only", "rigid"]
@@ -37,6 +37,13 @@ MOST_POSES = 10_000
 MOST_SEED = 2**64 - 1
 MOST_SIMULATED = 1_000_000
 """Poses that a simulation takes at most, as on the command line."""
+
+def _prior(prior: Path | Identification | None) -> Prior | None:
+    """What the extension module takes as prior: a file, or the name and the text of an estimate."""
+    if isinstance(prior, Identification):
+        return ("estimate.json", prior.to_json())
+    return None if prior is None else os.fspath(prior)
+
 
 TEXT = "<text>"
 """What messages call a problem in memory."""
@@ -139,6 +146,8 @@ class Problem(Forward):
         solver: Solver = "auto",
         *,
         remainder: bool = False,
+        prior: Path | Identification | None = None,
+        drift_days: float = 0.0,
         progress: Told = False,
     ) -> Identification:
         """Fits the free parameters to the rows that are not held out.
@@ -155,6 +164,11 @@ class Problem(Forward):
         remainder
             Correct predictions by what no law explains, if poses left out gain by it (docs/accuracy.md). A remainder that the
             problem declares corrects them anyway.
+        prior
+            Earlier identification of the same arm, or its ``estimate.json``: its posterior is the prior, and rows that were fitted
+            there are left out; or the ``PRIOR.toml`` of :func:`flexcal.fleet` (docs/life.md).
+        drift_days
+            Days since the earlier identification, by whose drift the prior is widened.
         progress
             A function that is called with a :class:`Progress` at every step, or True for a line on standard error.
 
@@ -166,8 +180,10 @@ class Problem(Forward):
         given = self._given_data(data)
         read = self._read(given)
         with told(progress) as step:
-            core = self._core.identify(read, strategy, solver, remainder, step)
-        result = Identification(core, self, Spec("identify", self, given, strategy, solver, remainder))
+            earlier = _prior(prior)
+            core = self._core.identify(read, strategy, solver, remainder, earlier, drift_days, step)
+        spec = Spec("identify", self, given, strategy, solver, remainder, prior=earlier, drift_days=drift_days)
+        result = Identification(core, self, spec)
         result._warn(stacklevel=2)
         return result
 

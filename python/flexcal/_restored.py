@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 from ._tables import Source
 
 if TYPE_CHECKING:
     from ._problem import Problem
+
+Prior: TypeAlias = "str | tuple[str, str]"
+"""A prior as the extension module takes it: a file, or the name and the text of an estimate."""
 
 
 class Spec(NamedTuple):
@@ -21,6 +24,8 @@ class Spec(NamedTuple):
     solver: str = "auto"
     remainder: bool = False
     paper: bool = False
+    prior: Prior | None = None
+    drift_days: float = 0.0
 
     def part(self, name: str) -> Spec:
         """The call that gives a fit of the result, ``"before"`` or ``"after"`` a loop, the ``"fit"`` of a trace or the
@@ -34,7 +39,7 @@ class Spec(NamedTuple):
         whole: Any
         call, _, part = self.call.partition(".")
         if call == "identify":
-            return core.identify(data, self.strategy, self.solver, self.remainder, None)
+            return core.identify(data, self.strategy, self.solver, self.remainder, self.prior, self.drift_days, None)
         if call == "compare":
             whole = core.compare(data, self.paper, None)
         else:

@@ -276,6 +276,31 @@ class Identification(_Fit, Forward):
         text: str | None = self._core.remainder_json()
         return text
 
+    def watch(self, data: Data, *, drift_days: float = 0.0, false_alarms: float = 0.01) -> dict[str, Any]:
+        """Tests new rows, in their order, for a change of the arm since this identification (docs/life.md).
+
+        Parameters
+        ----------
+        data
+            Measurements, as :meth:`Problem.identify` takes them; rows that were fitted are left out.
+        drift_days
+            Days since the identification; what drifts in them counts as no change.
+        false_alarms
+            Probability of an alarm at any row if nothing has changed.
+
+        Returns
+        -------
+        ``watch.json`` of the command line: ``changed``, and ``causes`` with their probabilities and sizes.
+
+        Raises
+        ------
+        InputError
+            No row is new, or the identification has no covariance.
+        """
+        read = self._problem._read(self._problem._given_data(data))
+        verdict: dict[str, Any] = json.loads(self._core.watch(read, drift_days, false_alarms))
+        return verdict
+
     def compensate(
         self, targets: Data, *, frame: Literal["measuring", "base"] = "measuring", level: float = 0.95
     ) -> Compensation:

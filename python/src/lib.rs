@@ -10,6 +10,7 @@ mod data;
 mod design;
 mod error;
 mod least_squares;
+mod life;
 mod outcome;
 mod pool;
 mod problem;
@@ -37,6 +38,8 @@ mod _core {
     use super::design::{Check, Next, Plan, check, next, plan};
     #[pymodule_export]
     use super::least_squares::LeastSquares;
+    #[pymodule_export]
+    use super::life::fleet;
     #[pymodule_export]
     use super::outcome::{ClosedLoop, Identification, Trace};
     #[pymodule_export]

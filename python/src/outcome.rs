@@ -18,8 +18,9 @@ use pyo3::types::PyDict;
 
 use crate::array::{Array, derivatives, numbers, points};
 use crate::compensation::Compensation;
-use crate::data::{Poses, Source};
+use crate::data::{Data, Poses, Source};
 use crate::error::raised;
+use crate::life;
 use crate::pool::detached;
 use crate::residuals;
 use crate::urdf::Export;
@@ -123,7 +124,7 @@ impl Identification {
 #[pymethods]
 impl Identification {
     /// Returns estimate.json, with the uncertainty of predictions.
-    fn json(&self, py: Python<'_>) -> PyResult<String> {
+    pub fn json(&self, py: Python<'_>) -> PyResult<String> {
         detached(py, || {
             let mut result = IdentificationResult::new(&self.problem, &self.found);
             if let Some(fitted) = self.fitted()? {
@@ -146,6 +147,11 @@ impl Identification {
             Ok(text)
         })?
         .map_err(|error: IdentifyError| raised(&error))
+    }
+
+    /// Tests new rows against the identification; returns watch.json.
+    fn watch(&self, py: Python<'_>, data: &Data, days: f64, false_alarms: f64) -> PyResult<String> {
+        life::watch(py, self, data, (days, false_alarms))
     }
 
     /// remainder.json; `None` without a remainder.

@@ -1,12 +1,13 @@
 //! A problem, and what can be done with it.
 
 use std::path::PathBuf;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use flexcal::fit::{
     self, CompareOptions, IdentifyError, Options, Placement, ResidualFunction, SolverChoice,
     Strategy,
 };
+use flexcal::life::{PriorError, identify_with_prior};
 use flexcal::model::Model;
 use flexcal::nalgebra::DVector;
 use flexcal::problem::{Joint, JointKind};
@@ -20,6 +21,7 @@ use crate::comparison::Comparison;
 use crate::data::{Data, Poses, Source};
 use crate::error::{of_argument, raised};
 use crate::least_squares::LeastSquares;
+use crate::life::{Prior, checked_days};
 use crate::outcome::{ClosedLoop, Identification, Trace, closed_text};
 use crate::pool::detached;
 use crate::supervise::supervised;
@@ -130,17 +132,31 @@ impl Problem {
         strategy: &str,
         solver: &str,
         remainder: bool,
+        prior: Option<Prior>,
+        drift_days: f64,
         progress: Option<Bound<'_, PyAny>>,
     ) -> PyResult<Identification> {
+        let drift_days = checked_days(drift_days)?;
+        if prior.is_none() && drift_days > 0.0 {
+            let message = "drift_days: widens a prior, and none is given".to_owned();
+            return Err(of_argument("drift_days", message));
+        }
+        if prior.is_some() && remainder {
+            let message = "remainder: a fit with a prior has none".to_owned();
+            return Err(of_argument("remainder", message));
+        }
+        let prior = prior.map(|prior| detached(py, || prior.read())).transpose()?.transpose();
+        let prior = prior.map_err(|error| raised(&error))?;
         let strategy = word("strategy", strategy, &Strategy::EACH, Strategy::as_str)?;
         let solver = word("solver", solver, SolverChoice::CHOICES, SolverChoice::as_str)?;
         let (problem, data) = (Arc::clone(&self.declared), Arc::clone(&data.data));
-        let declared = if remainder {
+        let declared = if remainder || prior.is_some() {
             None
         } else {
             remainder::declared(&problem).map_err(|error| raised(&error))?
         };
         let is_corrected = remainder || declared.is_some();
+        let has_prior = prior.is_some();
         let found = supervised(py, progress.as_ref(), {
             let (problem, data) = (Arc::clone(&problem), Arc::clone(&data));
             move |sink| {
@@ -149,6 +165,10 @@ impl Problem {
                     .with_strategy(strategy)
                     .with_solver(solver)
                     .with_progress(sink);
+                if let Some(prior) = prior {
+                    let found = identify_with_prior(&problem, &data, &options, &prior, drift_days)?;
+                    return Ok((found, None));
+                }
                 let found = fit::identify(&problem, &data, &options)?;
                 let fitted = match (remainder, declared) {
                     (true, _) => remainder::fit(&found, &problem, &data)?,
@@ -157,11 +177,15 @@ impl Problem {
                         .transpose()?,
                     (false, None) => None,
                 };
-                Ok::<_, IdentifyError>((found, fitted))
+                Ok::<_, PriorError>((found, fitted))
             }
         })?;
         let (found, fitted) = found.map_err(|error| raised(&error))?;
         let identified = Identification::plain(&problem, &data, Arc::new(found));
+        // The uncertainty of predictions would count the new rows alone.
+        if has_prior {
+            return Ok(Identification { fitted: OnceLock::from(None), ..identified });
+        }
         Ok(if is_corrected { identified.corrected(fitted.map(Arc::new)) } else { identified })
     }
 

@@ -1,0 +1,133 @@
+"""Earlier estimates as prior, changes of an arm, and fleets."""
+
+from __future__ import annotations
+
+import json
+import pickle
+from pathlib import Path
+from typing import Any
+
+import flexcal
+import numpy as np
+import pytest
+from conftest import Command
+
+ARM = """\
+name = "elbow"
+joint = [
+  { d_m = 0.45, min_deg = -150, max_deg = 150 },
+  { alpha_deg = 90, a_m = 0.05, min_deg = 0, max_deg = 120 },
+  { a_m = 0.60, min_deg = -130, max_deg = -10 },
+]
+tool.target_m = [0.5, 0.02, 0.0]
+
+[parameters]
+"joint*.*" = { sigma_deg = 0.2, sigma_mm = 1 }
+
+[data]
+position_sigma_mm = 0.03
+held_out = "none"
+"""
+TRUTH = """\
+[parameters]
+"joint2.theta" = { deg = 0.11 }
+"joint3.a" = { mm = 0.6 }
+
+[noise]
+position_sigma_mm = 0.03
+
+[poses]
+q1_deg = [-150, 150]
+q2_deg = [0, 120]
+q3_deg = [-130, -10]
+"""
+
+
+class Sessions:
+    """An arm with its calibration, and tables that were measured later."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        (folder / "problem.toml").write_text(ARM)
+        self.problem = flexcal.Problem(folder)
+        self.first = self.measured(24, 1)
+        self.identified = self.problem.identify(self.first)
+        self.estimate = folder / "estimate.json"
+        self.estimate.write_text(self.identified.to_json())
+
+    def measured(self, poses: int, seed: int, zero: float = 0.11) -> Path:
+        """Measures the arm, the zero of joint 2 off by so many degrees."""
+        truth, table = self.folder / "truth.toml", self.folder / f"rows-{seed}.csv"
+        truth.write_text(TRUTH.replace("deg = 0.11", f"deg = {zero}"))
+        self.problem.simulate(truth, poses=poses, seed=seed).measurements.to_csv(table, index=False)
+        return table
+
+
+@pytest.fixture(scope="module")
+def arm(tmp_path_factory: pytest.TempPathFactory) -> Sessions:
+    return Sessions(tmp_path_factory.mktemp("arm"))
+
+
+def timeless(text: str) -> Any:
+    """A result without times and digests of the whole, and without names of files."""
+    document = json.loads(text)
+    for key in ("seconds", "digest", "estimate", "command", "sources"):
+        document.pop(key, None)
+    return document
+
+
+def test_watch(arm: Sessions, command: Command) -> None:
+    same, moved = arm.measured(6, 2), arm.measured(6, 3, zero=0.16)
+    assert arm.identified.watch(same, drift_days=7)["changed"] is False
+    verdict = arm.identified.watch(moved)
+    assert verdict["changed"] and verdict["causes"][0]["label"] == "zero of joint 2"
+    ran, out = command("watch", arm.folder, "--estimate", arm.estimate, "--data", moved)
+    assert ran.returncode == 3
+    assert timeless(json.dumps(verdict)) == timeless((out / "watch.json").read_text())
+    again = pickle.loads(pickle.dumps(arm.identified))
+    assert again.watch(moved) == verdict
+    for wrong in ({"false_alarms": 0.0}, {"false_alarms": 1.5}, {"drift_days": -1.0}):
+        with pytest.raises(flexcal.InputError, match="is needed"):
+            arm.identified.watch(moved, **wrong)
+    with pytest.raises(flexcal.InputError, match="nothing is new"):
+        arm.identified.watch(arm.first)
+
+
+def test_an_earlier_identification_as_prior(arm: Sessions, command: Command) -> None:
+    rows = arm.measured(5, 4)
+    found = arm.problem.identify(rows, prior=arm.identified, drift_days=7)
+    assert "They agree" in found.summary() and found.to_dict()["prior"]["drift_days"] == 7
+    of_file = arm.problem.identify(rows, prior=arm.estimate, drift_days=7)
+    assert (of_file.parameters["estimate"] == found.parameters["estimate"]).all()
+    _, out = command("identify", arm.folder, "--data", rows, "--prior", arm.estimate, "--drift", 7)
+    written = json.loads((out / "estimate.json").read_text())
+    assert written["parameters"] == of_file.to_dict()["parameters"]
+    # Far fewer rows than parameters, and no less is known than before.
+    before, after = (fit.parameters["std_error"].to_numpy(dtype=float) for fit in (arm.identified, found))
+    assert np.nanmax(after / before) < 1.5
+    again = pickle.loads(pickle.dumps(found))
+    assert again.to_json() == found.to_json()
+    assert (again.predict(q_deg=[10, 20, -30]) == found.predict(q_deg=[10, 20, -30])).all()
+    with pytest.raises(flexcal.InputError, match="none is given"):
+        arm.problem.identify(rows, drift_days=7)
+    with pytest.raises(flexcal.InputError, match="a fit with a prior has none"):
+        arm.problem.identify(rows, prior=arm.identified, remainder=True)
+    with pytest.raises(flexcal.InputError, match=r"absent\.json"):
+        arm.problem.identify(rows, prior=arm.folder / "absent.json")
+
+
+def test_fleet(arm: Sessions, command: Command) -> None:
+    files = [arm.estimate]
+    for number in (1, 2):
+        table = arm.measured(24, 10 + number, zero=0.11 + 0.02 * number)
+        files.append(arm.folder / f"estimate-{number}.json")
+        files[-1].write_text(arm.problem.identify(table).to_json())
+    prior = arm.folder / "PRIOR.toml"
+    found = flexcal.fleet(files, out=prior)
+    zero = next(row for row in found["parameters"] if row["name"] == "joint2.theta")
+    assert zero["spread"] > 0 and len(found["arms"]) == 3
+    _, out = command("fleet", *files, file="PRIOR.toml")
+    assert (out / "PRIOR.toml").read_text() == prior.read_text()
+    assert arm.problem.identify(arm.measured(5, 20), prior=prior).trusted
+    with pytest.raises(flexcal.InputError, match="too few for a fleet"):
+        flexcal.fleet(files[:2])
