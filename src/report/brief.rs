@@ -5,6 +5,7 @@ use super::errors::noun;
 use super::identify::{errors_by_axis, headline};
 use super::noise::{influential_rows, noise};
 use super::parameters::correlated;
+use super::prior::summary;
 use super::render::text_within;
 use super::row_kinds::unsteady;
 use crate::fit::{Estimate, Identification, size_of_kind};
@@ -21,6 +22,7 @@ pub fn estimate_brief(problem: &Problem, found: &Identification, columns: usize)
         Block::lines(noise(problem, found)),
     ];
     blocks.extend(influential_rows(found));
+    blocks.extend(found.prior.as_ref().map(|comparison| Block::Text(summary(comparison))));
     blocks.push(Block::Lines(parameters(&found.estimates), remarks(found)));
     text_within(&blocks, columns)
 }
