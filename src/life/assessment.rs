@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::causes::{Cause, CauseKind};
+use super::causes::{Cause, CauseKind, LARGER_SIZE};
 use super::evidence::{NOISE_RATIOS, Unchanged, ln_sum};
 use super::rows::{SensitiveRows, Sums};
 
@@ -109,6 +109,13 @@ pub(super) fn assess(
     Some(Assessment { looks, causes, chi2, coordinates: sums.coordinates })
 }
 
+/// Returns the logarithms of the prior probabilities of `count` sizes, the smallest size first; the
+/// probabilities sum to 1.
+fn ln_size_priors(count: usize) -> impl Iterator<Item = f64> {
+    let sum = (1.0 - LARGER_SIZE.powf(count as f64)) / (1.0 - LARGER_SIZE);
+    (0..count).map(move |size| size as f64 * LARGER_SIZE.ln() - sum.ln())
+}
+
 /// Computes the weighted likelihood ratio of each cause, and of each of the first `count` rows as a
 /// gross one. `noisier` are the sums with each of [`NOISE_RATIOS`].
 fn ratios(
@@ -152,13 +159,15 @@ fn ratios(
                 let tried: Vec<_> = cause
                     .sizes
                     .iter()
-                    .filter_map(|sizes| Some((unchanged.cause(&cause.columns, sizes)?, sizes)))
+                    .zip(ln_size_priors(cause.sizes.len()))
+                    .filter_map(|(sizes, ln_prior)| {
+                        Some((unchanged.cause(&cause.columns, sizes)?, sizes, ln_prior))
+                    })
                     .collect();
-                let share = ln_sum(tried.iter().map(|((ratio, ..), _)| *ratio))
-                    - (cause.sizes.len() as f64).ln()
+                let share = ln_sum(tried.iter().map(|((ratio, ..), _, ln_prior)| ratio + ln_prior))
                     + cause.ln_weight;
-                let best = tried.into_iter().max_by(|a, b| a.0.0.total_cmp(&b.0.0));
-                weighted.extend(best.map(|((_, mean, covariance), sizes)| Weighted {
+                let best = tried.into_iter().max_by(|a, b| (a.0.0 + a.2).total_cmp(&(b.0.0 + b.2)));
+                weighted.extend(best.map(|((_, mean, covariance), sizes, _)| Weighted {
                     cause: index,
                     row: None,
                     ln_share: share,

@@ -8,7 +8,10 @@ use crate::model::parameter::{BeamField, JointField, Parameter, ParameterSite};
 use crate::problem::{JointKind, Problem};
 use crate::quantity::Unit;
 
-/// Sizes of a moved zero, 1 σ \[°\] or \[mm\], each as probable as the others.
+/// Prior probability of a size relative to that of the next smaller one. A change of k times the
+/// size has k² times the evidence, so large changes are seen in spite of it.
+pub(super) const LARGER_SIZE: f64 = 0.5;
+/// Sizes of a moved zero, 1 σ \[°\] or \[mm\], the smallest first.
 const ZERO_SIZES: [f64; 4] = [0.01, 0.05, 0.25, 1.2];
 /// Sizes of a moved point, 1 σ on each axis \[mm\].
 const LENGTH_SIZES: [f64; 4] = [0.05, 0.2, 1.0, 5.0];
@@ -58,16 +61,16 @@ impl CauseKind {
     /// Kinds with the prior probability of each, given a change; temperature is 20 times as probable
     /// if the rows are warmer or colder than the reference.
     const WEIGHTS: [(Self, f64); 10] = [
-        (Self::Zero, 0.32),
+        (Self::Zero, 0.40),
         (Self::Tool, 0.20),
         (Self::Base, 0.12),
-        (Self::Noise, 0.08),
-        (Self::Row, 0.08),
         (Self::Link, 0.06),
+        (Self::Noise, 0.05),
+        (Self::Row, 0.05),
         (Self::Stiffness, 0.05),
         (Self::Temperature, 0.04),
-        (Self::Law, 0.03),
-        (Self::Fixture, 0.02),
+        (Self::Law, 0.02),
+        (Self::Fixture, 0.01),
     ];
 }
 
