@@ -47,8 +47,8 @@ impl LeastSquares {
                 let (_, axes) = self.data.measurements.observation(row).description().residuals;
                 let turns = ["rx", "ry", "rz"];
                 let turn = || turns.get(coordinate.checked_sub(turns.len())?);
-                let axis = axes.get(coordinate).or_else(turn).copied().unwrap_or_default();
-                (Some(row), axis.to_owned())
+                let component = axes.get(coordinate).or_else(turn).copied().unwrap_or_default();
+                (Some(row), component.to_owned())
             }
             ResidualOrigin::Prior(unknown) => {
                 (None, names.get(unknown).map_or_else(String::new, |name| (*name).clone()))

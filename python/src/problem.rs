@@ -125,6 +125,7 @@ impl Problem {
     }
 
     /// Fits the free parameters, and a remainder beside them where that is asked for.
+    #[expect(clippy::too_many_arguments, reason = "keywords of Python")]
     fn identify(
         &self,
         py: Python<'_>,

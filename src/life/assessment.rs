@@ -76,7 +76,9 @@ pub(super) fn assess(
     let mut last = None;
     for row in 0..rows.len() {
         sums.add(rows, row, 1.0);
-        noisier.iter_mut().for_each(|noisier| noisier.add(rows, row, 1.0));
+        for sums in &mut noisier {
+            sums.add(rows, row, 1.0);
+        }
         let is_last = row + 1 == rows.len();
         if !(is_last || is_sequential && (row + 1) % step == 0) {
             continue;

@@ -118,15 +118,12 @@ fn the_noise_of_the_first_fit_is_kept() {
         let [first, second] = [first.sigma_taken, found.sigma_taken];
         assert!(second > 0.999 * first, "{first} {second}");
         let json: serde_json::Value = serde_json::from_str(&text).unwrap();
-        match declared {
-            Some(sigma) => {
-                let factor = json["noise_factor"].as_f64().unwrap();
-                assert!((factor - (second / sigma).powi(2)).abs() < 1e-6 * factor, "{factor}");
-            }
-            None => {
-                let sigma = json["estimated_sigma_mm"].as_f64().unwrap();
-                assert!((sigma - 1e3 * second).abs() < 1e-6 * sigma, "{sigma}");
-            }
+        if let Some(sigma) = declared {
+            let factor = json["noise_factor"].as_f64().unwrap();
+            assert!((factor - (second / sigma).powi(2)).abs() < 1e-6 * factor, "{factor}");
+        } else {
+            let sigma = json["estimated_sigma_mm"].as_f64().unwrap();
+            assert!((sigma - 1e3 * second).abs() < 1e-6 * sigma, "{sigma}");
         }
     }
 }
