@@ -111,11 +111,12 @@ pub(super) fn assess(
     Some(Assessment { looks, causes, chi2, coordinates: sums.coordinates })
 }
 
-/// Returns the logarithms of the prior probabilities of `count` sizes, the smallest size first; the
-/// probabilities sum to 1.
-fn ln_size_priors(count: usize) -> impl Iterator<Item = f64> {
-    let sum = (1.0 - LARGER_SIZE.powf(count as f64)) / (1.0 - LARGER_SIZE);
-    (0..count).map(move |size| size as f64 * LARGER_SIZE.ln() - sum.ln())
+/// Returns the logarithms of the prior probabilities of the sizes of a cause, the smallest size
+/// first; the probabilities sum to 1. Large rates per kelvin are as probable as small ones.
+fn ln_size_priors(cause: &Cause) -> impl Iterator<Item = f64> {
+    let larger = if cause.kind == CauseKind::Temperature { 1.0 } else { LARGER_SIZE };
+    let sum: f64 = (0..cause.sizes.len()).map(|size| larger.powf(size as f64)).sum();
+    (0..cause.sizes.len()).map(move |size| size as f64 * larger.ln() - sum.ln())
 }
 
 /// Computes the weighted likelihood ratio of each cause, and of each of the first `count` rows as a
@@ -161,7 +162,7 @@ fn ratios(
                 let tried: Vec<_> = cause
                     .sizes
                     .iter()
-                    .zip(ln_size_priors(cause.sizes.len()))
+                    .zip(ln_size_priors(cause))
                     .filter_map(|(sizes, ln_prior)| {
                         Some((unchanged.cause(&cause.columns, sizes)?, sizes, ln_prior))
                     })

@@ -9,7 +9,8 @@ use crate::problem::{JointKind, Problem};
 use crate::quantity::Unit;
 
 /// Prior probability of a size relative to that of the next smaller one. A change of k times the
-/// size has k² times the evidence, so large changes are seen in spite of it.
+/// size has k² times the evidence, so large changes are seen in spite of it. Causes of temperature
+/// have equally probable sizes.
 pub(super) const LARGER_SIZE: f64 = 0.5;
 /// Sizes of a moved zero, 1 σ \[°\] or \[mm\], the smallest first.
 const ZERO_SIZES: [f64; 4] = [0.01, 0.05, 0.25, 1.2];
