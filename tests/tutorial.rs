@@ -275,6 +275,8 @@ fn commands_of_the_documentation_are_understood() {
     assert!(quick.len() >= 8, "{quick:?}");
     for command in quick.iter().filter(|_| cfg!(unix)) {
         let run = run(command, &folder);
-        assert!(run.status < 2, "{run:?}");
+        // Without the effect that the loop finds, the rows of another temperature look like a change.
+        let is_watch = shell_words(command)[1] == "watch";
+        assert!(run.status < 2 || is_watch && run.status == 3, "{run:?}");
     }
 }
