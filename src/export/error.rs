@@ -26,15 +26,6 @@ pub enum ExportError {
         /// Formula of the law.
         formula: String,
     },
-    /// A law acts on the range of the instrument or moves a frame.
-    #[error(
-        "{formula} moves a frame of the arm or acts on the range of the instrument, for which the \
-         generated code has no place; identify the problem without this effect and export that"
-    )]
-    NoSite {
-        /// Formula of the law.
-        formula: String,
-    },
     /// A number is too large for a constant.
     #[error("{what} is {value}, which C cannot hold")]
     NotFinite {

@@ -177,6 +177,8 @@ fn structure(text: &mut String, problem: &Problem, parts: &ModelParts, has_remai
     let on_beams: usize = of_beams().map(|beam| 2 * arm.beam_elements + loads(beam) + 1).sum();
     define("EVENTS", 4 * arm.joints.len() + 2 + on_beams + tilts + first_body);
     define("PAYLOAD_JOINT", arm.payload_on.unwrap_or(arm.joints.len().saturating_sub(1)));
+    let moves = parts.terms.iter().any(|term| matches!(term.site, PartSite::Motion { .. }));
+    define("MOTIONS", usize::from(moves));
     define("REMAINDER", usize::from(has_remainder));
     let hoist = of_beams().find_map(|beam| beam.hoist).map_or(0.0, |hoist| hoist.force);
     let reference = problem.data.reference_temperature.unwrap_or(0.0);
@@ -269,9 +271,8 @@ fn terms(parts: &ModelParts, numbers: &Numbers) -> Result<String, ExportError> {
                 let beam = parts.arm.joints[..joint].iter().filter(|j| j.beam.is_some()).count();
                 format!("strain[{beam}][{which}]")
             }
-            PartSite::Shift { axis: RANGE_AXIS, .. } | PartSite::Motion { .. } => {
-                return Err(ExportError::NoSite { formula: term.regressor.text() });
-            }
+            PartSite::Motion { joint, which } => format!("motion[{joint}][{which}]"),
+            PartSite::Shift { axis: RANGE_AXIS, .. } => "range".to_owned(),
             PartSite::Shift { axis, is_error } => {
                 format!("shift[{}][{axis}]", usize::from(is_error))
             }

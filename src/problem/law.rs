@@ -31,7 +31,7 @@ pub(super) fn read(
         joints.iter().filter_map(|joint| Some(joint.beam.as_ref()?.name.clone())).collect();
     let site = LawSite::parse(at.text()?, joints.len(), &names, &links)
         .map_err(|reason| at.error(InputErrorKind::LawSite { reason }))?;
-    let prior = prior(&mut section, unit(&site, joints))?;
+    let prior = prior(&mut section, law_unit(site.at, site.joint(), joints))?;
     let parameters = parameters(&mut section)?;
     let formulas = formulas(&terms)?;
     let slides: Vec<bool> = joints.iter().map(|joint| joint.kind == JointKind::Prismatic).collect();
@@ -91,13 +91,13 @@ fn word(item: &Item, text: &str, noun: &'static str) -> Result<String, InputErro
     }
 }
 
-/// Returns the unit of the quantity that a law adds to.
-fn unit(site: &LawSite, joints: &[Joint]) -> Unit {
+/// Returns the unit of the quantity that a law adds to at a site; `joint` counts from 1.
+pub(crate) fn law_unit(at: At, joint: Option<usize>, joints: &[Joint]) -> Unit {
     let slides = |number: usize| {
         joints.get(number.wrapping_sub(1)).is_some_and(|joint| joint.kind == JointKind::Prismatic)
     };
-    match site.at {
-        At::Coordinate if site.joint().is_some_and(slides) => Unit::Length,
+    match at {
+        At::Coordinate if joint.is_some_and(slides) => Unit::Length,
         At::Coordinate | At::BaseTurn(_) | At::Before(3..) | At::After(3..) | At::Tool(3..) => {
             Unit::Angle
         }

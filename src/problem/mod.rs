@@ -43,6 +43,7 @@ use crate::error::{InputError, InputErrorKind, Location, Warning};
 pub(crate) use crate::laws::Argument;
 pub use crate::laws::Effect;
 pub(crate) use crate::laws::quoted;
+pub(crate) use law::law_unit;
 
 pub(crate) use crate::observation::FixtureKind;
 pub use conditions::PoseRanges;

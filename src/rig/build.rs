@@ -5,6 +5,7 @@ use nalgebra::{Rotation2, Vector2, Vector3};
 use super::Rig;
 use super::chain::{Chain, Force, Hinge, PieceFrame, Spring};
 use super::effect::TrueEffect;
+use crate::laws::At;
 use crate::problem::{Effect, Joint, JointKind, Placement, PoseConditions};
 use crate::spatial::rotate;
 
@@ -32,6 +33,8 @@ impl Rig {
             self.link(joint, number, &gravity, conditions, &mut chain);
             let (lateral, about_axis) = self.joint_hinges(joint, number, conditions);
             chain.hinge(lateral);
+            let before = self.moved_by_laws(conditions, At::Before, Some(number));
+            *chain.end() = chain.end().compose(&before);
             let (mut turn, mut slide) = (joint.theta, joint.d);
             let command =
                 |joint: usize| conditions.configuration.get(joint).copied().unwrap_or(0.0);
@@ -51,6 +54,12 @@ impl Rig {
             chain.end().rotate_z(turn.sin_cos());
             self.slide(number, slide, &mut chain);
             chain.end().rotate_y(joint.beta.sin_cos());
+            let behind = self.moved_by_laws(conditions, At::After, Some(number));
+            *chain.end() = chain.end().compose(&behind);
+            if index == self.arm.tool.joint {
+                let tool = self.moved_by_laws(conditions, At::Tool, None);
+                *chain.end() = chain.end().compose(&tool);
+            }
             for body in &joint.bodies {
                 chain.load(&body.position, weight(body.mass));
             }

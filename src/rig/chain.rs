@@ -191,6 +191,19 @@ impl Chain {
         self.springs.extend(springs.map(|spring| Spring { piece, ..spring }));
     }
 
+    /// Returns the sum of force times point of action over all loads, with every hinge undeformed
+    /// [N·m]. Its differences are the work of the loads.
+    pub fn work(&self) -> f64 {
+        let mut frames: Vec<Frame<f64>> = Vec::with_capacity(self.pieces.len());
+        for Piece { root, .. } in &self.pieces {
+            let carrier = root.piece.and_then(|piece| frames.get(piece));
+            frames.push(carrier.map_or(root.frame, |carrier| carrier.compose(&root.frame)));
+        }
+        let point = |load: &Load| Some(frames.get(load.piece)?.point(&load.at));
+        let placed = self.loads.iter().filter_map(|load| Some((load, point(load)?)));
+        placed.map(|(load, point)| load.force.at(&point).dot(&point)).sum()
+    }
+
     /// Adds a load at a point \[m\] relative to the current end of the chain.
     pub fn load(&mut self, point: &Vector3<f64>, force: Force) {
         self.loads.push(Load { piece: self.last, at: self.end.point(point), force });

@@ -2,6 +2,7 @@
 
 use super::Rig;
 use super::effect::{Cause, Shape, TrueEffect};
+use crate::laws::At;
 use crate::problem::{Effect, Mount, PoseConditions};
 
 impl Rig {
@@ -66,9 +67,6 @@ impl Rig {
                 {
                     rate * self.covariate(of, conditions)
                 }
-                (Effect::Law(law), coefficients) if law.joint() == Some(number) => {
-                    self.law_error(law, coefficients, conditions)
-                }
                 (Effect::JointCoupling { joint, from }, [factor]) if *joint == number => {
                     factor * command(*from)
                 }
@@ -76,7 +74,10 @@ impl Rig {
             },
             _ => 0.0,
         };
-        self.effects.iter().map(deviation).sum()
+        let by_laws = self.added_by_laws(conditions, |law| {
+            law.at() == At::Coordinate && law.joint() == Some(number)
+        });
+        self.effects.iter().map(deviation).sum::<f64>() + by_laws
     }
 
     /// Returns the value of a covariate declared by the problem, in its unit; 0 if it is unknown.

@@ -1,6 +1,6 @@
 //! Effects that the rig applies: those of the catalogue and one outside it, with their true values.
 
-use crate::problem::{Effect, Joint, JointKind, Mount};
+use crate::problem::{Effect, Joint, JointKind, Mount, law_unit};
 use crate::quantity::Unit;
 
 /// Cause of a deviation of the arm from its declared model.
@@ -167,8 +167,7 @@ pub(super) fn keys(cause: &Cause, joints: &[Joint]) -> Vec<(String, Unit)> {
             named(&[turns, ["x", "y", "z"].map(|name| (name, Unit::LengthPerUnit))].concat())
         }
         Effect::Law(law) => {
-            let slides = law.joint().is_some_and(|joint| slides(&joint));
-            let unit = if slides { Unit::Length } else { Unit::Angle };
+            let unit = law_unit(law.at(), law.joint(), joints);
             (1..=law.formulas().len()).map(|number| (format!("c{number}"), unit)).collect()
         }
     }

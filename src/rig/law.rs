@@ -1,29 +1,62 @@
-//! Laws of a truth: formulas that add to the coordinate of a joint.
+//! Laws of a truth: formulas that add to a quantity of the arm, its base, tool or instrument.
+
+use nalgebra::Vector3;
 
 use super::Rig;
-use crate::laws::{At, Law, Quantity};
-use crate::problem::PoseConditions;
+use super::build::EffectValues;
+use super::command::friction;
+use crate::laws::{At, BeamField, Law, Quantity};
+use crate::problem::{Effect, JointKind, PoseConditions};
+use crate::spatial::Frame;
 
-/// Returns the reason why the rig cannot apply a law, if it cannot.
-pub(super) fn refusal(law: &Law) -> Option<&'static str> {
-    let quantities = || law.expressions().flat_map(crate::laws::expression::Expression::quantities);
-    if law.at() != At::Coordinate {
-        return Some("laws of the rig add to the coordinate of a joint; write at = \"joint1\"");
-    }
-    let is_of_loads = |quantity: Quantity| matches!(quantity, Quantity::Moment(_));
-    quantities()
-        .any(is_of_loads)
-        .then_some("laws of the rig take no moments of the loads; write another quantity")
-}
+/// Turn \[rad\] or displacement \[m\] of a joint to each side, over which the work of the loads is
+/// differentiated.
+const MOMENT_STEP: f64 = 1e-4;
 
 impl Rig {
-    /// Returns what a law with these coefficients adds to its joint's coordinate \[rad\] or \[m\].
-    pub(super) fn law_error(
+    /// Returns what those laws that `acts` accepts add to the quantity at their site, SI units.
+    pub(super) fn added_by_laws(
         &self,
-        law: &Law,
-        coefficients: &[f64],
         conditions: &PoseConditions,
+        acts: impl Fn(&Law) -> bool,
     ) -> f64 {
+        let added = |effect: EffectValues<'_>| match effect {
+            (Effect::Law(law), coefficients) if acts(law) => {
+                self.sum_of_terms(law, coefficients, conditions)
+            }
+            _ => 0.0,
+        };
+        self.effect_values().map(added).sum()
+    }
+
+    /// Returns the small motion that laws add at the six sites `at(0)` … `at(5)`; the identity
+    /// without such a law. `joint` counts from 1; `None` accepts laws of any place.
+    pub(super) fn moved_by_laws(
+        &self,
+        conditions: &PoseConditions,
+        at: fn(usize) -> At,
+        joint: Option<usize>,
+    ) -> Frame<f64> {
+        let number = |axis: usize| {
+            self.added_by_laws(conditions, |law| {
+                law.at() == at(axis) && (joint.is_none() || law.joint() == joint)
+            })
+        };
+        let turn = Vector3::from_fn(|axis, _| number(3 + axis));
+        Frame::from_rotation_vector(Vector3::from_fn(|axis, _| number(axis)), &turn)
+    }
+
+    /// Returns the strain that laws add along a beam, and the curvatures about its y and z [1/m].
+    pub(super) fn strained_by_laws(&self, link: &str, conditions: &PoseConditions) -> [f64; 3] {
+        BeamField::STRAINS.map(|field| {
+            self.added_by_laws(conditions, |law| {
+                law.at() == At::Beam(field) && law.link() == Some(link)
+            })
+        })
+    }
+
+    /// Returns Σ cᵢ · termᵢ of a law with these coefficients, SI units.
+    fn sum_of_terms(&self, law: &Law, coefficients: &[f64], conditions: &PoseConditions) -> f64 {
         let side = |joint: usize| {
             let sides = conditions.approach.as_ref();
             sides.and_then(|sides| sides.get(joint)).copied().unwrap_or(0.0)
@@ -32,9 +65,7 @@ impl Rig {
             Quantity::Command(joint) => conditions.configuration.get(joint).copied().unwrap_or(0.0),
             Quantity::Warming => self.warming(conditions),
             Quantity::Lagging { time_constant } => self.lagged_warming(conditions, time_constant),
-            Quantity::Friction { joint, distance } => {
-                super::command::friction(conditions, joint, distance)
-            }
+            Quantity::Friction { joint, distance } => friction(conditions, joint, distance),
             Quantity::Elapsed => conditions.elapsed,
             Quantity::Time => conditions.time,
             Quantity::Payload => conditions.payload.unwrap_or(self.arm.tool.payload_mass),
@@ -44,10 +75,26 @@ impl Rig {
             }),
             Quantity::Approach(joint) => side(joint),
             Quantity::Covariate(k) => conditions.covariates.get(k).copied().unwrap_or(0.0),
-            Quantity::Moment(_) => 0.0,
+            Quantity::Moment(joint) => self.moment(joint, conditions),
         };
         let inner: Vec<f64> = law.parameters().iter().map(|parameter| parameter.start).collect();
         let terms = law.expressions().zip(coefficients);
         terms.map(|(formula, size)| size * formula.evaluate(&of, &inner)).sum()
+    }
+
+    /// Returns the moment of the loads about the axis of a joint, counted from 0, on the undeflected
+    /// arm without effects [N·m]: the work of the loads per turn of the joint.
+    fn moment(&self, joint: usize, conditions: &PoseConditions) -> f64 {
+        let mut bare = Self::new(self.arm.clone(), Vec::new()).with_segments(1);
+        let mut work = |step: f64| {
+            if let Some(joint) = bare.arm.joints.get_mut(joint) {
+                match joint.kind {
+                    JointKind::Prismatic => joint.d += step,
+                    _ => joint.theta += step,
+                }
+            }
+            bare.chain(conditions).0.work()
+        };
+        (work(MOMENT_STEP) - work(-2.0 * MOMENT_STEP)) / (2.0 * MOMENT_STEP)
     }
 }

@@ -118,6 +118,9 @@ impl Rig {
                 Vector3::new(compliance(beam.gj), compliance(beam.ei_y), compliance(beam.ei_z));
             hinge.compliance = per_length * size;
             hinge.stretch = compliance(beam.ea) * size;
+            let [strain, about_y, about_z] = self.strained_by_laws(&beam.name, conditions);
+            hinge.free_stretch = strain * length;
+            hinge.free_rotation = Vector3::new(0.0, about_y, about_z) * length;
         }
         let is_this = |link: &String| beam.is_some_and(|beam| beam.name == *link);
         for effect in self.effect_values() {

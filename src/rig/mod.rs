@@ -31,6 +31,7 @@ mod truth;
 
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
+use crate::laws::{At, RANGE_AXIS};
 use crate::problem::{Effect, Mount, PoseConditions, Problem};
 use crate::spatial::Frame;
 use equilibrium::Equilibrium;
@@ -159,7 +160,10 @@ impl Rig {
                 moved += Vector3::new(*x, *y, *z);
             }
         }
-        Frame::from_rotation_vector(moved, &turn)
+        let of_base = |at: fn(usize) -> At| {
+            Vector3::from_fn(|axis, _| self.added_by_laws(conditions, |law| law.at() == at(axis)))
+        };
+        Frame::from_rotation_vector(moved + of_base(At::BaseShift), &(turn + of_base(At::BaseTurn)))
     }
 
     /// Returns the position that the tracker reads for a true position, with the errors of the
@@ -187,6 +191,8 @@ impl Rig {
                 _ => {}
             }
         }
-        position * scale + moved
+        let read = |axis: usize| self.added_by_laws(conditions, |law| law.at() == At::Shift(axis));
+        moved += Vector3::from_fn(|axis, _| read(axis));
+        position * (scale + read(RANGE_AXIS) / position.norm().max(f64::MIN_POSITIVE)) + moved
     }
 }

@@ -1,7 +1,6 @@
 //! Reader of the tables `[[effect]]` of a truth: effects as in the problem file, with their values.
 
 use super::effect::{Cause, Shape, TrueEffect, keys};
-use super::law;
 use crate::error::{InputError, InputErrorKind, Location};
 use crate::laws::LAW;
 use crate::problem::effect::NAMES;
@@ -47,13 +46,7 @@ fn located_effect(
     let cause = if name == OUTSIDE {
         outside(&item, problem)?
     } else if name == LAW {
-        let effect = declared(name, &item, &problem.joints, &problem.data)?;
-        if let Effect::Law(law) = &effect
-            && let Some(reason) = law::refusal(law)
-        {
-            return Err(item.error(InputErrorKind::LawSite { reason: reason.to_owned() }));
-        }
-        Cause::Catalogued(effect)
+        Cause::Catalogued(declared(name, &item, &problem.joints, &problem.data)?)
     } else {
         Cause::Catalogued(effect(name, &item, &problem.joints)?)
     };

@@ -181,7 +181,7 @@ pub fn conditions(rows: &Measurements, row: usize) -> PoseConditions {
 pub fn of_effects(model: &Model) -> Vec<usize> {
     let is_effect = |name: &str| {
         let family = name.split(['[', '.']).next().unwrap();
-        flexcal::laws::FAMILIES.iter().any(|known| known.name == family)
+        family == "law" || flexcal::laws::FAMILIES.iter().any(|known| known.name == family)
     };
     (0..model.parameters.len()).filter(|&k| is_effect(&model.parameters[k].name)).collect()
 }

@@ -1,6 +1,8 @@
 //! Effects of the model compared with those of the rig, which shares no mechanics with it, and at
 //! zero.
 
+use std::path::Path;
+
 use flexcal::measurement::Measurements;
 use flexcal::problem::{Effect, JointKind, Problem};
 use flexcal::rig::Rig;
@@ -83,6 +85,28 @@ fn effects_on_an_arm_with_every_kind_of_joint_are_those_of_the_rig() {
 #[test]
 fn effects_on_a_tree_of_joints_are_those_of_the_rig() {
     check_all(tree(), 7);
+}
+
+#[test]
+fn laws_at_every_site_are_those_of_the_rig() {
+    let motions = ["x", "y", "z", "rx", "ry", "rz"];
+    let cases = [(lunar(), "joint3", "B", "M3", 1e-4), (odd(), "joint3", "lower", "M2", 1e-3)];
+    for ((mut arm, _), joint, link, moment, size) in cases {
+        arm.statics.beam_elements = 12;
+        let rows = poses(&arm, 8, true, &mut ChaCha8Rng::seed_from_u64(5));
+        let moved = |place: &str| motions.map(|motion| format!("{place}.{motion}"));
+        let sites = ["base", "tool", joint, &format!("{joint}.after")].map(moved).concat();
+        let read = ["x", "y", "z", "range"].map(|axis| format!("measurement.{axis}"));
+        let formula = format!("sin(q2)*(1 + T/10) + {moment}/300 + payload*approach2");
+        let of_commands = [vec![joint.to_owned()], sites, read.to_vec()].concat();
+        let strains = ["curvature_y", "curvature_z", "strain"].map(|of| format!("{link}.{of}"));
+        let cases = of_commands.iter().map(|site| (site, formula.as_str()));
+        for (site, formula) in cases.chain(strains.iter().map(|site| (site, "T*(1 + payload/5)"))) {
+            let text = format!("law = {{ name = 'w', at = '{site}', terms = ['{formula}'] }}");
+            let law = arm.effect(&text, Path::new("law")).unwrap().effect;
+            check(&arm, &(law, vec![size]), &rows);
+        }
+    }
 }
 
 #[test]

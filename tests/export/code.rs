@@ -72,19 +72,25 @@ fn made(text: &str) {
     export(&folder, ".");
 }
 
+/// Returns the declaration of a law with one term.
+fn law(at: &str, term: &str) -> String {
+    let name = at.replace('.', "-");
+    format!("[[effect]]\nlaw = {{ name = '{name}', at = '{at}', terms = ['{term}'] }}\n")
+}
+
+/// Returns laws of small motions before and behind joints, of the tool and of the range.
+fn motions() -> String {
+    let sites = ["joint3.x", "joint2.ry", "joint2.after.rz", "tool.y", "measurement.range"];
+    sites.map(|site| law(site, "sin(q3 + 1)")).concat()
+}
+
 #[test]
 fn laws_play_springs_and_slides() {
-    let law = |at: &str, terms: &str| {
-        format!(
-            "[[effect]]\nlaw = {{ name = 'w{}', at = '{at}', terms = ['{terms}'] }}\n",
-            terms.len()
-        )
-    };
     let text = format!(
         "name = 'odd'\n[[joint]]\nalpha_deg = 10\nstiffness_N_m_per_rad = 2e4\n\
          [[joint]]\na_m = 0.4\nalpha_deg = 90\n[[joint.body]]\nmass_kg = 4\ncom_m = [0.1, 0, 0]\n\
          [[joint]]\na_m = 0.3\nd_m = 0.1\n[[joint]]\nkind = 'prismatic'\nalpha_deg = 90\nd_m = 0.2\nmin_mm = 0\nmax_mm = 300\n\
-         [tool]\ntarget_m = [0.1, 0.05, 0.1]\npayload_kg = 3\n{}{}{}\
+         [tool]\ntarget_m = [0.1, 0.05, 0.1]\npayload_kg = 3\n{}{}{}{}\
          [[effect]]\njoint-lateral-compliance = {{ joint = 2 }}\n[[effect]]\nbase-compliance = {{}}\n\
          [[effect]]\njoint-compliance = {{ joint = 3 }}\n[[effect]]\njoint-nonlinear-stiffness = {{ joint = 2 }}\n\
          [[effect]]\ntracker-scale = {{}}\n[[effect]]\nlink-bending = {{ joint = 2 }}\n\
@@ -93,8 +99,20 @@ fn laws_play_springs_and_slides() {
         law("joint3", "sin(2*q2)*max(q3, 0.2) + sign(q2)*spline(q3 + 2)"),
         law("joint2", "tanh(q3)^3 + atan2(q2, 2)"),
         law("measurement.x", "expm1(q2/5) + step(q3)*abs(q2)^1.5"),
+        motions(),
     );
     made(&text);
+}
+
+#[test]
+fn small_motions_of_a_rigid_arm() {
+    made(&format!(
+        "name = 'rigid'\n[[joint]]\nalpha_deg = 10\n[[joint]]\na_m = 0.4\nalpha_deg = 90\n\
+         [[joint]]\na_m = 0.3\nd_m = 0.1\ntheta_deg = 65\nmin_deg = -40\nmax_deg = 40\n[tool]\ntarget_m = [0.1, 0.05, 0.1]\n{}\
+         [parameters]\n'joint*.theta' = {{ sigma_deg = 0.1 }}\n\
+         [data]\nfiles = ['rows.csv']\nposition_sigma_mm = 0.02\n",
+        motions()
+    ));
 }
 
 #[test]

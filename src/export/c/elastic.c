@@ -497,6 +497,9 @@ static void pass(const real *number, const flexcal_pose *pose, const terms *term
             tilt(&f, joint[J_LATERAL_X], joint[J_LATERAL_Y], mode, s);
         }
 #endif
+#if MOTIONS
+        displace(&f, term->motion[i]);
+#endif
         if (info->is_flexible) {
             if (pose->has_approach) {
                 const real play = R(0.5) * joint[J_PLAY] * pose->approach[i];
@@ -541,6 +544,9 @@ static void pass(const real *number, const flexcal_pose *pose, const terms *term
         shift(&f, 2, offset);
 #endif
         turn(&f, 2, 0, joint[J_BETA_SIN], joint[J_BETA_COS]);
+#if MOTIONS
+        displace(&f, term->motion[i] + 6);
+#endif
         s->behind[i + 1] = f;
         if (mode != FIRST_ORDER) {
             for (k = info->first_body; k < info->first_body + info->bodies; ++k) {

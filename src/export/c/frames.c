@@ -103,6 +103,16 @@ static frame compose(const frame *outer, const frame *inner)
     return f;
 }
 
+#if MOTIONS
+/* Moves a frame by a small motion in its axes: translation, then rotation vector. */
+static void displace(frame *f, const real *motion)
+{
+    frame by = rotation(vec_at(motion + 3));
+    by.origin = vec_at(motion);
+    *f = compose(f, &by);
+}
+#endif
+
 /* Returns the rotation vector, in the reference frame, that rotates the axes of `from` into those
    of `to`: log(R2 R1'), at most half a turn [rad]. */
 static vec rotation_between(const frame *from, const frame *to)

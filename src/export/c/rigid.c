@@ -14,9 +14,15 @@ static int arm_frame(const real *number, const flexcal_pose *pose, const terms *
         frame f = behind[JOINT[i].parent + 1];
         advance_to_link(&f, joint, JOINT[i].is_placed);
         shift(&f, 0, joint[J_A]);
+#if MOTIONS
+        displace(&f, term->motion[i]);
+#endif
         turn(&f, 0, 1, SIN(angle), COS(angle));
         shift(&f, 2, joint[J_D] + (JOINT[i].kind == PRISMATIC ? q : R(0.0)));
         turn(&f, 2, 0, joint[J_BETA_SIN], joint[J_BETA_COS]);
+#if MOTIONS
+        displace(&f, term->motion[i] + 6);
+#endif
         behind[i + 1] = f;
     }
     *out = behind[TARGET_JOINT[pose->target] + 1];
