@@ -5,7 +5,14 @@ use nalgebra::{DMatrix, DVector};
 use crate::least_squares::LinearRows;
 use crate::model::Model;
 
-/// Smallest eigenvalue of the scaled information, relative to the largest, that counts.
+/// Smallest eigenvalue of the earlier correlation matrix, relative to the largest, that is more than
+/// rounding. Combinations below it are those that the earlier fit held.
+const HELD: f64 = 1e-13;
+/// Eigenvalue of that matrix, relative to the largest, below which the declared prior of a
+/// combination is negligible.
+const WELL_KNOWN: f64 = 1e-6;
+/// Smallest eigenvalue of the information beyond the declared priors, relative to the largest, that
+/// counts.
 const NO_INFORMATION: f64 = 1e-10;
 
 /// Linear residual rows A x + b that stand for earlier data on some parameters, given by their
@@ -42,27 +49,38 @@ impl EarlierData {
         });
         let eigen = correlation.symmetric_eigen();
         let largest = eigen.eigenvalues.amax();
-        let inverse = eigen
-            .eigenvalues
-            .map(|value| if value > NO_INFORMATION * largest { value.recip() } else { 0.0 });
-        let total =
-            &eigen.eigenvectors * DMatrix::from_diagonal(&inverse) * eigen.eigenvectors.transpose();
+        let chosen = |is_chosen: &dyn Fn(f64) -> bool| -> Vec<usize> {
+            (0..scale.len()).filter(|&k| is_chosen(eigen.eigenvalues[k] / largest)).collect()
+        };
+        let mean = mean.component_div(&scale);
+        let mut rows: Vec<(DVector<f64>, f64)> = Vec::with_capacity(scale.len());
+        for k in chosen(&|value| value > HELD && value <= WELL_KNOWN) {
+            let row = eigen.eigenvectors.column(k) / eigen.eigenvalues[k].sqrt();
+            let constant = -row.dot(&mean);
+            rows.push((row, constant));
+        }
+        let others = chosen(&|value| value > WELL_KNOWN);
+        let directions = eigen.eigenvectors.select_columns(&others);
+        let information =
+            DVector::from_fn(others.len(), |k, _| eigen.eigenvalues[others[k]].recip());
+        let along = directions.tr_mul(&mean);
         let declared = precision.zip_map(&scale, |precision, scale| precision * scale * scale);
-        let pull = &total * mean.component_div(&scale);
-        let added = (total - DMatrix::from_diagonal(&declared)).symmetric_eigen();
-        let largest = added.eigenvalues.amax();
-        let kept: Vec<usize> =
-            (0..scale.len()).filter(|&k| added.eigenvalues[k] > NO_INFORMATION * largest).collect();
-        let (mut matrix, mut constant) =
-            (DMatrix::zeros(kept.len(), scale.len()), DVector::zeros(kept.len()));
-        for (row, &k) in kept.iter().enumerate() {
-            let root = added.eigenvalues[k].sqrt();
-            let direction = added.eigenvectors.column(k);
-            constant[row] = -direction.dot(&pull) / root;
-            for j in 0..scale.len() {
-                matrix[(row, j)] = root * direction[j] / scale[j];
+        // The declared priors also pull by the part of the mean along the well-known combinations.
+        let beyond = (&mean - &directions * &along).component_mul(&declared);
+        let pull = information.component_mul(&along) + directions.tr_mul(&beyond);
+        let declared = directions.tr_mul(&DMatrix::from_diagonal(&declared)) * &directions;
+        let added = (DMatrix::from_diagonal(&information) - declared).symmetric_eigen();
+        let largest = added.eigenvalues.iter().copied().fold(0.0, f64::max);
+        for (k, &value) in added.eigenvalues.iter().enumerate() {
+            if value > NO_INFORMATION * largest {
+                let direction = added.eigenvectors.column(k);
+                let root = value.sqrt();
+                rows.push((&directions * direction * root, -direction.dot(&pull) / root));
             }
         }
+        let matrix = DMatrix::from_fn(rows.len(), scale.len(), |row, j| rows[row].0[j] / scale[j]);
+        let constant =
+            DVector::from_iterator(rows.len(), rows.iter().map(|(_, constant)| *constant));
         Some(Self { names, matrix, constant })
     }
 
@@ -92,5 +110,35 @@ impl EarlierData {
             }
         }
         rows
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Rows of a Gaussian restore its information and its mean, whatever the precision of its
+    /// combinations; the information of the declared priors is left out.
+    #[test]
+    fn rows_restore_a_gaussian_with_combinations_of_every_precision() {
+        let turn = DMatrix::from_row_slice(3, 3, &[0.6, 0.8, 0.0, -0.8, 0.6, 0.0, 0.0, 0.0, 1.0]);
+        let mean = DVector::from_vec(vec![0.3, -0.2, 0.1]);
+        let precision = DVector::from_vec(vec![0.25, 0.0, 0.5]);
+        for narrow in [1.0, 1e-4, 1e-8, 1e-11] {
+            let variances = DMatrix::from_diagonal(&DVector::from_vec(vec![1.0, narrow, 0.7]));
+            let covariance = &turn * variances * turn.transpose();
+            let names = vec!["a".to_owned(), "b".to_owned(), "c".to_owned()];
+            let data = EarlierData::new(names, &mean, &covariance, &precision).unwrap();
+            let total = data.matrix.tr_mul(&data.matrix) + DMatrix::from_diagonal(&precision);
+            let inverse = total.cholesky().unwrap().inverse();
+            let off = (&inverse - &covariance).amax();
+            assert!(off < 1e-5, "{narrow}: {off}");
+            let found = -&inverse * data.matrix.tr_mul(&data.constant);
+            assert!((found - &mean).amax() < 1e-5, "{narrow}");
+            // The narrow combination keeps its variance.
+            let direction = turn.column(1);
+            let variance = (&inverse * direction).dot(&direction);
+            assert!((variance / narrow - 1.0).abs() < 0.01, "{narrow}: {variance}");
+        }
     }
 }
