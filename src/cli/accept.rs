@@ -22,8 +22,8 @@ use super::progress::Line;
   flexcal accept problems/lunar-sampler --instrument 'laser tracker, 1.5 inch reflector'
   flexcal accept out/lunar-sampler/problem.closed.toml --tolerance-mm 2 --share 0.9 --risk 0.05
 
-With --tolerance-mm the exit status is 1 unless the verdict is pass. A remainder that the problem declares corrects the
-predictions.
+With --tolerance-mm the exit status is 1 unless the verdict is pass. A remainder that the problem \
+declares corrects the predictions.
 
 Writes acceptance.html, a page to print and sign, and acceptance.json with the digest of every input.")]
 pub struct Arguments {

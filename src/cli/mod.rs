@@ -87,8 +87,8 @@ enum Command {
     /// Record to sign: accuracy of predictions before and after, counted as ISO 9283 does, with
     /// conditions and digests of every input.
     Accept(accept::Arguments),
-    /// Write the identified geometry into the URDF that the problem came from, or as YAML for a
-    /// regressor.
+    /// Write the identified arm: into the URDF that the problem came from, as YAML for a robot
+    /// driver, as Denavit-Hartenberg parameters, or as C code for a controller.
     Export(export::Arguments),
     /// Forecast what measurements at some poses will tell.
     Check(check::Arguments),

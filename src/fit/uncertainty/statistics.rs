@@ -65,8 +65,7 @@ impl Statistics {
         let mut held: Vec<bool> = end.at_bound.iter().map(Option::is_some).collect();
         let constraints = stage.held(&end.x)?;
         let closed = confine(&triangle, &end.gauge.rows, &constraints, &mut held);
-        let of = |factor| Uncertainty::of(&triangle, &priors, &closed, &held, factor);
-        let mut uncertainty = of(1.0);
+        let mut uncertainty = Uncertainty::of(&triangle, &priors, &closed, &held, 1.0);
         let unmoved = stage.unmoved(&end.x);
         let moved = |pose: &Pose| pose.coordinates().saturating_sub(unmoved.count());
         let coordinates = stage.poses.iter().map(moved).sum::<usize>() as f64;
@@ -100,7 +99,11 @@ impl Statistics {
                 let scale = if lengths.scatter > 0.0 { lengths.scatter / declared } else { 1.0 };
                 sandwich(stage, &end.x, (&each, scale, kept), (&closed, &held))
             } else {
-                of(stage.loss.variance_factor(&lengths.weighed, &each, freedom))
+                // The factor is of the new data alone, not of the earlier ones.
+                let factor = stage.loss.variance_factor(&lengths.weighed, &each, freedom);
+                let data = stage.linearised(&end.x, stage.loss).triangle / factor.sqrt();
+                let data = stage.with_earlier(data, &end.x);
+                Uncertainty::of(&data, &priors, &closed, &held, 1.0)
             };
         }
         let freedom = freedom - left_out;
