@@ -21,19 +21,28 @@ impl LeftOutGain {
         Some(Self(before.iter().zip(&after).map(|(before, after)| before - after).collect()))
     }
 
-    /// Returns true if the sum over all blocks decreases.
-    pub fn is_positive(&self) -> bool {
-        self.0.iter().sum::<f64>() > 0.0
+    /// Returns true if the mean decrease exceeds its standard error: the rule by which the plainer
+    /// of two models is kept. [Breiman et al. 1984, sec. 3.4.3]
+    pub fn exceeds_standard_error(&self) -> bool {
+        self.exceeds(|_| 1.0)
     }
 
     /// Returns true if the mean decrease is larger than chance: one-sided t test over the blocks at
     /// 2.5 %.
     pub fn is_significant(&self) -> bool {
+        self.exceeds(|freedom| {
+            let distribution = StudentsT::new(0.0, 1.0, freedom);
+            distribution.map_or(f64::INFINITY, |t| t.inverse_cdf(0.975))
+        })
+    }
+
+    /// Returns true if the mean decrease exceeds a multiple of its standard error, given the degrees
+    /// of freedom of that error.
+    fn exceeds(&self, multiple: impl Fn(f64) -> f64) -> bool {
         let count = self.0.len() as f64;
         let mean = self.0.iter().sum::<f64>() / count;
         let squares = self.0.iter().map(|gain| (gain - mean).powi(2)).sum::<f64>();
-        let variance = squares / (count - 1.0);
-        let quantile = StudentsT::new(0.0, 1.0, (count - 1.0).max(1.0));
-        quantile.is_ok_and(|t| mean > t.inverse_cdf(0.975) * (variance / count).sqrt())
+        let freedom = (count - 1.0).max(1.0);
+        mean > multiple(freedom) * (squares / freedom / count).sqrt()
     }
 }

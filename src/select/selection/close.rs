@@ -118,12 +118,13 @@ pub fn close_by(
     };
     let (fitted, evidence) = kept(&declared, (fitted, evidence), &data, &unstoppable)?;
     let mut conclusion = concluded(&state, &declared, (fitted, evidence), interrupted);
-    // Effects none of which is sure are used only if they predict poses that were left out better.
+    // Effects none of which is sure are used only if they predict poses that were left out better by
+    // more than the standard error of that gain.
     let is_sure = |found: &Found| found.status == Status::Found;
     if !conclusion.effects.is_empty()
         && !conclusion.effects.iter().any(is_sure)
         && !LeftOutGain::new(&conclusion.fitted, &declared, &data)
-            .is_some_and(|gain| gain.is_positive())
+            .is_some_and(|gain| gain.exceeds_standard_error())
     {
         conclusion = concluded(&state, &declared, (declared.clone(), None), interrupted);
     }
