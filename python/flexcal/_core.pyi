@@ -5,7 +5,7 @@ from typing import Literal, TypeAlias
 
 from ._progress import Step
 from ._restored import Prior
-from ._tables import Source
+from ._tables import Region, Source
 
 _Pages: TypeAlias = tuple[str, str, list[tuple[str, str]]]
 
@@ -26,6 +26,7 @@ def plan(
     candidates: Poses | None,
     criterion: str,
     separate: tuple[str, str] | None,
+    region: Region,
     truth: str | PathLike[str] | None,
     seed: int,
 ) -> Plan: ...
@@ -44,6 +45,7 @@ def next(
     tolerance_mm: float | None,
     level: float,
     remainder: bool,
+    region: Region,
     truth: str | PathLike[str] | None,
     seed: int,
 ) -> Next: ...

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Literal, TypeAlias
 
 import numpy as np
@@ -16,7 +16,7 @@ from ._least_squares import LeastSquares
 from ._progress import Told, told
 from ._results import Check, ClosedLoop, Comparison, Identification, Next, Plan, Simulation, Study, Trace
 from ._restored import Prior, Spec
-from ._tables import Data, Path, Source, count, source, warn
+from ._tables import Data, Path, Source, count, region, source, warn
 
 Strategy: TypeAlias = Literal["joint", "sequential", "sequential-one-sweep", "geometry-only", "stiffness-only", "rigid"]
 Solver: TypeAlias = Literal[
@@ -321,6 +321,8 @@ class Problem(Forward):
         candidates: Data | None = None,
         criterion: Criterion = "S",
         separate: tuple[str, str] | None = None,
+        workspace_mm: Sequence[float] | None = None,
+        keep_out_mm: Sequence[Sequence[float]] = (),
         truth: Path | None = None,
         seed: int = 1,
     ) -> Plan:
@@ -340,6 +342,10 @@ class Problem(Forward):
             positions (``"I"``).
         separate
             Two effects to tell apart, each as a problem declares it: ``"gear-ratio = { joint = 3 }"``.
+        workspace_mm
+            Box x0, x1, y0, y1, z0, z1 in which the nominal target stays, frame of the arm's base [mm].
+        keep_out_mm
+            Planes nx, ny, nz, d that the nominal target stays beyond: n·p ≥ d for a normal n, frame of the arm's base [mm].
         truth
             A TRUTH.toml whose ``[poses]`` say where poses may lie, instead of the limits of the joints.
         seed
@@ -347,7 +353,8 @@ class Problem(Forward):
         """
         poses, seed = count("poses", poses, 1, MOST_POSES), count("seed", seed, 0, MOST_SEED)
         given, table = self._given(data), self._given(candidates)
-        return Plan(_core.plan(self._core, poses, given, table, criterion, separate, truth, seed))
+        inside = region(workspace_mm, keep_out_mm)
+        return Plan(_core.plan(self._core, poses, given, table, criterion, separate, inside, truth, seed))
 
     def next(
         self,
@@ -360,10 +367,12 @@ class Problem(Forward):
         tolerance_mm: float | None = None,
         level: float = 0.95,
         remainder: bool = False,
+        workspace_mm: Sequence[float] | None = None,
+        keep_out_mm: Sequence[Sequence[float]] = (),
         truth: Path | None = None,
         seed: int = 1,
     ) -> Next:
-        """Chooses the poses to measure next, or says that there are enough (docs/plan.md).
+        """Chooses the poses to measure next, or says that there are enough (docs/next.md).
 
         Parameters
         ----------
@@ -383,6 +392,10 @@ class Problem(Forward):
             Probability with which errors stay below the bound.
         remainder
             Judge predictions with a remainder, as ``identify(remainder=True)`` makes them.
+        workspace_mm
+            Box x0, x1, y0, y1, z0, z1 in which the nominal target stays, frame of the arm's base [mm].
+        keep_out_mm
+            Planes nx, ny, nz, d that the nominal target stays beyond: n·p ≥ d for a normal n, frame of the arm's base [mm].
         truth
             A TRUTH.toml whose ``[poses]`` say where poses may lie, instead of the limits of the joints.
         seed
@@ -390,8 +403,9 @@ class Problem(Forward):
         """
         poses, seed = count("poses", poses, 1, MOST_POSES), count("seed", seed, 0, MOST_SEED)
         read, table = self._read(self._given_data(data)), self._given(pool)
+        inside = region(workspace_mm, keep_out_mm)
         core = _core.next(
-            self._core, read, poses, table, purpose, explanations, tolerance_mm, level, remainder, truth, seed
+            self._core, read, poses, table, purpose, explanations, tolerance_mm, level, remainder, inside, truth, seed
         )
         return Next(core)
 

@@ -29,6 +29,8 @@ shape (rows, 3), and ``approach``, shape (rows, joints)."""
 
 Column: TypeAlias = bytes | tuple[bytes, list[str]]
 """Bytes of 64-bit numbers, or of the 64-bit numbers of words with the words."""
+Region: TypeAlias = tuple[list[float] | None, list[list[float]]]
+"""Box and planes [mm] of a workspace."""
 Source: TypeAlias = list[Path] | tuple[str, list[tuple[str, Column]]]
 
 
@@ -198,6 +200,22 @@ def count(key: str, value: Any, least: int, most: int) -> int:
     if number is None or not least <= number <= most:
         raise InputError(f"{key}: {value!r} is not a whole number from {least} to {most}", key=key)
     return number
+
+
+def region(workspace_mm: Sequence[float] | None, keep_out_mm: Sequence[Sequence[float]]) -> Region:
+    """The box and the planes of a workspace, with their lengths checked."""
+    box = None if workspace_mm is None else _finite("workspace_mm", workspace_mm, 6)
+    return box, [_finite("keep_out_mm", plane, 4) for plane in keep_out_mm]
+
+
+def _finite(key: str, values: Any, length: int) -> list[float]:
+    try:
+        numbers = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        numbers = np.empty(0)
+    if numbers.shape != (length,) or not np.isfinite(numbers).all():
+        raise InputError(f"{key}: {values!r} is not {length} finite numbers", key=key)
+    return [float(number) for number in numbers]
 
 
 def _numbers(values: Any) -> Column:

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use flexcal::design::{
     self, Candidates, CheckedPoses, Criterion, DesignError, EffectPair, Explanations, NextOptions,
-    PlanOptions, PlanProgress, Purpose,
+    PlanOptions, PlanProgress, Purpose, Workspace,
 };
 use flexcal::fit::{Options, Progress};
 use flexcal::measurement::{Dataset, Measurements};
@@ -213,10 +213,12 @@ pub fn plan(
     candidates: Option<&Poses>,
     criterion: &str,
     separate: Option<(String, String)>,
+    region: Region,
     truth: Option<PathBuf>,
     seed: u64,
 ) -> PyResult<Plan> {
     let criterion = criterion_of(criterion)?;
+    let workspace = workspace(&region)?;
     let (given, candidates) = (rows(given), rows(candidates));
     let pair = separate.map(|(one, other)| {
         let effect = |text: &str| problem.declared.effect(text, Path::new("separate"));
@@ -246,7 +248,7 @@ pub fn plan(
             poses,
             criterion: &chosen,
             seed,
-            workspace: None,
+            workspace: workspace.as_ref(),
             progress: Some(&sweep),
         };
         match &pair {
@@ -274,9 +276,11 @@ pub fn next(
     tolerance_mm: Option<f64>,
     level: f64,
     remainder: bool,
+    region: Region,
     truth: Option<PathBuf>,
     seed: u64,
 ) -> PyResult<Next> {
+    let workspace = workspace(&region)?;
     let purpose = match purpose {
         "accuracy" => Purpose::Accuracy,
         "causes" => Purpose::Causes,
@@ -310,7 +314,7 @@ pub fn next(
             tolerance: tolerance_mm.map(|length| length * 1e-3),
             level,
             seed,
-            workspace: None,
+            workspace: workspace.as_ref(),
             explanations: explanations.as_ref(),
             remainder,
             fit: Options::default().with_progress(sink),
@@ -323,6 +327,14 @@ pub fn next(
         })
     })?;
     chosen.map_err(|error| raised(&error))
+}
+
+/// Box and planes [mm] in which the nominal target stays.
+type Region = (Option<[f64; 6]>, Vec<[f64; 4]>);
+
+fn workspace((room, planes): &Region) -> PyResult<Option<Workspace>> {
+    Workspace::from_mm(*room, planes)
+        .map_err(|error| of_argument("workspace_mm, keep_out_mm", error.to_string()))
 }
 
 fn rows(poses: Option<&Poses>) -> Option<Arc<Measurements>> {

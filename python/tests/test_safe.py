@@ -114,6 +114,10 @@ def test_numbers_of_poses(lunar: flexcal.Problem, poses: Any) -> None:
         assert caught.value.key == "poses"
     with pytest.raises(flexcal.InputError, match="seed: -1"):
         lunar.plan(5, seed=-1)
+    with pytest.raises(flexcal.InputError, match="workspace_mm: .* is not 6 finite numbers"):
+        lunar.plan(5, workspace_mm=[0, 1])
+    with pytest.raises(flexcal.InputError, match="the box is empty"):
+        lunar.next(5, workspace_mm=[1, 0, 0, 1, 0, 1])
 
 
 def test_numbers_of_threads(tmp_path: Path) -> None:

@@ -46,6 +46,6 @@ pub use self::{
     sensitivity::Sensitivity,
     separate::{EffectPair, PairSeparation, separate},
     site::Site,
-    workspace::Workspace,
+    workspace::{RegionError, Workspace},
     workspace_error::WorkspaceError,
 };
