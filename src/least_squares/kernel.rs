@@ -5,7 +5,6 @@
 //! do not depend on the processor.
 
 use multiversion::multiversion;
-use nalgebra::DMatrix;
 
 /// Number of Householder reflectors applied together to one trailing column.
 pub(super) const PANEL: usize = 4;
@@ -64,23 +63,6 @@ pub(super) fn dots(vectors: &[&[f64]; PANEL], b: &[f64]) -> [f64; PANEL] {
     let tail = |r: &[f64]| r.iter().zip(rest).map(|(v, b)| v * b).sum::<f64>();
     let tails = [tail(r0), tail(r1), tail(r2), tail(r3)];
     std::array::from_fn(|i| (sums[i][0] + sums[i][1]) + (sums[i][2] + sums[i][3]) + tails[i])
-}
-
-/// Returns AᵀB of two tall matrices with few columns, without the copies that a blocked matrix
-/// product makes.
-pub(crate) fn products(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
-    let rows = a.nrows();
-    let column = |i: usize| &a.as_slice()[i.min(a.ncols() - 1) * rows..][..rows];
-    let mut product = DMatrix::zeros(a.ncols(), b.ncols());
-    for first in (0..a.ncols()).step_by(PANEL) {
-        let panel: [&[f64]; PANEL] = std::array::from_fn(|i| column(first + i));
-        for (j, right) in b.as_slice().chunks_exact(rows.max(1)).enumerate() {
-            let sums = dots(&panel, right);
-            let count = PANEL.min(a.ncols() - first);
-            product.column_mut(j).rows_mut(first, count).copy_from_slice(&sums[..count]);
-        }
-    }
-    product
 }
 
 /// Subtracts Σ sᵢ vᵢ from b in one pass over b.

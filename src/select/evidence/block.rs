@@ -7,13 +7,8 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::marginal::{Coefficients, Normal, of_block};
-use crate::least_squares::kernel::products;
+use super::marginal::{Coefficients, NoiseGrid, Normal, of_block};
 use crate::select::neighbourhood::LinearNeighbourhood;
-
-/// Smallest number of columns at which products of tall matrices are computed row by row, because
-/// that is faster.
-const MIN_COLUMNS_BY_ROWS: usize = 24;
 
 /// Columns A of a hypothesis: derivatives of the whitened residuals with respect to its
 /// coefficients, shape = (3 N, k).
@@ -239,21 +234,17 @@ impl Block {
         self.normal.product()
     }
 
-    /// Returns MᵀA for columns M from which the fitted parameters are projected out. `others` holds
-    /// M and its transpose.
-    pub fn times(&self, (others, transposed): (&DMatrix<f64>, &DMatrix<f64>)) -> DMatrix<f64> {
+    /// Returns the projected columns if they are stored as a full matrix.
+    pub fn dense(&self) -> Option<&DMatrix<f64>> {
+        if let Columns::Dense(columns) = &self.columns { Some(columns) } else { None }
+    }
+
+    /// Returns MᵀA for grouped columns A and columns M from which the fitted parameters are
+    /// projected out, given the transpose of M; no columns for others.
+    pub fn times_grouped(&self, transposed: &DMatrix<f64>) -> DMatrix<f64> {
         match &self.columns {
-            Columns::Dense(columns)
-                if columns.ncols().min(others.ncols()) < MIN_COLUMNS_BY_ROWS =>
-            {
-                products(others, columns)
-            }
-            Columns::Dense(columns) => {
-                let mut all = DMatrix::zeros(others.ncols(), columns.ncols());
-                all.gemm(1.0, transposed, columns, 0.0);
-                all
-            }
             Columns::Grouped { levers, groups } => times_grouped(transposed, levers, groups),
+            Columns::Dense(_) => DMatrix::zeros(transposed.nrows(), 0),
         }
     }
 
@@ -265,7 +256,7 @@ impl Block {
         &self,
         set: Option<(&DMatrix<f64>, &DVector<f64>)>,
         (left, without): ((f64, f64), f64),
-        grid: &[(f64, f64)],
+        grid: &NoiseGrid,
     ) -> (f64, f64) {
         let (with, size) = match set {
             None => self.over_sizes(&self.normal, left, grid),
@@ -278,7 +269,7 @@ impl Block {
 
     /// Returns ln p(r | block), up to a constant, and the most probable size. `normal` and `left`
     /// belong to the columns and the residual after the other members of the set.
-    pub fn over_sizes(&self, normal: &Normal, left: (f64, f64), grid: &[(f64, f64)]) -> (f64, f64) {
+    pub fn over_sizes(&self, normal: &Normal, left: (f64, f64), grid: &NoiseGrid) -> (f64, f64) {
         of_block(normal, left, grid, (&DISPLACEMENTS, &self.coefficients))
     }
 }
@@ -286,6 +277,7 @@ impl Block {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::select::evidence::marginal::Noise;
     use crate::select::neighbourhood::Unknowns;
 
     /// Returns a matrix of pseudo-random numbers.
@@ -306,10 +298,9 @@ mod tests {
         let fit = LinearNeighbourhood::new(&jacobian, &residual, &unknowns, 0);
         let (within, grid) = (
             fit.projected_out(&matrix(36, 9).columns(7, 2).into_owned()).transpose() * 0.2,
-            [(0.0, 0.5), (-1.0, 0.2)],
+            Noise { freedom: 30.0, trust: 0.1, least: 0.0 }.grid(),
         );
         let taken = &within * fit.residual();
-        let others = within.transpose();
         for is_beside in [true, false] {
             let groups = (0..12).map(|pose| (pose != 5).then_some(pose / 2)).collect();
             for grouped in [
@@ -320,7 +311,10 @@ mod tests {
                 let dense = Design::Dense(grouped.columns().into_owned());
                 let [one, other] = [grouped, dense].map(|design| {
                     let block = Block::new(design, &fit, 0.0, Coefficients::default());
-                    let along = block.times((&others, &within));
+                    let along = match block.dense() {
+                        Some(columns) => &within * columns,
+                        None => block.times_grouped(&within),
+                    };
                     let set = is_beside.then_some((&along, &taken));
                     (block.gain(set, ((100.0, 30.0), 0.0), &grid), block.columns(&fit))
                 });

@@ -27,6 +27,12 @@ const MIN_LN_NOISE_STEP: f64 = 1e-4;
 /// Log odds to the largest term of a sum at which a term is neglected (e⁻⁴⁰).
 const NEGLIGIBLE_LN_ODDS: f64 = 40.0;
 
+/// Number of rows of L relative to its columns above which G = D − LᵀL is factored as a full matrix.
+/// Two factors of G then take less work than two of 1 − L E⁻¹ Lᵀ.
+const MIN_DENSE_SHARE: f64 = 0.8;
+/// Number of rows of a symmetric product that are formed together.
+const GRAM_ROWS: usize = 48;
+
 /// Degrees of freedom ν of a residual, and the prior on its noise factor f = true σ / assumed σ:
 /// Cauchy in ln f, with half-width `trust`.
 #[derive(Debug, Clone, Copy)]
@@ -39,8 +45,8 @@ pub(super) struct Noise {
 }
 
 impl Noise {
-    /// Returns, for each noise factor f of the grid, ln(prior(f) f^−ν) and 1 / (2 f²).
-    pub fn grid(self) -> Vec<(f64, f64)> {
+    /// Returns the grid of noise factors f.
+    pub fn grid(self) -> NoiseGrid {
         let step = MAX_LN_NOISE_STEP.min(0.5 / (2.0 * self.freedom).sqrt()).max(MIN_LN_NOISE_STEP);
         let least = self.least.clamp(-MAX_LN_NOISE_FACTOR, MAX_LN_NOISE_FACTOR);
         #[expect(clippy::cast_possible_truncation, reason = "few steps")]
@@ -49,17 +55,47 @@ impl Noise {
             let ln_f = step * f64::from(number);
             (-(ln_f / self.trust).powi(2).ln_1p() - self.freedom * ln_f, 0.5 * (-2.0 * ln_f).exp())
         };
-        (-steps..=steps)
+        let terms = (-steps..=steps)
             .filter(|&number| step * f64::from(number) >= least - 1e-9)
             .map(at)
-            .collect()
+            .collect();
+        let prior_range = (MAX_LN_NOISE_FACTOR / self.trust).powi(2).ln_1p();
+        NoiseGrid { terms, freedom: self.freedom, prior_range }
     }
 }
 
-/// Returns ln of the likelihood of a residual with sum of squares S, summed over the noise factor
-/// f, up to a constant. `grid` is that of [`Noise::grid`].
-pub(super) fn over_noise(squares: f64, grid: &[(f64, f64)]) -> f64 {
-    ln_sum(grid.iter().map(|(ln_weight, half)| ln_weight - half * squares))
+/// Grid over the noise factor f, in ascending order.
+#[derive(Debug, Clone)]
+pub(super) struct NoiseGrid {
+    /// For each f, ln(prior(f) f^−ν) and 1 / (2 f²).
+    terms: Vec<(f64, f64)>,
+    /// Degrees of freedom ν.
+    freedom: f64,
+    /// Largest difference of ln prior(f) on the grid.
+    prior_range: f64,
+}
+
+impl NoiseGrid {
+    /// Returns ln of the likelihood of a residual with sum of squares S, summed over the noise
+    /// factor f, up to a constant.
+    ///
+    /// Without the prior, the terms −ν ln f − S/(2f²) rise up to f² = S/ν and fall beyond. From
+    /// there, terms are computed until they are negligible, whatever the prior.
+    pub fn ln_likelihood(&self, squares: f64) -> f64 {
+        let term = |&(ln_weight, half): &(f64, f64)| ln_weight - half * squares;
+        let is_before_peak = |(_, half): &(f64, f64)| 2.0 * half * squares > self.freedom;
+        let peak = self.terms.partition_point(is_before_peak);
+        let mut most = f64::NEG_INFINITY;
+        let mut is_negligible = |entry: &(f64, f64)| {
+            let value = term(entry);
+            most = most.max(value);
+            value < most - NEGLIGIBLE_LN_ODDS - self.prior_range
+        };
+        let (before, behind) = self.terms.split_at(peak);
+        let end = behind.iter().position(&mut is_negligible).map_or(self.terms.len(), |k| peak + k);
+        let start = before.iter().rposition(is_negligible).map_or(0, |k| k + 1);
+        ln_sum(self.terms[start..end].iter().map(term))
+    }
 }
 
 /// Returns ln Σ exp of some terms.
@@ -113,11 +149,11 @@ impl Normal {
         }
     }
 
-    /// Computes G as a full matrix if L has so many rows that this takes less work.
+    /// Computes G as a full matrix if L has so many rows that this takes less work, for two sizes.
     pub fn dense_if_cheaper(self) -> Self {
         match self {
             Self::LowRankCorrection { diagonal, less, product }
-                if 2 * less.nrows() > less.ncols() =>
+                if less.nrows() as f64 > MIN_DENSE_SHARE * less.ncols() as f64 =>
             {
                 let mut gram = DMatrix::from_diagonal(&diagonal);
                 gram.gemm(-1.0, &less.transpose(), &less, 1.0);
@@ -148,9 +184,7 @@ impl Normal {
                 let mut scaled = less.clone();
                 scaled.column_iter_mut().zip(&root).for_each(|(mut column, root)| column /= *root);
                 let along = product.component_div(&root);
-                let mut inner = DMatrix::identity(less.nrows(), less.nrows());
-                inner.gemm(-1.0, &scaled, &scaled.transpose(), 1.0);
-                let lower = lower_factor(inner)?;
+                let lower = lower_factor(remainder_of_gram(&scaled))?;
                 let mut beside = scaled * &along;
                 if !lower.solve_lower_triangular_mut(&mut beside) {
                     return None;
@@ -160,6 +194,22 @@ impl Normal {
             }
         }
     }
+}
+
+/// Returns the lower half of 1 − S Sᵀ, block by block; the upper half is not complete.
+fn remainder_of_gram(s: &DMatrix<f64>) -> DMatrix<f64> {
+    let (n, transposed) = (s.nrows(), s.transpose());
+    let mut inner = DMatrix::identity(n, n);
+    for first in (0..n).step_by(GRAM_ROWS) {
+        let count = GRAM_ROWS.min(n - first);
+        inner.view_mut((first, 0), (count, first + count)).gemm(
+            -1.0,
+            &s.rows(first, count),
+            &transposed.columns(0, first + count),
+            1.0,
+        );
+    }
+    inner
 }
 
 /// Returns G + 1/c² on the diagonal, given the `precision` 1/c².
@@ -212,7 +262,7 @@ impl Coefficients {
 pub(super) fn of_block(
     normal: &Normal,
     left: (f64, f64),
-    grid: &[(f64, f64)],
+    grid: &NoiseGrid,
     (sizes, coefficients): (&[f64], &Coefficients),
 ) -> (f64, f64) {
     let k = coefficients.largest.len().max(1);
@@ -250,7 +300,7 @@ pub(super) fn of_block(
 fn of_columns(
     normal: &Normal,
     (squares, freedom): (f64, f64),
-    grid: &[(f64, f64)],
+    grid: &NoiseGrid,
     (sizes, never_negative): (&[f64], &[bool]),
 ) -> (f64, f64) {
     let at = |size: f64| {
@@ -271,14 +321,16 @@ fn of_columns(
             }
             _ => None,
         };
-        signs.unwrap_or(0.0) - determinant + over_noise(left, grid)
+        signs.unwrap_or(0.0) - determinant + grid.ln_likelihood(left)
     };
     // Sizes ascend, and beyond the most probable one the likelihood only falls: larger sizes of many
     // columns are not factored once they add nothing to the sum.
     let mut best = (1.0, f64::NEG_INFINITY);
     let mut tried = Vec::with_capacity(sizes.len());
     for &size in sizes {
-        let ln = at(size);
+        // Sizes above the largest plausible one are all equal to it.
+        let same = tried.last().filter(|(last, _): &&(f64, f64)| last.to_bits() == size.to_bits());
+        let ln = same.map_or_else(|| at(size), |(_, ln)| *ln);
         tried.push((size, ln));
         if ln > best.1 {
             best = (size, ln);
@@ -326,7 +378,7 @@ mod tests {
         let noise = Noise { freedom: 120.0, trust: 0.1, least: 0.0 };
         let (squares, grid) = (residual.norm_squared(), noise.grid());
         of_block(&normal, (squares, 120.0), &grid, (&SIZES, coefficients)).0
-            - over_noise(squares, &grid)
+            - grid.ln_likelihood(squares)
     }
 
     #[test]
@@ -344,8 +396,9 @@ mod tests {
 
     #[test]
     fn a_grid_is_bounded_whatever_the_degrees_of_freedom() {
-        let points =
-            |freedom: f64| Noise { freedom, trust: 0.1, least: f64::NEG_INFINITY }.grid().len();
+        let points = |freedom: f64| {
+            Noise { freedom, trust: 0.1, least: f64::NEG_INFINITY }.grid().terms.len()
+        };
         assert_eq!((points(30.0), points(1e300)), (141, 70_001));
     }
 

@@ -15,6 +15,7 @@ mod block;
 mod blocks;
 mod cache;
 mod candidate;
+mod column_products;
 mod columns;
 mod elsewhere;
 mod finer;

@@ -9,7 +9,8 @@ use rayon::prelude::*;
 
 use super::block::Block;
 use super::cache::Cache;
-use super::marginal::{Noise, Normal, over_noise};
+use super::column_products::{ColumnProducts, Member, form};
+use super::marginal::{Noise, NoiseGrid, Normal};
 use crate::fit::Stop;
 use crate::numeric::{inverse_factor, inverse_lower, lower_factor, lower_product};
 use crate::select::neighbourhood::LinearNeighbourhood;
@@ -39,7 +40,7 @@ pub(super) struct Products<'a> {
     /// Sum of squares rᵀr, with the fitted parameters projected out.
     pub squares: f64,
     /// Grid of noise factors.
-    grid: Vec<(f64, f64)>,
+    grid: NoiseGrid,
     cache: CachedProducts,
 }
 
@@ -47,8 +48,8 @@ pub(super) struct Products<'a> {
 /// are appended.
 #[derive(Default)]
 pub(super) struct CachedProducts {
-    /// Products of each hypothesis, by its index.
-    members: Vec<OnceLock<Member>>,
+    /// Columns of members and their products.
+    columns: ColumnProducts,
     /// Number of hypotheses after each extension of the list, 0 first.
     list_lengths: Vec<usize>,
     /// Gains of hypotheses when added to a set, by set and hypotheses.
@@ -66,16 +67,6 @@ fn sized_set(members: &[usize], sizes: &[f64]) -> SizedSet {
     members.iter().copied().zip(sizes.iter().map(|size| size.to_bits())).collect()
 }
 
-/// Hypothesis that is a member of at least one set, with its cached products.
-pub(super) struct Member {
-    /// Columns A with the fitted parameters projected out.
-    columns: Arc<DMatrix<f64>>,
-    /// Transpose Aᵀ.
-    transposed: DMatrix<f64>,
-    /// Products AᵀC with the columns of every hypothesis.
-    products: Vec<OnceLock<DMatrix<f64>>>,
-}
-
 impl<'a> Products<'a> {
     pub fn new(blocks: &'a [Block], target: &'a Target) -> Self {
         Self::with_cache(CachedProducts::default(), blocks, target)
@@ -84,10 +75,7 @@ impl<'a> Products<'a> {
     /// Creates the products for `blocks`, reusing cached results about the first of them.
     pub fn with_cache(mut cache: CachedProducts, blocks: &'a [Block], target: &'a Target) -> Self {
         let squares = target.fit.residual().norm_squared();
-        for member in cache.members.iter_mut().filter_map(OnceLock::get_mut) {
-            member.products.resize_with(blocks.len(), OnceLock::new);
-        }
-        cache.members.resize_with(blocks.len(), OnceLock::new);
+        cache.columns.extend_to(blocks.len());
         if cache.list_lengths.is_empty() {
             cache.list_lengths.push(0);
         }
@@ -102,7 +90,7 @@ impl<'a> Products<'a> {
 
     /// Returns ln of the density of a residual with this sum of squares, up to a constant.
     pub fn over_noise(&self, squares: f64) -> f64 {
-        over_noise(squares, &self.grid)
+        self.grid.ln_likelihood(squares)
     }
 
     /// Returns true if at least one of these hypotheses is a periodic error with many orders.
@@ -121,22 +109,22 @@ impl<'a> Products<'a> {
     }
 
     fn member(&self, block: usize) -> &Member {
-        if let Some(known) = self.cache.members[block].get() {
-            return known;
-        }
-        // The columns are computed before the cell is locked: a thread that helps with this
-        // product may need the same member.
-        let columns = self.blocks[block].columns(&self.target.fit);
-        let products = std::iter::repeat_with(OnceLock::new).take(self.blocks.len()).collect();
-        let new = Member { transposed: columns.transpose(), columns, products };
-        self.cache.members[block].get_or_init(|| new)
+        self.cache.columns.member(block, self.blocks, &self.target.fit)
     }
 
     /// Returns the product AᵀC of a set member's columns A and another hypothesis' columns C.
     fn product(&self, member: usize, other: usize) -> &DMatrix<f64> {
-        let member = self.member(member);
-        member.products[other]
-            .get_or_init(|| self.blocks[other].times((&member.columns, &member.transposed)))
+        self.member(member).product(other, self.blocks)
+    }
+
+    /// Forms the products of several set members with other hypotheses together, which is faster
+    /// than one after the other.
+    pub fn form(&self, members: impl IntoIterator<Item = usize>, others: &[usize]) {
+        if !self.target.stop.is_requested() {
+            let members: Vec<&Member> =
+                members.into_iter().map(|member| self.member(member)).collect();
+            form(&members, others, self.blocks);
+        }
     }
 
     /// Returns, for each tried hypothesis, the gain in ln p(r) in addition to a set with given
@@ -326,6 +314,7 @@ impl ReducedProblem<'_, '_> {
 
     /// Returns the gains of several hypotheses; empty if the search was stopped.
     pub fn gains(&self, tried: &[usize]) -> Vec<(f64, f64)> {
+        self.products.form(self.members.iter().copied(), tried);
         let stop = &self.products.target.stop;
         let of = |some: &[usize]| {
             if stop.is_requested() { Vec::new() } else { self.gains_together(some) }

@@ -137,6 +137,11 @@ pub(super) fn search(products: &Products, present: &[usize]) -> Vec<Weighted> {
     let every: Vec<usize> = (0..blocks.len()).collect();
     for _ in 0..longer {
         let mut next: BTreeMap<Vec<usize>, Set> = BTreeMap::new();
+        if let Some(promising) = &promising {
+            let members: BTreeSet<usize> =
+                front.iter().flat_map(|set| set.members.iter().copied()).collect();
+            products.form(members, promising);
+        }
         for (place, set) in front.iter().enumerate() {
             let tried = promising.as_ref().filter(|_| place > 0).unwrap_or(&every);
             for longer in extended(set, tried, products) {
@@ -311,11 +316,13 @@ fn replaced(
     let near: Vec<&Set> = one.iter().filter(is_near).take(MAX_EXTENDING).collect();
     let promising: Vec<usize> = near.iter().filter_map(|set| set.members.last().copied()).collect();
     let second: Vec<usize> = second.into_iter().collect();
-    let narrow = near.into_iter().filter(|set| !set.has_wide(blocks)).take(BEAM_WIDTH).enumerate();
-    let longer = |(place, set): (usize, &Set)| {
+    let narrow: Vec<&Set> =
+        near.into_iter().filter(|set| !set.has_wide(blocks)).take(BEAM_WIDTH).collect();
+    products.form(narrow.iter().filter_map(|set| set.members.last().copied()), &promising);
+    let longer = |(place, &set): (usize, &&Set)| {
         extended(set, if place == 0 { &second } else { &promising }, products)
     };
-    let two: Vec<Set> = narrow.flat_map(longer).collect();
+    let two: Vec<Set> = narrow.iter().enumerate().flat_map(longer).collect();
     let mut new: Vec<Set> = one.into_iter().chain(two).collect();
     new.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
     // With converged sizes, a set may be far more probable than with sizes found one after the

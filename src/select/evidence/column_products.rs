@@ -1,0 +1,168 @@
+//! Products AᵀC of the columns of set members with those of other hypotheses, each formed once.
+//!
+//! The products of many pairs are one matrix product, since each pair alone would read its columns
+//! from memory again. An entry does not depend on the pairs that are formed with it.
+
+use std::sync::{Arc, OnceLock};
+
+use nalgebra::DMatrix;
+use rayon::prelude::*;
+
+use super::block::Block;
+use crate::select::neighbourhood::LinearNeighbourhood;
+
+/// Number of hypotheses whose products are formed together; their columns fit into the cache.
+const HYPOTHESES_PER_PRODUCT: usize = 32;
+/// Smallest number of rows and of columns of a product. With fewer, nalgebra sums in another order.
+const MIN_SIDE: usize = 6;
+
+/// Members of sets with their products, by the index of the hypothesis.
+#[derive(Default)]
+pub(super) struct ColumnProducts(Vec<OnceLock<Member>>);
+
+/// Hypothesis that is a member of at least one set, with its cached products.
+pub(super) struct Member {
+    /// Columns A with the fitted parameters projected out.
+    pub columns: Arc<DMatrix<f64>>,
+    /// Transpose Aᵀ.
+    pub transposed: DMatrix<f64>,
+    /// Products AᵀC with the columns of every hypothesis.
+    products: Vec<OnceLock<DMatrix<f64>>>,
+}
+
+impl ColumnProducts {
+    /// Makes room for the products of `count` hypotheses.
+    pub fn extend_to(&mut self, count: usize) {
+        for member in self.0.iter_mut().filter_map(OnceLock::get_mut) {
+            member.products.resize_with(count, OnceLock::new);
+        }
+        self.0.resize_with(count, OnceLock::new);
+    }
+
+    /// Returns the columns of a set member.
+    pub fn member(&self, index: usize, blocks: &[Block], fit: &LinearNeighbourhood) -> &Member {
+        if let Some(known) = self.0[index].get() {
+            return known;
+        }
+        // The columns are computed before the cell is locked: a thread that helps with this
+        // product may need the same member.
+        let columns = blocks[index].columns(fit);
+        let products = std::iter::repeat_with(OnceLock::new).take(blocks.len()).collect();
+        let new = Member { transposed: columns.transpose(), columns, products };
+        self.0[index].get_or_init(|| new)
+    }
+}
+
+impl Member {
+    /// Returns the product AᵀC with the columns C of another hypothesis.
+    pub fn product(&self, other: usize, blocks: &[Block]) -> &DMatrix<f64> {
+        self.products[other].get_or_init(|| match blocks[other].dense() {
+            Some(columns) => together(&[self], &[columns]),
+            None => blocks[other].times_grouped(&self.transposed),
+        })
+    }
+
+    fn lacks(&self, other: usize) -> bool {
+        self.products[other].get().is_none()
+    }
+}
+
+/// Forms the products of some members with the hypotheses `others`, as far as they are missing.
+pub(super) fn form(members: &[&Member], others: &[usize], blocks: &[Block]) {
+    let of = |others: &[usize]| {
+        let is_missing = |other: usize| members.iter().any(|member| member.lacks(other));
+        let missing: Vec<(usize, &DMatrix<f64>)> = others
+            .iter()
+            .filter(|&&other| is_missing(other))
+            .filter_map(|&other| Some((other, blocks[other].dense()?)))
+            .collect();
+        let lacking: Vec<&Member> = members
+            .iter()
+            .copied()
+            .filter(|member| missing.iter().any(|&(other, _)| member.lacks(other)))
+            .collect();
+        if lacking.is_empty() {
+            return;
+        }
+        let columns: Vec<&DMatrix<f64>> = missing.iter().map(|(_, columns)| *columns).collect();
+        let all = together(&lacking, &columns);
+        let mut row = 0;
+        for member in lacking {
+            let (count, mut column) = (member.columns.ncols(), 0);
+            for (other, columns) in &missing {
+                let cell = &member.products[*other];
+                if cell.get().is_none() {
+                    let product = all.view((row, column), (count, columns.ncols()));
+                    // Another thread may have formed the same numbers meanwhile.
+                    let _ = cell.set(product.into_owned());
+                }
+                column += columns.ncols();
+            }
+            row += count;
+        }
+    };
+    others.par_chunks(HYPOTHESES_PER_PRODUCT).for_each(of);
+}
+
+/// Returns the products AᵀC of the members' columns, one below the other, with `columns` side by
+/// side. Rows and columns of zeros are added up to [`MIN_SIDE`] for several pairs only.
+fn together(members: &[&Member], columns: &[&DMatrix<f64>]) -> DMatrix<f64> {
+    let height: usize = members.iter().map(|member| member.columns.ncols()).sum();
+    let width: usize = columns.iter().map(|columns| columns.ncols()).sum();
+    let rows = columns.first().map_or(0, |columns| columns.nrows());
+    let mut left = DMatrix::zeros(height.max(MIN_SIDE), rows);
+    let mut first = 0;
+    for Member { transposed, .. } in members {
+        left.rows_mut(first, transposed.nrows()).copy_from(transposed);
+        first += transposed.nrows();
+    }
+    let mut right = DMatrix::zeros(rows, width.max(MIN_SIDE));
+    let mut first = 0;
+    for columns in columns {
+        right.columns_mut(first, columns.ncols()).copy_from(columns);
+        first += columns.ncols();
+    }
+    let product = left * right;
+    product.view((0, 0), (height, width)).into_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::select::evidence::block::Design;
+    use crate::select::evidence::marginal::Coefficients;
+    use crate::select::neighbourhood::Unknowns;
+    use nalgebra::DVector;
+
+    #[test]
+    fn a_product_is_the_same_to_the_bit_alone_and_together_with_others() {
+        let matrix = |columns: usize, seed: f64| {
+            DMatrix::from_fn(930, columns, |i, j| {
+                (12.9898 * i as f64 + 78.233 * j as f64 + seed).sin() * 43.7 % 1.0
+            })
+        };
+        let unknowns = Unknowns { x: vec![0.0], priors: vec![None], active: DMatrix::zeros(0, 1) };
+        let residual = DVector::from_element(930, 1.0);
+        let fit = LinearNeighbourhood::new(&matrix(1, 0.5), &residual, &unknowns, 0);
+        let design = |k: u8| {
+            let columns = matrix(usize::from(1 + 4 * k % 11), f64::from(k));
+            (Design::Dense(columns).scaled(310).unwrap(), 0.0, Coefficients::default())
+        };
+        let blocks = Block::all((0..40).map(design).collect(), &fit);
+        let all: Vec<usize> = (0..blocks.len()).collect();
+        let (mut alone, mut many) = (ColumnProducts::default(), ColumnProducts::default());
+        alone.extend_to(blocks.len());
+        many.extend_to(blocks.len());
+        let members: Vec<&Member> =
+            (0..12).map(|member| many.member(member, &blocks, &fit)).collect();
+        form(&members, &all, &blocks);
+        for (k, member) in members.iter().enumerate() {
+            for &other in &all {
+                let single = alone.member(k, &blocks, &fit).product(other, &blocks);
+                assert_eq!(member.product(other, &blocks), single, "{k} {other}");
+                let exact = member.columns.tr_mul(&*blocks[other].columns(&fit));
+                assert!((single - exact).amax() < 1e-9);
+            }
+        }
+    }
+}
