@@ -13,24 +13,14 @@ otherwise (``x_mm``, ``mean_mm``, ``temperature_C``).
 
 from __future__ import annotations
 
+from ._applied import Compensation, Export
+from ._designs import Check, Next, Plan, Simulation, Study
+from ._fits import ClosedLoop, Comparison, Identification, Trace
 from ._fleet import fleet
 from ._forward import Prediction
 from ._least_squares import LeastSquares
 from ._problem import Problem, study
 from ._progress import Progress
-from ._results import (
-    Check,
-    ClosedLoop,
-    Comparison,
-    Compensation,
-    Export,
-    Identification,
-    Next,
-    Plan,
-    Simulation,
-    Study,
-    Trace,
-)
 from .errors import FlexcalWarning, InputError
 
 __all__ = [

@@ -7,7 +7,7 @@ from html import escape
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from ._results import ClosedLoop, Identification, Trace
+    from ._fits import ClosedLoop, Identification, Trace
 
 
 def identification(result: Identification) -> str:

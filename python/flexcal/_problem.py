@@ -11,10 +11,11 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _core
+from ._designs import Check, Next, Plan, Simulation, Study
+from ._fits import ClosedLoop, Comparison, Identification, Trace
 from ._forward import Forward
 from ._least_squares import LeastSquares
 from ._progress import Told, told
-from ._results import Check, ClosedLoop, Comparison, Identification, Next, Plan, Simulation, Study, Trace
 from ._restored import Prior, Spec
 from ._tables import Data, Path, Source, count, region, source, warn
 

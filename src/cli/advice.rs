@@ -89,7 +89,7 @@ pub fn after_loop(
     }
     if result.structures().any(|left| left.limit.is_some()) {
         return format!(
-            "flexcal identify {named} -v shows the cost of each limit; then move it out"
+            "flexcal identify {named} -v shows how far the error would fall if a limit moved out; widen those that may be wrong"
         );
     }
     // A plan separates effects within known ranges, unless they depend on time.

@@ -49,15 +49,20 @@ enum PosesError {
     Twice,
 }
 
-/// Runs the check, writes `check.json`, and prints the expected results.
+/// Runs the check, writes `check.json` and `check.html`, and prints the expected results.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let common = &arguments.common;
     let problem = Problem::read(common.problem())?;
-    let results = common.results("check", &problem, &arguments.source.files(), &["check.json"])?;
+    let results = common.results(
+        "check",
+        &problem,
+        &arguments.source.files(),
+        &["check.json", "check.html"],
+    )?;
     let check = design::check(&problem, &judged(arguments, &problem)?, arguments.source.seed)?;
     let json = CheckResult::new(&problem, &check).to_json();
-    results.write(&[("check.json", &json)])?;
-    let written = results.path("check.json");
+    let page = report::check_page(&problem, &check);
+    results.write(&[("check.json", &json), ("check.html", &page)])?;
     common.print_result(&json, || {
         let problem_word = shell_word(common.problem());
         let is_measured = arguments.poses.is_none() && arguments.source.candidates.is_empty();
@@ -69,7 +74,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
             format!("flexcal plan {problem_word} --poses N chooses poses that tell more")
         };
         let text = report::check_text(&problem, &check);
-        format!("{text}\nWritten to {}\nNext: {next}\n", written.display())
+        format!("{text}{}Next: {next}\n", results.written())
     })?;
     if check.suffices() {
         return Ok(Outcome::Done);

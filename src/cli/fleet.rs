@@ -22,7 +22,7 @@ pub struct Arguments {
     /// An estimate.json of each arm; all arms have the same declaration
     #[arg(value_name = "ESTIMATE.json", required = true, num_args = 1..)]
     estimates: Vec<PathBuf>,
-    /// File to write, which identify takes with --prior
+    /// File to write, which identify takes with --prior; the page of the same name ends in .html
     #[arg(short, long, value_name = "PRIOR.toml", default_value = "PRIOR.toml")]
     out: PathBuf,
     /// Replace a file that flexcal did not write
@@ -46,7 +46,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let name = out.file_name().map(|name| name.to_string_lossy().into_owned());
     let name = name.unwrap_or_else(|| "PRIOR.toml".to_owned());
     let flags = (*force, *quiet);
-    let results = Results::claim("fleet", folder, estimates.clone(), &[&name], flags)?;
+    let page = Path::new(&name).with_extension("html").display().to_string();
+    let results = Results::claim("fleet", folder, estimates.clone(), &[&name, &page], flags)?;
     let read = estimates.iter().map(|file| trust.read(file)).collect::<Result<Vec<_>, _>>()?;
     for estimate in read.iter().filter(|estimate| !estimate.trusted) {
         let file = estimate.file.display();
@@ -55,7 +56,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         ));
     }
     let fleet = life::fleet(&read)?;
-    results.write(&[(&name, &fleet.to_toml())])?;
+    results.write(&[(&name, &fleet.to_toml()), (&page, &report::fleet_page(&fleet))])?;
     if *json {
         output::print_json(&FleetResult::new(&fleet).to_json())?;
     } else if !quiet {

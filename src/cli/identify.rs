@@ -175,7 +175,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         let told = if arguments.verbose {
             report::estimate_text(&problem, &identification)
         } else {
-            report::estimate_brief(&problem, &identification, output::columns())
+            let bound = report::bound_text(&shown);
+            report::estimate_brief(&problem, &identification, bound, output::columns())
         };
         let sources = sources.as_ref().map_or_else(String::new, |words| format!("\n{words}\n"));
         let is_structured = shown.residual_tests.is_structured();

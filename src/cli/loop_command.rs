@@ -103,7 +103,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         let told = if arguments.verbose {
             report::loop_text(&problem, &closure)
         } else {
-            report::loop_brief(&problem, &closure, output::columns())
+            report::loop_brief(&problem, &closure, report::bound_text(&shown), output::columns())
         };
         let next = advice::after_loop(common, &problem, &closure.before.fit, &result, &results);
         format!("{told}{words}{}Next: {next}\n", results.written())

@@ -24,7 +24,7 @@ use super::{diagnostic, interrupt};
         "Tables of poses to choose from, with the columns of measurements; positions are not needed. Predictions are judged there"
     )),
     after_help = "Fits the measured poses, then chooses those that lower the error of predictions in the workspace most: the limits of the \
-joints (measured ranges where there are none), the ranges of a TRUTH.toml, or the rows of --pool. Writes next.csv and next.json. Exit \
+joints (measured ranges where there are none), the ranges of a TRUTH.toml, or the rows of --pool. Writes next.csv, next.json and the page next.html. Exit \
 status 1: further poses gain nothing and the tolerance is not met.
 
 Examples:
@@ -87,11 +87,11 @@ impl From<PurposeArgument> for Purpose {
     }
 }
 
-/// Chooses poses, writes `next.csv` and `next.json`, and prints what they are expected to give.
+/// Chooses poses, writes `next.csv`, `next.json` and `next.html`, and prints what they are expected to give.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let (common, source) = (&arguments.common, &arguments.source);
     let Input { problem, data, results } =
-        common.read_beside("next", &source.files(), &["next.csv", "next.json"])?;
+        common.read_beside("next", &source.files(), &["next.json", "next.html", "next.csv"])?;
     let candidates = match source.table(&problem, common)? {
         Some(rows) => Candidates::Rows(Box::new(rows)),
         None => Candidates::Within(match source.known_ranges(&problem)? {
@@ -127,27 +127,23 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let json = NextResult::new(&problem, &options, &next).to_json();
     let table = poses_csv(&problem, &next.poses);
     interrupt::begin_writing();
-    let mut texts = vec![("next.json", json.as_str())];
+    let page = report::next_page(&problem, &options, &next);
+    let mut texts = vec![("next.json", json.as_str()), ("next.html", page.as_str())];
     if !next.poses.is_empty() {
         texts.push(("next.csv", table.as_str()));
     }
     results.write(&texts)?;
     common.print_result(&json, || {
         let text = report::next_text(&problem, &options, &next);
-        let named = common.named();
+        let (named, written) = (common.named(), results.written());
         if next.poses.is_empty() {
-            let file = results.path("next.json");
-            return format!(
-                "{text}\nWritten to {}\nNext: flexcal identify {named}\n",
-                file.display()
-            );
+            return format!("{text}{written}Next: flexcal identify {named}\n");
         }
         let (file, named) = (results.path("next.csv"), shell_word(common.problem()));
         let files: Vec<String> =
             common.files(&problem).iter().map(|file| shell_word(file)).collect();
         format!(
-            "{text}\nWritten to {0}, what it promises to next.json beside it\n\
-             Next: measure these poses, add the columns x_mm, y_mm, z_mm, then\n\
+            "{text}{written}Next: measure these poses, add the columns x_mm, y_mm, z_mm, then\n\
              flexcal next {named} --data {1} {0}\n",
             shell_word(&file),
             files.join(" "),

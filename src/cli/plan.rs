@@ -22,7 +22,7 @@ use super::region::Region;
 #[command(
     mut_arg("data", |arg| arg.help("Measurements that are there already: the plan completes them")),
     after_help = "Poses are sought within the limits of the joints, in the ranges of [poses] of a TRUTH.toml, or among the rows of \
-a table. The plan is plan.csv: measure it, add the columns x_mm, y_mm, z_mm, and identify.
+a table. The plan is plan.csv (page: plan.html): measure it, add the columns x_mm, y_mm, z_mm, and identify.
 
 Examples:
   flexcal plan problems/lunar-sampler --truth problems/lunar-sampler/TRUTH.toml --poses 28
@@ -81,7 +81,7 @@ impl From<CriterionArgument> for Criterion {
     }
 }
 
-/// Makes the plan, writes `plan.csv` and `plan.json`, and prints the accuracy that it is expected
+/// Makes the plan, writes `plan.csv`, `plan.json` and `plan.html`, and prints the accuracy that it is expected
 /// to give.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let (common, source) = (&arguments.common, &arguments.source);
@@ -91,7 +91,12 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     }
     let pair = pair(&arguments.separate, &declared)?;
     let problem = pair.as_ref().map_or(declared, |pair| pair.declared.clone());
-    let results = common.results("plan", &problem, &source.files(), &["plan.csv", "plan.json"])?;
+    let results = common.results(
+        "plan",
+        &problem,
+        &source.files(),
+        &["plan.csv", "plan.json", "plan.html"],
+    )?;
     let candidates = match source.table(&problem, common)? {
         Some(rows) => Candidates::Rows(Box::new(rows)),
         None => Candidates::Within(source.ranges(&problem)?),
@@ -135,15 +140,15 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let json =
         PlanResult::new(&problem, criterion, source.seed, &plan, separated.as_ref()).to_json();
     let table = poses_csv(&problem, &plan.poses);
-    results.write(&[("plan.csv", &table), ("plan.json", &json)])?;
+    let page = report::plan_page(&problem, criterion, &plan, separated.as_ref());
+    results.write(&[("plan.csv", &table), ("plan.json", &json), ("plan.html", &page)])?;
     common.print_result(&json, || {
         let text = report::plan_text(&problem, criterion, &plan, separated.as_ref());
-        let table = results.path("plan.csv");
-        let (problem, word) = (shell_word(common.problem()), shell_word(&table));
+        let (problem, table) =
+            (shell_word(common.problem()), shell_word(&results.path("plan.csv")));
         format!(
-            "{text}\nWritten to {}, what it promises to plan.json beside it\n\
-             Next: measure these poses, add the columns x_mm, y_mm, z_mm, then flexcal identify {problem} --data {word}\n",
-            table.display()
+            "{text}{}Next: measure these poses, add the columns x_mm, y_mm, z_mm, then flexcal identify {problem} --data {table}\n",
+            results.written()
         )
     })?;
     if plan.suffices {

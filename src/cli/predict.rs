@@ -20,7 +20,7 @@ use super::outcome::Outcome;
 #[derive(Debug, Args)]
 #[command(
     mut_arg("data", |arg| arg.help("Tables of poses like measurements; positions are not needed")),
-    after_help = "Writes predictions.csv; where the table holds measured positions also residuals.csv and errors.json, the errors of all \
+    after_help = "Writes predictions.csv and predictions.html; where the table holds measured positions also residuals.csv and errors.json, the errors of all \
 rows and of each session. A session that the estimate does not know is given a base and a tool fitted to its known rows, with the arm as \
 it is.
 
@@ -43,7 +43,7 @@ pub struct Arguments {
 }
 
 /// Names of the files that the command may write.
-const RESULTS: [&str; 3] = ["predictions.csv", "residuals.csv", "errors.json"];
+const RESULTS: [&str; 4] = ["predictions.csv", "residuals.csv", "errors.json", "predictions.html"];
 
 /// Predicts, writes predictions and their residuals, and prints the errors.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
@@ -92,11 +92,12 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         }
     });
     texts.extend(errors.clone().map(|json| ("errors.json", json)));
+    let arm = if estimate.is_some() { "the identified arm" } else { "the nominal arm" };
+    texts.push((RESULTS[3], report::prediction_page(&problem, arm, &prediction, bounds)));
     let borrowed: Vec<(&str, &str)> =
         texts.iter().map(|(name, text)| (*name, text.as_str())).collect();
     results.write(&borrowed)?;
     common.print_result(errors.as_deref().unwrap_or(&PredictionErrors::default().to_json()), || {
-        let arm = if estimate.is_some() { "the identified arm" } else { "the nominal arm" };
         let text = report::prediction_text(&problem, arm, &prediction, bounds);
         let names: Vec<&str> = texts.iter().map(|(name, _)| *name).collect();
         let problem = shell_word(common.problem());

@@ -107,7 +107,7 @@ struct NoFolder {
 }
 
 /// Names of the files that the command may write.
-const NAMES: [&str; 4] = ["study.json", "parameters.csv", "timing.csv", "study.csv"];
+const NAMES: [&str; 5] = ["study.json", "parameters.csv", "timing.csv", "study.csv", "study.html"];
 
 impl Common {
     /// Claims the file names for the results of a study.
@@ -122,7 +122,7 @@ impl Common {
 }
 
 /// Computes the unfinished fits, or merges shares; then writes `study.csv`, `study.json`,
-/// `parameters.csv`, `timing.csv` and prints the table.
+/// `parameters.csv`, `timing.csv` and `study.html`, and prints the table.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     if let Some(Merge::Merge { common, from }) = &arguments.merge {
         let study = Study::read(&common.study)?;
@@ -216,15 +216,10 @@ fn finish(
         (NAMES[1], &study_parameters_csv(study, &found)),
         (NAMES[2], &study_timing_csv(study, &found)),
         (NAMES[3], &study_csv(study, &found)),
+        (NAMES[4], &report::study_page(study, &found)),
     ];
     results.write(&texts)?;
-    common.flags.print_result(&json, || {
-        let (text, table) = (report::study_text(study, &found), results.path("study.csv"));
-        format!(
-            "{text}\nWritten to {}, each parameter to parameters.csv beside it\n",
-            table.display()
-        )
-    })?;
+    common.flags.print_result(&json, || report::study_text(study, &found) + &results.written())?;
     let has_failed = |cell: &CellResult| cell.tally.failed() == cell.tally.fits;
     Ok(Outcome::trusted(!found.cells.iter().any(has_failed)))
 }

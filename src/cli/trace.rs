@@ -4,7 +4,7 @@ use std::error::Error;
 
 use clap::Args;
 use flexcal::fit::Options;
-use flexcal::results::{Document as _, TraceResult};
+use flexcal::results::{Document as _, PlotData, TraceResult};
 use flexcal::{report, select};
 
 use super::input::{Common, Input};
@@ -23,11 +23,12 @@ pub struct Arguments {
     common: Common,
 }
 
-/// Fits, ranks the effects that the residual points to, writes `trace.json`, and prints the
+/// Fits, ranks the effects that the residual points to, writes `trace.json` and `trace.html`, and prints the
 /// ranking.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let common = &arguments.common;
-    let Input { problem, mut data, results } = common.read("trace", &["trace.json"])?;
+    let Input { problem, mut data, results } =
+        common.read("trace", &["trace.json", "trace.html"])?;
     common.say_if_nothing_is_free(&problem);
     common.say_of_orientation(&problem, &mut data);
     let trace = Line::during(common.prints_text(), None, |sink| {
@@ -35,12 +36,13 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     })?;
     let result = TraceResult::new(&problem, &trace);
     let json = result.to_json();
-    results.write(&[("trace.json", &json)])?;
-    let written = results.path("trace.json");
+    let plots = PlotData::of_identification(&problem, &data, &trace.fit)?;
+    let page = report::trace_page(&problem, &trace, &plots);
+    results.write(&[("trace.json", &json), ("trace.html", &page)])?;
     common.print_result(&json, || {
         let (text, next) =
             (report::trace_text(&problem, &trace), advice::after_trace(common, &result));
-        format!("{text}\nWritten to {}\nNext: {next}\n", written.display())
+        format!("{text}{}Next: {next}\n", results.written())
     })?;
     Ok(diagnostic::judged(&trace.fit, common.quiet))
 }

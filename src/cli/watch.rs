@@ -44,12 +44,12 @@ fn probability(text: &str) -> Result<f64, String> {
     number.ok_or_else(|| "a probability above 0 and up to 0.5 is expected".to_owned())
 }
 
-/// Tests the rows, writes `watch.json` and prints the verdict.
+/// Tests the rows, writes `watch.json` and `watch.html`, and prints the verdict.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let common = &arguments.common;
     let problem = Problem::read(common.problem())?;
     let others = std::slice::from_ref(&arguments.estimate);
-    let results = common.results("watch", &problem, others, &["watch.json"])?;
+    let results = common.results("watch", &problem, others, &["watch.json", "watch.html"])?;
     let (rows, warnings) = Measurements::read(common.files(&problem), &problem)?;
     common.warn(&warnings);
     let estimate = arguments.trust.read(&arguments.estimate)?;
@@ -57,10 +57,12 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         diagnostic::warn("the estimate is not to be trusted, so the verdict is not either");
     }
     let settings = (arguments.drift, arguments.false_alarms);
-    let watch = life::watch(&problem, &estimate, &rows.arm_rows(), settings)?;
+    let rows = rows.arm_rows();
+    let watch = life::watch(&problem, &estimate, &rows, settings)?;
     let named = arguments.estimate.display().to_string();
     let json = WatchResult::new(&problem, &named, arguments.drift, &watch).to_json();
-    results.write(&[("watch.json", &json)])?;
+    let page = report::watch_page(&problem, &watch, &rows);
+    results.write(&[("watch.json", &json), ("watch.html", &page)])?;
     common.print_result(&json, || {
         let [problem_word, estimate] = [common.problem(), &arguments.estimate].map(shell_word);
         let next = if watch.is_changed() {

@@ -14,12 +14,20 @@ use crate::quantity::format::{counted, number};
 use crate::results::Knowledge;
 
 /// Returns a summary of a fit for one screen, ending in a line break: errors, size of the residual,
-/// parameters and remarks. Lines have at most `columns` characters.
-pub fn estimate_brief(problem: &Problem, found: &Identification, columns: usize) -> String {
+/// parameters and remarks. Lines have at most `columns` characters; `bound` is a sentence on the
+/// error bound of predictions.
+pub fn estimate_brief(
+    problem: &Problem,
+    found: &Identification,
+    bound: Option<String>,
+    columns: usize,
+) -> String {
     let mut blocks = vec![
         headline(problem, found),
         Block::Table(errors_by_axis(found)),
-        Block::lines(noise(problem, found)),
+        Block::lines(
+            [noise(problem, found)].into_iter().chain(bound).collect::<Vec<_>>().join("\n"),
+        ),
     ];
     blocks.extend(influential_rows(found));
     blocks.extend(found.prior.as_ref().map(|comparison| Block::Text(summary(comparison))));

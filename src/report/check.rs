@@ -1,10 +1,11 @@
-//! Text of the command `check`: the expected result of measurements at some poses.
+//! Text and page of the command `check`: the expected result of measurements at some poses.
 
 use super::detection;
-use super::document::{Block, Column, Table};
+use super::document::{Block, Column, Table, opening};
+use super::figures::{ACCENT, Curve, Drawing, FAINT, INK, Series};
 use super::forecast::{assumptions, cells};
 use super::parameters::{conditioning, unidentifiable};
-use super::render::text;
+use super::render::{page, text};
 use crate::design::{Check, ExpectedParameter, Forecast, GrowthStep, Prediction, PredictionPoses};
 use crate::fit::rows_of_kind;
 use crate::problem::Problem;
@@ -12,6 +13,15 @@ use crate::quantity::format::{counted, mm};
 
 /// Returns the forecast of the command `check` as text, ending in a line break.
 pub fn check_text(problem: &Problem, check: &Check) -> String {
+    text(&blocks(problem, check))
+}
+
+/// Returns the forecast as a page, with the error of predictions against the number of poses.
+pub(crate) fn check_page(problem: &Problem, check: &Check) -> String {
+    page(&problem.title, "check", &blocks(problem, check))
+}
+
+fn blocks<'a>(problem: &Problem, check: &Check) -> Vec<Block<'a>> {
     let forecast = &check.forecast;
     let names: Vec<String> =
         forecast.expected.iter().map(|expected| expected.name.clone()).collect();
@@ -29,13 +39,10 @@ pub fn check_text(problem: &Problem, check: &Check) -> String {
             "two shares: the first at the nominal arm, where the parameter is confounded with others (below), the second over arms drawn from the priors",
         );
     }
-    let mut blocks = vec![
-        Block::lines(format!(
-            "{}\n{}, {}",
-            problem.title,
-            counted(names.len(), "parameter"),
-            counted(forecast.poses, "pose")
-        )),
+    let counts =
+        format!("{}, {}", counted(names.len(), "parameter"), counted(forecast.poses, "pose"));
+    let mut blocks = opening(&problem.title, counts).to_vec();
+    blocks.extend([
         Block::Table(Table::new(&header, rows.collect(), &[0, 4, 5]).noted(&notes)),
         conditioning(&forecast.identifiability, names.len(), check.coordinates),
         unidentifiable(&forecast.identifiability, &names, "check.json"),
@@ -45,12 +52,41 @@ pub fn check_text(problem: &Problem, check: &Check) -> String {
         ),
         Block::Table(growth(check)),
         Block::lines(enough(check)),
-    ];
+        Block::figures([growing(check)]),
+    ]);
     // Measured poses do not include the held-out ones.
     let all = (check.predicted_at != PredictionPoses::HeldOut).then_some(forecast.poses);
     blocks.extend(assumptions(problem, &forecast.expected, all));
     blocks.extend(detection::blocks(&check.detection));
-    text(&blocks)
+    blocks
+}
+
+/// Draws the expected error of predictions against the number of poses.
+fn growing(check: &Check) -> Option<Drawing> {
+    let curve = |name, colour, of: fn(&Prediction) -> f64| {
+        let at = |step: &GrowthStep| (step.poses as f64, of(&step.prediction) * 1e3);
+        Curve::new(name, colour, check.growth.steps.iter().map(at))
+    };
+    let noise = check.noise.map(|noise| {
+        let name = format!("noise of one measured position, rms {} mm", mm(noise, 3));
+        (name, noise * 1e3)
+    });
+    Series {
+        names: ("check-growth", "Expected error of predictions against the number of poses"),
+        caption: "Expected error of predicted positions after so many poses of this kind, without \
+                  measurement noise, on a logarithmic scale."
+            .to_owned(),
+        labels: ("poses", "error [mm]"),
+        is_logarithmic: true,
+        curves: vec![
+            curve("95 % stay below", ACCENT, |error| error.quantile_95),
+            curve("root mean square", INK, |error| error.rms),
+            curve("median", FAINT, |error| error.median),
+        ],
+        levels: noise.into_iter().collect(),
+        ..Series::default()
+    }
+    .drawing()
 }
 
 /// Smallest difference between the identified shares at the nominal and at drawn arms at which both

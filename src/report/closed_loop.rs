@@ -34,8 +34,13 @@ const SCREEN_LINES: usize = 22;
 const EXTENDED: &str = "with what was found";
 
 /// Returns a summary of the outcome for one screen, ending in a line break. Lines have at most
-/// `columns` characters.
-pub fn loop_brief(problem: &Problem, closure: &ClosedLoop, columns: usize) -> String {
+/// `columns` characters; `bound` is a sentence on the error bound of predictions.
+pub fn loop_brief(
+    problem: &Problem,
+    closure: &ClosedLoop,
+    bound: Option<String>,
+    columns: usize,
+) -> String {
     let result = &LoopResult::new(problem, closure);
     let text = |blocks: &[Block]| text_within(blocks, columns);
     let mut blocks = head(problem, closure, result);
@@ -45,7 +50,9 @@ pub fn loop_brief(problem: &Problem, closure: &ClosedLoop, columns: usize) -> St
     table.header.pop();
     table.rows.iter_mut().for_each(|row| _ = row.pop());
     blocks.push(Block::Table(table));
-    blocks.extend(gain_sentence(closure, result).map(Block::Text));
+    let size = gain_sentence(closure, result).into_iter().chain(bound);
+    let size: Vec<String> = size.collect();
+    blocks.extend((!size.is_empty()).then(|| Block::Text(size.join(" "))));
     let end = remaining_structure(closure, result)
         .map_or_else(String::new, |words| format!("\n{}", text(&[Block::Text(words)])));
     let points: Vec<Point> = causes(result).map(cause).collect();
@@ -299,7 +306,7 @@ fn cautions<'a>(closure: &ClosedLoop, result: &LoopResult) -> Vec<Block<'a>> {
     let limits = (!held.is_empty() && !result.effects.is_empty()).then(|| {
         format!(
             "Limits are active in the declared fit ({held}). If one is wrong, an effect that was found may only compensate for it. \
-             flexcal identify -v shows what each costs."
+             flexcal identify -v shows how far the error would fall without each."
         )
     });
     untrusted.into_iter().chain(limits).map(Block::Note).collect()

@@ -172,6 +172,14 @@ impl Table {
     }
 }
 
+/// Creates the opening lines: on terminals below the title, on the page, whose heading is the title,
+/// without it.
+pub(super) fn opening<'a>(title: &str, words: impl Into<String>) -> [Block<'a>; 2] {
+    let words = words.into();
+    let titled = Block::lines(format!("{title}\n{words}"));
+    [Block::Words(vec![titled]), Block::Page(vec![Block::Text(words)])]
+}
+
 /// Encloses words in code marks.
 pub(super) fn code(words: &str) -> String {
     format!("{}{words}{}", CODE.0, CODE.1)

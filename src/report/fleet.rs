@@ -1,9 +1,10 @@
-//! Text of the command `fleet`.
+//! Text and page of the command `fleet`.
 
 use std::fmt::Write as _;
 
 use super::document::{Block, Table};
-use super::render::text;
+use super::figures::{ACCENT, Drawing, FAINT, Forest, INK, WARM};
+use super::render::{page, text};
 use crate::life::{Fleet, FleetArm, FleetParameter};
 use crate::quantity::format::{counted, number, or_dash, two_digits};
 
@@ -16,6 +17,15 @@ const MAX_DECIMALS: usize = 5;
 
 /// Returns the fleet as text, ending in a line break.
 pub fn fleet_text(fleet: &Fleet) -> String {
+    text(&blocks(fleet))
+}
+
+/// Returns the fleet as a page, with its arms and parameters drawn.
+pub(crate) fn fleet_page(fleet: &Fleet) -> String {
+    page(&fleet.problem, "fleet", &blocks(fleet))
+}
+
+fn blocks<'a>(fleet: &Fleet) -> Vec<Block<'a>> {
     let unlike = fleet.arms.iter().filter(|arm| arm.is_unlike).count();
     let verdict = match unlike {
         0 => "no arm is unlike the others".to_owned(),
@@ -31,11 +41,60 @@ pub fn fleet_text(fleet: &Fleet) -> String {
     let notes = [
         "deviations from nominal; spread: 1 σ of the next arm about the mean; data sheet: declared 1 σ",
     ];
-    text(&[
+    vec![
         Block::lines(head),
+        Block::figures([drawn_arms(fleet), drawn_parameters(fleet)]),
         Block::Table(Table::new(&PARAMETERS, parameters, &[0]).noted(&notes)),
         Block::Table(Table::new(&ARMS, arms, &[0, 1, 2])),
-    ])
+    ]
+}
+
+/// Draws the largest deviation of each arm from its siblings.
+fn drawn_arms(fleet: &Fleet) -> Option<Drawing> {
+    let row = |arm: &FleetArm| {
+        let (parameter, sigmas) = arm.most.as_ref()?;
+        let value = Some((*sigmas, 0.0));
+        let values = if arm.is_unlike { vec![None, value] } else { vec![value, None] };
+        Some((format!("{}: {parameter}", short(arm)), values))
+    };
+    Forest {
+        names: ("fleet-arms", "Each arm against its siblings"),
+        caption: "The parameter in which each arm deviates most from what the other arms say, in standard deviations of that \
+                  difference."
+            .to_owned(),
+        label: "deviation [standard deviations]",
+        legend: vec![("like its siblings", INK), ("unlike", WARM)],
+        references: vec![0.0],
+        rows: fleet.arms.iter().filter_map(row).collect(),
+    }
+    .drawing()
+}
+
+/// Draws mean and spread of each parameter beside the tolerance of the data sheet.
+fn drawn_parameters(fleet: &Fleet) -> Option<Drawing> {
+    let row = |parameter: &FleetParameter| {
+        let declared = parameter.declared.filter(|sigma| *sigma > 0.0)?;
+        let within = Some((parameter.mean / declared, parameter.spread / declared));
+        Some((parameter.name.clone(), vec![within, Some((0.0, 1.0))]))
+    };
+    Forest {
+        names: ("fleet-parameters", "Parameters of the fleet against the data sheet"),
+        caption: "Mean deviation from nominal and its spread (1 σ) from arm to arm, both in units of the σ that the problem \
+                  declares."
+            .to_owned(),
+        label: "deviation from nominal [declared σ]",
+        legend: vec![("fleet, mean ± spread", ACCENT), ("data sheet, ± 1 σ", FAINT)],
+        references: vec![0.0],
+        rows: fleet.parameters.iter().filter_map(row).collect(),
+    }
+    .drawing()
+}
+
+/// Returns the last two parts of the path of an arm's estimate.
+fn short(arm: &FleetArm) -> String {
+    let parts: Vec<_> =
+        arm.file.components().map(|part| part.as_os_str().to_string_lossy()).collect();
+    parts[parts.len().saturating_sub(2)..].join("/")
 }
 
 fn parameter(parameter: &FleetParameter) -> Vec<String> {

@@ -24,10 +24,9 @@ pub(super) fn active_limits<'a>(found: &Identification) -> Option<Block<'a>> {
     let bounds = found.estimates.iter().filter_map(bound);
     let points: Vec<String> =
         bounds.chain(found.active_constraints.iter().map(constraint)).collect();
-    let words =
-        "Active limits and their cost: decrease of the rms residual of the fit if the limit \
-                 moves out\n(standard errors are along active constraints):"
-            .to_owned();
+    let words = "Active limits and their cost: fall of the rms residual if the limit moves out \
+                 by so much\n(standard errors are along active constraints):"
+        .to_owned();
     (!points.is_empty()).then_some(Block::Lines(words, points))
 }
 

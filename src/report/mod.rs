@@ -45,18 +45,24 @@ mod watch;
 
 pub(crate) use acceptance::{acceptance_page, acceptance_text, tolerance_text};
 pub(crate) use brief::{determines_nothing, estimate_brief};
+pub(crate) use check::check_page;
 pub use closed_loop::{loop_report, loop_text};
-pub(crate) use fleet::fleet_text;
+pub(crate) use fleet::{fleet_page, fleet_text};
 pub(crate) use identify::joint_sources_text;
 pub use identify::{estimate_text, identification_report};
 pub(crate) use init::init_text;
+pub(crate) use next::next_page;
 pub(crate) use noise::show_influential_rows;
-pub(crate) use predict::prediction_text;
+pub(crate) use plan::plan_page;
+pub(crate) use predict::{prediction_page, prediction_text};
+pub(crate) use remainder::bound_text;
 pub use render::Report;
 pub(crate) use replica::{replica_report, replica_text};
 pub(crate) use shell::shell_word;
+pub(crate) use study::study_page;
+pub(crate) use trace::trace_page;
 pub(crate) use verdict::interrupted;
-pub(crate) use watch::watch_text;
+pub(crate) use watch::{watch_page, watch_text};
 // Public for the tests, the benches and the Python module only.
 #[doc(hidden)]
 pub use self::{

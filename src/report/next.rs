@@ -1,10 +1,12 @@
-//! Text of the command `next`: the poses to measure next, or that there are enough.
+//! Text and page of the command `next`: the poses to measure next, or that there are enough.
 
-use super::document::{Block, Table};
-use super::render::text;
-use crate::design::{NextOptions, NextPoses, Purpose, StopReason};
+use super::document::{Block, Table, opening};
+use super::figures::{ACCENT, Curve, Drawing, INK, Series};
+use super::render::{page, text};
+use crate::design::{NextOptions, NextPoses, Purpose, StopReason, WorkspaceError};
 use crate::problem::Problem;
 use crate::quantity::format::{counted, number, or_dash};
+use crate::results::{CommandedJoint, commanded_joints};
 
 /// Formats a length in mm with three decimals.
 fn mm(length: f64) -> String {
@@ -13,15 +15,24 @@ fn mm(length: f64) -> String {
 
 /// Returns the text of a choice of poses, ending in a line break.
 pub fn next_text(problem: &Problem, options: &NextOptions, next: &NextPoses) -> String {
+    text(&blocks(problem, options, next))
+}
+
+/// Returns the page of a choice of poses, with the error expected after each of them.
+pub(crate) fn next_page(problem: &Problem, options: &NextOptions, next: &NextPoses) -> String {
+    page(&problem.title, "next poses", &blocks(problem, options, next))
+}
+
+fn blocks<'a>(problem: &Problem, options: &NextOptions, next: &NextPoses) -> Vec<Block<'a>> {
     let percent = number(options.level * 100.0, 1);
     let percent = percent.trim_end_matches(".0");
-    let mut blocks = vec![Block::lines(format!(
-        "{}\n{} measured; {}; predictions judged at {}",
-        problem.title,
+    let counts = format!(
+        "{} measured; {}; predictions judged at {}",
         counted(next.measured, "row"),
         counted(next.candidates, "candidate"),
         counted(next.workspace_poses, "pose"),
-    ))];
+    );
+    let mut blocks = opening(&problem.title, counts).to_vec();
     blocks.push(Block::Text(match next.error {
         Some(error) => format!(
             "In the workspace the identified arm errs by {} ± {} mm (expected rms, noise included), and by less than {} mm with a \
@@ -48,10 +59,65 @@ pub fn next_text(problem: &Problem, options: &NextOptions, next: &NextPoses) -> 
         blocks
             .push(Block::Lines("Effects that the poses tell apart:".to_owned(), effects.collect()));
     }
+    blocks.push(Block::figures([errors(options, next, percent)]));
     if !next.steps.is_empty() {
         blocks.push(Block::Table(steps(options, next, percent)));
+        blocks.push(Block::Page(vec![
+            Block::heading("The chosen poses, in the order of measurement"),
+            Block::Table(commands(problem, next)),
+        ]));
     }
-    text(&blocks)
+    blocks
+}
+
+/// Draws the error in the workspace against the number of further poses; `None` without one.
+fn errors(options: &NextOptions, next: &NextPoses, percent: &str) -> Option<Drawing> {
+    let after: Vec<_> =
+        std::iter::once(next.error).chain(next.steps.iter().map(|step| step.error)).collect();
+    let curve = |name, colour, of: fn(&WorkspaceError) -> f64| {
+        let points = after.iter().enumerate();
+        Curve::new(
+            name,
+            colour,
+            points.filter_map(|(k, error)| Some((k as f64, of(error.as_ref()?) * 1e3))),
+        )
+    };
+    let tolerance =
+        options.tolerance.map(|most| (format!("tolerance {} mm", mm(most)), most * 1e3));
+    let least = next
+        .attainable
+        .map(|least| (format!("rms after any number of poses {} mm", mm(least)), least * 1e3));
+    let caption = format!(
+        "Error of predicted positions in the workspace, measurement noise included, now (0) and expected after each chosen pose: \
+         the root mean square, and the bound that {percent} % of the errors do not exceed."
+    );
+    Series {
+        names: ("next-errors", "Error in the workspace against the number of further poses"),
+        caption,
+        labels: ("further poses", "error [mm]"),
+        curves: vec![
+            curve("bound", ACCENT, |error| error.bound),
+            curve("root mean square", INK, |error| error.expected),
+        ],
+        levels: tolerance.into_iter().chain(least).collect(),
+        ..Series::default()
+    }
+    .drawing()
+}
+
+/// Returns the table of the commands of the chosen poses.
+fn commands(problem: &Problem, next: &NextPoses) -> Table {
+    let joints = commanded_joints(problem);
+    let rows = (0..next.poses.len()).map(|pose| {
+        let q = next.poses.configuration(pose);
+        let value = |joint: &CommandedJoint| {
+            let command = q.get(joint.joint).copied().unwrap_or(f64::NAN) * joint.factor();
+            format!("{} {} {}", joint.name(), number(command, 2), joint.symbol())
+        };
+        let commands: Vec<String> = joints.iter().map(value).collect();
+        vec![(pose + 1).to_string(), commands.join(", ")]
+    });
+    Table::new(&["pose", "commands"], rows.collect(), &[1])
 }
 
 /// Returns the sentence that ends a series of measurements, or forecasts its end.

@@ -155,8 +155,8 @@ pub(super) fn unidentifiable<'a>(
     }
     let is = if unidentifiable.len() == 1 { "is" } else { "are" };
     let words = format!(
-        "{} of {} combinations of parameters {is} not identifiable at the nominal arm (a change in these proportions,\n\
-         each scaled by its effect, moves no predicted position):",
+        "{} of {} combinations of parameters {is} not identifiable at the nominal arm. Changed together, these\n\
+         parameters move no predicted position (numbers: shares of the displacement that each change alone would cause):",
         unidentifiable.len(),
         unknowns.len()
     );

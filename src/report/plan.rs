@@ -1,10 +1,11 @@
-//! Text of the command `plan`: the poses to measure and the accuracy that they are expected to
+//! Text and page of the command `plan`: the poses to measure and the accuracy that they are expected to
 //! give.
 
-use super::document::{Block, Table};
+use super::document::{Block, Table, opening};
+use super::figures::{ACCENT, Drawing, Forest};
 use super::forecast::{assumptions, cells};
 use super::parameters::{conditioning, unidentifiable};
-use super::render::text;
+use super::render::{page, text};
 use super::separation;
 use crate::design::{Criterion, PairSeparation, Plan};
 use crate::problem::Problem;
@@ -40,6 +41,25 @@ pub fn plan_text(
     plan: &Plan,
     separated: Option<&PairSeparation>,
 ) -> String {
+    text(&blocks(problem, criterion, plan, separated))
+}
+
+/// Returns the plan as a page, with the gain over random poses.
+pub(crate) fn plan_page(
+    problem: &Problem,
+    criterion: &Criterion,
+    plan: &Plan,
+    separated: Option<&PairSeparation>,
+) -> String {
+    page(&problem.title, "plan", &blocks(problem, criterion, plan, separated))
+}
+
+fn blocks<'a>(
+    problem: &Problem,
+    criterion: &Criterion,
+    plan: &Plan,
+    separated: Option<&'a PairSeparation>,
+) -> Vec<Block<'a>> {
     let planned = &plan.planned;
     let (poses, given) = (plan.poses.len(), plan.given);
     let besides =
@@ -69,20 +89,40 @@ pub fn plan_text(
     });
     let names: Vec<String> =
         planned.expected.iter().map(|expected| expected.name.clone()).collect();
-    let mut blocks = vec![Block::lines(format!(
-        "{}\n{}{besides}, from {}; criterion {}, best of {}",
-        problem.title,
+    let counts = format!(
+        "{}{besides}, from {}; criterion {}, best of {}",
         counted(poses, "pose"),
         counted(plan.candidates, "candidate"),
         criterion.as_str(),
         counted(plan.starts.len(), "start"),
-    ))];
+    );
+    let mut blocks = opening(&problem.title, counts).to_vec();
     blocks.extend(too_few(plan));
     blocks.push(Block::Table(Table::new(&header, rows.collect(), &[0, 6]).noted(&[&note])));
     blocks.extend(gain);
+    blocks.push(Block::figures([gains(plan)]));
     blocks.push(conditioning(&planned.identifiability, names.len(), plan.coordinates));
     blocks.push(unidentifiable(&planned.identifiability, &names, "plan.json"));
     blocks.extend(assumptions(problem, &planned.expected, Some(poses + given)));
     blocks.extend(separated.map(separation::blocks).unwrap_or_default());
-    text(&blocks)
+    blocks
+}
+
+/// Draws the standard error of each parameter after random poses over that after planned ones.
+fn gains(plan: &Plan) -> Option<Drawing> {
+    let rows = plan.planned.expected.iter().enumerate().filter_map(|(k, expected)| {
+        let gain = plan.random_error(k)? / expected.std_error?;
+        gain.is_finite().then(|| (expected.name.clone(), vec![Some((gain, 0.0))]))
+    });
+    Forest {
+        names: ("plan-gains", "Gain of the planned poses over random ones"),
+        caption: "Standard error of each parameter after as many random poses, divided by that after the planned ones: right of 1 \
+                  the plan is better."
+            .to_owned(),
+        label: "standard error, random / planned",
+        legend: vec![("gain", ACCENT)],
+        references: vec![1.0],
+        rows: rows.collect(),
+    }
+    .drawing()
 }

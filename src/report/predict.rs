@@ -1,11 +1,12 @@
-//! Text of the command `predict`.
+//! Text and page of the command `predict`.
 
 use std::fmt::Write as _;
 
-use super::document::{Block, Table};
+use super::document::{Block, Table, opening};
 use super::errors::{measure, sizes};
+use super::figures::{ACCENT, Curve, Drawing, INK, Series, WARM};
 use super::remainder::bounded;
-use super::render::text;
+use super::render::{page, text};
 use super::row_kinds::unsteady;
 use crate::fit::{ErrorSummary, Prediction};
 use crate::problem::Problem;
@@ -19,11 +20,26 @@ pub fn prediction_text(
     prediction: &Prediction,
     bounds: Option<&Bounds>,
 ) -> String {
-    let mut words = format!(
-        "{}\n{} predicted for {arm}",
-        problem.title,
-        counted(prediction.positions.len(), "pose")
-    );
+    text(&blocks(problem, arm, prediction, bounds))
+}
+
+/// Returns the predictions as a page, with the errors of measured rows.
+pub(crate) fn prediction_page(
+    problem: &Problem,
+    arm: &str,
+    prediction: &Prediction,
+    bounds: Option<&Bounds>,
+) -> String {
+    page(&problem.title, "predictions", &blocks(problem, arm, prediction, bounds))
+}
+
+fn blocks<'a>(
+    problem: &Problem,
+    arm: &str,
+    prediction: &Prediction,
+    bounds: Option<&Bounds>,
+) -> Vec<Block<'a>> {
+    let mut words = format!("{} predicted for {arm}", counted(prediction.positions.len(), "pose"));
     let lost = prediction
         .positions
         .iter()
@@ -32,7 +48,7 @@ pub fn prediction_text(
     if lost > 0 {
         let _ = write!(words, "; {lost} of them have no equilibrium");
     }
-    let mut blocks = vec![Block::lines(words)];
+    let mut blocks = opening(&problem.title, words).to_vec();
     if !prediction.placed.is_empty() {
         let names = prediction.placed.join(", ");
         blocks.push(Block::lines(format!("Fitted to these rows, with the arm held: {names}")));
@@ -66,5 +82,48 @@ pub fn prediction_text(
     if !unsteady.is_empty() {
         blocks.push(Block::list(unsteady));
     }
-    text(&blocks)
+    blocks.push(Block::figures([errors(prediction, bounds)]));
+    blocks
+}
+
+/// Draws the error of each row against its bound, or against its number if there are no bounds;
+/// `None` unless all rows measure positions.
+fn errors(prediction: &Prediction, bounds: Option<&Bounds>) -> Option<Drawing> {
+    let of_rows = prediction.errors.as_ref()?;
+    if !of_rows.kinds.is_empty() || of_rows.all.kind != "position" {
+        return None;
+    }
+    let residuals = prediction.residuals.as_ref()?;
+    let lengths = residuals.iter().map(|residual| residual.position.norm() * 1e3);
+    let Some(bounds) = bounds else {
+        let points = lengths.enumerate().map(|(row, length)| ((row + 1) as f64, length));
+        return Series {
+            names: ("prediction-errors", "Error of each row"),
+            caption: "Distance between measured and predicted position of each row.".to_owned(),
+            labels: ("row", "error [mm]"),
+            curves: vec![Curve::new("row", INK, points).scattered()],
+            ..Series::default()
+        }
+        .drawing();
+    };
+    let points = lengths.enumerate().map(|(row, length)| (bounds.bound(row) * 1e3, length));
+    let (within, beyond): (Vec<_>, Vec<_>) = points.partition(|(bound, length)| length <= bound);
+    let most = bounds.poses.len();
+    let bound = (0..most).map(|row| bounds.bound(row) * 1e3).fold(0.0, f64::max);
+    let percent = (bounds.level * 1e6).round() / 1e4;
+    Series {
+        names: ("prediction-errors", "Error of each row against its bound"),
+        caption: format!(
+            "Distance between measured and predicted position of each row, and the bound that holds for it with a probability of \
+             {percent} %. Dots above the line exceed their bounds."
+        ),
+        labels: ("bound [mm]", "error [mm]"),
+        curves: vec![
+            Curve::new("error = bound", ACCENT, [(0.0, 0.0), (bound, bound)]),
+            Curve::new("within", INK, within).scattered(),
+            Curve::new("beyond", WARM, beyond).scattered(),
+        ],
+        ..Series::default()
+    }
+    .drawing()
 }

@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use super::document::{Block, Table};
+use super::figures::{ACCENT, Drawing, Forest, INK};
 use crate::fit::{ComparedParameter, Identification, PriorComparison};
 use crate::quantity::format::{counted, decimals, number, or_dash, p_value};
 
@@ -27,8 +28,31 @@ pub(super) fn prior<'a>(found: &Identification) -> Vec<Block<'a>> {
     vec![
         Block::Heading("Earlier estimate as prior".to_owned()),
         Block::Text(summary(comparison)),
+        Block::figures([drawn(comparison)]),
         Block::Table(table),
     ]
+}
+
+/// Draws what new rows and posterior say of each parameter, in standard errors of the earlier
+/// estimate.
+fn drawn(comparison: &PriorComparison) -> Option<Drawing> {
+    let row = |compared: &ComparedParameter| {
+        let (earlier, sigma) = compared.prior;
+        let scaled = |(value, error): (f64, f64)| ((value - earlier) / sigma, error / sigma);
+        let posterior = compared.posterior.1.map(|error| scaled((compared.posterior.0, error)));
+        Some((compared.name.clone(), vec![Some(scaled(compared.data?)), posterior]))
+    };
+    Forest {
+        names: ("earlier-estimate", "New rows and posterior against the earlier estimate"),
+        caption: "Values ± 1 σ of each parameter that the new rows inform on, in standard errors of the earlier estimate, which is \
+                  at 0 ± 1."
+            .to_owned(),
+        label: "change from the earlier estimate [its σ]",
+        legend: vec![("new rows", INK), ("posterior", ACCENT)],
+        references: vec![0.0, -1.0, 1.0],
+        rows: comparison.parameters.iter().filter_map(row).collect(),
+    }
+    .drawing()
 }
 
 /// States whether the new rows agree with the earlier estimate.

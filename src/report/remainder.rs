@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use super::document::{Block, Column, Table, code};
 use super::figures;
 use crate::fit::{Identification, Residual};
-use crate::quantity::format::{counted, mm, number};
+use crate::quantity::format::{counted, mm, number, two_digits};
 use crate::remainder::{Bounds, Gain, JointError, Outcome};
 use crate::results::PlotData;
 
@@ -77,6 +77,20 @@ pub(super) fn uncertainty<'a>(found: &Identification, plots: &'a PlotData) -> Ve
         figures::bounds_over_workspace(plots),
     ]));
     blocks
+}
+
+/// States the mean bound of prediction errors over the workspace, if it is known.
+pub(crate) fn bound_text(plots: &PlotData) -> Option<String> {
+    let uncertainty = plots.uncertainty.as_ref()?;
+    let (level, bounds) = (uncertainty.level, &uncertainty.bounds);
+    let mean = bounds.iter().map(|at| at.bound).sum::<f64>() / bounds.len() as f64;
+    let percent = (level * 1e6).round() / 1e4;
+    mean.is_finite().then(|| {
+        format!(
+            "Bound of a prediction anywhere in the workspace: {} mm ({percent} %, mean).",
+            two_digits(mean * 1e3, 4)
+        )
+    })
 }
 
 /// Returns the expected error and its bound in words. If there are `residuals`, adds the share of

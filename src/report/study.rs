@@ -1,7 +1,8 @@
-//! Text of `study`, and its tables for other programs.
+//! Text and page of the command `study`.
 
-use super::document::{Block, Column, Table};
-use super::render::text;
+use super::document::{Block, Column, Table, opening};
+use super::figures::{Drawing, Forest, INK};
+use super::render::{page, text};
 use crate::quantity::format::{number, or_dash};
 use crate::results::{Cell, StudyResult};
 use crate::study::{Results, Source, Study};
@@ -11,13 +12,21 @@ type Timed = (Cell, f64);
 
 /// Returns the study as text, ending in a line break.
 pub fn study_text(study: &Study, results: &Results) -> String {
+    text(&blocks(study, results))
+}
+
+/// Returns the study as a page, with the error of each cell.
+pub(crate) fn study_page(study: &Study, results: &Results) -> String {
+    page(&study.title, "study", &blocks(study, results))
+}
+
+fn blocks<'a>(study: &Study, results: &Results) -> Vec<Block<'a>> {
     let by = match study.source {
         Source::Model => "the model itself",
         Source::Rig => "the virtual test rig",
     };
     let head = format!(
-        "{}\n{} cells of {} fits, {} parameters, measured by {by}; {} poses held out in each",
-        study.title,
+        "{} cells of {} fits, {} parameters, measured by {by}; {} poses held out in each",
         study.cells.len(),
         study.repetitions,
         study.parameters.len(),
@@ -55,5 +64,29 @@ pub fn study_text(study: &Study, results: &Results) -> String {
         "held out: measured − predicted, noise included; covered: share of estimates within 1.96 standard errors, 95 % if these are right;",
         "largest bias: of any parameter, over the spread of its estimates; ms: median time of a fit",
     ]);
-    text(&[Block::lines(head), Block::Table(table)])
+    let [titled, untitled] = opening(&study.title, head);
+    vec![titled, untitled, Block::Table(table), Block::figures([errors(&cells)])]
+}
+
+/// Draws the held-out error of each cell.
+fn errors(cells: &[Timed]) -> Option<Drawing> {
+    let row = |(cell, _): &Timed| {
+        let name = format!(
+            "{} mm, {} poses, {} {}",
+            cell.position_sigma_mm, cell.identification_poses, cell.strategy, cell.solver
+        );
+        let rms = cell.held_out_mm.rms?;
+        Some((name, vec![Some((rms, cell.held_out_mm.rms_sd.unwrap_or_default()))]))
+    };
+    Forest {
+        names: ("study-errors", "Held-out error of each cell"),
+        caption: "Root mean square error at held-out poses, noise included, with the standard deviation over the fits of the cell. A \
+                  cell is a noise (1 σ), a number of poses, a strategy and a solver."
+            .to_owned(),
+        label: "held-out error, rms [mm]",
+        legend: vec![("rms", INK)],
+        references: Vec::new(),
+        rows: cells.iter().filter_map(row).collect(),
+    }
+    .drawing()
 }

@@ -1,20 +1,21 @@
-//! Text of the command `trace`: the effects that the residual of a fit points to.
+//! Text and page of the command `trace`: the effects that the residual of a fit points to.
 
 use std::fmt::Write as _;
 
-use super::document::{Block, Point, named};
+use super::document::{Block, Point, named, opening};
 use super::errors::{held_out_rows, rows_of, without_equilibrium};
 use super::noise::short;
 use super::probability::percent;
-use super::render::text;
+use super::render::{page, text};
 use super::verdict::declared;
-use super::{effect, residual_tests};
+use super::{effect, figures, residual_tests};
 use crate::fit::Identification;
 use crate::problem::Problem;
 use crate::quantity::Unit;
 use crate::quantity::format::{counted, number, p_value};
 use crate::results::{
-    Candidate, Claims, Confounded, Hypothesis, HypothesisSet, SeparatingPose, Summary, TraceResult,
+    Candidate, Claims, Confounded, Hypothesis, HypothesisSet, PlotData, SeparatingPose, Summary,
+    TraceResult,
 };
 use crate::results::{CommandedJoint, commanded_joints};
 use crate::select::Trace;
@@ -28,23 +29,40 @@ const MAX_SHOWN_CONFOUNDED: usize = 3;
 
 /// Returns the result of the command `trace` as text, ending in a line break.
 pub fn trace_text(problem: &Problem, trace: &Trace) -> String {
+    text(&blocks(problem, trace, None))
+}
+
+/// Returns the result as a page, with the ranking and the residuals `plots`.
+pub(crate) fn trace_page(problem: &Problem, trace: &Trace, plots: &PlotData) -> String {
+    page(&problem.title, "trace", &blocks(problem, trace, Some(plots)))
+}
+
+fn blocks<'a>(problem: &Problem, trace: &Trace, plots: Option<&PlotData>) -> Vec<Block<'a>> {
     let result = TraceResult::new(problem, trace);
-    let mut blocks = vec![
-        Block::Text(headline(problem, &trace.fit)),
+    let mut blocks = opening(&problem.title, headline(&trace.fit)).to_vec();
+    blocks.extend([
         Block::heading("Tests of the residual (measured − predicted) of the identification poses"),
         Block::List(residual_tests::all(&trace.residual_tests)),
-    ];
+    ]);
     blocks.extend(
         residual_tests::other_reduced_chi2(&trace.residual_tests, trace.fit.reduced_chi2)
             .map(Block::Text),
     );
     blocks.extend(hypothesis_sets(&result));
     blocks.extend(ranking(problem, &result, MAX_SHOWN_CANDIDATES, "trace.json holds them all"));
+    blocks.extend(plots.map(|plots| {
+        Block::figures([
+            figures::ranking(trace),
+            figures::order(plots),
+            figures::joint_map(plots),
+            figures::histogram(plots),
+        ])
+    }));
     blocks.extend(undetectable_effects(trace));
-    text(&blocks)
+    blocks
 }
 
-fn headline(problem: &Problem, fit: &Identification) -> String {
+fn headline(fit: &Identification) -> String {
     let held_out = &fit.fitted.held_out;
     let size = fit.reduced_chi2.map_or_else(String::new, |chi2| {
         format!("; χ²/ν {}, 1 if only noise is left", short(chi2))
@@ -61,8 +79,7 @@ fn headline(problem: &Problem, fit: &Identification) -> String {
         _ => without_equilibrium(held_out, "held-out"),
     };
     format!(
-        "{}\n{} from {}{size}; {error}",
-        problem.title,
+        "{} from {}{size}; {error}",
         counted(fit.unknowns.len(), "parameter"),
         rows_of(fit, |errors| errors.identification)
     )

@@ -59,22 +59,25 @@ pub(super) fn to_declare(
     declarations.extend(wrong_limits(result).map(|(limit, probability)| {
         format!(
             "Move the limit {limit} out, or remove it: with probability {} it is wrong, or hides a cause. flexcal identify -v shows \
-             its cost.",
+             how far the error would fall.",
             percent(probability)
         )
     }));
     declarations
 }
 
-/// Returns the places of all structure whose law is unknown, without duplicates.
-pub(super) fn places(result: &LoopResult) -> Vec<&str> {
-    let mut places: Vec<&str> = Vec::new();
+/// Returns the places of all structure whose law is unknown, without duplicates, with their
+/// probabilities.
+pub(super) fn places(result: &LoopResult) -> Vec<String> {
+    let mut places: Vec<(&str, String)> = Vec::new();
     for left in result.structures() {
-        if !places.contains(&left.place.as_str()) {
-            places.push(&left.place);
+        if places.iter().all(|(place, _)| *place != left.place) {
+            let probability = left.claims.as_ref().map(|claims| percent(claims.place.probability));
+            let words = probability.map_or_else(String::new, |percent| format!(": {percent}"));
+            places.push((&left.place, format!("{}{words}", left.place)));
         }
     }
-    places
+    places.into_iter().map(|(_, words)| words).collect()
 }
 
 /// Describes structure whose law is unknown, sentence by sentence.

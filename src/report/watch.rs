@@ -1,10 +1,12 @@
-//! Text of the command `watch`.
+//! Text and page of the command `watch`.
 
 use std::fmt::Write as _;
 
-use super::document::{Block, Table};
-use super::render::text;
+use super::document::{Block, Table, opening};
+use super::figures::{ACCENT, Curve, Drawing, Series};
+use super::render::{page, text};
 use crate::life::{Change, NAMED, Watch, WatchedCause};
+use crate::measurement::Measurements;
 use crate::problem::Problem;
 use crate::quantity::format::{counted, decimals, number, or_dash, p_value, two_digits};
 
@@ -15,12 +17,20 @@ const MAX_DECIMALS: usize = 6;
 
 /// Returns the verdict as text, ending in a line break.
 pub fn watch_text(problem: &Problem, watch: &Watch) -> String {
+    text(&blocks(problem, watch, None))
+}
+
+/// Returns the verdict as a page, with the evidence after each of the tested `rows`.
+pub(crate) fn watch_page(problem: &Problem, watch: &Watch, rows: &Measurements) -> String {
+    page(&problem.title, "watch", &blocks(problem, watch, control_chart(watch, rows)))
+}
+
+fn blocks<'a>(problem: &Problem, watch: &Watch, drawn: Option<Drawing>) -> Vec<Block<'a>> {
     let unit = watch.unit.display(0.0);
     let in_unit = |error: f64| format!("{} {}", two_digits(error * unit.factor, 4), unit.symbol);
     let (chi2, coordinates, p) = watch.chi2;
     let mut head = format!(
-        "{}\n{} against the estimate; false alarms of all looks together: at most {} %\n\n{}",
-        problem.title,
+        "{} against the estimate; false alarms of all looks together: at most {} %\n\n{}",
         counted(watch.rows, "row"),
         two_digits(100.0 * watch.false_alarm_rate, 3),
         verdict(watch)
@@ -37,7 +47,8 @@ pub fn watch_text(problem: &Problem, watch: &Watch) -> String {
         let rows = counted(watch.left_out, "row");
         let _ = write!(head, "\n{rows} left out, because the estimate was fitted to them");
     }
-    let mut blocks = vec![Block::lines(head)];
+    let mut blocks = opening(&problem.title, head).to_vec();
+    blocks.push(Block::figures([drawn]));
     if watch.is_changed() {
         let rows = watch.causes.iter().map(|cause| row(cause, &in_unit)).collect();
         let notes = [
@@ -47,7 +58,47 @@ pub fn watch_text(problem: &Problem, watch: &Watch) -> String {
         ];
         blocks.push(Block::Table(Table::new(&HEADER, rows, &[0, 2]).noted(&notes)));
     }
-    text(&blocks)
+    blocks
+}
+
+/// Draws the evidence for a change after each row, with the level of an alarm; `None` for fewer
+/// than two looks.
+fn control_chart(watch: &Watch, rows: &Measurements) -> Option<Drawing> {
+    let evidence = watch.looks.iter().map(|look| (look.0 as f64, look.1 / 10_f64.ln()));
+    // Rows that were left out shift the others.
+    let first_rows = if watch.left_out == 0 { first_rows(rows) } else { Vec::new() };
+    Series {
+        names: ("watch-evidence", "Evidence for a change after each row"),
+        caption: format!(
+            "Common logarithm of the evidence for a change: how many times as probable the rows are with a change as without one. \
+             An arm that has not changed reaches the orange line at any row with a probability of at most {} %. Vertical lines: \
+             the first row of each session or file.",
+            two_digits(100.0 * watch.false_alarm_rate, 3)
+        ),
+        labels: ("row", "log₁₀ of the evidence"),
+        curves: vec![Curve::new("evidence", ACCENT, evidence)],
+        levels: vec![("alarm".to_owned(), -watch.false_alarm_rate.log10())],
+        starts: first_rows,
+        ..Series::default()
+    }
+    .drawing()
+}
+
+/// Returns name and first row (from 1) of each session, or of each file where sessions have no
+/// names; nothing if there is only one.
+fn first_rows(rows: &Measurements) -> Vec<(String, f64)> {
+    let session = |row: usize| rows.session.names.get(*rows.session.of_row.get(row)?);
+    let file = |row: usize| rows.files.get(rows.origin.get(row)?.0 as usize)?.file_name();
+    let mut found: Vec<(String, f64)> = Vec::new();
+    for row in 0..rows.len() {
+        let file = || file(row).map(|name| name.to_string_lossy().into_owned());
+        let session = session(row).filter(|name| !name.is_empty()).cloned();
+        let name = session.or_else(file).unwrap_or_default();
+        if found.last().is_none_or(|last| last.0 != name) {
+            found.push((name, (row + 1) as f64));
+        }
+    }
+    if found.len() > 1 { found } else { Vec::new() }
 }
 
 /// States whether the arm has changed, and what.

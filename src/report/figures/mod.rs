@@ -4,9 +4,11 @@ mod axis;
 mod chart;
 mod contribution;
 mod correlation;
+mod curves;
 mod drawing;
 mod effect;
 mod errors;
+mod forest;
 mod histogram;
 mod joint_map;
 mod misprints;
@@ -21,9 +23,11 @@ mod vectors;
 
 pub(super) use contribution::contributions;
 pub(super) use correlation::correlation;
+pub(super) use curves::{Curve, Series};
 pub(super) use drawing::Drawing;
 pub(super) use effect::{effect, unexplained};
 pub(super) use errors::{errors, of_procedure};
+pub(super) use forest::Forest;
 pub(super) use histogram::histogram;
 pub(super) use joint_map::joint_map;
 pub(super) use misprints::misprints;
@@ -41,6 +45,7 @@ const NAMES: &[&str] = &[
     "bounds",
     "contributions",
     "correlations",
+    "earlier-estimate",
     "held-out-errors",
     "misprints",
     "ranking",

@@ -18,6 +18,11 @@ const BAR_SIGMAS: f64 = 10.0;
 /// Scripts of the page: interaction, and the three-dimensional view of the arm.
 const SCRIPTS: [&str; 2] = [include_str!("page.js"), include_str!("view.js")];
 
+/// Sentences at the end of a report that explain its errors.
+const ERRORS: &str = " Errors are distances between measured and predicted positions. Before: the nominal arm, with base and tool \
+                      fitted if they are free, unless stated otherwise. Held-out poses influence nothing: no parameter is fitted to \
+                      them and no effect chosen by them.";
+
 /// Report in two formats, with its figures.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
@@ -33,6 +38,26 @@ pub struct Report {
 /// Renders blocks as a report; `kind` names the command or analysis in the title.
 pub(in crate::report) fn report(problem: &Problem, kind: &str, blocks: &[Block]) -> Report {
     let title = if problem.title.is_empty() { &problem.name } else { &problem.title };
+    let (html, figures) = rendered(title, [&format!("{}, ", problem.name), kind], ERRORS, blocks);
+    let files = figures
+        .iter()
+        .map(|figure| (format!("{}.svg", figure.name), printable(&style::standalone(&figure.svg))));
+    Report { markdown: markdown(&problem.title, blocks), figures: files.collect(), html }
+}
+
+/// Renders blocks as a page without separate files; `kind` names the command in the title.
+pub(in crate::report) fn page(title: &str, kind: &str, blocks: &[Block]) -> String {
+    rendered(title, ["", kind], "", blocks).0
+}
+
+/// Renders blocks as a page, and returns it with its figures; `before_kind` precedes the kind in the
+/// heading, and `note` explains errors at the end.
+fn rendered<'a>(
+    title: &str,
+    [before_kind, kind]: [&str; 2],
+    note: &str,
+    blocks: &'a [Block],
+) -> (String, Vec<&'a Drawing>) {
     let mut figures = Vec::new();
     let body = sections(blocks, &mut figures);
     let page = html! {
@@ -50,25 +75,19 @@ pub(in crate::report) fn report(problem: &Problem, kind: &str, blocks: &[Block])
                 main {
                     header {
                         h1 { (title) }
-                        p.kind { (problem.name) ", " (kind) }
+                        p.kind { (before_kind) (kind) }
                     }
                     (body)
                     footer {
-                        "Made by flexcal " (env!("CARGO_PKG_VERSION")) ". Errors are distances between measured and predicted \
-                        positions. Before: the nominal arm, with base and tool fitted if they are free, unless stated \
-                        otherwise. Held-out poses influence nothing: no parameter is fitted to them and no effect chosen by them."
-                        @if !figures.is_empty() { " Every figure is also a file in the folder figures." }
+                        "Made by flexcal " (env!("CARGO_PKG_VERSION")) "." (note)
+                        @if !figures.is_empty() && !note.is_empty() { " Every figure is also a file in the folder figures." }
                     }
                 }
                 script { (PreEscaped(SCRIPTS.concat())) }
             }
         }
     };
-    let files = figures
-        .iter()
-        .map(|figure| (format!("{}.svg", figure.name), printable(&style::standalone(&figure.svg))));
-    let html = printable(&page.into_string());
-    Report { markdown: markdown(&problem.title, blocks), figures: files.collect(), html }
+    (printable(&page.into_string()), figures)
 }
 
 /// Renders the blocks before the first heading, then a section for each heading.

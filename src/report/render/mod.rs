@@ -7,5 +7,5 @@ mod style;
 mod text;
 
 pub use html::Report;
-pub(super) use html::report;
+pub(super) use html::{page, report};
 pub(super) use text::{text, text_within};

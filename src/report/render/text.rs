@@ -89,16 +89,23 @@ fn point(text: &mut String, mark: &str, point: &Point, width: usize) {
     }
 }
 
-/// Wraps text, each line ending in a line break; line breaks in the text are kept.
+/// Units that stay on the line of their number.
+const UNITS: [&str; 6] = ["%", "mm", "°", "σ", "px", "kg"];
+
+/// Wraps text, each line ending in a line break; line breaks in the text are kept, and a unit stays
+/// with its number.
 fn wrapped(words: &str, (first, following): (&str, &str), width: usize) -> String {
-    let plain = plain(words);
+    let joined =
+        |text: String, unit: &str| text.replace(&format!(" {unit}"), &format!("\u{a0}{unit}"));
+    let plain = UNITS.into_iter().fold(plain(words), joined);
     // Names of effects and files are not split, so that they can be copied.
     let options = textwrap::Options::new(width)
         .initial_indent(first)
         .subsequent_indent(following)
         .break_words(false)
         .word_splitter(textwrap::WordSplitter::NoHyphenation);
-    textwrap::wrap(&plain, options).iter().flat_map(|line| [line.trim_end(), "\n"]).collect()
+    let lines = textwrap::wrap(&plain, options);
+    lines.iter().map(|line| line.trim_end().replace('\u{a0}', " ") + "\n").collect()
 }
 
 /// Removes code marks and other control characters.

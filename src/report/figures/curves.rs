@@ -1,0 +1,128 @@
+//! Quantities along a series: errors against the number of poses, evidence after each row.
+
+use super::chart::At;
+use super::prelude::*;
+
+/// Maximum number of points of a curve that are also drawn as dots.
+const MAX_DOTS: usize = 60;
+/// Maximum number of points of a curve without a line.
+const MAX_SCATTERED: usize = 600;
+/// Height of the panel in displayed pixels.
+const HEIGHT: f64 = 210.0;
+
+/// Named points of a figure, joined by a line or scattered.
+#[derive(Debug, Clone)]
+pub struct Curve<'a> {
+    pub name: &'a str,
+    pub colour: Colour,
+    pub points: Vec<At>,
+    pub is_joined: bool,
+}
+
+impl<'a> Curve<'a> {
+    pub fn new(name: &'a str, colour: Colour, points: impl IntoIterator<Item = At>) -> Self {
+        let is_finite = |at: &At| at.0.is_finite() && at.1.is_finite();
+        let points = points.into_iter().filter(is_finite).collect();
+        Self { name, colour, points, is_joined: true }
+    }
+
+    /// Draws dots without a line between them.
+    pub fn scattered(self) -> Self {
+        Self { is_joined: false, ..self }
+    }
+}
+
+/// Figure of curves over one pair of axes.
+#[derive(Debug, Clone, Default)]
+pub struct Series<'a> {
+    /// File name and title.
+    pub names: (&'a str, &'a str),
+    pub caption: String,
+    /// Labels of the horizontal and the vertical axis, with units.
+    pub labels: (&'a str, &'a str),
+    /// True if the vertical axis is logarithmic.
+    pub is_logarithmic: bool,
+    pub curves: Vec<Curve<'a>>,
+    /// Horizontal lines with their names.
+    pub levels: Vec<(String, f64)>,
+    /// Vertical lines with their names, for example the first row of each file.
+    pub starts: Vec<(String, f64)>,
+}
+
+impl Series<'_> {
+    /// Draws the curves; `None` if there are fewer than two points.
+    pub fn drawing(&self) -> Option<Drawing> {
+        let points = || self.curves.iter().flat_map(|curve| &curve.points);
+        if points().count() < 2 {
+            return None;
+        }
+        let up = |y: f64| if self.is_logarithmic { y.max(1e-12).log10() } else { y };
+        let levels = self.levels.iter().map(|level| level.1);
+        let (low, high) = range(points().map(|at| at.1).chain(levels).map(up));
+        let from_zero = !self.is_logarithmic && low >= 0.0;
+        let (below, above) = with_margin((low, high), 0.08);
+        let ends = (if from_zero { 0.0 } else { below }, above);
+        let y = if self.is_logarithmic {
+            Axis::logarithmic(ends, self.labels.1, 6)
+        } else {
+            Axis::linear(ends, self.labels.1, 5)
+        };
+        let across = with_margin(range(points().map(|at| at.0)), 0.03);
+        let x = Axis::linear(across, self.labels.0, 7);
+        let named = |text: &String, at: At, shift: (f64, f64)| Shape::Text {
+            at,
+            shift,
+            text: text.clone(),
+            colour: MUTED,
+            anchor: Anchor::Start,
+        };
+        let levels = self.levels.iter().flat_map(|(text, level)| {
+            let level = up(*level);
+            let line = Shape::line([(across.0, level), (across.1, level)], Paint::line(WARM, 1.2));
+            [line, named(text, (across.0, level), (6.0, -8.0))]
+        });
+        let starts = self.starts.iter().flat_map(|(text, start)| {
+            let line = Shape::line([(*start, ends.0), (*start, ends.1)], Paint::line(FAINT, 1.0));
+            [line, named(text, (*start, ends.1), (4.0, 8.0))]
+        });
+        let shapes = self.curves.iter().flat_map(|curve| {
+            let at = move |at: &At| (at.0, up(at.1));
+            let is_dotted = !curve.is_joined || curve.points.len() <= MAX_DOTS;
+            let line = curve
+                .is_joined
+                .then(|| Shape::line(curve.points.iter().map(at), Paint::line(curve.colour, 1.8)));
+            let dots = curve
+                .drawn()
+                .into_iter()
+                .filter(move |_| is_dotted)
+                .map(move |point| Shape::dot(at(point), 2.4, Paint::fill(curve.colour), None));
+            line.into_iter().chain(dots)
+        });
+        let panel = Panel::new(HEIGHT, x, y).with(starts).with(levels).with(shapes);
+        let mark = |curve: &Curve| if curve.is_joined { Mark::Line } else { Mark::Dot };
+        let legend: Vec<_> =
+            self.curves.iter().map(|curve| (curve.name, curve.colour, mark(curve))).collect();
+        let rows = self.curves.iter().flat_map(|curve| {
+            let row = |at: &At| vec![curve.name.to_owned(), fixed(at.0, 6), fixed(at.1, 6)];
+            curve.points.iter().map(row)
+        });
+        let data = sheet(["curve", self.labels.0, self.labels.1], rows);
+        let drawn = self.curves.iter().map(|curve| curve.drawn().len()).sum();
+        let caption = format!("{}{}", self.caption, thinning_note(drawn, points().count()));
+        let svg = chart(self.names.1, &legend, &[panel]);
+        Some(Drawing::new(self.names, caption, svg, data))
+    }
+}
+
+impl Curve<'_> {
+    /// Returns the points that are drawn: all of a line, some of many scattered ones.
+    fn drawn(&self) -> Vec<&At> {
+        let every: Vec<usize> = (0..self.points.len()).collect();
+        let kept = if self.is_joined {
+            every
+        } else {
+            sample(&every, MAX_SCATTERED, |k| self.points[k].1)
+        };
+        kept.into_iter().map(|k| &self.points[k]).collect()
+    }
+}

@@ -1,0 +1,84 @@
+//! Values with their intervals, a row for each name.
+
+use super::prelude::*;
+
+/// Maximum number of rows of a figure.
+const MAX_ROWS: usize = 24;
+/// Distance between the marks of one row, as a share of the height of the row.
+const OFFSET: f64 = 0.22;
+
+/// Row of the figure: its name, and the values with the half-width of their intervals, in the
+/// order of the legend.
+pub type Row = (String, Vec<Option<(f64, f64)>>);
+
+/// Figure with a row for each name.
+#[derive(Debug, Clone, Default)]
+pub struct Forest<'a> {
+    /// File name and title.
+    pub names: (&'a str, &'a str),
+    pub caption: String,
+    /// Label of the horizontal axis, with the unit.
+    pub label: &'a str,
+    /// Names and colours of the values of a row.
+    pub legend: Vec<(&'a str, Colour)>,
+    /// Values at vertical lines.
+    pub references: Vec<f64>,
+    pub rows: Vec<Row>,
+}
+
+impl Forest<'_> {
+    /// Draws the rows; `None` if there are none. Of many rows it draws those with values farthest
+    /// from the first reference.
+    pub fn drawing(&self) -> Option<Drawing> {
+        let centre = self.references.first().copied().unwrap_or_default();
+        let size = |row: &Row| {
+            row.1.iter().flatten().map(|value| (value.0 - centre).abs()).fold(0.0, f64::max)
+        };
+        let every: Vec<usize> = (0..self.rows.len()).collect();
+        let mut kept = every.clone();
+        kept.sort_by(|&a, &b| size(&self.rows[b]).total_cmp(&size(&self.rows[a])));
+        kept.truncate(MAX_ROWS);
+        kept.sort_unstable();
+        let shown: Vec<&Row> = kept.iter().map(|&k| &self.rows[k]).collect();
+        let values = || shown.iter().flat_map(|row| row.1.iter().flatten());
+        let ends = values().flat_map(|(value, error)| [value - error, value + error]);
+        let (low, high) = range(ends.chain(self.references.iter().copied()));
+        if shown.is_empty() || !(low.is_finite() && high.is_finite()) {
+            return None;
+        }
+        let count = self.legend.len() as f64;
+        let marks = shown.iter().enumerate().flat_map(|(k, (_, values))| {
+            let marks = values.iter().zip(&self.legend).enumerate();
+            marks.flat_map(move |(of, (value, &(_, colour)))| {
+                let row = k as f64 + OFFSET * (of as f64 - 0.5 * (count - 1.0));
+                value.iter().flat_map(move |&(value, error)| {
+                    let interval = [(value - error, row), (value + error, row)];
+                    let dot = Shape::dot((value, row), 3.2, Paint::fill(colour), None);
+                    [Shape::line(interval, Paint::line(colour, 1.6)), dot]
+                })
+            })
+        });
+        let x = Axis::linear(with_margin((low, high), 0.04), self.label, 5);
+        let names = shown.iter().map(|row| (row.0.clone(), INK));
+        let panel = Panel::of_rows(22.0, (220.0, 20.0), x, names);
+        let panel =
+            self.references.iter().fold(panel, |panel, at| panel.with_reference(*at, FAINT));
+        let legend: Vec<_> =
+            self.legend.iter().map(|&(name, colour)| (name, colour, Mark::Dot)).collect();
+        let legend = if legend.len() > 1 { legend.as_slice() } else { &[] };
+        let svg = chart(self.names.1, legend, &[panel.with(marks)]);
+        let note = if shown.len() < self.rows.len() {
+            format!(" {} of {} rows are drawn, the farthest ones.", shown.len(), self.rows.len())
+        } else {
+            String::new()
+        };
+        let cells = self.rows.iter().flat_map(|(name, values)| {
+            values.iter().zip(&self.legend).filter_map(move |(value, (of, _))| {
+                let (value, error) = (*value)?;
+                Some(vec![name.clone(), (*of).to_owned(), fixed(value, 6), fixed(error, 6)])
+            })
+        });
+        let data = sheet(["name", "of", self.label, "half width of the interval"], cells);
+        Some(Drawing::new(self.names, format!("{}{note}", self.caption), svg, data))
+    }
+}
