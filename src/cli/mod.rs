@@ -6,6 +6,7 @@ mod accept;
 mod advice;
 mod check;
 mod compare;
+mod compare_results;
 mod compensate;
 mod completions;
 mod course;
@@ -71,6 +72,8 @@ enum Command {
     Identify(identify::Arguments),
     /// Compare strategies, solvers, and fits without parts of the elasticity.
     Compare(compare::Arguments),
+    /// Put two estimates of one arm side by side: which parameters differ by more than their errors.
+    CompareResults(compare_results::Arguments),
     /// Rank the effects that the residual points to; changes nothing.
     Trace(trace::Arguments),
     /// Find the effects that a problem lacks and add them, until nothing is left to find.
@@ -128,6 +131,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Command::Accept(arguments) => accept::run(&arguments),
         Command::Identify(arguments) => identify::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
+        Command::CompareResults(arguments) => compare_results::run(&arguments),
         Command::Trace(arguments) => trace::run(&arguments),
         Command::Loop(arguments) => loop_command::run(&arguments),
         Command::Predict(arguments) => predict::run(&arguments),

@@ -1,0 +1,81 @@
+//! Arguments and work of `flexcal compare-results`.
+
+use std::error::Error;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use flexcal::fit::SavedEstimateError;
+use flexcal::report::{self, Side};
+
+use super::diagnostic;
+use super::estimate::Trust;
+use super::outcome::Outcome;
+use super::output::{self, Results};
+
+/// Name of the page.
+const PAGE: &str = "compare-results.html";
+/// Parts of an estimate.json with errors, and the names that people read.
+const PARTS: [(&str, &str); 3] =
+    [("held_out", "held out"), ("left_out", "left out"), ("identification", "fitted rows")];
+
+/// Arguments of `flexcal compare-results`.
+#[derive(Debug, Args)]
+#[command(after_help = "Writes compare-results.html.
+
+Examples:
+  flexcal compare-results out/spring/estimate.json out/autumn/estimate.json")]
+pub struct Arguments {
+    /// The estimate.json of the first result
+    #[arg(value_name = "A.json")]
+    first: PathBuf,
+    /// The estimate.json of the second result
+    #[arg(value_name = "B.json")]
+    second: PathBuf,
+    /// Folder for the page
+    #[arg(short, long, value_name = "DIR", default_value = "out/compare-results")]
+    out: PathBuf,
+    /// Replace a page that flexcal did not write
+    #[arg(long)]
+    force: bool,
+    /// Print errors alone
+    #[arg(short, long)]
+    quiet: bool,
+    #[command(flatten)]
+    trust: Trust,
+}
+
+/// Compares two estimates, writes the page and prints the differences.
+pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
+    let Arguments { first, second, out, force, quiet, trust } = arguments;
+    let inputs = vec![first.clone(), second.clone()];
+    let flags = (*force, *quiet);
+    let results = Results::claim("compare-results", out.clone(), inputs, &[PAGE], flags)?;
+    let sides = [side(first, *trust)?, side(second, *trust)?];
+    if sides[0].estimate.problem_name() != sides[1].estimate.problem_name() {
+        diagnostic::warn("the two results are of problems with different names");
+    }
+    results.write(&[(PAGE, &report::difference_page(&sides))])?;
+    if !quiet {
+        output::print(&(report::difference_text(&sides) + &results.written()))?;
+    }
+    Ok(Outcome::Done)
+}
+
+/// Reads one estimate with its errors.
+fn side(file: &Path, trust: Trust) -> Result<Side, Box<dyn Error>> {
+    let estimate = trust.read(file)?;
+    let text = flexcal::files::read_text(file)
+        .map_err(|source| SavedEstimateError::Unreadable { file: file.to_owned(), source })?;
+    let document: serde_json::Value = serde_json::from_str(&text)
+        .map_err(|source| SavedEstimateError::Syntax { file: file.to_owned(), source })?;
+    let mut errors = Vec::new();
+    for (key, name) in PARTS {
+        let part = document.get(key).and_then(serde_json::Value::as_object);
+        for (size, value) in part.into_iter().flatten() {
+            let norm = value.get("norm").and_then(serde_json::Value::as_f64);
+            let words = size.replace('_', " in ");
+            errors.extend(norm.map(|norm| (format!("{name}, {words}"), norm)));
+        }
+    }
+    Ok(Side { estimate, errors })
+}

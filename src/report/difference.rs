@@ -1,0 +1,184 @@
+//! Text and page of the command `compare-results`: two estimates of one arm side by side.
+
+use statrs::distribution::{ContinuousCDF as _, Normal};
+
+use super::document::{Block, Column, Table};
+use super::figures::{ACCENT, Drawing, Forest};
+use super::render::{page, text};
+use crate::fit::SavedEstimate;
+use crate::quantity::format::{counted, decimals, number, or_dash};
+
+/// Probability that any parameter of two estimates of an unchanged arm is said to differ.
+const FALSE_ALARMS: f64 = 0.01;
+/// Maximum number of parameters that the terminal lists.
+const MAX_LISTED: usize = 20;
+/// Maximum number of decimals of a value.
+const MAX_DECIMALS: usize = 6;
+
+/// Estimate with its errors, as one of two sides.
+pub(crate) struct Side {
+    pub estimate: SavedEstimate,
+    /// Names of errors with their values, for example `held out, mean_mm`.
+    pub errors: Vec<(String, f64)>,
+}
+
+/// Parameter that both estimates have, in the unit of tables.
+struct Difference {
+    name: String,
+    values: [f64; 2],
+    /// Second value minus first one, and its standard error if both have one.
+    change: (f64, Option<f64>),
+}
+
+impl Difference {
+    /// Returns the change in units of its standard error.
+    fn sigmas(&self) -> Option<f64> {
+        self.change.1.filter(|sigma| *sigma > 0.0).map(|sigma| self.change.0 / sigma)
+    }
+}
+
+/// Returns the comparison as text, ending in a line break.
+pub(crate) fn difference_text(sides: &[Side; 2]) -> String {
+    text(&blocks(sides))
+}
+
+/// Returns the comparison as a page with all parameters.
+pub(crate) fn difference_page(sides: &[Side; 2]) -> String {
+    page(sides[0].estimate.problem_name(), "two results", &blocks(sides))
+}
+
+fn blocks<'a>(sides: &[Side; 2]) -> Vec<Block<'a>> {
+    let differences = differences(sides);
+    let tested = differences.iter().filter(|of| of.sigmas().is_some()).count();
+    let limit = Normal::standard().inverse_cdf(1.0 - 0.5 * FALSE_ALARMS / tested.max(1) as f64);
+    let [a, b] = sides.each_ref().map(|side| &side.estimate);
+    let mut blocks = vec![Block::lines(format!(
+        "A: {}\nB: {}",
+        a.file.display(),
+        b.file.display()
+    ))];
+    blocks.push(Block::Text(verdict(&differences, tested, limit)));
+    blocks.extend(notes([a, b]).into_iter().map(Block::Note));
+    let error = |side: &Side, name: &str| {
+        let found = side.errors.iter().find(|error| error.0 == name);
+        or_dash(found, |error| number(error.1, 4))
+    };
+    let rows = sides[0].errors.iter().map(|(name, _)| {
+        vec![name.clone(), error(&sides[0], name), error(&sides[1], name)]
+    });
+    blocks.push(Block::Table(Table::new(&["error", "A", "B"], rows.collect(), &[0])));
+    blocks.push(Block::figures([drawn(&differences, limit)]));
+    let listed = &differences[..differences.len().min(MAX_LISTED)];
+    blocks.push(Block::Words(vec![Block::Table(table(listed))]));
+    if listed.len() < differences.len() {
+        let more = differences.len() - listed.len();
+        let words = format!("{more} parameters with smaller differences are on the page.");
+        blocks.push(Block::Words(vec![Block::Text(words)]));
+    }
+    blocks.push(Block::Page(vec![Block::Table(table(&differences))]));
+    blocks
+}
+
+/// Returns the parameters that both estimates have, the largest difference first.
+fn differences([a, b]: &[Side; 2]) -> Vec<Difference> {
+    let variance = |side: &Side, k: usize| side.estimate.posterior().covariance[(k, k)];
+    let others: Vec<(&str, f64, Option<f64>)> = b.estimate.entries().collect();
+    let of = |(k, (name, value, _)): (usize, (&str, f64, Option<f64>))| {
+        let other = others.iter().position(|entry| entry.0 == name)?;
+        let (factor, symbol) = match a.estimate.unit_of(name).unwrap_or_default() {
+            "rad" => (1_f64.to_degrees(), "°"),
+            "m" => (1e3, "mm"),
+            symbol => (1.0, symbol),
+        };
+        let values = [value, others[other].1].map(|value| value * factor);
+        let sigma = (variance(a, k) + variance(b, other)).sqrt() * factor;
+        let sigma = Some(sigma).filter(|sigma| sigma.is_finite());
+        Some(Difference {
+            name: format!("{name} [{symbol}]"),
+            values,
+            change: (values[1] - values[0], sigma),
+        })
+    };
+    let mut found: Vec<Difference> = a.estimate.entries().enumerate().filter_map(of).collect();
+    let size = |of: &Difference| of.sigmas().map_or(-1.0, f64::abs);
+    found.sort_by(|one, other| size(other).total_cmp(&size(one)));
+    found
+}
+
+/// States whether the estimates differ by more than their errors.
+fn verdict(differences: &[Difference], tested: usize, limit: f64) -> String {
+    let beyond = differences
+        .iter()
+        .filter(|of| of.sigmas().is_some_and(|sigmas| sigmas.abs() > limit))
+        .count();
+    let most = differences.first().and_then(|of| Some((of, of.sigmas()?)));
+    let Some((first, sigmas)) = most else {
+        return "No parameter has a standard error in both results, so they cannot be compared."
+            .to_owned();
+    };
+    let most = format!("largest difference: {}, {} σ", first.name, number(sigmas, 1));
+    let test = format!(
+        "limit {} σ for {}, false alarms {} %",
+        number(limit, 1),
+        counted(tested, "parameter"),
+        number(100.0 * FALSE_ALARMS, 0)
+    );
+    match beyond {
+        0 => format!("They agree: no parameter differs by more than its error allows ({most}; {test})."),
+        count => format!(
+            "They differ: {} by more than the errors allow ({most}; {test}).",
+            counted(count, "parameter")
+        ),
+    }
+}
+
+/// Lists what limits the comparison.
+fn notes([a, b]: [&SavedEstimate; 2]) -> Vec<String> {
+    let mut notes = Vec::new();
+    if let Some(part) = a.differing_part(b) {
+        notes.push(format!("The arms are declared differently: {part}."));
+    }
+    let shared = a.posterior().fitted_rows.intersection(&b.posterior().fitted_rows).count();
+    if shared > 0 {
+        notes.push(format!(
+            "{} fitted in both: the standard errors of the differences, which assume different rows, are too large.",
+            counted(shared, "row")
+        ));
+    }
+    for (name, estimate) in [("A", a), ("B", b)] {
+        if !estimate.trusted {
+            notes.push(format!("The fit of {name} was not trusted; see its findings."));
+        }
+    }
+    notes
+}
+
+fn table(differences: &[Difference]) -> Table {
+    let digits = |of: &Difference| of.change.1.map_or(4, |sigma| decimals(sigma, MAX_DECIMALS));
+    let value = |k: usize| move |of: &Difference| number(of.values[k], digits(of));
+    let sigma = |of: &Difference| or_dash(of.change.1, |sigma| number(sigma, digits(of)));
+    let columns = [
+        Column::words("parameter", |of: &Difference| of.name.clone()),
+        Column::number("A", value(0)).minor(),
+        Column::number("B", value(1)).minor(),
+        Column::number("B − A", move |of: &Difference| number(of.change.0, digits(of))),
+        Column::number("± 1 σ", sigma),
+        Column::number("in σ", |of: &Difference| or_dash(of.sigmas(), |sigmas| number(sigmas, 1))),
+    ];
+    Table::of(differences, &columns)
+}
+
+fn drawn(differences: &[Difference], limit: f64) -> Option<Drawing> {
+    let row = |of: &Difference| Some((of.name.clone(), vec![Some((of.sigmas()?, 1.0))]));
+    Forest {
+        names: ("differences", "Differences of the two results"),
+        caption: "Second estimate minus first one with an interval of ± 1 σ, in standard errors of the difference. Beyond the outer \
+                  lines errors alone do not explain it."
+            .to_owned(),
+        label: "B − A [standard errors]",
+        legend: vec![("difference", ACCENT)],
+        references: vec![0.0, -limit, limit],
+        rows: differences.iter().filter_map(row).collect(),
+    }
+    .drawing()
+}
