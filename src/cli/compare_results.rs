@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use flexcal::fit::SavedEstimateError;
-use flexcal::report::{self, Side};
+use flexcal::report::{self, Side, shell_word};
 
 use super::diagnostic;
 use super::estimate::Trust;
@@ -17,6 +17,9 @@ const PAGE: &str = "compare-results.html";
 /// Parts of an estimate.json with errors, and the names that people read.
 const PARTS: [(&str, &str); 3] =
     [("held_out", "held out"), ("left_out", "left out"), ("identification", "fitted rows")];
+
+/// Units of errors in keys and in words.
+const UNITS: [(&str, &str); 3] = [("mm", "mm"), ("deg", "°"), ("px", "px")];
 
 /// Arguments of `flexcal compare-results`.
 #[derive(Debug, Args)]
@@ -56,7 +59,12 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     }
     results.write(&[(PAGE, &report::difference_page(&sides))])?;
     if !quiet {
-        output::print(&(report::difference_text(&sides) + &results.written()))?;
+        let [first, second] = [first, second].map(|file| shell_word(file));
+        output::print(&format!(
+            "{}{}Next: flexcal fleet {first} {second} if these are two arms; flexcal watch PROBLEM --estimate {first} --data FILE if it is one\n",
+            report::difference_text(&sides),
+            results.written()
+        ))?;
     }
     Ok(Outcome::Done)
 }
@@ -70,11 +78,14 @@ fn side(file: &Path, trust: Trust) -> Result<Side, Box<dyn Error>> {
         .map_err(|source| SavedEstimateError::Syntax { file: file.to_owned(), source })?;
     let mut errors = Vec::new();
     for (key, name) in PARTS {
-        let part = document.get(key).and_then(serde_json::Value::as_object);
-        for (size, value) in part.into_iter().flatten() {
-            let norm = value.get("norm").and_then(serde_json::Value::as_f64);
-            let words = size.replace('_', " in ");
-            errors.extend(norm.map(|norm| (format!("{name}, {words}"), norm)));
+        for (size, unit, symbol) in ["mean", "rms", "max"]
+            .into_iter()
+            .flat_map(|size| UNITS.map(|(unit, symbol)| (size, unit, symbol)))
+        {
+            let value =
+                document.get(key).and_then(|part| part.get(format!("{size}_{unit}"))?.get("norm"));
+            let norm = value.and_then(serde_json::Value::as_f64);
+            errors.extend(norm.map(|norm| (format!("{name}, {size}, {symbol}"), norm)));
         }
     }
     Ok(Side { estimate, errors })

@@ -4,7 +4,7 @@ use std::error::Error;
 use std::path::PathBuf;
 
 use clap::Args;
-use flexcal::fit;
+use flexcal::fit::{self, Residual};
 use flexcal::measurement::{Measurements, Split};
 use flexcal::problem::{HeldOut, Problem};
 use flexcal::remainder::{self, Bounds, CorrectedPrediction};
@@ -41,6 +41,9 @@ pub struct Arguments {
     #[command(flatten)]
     trust: Trust,
 }
+
+/// Number of standard deviations by which the share of rows within their bounds may fall short.
+const MAX_SPREADS: f64 = 3.0;
 
 /// Names of the files that the command may write.
 const RESULTS: [&str; 4] = ["predictions.csv", "residuals.csv", "errors.json", "predictions.html"];
@@ -102,6 +105,11 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         let names: Vec<&str> = texts.iter().map(|(name, _)| *name).collect();
         let problem = shell_word(common.problem());
         let next = match &arguments.estimate {
+            Some(file) if is_beyond(residuals, bounds) => format!(
+                "flexcal watch {} --estimate {} says whether the arm has changed: fewer rows than foreseen lie within their bounds",
+                common.named(),
+                shell_word(file)
+            ),
             Some(file) => format!(
                 "flexcal compensate {problem} --estimate {} --data TARGETS.csv corrects commands",
                 shell_word(file)
@@ -112,4 +120,12 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         format!("{text}\nWritten to {folder}: {}\nNext: {next}\n", names.join(", "))
     })?;
     Ok(Outcome::trusted(trusted))
+}
+
+/// Returns true if fewer rows lie within their bounds than their probability explains.
+fn is_beyond(residuals: &[Residual], bounds: Option<&Bounds>) -> bool {
+    let Some(bounds) = bounds.filter(|_| !residuals.is_empty()) else { return false };
+    let share = bounds.coverage(residuals.iter().map(|row| row.position.norm()));
+    let spread = (bounds.level * (1.0 - bounds.level) / residuals.len() as f64).sqrt();
+    share < bounds.level - MAX_SPREADS * spread
 }

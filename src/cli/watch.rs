@@ -4,7 +4,7 @@ use std::error::Error;
 use std::path::PathBuf;
 
 use clap::Args;
-use flexcal::life;
+use flexcal::life::{self, CauseKind};
 use flexcal::measurement::Measurements;
 use flexcal::problem::Problem;
 use flexcal::report::{self, shell_word};
@@ -65,7 +65,13 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     results.write(&[("watch.json", &json), ("watch.html", &page)])?;
     common.print_result(&json, || {
         let [problem_word, estimate] = [common.problem(), &arguments.estimate].map(shell_word);
-        let next = if watch.is_changed() {
+        let first = watch.causes.first().map(|cause| cause.kind);
+        let next = if watch.is_changed() && first == Some(CauseKind::Noise) {
+            "measure a few of these poses again. If watch.html shows the evidence rise from some row on, give the rows from there on alone"
+                .to_owned()
+        } else if watch.is_changed() && first == Some(CauseKind::Row) {
+            format!("check that row, then flexcal watch {} --estimate {estimate} without it", common.named())
+        } else if watch.is_changed() {
             format!(
                 "flexcal identify {} --prior {estimate} takes the change over into an estimate",
                 common.named()

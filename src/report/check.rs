@@ -43,15 +43,15 @@ fn blocks<'a>(problem: &Problem, check: &Check) -> Vec<Block<'a>> {
         format!("{}, {}", counted(names.len(), "parameter"), counted(forecast.poses, "pose"));
     let mut blocks = opening(&problem.title, counts).to_vec();
     blocks.extend([
+        Block::lines(enough(check)),
+        Block::lines(prediction(check)),
         Block::Table(Table::new(&header, rows.collect(), &[0, 4, 5]).noted(&notes)),
         conditioning(&forecast.identifiability, names.len(), check.coordinates),
         unidentifiable(&forecast.identifiability, &names, "check.json"),
-        Block::lines(prediction(check)),
         Block::lines(
             "With more or fewer such poses (rank; parameters of the arm identified to 90 % or more; error of predictions):",
         ),
         Block::Table(growth(check)),
-        Block::lines(enough(check)),
         Block::figures([growing(check)]),
     ]);
     // Measured poses do not include the held-out ones.

@@ -52,20 +52,18 @@ fn blocks<'a>(sides: &[Side; 2]) -> Vec<Block<'a>> {
     let tested = differences.iter().filter(|of| of.sigmas().is_some()).count();
     let limit = Normal::standard().inverse_cdf(1.0 - 0.5 * FALSE_ALARMS / tested.max(1) as f64);
     let [a, b] = sides.each_ref().map(|side| &side.estimate);
-    let mut blocks = vec![Block::lines(format!(
-        "A: {}\nB: {}",
-        a.file.display(),
-        b.file.display()
-    ))];
+    let mut blocks =
+        vec![Block::lines(format!("A: {}\nB: {}", a.file.display(), b.file.display()))];
     blocks.push(Block::Text(verdict(&differences, tested, limit)));
     blocks.extend(notes([a, b]).into_iter().map(Block::Note));
     let error = |side: &Side, name: &str| {
         let found = side.errors.iter().find(|error| error.0 == name);
         or_dash(found, |error| number(error.1, 4))
     };
-    let rows = sides[0].errors.iter().map(|(name, _)| {
-        vec![name.clone(), error(&sides[0], name), error(&sides[1], name)]
-    });
+    let rows = sides[0]
+        .errors
+        .iter()
+        .map(|(name, _)| vec![name.clone(), error(&sides[0], name), error(&sides[1], name)]);
     blocks.push(Block::Table(Table::new(&["error", "A", "B"], rows.collect(), &[0])));
     blocks.push(Block::figures([drawn(&differences, limit)]));
     let listed = &differences[..differences.len().min(MAX_LISTED)];
@@ -116,7 +114,10 @@ fn verdict(differences: &[Difference], tested: usize, limit: f64) -> String {
         return "No parameter has a standard error in both results, so they cannot be compared."
             .to_owned();
     };
-    let most = format!("largest difference: {}, {} σ", first.name, number(sigmas, 1));
+    let digits = first.change.1.map_or(4, |sigma| decimals(sigma, MAX_DECIMALS));
+    let [change, sigma] =
+        [first.change.0, first.change.1.unwrap_or(f64::NAN)].map(|value| number(value, digits));
+    let most = format!("the largest: {} {change} ± {sigma}, {} σ", first.name, number(sigmas, 1));
     let test = format!(
         "limit {} σ for {}, false alarms {} %",
         number(limit, 1),
@@ -124,7 +125,9 @@ fn verdict(differences: &[Difference], tested: usize, limit: f64) -> String {
         number(100.0 * FALSE_ALARMS, 0)
     );
     match beyond {
-        0 => format!("They agree: no parameter differs by more than its error allows ({most}; {test})."),
+        0 => format!(
+            "They agree: no parameter differs by more than its error allows ({most}; {test})."
+        ),
         count => format!(
             "They differ: {} by more than the errors allow ({most}; {test}).",
             counted(count, "parameter")

@@ -3,6 +3,8 @@
 //! Texts mark code with [`code`]. Only the page shows figures and folded sections; [`Block::Page`]
 //! and [`Block::Words`] restrict blocks to one kind of output.
 
+use std::path::Path;
+
 use super::figures::Drawing;
 use crate::results::PlotData;
 
@@ -177,7 +179,16 @@ impl Table {
 pub(super) fn opening<'a>(title: &str, words: impl Into<String>) -> [Block<'a>; 2] {
     let words = words.into();
     let titled = Block::lines(format!("{title}\n{words}"));
-    [Block::Words(vec![titled]), Block::Page(vec![Block::Text(words)])]
+    let lines = words.lines().filter(|line| !line.is_empty());
+    let untitled = lines.map(|line| Block::Text(line.to_owned())).collect();
+    [Block::Words(vec![titled]), Block::Page(untitled)]
+}
+
+/// Returns the last two parts of a path, which tell files of one name apart.
+pub(super) fn last_parts(file: &Path) -> String {
+    let parts: Vec<_> = file.components().map(|part| part.as_os_str().to_string_lossy()).collect();
+    let first = parts.len().saturating_sub(2);
+    parts.get(first..).unwrap_or_default().join("/")
 }
 
 /// Encloses words in code marks.

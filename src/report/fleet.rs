@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::document::{Block, Table};
+use super::document::{Block, Table, last_parts};
 use super::figures::{ACCENT, Drawing, FAINT, Forest, INK, WARM};
 use super::render::{page, text};
 use crate::life::{Fleet, FleetArm, FleetParameter};
@@ -55,7 +55,7 @@ fn drawn_arms(fleet: &Fleet) -> Option<Drawing> {
         let (parameter, sigmas) = arm.most.as_ref()?;
         let value = Some((*sigmas, 0.0));
         let values = if arm.is_unlike { vec![None, value] } else { vec![value, None] };
-        Some((format!("{}: {parameter}", short(arm)), values))
+        Some((format!("{}: {parameter}", last_parts(&arm.file)), values))
     };
     Forest {
         names: ("fleet-arms", "Each arm against its siblings"),
@@ -88,13 +88,6 @@ fn drawn_parameters(fleet: &Fleet) -> Option<Drawing> {
         rows: fleet.parameters.iter().filter_map(row).collect(),
     }
     .drawing()
-}
-
-/// Returns the last two parts of the path of an arm's estimate.
-fn short(arm: &FleetArm) -> String {
-    let parts: Vec<_> =
-        arm.file.components().map(|part| part.as_os_str().to_string_lossy()).collect();
-    parts[parts.len().saturating_sub(2)..].join("/")
 }
 
 fn parameter(parameter: &FleetParameter) -> Vec<String> {

@@ -98,8 +98,8 @@ fn blocks<'a>(
     );
     let mut blocks = opening(&problem.title, counts).to_vec();
     blocks.extend(too_few(plan));
-    blocks.push(Block::Table(Table::new(&header, rows.collect(), &[0, 6]).noted(&[&note])));
     blocks.extend(gain);
+    blocks.push(Block::Table(Table::new(&header, rows.collect(), &[0, 6]).noted(&[&note])));
     blocks.push(Block::figures([gains(plan)]));
     blocks.push(conditioning(&planned.identifiability, names.len(), plan.coordinates));
     blocks.push(unidentifiable(&planned.identifiability, &names, "plan.json"));

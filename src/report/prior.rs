@@ -12,6 +12,9 @@ const HEADER: [&str; 7] =
     ["parameter", "earlier", "± 1 σ", "new rows", "± 1 σ", "posterior", "± 1 σ"];
 /// p-value of χ² below which new rows do not agree with the prior.
 const LEAST_P: f64 = 0.001;
+/// Standard error of the new rows, in units of the earlier one, beyond which the figure omits a
+/// parameter: the rows say next to nothing.
+const MAX_DRAWN_ERROR: f64 = 10.0;
 /// Maximum number of decimals of a value.
 const MAX_DECIMALS: usize = 6;
 
@@ -39,8 +42,9 @@ fn drawn(comparison: &PriorComparison) -> Option<Drawing> {
     let row = |compared: &ComparedParameter| {
         let (earlier, sigma) = compared.prior;
         let scaled = |(value, error): (f64, f64)| ((value - earlier) / sigma, error / sigma);
+        let data = compared.data.map(scaled).filter(|data| data.1 <= MAX_DRAWN_ERROR)?;
         let posterior = compared.posterior.1.map(|error| scaled((compared.posterior.0, error)));
-        Some((compared.name.clone(), vec![Some(scaled(compared.data?)), posterior]))
+        Some((compared.name.clone(), vec![Some(data), posterior]))
     };
     Forest {
         names: ("earlier-estimate", "New rows and posterior against the earlier estimate"),

@@ -87,7 +87,7 @@ pub(crate) fn bound_text(plots: &PlotData) -> Option<String> {
     let percent = (level * 1e6).round() / 1e4;
     mean.is_finite().then(|| {
         format!(
-            "Bound of a prediction anywhere in the workspace: {} mm ({percent} %, mean).",
+            "Predictions in the workspace err by less than {} mm ({percent} %; mean of the bounds).",
             two_digits(mean * 1e3, 4)
         )
     })

@@ -40,6 +40,7 @@ pub(crate) fn trace_page(problem: &Problem, trace: &Trace, plots: &PlotData) -> 
 fn blocks<'a>(problem: &Problem, trace: &Trace, plots: Option<&PlotData>) -> Vec<Block<'a>> {
     let result = TraceResult::new(problem, trace);
     let mut blocks = opening(&problem.title, headline(&trace.fit)).to_vec();
+    blocks.extend(hypothesis_sets(&result));
     blocks.extend([
         Block::heading("Tests of the residual (measured − predicted) of the identification poses"),
         Block::List(residual_tests::all(&trace.residual_tests)),
@@ -48,7 +49,6 @@ fn blocks<'a>(problem: &Problem, trace: &Trace, plots: Option<&PlotData>) -> Vec
         residual_tests::other_reduced_chi2(&trace.residual_tests, trace.fit.reduced_chi2)
             .map(Block::Text),
     );
-    blocks.extend(hypothesis_sets(&result));
     blocks.extend(ranking(problem, &result, MAX_SHOWN_CANDIDATES, "trace.json holds them all"));
     blocks.extend(plots.map(|plots| {
         Block::figures([

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::document::{Block, Table, opening};
+use super::document::{Block, Table, last_parts, opening};
 use super::figures::{ACCENT, Curve, Drawing, Series};
 use super::render::{page, text};
 use crate::life::{Change, NAMED, Watch, WatchedCause};
@@ -88,12 +88,12 @@ fn control_chart(watch: &Watch, rows: &Measurements) -> Option<Drawing> {
 /// names; nothing if there is only one.
 fn first_rows(rows: &Measurements) -> Vec<(String, f64)> {
     let session = |row: usize| rows.session.names.get(*rows.session.of_row.get(row)?);
-    let file = |row: usize| rows.files.get(rows.origin.get(row)?.0 as usize)?.file_name();
+    let file =
+        |row: usize| rows.files.get(rows.origin.get(row)?.0 as usize).map(|file| last_parts(file));
     let mut found: Vec<(String, f64)> = Vec::new();
     for row in 0..rows.len() {
-        let file = || file(row).map(|name| name.to_string_lossy().into_owned());
         let session = session(row).filter(|name| !name.is_empty()).cloned();
-        let name = session.or_else(file).unwrap_or_default();
+        let name = session.or_else(|| file(row)).unwrap_or_default();
         if found.last().is_none_or(|last| last.0 != name) {
             found.push((name, (row + 1) as f64));
         }
@@ -103,9 +103,13 @@ fn first_rows(rows: &Measurements) -> Vec<(String, f64)> {
 
 /// States whether the arm has changed, and what.
 fn verdict(watch: &Watch) -> String {
-    let evidence = watch.looks.last().map_or(0.0, |look| look.1 / 10_f64.ln());
+    let evidence = watch.looks.last().map_or(0.0, |look| look.1.exp());
     let Some(row) = watch.changed_at else {
-        return format!("Unchanged: the evidence for a change is 10^{}", number(evidence, 1));
+        return format!(
+            "Unchanged: the rows are {} times as probable with a change as without one; an alarm takes {} times",
+            two_digits(evidence, 4),
+            number(1.0 / watch.false_alarm_rate, 0)
+        );
     };
     let what = match watch.causes.first() {
         Some(cause) if cause.probability >= NAMED => cause.label.clone(),

@@ -7,6 +7,8 @@ use super::prelude::*;
 const MAX_DOTS: usize = 60;
 /// Maximum number of points of a curve without a line.
 const MAX_SCATTERED: usize = 600;
+/// Smallest value on a logarithmic axis.
+const LEAST_LOGARITHM: f64 = 1e-12;
 /// Height of the panel in displayed pixels.
 const HEIGHT: f64 = 210.0;
 
@@ -40,7 +42,7 @@ pub struct Series<'a> {
     pub caption: String,
     /// Labels of the horizontal and the vertical axis, with units.
     pub labels: (&'a str, &'a str),
-    /// True if the vertical axis is logarithmic.
+    /// True if both axes are logarithmic.
     pub is_logarithmic: bool,
     pub curves: Vec<Curve<'a>>,
     /// Horizontal lines with their names.
@@ -50,13 +52,13 @@ pub struct Series<'a> {
 }
 
 impl Series<'_> {
-    /// Draws the curves; `None` if there are fewer than two points.
+    /// Draws the curves; `None` if none has two points.
     pub fn drawing(&self) -> Option<Drawing> {
         let points = || self.curves.iter().flat_map(|curve| &curve.points);
-        if points().count() < 2 {
+        if self.curves.iter().all(|curve| curve.points.len() < 2) {
             return None;
         }
-        let up = |y: f64| if self.is_logarithmic { y.max(1e-12).log10() } else { y };
+        let up = |y: f64| if self.is_logarithmic { y.max(LEAST_LOGARITHM).log10() } else { y };
         let levels = self.levels.iter().map(|level| level.1);
         let (low, high) = range(points().map(|at| at.1).chain(levels).map(up));
         let from_zero = !self.is_logarithmic && low >= 0.0;
@@ -67,26 +69,30 @@ impl Series<'_> {
         } else {
             Axis::linear(ends, self.labels.1, 5)
         };
-        let across = with_margin(range(points().map(|at| at.0)), 0.03);
-        let x = Axis::linear(across, self.labels.0, 7);
-        let named = |text: &String, at: At, shift: (f64, f64)| Shape::Text {
+        let across = with_margin(range(points().map(|at| up(at.0))), 0.03);
+        let x = if self.is_logarithmic {
+            Axis::logarithmic(across, self.labels.0, 8)
+        } else {
+            Axis::linear(across, self.labels.0, 7)
+        };
+        let named = |text: &String, at: At, shift: (f64, f64), anchor: Anchor| Shape::Text {
             at,
             shift,
             text: text.clone(),
             colour: MUTED,
-            anchor: Anchor::Start,
+            anchor,
         };
         let levels = self.levels.iter().flat_map(|(text, level)| {
             let level = up(*level);
             let line = Shape::line([(across.0, level), (across.1, level)], Paint::line(WARM, 1.2));
-            [line, named(text, (across.0, level), (6.0, -8.0))]
+            [line, named(text, (across.1, level), (-4.0, -8.0), Anchor::End)]
         });
         let starts = self.starts.iter().flat_map(|(text, start)| {
             let line = Shape::line([(*start, ends.0), (*start, ends.1)], Paint::line(FAINT, 1.0));
-            [line, named(text, (*start, ends.1), (4.0, 8.0))]
+            [line, named(text, (*start, ends.1), (4.0, 8.0), Anchor::Start)]
         });
         let shapes = self.curves.iter().flat_map(|curve| {
-            let at = move |at: &At| (at.0, up(at.1));
+            let at = move |at: &At| if self.is_logarithmic { (up(at.0), up(at.1)) } else { *at };
             let is_dotted = !curve.is_joined || curve.points.len() <= MAX_DOTS;
             let line = curve
                 .is_joined
