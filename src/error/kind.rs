@@ -283,9 +283,10 @@ pub enum InputErrorKind {
     #[error("column {column} of the formula: {mistake}")]
     Formula { column: usize, mistake: String },
     #[error(
-        "{formula} has no finite value in row {row}; keep log, sqrt and divisions off their edges"
+        "{formula} has no finite value in row {row} ({place}); keep log, sqrt and divisions off \
+         their edges"
     )]
-    FormulaNotFinite { formula: String, row: usize },
+    FormulaNotFinite { formula: String, row: usize, place: String },
     #[error("{reason}")]
     LawSite { reason: String },
     #[error("\"{name}\" cannot name {noun}; write a word of letters, digits and _")]

@@ -61,7 +61,7 @@ pub fn answers(
     };
     let all: Vec<usize> = (0..rows.len()).collect();
     let mut poses = placement.poses(&rows, &all, 1.0);
-    estimate.count_time_in(&mut poses);
+    estimate.count_time_in(&placement, &mut poses);
     let axes = model.orientations(&poses, x.as_slice());
     let few = rows.select(&all[..commands.min(rows.len())]);
     let goals = fit::waypoints(problem, &model, &x, &few).ok();
@@ -151,7 +151,7 @@ pub(super) fn random_rows(
         })
         .collect();
     let mut list = |range: (f64, f64)| (0..count).map(|_| between(range)).collect::<Vec<f64>>();
-    let first = estimate.first_time.unwrap_or(0.0);
+    let first = estimate.start_times.as_ref().map_or(0.0, |starts| starts.first);
     let mut time = list((first, first + MAX_TIME));
     // Time counts from the first row in commands, and from the first pose of the fit in predictions.
     if let Some(time) = time.first_mut() {

@@ -59,7 +59,7 @@ pub fn best_rigid(
     let x = estimate.vector(problem, &model)?;
     let all: Vec<usize> = (0..rows.len()).collect();
     let mut poses = placement.poses(&rows, &all, 1.0);
-    estimate.count_time_in(&mut poses);
+    estimate.count_time_in(&placement, &mut poses);
     let targets = model.target_positions(x.as_slice());
     let frames = model.frames(&poses, x.as_slice());
     let inside = poses.into_iter().zip(frames).filter_map(|(pose, frame)| {

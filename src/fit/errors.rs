@@ -112,7 +112,7 @@ impl ErrorSummary {
     }
 
     /// Adds the image errors converted to `lengths` at the observed points \[m\].
-    pub(super) fn with_lengths(self, lengths: &[Vector3<f64>]) -> Self {
+    pub(in crate::fit) fn with_lengths(self, lengths: &[Vector3<f64>]) -> Self {
         let Self { mean, max, rms, .. } = Self::of(lengths);
         Self { at_point: Some([mean, max, rms]), ..self }
     }

@@ -319,7 +319,7 @@ fn fit_rows(
         } else {
             Vec::new()
         },
-        first_time: measurements.time.iter().copied().fold(f64::INFINITY, f64::min),
+        start_times: measurements.start_times(),
         sigma: fitting.sigma,
         seconds: clock.elapsed().as_secs_f64(),
     })

@@ -17,6 +17,7 @@ use crate::fit::{
 };
 use crate::least_squares::solver::{AtBound, Termination};
 use crate::least_squares::{Identifiability, UnidentifiableCombination};
+use crate::measurement::StartTimes;
 use crate::model::parameter::Parameter;
 use crate::quantity::Unit;
 
@@ -167,8 +168,8 @@ pub struct Identification {
     pub(crate) prior: Option<PriorComparison>,
     /// Digests of the identification rows; empty for a provisional fit.
     pub(crate) fitted_rows: Vec<String>,
-    /// Start time of the time-dependent terms \[s\]: that of the first pose.
-    pub first_time: f64,
+    /// Start of each session, from which time-dependent terms count.
+    pub(crate) start_times: StartTimes,
     /// Standard deviation (1 σ) of a coordinate in rows that state none, declared or estimated
     /// \[m\].
     pub sigma: f64,

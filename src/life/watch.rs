@@ -142,7 +142,7 @@ pub fn watch(
     }
     let sigma = known.sigma.unwrap_or(f64::NAN);
     let mut poses = placement.oriented_poses(&kept, &every_row, (sigma, turn));
-    estimate.count_time_in(&mut poses);
+    estimate.count_time_in(&placement, &mut poses);
     let misfit = known.misfit_of(&poses);
     let leading = kept.leading();
     let leads: Vec<bool> =

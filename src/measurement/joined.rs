@@ -138,8 +138,8 @@ impl JoinedLog {
         let (key, write) = match self.rule {
             JoinRule::Order => return Ok(None),
             JoinRule::Name => {
-                let key = place("pose").map(|place| Key { place, to_si: std::convert::identity });
-                (key, "pose")
+                let named = place("pose").or_else(|| place("name"));
+                (named.map(|place| Key { place, to_si: std::convert::identity }), "pose or name")
             }
             JoinRule::Time { .. } => {
                 let with_unit = Unit::Time.suffixes().iter().find_map(|suffix| {

@@ -43,6 +43,7 @@ mod role;
 mod rows;
 mod settled;
 mod split;
+mod start_times;
 #[deny(clippy::indexing_slicing)]
 mod table;
 #[deny(clippy::indexing_slicing)]
@@ -64,6 +65,7 @@ pub use dataset::Dataset;
 pub(crate) use order::RowOrder;
 pub(crate) use repeats::count_distinct;
 pub use split::Split;
+pub(crate) use start_times::StartTimes;
 
 /// Measured poses with one column per quantity, in the order of the files.
 #[derive(Debug, Clone, Default)]
@@ -262,17 +264,18 @@ impl Measurements {
         Location::file(&self.files[file as usize]).at_line(line as usize)
     }
 
-    /// Returns a copy of the conditions of a row; times count from the first pose.
+    /// Returns a copy of the conditions of a row; elapsed time counts from the first pose of the
+    /// session.
     #[doc(hidden)]
     pub fn conditions(&self, row: usize) -> PoseConditions {
-        self.setup(row, self.first_time()).to_owned()
+        self.setup(row, &self.session_starts()).to_owned()
     }
 
     /// Returns the conditions of all rows without their past: the earlier poses are the other rows.
     pub(crate) fn conditions_without_past(&self) -> Vec<PoseConditions> {
-        let first = self.first_time();
+        let starts = self.session_starts();
         let alone =
-            |row| PoseView { past: LazyPast::default(), ..self.setup(row, first) }.to_owned();
+            |row| PoseView { past: LazyPast::default(), ..self.setup(row, &starts) }.to_owned();
         (0..self.len()).map(alone).collect()
     }
 
@@ -289,13 +292,10 @@ impl Measurements {
         conditions.map(|(row, conditions)| (conditions, name(row))).collect()
     }
 
-    /// Returns the time of the first pose \[s\].
-    pub(crate) fn first_time(&self) -> f64 {
-        self.time.iter().copied().fold(f64::INFINITY, f64::min)
-    }
-
-    /// Returns a view of the conditions of a row; `first` is the time of the first pose \[s\].
-    pub(crate) fn setup(&self, row: usize, first: f64) -> PoseView<'_> {
+    /// Returns a view of the conditions of a row; `starts` are the times of the first pose of each
+    /// session, as [`Self::session_starts`] returns them \[s\].
+    pub(crate) fn setup(&self, row: usize, starts: &[f64]) -> PoseView<'_> {
+        let session = self.session.of_row.get(row).copied().unwrap_or(0);
         let narrow = u32::try_from(row).unwrap_or(u32::MAX);
         PoseView {
             configuration: self.configuration(row),
@@ -303,7 +303,7 @@ impl Measurements {
             hoist: self.hoist.as_ref().map(|column| &column[row]),
             temperature: self.temperature.as_ref().map(|column| &column[row]),
             time: self.time[row],
-            elapsed: self.time[row] - first,
+            elapsed: self.time[row] - starts.get(session).copied().unwrap_or(0.0),
             approach: self
                 .approach
                 .as_ref()

@@ -189,7 +189,7 @@ mod tests {
             (past.times, [23.0].as_slice())
         );
         // The conditions of a row have the same past and can own it.
-        let setup = table.setup(0, table.first_time());
+        let setup = table.setup(0, &table.session_starts());
         assert_eq!((setup.past.read(), setup.past.place()), (past, Some(0)));
         assert_eq!(setup.to_owned().view().past.read(), past);
         let unknown = PoseView::from_configuration(setup.configuration).past;

@@ -59,7 +59,7 @@ pub fn predict(
     };
     let all: Vec<usize> = (0..rows.len()).collect();
     let mut poses = placement.poses(rows, &all, correction.sigma);
-    estimate.count_time_in(&mut poses);
+    estimate.count_time_in(&placement, &mut poses);
     let is_placed = |k: &usize| prediction.placed.contains(&model.parameters[*k].name);
     let placed: Vec<usize> = (0..model.parameters.len()).filter(is_placed).collect();
     let corrected = correction.at((problem, &model, &prediction.x), &placed, &poses);
@@ -92,7 +92,7 @@ pub fn predict_identified(
     let mut positions = found.predict(problem, rows)?;
     let model = found.model(problem, &Placement::of(rows))?;
     let every_row: Vec<usize> = (0..rows.len()).collect();
-    let poses = timed_poses(rows, &every_row, (found.sigma, found.first_time));
+    let poses = timed_poses(rows, &every_row, (found.sigma, &found.start_times));
     let corrected = correction.at((problem, &model, &found.vector(&model)?), &[], &poses);
     for (position, pose) in positions.iter_mut().zip(&corrected) {
         *position += pose.shift;
@@ -132,8 +132,9 @@ pub fn compensate(
 ) -> Result<Vec<(Command, CorrectedPose)>, StageError> {
     let all: Vec<usize> = (0..targets.len()).collect();
     let corrected = |rows: &Measurements| {
-        let mut poses = Placement::of(rows).poses(rows, &all, correction.sigma);
-        estimate.count_time_in(&mut poses);
+        let placement = Placement::of(rows);
+        let mut poses = placement.poses(rows, &all, correction.sigma);
+        estimate.count_time_in(&placement, &mut poses);
         correction.at((problem, model, x), &[], &poses)
     };
     let mut shifts: Vec<Vector3<f64>> = corrected(targets).iter().map(|pose| pose.shift).collect();

@@ -142,7 +142,7 @@ fn training_rows(
     data: &Dataset,
 ) -> Option<TrainingRows> {
     let rows = fitted_rows(found, data)?;
-    let times = (found.sigma, found.first_time);
+    let times = (found.sigma, &found.start_times);
     let poses = timed_poses(&data.measurements, &rows, times);
     let is_free = |k: &usize| {
         let estimate = &found.estimates[*k];

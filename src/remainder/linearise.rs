@@ -9,7 +9,7 @@ use super::prior::ParameterPrior;
 use super::rows::{AXES, Inputs, Layout, Rows, Site, SiteKind, Source};
 use crate::fit::Placement;
 use crate::least_squares::jacobian_and_residual;
-use crate::measurement::Measurements;
+use crate::measurement::{Measurements, StartTimes};
 use crate::model::parameter::{JointField, ParameterSite};
 use crate::model::{Model, Pose, PoseResiduals};
 use crate::problem::{Joint, JointKind, Problem};
@@ -222,15 +222,14 @@ pub(super) fn prior(
 }
 
 /// Returns rows of a table as poses. `sigma` \[m\] is used for rows for which the table gives none,
-/// and elapsed time counts from `first_time` \[s\].
+/// and elapsed time counts from the `starts` of sessions.
 pub(super) fn timed_poses<'a>(
     table: &'a Measurements,
     rows: &[usize],
-    (sigma, first_time): (f64, f64),
+    (sigma, starts): (f64, &StartTimes),
 ) -> Vec<Pose<'a>> {
-    let mut poses = Placement::of(table).poses(table, rows, sigma);
-    for pose in &mut poses {
-        pose.setup.elapsed = pose.setup.time - first_time;
-    }
+    let placement = Placement::of(table);
+    let mut poses = placement.poses(table, rows, sigma);
+    placement.count_time_from(starts, &mut poses);
     poses
 }

@@ -100,7 +100,7 @@ fn cause(found: &FoundEffect) -> Point {
 
 /// Removes the name of the effect from "effect[1].parameter = value".
 fn without_effect(value: &str) -> String {
-    let name = value.split(" = ").next().unwrap_or_default();
+    let Some((name, _)) = value.split_once(" = ") else { return value.to_owned() };
     let parameter = name.rsplit('.').next().unwrap_or_default();
     value.replacen(name, parameter, 1)
 }

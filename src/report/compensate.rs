@@ -25,13 +25,21 @@ pub fn commands_text(
         problem.title, result.reached, result.targets
     );
     if let (Some(before), Some(after)) = (result.mean_miss_before_mm, result.mean_miss_mm) {
-        let _ = write!(
-            words,
-            ": {} mm from them on average with these commands, {} mm with those in the file, \
-             as the identified arm predicts",
-            number(after, 4),
-            number(before, 4)
-        );
+        let before = number(before, 4);
+        // With bounds the expected error is stated, not what the solver leaves.
+        let _ = match bounds {
+            Some(_) => write!(
+                words,
+                "; with the commands in the file the identified arm misses them by {before} mm on \
+                 average"
+            ),
+            None => write!(
+                words,
+                ": {} mm from them on average with these commands, {before} mm with those in the \
+                 file, as the identified arm predicts",
+                number(after, 4)
+            ),
+        };
     }
     if let (Some(before), Some(after)) = (result.mean_turn_before_deg, result.mean_turn_deg) {
         let _ = write!(

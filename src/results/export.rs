@@ -90,7 +90,7 @@ impl ExportedErrors {
         let placement = Placement::of(measurements);
         let mut poses = placement.poses(measurements, &split.held_out, 1.0);
         if let Some(saved) = saved {
-            saved.count_time_in(&mut poses);
+            saved.count_time_in(&placement, &mut poses);
         }
         let rigid = model.geometric_residuals(&poses, x.as_slice());
         let whole = model.residuals(poses, x);

@@ -49,8 +49,11 @@ pub struct IdentificationResult {
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub spread: BTreeMap<String, SpreadChange>,
     pub reduced_chi2: Option<f64>,
-    /// Start time of the time-dependent effects.
+    /// Time of the first pose.
     pub first_time_s: f64,
+    /// Time of the first pose of each named session, from which effects that follow the time count.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub session_times_s: BTreeMap<String, f64>,
     /// Standard deviation (1 σ) of a coordinate, estimated from the residuals; null if the problem
     /// declares σ.
     pub estimated_sigma_mm: Option<f64>,
@@ -309,7 +312,8 @@ impl IdentificationResult {
             kinds: KindErrors::all(&found.kinds),
             spread: found.spreads.iter().map(spread).collect(),
             reduced_chi2: found.reduced_chi2,
-            first_time_s: found.first_time,
+            first_time_s: found.start_times.first,
+            session_times_s: found.start_times.sessions.clone(),
             estimated_sigma_mm: match found.noise {
                 Noise::Declared => found.prior.as_ref().and_then(|prior| prior.estimated_sigma),
                 Noise::Unknown => None,

@@ -130,7 +130,7 @@ pub(super) fn reference_check(
 ) -> Option<ReferenceCheck> {
     let measurements = data.measurements;
     let course = time_function(effect, &fitted.problem)?;
-    let first = measurements.time.iter().copied().fold(f64::INFINITY, f64::min);
+    let starts = measurements.start_times();
     let moves = |reading: &NestReading| -> Option<f64> {
         // Where rows are the time, a reading lies between those before and behind it.
         let time = if measurements.time_measured {
@@ -139,7 +139,8 @@ pub(super) fn reference_check(
             measurements.time.first()? + reading.after as f64 - 0.5
         };
         let pose = PoseView::from_configuration(&[]);
-        Some(course.value(&PoseView { time, elapsed: time - first, ..pose }))
+        let start = starts.of_session(&reading.session).unwrap_or(starts.first);
+        Some(course.value(&PoseView { time, elapsed: time - start, ..pose }))
     };
     let places = fitted.parameters_of(effect);
     let count = places.len();

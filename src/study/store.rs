@@ -45,9 +45,24 @@ impl Study {
     }
 }
 
+/// Name of the format of finished parts, and its version.
+const FORMAT: (&str, u32) = ("flexcal-study-part", 1);
+
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+struct Format {
+    name: String,
+    version: u32,
+}
+
 /// Finished part with its statistics.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct FinishedPart {
+    /// Name and version of the format; empty in files of older versions.
+    #[serde(default)]
+    format: Format,
+    /// Program and version that wrote the file; empty in files of older versions.
+    #[serde(default)]
+    program: String,
     /// Description of the part for people.
     part: String,
     /// Digest of the inputs of the part.
@@ -74,7 +89,14 @@ impl FinishedPart {
             part.repetitions.start + 1,
             part.repetitions.end
         );
-        Self { part: what, key: key(study, part, cell), tally, seconds }
+        Self {
+            format: Format { name: FORMAT.0.to_owned(), version: FORMAT.1 },
+            program: format!("flexcal {}", env!("CARGO_PKG_VERSION")),
+            part: what,
+            key: key(study, part, cell),
+            tally,
+            seconds,
+        }
     }
 }
 

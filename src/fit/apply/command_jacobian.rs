@@ -35,9 +35,7 @@ pub fn jacobian(
     let mut x = DVector::zeros(model.parameters.len());
     if let Some(identified) = identified {
         x = identified.vector(&model)?;
-        for pose in &mut poses {
-            pose.setup.elapsed = pose.setup.time - identified.first_time;
-        }
+        placement.count_time_from(&identified.start_times, &mut poses);
     }
     Ok(model.command_jacobian(problem, poses, &x))
 }

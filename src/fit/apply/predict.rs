@@ -168,17 +168,16 @@ impl Identification {
     }
 
     /// Returns every row as a pose; `turn` is 1 σ of its orientation \[rad\]. Elapsed time counts
-    /// from the first pose of the identification.
+    /// from the first pose of the session in the identification.
     pub(in crate::fit) fn poses<'a>(
         &self,
         rows: &'a Measurements,
         turn: Option<f64>,
     ) -> Vec<Pose<'a>> {
         let all: Vec<usize> = (0..rows.len()).collect();
-        let mut poses = Placement::of(rows).oriented_poses(rows, &all, (1.0, turn));
-        for pose in &mut poses {
-            pose.setup.elapsed = pose.setup.time - self.first_time;
-        }
+        let placement = Placement::of(rows);
+        let mut poses = placement.oriented_poses(rows, &all, (1.0, turn));
+        placement.count_time_from(&self.start_times, &mut poses);
         poses
     }
 

@@ -20,6 +20,7 @@ use crate::model::parameter::ParameterSite;
 use crate::model::{Model, Pose};
 use crate::observation::Needs;
 use crate::problem::{Observation, Problem};
+use crate::quantity::Unit;
 
 /// Largest share of a parameter in undetermined combinations, 0…1, at which the rows determine the
 /// parameter.
@@ -94,11 +95,18 @@ pub enum PredictError {
 
 impl ErrorsBySession {
     /// Summarises the errors measured − predicted of `rows` \[m\], in total and by session.
-    pub fn new(rows: &Measurements, errors: &[Vector3<f64>]) -> Self {
+    /// `at_points` converts the image errors of rows to lengths at the observed points \[m\].
+    fn new(
+        rows: &Measurements,
+        errors: &[Vector3<f64>],
+        at_points: impl Fn(&[usize]) -> Vec<Vector3<f64>>,
+    ) -> Self {
         let kinds = rows.kinds();
         let of = |chosen: &[usize], errors: &[Vector3<f64>]| {
             let first = chosen.iter().map(|&row| rows.observation(row)).min().unwrap_or_default();
-            of_kind(rows, chosen.iter().copied(), errors, first)
+            let summary = of_kind(rows, chosen.iter().copied(), errors, first);
+            let is_image = summary.unit() == Unit::Pixel;
+            if is_image { summary.with_lengths(&at_points(chosen)) } else { summary }
         };
         let session = |(label, name): (usize, &String)| {
             let of_session = (0..rows.len()).filter(|&row| rows.session.of_row[row] == label);
@@ -156,7 +164,7 @@ pub fn predict(
     let turn = problem.data.orientation_sigma.filter(|_| problem.data.fits_orientation);
     let mut poses = placement.oriented_poses(rows, &all, (sigma.unwrap_or(ASSUMED_SIGMA), turn));
     if let Some(estimate) = estimate {
-        estimate.count_time_in(&mut poses);
+        estimate.count_time_in(&placement, &mut poses);
     }
     // A point or surface that no row uses is not needed.
     let is_needed = |k: usize| {
@@ -187,7 +195,13 @@ pub fn predict(
     let targets = model.predicted_targets_in_base(&poses, x.as_slice());
     let base_of: Vec<usize> = poses.iter().map(|pose| pose.base).collect();
     let spreads = spreads(&model, &problem.fixtures, &poses, &x);
-    let errors = model.residuals(poses, &x);
+    let errors = model.residuals(poses.clone(), &x);
+    let image_errors = errors.clone();
+    let at_points = |chosen: &[usize]| {
+        let (poses, errors): (Vec<Pose>, Vec<Vector3<f64>>) =
+            chosen.iter().map(|&row| (poses[row].clone(), image_errors[row])).unzip();
+        model.lengths_at_points(&poses, &errors, &x)
+    };
     let is_behind = |&row: &usize| {
         let is_of_camera = rows.observation(row).description().needs == Needs::Carriers;
         is_of_camera && rows.position_measured && targets[row].is_some() && errors[row].x.is_nan()
@@ -210,7 +224,7 @@ pub fn predict(
     let residuals = rows.position_measured.then(|| {
         residuals((&errors, &seen), (&sigmas, &numbers), turns.as_deref().zip(turn), split)
     });
-    let errors = rows.position_measured.then(|| ErrorsBySession::new(rows, &errors));
+    let errors = rows.position_measured.then(|| ErrorsBySession::new(rows, &errors, at_points));
     let placed = if rows.position_measured { missing } else { Vec::new() };
     let placed = placed.into_iter().map(|k| model.parameters[k].name.clone()).collect();
     Ok(Prediction { positions, orientations, residuals, errors, spreads, placed, x })

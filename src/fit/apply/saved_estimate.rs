@@ -10,7 +10,8 @@ use serde_json::value::RawValue;
 
 use crate::error::one_line;
 use crate::files::{Changes, changed_key, read_limited};
-use crate::fit::Strategy;
+use crate::fit::{Placement, Strategy};
+use crate::measurement::StartTimes;
 use crate::model::parameter::Parameter;
 use crate::model::{Model, Pose};
 use crate::problem::Problem;
@@ -38,8 +39,9 @@ pub struct SavedEstimate {
     /// Standard deviation (1 σ) of a measured coordinate, estimated from the scatter of the fit
     /// \[m\]; `None` if the problem declares σ.
     pub estimated_sigma: Option<f64>,
-    /// Start time of the time-dependent terms \[s\]; `None` in files of older versions.
-    pub first_time: Option<f64>,
+    /// Start of each session, from which time-dependent terms count; `None` in files of older
+    /// versions.
+    pub start_times: Option<StartTimes>,
     /// Name of the `remainder.json` in the same folder; `None` if no remainder was accepted.
     pub remainder: Option<String>,
     /// Uncertainty of predictions as JSON text; `None` in files of older versions.
@@ -102,6 +104,7 @@ struct Document {
     trusted: bool,
     estimated_sigma_mm: Option<f64>,
     first_time_s: Option<f64>,
+    session_times_s: Option<BTreeMap<String, f64>>,
     parameters: Vec<Entry>,
     remainder: Option<RemainderEntry>,
     prediction: Option<Box<RawValue>>,
@@ -215,6 +218,7 @@ impl SavedEstimate {
             trusted,
             estimated_sigma_mm,
             first_time_s,
+            session_times_s,
             mut parameters,
             remainder,
             prediction,
@@ -268,7 +272,8 @@ impl SavedEstimate {
             changed_key,
             trusted,
             estimated_sigma,
-            first_time: first_time_s,
+            start_times: first_time_s
+                .map(|first| StartTimes { first, sessions: session_times_s.unwrap_or_default() }),
             remainder: remainder.and_then(|result| result.file),
             prediction: prediction.map(|result| result.get().to_owned()),
             problem,
@@ -295,12 +300,11 @@ impl SavedEstimate {
         self.strategy.model(declared)
     }
 
-    /// Sets the elapsed time of `poses` relative to the start time of the identification.
-    pub(crate) fn count_time_in(&self, poses: &mut [Pose]) {
-        if let Some(first) = self.first_time {
-            for pose in poses {
-                pose.setup.elapsed = pose.setup.time - first;
-            }
+    /// Sets the elapsed times of `poses`, placed by `placement`, relative to the starts of their
+    /// sessions in the identification.
+    pub(crate) fn count_time_in(&self, placement: &Placement, poses: &mut [Pose]) {
+        if let Some(starts) = &self.start_times {
+            placement.count_time_from(starts, poses);
         }
     }
 

@@ -17,13 +17,18 @@ pub fn check_columns(problem: &Problem, rows: &Measurements) -> Result<(), Input
 /// Returns the error of the first declared law with a formula that has no finite value in a row;
 /// `None` if all are finite.
 fn not_finite(problem: &Problem, rows: &Measurements) -> Option<InputError> {
-    let first = rows.time.iter().copied().fold(f64::INFINITY, f64::min);
+    let starts = rows.session_starts();
     problem.effects.iter().find_map(|EffectDeclaration { effect, location }| {
         let Effect::Law(_) = effect else { return None };
         effect.terms(problem).into_iter().find_map(|term| {
-            let is_lost = |row: &usize| !term.regressor.value(&rows.setup(*row, first)).is_finite();
-            let row = (0..rows.len()).find(is_lost)? + 1;
-            let kind = InputErrorKind::FormulaNotFinite { formula: term.regressor.text(), row };
+            let is_lost =
+                |row: &usize| !term.regressor.value(&rows.setup(*row, &starts)).is_finite();
+            let row = (0..rows.len()).find(is_lost)?;
+            let kind = InputErrorKind::FormulaNotFinite {
+                formula: term.regressor.text(),
+                row: row + 1,
+                place: rows.location(row).to_string(),
+            };
             Some(location.clone().error(kind))
         })
     })

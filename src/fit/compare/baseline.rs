@@ -80,9 +80,9 @@ pub(in crate::fit) fn baselines(problem: &Problem, data: &Dataset) -> Vec<Baseli
 
 /// Returns `rows` as measured poses for the paper's procedure.
 fn poses<'a>(data: &'a Measurements, rows: &[usize]) -> Vec<Measured<'a>> {
-    let first = data.first_time();
+    let starts = data.session_starts();
     rows.iter()
-        .map(|&row| Measured { setup: data.setup(row, first), position: data.positions[row] })
+        .map(|&row| Measured { setup: data.setup(row, &starts), position: data.positions[row] })
         .collect()
 }
 

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use nalgebra::{DVector, Vector3};
 
-use crate::measurement::{Measurements, Split};
+use crate::measurement::{Measurements, Split, StartTimes};
 use crate::model::parameter::ParameterSite;
 use crate::model::{MeasuredOrientation, Model, Pose};
 use crate::problem::Problem;
@@ -61,10 +61,10 @@ impl Placement {
         rows: &[usize],
         sigma: f64,
     ) -> Vec<Pose<'a>> {
-        let first = measurements.first_time();
+        let starts = measurements.session_starts();
         rows.iter()
             .map(|&row| Pose {
-                setup: measurements.setup(row, first),
+                setup: measurements.setup(row, &starts),
                 base: self.base_of_row[row],
                 target: self.target_of_row[row],
                 observation: measurements.observation(row),
@@ -73,6 +73,18 @@ impl Placement {
                 orientation: None,
             })
             .collect()
+    }
+
+    /// Sets the elapsed times of poses relative to the starts of their sessions in an earlier table.
+    /// Poses of other sessions keep the time since the first pose of theirs.
+    pub(crate) fn count_time_from(&self, starts: &StartTimes, poses: &mut [Pose]) {
+        let starts: Vec<Option<f64>> =
+            self.bases.iter().map(|session| starts.of_session(session)).collect();
+        for pose in poses {
+            if let Some(start) = starts[pose.base] {
+                pose.setup.elapsed = pose.setup.time - start;
+            }
+        }
     }
 
     /// Returns `rows` as poses with their measured orientations, if the σ `turn` of these is given

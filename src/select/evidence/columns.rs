@@ -242,9 +242,11 @@ impl<'a, 'l> Columns<'a, 'l> {
                     .map(|values| (Covariate::declared(which, self.problem), values)),
             );
         }
+        // Structure may go on from one session to the next.
+        let first = poses.iter().map(|pose| pose.setup.time).fold(f64::INFINITY, f64::min);
         all.push((
             Covariate::time(self.coverage.1),
-            poses.iter().map(|pose| pose.setup.elapsed).collect(),
+            poses.iter().map(|pose| pose.setup.time - first).collect(),
         ));
         for (joint, _) in moving {
             let sides = poses.iter().map(|pose| pose.setup.approach.map(|all| all[joint]));
