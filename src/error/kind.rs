@@ -297,10 +297,6 @@ pub enum InputErrorKind {
     NoTermsOfLaw,
     #[error("the start {start} lies outside of its bounds")]
     StartOutOfBounds { start: f64 },
-    #[error(
-        "the shape of a link follows temperature, time and loads in this model; {quantity} is a command of a joint"
-    )]
-    LinkFollowsCommand { quantity: String },
     #[error("the measurements contain no information about this effect; they need {write}")]
     NeedsColumn { write: &'static str },
 

@@ -6,6 +6,8 @@ use rayon::prelude::*;
 use super::command_term::TermSite;
 use super::{Model, Pose, PoseResiduals};
 use crate::least_squares::{Block, CHUNK_ITEMS, LeastSquares as _};
+use crate::mechanics::MOTION;
+use crate::model::parameter::{BeamField, JointField, ParameterSite, Regressor};
 use crate::problem::Problem;
 
 impl Model {
@@ -13,9 +15,9 @@ impl Model {
     /// for each pose, measuring frame \[m/rad\], for prismatic joints \[m/m\]. It is 0 at fixed
     /// joints and NaN without equilibrium.
     ///
-    /// A command moves its joint, joints with terms that depend on it, and the displacements s of
-    /// the instrument: ∂p/∂q = ∂p/∂θ (1 + ∂Δθ/∂q) + ∂s/∂q. Directions of approach are kept
-    /// constant.
+    /// A command moves its joint, and every coordinate, strain, small motion, base and reading with
+    /// a term that depends on it: ∂p/∂q = ∂p/∂θ (1 + ∂Δθ/∂q) + Σ ∂p/∂s ∂s/∂q. Directions of approach
+    /// are kept constant.
     pub(crate) fn command_jacobian(
         &self,
         problem: &Problem,
@@ -27,14 +29,19 @@ impl Model {
         let commanded = arm.moving_joints().len();
         let arm = arm.with_mimic_joints(problem);
         let moving = arm.moving_joints();
+        // Sites beyond the coordinates to which terms add that depend on commands.
+        let beyond = arm.sites_that_follow_commands();
+        let probes: Vec<(ParameterSite, f64)> = beyond.iter().map(|of| (of.site, 0.0)).collect();
+        let arm = arm.with_probes(&probes);
+        let columns = moving.len() + probes.len();
         let poses: Vec<Pose> = poses.into_iter().map(|pose| Pose { sigma: 1.0, ..pose }).collect();
         let count = poses.len();
-        let unknowns: Vec<usize> = (0..moving.len()).collect();
-        let residuals = PoseResiduals::new(&arm, poses, unknowns, DVector::zeros(moving.len()));
+        let unknowns: Vec<usize> = (0..columns).collect();
+        let residuals = PoseResiduals::new(&arm, poses, unknowns, DVector::zeros(columns));
         let chunk = |first: usize| {
             let items = first..count.min(first + CHUNK_ITEMS);
-            let mut block = Block::zeros(3 * items.len(), moving.len());
-            residuals.linearise(&DVector::zeros(moving.len()), items.clone(), &mut block);
+            let mut block = Block::zeros(3 * items.len(), columns);
+            residuals.linearise(&DVector::zeros(columns), items.clone(), &mut block);
             let of_pose = |(k, pose): (usize, &Pose)| {
                 let rows = 3 * k..3 * k + 3;
                 let mut by_coordinate = DMatrix::zeros(3, joints);
@@ -46,12 +53,11 @@ impl Model {
                     by_coordinate.column_mut(joint).neg_mut();
                 }
                 // Without equilibrium, the residual is NaN and no derivatives are written.
-                if block.column(moving.len())[rows].iter().any(|value| value.is_nan()) {
+                if block.column(columns)[rows.clone()].iter().any(|value| value.is_nan()) {
                     return DMatrix::from_element(3, joints, f64::NAN);
                 }
                 let mut jacobian = by_coordinate.clone();
                 for term in &arm.fixed_terms {
-                    // Strains of beams do not depend on commands.
                     let TermSite::Joint(joint_of_term) = term.site else { continue };
                     for &joint in &moving {
                         let slope = term.value * term.regressor.slope(&pose.setup, joint);
@@ -62,9 +68,15 @@ impl Model {
                         );
                     }
                 }
-                for &joint in &moving {
-                    let mut column = jacobian.column_mut(joint);
-                    column += arm.instrument.command_slope(&pose.setup, joint);
+                for (of, place) in beyond.iter().zip(moving.len()..) {
+                    let by_site = &block.column(place)[rows.clone()];
+                    for &joint in &moving {
+                        let slope = of.size * of.regressor.slope(&pose.setup, joint);
+                        // The block contains derivatives of measured − predicted.
+                        for (entry, by_site) in jacobian.column_mut(joint).iter_mut().zip(by_site) {
+                            *entry -= slope * by_site;
+                        }
+                    }
                 }
                 // Mimic joints take no command.
                 moving
@@ -76,5 +88,127 @@ impl Model {
             residuals.poses()[items].iter().enumerate().map(of_pose).collect::<Vec<_>>()
         };
         (0..count).into_par_iter().step_by(CHUNK_ITEMS).flat_map_iter(chunk).collect()
+    }
+}
+
+/// Term beyond the coordinates of joints: what it adds to, size × regressor.
+struct TermBeyond {
+    site: ParameterSite,
+    regressor: Regressor,
+    size: f64,
+}
+
+impl Model {
+    /// Returns the terms of strains, small motions, bases and readings that depend on commands.
+    fn sites_that_follow_commands(&self) -> Vec<TermBeyond> {
+        let of_arm = self.fixed_terms.iter().filter_map(|term| {
+            let site = match term.site {
+                TermSite::Joint(_) => return None,
+                TermSite::Strain { joint, which } => {
+                    ParameterSite::Beam { joint, field: BeamField::STRAINS[which] }
+                }
+                TermSite::Motion { joint, which } => {
+                    let field = which.checked_sub(MOTION);
+                    let field = field.map_or(JointField::Before(which), JointField::After);
+                    ParameterSite::Joint { joint, field }
+                }
+            };
+            Some(TermBeyond { site, regressor: term.regressor.clone(), size: term.value })
+        });
+        let [shifts, turns] = self.instrument.terms();
+        let of_shift = |&(axis, ref regressor, size): &(usize, Regressor, f64)| TermBeyond {
+            site: ParameterSite::Shift { axis },
+            regressor: regressor.clone(),
+            size,
+        };
+        let of_turn = |&(axis, ref regressor, size): &(usize, Regressor, f64)| TermBeyond {
+            site: ParameterSite::Turn { axis },
+            regressor: regressor.clone(),
+            size,
+        };
+        let all = of_arm.chain(shifts.iter().map(of_shift)).chain(turns.iter().map(of_turn));
+        all.filter(|term| term.regressor.follows_commands()).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+
+    use super::*;
+    use crate::observation::Observation;
+    use crate::problem::PoseView;
+
+    /// Step of the central differences \[rad\].
+    const STEP: f64 = 1e-4;
+
+    #[test]
+    fn laws_at_every_site_that_follow_commands() {
+        let sites = [
+            "joint2",
+            "joint2.x",
+            "joint3.ry",
+            "joint2.after.rz",
+            "joint1.after.y",
+            "tool.rx",
+            "tool.z",
+            "base.x",
+            "base.rz",
+            "measurement.y",
+            "measurement.range",
+            "link.curvature_y",
+            "link.curvature_z",
+            "link.strain",
+        ];
+        let laws: Vec<String> = sites
+            .iter()
+            .enumerate()
+            .map(|(k, site)| {
+                let law = "[[effect]]\nlaw = { name = 'w";
+                format!("{law}{k}', at = '{site}', terms = ['sin(2*q1 + {k}) + q2*q3'] }}\n")
+            })
+            .collect();
+        for stiffness in ["", "stiffness_N_m_per_rad = 2e4\n"] {
+            let text = format!(
+                "name = 'arm'\n[[joint]]\n{stiffness}[[joint]]\nalpha_deg = 90\n[[joint]]\na_m = 0.8\n\
+                 [joint.beam]\nname = 'link'\nmass_kg = 5\nEIy_N_m2 = 3e4\nEIz_N_m2 = 1.2e4\n\
+                 [tool]\ntarget_m = [0.3, 0.1, 0.2]\n[base]\nxyz_m = [1.0, 2.0, 0.5]\n{}",
+                laws.concat()
+            );
+            let problem = Problem::parse(&text, "problem.toml".as_ref()).unwrap();
+            let model = Model::new(&problem, &[String::new()], &[String::new()]).unwrap();
+            let size = |name: &str| if name.starts_with("law") { 3e-3 } else { 0.0 };
+            let x = model.parameters.iter().map(|parameter| size(&parameter.name));
+            let x = DVector::from_iterator(model.parameters.len(), x);
+            let nowhere = Vector3::zeros();
+            let pose = |configuration: &[f64]| -> Vector3<f64> {
+                let pose = at(configuration, &nowhere);
+                model.predict(vec![pose], &x)[0]
+            };
+            let configuration = [0.4, -0.7, 1.1];
+            let exact = model.command_jacobian(&problem, vec![at(&configuration, &nowhere)], &x);
+            for joint in 0..3 {
+                let moved = |step: f64| {
+                    let mut moved = configuration;
+                    moved[joint] += step;
+                    pose(&moved)
+                };
+                let slope = (moved(STEP) - moved(-STEP)) / (2.0 * STEP);
+                let off = (slope - exact[0].column(joint)).norm();
+                assert!(off < 1e-7, "joint {joint}: {off}");
+            }
+        }
+    }
+
+    fn at<'a>(configuration: &'a [f64], measured: &'a Vector3<f64>) -> Pose<'a> {
+        Pose {
+            setup: PoseView::from_configuration(configuration),
+            base: 0,
+            target: 0,
+            observation: Observation::Position,
+            measured,
+            sigma: 1.0,
+            orientation: None,
+        }
     }
 }

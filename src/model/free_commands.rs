@@ -68,7 +68,11 @@ impl Model {
 
     /// Returns true if a term that is not free depends on the joints' commands.
     pub(crate) fn follows_commands(&self) -> bool {
-        self.fixed_terms.iter().any(|term| term.regressor.follows_commands())
+        let [shifts, turns] = self.instrument.terms();
+        let of_instrument = shifts.iter().chain(turns).map(|(_, regressor, _)| regressor);
+        let mut regressors =
+            self.fixed_terms.iter().map(|term| &term.regressor).chain(of_instrument);
+        regressors.any(Regressor::follows_commands)
     }
 
     /// Returns the joints that the parameters of a model with free commands move, in their order.

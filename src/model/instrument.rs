@@ -142,12 +142,6 @@ impl Instrument {
             *base
         }
     }
-
-    /// Returns the derivative of the sum of displacements with respect to the command of a joint,
-    /// counted from 0 [m/rad] or \[m/m\].
-    pub fn command_slope(&self, setup: &PoseView, joint: usize) -> Vector3<f64> {
-        sum(&self.shifts, |regressor| regressor.slope(setup, joint))
-    }
 }
 
 /// Returns the direction of a displacement of readings: an axis of the measuring frame, or the line

@@ -140,7 +140,7 @@ impl Model {
                 ParameterSite::Joint { field, .. } => {
                     field.is_geometry() || field.motion().is_some()
                 }
-                ParameterSite::Shift { .. } => true,
+                ParameterSite::Shift { .. } | ParameterSite::Turn { .. } => true,
                 _ => false,
             };
             model.parameters.push(Parameter {

@@ -5,7 +5,7 @@ use super::section::Section;
 use super::{Data, Joint, JointKind};
 use crate::error::{InputError, InputErrorKind};
 use crate::laws::expression::{FormulaError, Vocabulary};
-use crate::laws::{At, BeamField, Effect, Law, LawParameter, LawPrior, LawSite, Quantity};
+use crate::laws::{At, BeamField, Effect, Law, LawParameter, LawPrior, LawSite};
 use crate::quantity::Unit;
 
 /// Maximum number of terms of one law.
@@ -58,25 +58,13 @@ pub(super) fn read(
     Ok(Effect::Law(law))
 }
 
-/// Returns an error if the law cannot act at its place: a fixed joint has no command, and a beam's
-/// strain must not depend on joint commands.
+/// Returns an error if the law acts on the coordinate of a fixed joint, which has no command.
 fn check(law: &Law, at: &Item, joints: &[Joint]) -> Result<(), InputError> {
-    let joint = law.joint();
-    let declared = joint.and_then(|joint| joints.get(joint.wrapping_sub(1)));
-    match (joint, declared.map(Joint::command_kind)) {
-        (Some(joint), Some(JointKind::Fixed)) if law.at() == At::Coordinate => {
-            return Err(at.error(InputErrorKind::NoCommand { joint }));
-        }
-        _ if matches!(law.at(), At::Beam(_)) => {}
-        _ => return Ok(()),
-    }
-    let commands = Effect::Law(law.clone()).quantities();
-    match commands.into_iter().find_map(Quantity::commanded_joint) {
-        Some(joint) => {
-            let quantity = format!("q{}", joint + 1);
-            Err(at.error(InputErrorKind::LinkFollowsCommand { quantity }))
-        }
-        None => Ok(()),
+    let joint = law.joint().filter(|_| law.at() == At::Coordinate);
+    let declared = joint.and_then(|joint| Some((joint, joints.get(joint.wrapping_sub(1))?)));
+    match declared.map(|(joint, declared)| (joint, declared.command_kind())) {
+        Some((joint, JointKind::Fixed)) => Err(at.error(InputErrorKind::NoCommand { joint })),
+        _ => Ok(()),
     }
 }
 
