@@ -14,7 +14,7 @@ use crate::select::neighbourhood::LinearNeighbourhood;
 /// Number of hypotheses whose products are formed together; their columns fit into the cache.
 const HYPOTHESES_PER_PRODUCT: usize = 32;
 /// Smallest number of rows and of columns of a product. With fewer, nalgebra sums in another order.
-const MIN_SIDE: usize = 6;
+pub(super) const MIN_SIDE: usize = 6;
 
 /// Members of sets with their products, by the index of the hypothesis.
 #[derive(Default)]

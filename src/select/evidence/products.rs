@@ -1,15 +1,15 @@
 //! Products of the columns of hypotheses with one another and with the residual. The evidence of a
 //! set needs nothing else. Each product is computed on first use and cached.
 
-use std::cell::OnceCell;
-use std::sync::{Arc, OnceLock};
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::block::Block;
 use super::cache::Cache;
-use super::column_products::{ColumnProducts, Member, form};
+use super::column_products::{ColumnProducts, MIN_SIDE, Member, form};
 use super::marginal::{Noise, NoiseGrid, Normal};
 use crate::fit::Stop;
 use crate::numeric::{inverse_factor, inverse_lower, lower_factor, lower_product};
@@ -50,18 +50,14 @@ pub(super) struct Products<'a> {
 pub(super) struct CachedProducts {
     /// Columns of members and their products.
     columns: ColumnProducts,
-    /// Number of hypotheses after each extension of the list, 0 first.
-    list_lengths: Vec<usize>,
-    /// Gains of hypotheses when added to a set, by set and hypotheses.
-    gains: Cache<GainKey, Vec<(f64, f64)>>,
+    /// Gains of hypotheses when added to a set, by set.
+    gains: Mutex<BTreeMap<SizedSet, BTreeMap<usize, (f64, f64)>>>,
     /// Converged sizes and log posterior of sets.
     settled: Cache<SizedSet, (Vec<f64>, f64)>,
 }
 
 /// Key of a set: its members with the bit patterns of their sizes, in order.
 type SizedSet = Vec<(usize, u64)>;
-/// Key of gains: a set, and the hypotheses tried in addition to it.
-type GainKey = (SizedSet, Vec<usize>);
 
 fn sized_set(members: &[usize], sizes: &[f64]) -> SizedSet {
     members.iter().copied().zip(sizes.iter().map(|size| size.to_bits())).collect()
@@ -76,10 +72,6 @@ impl<'a> Products<'a> {
     pub fn with_cache(mut cache: CachedProducts, blocks: &'a [Block], target: &'a Target) -> Self {
         let squares = target.fit.residual().norm_squared();
         cache.columns.extend_to(blocks.len());
-        if cache.list_lengths.is_empty() {
-            cache.list_lengths.push(0);
-        }
-        cache.list_lengths.push(blocks.len());
         Self { blocks, target, squares, grid: target.noise.grid(), cache }
     }
 
@@ -130,31 +122,25 @@ impl<'a> Products<'a> {
     /// Returns, for each tried hypothesis, the gain in ln p(r) in addition to a set with given
     /// sizes, and its most probable size. Empty if the search was stopped or the set is degenerate.
     pub fn gains(&self, members: &[usize], sizes: &[f64], tried: &[usize]) -> Vec<(f64, f64)> {
-        let left = OnceCell::new();
-        let mut all: Vec<Option<(f64, f64)>> = vec![None; tried.len()];
-        // The list is cut where it was extended, so that the gains of a list that was tried before
-        // are found in the cache. The columns multiplied together, and so their rounding, then do
-        // not depend on what other threads have cached.
-        for bounds in self.cache.list_lengths.windows(2) {
-            let places: Vec<usize> =
-                (0..tried.len()).filter(|&k| (bounds[0]..bounds[1]).contains(&tried[k])).collect();
-            if places.is_empty() {
-                continue;
+        let set = sized_set(members, sizes);
+        let cached = || self.cache.gains.lock().unwrap_or_else(PoisonError::into_inner);
+        let missing: Vec<usize> = match cached().get(&set) {
+            Some(known) => {
+                tried.iter().copied().filter(|block| !known.contains_key(block)).collect()
             }
-            let key = (
-                sized_set(members, sizes),
-                places.iter().map(|&k| tried[k]).collect::<Vec<usize>>(),
-            );
-            let gains = self.cache.gains.get_or_compute(&key, || {
-                let left = left.get_or_init(|| self.reduced(members, sizes)).as_ref()?;
-                Some(left.gains(&key.1)).filter(|gains| gains.len() == places.len())
-            });
-            places
-                .into_iter()
-                .zip(gains.unwrap_or_default())
-                .for_each(|(k, gain)| all[k] = Some(gain));
+            None => tried.to_vec(),
+        };
+        if !missing.is_empty() {
+            let Some(left) = self.reduced(members, sizes) else { return Vec::new() };
+            let gains = left.gains(&missing);
+            if gains.len() < missing.len() {
+                return Vec::new();
+            }
+            cached().entry(set.clone()).or_default().extend(missing.into_iter().zip(gains));
         }
-        all.into_iter().collect::<Option<_>>().unwrap_or_default()
+        let cached = cached();
+        let known = cached.get(&set);
+        tried.iter().filter_map(|block| known?.get(block).copied()).collect()
     }
 
     /// Returns the converged sizes of a set and ln of its posterior; calls `settle` if they are not
@@ -327,7 +313,9 @@ impl ReducedProblem<'_, '_> {
     fn gains_together(&self, tried: &[usize]) -> Vec<(f64, f64)> {
         let Products { blocks, .. } = *self.products;
         let counts = || tried.iter().map(|&block| blocks[block].product().len());
-        let mut all = DMatrix::zeros(self.taken.len(), counts().sum());
+        // A gain does not depend on the hypotheses that are tried with it.
+        let width = counts().sum::<usize>().max(MIN_SIDE);
+        let mut all = DMatrix::zeros(self.taken.len(), width);
         let mut first = 0;
         for &member in &self.members {
             let count = self.products.member(member).columns.ncols();
