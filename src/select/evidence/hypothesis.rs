@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use crate::laws::At;
 use crate::model::parameter::{ArmField, JointField, ParameterSite, Regressor};
 use crate::problem::{Effect, Problem};
 use crate::residual_tests::Covariate;
@@ -19,6 +20,8 @@ pub enum Site {
     Base,
     /// Payload at the tool.
     Payload,
+    /// Tool.
+    Tool,
     /// Hoist that carries part of the weight.
     Hoist,
     /// Arm as a whole.
@@ -65,6 +68,7 @@ impl fmt::Display for Site {
             Self::LinkBefore(joint) => write!(f, "link before joint {}", joint + 1),
             Self::Base => f.write_str("base"),
             Self::Payload => f.write_str("payload"),
+            Self::Tool => f.write_str("tool"),
             Self::Hoist => f.write_str("hoist"),
             Self::Arm => f.write_str("arm"),
             Self::Measurement => f.write_str("measurement"),
@@ -129,7 +133,10 @@ impl Hypothesis {
     /// `coverage` states whether directions of approach and times are recorded.
     pub fn of_effect(effect: &Effect, problem: &Problem, coverage: (bool, bool)) -> Self {
         let terms = effect.terms(problem);
-        let site = terms.first().map_or(Site::Arm, |term| Site::of(term.site));
+        let site = match effect {
+            Effect::Law(law) if matches!(law.at(), At::Tool(_)) => Site::Tool,
+            _ => terms.first().map_or(Site::Arm, |term| Site::of(term.site)),
+        };
         let mut depends_on: Vec<Covariate> = terms
             .iter()
             .flat_map(|term| covariates(term.site, &term.regressor, problem, coverage))

@@ -1,6 +1,7 @@
-//! Laws of the grammar, searched where probable sets hold something at the coordinate of a joint.
+//! Laws of the grammar, searched where probable sets hold something: at the coordinates of joints,
+//! at the tool, in the measurement and at the base.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::PoisonError;
 
 use nalgebra::{DMatrix, DVector};
@@ -11,21 +12,44 @@ use super::hypotheses::Hypotheses;
 use super::hypothesis::{Hypothesis, HypothesisKind, Site};
 use super::products::{Products, ReducedProblem};
 use super::search::{Weighted, reduced_by};
+use super::sites::tool_site;
 use super::waves::is_free;
 use crate::laws::expression::Vocabulary;
 use crate::laws::{Law, LawSite};
-use crate::model::parameter::ParameterSite;
+use crate::model::parameter::{JointField, ParameterSite};
 use crate::problem::{Effect, Problem};
 use crate::select::data::Data;
 use crate::select::fitted::Fitted;
 use crate::select::grammar::{MAX_POSES, Noise, Proposal, Quantities, WhitenedSite, proposals};
 
-/// Smallest probability of a set at which laws are searched in place of its members.
-const MIN_SET_PROBABILITY: f64 = 0.05;
+/// Smallest probability of a set at which laws are searched in place of its members: at the
+/// coordinate of a joint, and elsewhere.
+const MIN_SET_PROBABILITIES: [f64; 2] = [0.05, 0.2];
 /// Maximum number of pairs of a joint and a set for which laws are searched.
 const MAX_SEARCHED: usize = 2;
+/// Maximum number of laws elsewhere than at the coordinate of a joint, of all sites together.
+const MAX_ELSEWHERE: usize = 12;
+/// Log odds to the most probable law of all these sites beyond which laws are dropped.
+const MAX_LN_ODDS_ELSEWHERE: f64 = 8.0;
 
-/// Returns formulas that may replace the members of probable sets at one joint.
+/// Site at which laws are searched.
+#[derive(Debug, Clone, PartialEq)]
+struct LawAt {
+    /// Site as in files.
+    name: String,
+    /// Joint, counted from 0, if the site is its coordinate.
+    joint: Option<usize>,
+    /// Parameter site with the displacements of the target by the law.
+    lever: ParameterSite,
+}
+
+/// Sites at which laws are searched together, and the other members of a probable set.
+struct Place {
+    sites: Vec<LawAt>,
+    rest: Vec<usize>,
+}
+
+/// Returns formulas that may replace the members of probable sets at one joint, and elsewhere.
 pub(super) fn promising(
     hypotheses: &Hypotheses,
     weighted: &[Weighted],
@@ -34,20 +58,20 @@ pub(super) fn promising(
 ) -> Vec<Candidate> {
     let problem = &fitted.problem;
     let mut laws: Vec<Candidate> = Vec::new();
-    for (joint, rest) in places(hypotheses, weighted, products) {
+    let places = places(hypotheses, weighted, products);
+    for Place { sites, rest } in places.into_iter().chain(elsewhere(hypotheses, weighted, products))
+    {
         if products.target.stop.is_requested() {
             break;
         }
         let fitted_effects = fitted.effects().iter().map(Effect::name_and_place).collect();
-        let key = (joint, member_names(hypotheses, &rest), left_out.to_vec(), fitted_effects);
+        let names = sites.iter().map(|at| at.name.as_str()).collect::<Vec<_>>().join(" ");
+        let key = (names, member_names(hypotheses, &rest), left_out.to_vec(), fitted_effects);
         let known = || data.proposed.lock().unwrap_or_else(PoisonError::into_inner);
         let proposed = known().get(&key).cloned();
         let proposed = proposed.unwrap_or_else(|| {
-            let search = Search { hypotheses, fitted, data, left_out, joint };
-            // A class that contains a law of the fit is represented by that law.
-            let new = search.proposals(&rest, products).into_iter().filter(|law| !law.is_present);
-            let new: Vec<Effect> =
-                new.filter_map(|proposal| effect(problem, joint, &proposal)).collect();
+            let search = Search { hypotheses, fitted, data, left_out };
+            let new = search.laws(&sites, &rest, products);
             known().insert(key, new.clone());
             new
         });
@@ -57,7 +81,7 @@ pub(super) fn promising(
             };
             let is_known = hypotheses.all.iter().chain(&laws).any(is_known);
             if !is_known && is_free(&effect, problem) {
-                let columns = coefficients(&effect, hypotheses, problem);
+                let columns = coefficients(&effect, hypotheses, (problem, &sites));
                 laws.extend(hypotheses.entered(&effect, columns, problem));
             }
         }
@@ -67,13 +91,34 @@ pub(super) fn promising(
 
 /// Returns the columns of the coefficients of a law, without those of the parameters inside its
 /// formulas.
-fn coefficients(effect: &Effect, hypotheses: &Hypotheses, problem: &Problem) -> DMatrix<f64> {
-    let columns = hypotheses.linearised.columns(effect);
-    let count = match effect {
-        Effect::Law(law) => columns.ncols().saturating_sub(law.parameters().len()),
-        _ => effect.terms(problem).len(),
+///
+/// The columns of a law elsewhere than at the coordinate of a joint are products of its formulas
+/// and the lever of its site.
+fn coefficients(
+    effect: &Effect,
+    hypotheses: &Hypotheses,
+    (problem, sites): (&Problem, &[LawAt]),
+) -> DMatrix<f64> {
+    let linearised = &hypotheses.linearised;
+    let terms = effect.terms(problem);
+    let Effect::Law(law) = effect else { return linearised.columns(effect) };
+    let count = terms.len().saturating_sub(law.parameters().len());
+    let site = law.site();
+    let lever = sites
+        .iter()
+        .find(|at| at.joint.is_none() && at.name == site)
+        .and_then(|at| linearised.place(at.lever));
+    let Some(lever) = lever else {
+        return linearised.columns(effect).columns(0, count).into_owned();
     };
-    columns.columns(0, count).into_owned()
+    let mut columns = DMatrix::zeros(lever.len(), count);
+    for (term, mut column) in terms.iter().zip(columns.column_iter_mut()) {
+        let values = term.regressor.values(linearised.poses().iter().map(|pose| &pose.setup));
+        for (row, (out, lever)) in column.iter_mut().zip(lever.iter()).enumerate() {
+            *out = lever * values[row / 3];
+        }
+    }
+    columns
 }
 
 /// Returns the names of the `members`, which key the cache of laws.
@@ -90,14 +135,13 @@ fn member_names(hypotheses: &Hypotheses, members: &[usize]) -> Vec<String> {
     names
 }
 
-/// Returns a proposed formula at a joint, counted from 0, as an effect; `None` if the formula is
-/// not valid.
-fn effect(problem: &Problem, joint: usize, proposal: &Proposal) -> Option<Effect> {
+/// Returns a proposed formula at a site as an effect; `None` if the formula is not valid.
+fn effect(problem: &Problem, at: &LawAt, proposal: &Proposal) -> Option<Effect> {
     let (slides, covariates) = (problem.slides(), problem.covariate_names());
     let vocabulary =
         Vocabulary { slides: &slides, covariates: &covariates, ..Vocabulary::default() };
     let written = &proposal.law;
-    let site = LawSite::of_joint(joint + 1);
+    let site = LawSite::parse(&at.name, problem.joints.len(), &[], &[]).ok()?;
     let parameters = written.parameters.clone();
     let law = Law::new(&written.name, site, &written.formulas, None, parameters, &vocabulary);
     Some(Effect::Law(law.ok()?.described(proposal.ln_prior)))
@@ -115,44 +159,97 @@ fn joint_of(hypothesis: &Hypothesis, problem: &Problem) -> Option<usize> {
     is_there.then_some(joint)
 }
 
-/// Returns the joints, counted from 0, at which laws are searched, each with the other members of a
+/// Returns the joints at whose coordinates laws are searched, each with the other members of a
 /// probable set.
-fn places(
-    hypotheses: &Hypotheses,
-    weighted: &[Weighted],
-    products: &Products,
-) -> BTreeSet<(usize, Vec<usize>)> {
+fn places(hypotheses: &Hypotheses, weighted: &[Weighted], products: &Products) -> Vec<Place> {
     let problem = hypotheses.linearised.problem();
     let of = |member: usize| joint_of(&hypotheses.all[member].hypothesis, problem);
-    let mut found: BTreeSet<(usize, Vec<usize>)> = BTreeSet::new();
-    let likely = weighted
-        .iter()
-        .filter(|set| set.probability > MIN_SET_PROBABILITY && !products.has_gear(&set.members));
-    for set in likely {
-        for joint in set.members.iter().filter_map(|&member| of(member)) {
+    // Sets that differ at the joint alone count together.
+    let mut all: BTreeMap<(usize, Vec<usize>), f64> = BTreeMap::new();
+    for set in weighted.iter().filter(|set| !products.has_gear(&set.members)) {
+        let joints: BTreeSet<usize> = set.members.iter().filter_map(|&member| of(member)).collect();
+        for joint in joints {
             let mut rest: Vec<usize> =
                 set.members.iter().copied().filter(|&member| of(member) != Some(joint)).collect();
             rest.sort_unstable();
-            if found.len() < MAX_SEARCHED {
-                found.insert((joint, rest));
-            }
+            *all.entry((joint, rest)).or_default() += set.probability;
         }
     }
-    found
+    let mut found: Vec<((usize, Vec<usize>), f64)> = all
+        .into_iter()
+        .filter(|(_, probability)| *probability > MIN_SET_PROBABILITIES[0])
+        .collect();
+    found.sort_by(|a, b| b.1.total_cmp(&a.1).then_with(|| a.0.cmp(&b.0)));
+    found.truncate(MAX_SEARCHED);
+    let place = |(joint, rest): (usize, Vec<usize>)| {
+        let lever = ParameterSite::coordinate(problem, joint + 1);
+        let at = LawAt { name: format!("joint{}", joint + 1), joint: Some(joint), lever };
+        Place { sites: vec![at], rest }
+    };
+    found.into_iter().map(|(found, _)| place(found)).collect()
 }
 
-/// Search for formulas at one joint.
+/// Returns the sites elsewhere than at the coordinates of joints at which laws are searched in place
+/// of the members of the most probable set that act there: tool, measurement and base, and the
+/// small motion of a joint at which a function without a law acts. `None` if there is none.
+fn elsewhere(hypotheses: &Hypotheses, weighted: &[Weighted], products: &Products) -> Option<Place> {
+    let problem = hypotheses.linearised.problem();
+    let set = weighted.first().filter(|set| {
+        set.probability > MIN_SET_PROBABILITIES[1] && !products.has_gear(&set.members)
+    })?;
+    let of = |member: usize| &hypotheses.all[member].hypothesis;
+    let is_elsewhere = |member: usize| {
+        let hypothesis = of(member);
+        let is_listed = match &hypothesis.kind {
+            HypothesisKind::Effect(effect) => effect.is_described() || !effect.acts_at_joint(),
+            HypothesisKind::Smooth | HypothesisKind::Wandering => true,
+            _ => false,
+        };
+        is_listed && joint_of(hypothesis, problem).is_none()
+    };
+    let members: Vec<usize> =
+        set.members.iter().copied().filter(|&member| is_elsewhere(member)).collect();
+    if members.is_empty() {
+        return None;
+    }
+    let mut rest: Vec<usize> =
+        set.members.iter().copied().filter(|member| !members.contains(member)).collect();
+    rest.sort_unstable();
+    let mut sites: Vec<LawAt> = Vec::new();
+    let mut add = |name: String, lever: ParameterSite| {
+        sites.push(LawAt { name, joint: None, lever });
+    };
+    for (axis, letter) in ["x", "y", "z"].into_iter().enumerate() {
+        add(format!("tool.{letter}"), tool_site(problem, axis));
+        add(format!("measurement.{letter}"), ParameterSite::Shift { axis });
+        add(format!("base.r{letter}"), ParameterSite::Turn { axis });
+    }
+    for coordinate in members.iter().filter_map(|&member| of(member).coordinate) {
+        let ParameterSite::Joint { joint, field } = coordinate else { continue };
+        let motion = match field {
+            JointField::A => "x",
+            JointField::D => "z",
+            JointField::Alpha => "rx",
+            JointField::Beta => "ry",
+            _ => continue,
+        };
+        add(format!("joint{}.{motion}", joint + 1), coordinate);
+    }
+    Some(Place { sites, rest })
+}
+
+/// Search for formulas that explain what some members of a set leave.
 struct Search<'s, 'h, 'd> {
     hypotheses: &'s Hypotheses<'h>,
     fitted: &'s Fitted,
     data: &'s Data<'d>,
     left_out: &'s [usize],
-    joint: usize,
 }
 
 impl Search<'_, '_, '_> {
-    /// Returns the formulas that best explain the residual that the members `rest` leave.
-    fn proposals(&self, rest: &[usize], products: &Products) -> Vec<Proposal> {
+    /// Returns the laws at some sites that best explain the residual that the members `rest` leave.
+    /// A class that contains a law of the fit is represented by that law.
+    fn laws(&self, sites: &[LawAt], rest: &[usize], products: &Products) -> Vec<Effect> {
         let poses = self.hypotheses.linearised.poses();
         let kept: Vec<usize> =
             (0..poses.len()).filter(|pose| !self.left_out.contains(pose)).collect();
@@ -164,7 +261,7 @@ impl Search<'_, '_, '_> {
         let dropped: Vec<usize> = (0..poses.len()).filter(|pose| !kept.contains(pose)).collect();
         if dropped.len() == self.left_out.len() {
             let left = reduced_by(rest, products);
-            return left.map_or_else(Vec::new, |left| self.proposals_after(&left, products, &kept));
+            return left.map_or_else(Vec::new, |left| self.best(sites, &left, products, &kept));
         }
         let members: Vec<&Candidate> =
             rest.iter().map(|&member| &self.hypotheses.all[member]).collect();
@@ -176,27 +273,50 @@ impl Search<'_, '_, '_> {
         let products = Products::new(&blocks, &target);
         let all: Vec<usize> = (0..blocks.len()).collect();
         let left = reduced_by(&all, &products);
-        left.map_or_else(Vec::new, |left| self.proposals_after(&left, &products, &kept))
+        left.map_or_else(Vec::new, |left| self.best(sites, &left, &products, &kept))
     }
 
-    fn proposals_after(
+    /// Returns the best laws of all sites, those of one site in the order of their probability.
+    fn best(
         &self,
+        sites: &[LawAt],
         left: &ReducedProblem,
         products: &Products,
         kept: &[usize],
+    ) -> Vec<Effect> {
+        let of_site = |at: &LawAt| {
+            let proposals = self.proposals(at, (left, products), kept);
+            proposals.into_iter().map(|proposal| (at.clone(), proposal)).collect::<Vec<_>>()
+        };
+        let mut all: Vec<(LawAt, Proposal)> = sites.iter().flat_map(of_site).collect();
+        if sites.iter().all(|at| at.joint.is_none()) {
+            all.sort_by(|a, b| b.1.ln_posterior.total_cmp(&a.1.ln_posterior));
+            let most = all.first().map_or(0.0, |best| best.1.ln_posterior);
+            all.retain(|(_, law)| law.ln_posterior > most - MAX_LN_ODDS_ELSEWHERE);
+            all.truncate(MAX_ELSEWHERE);
+        }
+        let new = all.iter().filter(|(_, proposal)| !proposal.is_present);
+        new.filter_map(|(at, proposal)| effect(&self.fitted.problem, at, proposal)).collect()
+    }
+
+    /// Returns the formulas at one site that best explain a residual.
+    fn proposals(
+        &self,
+        at: &LawAt,
+        (left, products): (&ReducedProblem, &Products),
+        kept: &[usize],
     ) -> Vec<Proposal> {
-        let Self { hypotheses, fitted, data, joint, .. } = *self;
+        let Self { hypotheses, fitted, data, .. } = *self;
         let problem = &fitted.problem;
         let linearised = &hypotheses.linearised;
-        let Some(lever) = linearised.place(ParameterSite::coordinate(problem, joint + 1)) else {
-            return Vec::new();
-        };
+        let lever = linearised.place(at.lever).filter(|lever| lever.norm_squared() > 0.0);
+        let Some(lever) = lever else { return Vec::new() };
         let (less, product) = along_lever(left, products, &lever);
-        let at = |pose: &usize| lever.rows(3 * pose, 3);
+        let of_pose = |pose: &usize| lever.rows(3 * pose, 3);
         let site = WhitenedSite {
             diagonal: DVector::from_iterator(
                 kept.len(),
-                kept.iter().map(|pose| at(pose).norm_squared()),
+                kept.iter().map(|pose| of_pose(pose).norm_squared()),
             ),
             less: less.select_columns(kept),
             product: product.select_rows(kept),
@@ -209,16 +329,15 @@ impl Search<'_, '_, '_> {
         let known = Quantities::new(problem, &poses, data.measurements.time_measured);
         // The functions of present laws, from their columns along the lever.
         let is_present = |k: &usize| {
-            let hypothesis = &hypotheses.all[*k].hypothesis;
-            hypothesis.site == Site::Joint(joint)
-                && matches!(hypothesis.effect(), Some(Effect::Law(law)) if law.description().is_some())
+            let effect = hypotheses.all[*k].hypothesis.effect();
+            matches!(effect, Some(Effect::Law(law)) if law.description().is_some() && law.site() == at.name)
         };
         let present: Vec<usize> = (0..hypotheses.all.len()).filter(is_present).collect();
         let functions = |&k: &usize| {
             let columns = hypotheses.all[k].design.columns();
             let function = |column: nalgebra::DVectorView<f64>| {
                 let value = |pose: &usize| {
-                    let lever = at(pose);
+                    let lever = of_pose(pose);
                     column.rows(3 * pose, 3).dot(&lever) / lever.norm_squared().max(1e-300)
                 };
                 DVector::from_iterator(kept.len(), kept.iter().map(value))
@@ -226,7 +345,7 @@ impl Search<'_, '_, '_> {
             columns.column_iter().map(|column| function(column.as_view())).collect()
         };
         let functions: Vec<Vec<DVector<f64>>> = present.iter().map(functions).collect();
-        proposals(&known, joint, (&site, &noise), &functions)
+        proposals(&known, (&at.name, at.joint), (&site, &noise), &functions)
     }
 }
 

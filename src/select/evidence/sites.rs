@@ -12,6 +12,7 @@ pub(super) fn hypothesis_sites(problem: &Problem) -> Vec<ParameterSite> {
     sites.extend(
         (0..3).flat_map(|axis| [ParameterSite::Shift { axis }, ParameterSite::Turn { axis }]),
     );
+    sites.extend((0..3).map(|axis| tool_site(problem, axis)));
     for joint in 0..problem.joints.len() {
         sites.extend(
             [JointField::Compliance, JointField::LateralX]
@@ -22,6 +23,13 @@ pub(super) fn hypothesis_sites(problem: &Problem) -> Vec<ParameterSite> {
         }
     }
     sites
+}
+
+/// Returns the site of a displacement of the tool along an axis, 0 to 2, in the frame that carries
+/// it.
+pub(super) fn tool_site(problem: &Problem, axis: usize) -> ParameterSite {
+    let joint = problem.tool.joint.min(problem.joints.len().saturating_sub(1));
+    ParameterSite::Joint { joint, field: JointField::After(axis) }
 }
 
 /// Returns the sites of the geometric parameters of every joint.

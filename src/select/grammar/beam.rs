@@ -5,6 +5,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
+use super::quantities::Quantities;
+use super::refinement::Refiner;
 use super::site::{BEAM_VARIANCE, Noise, Span, Weighted, WhitenedSite};
 use super::terms::{Chunk, Product, Terms};
 
@@ -12,8 +14,11 @@ use super::terms::{Chunk, Product, Terms};
 const MAX_TERMS: usize = 3;
 /// Number of best sums of each length that are extended by a further term.
 const EXTENDED_SUMS: usize = 8;
-/// Number of best sums in which each term is exchanged in turn.
+/// Number of best sums in which each term is exchanged in turn, and multiplied by each factor.
 const EXCHANGED_SUMS: usize = 4;
+/// Number of best sums of each length whose inner parameters are refined before further terms are
+/// added. Otherwise further terms would make up for a wrong value.
+const REFINED_SUMS: usize = 8;
 /// Maximum number of extensions of a sum that are kept: by posterior, and by the guide
 /// [`Scored::guide`].
 const KEPT_EXTENSIONS: [usize; 2] = [100, 40];
@@ -52,11 +57,12 @@ struct Extension {
 /// Beam search for the formula of an error at one joint.
 pub struct Beam<'a> {
     /// Terms from which sums are built.
-    pub terms: &'a Terms,
+    terms: Terms,
+    known: &'a Quantities,
     /// Products of columns at the joint's coordinate, with the fit projected out.
-    pub site: &'a WhitenedSite,
+    site: &'a WhitenedSite,
     /// Likelihood of a residual, integrated over the noise scale.
-    pub noise: &'a Noise,
+    noise: &'a Noise,
     /// Sum of squares that one free value per pose would explain.
     explainable: f64,
 }
@@ -72,12 +78,17 @@ pub fn ln_prior(terms: &Terms, sum: &Sum) -> f64 {
 
 impl<'a> Beam<'a> {
     /// Creates the search at one joint.
-    pub fn new(terms: &'a Terms, site: &'a WhitenedSite, noise: &'a Noise) -> Self {
-        Self { terms, site, noise, explainable: site.explainable() }
+    pub fn new(
+        terms: Terms,
+        known: &'a Quantities,
+        (site, noise): (&'a WhitenedSite, &'a Noise),
+    ) -> Self {
+        Self { terms, known, site, noise, explainable: site.explainable() }
     }
 
-    /// Returns all sums that were evaluated, with their scores.
-    pub fn search(&self) -> BTreeMap<Sum, Scored> {
+    /// Returns all sums that were evaluated, with their scores, and the terms with the factors that
+    /// the refinement added.
+    pub fn search(mut self) -> (Terms, BTreeMap<Sum, Scored>) {
         let mut known: BTreeMap<Sum, Scored> = BTreeMap::new();
         let mut extended: BTreeSet<Sum> = BTreeSet::new();
         let mut front: Vec<Sum> = vec![Vec::new()];
@@ -96,10 +107,12 @@ impl<'a> Beam<'a> {
                 let exchanged: Vec<Sum> = exchanged.into_iter().collect();
                 self.extend(&exchanged, &mut extended, &mut next);
             }
+            self.multiply(&mut next);
+            self.refine(&mut next);
             front = self.best(&next, EXTENDED_SUMS);
             known.extend(next);
         }
-        known
+        (self.terms, known)
     }
 
     /// Extends each of `sums` by every term, and adds the new sums to `next` with their scores.
@@ -107,19 +120,58 @@ impl<'a> Beam<'a> {
     fn extend(&self, sums: &[Sum], extended: &mut BTreeSet<Sum>, next: &mut BTreeMap<Sum, Scored>) {
         for sum in sums {
             extended.insert(sum.clone());
-            let state = self.state(sum);
-            for Extension { place: (chunk, term), scored } in self.extensions(&state) {
-                let term = &self.terms.chunks[chunk].terms[term];
-                if state.sum.contains(term) {
-                    continue;
-                }
-                let mut longer = [state.sum.as_slice(), std::slice::from_ref(term)].concat();
-                longer.sort();
-                let entry = next.entry(longer).or_insert(scored);
-                if scored.ln_posterior > entry.ln_posterior {
-                    *entry = scored;
-                }
+            self.extend_by(&self.terms.chunks, sum, next);
+        }
+    }
+
+    /// Extends a sum by each term of `chunks`, and adds the new sums to `next` with their scores.
+    fn extend_by(&self, chunks: &[Chunk], sum: &Sum, next: &mut BTreeMap<Sum, Scored>) {
+        let state = self.state(sum);
+        for Extension { place: (chunk, term), scored } in self.extensions(&state, chunks) {
+            let term = &chunks[chunk].terms[term];
+            if state.sum.contains(term) {
+                continue;
             }
+            let mut longer = [state.sum.as_slice(), std::slice::from_ref(term)].concat();
+            longer.sort();
+            let entry = next.entry(longer).or_insert(scored);
+            if scored.ln_posterior > entry.ln_posterior {
+                *entry = scored;
+            }
+        }
+    }
+
+    /// Multiplies each term of the best sums by every factor: the factors of a term that explains
+    /// little alone are found beside the other terms.
+    fn multiply(&self, next: &mut BTreeMap<Sum, Scored>) {
+        for sum in self.best(next, EXCHANGED_SUMS) {
+            for k in 0..sum.len() {
+                let others = [&sum[..k], &sum[k + 1..]].concat();
+                let chunks = self.terms.multiples(&sum[k], self.site);
+                self.extend_by(&chunks, &others, next);
+            }
+        }
+    }
+
+    /// Adds the best sums with refined values of their inner parameters.
+    fn refine(&mut self, next: &mut BTreeMap<Sum, Scored>) {
+        for sum in self.best(next, REFINED_SUMS) {
+            let Self { terms, known, site, noise, .. } = &*self;
+            let refiner = Refiner { terms, known, site, noise };
+            let Some(values) = refiner.values(&sum) else { continue };
+            let with_values = |(term, values): (&Product, Vec<f64>)| {
+                let pairs = term.iter().zip(values);
+                let mut term: Product =
+                    pairs.map(|(&k, value)| self.terms.with_inner(k, value, self.known)).collect();
+                term.sort_unstable();
+                term
+            };
+            let mut refined: Sum = sum.iter().zip(values).map(with_values).collect();
+            refined.sort();
+            let span = self.state(&refined).span;
+            let prior = ln_prior(&self.terms, &refined);
+            let scored = self.scored(span.explained_squares(), span.along.len(), prior);
+            next.entry(refined).or_insert(scored);
         }
     }
 
@@ -135,12 +187,12 @@ impl<'a> Beam<'a> {
         }
         #[expect(clippy::cast_possible_truncation, reason = "half the width is twice as fast")]
         let weighted = span.weighted.transpose().map(|value| value as f32);
-        let ln_prior = if sum.is_empty() { 0.0 } else { ln_prior(self.terms, sum) };
+        let ln_prior = if sum.is_empty() { 0.0 } else { ln_prior(&self.terms, sum) };
         State { sum: sum.clone(), ln_prior, span, weighted }
     }
 
-    /// Returns the extensions of a sum with the best scores.
-    fn extensions(&self, state: &State) -> Vec<Extension> {
+    /// Returns the extensions of a sum by terms of `chunks` with the best scores.
+    fn extensions(&self, state: &State, chunks: &[Chunk]) -> Vec<Extension> {
         let count = state.sum.len() as f64;
         let further = if state.sum.is_empty() { 0.0 } else { 0.5_f64.ln() + (count + 1.0).ln() };
         let (before, rank) = (state.span.explained_squares(), state.span.along.len());
@@ -166,8 +218,7 @@ impl<'a> Beam<'a> {
             }
             best_of(all)
         };
-        let all: Vec<Extension> =
-            self.terms.chunks.par_iter().enumerate().flat_map_iter(of_chunk).collect();
+        let all: Vec<Extension> = chunks.par_iter().enumerate().flat_map_iter(of_chunk).collect();
         best_of(all)
     }
 
@@ -195,6 +246,8 @@ impl<'a> Beam<'a> {
         let (by_evidence, by_guide) = (by(|s| s.ln_posterior), by(|s| s.guide));
         let in_turn = by_evidence.iter().zip(&by_guide).flat_map(|(a, b)| [a.0, b.0]);
         let mut found: Vec<(Sum, Weighted)> = Vec::new();
+        // What the best sum leaves is noise.
+        let mut factor = f64::NAN;
         let mut of_terms: BTreeMap<&Product, Vec<Weighted>> = BTreeMap::new();
         for sum in in_turn {
             if found.len() >= most {
@@ -209,9 +262,11 @@ impl<'a> Beam<'a> {
                 span.extend(columns, &self.site.product);
             }
             let prediction = span.prediction();
+            if factor.is_nan() {
+                factor = self.noise.factor(span.explained_squares());
+            }
             let is_near = |(_, other): &(Sum, Weighted)| {
-                other.squared_distance(&prediction)
-                    < MIN_BEAM_DIFFERENCE.powi(2) * self.noise.factor
+                other.squared_distance(&prediction) < MIN_BEAM_DIFFERENCE.powi(2) * factor
             };
             if !found.iter().any(is_near) {
                 found.push((sum.clone(), prediction));

@@ -2,11 +2,12 @@
 
 use nalgebra::DVector;
 
-use super::beam::{Beam, Sum, ln_prior};
-use super::dictionary::factors;
+use super::beam::{Beam, Sum};
+use super::dictionary::{factors, factors_elsewhere};
 use super::quantities::Quantities;
-use super::site::{Noise, Span, Weighted, WhitenedSite};
-use super::terms::{Terms, product};
+use super::refinement::{Refined, Refiner};
+use super::site::{Noise, Weighted, WhitenedSite};
+use super::terms::Terms;
 use super::written::{Written, written};
 
 /// Log odds to the best sum beyond which sums are dropped.
@@ -17,11 +18,11 @@ const MAX_SUMS: usize = 400;
 const MAX_REFINED: usize = 40;
 /// Maximum number of classes that are proposed as laws.
 const MAX_CLASSES: usize = 8;
+/// Largest difference between the values of an inner parameter, in grid cells, at which two sums
+/// are the same.
+const MAX_CELL_DIFFERENCE: f64 = 0.5;
 /// Largest difference between the predictions of two sums of one class, in units of the noise.
-const MAX_CLASS_DIFFERENCE: f64 = 2.0;
-/// Number of trial values of an inner parameter on either side of its listed value, within one grid
-/// step.
-const TRIAL_VALUES: i32 = 8;
+const MAX_CLASS_DIFFERENCE: f64 = 1.0;
 
 /// Formula proposed for a class of sums with nearly equal predictions.
 #[derive(Debug, Clone)]
@@ -30,19 +31,10 @@ pub struct Proposal {
     pub law: Written,
     /// ln of the prior probability of the class if its likelihood is that of the proposed formula.
     pub ln_prior: f64,
+    /// ln of the posterior probability of the class, up to a constant of the residual.
+    pub ln_posterior: f64,
     /// True if a law that the fit contains belongs to the class.
     pub is_present: bool,
-}
-
-/// Sum with refined values of its inner parameters.
-struct Refined {
-    sum: Sum,
-    /// Values of the inner parameters: one list for each term, with one value for each factor.
-    inner: Vec<Vec<f64>>,
-    ln_posterior: f64,
-    ln_evidence: f64,
-    ln_prior: f64,
-    prediction: Weighted,
 }
 
 struct Class {
@@ -51,18 +43,20 @@ struct Class {
     ln_posterior: f64,
 }
 
-/// Returns the most probable formulas of the error at a joint, counted from 0. `present` holds the
-/// columns of laws that the fit contains.
+/// Returns the most probable formulas of the error at a site, given as in files. `joint` is the
+/// joint, counted from 0, if the site is its coordinate. `present` holds the columns of laws that
+/// the fit contains.
 pub fn proposals(
     known: &Quantities,
-    joint: usize,
+    (at, joint): (&str, Option<usize>),
     (site, noise): (&WhitenedSite, &Noise),
     present: &[Vec<DVector<f64>>],
 ) -> Vec<Proposal> {
-    let terms = Terms::new(factors(known, joint), known, site);
-    let beam = Beam::new(&terms, site, noise);
+    let factors = joint.map_or_else(|| factors_elsewhere(known), |joint| factors(known, joint));
+    let beam = Beam::new(Terms::new(factors, known, site), known, (site, noise));
+    let (terms, sums) = beam.search();
     let mut sums: Vec<(Sum, f64)> =
-        beam.search().into_iter().map(|(sum, scored)| (sum, scored.ln_posterior)).collect();
+        sums.into_iter().map(|(sum, scored)| (sum, scored.ln_posterior)).collect();
     sums.sort_by(|a, b| b.1.total_cmp(&a.1));
     let Some(best) = sums.first().map(|sum| sum.1) else { return Vec::new() };
     sums.retain(|(_, ln)| *ln > best - MAX_LN_ODDS);
@@ -74,11 +68,14 @@ pub fn proposals(
         .map(|(place, (sum, _))| refiner.refined(sum, place < MAX_REFINED))
         .collect();
     all.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
+    let all = distinct(all, &terms);
+    // What the best sum leaves is noise.
+    let factor = all.first().map_or(0.0, |best| noise.factor(best.prediction.squared_length()));
+    let largest = MAX_CLASS_DIFFERENCE.powi(2) * factor;
     let mut classes: Vec<Class> = Vec::new();
     for refined in all {
         let is_same = |class: &&mut Class| {
-            class.first.prediction.squared_distance(&refined.prediction)
-                < MAX_CLASS_DIFFERENCE.powi(2) * noise.factor
+            class.first.prediction.squared_distance(&refined.prediction) < largest
         };
         if let Some(class) = classes.iter_mut().find(is_same) {
             class.ln_posterior = ln_add(class.ln_posterior, refined.ln_posterior);
@@ -99,105 +96,60 @@ pub fn proposals(
     let proposal = |class: Class| {
         let first = &class.first;
         let is_catalogued = first.sum.iter().all(|term| {
-            matches!(term.as_slice(), [k] if terms.factors[usize::from(*k)].form.is_catalogued(joint))
+            let is_catalogued =
+                |joint: usize, k: u16| terms.factors[usize::from(k)].form.is_catalogued(joint);
+            matches!((term.as_slice(), joint), (&[k], Some(joint)) if is_catalogued(joint, k))
         });
         if is_catalogued {
             return None;
         }
-        let is_near = |other: &Weighted| {
-            other.squared_distance(&first.prediction) < MAX_CLASS_DIFFERENCE.powi(2) * noise.factor
-        };
+        let is_near = |other: &Weighted| other.squared_distance(&first.prediction) < largest;
         let is_present = predictions.iter().any(is_near);
-        let law = written((&terms, known), joint, &first.sum, &first.inner);
+        let law = written((&terms, known), at, &first.sum, &first.inner);
         let ln_prior = class.ln_posterior - first.ln_evidence;
-        Some(Proposal { law, ln_prior, is_present })
+        Some(Proposal { law, ln_prior, ln_posterior: class.ln_posterior, is_present })
     };
     classes.into_iter().filter_map(proposal).take(MAX_CLASSES).collect()
 }
 
-/// Refinement of the inner parameters of sums, such as time constants and kink positions.
-struct Refiner<'a> {
-    terms: &'a Terms,
-    known: &'a Quantities,
-    site: &'a WhitenedSite,
-    noise: &'a Noise,
-}
-
-impl Refiner<'_> {
-    /// Returns a sum with the best values of its inner parameters. Its evidence is averaged over
-    /// the grid cell of each parameter.
-    fn refined(&self, sum: Sum, is_refined: bool) -> Refined {
-        let starts = |term: &Vec<u16>| {
-            term.iter()
-                .map(|&k| self.terms.factors[usize::from(k)].inner.map_or(0.0, |inner| inner.0))
-                .collect::<Vec<f64>>()
+/// Returns the sums without those that an earlier one equals but for a fraction of a grid cell in
+/// the values of inner parameters.
+fn distinct(all: Vec<Refined>, terms: &Terms) -> Vec<Refined> {
+    let parts = |refined: &Refined| {
+        let part = |(term, inner): (&Vec<u16>, &Vec<f64>)| {
+            let factor = |(&k, &value): (&u16, &f64)| {
+                let factor = &terms.factors[usize::from(k)];
+                let step = factor.inner.map_or(1.0, |inner| inner.1);
+                (format!("{:?}", factor.form), value / step)
+            };
+            let mut part: Vec<(String, f64)> = term.iter().zip(inner).map(factor).collect();
+            part.sort_by(|a, b| a.0.cmp(&b.0));
+            part
         };
-        let mut inner: Vec<Vec<f64>> = sum.iter().map(starts).collect();
-        let ln_prior = ln_prior(self.terms, &sum);
-        let mut averaged = 0.0;
-        let mut columns: Vec<Vec<Weighted>> =
-            sum.iter().zip(&inner).map(|(term, inner)| self.columns(term, inner)).collect();
-        // Functions of earlier terms do not change any more.
-        let mut earlier = self.site.empty_span();
-        for (t, term) in sum.iter().enumerate() {
-            for (f, &factor) in term.iter().enumerate().filter(|_| is_refined) {
-                let Some((start, step)) = self.terms.factors[usize::from(factor)].inner else {
-                    continue;
-                };
-                let at = |k: i32| start + step * f64::from(k) / f64::from(TRIAL_VALUES);
-                let mut evidences = Vec::new();
-                for k in -TRIAL_VALUES..=TRIAL_VALUES {
-                    inner[t][f] = at(k);
-                    columns[t] = self.columns(term, &inner[t]);
-                    let span = self.span(earlier.clone(), &columns[t..]);
-                    let evidence = self.noise.evidence(span.explained_squares(), span.along.len());
-                    evidences.push((k, evidence));
-                }
-                let best = evidences
-                    .iter()
-                    .copied()
-                    .max_by(|a, b| a.1.total_cmp(&b.1).then_with(|| b.0.abs().cmp(&a.0.abs())));
-                let (k, most) = best.unwrap_or((0, 0.0));
-                inner[t][f] = at(k);
-                columns[t] = self.columns(term, &inner[t]);
-                // Over the cell about the best value.
-                let cell: Vec<f64> = evidences
-                    .iter()
-                    .filter(|(other, _)| (other - k).abs() <= TRIAL_VALUES / 2)
-                    .map(|(_, ln)| (ln - most).exp())
-                    .collect();
-                averaged += (cell.iter().sum::<f64>() / f64::from(TRIAL_VALUES + 1)).ln();
-            }
-            earlier.extend(&columns[t], &self.site.product);
-        }
-        let ln_evidence = self.noise.evidence(earlier.explained_squares(), earlier.along.len());
-        Refined {
-            ln_posterior: ln_evidence + averaged + ln_prior,
-            prediction: earlier.prediction(),
-            ln_evidence,
-            ln_prior,
-            inner,
-            sum,
-        }
-    }
-
-    /// Returns a span extended by the columns of further terms.
-    fn span(&self, mut span: Span, terms: &[Vec<Weighted>]) -> Span {
-        for columns in terms {
-            span.extend(columns, &self.site.product);
-        }
-        span
-    }
-
-    /// Returns the columns of a term with values of its inner parameters, and W times them.
-    fn columns(&self, term: &[u16], inner: &[f64]) -> Vec<Weighted> {
-        let of_factor = |(&k, &x): (&u16, &f64)| {
-            let form = self.terms.factors[usize::from(k)].form;
-            form.columns(self.known, x).into_iter().map(DVector::from_vec).collect::<Vec<_>>()
+        let mut parts: Vec<_> = refined.sum.iter().zip(&refined.inner).map(part).collect();
+        let forms = |part: &[(String, f64)]| {
+            part.iter().map(|(form, _)| form.clone()).collect::<Vec<String>>()
         };
-        let factors: Vec<Vec<DVector<f64>>> = term.iter().zip(inner).map(of_factor).collect();
-        self.site.weighted(product(factors.iter().map(Vec::as_slice)).unwrap_or_default())
-    }
+        parts.sort_by_key(|part| forms(part));
+        parts.concat()
+    };
+    let mut known: Vec<Vec<(String, f64)>> = Vec::new();
+    let mut is_new = |refined: &Refined| {
+        let parts = parts(refined);
+        let is_same = |other: &Vec<(String, f64)>| {
+            other.len() == parts.len()
+                && other
+                    .iter()
+                    .zip(&parts)
+                    .all(|(a, b)| a.0 == b.0 && (a.1 - b.1).abs() < MAX_CELL_DIFFERENCE)
+        };
+        let is_new = !known.iter().any(is_same);
+        if is_new {
+            known.push(parts);
+        }
+        is_new
+    };
+    all.into_iter().filter(|refined| is_new(refined)).collect()
 }
 
 fn ln_add(a: f64, b: f64) -> f64 {
@@ -244,7 +196,7 @@ mod tests {
             product,
         };
         let noise = Noise::new(squares, 60.0, |squares| -0.5 * squares);
-        proposals(&known, 0, (&site, &noise), &[])
+        proposals(&known, ("joint1", Some(0)), (&site, &noise), &[])
     }
 
     #[test]

@@ -21,6 +21,33 @@ const ANGLE_FACTORS: [[i32; 2]; 6] = [[1, 1], [1, -1], [2, 1], [2, -1], [1, 2], 
 /// Smallest share of the poses that must have a moment of either sign for the sign to be a factor.
 const MIN_SIGN_SHARE: f64 = 0.1;
 
+/// Returns the factors of formulas elsewhere than at the coordinate of a joint, such as at the tool:
+/// conditions of a pose, and the commands with their sines and cosines.
+///
+/// All kinds of factors have the same prior probability, and so have the joints.
+pub fn factors_elsewhere(known: &Quantities) -> Vec<Factor> {
+    let is_listed = |factor: &Factor| match factor.form {
+        Form::Command(_) => true,
+        Form::Wave { order, .. } => order == 1,
+        form => form.is_condition(),
+    };
+    let of_joint = -(known.commands.len().max(1) as f64).ln();
+    let mut all: Vec<Factor> = factors(known, usize::MAX).into_iter().filter(is_listed).collect();
+    let families: BTreeSet<usize> = all.iter().map(|factor| factor.form.family()).collect();
+    let ln_families = (families.len().max(1) as f64).ln();
+    for factor in &mut all {
+        factor.ln_prior = match factor.form {
+            Form::Command(_) => of_joint,
+            Form::Wave { .. } => of_joint - 2.0_f64.ln(),
+            Form::Settling => -f64::from(SETTLING_TIMES.2).ln(),
+            Form::Step => -f64::from(STEP_TIMES).ln(),
+            Form::Covariate(_) => -(known.covariates.len().max(1) as f64).ln(),
+            _ => 0.0,
+        } - ln_families;
+    }
+    all
+}
+
 /// Returns all factors of formulas at the coordinate of the joint `own`, counted from 0.
 ///
 /// All kinds of factors have the same prior probability. Half of it belongs to the joint itself,

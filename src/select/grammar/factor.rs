@@ -112,6 +112,23 @@ impl Form {
         matches!(self, Self::Side(_) | Self::MomentSign(_) | Self::Step)
     }
 
+    /// Returns true for a quantity that describes the conditions of a pose: temperature, time,
+    /// payload or a declared covariate.
+    pub fn is_condition(self) -> bool {
+        matches!(
+            self,
+            Self::Warming
+                | Self::WarmingSquare
+                | Self::Lag
+                | Self::Elapsed
+                | Self::Settling
+                | Self::Step
+                | Self::Payload
+                | Self::PayloadSquare
+                | Self::Covariate(_)
+        )
+    }
+
     /// Returns true if the catalogue contains this form alone as an effect at the coordinate of
     /// `joint`.
     pub fn is_catalogued(self, joint: usize) -> bool {

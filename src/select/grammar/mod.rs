@@ -16,6 +16,7 @@ mod dictionary;
 mod factor;
 mod prior;
 mod quantities;
+mod refinement;
 mod site;
 mod terms;
 mod written;

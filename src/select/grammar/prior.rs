@@ -1,16 +1,33 @@
 //! Prior probability of the laws of the grammar among all hypotheses.
 
+use crate::laws::{At, Law};
 use crate::problem::{Effect, Joint, JointKind, Problem};
 
-/// Prior weight of all laws of the grammar at all joints, relative to one family of effects: they
-/// are some twenty families of formulas, each rarer than what the catalogue holds.
+/// Prior weight of all laws of the grammar at the coordinates of all joints, relative to one family
+/// of effects: they are some twenty families of formulas, each rarer than what the catalogue holds.
 const PRIOR_OF_GRAMMAR: f64 = 8.0;
+/// Prior weight of all laws of the grammar at one of the other sites: tool, measurement, base, and
+/// small motions of all joints. Each has fewer formulas.
+const PRIOR_ELSEWHERE: f64 = 2.0;
+/// Number of sites of laws at the tool, at the measurement and at the base: one for each axis.
+const AXES: f64 = 3.0;
+/// Number of small motions of a joint at which laws are searched.
+const MOTIONS: f64 = 4.0;
 
 /// Returns ln of the prior probability of a formula from the search, relative to a family of
 /// effects; `None` for other effects.
 pub fn ln_prior(effect: &Effect, problem: &Problem) -> Option<f64> {
     let Effect::Law(law) = effect else { return None };
+    Some(ln_weight(law, problem) + law.description()?)
+}
+
+/// Returns ln of the prior weight of all laws at the site of a law.
+fn ln_weight(law: &Law, problem: &Problem) -> f64 {
     let takes = |joint: &&Joint| joint.command_kind() != JointKind::Fixed;
-    let joints = problem.joints.iter().filter(takes).count().max(1);
-    Some((PRIOR_OF_GRAMMAR / joints as f64).ln() + law.description()?)
+    let joints = problem.joints.iter().filter(takes).count().max(1) as f64;
+    match law.at() {
+        At::Coordinate => (PRIOR_OF_GRAMMAR / joints).ln(),
+        At::Before(_) | At::After(_) => (PRIOR_ELSEWHERE / MOTIONS / joints).ln(),
+        _ => (PRIOR_ELSEWHERE / AXES).ln(),
+    }
 }

@@ -17,9 +17,8 @@ const MIN_LEFT: f64 = 1e-4;
 /// Table of ln p(residual) by its sum of squares, integrated over the noise.
 pub struct Noise {
     squares: f64,
+    freedom: f64,
     table: Vec<f64>,
-    /// Squared noise factor f² estimated if all that remains is noise.
-    pub factor: f64,
 }
 
 impl Noise {
@@ -28,7 +27,13 @@ impl Noise {
     pub fn new(squares: f64, freedom: f64, ln_density: impl Fn(f64) -> f64) -> Self {
         let at = |k: usize| squares * (k as f64 / NOISE_TABLE_POINTS as f64).powi(2);
         let table: Vec<f64> = (0..=NOISE_TABLE_POINTS).map(|k| ln_density(at(k))).collect();
-        Self { squares, table, factor: (squares / freedom.max(1.0)).max(1e-12) }
+        Self { squares, freedom: freedom.max(1.0), table }
+    }
+
+    /// Returns the squared noise factor f² if columns explain the sum of squares `taken` and all
+    /// that remains is noise.
+    pub fn factor(&self, taken: f64) -> f64 {
+        ((self.squares - taken) / self.freedom).max(1e-12)
     }
 
     /// Returns the gain in ln p(residual) if columns reduce the sum of squares by `taken`.
@@ -133,6 +138,11 @@ impl WhitenedSite {
 }
 
 impl Weighted {
+    /// Returns the squared length fᵀWf, in units of the noise.
+    pub fn squared_length(&self) -> f64 {
+        self.values.dot(&self.times)
+    }
+
     /// Returns the squared length (f − g)ᵀW(f − g) of the difference to another function g, in
     /// units of the noise.
     pub fn squared_distance(&self, other: &Self) -> f64 {

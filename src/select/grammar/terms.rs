@@ -47,6 +47,8 @@ pub struct Terms {
     /// Factors with their columns.
     pub factors: Vec<Factor>,
     values: Vec<Vec<DVector<f64>>>,
+    /// Number of factors with listed values of their inner parameters, the first ones.
+    listed: usize,
     /// Terms in groups of equal width.
     pub chunks: Vec<Chunk>,
 }
@@ -60,9 +62,9 @@ impl Terms {
             columns.into_iter().map(DVector::from_vec).collect()
         };
         let values: Vec<Vec<DVector<f64>>> = factors.iter().map(columns).collect();
-        let mut all = Self { factors, values, chunks: Vec::new() };
+        let count = factors.len().min(usize::from(u16::MAX));
+        let mut all = Self { factors, values, listed: count, chunks: Vec::new() };
         let number = |k: usize| u16::try_from(k).unwrap_or(u16::MAX);
-        let count = all.factors.len().min(usize::from(u16::MAX));
         let single: Vec<Product> = (0..count).map(|k| vec![number(k)]).collect();
         let pairs: Vec<Product> = (0..count)
             .flat_map(|a| (a..count).map(move |b| vec![number(a), number(b)]))
@@ -87,6 +89,43 @@ impl Terms {
         chunks.extend(all.chunks_of(&extended, site));
         all.chunks = chunks;
         all
+    }
+
+    /// Returns the products of a term with every listed factor, in chunks; none for a term with the
+    /// largest number of factors.
+    pub fn multiples(&self, term: &Product, site: &WhitenedSite) -> Vec<Chunk> {
+        if term.len() >= FACTOR_COUNT_PROBABILITIES.len() {
+            return Vec::new();
+        }
+        let number = |k: usize| u16::try_from(k).unwrap_or(u16::MAX);
+        let multiple = |k: usize| {
+            let mut term = [term.as_slice(), &[number(k)]].concat();
+            term.sort_unstable();
+            term
+        };
+        let all: Vec<Product> =
+            (0..self.listed).map(multiple).filter(|term| self.is_new(term)).collect();
+        self.chunks_of(&all, site)
+    }
+
+    /// Returns the index of a factor with another value of its inner parameter, which is added if
+    /// it is not known.
+    pub fn with_inner(&mut self, factor: u16, value: f64, known: &Quantities) -> u16 {
+        let Factor { form, inner, ln_prior } = self.factors[usize::from(factor)].clone();
+        let Some((old, step)) = inner else { return factor };
+        #[expect(clippy::float_cmp, reason = "the same value is the same factor")]
+        let is_same =
+            |known: &Factor| known.form == form && known.inner.is_some_and(|(at, _)| at == value);
+        if old.to_bits() == value.to_bits() {
+            return factor;
+        }
+        let place = self.factors.iter().position(is_same).unwrap_or_else(|| {
+            self.factors.push(Factor { form, inner: Some((value, step)), ln_prior });
+            let columns = form.columns(known, value);
+            self.values.push(columns.into_iter().map(DVector::from_vec).collect());
+            self.factors.len() - 1
+        });
+        u16::try_from(place).unwrap_or(factor)
     }
 
     /// Returns true if no product of fewer or other factors is the same function.

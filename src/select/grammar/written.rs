@@ -9,7 +9,7 @@ use crate::laws::LawParameter;
 /// Formulas of a law with its inner parameters.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Written {
-    /// Name of the law: joint and quantities, without numbers.
+    /// Name of the law: site and quantities, without numbers.
     pub name: String,
     /// Formulas as text, one for each coefficient.
     pub formulas: Vec<String>,
@@ -20,11 +20,11 @@ pub struct Written {
 /// Number of significant digits with which parameters inside a formula are written.
 const PARAMETER_DIGITS: i32 = 3;
 
-/// Writes a sum as a law of the joint with index `joint`, with the values `inner` of its inner
+/// Writes a sum as a law at a site, which is given as in files, with the values `inner` of its inner
 /// parameters.
 pub fn written(
     (terms, known): (&Terms, &Quantities),
-    joint: usize,
+    site: &str,
     sum: &Sum,
     inner: &[Vec<f64>],
 ) -> Written {
@@ -71,7 +71,7 @@ pub fn written(
         }
         formulas.extend(products.iter().map(|factors| joined(factors)));
     }
-    Written { name: name(joint, &formulas), formulas, parameters }
+    Written { name: name(site, &formulas), formulas, parameters }
 }
 
 /// Joins factors by `*`; repeated factors become powers.
@@ -95,9 +95,9 @@ fn joined(factors: &[String]) -> String {
     written.collect::<Vec<_>>().join("*")
 }
 
-/// Returns the name of a law: its joint and its formulas, without the values of inner parameters.
-fn name(joint: usize, formulas: &[String]) -> String {
-    let mut name = format!("joint{}", joint + 1);
+/// Returns the name of a law: its site and its formulas, without the values of inner parameters.
+fn name(site: &str, formulas: &[String]) -> String {
+    let mut name = site.replace('.', "-");
     for formula in formulas {
         let searched = formula.split("step(t - ").enumerate().map(|(k, part)| match k {
             0 => part.to_owned(),
