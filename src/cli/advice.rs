@@ -96,7 +96,7 @@ pub fn after_loop(
     let doubted = result.effects.iter().filter(|found| found.is_doubted());
     let mut pairs = doubted.filter_map(|found| {
         let rival = found.alternatives.first()?;
-        Some([found.effect.declaration.clone(), rival.declaration.clone()])
+        Some([found.effect.declaration.clone(), rival.effect.declaration.clone()])
     });
     let can_be_planned =
         |pair: &[String; 2]| PoseRanges::of(problem).is_ok() && plan::pair(pair, problem).is_ok();

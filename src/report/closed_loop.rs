@@ -13,7 +13,7 @@ use super::parameters::parameters;
 use super::probability::percent;
 use super::render::{Report, report, text, text_within};
 use super::unexplained::{correction, places, to_declare, unexplained};
-use super::verdict::{causes, counts, title, verdict};
+use super::verdict::{alternative, causes, counts, title, verdict};
 use super::{effect, residual_tests, trace};
 use crate::problem::Problem;
 use crate::quantity::format::{counted, decimals, number};
@@ -88,10 +88,10 @@ fn cause(found: &FoundEffect) -> Point {
     facts.extend(law.map(|law| format!("probability of the law {}", percent(law))));
     let others = match found.alternatives.as_slice() {
         [] => String::new(),
-        [first] => format!("; not told from: {}", first.description),
+        [first] => format!("; not told from: {}", alternative(first)),
         [first, others @ ..] => {
             let count = others.len();
-            format!("; not told from: {} ({count} more in loop.json)", first.description)
+            format!("; not told from: {} ({count} more in loop.json)", alternative(first))
         }
     };
     let details = if facts.is_empty() { Vec::new() } else { vec![facts.join("; ")] };

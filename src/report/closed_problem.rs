@@ -7,7 +7,8 @@ use toml_edit::TomlError;
 use super::effect::values;
 use crate::error::one_line;
 use crate::problem::{Effect, Problem, edit};
-use crate::quantity::format::p_value;
+use crate::quantity::format::{number, p_value};
+use crate::residual_tests::Covariate;
 use crate::results::ParameterValue;
 use crate::select::{ClosedLoop, Found, Status};
 
@@ -65,6 +66,18 @@ fn comments(found: &Found, closure: &ClosedLoop) -> Vec<String> {
     // A custom effect may describe itself in several lines.
     std::iter::once(first)
         .chain(values(&found.effect, &parameters))
+        .chain(seen(found))
         .map(|line| one_line(&line.replace('\n', " ")))
         .collect()
+}
+
+/// States the ranges of the quantities of a law that the search composed; `None` for other effects.
+fn seen(found: &Found) -> Option<String> {
+    let range = |(of, (low, high)): &(Covariate, (f64, f64))| {
+        format!("{of} from {} to {}", number(*low, 3), number(*high, 3))
+    };
+    let ranges: Vec<String> = found.ranges.iter().map(range).collect();
+    (!ranges.is_empty()).then(|| {
+        format!("Seen for {} (SI units, °C); beyond, it is an extrapolation.", ranges.join(", "))
+    })
 }

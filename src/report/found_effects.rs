@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use super::document::{Block, Column, Point, Table, some_of};
 use super::errors::header;
-use super::verdict::{stand_in, title};
+use super::verdict::{alternative, stand_in, title};
 use super::{effect, figures, trace};
 use crate::quantity::format::{number, or_dash, p_value};
 use crate::results::{FoundEffect, LoopResult, Step, Witness};
@@ -35,6 +35,8 @@ fn point(result: &LoopResult, found: &FoundEffect, alternatives: usize) -> Point
     let mut details: Vec<String> = stand_in(found).into_iter().collect();
     details.extend(effect::values(&found.effect.effect, &found.parameters));
     details.extend(found.claims.as_ref().map(trace::claimed));
+    details.extend(seen(found));
+    details.extend(found.resembles.as_ref().map(|cause| format!("hint: {cause}")));
     details.extend(found.stability.map(|share| {
         format!(
             "found in {} % of refits on random 80 % subsets of the poses",
@@ -60,12 +62,21 @@ fn point(result: &LoopResult, found: &FoundEffect, alternatives: usize) -> Point
     }
     details.push(chance);
     if !found.alternatives.is_empty() {
-        let others = found.alternatives.iter().map(|other| other.description.clone());
+        let others = found.alternatives.iter().map(alternative);
         let (mut others, more) = some_of(others, alternatives);
         others.extend((more > 0).then(|| format!("{more} more in loop.json")));
         details.push(format!("these data do not distinguish it from: {}", others.join("; ")));
     }
     Point { text: title(found), details, mark: None }
+}
+
+/// States the ranges of the quantities of a law that the search composed; `None` for other effects.
+fn seen(found: &FoundEffect) -> Option<String> {
+    let range = |(of, (low, high)): &(String, (f64, f64))| {
+        format!("{of} from {} to {}", number(*low, 3), number(*high, 3))
+    };
+    let ranges: Vec<String> = found.ranges.iter().map(range).collect();
+    (!ranges.is_empty()).then(|| format!("seen for {} (SI units, °C)", ranges.join(", ")))
 }
 
 fn witness(witness: &Witness) -> String {

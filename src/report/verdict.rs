@@ -4,7 +4,7 @@
 use super::document::code;
 use super::probability::{MIN_PROBABLE, percent};
 use crate::quantity::format::{counted, number};
-use crate::results::{FoundEffect, LoopResult, MAX_COEFFICIENTS, NamedEffect};
+use crate::results::{AlternativeEffect, FoundEffect, LoopResult, MAX_COEFFICIENTS, NamedEffect};
 use crate::select::{Status, Verdict};
 
 /// Smallest probability at which a law is named as a candidate.
@@ -116,7 +116,7 @@ fn found(result: &LoopResult) -> String {
         [cause] => {
             let rival = cause.alternatives.first();
             let or_else =
-                rival.map_or_else(String::new, |rival| format!(", or else {}", rival.description));
+                rival.map_or_else(String::new, |rival| format!(", or else {}", alternative(rival)));
             format!("; {}{or_else}", claim(cause, &cause.effect.description))
         }
         causes => format!("; {} causes are probable or located", causes.len()),
@@ -150,6 +150,11 @@ pub(super) fn declared(effect: &NamedEffect) -> String {
         Some(orders) if orders.len() > MAX_COEFFICIENTS => effect.description.clone(),
         _ => format!("{}: {}", effect.description, code(&effect.declaration)),
     }
+}
+
+/// Describes an effect that may act instead of a found one, with its probability.
+pub(super) fn alternative(other: &AlternativeEffect) -> String {
+    format!("{} ({})", other.effect.description, percent(other.probability))
 }
 
 /// Returns the title of a cause: its status, what may be claimed about it, and the line that

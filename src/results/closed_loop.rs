@@ -6,6 +6,7 @@ use serde::Serialize;
 use super::claims::{Claims, law_name};
 use super::document::Document;
 use super::effect::{EffectKeys, NamedEffect};
+use super::hints::resembled;
 use super::identification::{FindingKeys, InfluentialRowSet};
 use super::remainder::Remainder;
 use super::residual_test::ResidualTest;
@@ -102,6 +103,14 @@ pub struct FoundEffect {
     pub status: Status,
     /// Claims about the cause; null if no evidence was evaluated.
     pub claims: Option<Claims>,
+    /// Quantities of a law that the search composed, with their ranges over the identification
+    /// rows, SI units; absent for other effects.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub ranges: Vec<(String, (f64, f64))>,
+    /// Physical cause that a law of the search resembles, a hint and not a claim; absent if the
+    /// table of hints has none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub resembles: Option<String>,
     /// Share of 20 refits, each on random 80 % of the configurations, that find the effect again.
     pub stability: Option<f64>,
     /// Verdict of measurements that are independent of the fit.
@@ -111,9 +120,19 @@ pub struct FoundEffect {
     pub p_value: f64,
     pub parameters: Vec<ParameterValue>,
     /// Effects that the data cannot distinguish from the found one, most probable first.
-    pub alternatives: Vec<NamedEffect>,
+    pub alternatives: Vec<AlternativeEffect>,
     /// Held-out errors after the first round with the effect.
     pub held_out_after: Summary,
+}
+
+/// Effect that may act instead of a found one.
+#[derive(Debug, Serialize, JsonSchema)]
+#[schemars(rename = "Alternative")]
+pub struct AlternativeEffect {
+    #[serde(flatten)]
+    pub effect: NamedEffect,
+    /// Probability that this effect acts instead of the found one.
+    pub probability: f64,
 }
 
 /// Verdict of measurements that are independent of the fit, such as readings of fixed points.
@@ -324,11 +343,20 @@ impl FoundEffect {
             effect: named(&found.effect),
             status: found.status,
             claims: found.claims.as_ref().map(|claims| Claims::new(claims, trace)),
+            ranges: found.ranges.iter().map(|(of, range)| (of.to_string(), *range)).collect(),
+            resembles: resembled(&found.effect),
             stability: found.stability,
             witness: found.reference_check.as_ref().map(witness),
             p_value: found.p_value,
             parameters: found.estimates.iter().map(ParameterValue::new).collect(),
-            alternatives: found.alternatives.iter().map(named).collect(),
+            alternatives: found
+                .alternatives
+                .iter()
+                .map(|&(ref effect, probability)| AlternativeEffect {
+                    effect: named(effect),
+                    probability,
+                })
+                .collect(),
             held_out_after: Summary::of(&found.held_out_after),
         }
     }

@@ -19,6 +19,7 @@ mod document;
 mod effect;
 mod export;
 mod fleet;
+mod hints;
 mod identification;
 mod knowledge;
 mod next;
@@ -70,7 +71,7 @@ pub(crate) use effect::joined;
 pub use self::{
     application::CompensationResult,
     claims::Hypothesis,
-    closed_loop::{Correction, Fit, FoundEffect, Row},
+    closed_loop::{AlternativeEffect, Correction, Fit, FoundEffect, Row},
     comparison::ComparisonResult,
     design::{CheckResult, ExpectedParameter, PlanResult},
     document::{FORMAT_VERSION, PROGRAM},

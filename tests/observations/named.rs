@@ -127,10 +127,9 @@ fn judged(problem: &Problem, closed: &ClosedLoop, truth: Option<&Effect>) -> Loo
     let (named, such): (Vec<_>, Vec<_>) =
         closed.effects.iter().partition(|found| found.status == Status::Found);
     let wrong = named.iter().filter(|found| !is_true(&found.effect)).count();
-    let listed = closed
-        .effects
-        .iter()
-        .any(|found| found.alternatives.iter().chain([&found.effect]).any(is_true));
+    let listed = closed.effects.iter().any(|found| {
+        found.alternatives.iter().map(|known| &known.0).chain([&found.effect]).any(is_true)
+    });
     let structure = || closed.unexplained.iter().filter(|left| left.claims.is_some());
     let outcome = match () {
         () if named.iter().any(|found| is_true(&found.effect)) => Outcome::Named,
@@ -152,7 +151,7 @@ fn judged(problem: &Problem, closed: &ClosedLoop, truth: Option<&Effect>) -> Loo
     for found in &closed.effects {
         let law = found.claims.as_ref().map_or(-1.0, |claims| claims.law.1);
         said.push(format!("{} {law:.2}", place(&found.effect)));
-        said.extend(found.alternatives.iter().map(|other| format!("or {}", place(other))));
+        said.extend(found.alternatives.iter().map(|(other, _)| format!("or {}", place(other))));
     }
     for left in structure() {
         let claims = left.claims.as_ref().unwrap();

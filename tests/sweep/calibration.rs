@@ -71,7 +71,8 @@ impl Set {
     pub fn of(judged: &LoopVerdict, truth: &[Effect], (problem, seed): (&Problem, u64)) -> Self {
         if std::env::var_os("FLEXCAL_FIRST").is_some() {
             for found in &judged.closure.effects {
-                let others: Vec<String> = found.alternatives.iter().map(named).collect();
+                let others: Vec<String> =
+                    found.alternatives.iter().map(|(other, _)| named(other)).collect();
                 println!(
                     "  {} instead of {}: {:?}",
                     named(&found.effect),

@@ -68,8 +68,12 @@ impl LoopVerdict {
             Squares::of(&problem, &others, set).chance_beside(&full)
         };
         let found: Vec<&Effect> = closure.effects.iter().map(|found| &found.effect).collect();
-        let others: Vec<&Effect> =
-            closure.effects.iter().flat_map(|found| &found.alternatives).collect();
+        let others: Vec<&Effect> = closure
+            .effects
+            .iter()
+            .flat_map(|found| &found.alternatives)
+            .map(|known| &known.0)
+            .collect();
         let place = |truth: &Effect| match () {
             () if found.iter().any(|effect| is_the_same(effect, truth)) => Place::Found,
             () if others.iter().any(|effect| is_the_same(effect, truth)) => Place::Alternative,
@@ -133,7 +137,13 @@ impl LoopVerdict {
             u8::from(self.first),
             p.join(" "),
             names(&mut closure.effects.iter().map(|found| &found.effect)),
-            names(&mut closure.effects.iter().flat_map(|found| &found.alternatives)),
+            names(
+                &mut closure
+                    .effects
+                    .iter()
+                    .flat_map(|found| &found.alternatives)
+                    .map(|known| &known.0)
+            ),
             cause,
             failed.join(", "),
             self.before,

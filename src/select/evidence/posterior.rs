@@ -148,8 +148,13 @@ impl Evidence {
     }
 
     /// Returns effects that may replace `effect` in a model with the effects `held`, best first.
-    /// Each is at least `beside` times as probable as `effect`.
-    pub fn alternatives(&self, effect: &Effect, held: &[Effect], beside: f64) -> Vec<Effect> {
+    /// Each is at least `beside` times as probable as `effect`, and stands with its probability.
+    pub fn alternatives(
+        &self,
+        effect: &Effect,
+        held: &[Effect],
+        beside: f64,
+    ) -> Vec<(Effect, f64)> {
         // If a model has very many effects, most are in no set, and the search below is not
         // needed.
         let mut all = self.sets.iter().flat_map(|explanation| &explanation.hypotheses);
@@ -192,7 +197,7 @@ impl Evidence {
         }
         instead.retain(|(_, probability)| *probability >= with * beside);
         instead.sort_by(|a, b| b.1.total_cmp(&a.1));
-        instead.into_iter().map(|(effect, _)| effect).collect()
+        instead
     }
 
     /// Returns place, quantities and law of an effect with their probabilities; `None` if no set
@@ -281,7 +286,8 @@ mod tests {
         let held = explanations[0].effects();
         let evidence = Evidence { sets: explanations, stand_ins: Vec::new(), left_out: Vec::new() };
         // Two later moves together are twice as probable as settling.
-        assert_eq!(evidence.alternatives(&drift(), &held, 0.1), [shift(30.0), settling()]);
+        let alternatives = evidence.alternatives(&drift(), &held, 0.1);
+        assert_eq!(alternatives, [(shift(30.0), 0.2), (settling(), 0.1)]);
         assert_eq!(evidence.alternatives(&shift(10.0), &held, 0.1), []);
     }
 

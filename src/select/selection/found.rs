@@ -5,10 +5,12 @@ use std::collections::BTreeMap;
 
 use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
 
+use super::ranges::ranges;
 use super::state::{Round, SearchState};
 use super::status::Status;
 use crate::fit::{ErrorSummary, Estimate};
 use crate::problem::Effect;
+use crate::residual_tests::Covariate;
 use crate::select::candidates::Candidates;
 use crate::select::evidence::{Claims, Evidence, HypothesisSet, SubsetEvidence, subset_evidence};
 use crate::select::fitted::Fitted;
@@ -34,8 +36,12 @@ pub struct Found {
     pub p_value: f64,
     /// Estimates of the effect's parameters.
     pub estimates: Vec<Estimate>,
-    /// Effects that the data cannot distinguish from the found one, best first.
-    pub alternatives: Vec<Effect>,
+    /// Effects that the data cannot distinguish from the found one, best first, each with the
+    /// probability that it acts instead.
+    pub alternatives: Vec<(Effect, f64)>,
+    /// Quantities of a law that the search composed, with their ranges over the identification
+    /// poses \[SI\]. Beyond them nothing supports the law.
+    pub ranges: Vec<(Covariate, (f64, f64))>,
     /// Share of refits on random 80 % of the configurations that find the effect again; `None` if
     /// no evidence was evaluated.
     pub stability: Option<f64>,
@@ -120,6 +126,7 @@ pub(super) fn found(
                 .map(|k| fitted.found.estimates[k].clone())
                 .collect(),
             held_out_after: held_out_after(&effect),
+            ranges: if effect.is_described() { ranges(fitted, data, &effect) } else { Vec::new() },
             alternatives,
             reference_check: check,
             effect,
@@ -200,11 +207,16 @@ fn limited_to(mut claims: Claims, others: [f64; 3]) -> Claims {
 
 /// Returns effects that may replace `effect` in a model with the effects `held`; of each family at
 /// a place, only the most probable. Each is at least `beside` times as probable as `effect`.
-fn alternatives(evidence: &Evidence, effect: &Effect, held: &[Effect], beside: f64) -> Vec<Effect> {
+fn alternatives(
+    evidence: &Evidence,
+    effect: &Effect,
+    held: &[Effect],
+    beside: f64,
+) -> Vec<(Effect, f64)> {
     let mut by_place: BTreeMap<String, usize> = BTreeMap::new();
-    let mut found: Vec<Effect> = Vec::new();
+    let mut found: Vec<(Effect, f64)> = Vec::new();
     for other in effect.parts().iter().flat_map(|part| evidence.alternatives(part, held, beside)) {
-        by_place.entry(other.name_and_place()).or_insert_with(|| {
+        by_place.entry(other.0.name_and_place()).or_insert_with(|| {
             found.push(other);
             found.len()
         });

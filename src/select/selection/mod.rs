@@ -14,6 +14,7 @@ mod found;
 mod gears;
 mod interval;
 mod polish;
+mod ranges;
 mod search;
 mod state;
 mod status;
