@@ -18,13 +18,14 @@ use crate::laws::expression::Vocabulary;
 use crate::laws::{Law, LawSite};
 use crate::model::parameter::{JointField, ParameterSite};
 use crate::problem::{Effect, Problem};
+use crate::residual_tests::Covariate;
 use crate::select::data::Data;
 use crate::select::fitted::Fitted;
 use crate::select::grammar::{MAX_POSES, Noise, Proposal, Quantities, WhitenedSite, proposals};
 
 /// Smallest probability of a set at which laws are searched in place of its members: at the
 /// coordinate of a joint, and elsewhere.
-const MIN_SET_PROBABILITIES: [f64; 2] = [0.05, 0.2];
+const MIN_SET_PROBABILITIES: [f64; 2] = [0.1, 0.2];
 /// Maximum number of pairs of a joint and a set for which laws are searched.
 const MAX_SEARCHED: usize = 2;
 /// Maximum number of laws elsewhere than at the coordinate of a joint, of all sites together.
@@ -205,7 +206,12 @@ fn elsewhere(hypotheses: &Hypotheses, weighted: &[Weighted], products: &Products
             HypothesisKind::Smooth | HypothesisKind::Wandering => true,
             _ => false,
         };
-        is_listed && joint_of(hypothesis, problem).is_none()
+        // Laws there depend on the conditions of a pose, such as temperature and time.
+        let is_condition =
+            |covariate: &Covariate| !matches!(covariate, Covariate::Load | Covariate::Position);
+        is_listed
+            && hypothesis.depends_on.iter().any(is_condition)
+            && joint_of(hypothesis, problem).is_none()
     };
     let members: Vec<usize> =
         set.members.iter().copied().filter(|&member| is_elsewhere(member)).collect();

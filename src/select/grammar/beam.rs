@@ -22,6 +22,8 @@ const REFINED_SUMS: usize = 8;
 /// Maximum number of extensions of a sum that are kept: by posterior, and by the guide
 /// [`Scored::guide`].
 const KEPT_EXTENSIONS: [usize; 2] = [100, 40];
+/// Loss of ln posterior by the best further term above which no further terms are added.
+const MAX_LN_LOSS_OF_TERM: f64 = 1.0;
 /// Smallest difference between the predictions of two sums that are both kept, in units of the
 /// noise.
 const MIN_BEAM_DIFFERENCE: f64 = 0.7;
@@ -92,25 +94,34 @@ impl<'a> Beam<'a> {
         let mut known: BTreeMap<Sum, Scored> = BTreeMap::new();
         let mut extended: BTreeSet<Sum> = BTreeSet::new();
         let mut front: Vec<Sum> = vec![Vec::new()];
+        let mut most = f64::NEG_INFINITY;
         for depth in 1..=MAX_TERMS {
             let mut next: BTreeMap<Sum, Scored> = BTreeMap::new();
             self.extend(&front, &mut extended, &mut next);
+            let changed = self.best(&next, EXCHANGED_SUMS);
             if depth > 1 {
-                let exchanged: BTreeSet<Sum> = self
-                    .best(&next, EXCHANGED_SUMS)
-                    .into_iter()
-                    .flat_map(|sum| {
-                        (0..sum.len()).map(move |k| [&sum[..k], &sum[k + 1..]].concat())
-                    })
+                let without = |sum: &Sum| {
+                    (0..sum.len()).map(|k| [&sum[..k], &sum[k + 1..]].concat()).collect::<Vec<_>>()
+                };
+                let exchanged: BTreeSet<Sum> = changed
+                    .iter()
+                    .flat_map(without)
                     .filter(|sum| !extended.contains(sum))
                     .collect();
                 let exchanged: Vec<Sum> = exchanged.into_iter().collect();
                 self.extend(&exchanged, &mut extended, &mut next);
             }
-            self.multiply(&mut next);
+            self.multiply(&changed, &mut next);
             self.refine(&mut next);
             front = self.best(&next, EXTENDED_SUMS);
+            let of_length = next.values().map(|scored| scored.ln_posterior);
+            let of_length = of_length.fold(f64::NEG_INFINITY, f64::max);
             known.extend(next);
+            // A further term that hardly pays is followed by none that does.
+            if of_length < most - MAX_LN_LOSS_OF_TERM {
+                break;
+            }
+            most = of_length;
         }
         (self.terms, known)
     }
@@ -141,10 +152,10 @@ impl<'a> Beam<'a> {
         }
     }
 
-    /// Multiplies each term of the best sums by every factor: the factors of a term that explains
+    /// Multiplies each term of some sums by every factor: the factors of a term that explains
     /// little alone are found beside the other terms.
-    fn multiply(&self, next: &mut BTreeMap<Sum, Scored>) {
-        for sum in self.best(next, EXCHANGED_SUMS) {
+    fn multiply(&self, sums: &[Sum], next: &mut BTreeMap<Sum, Scored>) {
+        for sum in sums {
             for k in 0..sum.len() {
                 let others = [&sum[..k], &sum[k + 1..]].concat();
                 let chunks = self.terms.multiples(&sum[k], self.site);
