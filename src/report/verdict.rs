@@ -115,8 +115,9 @@ fn found(result: &LoopResult) -> String {
         [] => String::new(),
         [cause] => {
             let rival = cause.alternatives.first();
-            let or_else =
-                rival.map_or_else(String::new, |rival| format!(", or else {}", alternative(rival)));
+            let or_else = rival.map_or_else(String::new, |rival| {
+                format!(", or else {}", rival.effect.description)
+            });
             format!("; {}{or_else}", claim(cause, &cause.effect.description))
         }
         causes => format!("; {} causes are probable or located", causes.len()),
