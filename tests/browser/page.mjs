@@ -11,7 +11,7 @@ const browser = await puppeteer.launch({
   args: ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"],
 });
 /* What people read, with the pages of paper it may take. */
-const paper = { "loop/report.html": 10, "accept/acceptance.html": 2 };
+const paper = { "loop/report.html": 10, "accept/acceptance.html": 2, "check/check.html": 4, "next/next.html": 3 };
 const pages = Object.keys(paper);
 let passed = 0;
 const test = async (name, check) => {

@@ -2,7 +2,7 @@
 
 use comfy_table::{CellAlignment, presets::NOTHING};
 
-use crate::report::document::{Block, Mark, Point, Table};
+use crate::report::document::{Block, CODE, Mark, Point, Table};
 
 /// Maximum width of running text in columns; tables may be wider.
 const MAX_TEXT_WIDTH: usize = 110;
@@ -92,12 +92,24 @@ fn point(text: &mut String, mark: &str, point: &Point, width: usize) {
 /// Units that stay on the line of their number.
 const UNITS: [&str; 6] = ["%", "mm", "°", "σ", "px", "kg"];
 
-/// Wraps text, each line ending in a line break; line breaks in the text are kept, and a unit stays
-/// with its number.
+/// Keeps code that fits on a line of `width` characters on one line, so that it can be copied.
+fn whole_code(words: &str, width: usize) -> String {
+    let part = |(k, part): (usize, &str)| match part.split_once(CODE.1) {
+        Some((code, plain)) if k > 0 && code.chars().count() <= width => {
+            code.replace(' ', "\u{a0}") + plain
+        }
+        _ => part.to_owned(),
+    };
+    words.split(CODE.0).enumerate().map(part).collect()
+}
+
+/// Wraps text, each line ending in a line break; line breaks in the text are kept, a unit stays with
+/// its number, and code that fits on a line is not broken.
 fn wrapped(words: &str, (first, following): (&str, &str), width: usize) -> String {
     let joined =
         |text: String, unit: &str| text.replace(&format!(" {unit}"), &format!("\u{a0}{unit}"));
-    let plain = UNITS.into_iter().fold(plain(words), joined);
+    let whole = whole_code(words, width.saturating_sub(following.len()));
+    let plain = UNITS.into_iter().fold(plain(&whole), joined);
     // Names of effects and files are not split, so that they can be copied.
     let options = textwrap::Options::new(width)
         .initial_indent(first)
