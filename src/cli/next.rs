@@ -139,11 +139,17 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         if next.poses.is_empty() {
             return format!("{text}{written}Next: flexcal identify {named}\n");
         }
+        // Poses cannot replace what the model lacks.
+        let lacks = if next.error.is_some() && next.misfit > next.noise {
+            format!("flexcal loop {named} looks for what the model lacks, because the misfit exceeds the noise; or ")
+        } else {
+            String::new()
+        };
         let (file, named) = (results.path("next.csv"), shell_word(common.problem()));
         let files: Vec<String> =
             common.files(&problem).iter().map(|file| shell_word(file)).collect();
         format!(
-            "{text}{written}Next: measure these poses, add the columns x_mm, y_mm, z_mm, then\n\
+            "{text}{written}Next: {lacks}measure these poses, add the columns x_mm, y_mm, z_mm, then\n\
              flexcal next {named} --data {1} {0}\n",
             shell_word(&file),
             files.join(" "),

@@ -52,8 +52,8 @@ fn blocks<'a>(sides: &[Side; 2]) -> Vec<Block<'a>> {
     let tested = differences.iter().filter(|of| of.sigmas().is_some()).count();
     let limit = Normal::standard().inverse_cdf(1.0 - 0.5 * FALSE_ALARMS / tested.max(1) as f64);
     let [a, b] = sides.each_ref().map(|side| &side.estimate);
-    let mut blocks =
-        vec![Block::lines(format!("A: {}\nB: {}", a.file.display(), b.file.display()))];
+    let files = [("A", a), ("B", b)].map(|(name, side)| format!("{name}: {}", side.file.display()));
+    let mut blocks = vec![Block::Lines("Estimates side by side".to_owned(), files.to_vec())];
     blocks.push(Block::Text(verdict(&differences, tested, limit)));
     blocks.extend(notes([a, b]).into_iter().map(Block::Note));
     let error = |side: &Side, name: &str| {

@@ -112,7 +112,8 @@ fn commands(problem: &Problem, next: &NextPoses) -> Table {
         let q = next.poses.configuration(pose);
         let value = |joint: &CommandedJoint| {
             let command = q.get(joint.joint).copied().unwrap_or(f64::NAN) * joint.factor();
-            format!("{} {} {}", joint.name(), number(command, 2), joint.symbol())
+            let space = if joint.symbol() == "°" { "" } else { " " };
+            format!("{} {}{space}{}", joint.name(), number(command, 2), joint.symbol())
         };
         let commands: Vec<String> = joints.iter().map(value).collect();
         vec![(pose + 1).to_string(), commands.join(", ")]

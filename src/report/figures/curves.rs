@@ -82,10 +82,16 @@ impl Series<'_> {
             colour: MUTED,
             anchor,
         };
+        // The name of a level is on the side away from the ends of the curves.
+        let is_below = |level: f64| {
+            let ends = self.curves.iter().filter(|curve| curve.is_joined);
+            ends.filter_map(|curve| curve.points.last()).any(|at| up(at.1) > level)
+        };
         let levels = self.levels.iter().flat_map(|(text, level)| {
             let level = up(*level);
+            let shift = if is_below(level) { 9.0 } else { -8.0 };
             let line = Shape::line([(across.0, level), (across.1, level)], Paint::line(WARM, 1.2));
-            [line, named(text, (across.1, level), (-4.0, -8.0), Anchor::End)]
+            [line, named(text, (across.1, level), (-4.0, shift), Anchor::End)]
         });
         let starts = self.starts.iter().flat_map(|(text, start)| {
             let line = Shape::line([(*start, ends.0), (*start, ends.1)], Paint::line(FAINT, 1.0));
