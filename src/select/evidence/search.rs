@@ -20,6 +20,10 @@ const MAX_PAIRED_MEMBERS: usize = 6;
 /// Maximum number of replacements in the best set, each in the best set found so far.
 const MAX_EXCHANGES: usize = 4;
 
+/// Difference of ln posteriors of the same members in another order that counts as rounding. The
+/// order found first stays, so that effects are listed alike on every machine.
+const MAX_ROUNDING_OF_LN_POSTERIOR: f64 = 1e-6;
+
 /// Set of hypotheses with its probability among all sets evaluated.
 #[derive(Debug, Clone)]
 pub(super) struct Weighted {
@@ -48,6 +52,11 @@ impl Set {
                 + gain
                 + products.ln_prior(&products.blocks[block], &self.members),
         }
+    }
+
+    /// Returns true if the set is more probable than another one by more than rounding.
+    fn exceeds(&self, other: &Self) -> bool {
+        self.ln_posterior > other.ln_posterior + MAX_ROUNDING_OF_LN_POSTERIOR
     }
 
     /// Returns true if the set is not extended: a member is a periodic error, or has more than
@@ -147,7 +156,7 @@ pub(super) fn search(products: &Products, present: &[usize]) -> Vec<Weighted> {
             for longer in extended(set, tried, products) {
                 let key = sorted(&longer.members);
                 let best = next.get(&key).or_else(|| known.get(&key));
-                if best.is_none_or(|other| longer.ln_posterior > other.ln_posterior) {
+                if best.is_none_or(|other| longer.exceeds(other)) {
                     next.insert(key, longer);
                 }
             }
@@ -290,7 +299,7 @@ fn changed(known: &mut BTreeMap<Vec<usize>, Set>, products: &Products) {
         }
         for set in new.into_iter().flatten() {
             let entry = known.entry(sorted(&set.members)).or_insert_with(|| set.clone());
-            if set.ln_posterior > entry.ln_posterior {
+            if set.exceeds(entry) {
                 *entry = set;
             }
         }
