@@ -300,7 +300,13 @@ fn shares_of_the_command_line_merge_to_the_same_bytes() {
     let bench = bench();
     assert_contains(
         &bench.flexcal("study STUDY.toml").success().stdout,
-        &["gauss-newton", "levenberg-marquardt", "held out mean", "out/small-study/study.csv"],
+        &[
+            "gauss-newton",
+            "levenberg-marquardt",
+            "held out mean",
+            "Written to out/small-study: ",
+            "study.csv",
+        ],
     );
     for share in ["1/3", "2/3", "3/3"] {
         // All shards in one folder, and each in a separate one.
