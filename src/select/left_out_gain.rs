@@ -10,10 +10,13 @@ use super::fitted::Fitted;
 pub(super) struct LeftOutGain(Vec<f64>);
 
 impl LeftOutGain {
-    /// Compares the fit `new` with the fit `old`; `None` if an error is not finite.
+    /// Compares the fit `new` with the fit `old` on all rows but those that are outliers of both;
+    /// `None` if an error is not finite.
     pub fn new(new: &Fitted, old: &Fitted, data: &Data) -> Option<Self> {
+        let of_both = |row: &usize| old.set_aside.contains(row);
+        let aside: Vec<usize> = new.set_aside.iter().copied().filter(of_both).collect();
         let squares = |fitted: &Fitted| {
-            let fit = fitted.with_all_rows().around(data);
+            let fit = fitted.with_outliers(aside.clone()).around(data);
             let blocks = fit.left_out_squares(&data.block)?;
             Some(blocks.into_iter().map(|sum| sum * fitted.sigma.powi(2)).collect::<Vec<f64>>())
         };

@@ -123,9 +123,9 @@ fn results_of_an_earlier_table_do_not_stay_beside_those_of_another() {
     };
     let poses = "predict arm --data poses.csv --out out";
     bench.flexcal("predict arm --out out").success();
-    assert_eq!(there(), ["errors.json", "predictions.csv", "residuals.csv"]);
+    assert_eq!(there(), ["errors.json", "predictions.csv", "predictions.html", "residuals.csv"]);
     bench.flexcal(poses).success();
-    assert_eq!(there(), ["predictions.csv"]);
+    assert_eq!(there(), ["predictions.csv", "predictions.html"]);
     // Files of another command stay, and so do changed ones.
     bench.flexcal("predict arm --out out").success();
     bench.flexcal("identify arm --out out").success();

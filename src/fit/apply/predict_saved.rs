@@ -199,7 +199,7 @@ pub fn predict(
     let image_errors = errors.clone();
     let at_points = |chosen: &[usize]| {
         let (poses, errors): (Vec<Pose>, Vec<Vector3<f64>>) =
-            chosen.iter().map(|&row| (poses[row].clone(), image_errors[row])).unzip();
+            chosen.iter().map(|&row| (poses[row], image_errors[row])).unzip();
         model.lengths_at_points(&poses, &errors, &x)
     };
     let is_behind = |&row: &usize| {

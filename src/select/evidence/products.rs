@@ -51,10 +51,13 @@ pub(super) struct CachedProducts {
     /// Columns of members and their products.
     columns: ColumnProducts,
     /// Gains of hypotheses when added to a set, by set.
-    gains: Mutex<BTreeMap<SizedSet, BTreeMap<usize, (f64, f64)>>>,
+    gains: Mutex<BTreeMap<SizedSet, Gains>>,
     /// Converged sizes and log posterior of sets.
     settled: Cache<SizedSet, (Vec<f64>, f64)>,
 }
+
+/// Gain in ln p(r) of each hypothesis, by its index, with its most probable size.
+type Gains = BTreeMap<usize, (f64, f64)>;
 
 /// Key of a set: its members with the bit patterns of their sizes, in order.
 type SizedSet = Vec<(usize, u64)>;

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::quantities::Quantities;
 use super::refinement::Refiner;
 use super::site::{BEAM_VARIANCE, Noise, Span, Weighted, WhitenedSite};
-use super::terms::{Chunk, Product, Terms};
+use super::terms::{Chunk, Product, Sum, Terms, ln_prior};
 
 /// Maximum number of terms of a sum.
 const MAX_TERMS: usize = 3;
@@ -27,9 +27,6 @@ const MAX_LN_LOSS_OF_TERM: f64 = 1.0;
 /// Smallest difference between the predictions of two sums that are both kept, in units of the
 /// noise.
 const MIN_BEAM_DIFFERENCE: f64 = 0.7;
-
-/// Sum of products of factors: the terms of a formula.
-pub type Sum = Vec<Product>;
 
 /// Scores of a sum.
 #[derive(Debug, Clone, Copy)]
@@ -67,15 +64,6 @@ pub struct Beam<'a> {
     noise: &'a Noise,
     /// Sum of squares that one free value per pose would explain.
     explainable: f64,
-}
-
-/// Returns ln of the prior probability of a sum. Each further term halves it; the order of terms
-/// does not count.
-pub fn ln_prior(terms: &Terms, sum: &Sum) -> f64 {
-    let count = sum.len().max(1);
-    let orderings: f64 = (1..=count).map(|k| k as f64).product();
-    let of_terms: f64 = sum.iter().map(|term| terms.ln_prior(term)).sum();
-    of_terms + (count - 1) as f64 * 0.5_f64.ln() + orderings.ln()
 }
 
 impl<'a> Beam<'a> {

@@ -2,12 +2,12 @@
 
 use nalgebra::DVector;
 
-use super::beam::{Beam, Sum};
+use super::beam::Beam;
 use super::dictionary::{factors, factors_elsewhere};
 use super::quantities::Quantities;
 use super::refinement::{Refined, Refiner};
 use super::site::{Noise, Weighted, WhitenedSite};
-use super::terms::Terms;
+use super::terms::{Sum, Terms};
 use super::written::{Written, written};
 
 /// Log odds to the best sum beyond which sums are dropped.

@@ -2,10 +2,9 @@
 
 use nalgebra::DVector;
 
-use super::beam::{Sum, ln_prior};
 use super::quantities::Quantities;
 use super::site::{Noise, Span, Weighted, WhitenedSite};
-use super::terms::{Terms, product};
+use super::terms::{Sum, Terms, ln_prior, product};
 
 /// Number of trial values of an inner parameter on either side of its value, within one step.
 const TRIAL_VALUES: i32 = 8;

@@ -24,6 +24,18 @@ const MAX_EXTENDED: usize = 40;
 /// Product of factors, given by their indices in ascending order.
 pub type Product = Vec<u16>;
 
+/// Sum of products of factors: the terms of a formula.
+pub type Sum = Vec<Product>;
+
+/// Returns ln of the prior probability of a sum. Each further term halves it; the order of terms
+/// does not count.
+pub fn ln_prior(terms: &Terms, sum: &Sum) -> f64 {
+    let count = sum.len().max(1);
+    let orderings: f64 = (1..=count).map(|k| k as f64).product();
+    let of_terms: f64 = sum.iter().map(|term| terms.ln_prior(term)).sum();
+    of_terms + (count - 1) as f64 * 0.5_f64.ln() + orderings.ln()
+}
+
 /// Group of terms that have the same number of columns, with the columns.
 pub struct Chunk {
     /// Number of columns of each term.

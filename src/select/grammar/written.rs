@@ -1,8 +1,8 @@
 //! Sums as formulas of a law.
 
-use super::beam::Sum;
 use super::factor::Form;
 use super::quantities::Quantities;
+use super::terms::Sum;
 use super::terms::Terms;
 use crate::laws::LawParameter;
 

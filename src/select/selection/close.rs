@@ -118,14 +118,16 @@ pub fn close_by(
     };
     let (fitted, evidence) = kept(&declared, (fitted, evidence), &data, &unstoppable)?;
     let mut conclusion = concluded(&state, &declared, (fitted, evidence), interrupted);
-    // Effects none of which is sure are used only if they predict poses that were left out better by
-    // more than the standard error of that gain.
-    let is_sure = |found: &Found| found.status == Status::Found;
-    if !conclusion.effects.is_empty()
-        && !conclusion.effects.iter().any(is_sure)
-        && !LeftOutGain::new(&conclusion.fitted, &declared, &data)
-            .is_some_and(|gain| gain.exceeds_standard_error())
-    {
+    // Effects none of which is sure are used only if they predict poses that were left out better: by
+    // more than the standard error of that gain, or beyond chance if none is even probable.
+    let best = conclusion.effects.iter().map(|found| found.status).min();
+    let gain = || LeftOutGain::new(&conclusion.fitted, &declared, &data);
+    let is_used = match best {
+        None | Some(Status::Found) => true,
+        Some(Status::Probable) => gain().is_some_and(|gain| gain.exceeds_standard_error()),
+        Some(_) => gain().is_some_and(|gain| gain.is_significant()),
+    };
+    if !is_used {
         conclusion = concluded(&state, &declared, (declared.clone(), None), interrupted);
     }
     let Conclusion { fitted, evidence, residual_tests, effects, mut unexplained } = conclusion;
