@@ -22,7 +22,7 @@ const MAX_CLASSES: usize = 8;
 /// are the same.
 const MAX_CELL_DIFFERENCE: f64 = 0.5;
 /// Largest difference between the predictions of two sums of one class, in units of the noise.
-const MAX_CLASS_DIFFERENCE: f64 = 1.0;
+const MAX_CLASS_DIFFERENCE: f64 = 2.0;
 
 /// Formula proposed for a class of sums with nearly equal predictions.
 #[derive(Debug, Clone)]
