@@ -43,13 +43,13 @@ def test_loop_trace_check_plan(lunar: flexcal.Problem, closed: flexcal.ClosedLoo
     plan = lunar.plan(12, criterion="D", truth=truth, seed=3)
     assert plan.to_json() == (out / "plan.json").read_text()
     assert len(plan.poses) == 12 and plan.poses.equals(exact(out / "plan.csv"))
+    run, out = command("plan", LUNAR, "--poses", 5, "--candidates", out / "plan.csv", "--data", LUNAR / "measurements.csv")
+    again = lunar.plan(5, LUNAR / "measurements.csv", candidates=plan.poses)
+    assert again.to_json() == (out / "plan.json").read_text()
     inside = ("--workspace-mm=0,4000,-4000,4000,-500,3000", "--keep-out-mm", "0,0,1,-200")
     run, out = command("plan", LUNAR, "--truth", truth, "--poses", 4, *inside)
     near = lunar.plan(4, truth=truth, workspace_mm=[0, 4000, -4000, 4000, -500, 3000], keep_out_mm=[[0, 0, 1, -200]])
     assert near.to_json() == (out / "plan.json").read_text()
-    run, out = command("plan", LUNAR, "--poses", 5, "--candidates", out / "plan.csv", "--data", LUNAR / "measurements.csv")
-    again = lunar.plan(5, LUNAR / "measurements.csv", candidates=plan.poses)
-    assert again.to_json() == (out / "plan.json").read_text()
 
 
 AROUND = """
