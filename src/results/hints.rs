@@ -66,7 +66,7 @@ pub(super) fn resembled(effect: &Effect) -> Option<String> {
 /// Returns a formula with `#` for the number of `joint`, `*` for those of other joints, and without
 /// the time of a step.
 fn pattern(formula: &str, joint: Option<usize>) -> String {
-    let own = joint.map(|joint| joint.to_string());
+    let of_law = joint.map(|joint| joint.to_string());
     let mut out = String::new();
     let mut letters: Vec<char> = formula.chars().collect();
     letters.push(' ');
@@ -80,7 +80,7 @@ fn pattern(formula: &str, joint: Option<usize>) -> String {
         let number = &word[name.len()..];
         if matches!(name, "q" | "M" | "approach") && !number.is_empty() {
             out += name;
-            out.push(if own.as_deref() == Some(number) { '#' } else { '*' });
+            out.push(if of_law.as_deref() == Some(number) { '#' } else { '*' });
         } else {
             out += &word;
         }

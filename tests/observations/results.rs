@@ -85,6 +85,21 @@ impl Residuals {
 }
 
 #[test]
+fn predicted_image_rows_have_their_errors_in_mm_at_the_points() {
+    let folder = Folder::new();
+    for name in ["problem.toml", "data.csv"] {
+        folder.copy(&format!("tests/observations/camera/{name}"), name);
+    }
+    folder.flexcal("identify . --out fit --quiet").success();
+    folder.flexcal("predict . --estimate fit/estimate.json --out there --quiet").success();
+    let (fitted, errors) = (folder.json("fit/estimate.json"), folder.json("there/errors.json"));
+    let mean = |of: &Value| of["mean_mm"]["norm"].as_f64().unwrap();
+    let [low, high] = ["identification", "held_out"].map(|part| mean(&fitted[part]));
+    let all = mean(&errors["all"]);
+    assert!(low.min(high) <= all && all <= low.max(high), "{low} {all} {high}");
+}
+
+#[test]
 fn error_summaries_are_of_the_rows_own_residuals_and_say_their_kind() {
     let mixed = ["position", "point", "distance", "surface", "tilt"];
     for (measured, kinds) in [

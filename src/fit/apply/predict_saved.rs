@@ -1,5 +1,7 @@
 //! Predictions of a saved estimate for any rows, without another fit of the arm.
 
+use std::collections::BTreeMap;
+
 use nalgebra::{DVector, Vector3};
 
 use crate::error::{InputError, InputErrorKind};
@@ -102,11 +104,14 @@ impl ErrorsBySession {
         at_points: impl Fn(&[usize]) -> Vec<Vector3<f64>>,
     ) -> Self {
         let kinds = rows.kinds();
-        let of = |chosen: &[usize], errors: &[Vector3<f64>]| {
-            let first = chosen.iter().map(|&row| rows.observation(row)).min().unwrap_or_default();
-            let summary = of_kind(rows, chosen.iter().copied(), errors, first);
+        let summary = |chosen: &[usize], errors: &[Vector3<f64>], kind: Observation| {
+            let summary = of_kind(rows, chosen.iter().copied(), errors, kind);
             let is_image = summary.unit() == Unit::Pixel;
             if is_image { summary.with_lengths(&at_points(chosen)) } else { summary }
+        };
+        let of = |chosen: &[usize], errors: &[Vector3<f64>]| {
+            let first = chosen.iter().map(|&row| rows.observation(row)).min().unwrap_or_default();
+            summary(chosen, errors, first)
         };
         let session = |(label, name): (usize, &String)| {
             let of_session = (0..rows.len()).filter(|&row| rows.session.of_row[row] == label);
@@ -116,10 +121,8 @@ impl ErrorsBySession {
         };
         let sessions = rows.session.names.iter().enumerate().filter_map(session).collect();
         let all: Vec<usize> = (0..rows.len()).collect();
-        let each = kinds
-            .iter()
-            .filter(|_| kinds.len() > 1)
-            .map(|&kind| of_kind(rows, 0..rows.len(), errors, kind));
+        let each =
+            kinds.iter().filter(|_| kinds.len() > 1).map(|&kind| summary(&all, errors, kind));
         Self { all: of(&all, errors), kinds: each.collect(), sessions }
     }
 }
@@ -195,16 +198,22 @@ pub fn predict(
     let targets = model.predicted_targets_in_base(&poses, x.as_slice());
     let base_of: Vec<usize> = poses.iter().map(|pose| pose.base).collect();
     let spreads = spreads(&model, &problem.fixtures, &poses, &x);
-    let errors = model.residuals(poses.clone(), &x);
-    let image_errors = errors.clone();
+    let is_of_camera = |row: usize| rows.observation(row).description().needs == Needs::Carriers;
+    let images: Vec<(usize, Pose)> =
+        all.iter().filter(|row| is_of_camera(**row)).map(|&row| (row, poses[row])).collect();
+    let errors = model.residuals(poses, &x);
+    let images: BTreeMap<usize, (Pose, Vector3<f64>)> =
+        images.into_iter().map(|(row, pose)| (row, (pose, errors[row]))).collect();
     let at_points = |chosen: &[usize]| {
         let (poses, errors): (Vec<Pose>, Vec<Vector3<f64>>) =
-            chosen.iter().map(|&row| (poses[row], image_errors[row])).unzip();
+            chosen.iter().filter_map(|row| images.get(row)).copied().unzip();
         model.lengths_at_points(&poses, &errors, &x)
     };
     let is_behind = |&row: &usize| {
-        let is_of_camera = rows.observation(row).description().needs == Needs::Carriers;
-        is_of_camera && rows.position_measured && targets[row].is_some() && errors[row].x.is_nan()
+        is_of_camera(row)
+            && rows.position_measured
+            && targets[row].is_some()
+            && errors[row].x.is_nan()
     };
     if let Some(row) = (0..rows.len()).find(is_behind) {
         return Err(rows.location(row).error(InputErrorKind::PointBehindCamera).into());
