@@ -11,6 +11,7 @@ mod checks;
 mod command;
 mod custom_effect;
 mod evidence;
+mod evidence_laws;
 mod harmonics;
 mod limits;
 mod screening;
