@@ -97,7 +97,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let fitted = (&estimate, correction.as_ref().ok().and_then(Option::as_ref));
     let found =
         Compensation::new(&problem, fitted, targets, arguments.frame.into(), arguments.level)?;
-    // After the errors of the estimate, which say more.
+    // An error of the correction is reported only after the errors of the estimate, which explain
+    // more.
     correction?;
     if found.is_base_open && !common.quiet {
         diagnostic::warn(

@@ -165,7 +165,8 @@ mod tests {
         for (k, cost) in [2.11, 1.11, 1.01, 1.001].into_iter().enumerate() {
             course.take(&step(k as u64 + 1, cost), 2.0 * k as f64);
         }
-        // From a gain of 9e-3 to 1e-11 in steps of 2 s, each of which gains 0.09 of the one before.
+        // The gain falls from 9e-3 to 1e-11. A step takes 2 s and gains 0.09 of what the step
+        // before gained.
         assert!(
             course.to_string().ends_with(
                 "step 4, half the sum of squares 1.001000e0, about 17 s left of the fit"

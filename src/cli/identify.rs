@@ -121,7 +121,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
                 sources => Ok((sources.map_err(PriorError::from)?, found)),
             }
         })?;
-    // The uncertainty of predictions would count the new rows alone.
+    // With an earlier estimate as prior, no uncertainty of predictions is computed: it would count
+    // the new rows alone.
     let fitted = if prior.is_some() {
         None
     } else if arguments.remainder {

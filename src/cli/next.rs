@@ -139,7 +139,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         if next.poses.is_empty() {
             return format!("{text}{written}Next: flexcal identify {named}\n");
         }
-        // Poses cannot replace what the model lacks.
+        // More poses cannot correct a model that lacks an effect.
         let lacks = if next.error.is_some() && next.misfit > next.noise {
             format!("flexcal loop {named} looks for what the model lacks, because the misfit exceeds the noise; or ")
         } else {

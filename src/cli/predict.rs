@@ -122,7 +122,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     Ok(Outcome::trusted(trusted))
 }
 
-/// Returns true if fewer rows lie within their bounds than their probability explains.
+/// Returns true if the share of rows within their bounds is below the level of the bounds by more
+/// than chance explains.
 fn is_beyond(residuals: &[Residual], bounds: Option<&Bounds>) -> bool {
     let Some(bounds) = bounds.filter(|_| !residuals.is_empty()) else { return false };
     let share = bounds.coverage(residuals.iter().map(|row| row.position.norm()));

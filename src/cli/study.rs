@@ -151,7 +151,7 @@ fn work(common: &Common, shard: Option<Shard>) -> Result<Outcome, Box<dyn Error>
     let study = match Request::read(&common.study)? {
         Request::Fits(study) => *study,
         Request::Misprints(study) if shard.is_none() => return misprints(common, &study),
-        // Reading it as a study with shares names the mistake.
+        // The reader of studies of fits reports why this file cannot be divided into shards.
         Request::Misprints(_) => Study::read(&common.study)?,
     };
     if study.problem.data.fits_orientation && !common.flags.quiet {

@@ -20,7 +20,7 @@ use super::urdf::UrdfErrorKind;
 #[non_exhaustive]
 #[expect(missing_docs, reason = "the message of each variant says what it stands for")]
 pub enum InputErrorKind {
-    // Errors of files.
+    // The following errors concern files.
     #[error("no such file; give a problem.toml or the folder that holds one")]
     ProblemMissing,
     #[error(
@@ -52,7 +52,7 @@ pub enum InputErrorKind {
     #[error("not valid TOML: {message}{}", near(near_text))]
     Syntax { message: String, near_text: String },
 
-    // Errors of keys.
+    // The following errors concern keys.
     #[error("unknown key{}; known here: {}", meant(key, known), known.join(", "))]
     UnknownKey { key: String, known: Vec<String> },
     #[error("missing; write {write}{}", instead("", near.as_deref()))]
@@ -68,7 +68,7 @@ pub enum InputErrorKind {
     #[error("\"{word}\" is none of {}", known.join(", "))]
     UnknownWord { word: String, known: &'static [&'static str] },
 
-    // Errors of values.
+    // The following errors concern values.
     #[error("{value} is not a finite number")]
     NotFinite { value: String },
     #[error("{value} is larger than 1e150, the largest number that flexcal accepts")]
@@ -99,7 +99,7 @@ pub enum InputErrorKind {
     #[error("empty; write at least one character")]
     Empty,
 
-    // Errors of the arm.
+    // The following errors concern the arm.
     #[error(
         "\"{name}\" cannot name a folder; leave out / \\ : * ? \" < > | and spaces or dots at \
          either end"
@@ -151,7 +151,7 @@ pub enum InputErrorKind {
     #[error("another beam is called \"{name}\"; choose another name")]
     RepeatedBeamName { name: String },
 
-    // Errors of points, anchors, surfaces and targets.
+    // The following errors concern points, anchors, surfaces and targets.
     #[error(
         "\"{name}\" cannot name {what}, because parameter names contain it; leave out . * [ ] \
          and spaces"
@@ -203,7 +203,7 @@ pub enum InputErrorKind {
     #[error("rows of several kinds need their standard deviations; write {write} in [data]")]
     NoSigmaOfKind { write: String },
 
-    // Errors of effects.
+    // The following errors concern effects.
     #[error("an effect is one key, as in `gear-ratio = {{ joint = 2 }}`; found {found}")]
     NotOneEffect { found: usize },
     #[error("needs arguments; write {write}")]
@@ -300,7 +300,7 @@ pub enum InputErrorKind {
     #[error("the measurements contain no information about this effect; they need {write}")]
     NeedsColumn { write: &'static str },
 
-    // Errors of rules in [parameters].
+    // The following errors concern rules in [parameters].
     #[error("a name with dots needs quotes: \"{name}\" = {{ … }}")]
     UnquotedName { name: String },
     #[error("the rule is empty; write free = true, fixed = true, or a sigma, min or max")]
@@ -327,7 +327,7 @@ pub enum InputErrorKind {
     #[error("{suffixes} does not apply to any parameter that the pattern matches; leave it out")]
     QuantityUseless { suffixes: &'static str },
 
-    // Errors of constraints.
+    // The following errors concern constraints.
     #[error("a constraint may contain only angles, lengths, stiffnesses and rigidities")]
     NotConstrainable,
     #[error(
@@ -364,7 +364,7 @@ pub enum InputErrorKind {
     )]
     NoEquilibrium,
 
-    // Errors in the truth of a simulation.
+    // The following errors concern the truth of a simulation.
     #[error(
         "a range has two numbers, the lower one first; for a fixed value write [{value}, {value}]"
     )]
@@ -390,7 +390,7 @@ pub enum InputErrorKind {
     #[error(transparent)]
     Urdf(#[from] UrdfErrorKind),
 
-    // Errors of held-out rows.
+    // The following errors concern held-out rows.
     #[error(
         "give one of column, fraction (with seed) or session, or held_out = \"none\" to fit all rows"
     )]

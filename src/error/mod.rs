@@ -25,7 +25,7 @@ pub(crate) use table::TableErrorKind;
 pub(crate) use urdf::UrdfErrorKind;
 #[doc(hidden)]
 pub use warning::WarningKind;
-// Public for the tests, the benches and the Python module only.
+// These items are public for the tests, the benches and the Python module only.
 #[doc(hidden)]
 pub use self::{
     causes::{message_with_causes, mistake},

@@ -62,7 +62,7 @@ pub fn standard_dh(problem: &Problem, arm: &Arm<f64>) -> Result<String, ExportEr
     let mut far = 0.0_f64;
     for (k, ((_, link), joint)) in links.iter().zip(moving).enumerate() {
         let link = before.compose(link);
-        // Behind the last axis all is tool.
+        // All transforms after the last axis belong to the tool.
         let ([theta, d, a, alpha], after) =
             if k < last { standard(&link) } else { ([0.0; 4], link) };
         far = far.max(d.abs());

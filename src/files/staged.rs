@@ -72,7 +72,7 @@ impl Storage {
         #[cfg(target_os = "linux")]
         {
             use rustix::fs::{Mode, OFlags, open};
-            // Usual mode of a new file; the system applies its umask.
+            // This is the usual mode of a new file; the system applies its umask.
             let mode = Mode::from_raw_mode(0o666);
             // A nameless file is linked through /proc.
             if let (Ok(file), true) = (

@@ -93,7 +93,7 @@ pub fn identify_model(
 ) -> Result<Identification, IdentifyError> {
     let Dataset { measurements, split } = data;
     let mut found = fit_rows(model, problem, (measurements, split), options)?;
-    // A robust loss sets such rows aside anyway.
+    // A robust loss already limits the influence of such rows.
     if options.influential_rows && !options.provisional && problem.robust.is_none() {
         let values =
             found.estimates.iter().map(|estimate| (estimate.name.clone(), estimate.estimate));
@@ -185,13 +185,14 @@ fn fit_rows(
         prepared(&mut fitting, options.warm_start.as_deref(), has_declared_noise)?;
     let begin = options.begin(model, &start);
     let enough = PoseSufficiency::new(&fitting, problem, &unknowns, &start);
-    // Few new rows cannot tell a larger noise from a change since the earlier data.
+    // A few new rows cannot distinguish a larger noise from a change since the earlier data.
     let judged = options.earlier.is_none() && enough.judges_noise(unknowns.len());
     let (mut end, statistics, noise) = fitted(&mut fitting, &begin, (has_declared_noise, judged))?;
     let errors = fitting.position_errors(&split.identification, &end.x);
     let outliers = outliers(&statistics.lengths, &split.identification, &errors, measurements);
     let asked = !options.provisional;
-    // Before fits of other rows: the first linearisation of this fit is still remembered.
+    // The triangle is computed before other rows are fitted, while the cache still holds the first
+    // linearisation of this fit.
     let whitened_triangle =
         if asked { fitting.whole().data_triangle(&start) } else { DMatrix::zeros(0, 0) };
     let (estimates, covariance, not_converged) = estimated(&fitting, &mut end, &statistics, noise)?;

@@ -69,7 +69,7 @@ pub use uncertainty::noise::Noise;
 pub use uncertainty::prior_sizes::PriorSize;
 pub(crate) use uncertainty::residual_lengths::TypicalScatter;
 pub use uncertainty::shadow_price::ShadowPrice;
-// Public for the tests, the benches and the Python module only.
+// These items are public for the tests, the benches and the Python module only.
 #[doc(hidden)]
 pub use self::{
     apply::compensate::{seen_from_base, seen_in_base, waypoints},

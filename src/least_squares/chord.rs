@@ -155,8 +155,8 @@ impl Base {
         if let Some(projector) = self.projector.get() {
             return projector.as_ref();
         }
-        // Formed outside of `get_or_init`: its products run on several threads, which must not
-        // wait for the cell.
+        // The projector is formed before `get_or_init`: its products run on several threads, which
+        // must not wait for the cell.
         let new = Projector::new(&self.triangle);
         self.projector.get_or_init(|| new).as_ref()
     }

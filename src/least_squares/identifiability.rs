@@ -269,7 +269,7 @@ mod tests {
 
     #[test]
     fn duplicated_and_dead_columns_are_named() {
-        // Columns: a, b, a, 0, a + b
+        // The columns are a, b, a, 0 and a + b.
         let base = DMatrix::from_row_slice(4, 2, &[1.0, 0.2, 0.5, -1.0, 0.0, 2.0, 3.0, 1.0]);
         let (a, b) = (base.column(0), base.column(1));
         let jacobian = DMatrix::from_columns(&[
@@ -294,7 +294,7 @@ mod tests {
             |combination| combination.singular_value < 1e-12 && combination.weights[0].1 > 0.0
         ));
         assert!(found.visible[3] == 0.0 && found.visible[1] > 0.0);
-        // Orthonormal in scaled unknowns, and seen by no row there.
+        // The combinations are orthonormal in scaled unknowns, and they change no row.
         let norms: Vec<f64> = triangle
             .column_iter()
             .map(|c| c.norm())
@@ -306,7 +306,7 @@ mod tests {
         let rows = unscaled(&found.gauge);
         assert!((&rows * rows.transpose() - DMatrix::identity(3, 3)).amax() < 1e-12);
         assert!((unscaled(&triangle) * rows.transpose()).amax() < 1e-12);
-        // Without singular values the same space.
+        // The tests without singular values find the same space.
         let blind = Blind::in_triangle(&triangle);
         assert!(certain_null(&Scaled::of(&triangle).matrix).is_some());
         let recovered = unscaled(&blind.gauge);

@@ -57,7 +57,7 @@ impl Loss {
             Self::Squares => s * s,
             Self::Huber { threshold } if s <= threshold => s * s,
             Self::Huber { threshold } => threshold * (2.0 * s - threshold),
-            // c s²/(√(s² + ε²) + ε), free of cancellation and of overflow.
+            // This form c s²/(√(s² + ε²) + ε) neither cancels nor overflows.
             Self::L1 { slope, smoothing } => {
                 2.0 * slope * s * (s / (s.hypot(smoothing) + smoothing))
             }
@@ -156,7 +156,7 @@ impl Loss {
         };
         let influence = sum(&|s, _| (self.weight(s) * s).powi(2)) / freedom;
         let weight = sum(&|s, count| count * self.weight(s)) / directions;
-        // The curvature is that of the loss along the residual, and the weight ρ′ across it.
+        // Along the residual, the curvature is that of the loss; across it, it is the weight ρ′.
         let curvature =
             sum(&|s, count| (count - 1.0) * self.weight(s) + self.curvature(s)) / directions;
         influence * weight / (curvature * curvature)

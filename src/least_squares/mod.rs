@@ -33,7 +33,7 @@ pub(crate) use uncertainty::Uncertainty;
 pub(crate) use variance::VarianceLikelihood;
 pub(crate) use weak::{StabilisedObjective, WEAK_THRESHOLD, Weak};
 pub(crate) use whole::jacobian_and_residual;
-// Public for the tests, the benches and the Python module only.
+// These items are public for the tests, the benches and the Python module only.
 #[doc(hidden)]
 pub use self::{
     derivative::check_jacobian,

@@ -322,7 +322,7 @@ impl<P: LeastSquares> Objective for Fit<'_, P> {
     }
 
     fn acceleration_gradient(&self, x: &DVector<f64>, step: &DVector<f64>) -> Option<DVector<f64>> {
-        // In a provisional fit one more step costs less than an acceleration.
+        // In a provisional fit, one more step costs less than the acceleration of this one.
         if self.cache.is_some_and(|(cache, ..)| cache.is_provisional()) && self.keeps_derivatives()
         {
             return None;
@@ -475,7 +475,7 @@ mod tests {
                     < 1e-6 * gradient.norm()
             );
             assert!((2.0 * predicted.cost / residual.norm_squared() - 1.0).abs() < 1e-12);
-            // The two exchangeable unknowns do not diverge against each other.
+            // The two exchangeable unknowns do not grow with opposite signs.
             assert!(predicted.projected.norm_squared() < residual.norm_squared());
         }
         assert!(base.at(&curve, &(&start * 3.0), 0.1).is_none());

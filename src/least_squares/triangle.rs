@@ -455,7 +455,8 @@ mod tests {
     #[test]
     fn a_factor_does_not_depend_on_the_order_of_the_rows() {
         for n in [6, 130, 400] {
-            // Rows of a factor, rows of priors below it, a row of zeros, and a full row.
+            // The matrix has rows of a factor, rows of priors below them, a row of zeros and a full
+            // row.
             let entry = |i: usize, j: usize| match i {
                 i if i < n => f64::from(u8::from(i <= j)) * wave(i + 31 * j),
                 i if i < 2 * n => f64::from(u8::from(i - n == j)),

@@ -93,7 +93,7 @@ impl VarianceLikelihood {
             let free_rows = free_rows - k as f64;
             return Self { directions: Vec::new(), residual_squares, free_rows };
         }
-        // Left singular vectors are the right ones of the transpose.
+        // The left singular vectors are the right singular vectors of the transpose.
         let SingularValues { values, right } = SingularValues::of(&prior_block.transpose());
         let along = right.tr_mul(&y);
         let mut directions: Vec<(f64, f64)> =

@@ -44,7 +44,7 @@ impl Weak {
         if sized.is_empty() {
             return None;
         }
-        // ‖R₃⁻¹‖ of the scaled unknowns, from the rows of R⁻¹.
+        // The norm ‖R₃⁻¹‖ in scaled unknowns follows from the rows of R⁻¹.
         let inverse = inverse_rows(triangle, sized.iter().map(|&(j, size)| (j, size.recip())));
         if inverse.is_some_and(|squares| squares.sqrt() * WEAK_THRESHOLD < 1.0) {
             return None;

@@ -86,7 +86,7 @@ impl Columns {
                     return Err(declared.unwrap_or_else(location).error(kind));
                 }
                 (_, Some(index)) => Ok(Meaning::Read(Role::Covariate(index), identity)),
-                // Another program may use our name for a different quantity.
+                // In a table of another program, a name of flexcal may mean a different quantity.
                 (Err(_), _) if foreign => Ok(Meaning::Unknown),
                 (Ok(Meaning::Read(role, _)), _) if foreign && found.contains_key(&role) => {
                     hidden = hidden.or_else(|| Some((found.get(&role)?.1?, name)));
@@ -105,7 +105,8 @@ impl Columns {
                     columns.read.push(Column { role, place, to_si });
                 }
                 Meaning::Ignored(_) | Meaning::Unknown if is_marked => {}
-                // If another name is misspelt, numbers count the joints differently.
+                // If the name of another joint column is misspelt, the numbers of the columns are
+                // assigned to other joints.
                 Meaning::Ignored(WarningKind::JointIgnored { .. }) if rule.is_some() => {
                     let meant = numbering.meant(name, &present, problem);
                     shifted = shifted

@@ -55,8 +55,8 @@ pub(super) fn of_row(
     };
     for kind in others() {
         let cells = cells_of(kind);
-        // Kinds may share a column: the kind with more filled cells takes it. The number of a
-        // point alone makes no observation.
+        // Kinds of rows may share a column. The kind with more filled cells takes it. The number of
+        // a point alone is no observation.
         let is_taken = |other: &Kind| {
             cells.iter().all(|cell| other.field(cell.field.name).is_some())
                 && cells_of(other).len() > cells.len()

@@ -188,7 +188,7 @@ mod tests {
             (in_order.past(2).times, in_order.past(4).temperatures),
             (past.times, [23.0].as_slice())
         );
-        // The conditions of a row have the same past and can own it.
+        // An owned copy of a row's conditions keeps the same past.
         let setup = table.setup(0, &table.session_starts());
         assert_eq!((setup.past.read(), setup.past.place()), (past, Some(0)));
         assert_eq!(setup.to_owned().view().past.read(), past);

@@ -149,7 +149,7 @@ impl<'a> Tables<'a> {
                 .as_ref()
                 .is_some_and(|missing| is_missing(missing, &table, &columns));
             if !is_complete {
-                // The log lists the row.
+                // The warnings of the joint table list rows without a partner.
             } else if missing && !columns.observes_at(&table) {
                 left_out.count(&table);
             } else if let Some(name) = columns.nest(&table) {

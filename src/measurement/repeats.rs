@@ -132,7 +132,7 @@ struct Column {
 /// Candidates are found by weighted sums Σ wⱼ vⱼ/stepⱼ in bins of width Σ wⱼ: rows that agree lie
 /// in the same or neighbouring bins.
 fn group_rows(columns: &[Column], order: &[usize]) -> (Vec<usize>, usize) {
-    // Irrational ratios of the weights let different rows rarely share a bin.
+    // With weights in irrational ratios, different rows rarely share a bin.
     let weights: Vec<f64> =
         (1..=columns.len()).map(|j| 0.5 + (j as f64 * 0.618_033_988_749_895).fract()).collect();
     let width: f64 = weights.iter().sum();

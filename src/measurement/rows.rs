@@ -254,7 +254,8 @@ impl RowsBuilder {
                 Role::Covariate(_) => measurements.covariates.push(number()?),
                 Role::Split => _ = is_validation(table, column.place)?,
                 Role::Session => self.session.push(table.name(column.place)?),
-                // Rows without a target may leave it out; a named one has been checked.
+                // A row may lack a target if its kind needs none. The name of a target was checked
+                // before.
                 Role::Target if self.names_targets && kind.needs != Needs::Target => {
                     self.target.push(table.text(column.place)?);
                 }

@@ -256,7 +256,8 @@ impl<S: Scalar> Arm<S> {
             let motion = setup.motion(i);
             joint.displace(&mut walk.frame, motion, SIDES[0]);
             if joint.motion.is_some() {
-                // The axis moves with it: it belongs to the next part.
+                // The motion before the joint also moves its axis, so the axis belongs to the next
+                // segment.
                 walk.cut(Segment::Joint(i), 0, &mut ws.events, &mut ws.cuts);
             }
             let (mut twist, mut play_offset) = (None, None);

@@ -16,7 +16,8 @@ impl LinearisedArm {
         let mut cuts = ws.cuts.iter();
         let mut root = Frame::identity();
         let mut forks = Vec::new();
-        // Loads since the last other event: those of an element, if its end comes next.
+        // Number of loads since the last event of another kind. If the end of a beam element is
+        // next, they are its loads.
         let mut element_loads = 0;
         for (index, event) in ws.events.iter().enumerate() {
             if index == ws.passed {

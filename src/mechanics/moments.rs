@@ -24,7 +24,8 @@ impl AxisMoments<f64> {
         let mut arm = Arm::nominal(problem);
         (arm.mounting, arm.rope, arm.mixing) = (None, None, None);
         for joint in &mut arm.joints {
-            // A joint that gives way by nothing: the moment about its axis is summed.
+            // With a flexibility of 0 the joint stays rigid, but the pass sums the moment about its
+            // axis.
             joint.flexibility = Some(0.0);
             (joint.nonlinear, joint.lateral, joint.slide) = (None, None, None);
         }
@@ -52,7 +53,7 @@ impl<S: Scalar> AxisMoments<S> {
         arm.gather_forces(setup, &[], &mut ws);
         arm.walk(setup, Bend::Rigid, arm.last(), &mut ws);
         ws.sum_moments();
-        // A moment that is rounding has no sign.
+        // A moment within rounding errors is set to zero, because its sign is meaningless.
         let term = |event: &Event<S>| match event {
             Event::Load { at, force } => at.map(|x| x.re()).norm() * force.map(|x| x.re()).norm(),
             _ => 0.0,

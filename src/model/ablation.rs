@@ -69,7 +69,7 @@ impl Model {
             if matches!(ablation, Ablation::Rigid | Ablation::LinksOnly | Ablation::BendingOnly) {
                 (joint.flexibility, joint.lateral, joint.slide) = (None, None, None);
             }
-            // The forward pass still needs a rigid link that changes with temperature.
+            // A rigid link whose strain depends on temperature remains in the forward pass.
             if ablation == Ablation::Rigid
                 && joint.beam.as_ref().is_some_and(|beam| beam.strain.is_none())
             {

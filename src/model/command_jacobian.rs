@@ -29,7 +29,7 @@ impl Model {
         let commanded = arm.moving_joints().len();
         let arm = arm.with_mimic_joints(problem);
         let moving = arm.moving_joints();
-        // Sites beyond the coordinates to which terms add that depend on commands.
+        // Besides joint coordinates, terms that depend on commands add to these sites.
         let beyond = arm.sites_that_follow_commands();
         let probes: Vec<(ParameterSite, f64)> = beyond.iter().map(|of| (of.site, 0.0)).collect();
         let arm = arm.with_probes(&probes);

@@ -90,7 +90,7 @@ mod tests {
             .collect();
         let mut commands = CommandTerms::new(&terms, &[], &[]);
         assert!(commands.series.len() == 2 && commands.others.len() == 3);
-        // Strains that remained from the last pose would be noticed.
+        // The two poses show whether strains of one pose remain in the next.
         for configuration in [[0.3, -1.2], [0.9, 0.4]] {
             let pose = PoseView {
                 temperature: Some(&31.0),

@@ -117,7 +117,7 @@ mod tests {
                 value: -2.0 * value,
             });
         }
-        // Terms that stay: another quantity, few harmonics, sparse orders.
+        // These terms are not summed: they are few, sparse, or add to another quantity.
         let few = [(TermSite::Joint(2), 1, 3), (site, 2, 1), (site, 2, 400)];
         let few = few.map(|(site, joint, order)| CommandTerm {
             site,

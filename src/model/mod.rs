@@ -49,7 +49,7 @@ use crate::spatial::Frame;
 use command_term::CommandTerm;
 use command_terms::CommandTerms;
 use instrument::Instrument;
-// Public for the tests, the benches and the Python module only.
+// These items are public for the tests, the benches and the Python module only.
 #[doc(hidden)]
 pub use self::{ablation::Ablation, pose::Pose, pose_residuals::PoseResiduals};
 

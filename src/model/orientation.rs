@@ -42,7 +42,7 @@ pub(super) fn write(
     let ends = target.axes.map(|axis| target.position + axis);
     for (k, point) in std::iter::once(&target.position).chain(&ends).enumerate() {
         let mut rows = Rows { block: points, row: 3 * k, scale: 1.0 };
-        // The row of the position has found the equilibrium already.
+        // The equilibrium exists, because the position of the same row was predicted before.
         if arm.write(setups, base, (target.joint, point), &mut rows).is_none() {
             return;
         }

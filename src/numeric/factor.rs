@@ -128,7 +128,7 @@ mod tests {
 
     #[test]
     fn nearly_dependent_columns_are_factored_as_accurately_as_column_by_column() {
-        // Sines of close orders with a small addition to the diagonal.
+        // The columns are sines of close orders; a small number is added to the diagonal.
         let a =
             DMatrix::from_fn(400, 130, |i, j| ((1.0 + 0.05 * j as f64) * i as f64 / 400.0).sin());
         let mut matrix = a.transpose() * &a;

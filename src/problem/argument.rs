@@ -33,8 +33,8 @@ impl<'s, 'a, 'i> Reader<'s, 'a, 'i> {
     pub fn read(&mut self, key: &str, kind: ArgumentKind) -> Result<Argument, InputError> {
         let turns = |kind| kind == JointKind::Revolute;
         match kind {
-            // A link before the joint is checked when all effects are read, and so is a joint that
-            // gives way.
+            // That a link precedes the joint, or that the joint rotates under a moment, is checked
+            // after all effects are read.
             ArgumentKind::AnyJoint | ArgumentKind::LinkedJoint => self.any_joint(key),
             ArgumentKind::MovingJoint => self.moving_joint(key),
             ArgumentKind::TurningJoint | ArgumentKind::RelievedJoint => {

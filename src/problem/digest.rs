@@ -55,7 +55,8 @@ impl Problem {
                 joints += 1;
                 format!("joint {joints}")
             }
-            // The reference temperature stands behind the last effect.
+            // The last line is that of the reference temperature; in this text it follows the last
+            // effect.
             _ => line.rsplit_once('}').map_or(line, |(declared, _)| declared).to_owned(),
         };
         let short = |line: &str| hexadecimal(line).chars().take(16).collect::<String>();

@@ -108,7 +108,7 @@ pub(super) fn parse(
             },
             kind => kind,
         };
-        // Nobody wrote the text that was read.
+        // The text around the effect was generated, so only the effect itself is quoted.
         Location::file(named).with_key(text.trim()).error(kind)
     })
 }

@@ -60,7 +60,7 @@ pub(crate) use past::ThermalLag;
 pub(crate) use past::{LazyPast, Past};
 pub(crate) use remainder::RemainderDeclaration;
 pub(crate) use target::Tool;
-// Public for the tests, the benches and the Python module only.
+// These items are public for the tests, the benches and the Python module only.
 #[doc(hidden)]
 pub use self::{
     conditions::{JointOffsets, PoseConditions, PoseView},

@@ -105,7 +105,7 @@ pub fn predict_identified(
 fn shifted(rows: &Measurements, shifts: &[Vector3<f64>]) -> Measurements {
     let mut rows = rows.clone();
     let of_rows = rows.positions.iter_mut().zip(shifts);
-    // Where the arm has no equilibrium nothing is corrected.
+    // A row whose arm has no equilibrium is not corrected.
     for (position, shift) in
         of_rows.filter(|(_, shift)| shift.iter().all(|value| value.is_finite()))
     {

@@ -68,9 +68,10 @@ impl Compensation {
         let placement = Placement::of(&targets);
         let model = estimate.model(Model::new(problem, &placement.bases, &placement.targets)?);
         let x = estimate.vector(problem, &model)?;
-        // Waypoints move with the base.
+        // Waypoints are relative to the arm, so they do not depend on the pose of the base.
         let is_seen = targets.position_measured && frame == TargetFrame::Measuring;
-        // Targets as shown, and as sought in the measuring frame.
+        // The targets are kept in the frame in which they are shown, and sought in the measuring
+        // frame.
         let (targets, sought) = match (targets.position_measured, frame) {
             (false, _) => {
                 let waypoints = fit::waypoints(problem, &model, &x, &targets)?;

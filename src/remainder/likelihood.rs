@@ -189,7 +189,7 @@ impl<'a> MarginalLikelihood<'a> {
         let lower = lower_factor(matrix)?;
         let log_det_c = 2.0 * lower.diagonal().iter().map(|value| value.ln()).sum::<f64>();
         let inverse = inverse_lower(&lower);
-        // C⁻¹J S½ and H.
+        // These are C⁻¹J S½ and H.
         let whitened = product(&inverse, &self.scaled);
         let n = self.scaled.ncols();
         let outer = lower_factor(DMatrix::identity(n, n) + gram(&whitened))?;
@@ -200,7 +200,7 @@ impl<'a> MarginalLikelihood<'a> {
         inverse -= product(&reach, &reach.transpose());
         let weights = &inverse * &self.target;
         let mut value = 0.5 * (self.target.dot(&weights) + log_det_c + log_det_h);
-        // ½ tr((K⁻¹ − α αᵀ) ∂C).
+        // Half the trace is ½ tr((K⁻¹ − α αᵀ) ∂C).
         inverse.ger(-1.0, &weights, &weights, 1.0);
         let mut gradient = self.gradient(&hyper, &inverse, &pairs);
         for k in 0..self.amplitudes.len() {
@@ -315,8 +315,9 @@ impl<'a> MarginalLikelihood<'a> {
             self.each_shared(|first, second| sum += weight[(first, second)]);
             gradient[noise + 1] = hyper.shared_noise.powi(2) * sum;
         }
-        // Sums over the pairs, before the factors that all pairs share: of each site for single,
-        // joint and constant functions and single lengths, and of each input for joint lengths.
+        // Each column sums over its pairs, before factors that all pairs share. There are sums for
+        // each site (single, joint and constant functions, single lengths) and for each input
+        // (joint lengths).
         let column = |first: usize| {
             let mut out = vec![0.0; 4 * sites + width];
             let mut carried = vec![0.0; sites];

@@ -297,7 +297,7 @@ impl Training {
         let of_groups = |groups: &[&Group]| -> Vec<usize> {
             groups.iter().flat_map(|(group, _)| coordinates(group)).collect()
         };
-        // S of all small parts at once, and A for the large ones.
+        // S is computed for all small parts at once, A for the large parts.
         let width = self.whitened.ncols();
         let places: Vec<Vec<usize>> = parts.iter().map(|groups| of_groups(groups)).collect();
         let small: Vec<usize> =
@@ -383,7 +383,7 @@ impl Training {
         let Posterior { factor, weights, .. } = &self.posterior;
         let features = self.whitened.select_rows(left_out);
         let lower = lower_factor(whole - gram(&features))?;
-        // Φᵀy of the other rows.
+        // This is Φᵀy of the other rows.
         let target = self.target.select_rows(left_out);
         let projected = factor * factor.tr_mul(weights) - features.tr_mul(&target);
         let of_judged = self.whitened.select_rows(judged);

@@ -193,7 +193,7 @@ mod tests {
     fn quantiles_come_from_the_larger_list_and_survive_thinning() {
         let ramp = |n: usize, scale: f64| (1..=n).map(|k| scale * k as f64 / n as f64).collect();
         let few = Scores::new(99, ramp(99, 1.0), ramp(99, 2.0));
-        // 0.95 · 100 = 95 of 99.
+        // The rank is 0.95 · 100 = 95 among 99 scores.
         assert!((few.quantile(0.95) - 2.0 * 95.0 / 99.0).abs() < 1e-12);
         assert!((2.2..2.6).contains(&few.quantile(0.999)), "more than the largest");
         let many = Scores::new(20_000, ramp(20_000, 1.0), ramp(20_000, 0.5));

@@ -106,7 +106,8 @@ mod tests {
 
     #[test]
     fn a_valley_is_followed_into_a_corner() {
-        // Rosenbrock's valley with its minimum at (1, 1), and the same cut off at x = 0.5.
+        // The function is Rosenbrock's valley with its minimum at (1, 1), and the same with x
+        // limited to 0.5.
         let function = |x: &DVector<f64>| {
             let (a, b) = (1.0 - x[0], x[1] - x[0] * x[0]);
             let gradient = DVector::from_vec(vec![-2.0 * a - 400.0 * x[0] * b, 200.0 * b]);

@@ -87,7 +87,8 @@ impl Correction {
         if !self.has_remainder() {
             return None;
         }
-        // Named without rest: a new field must be exported too.
+        // The fields are listed without `..`, so that a new field cannot be forgotten in the
+        // export.
         let Layout { sites, inputs } = &self.layout;
         let Inputs { sites: functions, sources, angles, standard, ranges: _ } = inputs;
         let Hyperparameters {

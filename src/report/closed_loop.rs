@@ -44,7 +44,7 @@ pub fn loop_brief(
     let result = &LoopResult::new(problem, closure);
     let text = |blocks: &[Block]| text_within(blocks, columns);
     let mut blocks = head(problem, closure, result);
-    // The held-out rows, without their empty column of χ².
+    // The summary shows the held-out rows without their column of χ², which is empty.
     let mut table = errors(closure, result);
     table.rows.truncate(table.rows.len() / 2);
     table.header.pop();
@@ -167,7 +167,7 @@ pub fn loop_text(problem: &Problem, closure: &ClosedLoop) -> String {
     if result.unexplained.is_some() || (!failed.is_empty() && !result.effects.is_empty()) {
         blocks.push(Block::heading("What remains"));
         let unexplained = unexplained(problem, closure, result).into_iter();
-        // Without effects the tests are those above.
+        // Without found effects, the failed tests are already listed above.
         let failed = failed.into_iter().filter(|_| !result.effects.is_empty());
         blocks.push(Block::list(unexplained.chain(failed)));
     }

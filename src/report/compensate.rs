@@ -26,7 +26,8 @@ pub fn commands_text(
     );
     if let (Some(before), Some(after)) = (result.mean_miss_before_mm, result.mean_miss_mm) {
         let before = number(before, 4);
-        // With bounds the expected error is stated, not what the solver leaves.
+        // If bounds are known, the text states the expected error instead of the distance that the
+        // solver leaves.
         let _ = match bounds {
             Some(_) => write!(
                 words,

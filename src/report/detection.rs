@@ -76,7 +76,7 @@ fn hardest(shown: &[&Detectable], family: &str) -> Vec<Vec<String>> {
     members.sort_by(|a, b| b.1.total_cmp(&a.1));
     let mut places: Vec<String> = Vec::new();
     let rows = members.iter().filter(|(effect, _)| {
-        // Times of a shift are not places.
+        // Effects that differ only in a searched argument, such as a time, act at one place.
         let place = effect.effect.name_and_place();
         let new = !places.contains(&place);
         places.push(place);

@@ -65,7 +65,7 @@ pub(crate) use study::study_page;
 pub(crate) use trace::trace_page;
 pub(crate) use verdict::interrupted;
 pub(crate) use watch::{watch_page, watch_text};
-// Public for the tests, the benches and the Python module only.
+// These items are public for the tests, the benches and the Python module only.
 #[doc(hidden)]
 pub use self::{
     check::{check_text, why_not_sufficient},

@@ -102,7 +102,7 @@ pub(super) fn unexplained(
             sentences.push(words);
         }
     }
-    // A wrong limit is no function, and no law was tried in its place.
+    // If all structure is due to wrong limits, the sentences about laws do not apply.
     if result.structures().all(|left| left.limit.is_some()) {
         return sentences;
     }

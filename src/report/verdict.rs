@@ -60,7 +60,7 @@ fn outcome(result: &LoopResult, takes_less: bool) -> String {
     }
     let found = found(result);
     if let (Verdict::Unexplained, Some(size)) = (result.verdict, result.size_alone()) {
-        // An interrupted search has not looked everywhere.
+        // An interrupted search cannot state that there is no structure.
         let seen = if result.interrupted { "" } else { ", and no structure is seen in it" };
         return format!(
             "Unexplained: the residual is {} × the declared σ{seen}. {found}.",

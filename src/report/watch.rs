@@ -65,7 +65,7 @@ fn blocks<'a>(problem: &Problem, watch: &Watch, drawn: Option<Drawing>) -> Vec<B
 /// than two looks.
 fn control_chart(watch: &Watch, rows: &Measurements) -> Option<Drawing> {
     let evidence = watch.looks.iter().map(|look| (look.0 as f64, look.1 / 10_f64.ln()));
-    // Rows that were left out shift the others.
+    // If rows were left out, the row numbers of the curve differ from those of the table.
     let first_rows = if watch.left_out == 0 { first_rows(rows) } else { Vec::new() };
     Series {
         names: ("watch-evidence", "Evidence for a change after each row"),

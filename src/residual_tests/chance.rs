@@ -117,7 +117,7 @@ impl Drawn {
     fn upper(&self, level: f64) -> f64 {
         if level > self.share(MIN_EXCEEDING_DRAWS) {
             let reached = level * (1 + self.values.len()) as f64 - 1.0;
-            // The share is one of whole draws.
+            // The statistic is the value that a whole number of draws reaches.
             #[expect(
                 clippy::cast_possible_truncation,
                 clippy::cast_sign_loss,

@@ -62,7 +62,7 @@ impl FitResidual<'_> {
             return Err(Untestable::SizeMismatch);
         }
         let finite = self.fitted.iter().all(|value| value.is_finite());
-        // Statistics are variances of squares.
+        // The statistics contain fourth powers of residuals, which must be finite, too.
         if finite && self.residual.norm_squared().powi(2).is_finite() {
             Ok(())
         } else {

@@ -73,8 +73,8 @@ impl<'a> Leverage<'a> {
         if p < MAX_EIGENVECTOR_DIRECTIONS || left.trace() <= MIN_PRIOR_SHARE {
             return root_of_priors(left);
         }
-        // Any root does; this one has a column for every direction, those that data alone decide
-        // with next to nothing.
+        // Every root of the matrix is valid. This one has a column for every direction; columns of
+        // directions that data alone determine are almost zero.
         (0..p).for_each(|k| left[(k, k)] += CHOLESKY_JITTER);
         lower_factor(left.clone()).unwrap_or_else(|| root_of_priors(left))
     }
@@ -104,7 +104,7 @@ fn by_poses<T: Send>(
     of: impl Fn(usize, &DMatrix<f64>) -> Vec<T> + Sync,
 ) -> Vec<T> {
     let poses = fitted.nrows() / 3;
-    // Evenly: no part is of one pose where others are of many.
+    // The poses are divided evenly, so that no part is much smaller than the others.
     let together = poses.div_ceil(poses.div_ceil(POSES_PER_BLOCK).max(1)).max(1);
     let part = |part: usize| {
         let first = part * together;

@@ -87,7 +87,7 @@ fn draw(
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         random.set_stream(draw as u64);
         let (poses, _) = column.as_chunks_mut::<3>();
-        // Numbers are smaller than what they stand for.
+        // Indices of poses are permuted instead of poses, because they take less memory.
         let mut numbers: Vec<u32> = (0..).take(poses.len()).collect();
         numbers.shuffle(&mut random);
         poses

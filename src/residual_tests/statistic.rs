@@ -244,7 +244,7 @@ fn centred_norm(sorted: &[f64]) -> f64 {
     let squares: f64 = sorted.iter().map(|x| (x - sum / n).powi(2)).sum();
     let (mut below, mut means_sum, mut means_squares) = (0.0, 0.0, 0.0);
     for (i, x) in sorted.iter().enumerate() {
-        // The i values below x, and those from x on.
+        // The sum has two parts: the i values below x, and the values from x on.
         let mean = (x * i as f64 - below + (sum - below) - x * (n - i as f64)) / n;
         means_sum += mean;
         means_squares += mean * mean;

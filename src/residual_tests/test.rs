@@ -34,7 +34,8 @@ pub fn test_residual(fit: &FitResidual, level: f64, seed: u64) -> ResidualTests 
         Err(why) => return judge(all_untestable(fit, &why), level, Vec::new()),
     };
     let studentised = leverage.studentise(fit.residual.as_slice());
-    // At most so many tests: what is left out fails in the judgement, too.
+    // This is the largest possible number of tests. A pose that is an outlier at this level also
+    // fails in the judgement.
     let most = fit.covariates.len() + 8;
     let found = outliers::find(fit, &leverage, level / most as f64);
     let kept = found.kept.unwrap_or_else(|| Kept::all(fit, leverage));

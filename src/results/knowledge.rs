@@ -109,7 +109,7 @@ impl MissingReference {
             names.iter().any(|name| is_base(name))
                 && names.iter().all(|name| is_base(name) || is_fixture(name))
         };
-        // A translation moves the points along one axis, a scale along all three.
+        // A translation moves all points along one axis, a change of scale along all three.
         let leaves_length = |names: &[&str]| {
             let along =
                 |axis: &str| names.iter().any(|name| is_fixture(name) && field(name) == axis);

@@ -66,7 +66,7 @@ pub(crate) use trace::{Candidate, Confounded, HypothesisSet, SeparatingPose};
 pub use watch::WatchResult;
 
 pub(crate) use effect::joined;
-// Public for the tests, the benches and the Python module only.
+// These items are public for the tests, the benches and the Python module only.
 #[doc(hidden)]
 pub use self::{
     application::CompensationResult,

@@ -119,8 +119,8 @@ impl Rig {
                 (Effect::JointLateralCompliance { joint }, [x, y]) if *joint == number => {
                     lateral.compliance += Vector3::new(*x, *y, 0.0);
                 }
-                // Backlash acts on moments about the axis, which a prismatic joint does not yield
-                // to.
+                // Backlash yields to moments about the axis, about which a prismatic joint does not
+                // rotate.
                 (Effect::Backlash { joint: affected }, [width])
                     if *affected == number
                         && conditions.approach.is_none()

@@ -305,7 +305,8 @@ fn true_arm(
     let mut parameters = Vec::new();
     parameters::visit(&mut arm, |name, unit, value| {
         let nominal = *value;
-        // Drawn for every parameter, so that a rule for one does not change another.
+        // A number is drawn for every parameter, so that a rule for one parameter does not change
+        // the others.
         let drawn = normal(&mut random);
         if let Some(given) = truth.parameters.iter().rev().find(|given| given.name == name) {
             *value = parameters::deviated(unit, nominal, given.value);
@@ -330,7 +331,7 @@ fn draw_poses(problem: &Problem, truth: &Truth, poses: usize, mut random: ChaCha
     let mut time = 0.0;
     let (targets, round) = (problem.target_words(), truth.rows_per_target(&problem.fixtures));
     for row in 0..poses {
-        // Rows before the first round of fixtures measure one target after the other.
+        // All rows before the first round of fixtures measure positions of the targets in turn.
         let turn = row.checked_sub(truth.positions).map_or(row, |place| place / round);
         let mut conditions: PoseConditions = PoseConditions::default();
         for (joint, range) in problem.joints.iter().zip(&ranges.joints) {

@@ -42,7 +42,7 @@ pub use draw::{Simulation, SimulationError, simulate};
 pub(crate) use parameters::TrueParameter;
 pub(crate) use truth::RandomRule;
 pub use truth::Truth;
-// Public for the tests, the benches and the Python module only.
+// These items are public for the tests, the benches and the Python module only.
 #[doc(hidden)]
 pub use self::{
     draw::{Row, SimulatedPoses, draw, simulate_counted, simulate_poses},
@@ -152,7 +152,8 @@ impl Rig {
                 turn += Vector3::new(*rx, *ry, *rz) * value;
                 moved += Vector3::new(*x, *y, *z) * value;
             }
-            // A move of the instrument rotates the floor in its frame.
+            // If the instrument is moved, the floor appears displaced and rotated in the measuring
+            // frame.
             if let (Effect::StationMove { at_time }, [x, y, z, rx, ry, rz]) = effect
                 && conditions.time >= *at_time
             {

@@ -65,7 +65,8 @@ fn truth(document: &Document, problem: &Problem) -> Result<Truth, InputError> {
         return Err(error);
     }
     let noise_sigma = given.get(POSITION).copied().unwrap_or(0.0);
-    // Lengths without a σ of their kind have that of positions.
+    // Kinds of rows that measure lengths use the σ of positions unless the section states another
+    // one.
     let sigma = |kind: &'static Kind| {
         let sigma = given.get(kind.name).filter(|_| kind.name != POSITION).copied();
         let declared = problem.data.kind_sigmas.get(kind.name).copied().unwrap_or(0.0);

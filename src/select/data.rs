@@ -267,7 +267,8 @@ pub(super) fn number<K: Ord>(keys: impl Iterator<Item = K>) -> Vec<usize> {
 fn half_way(low: f64, high: f64) -> f64 {
     let middle = 0.5 * (low + high);
     let unit = 10.0_f64.powf(((high - low) / 10.0).log10().floor());
-    // Divided by a whole number, what is below one has the digits that it is written in.
+    // Dividing by an integer, instead of multiplying by 0.1 or 0.01, gives the float nearest to the
+    // decimal number.
     let near = if unit < 1.0 {
         (middle / unit).round() / unit.recip().round()
     } else {

@@ -102,7 +102,8 @@ impl Fitted {
         let active = DMatrix::from_fn(found.active_constraints.len(), unknowns.len(), coefficient);
         let sigma = match found.noise {
             Noise::Estimated(sigma) => sigma,
-            // A σ that is too large would leave everything to the priors.
+            // If the declared σ is too large, it is reduced; otherwise the priors would decide
+            // everything.
             Noise::Declared | Noise::Unknown => {
                 found.sigma_scale * placement.sigma(data.measurements, data.rows(), &problem)
             }
@@ -123,7 +124,8 @@ impl Fitted {
         };
         let work = data.rows().len() as f64 * (fitted.unknowns.len() as f64).powi(2);
         fitted.set_aside = match previous {
-            // Rows that a cause selects are what the search is about.
+            // A robust loss has found the outliers. If a cause selects them, the search must
+            // explain these rows, so none is left out.
             _ if fitted.problem.robust.is_some() => {
                 let found = &fitted.found.outliers;
                 let cause = selection_of_outliers(data.measurements, data.rows(), found);
@@ -243,7 +245,7 @@ impl Fitted {
     }
 
     /// Returns the model linearised at the fit in some rows, with the sites of `effects` and the
-    /// sites `slots`.
+    /// parameter sites `slots`.
     pub fn linearised_with<'a>(
         &'a self,
         data: &Data<'a>,
@@ -407,7 +409,7 @@ fn outliers(fitted: &Fitted, data: &Data) -> Vec<usize> {
         order.sort_unstable();
         order
     };
-    // Concentration steps on the rows of the evidence, the final steps on all rows.
+    // The concentration steps use the rows of the evidence, the final steps all rows.
     let (rows, subset) = (data.rows(), data.evidence_rows());
     let linearised = fitted.linearised_at(data, &subset, &[]);
     let mut aside = Vec::new();

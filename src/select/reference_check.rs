@@ -132,7 +132,8 @@ pub(super) fn reference_check(
     let course = time_function(effect, &fitted.problem)?;
     let starts = measurements.start_times();
     let moves = |reading: &NestReading| -> Option<f64> {
-        // Where rows are the time, a reading lies between those before and behind it.
+        // If row numbers replace times, the reading is half way between the rows before and after
+        // it.
         let time = if measurements.time_measured {
             reading.time?
         } else {
@@ -151,7 +152,7 @@ pub(super) fn reference_check(
     let spread = DMatrix::from_fn(count, count, |i, j| {
         fitted.found.covariance.entry(places[i], places[j]).unwrap_or(0.0)
     });
-    // A session has a place of its own for the instrument.
+    // The instrument is set up anew in each session, so a point has another position there.
     let mut points: BTreeMap<(&str, &str), Vec<Reading>> = BTreeMap::new();
     for reading in &measurements.nests {
         let weight = reading.sigma.unwrap_or(fitted.sigma).powi(-2);
@@ -192,12 +193,13 @@ mod tests {
             let certainty = &identity * 1e4;
             super::twice_ln_odds(&found, spread, (&(&found * part * 1e4), &certainty)).unwrap()
         };
-        // Sharp readings of less than half of what was found with an error of 0.3: a motion all the
-        // same.
+        // The readings show less than half of an estimate that has a standard error of 0.3. They
+        // still corroborate the motion, because they are precise.
         assert!(odds(&unsure, 0.45) > 100.0);
         assert!(odds(&sure, 0.45) < -100.0);
         assert!((odds(&sure, 1.0) - 1e4).abs() < 1.0);
-        // Twice ln of N(0; 1, 0.09 + 1e-4) of each coordinate over that of N(0; 0, 1e-4), by hand.
+        // The expected value is twice ln of N(0; 1, 0.09 + 1e-4) over N(0; 0, 1e-4), for each
+        // coordinate.
         let expected = -1.0 / 0.0901 - 3.0 * (901.0_f64).ln();
         assert!((odds(&unsure, 0.0) - expected).abs() < 1e-6);
         assert_eq!(

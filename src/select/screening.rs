@@ -90,7 +90,7 @@ pub fn trace_by(
 ) -> Result<Trace, IdentifyError> {
     rules.check()?;
     let data = Data::new(problem, data, rules).with_candidates(&options.candidates);
-    // Evidence is of positions: so is the fit.
+    // Evidence is evaluated for positions only, so only positions are fitted.
     let fitted = Fitted::new(problem.positions_alone(), &data, options)?;
     Ok(Trace { evidence: evaluate(&fitted, &data, &[]), ..trace_fit(&fitted, &data) })
 }
@@ -191,7 +191,7 @@ pub(super) fn check_fit(fitted: &Fitted, data: &Data) -> ResidualTests {
     let linearised = fitted.linearised(data, &[]);
     let coordinates: Vec<usize> =
         (0..linearised.poses().len()).map(|pose| linearised.coordinates(pose)).collect();
-    // With millions of rows, memory holds one such matrix, not several.
+    // With millions of rows, memory suffices for one such matrix only.
     let (columns, residual) = fitted.neighbourhood_as_fitted(linearised).into_fitted();
     let fit = FitResidual {
         residual: &residual,
@@ -204,7 +204,7 @@ pub(super) fn check_fit(fitted: &Fitted, data: &Data) -> ResidualTests {
         covariates: &data.covariates(&fitted.problem),
     };
     let mut residual_tests = test_residual(&fit, data.rules.level, data.rules.seed);
-    // The tests count poses; people count rows of files.
+    // The tests count poses from 0; results name the rows of the files.
     for test in &mut residual_tests.tests {
         if let Test::Outliers { worst: Some(pose) } = test.test {
             test.row = data.rows().get(pose).map(|&row| data.measurements.location(row));

@@ -1,7 +1,7 @@
 //! Constants of the search that users do not set, in one place.
 //! [`SelectionRules`](super::SelectionRules) contains those that users may set.
 
-// Prior probabilities.
+// The following constants are prior probabilities.
 
 /// Prior weight of a family of functions without a law, relative to a family of effects. The
 /// catalogue contains most causes.
@@ -24,7 +24,7 @@ pub(super) const SPREAD_OF_DECLARED_NOISE: f64 = 0.1;
 /// same residual.
 pub(super) const SPREAD_OF_ESTIMATED_NOISE: f64 = 1.0;
 
-// Functions without a law.
+// The following constants concern functions without a law.
 
 /// Lengths over which smooth functions change, as fractions of the measured range of the covariate.
 pub(super) const SMOOTH_LENGTHS: [f64; 3] = [0.5, 0.2, 0.08];
@@ -41,7 +41,7 @@ pub(super) const MAX_NEAR_ORDER: u32 = 60;
 /// in the catalogue.
 pub(super) const GEAR_ORDERS: [u32; 4] = [12, 20, 30, 60];
 
-// Searched arguments.
+// The following constants concern searched arguments.
 
 /// Minimum number of poses before and after a station shift.
 pub(super) const MIN_POSES_BESIDE_SHIFT: usize = 3;
@@ -54,7 +54,7 @@ pub(super) const MAX_WAVE_ORDER: f64 = 320.0;
 /// hypothesis besides a listed one.
 pub(super) const LN_ODDS_OF_ANOTHER_ARGUMENT: f64 = 3.0;
 
-// Beam search over sets of hypotheses.
+// The following constants concern the beam search over sets of hypotheses.
 
 /// Smallest probability of a set in which searched arguments are refined: 1 %.
 pub(super) const MIN_REVISED_PROBABILITY: f64 = 0.01;
@@ -81,7 +81,7 @@ pub(super) const MAX_RIVALS: usize = 5;
 /// without a law.
 pub(super) const MAX_STAND_INS: usize = 3;
 
-// Rows that do not take part.
+// The following constants concern rows that are left out.
 
 /// Maximum number of poses, each of which alone supports an effect, that are left out of the
 /// evidence.
@@ -94,7 +94,7 @@ pub(super) const OUTLIER_DISTANCE: f64 = 100.0;
 /// outlier.
 pub(super) const MAX_OUTLIER_SHARE: f64 = 0.1;
 
-// Ranking and what is stated of an effect.
+// The following constants concern the ranking and the claims about effects.
 
 /// Smallest share of a candidate's column length that the fitted parameters cannot reproduce, at
 /// which it is detectable. The linear neighbourhood is not more accurate.
@@ -130,7 +130,7 @@ pub(super) const RESAMPLES: usize = 2000;
 /// Probability that the bootstrap interval of the gain covers the gain.
 pub(super) const INTERVAL_LEVEL: f64 = 0.95;
 
-// Plans.
+// The following constants concern plans of measurements.
 
 /// Probability that an effect of the stated size is found, in `check` and `plan`: 0.8, as usual
 /// [Cohen 1988].

@@ -108,8 +108,8 @@ pub(super) fn without_law(
     }
     let place = |found: &Unexplained| found.claims.as_ref().map_or(0.0, |claims| claims.place.1);
     all.sort_by(|a, b| place(&b.1).total_cmp(&place(&a.1)));
-    // An error with a free value per pose cannot be predicted, and a wrong limit is no function:
-    // neither has a correction.
+    // Neither an error with a free value per pose nor a wrong limit has a correction: the former
+    // cannot be predicted, the latter is no function.
     let first = all.iter().position(|(hypothesis, _)| {
         !matches!(hypothesis.kind, HypothesisKind::PerPose | HypothesisKind::Limit(_))
     });
@@ -144,8 +144,8 @@ fn correction(
     best: &HypothesisSet,
     hypothesis: &Hypothesis,
 ) -> Option<Correction> {
-    // The peak of a narrow function may have been treated as outliers; left-out poses distinguish
-    // a peak from outliers.
+    // The peak of a narrow function may have been mistaken for outliers. Predictions of left-out
+    // poses distinguish the two.
     let bends = fitted.problem.robust.is_none() && !fitted.set_aside.is_empty();
     let whole = bends.then(|| fitted.with_all_rows());
     let fitted = whole.as_ref().unwrap_or(fitted);
@@ -181,8 +181,8 @@ fn correction(
     let moved = held_out.fitted() * parameters + beyond * coefficients;
     let reached = hypotheses.is_in_range(hypothesis, here.len());
     let mut errors = fitted.errors(data, there);
-    // Parameters fitted together with the function apply everywhere. Beyond its range the function
-    // keeps its last value.
+    // The change of the parameters that were fitted with the function applies to all poses. Outside
+    // its range the function keeps its value at the end.
     for (pose, error) in errors.iter_mut().enumerate() {
         *error += moved.fixed_rows::<3>(3 * pose) * held_out.poses()[pose].sigma;
     }
@@ -206,7 +206,8 @@ fn curve(
 ) -> Option<Curve> {
     let (covariate, site, values, lever) = hypotheses.coordinate(hypothesis)?;
     let point = |(pose, &value): (usize, &f64)| {
-        // All in σ; r = measured − predicted, so that the lever is −∂r/∂(coordinate).
+        // All vectors are in units of σ. The residual is measured − predicted, so the lever is
+        // −∂r/∂(coordinate).
         let at = |column: &DVector<f64>| column.fixed_rows::<3>(3 * pose).into_owned();
         let (lever, function, left) = (-at(&lever), -at(function), at(left));
         let correction = lever.dot(&function) / lever.norm_squared();

@@ -25,7 +25,7 @@ impl Strengths {
         let value = |(parameter, normal): (EffectParameter, f64)| {
             let stated =
                 values.iter().find(|(name, _)| *name == parameter.name).map(|(_, value)| *value);
-            // The rig is always in equilibrium.
+            // The rig always computes the loads on the deflected arm, so its mixing factor is 1.
             let at_rest = (study.source == Source::Rig
                 && parameter.site == ParameterSite::Arm(ArmField::Mixing))
             .then_some(1.0);

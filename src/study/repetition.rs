@@ -180,7 +180,7 @@ fn score(study: &Study, data: &Data, identification: &Identification) -> Score {
     if !held_out.rms.norm.is_finite() {
         return Score::Failed("no-equilibrium");
     }
-    // Parameters outside the model of a strategy are nominal.
+    // Parameters that the model of the strategy lacks are nominal.
     let estimate = |name: &str| {
         let estimates = identification.estimates.iter().zip(&identification.x);
         estimates.into_iter().find(|(estimate, _)| estimate.name == name)

@@ -260,7 +260,7 @@ fn leaf(
     base: usize,
 ) -> Result<(usize, Vec<String>), InputError> {
     let is_parent = |link: usize| robot.joints.iter().any(|joint| joint.parent == link);
-    // Number of moving joints from the base to a link below it.
+    // Returns the number of moving joints from the base to a link below it.
     let depth = |link: usize| {
         let (mut at, mut moving) = (link, 0);
         while at != base {

@@ -68,7 +68,7 @@ pub fn describe(chain: &Chain) -> Result<Description, InputError> {
     let rows = rows(chain, &mut notes);
     let name = name(&chain.robot.name);
     let arm = arm(chain, &name, &rows);
-    // Only numbers of excessive size make this fail.
+    // Only numbers of excessive size cause an error here.
     let problem = Problem::parse(&arm, Path::new("problem.toml"))
         .map_err(|error| chain.robot.as_problem(&error))?;
     let free = distinguishable_parameters(&problem)?;
@@ -88,7 +88,7 @@ fn rows(chain: &Chain, notes: &mut Vec<String>) -> Vec<Row> {
     let mut steps: Vec<Step> =
         chain.stages.iter().map(|stage| Step::from_frame(&stage.step)).collect();
     let mut rows = Vec::new();
-    // The first axis may be unreachable by α and a from the base.
+    // The parameters α and a may not suffice to reach the first axis from the base.
     if let (Some(first), Some(stage)) = (steps.first_mut(), chain.stages.first())
         && [first.theta_before, first.d_before, first.beta]
             .iter()

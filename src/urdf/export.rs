@@ -128,7 +128,7 @@ pub fn export(chain: &Chain, problem: &Problem, arm: &Arm<f64>) -> Result<Export
     let gauges = Steps::new(&Arm::nominal(problem)).gauges(chain)?;
     let steps = Steps::new(arm);
     let mut patches = Patches { chain, text: Vec::new(), moved: Vec::new() };
-    // Frame of the previous joint in its axis frame, and the fixed joints passed since.
+    // The state is the frame of the previous joint in its axis frame, and the fixed joints since.
     let (mut from, mut fixed) = (Frame::identity(), Vec::new());
     let mut stages =
         chain.stages.iter().zip(&steps.before).zip(gauges.iter().zip(gauges.iter().skip(1)));

@@ -47,7 +47,7 @@ impl Step {
 fn crossing(frame: &Frame<f64>) -> Step {
     let (z, p) = (&frame.axes[2], &frame.origin);
     let sin = z.x.hypot(z.y);
-    // Direction of the common normal, e_z × z.
+    // This is the direction of the common normal, e_z × z.
     let (x, y) = (-z.y / sin, z.x / sin);
     let normal = y.atan2(x);
     let (theta_before, sign) = near_zero(normal);

@@ -24,7 +24,7 @@ pub use describe::{Description, describe};
 pub(crate) use export::MovedOrigin;
 pub use export::{Export, export};
 pub use read::Robot;
-// Public for the tests, the benches and the Python module only.
+// These items are public for the tests, the benches and the Python module only.
 #[doc(hidden)]
 pub use self::{
     describe::HELD_OUT,

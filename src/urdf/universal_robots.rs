@@ -52,14 +52,15 @@ fn gauges(nominal: &Steps, base: &Frame<f64>) -> Result<Vec<Frame<f64>>, String>
         let frame = before.compose(step);
         let mut turned = Frame::identity();
         turned.rotate_x(roll.sin_cos());
-        // Remaining rotation about the axis and position of the origin along it.
+        // The remainder is a rotation about the axis and a shift of the origin along it.
         let remainder = turned.inverse().compose(&frame);
         if remainder.axes[2].xy().norm() > FORM_TOLERANCE || remainder.axes[2].z < 0.0 {
             return Err(format!("the axis of {link} does not lie as that maker's arms have it"));
         }
         let next = nominal.before.get(k + 1);
         let along = match k {
-            // Point nearest to the next axis, so that the next origin has no shift along this axis.
+            // The origin is at the point nearest to the next axis, so that the next origin has no
+            // shift along this axis.
             0 | 3 | 4 => remainder.origin.z + next.map_or(0.0, nearest),
             5 => remainder.origin.z + nominal.end.origin.z,
             _ => 0.0,

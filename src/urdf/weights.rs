@@ -22,7 +22,7 @@ pub(super) struct Weight {
 pub(super) fn weights(chain: &Chain) -> (Vec<Weight>, Vec<String>) {
     let robot = chain.robot;
     let (mut weights, mut beside) = (Vec::new(), Vec::new());
-    // Links with their frames and carrying stages, from the base outwards.
+    // Each entry is a link with its frame and carrying stage, from the base outwards.
     let mut open = vec![(chain.base, Frame::identity(), None)];
     while let Some((link, frame, carrier)) = open.pop() {
         if let (Some(stage), Some(body)) = (carrier, robot.links.get(link))
@@ -41,7 +41,7 @@ pub(super) fn weights(chain: &Chain) -> (Vec<Weight>, Vec<String>) {
             let mut next = frame.compose(&joint.origin.frame());
             let stage = chain.stages.iter().position(|stage| stage.joint == index);
             if let Some(moving) = stage.and_then(|stage| chain.stages.get(stage)) {
-                // A mimic joint may be off zero when its leader is at zero.
+                // A mimic joint may have an offset when its leader is at zero.
                 next = moved(&next.compose(&moving.axis), joint, moving.addend)
                     .compose(&moving.axis.inverse());
             } else if joint.kind != Kind::Fixed && carrier.is_some() {

@@ -131,7 +131,7 @@ pub fn acceptance(
     let placement = Placement::of(measurements);
     let model = found.model(problem, &placement)?;
     let later = placement.held_out_only(&model, measurements, &data.split);
-    // A number that was fitted is not exactly nominal.
+    // A fitted number is never exactly at its nominal value.
     let is_fitted = |(is_later, x): (&bool, &f64)| *is_later && x.abs() > 0.0;
     let is_placed_anew = later.parameters.iter().zip(found.x.iter()).any(is_fitted);
     let errors = |x| placement.position_errors(&model, x, measurements, &held_out);
@@ -207,12 +207,14 @@ mod tests {
     fn repeated_positions_scatter_about_their_barycentre() {
         assert_eq!(repeatability(&[Vector3::zeros()]), None);
         assert_eq!(repeatability(&[Vector3::zeros(), Vector3::x()]), None);
-        // Four points at a distance of 1 from the middle: no spread of the distances.
+        // All four points are at a distance of 1 from their barycentre, so the distances have no
+        // spread.
         let square = [(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)]
             .map(|(x, y)| Vector3::new(x, y, 5.0));
         assert!((repeatability(&square).unwrap_or(0.0) - 1.0).abs() < 1e-12);
         let line = [0.0, 0.0, 3.0].map(|x| Vector3::new(x, 0.0, 0.0));
-        // Barycentre at 1: distances 1, 1, 2; mean 4/3, spread 1/√3.
+        // The barycentre is at 1: the distances are 1, 1 and 2, with mean 4/3 and standard
+        // deviation 1/√3.
         assert!((repeatability(&line).unwrap_or(0.0) - (4.0 / 3.0 + 3.0_f64.sqrt())).abs() < 1e-12);
     }
 }

@@ -53,7 +53,8 @@ impl Goal<'_> {
             if cost(&tried, &next) <= (1.0 + COST_ROUNDING) * cost(&misfit, &q) {
                 (q, misfit) = (next, tried);
                 slopes = (self.slopes)(&q);
-                // A damped step is shorter than what is left.
+                // The damping shortens a step, so the remaining undamped step is longer than this
+                // one.
                 if step.amax() * (1.0 + damping) <= MAX_CONVERGED_STEP {
                     break;
                 }
@@ -101,7 +102,7 @@ impl Goal<'_> {
                     step[j] = along;
                     (low - along).max(along - high)
                 } else if step[j] <= low {
-                    // Without the limit the command would move inwards.
+                    // If this is positive, the command would move away from its limit.
                     along - step[j]
                 } else {
                     step[j] - along

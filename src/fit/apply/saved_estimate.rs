@@ -253,7 +253,7 @@ impl SavedEstimate {
                 return Err(SavedEstimateError::MagnitudeTooLarge { file, name: name.clone() });
             }
         }
-        // After the other errors, which say more.
+        // Digests are checked last, because the errors above explain more.
         let changed_key = match changed_key(text) {
             Ok(key) => key.map(|key| one_line(&key)),
             Err(source) => return Err(SavedEstimateError::Syntax { file, source }),

@@ -135,14 +135,15 @@ mod tests {
 
     #[test]
     fn few_poses_decide_nothing_and_the_number_that_would_is_told() {
-        // 0.9²⁸ = 0.052 and 0.9²⁹ = 0.047.
+        // The probabilities of no pose beyond the tolerance are 0.9²⁸ = 0.052 and 0.9²⁹ = 0.047.
         let [few, enough] = [28, 29].map(|poses| test(poses, 0, 0.9));
         assert_eq!((few.verdict, few.poses_to_pass), (Verdict::Undecided, Some(29)));
         assert_eq!((enough.verdict, enough.poses_to_pass), (Verdict::Pass, Some(29)));
         assert!((enough.share_within[0] - 0.05_f64.powf(1.0 / 29.0)).abs() < 1e-9);
         assert!((enough.share_within[1] - 1.0).abs() < 1e-15);
         assert_eq!(test(50, 30, 0.9).verdict, Verdict::Fail);
-        // Tables of Clopper and Pearson: 45 of 50, one-sided 95 %: 0.8008 and 0.9583... of 50.
+        // The reference is the table of Clopper and Pearson for 45 of 50, one-sided 95 %: 0.8008
+        // and 0.9583.
         let [least, most] = test(50, 5, 0.9).share_within;
         assert!((least - 0.801).abs() < 2e-3 && (most - 0.960).abs() < 3e-3, "{least} {most}");
         assert_eq!(test(0, 0, 0.9).verdict, Verdict::Undecided);
@@ -150,7 +151,8 @@ mod tests {
 
     #[test]
     fn wrong_passes_are_no_more_than_the_risk() {
-        // Exactly 90 % of all poses are within: the probability of a pass is that of few beyond.
+        // Exactly 90 % of all poses are within the tolerance. A pass then has the probability that
+        // few of the tested poses are beyond it.
         for poses in [10, 29, 50, 100, 321] {
             let passing = (0..poses).filter(|&k| test(poses, k, 0.9).verdict == Verdict::Pass);
             let most = passing.max();

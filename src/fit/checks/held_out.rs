@@ -56,7 +56,7 @@ pub(in crate::fit) fn outliers(
             let entry =
                 |i: usize, k: usize| spread.row(3 * pose + i).dot(&jacobian.row(3 * pose + k));
             let variance = Matrix3::identity() + Matrix3::from_fn(entry);
-            // Scaled: squares of what is far off overflow.
+            // The residual is scaled first, because squares of very large numbers overflow.
             let size = residual.amax().max(1.0);
             let square = variance.cholesky().map_or(f64::NAN, |factor| {
                 (residual / size).dot(&factor.solve(&(residual / size)))

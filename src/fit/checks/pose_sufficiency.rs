@@ -116,7 +116,7 @@ fn coordinates(
     let Fitting { model, measurements, placement, .. } = fitting;
     let (positions, others): (Vec<usize>, Vec<usize>) =
         rows.iter().partition(|&&row| measurements.observation(row).is_position());
-    // Points and targets by the frame that carries them.
+    // Each point or target is counted with the frame that carries it.
     let mut points: BTreeMap<(usize, usize), BTreeMap<usize, usize>> = BTreeMap::new();
     let mut targets: BTreeMap<usize, BTreeMap<usize, usize>> = BTreeMap::new();
     for &row in &positions {

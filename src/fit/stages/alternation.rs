@@ -107,7 +107,8 @@ mod tests {
 
     #[test]
     fn two_unknowns_that_couple_contract_by_the_square_of_their_cosine() {
-        // Columns of length one at 60°: each sweep leaves cos² = ¼.
+        // Two columns of length one are at 60° to each other, so each sweep multiplies the error by
+        // cos² = ¼.
         let triangle = DMatrix::from_row_slice(2, 2, &[1.0, 0.5, 0.0, 0.75_f64.sqrt()]);
         let rate = contraction(&triangle, &[vec![0], vec![1]]).unwrap();
         assert!((rate - 0.25).abs() < 1e-9, "{rate}");

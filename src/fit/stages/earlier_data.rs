@@ -43,7 +43,7 @@ impl EarlierData {
         if !scale.iter().all(|scale| *scale > 0.0 && scale.is_finite()) {
             return None;
         }
-        // In units of the standard errors, so that no unit dominates.
+        // The covariance is scaled by the standard errors, so that no unit dominates.
         let correlation = DMatrix::from_fn(scale.len(), scale.len(), |i, j| {
             covariance[(i, j)] / (scale[i] * scale[j])
         });
@@ -65,7 +65,8 @@ impl EarlierData {
             DVector::from_fn(others.len(), |k, _| eigen.eigenvalues[others[k]].recip());
         let along = directions.tr_mul(&mean);
         let declared = precision.zip_map(&scale, |precision, scale| precision * scale * scale);
-        // The declared priors also pull by the part of the mean along the well-known combinations.
+        // Through the declared priors, the part of the mean along the well-known combinations also
+        // contributes.
         let beyond = (&mean - &directions * &along).component_mul(&declared);
         let pull = information.component_mul(&along) + directions.tr_mul(&beyond);
         let declared = directions.tr_mul(&DMatrix::from_diagonal(&declared)) * &directions;

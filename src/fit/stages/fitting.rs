@@ -332,8 +332,8 @@ impl<'a> Fitting<'a> {
         let scale = DVector::from_vec(scale);
         let mut anderson = Anderson::default();
         let mut cost = f64::INFINITY;
-        // Stages of few steps may all fail where a longer one succeeds: only a sweep of unlimited
-        // stages ends the search.
+        // All short stages may fail where a longer one succeeds. The search therefore ends only
+        // after a sweep without a limit of steps.
         let mut long = false;
         for sweep in 1..=MAX_SWEEPS {
             let begin = whole.reduced(&end.x);

@@ -94,7 +94,7 @@ impl Stage<'_> {
 /// Finds the directions in which no unknown moves any pose. `squares` holds, for each unknown, the
 /// sum over poses of the outer products of its derivatives.
 fn unmoved_by(squares: impl Iterator<Item = Matrix3<f64>>) -> Vec<Vector3<f64>> {
-    // Each unknown in units of its effect: angles and lengths do not compare.
+    // Each unknown is scaled by its effect, because angles and lengths cannot be compared.
     let scaled = squares.map(|square| match square.trace() {
         trace if trace > 0.0 => square / trace,
         _ => Matrix3::zeros(),

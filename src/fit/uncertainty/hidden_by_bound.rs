@@ -131,7 +131,7 @@ fn valley(
 
 /// Returns √(E u²) of p(u) ∝ exp(−μ u − ½ h u²) on 0 ≤ u ≤ `width`, by Simpson's rule.
 fn deviation(multiplier: f64, curvature: f64, width: f64) -> f64 {
-    // Where the exponent reaches its limit: μ u + ½ h u² = MAX_EXPONENT.
+    // At this u the exponent reaches its limit: μ u + ½ h u² = MAX_EXPONENT.
     let root = (multiplier * multiplier + 2.0 * curvature * MAX_EXPONENT).sqrt();
     let reach = 2.0 * MAX_EXPONENT / (multiplier + root);
     let end = width.min(reach);
@@ -160,7 +160,7 @@ mod tests {
 
     #[test]
     fn deviations_from_a_bound_follow_the_posterior() {
-        // Uniform on 0…w, exponential, half normal.
+        // The cases are a uniform, an exponential and a half-normal distribution.
         for (multiplier, curvature, width, expected) in [
             (0.0, 0.0, 3.0, 3.0 / 3.0_f64.sqrt()),
             (2.0, 0.0, f64::INFINITY, 0.5_f64.sqrt()),

@@ -87,15 +87,15 @@ pub(in crate::fit) fn fitted(
                 Some(next) => {
                     (fitting.noise_model, fitting.turn_noise_model) = next;
                     if judged_early {
-                        // The fit has not converged: its σ is tested again, as if an earlier fit
-                        // had taken it.
+                        // The fit has not converged. Its σ is tested again, like one that an
+                        // earlier fit assumed.
                         taken_over = is_beyond_doubt(&fitting.whole());
                         if !taken_over {
                             (fitting.noise_model, fitting.turn_noise_model) = DECLARED_NOISE;
                         }
                     }
-                    // Held combinations stay where they started, and a fit that diverged under a σ
-                    // too small starts again.
+                    // A fit with combinations held at their start, or one that diverged because its
+                    // σ was too small, starts again.
                     let went_well = end.termination.converged()
                         || end.termination == Termination::IterationLimit;
                     begin = if went_well && end.gauge.rows.nrows() == 0 {
@@ -188,7 +188,7 @@ fn contradicted(
     }
     let first = assumed == DECLARED_NOISE;
     let shares = shares(&whitened, stage.coordinates(), [count - turned, turned]);
-    // Positions and orientations settle separately.
+    // The σ of positions and that of orientations must both have converged.
     let settled = shares.iter().all(|share| ((ratio * share).sqrt() - 1.0).abs() < SCALE_TOLERANCE);
     let chance = by_chance();
     if (first && gain <= chance) || (!first && settled) {
@@ -198,7 +198,7 @@ fn contradicted(
         let of_arm = places.iter().filter(|&&place| stage.poses[place].observation.is_of_arm());
         of_arm.map(|&place| all(place)).collect::<Vec<f64>>()
     };
-    // A model error is one length for all rows only where all measure the same kind of thing.
+    // One model error can apply to all rows only if all rows measure the same kind of quantity.
     let raised = if several_kinds { NoiseModel::scaled } else { NoiseModel::raised };
     let of_position = raised(
         &of(&|place| stage.declared[place]),

@@ -213,8 +213,8 @@ mod tests {
     fn of_two_kinds_that_data_hardly_tell_apart_neither_is_contradicted_by_the_other() {
         let mut random = stream(3, 0);
         let n = 8;
-        // Only the sum of both at a joint is seen, 1 of each kind as declared, and it deviates
-        // three times as far.
+        // The data determine only the sum of two parameters of a joint. Each has the declared σ 1,
+        // and the sum deviates three times as far as the priors expect.
         let seen: Vec<(usize, JointField, f64)> = (0..2 * n)
             .map(|k| (k, if k < n { JointField::Theta } else { JointField::Beta }, 1e-3))
             .collect();

@@ -76,7 +76,8 @@ pub(in crate::fit) fn refuted_priors(
     };
     let mut factors = vec![1.0; names.len()];
     let Some(declared) = evidence.best(&widened(&factors)) else { return Vec::new() };
-    // No choice of rules leaves less than all of them widened together.
+    // Widening all rules together leaves the smallest variance. If that explains too little, no
+    // choice of rules does.
     let widest =
         evidence.best(&widened(&vec![TRIAL_FACTORS[TRIAL_FACTORS.len() - 1]; names.len()]));
     if widest.is_none_or(|best| best.variance > MAX_VARIANCE_RATIO * declared.variance) {
@@ -84,7 +85,7 @@ pub(in crate::fit) fn refuted_priors(
     }
     let mut best = declared;
     let mut order = Vec::new();
-    // The rules that gain most, one after the other.
+    // Each pass widens the rule with the largest gain.
     loop {
         let open = (0..names.len()).filter(|place| factors[*place] <= 1.0);
         let trial = |(place, factor): (usize, f64)| {

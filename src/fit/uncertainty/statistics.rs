@@ -132,13 +132,13 @@ impl Statistics {
             let has = |valley: &HiddenByBound| valley.partners.contains(&j);
             hidden.iter().any(|valley| has(valley) && valley.deviation.is_infinite())
         };
-        // Provisional fits report no identified parts.
+        // Provisional fits do not compute identified shares.
         let visible = if priors.iter().all(Option::is_some) || stage.cache.is_provisional() {
             vec![1.0; errors.len()]
         } else {
             Blind::in_triangle(&stage.data_triangle(&end.x)).visible
         };
-        // The part of a variance that a bound alone limits is not from the data.
+        // A variance that only a bound limits contains no information of the data.
         let from_data = |j: usize| match errors[j] {
             error if error > bounded_errors[j] => (bounded_errors[j] / error).powi(2),
             _ => 1.0,
@@ -150,8 +150,8 @@ impl Statistics {
                 None => visible[j].min(from_data(j)),
             })
             .collect();
-        // A combination that was determined at the start may no longer be, such as a rigidity that
-        // went towards infinity.
+        // A combination that the data determined at the start may be undetermined at the end, for
+        // example if a rigidity went towards infinity.
         let seen = stage.gauge(&end.x, &held, &constraints).visible;
         let known = (0..errors.len())
             .map(|j| {

@@ -105,7 +105,7 @@ impl<'a> Parser<'a> {
 
     fn sum(&mut self) -> Result<Part, FormulaError> {
         let mut left = self.product()?;
-        // A chain of operators nests to the left: it counts as depth of the tree.
+        // A chain of operators nests to the left, so it counts towards the depth of the tree.
         let mut chained = 0;
         loop {
             let operator = match self.peek() {
@@ -277,7 +277,7 @@ impl<'a> Parser<'a> {
         }
         let of = |expression, dimension| Ok(Part { expression, dimension, span: span.clone() });
         let quantity = |quantity, dimension| of(Expression::Quantity(quantity), dimension);
-        // Words of the problem go before built-in ones of the same spelling.
+        // Names that the problem declares take precedence over built-in words of the same spelling.
         if let Some(index) = self.vocabulary.parameters.iter().position(|known| known == word) {
             return of(Expression::Parameter(index), Dimension::FLEXIBLE);
         }

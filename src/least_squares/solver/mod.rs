@@ -37,7 +37,7 @@ pub use solution::Solution;
 pub(crate) use step::Step;
 pub use termination::Termination;
 pub(crate) use trust_region::{Subproblem, TrustRegion};
-// Public for the tests, the benches and the Python module only.
+// These items are public for the tests, the benches and the Python module only.
 #[doc(hidden)]
 pub use self::{
     bounded::nearest,

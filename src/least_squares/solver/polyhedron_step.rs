@@ -223,7 +223,7 @@ mod tests {
         };
         for lambda in [0.0, 1e-3, 10.0] {
             let boxed = check(&Inequalities::none(n), lambda);
-            // A row that the minimiser in the box violates.
+            // The limit makes the minimiser in the box violate this row.
             let limit = DVector::from_element(1, 0.5 * (&row * &boxed.q)[0].abs());
             let solution = check(&Inequalities::new(row.clone(), -&limit, limit).unwrap(), lambda);
             assert_eq!(solution.faces.rows.iter().filter(|on| **on).count(), 1, "{lambda}");

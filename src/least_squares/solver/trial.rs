@@ -24,7 +24,7 @@ pub(super) struct Trial {
 impl Trial {
     /// Compares a step, and its acceleration ratio, with the costs before and after it.
     pub fn new((step, acceleration): (&Step, Option<f64>), before: f64, after: f64) -> Self {
-        // A cost a hundred times the previous one carries no information on curvature.
+        // If the cost grew a hundredfold, it says nothing about the curvature.
         let actual = if after < 100.0 * before { 1.0 - after / before } else { -1.0 };
         let predicted = step.predicted / before;
         let ratio = if predicted > 0.0 { actual / predicted } else { 0.0 };
@@ -49,7 +49,8 @@ impl Trial {
     /// Returns the radius of the next step.
     pub fn next_radius(&self, radius: f64) -> f64 {
         if self.ratio <= 0.25 {
-            // Minimum of the parabola through both costs and the slope, clamped to 0.1 … 0.5.
+            // The factor is the minimum of the parabola through both costs and the slope, clamped
+            // to 0.1 … 0.5.
             let shrink = if self.actual >= 0.0 {
                 0.5
             } else {

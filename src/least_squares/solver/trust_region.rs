@@ -267,7 +267,8 @@ impl<S: Subproblem> TrustRegion<S> {
     fn test_convergence(&self, trial: &Trial, size: f64) -> Option<Termination> {
         let settings = &self.settings;
         if trial.damping > 0.0 && trial.ratio >= GOOD_RATIO {
-            // Only the radius, which is about to grow, limits the step: its length is no evidence.
+            // The radius alone limits this step and will grow, so the length of the step does not
+            // indicate convergence.
             return None;
         }
         let is_predicted = 0.5 * trial.ratio <= 1.0 || trial.actual.abs() <= ROUNDING;

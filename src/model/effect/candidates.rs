@@ -89,7 +89,7 @@ fn places(family: &Family, problem: &Problem) -> Vec<Arguments> {
             }
             ArgumentKind::Covariate => {
                 let covariates = problem.covariate_names();
-                // Covariate by covariate, each at every place.
+                // The candidates are ordered by covariate: each covariate at every place.
                 all = covariates
                     .into_iter()
                     .flat_map(|name| {

@@ -22,8 +22,8 @@ impl Effect {
         match self.family().map_or(Chance::Equal, |family| family.chance) {
             Chance::Equal => members.len().max(1) as f64,
             Chance::Orders => {
-                // Order k of each of n joints: n π²/6 k². Low orders have causes, high ones are
-                // found by trying.
+                // The probability of order k falls as 1/k², and Σ 1/k² = π²/6: n π²/6 k² tries at n
+                // joints. Low orders have known physical causes, high orders do not.
                 let joints: BTreeSet<usize> =
                     members.iter().filter_map(|member| member.joint()).collect();
                 let order = self.waves().iter().map(|wave| wave.1).fold(1.0, f64::max);
@@ -36,12 +36,13 @@ impl Effect {
                 };
                 let (joint, order) = self.waves().first().copied().unwrap_or((1, 1.0));
                 let order = order.max(1.0);
-                // The chance of a lead in a factor e of leads, over the orders in it.
+                // The prior is uniform in ln(lead), and a unit interval of ln(lead) contains about
+                // k orders.
                 if slides(problem, joint) {
                     return of_kind(JointKind::Prismatic) * LOG_LEAD_RANGE * order;
                 }
-                // All orders in a unit together: those of a harmonic of that order of each joint
-                // that turns, over the share.
+                // All waves with orders between k and k + 1 together have `FRACTIONAL_SHARE` times
+                // the probability of a harmonic of order k at a revolute joint.
                 of_kind(JointKind::Revolute) * PI.powi(2) / 6.0 * order.powi(2) / FRACTIONAL_SHARE
             }
         }

@@ -19,13 +19,15 @@ impl Effect {
         Some(match prior {
             Prior::Size(size) => size,
             Prior::OfCubedMoment(angle) => angle / moment()?.powi(3),
-            // l h is at most |A| |B|, and the distance h of the line of pull from the axis at most
-            // the shorter of the two.
+            // The moment of a spring is l h times its rate, or h times its preload. l h is at most
+            // |A| |B|, and h, the distance of the line of pull from the axis, at most the shorter
+            // lever.
             Prior::SpringRate => moment()? / (length("anchor_m")? * length("lever_m")?),
             Prior::SpringPreload => moment()? / length("anchor_m")?.min(length("lever_m")?),
             Prior::TwistCoupling { about_z } => {
                 let beam = problem.joints.get(self.beam(problem)?)?.beam.as_ref()?;
-                // 1/√(EI GJ); one that is declared rigid counts as the other.
+                // The size is 1/√(EI GJ). If one rigidity is not declared, the other one is used
+                // for both.
                 match (if about_z { beam.ei_z } else { beam.ei_y }, beam.gj) {
                     (Some(ei), Some(gj)) => (ei * gj).sqrt().recip(),
                     (Some(rigidity), None) | (None, Some(rigidity)) => rigidity.recip(),

@@ -152,7 +152,7 @@ impl Formula {
     fn value(&self, setup: &PoseView) -> f64 {
         let at = |quantity| self.quantity(quantity, setup);
         match self.expression {
-            // The commonest formulas are one quantity.
+            // Most formulas are a single quantity.
             Expression::Quantity(quantity) => at(quantity),
             _ if self.parameters.is_empty() => self.expression.evaluate(&at, &[]),
             _ => {

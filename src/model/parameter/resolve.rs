@@ -109,7 +109,7 @@ pub fn resolve(
                 }
             }
             let undeclared = undeclared(problem, &rule.pattern, &known);
-            // Effects that a rule holds are not searched.
+            // Undeclared effects that a rule fixes are not searched for.
             if undeclared.is_some() && matches!(rule.freedom, Freedom::Fixed) {
                 continue;
             }
@@ -136,7 +136,7 @@ pub fn resolve(
             (Some(Freedom::Free { sigma, min, max }), _) => {
                 (of_kind(sigma, candidate.unit()), min, max)
             }
-            // In an unknown unit, no size is too large.
+            // Without a known unit, the size of σ cannot be judged.
             (None, Some(sigma)) => (Some(sigma).filter(|sigma| sigma.is_finite()), &none, &none),
             (None, None) if candidate.unknown => (None, &none, &none),
             (Some(Freedom::Fixed), _) | (None, None) => continue,
@@ -322,7 +322,8 @@ fn check_kinds(rule: &ParameterRule, candidates: &[Candidate]) -> Result<(), Inp
     }
     let matched: Vec<&Candidate> =
         candidates.iter().filter(|candidate| candidate.matches(rule)).collect();
-    // A rule that also matches other parameters leaves effects of another unit unchanged.
+    // A rule that also matches parameters other than those of effects does not change effects with
+    // another unit.
     let all_of_effects = matched.iter().all(|candidate| candidate.effect_sigma.is_some());
     // A rule written for the tool's position leaves its orientation free without a prior.
     let has_position = matched.iter().any(|candidate| !candidate.site.turns_target());

@@ -67,7 +67,7 @@ fn rendered<'a>(
                 meta charset="utf-8";
                 meta name="viewport" content="width=device-width, initial-scale=1";
                 title { (title) " – " (kind) }
-                // An empty icon, so that browsers do not request one.
+                // The empty icon prevents browsers from requesting one.
                 link rel="icon" href="data:,";
                 style { (PreEscaped(style::sheet())) }
             }

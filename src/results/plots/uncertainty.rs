@@ -74,7 +74,8 @@ impl Uncertainty {
                 joints: Vec::new(),
             });
         }
-        // Sessions have measuring frames of their own: all poses are of the first.
+        // Each session has a measuring frame of its own, so all poses are taken from the first
+        // session.
         let first = table.session.of_row[measured[0]];
         let of_session: Vec<usize> =
             measured.iter().copied().filter(|&row| table.session.of_row[row] == first).collect();

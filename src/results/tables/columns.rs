@@ -83,7 +83,8 @@ pub(super) fn names(problem: &Problem, rows: &Measurements, picked: &[usize]) ->
             add(name, labels(all));
         }
     }
-    // Columns of what rows are measured against, in the order of the rows.
+    // These are the columns of the fixtures against which rows are measured, in the order of the
+    // rows.
     let mut columns_of_rows = Vec::new();
     for observation in (0..rows.len()).map(|row| rows.observation(row)) {
         let references = observation.references().map(|(field, _)| field);

@@ -174,7 +174,7 @@ impl Block {
                     let projected = left.columns(first, columns.ncols()).into_owned();
                     first += columns.ncols();
                     let mut gram = DMatrix::zeros(projected.ncols(), projected.ncols());
-                    // The narrow side is transposed: this is the product that is fast.
+                    // Transposing the narrow matrix gives the fastest product.
                     gram.gemm(1.0, &projected.transpose(), &projected, 0.0);
                     let product = projected.tr_mul(fit.residual());
                     (Columns::Dense(Arc::new(projected)), Normal::Dense { product, gram })

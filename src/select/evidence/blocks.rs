@@ -31,8 +31,8 @@ pub(super) fn blocks(
     if !neighbourhood.residual().iter().all(|value| value.is_finite()) {
         return None;
     }
-    // A declared σ that the residual contradicts as too large is no bound: the scatter about the
-    // fit is the σ, as where none is declared.
+    // A declared σ that is larger than the scatter about the fit does not bound the noise from
+    // below. The scatter is then used, as if no σ were declared.
     let holds = fitted.found.noise == Noise::Declared && fitted.found.sigma_scale >= 1.0;
     let unless_stopped = |some: &[&Candidate]| {
         (!data.stop.is_requested())

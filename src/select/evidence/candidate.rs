@@ -43,8 +43,8 @@ impl Candidate {
         let design = |candidate: &&Self| {
             let mut coefficients = candidate.coefficients.clone();
             if fitted.found.noise != Noise::Declared {
-                // If σ was estimated from a residual that contains the effect, σ gives no scale
-                // for its size.
+                // If σ was estimated from a residual that contains the effect, it cannot limit the
+                // size of the effect.
                 coefficients.largest.fill(f64::INFINITY);
             }
             (candidate.design.clone().without(left_out), candidate.ln_prior, coefficients)

@@ -98,7 +98,8 @@ impl<'a, 'l> Columns<'a, 'l> {
         if self.only.is_some_and(|only| *only != hypothesis) {
             return;
         }
-        // Names of effects, one's own among them, have no space before them.
+        // The space distinguishes this family from families of effects, whose names never begin
+        // with one.
         self.entered(&format!(" {family}"), share, hypothesis, design(), Coefficients::default());
     }
 
@@ -164,7 +165,8 @@ impl<'a, 'l> Columns<'a, 'l> {
 
     fn functions(&mut self) {
         let (known, loads) = (self.known(), self.loads());
-        // The shortest only of the coordinates that joints move: it takes many poses.
+        // The shortest length is used only for the coordinates that joints move, because it needs
+        // many poses.
         let lengths = SMOOTH_LENGTHS;
         for site in geometry_sites(self.problem) {
             let Some(at) = self.linearised.place(site) else { continue };
@@ -242,7 +244,8 @@ impl<'a, 'l> Columns<'a, 'l> {
                     .map(|values| (Covariate::declared(which, self.problem), values)),
             );
         }
-        // Structure may go on from one session to the next.
+        // Times count from the first pose of all sessions, because structure may continue from one
+        // session to the next.
         let first = poses.iter().map(|pose| pose.setup.time).fold(f64::INFINITY, f64::min);
         all.push((
             Covariate::time(self.coverage.1),
@@ -278,7 +281,7 @@ impl<'a, 'l> Columns<'a, 'l> {
         else {
             return values;
         };
-        // The column is in σ per rad or m.
+        // The column of the coordinate is in σ per rad or m.
         let square = |pose: usize| at.rows(3 * pose, 3).norm_squared();
         let is_contact = |pose: &Pose| {
             matches!(pose.observation, Observation::Point(_) | Observation::Surface(_))

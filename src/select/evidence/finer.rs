@@ -50,8 +50,9 @@ pub(super) fn finer(
             {
                 continue;
             }
-            // The other members of the set stay, first all of them, then all except effects of the
-            // same family at the same place: one value may replace two members.
+            // The value is tried beside all other members of the set, and beside those except
+            // effects of the same family at the same place. In the latter case one value replaces
+            // two members.
             let place =
                 |k: usize| hypotheses.all[k].hypothesis.effect().map(Effect::name_and_place);
             let without_own =

@@ -157,7 +157,7 @@ pub(super) fn basis(scaled: &[f64], length: f64) -> DMatrix<f64> {
 /// correlated from reading to reading. `None` if `levels` values do not determine so many
 /// functions.
 pub(super) fn rough_basis(scaled: &[f64], length: f64, levels: usize) -> Option<DMatrix<f64>> {
-    // The mean square of the constant is 1, that of the cosines ½.
+    // The mean square of the constant is 1, that of each cosine is ½.
     let of_constant = |k: usize| if k == 0 { 0.5 } else { 1.0 };
     let variance = |k: usize| {
         of_constant(k) / (1.0 + (PI * k as f64 * length / (1.0 + 2.0 * RANGE_MARGIN)).powi(2))
@@ -239,7 +239,8 @@ mod tests {
             let basis = rough_basis(&scaled, length, 200).unwrap();
             let covariance = |a: usize, b: usize| basis.row(a).dot(&basis.row(b));
             for first in [20, 60, 100] {
-                // exp(−lengths), where what is left out smooths it over part of the first length.
+                // The covariance is near exp(−lengths). The truncated basis smooths it over part of
+                // the first length.
                 for (lengths, expected, within) in
                     [(1, 0.37, 0.16), (2, 0.14, 0.06), (3, 0.05, 0.06)]
                 {
@@ -274,7 +275,8 @@ mod tests {
 
     #[test]
     fn values_in_a_short_row_are_one_and_others_stay() {
-        // The last is none of those that may be merged; neither are many in a long row.
+        // The index of the last value is not among those to merge. A cluster of many values is not
+        // merged either.
         let mut values: Vec<f64> = [3.0, 1.0, 1.2, 1.4, 2.0]
             .into_iter()
             .chain((0..20).map(|k| 5.0 + 0.2 * f64::from(k)))

@@ -65,8 +65,8 @@ impl<'a> Hypotheses<'a> {
             let count = columns_of_part.len().saturating_sub(inner);
             (part.clone(), fit.select_columns(&columns_of_part[..count]))
         });
-        // No list holds all waves and moves: each has its own chance, whichever others are looked
-        // at.
+        // No list can contain all waves, composed laws and moves. The prior probability of each of
+        // them therefore does not depend on the other candidates.
         let is_unlisted = |effect: &Effect| {
             order_of(effect).is_some()
                 || effect.is_described()

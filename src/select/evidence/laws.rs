@@ -165,7 +165,7 @@ fn joint_of(hypothesis: &Hypothesis, problem: &Problem) -> Option<usize> {
 fn places(hypotheses: &Hypotheses, weighted: &[Weighted], products: &Products) -> Vec<Place> {
     let problem = hypotheses.linearised.problem();
     let of = |member: usize| joint_of(&hypotheses.all[member].hypothesis, problem);
-    // Sets that differ at the joint alone count together.
+    // The probabilities of sets that differ only at the joint are added.
     let mut all: BTreeMap<(usize, Vec<usize>), f64> = BTreeMap::new();
     for set in weighted.iter().filter(|set| !products.has_gear(&set.members)) {
         let joints: BTreeSet<usize> = set.members.iter().filter_map(|&member| of(member)).collect();
@@ -206,7 +206,8 @@ fn elsewhere(hypotheses: &Hypotheses, weighted: &[Weighted], products: &Products
             HypothesisKind::Smooth | HypothesisKind::Wandering => true,
             _ => false,
         };
-        // Laws there depend on the conditions of a pose, such as temperature and time.
+        // Laws elsewhere than at a joint depend on conditions of a pose, such as temperature and
+        // time.
         let is_condition =
             |covariate: &Covariate| !matches!(covariate, Covariate::Load | Covariate::Position);
         is_listed
@@ -333,7 +334,7 @@ impl Search<'_, '_, '_> {
         let all = linearised.poses();
         let poses: Vec<_> = kept.iter().map(|&pose| &all[pose]).collect();
         let known = Quantities::new(problem, &poses, data.measurements.time_measured);
-        // The functions of present laws, from their columns along the lever.
+        // The functions of laws that the fit contains follow from their columns and the lever.
         let is_present = |k: &usize| {
             let effect = hypotheses.all[*k].hypothesis.effect();
             matches!(effect, Some(Effect::Law(law)) if law.description().is_some() && law.site() == at.name)

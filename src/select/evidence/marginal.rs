@@ -169,7 +169,8 @@ impl Normal {
         let precision = (size * size).recip();
         match self {
             Self::Dense { gram, product } => {
-                // 1/c² + G = L Lᵀ: det(1 + c² G) = c^2k det(L)², taken off are |L⁻¹ b|².
+                // With 1/c² + G = L Lᵀ: det(1 + c² G) = c^2k det(L)², and the squares decrease by
+                // |L⁻¹ b|².
                 let lower = lower_factor(with_prior(gram, precision))?;
                 let mut taken = product.clone();
                 if !lower.solve_lower_triangular_mut(&mut taken) {
@@ -178,8 +179,8 @@ impl Normal {
                 Some((ln_product(&lower.diagonal(), size), taken.norm_squared()))
             }
             Self::LowRankCorrection { diagonal, less, product } => {
-                // E = 1/c² + D, K = 1 − L E⁻¹ Lᵀ: det(E − LᵀL) = det E det K,
-                // (E − LᵀL)⁻¹ = E⁻¹ + E⁻¹Lᵀ K⁻¹ L E⁻¹.
+                // With E = 1/c² + D and K = 1 − L E⁻¹ Lᵀ: det(E − LᵀL) = det E det K, (E − LᵀL)⁻¹ =
+                // E⁻¹ + E⁻¹Lᵀ K⁻¹ L E⁻¹.
                 let root = diagonal.map(|entry| (entry + precision).sqrt());
                 let mut scaled = less.clone();
                 scaled.column_iter_mut().zip(&root).for_each(|(mut column, root)| column /= *root);
@@ -266,7 +267,7 @@ pub(super) fn of_block(
     (sizes, coefficients): (&[f64], &Coefficients),
 ) -> (f64, f64) {
     let k = coefficients.largest.len().max(1);
-    // All columns together have a root mean square of 1, and so has each alone.
+    // All k columns together have a root mean square of 1, so each of them has 1/√k.
     let column = (k as f64).sqrt().recip();
     let plausible = coefficients.plausible(sizes, 0..k, column);
     let (whole, size) = of_columns(normal, left, grid, (&plausible, &coefficients.never_negative));
@@ -323,12 +324,12 @@ fn of_columns(
         };
         signs.unwrap_or(0.0) - determinant + grid.ln_likelihood(left)
     };
-    // Sizes ascend, and beyond the most probable one the likelihood only falls: larger sizes of many
-    // columns are not factored once they add nothing to the sum.
+    // Sizes ascend, and above the most probable one the likelihood falls. The loop therefore ends
+    // once larger sizes add nothing to the sum.
     let mut best = (1.0, f64::NEG_INFINITY);
     let mut tried = Vec::with_capacity(sizes.len());
     for &size in sizes {
-        // Sizes above the largest plausible one are all equal to it.
+        // All trial sizes above the largest plausible one are limited to it, so they are equal.
         let same = tried.last().filter(|(last, _): &&(f64, f64)| last.to_bits() == size.to_bits());
         let ln = same.map_or_else(|| at(size), |(_, ln)| *ln);
         tried.push((size, ln));

@@ -118,7 +118,8 @@ pub(super) fn best_form(
     let finer = hypotheses.shaped(hypothesis, weighed, &shapes);
     let forms: Vec<&Candidate> =
         std::iter::once(smooth).chain(finer.iter().map(|(_, candidate)| candidate)).collect();
-    // Half of the chance for the smooth function, half for all shapes together.
+    // Half of the prior probability belongs to the smooth function, the other half to all shapes
+    // together.
     let even = |(k, gain, size): (usize, f64, f64)| {
         (k, if k == 0 { gain - smooth.ln_prior } else { gain }, size)
     };
@@ -205,7 +206,7 @@ fn weighed_without<'a>(
     if data.stop.is_requested() {
         return None;
     }
-    // Functions of one covariate that change over other lengths are one hypothesis.
+    // Functions of the same covariate with different lengths belong to one hypothesis.
     let (mut numbers, mut distinct): (BTreeMap<usize, usize>, Vec<usize>) =
         (BTreeMap::new(), Vec::new());
     let mut number = |member: usize| {

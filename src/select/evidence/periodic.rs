@@ -84,7 +84,7 @@ impl Columns<'_, '_> {
                 let single = Effect::JointHarmonic { joint: joint + 1, orders: vec![*order] };
                 self.problem.effects.iter().any(|declared| declared.effect.covers(&single))
             };
-            // Fewer new orders have no common prior.
+            // A common prior is used only for at least this many orders that are not declared.
             if (1..=highest).filter(|order| !is_declared(order)).count() < MIN_GEAR_ORDERS {
                 continue;
             }

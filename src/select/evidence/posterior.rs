@@ -130,7 +130,7 @@ impl Evidence {
             .find(|set| set.hypotheses == best.hypotheses)
             .map_or(0.0, |set| set.probability);
         for (explanation, ln_odds) in odds {
-            // Beyond that nothing is left of the best one.
+            // At larger odds the best set has practically no probability left.
             let probability = of_best * ln_odds.min(40.0).exp();
             let is_same = |set: &&mut HypothesisSet| {
                 set.hypotheses.len() == explanation.hypotheses.len()
@@ -163,8 +163,8 @@ impl Evidence {
             return Vec::new();
         }
         let others: Vec<&Effect> = held.iter().filter(|other| *other != effect).collect();
-        // Effects of a set that are not held. A held effect may have another value of its searched
-        // argument in the set.
+        // Returns the effects of a set without the held ones. The searched argument of a held
+        // effect may have another value in the set.
         let beside_others = |explanation: &HypothesisSet| {
             let mut rest = explanation.effects();
             for other in &others {
@@ -176,8 +176,8 @@ impl Evidence {
             rest
         };
         let mut with = 0.0;
-        // Each with the value of its argument that was most probable first, for explanations are
-        // sorted.
+        // Sets are sorted by probability, so each effect gets the value of its searched argument in
+        // the most probable set.
         let mut instead: Vec<(Effect, f64)> = Vec::new();
         for explanation in &self.sets {
             let rest = beside_others(explanation);
@@ -216,7 +216,7 @@ impl Evidence {
         let most = self.sets.iter().map(|known| &known.hypotheses).find(|known| known.contains(of));
         let is_beside =
             |other: &Hypothesis| other != of && most.is_some_and(|most| most.contains(other));
-        // If a limit is wrong, no other error at the site is needed.
+        // If a limit is wrong, it explains the error at its site alone.
         let is_there =
             |other: &Hypothesis| other.site == of.site && (of.is_limit() || !other.is_limit());
         let place = self.probability(is_there);
@@ -224,8 +224,8 @@ impl Evidence {
             self.probability(|other| is_there(other) && other.depends_on == of.depends_on);
         let has_law = |explanation: &&HypothesisSet| {
             let unknown = |other: &Hypothesis| is_there(other) && other.effect().is_none();
-            // Functions without a law, smooth or not, say the same of the law; what wanders or sags
-            // under weight that nobody declared does not.
+            // All functions without a law make the same claim that the law is unknown. Errors that
+            // wander, and sag under undeclared masses, are claims of their own.
             let has_one = of.effect().is_some()
                 || of.is_limit()
                 || matches!(of.kind, HypothesisKind::Sag | HypothesisKind::Wandering);
@@ -285,7 +285,7 @@ mod tests {
         ];
         let held = explanations[0].effects();
         let evidence = Evidence { sets: explanations, stand_ins: Vec::new(), left_out: Vec::new() };
-        // Two later moves together are twice as probable as settling.
+        // The two later shifts together are twice as probable as settling.
         let alternatives = evidence.alternatives(&drift(), &held, 0.1);
         assert_eq!(alternatives, [(shift(30.0), 0.2), (settling(), 0.1)]);
         assert_eq!(evidence.alternatives(&shift(10.0), &held, 0.1), []);
@@ -312,7 +312,7 @@ mod tests {
         ];
         let evidence = Evidence { sets: explanations, stand_ins: Vec::new(), left_out: Vec::new() };
         let law = |order: f64| evidence.claims(&wave(order)).law.1;
-        // 6.41 stands for 6.4 and 1.6 for 1.5, but neither 6.4 for 1.5 nor the reverse.
+        // Order 6.41 counts as 6.4 and 1.6 as 1.5, but 6.4 and 1.5 do not count as each other.
         assert!((law(6.4) - 1.0).abs() < 1e-12, "{}", law(6.4));
         assert!((law(1.5) - 0.75).abs() < 1e-12, "{}", law(1.5));
     }

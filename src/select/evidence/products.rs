@@ -171,7 +171,7 @@ impl<'a> Products<'a> {
             let product = self.blocks[one].product();
             taken.rows_mut(begins[i], product.len()).axpy(size, product, 0.0);
             for j in 0..=i {
-                // The lower half alone is read.
+                // The factorisation reads only the lower half.
                 let gram = self.product(one, members[j]);
                 inner.view_mut((begins[i], begins[j]), gram.shape()).zip_apply(
                     gram,
@@ -473,7 +473,7 @@ mod tests {
         is(of(1, &[]), -3.0);
         is(of(1, &[2, 3]), -3.0);
         is(of(1, &[2, 0]), -1.5);
-        // Functions without a law are no family of effects.
+        // Functions without a law do not belong to a family of effects.
         is(of(4, &[3, 0]), -3.0);
     }
 }

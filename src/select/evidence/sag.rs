@@ -72,8 +72,8 @@ impl Columns<'_, '_> {
             joint,
             self.linearised.poses().iter().map(|pose| pose.setup.configuration),
         );
-        // The same sum of functions by fewer: M = U Σ Vᵀ with coefficients of the same prior has
-        // those of U Σ.
+        // The same functions need fewer columns: M = U Σ Vᵀ, and coefficients with equal priors on
+        // the columns of M equal such coefficients on those of U Σ.
         let weighed = moments.rows(0, self.weighed).into_owned().svd(false, true);
         let turned = weighed.v_t?.transpose();
         let most = weighed.singular_values.max();
@@ -126,8 +126,8 @@ mod tests {
         assert!(weight_is_unknown(&problem));
         let (first, second) = (0.3_f64, 0.4_f64);
         let configuration = [first, second, 0.0];
-        // About joint 2, which lies level, the origin of frame 3 hangs half a metre out along the
-        // link.
+        // The axis of joint 2 is horizontal, and the origin of frame 3 is half a metre from it
+        // along the link.
         let moments = moments(&problem, 1, std::iter::once(&configuration[..]));
         assert_eq!(moments.shape(), (1, 8));
         let g = problem.gravity.norm();

@@ -257,8 +257,8 @@ fn changed(known: &mut BTreeMap<Vec<usize>, Set>, products: &Products) {
         every.iter().copied().filter(|&block| is_of(&blocks[block])).collect()
     };
     let (plain, laws) = (of(&|block| !block.is_surface), of(&|block| block.is_law()));
-    // Hypotheses tried as first and second replacement of a function of several covariates, of any
-    // other hypothesis, and of two hypotheses.
+    // Entry k holds the hypotheses tried as first and as second replacement: of a function of
+    // several covariates, of any other hypothesis, and of two hypotheses.
     let instead: [[&[usize]; 2]; 3] = [[&every, &plain], [&every, &laws], [&laws, &laws]];
     let mut tried: BTreeSet<(Vec<usize>, usize)> = BTreeSet::new();
     for _ in 0..MAX_EXCHANGES {
@@ -280,7 +280,8 @@ fn changed(known: &mut BTreeMap<Vec<usize>, Set>, products: &Products) {
                 set.members.iter().copied().filter(|member| !gone.contains(member)).collect();
             let kind = if gone.len() > 1 { 2 } else { usize::from(!gone.iter().any(is_surface)) };
             let key = sorted(&rest);
-            // Most pairs of laws were tried there among others.
+            // If a single member was replaced for the same rest before, most pairs of laws were tried
+            // then.
             let is_tried = kind == 2 && tried.contains(&(key.clone(), 1));
             if !is_tried && tried.insert((key, kind)) {
                 rests.push((rest, gone, kind));
@@ -450,7 +451,7 @@ mod tests {
             "{first} {}",
             of([1, 0, 2], &[0, 1])
         );
-        // In addition to two strong effects at their sizes, an absent effect gains nothing.
+        // In addition to two strong effects with their sizes, an absent effect gains nothing.
         assert!(of([0, 1, 2], &[0, 1, 2]) < first - 4.0);
     }
 
@@ -460,7 +461,8 @@ mod tests {
         let residual = (&one * 20.0 + &other * 20.0 + noise).column(0).into_owned();
         let unknowns = Unknowns { x: vec![0.0], priors: vec![None], active: DMatrix::zeros(0, 1) };
         let fit = LinearNeighbourhood::new(&matrix(90, 1, 55.0), &residual, &unknowns, 0);
-        // The third is nearly the sum of both, and nothing of it is there.
+        // The columns of the third effect are nearly the sum of both others, and the residual
+        // contains nothing of it.
         let third = &one + &other + matrix(90, 1, 40.0) * 0.2;
         let block = |columns: &DMatrix<f64>| {
             let design = Design::Dense(columns.clone()).scaled(30).unwrap();

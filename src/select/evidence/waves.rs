@@ -95,7 +95,8 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
     pub fn promising(&self, weighted: &[Weighted]) -> Vec<Candidate> {
         let mut found: Vec<Candidate> = Vec::new();
         for (joint, rests) in self.places(weighted) {
-            // The orders of a joint with a periodic error of many orders are in the fit.
+            // If the fit contains a periodic error of many orders at the joint, its orders need not
+            // be searched.
             let effects = &self.fitted.problem.effects;
             if effects.iter().any(|declared| is_gear_of(&declared.effect, joint + 1)) {
                 continue;
@@ -111,12 +112,12 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
             let left: Vec<ReducedProblem> =
                 rests.iter().filter_map(|rest| self.reduced_by_set(rest)).collect();
             let [step, finer] = PHASE_STEPS.map(|phase| phase / (high - low));
-            // A wave of which less than one cycle is seen is none.
+            // Orders with less than one cycle over the range of the joint are not searched.
             let first = self.gains(joint, &row(TAU / (high - low), highest, step), &left);
             let tens = std::iter::successors(Some(1.0), |digit| Some(digit / 10.0));
             let digits = tens.take_while(|digit| *digit >= 2.0 * finer).count();
             for (left, first) in left.iter().zip(first) {
-                // One wave represents all orders near its order, in whatever set it was found.
+                // A wave that was found for one set represents all orders near its order for every set.
                 let known = || {
                     self.hypotheses
                         .all

@@ -105,7 +105,7 @@ impl<'a> Beam<'a> {
             let of_length = next.values().map(|scored| scored.ln_posterior);
             let of_length = of_length.fold(f64::NEG_INFINITY, f64::max);
             known.extend(next);
-            // A further term that hardly pays is followed by none that does.
+            // If the best sum with one more term hardly gains, longer sums do not gain either.
             if of_length < most - MAX_LN_LOSS_OF_TERM {
                 break;
             }
@@ -245,7 +245,7 @@ impl<'a> Beam<'a> {
         let (by_evidence, by_guide) = (by(|s| s.ln_posterior), by(|s| s.guide));
         let in_turn = by_evidence.iter().zip(&by_guide).flat_map(|(a, b)| [a.0, b.0]);
         let mut found: Vec<(Sum, Weighted)> = Vec::new();
-        // What the best sum leaves is noise.
+        // The noise factor assumes that the residual of the best sum is only noise.
         let mut factor = f64::NAN;
         let mut of_terms: BTreeMap<&Product, Vec<Weighted>> = BTreeMap::new();
         for sum in in_turn {

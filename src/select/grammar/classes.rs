@@ -69,7 +69,7 @@ pub fn proposals(
         .collect();
     all.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
     let all = distinct(all, &terms);
-    // What the best sum leaves is noise.
+    // The noise factor assumes that the residual of the best sum is only noise.
     let factor = all.first().map_or(0.0, |best| noise.factor(best.prediction.squared_length()));
     let largest = MAX_CLASS_DIFFERENCE.powi(2) * factor;
     let mut classes: Vec<Class> = Vec::new();
@@ -79,7 +79,7 @@ pub fn proposals(
         };
         if let Some(class) = classes.iter_mut().find(is_same) {
             class.ln_posterior = ln_add(class.ln_posterior, refined.ln_posterior);
-            // The simplest sum that is hardly less probable represents the class.
+            // The simplest sum represents the class if it is hardly less probable.
             let is_simpler = refined.ln_prior > class.first.ln_prior + 1e-9
                 && refined.ln_posterior > class.first.ln_posterior - 0.5;
             if is_simpler {
@@ -163,14 +163,14 @@ mod tests {
 
     use super::*;
 
-    /// Returns numbers without pattern, of mean 0 and root mean square 1 about.
+    /// Returns numbers without pattern, with mean about 0 and root mean square about 1.
     fn scattered(count: usize, seed: f64) -> Vec<f64> {
         let value = |k: usize| ((12.9898 * k as f64 + 78.233 * seed).sin() * 43_758.545_3).fract();
         (0..count).map(|k| 2.0 * 3.0_f64.sqrt() * (value(k).abs() - 0.5)).collect()
     }
 
-    /// Returns the laws of a residual of 60 poses of three joints that one function makes beside
-    /// noise.
+    /// Returns the laws found for a residual of 60 poses of three joints that contains this
+    /// function and noise.
     fn found(function: impl Fn(&[f64; 3]) -> f64) -> Vec<Proposal> {
         let commands: Vec<(usize, Vec<f64>)> =
             (0..3).map(|joint| (joint, scattered(60, 1.0 + joint as f64))).collect();

@@ -76,7 +76,7 @@ impl Refiner<'_> {
                 let Some((_, step)) = self.terms.factors[usize::from(factor)].inner else {
                     continue;
                 };
-                // The other terms do not change.
+                // The span of the other terms does not change while this term is refined.
                 let mut others = self.site.empty_span();
                 for (other, (term, inner)) in sum.iter().zip(inner.iter()).enumerate() {
                     if other != t {
@@ -84,7 +84,7 @@ impl Refiner<'_> {
                     }
                 }
                 let start = inner[t][f];
-                // The other factors of the term do not change either.
+                // The other factors of the term do not change either while one factor is refined.
                 let mut fixed = self.factors(term, &inner[t]);
                 fixed.remove(f);
                 let fixed = product(fixed.iter().map(Vec::as_slice));

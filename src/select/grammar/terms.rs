@@ -149,7 +149,7 @@ impl Terms {
                 term[k + 1..].iter().all(|&other| {
                     let (a, b) = (of(one), of(other));
                     let is_same = one == other;
-                    // One kink, step or settling of a quantity in a product.
+                    // A product contains at most one kink, step or settling of the same quantity.
                     let is_shifted = a.form == b.form && a.inner.is_some();
                     !(is_same && (a.form.is_idempotent() || a.form.width() > 1)) && !is_shifted
                 })
@@ -224,7 +224,8 @@ impl Terms {
                 let values = values[(k % width).min(values.len() - 1)].as_slice();
                 target.iter_mut().zip(values).for_each(|(value, factor)| *value *= factor);
             }
-            // To one length: powers of large numbers would leave the range of single precision.
+            // Each column is scaled to length 1, because powers of large numbers would exceed the
+            // range of single precision.
             let norm = sum_of_squares(target).sqrt();
             let scale = if norm > 0.0 { norm } else { 1.0 };
             for value in target {

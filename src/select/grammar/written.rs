@@ -32,7 +32,7 @@ pub fn written(
     let mut parameters: Vec<LawParameter> = Vec::new();
     let mut formulas = Vec::new();
     let mut order: Vec<usize> = (0..sum.len()).collect();
-    // The most probable term first.
+    // The most probable term is written first.
     order.sort_by(|&a, &b| terms.ln_prior(&sum[b]).total_cmp(&terms.ln_prior(&sum[a])));
     for t in order {
         let mut products: Vec<Vec<String>> = vec![Vec::new()];

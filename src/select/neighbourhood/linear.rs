@@ -263,7 +263,7 @@ impl LinearNeighbourhood {
     /// out, shape = (3 N + priors, k).
     pub fn projected_out(&self, columns: &DMatrix<f64>) -> DMatrix<f64> {
         let mut left = columns.clone().resize_vertically(self.residual.len(), 0.0);
-        // Below the data there is nothing at first.
+        // The rows of the priors, below the data rows, are zero at first.
         self.subtract_components(&mut left, self.rows);
         let is_short = |k: &usize| {
             left.column(*k).norm() < MIN_PART_OF_ONE_PROJECTION * columns.column(*k).norm()
@@ -284,7 +284,7 @@ impl LinearNeighbourhood {
     /// are zero on entry.
     fn subtract_components(&self, left: &mut DMatrix<f64>, filled: usize) {
         if left.ncols() > MAX_SEQUENTIAL_COLUMNS {
-            // The narrow side is transposed: this is the product that is fast.
+            // Transposing the narrow matrix gives the fastest product.
             let along = (left.rows(0, filled).transpose() * self.basis.rows(0, filled)).transpose();
             left.gemm(-1.0, &self.basis, &along, 1.0);
             return;
@@ -313,7 +313,7 @@ impl LinearNeighbourhood {
         }
         let columns =
             DMatrix::from_columns(&sets.iter().flat_map(DMatrix::column_iter).collect::<Vec<_>>());
-        // The narrow side is transposed: this is the product that is fast.
+        // Transposing the narrow matrix gives the fastest product.
         let along = (columns.transpose() * self.basis.rows(0, self.rows)).transpose();
         let mut first = 0;
         let mut next = |set: &DMatrix<f64>| {

@@ -96,8 +96,8 @@ impl<'a> Linearised<'a> {
                 slots.push((site, nominal));
             }
         }
-        // Bending stiffnesses about y and z that the problem holds equal may differ: that they do
-        // is no effect of another kind.
+        // Bending stiffnesses about y and z that the problem declares equal may differ here,
+        // because such a difference is not to be attributed to another effect.
         let shared = |&k: &usize| match model.parameters[k].site {
             ParameterSite::Beam { joint, field: BeamField::Bending } => {
                 let site = ParameterSite::Beam { joint, field: BeamField::Anisotropy };
@@ -107,7 +107,7 @@ impl<'a> Linearised<'a> {
         };
         let (shared, relaxed): (Vec<(ParameterSite, f64)>, Vec<Option<f64>>) =
             unknowns.iter().filter_map(shared).map(|(site, sigma)| ((site, 0.0), sigma)).unzip();
-        // A parameter that is fitted at a place has its column already.
+        // A site at which a parameter is fitted already has a column.
         let fitted_at = |&(site, _): &(ParameterSite, f64)| {
             let is_it = |&k: &usize| {
                 model.parameters[k].site == site && model.parameters[k].regressor.is_constant()
@@ -117,7 +117,7 @@ impl<'a> Linearised<'a> {
         let at_fitted: Vec<(ParameterSite, usize)> = slots.iter().filter_map(fitted_at).collect();
         slots.retain(|place| fitted_at(place).is_none());
         let first = model.parameters.len();
-        // Columns of parameters and of slots, and the residual.
+        // One pass computes the columns of parameters and of parameter sites, and the residual.
         let pass = |parameters: &[usize], slots: &[(ParameterSite, f64)]| {
             let probing = model.with_springs_of(effects).with_probes(slots);
             let mut at = x.clone().resize_vertically(first + slots.len(), 0.0);
@@ -174,7 +174,8 @@ impl<'a> Linearised<'a> {
         }
         let unmoved = unmoved(&poses, &derivatives.fitted);
         if unmoved.count() > 0 {
-            // Neither counts there: a constant residual contradicts no effect.
+            // Components along unmoved directions are set to zero in columns and residual: a
+            // constant residual there contradicts no effect.
             for column in derivatives.others.iter_mut().chain([&mut derivatives.residual]) {
                 let column = Arc::make_mut(column);
                 for pose in 0..poses.len() {

@@ -44,7 +44,7 @@ pub(super) fn orthonormal_above(
     }
     let norms: Vec<f64> = products.diagonal().iter().map(|square| square.sqrt()).collect();
     let (kept, first) = independent(&products, &norms, lengths.unwrap_or(&norms));
-    // L⁻ᵀ takes columns with the Gram matrix L Lᵀ to orthonormal ones.
+    // The factor L⁻ᵀ transforms columns with the Gram matrix L Lᵀ to orthonormal ones.
     let mut turn = inverse_lower(&first).transpose();
     turn.row_iter_mut().zip(&kept).for_each(|(mut row, &j)| row.unscale_mut(norms[j]));
     let independent_columns =
@@ -63,7 +63,7 @@ pub(super) fn orthonormal_above(
             basis.row_mut(rows + row).copy_from(&(turn.row(k) * *value));
         }
     }
-    // Once more, for what rounding left.
+    // A second pass removes the rounding errors of the first.
     let again = inverse_factor(&gram(&basis)).map(|inverse| inverse.transpose());
     let Some(again) = again else {
         return (DMatrix::zeros(basis.nrows(), 0), DMatrix::zeros(n, 0));
@@ -189,8 +189,8 @@ mod tests {
     fn rows_below_are_rows_of_the_columns() {
         let mut columns =
             DMatrix::from_fn(200, 40, |i, j| ((1.0 + 0.3 * j as f64) * i as f64 / 20.0).sin());
-        // A column that the first two take up, one of zeros with a row of its own, and one that is
-        // no number.
+        // The columns include a sum of the first two, one of zeros in the data rows with a prior
+        // row, and one that contains NaN.
         let sum = columns.column(0) + columns.column(1);
         columns.set_column(7, &sum);
         columns.column_mut(9).fill(0.0);

@@ -100,7 +100,7 @@ pub fn close_by(
         data.clone().with_stop(options.stop.clone().unwrap_or_default()),
         options.clone().with_stop(None),
     );
-    // Evidence is of positions: so are the fits.
+    // Evidence is evaluated for positions only, so only positions are fitted.
     let declared = Fitted::new(problem.positions_alone(), &data, options)?;
     let before = trace_fit(&declared, &data);
     let mut state = SearchState::new(&stoppable, options, &declared);
@@ -118,8 +118,9 @@ pub fn close_by(
     };
     let (fitted, evidence) = kept(&declared, (fitted, evidence), &data, &unstoppable)?;
     let mut conclusion = concluded(&state, &declared, (fitted, evidence), interrupted);
-    // Effects none of which is sure are used only if they predict poses that were left out better: by
-    // more than the standard error of that gain, or beyond chance if none is even probable.
+    // If no effect has the status found, the effects are kept only if they predict left-out poses
+    // better: by more than one standard error of the gain, or significantly if none is even
+    // probable.
     let best = conclusion.effects.iter().map(|found| found.status).min();
     let gain = || LeftOutGain::new(&conclusion.fitted, &declared, &data);
     let is_used = match best {
@@ -280,7 +281,7 @@ fn fit_with_found(
     let sure = effects.iter().filter(|found| found.status == Status::Found);
     let sure: Vec<Effect> = sure.map(|found| found.effect.clone()).collect();
     let problem = state.problem(fitted, &sure);
-    // Its errors are stated, nothing else: a fit of many unknowns need not be checked.
+    // Only the errors of this fit are reported, so a fit of many unknowns is not checked.
     let options = if state.paid_fits(fitted) > 1 {
         fitted.continuing(options)
     } else {

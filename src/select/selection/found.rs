@@ -83,7 +83,8 @@ pub(super) fn found(
         let of_parts: Vec<&SubsetEvidence> =
             subsets.iter().filter(|subset| effect.covers(&subset.effect)).collect();
         let share = of_parts.iter().map(|subset| subset.share).reduce(f64::min);
-        // Evidence about a fit whose searched argument was polished is about the argument before.
+        // If a searched argument was refined after the evidence was evaluated, the evidence is
+        // about the earlier value.
         let claims = best.and_then(|(evidence, set)| {
             let is_alike = |other: &Effect| other.is_but_for_search(&effect);
             let alike = || set.effects().into_iter().find(is_alike);
@@ -109,7 +110,7 @@ pub(super) fn found(
             }
             _ => None,
         };
-        // An effect that was evaluated and is in no probable set has no claim.
+        // An effect that was evaluated but belongs to no probable set has no claims.
         let is_evaluated = best.is_some() && reconsidered.iter().any(|known| effect.covers(known));
         let law = claims.as_ref().map(|claims| claims.law.1).or(gear);
         let law = law.or_else(|| is_evaluated.then_some(0.0));

@@ -64,11 +64,12 @@ pub(super) fn estimated_prior(
     let parameters =
         fitted.unknowns.iter().map(|&k| (fitted.found.x[k], fitted.model.parameters[k].sigma));
     let all = parameters.chain(linearised.relaxed().iter().map(|&sigma| (0.0, sigma)));
-    // A fit that took a σ larger than the declared one gave its priors that much more weight.
+    // If the fit assumed a σ larger than the declared one, its priors had a correspondingly larger
+    // weight.
     let weight = fitted.found.noise_factor.max(1.0).sqrt();
     let priors: Vec<(f64, Option<f64>)> =
         all.map(|(x, sigma)| (x, sigma.map(|sigma| sigma / weight))).collect();
-    // Declared harmonics beyond the orders of the prior keep their own.
+    // Declared harmonics whose orders the prior does not contain keep their declared priors.
     let coefficients: Vec<(usize, u32)> = coefficients(fitted)
         .into_iter()
         .filter(|(_, order)| first.sigma(*order).is_some())
@@ -95,7 +96,7 @@ pub(super) fn estimated_prior(
     let refined = |(least, prior): (f64, HarmonicPrior), step: f64| {
         best_of(&prior, &[-step, step]).filter(|other| other.0 < least).unwrap_or((least, prior))
     };
-    // Under a looser prior coefficients of neighbouring orders are large and cancel, so that they do
+    // Under a wider prior, the coefficients of neighbouring orders are large and cancel, so they do
     // not show the spectrum.
     let powers: Vec<f64> = SCALE_POWERS.map(f64::from).collect();
     let Some(flat) = best_of(&first, &powers).map(|best| refined(refined(best, 0.5), 0.25)) else {

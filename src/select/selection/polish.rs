@@ -27,7 +27,8 @@ pub(super) fn polished(
     fitted: &Fitted,
 ) -> Result<Option<Fitted>, IdentifyError> {
     let data = state.data;
-    // On rows that the evidence saw all of it tried these arguments itself, if it tried all times.
+    // If the evidence used all rows and all times between poses, it has already tried these
+    // arguments.
     let saw_all = data.rows().len() == data.evidence_rows().len();
     if saw_all && data.times_between_poses().len() <= MAX_SHIFT_TIMES {
         return Ok(None);
@@ -81,7 +82,7 @@ fn neighbouring_arguments(data: &Data, effect: &Effect) -> Vec<Effect> {
         _ => return TRIAL_FACTORS.iter().filter_map(|factor| effect.scaled(*factor)).collect(),
     };
     let all = data.times_between_poses();
-    // The evidence sees every n-th row, and the list holds every m-th time.
+    // The evidence uses every n-th row, and the list of times contains every m-th time.
     let thinned = data.rows().len().div_ceil(data.evidence_rows().len().max(1));
     let reach = 2 * thinned.max(all.len().div_ceil(MAX_SHIFT_TIMES));
     let place = all.partition_point(|other| *other < time);

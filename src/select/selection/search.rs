@@ -42,9 +42,10 @@ fn settled_set(
 ) -> Result<(Fitted, Option<Evidence>), IdentifyError> {
     let rules = state.data.rules;
     let mut fitted = first;
-    // Evidence that led to the fit at hand by odds between fits.
+    // This evidence compared sets at fits of their own and selected the set of the present fit.
     let mut leading: Option<Evidence> = None;
-    // Periodic errors of many orders whose coefficients the common prior was estimated from.
+    // The common prior was estimated from the coefficients of these periodic errors with many
+    // orders.
     let mut estimated_from: Vec<Effect> = Vec::new();
     let mut is_polished = false;
     while state.rounds.len() < rules.max_rounds {
@@ -54,7 +55,8 @@ fn settled_set(
             return Ok((fitted, Some(evidence)));
         };
         let open = state.reconsidered(&fitted);
-        // Polished arguments stay: they explain all rows, of which the evidence has some.
+        // Refined arguments are kept: they explain all rows, while the evidence uses only some
+        // rows.
         let stays = is_held(best, &open, Effect::eq)
             || is_polished && is_held(best, &open, Effect::is_but_for_search);
         if !stays {
@@ -72,7 +74,8 @@ fn settled_set(
                 }
                 continue;
             }
-            // The evidence points back to a set that did less well at a fit of its own.
+            // The evidence prefers a set that was less probable than the present one when it was
+            // fitted itself.
             if let Some(leading) = leading {
                 return Ok((fitted, Some(leading)));
             }
@@ -149,7 +152,7 @@ fn refitted(
     let mut rivals = evidence.exchanged(&best, MAX_RIVALS);
     rivals.truncate(state.paid_fits(fitted) - 1);
     let mut tried: Vec<(HypothesisSet, f64, Fitted)> = Vec::new();
-    // ln posterior of the set held, by the rows set aside.
+    // The map holds ln posterior of the present set for each set of outliers.
     let mut of_held: BTreeMap<BTreeSet<usize>, Option<f64>> = BTreeMap::new();
     let count = rivals.len();
     for (k, rival) in rivals.into_iter().enumerate() {
@@ -157,7 +160,7 @@ fn refitted(
         let kept = state.added(fitted).into_iter().filter(|effect| !open.contains(effect));
         let effects: Vec<Effect> = kept.chain(rival.effects()).collect();
         let next = state.fit(fitted, &effects)?;
-        // Both are compared on the same rows.
+        // Both sets are compared on the same rows.
         let aside: BTreeSet<usize> =
             fitted.set_aside.iter().chain(&next.set_aside).copied().collect();
         let of = |fit: &Fitted, functions: &[(Hypothesis, usize)]| {
@@ -177,8 +180,8 @@ fn refitted(
     let mut ln_odds_of: Vec<(HypothesisSet, f64)> = Vec::new();
     let mut better: Option<Fitted> = None;
     for (rival, ln_odds, next) in tried {
-        // Functions without a law are only linear about another fit. So a law in the place of one
-        // must be what the evidence about its own fit calls most probable.
+        // A function without a law is linear only about the fit for which it was built. A law that
+        // replaces it must therefore also be confirmed by the evidence about its own fit.
         let left = rival.without_law().len();
         let is_best = ln_odds > 0.0 && better.is_none();
         if is_best && left < functions.len() && !is_confirmed(state, &next, left)? {

@@ -52,7 +52,7 @@ impl MisprintStudy {
                 Err(item.error(InputErrorKind::NotPositive { value }))
             }
         })?;
-        // The case closest to the declared ratio comes first.
+        // The case with the ratio closest to the declared one comes first.
         links_over_joints.sort_by(|a, b| a.ln().abs().total_cmp(&b.ln().abs()));
         let one_load = root.section("one_load")?.map(load).transpose()?;
         let second_load = match root.section("second_load")? {

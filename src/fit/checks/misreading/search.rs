@@ -66,11 +66,11 @@ fn explanations(fit: &CheckedFit) -> Explanations {
     let step = split.identification.len().div_ceil(MAX_ROWS).max(1);
     let chosen: Vec<usize> = split.identification.iter().copied().step_by(step).collect();
     let trial = Trial { fitting: fit.fitting, problem: fit.problem, chosen };
-    // Without orientations, as in all trials; a set of no joints changes nothing.
+    // This trial leaves out orientations, as all trials do. Reversing no joint changes nothing.
     let as_declared = trial.rms(Misreading::Reversed { joints: 0 }, false);
     let nominal = as_declared.map_or(nominal, |(error, _)| error.min(nominal));
     let is_position = measurements.leading().is_position();
-    // Contacts with one point agree with every arm that hardly moves.
+    // If the target hardly moves, contacts with one point agree with any arm.
     let is_tested =
         |misreading: &Misreading| is_position || matches!(misreading, Misreading::Reversed { .. });
     let all = if is_position && nominal < MAX_REACHES_OF_LOADS * model.reach() {
@@ -131,7 +131,7 @@ impl Trial<'_> {
             .collect();
         let explanation = |&misreading: &Misreading| {
             let (rms, size) = self.rms(misreading, true)?;
-            // A ratio that becomes negative is a joint that counts the other way.
+            // A negative ratio means that the joint turns against its command.
             if size.is_some_and(|size| matches!(misreading, Misreading::Ratio { .. }) && size < 0.0)
             {
                 return None;
@@ -175,7 +175,7 @@ impl Trial<'_> {
             }
             None => model,
         };
-        // Linearisations of another model are not those of this one.
+        // The corrected model needs a cache of its own, because its linearisations differ.
         let cache = &LinearisationCache::default();
         let fitting = Fitting {
             model,
@@ -213,7 +213,8 @@ impl Trial<'_> {
     /// Returns the root mean squared error of `rows` at the full parameter vector `x` \[m\].
     /// Deviations from priors count like measured numbers: √((Σ e² + σ² Σ (x/σₚ)²) / n).
     fn penalised(&self, fitting: &Fitting, rows: &[usize], x: &DVector<f64>) -> f64 {
-        // Declared effects may go far beyond their priors.
+        // Deviations of declared effects do not count, because they may be far larger than their
+        // priors.
         let parameters = fitting.model.parameters.iter().zip(x);
         let of_arm = parameters.filter(|(parameter, _)| is_of_arm(parameter));
         let squares = of_arm.filter_map(|(parameter, x)| Some((x / parameter.sigma?).powi(2)));

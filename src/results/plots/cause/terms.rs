@@ -84,7 +84,7 @@ impl Rows<'_> {
                 let value = |pose: &PoseView| pose.temperature.copied().unwrap_or_default();
                 (Quantity::temperature(), each(&value), Box::new(law))
             }
-            // The lagged temperature itself multiplies every term.
+            // This case applies if the lagged temperature itself multiplies every term.
             LawQuantity::Lagging { time_constant } if self.is_each(quantity) => {
                 let sum: f64 = self.terms.iter().map(|term| term.1).sum();
                 let regressor = &self.terms.first()?.0;

@@ -48,7 +48,7 @@ pub fn at_joint<'a>(
     let (number, levers) = (joint + 1, levers.get(joint)?);
     let first = rows.terms.first()?.1;
     let unit = if slides(problem, number) { Unit::Length } else { Unit::Angle };
-    // Δθ = c M, c₃ M³: the moment follows from the law itself.
+    // The law Δθ = c M or c₃ M³ gives the moment M from the fitted change of θ.
     let moments = |of: fn(f64) -> f64| -> (Quantity, Vec<f64>) {
         let moment =
             |(lever, axis): (&Vector3<f64>, &Vector3<f64>)| of(change_along(lever, axis) / first);
@@ -125,7 +125,8 @@ fn at_link<'a>(found: &Effect, problem: &Problem, rows: &'a Rows) -> Option<View
     let link = found.link()?;
     let stretches =
         matches!(rows.sites.first(), Some(ParameterSite::Beam { field: BeamField::Stretch, .. }));
-    // An expansion has one coefficient with a sign; a bending's two make one size.
+    // An expansion has one signed coefficient. The two coefficients of a bending are combined to
+    // their norm.
     let sizes = || rows.terms.iter().map(|term| term.1);
     let size = if stretches { sizes().sum() } else { sizes().map(|c| c * c).sum::<f64>().sqrt() };
     let up: Box<dyn Fn(f64) -> Quantity> = if stretches {
