@@ -114,7 +114,8 @@ impl Common {
         }
     }
 
-    /// Warns that the search for effects ignores orientations, if the problem fits them.
+    /// Prints a warning if the problem fits orientations, which the search for effects ignores.
+    /// Adds the warning to `data` for the reports.
     pub fn say_of_orientation(&self, problem: &Problem, data: &mut Dataset) {
         if problem.data.fits_orientation {
             let warning = Warning {

@@ -22,7 +22,7 @@ const MAX_FINISHING_TIME: Duration =
 /// status.
 type LastWork = Box<dyn FnOnce() -> u8 + Send>;
 
-/// Lock that is held while files take their names.
+/// Lock that is held while finished files are renamed to their final names.
 static WRITE_LOCK: Mutex<()> = Mutex::new(());
 /// True while a command watches for the request to stop.
 static IS_WATCHED: AtomicBool = AtomicBool::new(false);
@@ -41,7 +41,7 @@ enum State {
 }
 
 /// Returns the stop request that the first interrupt makes. The second interrupt ends the process
-/// at once, except while files take their names.
+/// at once, except while files are renamed to their final names.
 ///
 /// Interrupts that were ignored, or handled by a host program, before the call remain so.
 pub fn stop() -> Stop {

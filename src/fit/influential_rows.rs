@@ -4,12 +4,12 @@ use crate::fit::checks::outliers::{InfluentialRows, Outlier};
 use crate::fit::outcome::Identification;
 use crate::fit::uncertainty::noise::Noise;
 
-/// Ratio of the residual variance without the rows to that with them, below which the rows are
-/// influential even if a misfit remains. Rows that a single effect concerns, such as two with a
-/// payload, may be among them.
+/// Ratio of the residual variances without and with some rows, below which the rows are influential
+/// even if a misfit remains. Rows that a single effect concerns, such as two with a payload, may be
+/// among them.
 const MAX_DECISIVE_RATIO: f64 = 0.01;
-/// Ratio of the residual variance without the rows to that with them, below which the rows are
-/// influential if the declared σ then explains the remaining residual.
+/// Ratio of the residual variances without and with some rows, below which the rows are influential
+/// if the declared σ then explains the remaining residual.
 const MAX_INFLUENTIAL_RATIO: f64 = 0.5;
 /// Smallest number of rows per influential row. If more rows seem influential, the model does not
 /// fit any of them.

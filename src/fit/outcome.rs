@@ -99,8 +99,8 @@ pub struct Identification {
     /// Errors of each kind of rows: with the registered nominal arm and with the identified arm.
     /// Empty if there is only one kind.
     pub kinds: Vec<(Errors, Errors)>,
-    /// For each touched point, scatter of the predicted target with the registered nominal and with
-    /// the identified arm, and true if all its rows are held out.
+    /// Scatter of the predicted target at each touched point, with the registered nominal and with
+    /// the identified arm. The flag is true if all rows of the point are held out.
     #[doc(hidden)]
     pub spreads: Vec<(PointSpread, PointSpread, bool)>,
     /// Errors of orientation, where it is fitted.
@@ -181,8 +181,8 @@ impl Identification {
         self.first_error().is_none()
     }
 
-    /// Returns true if the fit describes the measured arm well enough to look for effects: no finding
-    /// is an error, unless it is about a residual beyond the declared noise.
+    /// Returns true if the fit describes the measured arm well enough to look for effects. No
+    /// finding may be an error, except about a residual beyond the declared noise.
     pub(crate) fn describes_arm(&self) -> bool {
         let is_noise = |finding: &Finding| finding.code == FindingCode::NoiseBeyondDeclared;
         let mut findings = self.findings.iter();

@@ -7,7 +7,7 @@ use crate::fit::{Errors, Identification};
 use crate::model::{LinearModel, Model};
 
 /// State reused to start the next fit of the same data, or of most of their rows, with other
-/// effects: registered parameters, noise model, and the linear model at the optimum.
+/// effects. It contains registered parameters, noise model, and the linear model at the optimum.
 #[derive(Debug, Clone)]
 pub(crate) struct WarmStart {
     /// Deviations of the registered nominal arm by parameter name; parameters without an entry do

@@ -8,8 +8,8 @@ use nalgebra::DVector;
 use super::chord::Base;
 use super::{Loss, Triangle};
 
-/// Largest number of cached linearisations: at the last point, at the one before, and at the first
-/// point of the same data, which is needed again at the end.
+/// Largest number of cached linearisations. They are at the last point, at the one before, and at
+/// the first point of the same data, which is needed again at the end.
 const MAX_CACHED: usize = 3;
 
 /// Most recent linearisations of some data. Reducing many rows takes far longer than any use of the

@@ -122,7 +122,7 @@ impl Loss {
     }
 
     /// Returns the mean curvature of the loss and the mean square of its slope, each over all
-    /// directions, for normal residuals of `coordinates` numbers with 1 σ = `scale`.
+    /// directions. The residuals are normal with `coordinates` numbers and 1 σ = `scale`.
     ///
     /// E[(k − 1) ρ′(s) + ∂(ρ′ s)/∂s] / k and E[(ρ′ s)²] / k with s² / scale² ~ χ²ₖ [Huber &
     /// Ronchetti 2009, sec. 7.6].

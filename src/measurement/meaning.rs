@@ -222,8 +222,8 @@ pub(super) fn split_unit(name: &str) -> (&str, Option<&str>) {
     name.split_once('_').map_or((name, None), |(base, suffix)| (base, Some(suffix)))
 }
 
-/// Returns true for the name of a numbered joint or of a coordinate with a unit, such as `q1_deg` or
-/// `x_mm`, which occur in the header of every table of flexcal.
+/// Returns true for the name of a numbered joint or of a coordinate with a unit, such as `q1_deg`
+/// or `x_mm`. Such names occur in the header of every table of flexcal.
 pub(super) fn is_numbered_or_position(name: &str) -> bool {
     let (base, Some(_)) = split_unit(name) else { return false };
     numbered(base, "q").is_some() || ["x", "y", "z"].contains(&base)

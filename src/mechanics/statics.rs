@@ -1,14 +1,14 @@
 //! Static equilibrium: moments that deflect the arm, and position of its target.
 //!
-//! The unknowns x are the moments at the sections that deflect (three at every beam element's tip,
-//! one about every flexible joint, two where a part tilts), and the positions of hooks whose ropes
-//! may lean. A forward pass with moments x places every load, and the loads give moments G(x). The
-//! moments of the undeflected pass are the paper's first order; x = G(x) is equilibrium on the
-//! deflected arm. With P(x) the target position,
+//! The unknowns x are the moments at the sections that deflect, and the positions of hooks whose
+//! ropes may lean. There are three moments at every beam element's tip, one about every flexible
+//! joint, and two where a part tilts. A forward pass with moments x places every load, and the
+//! loads give moments G(x). The moments of the undeflected pass are the paper's first order; x =
+//! G(x) is equilibrium on the deflected arm. With P(x) the target position,
 //!
 //! p = P(x*) + Λ (G(x*) − x*),  Λ = `P_x` (I − `G_x`)⁻¹,
 //!
-//! has the value and the first derivatives of the equilibrium position, if the pass is made in dual
+//! has the value and the first derivatives of the equilibrium position. The pass is made in dual
 //! numbers at the real fixed point x* (implicit function theorem, in adjoint form). No iteration in
 //! dual numbers is needed.
 
@@ -236,7 +236,7 @@ impl<S: Scalar> Arm<S> {
     /// Returns the position \[m\] of the target at `target` \[m\] in the pose's frame, arm base
     /// frame, with its exact first derivatives.
     ///
-    /// `pose` is the equilibrium of the same pose with the real parts of this arm's parameters; for
+    /// `pose` is the equilibrium of the same pose with the real parts of this arm's parameters. For
     /// loads on the deflected arm it contains Λ of the same target.
     pub fn target_position(
         &self,

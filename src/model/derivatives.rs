@@ -100,8 +100,8 @@ impl Base {
         rotation_vector.chain(effects)
     }
 
-    /// Returns the column of each parameter that rotates the base, with the rotation vector of the
-    /// base per unit of the parameter, measuring frame: ω = ½ Σ eₖ × deₖ for its axes eₖ.
+    /// Returns the column of each parameter that rotates the base, with the base's rotation vector
+    /// per unit of the parameter, measuring frame. It is ω = ½ Σ eₖ × deₖ for the base's axes eₖ.
     pub fn angular_velocities(&self) -> impl Iterator<Item = (usize, Vector3<f64>)> + '_ {
         let axes = &self.frame.axes;
         let rotation_vector = self.rotation_columns().map(|(column, slope)| (column, slope.axes));

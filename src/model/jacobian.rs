@@ -113,7 +113,7 @@ impl<'m> JacobianWriter<'m> {
     }
 
     /// Writes the whitened residual of a row and its derivatives into a block of zeros, from row
-    /// `row` on: three rows, six if the row has an orientation.
+    /// `row` on. There are three rows, or six if the row has an orientation.
     #[inline]
     pub fn write(&mut self, pose: &Pose, block: &mut Block, row: usize) {
         if pose.observation.is_position() {
@@ -187,8 +187,9 @@ impl<'m> JacobianWriter<'m> {
     /// that carry its fixtures. Returns the derivatives of its prediction with respect to the
     /// fixtures' numbers; `None` without equilibrium.
     ///
-    /// Only the motion of the second fixture's point relative to the frame of the first one counts:
-    /// the point's motion with its carrier, less its motion if it were fixed to the first carrier.
+    /// Only the motion of the second fixture's point relative to the frame of the first fixture
+    /// counts. It is the point's motion with its carrier, less its motion if it were fixed to the
+    /// first carrier.
     fn write_carriers(
         &mut self,
         pose: &Pose,

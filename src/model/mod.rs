@@ -172,8 +172,9 @@ impl Model {
         self.nominal.joints.len()
     }
 
-    /// Returns the largest distance that the undeflected arm can reach \[m\]: Σ √(a² + d²), or
-    /// ‖xyz‖, over the joints that carry a target, plus the target's offset; 1 m if that is zero.
+    /// Returns the largest distance that the undeflected arm can reach \[m\]. It is Σ √(a² + d²),
+    /// or ‖xyz‖, over the joints that carry a target, plus the target's offset; 1 m if that is
+    /// zero.
     #[doc(hidden)]
     pub fn reach(&self) -> f64 {
         let length = |joint: &Joint<f64>| {

@@ -22,8 +22,8 @@ const POSE_RESIDUALS: usize = 6;
 /// parameters.
 ///
 /// A row has three residuals; those beyond the numbers that it measures are 0. If any row has an
-/// orientation that is fitted, each has six: the last three are log(R Rₚᵀ) / σ of measured R and
-/// predicted Rₚ, measuring frame, and 0 for rows without an orientation.
+/// orientation that is fitted, each has six. The last three are log(R Rₚᵀ) / σ of measured R and
+/// predicted Rₚ, measuring frame. They are 0 for rows without an orientation.
 pub struct PoseResiduals<'a> {
     model: &'a Model,
     poses: Arc<Vec<Pose<'a>>>,

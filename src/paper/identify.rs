@@ -85,7 +85,7 @@ pub enum IdentifyError {
 /// 2. With fixed stiffness, e_{j+1} = `J_g(E_j)`⁺ [`PE_meas` − `PE_nom(E_j)` − `D_f(E_j)`],
 ///    E_{j+1} = E_j + e_{j+1}, until e is negligible [Chen2021, eq. 45].
 ///
-/// Geometric errors that resemble deflections bias stage 1 if it uses positions: it explains them
+/// Geometric errors that resemble deflections bias stage 1 if it uses positions. It explains them
 /// by flexibilities many times the true ones, or negative, and stage 2 cannot correct that. Load
 /// differences are not biased. Eq. 41, which neglects the coupling, matters less; `docs/paper.md`
 /// has figures.

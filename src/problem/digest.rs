@@ -44,8 +44,9 @@ impl Problem {
         hexadecimal(&self.canonical_text())
     }
 
-    /// Returns the name of each part of the declared arm with its digest, 16 hexadecimal digits:
-    /// the whole (gravity, statics, tool, base), each target, each joint, and each effect.
+    /// Returns the name of each part of the declared arm with its digest, 16 hexadecimal digits.
+    /// The parts are the whole (gravity, statics, tool, base), each target, each joint, and each
+    /// effect.
     pub(crate) fn digest_parts(&self) -> BTreeMap<String, String> {
         let text = self.canonical_text();
         let mut joints = 0;

@@ -95,7 +95,8 @@ pub struct Problem {
     /// Measured point and payload.
     #[doc(hidden)]
     pub tool: Tool,
-    /// Declared measured points, named by the rows; empty if the tool's point is the only one.
+    /// Declared measured points, which rows name in the column `target`. Empty if the point of the
+    /// tool is the only one.
     #[doc(hidden)]
     pub targets: Vec<Target>,
     /// Pose of the arm's base in the measuring frame.

@@ -43,8 +43,8 @@ pub(super) fn joint(section: &Section<'_, '_>) -> Vec<Warning> {
     warnings
 }
 
-/// Returns a warning if a joint table without the key `dh` has the zeros of a standard DH table: α
-/// of the first row is not zero, and both α and a of the last row are.
+/// Returns a warning if a joint table without the key `dh` has the zeros of a standard DH table. In
+/// such a table α of the first row is not zero, and both α and a of the last row are.
 pub(super) fn form(joints: &[Joint]) -> Option<Warning> {
     let (first, last) = (joints.first()?, joints.last()?);
     let is_standard = joints.len() >= MIN_ROWS

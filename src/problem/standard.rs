@@ -57,8 +57,8 @@ pub(super) fn modified(rows: Vec<Joint>) -> Vec<Joint> {
 }
 
 impl Problem {
-    /// Reads the joint table as standard DH, whose rows were taken for modified DH; `None` where
-    /// the table has no such rows.
+    /// Returns the problem with the rows of its joint table interpreted as standard DH, for a table
+    /// declared as modified DH. Returns `None` if standard rows cannot have such values.
     pub(crate) fn read_as_standard(&self) -> Option<Self> {
         let has_row = |joint: &Joint| {
             joint.kind != JointKind::Fixed
@@ -72,8 +72,8 @@ impl Problem {
         Some(self.with_chain(modified(self.joints.clone())))
     }
 
-    /// Reads the joint table as modified DH, whose rows were taken for standard DH; `None` where
-    /// the table was not declared as standard.
+    /// Returns the problem with the rows of its joint table interpreted as modified DH, for a table
+    /// declared as standard DH. Returns `None` for other tables.
     pub(crate) fn read_as_modified(&self) -> Option<Self> {
         let (last, rows) = self.joints.split_last()?;
         let is_standard = last.kind == JointKind::Fixed && last.name == FLANGE;

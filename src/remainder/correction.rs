@@ -76,8 +76,8 @@ pub struct CorrectedPose {
     /// Expected root mean square of the error length ‖measured − predicted‖ \[m\]. Multiplied by
     /// [`Scores::quantile`], it is an error bound.
     pub size: f64,
-    /// True if an input of the pose is outside its measured range, or if less than half of the
-    /// correction is applied because measured poses are far.
+    /// True if an input of the pose is outside its measured range. Also true if less than half of
+    /// the correction is applied, because measured poses are far away.
     pub is_extrapolated: bool,
 }
 
@@ -146,8 +146,8 @@ impl Correction {
         self.scores.pooled_bound(sizes, level, certainty)
     }
 
-    /// Returns the names of the free parameters of those bases and tools of `model` that no fitted
-    /// row depends on, because their sessions or targets were not fitted.
+    /// Returns the names of the free parameters of bases and tools of `model` on which no fitted
+    /// row depends. Their sessions or targets were not fitted.
     pub(super) fn unseen_placements<'a>(&self, model: &'a Model) -> HashSet<&'a str> {
         let whole = |name: &str| name.split('.').next().unwrap_or_default().to_owned();
         let seen: HashSet<String> =

@@ -6,8 +6,8 @@ use super::correction::Correction;
 use super::kernel::Hyperparameters;
 use super::rows::{AXES, Rows, Site, SiteKind};
 
-/// Error of a joint's coordinate as a function of its own command, and the motions of the position
-/// that all errors of the joint cause.
+/// Error of a joint's coordinate as a function of its own command, and the motions of the target's
+/// position that all modelled errors of the joint cause.
 #[derive(Debug, Clone, PartialEq)]
 pub struct JointError {
     /// Joint, counted from 0.
@@ -18,8 +18,9 @@ pub struct JointError {
     /// Error over the measured range of the command. The mean over the range is subtracted, because
     /// it only changes the joint's offset.
     pub points: Vec<JointErrorPoint>,
-    /// Root mean square motion of the position at the centres \[m\]: by the function of the joint's
-    /// own command, by the function of all inputs, and by the additional compliance.
+    /// Root mean square motions of the target's position at the centres \[m\]. They are caused by
+    /// the function of the joint's own command, by the function of all inputs, and by the
+    /// additional compliance.
     pub motions: [f64; 3],
 }
 

@@ -68,8 +68,8 @@ struct PairColumn {
     /// For each pair and site j, the correlation of the function uⱼ of the site's own command, and
     /// its derivative with respect to ln ℓᵤⱼ.
     single: Vec<(f64, f64)>,
-    /// For each pair, the correlation of the functions vⱼ of all inputs, and its derivative with
-    /// respect to −½ d²; d is the distance of both rows in units of the lengths ℓᵥ.
+    /// Correlation of the functions vⱼ of all inputs for each pair, and its derivative with respect
+    /// to −½ d². d is the distance of both rows in units of the lengths ℓᵥ.
     joint: Vec<(f64, f64)>,
 }
 

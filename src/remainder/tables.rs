@@ -18,8 +18,8 @@ pub struct SiteTable {
     pub is_compliance: bool,
     /// Lever that divides the derivative of the position: \[m/rad\], \[1\] or \[N·m²/rad\].
     pub lever: f64,
-    /// Prior variances \[m²\] of the error times `lever`: of its part that depends on the joint's
-    /// command alone, of its part that depends on all inputs, and of its constant part.
+    /// Prior variances \[m²\] of the error times `lever`. There are three parts: as a function of
+    /// the joint's command alone, as a function of all inputs, and constant.
     pub variances: [f64; 3],
     /// Index of the input that is the joint's own command, and 1/ℓᵤ² of the function of it.
     pub single: Option<(usize, f64)>,

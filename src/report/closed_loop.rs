@@ -290,8 +290,8 @@ fn headline(problem: &Problem, closure: &ClosedLoop, result: &LoopResult) -> Hea
     Headline { states, unit, of, facts }
 }
 
-/// Returns reasons for doubt: a fit that is not trusted, and active limits for which an effect may
-/// only compensate.
+/// Returns reasons for doubt. The fit may not be trusted, or a limit may be active, so that an
+/// effect may only compensate for that limit.
 fn cautions<'a>(closure: &ClosedLoop, result: &LoopResult) -> Vec<Block<'a>> {
     let (before, after) = (&closure.before.fit, &closure.after);
     let untrusted = (!result.trusted).then(|| format!("Warning: {}.", why_not_trusted(after)));

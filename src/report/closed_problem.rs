@@ -13,8 +13,8 @@ use crate::results::ParameterValue;
 use crate::select::{ClosedLoop, Found, Status};
 
 /// Adds the found effects to the `text` of `problem` and replaces its data `files` (measurements,
-/// then the joint table), relative to the folder of the new text. Everything else, including
-/// comments, is unchanged.
+/// then the joint table). The paths are relative to the folder of the new text. Everything else,
+/// including comments, is unchanged.
 ///
 /// # Errors
 /// Returns an error if the text is not TOML.

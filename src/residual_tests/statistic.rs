@@ -176,11 +176,11 @@ impl Order {
 ///
 /// with K the doubly centred distances of the covariate x, y the centred residuals and Cₖ their sum
 /// over the k poses with the smallest x. It is the distance correlation of [Székely, Rizzo and
-/// Bakirov 2007] with squared distances between residuals instead of plain ones, which is the
-/// martingale difference correlation of [Shao and Zhang 2014]: between 0 and 1, and 0 (for many
-/// poses) exactly if the mean residual is the same at every x. An effect that the model lacks moves
-/// the mean; noise that is larger at some x does not. The second form takes time proportional to
-/// the number of poses, so that all poses of a long campaign can be used.
+/// Bakirov 2007] with squared distances between residuals instead of plain ones. That is the
+/// martingale difference correlation of [Shao and Zhang 2014]. It is between 0 and 1, and 0 (for
+/// many poses) exactly if the mean residual is the same at every x. An effect that the model lacks
+/// moves the mean; noise that is larger at some x does not. The second form takes time proportional
+/// to the number of poses, so that all poses of a long campaign can be used.
 #[derive(Debug, Clone)]
 pub(super) struct Cumulative {
     /// Indices of the poses in ascending order of x.

@@ -14,10 +14,11 @@ use super::statistic::{Cumulative, Sample, Statistic, sequences};
 /// Tests the residual of a fit. `level` is the probability that noise alone makes at least one test
 /// fail; `seed` seeds the permutations.
 ///
-/// The tests come in a fixed order: χ², lack of fit, runs and Ljung–Box in the order of time (and
-/// of the rows, if that differs), each covariate, outliers, normality. All tests except the last
-/// two use the fit without outliers. Holm's procedure judges all tests together at that level.
-/// Outliers and normality take part in it, but are not structure, because no effect explains them.
+/// The tests come in a fixed order: χ², lack of fit, runs, Ljung–Box, each covariate, outliers,
+/// normality. Runs and Ljung–Box use the order of time, and that of the rows if it differs. All
+/// tests except the last two use the fit without outliers. Holm's procedure judges all tests
+/// together at that level. Outliers and normality take part in it, but are not structure, because
+/// no effect explains them.
 pub fn test_residual(fit: &FitResidual, level: f64, seed: u64) -> ResidualTests {
     let poses = fit.residual.len() / 3;
     let leverage = match fit

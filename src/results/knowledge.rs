@@ -91,9 +91,9 @@ pub enum MissingReference {
 }
 
 impl MissingReference {
-    /// Returns the missing references that explain undetermined `combinations` of the unknowns: the
-    /// pose of the whole arm is undetermined without a known position, its size without a known
-    /// length.
+    /// Returns the missing references that explain undetermined `combinations` of the unknowns.
+    /// Without a known position the pose of the whole arm is undetermined, without a known length
+    /// its size.
     pub fn all(combinations: &[UnidentifiableCombination], unknowns: &[String]) -> Vec<Self> {
         let begins = |name: &str, words: &[&str]| words.iter().any(|word| name.starts_with(word));
         let field = |name: &'_ str| name.rsplit('.').next().unwrap_or_default().to_owned();

@@ -56,8 +56,8 @@ pub struct CauseResult {
     pub changes: Vec<ChangeResult>,
     /// Root mean square error of each row with this cause as estimated without it, in `unit`.
     pub left_out_error: Option<f64>,
-    /// Number of further poses after which this cause and the next one are expected to be told
-    /// apart; null if no number of such poses would.
+    /// Number of further poses after which this cause and the next one can be expected to be told
+    /// apart. Null if no number of such poses would suffice.
     pub poses_to_tell_apart: Option<usize>,
 }
 

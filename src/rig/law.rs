@@ -82,8 +82,8 @@ impl Rig {
         terms.map(|(formula, size)| size * formula.evaluate(&of, &inner)).sum()
     }
 
-    /// Returns the moment of the loads about the axis of a joint, counted from 0, on the undeflected
-    /// arm without effects [N·m]: the work of the loads per turn of the joint.
+    /// Returns the moment of the loads about the axis of a joint, counted from 0, on the
+    /// undeflected arm without effects [N·m]. It is the work of the loads per turn of the joint.
     fn moment(&self, joint: usize, conditions: &PoseConditions) -> f64 {
         let mut bare = Self::new(self.arm.clone(), Vec::new()).with_segments(1);
         let mut work = |step: f64| {

@@ -106,9 +106,9 @@ impl Truth {
         (0..rows).map(of_row).collect()
     }
 
-    /// Returns the number of successive rows with one target. With fixtures, it is one row for each
-    /// fixture and tilted frame, so that each target is measured against all of them; otherwise it
-    /// is one.
+    /// Returns the number of successive rows with one target. With fixtures, there is one row for
+    /// each fixture and tilted frame, so that each target is measured against all of them.
+    /// Otherwise there is one row.
     pub(super) fn rows_per_target(&self, fixtures: &[Fixture]) -> usize {
         if fixtures.is_empty() { 1 } else { fixtures.len() + self.tilts.len() }
     }

@@ -26,8 +26,8 @@ const MAX_CONCENTRATION_STEPS: usize = 10;
 /// Largest work of one least-squares solve, in poses × unknowns², at which outliers are searched
 /// again. Otherwise those of the previous fit are kept, because a search takes about ten solves.
 const MAX_OUTLIER_WORK: f64 = 2e8;
-/// Largest root mean square change of the residuals, in units of σ, at which evidence about a fit
-/// that was stopped early remains valid for the converged one.
+/// Largest root mean square change of the residuals between a fit that was stopped early and the
+/// converged one, in units of σ. Up to it, evidence about the former remains valid.
 const MAX_UNSETTLED: f64 = 0.05;
 /// Smallest share of its variance that the residual of a pose keeps along a direction that the pose
 /// alone determines.
@@ -170,8 +170,8 @@ impl Fitted {
         Options { start: values.collect(), influential_rows: false, ..options.clone() }
     }
 
-    /// Returns options for the next fit with the state that it reuses: the registered nominal arm,
-    /// the derivatives at the optimum and, if the fits are `alike`, the noise scale.
+    /// Returns options for the next fit with the state that it reuses: the registered nominal arm
+    /// and the derivatives at the optimum. If the fits are `alike`, it also reuses the noise scale.
     pub fn succeeding(&self, options: &Options, alike: bool) -> Options {
         let derivatives = self.derivatives.lock().unwrap_or_else(PoisonError::into_inner).clone();
         let at = (self.model.parameters.as_slice(), &self.found.x);
@@ -393,8 +393,8 @@ impl Fitted {
 /// without them.
 ///
 /// The rows with the largest residuals, as many as may be outliers, are left out repeatedly until
-/// they stay the same, as in one start of least trimmed squares [Rousseeuw and Van Driessen 2006].
-/// Then only rows beyond `OUTLIER_DISTANCE` are left out.
+/// they stay the same. This is one start of least trimmed squares [Rousseeuw and Van Driessen
+/// 2006]. Then only rows beyond `OUTLIER_DISTANCE` are left out.
 fn outliers(fitted: &Fitted, data: &Data) -> Vec<usize> {
     #[expect(
         clippy::cast_possible_truncation,

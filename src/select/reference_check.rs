@@ -1,18 +1,18 @@
 //! Check of an effect of the instrument against readings of fixed points, which were not fitted.
 //!
-//! An instrument that moved by d f(t) and turned by ω f(t) moves a fixed point p with it: z = p +
-//! (d + ω × p) f(t) + noise of σ, the true place unknown and p near it. With θ = (d, ω), or d
-//! alone, B = [1  −p×] and what readings of a point say once its place is taken out,
+//! If an instrument moves by d f(t) and rotates by ω f(t), a fixed point near p is read at z = p +
+//! (d + ω × p) f(t) + noise of σ. The true position of the point is unknown. With θ = (d, ω), or d
+//! alone, and B = [1 −p×], the readings of a point relative to their mean contain
 //!
 //! v = Bᵀ Σ (f − f̄)(z − z̄)/σ²,   M = BᵀB Σ (f − f̄)²/σ²,
 //!
-//! summed over the points, ln p(readings | θ) = θᵀv − θᵀMθ/2 but for a constant. What the loop
-//! found, θ̂ with its covariance C = L Lᵀ, is held against no motion by twice the logarithm of the
-//! ratio of both marginal likelihoods: with g = Lᵀ(v − M θ̂) and K = 1 + LᵀM L,
+//! summed over the points: ln p(readings | θ) = θᵀv − θᵀMθ/2, up to a constant. The estimate θ̂ of
+//! the loop with its covariance C = L Lᵀ is compared with no motion. With g = Lᵀ(v − M θ̂) and K =
+//! 1 + LᵀM L, twice the logarithm of the ratio of both marginal likelihoods is
 //!
 //! 2 θ̂ᵀv − θ̂ᵀM θ̂ + gᵀK⁻¹g − ln det K,
 //!
-//! which decides if the odds are 100 to 1 either way.
+//! The readings decide if the odds are 100 to 1 either way.
 
 use std::collections::{BTreeMap, BTreeSet};
 

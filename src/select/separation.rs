@@ -35,7 +35,7 @@ pub struct Side {
 
 impl Side {
     /// Returns the expected p-value of the effect, given the other one, at a size \[SI\] in the
-    /// direction that is hardest to distinguish; 1 if nothing distinguishes them.
+    /// direction that is hardest to distinguish. It is 1 if nothing distinguishes the effects.
     pub fn expected_p(&self, size: f64) -> f64 {
         let told =
             self.test.and_then(|test| Some((test, test.noncentrality(POWER)?, self.told.worst?)));

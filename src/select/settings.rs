@@ -7,7 +7,7 @@
 /// catalogue contains most causes.
 pub(super) const PRIOR_OF_FUNCTIONS: f64 = 0.25;
 /// Prior weight of the bending of links that are declared rigid, relative to another family of
-/// effects: most of an arm's compliance is in its joints.
+/// effects. Most of an arm's compliance is in its joints.
 pub(super) const PRIOR_OF_RIGID_LINKS: f64 = 0.1;
 /// Prior probability that a further effect belongs to a family that the set already contains: an
 /// effect of one joint often occurs at others.

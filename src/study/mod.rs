@@ -3,10 +3,9 @@
 //!
 //! A [`Study`] (`STUDY.toml`, see `docs/study.md`) crosses noise levels, numbers of poses,
 //! strategies and solvers into cells. Repetition r draws an arm, poses and noise from the seed and
-//! r alone. Every cell therefore fits the same arms in the same poses, and results depend neither
-//! on the order nor on the number of threads or machines. The fits of a cell are grouped into
-//! [`Part`]s; a finished part is kept in a [`Store`], and results are made from finished parts
-//! only.
+//! r alone. Every cell therefore fits the same arms in the same poses. Results do not depend on the
+//! order or on the number of threads or machines. The fits of a cell are grouped into [`Part`]s; a
+//! finished part is kept in a [`Store`], and results are made from finished parts only.
 //!
 //! A [`MisprintStudy`] repeats the experiment of Chen et al. (2021) with simulated arms instead.
 

@@ -44,8 +44,9 @@ pub(super) struct Stage {
 }
 
 impl<'a> Chain<'a> {
-    /// Finds the chain from `base` to `tip`. The defaults are the root and the only leaf below the
-    /// base, or the leaf with at least twice as many moving joints as every other one.
+    /// Finds the chain from `base` to `tip`. The default base is the root. The default tip is the
+    /// only leaf below the base, or the leaf with at least twice as many moving joints as every
+    /// other one.
     ///
     /// # Errors
     /// Returns an error if the links form no tree, several roots or leaves are possible, a joint

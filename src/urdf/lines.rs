@@ -9,7 +9,7 @@ const MAX_PARALLEL_SINE: f64 = 0.1;
 /// Smallest distance between two points that defines a direction \[m\].
 const MIN_DISTANCE: f64 = 1e-12;
 
-/// Transform Rz(θ₀) Tz(d₀) Ry(β) Rx(α) Tx(a) Rz(θ) Tz(d) between two axes: the first two factors
+/// Transform Rz(θ₀) Tz(d₀) Ry(β) Rx(α) Tx(a) Rz(θ) Tz(d) between two axes. The first two factors
 /// act along the first axis, the last two along the second.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Step {

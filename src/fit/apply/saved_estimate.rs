@@ -345,8 +345,8 @@ impl SavedEstimate {
         Ok(())
     }
 
-    /// Returns true if the fitted rows did not determine the pose of a base in its measuring frame,
-    /// as contacts with sockets at unknown positions do not.
+    /// Returns true if the fitted rows did not determine the pose of a base in its measuring frame.
+    /// Contacts with sockets at unknown positions, for example, do not determine it.
     pub(crate) fn leaves_base_open(&self) -> bool {
         let is_base =
             |entry: &&Entry| entry.name.starts_with("base.") || entry.name.starts_with("base[");
@@ -428,7 +428,8 @@ impl SavedEstimate {
     }
 
     /// Checks that the estimate is of the arm and the laws of `problem`, as [`check`](Self::check)
-    /// does, and that it has a value of every parameter of the model but bases, tools and fixtures.
+    /// does. The estimate must have a value of every parameter of the model except bases, tools and
+    /// fixtures.
     ///
     /// # Errors
     /// Returns an error that names what differs.

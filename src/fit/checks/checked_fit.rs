@@ -65,8 +65,8 @@ pub(in crate::fit) struct CheckedFit<'a> {
     pub hidden: &'a [HiddenByBound],
     /// Prior widths that the fitted deviations contradict.
     pub prior_sizes: &'a [PriorSize],
-    /// For each touched point, scatter of the prediction with the nominal and with the fitted arm,
-    /// and a flag that is true if all rows of the point are held out.
+    /// Scatter of the prediction at each touched point, with the nominal and with the fitted arm.
+    /// The flag is true if all rows of the point are held out.
     pub spreads: &'a [(PointSpread, PointSpread, bool)],
     /// Misreadings of the input that would explain the misfit; they are searched at first use.
     pub explanations: OnceCell<Explanations>,

@@ -17,8 +17,8 @@ use crate::measurement::Measurements;
 use crate::numeric::median;
 use crate::observation::kind_named;
 
-/// Smallest ratio of the held-out error of the fitted arm to that of the nominal arm at which the
-/// fit is reported as worse than the nominal arm.
+/// Smallest ratio of the held-out errors of fitted and nominal arm at which the fit is reported as
+/// worse than the nominal arm.
 const MIN_ERROR_RATIO: f64 = 1.5;
 /// Smallest held-out error, as a multiple of the noise, at which a fit is reported as worse than
 /// the nominal arm.

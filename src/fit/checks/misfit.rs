@@ -109,7 +109,7 @@ fn no_better(kind: &RowKind, before: f64, after: f64) -> Option<Finding> {
 }
 
 /// Reports measured points whose spread `measured` \[m\] differs much from the spread `expected`
-/// \[m\] of the nominal arm's points, so that they belong to an arm of another size.
+/// \[m\] of the nominal arm's points. They belong to an arm of another size.
 fn other_size(measured: f64, expected: f64) -> Option<Finding> {
     let is_same = (expected / MAX_SIZE_RATIO..=expected * MAX_SIZE_RATIO).contains(&measured);
     let text = format!(

@@ -8,12 +8,12 @@ use crate::problem::Problem;
 
 use super::finding::Finding;
 
-/// Smallest fall of the deviance (−2 ln of the posterior density) at which the measurements speak for
-/// another place of the payload: a likelihood ratio of 90, or three standard errors.
+/// Smallest decrease of the deviance (−2 ln of the posterior density) at which the measurements
+/// favour another place of the payload. It is a likelihood ratio of 90, or three standard errors.
 const MIN_FALL_OF_DEVIANCE: f64 = 9.0;
 
-/// Compares the fit with one whose payload hangs at the identified target instead of the nominal one.
-/// Returns a finding if the measurements speak for the identified target.
+/// Compares the fit with one whose payload hangs at the identified target instead of the nominal
+/// one. Returns a finding if the measurements favour the identified target.
 ///
 /// `fit` repeats the fit with another problem. There is nothing to compare if the problem declares
 /// the place, no payload is carried, the arm is rigid, or the target is not identified.

@@ -95,8 +95,8 @@ pub(in crate::fit) fn spreads(
 }
 
 impl Fitting<'_> {
-    /// Returns for each touched point the scatter of the predicted target with the registered
-    /// nominal and with the fitted arm, and true if all its rows are held out.
+    /// Returns the scatter of the predicted target at each touched point, with the registered
+    /// nominal and with the fitted arm. The flag is true if all rows of the point are held out.
     pub fn spreads(
         &self,
         fixtures: &[Fixture],

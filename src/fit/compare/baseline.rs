@@ -54,9 +54,9 @@ impl Baseline {
 /// allow: first with elasticity ignored, then corrected and as printed, with stiffness known, from
 /// positions, or from load differences.
 ///
-/// Returns nothing where the procedure does not apply: it needs one session and target, one chain
-/// of joints in DH form without mimic joints, and as many equations as geometric parameters.
-/// Without elasticity it returns the rigid form alone.
+/// Returns an empty list if the procedure does not apply. It needs one session and target, and one
+/// chain of joints in DH form without mimic joints. It also needs at least as many equations as
+/// geometric parameters. Without elasticity it returns the rigid form alone.
 pub(in crate::fit) fn baselines(problem: &Problem, data: &Dataset) -> Vec<Baseline> {
     let Dataset { measurements, .. } = data;
     let beyond = |joint: &Joint| joint.placement.is_some() || joint.mimic.is_some();

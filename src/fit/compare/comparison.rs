@@ -29,8 +29,8 @@ pub struct Comparison {
     pub paper: Vec<Baseline>,
     /// Ablation and joint fit of the model without the ablated elasticity.
     pub ablations: Vec<(Ablation, Identification)>,
-    /// Results of the joint fit and of every elastic form of the paper's procedure, in the form of
-    /// the paper's tables; empty if rows measure anything but positions.
+    /// Results of the joint fit and of every elastic form of the paper's procedure, as in the
+    /// paper's tables. Empty if some rows measure no position.
     pub procedures: Vec<Procedure>,
     /// Errors before calibration as the paper defines them: those of the rigid nominal arm.
     pub before: Before,

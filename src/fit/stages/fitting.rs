@@ -419,8 +419,8 @@ impl<'a> Fitting<'a> {
         }
     }
 
-    /// Returns the errors of every kind of rows with the full parameter vectors of the registered
-    /// nominal and of the fitted arm; empty if there is only one kind.
+    /// Returns the errors of every kind of rows, with the full parameter vectors of the registered
+    /// nominal and of the fitted arm. Empty if there is only one kind.
     pub fn errors_by_kind(
         &self,
         registered: &DVector<f64>,

@@ -151,8 +151,8 @@ fn least_squares(rows: &[(Vec<f64>, f64)]) -> Option<DVector<f64>> {
 /// Returns the anchor A of distances ℓ to points p: ‖p‖² − ℓ² = 2 p·A − ‖A‖² is linear in A and
 /// ‖A‖².
 ///
-/// If the points lie in a plane, the distance of the anchor from it follows from the lengths, on
-/// the side that fits better, or else on the upper side.
+/// If the points lie in a plane, the distance of the anchor from the plane follows from the
+/// lengths. Of the two sides, the one that fits better is taken, or else the upper one.
 fn anchor(contacts: &[(Vector3<f64>, f64)]) -> Vector3<f64> {
     let centre = centre(contacts);
     let axes = principal(contacts, &centre);

@@ -12,9 +12,9 @@ const PLAUSIBLE_LN_STIFFNESS: f64 = 4.605_170_185_988_092;
 /// other sign.
 const MAX_ANGLE: f64 = std::f64::consts::PI;
 
-/// Returns the plausible deviation of a parameter without a prior: the reach of the arm for a
-/// length, 1 rad for an angle, a factor of 100 for a stiffness. Returns `None` for parameters with
-/// a prior, for positions of bases and fixtures, which are arbitrary, and for other units.
+/// Returns the plausible deviation of a parameter without a prior. It is the reach of the arm for a
+/// length, 1 rad for an angle, and a factor of 100 for a stiffness. Returns `None` for parameters
+/// with a prior, for positions of bases and fixtures, which are arbitrary, and for other units.
 pub(in crate::fit) fn plausible(model: &Model, parameter: &Parameter) -> Option<f64> {
     if parameter.sigma.is_some()
         || matches!(
@@ -31,9 +31,9 @@ pub(in crate::fit) fn plausible(model: &Model, parameter: &Parameter) -> Option<
     }
 }
 
-/// Returns the largest possible deviation of a parameter of the arm: the reach of the arm for a
-/// length, half a turn for an angle, a factor of 100 for a stiffness. Returns `None` for bases,
-/// fixtures, orientations of targets, and other units.
+/// Returns the largest possible deviation of a parameter of the arm. It is the reach of the arm for
+/// a length, half a turn for an angle, and a factor of 100 for a stiffness. Returns `None` for
+/// bases, fixtures, orientations of targets, and other units.
 pub(in crate::fit) fn largest(model: &Model, parameter: &Parameter) -> Option<f64> {
     match (parameter.site, parameter.unit()) {
         (

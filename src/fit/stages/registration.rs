@@ -14,8 +14,8 @@ const MAX_COLLINEAR_RATIO: f64 = 1e-12;
 /// full parameter vector `x`.
 ///
 /// A base becomes the best rigid motion from the arm's base frame to the measured positions of
-/// `poses`; then the orientation of a target becomes the best one. Bases and targets that no pose
-/// uses keep their values.
+/// `poses`. Then the best orientation of each target is found. Bases and targets that no pose uses
+/// keep their values.
 ///
 /// min over R, t of Σ ‖y − R p − t‖²: the unit quaternion of R is the eigenvector of a symmetric 4
 /// × 4 matrix  [Horn 1987].

@@ -24,9 +24,10 @@ impl Unmoved {
         self.0.len()
     }
 
-    /// Finds the directions in which none of several unknowns moves any pose, from the derivatives of
-    /// positions: one column per unknown, with `per_pose` rows per pose of which the first three are
-    /// the position. There are none if no unknown moves anything.
+    /// Finds the directions in which none of several unknowns moves any pose. `columns` holds the
+    /// derivatives of positions, one column per unknown, with `per_pose` rows per pose. The first
+    /// three rows of a pose are the position. There are no such directions if no unknown moves
+    /// anything.
     pub fn from_columns<'a>(columns: impl Iterator<Item = &'a [f64]>, per_pose: usize) -> Self {
         let square = |column: &[f64]| -> Matrix3<f64> {
             let slopes =

@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 
 use crate::model::Model;
 
-/// Covariance of the estimates, consistent with their standard errors: it includes priors, active
+/// Covariance of the estimates, consistent with their standard errors. It includes priors, active
 /// constraints, the weights of a robust loss and the noise that the fit assumed.
 ///
 /// Unidentifiable combinations keep their start values: their parameters have a variance here, but

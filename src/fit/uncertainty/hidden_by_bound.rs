@@ -1,9 +1,9 @@
 //! Uncertainty that a bound hides: partners of an unknown that rests on a bound.
 //!
 //! If the data hardly determine a combination of unknowns, a bound on one of them seems to decide
-//! the others: with the unknown held at its bound they have small standard errors. The bound only
-//! restricts the side on which the unknown lies. Along the valley of the cost, x + s u, the unknown
-//! is inside its bound by u ≥ 0, and the posterior of u is
+//! the others. They have small standard errors if the unknown is held at its bound, but the bound
+//! only restricts the side on which the unknown lies. Along the valley of the cost, x + s u, the
+//! unknown is inside its bound by u ≥ 0, and the posterior of u is
 //!
 //! p(u) ∝ exp(−μ u − ½ h u²) on 0 ≤ u ≤ w
 //!
@@ -16,9 +16,9 @@ use crate::fit::stages::stage::Stage;
 use crate::least_squares::Triangle;
 use crate::least_squares::solver::AtBound;
 
-/// Smallest ratio of an unknown's deviation along the valley to its standard error with the other
-/// unknown held at its bound, at which the bound hides its uncertainty. At 3, the valley has nine
-/// tenths of the variance.
+/// Smallest ratio of two deviations of an unknown at which the bound of another unknown hides its
+/// uncertainty: along the valley, and its standard error with the other unknown held at its bound.
+/// At 3, the valley has nine tenths of the variance.
 const MIN_HIDDEN_RATIO: f64 = 3.0;
 /// Weight of the rows that hold combinations constant in a least-squares problem.
 const CONSTRAINT_WEIGHT: f64 = 1e5;
@@ -46,10 +46,10 @@ pub(in crate::fit) struct HiddenByBound {
 
 /// Finds the bounds of a stage that hide the uncertainty of partners.
 ///
-/// `triangle` is the factor R of the weighted data at the full parameter vector `at`, `closed` are
-/// rows of combinations that are held, `held` marks unknowns that are not estimated, `multipliers`
-/// are those of bounds, where an unknown rests on one, and `errors` are the standard errors with
-/// all bounds holding.
+/// `triangle` is the factor R of the weighted data at the full parameter vector `at`, and the rows
+/// of `closed` are combinations that are held. `held` marks unknowns that are not estimated.
+/// `multipliers` are those of the bounds on which unknowns rest. `errors` are the standard errors
+/// with all bounds holding.
 pub(in crate::fit) fn hidden_by_bounds(
     stage: &Stage,
     at: &DVector<f64>,

@@ -45,11 +45,11 @@ pub enum Noise {
 }
 
 /// Runs the strategy until its σ has converged. The σ is the declared one, or the restricted
-/// maximum likelihood estimate if residuals and priors contradict it, or the scatter about the fit
-/// if none is declared. `judged` is true if the poses suffice to contradict a σ.
+/// maximum likelihood estimate if residuals and priors contradict it. If none is declared, it is
+/// the scatter about the fit. `judged` is true if the poses suffice to contradict a σ.
 ///
-/// A fit may start with the σ of an earlier one, as long as that certainly contradicts the declared
-/// one.
+/// A fit may start with the noise models that an earlier fit assumed. It keeps them as long as the
+/// declared σ is certainly contradicted.
 pub(in crate::fit) fn fitted(
     fitting: &mut Fitting,
     start: &DVector<f64>,

@@ -1,9 +1,9 @@
 //! Rules of `[parameters]` whose σ the data refute.
 //!
-//! A prior that is far too narrow keeps its parameters near nominal, and the misfit ends up in the
-//! noise: the fit takes a σ far above the declared one. For each rule a wider σ is weighed by the
-//! evidence, linearised about the fit: with the deviations z, r = R z + c in declared σ, priors
-//! z ∼ N(0, K⁻¹) and noise variance s²,
+//! A prior that is far too narrow keeps its parameters near nominal, and the misfit is attributed
+//! to the noise. The fit then assumes a σ far above the declared one. For each rule the evidence of
+//! wider σ is computed, linearised about the fit. With the deviations z, r = R z + c in declared σ,
+//! priors z ∼ N(0, K⁻¹) and noise variance s²,
 //!
 //! −2 ln L(s², K) = m ln s² + ln|A| − ln|K| + (‖r₀‖² − bᵀA⁻¹b / s²) / s²,  A = RᵀR / s² + K
 //!
@@ -48,10 +48,10 @@ pub(in crate::fit) struct RefutedPrior {
 
 /// Finds the rules whose σ the data refute, the most improbable first.
 ///
-/// `stage` holds all unknowns and identification rows with declared σ, `at` is the full parameter
-/// vector of the fit, and `held` marks unknowns that rest on bounds. `rules` names the rule of each
-/// unknown with a prior. `noise_factor` is the ratio of the noise variance taken to the declared
-/// one.
+/// `stage` has all unknowns and identification rows with declared σ, and `at` is the full parameter
+/// vector of the fit. `held` marks unknowns that rest on bounds. `rules` names the rule of each
+/// unknown with a prior. `noise_factor` is the ratio of the noise variance that the fit assumed to
+/// the declared one.
 pub(in crate::fit) fn refuted_priors(
     stage: &Stage,
     at: &DVector<f64>,

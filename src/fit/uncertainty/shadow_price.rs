@@ -16,7 +16,7 @@ pub struct ShadowPrice {
 
 impl ShadowPrice {
     /// Returns the decrease of the root mean square \[mm\] for a limit moved outwards by one step,
-    /// and the name of that step: 1 mm, 1°, 1 % (for logarithms) or one SI unit.
+    /// and the name of that step. The step is 1 mm, 1°, 1 % (for logarithms) or one SI unit.
     #[doc(hidden)]
     pub fn in_mm(self, unit: Unit) -> (f64, &'static str) {
         let (step, name) = match unit {

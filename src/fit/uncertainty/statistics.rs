@@ -175,8 +175,8 @@ impl Statistics {
     }
 }
 
-/// Smallest share of residual coordinates for which normal residuals are assumed, where nearly all
-/// rows are outliers.
+/// Lower limit of the share of residual coordinates that are not outliers, in the covariance of a
+/// fit of absolute lengths. It keeps the covariance finite if nearly all rows are outliers.
 const MIN_SHARE_KEPT: f64 = 0.1;
 
 /// Returns the covariance of a fit of absolute lengths, A⁻¹ B A⁻¹ with A = a JᵀJ + Λ and B = b JᵀJ

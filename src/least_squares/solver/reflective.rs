@@ -17,8 +17,8 @@ const START_MARGIN: f64 = 1e-10;
 ///
 /// Let v be the distance to the bound in the direction of −g (1 if there is none), and V = diag(v).
 /// The optimality conditions are V g = 0, and min ½‖J p + r‖² + ½ pᵀ V⁻¹|g| p is solved within a
-/// radius in unknowns scaled by √v. If the step leaves the box, the best of three is taken, like in
-/// SciPy's `trf`: the step to the bound, its reflection there, and the steepest descent. Unknowns
+/// radius in unknowns scaled by √v. If the step leaves the box, the best of three steps is taken,
+/// like in SciPy's `trf`: to the bound, its reflection there, and the steepest descent. Unknowns
 /// that end next to a bound are moved onto it by
 /// [`minimise_constrained_by`](super::minimise_constrained_by).
 #[derive(Debug, Clone)]

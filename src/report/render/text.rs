@@ -92,7 +92,8 @@ fn point(text: &mut String, mark: &str, point: &Point, width: usize) {
 /// Units that stay on the line of their number.
 const UNITS: [&str; 6] = ["%", "mm", "°", "σ", "px", "kg"];
 
-/// Keeps code that fits on a line of `width` characters on one line, so that it can be copied.
+/// Replaces spaces in code by unbreakable ones if the code fits on a line of `width` characters. It
+/// can then be copied as a whole.
 fn whole_code(words: &str, width: usize) -> String {
     let part = |(k, part): (usize, &str)| match part.split_once(CODE.1) {
         Some((code, plain)) if k > 0 && code.chars().count() <= width => {
@@ -103,8 +104,8 @@ fn whole_code(words: &str, width: usize) -> String {
     words.split(CODE.0).enumerate().map(part).collect()
 }
 
-/// Wraps text, each line ending in a line break; line breaks in the text are kept, a unit stays with
-/// its number, and code that fits on a line is not broken.
+/// Wraps text, each line ending in a line break. Line breaks in the text are kept, and a unit stays
+/// with its number. Code that fits on a line is not broken.
 fn wrapped(words: &str, (first, following): (&str, &str), width: usize) -> String {
     let joined =
         |text: String, unit: &str| text.replace(&format!(" {unit}"), &format!("\u{a0}{unit}"));

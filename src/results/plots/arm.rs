@@ -73,8 +73,9 @@ impl<'a> Poses<'a> {
         self.placement.position_errors(&arm.model, &arm.x, self.measurements, rows)
     }
 
-    /// Returns, for each parameter site, the lever of every row: the derivative of the target's
-    /// position with respect to the quantity at the site, measuring frame \[m/rad\] or \[m/m\].
+    /// Returns the lever of every row for each parameter site: the derivative of the target's
+    /// position with respect to the quantity at the site. It is in the measuring frame \[m/rad\] or
+    /// \[m/m\].
     pub fn levers(&self, arm: &Arm, sites: &[ParameterSite]) -> Vec<Vec<Vector3<f64>>> {
         let (first, count) = (arm.x.len(), sites.len());
         if sites.is_empty() {

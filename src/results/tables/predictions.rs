@@ -82,9 +82,9 @@ fn degrees(angle: Option<f64>) -> String {
     angle.map_or_else(String::new, |angle| fixed(angle.to_degrees(), 6))
 }
 
-/// Returns commands as CSV, with the names and units of the table of targets: q of every moving
-/// joint (empty if the target is out of reach), desired pose and conditions, and predicted
-/// distances.
+/// Returns commands as CSV, with the names and units of the table of targets. Columns are q of
+/// every moving joint (empty if the target is out of reach), desired pose and conditions, and
+/// predicted distances.
 pub fn commands_csv(
     problem: &Problem,
     targets: &Measurements,

@@ -1,4 +1,4 @@
-//! Hypotheses as blocks of columns beside one another.
+//! Conversion of candidate hypotheses to blocks of columns of one linear model.
 
 use crate::select::settings::{
     PRIOR_OF_SAME_FAMILY, SPREAD_OF_DECLARED_NOISE, SPREAD_OF_ESTIMATED_NOISE,

@@ -1,5 +1,5 @@
-//! Functions without a law elsewhere than at one joint: in the measurement, at the base, in whole
-//! configurations, and in links that warm.
+//! Functions without a law that do not act at a single joint: in the measurement, at the base, in
+//! whole configurations, and in links that warm.
 
 use nalgebra::{DMatrix, DVector};
 

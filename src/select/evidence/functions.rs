@@ -6,8 +6,8 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::residual_tests::Covariate;
 
-/// Margin on either side of the covariate's range, as a fraction of it, by which the cosine basis
-/// is extended, so that functions need not be flat at the ends.
+/// Margin by which the cosine basis extends on either side of the covariate's range, as a fraction
+/// of the range. Functions then need not be flat at the ends of the range.
 const RANGE_MARGIN: f64 = 0.25;
 /// Smallest prior variance of a smooth basis function, relative to the first one, at which it is
 /// kept.
@@ -90,8 +90,8 @@ impl SampledCovariate {
         }
     }
 
-    /// Returns true if an error may grow in proportion to this quantity: it is a temperature, load
-    /// or declared covariate, and varies at least by half its largest distance from zero.
+    /// Returns true if an error may grow in proportion to this quantity. It must be a temperature,
+    /// load or declared covariate, and vary at least by half its largest distance from zero.
     pub(super) fn is_size(&self, reference: Option<f64>) -> bool {
         use Covariate::{Declared, Hoist, Payload, Temperature};
         let (low, high) = self.range;

@@ -1,5 +1,5 @@
-//! Laws of the grammar, searched where probable sets hold something: at the coordinates of joints,
-//! at the tool, in the measurement and at the base.
+//! Search for laws of the grammar in place of members of probable sets: at the coordinates of
+//! joints, at the tool, in the measurement and at the base.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::PoisonError;
@@ -28,7 +28,7 @@ use crate::select::grammar::{MAX_POSES, Noise, Proposal, Quantities, WhitenedSit
 const MIN_SET_PROBABILITIES: [f64; 2] = [0.1, 0.2];
 /// Maximum number of pairs of a joint and a set for which laws are searched.
 const MAX_SEARCHED: usize = 2;
-/// Maximum number of laws elsewhere than at the coordinate of a joint, of all sites together.
+/// Maximum number of laws at all sites other than joint coordinates together.
 const MAX_ELSEWHERE: usize = 12;
 /// Log odds to the most probable law of all these sites beyond which laws are dropped.
 const MAX_LN_ODDS_ELSEWHERE: f64 = 8.0;
@@ -93,8 +93,8 @@ pub(super) fn promising(
 /// Returns the columns of the coefficients of a law, without those of the parameters inside its
 /// formulas.
 ///
-/// The columns of a law elsewhere than at the coordinate of a joint are products of its formulas
-/// and the lever of its site.
+/// The columns of a law at another site than a joint's coordinate are products of its formulas and
+/// the lever of its site.
 fn coefficients(
     effect: &Effect,
     hypotheses: &Hypotheses,
@@ -190,9 +190,10 @@ fn places(hypotheses: &Hypotheses, weighted: &[Weighted], products: &Products) -
     found.into_iter().map(|(found, _)| place(found)).collect()
 }
 
-/// Returns the sites elsewhere than at the coordinates of joints at which laws are searched in place
-/// of the members of the most probable set that act there: tool, measurement and base, and the
-/// small motion of a joint at which a function without a law acts. `None` if there is none.
+/// Returns the sites other than joint coordinates at which laws are searched. The laws replace
+/// those members of the most probable set that act there. The sites are tool, measurement and base,
+/// and small motions of a joint at which a function without a law acts. Returns `None` if no member
+/// acts there.
 fn elsewhere(hypotheses: &Hypotheses, weighted: &[Weighted], products: &Products) -> Option<Place> {
     let problem = hypotheses.linearised.problem();
     let set = weighted.first().filter(|set| {
@@ -245,7 +246,7 @@ fn elsewhere(hypotheses: &Hypotheses, weighted: &[Weighted], products: &Products
     Some(Place { sites, rest })
 }
 
-/// Search for formulas that explain what some members of a set leave.
+/// Search for formulas that explain the residual that some members of a set leave.
 struct Search<'s, 'h, 'd> {
     hypotheses: &'s Hypotheses<'h>,
     fitted: &'s Fitted,

@@ -6,10 +6,10 @@
 //! them. The prior gives each family its weight, each further member of a set odds of 1 to 2, and
 //! each member its share of its family.
 //!
-//! Effects (laws) compete with functions without a law: smooth functions of the same covariates at
-//! the same part, functions of two covariates, harmonics with changing amplitude and phase, and a
-//! free value in every pose. A law is therefore probable only if it explains the residual better
-//! than functions that need none.
+//! Effects (laws) compete with functions without a law. These are smooth functions of the same
+//! covariates at the same part, functions of two covariates, harmonics with changing amplitude and
+//! phase, and a free value in every pose. A law is therefore probable only if it explains the
+//! residual better than functions that need none.
 
 mod block;
 mod blocks;
@@ -65,7 +65,7 @@ const MAX_REFINED_SHAPES: usize = 4;
 /// effects `added` by the search and functions without a law.
 ///
 /// The fit is linear about its own optimum. Sets with strong effects are compared by this value,
-/// each at a fit of its own set. Each fit scales its residual by its own σ′; the density is that of
+/// each at a fit of its own set. Each fit scales its residual by its own σ′. The density is that of
 /// the residual over the common `sigma` σ \[m\], with ν degrees of freedom: ln p(r/σ′) = ln p(r/σ)
 /// − ν ln (σ/σ′).
 pub(super) fn ln_posterior(
@@ -90,8 +90,9 @@ pub(super) fn ln_posterior(
     )
 }
 
-/// Returns the most probable form of a function without a law in addition to the effects of the
-/// fit: a bump or step, or `None` for the smooth function. Also returns 1 σ of its coefficients.
+/// Returns the most probable form of a function without a law, in addition to the effects of the
+/// fit. The form is a bump or a step, or `None` for the smooth function. Also returns 1 σ of its
+/// coefficients.
 pub(super) fn best_form(
     fitted: &Fitted,
     data: &Data,

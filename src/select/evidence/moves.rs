@@ -1,4 +1,4 @@
-//! Times at which the instrument may have moved and rotated. They are searched if probable sets
+//! Search for times at which the instrument may have moved and rotated. It is made if probable sets
 //! contain a hypothesis that depends on time.
 
 use std::collections::BTreeSet;
@@ -15,8 +15,8 @@ use crate::residual_tests::Covariate;
 use crate::select::fitted::Fitted;
 use crate::select::settings::{MAX_REVISED_SETS, MIN_REVISED_PROBABILITY};
 
-/// Returns, for each of some sets, the station move that best replaces its time-dependent members:
-/// one of them, or all together.
+/// Returns the station moves that best replace the time-dependent members of probable sets: for
+/// each set, in place of one of these members, or of all together.
 pub(super) fn promising(
     hypotheses: &Hypotheses,
     weighted: &[Weighted],

@@ -1,5 +1,5 @@
-//! Functions without a law of one joint coordinate that are not smooth: a free value in every pose,
-//! harmonics with slowly changing amplitude, and periodic errors with many orders.
+//! Functions without a law of one joint coordinate that are not smooth. They are a free value in
+//! every pose, harmonics with slowly changing amplitude, and periodic errors with many orders.
 
 use nalgebra::{DMatrix, DVector};
 

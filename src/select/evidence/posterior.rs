@@ -147,8 +147,8 @@ impl Evidence {
         self
     }
 
-    /// Returns effects that may replace `effect` in a model with the effects `held`, best first.
-    /// Each is at least `beside` times as probable as `effect`, and stands with its probability.
+    /// Returns effects that may replace `effect` in a model with the effects `held`, each with its
+    /// probability, best first. Each is at least `beside` times as probable as `effect`.
     pub fn alternatives(
         &self,
         effect: &Effect,

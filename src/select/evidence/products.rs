@@ -18,8 +18,9 @@ use crate::select::neighbourhood::LinearNeighbourhood;
 /// Number of hypotheses whose gains are computed in one matrix product.
 const HYPOTHESES_PER_PRODUCT: usize = 16;
 
-/// Smallest size at which a member's columns, given the others, follow from Pₖₖ⁻¹ (see
-/// [`ReducedProblem::of_member`]). Below it, Pₖₖ⁻¹ is 1 to rounding.
+/// Smallest size of a set's member at which its gain is computed from the diagonal block Pₖₖ (see
+/// [`ReducedProblem::of_member`]). At smaller sizes Pₖₖ⁻¹ is 1 to rounding, and the other members
+/// are factored instead.
 const MIN_SIZE_OF_MEMBER: f64 = 1e-3;
 
 /// Residual that the hypotheses are to explain, with its degrees of freedom and the prior on its σ.
@@ -44,8 +45,8 @@ pub(super) struct Products<'a> {
     cache: CachedProducts,
 }
 
-/// Cached results about some hypotheses and one residual. They remain valid when more hypotheses
-/// are appended.
+/// Cached results of computations about a list of hypotheses and one residual. They remain valid
+/// when hypotheses are appended to the list.
 #[derive(Default)]
 pub(super) struct CachedProducts {
     /// Columns of members and their products.

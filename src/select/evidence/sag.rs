@@ -87,8 +87,8 @@ impl Columns<'_, '_> {
 }
 
 /// Returns, as columns, moments about the axis of `joint`, shape = (N, functions). For each link
-/// that the joint carries they are the moment of 1 kg at its origin, and its changes if the mass
-/// moves by the link's length along x, y and z.
+/// that the joint carries there are four: the moment of 1 kg at the link's origin, and its changes
+/// if the mass moves by the link's length along x, y and z.
 fn moments<'a>(
     problem: &Problem,
     joint: usize,

@@ -307,8 +307,8 @@ fn changed(known: &mut BTreeMap<Vec<usize>, Set>, products: &Products) {
     }
 }
 
-/// Returns the set of the members `rest`, and `rest` with one and with two other hypotheses in
-/// place of the members `gone`, if their log posterior is above `least`.
+/// Returns sets with other hypotheses in place of the members `gone`: the members `rest` alone, and
+/// `rest` with one and with two others. Sets with a log posterior below `least` are left out.
 fn replaced(
     (rest, gone): (&[usize], &[usize]),
     [first, second]: [&[usize]; 2],

@@ -39,9 +39,9 @@ pub(super) fn geometry_sites(problem: &Problem) -> impl Iterator<Item = Paramete
     })
 }
 
-/// Returns true if each parameter of an effect acts about its own axis of the arm, so that one of
-/// them may act without the others. This holds for two compliances, but not for a shift of the
-/// measurement or a harmonic.
+/// Returns true if each parameter of an effect acts about another axis of the arm, so that one of
+/// them may act alone. This holds for two compliances, but not for a shift of the measurement or a
+/// harmonic.
 pub(super) fn acts_along_axes(terms: &[Term]) -> bool {
     let is_axis = |term: &Term| {
         term.regressor == Regressor::Constant

@@ -271,8 +271,8 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
     /// Returns effects for the best orders. `gains` contains orders with their log odds, best
     /// first.
     ///
-    /// They are the wave with the best non-integer order, unless an order in `taken` is about as
-    /// good, and the harmonics that are not listed and about as good as the best.
+    /// One is the wave with the best non-integer order, unless an order in `taken` is about as
+    /// good. The others are the unlisted harmonics that are about as good as the best order.
     fn another(&self, joint: usize, gains: &[(f64, f64)], taken: &[f64]) -> Vec<Effect> {
         let Some(&(_, most)) = gains.first().filter(|(_, most)| *most > 0.0) else {
             return Vec::new();

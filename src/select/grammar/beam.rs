@@ -140,8 +140,8 @@ impl<'a> Beam<'a> {
         }
     }
 
-    /// Multiplies each term of some sums by every factor: the factors of a term that explains
-    /// little alone are found beside the other terms.
+    /// Multiplies each term of some sums by every factor. A term that alone explains little gets
+    /// its factors only in a sum with the other terms.
     fn multiply(&self, sums: &[Sum], next: &mut BTreeMap<Sum, Scored>) {
         for sum in sums {
             for k in 0..sum.len() {

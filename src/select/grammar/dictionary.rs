@@ -21,8 +21,8 @@ const ANGLE_FACTORS: [[i32; 2]; 6] = [[1, 1], [1, -1], [2, 1], [2, -1], [1, 2], 
 /// Smallest share of the poses that must have a moment of either sign for the sign to be a factor.
 const MIN_SIGN_SHARE: f64 = 0.1;
 
-/// Returns the factors of formulas elsewhere than at the coordinate of a joint, such as at the tool:
-/// conditions of a pose, and the commands with their sines and cosines.
+/// Returns the factors of formulas at other sites than joint coordinates, such as at the tool. They
+/// are conditions of a pose, and the commands with their sines and cosines.
 ///
 /// All kinds of factors have the same prior probability, and so have the joints.
 pub fn factors_elsewhere(known: &Quantities) -> Vec<Factor> {

@@ -1,14 +1,17 @@
-//! Laws that no catalogue holds, written down: a grammar of formulas is searched at the coordinate
-//! of a joint.
+//! Grammar of laws: formulas that the catalogue does not contain are composed and compared at one
+//! site, such as the coordinate of a joint.
 //!
-//! A law is a sum of up to three terms, a term a product of up to three factors of what is known of
-//! a pose ([`dictionary`]). With W the Gram matrix of the joint's lever in all poses, everything
-//! else projected out ([`site`]), the columns of formulas have Gram matrix FᵀWF and product Fᵀp: no
-//! work grows with the number of measured coordinates. Sums grow by a beam search ([`beam`]), each
-//! with a description-length prior: every choice costs the logarithm of its alternatives. Formulas
-//! whose predictions noise does not tell apart are one class and share its probability, the
-//! simplest stands for it ([`classes`]). The laws found are hypotheses of the evidence, beside the
-//! catalogue and the functions without a law.
+//! A law is a sum of up to three terms, and a term is a product of up to three factors, which are
+//! functions of recorded quantities ([`dictionary`]). W is the Gram matrix of the site's lever in
+//! all poses, with the fit projected out ([`site`]). The columns F of formulas then have the Gram
+//! matrix FᵀWF and the product Fᵀp with the residual. The work does not grow with the number of
+//! measured coordinates.
+//!
+//! Sums grow by a beam search ([`beam`]). Each has a description-length prior, in which every
+//! choice costs the logarithm of the number of alternatives. Formulas whose predictions noise does
+//! not distinguish form one class with one probability, represented by the simplest of them
+//! ([`classes`]). The laws found are hypotheses of the evidence, in addition to the catalogue and
+//! the functions without a law.
 
 mod beam;
 mod classes;

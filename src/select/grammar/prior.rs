@@ -4,10 +4,11 @@ use crate::laws::{At, Law};
 use crate::problem::{Effect, Joint, JointKind, Problem};
 
 /// Prior weight of all laws of the grammar at the coordinates of all joints, relative to one family
-/// of effects: they are some twenty families of formulas, each rarer than what the catalogue holds.
+/// of effects. There are about twenty families of formulas, each less common than a family of the
+/// catalogue.
 const PRIOR_OF_GRAMMAR: f64 = 8.0;
-/// Prior weight of all laws of the grammar at one of the other sites: tool, measurement, base, and
-/// small motions of all joints. Each has fewer formulas.
+/// Prior weight of all laws of the grammar at each of the other sites: tool, measurement, base, and
+/// small motions of all joints. Fewer formulas are searched there.
 const PRIOR_ELSEWHERE: f64 = 2.0;
 /// Number of sites of laws at the tool, at the measurement and at the base: one for each axis.
 const AXES: f64 = 3.0;

@@ -67,8 +67,8 @@ impl Refiner<'_> {
         sum.iter().map(|term| term.iter().map(start).collect()).collect()
     }
 
-    /// Sets each inner parameter in turn to its best value, beside the others. Returns ln of the
-    /// mean likelihood over the grid cells, relative to the best values.
+    /// Sets each inner parameter in turn to its best value, with the others fixed. Returns ln of
+    /// the mean likelihood over the grid cells, relative to the best values.
     fn refine(&self, sum: &Sum, inner: &mut [Vec<f64>]) -> f64 {
         let mut averaged = 0.0;
         for (t, term) in sum.iter().enumerate() {
@@ -131,9 +131,9 @@ impl Refiner<'_> {
     }
 }
 
-/// Returns the value within one step of `start` with the largest ln evidence, and ln of the mean
-/// likelihood over the cell of one step about it, relative to that value. Where the evidence has a
-/// narrow peak, values between the first trial values are tried.
+/// Returns the value within one step of `start` with the largest ln evidence. Also returns ln of
+/// the mean likelihood over the cell of one step about it, relative to that value. Where the
+/// evidence has a narrow peak, values between the first trial values are tried.
 fn best_in_cell(start: f64, step: f64, evidence: &mut impl FnMut(f64) -> f64) -> (f64, f64) {
     let mut trials = |centre: f64, width: f64| {
         let at = |k: i32| centre + width * f64::from(k) / f64::from(TRIAL_VALUES);

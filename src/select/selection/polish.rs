@@ -1,5 +1,6 @@
-//! Refinement of searched arguments of the added effects on all rows: times between poses that the
-//! evidence did not use, and time constants, distances and orders between the listed ones.
+//! Refinement of searched arguments of the added effects on all rows. Trial values are times
+//! between poses that the evidence did not use, and time constants, distances and orders between
+//! the listed ones.
 
 use nalgebra::DMatrix;
 

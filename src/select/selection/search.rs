@@ -16,9 +16,10 @@ use crate::select::settings::MAX_RIVALS;
 
 /// Runs the search from the fit of the declared problem.
 ///
-/// Returns the final, converged fit and the evidence about it; `None` if its residual is not finite
-/// or the fit changed since. With periodic errors of many orders, evidence is evaluated under the
-/// prior of the largest evidence, and the final fit has the prior that predicts best.
+/// Returns the final, converged fit and the evidence about it. The evidence is `None` if the
+/// residual is not finite or the fit changed since. With periodic errors of many orders, evidence
+/// is evaluated under the prior of the largest evidence. The final fit then has the prior that
+/// predicts best.
 ///
 /// # Errors
 /// Returns an error if a fit fails or the search was stopped.
@@ -129,8 +130,8 @@ fn is_held(
         && unmatched.is_empty()
 }
 
-/// Returns the evidence with its rival sets evaluated at fits of these sets, and the best of these
-/// fits if it is more probable than the given one.
+/// Returns the evidence with its rival sets evaluated at fits of these sets. Also returns the best
+/// of these fits if it is more probable than the given one.
 fn refitted(
     state: &SearchState,
     fitted: &Fitted,

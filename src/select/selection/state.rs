@@ -166,9 +166,9 @@ impl<'a> SearchState<'a> {
         from.next(problem, self.data, &options)
     }
 
-    /// Returns the effects of a hypothesis set for the next fit: its laws, its periodic errors with
-    /// many orders, and the effects that stay in the fit. Sets the common prior of the harmonics if
-    /// the set contains the first or a longer periodic error.
+    /// Returns the effects of a hypothesis set for the next fit. They are its laws, its periodic
+    /// errors with many orders, and the effects that stay in the fit. Sets the common prior of the
+    /// harmonics if the set contains the first or a longer periodic error.
     pub fn effects_of(
         &mut self,
         fitted: &Fitted,

@@ -28,9 +28,9 @@ pub struct Replica {
     /// Errors of a fit of the geometry alone, with the declared stiffness, by the model of this
     /// library.
     pub geometry_only: ErrorSummary,
-    /// Errors of the joint fit.
+    /// Errors of the fit of geometry and stiffness together, by the model of this library.
     pub joint: ErrorSummary,
-    /// Errors of the joint fit that includes the poses under the second load.
+    /// Errors of the same fit with the poses under the second load in addition.
     pub joint_twice: ErrorSummary,
 }
 

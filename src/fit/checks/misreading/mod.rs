@@ -1,9 +1,9 @@
 //! Misreadings of a table or problem: mistakes that would explain why an arm does not fit its
 //! measurements.
 //!
-//! Each [`Misreading`] is undone in a copy of table and problem. The registered nominal arm is
-//! compared with all of them ([`search`]); the best ones are then fitted in full, since no scan
-//! about a fit that is far off finds them.
+//! Each [`Misreading`] is undone in a copy of table and problem, with which the nominal arm is
+//! registered ([`search`]). The misreadings with the smallest errors are then fitted in full. Tests
+//! of a fit that is far off would not find them.
 
 mod candidates;
 mod explanation;
