@@ -72,7 +72,8 @@ enum Command {
     Identify(identify::Arguments),
     /// Compare strategies, solvers, and fits without parts of the elasticity.
     Compare(compare::Arguments),
-    /// Put two estimates of one arm side by side: which parameters differ by more than their errors.
+    /// Put two estimates of one arm side by side: which parameters differ by more than their
+    /// errors.
     CompareResults(compare_results::Arguments),
     /// Rank the effects that the residual points to; changes nothing.
     Trace(trace::Arguments),
@@ -110,7 +111,8 @@ enum Command {
 }
 
 /// Runs the command line; `arguments` begin with the name of the program. Returns the exit status:
-/// 0 done, 1 the fit is not to be trusted or the arm does not pass a tolerance, 2 bad input, 3 the arm has changed since its estimate, 130 interrupted with nothing written.
+/// 0 done, 1 the fit is not to be trusted or the arm does not pass a tolerance, 2 bad input, 3 the
+/// arm has changed since its estimate, 130 interrupted with nothing written.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let cli = match Cli::try_parse_from(arguments) {
         Ok(cli) => cli,

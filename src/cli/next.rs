@@ -45,7 +45,8 @@ pub struct Arguments {
     /// Aim of the poses
     #[arg(long = "for", value_enum, default_value_t = PurposeArgument::Accuracy)]
     purpose: PurposeArgument,
-    /// The loop.json with the explanations to tell apart [default: the one in the folder of results]
+    /// The loop.json with the explanations to tell apart [default: the one in the folder of
+    /// results]
     #[arg(long, value_name = "LOOP.json")]
     explanations: Option<PathBuf>,
     /// Probability with which errors stay below the bound
@@ -87,7 +88,8 @@ impl From<PurposeArgument> for Purpose {
     }
 }
 
-/// Chooses poses, writes `next.csv`, `next.json` and `next.html`, and prints what they are expected to give.
+/// Chooses poses, writes `next.csv`, `next.json` and `next.html`, and prints what they are expected
+/// to give.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let (common, source) = (&arguments.common, &arguments.source);
     let Input { problem, data, results } =

@@ -81,8 +81,8 @@ impl From<CriterionArgument> for Criterion {
     }
 }
 
-/// Makes the plan, writes `plan.csv`, `plan.json` and `plan.html`, and prints the accuracy that it is expected
-/// to give.
+/// Makes the plan, writes `plan.csv`, `plan.json` and `plan.html`, and prints the accuracy that it
+/// is expected to give.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let (common, source) = (&arguments.common, &arguments.source);
     let declared = Problem::read(common.problem())?;

@@ -23,8 +23,8 @@ pub struct Arguments {
     common: Common,
 }
 
-/// Fits, ranks the effects that the residual points to, writes `trace.json` and `trace.html`, and prints the
-/// ranking.
+/// Fits, ranks the effects that the residual points to, writes `trace.json` and `trace.html`, and
+/// prints the ranking.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let common = &arguments.common;
     let Input { problem, mut data, results } =

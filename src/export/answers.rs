@@ -153,7 +153,8 @@ pub(super) fn random_rows(
     let mut list = |range: (f64, f64)| (0..count).map(|_| between(range)).collect::<Vec<f64>>();
     let first = estimate.start_times.as_ref().map_or(0.0, |starts| starts.first);
     let mut time = list((first, first + MAX_TIME));
-    // Time counts from the first row in commands, and from the first pose of the fit in predictions.
+    // Time counts from the first row in commands, and from the first pose of the fit in
+    // predictions.
     if let Some(time) = time.first_mut() {
         *time = first;
     }

@@ -61,8 +61,8 @@ pub fn same_file(first: &Path, second: &Path) -> bool {
     matches!((first.canonicalize(), second.canonicalize()), (Ok(first), Ok(second)) if first == second)
 }
 
-/// Returns CSV text with a header line; every line must have as many cells as the header. Words that
-/// a spreadsheet would run as a formula are escaped; see [`unescape_cell`].
+/// Returns CSV text with a header line; every line must have as many cells as the header. Words
+/// that a spreadsheet would run as a formula are escaped; see [`unescape_cell`].
 pub(crate) fn csv(header: Vec<String>, lines: impl IntoIterator<Item = Vec<String>>) -> String {
     let mut writer = csv::Writer::from_writer(Vec::new());
     for line in std::iter::once(header).chain(lines) {

@@ -103,7 +103,8 @@ impl TermEntry {
     }
 }
 
-/// Axis of displacements along the line of sight from the station, the origin of the measuring frame.
+/// Axis of displacements along the line of sight from the station, the origin of the measuring
+/// frame.
 pub(crate) const RANGE_AXIS: usize = 3;
 
 /// Site of a parameter, relative to the place that the effect names.

@@ -19,8 +19,8 @@ const ZERO_COLUMN: f64 = 1e-14;
 const PIVOT_SHARE: f64 = 0.1;
 /// Smallest entry of a combination that is not a rounding error.
 const MAX_ROUNDING_ENTRY: f64 = 1e-6;
-/// Smallest relative singular value that certifies full rank without an SVD: twice [`UNIDENTIFIABLE_BELOW`],
-/// to allow for rounding.
+/// Smallest relative singular value that certifies full rank without an SVD: twice
+/// [`UNIDENTIFIABLE_BELOW`], to allow for rounding.
 const CERTAIN_FULL_RANK: f64 = 2.0 * UNIDENTIFIABLE_BELOW;
 /// Relative size of a trailing pivot below which a direction is certainly unidentifiable.
 const CERTAIN_NULL: f64 = 1e-12;
@@ -106,9 +106,9 @@ pub(crate) struct Blind {
 impl Blind {
     /// Analyses the least-squares problem with triangular factor `triangle` (n × n).
     ///
-    /// Forms singular values only where cheaper tests do not decide. If ‖R⁻¹‖ of R with unit columns
-    /// bounds every singular value away from zero, the rank is full. If pivoted QR gives R P =
-    /// Q [R₁ R₂; 0 ε] with R₁ of certainly full rank and ε at rounding level, the null space is
+    /// Forms singular values only where cheaper tests do not decide. If ‖R⁻¹‖ of R with unit
+    /// columns bounds every singular value away from zero, the rank is full. If pivoted QR gives R
+    /// P = Q [R₁ R₂; 0 ε] with R₁ of certainly full rank and ε at rounding level, the null space is
     /// spanned by P [−R₁⁻¹R₂; 1].
     pub fn in_triangle(triangle: &DMatrix<f64>) -> Self {
         let n = triangle.ncols();
@@ -205,7 +205,8 @@ pub(super) fn complement(basis: &DMatrix<f64>) -> DMatrix<f64> {
 /// `null`.
 ///
 /// This basis depends on the space alone and has few unknowns in each combination. Pivots are the
-/// first unknowns with a share of at least [`PIVOT_SHARE`], then those above [`MAX_ROUNDING_ENTRY`].
+/// first unknowns with a share of at least [`PIVOT_SHARE`], then those above
+/// [`MAX_ROUNDING_ENTRY`].
 fn named(mut null: DMatrix<f64>, scaled: &DMatrix<f64>) -> Vec<UnidentifiableCombination> {
     let (rows, n) = null.shape();
     let mut row = 0;

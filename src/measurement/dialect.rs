@@ -148,8 +148,8 @@ fn mark_bytes(line: &str, comment: Option<&str>) -> Option<usize> {
     (!is_cell).then_some(start + text.len() - content.len())
 }
 
-/// Returns true if commas separate a header line and the declared delimiter does not occur in it, as
-/// in files written by flexcal.
+/// Returns true if commas separate a header line and the declared delimiter does not occur in it,
+/// as in files written by flexcal.
 fn is_separated_otherwise(line: &str, declared: Delimiter) -> bool {
     let Delimiter::Byte(declared) = declared else { return false };
     line.contains(',') && !line.contains(char::from(declared))

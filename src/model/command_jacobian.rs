@@ -16,8 +16,8 @@ impl Model {
     /// joints and NaN without equilibrium.
     ///
     /// A command moves its joint, and every coordinate, strain, small motion, base and reading with
-    /// a term that depends on it: ∂p/∂q = ∂p/∂θ (1 + ∂Δθ/∂q) + Σ ∂p/∂s ∂s/∂q. Directions of approach
-    /// are kept constant.
+    /// a term that depends on it: ∂p/∂q = ∂p/∂θ (1 + ∂Δθ/∂q) + Σ ∂p/∂s ∂s/∂q. Directions of
+    /// approach are kept constant.
     pub(crate) fn command_jacobian(
         &self,
         problem: &Problem,

@@ -13,7 +13,8 @@ pub(super) struct Rows<'a> {
     pub block: &'a mut Block,
     /// First of the three rows.
     pub row: usize,
-    /// Factor from a derivative of the prediction to one of the residual (measured − predicted) / σ.
+    /// Factor from a derivative of the prediction to one of the residual (measured − predicted) /
+    /// σ.
     pub scale: f64,
 }
 

@@ -48,8 +48,8 @@ impl TiltDerivatives {
         Some(axes.map(|axis| axis.map(|coordinate| coordinate.re)))
     }
 
-    /// Writes the derivatives of the tilts that a row measures into `rows`; returns the tilts \[rad\],
-    /// `None` if the pose has no equilibrium.
+    /// Writes the derivatives of the tilts that a row measures into `rows`; returns the tilts
+    /// \[rad\], `None` if the pose has no equilibrium.
     pub fn write(
         &mut self,
         (commanded, setup): (&PoseView, &PoseView),

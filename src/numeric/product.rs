@@ -234,8 +234,9 @@ pub(crate) fn gram_of_lower(lower: &DMatrix<f64>) -> DMatrix<f64> {
     out
 }
 
-/// Returns a view of Aᵀ without copying. It is not for products with a size up to [`MAX_NARROW_COLUMNS`]:
-/// nalgebra forms these by axpy operations that access strided columns out of bounds.
+/// Returns a view of Aᵀ without copying. It is not for products with a size up to
+/// [`MAX_NARROW_COLUMNS`]: nalgebra forms these by axpy operations that access strided columns out
+/// of bounds.
 fn transposed_view(a: &DMatrix<f64>) -> MatrixView<'_, f64, Dyn, Dyn, Dyn, Dyn> {
     let (rows, n) = a.shape();
     DMatrixView::from_slice_with_strides_generic(a.as_slice(), Dyn(n), Dyn(rows), Dyn(rows), Dyn(1))

@@ -37,7 +37,8 @@ pub struct Target {
     pub joint: usize,
     /// Position of the target in the frame of the joint that carries it \[m\].
     pub at: Vector3<f64>,
-    /// Orientation of the target in the frame of the joint that carries it, a rotation vector \[rad\].
+    /// Orientation of the target in the frame of the joint that carries it, a rotation vector
+    /// \[rad\].
     pub rotation: Vector3<f64>,
     /// Place in the file, for errors.
     pub location: Location,

@@ -9,8 +9,8 @@ use super::scores::LeftOutError;
 /// tests.
 const FALSE_GAIN_PROBABILITY: f64 = 0.02;
 /// Probability with which the test of the predictive density finds a gain although there is no
-/// model error. It is larger than [`FALSE_GAIN_PROBABILITY`] because the test of the error must pass, too. Without
-/// model error, the density decreases in 94 % of data sets.
+/// model error. It is larger than [`FALSE_GAIN_PROBABILITY`] because the test of the error must
+/// pass, too. Without model error, the density decreases in 94 % of data sets.
 const FALSE_DENSITY_GAIN_PROBABILITY: f64 = 0.1;
 
 /// Mean difference over the configurations, with its standard error.

@@ -174,8 +174,8 @@ impl Table {
     }
 }
 
-/// Creates the opening lines: on terminals below the title, on the page, whose heading is the title,
-/// without it.
+/// Creates the opening lines: on terminals below the title, on the page, whose heading is the
+/// title, without it.
 pub(super) fn opening<'a>(title: &str, words: impl Into<String>) -> [Block<'a>; 2] {
     let words = words.into();
     let titled = Block::lines(format!("{title}\n{words}"));

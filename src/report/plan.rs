@@ -1,5 +1,5 @@
-//! Text and page of the command `plan`: the poses to measure and the accuracy that they are expected to
-//! give.
+//! Text and page of the command `plan`: the poses to measure and the accuracy that they are
+//! expected to give.
 
 use super::document::{Block, Table, opening};
 use super::figures::{ACCENT, Drawing, Forest};

@@ -199,8 +199,8 @@ impl AcceptanceResult {
         }
     }
 
-    /// Returns the record with the bounds of some rows and their share within these; the predictions
-    /// may be corrected by a remainder.
+    /// Returns the record with the bounds of some rows and their share within these; the
+    /// predictions may be corrected by a remainder.
     #[must_use]
     pub fn with_bounds(self, bounds: &Bounds, coverage: f64, remainder: bool) -> Self {
         let bounds = BoundSummary::new(bounds);

@@ -47,8 +47,8 @@ const HINTS: [Hint; 26] = [
     hint("base", "t", "a base that sinks"),
 ];
 
-/// Returns the cause that a law of the search resembles, in words; `None` for other effects, and for
-/// laws with several terms or without an entry.
+/// Returns the cause that a law of the search resembles, in words; `None` for other effects, and
+/// for laws with several terms or without an entry.
 pub(super) fn resembled(effect: &Effect) -> Option<String> {
     let Effect::Law(law) = effect else { return None };
     law.description()?;

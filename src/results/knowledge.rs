@@ -180,7 +180,8 @@ impl ManyHarmonics {
         })
     }
 
-    /// Returns the joint of a coefficient and the number of its smaller harmonics, if there are any.
+    /// Returns the joint of a coefficient and the number of its smaller harmonics, if there are
+    /// any.
     pub fn joint_of(&self, name: &str) -> Option<(usize, usize)> {
         let (joint, _) = self.coefficients.get(name)?;
         let (_, smaller) = self.largest.get(joint)?;

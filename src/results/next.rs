@@ -16,7 +16,8 @@ pub struct NextResult {
     #[serde(rename = "for")]
     pub purpose: &'static str,
     pub seed: u64,
-    /// True if no check contradicts the fit to the measured rows. Otherwise no pose is called enough.
+    /// True if no check contradicts the fit to the measured rows. Otherwise no pose is called
+    /// enough.
     pub trusted: bool,
     /// Number of rows that are measured and fitted.
     pub measured: usize,

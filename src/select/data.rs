@@ -45,8 +45,8 @@ pub(super) struct Data<'a> {
 /// Cached laws by key.
 pub(super) type Proposed = Arc<Mutex<BTreeMap<ProposalKey, Vec<Effect>>>>;
 
-/// Key of cached laws: names of the sites, names of the other hypotheses assumed, poses left out, and
-/// names of the fitted effects.
+/// Key of cached laws: names of the sites, names of the other hypotheses assumed, poses left out,
+/// and names of the fitted effects.
 pub(super) type ProposalKey = (String, Vec<String>, Vec<usize>, Vec<String>);
 
 impl<'a> Data<'a> {

@@ -39,8 +39,8 @@ impl LeftOutGain {
         })
     }
 
-    /// Returns true if the mean decrease exceeds a multiple of its standard error, given the degrees
-    /// of freedom of that error.
+    /// Returns true if the mean decrease exceeds a multiple of its standard error, given the
+    /// degrees of freedom of that error.
     fn exceeds(&self, multiple: impl Fn(f64) -> f64) -> bool {
         let count = self.0.len() as f64;
         let mean = self.0.iter().sum::<f64>() / count;

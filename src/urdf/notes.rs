@@ -7,7 +7,8 @@ use super::read::{Joint, Kind};
 
 /// Maximum plausible angle of an origin \[rad\]: one turn, with a margin for rounding.
 const MAX_PLAUSIBLE_ANGLE: f64 = TAU + 0.01;
-/// Maximum plausible length of an origin \[m\]; no joint of an arm is farther from the previous one.
+/// Maximum plausible length of an origin \[m\]; no joint of an arm is farther from the previous
+/// one.
 const MAX_PLAUSIBLE_LENGTH: f64 = 20.0;
 
 /// Returns the notes about a chain and about joints outside it.

@@ -28,8 +28,8 @@ const MIN_NOISE_MULTIPLE: f64 = 5.0;
 /// the fit allow, in the order of the rows.
 ///
 /// A row is an outlier where P(χ²ₖ > s²) < 0.01 / N with s² = rᵀ (I + J C Jᵀ)⁻¹ r / scatter², r and
-/// J whitened by the σ that the fit assumed, C the covariance of its `unknowns` at `x`. The scatter is
-/// the median of s / √(median of χ²ₖ), at least 1, so that a model which misses an effect
+/// J whitened by the σ that the fit assumed, C the covariance of its `unknowns` at `x`. The scatter
+/// is the median of s / √(median of χ²ₖ), at least 1, so that a model which misses an effect
 /// everywhere does not make every row an outlier.
 pub(in crate::fit) fn outliers(
     fitting: &Fitting,

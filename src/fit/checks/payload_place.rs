@@ -52,8 +52,8 @@ pub(in crate::fit) fn payload_finding(
     })
 }
 
-/// Returns the sum of squared residuals and deviations from the priors, in units of the σ taken by a
-/// fit with this noise factor. `None` unless every identification row measures a position.
+/// Returns the sum of squared residuals and deviations from the priors, in units of the σ taken by
+/// a fit with this noise factor. `None` unless every identification row measures a position.
 fn deviance(
     problem: &Problem,
     data: &Dataset,

@@ -61,8 +61,8 @@ impl Check for PredictionHolds {
 }
 
 /// Returns the probability that a valid prediction exceeds `chi2`, and the χ² that it exceeds with
-/// probability [`MAX_CHANCE_PROBABILITY`]. `noise_dof` are the degrees of freedom from which the noise was
-/// estimated; `None` if it is declared.
+/// probability [`MAX_CHANCE_PROBABILITY`]. `noise_dof` are the degrees of freedom from which the
+/// noise was estimated; `None` if it is declared.
 fn upper_tail(chi2: f64, coordinates: usize, noise_dof: Option<f64>) -> Option<(f64, f64)> {
     let k = coordinates as f64;
     if !chi2.is_finite() || coordinates == 0 {
@@ -80,11 +80,11 @@ fn upper_tail(chi2: f64, coordinates: usize, noise_dof: Option<f64>) -> Option<(
     }
 }
 
-/// Returns χ² = rᵀ(I + J C Jᵀ)⁻¹ r of the positions of `rows`, whitened by the σ that the fit assumed,
-/// and its number of coordinates.
+/// Returns χ² = rᵀ(I + J C Jᵀ)⁻¹ r of the positions of `rows`, whitened by the σ that the fit
+/// assumed, and its number of coordinates.
 ///
-/// With N = JᵀJ and v = Jᵀr it is r·r − vᵀ C (I + N C)⁻¹ v, by the Woodbury identity, with the unknowns in units
-/// of their standard errors.
+/// With N = JᵀJ and v = Jᵀr it is r·r − vᵀ C (I + N C)⁻¹ v, by the Woodbury identity, with the
+/// unknowns in units of their standard errors.
 fn predictive_chi2(
     fitting: &Fitting,
     rows: &[usize],

@@ -125,8 +125,8 @@ fn upper_tail(z: f64) -> f64 {
     Normal::new(0.0, 1.0).map_or(1.0, |normal| normal.sf(z))
 }
 
-/// Checks that the rows which a robust loss treats as outliers are a random choice: that no quantity
-/// (time, session, joint command) decides which rows they are.
+/// Checks that the rows which a robust loss treats as outliers are a random choice: that no
+/// quantity (time, session, joint command) decides which rows they are.
 pub(super) struct SetAsideByChance;
 
 impl Check for SetAsideByChance {

@@ -5,8 +5,8 @@ use nalgebra::{DMatrix, DVector};
 use crate::least_squares::LinearRows;
 use crate::model::Model;
 
-/// Smallest eigenvalue of the earlier correlation matrix, relative to the largest, that is more than
-/// rounding. Combinations below it are those that the earlier fit held.
+/// Smallest eigenvalue of the earlier correlation matrix, relative to the largest, that is more
+/// than rounding. Combinations below it are those that the earlier fit held.
 const HELD: f64 = 1e-13;
 /// Eigenvalue of that matrix, relative to the largest, below which the declared prior of a
 /// combination is negligible.
@@ -31,8 +31,8 @@ impl EarlierData {
     /// Gaussian with this `mean` and `covariance`.
     ///
     /// `precision` holds the declared prior precision 1/σ² of each parameter, 0 without a prior.
-    /// Directions in which the Gaussian is wider than the declared prior get no rows. Returns `None`
-    /// if the covariance is not positive.
+    /// Directions in which the Gaussian is wider than the declared prior get no rows. Returns
+    /// `None` if the covariance is not positive.
     pub fn new(
         names: Vec<String>,
         mean: &DVector<f64>,

@@ -275,8 +275,8 @@ impl<'a> Fitting<'a> {
         self.registered_to(COST_TOLERANCE)
     }
 
-    /// Registers the nominal arm as [`Self::registered`] does, until a step reduces the cost by less
-    /// than `cost_tolerance`, relative to the cost.
+    /// Registers the nominal arm as [`Self::registered`] does, until a step reduces the cost by
+    /// less than `cost_tolerance`, relative to the cost.
     pub fn registered_to(&self, cost_tolerance: f64) -> Result<DVector<f64>, StageError> {
         let mut x = self.located();
         let placements = self.placements();

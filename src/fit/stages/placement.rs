@@ -75,8 +75,8 @@ impl Placement {
             .collect()
     }
 
-    /// Sets the elapsed times of poses relative to the starts of their sessions in an earlier table.
-    /// Poses of other sessions keep the time since the first pose of theirs.
+    /// Sets the elapsed times of poses relative to the starts of their sessions in an earlier
+    /// table. Poses of other sessions keep the time since the first pose of theirs.
     pub(crate) fn count_time_from(&self, starts: &StartTimes, poses: &mut [Pose]) {
         let starts: Vec<Option<f64>> =
             self.bases.iter().map(|session| starts.of_session(session)).collect();

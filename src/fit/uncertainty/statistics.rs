@@ -49,8 +49,8 @@ impl Statistics {
     /// σ to the one that the fit assumed; `None` if none is declared.
     ///
     /// With Huber's loss the covariance is that of the weighted Jacobian, times
-    /// [`Loss::variance_factor`]; with absolute lengths it is that of [`sandwich`]. Active constraints confine it to the directions that they leave
-    /// open.
+    /// [`Loss::variance_factor`]; with absolute lengths it is that of [`sandwich`]. Active
+    /// constraints confine it to the directions that they leave open.
     ///
     /// # Errors
     /// Returns an error if a constraint is not finite, or the priors do not match the unknowns.

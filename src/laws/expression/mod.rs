@@ -1,8 +1,8 @@
 //! Expressions: formulas over quantities of a pose and named parameters.
 //!
-//! An expression is read from text ([`parse`](fn@parse)), written back ([`std::fmt::Display`]), and evaluated
-//! generically over the scalar, so that dual numbers differentiate it. Joints print as `q1`, `q2`, …
-//! and covariates as `covariate1`, …, unless names are given ([`Names`]).
+//! An expression is read from text ([`parse`](fn@parse)), written back ([`std::fmt::Display`]), and
+//! evaluated generically over the scalar, so that dual numbers differentiate it. Joints print as
+//! `q1`, `q2`, … and covariates as `covariate1`, …, unless names are given ([`Names`]).
 
 mod dimension;
 mod evaluate;

@@ -41,7 +41,8 @@ pub struct Slope {
 }
 
 impl Slope {
-    /// Creates the derivative from the coefficient, the formula and the parameter index of each term.
+    /// Creates the derivative from the coefficient, the formula and the parameter index of each
+    /// term.
     pub(super) fn new(terms: Vec<(f64, Arc<Formula>, usize)>) -> Self {
         Self { terms }
     }

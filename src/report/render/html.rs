@@ -50,8 +50,8 @@ pub(in crate::report) fn page(title: &str, kind: &str, blocks: &[Block]) -> Stri
     rendered(title, ["", kind], "", blocks).0
 }
 
-/// Renders blocks as a page, and returns it with its figures; `before_kind` precedes the kind in the
-/// heading, and `note` explains errors at the end.
+/// Renders blocks as a page, and returns it with its figures; `before_kind` precedes the kind in
+/// the heading, and `note` explains errors at the end.
 fn rendered<'a>(
     title: &str,
     [before_kind, kind]: [&str; 2],

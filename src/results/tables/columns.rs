@@ -110,8 +110,8 @@ type Part<'a> =
     (&'static str, fn(&Residual) -> Vector3<f64>, &'a dyn Fn(&Residual) -> Option<Vector3<f64>>);
 
 /// Returns the table of residuals. Its columns identify the row and give the commands, predicted
-/// values and residuals in mm and ° of every kind of rows. Further columns are `whitened` (length in units of
-/// σ), `outlier` and `held_out`.
+/// values and residuals in mm and ° of every kind of rows. Further columns are `whitened` (length
+/// in units of σ), `outlier` and `held_out`.
 pub fn residual_columns(problem: &Problem, rows: &Measurements, residuals: &[Residual]) -> Columns {
     let picked: Vec<usize> = residuals.iter().map(|residual| residual.row).collect();
     let mut columns = names(problem, rows, &picked);

@@ -27,8 +27,8 @@ const MIN_LN_NOISE_STEP: f64 = 1e-4;
 /// Log odds to the largest term of a sum at which a term is neglected (e⁻⁴⁰).
 const NEGLIGIBLE_LN_ODDS: f64 = 40.0;
 
-/// Number of rows of L relative to its columns above which G = D − LᵀL is factored as a full matrix.
-/// Two factors of G then take less work than two of 1 − L E⁻¹ Lᵀ.
+/// Number of rows of L relative to its columns above which G = D − LᵀL is factored as a full
+/// matrix. Two factors of G then take less work than two of 1 − L E⁻¹ Lᵀ.
 const MIN_DENSE_SHARE: f64 = 0.8;
 /// Number of rows of a symmetric product that are formed together.
 const GRAM_ROWS: usize = 48;

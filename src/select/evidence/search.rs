@@ -280,8 +280,8 @@ fn changed(known: &mut BTreeMap<Vec<usize>, Set>, products: &Products) {
                 set.members.iter().copied().filter(|member| !gone.contains(member)).collect();
             let kind = if gone.len() > 1 { 2 } else { usize::from(!gone.iter().any(is_surface)) };
             let key = sorted(&rest);
-            // If a single member was replaced for the same rest before, most pairs of laws were tried
-            // then.
+            // If a single member was replaced for the same rest before, most pairs of laws were
+            // tried then.
             let is_tried = kind == 2 && tried.contains(&(key.clone(), 1));
             if !is_tried && tried.insert((key, kind)) {
                 rests.push((rest, gone, kind));

@@ -117,7 +117,8 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
             let tens = std::iter::successors(Some(1.0), |digit| Some(digit / 10.0));
             let digits = tens.take_while(|digit| *digit >= 2.0 * finer).count();
             for (left, first) in left.iter().zip(first) {
-                // A wave that was found for one set represents all orders near its order for every set.
+                // A wave that was found for one set represents all orders near its order for every
+                // set.
                 let known = || {
                     self.hypotheses
                         .all

@@ -153,8 +153,8 @@ impl Weighted {
 }
 
 impl Span {
-    /// Adds functions to the span; those that depend linearly on earlier ones or on the fit are left
-    /// out. `product` is the vector p of the site.
+    /// Adds functions to the span; those that depend linearly on earlier ones or on the fit are
+    /// left out. `product` is the vector p of the site.
     pub fn extend(&mut self, functions: &[Weighted], product: &DVector<f64>) {
         for Weighted { values, times } in functions {
             let (mut left, mut weighted) = (values.clone(), times.clone());

@@ -191,8 +191,8 @@ impl Terms {
         self.groups(terms).par_iter().map(chunk).collect()
     }
 
-    /// Returns the `most` of `terms` that alone reduce the residual most, in chunks. A few chunks are
-    /// formed at a time, so that memory does not grow with the number of terms.
+    /// Returns the `most` of `terms` that alone reduce the residual most, in chunks. A few chunks
+    /// are formed at a time, so that memory does not grow with the number of terms.
     fn best_of(&self, terms: &[Product], most: usize, site: &WhitenedSite) -> Vec<Chunk> {
         let chunk = |(width, terms): &(usize, Vec<&Product>)| self.chunk(*width, terms, site);
         let mut all: Vec<Chunk> = Vec::new();

@@ -20,8 +20,8 @@ pub struct Written {
 /// Number of significant digits with which parameters inside a formula are written.
 const PARAMETER_DIGITS: i32 = 3;
 
-/// Writes a sum as a law at a site, which is given as in files, with the values `inner` of its inner
-/// parameters.
+/// Writes a sum as a law at a site, which is given as in files, with the values `inner` of its
+/// inner parameters.
 pub fn written(
     (terms, known): (&Terms, &Quantities),
     site: &str,

@@ -245,8 +245,8 @@ impl<'a> Linearised<'a> {
         &self.derivatives.residual
     }
 
-    /// Returns the number of residual coordinates of a pose that count: those that it measures, less
-    /// the directions in which no fitted parameter moves any pose.
+    /// Returns the number of residual coordinates of a pose that count: those that it measures,
+    /// less the directions in which no fitted parameter moves any pose.
     pub fn coordinates(&self, pose: usize) -> usize {
         self.poses[pose].observation.coordinates() - self.unmoved
     }

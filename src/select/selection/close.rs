@@ -185,8 +185,8 @@ struct Conclusion {
     unexplained: Vec<Unexplained>,
 }
 
-/// Tests the residual of a fit and collects the claims about the effects that it contains, and about
-/// structure without a law. Evidence that is missing is evaluated first.
+/// Tests the residual of a fit and collects the claims about the effects that it contains, and
+/// about structure without a law. Evidence that is missing is evaluated first.
 fn concluded(
     state: &SearchState,
     declared: &Fitted,

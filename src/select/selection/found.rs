@@ -53,9 +53,9 @@ pub struct Found {
 }
 
 /// Returns every effect that a fit contains in addition to the declared ones, with its tests. If
-/// the fit has cautions (`is_trusted` is false), no effect is more than probable. If the
-/// residual of the fit is not noise (`is_structured`), its claims are means over subsets. No claim is
-/// surer than by the evidence `of_all_rows`, which includes rows that the effects make outliers.
+/// the fit has cautions (`is_trusted` is false), no effect is more than probable. If the residual
+/// of the fit is not noise (`is_structured`), its claims are means over subsets. No claim is surer
+/// than by the evidence `of_all_rows`, which includes rows that the effects make outliers.
 pub(super) fn found(
     state: &SearchState,
     fitted: &Fitted,
