@@ -30,7 +30,7 @@ pub(super) fn influential_rows(
     found: &Identification,
     without: impl Fn(&[usize]) -> Option<Identification>,
 ) -> Option<InfluentialRows> {
-    if explains(found) {
+    if is_explained_by_sigma(found) {
         return None;
     }
     let count = found.fitted.identification.n;
@@ -46,12 +46,12 @@ pub(super) fn influential_rows(
         far.sort_by(|a, b| b.distance.total_cmp(&a.distance));
         far.truncate(a_round);
         let far: Vec<Outlier> = far.into_iter().cloned().collect();
-        if explains(last) || far.is_empty() || rows.len() + far.len() > most {
+        if is_explained_by_sigma(last) || far.is_empty() || rows.len() + far.len() > most {
             break;
         }
         let numbers: Vec<usize> = rows.iter().chain(&far).map(|outlier| outlier.row).collect();
         let Some(next) = without(&numbers).filter(|fit| fit.termination.converged()) else { break };
-        if part(&next, last) > MAX_GAINFUL_RATIO {
+        if variance_ratio(&next, last) > MAX_GAINFUL_RATIO {
             break;
         }
         rows.extend(far);
@@ -59,19 +59,20 @@ pub(super) fn influential_rows(
     }
     let rest = rest?;
     rows.sort_by_key(|outlier| outlier.row);
-    let left = part(&rest, found);
-    let is_better = left < MAX_DECISIVE_RATIO || (left < MAX_INFLUENTIAL_RATIO && explains(&rest));
+    let left = variance_ratio(&rest, found);
+    let is_better =
+        left < MAX_DECISIVE_RATIO || (left < MAX_INFLUENTIAL_RATIO && is_explained_by_sigma(&rest));
     let Identification { reduced_chi2, sigma_taken, .. } = rest;
     is_better.then_some(InfluentialRows { rows, reduced_chi2, sigma_taken })
 }
 
 /// Returns true if the declared σ explains the residual of a fit.
-fn explains(fit: &Identification) -> bool {
+fn is_explained_by_sigma(fit: &Identification) -> bool {
     fit.noise == Noise::Declared && fit.noise_factor <= 1.0 + 1e-9
 }
 
 /// Returns the ratio of the residual variance of `fit` to that of `other`.
-fn part(fit: &Identification, other: &Identification) -> f64 {
+fn variance_ratio(fit: &Identification, other: &Identification) -> f64 {
     match (fit.reduced_chi2, other.reduced_chi2) {
         (Some(chi2), Some(other)) => chi2 / other,
         _ => (fit.sigma_taken / other.sigma_taken).powi(2),

@@ -106,7 +106,7 @@ impl ResidualFunction {
 
     /// Returns the residuals r(x), without unit; NaN in rows where the arm has no equilibrium.
     pub fn residuals(&self, x: &DVector<f64>) -> DVector<f64> {
-        let measured = self.used(residual_vector(&self.rows(), x).as_slice());
+        let measured = self.without_padding(residual_vector(&self.rows(), x).as_slice());
         let priors = self.parameters().zip(x.iter());
         let priors = priors.filter_map(|(parameter, x)| Some(x / parameter.sigma?));
         DVector::from_vec(measured.into_iter().chain(priors).collect())
@@ -118,7 +118,7 @@ impl ResidualFunction {
         let origins = self.origins();
         let mut jacobian = DMatrix::zeros(origins.len(), self.unknowns.len());
         for (mut out, column) in jacobian.column_iter_mut().zip(measured.column_iter()) {
-            let used = self.used(column.as_slice());
+            let used = self.without_padding(column.as_slice());
             out.iter_mut().zip(used).for_each(|(out, value)| *out = value);
         }
         for (row, origin) in origins.iter().enumerate() {
@@ -143,7 +143,7 @@ impl ResidualFunction {
     }
 
     /// Returns the values of measured numbers, without those that fill up the rows of a table.
-    fn used(&self, values: &[f64]) -> Vec<f64> {
+    fn without_padding(&self, values: &[f64]) -> Vec<f64> {
         let rows = &self.data.split.identification;
         let size = if rows.is_empty() { NUMBERS } else { values.len() / rows.len() };
         let mut used = Vec::with_capacity(values.len());

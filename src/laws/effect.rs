@@ -383,7 +383,7 @@ impl Effect {
     }
 
     /// Returns the orders of both effects, with their key, if the effects differ only in them.
-    fn alike(&self, other: &Self) -> Option<(&'static str, Vec<u32>, Vec<u32>)> {
+    fn orders_of_both(&self, other: &Self) -> Option<(&'static str, Vec<u32>, Vec<u32>)> {
         let ((key, orders), (_, more)) = (self.orders()?, other.orders()?);
         let same = self.with(key, &Argument::Orders(more.clone()))? == *other;
         same.then_some((key, orders, more))
@@ -392,7 +392,7 @@ impl Effect {
     /// Returns one effect that contains both: the harmonics of one joint. `None` if they are
     /// different effects.
     pub(crate) fn joined(&self, other: &Self) -> Option<Self> {
-        let (key, mut orders, more) = self.alike(other)?;
+        let (key, mut orders, more) = self.orders_of_both(other)?;
         let added: Vec<u32> = more.into_iter().filter(|order| !orders.contains(order)).collect();
         orders.extend(added);
         orders.sort_unstable();
@@ -402,7 +402,7 @@ impl Effect {
     /// Returns true if the effect contains the other one, as a harmonic with more orders does.
     #[doc(hidden)]
     pub fn covers(&self, other: &Self) -> bool {
-        match self.alike(other) {
+        match self.orders_of_both(other) {
             Some((_, orders, wanted)) => wanted.iter().all(|order| orders.contains(order)),
             None => self == other,
         }

@@ -14,16 +14,16 @@ use super::singular::SingularValues;
 /// than 1e-5.
 pub const UNIDENTIFIABLE_BELOW: f64 = 1e-9;
 /// Largest norm of a column, relative to the largest column, that counts as zero.
-const ZERO_COLUMN: f64 = 1e-14;
+const MAX_ZERO_COLUMN_NORM: f64 = 1e-14;
 /// Smallest share of a combination that makes an unknown a preferred pivot of its description.
-const PIVOT_SHARE: f64 = 0.1;
+const MIN_PIVOT_SHARE: f64 = 0.1;
 /// Smallest entry of a combination that is not a rounding error.
 const MAX_ROUNDING_ENTRY: f64 = 1e-6;
 /// Smallest relative singular value that certifies full rank without an SVD: twice
 /// [`UNIDENTIFIABLE_BELOW`], to allow for rounding.
-const CERTAIN_FULL_RANK: f64 = 2.0 * UNIDENTIFIABLE_BELOW;
+const MIN_CERTAIN_FULL_RANK: f64 = 2.0 * UNIDENTIFIABLE_BELOW;
 /// Relative size of a trailing pivot below which a direction is certainly unidentifiable.
-const CERTAIN_NULL: f64 = 1e-12;
+const MAX_CERTAIN_NULL_PIVOT: f64 = 1e-12;
 
 /// Identifiability of the unknowns, from the triangular factor R of the Jacobian.
 #[derive(Debug, Clone, PartialEq)]
@@ -61,7 +61,13 @@ impl Identifiability {
         let rank = singular_values.iter().filter(|&&value| value > threshold).count();
         let null = complement(&right.columns(0, rank).into_owned());
         let Blind { gauge, visible } = Blind::of(&null, &scale);
-        Self { singular_values, rank, unidentifiable: named(null, &scaled), gauge, visible }
+        Self {
+            singular_values,
+            rank,
+            unidentifiable: echelon_combinations(null, &scaled),
+            gauge,
+            visible,
+        }
     }
 
     /// Returns the ratio of the largest singular value to the smallest nonzero one.
@@ -113,7 +119,7 @@ impl Blind {
     pub fn in_triangle(triangle: &DMatrix<f64>) -> Self {
         let n = triangle.ncols();
         let Scaled { matrix: scaled, scale } = Scaled::of(triangle);
-        if regular_inverse(&scaled, CERTAIN_FULL_RANK).is_some() {
+        if regular_inverse(&scaled, MIN_CERTAIN_FULL_RANK).is_some() {
             return Self { gauge: DMatrix::zeros(0, n), visible: vec![1.0; n] };
         }
         if let Some(null) = certain_null(&scaled) {
@@ -149,11 +155,15 @@ impl Scaled {
         let largest = norms.iter().copied().fold(0.0, f64::max);
         let scale: Vec<f64> = norms
             .iter()
-            .map(|&norm| if norm > ZERO_COLUMN * largest { norm } else { 1.0 })
+            .map(|&norm| if norm > MAX_ZERO_COLUMN_NORM * largest { norm } else { 1.0 })
             .collect();
         let mut matrix = triangle.clone();
         for (mut column, (norm, scale)) in matrix.column_iter_mut().zip(norms.iter().zip(&scale)) {
-            column.scale_mut(if *norm > ZERO_COLUMN * largest { scale.recip() } else { 0.0 });
+            column.scale_mut(if *norm > MAX_ZERO_COLUMN_NORM * largest {
+                scale.recip()
+            } else {
+                0.0
+            });
         }
         Self { matrix, scale }
     }
@@ -166,15 +176,19 @@ fn certain_null(scaled: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let qr = scaled.clone().col_piv_qr();
     let triangle = qr.r();
     let largest = triangle.get((0, 0))?.abs();
-    let rank = (0..n).take_while(|&k| triangle[(k, k)].abs() > CERTAIN_NULL * largest).count();
+    let rank =
+        (0..n).take_while(|&k| triangle[(k, k)].abs() > MAX_CERTAIN_NULL_PIVOT * largest).count();
     let remainder = triangle.view((rank, rank), (n - rank, n - rank)).norm();
-    if rank == 0 || rank == n || remainder.is_nan() || remainder > CERTAIN_NULL * n as f64 * largest
+    if rank == 0
+        || rank == n
+        || remainder.is_nan()
+        || remainder > MAX_CERTAIN_NULL_PIVOT * n as f64 * largest
     {
         return None;
     }
     let first = triangle.view((0, 0), (rank, rank)).into_owned();
     // The largest singular value of all n columns is at most √n; `regular_inverse` assumes √rank.
-    let inverse = regular_inverse(&first, CERTAIN_FULL_RANK * (n as f64 / rank as f64).sqrt())?;
+    let inverse = regular_inverse(&first, MIN_CERTAIN_FULL_RANK * (n as f64 / rank as f64).sqrt())?;
     let mut null = DMatrix::zeros(n, n - rank);
     null.rows_mut(0, rank)
         .copy_from(&(inverse * triangle.view((0, rank), (rank, n - rank)) * -1.0));
@@ -205,13 +219,16 @@ pub(super) fn complement(basis: &DMatrix<f64>) -> DMatrix<f64> {
 /// `null`.
 ///
 /// This basis depends on the space alone and has few unknowns in each combination. Pivots are the
-/// first unknowns with a share of at least [`PIVOT_SHARE`], then those above
+/// first unknowns with a share of at least [`MIN_PIVOT_SHARE`], then those above
 /// [`MAX_ROUNDING_ENTRY`].
-fn named(mut null: DMatrix<f64>, scaled: &DMatrix<f64>) -> Vec<UnidentifiableCombination> {
+fn echelon_combinations(
+    mut null: DMatrix<f64>,
+    scaled: &DMatrix<f64>,
+) -> Vec<UnidentifiableCombination> {
     let (rows, n) = null.shape();
     let mut row = 0;
     let mut pivots = Vec::new();
-    for (least, column) in [PIVOT_SHARE, MAX_ROUNDING_ENTRY]
+    for (least, column) in [MIN_PIVOT_SHARE, MAX_ROUNDING_ENTRY]
         .into_iter()
         .flat_map(|least| (0..n).map(move |column| (least, column)))
     {

@@ -10,10 +10,10 @@ use super::singular::SingularValues;
 pub(super) const CONSTRAINT_WEIGHT: f64 = 1e5;
 /// Largest scaled singular value, relative to the largest of all, whose direction counts as
 /// undetermined.
-const NO_INFORMATION: f64 = 1e-13;
+const MAX_UNDETERMINED_SINGULAR_VALUE: f64 = 1e-13;
 /// Smallest ratio of singular values at which the explicit inverse is used, with an error of at
 /// most 1e-7.
-const WELL_CONDITIONED: f64 = 1e-9;
+const MIN_WELL_CONDITIONED_RATIO: f64 = 1e-9;
 
 /// Covariance of the unknowns of a fit with the number of unknowns that the data determine.
 #[derive(Debug, Clone, PartialEq)]
@@ -88,11 +88,15 @@ fn inverse_normal(mut a: DMatrix<f64>) -> DMatrix<f64> {
         column.unscale_mut(*scale);
     }
     let triangle = Triangle::factor(&a);
-    let mut v = regular_inverse(&triangle, WELL_CONDITIONED).unwrap_or_else(|| {
+    let mut v = regular_inverse(&triangle, MIN_WELL_CONDITIONED_RATIO).unwrap_or_else(|| {
         let SingularValues { values, right: mut v } = SingularValues::of(&a);
         let largest = values[0];
         for (mut column, &value) in v.column_iter_mut().zip(&values) {
-            column.scale_mut(if value > NO_INFORMATION * largest { value.recip() } else { 0.0 });
+            column.scale_mut(if value > MAX_UNDETERMINED_SINGULAR_VALUE * largest {
+                value.recip()
+            } else {
+                0.0
+            });
         }
         v
     });

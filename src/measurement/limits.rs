@@ -7,7 +7,7 @@ use crate::problem::{JointKind, Problem};
 /// Excess over a joint limit that counts as rounding \[rad\] or \[m\].
 const LIMIT_TOLERANCE: f64 = 1e-6;
 /// Number of turns from zero at which a warning suggests that a column in radians is in degrees.
-const MANY_TURNS: f64 = 2.0;
+const MIN_SUSPICIOUS_TURNS: f64 = 2.0;
 /// Highest plausible temperature [°C]. Above it, a warning suggests kelvins; a cold room in kelvins
 /// exceeds it.
 const MAX_PLAUSIBLE_TEMPERATURE: f64 = 200.0;
@@ -57,7 +57,7 @@ impl Measurements {
     }
 
     /// Returns a warning, located at the largest angle, if a column in radians exceeds
-    /// [`MANY_TURNS`] turns.
+    /// [`MIN_SUSPICIOUS_TURNS`] turns.
     pub(super) fn many_turns(&self, problem: &Problem, columns: &[Commands]) -> Option<Warning> {
         let is_angle = |column: &&Commands| {
             column.unit() == "rad"
@@ -81,7 +81,7 @@ impl Measurements {
             turns: format!("{turns:.0}"),
         };
         let location = self.location(row).with_key(format!("joint {}", column.joint + 1));
-        (turns > MANY_TURNS).then_some(Warning { location, kind })
+        (turns > MIN_SUSPICIOUS_TURNS).then_some(Warning { location, kind })
     }
 
     /// Returns a warning for each joint that is commanded beyond its declared range, located at the

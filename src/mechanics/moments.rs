@@ -7,7 +7,7 @@ use crate::problem::{PoseView, Problem};
 use crate::scalar::Scalar;
 
 /// Largest rounding of a moment, relative to the sum of the moments of all loads about the base.
-const ROUNDING: f64 = 1e-12;
+const MAX_MOMENT_ROUNDING: f64 = 1e-12;
 
 /// Undeflected arm whose loads have a moment about every joint's axis.
 ///
@@ -58,7 +58,7 @@ impl<S: Scalar> AxisMoments<S> {
             Event::Load { at, force } => at.map(|x| x.re()).norm() * force.map(|x| x.re()).norm(),
             _ => 0.0,
         };
-        let least = ROUNDING * ws.events.iter().map(term).sum::<f64>();
+        let least = MAX_MOMENT_ROUNDING * ws.events.iter().map(term).sum::<f64>();
         let mut next = 0;
         // Three moments for each element of a beam come before that of its joint.
         let moment = |joint: &super::Joint<S>| {

@@ -4,7 +4,7 @@ use super::kinematics::Mdh;
 use crate::problem::Problem;
 
 /// Largest difference from a tabulated parameter that counts as equal [m, rad].
-const TOLERANCE: f64 = 1e-9;
+const MAX_TABLE_DIFFERENCE: f64 = 1e-9;
 
 /// Nominal α \[°\], a \[m\], θ \[°\], d \[m\], β \[°\] of each joint, with the α₂ of table 1
 /// [Chen2021, tables 1, 2].
@@ -49,13 +49,13 @@ pub fn is_published_arm(problem: &Problem) -> bool {
     let is_equal = |(joint, [alpha, a, theta, d, beta]): (&crate::problem::Joint, &[f64; 5])| {
         let declared = Mdh::nominal(joint);
         let angle = |declared: f64, printed: f64| {
-            (declared.abs() - printed.to_radians().abs()).abs() < TOLERANCE
+            (declared.abs() - printed.to_radians().abs()).abs() < MAX_TABLE_DIFFERENCE
         };
         angle(declared.alpha, *alpha)
             && angle(declared.theta, *theta)
             && angle(declared.beta, *beta)
-            && (declared.a - a).abs() < TOLERANCE
-            && (declared.d - d).abs() < TOLERANCE
+            && (declared.a - a).abs() < MAX_TABLE_DIFFERENCE
+            && (declared.d - d).abs() < MAX_TABLE_DIFFERENCE
     };
     problem.joints.len() == NOMINAL.len() && problem.joints.iter().zip(&NOMINAL).all(is_equal)
 }

@@ -99,9 +99,9 @@ pub(super) fn parse(
     problem: &Problem,
 ) -> Result<EffectDeclaration, InputError> {
     if text.contains('=') {
-        return written(text.to_owned(), named, problem);
+        return parse_written(text.to_owned(), named, problem);
     }
-    written(format!("{text} = true"), named, problem).map_err(|error| {
+    parse_written(format!("{text} = true"), named, problem).map_err(|error| {
         let kind = match *error.kind {
             InputErrorKind::MissingKey { .. } => InputErrorKind::NeedsArguments {
                 write: format!("'{}'", example(text.trim(), problem)),
@@ -113,7 +113,11 @@ pub(super) fn parse(
     })
 }
 
-fn written(text: String, named: &Path, problem: &Problem) -> Result<EffectDeclaration, InputError> {
+fn parse_written(
+    text: String,
+    named: &Path,
+    problem: &Problem,
+) -> Result<EffectDeclaration, InputError> {
     let document = Document { file: named.to_owned(), text: text.into() };
     let table = document.table()?;
     let section = Section::new(&document, String::new(), 0..0, table.get_ref());

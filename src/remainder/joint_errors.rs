@@ -66,7 +66,10 @@ impl Correction {
             rows.inputs[(input, row)] = (command - offset) / unit;
         }
         let hyper = &self.posterior.hyper;
-        let single = Hyperparameters { single: only(&hyper.single, place), ..silent(hyper) };
+        let single = Hyperparameters {
+            single: single_amplitude(&hyper.single, place),
+            ..without_amplitudes(hyper)
+        };
         let mut factors = self.posterior.factors_of(&single, &rows);
         // The first coordinate of each row holds the error itself.
         let mean = (0..commands.len()).map(|row| factors.mean[AXES * row]).sum::<f64>()
@@ -90,10 +93,13 @@ impl Correction {
             .sites
             .iter()
             .position(|other| other.joint == site.joint && other.kind == SiteKind::Compliance);
-        let joint = Hyperparameters { joint: only(&hyper.joint, place), ..silent(hyper) };
+        let joint = Hyperparameters {
+            joint: single_amplitude(&hyper.joint, place),
+            ..without_amplitudes(hyper)
+        };
         let constant = compliance.map(|place| Hyperparameters {
-            constant: only(&hyper.constant, place),
-            ..silent(hyper)
+            constant: single_amplitude(&hyper.constant, place),
+            ..without_amplitudes(hyper)
         });
         Some(JointError {
             joint: site.joint,
@@ -115,12 +121,12 @@ impl Correction {
 }
 
 /// Returns the amplitudes with all except the one at `place` set to 0.
-fn only(amplitudes: &[f64], place: usize) -> Vec<f64> {
+fn single_amplitude(amplitudes: &[f64], place: usize) -> Vec<f64> {
     amplitudes.iter().enumerate().map(|(k, a)| if k == place { *a } else { 0.0 }).collect()
 }
 
 /// Returns the hyperparameters with the same lengths and noise, but with all amplitudes 0.
-fn silent(hyper: &Hyperparameters) -> Hyperparameters {
+fn without_amplitudes(hyper: &Hyperparameters) -> Hyperparameters {
     let zeros = vec![0.0; hyper.sites()];
     Hyperparameters {
         single: zeros.clone(),

@@ -125,7 +125,11 @@ impl Scores {
             let high = scores.get(below + 1).copied().unwrap_or(low);
             low + (high - low) * (place - below as f64)
         };
-        let beyond = if part > 1.0 { length(level) / length(count / (count + 1.0)) } else { 1.0 };
+        let beyond = if part > 1.0 {
+            length_quantile(level) / length_quantile(count / (count + 1.0))
+        } else {
+            1.0
+        };
         beyond * of(&self.single).max(of(&self.blocks))
     }
 
@@ -152,7 +156,7 @@ impl Scores {
         let scale = self.scale()?;
         let squares = ChiSquared::new(AXES as f64).ok()?;
         let lowest = ChiSquared::new(freedom).ok()?.inverse_cdf(1.0 - confidence);
-        let normal = length(level) / (AXES as f64).sqrt();
+        let normal = length_quantile(level) / (AXES as f64).sqrt();
         let tail = if self.configurations < MIN_FOR_TAIL {
             1.0
         } else {
@@ -169,7 +173,7 @@ impl Scores {
 }
 
 /// Returns the quantile of the length of a standard normal vector in three dimensions.
-fn length(level: f64) -> f64 {
+fn length_quantile(level: f64) -> f64 {
     ChiSquared::new(AXES as f64).map_or(1.0, |squares| squares.inverse_cdf(level).sqrt())
 }
 

@@ -52,7 +52,7 @@ fn blocks<'a>(problem: &Problem, check: &Check) -> Vec<Block<'a>> {
             "With more or fewer such poses (rank; parameters of the arm identified to 90 % or more; error of predictions):",
         ),
         Block::Table(growth(check)),
-        Block::figures([growing(check)]),
+        Block::figures([growth_figure(check)]),
     ]);
     // Measured poses do not include the held-out ones.
     let all = (check.predicted_at != PredictionPoses::HeldOut).then_some(forecast.poses);
@@ -62,7 +62,7 @@ fn blocks<'a>(problem: &Problem, check: &Check) -> Vec<Block<'a>> {
 }
 
 /// Draws the expected error of predictions against the number of poses.
-fn growing(check: &Check) -> Option<Drawing> {
+fn growth_figure(check: &Check) -> Option<Drawing> {
     let curve = |name, colour, of: fn(&Prediction) -> f64| {
         let at = |step: &GrowthStep| (step.poses as f64, of(&step.prediction) * 1e3);
         Curve::new(name, colour, check.growth.steps.iter().map(at))
@@ -138,7 +138,7 @@ fn prediction(check: &Check) -> String {
     };
     let Prediction { median, quantile_95, rms } = check.prediction;
     let noise = match check.noise {
-        Some(noise) if positions(check) => format!(
+        Some(noise) if measures_positions(check) => format!(
             "One measured position has {} mm of noise (rms), so held-out errors to expect are {} mm (rms).",
             mm(noise, 3),
             mm(rms.hypot(noise), 3)
@@ -157,7 +157,7 @@ fn prediction(check: &Check) -> String {
 }
 
 /// Returns true if at least one of the poses measures a position.
-fn positions(check: &Check) -> bool {
+fn measures_positions(check: &Check) -> bool {
     check.noise_of == "position"
 }
 

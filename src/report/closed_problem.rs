@@ -66,13 +66,13 @@ fn comments(found: &Found, closure: &ClosedLoop) -> Vec<String> {
     // A custom effect may describe itself in several lines.
     std::iter::once(first)
         .chain(values(&found.effect, &parameters))
-        .chain(seen(found))
+        .chain(ranges_of_law(found))
         .map(|line| one_line(&line.replace('\n', " ")))
         .collect()
 }
 
 /// States the ranges of the quantities of a law that the search composed; `None` for other effects.
-fn seen(found: &Found) -> Option<String> {
+fn ranges_of_law(found: &Found) -> Option<String> {
     let range = |(of, (low, high)): &(Covariate, (f64, f64))| {
         format!("{of} from {} to {}", number(*low, 3), number(*high, 3))
     };

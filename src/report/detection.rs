@@ -33,7 +33,7 @@ pub(super) fn blocks<'a>(detection: &Detection) -> Vec<Block<'a>> {
         }
     }
     let rows: Vec<Vec<String>> =
-        families.into_iter().flat_map(|family| hardest(&visible, family)).collect();
+        families.into_iter().flat_map(|family| hardest_rows(&visible, family)).collect();
     let mut blocks = vec![Block::Text(format!(
         "Size from which on an effect is found in {:.0} of 100 such sets of measurements, for the {MAX_SHOWN_EFFECTS} least visible effects \
          of each family:",
@@ -65,7 +65,7 @@ pub(super) fn blocks<'a>(detection: &Detection) -> Vec<Block<'a>> {
 
 /// Returns table rows of a family: for each place, the effect that is hardest to detect; the
 /// easiest place first.
-fn hardest(shown: &[&Detectable], family: &str) -> Vec<Vec<String>> {
+fn hardest_rows(shown: &[&Detectable], family: &str) -> Vec<Vec<String>> {
     let mut members: Vec<(&Detectable, f64)> = Vec::new();
     for effect in shown.iter().filter(|effect| effect.effect.name() == family) {
         let sizes = effect.sizes.iter();

@@ -35,7 +35,7 @@ fn point(result: &LoopResult, found: &FoundEffect, alternatives: usize) -> Point
     let mut details: Vec<String> = stand_in(found).into_iter().collect();
     details.extend(effect::values(&found.effect.effect, &found.parameters));
     details.extend(found.claims.as_ref().map(trace::claimed));
-    details.extend(seen(found));
+    details.extend(ranges_of_law(found));
     details.extend(found.resembles.as_ref().map(|cause| format!("hint: {cause}")));
     details.extend(found.stability.map(|share| {
         format!(
@@ -71,7 +71,7 @@ fn point(result: &LoopResult, found: &FoundEffect, alternatives: usize) -> Point
 }
 
 /// States the ranges of the quantities of a law that the search composed; `None` for other effects.
-fn seen(found: &FoundEffect) -> Option<String> {
+fn ranges_of_law(found: &FoundEffect) -> Option<String> {
     let range = |(of, (low, high)): &(String, (f64, f64))| {
         format!("{of} from {} to {}", number(*low, 3), number(*high, 3))
     };

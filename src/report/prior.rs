@@ -11,7 +11,7 @@ use crate::quantity::format::{counted, decimals, number, or_dash, p_value};
 const HEADER: [&str; 7] =
     ["parameter", "earlier", "± 1 σ", "new rows", "± 1 σ", "posterior", "± 1 σ"];
 /// p-value of χ² below which new rows do not agree with the prior.
-const LEAST_P: f64 = 0.001;
+const MIN_AGREEING_P: f64 = 0.001;
 /// Standard error of the new rows, in units of the earlier one, beyond which the figure omits a
 /// parameter: the rows say next to nothing.
 const MAX_DRAWN_ERROR: f64 = 10.0;
@@ -79,7 +79,7 @@ pub(super) fn summary(comparison: &PriorComparison) -> String {
     }
     let verdict = match comparison.causes.as_slice() {
         [] => match comparison.chi2 {
-            Some((.., p)) if p >= LEAST_P => ". They agree.".to_owned(),
+            Some((.., p)) if p >= MIN_AGREEING_P => ". They agree.".to_owned(),
             Some(_) => ". That is improbable, but no single cause explains it.".to_owned(),
             None => ". Their agreement could not be tested.".to_owned(),
         },

@@ -38,7 +38,7 @@ pub(super) fn find<'a>(fit: &FitResidual<'a>, leverage: &Leverage, level: f64) -
     let tried = test(&distances);
     let mut out = vec![false; poses];
     loop {
-        let far = too_far(&distances, level);
+        let far = farthest_outliers(&distances, level);
         if far.is_empty() {
             break;
         }
@@ -106,7 +106,7 @@ fn test(distances: &[Option<Distance>]) -> Tried {
 }
 
 /// Returns the outliers, the farthest first, at most as many as one round removes.
-fn too_far(distances: &[Option<Distance>], level: f64) -> Vec<usize> {
+fn farthest_outliers(distances: &[Option<Distance>], level: f64) -> Vec<usize> {
     let count = distances.len();
     let far = |(number, distance): (usize, &Option<Distance>)| {
         let Distance { ratio, distribution } = distance.as_ref()?;

@@ -6,7 +6,7 @@ use super::chain::{Chain, Load, Motion, PieceFrame};
 use crate::spatial::Frame;
 
 /// Largest sum of the changes of all hinges in a pass at which the equilibrium is reached [rad, m].
-const TOLERANCE: f64 = 1e-12;
+const EQUILIBRIUM_TOLERANCE: f64 = 1e-12;
 /// Maximum number of passes. If they do not suffice, the arm counts as too flexible for its loads.
 const MAX_PASSES: usize = 2000;
 /// Smallest fraction of a pass that is applied after an overshoot.
@@ -48,7 +48,7 @@ impl Equilibrium {
         for _ in 0..MAX_PASSES {
             equilibrium.place(chain);
             let change = equilibrium.load(chain, &loads, &mut next_missing);
-            if change <= TOLERANCE {
+            if change <= EQUILIBRIUM_TOLERANCE {
                 return Some(equilibrium);
             }
             if step > MIN_STEP && (change > least || !change.is_finite()) {

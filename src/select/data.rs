@@ -94,7 +94,7 @@ impl<'a> Data<'a> {
     }
 
     /// Returns the values of a column at the identification rows.
-    fn pick(&self, column: &[f64]) -> Vec<f64> {
+    fn values_at_rows(&self, column: &[f64]) -> Vec<f64> {
         self.rows().iter().map(|&row| column[row]).collect()
     }
 
@@ -108,7 +108,7 @@ impl<'a> Data<'a> {
 
     /// Returns the time of each identification row \[s\].
     pub fn time(&self) -> Vec<f64> {
-        self.pick(&self.measurements.time)
+        self.values_at_rows(&self.measurements.time)
     }
 
     /// Returns the session of each identification row.
@@ -130,8 +130,8 @@ impl<'a> Data<'a> {
         };
         let varies =
             |values: Vec<f64>| values.iter().any(|value| value.to_bits() != values[0].to_bits());
-        let payload = measurements.payload.as_deref().map(|all| self.pick(all));
-        let temperature = measurements.temperature.as_deref().map(|all| self.pick(all));
+        let payload = measurements.payload.as_deref().map(|all| self.values_at_rows(all));
+        let temperature = measurements.temperature.as_deref().map(|all| self.values_at_rows(all));
         let n = measurements.joints;
         let from = |joint: usize, side: f64| {
             let came =
@@ -150,7 +150,7 @@ impl<'a> Data<'a> {
             payload: payload
                 .map_or([problem.tool.payload_mass; 2].into(), |all| range(all.into_iter())),
             ranges: (0..n).map(column).collect(),
-            covariates: self.own_covariates().map(varies).collect(),
+            covariates: self.declared_covariates().map(varies).collect(),
             times: self.shift_times(),
             clock: measurements.clock(),
             gravity: problem.gravity,
@@ -159,7 +159,7 @@ impl<'a> Data<'a> {
 
     /// Returns the covariates that the problem declares, each with its value in every
     /// identification row.
-    fn own_covariates(&self) -> impl Iterator<Item = Vec<f64>> {
+    fn declared_covariates(&self) -> impl Iterator<Item = Vec<f64>> {
         let count =
             self.rows().first().map_or(0, |&row| self.measurements.covariates_of(row).len());
         (0..count).map(|which| {
@@ -207,10 +207,10 @@ impl<'a> Data<'a> {
         ];
         for (covariate, column) in columns {
             if let Some(column) = column {
-                covariates.push(CovariateValues { covariate, values: self.pick(column) });
+                covariates.push(CovariateValues { covariate, values: self.values_at_rows(column) });
             }
         }
-        let declared = self.own_covariates().enumerate();
+        let declared = self.declared_covariates().enumerate();
         covariates.extend(declared.map(|(which, values)| CovariateValues {
             covariate: Covariate::declared(which, problem),
             values,

@@ -229,7 +229,7 @@ impl Fitted {
         }
         let kept = || self.derivatives.lock().unwrap_or_else(PoisonError::into_inner);
         let known = kept().clone();
-        let found = self.linearised_knowing(known, (data, data.rows()), effects, &[]);
+        let found = self.linearised_reusing(known, (data, data.rows()), effects, &[]);
         *kept() = Some(found.derivatives());
         found
     }
@@ -253,10 +253,10 @@ impl Fitted {
         effects: &[Effect],
         slots: &[ParameterSite],
     ) -> Linearised<'a> {
-        self.linearised_knowing(None, (data, rows), effects, slots)
+        self.linearised_reusing(None, (data, rows), effects, slots)
     }
 
-    fn linearised_knowing<'a>(
+    fn linearised_reusing<'a>(
         &'a self,
         known: Option<Arc<Derivatives>>,
         (data, rows): (&Data<'a>, &[usize]),

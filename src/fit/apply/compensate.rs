@@ -224,7 +224,7 @@ pub fn compensate(
         let mut configuration = full(&goal.nearest(&start));
         let (miss, turn) = at(&configuration);
         if !is_reached(&miss, turn.as_ref()) {
-            configuration = damped(problem, (&arm, &led), &serving, pose)?;
+            configuration = damped_search(problem, (&arm, &led), &serving, pose)?;
         }
         let ((miss, turn), (before, turn_before)) = (at(&configuration), at(seed));
         let (seed_miss, seed_turn) = (before.norm(), turn_before.map(|turn| turn.norm()));
@@ -236,7 +236,7 @@ pub fn compensate(
 /// Computes the configuration for one target by Levenberg–Marquardt steps, if Newton steps do not
 /// reach it. Effects that depend on the command are evaluated at the command of the previous pass.
 /// Only the joints `serving` move.
-fn damped(
+fn damped_search(
     problem: &Problem,
     (arm, led): (&Model, &Model),
     serving: &[usize],

@@ -158,7 +158,7 @@ pub fn predict(
             Some(value) => x[k] = parameter.deviation(value),
             None if parameter.site.is_placement() => missing.push(k),
             None if estimate.is_none() => {}
-            None => return Err(lacking(estimate, &parameter.name)),
+            None => return Err(missing_parameter_error(estimate, &parameter.name)),
         }
     }
     let sigma =
@@ -179,16 +179,16 @@ pub fn predict(
         if let Some(k) = too_few(&model, &poses, &missing) {
             let name = &model.parameters[k].name;
             return Err(match model.parameters[k].site {
-                ParameterSite::Fixture { .. } => open(estimate, name.clone()),
-                _ => lacking(estimate, name),
+                ParameterSite::Fixture { .. } => undetermined_error(estimate, name.clone()),
+                _ => missing_parameter_error(estimate, name),
             });
         }
-        x = place(&model, &poses, &missing, x).map_err(|error| match error {
-            PredictError::Open { name } => open(estimate, name),
+        x = fit_placements(&model, &poses, &missing, x).map_err(|error| match error {
+            PredictError::Open { name } => undetermined_error(estimate, name),
             other => other,
         })?;
     } else if let (Some(&k), Some(_)) = (missing.first(), estimate) {
-        return Err(lacking(estimate, &model.parameters[k].name));
+        return Err(missing_parameter_error(estimate, &model.parameters[k].name));
     }
     let sigmas: Vec<Option<f64>> = all.iter().map(|&row| rows.sigma_of(row).or(sigma)).collect();
     let orientations = turn.map(|_| model.orientations(&poses, x.as_slice()));
@@ -240,7 +240,7 @@ pub fn predict(
 }
 
 /// Returns the error that the `estimate` lacks the parameter `name`, or that there is no estimate.
-fn lacking(estimate: Option<&SavedEstimate>, name: &str) -> PredictError {
+fn missing_parameter_error(estimate: Option<&SavedEstimate>, name: &str) -> PredictError {
     let name = name.to_owned();
     match estimate {
         Some(SavedEstimate { file, .. }) => {
@@ -251,7 +251,7 @@ fn lacking(estimate: Option<&SavedEstimate>, name: &str) -> PredictError {
 }
 
 /// Returns the error that the rows do not determine the parameter `name`, which the estimate lacks.
-fn open(estimate: Option<&SavedEstimate>, name: String) -> PredictError {
+fn undetermined_error(estimate: Option<&SavedEstimate>, name: String) -> PredictError {
     match estimate {
         Some(_) => PredictError::Open { name },
         None => PredictError::OpenWithoutEstimate { name },
@@ -289,7 +289,7 @@ fn too_few(model: &Model, poses: &[Pose], missing: &[usize]) -> Option<usize> {
 
 /// Returns the full parameter vector `x` with the `missing` bases and tools fitted to the poses
 /// that use them.
-fn place(
+fn fit_placements(
     model: &Model,
     poses: &[Pose],
     missing: &[usize],

@@ -101,7 +101,7 @@ fn copies(measurements: &Measurements, identification: &[usize], held_out: &[usi
 const MAX_NAMED_ROWS: usize = 5;
 
 /// Returns the number of held-out rows that copy an identification row.
-fn copied(fit: &CheckedFit) -> usize {
+fn copies_in_fit(fit: &CheckedFit) -> usize {
     let Fitting { measurements, split, .. } = fit.fitting;
     copies(measurements, &split.identification, &split.held_out)
 }
@@ -112,7 +112,7 @@ pub(super) struct NotAllCopied;
 impl Check for NotAllCopied {
     fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
         let rows = fit.fitting.split.held_out.len();
-        if rows == 0 || copied(fit) < rows {
+        if rows == 0 || copies_in_fit(fit) < rows {
             return Vec::new();
         }
         let text = "all held-out rows are identification rows again: their errors judge nothing"
@@ -126,7 +126,7 @@ pub(super) struct NotRepeated;
 
 impl Check for NotRepeated {
     fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
-        let (rows, of) = (copied(fit), fit.fitting.split.held_out.len());
+        let (rows, of) = (copies_in_fit(fit), fit.fitting.split.held_out.len());
         if rows == 0 || rows == of {
             return Vec::new();
         }

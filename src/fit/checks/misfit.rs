@@ -35,9 +35,12 @@ impl Check for Misfit {
             let error = |x| fit.rms(&kind.rows, &fit.fitting.position_errors(&kind.rows, x));
             let (nominal, fitted) = (error(fit.registered_x), error(&fit.end.x));
             // A solver that did not converge may have driven away an arm that was near before.
-            let counts =
-                |_: &Finding| fit.end.termination.converged() || misses(&kind, nominal).is_some();
-            misses(&kind, fitted).filter(counts).or_else(|| no_better(&kind, nominal, fitted))
+            let counts = |_: &Finding| {
+                fit.end.termination.converged() || misfit_finding(&kind, nominal).is_some()
+            };
+            misfit_finding(&kind, fitted)
+                .filter(counts)
+                .or_else(|| no_better_finding(&kind, nominal, fitted))
         };
         fit.kinds().into_iter().filter_map(of_kind).collect()
     }
@@ -58,7 +61,7 @@ impl Check for SizeOfArm {
             let predicted = spread(fit.fitting.placement, rows, |place| {
                 positions[rows[place]] - nominal[place]
             });
-            other_size(kind.spread, predicted)
+            other_size_finding(kind.spread, predicted)
         };
         fit.kinds().into_iter().filter_map(of_kind).collect()
     }
@@ -66,7 +69,7 @@ impl Check for SizeOfArm {
 
 /// Reports a fit whose error `rms` is large relative to both the spread and the σ of rows of a
 /// kind; `None` if it is not.
-fn misses(kind: &RowKind, rms: f64) -> Option<Finding> {
+fn misfit_finding(kind: &RowKind, rms: f64) -> Option<Finding> {
     let RowKind { observation, spread, declared_sigma, .. } = *kind;
     let noise = declared_sigma.map_or(0.0, |sigma| MAX_UNREPORTED_RESIDUAL * sigma);
     if !(spread > MIN_SPREAD && rms > MAX_MISS * spread && rms > noise) {
@@ -90,7 +93,7 @@ fn misses(kind: &RowKind, rms: f64) -> Option<Finding> {
 /// Reports a fit that predicts rows other than positions no better than the nominal arm; `before`
 /// and `after` are the errors of nominal and fitted arm. The spread of such rows may carry no
 /// information.
-fn no_better(kind: &RowKind, before: f64, after: f64) -> Option<Finding> {
+fn no_better_finding(kind: &RowKind, before: f64, after: f64) -> Option<Finding> {
     let RowKind { observation, declared_sigma, .. } = *kind;
     let is_far = declared_sigma.is_some_and(|sigma| after > MIN_REPORTED_ERROR * sigma);
     if observation.is_position() || !is_far || after <= MIN_UNIMPROVED_RATIO * before {
@@ -110,7 +113,7 @@ fn no_better(kind: &RowKind, before: f64, after: f64) -> Option<Finding> {
 
 /// Reports measured points whose spread `measured` \[m\] differs much from the spread `expected`
 /// \[m\] of the nominal arm's points. They belong to an arm of another size.
-fn other_size(measured: f64, expected: f64) -> Option<Finding> {
+fn other_size_finding(measured: f64, expected: f64) -> Option<Finding> {
     let is_same = (expected / MAX_SIZE_RATIO..=expected * MAX_SIZE_RATIO).contains(&measured);
     let text = format!(
         "the measured points lie {:.1} mm from their centre, those of the nominal arm {:.1} mm",
@@ -144,7 +147,7 @@ mod tests {
                 taken_sigma: 1e-3,
             };
             assert_eq!(
-                no_better(&kind, 0.06, after).is_some(),
+                no_better_finding(&kind, 0.06, after).is_some(),
                 is_reported,
                 "{observation:?} {sigma:?} {after}"
             );

@@ -82,7 +82,7 @@ pub(in crate::fit) fn spreads(
         let mean = touched.iter().map(|point| (point - middle).norm()).sum::<f64>() / n;
         let squares: Matrix3<f64> =
             touched.iter().map(|point| (point - middle) * (point - middle).transpose()).sum();
-        let (along, share) = longest(squares);
+        let (along, share) = main_direction(squares);
         (!touched.is_empty()).then(|| PointSpread {
             point: fixture.name.clone(),
             n: touched.len(),
@@ -124,7 +124,7 @@ impl Fitting<'_> {
 
 /// Returns the direction in which the sum of squares is largest, with its largest component
 /// positive, and the share along it; NaN if `squares` is zero or not finite.
-fn longest(squares: Matrix3<f64>) -> (Vector3<f64>, f64) {
+fn main_direction(squares: Matrix3<f64>) -> (Vector3<f64>, f64) {
     let trace = squares.trace();
     if !(trace.is_finite() && trace > 0.0) {
         return (Vector3::from_element(f64::NAN), f64::NAN);

@@ -60,16 +60,25 @@ impl PoseSufficiency {
         let is_fitted = |k: usize| !held_out_only.parameters[k] && !fitting.is_covered(k);
         let is_held_out = |k: usize| held_out_only.parameters[k];
         let finding = (coordinates < without_prior)
-            .then(|| too_few("the fit".to_owned(), coordinates, without_prior))
+            .then(|| too_few_finding("the fit".to_owned(), coordinates, without_prior))
             .or_else(|| {
-                underdetermined((model, placement), (&numbers, &of_row), (rows, false), is_fitted)
+                too_few_poses_finding(
+                    (model, placement),
+                    (&numbers, &of_row),
+                    (rows, false),
+                    is_fitted,
+                )
             })
-            .or_else(|| undetermined(fitting, &numbers, rows, at, is_fitted));
+            .or_else(|| undetermined_base_finding(fitting, &numbers, rows, at, is_fitted));
         // A held-out session gives no information on the arm, whatever its points determine.
-        let held_out =
-            underdetermined((model, placement), (&numbers, &of_row), (later, true), is_held_out)
-                .or_else(|| undetermined(fitting, &numbers, later, at, is_held_out))
-                .map(|finding| of_held_out(&finding));
+        let held_out = too_few_poses_finding(
+            (model, placement),
+            (&numbers, &of_row),
+            (later, true),
+            is_held_out,
+        )
+        .or_else(|| undetermined_base_finding(fitting, &numbers, later, at, is_held_out))
+        .map(|finding| held_out_finding(&finding));
         let several_targets =
             poses < count_distinct(&numbers, split.identification.iter().copied());
         Self { finding, held_out, coordinates, poses, several_targets }
@@ -85,7 +94,7 @@ impl PoseSufficiency {
 
 /// Returns the finding about a base or tool that only held-out rows use, made from one about
 /// identification rows.
-fn of_held_out(finding: &Finding) -> Finding {
+fn held_out_finding(finding: &Finding) -> Finding {
     let number = |name| finding.value(name).cloned().unwrap_or_default();
     let text = format!("held-out rows of {}; their errors say little", finding.text);
     let numbers = [number("of"), number("poses")];
@@ -94,7 +103,7 @@ fn of_held_out(finding: &Finding) -> Finding {
 
 /// Reports that the fit, a base or a tool (`of`) has fewer measured coordinates than parameters
 /// without a prior.
-fn too_few(of: String, coordinates: usize, parameters: usize) -> Finding {
+fn too_few_finding(of: String, coordinates: usize, parameters: usize) -> Finding {
     let text = format!(
         "{of}: {coordinates} measured coordinates for {parameters} parameters without a prior (a pose measured again adds none)"
     );
@@ -148,7 +157,7 @@ fn label(what: &str, word: &str) -> String {
 
 /// Reports the first base whose pose the points of `rows` do not determine; `None` if there is
 /// none. Only its parameters without a prior for which `varied` is true count.
-fn undetermined(
+fn undetermined_base_finding(
     fitting: &Fitting,
     numbers: &[usize],
     rows: &[usize],
@@ -188,7 +197,7 @@ fn undetermined(
 ///
 /// `numbers` are the pose numbers of all rows, `of_row` their numbers of coordinates. If `judged`,
 /// one more coordinate is required, so that errors of the rows can be judged.
-fn underdetermined(
+fn too_few_poses_finding(
     (model, placement): (&Model, &Placement),
     (numbers, of_row): (&[usize], &[usize]),
     (rows, judged): (&[usize], bool),
@@ -205,7 +214,8 @@ fn underdetermined(
         };
         let unknowns = (0..model.parameters.len()).filter(|&k| counts(k)).count();
         let enough = if judged { coordinates > unknowns } else { coordinates >= unknowns };
-        (0 < coordinates && 0 < unknowns && !enough).then(|| too_few(of, coordinates, unknowns))
+        (0 < coordinates && 0 < unknowns && !enough)
+            .then(|| too_few_finding(of, coordinates, unknowns))
     };
     let base = |b: usize| {
         let alone = |t: usize| {

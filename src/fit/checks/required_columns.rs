@@ -10,7 +10,7 @@ use crate::problem::{Effect, EffectDeclaration, Problem};
 /// # Errors
 /// Returns an error at the file and line of the first effect whose column is missing.
 pub fn check_columns(problem: &Problem, rows: &Measurements) -> Result<(), InputError> {
-    missing(problem, rows, rows.time_measured).next().map_or(Ok(()), Err)?;
+    missing_columns(problem, rows, rows.time_measured).next().map_or(Ok(()), Err)?;
     not_finite(problem, rows).map_or(Ok(()), Err)
 }
 
@@ -37,10 +37,14 @@ fn not_finite(problem: &Problem, rows: &Measurements) -> Option<InputError> {
 /// Returns an error for each effect that needs a column which the targets `rows` lack. Targets have
 /// no earlier poses, so they need no times.
 pub fn missing_target_columns(problem: &Problem, rows: &Measurements) -> Vec<InputError> {
-    missing(problem, rows, true).collect()
+    missing_columns(problem, rows, true).collect()
 }
 
-fn missing(problem: &Problem, rows: &Measurements, time: bool) -> impl Iterator<Item = InputError> {
+fn missing_columns(
+    problem: &Problem,
+    rows: &Measurements,
+    time: bool,
+) -> impl Iterator<Item = InputError> {
     let columns = Columns {
         temperature: rows.temperature.is_some(),
         approach: rows.approach.is_some(),

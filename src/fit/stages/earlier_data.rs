@@ -7,13 +7,13 @@ use crate::model::Model;
 
 /// Smallest eigenvalue of the earlier correlation matrix, relative to the largest, that is more
 /// than rounding. Combinations below it are those that the earlier fit held.
-const HELD: f64 = 1e-13;
+const MAX_HELD_EIGENVALUE: f64 = 1e-13;
 /// Eigenvalue of that matrix, relative to the largest, below which the declared prior of a
 /// combination is negligible.
-const WELL_KNOWN: f64 = 1e-6;
+const MAX_WELL_KNOWN_EIGENVALUE: f64 = 1e-6;
 /// Smallest eigenvalue of the information beyond the declared priors, relative to the largest, that
 /// counts.
-const NO_INFORMATION: f64 = 1e-10;
+const MIN_INFORMATIVE_EIGENVALUE: f64 = 1e-10;
 
 /// Linear residual rows A x + b that stand for earlier data on some parameters, given by their
 /// names. x are deviations from nominal.
@@ -54,12 +54,13 @@ impl EarlierData {
         };
         let mean = mean.component_div(&scale);
         let mut rows: Vec<(DVector<f64>, f64)> = Vec::with_capacity(scale.len());
-        for k in chosen(&|value| value > HELD && value <= WELL_KNOWN) {
+        for k in chosen(&|value| value > MAX_HELD_EIGENVALUE && value <= MAX_WELL_KNOWN_EIGENVALUE)
+        {
             let row = eigen.eigenvectors.column(k) / eigen.eigenvalues[k].sqrt();
             let constant = -row.dot(&mean);
             rows.push((row, constant));
         }
-        let others = chosen(&|value| value > WELL_KNOWN);
+        let others = chosen(&|value| value > MAX_WELL_KNOWN_EIGENVALUE);
         let directions = eigen.eigenvectors.select_columns(&others);
         let information =
             DVector::from_fn(others.len(), |k, _| eigen.eigenvalues[others[k]].recip());
@@ -73,7 +74,7 @@ impl EarlierData {
         let added = (DMatrix::from_diagonal(&information) - declared).symmetric_eigen();
         let largest = added.eigenvalues.iter().copied().fold(0.0, f64::max);
         for (k, &value) in added.eigenvalues.iter().enumerate() {
-            if value > NO_INFORMATION * largest {
+            if value > MIN_INFORMATIVE_EIGENVALUE * largest {
                 let direction = added.eigenvectors.column(k);
                 let root = value.sqrt();
                 rows.push((&directions * direction * root, -direction.dot(&pull) / root));

@@ -182,7 +182,7 @@ impl<'a> Fitting<'a> {
     }
 
     /// Creates a stage that fits bases and targets, always by the solver that `auto` chooses.
-    fn placing(&self, rows: &[usize], unknowns: Vec<usize>) -> Stage<'a> {
+    fn placement_stage(&self, rows: &[usize], unknowns: Vec<usize>) -> Stage<'a> {
         let mut stage = self.stage(rows, unknowns);
         stage.solver = SolverChoice::Auto.decide(self.model);
         stage
@@ -216,7 +216,8 @@ impl<'a> Fitting<'a> {
     pub fn held_out_stage(&self) -> Option<Stage<'a>> {
         let HeldOutOnly { parameters, rows } = &self.held_out_only;
         let unknowns: Vec<usize> = (0..parameters.len()).filter(|&k| parameters[k]).collect();
-        (!unknowns.is_empty()).then(|| Stage { counts_fixed: true, ..self.placing(rows, unknowns) })
+        (!unknowns.is_empty())
+            .then(|| Stage { counts_fixed: true, ..self.placement_stage(rows, unknowns) })
     }
 
     /// Returns an error about the first row that the nominal arm cannot predict, because its pose
@@ -281,7 +282,7 @@ impl<'a> Fitting<'a> {
         let mut x = self.located();
         let placements = self.placements();
         if !placements.is_empty() {
-            let stage = self.placing(&self.split.identification, placements);
+            let stage = self.placement_stage(&self.split.identification, placements);
             x = Stage { cost_tolerance, ..stage }.run(&x)?.x;
         }
         match self.held_out_stage() {
@@ -303,7 +304,7 @@ impl<'a> Fitting<'a> {
         if self.strategy == Strategy::OneSweep {
             let mut end = FitEnd::at(start, whole.unknowns.len());
             end.termination = self.sweep(&whole, &mut end, None)?;
-            return Self::gauged(&whole, end);
+            return Self::with_gauge(&whole, end);
         }
         let mut end = self.alternate(&whole, start)?;
         let stages: Vec<Vec<usize>> =
@@ -318,7 +319,7 @@ impl<'a> Fitting<'a> {
         if let Some(alternation) = &mut end.alternation {
             alternation.contraction = contraction(&whole.triangle_with_priors(&end.x), &stages);
         }
-        Self::gauged(&whole, end)
+        Self::with_gauge(&whole, end)
     }
 
     /// Repeats accelerated sweeps over the stages of the strategy until the cost converges.
@@ -390,7 +391,7 @@ impl<'a> Fitting<'a> {
 
     /// Completes `end` with the combinations of unknowns that data and priors do not determine
     /// there.
-    fn gauged(whole: &Stage, mut end: FitEnd) -> Result<FitEnd, StageError> {
+    fn with_gauge(whole: &Stage, mut end: FitEnd) -> Result<FitEnd, StageError> {
         let held: Vec<bool> = end.at_bound.iter().map(Option::is_some).collect();
         end.gauge = whole.gauge(&end.x, &held, &whole.held(&end.x)?);
         Ok(end)

@@ -61,11 +61,11 @@ pub(crate) fn locate(
             poses.iter().zip(&points).filter_map(touches).collect();
         let base = poses.iter().find(|pose| pose.observation.fixture() == Some(fixture));
         let base = base.map_or(Vector3::zeros(), |pose| bases[pose.base].origin);
-        let Some(mut found) = found(kind, &contacts, &base) else { continue };
+        let Some(mut found) = fixture_of_contacts(kind, &contacts, &base) else { continue };
         if kind == FixtureKind::Plane && model.is_declared(fixture, 0) {
             // The normal is declared, so that only the distance is free.
             let [rx, ry, ..] = model.fixtures(x.as_slice())[fixture].numbers;
-            found[2] = height(&contacts, &plane_normal(rx, ry));
+            found[2] = plane_distance(&contacts, &plane_normal(rx, ry));
         }
         for &&(_, _, axis, k) in &parameters {
             x[k] = found[axis] - model.parameters[k].nominal;
@@ -101,7 +101,7 @@ fn locate_cameras(
 /// Returns the parameters of a fixture that fit its contacts best. A contact is a predicted point
 /// and the measured distance or offset \[m\]. Points and `base`, the arm's base, are in the
 /// measuring frame. `None` if there are no contacts, or for cameras and markers.
-fn found(
+fn fixture_of_contacts(
     kind: FixtureKind,
     contacts: &[(Vector3<f64>, f64)],
     base: &Vector3<f64>,
@@ -219,11 +219,11 @@ fn plane(contacts: &[(Vector3<f64>, f64)], base: &Vector3<f64>) -> [f64; 4] {
     };
     let normal = if side < 0.0 { -normal } else { normal };
     let [rx, ry] = lean(&normal);
-    [rx, ry, height(contacts, &normal), 0.0]
+    [rx, ry, plane_distance(contacts, &normal), 0.0]
 }
 
 /// Returns the distance d of the plane with this normal from the origin \[m\].
-fn height(contacts: &[(Vector3<f64>, f64)], normal: &Vector3<f64>) -> f64 {
+fn plane_distance(contacts: &[(Vector3<f64>, f64)], normal: &Vector3<f64>) -> f64 {
     contacts.iter().map(|(point, offset)| normal.dot(point) - offset).sum::<f64>()
         / contacts.len() as f64
 }

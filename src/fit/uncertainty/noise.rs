@@ -82,7 +82,7 @@ pub(in crate::fit) fn fitted(
                 (taken_over, fits, begin) = (false, 0, end.x);
                 continue;
             }
-            let next = if judged { contradicted(&whole, &end, assumed)? } else { None };
+            let next = if judged { next_noise_models(&whole, &end, assumed)? } else { None };
             match next.filter(|_| fits < MAX_NOISE_FITS) {
                 Some(next) => {
                     (fitting.noise_model, fitting.turn_noise_model) = next;
@@ -152,7 +152,7 @@ fn is_beyond_doubt(stage: &Stage) -> bool {
 ///
 /// The declared σ is contradicted if 2 ln of the likelihood ratio exceeds its critical value (χ²₁)
 /// at probability 0.001.
-fn contradicted(
+fn next_noise_models(
     stage: &Stage,
     end: &FitEnd,
     assumed: (NoiseModel, NoiseModel),
@@ -187,7 +187,7 @@ fn contradicted(
         return Ok(None);
     }
     let first = assumed == DECLARED_NOISE;
-    let shares = shares(&whitened, stage.coordinates(), [count - turned, turned]);
+    let shares = mean_square_ratios(&whitened, stage.coordinates(), [count - turned, turned]);
     // The σ of positions and that of orientations must both have converged.
     let settled = shares.iter().all(|share| ((ratio * share).sqrt() - 1.0).abs() < SCALE_TOLERANCE);
     let chance = by_chance();
@@ -217,7 +217,7 @@ fn contradicted(
 
 /// Returns the mean squares of the whitened residuals of positions and of orientations, each
 /// divided by that of all. Both are 1 if only positions are fitted.
-fn shares(whitened: &DVector<f64>, coordinates: usize, counts: [usize; 2]) -> [f64; 2] {
+fn mean_square_ratios(whitened: &DVector<f64>, coordinates: usize, counts: [usize; 2]) -> [f64; 2] {
     if coordinates == 3 {
         return [1.0; 2];
     }

@@ -166,7 +166,7 @@ impl Statistics {
             known,
             identified,
             reduced_chi2: (freedom > 0.5).then_some(chi2 / freedom),
-            chance: chance(freedom),
+            chance: noise_interval(freedom),
             prices,
             hidden,
             constraints,
@@ -222,7 +222,7 @@ fn sandwich(
 
 /// Returns the interval in which χ² / ν of pure noise lies with probability 0.999, with ν =
 /// `freedom`.
-fn chance(freedom: f64) -> Option<(f64, f64)> {
+fn noise_interval(freedom: f64) -> Option<(f64, f64)> {
     let distribution = ChiSquared::new(freedom).ok().filter(|_| freedom > 0.5)?;
     let bound = |p: f64| distribution.inverse_cdf(p) / freedom;
     Some((bound(0.5 * MAX_CHANCE_PROBABILITY), bound(1.0 - 0.5 * MAX_CHANCE_PROBABILITY)))

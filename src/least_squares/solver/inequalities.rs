@@ -8,7 +8,7 @@ use super::AtBound;
 /// active (on the limit).
 const MAX_ACTIVE_DISTANCE: f64 = 1e-12;
 /// Violation up to which a row counts as satisfied, relative to the size of its terms.
-const ROUNDING: f64 = 1e-14;
+const MAX_ROUNDING_VIOLATION: f64 = 1e-14;
 
 /// Linear inequalities lo ≤ A x ≤ hi, infinite where a side has no limit.
 #[derive(Debug, Clone, PartialEq)]
@@ -119,8 +119,8 @@ impl Inequalities {
     pub(super) fn holds(&self, x: &DVector<f64>, i: usize) -> bool {
         let (value, size) = self.value(x, i);
         let (lower, upper) = (self.lower[i], self.upper[i]);
-        lower - value <= ROUNDING * (size + lower.abs())
-            && value - upper <= ROUNDING * (size + upper.abs())
+        lower - value <= MAX_ROUNDING_VIOLATION * (size + lower.abs())
+            && value - upper <= MAX_ROUNDING_VIOLATION * (size + upper.abs())
     }
 
     /// Returns true if every row is satisfied to within rounding.

@@ -10,7 +10,7 @@ use nalgebra::DVector;
 use super::Factor;
 
 /// Tolerance on duality gap and feasibility, relative to the scaled problem of unit columns.
-const TOLERANCE: f64 = 1e-11;
+const CLARABEL_TOLERANCE: f64 = 1e-11;
 
 /// Half-space g·q ≥ h, with g given as pairs of unknown and coefficient.
 #[derive(Debug, Clone)]
@@ -79,9 +79,9 @@ pub(super) fn interior_point(
     let settings = DefaultSettings {
         verbose: false,
         presolve_enable: false,
-        tol_gap_abs: TOLERANCE,
-        tol_gap_rel: TOLERANCE,
-        tol_feas: TOLERANCE,
+        tol_gap_abs: CLARABEL_TOLERANCE,
+        tol_gap_rel: CLARABEL_TOLERANCE,
+        tol_feas: CLARABEL_TOLERANCE,
         ..DefaultSettings::default()
     };
     let linear = vec![0.0; n + rows];
@@ -93,6 +93,6 @@ pub(super) fn interior_point(
     // The multiplier of the cone is λ q, of length λ Δ.
     let damping = radius
         .and_then(|radius| Some(solver.solution.z.get(rows + spaces.len())? * scale / radius));
-    let damping = damping.filter(|lambda| *lambda > TOLERANCE).unwrap_or(0.0);
+    let damping = damping.filter(|lambda| *lambda > CLARABEL_TOLERANCE).unwrap_or(0.0);
     q.iter().all(|v| v.is_finite()).then_some((q, damping))
 }

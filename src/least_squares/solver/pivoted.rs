@@ -10,7 +10,7 @@ use crate::least_squares::inverse::regular_inverse;
 /// singular values are used.
 const MAX_SECULAR_STEPS: usize = 20;
 /// Smallest ratio of singular values at which an upper triangle is used without pivoting.
-const WELL_CONDITIONED: f64 = 1e-8;
+const MIN_UNPIVOTED_RATIO: f64 = 1e-8;
 
 /// Least-squares problem min ‖B q + c‖ of full rank with B S⁻¹ P = Q R; S holds the column norms of
 /// B.
@@ -43,7 +43,8 @@ impl Pivoted {
             return None;
         }
         let (unit, mut inverse_sizes) = with_unit_columns(matrix);
-        if tolerance <= WELL_CONDITIONED && regular_inverse(&unit, WELL_CONDITIONED).is_some() {
+        if tolerance <= MIN_UNPIVOTED_RATIO && regular_inverse(&unit, MIN_UNPIVOTED_RATIO).is_some()
+        {
             let (projected, permutation) =
                 (constant.clone(), PermutationSequence::<Dyn>::identity_generic(Dyn(n)));
             let solution = solve(&unit, &projected, &inverse_sizes)?;
@@ -144,8 +145,8 @@ impl Pivoted {
 /// Returns true if B is a well-conditioned upper triangle after scaling to unit columns. The factor
 /// of any subset of its columns then is, too, with or without damping.
 pub(super) fn is_well_conditioned(matrix: &DMatrix<f64>, tolerance: f64) -> bool {
-    tolerance <= WELL_CONDITIONED
-        && regular_inverse(&with_unit_columns(matrix).0, WELL_CONDITIONED).is_some()
+    tolerance <= MIN_UNPIVOTED_RATIO
+        && regular_inverse(&with_unit_columns(matrix).0, MIN_UNPIVOTED_RATIO).is_some()
 }
 
 /// Returns B S⁻¹ and 1/S, with S the column norms of B.

@@ -21,7 +21,7 @@ const MAX_SINGLE_CORRECTIONS: usize = 40;
 /// Maximum number of corrections of the faces near the interior point.
 const MAX_INTERIOR_CORRECTIONS: usize = 30;
 /// Relative rounding allowed in the optimality conditions.
-const ROUNDING: f64 = 1e-12;
+const OPTIMALITY_ROUNDING: f64 = 1e-12;
 
 /// Problem min ½‖B q + c‖² + ½λ‖q‖² within a polyhedron, for any λ.
 pub(super) struct PolyhedronProblem<'a> {
@@ -114,11 +114,11 @@ impl<'a> PolyhedronProblem<'a> {
         // upper bound, and μ ≥ 0.
         let force =
             self.factor.matrix().tr_mul(&self.factor.image(q)) + &self.gradient + lambda * q;
-        let slack = ROUNDING * (self.gradient.amax() + lambda * q.amax());
+        let slack = OPTIMALITY_ROUNDING * (self.gradient.amax() + lambda * q.amax());
         let (bounds, rows) = self.polyhedron.multipliers(faces, &force);
         let mut corrected = self.polyhedron.retained_faces(faces, &bounds, &rows, slack);
         let Polyhedron { lower, upper, .. } = self.polyhedron;
-        let tolerance = ROUNDING * q.amax();
+        let tolerance = OPTIMALITY_ROUNDING * q.amax();
         for j in 0..q.len() {
             if lower[j] >= upper[j] || (faces.bounds[j].is_none() && q[j] < lower[j] - tolerance) {
                 corrected.bounds[j] = Some(AtBound::Lower);

@@ -14,7 +14,7 @@ use crate::least_squares::Objective;
 
 /// Distance to a bound, as a fraction of the width between the bounds, up to which a solution is
 /// moved onto the bound.
-const NEAR_BOUND: f64 = 1e-3;
+const MAX_DISTANCE_TO_BOUND: f64 = 1e-3;
 /// Relative increase of the cost that counts as rounding.
 const COST_ROUNDING: f64 = 1e-12;
 
@@ -169,7 +169,7 @@ fn move_onto_bounds<O: Objective>(
             let (value, width) = (solution.x[j], bounds.upper()[j] - bounds.lower()[j]);
             let size = if width.is_finite() { width } else { bound.abs().max(value.abs()) };
             let distance = (value - bound).abs();
-            if !bound.is_finite() || distance == 0.0 || distance > NEAR_BOUND * size {
+            if !bound.is_finite() || distance == 0.0 || distance > MAX_DISTANCE_TO_BOUND * size {
                 continue;
             }
             let mut moved = solution.x.clone();

@@ -11,22 +11,22 @@ const GOOD_RATIO: std::ops::RangeInclusive<f64> = 0.5..=1.5;
 /// which is exact near an optimum.
 const GOOD_RATIO_WITH_S: std::ops::RangeInclusive<f64> = 0.9..=1.1;
 /// Number of poorly predicted steps in a run from which further steps get geodesic acceleration.
-const ACCELERATION_MISSES: usize = 2;
+const MIN_MISSES_FOR_ACCELERATION: usize = 2;
 /// Largest ratio of acceleration to length of an undamped step after which acceleration pauses
 /// until the next poorly predicted step.
-const SMALL_ACCELERATION: f64 = 0.01;
+const MAX_STRAIGHT_ACCELERATION: f64 = 0.01;
 /// Number of poorly predicted steps after which S = Σ rᵢ ∇²rᵢ is formed, if there are few unknowns.
-const FORMATION_MISSES: usize = 15;
+const MIN_MISSES_FOR_FORMATION: usize = 15;
 /// Number of poorly predicted steps per unknown after which S is formed, with many unknowns.
 /// Forming S takes about one linearisation per unknown.
-const FORMATION_MISSES_PER_UNKNOWN: f64 = 1.0 / 6.0;
+const MIN_MISSES_PER_UNKNOWN_FOR_FORMATION: f64 = 1.0 / 6.0;
 /// Number of successive slow steps from which the remaining steps are extrapolated. S is then
 /// formed if those steps would cost more than S, or exceed the iteration limit.
-const SLOW_STEPS: usize = 3;
+const MIN_SLOW_STEPS: usize = 3;
 /// Number of steps per unknown that must pass before S is formed again.
-const STEPS_PER_UNKNOWN: f64 = 1.0 / 40.0;
+const MIN_STEPS_PER_UNKNOWN: f64 = 1.0 / 40.0;
 /// Ratio of the lengths of successive undamped steps above which convergence is slow.
-const SLOW_RATIO: f64 = 0.5;
+const MIN_SLOW_RATIO: f64 = 0.5;
 /// Maximum number of times that S is formed in one run.
 const MAX_FORMATIONS: usize = 50;
 /// Penalty ρ on leaving active faces in the convex model, relative to the largest curvature.
@@ -86,12 +86,12 @@ impl ConvexModel {
 impl SecondOrder {
     /// Returns true if the next step should be accelerated.
     pub fn accelerates(&self) -> bool {
-        self.misses >= ACCELERATION_MISSES && !self.is_straight && !self.is_retired
+        self.misses >= MIN_MISSES_FOR_ACCELERATION && !self.is_straight && !self.is_retired
     }
 
     /// Records the ratio of acceleration to length of an accelerated step, and its damping.
     pub fn record_acceleration(&mut self, ratio: f64, damping: f64) {
-        self.is_straight = damping == 0.0 && ratio <= SMALL_ACCELERATION;
+        self.is_straight = damping == 0.0 && ratio <= MAX_STRAIGHT_ACCELERATION;
     }
 
     /// Stops the use of second derivatives and returns true if S was in use.
@@ -133,18 +133,19 @@ impl SecondOrder {
             self.lengths.clear();
         }
         let is_slow =
-            self.lengths.windows(2).last().is_some_and(|pair| pair[1] > SLOW_RATIO * pair[0]);
+            self.lengths.windows(2).last().is_some_and(|pair| pair[1] > MIN_SLOW_RATIO * pair[0]);
         self.misses += usize::from(missed);
         self.is_fresh = self.is_fresh && !taken;
         self.age += 1;
         let per_unknown = |factor: f64| factor * unknowns as f64;
         let pays = if self.matrix.is_some() {
-            self.age as f64 >= per_unknown(STEPS_PER_UNKNOWN)
+            self.age as f64 >= per_unknown(MIN_STEPS_PER_UNKNOWN)
         } else {
-            let limit = per_unknown(FORMATION_MISSES_PER_UNKNOWN).max(FORMATION_MISSES as f64);
+            let limit = per_unknown(MIN_MISSES_PER_UNKNOWN_FOR_FORMATION)
+                .max(MIN_MISSES_FOR_FORMATION as f64);
             let exceeds = |steps: f64| steps > per_unknown(1.0).min(remaining as f64);
             self.misses as f64 >= limit
-                || (remaining > SLOW_STEPS as u64 && exceeds(self.expected_steps(worth)))
+                || (remaining > MIN_SLOW_STEPS as u64 && exceeds(self.expected_steps(worth)))
         };
         (missed || is_slow)
             && pays
@@ -161,14 +162,14 @@ impl SecondOrder {
     /// reduction reaches the smallest one after ln(worth) / (2 ln 1/s) steps.
     fn expected_steps(&self, worth: f64) -> f64 {
         let Some(last) =
-            self.lengths.len().checked_sub(SLOW_STEPS + 1).map(|first| &self.lengths[first..])
+            self.lengths.len().checked_sub(MIN_SLOW_STEPS + 1).map(|first| &self.lengths[first..])
         else {
             return 0.0;
         };
-        if !last.windows(2).all(|pair| pair[1] > SLOW_RATIO * pair[0]) {
+        if !last.windows(2).all(|pair| pair[1] > MIN_SLOW_RATIO * pair[0]) {
             return 0.0;
         }
-        let shrinkage = (last[SLOW_STEPS] / last[0]).powf(1.0 / SLOW_STEPS as f64);
+        let shrinkage = (last[MIN_SLOW_STEPS] / last[0]).powf(1.0 / MIN_SLOW_STEPS as f64);
         if shrinkage < 1.0 { -0.5 * worth.ln() / shrinkage.ln() } else { f64::INFINITY }
     }
 

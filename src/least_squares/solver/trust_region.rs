@@ -19,7 +19,7 @@ const MAX_ACCELERATION: f64 = 0.75;
 /// Maximum number of accelerated steps tried from one point, with decreasing radius.
 const MAX_ACCELERATION_TRIES: usize = 6;
 /// Relative change of the cost that counts as rounding.
-const ROUNDING: f64 = 1e3 * f64::EPSILON;
+const MAX_COST_ROUNDING: f64 = 1e3 * f64::EPSILON;
 
 /// Method by which a solver chooses its step from a linearisation.
 pub trait Subproblem {
@@ -271,7 +271,7 @@ impl<S: Subproblem> TrustRegion<S> {
             // indicate convergence.
             return None;
         }
-        let is_predicted = 0.5 * trial.ratio <= 1.0 || trial.actual.abs() <= ROUNDING;
+        let is_predicted = 0.5 * trial.ratio <= 1.0 || trial.actual.abs() <= MAX_COST_ROUNDING;
         let is_settled = |tolerance: f64| {
             trial.actual.abs() <= tolerance && trial.predicted <= tolerance && is_predicted
         };

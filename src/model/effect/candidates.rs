@@ -41,7 +41,7 @@ pub struct Candidate {
 pub fn candidates(problem: &Problem, data: &DataCoverage) -> Vec<Candidate> {
     let of_family = |family: &'static Family| {
         let found = places(family, problem).into_iter();
-        let found = found.flat_map(move |place| searched(family, place, data));
+        let found = found.flat_map(move |place| with_searched_values(family, place, data));
         found.filter_map(move |arguments| {
             let argument = |key: &str| {
                 arguments.iter().find(|(known, _)| *known == key).map(|(_, value)| value.clone())
@@ -121,7 +121,7 @@ fn places(family: &Family, problem: &Problem) -> Vec<Arguments> {
 
 /// Returns the arguments of a place, once for each value of the argument that the search varies or
 /// lists.
-fn searched(family: &Family, place: Arguments, data: &DataCoverage) -> Vec<Arguments> {
+fn with_searched_values(family: &Family, place: Arguments, data: &DataCoverage) -> Vec<Arguments> {
     let is_open = |kind: ArgumentKind| kind.is_searched() || kind == ArgumentKind::Orders;
     let Some((key, _)) = family.arguments.iter().find(|(_, kind)| is_open(*kind)) else {
         return vec![place];

@@ -12,7 +12,7 @@ pub(crate) fn value_regressor(parameters: &[Parameter], x: &[f64], k: usize) -> 
     match &parameters[k].regressor {
         Regressor::Inner => None,
         Regressor::Formula(formula) if !formula.parameters().is_empty() => {
-            Some(Regressor::Formula(Arc::new(bound(formula, parameters, x))))
+            Some(Regressor::Formula(Arc::new(with_values_at(formula, parameters, x))))
         }
         regressor => Some(regressor.clone()),
     }
@@ -27,7 +27,7 @@ pub(crate) fn slope_regressor(parameters: &[Parameter], x: &[f64], k: usize) -> 
         let term = |(parameter, c): (&Parameter, &f64)| {
             let Regressor::Formula(formula) = &parameter.regressor else { return None };
             let index = formula.parameters().iter().position(|(inner, _)| inner == name)?;
-            Some((*c, Arc::new(bound(formula, parameters, x)), index))
+            Some((*c, Arc::new(with_values_at(formula, parameters, x)), index))
         };
         let terms = parameters.iter().zip(x).filter_map(term).collect();
         Regressor::Slope(Arc::new(Slope::new(terms)))
@@ -36,7 +36,7 @@ pub(crate) fn slope_regressor(parameters: &[Parameter], x: &[f64], k: usize) -> 
 
 /// Returns a formula with the values that its parameters have at the full parameter vector `x`;
 /// parameters that are not free keep their start value.
-fn bound(formula: &Formula, parameters: &[Parameter], x: &[f64]) -> Formula {
+fn with_values_at(formula: &Formula, parameters: &[Parameter], x: &[f64]) -> Formula {
     let value = |(name, start): &(String, f64)| {
         let place = parameters.iter().position(|parameter| parameter.name == *name);
         let value = place.map_or(*start, |k| parameters[k].value(x[k]));

@@ -32,7 +32,7 @@ impl Candidate {
     }
 
     fn matches(&self, rule: &ParameterRule) -> bool {
-        names(rule, &self.name, &self.plain)
+        matches_name(rule, &self.name, &self.plain)
     }
 }
 
@@ -65,13 +65,13 @@ impl EffectParameter {
     }
 
     fn is_named(&self, rule: &ParameterRule) -> bool {
-        names(rule, &self.name, &self.plain)
+        matches_name(rule, &self.name, &self.plain)
     }
 }
 
 /// Returns true if the rule's pattern matches the name or the plain name (without brackets) of a
 /// parameter.
-fn names(rule: &ParameterRule, name: &str, plain: &str) -> bool {
+fn matches_name(rule: &ParameterRule, name: &str, plain: &str) -> bool {
     matches(&rule.pattern, name) || matches(&rule.pattern, plain)
 }
 

@@ -8,7 +8,7 @@ const MAX_DOTS: usize = 60;
 /// Maximum number of points of a curve without a line.
 const MAX_SCATTERED: usize = 600;
 /// Smallest value on a logarithmic axis.
-const LEAST_LOGARITHM: f64 = 1e-12;
+const MIN_LOGARITHMIC_VALUE: f64 = 1e-12;
 /// Height of the panel in displayed pixels.
 const HEIGHT: f64 = 210.0;
 
@@ -58,7 +58,8 @@ impl Series<'_> {
         if self.curves.iter().all(|curve| curve.points.len() < 2) {
             return None;
         }
-        let up = |y: f64| if self.is_logarithmic { y.max(LEAST_LOGARITHM).log10() } else { y };
+        let up =
+            |y: f64| if self.is_logarithmic { y.max(MIN_LOGARITHMIC_VALUE).log10() } else { y };
         let levels = self.levels.iter().map(|level| level.1);
         let (low, high) = range(points().map(|at| at.1).chain(levels).map(up));
         let from_zero = !self.is_logarithmic && low >= 0.0;

@@ -75,7 +75,7 @@ impl<'a, 'l> Columns<'a, 'l> {
         };
         all.effects(effects);
         all.functions();
-        all.weighted()
+        all.into_candidates()
     }
 
     pub(super) fn add(
@@ -100,10 +100,16 @@ impl<'a, 'l> Columns<'a, 'l> {
         }
         // The space distinguishes this family from families of effects, whose names never begin
         // with one.
-        self.entered(&format!(" {family}"), share, hypothesis, design(), Coefficients::default());
+        self.push_candidate(
+            &format!(" {family}"),
+            share,
+            hypothesis,
+            design(),
+            Coefficients::default(),
+        );
     }
 
-    fn entered(
+    fn push_candidate(
         &mut self,
         family: &str,
         share: f64,
@@ -153,7 +159,7 @@ impl<'a, 'l> Columns<'a, 'l> {
                 alone: acts_along_axes(&terms),
                 largest,
             };
-            self.entered(
+            self.push_candidate(
                 effect.name(),
                 1.0 / tries,
                 hypothesis,
@@ -164,13 +170,13 @@ impl<'a, 'l> Columns<'a, 'l> {
     }
 
     fn functions(&mut self) {
-        let (known, loads) = (self.known(), self.loads());
+        let (known, loads) = (self.recorded_covariates(), self.loads());
         // The shortest length is used only for the coordinates that joints move, because it needs
         // many poses.
         let lengths = SMOOTH_LENGTHS;
         for site in geometry_sites(self.problem) {
             let Some(at) = self.linearised.place(site) else { continue };
-            let moving = self.moving(site);
+            let moving = self.is_command_coordinate(site);
             let (family, lengths_here) =
                 if moving { ("smooth", &lengths[..]) } else { ("smooth elsewhere", &lengths[..2]) };
             for of in &known {
@@ -199,7 +205,7 @@ impl<'a, 'l> Columns<'a, 'l> {
 
     /// Returns true if a parameter site is the coordinate that a joint's command moves: θ or, for a
     /// prismatic joint, d.
-    fn moving(&self, site: ParameterSite) -> bool {
+    fn is_command_coordinate(&self, site: ParameterSite) -> bool {
         let ParameterSite::Joint { joint, field } = site else { return false };
         match self.problem.joints[joint].kind {
             JointKind::Revolute => field == JointField::Theta,
@@ -210,7 +216,7 @@ impl<'a, 'l> Columns<'a, 'l> {
 
     /// Returns the recorded quantities that vary, such as commands, temperature, loads and time,
     /// with their values in every pose.
-    fn known(&self) -> Vec<SampledCovariate> {
+    fn recorded_covariates(&self) -> Vec<SampledCovariate> {
         let poses = self.linearised.poses();
         let mut all: Vec<(Covariate, Vec<f64>)> = Vec::new();
         let moving = self
@@ -441,7 +447,7 @@ impl<'a, 'l> Columns<'a, 'l> {
     /// Returns the candidates with their prior probabilities. The odds of each further hypothesis
     /// are 1 to 2. The probability is divided between families by weight, and within a family by
     /// share.
-    fn weighted(self) -> (Vec<Candidate>, Vec<SampledCovariate>, f64) {
+    fn into_candidates(self) -> (Vec<Candidate>, Vec<SampledCovariate>, f64) {
         let mut families: Vec<(&str, f64, f64)> = Vec::new();
         for ((family, share), candidate) in self.shares.iter().zip(&self.candidates) {
             if let Some((_, _, sum)) =

@@ -72,8 +72,11 @@ pub(super) fn finer(
                     + products.ln_prior(&blocks[member], rest)
                     + MIN_LN_ODDS_OF_FINER;
                 for farthest in LAST_RATIOS {
-                    let near =
-                        hypotheses.near(best.as_ref().unwrap_or(candidate), farthest, problem);
+                    let near = hypotheses.neighbouring_candidates(
+                        best.as_ref().unwrap_or(candidate),
+                        farthest,
+                        problem,
+                    );
                     if target.stop.is_requested() {
                         break;
                     }
@@ -99,7 +102,12 @@ pub(super) fn finer(
 impl Hypotheses<'_> {
     /// Returns copies of the candidate with neighbouring values of its searched argument, up to the
     /// ratio `farthest`. Values of other candidates are left out.
-    fn near(&self, candidate: &Candidate, farthest: f64, problem: &Problem) -> Vec<Candidate> {
+    fn neighbouring_candidates(
+        &self,
+        candidate: &Candidate,
+        farthest: f64,
+        problem: &Problem,
+    ) -> Vec<Candidate> {
         let Some(effect) = candidate.hypothesis.effect() else { return Vec::new() };
         let factors = (-TRIALS_PER_SIDE..=TRIALS_PER_SIDE)
             .filter(|step| *step != 0)

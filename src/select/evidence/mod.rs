@@ -136,7 +136,7 @@ pub(super) fn best_form(
 pub(super) fn evaluate(fitted: &Fitted, data: &Data, added: &[Effect]) -> Option<Evidence> {
     let mut left_out = Vec::new();
     loop {
-        let (evidence, hypotheses) = weighed_without(fitted, data, added, &left_out)?;
+        let (evidence, hypotheses) = evaluated_without(fitted, data, added, &left_out)?;
         match single_supporting_pose(fitted, data, (&evidence, &hypotheses)) {
             Some(pose) if left_out.len() < MAX_SINGLE_POSES => left_out.push(pose),
             _ => return Some(evidence),
@@ -146,7 +146,7 @@ pub(super) fn evaluate(fitted: &Fitted, data: &Data, added: &[Effect]) -> Option
 
 /// Evaluates the evidence without the poses `left_out`. Also returns the hypotheses that were
 /// evaluated.
-fn weighed_without<'a>(
+fn evaluated_without<'a>(
     fitted: &'a Fitted,
     data: &Data<'a>,
     added: &[Effect],

@@ -41,7 +41,7 @@ impl Columns<'_, '_> {
         {
             let site = ParameterSite::Joint { joint, field: JointField::Theta };
             let Some(lever) = self.linearised.place(site) else { continue };
-            let Some(columns) = self.sags(joint, &lever) else { continue };
+            let Some(columns) = self.sag_columns(joint, &lever) else { continue };
             let site = Site::Joint(joint);
             let hypothesis = Hypothesis {
                 kind: HypothesisKind::Sag,
@@ -66,7 +66,7 @@ impl Columns<'_, '_> {
 
     /// Returns the lever of a joint times the moments about it, shape = (3 N, functions); `None` if
     /// gravity exerts no moment about it.
-    fn sags(&self, joint: usize, lever: &DVector<f64>) -> Option<DMatrix<f64>> {
+    fn sag_columns(&self, joint: usize, lever: &DVector<f64>) -> Option<DMatrix<f64>> {
         let moments = moments(
             self.problem,
             joint,

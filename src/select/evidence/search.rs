@@ -191,8 +191,8 @@ pub(super) fn search(products: &Products, present: &[usize]) -> Vec<Weighted> {
             break;
         }
     }
-    changed(&mut known, products);
-    with_gears(&mut known, products);
+    add_replacements(&mut known, products);
+    add_gears(&mut known, products);
     let mut likely: Vec<&Set> = known.values().collect();
     likely.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
     let likely: Vec<Set> = likely.into_iter().take(MAX_SETTLED_SETS).cloned().collect();
@@ -217,7 +217,7 @@ pub(super) fn search(products: &Products, present: &[usize]) -> Vec<Weighted> {
 /// Sets with periodic errors are not extended otherwise, because they have many columns. Each of
 /// several such errors alone may gain less than smaller functions. Two errors of one joint, with a
 /// lower and a higher highest order, together describe coefficients that decrease with the order.
-fn with_gears(known: &mut BTreeMap<Vec<usize>, Set>, products: &Products) {
+fn add_gears(known: &mut BTreeMap<Vec<usize>, Set>, products: &Products) {
     let blocks = products.blocks;
     let gears: Vec<usize> = (0..blocks.len()).filter(|&block| blocks[block].is_gear).collect();
     let by_posterior = |a: &Set, b: &Set| a.ln_posterior.total_cmp(&b.ln_posterior);
@@ -250,7 +250,7 @@ fn extended(set: &Set, tried: &[usize], products: &Products) -> Vec<Set> {
 /// and each pair of members. It then tries one and two other hypotheses in their place. So it finds
 /// two causes that a third hypothesis, or a function of several covariates, explains almost as well
 /// alone. Two members are replaced by effects only, because free functions would always gain.
-fn changed(known: &mut BTreeMap<Vec<usize>, Set>, products: &Products) {
+fn add_replacements(known: &mut BTreeMap<Vec<usize>, Set>, products: &Products) {
     let Products { blocks, .. } = *products;
     let every: Vec<usize> = (0..blocks.len()).collect();
     let of = |is_of: &dyn Fn(&Block) -> bool| -> Vec<usize> {
@@ -270,10 +270,9 @@ fn changed(known: &mut BTreeMap<Vec<usize>, Set>, products: &Products) {
         let surfaces = likely
             .iter()
             .filter_map(|set| Some((vec![set.members.iter().copied().find(is_surface)?], *set)));
-        let of_best = likely
-            .iter()
-            .take(1)
-            .flat_map(|set| one_or_two(&set.members).into_iter().map(move |gone| (gone, *set)));
+        let of_best = likely.iter().take(1).flat_map(|set| {
+            members_and_pairs(&set.members).into_iter().map(move |gone| (gone, *set))
+        });
         let mut rests: Vec<(Vec<usize>, Vec<usize>, usize)> = Vec::new();
         for (gone, set) in surfaces.take(MAX_SPLIT_SETS).chain(of_best) {
             let rest: Vec<usize> =
@@ -344,7 +343,7 @@ fn replaced(
 }
 
 /// Returns each member, and each pair of members if there are at most [`MAX_PAIRED_MEMBERS`].
-fn one_or_two(members: &[usize]) -> Vec<Vec<usize>> {
+fn members_and_pairs(members: &[usize]) -> Vec<Vec<usize>> {
     let single = members.iter().map(|&member| vec![member]);
     let few = if members.len() <= MAX_PAIRED_MEMBERS { members } else { &[] };
     let pairs = few

@@ -74,7 +74,7 @@ pub(super) fn is_free(effect: &Effect, problem: &Problem) -> bool {
 }
 
 /// Returns orders from `low` to `high` in equal steps, at most [`MAX_SCANNED_ORDERS`].
-fn row(low: f64, high: f64, step: f64) -> Vec<f64> {
+fn equidistant(low: f64, high: f64, step: f64) -> Vec<f64> {
     let all = std::iter::successors(Some(low), |order| Some(order + step));
     all.take_while(|order| *order <= high).take(MAX_SCANNED_ORDERS).collect()
 }
@@ -94,7 +94,7 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
     /// probable sets.
     pub fn promising(&self, weighted: &[Weighted]) -> Vec<Candidate> {
         let mut found: Vec<Candidate> = Vec::new();
-        for (joint, rests) in self.places(weighted) {
+        for (joint, rests) in self.sets_without_functions(weighted) {
             // If the fit contains a periodic error of many orders at the joint, its orders need not
             // be searched.
             let effects = &self.fitted.problem.effects;
@@ -102,7 +102,7 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
                 continue;
             }
             let Some((low, high)) = self.range(joint) else { continue };
-            let (slides, highest) = (self.slides(joint), self.highest(joint));
+            let (slides, highest) = (self.slides(joint), self.highest_order(joint));
             if !is_free(
                 &Effect::JointWave { joint: joint + 1, order: highest },
                 &self.fitted.problem,
@@ -113,7 +113,7 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
                 rests.iter().filter_map(|rest| self.reduced_by_set(rest)).collect();
             let [step, finer] = PHASE_STEPS.map(|phase| phase / (high - low));
             // Orders with less than one cycle over the range of the joint are not searched.
-            let first = self.gains(joint, &row(TAU / (high - low), highest, step), &left);
+            let first = self.gains(joint, &equidistant(TAU / (high - low), highest, step), &left);
             let tens = std::iter::successors(Some(1.0), |digit| Some(digit / 10.0));
             let digits = tens.take_while(|digit| *digit >= 2.0 * finer).count();
             for (left, first) in left.iter().zip(first) {
@@ -133,8 +133,8 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
                 let taken: Vec<f64> = taken.collect();
                 let mut second = taken.clone();
                 for (order, _) in first.into_iter().take(MAX_REFINED_ORDERS) {
-                    let near = row(order - step, order + step, finer);
-                    second.extend(near.into_iter().map(|order| written(order, digits)));
+                    let near = equidistant(order - step, order + step, finer);
+                    second.extend(near.into_iter().map(|order| rounded_order(order, digits)));
                     if !slides {
                         second.extend([order.floor(), order.ceil()]);
                     }
@@ -144,12 +144,15 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
                 second.dedup();
                 let gains = self.gains(joint, &second, std::slice::from_ref(left)).concat();
                 let is_new = |effect: &Effect| known().all(|known| known != effect);
-                let new: Vec<Effect> =
-                    self.another(joint, &gains, &taken).into_iter().filter(is_new).collect();
+                let new: Vec<Effect> = self
+                    .effects_of_best_orders(joint, &gains, &taken)
+                    .into_iter()
+                    .filter(is_new)
+                    .collect();
                 for effect in new.into_iter().filter(|effect| is_free(effect, &self.fitted.problem))
                 {
-                    let spread =
-                        order_of(&effect).map_or(1.0, |(_, order)| self.spread(joint, order, left));
+                    let spread = order_of(&effect)
+                        .map_or(1.0, |(_, order)| self.likelihood_width(joint, order, left));
                     let candidate = self.hypotheses.function_of(&effect, &self.fitted.problem);
                     found.extend(candidate.map(|candidate| Candidate {
                         ln_prior: candidate.ln_prior + spread.ln(),
@@ -168,7 +171,7 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
             let (joint, order) = order_of(effect)?;
             let rest: Vec<usize> =
                 numbers.iter().copied().filter(|&other| other != number).collect();
-            Some((number, self.spread(joint, order, &self.reduced_by_set(&rest)?).ln()))
+            Some((number, self.likelihood_width(joint, order, &self.reduced_by_set(&rest)?).ln()))
         };
         numbers.iter().zip(effects).filter_map(one).collect()
     }
@@ -185,7 +188,7 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
 
     /// Returns the highest order that is searched at a joint: [cycles per revolution], for a
     /// prismatic joint \[rad/m\].
-    fn highest(&self, joint: usize) -> f64 {
+    fn highest_order(&self, joint: usize) -> f64 {
         if self.slides(joint) { TAU / MIN_LEAD } else { MAX_WAVE_ORDER }
     }
 
@@ -198,7 +201,7 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
     /// Returns, for each joint (from 0), the sets to which a wave may be added. They are probable
     /// sets without one function of the joint's command, and without all of them; for prismatic
     /// joints also the whole sets.
-    fn places(&self, weighted: &[Weighted]) -> BTreeMap<usize, Vec<Vec<usize>>> {
+    fn sets_without_functions(&self, weighted: &[Weighted]) -> BTreeMap<usize, Vec<Vec<usize>>> {
         let mut all: BTreeMap<usize, Vec<Vec<usize>>> = BTreeMap::new();
         let of = |member: usize| {
             function_of_command(&self.hypotheses.all[member].hypothesis, &self.fitted.problem)
@@ -274,7 +277,12 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
     ///
     /// One is the wave with the best non-integer order, unless an order in `taken` is about as
     /// good. The others are the unlisted harmonics that are about as good as the best order.
-    fn another(&self, joint: usize, gains: &[(f64, f64)], taken: &[f64]) -> Vec<Effect> {
+    fn effects_of_best_orders(
+        &self,
+        joint: usize,
+        gains: &[(f64, f64)],
+        taken: &[f64],
+    ) -> Vec<Effect> {
         let Some(&(_, most)) = gains.first().filter(|(_, most)| *most > 0.0) else {
             return Vec::new();
         };
@@ -302,14 +310,14 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
 
     /// Returns the width of the likelihood about an order \[orders\]: its integral over its
     /// maximum, by the trapezoid rule.
-    fn spread(&self, joint: usize, order: f64, left: &ReducedProblem) -> f64 {
+    fn likelihood_width(&self, joint: usize, order: f64, left: &ReducedProblem) -> f64 {
         let Some((low, high)) = self.range(joint) else { return 1.0 };
         let range = high - low;
         let away =
             std::iter::successors(Some(PHASE_STEPS[1]), |phase| Some(phase * DISTANCE_RATIO))
                 .take_while(|phase| *phase < PI);
         let orders = away.flat_map(|phase| [order - phase / range, order + phase / range]);
-        let is_looked_for = |order: &f64| (TAU / range..=self.highest(joint)).contains(order);
+        let is_looked_for = |order: &f64| (TAU / range..=self.highest_order(joint)).contains(order);
         let mut orders: Vec<f64> = orders.filter(is_looked_for).chain([order]).collect();
         orders.sort_by(f64::total_cmp);
         let mut gains = self.gains(joint, &orders, std::slice::from_ref(left)).concat();
@@ -328,7 +336,7 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
 }
 
 /// Rounds an order to a number of decimals.
-fn written(order: f64, digits: usize) -> f64 {
+fn rounded_order(order: f64, digits: usize) -> f64 {
     format!("{order:.digits$}").parse().unwrap_or(order)
 }
 

@@ -176,7 +176,8 @@ impl<'a> Beam<'a> {
 
     /// Returns the columns of a term, each of length 1, with W times them.
     fn weighted(&self, term: &Product) -> Vec<Weighted> {
-        self.site.weighted(self.terms.columns(term).into_iter().map(normed).collect())
+        self.site
+            .weighted(self.terms.columns(term).into_iter().map(scaled_to_unit_length).collect())
     }
 
     fn state(&self, sum: &Sum) -> State {
@@ -276,7 +277,7 @@ impl<'a> Beam<'a> {
 }
 
 /// Returns the column scaled to length 1.
-fn normed(column: DVector<f64>) -> DVector<f64> {
+fn scaled_to_unit_length(column: DVector<f64>) -> DVector<f64> {
     let norm = column.norm();
     if norm > 0.0 { column / norm } else { column }
 }

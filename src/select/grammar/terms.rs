@@ -273,7 +273,7 @@ impl Terms {
             return chunks;
         }
         let (_, &mut least, _) = gains.select_nth_unstable_by(most, |a, b| b.total_cmp(a));
-        chunks.into_iter().map(|chunk| chunk.above(least)).collect()
+        chunks.into_iter().map(|chunk| chunk.explaining_more_than(least)).collect()
     }
 
     /// Returns the `most` terms that alone reduce the residual most.
@@ -330,7 +330,7 @@ impl Chunk {
     }
 
     /// Keeps the terms that alone explain more than the sum of squares `least`.
-    fn above(self, least: f64) -> Self {
+    fn explaining_more_than(self, least: f64) -> Self {
         let gains: Vec<f64> = self.lone_gains().collect();
         let kept: Vec<usize> = (0..gains.len()).filter(|&k| gains[k] > least).collect();
         if kept.len() == gains.len() {

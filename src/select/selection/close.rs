@@ -116,7 +116,7 @@ pub fn close_by(
     } else {
         result?
     };
-    let (fitted, evidence) = kept(&declared, (fitted, evidence), &data, &unstoppable)?;
+    let (fitted, evidence) = found_or_declared(&declared, (fitted, evidence), &data, &unstoppable)?;
     let mut conclusion = concluded(&state, &declared, (fitted, evidence), interrupted);
     // If no effect has the status found, the effects are kept only if they predict left-out poses
     // better: by more than one standard error of the gain, or significantly if none is even
@@ -223,7 +223,7 @@ fn concluded(
 /// A found fit with cautions is repeated from the nominal arm, because terms that were missing at
 /// first may have driven a parameter to a wrong optimum. If cautions remain, it is kept only if it
 /// predicts significantly better than the declared fit.
-fn kept(
+fn found_or_declared(
     declared: &Fitted,
     (fitted, evidence): (Fitted, Option<Evidence>),
     data: &Data,

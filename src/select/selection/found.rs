@@ -20,7 +20,7 @@ use crate::select::reference_check::{ReferenceCheck, reference_check};
 
 /// Smallest number of orders of one harmonic from which the claim is only that some of the orders
 /// act.
-const SEVERAL_ORDERS: usize = 3;
+const MIN_SEVERAL_ORDERS: usize = 3;
 
 /// Effect that the loop added, with its status and tests.
 #[derive(Debug, Clone)]
@@ -173,7 +173,7 @@ fn claims(evidence: &Evidence, effect: &Effect) -> Option<Claims> {
     let claims =
         parts.iter().map(|part| evidence.claims_of(part)).collect::<Option<Vec<Claims>>>()?;
     let by_law = |a: &Claims, b: &Claims| a.law.1.total_cmp(&b.law.1);
-    if parts.len() >= SEVERAL_ORDERS {
+    if parts.len() >= MIN_SEVERAL_ORDERS {
         claims.into_iter().max_by(by_law)
     } else {
         claims.into_iter().min_by(by_law)
@@ -187,7 +187,7 @@ fn claims(evidence: &Evidence, effect: &Effect) -> Option<Claims> {
 /// one. Its mean over resampled data does not. [Huggins and Miller 2023]
 fn over_subsets(claims: Claims, of_parts: &[&SubsetEvidence]) -> Claims {
     let by_law = |a: &&&SubsetEvidence, b: &&&SubsetEvidence| a.means[2].total_cmp(&b.means[2]);
-    let part = if of_parts.len() >= SEVERAL_ORDERS {
+    let part = if of_parts.len() >= MIN_SEVERAL_ORDERS {
         of_parts.iter().max_by(by_law)
     } else {
         of_parts.iter().min_by(by_law)

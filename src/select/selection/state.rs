@@ -97,7 +97,7 @@ impl<'a> SearchState<'a> {
     }
 
     /// Returns the added effects that stay in the fit while evidence is evaluated.
-    fn kept(&self, fitted: &Fitted) -> Vec<Effect> {
+    fn retained_effects(&self, fitted: &Fitted) -> Vec<Effect> {
         let open = self.reconsidered(fitted);
         self.added(fitted).into_iter().filter(|effect| !open.contains(effect)).collect()
     }
@@ -174,7 +174,7 @@ impl<'a> SearchState<'a> {
         fitted: &Fitted,
         (evidence, set): (&Evidence, &HypothesisSet),
     ) -> Vec<Effect> {
-        let mut effects = self.kept(fitted);
+        let mut effects = self.retained_effects(fitted);
         for effect in set.effects() {
             effects = joined(&effects, &effect);
         }

@@ -79,28 +79,28 @@ fn explanations(fit: &CheckedFit) -> Explanations {
         candidates(fit.problem, measurements)
     };
     let all: Vec<Misreading> = all.into_iter().filter(is_tested).collect();
-    let mut errors = trial.registered(&all);
+    let mut errors = trial.registered_errors(&all);
     errors.sort_by(|a, b| a.1.total_cmp(&b.1));
-    let near_alone = near(&errors, nominal);
+    let near_alone = near_misreadings(&errors, nominal);
     errors.extend(trial.several_reversed(&all));
     errors.sort_by(|a, b| a.1.total_cmp(&b.1));
     if let Some(shift) = errors.iter_mut().find(|(found, _)| found.shifted_from().is_some()) {
-        *shift = trial.refined(*shift);
+        *shift = trial.with_best_start(*shift);
     }
     errors.sort_by(|a, b| a.1.total_cmp(&b.1));
-    let near = if near_alone.is_empty() { near(&errors, nominal) } else { near_alone };
+    let near = if near_alone.is_empty() { near_misreadings(&errors, nominal) } else { near_alone };
     let mut explanations = Explanations { near, ..Explanations::default() };
     if is_position {
         let at = |x: &DVector<f64>| trial.penalised(fit.fitting, &trial.chosen, x);
         explanations.as_read = at(&fit.end.x).min(at(fit.registered_x));
-        explanations.fitted = trial.fitted(&errors, explanations.as_read);
+        explanations.fitted = trial.fit_in_full(&errors, explanations.as_read);
     }
     explanations
 }
 
 /// Returns the misreadings with which the nominal arm is far nearer than with the error `nominal`.
 /// `errors` is in ascending order.
-fn near(errors: &[(Misreading, f64)], nominal: f64) -> Vec<Misreading> {
+fn near_misreadings(errors: &[(Misreading, f64)], nominal: f64) -> Vec<Misreading> {
     let best = errors.first().map_or(0.0, |found| found.1);
     let limit = (MAX_EXPLAINED_RATIO * nominal).min(MAX_RATIO_TO_BEST * best);
     errors.iter().take_while(|found| found.1 <= limit).map(|(misreading, _)| *misreading).collect()
@@ -108,7 +108,7 @@ fn near(errors: &[(Misreading, f64)], nominal: f64) -> Vec<Misreading> {
 
 impl Trial<'_> {
     /// Returns the error of the registered nominal arm with each misreading corrected \[m\].
-    fn registered(&self, misreadings: &[Misreading]) -> Vec<(Misreading, f64)> {
+    fn registered_errors(&self, misreadings: &[Misreading]) -> Vec<(Misreading, f64)> {
         let error = |&misreading: &Misreading| Some((misreading, self.rms(misreading, false)?.0));
         let errors: Vec<_> = misreadings.par_iter().map(error).collect();
         errors.into_iter().flatten().collect()
@@ -116,7 +116,7 @@ impl Trial<'_> {
 
     /// Fits the most promising misreadings in full. Returns those that leave far less than
     /// `as_read` \[m\], best first.
-    fn fitted(&self, errors: &[(Misreading, f64)], as_read: f64) -> Vec<Explanation> {
+    fn fit_in_full(&self, errors: &[(Misreading, f64)], as_read: f64) -> Vec<Explanation> {
         let mut groups = Vec::new();
         let mut is_first = |misreading: &Misreading| {
             let is_new = !groups.contains(&misreading.group());
@@ -225,7 +225,7 @@ impl Trial<'_> {
 
     /// Returns a shift of rows with the first shifted row that leaves the smallest error; other
     /// misreadings stay as they are.
-    fn refined(&self, (misreading, error): (Misreading, f64)) -> (Misreading, f64) {
+    fn with_best_start(&self, (misreading, error): (Misreading, f64)) -> (Misreading, f64) {
         let step = shift_step(self.fitting.measurements.len());
         let places = misreading.shifted_from().into_iter().flat_map(|from| {
             let near = from.saturating_sub(step)..from + step;
@@ -234,7 +234,7 @@ impl Trial<'_> {
         });
         let moved: Vec<Misreading> =
             places.map(|(from, misreading)| misreading.with_shift_from(from)).collect();
-        let errors = self.registered(&moved);
+        let errors = self.registered_errors(&moved);
         errors
             .into_iter()
             .chain([(misreading, error)])
@@ -273,7 +273,7 @@ impl Trial<'_> {
         };
         let sets = (1..1_u64 << joints.len()).filter(|bits| bits.count_ones() > 1).map(set);
         let sets: Vec<Misreading> = sets.map(|joints| Misreading::Reversed { joints }).collect();
-        let errors = self.registered(&sets);
+        let errors = self.registered_errors(&sets);
         let best = errors.iter().map(|(_, error)| *error).fold(f64::INFINITY, f64::min);
         let size = |found: &(Misreading, f64)| match found.0 {
             Misreading::Reversed { joints } => joints.count_ones(),

@@ -16,7 +16,7 @@ use crate::problem::{Effect, Freedom, ParameterRule, Problem, Quantities};
 const MM_PER_INCH: f64 = 25.4;
 
 /// Returns 10 to the given power.
-fn ten(power: i8) -> f64 {
+fn power_of_ten(power: i8) -> f64 {
     10.0_f64.powi(power.into())
 }
 
@@ -63,18 +63,18 @@ impl Misreading {
                 return Some(problem);
             }
             Self::Length { joint, field, power } => {
-                scale(&mut problem, joint, field, ten(power), &|_| true)?;
+                scale(&mut problem, joint, field, power_of_ten(power), &|_| true)?;
                 return Some(problem);
             }
             Self::Mass { mass, power } => {
                 let masses = (1..).zip(masses_of(&mut problem));
                 let chosen = masses.filter(|(number, _)| mass == 0 || *number == mass);
-                chosen.for_each(|(_, value)| *value *= ten(power));
+                chosen.for_each(|(_, value)| *value *= power_of_ten(power));
                 return Some(problem);
             }
-            Self::Payload { power } => problem.tool.payload_mass *= ten(power),
+            Self::Payload { power } => problem.tool.payload_mass *= power_of_ten(power),
             Self::Stiffness { power } => {
-                let factor = if power == 0 { 180.0 / PI } else { ten(power) };
+                let factor = if power == 0 { 180.0 / PI } else { power_of_ten(power) };
                 let stiffnesses =
                     problem.joints.iter_mut().filter_map(|joint| joint.stiffness.as_mut());
                 stiffnesses.for_each(|stiffness| *stiffness *= factor);
@@ -167,7 +167,10 @@ impl Misreading {
                 rows.positions.iter_mut().for_each(|position| position.swap_rows(0, 1));
             }
             Self::Payload { power } => {
-                rows.payload.iter_mut().flatten().for_each(|payload| *payload *= ten(power));
+                rows.payload
+                    .iter_mut()
+                    .flatten()
+                    .for_each(|payload| *payload *= power_of_ten(power));
             }
             _ => {}
         }

@@ -6,7 +6,7 @@ use super::{Misreading, numbers_of};
 use crate::model::parameter::JointField;
 
 /// Returns the name of an entry of the joint table, such as `alpha of joint 3`.
-fn number(joint: usize, field: JointField) -> String {
+fn entry_name(joint: usize, field: JointField) -> String {
     match joint {
         0 => format!("{} of all joints", field.name()),
         _ => format!("{} of joint {joint}", field.name()),
@@ -14,7 +14,7 @@ fn number(joint: usize, field: JointField) -> String {
 }
 
 /// Returns a power of ten as a number, such as `0.001`.
-fn factor(power: i8) -> f64 {
+fn power_of_ten(power: i8) -> f64 {
     10.0_f64.powi(power.into())
 }
 
@@ -86,22 +86,27 @@ impl fmt::Display for Misreading {
                 f.write_str("a joint table in modified DH form, declared as standard")
             }
             Self::TableRadians { joint, field } => {
-                write!(f, "{} that is in radians, declared in degrees", number(joint, field))
+                write!(f, "{} that is in radians, declared in degrees", entry_name(joint, field))
             }
             Self::TableDegrees { joint, field } => {
-                write!(f, "{} that is in degrees, declared in radians", number(joint, field))
+                write!(f, "{} that is in degrees, declared in radians", entry_name(joint, field))
             }
             Self::Sign { joint, field } => {
-                write!(f, "{} that has the other sign", number(joint, field))
+                write!(f, "{} that has the other sign", entry_name(joint, field))
             }
             Self::Length { joint, field, power: -3 } => {
-                write!(f, "{} that is in millimetres, declared in metres", number(joint, field))
+                write!(f, "{} that is in millimetres, declared in metres", entry_name(joint, field))
             }
             Self::Length { joint, field, power: 3 } => {
-                write!(f, "{} that is in metres, declared in millimetres", number(joint, field))
+                write!(f, "{} that is in metres, declared in millimetres", entry_name(joint, field))
             }
             Self::Length { joint, field, power } => {
-                write!(f, "{} that is to be multiplied by {}", number(joint, field), factor(power))
+                write!(
+                    f,
+                    "{} that is to be multiplied by {}",
+                    entry_name(joint, field),
+                    power_of_ten(power)
+                )
             }
             Self::TargetInMillimetres => {
                 f.write_str("a target of [tool] that is in millimetres, declared in metres")
@@ -110,20 +115,24 @@ impl fmt::Display for Misreading {
                 f.write_str("lengths of joints that are in millimetres, declared in metres")
             }
             Self::Mass { mass: 0, power } => {
-                write!(f, "masses that are to be multiplied by {}", factor(power))
+                write!(f, "masses that are to be multiplied by {}", power_of_ten(power))
             }
             Self::Mass { mass, power } => {
-                let times = factor(power);
+                let times = power_of_ten(power);
                 write!(f, "mass {mass}, counted along the arm, that is to be multiplied by {times}")
             }
             Self::Payload { power } => {
-                write!(f, "payloads that are to be multiplied by {}", factor(power))
+                write!(f, "payloads that are to be multiplied by {}", power_of_ten(power))
             }
             Self::Stiffness { power: 0 } => {
                 f.write_str("stiffnesses of joints per degree, declared per radian")
             }
             Self::Stiffness { power } => {
-                write!(f, "stiffnesses of joints that are to be multiplied by {}", factor(power))
+                write!(
+                    f,
+                    "stiffnesses of joints that are to be multiplied by {}",
+                    power_of_ten(power)
+                )
             }
             Self::Gravity { axis, is_negative } => {
                 let sign = if is_negative { "−" } else { "+" };
