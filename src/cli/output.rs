@@ -170,7 +170,7 @@ impl Results {
         }
         let _unbroken = interrupt::unbroken();
         // The record is written before the files, with the digests of the files that it replaces.
-        // If the command is interrupted here, flexcal still knows all files as its own.
+        // After an interruption here, the next run still recognises all files as written by flexcal.
         self.write_record(&record)?;
         for (file, path) in ready {
             file.commit().map_err(|source| WriteError::Io { path, source })?;

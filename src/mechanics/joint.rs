@@ -262,8 +262,8 @@ impl<S: Scalar> Joint<S> {
         }
         let number = |axis: usize| {
             let k = first + axis;
-            let own = self.motion.as_ref().map_or_else(|| S::from(0.0), |motion| motion[k]);
-            own + of_pose.map_or(0.0, |motion| motion[k])
+            let constant = self.motion.as_ref().map_or_else(|| S::from(0.0), |motion| motion[k]);
+            constant + of_pose.map_or(0.0, |motion| motion[k])
         };
         frame.translate(&Vector3::from_fn(|axis, _| number(axis)));
         frame.rotate(&Vector3::from_fn(|axis, _| number(3 + axis)));

@@ -10,7 +10,7 @@
 //! the loop with its covariance C = L Lᵀ is compared with no motion. With g = Lᵀ(v − M θ̂) and K =
 //! 1 + LᵀM L, twice the logarithm of the ratio of both marginal likelihoods is
 //!
-//! 2 θ̂ᵀv − θ̂ᵀM θ̂ + gᵀK⁻¹g − ln det K,
+//! 2 θ̂ᵀv − θ̂ᵀM θ̂ + gᵀK⁻¹g − ln det K.
 //!
 //! The readings decide if the odds are 100 to 1 either way.
 
@@ -66,7 +66,7 @@ fn point_information(readings: &[Reading], parameters: usize) -> (DVector<f64>, 
         let f = reading.moved - moved;
         ((reading.seen - place) * (reading.weight * f), reading.weight * f * f)
     };
-    let (sum, certainty) = readings
+    let (sum, information) = readings
         .iter()
         .map(one)
         .fold((Vector3::zeros(), 0.0), |a: (Vector3<f64>, f64), b| (a.0 + b.0, a.1 + b.1));
@@ -77,7 +77,7 @@ fn point_information(readings: &[Reading], parameters: usize) -> (DVector<f64>, 
             parameters,
             |i, j| if j < 3 { f64::from(i == j) } else { turned[(i, j - 3)] },
         );
-    (moves.tr_mul(&sum), moves.tr_mul(&moves) * certainty)
+    (moves.tr_mul(&sum), moves.tr_mul(&moves) * information)
 }
 
 /// Returns twice the log odds of θ ∼ N(θ̂, C) against θ = 0, with θ̂ = `found`, C = `spread` and
@@ -85,9 +85,9 @@ fn point_information(readings: &[Reading], parameters: usize) -> (DVector<f64>, 
 fn twice_ln_odds(
     found: &DVector<f64>,
     spread: &DMatrix<f64>,
-    (told, certainty): (&DVector<f64>, &DMatrix<f64>),
+    (vector, information): (&DVector<f64>, &DMatrix<f64>),
 ) -> Option<f64> {
-    if certainty.trace() <= 0.0 {
+    if information.trace() <= 0.0 {
         return None;
     }
     // If some parameters are almost certain, C may be singular to rounding.
@@ -96,13 +96,17 @@ fn twice_ln_odds(
     root.column_iter_mut()
         .zip(&eigen.eigenvalues)
         .for_each(|(mut column, value)| column *= value.max(0.0).sqrt());
-    let known = certainty * found;
-    let left = root.tr_mul(&(told - &known));
-    let inner = (root.tr_mul(&(certainty * &root)) + DMatrix::identity(root.ncols(), root.ncols()))
-        .cholesky()?;
+    let known = information * found;
+    let left = root.tr_mul(&(vector - &known));
+    let inner = (root.tr_mul(&(information * &root))
+        + DMatrix::identity(root.ncols(), root.ncols()))
+    .cholesky()?;
     let ln_determinant =
         2.0 * inner.l_dirty().diagonal().iter().map(|value| value.ln()).sum::<f64>();
-    Some(2.0 * found.dot(told) - found.dot(&known) + left.dot(&inner.solve(&left)) - ln_determinant)
+    Some(
+        2.0 * found.dot(vector) - found.dot(&known) + left.dot(&inner.solve(&left))
+            - ln_determinant,
+    )
 }
 
 /// Returns the function of time f(t) by which an effect moves the instrument; `None` for other
@@ -160,11 +164,11 @@ pub(super) fn reference_check(
         points.entry((&reading.session, &reading.name)).or_default().push(reading_of_point);
     }
     let nothing = (DVector::zeros(count), DMatrix::zeros(count, count));
-    let (told, certainty) = points
+    let (vector, information) = points
         .values()
         .map(|all| point_information(all, count))
         .fold(nothing, |a, b| (a.0 + b.0, a.1 + b.1));
-    let gain = twice_ln_odds(&found, &spread, (&told, &certainty))?;
+    let gain = twice_ln_odds(&found, &spread, (&vector, &information))?;
     let verdict = if gain > MIN_TWICE_LN_ODDS {
         ReferenceVerdict::Corroborated
     } else if gain < -MIN_TWICE_LN_ODDS {
@@ -190,8 +194,8 @@ mod tests {
         let identity = DMatrix::<f64>::identity(3, 3);
         let (sure, unsure) = (&identity * 1e-8, &identity * 0.09);
         let odds = |spread: &DMatrix<f64>, part: f64| {
-            let certainty = &identity * 1e4;
-            super::twice_ln_odds(&found, spread, (&(&found * part * 1e4), &certainty)).unwrap()
+            let information = &identity * 1e4;
+            super::twice_ln_odds(&found, spread, (&(&found * part * 1e4), &information)).unwrap()
         };
         // The readings show less than half of an estimate that has a standard error of 0.3. They
         // still corroborate the motion, because they are precise.
@@ -232,12 +236,12 @@ mod tests {
         let found = DVector::from_iterator(6, moved.iter().chain(&turned).copied());
         let spread = DMatrix::identity(6, 6) * 1e-12;
         let odds = |turn: f64| {
-            let (told, certainty) = all(turn);
-            super::twice_ln_odds(&found, &spread, (&told, &certainty)).unwrap()
+            let (vector, information) = all(turn);
+            super::twice_ln_odds(&found, &spread, (&vector, &information)).unwrap()
         };
         // The measured places are off by the motion itself, which hardly changes the estimate.
-        let (told, certainty) = all(1.0);
-        let read = certainty.cholesky().unwrap().solve(&told);
+        let (vector, information) = all(1.0);
+        let read = information.cholesky().unwrap().solve(&vector);
         assert!((read - &found).norm() < 1e-3 * found.norm());
         assert!(odds(1.0) > 1e5 && odds(-2.0) < odds(1.0) - 1e4, "{} {}", odds(1.0), odds(-2.0));
     }

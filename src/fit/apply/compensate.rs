@@ -116,7 +116,7 @@ pub fn waypoints(
 /// Transforms target positions and orientations from the base frame of the arm to the measuring
 /// frame.
 pub fn seen_from_base(model: &Model, x: &DVector<f64>, targets: &Measurements) -> Measurements {
-    moved(targets, &model.base_frames(x.as_slice()))
+    transformed_by_bases(targets, &model.base_frames(x.as_slice()))
 }
 
 /// Transforms target positions and orientations from the measuring frame to the base frame of the
@@ -124,12 +124,12 @@ pub fn seen_from_base(model: &Model, x: &DVector<f64>, targets: &Measurements) -
 pub fn seen_in_base(model: &Model, x: &DVector<f64>, targets: &Measurements) -> Measurements {
     let bases: Vec<Frame<f64>> =
         model.base_frames(x.as_slice()).iter().map(Frame::inverse).collect();
-    moved(targets, &bases)
+    transformed_by_bases(targets, &bases)
 }
 
 /// Transforms the position and orientation of each row by the frame in `bases` that belongs to the
 /// row's base.
-fn moved(targets: &Measurements, bases: &[Frame<f64>]) -> Measurements {
+fn transformed_by_bases(targets: &Measurements, bases: &[Frame<f64>]) -> Measurements {
     let placement = Placement::of(targets);
     let base = |row: usize| &bases[placement.base_of(row)];
     let mut moved = targets.clone();
@@ -181,11 +181,11 @@ pub fn compensate(
         let carrier = model.target_joint(pose.target);
         let leads = |joint: usize| tree.path_contains(joint, carrier);
         let serves = |joint: usize| {
-            let moved = |(index, mimic): (usize, Option<Mimic>)| {
+            let moves_target = |(index, mimic): (usize, Option<Mimic>)| {
                 let follows = mimic.is_some_and(|mimic| mimic.joint == joint);
                 leads(index) && (index == joint || follows)
             };
-            problem.joints.iter().map(|other| other.mimic).enumerate().any(moved)
+            problem.joints.iter().map(|other| other.mimic).enumerate().any(moves_target)
         };
         let at = |configuration: &[f64]| {
             let pose = Pose { setup: PoseView { configuration, ..pose.setup }, ..pose };

@@ -95,7 +95,7 @@ pub fn resolve(
         for (candidate, decision) in candidates.iter().zip(&mut decided) {
             if candidate.matches(rule) {
                 matched = true;
-                if candidate.effect_sigma.is_some() && !fits(rule, candidate.unit()) {
+                if candidate.effect_sigma.is_some() && !applies_to_unit(rule, candidate.unit()) {
                     continue;
                 }
                 *decision = Some(rule);
@@ -166,7 +166,7 @@ pub fn rule_of<'a>(problem: &'a Problem, parameter: &EffectParameter) -> Option<
         .parameters
         .iter()
         .rev()
-        .find(|rule| parameter.is_named(rule) && fits(rule, parameter.unit()))
+        .find(|rule| parameter.is_named(rule) && applies_to_unit(rule, parameter.unit()))
 }
 
 /// Returns the error for a pattern that matches no parameter in `known` but effects which the
@@ -199,7 +199,9 @@ pub fn refuses(problem: &Problem, parameters: &[EffectParameter]) -> bool {
         candidates(problem, &none, &none, &[]).iter().any(|candidate| candidate.matches(rule))
     };
     let misses = |rule: &ParameterRule| {
-        parameters.iter().any(|parameter| parameter.is_named(rule) && !fits(rule, parameter.unit()))
+        parameters
+            .iter()
+            .any(|parameter| parameter.is_named(rule) && !applies_to_unit(rule, parameter.unit()))
     };
     problem.parameters.iter().any(|rule| misses(rule) && !is_for_arm(rule))
 }
@@ -345,9 +347,9 @@ fn check_kinds(rule: &ParameterRule, candidates: &[Candidate]) -> Result<(), Inp
     Ok(())
 }
 
-/// Returns true if a rule can apply to a parameter of this unit: it holds it, frees it, or gives a
-/// quantity in its unit.
-fn fits(rule: &ParameterRule, unit: Unit) -> bool {
+/// Returns true if a rule can apply to a parameter of this unit. Such a rule holds the parameter,
+/// frees it without quantities, or gives a quantity in its unit.
+fn applies_to_unit(rule: &ParameterRule, unit: Unit) -> bool {
     let Freedom::Free { sigma, min, max } = &rule.freedom else { return true };
     let quantities = [sigma, min, max];
     quantities.iter().all(|q| **q == Quantities::default())

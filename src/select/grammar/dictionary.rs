@@ -48,18 +48,19 @@ pub fn factors_elsewhere(known: &Quantities) -> Vec<Factor> {
     all
 }
 
-/// Returns all factors of formulas at the coordinate of the joint `own`, counted from 0.
+/// Returns all factors of formulas at the coordinate of the joint `joint_of_site`, counted from 0.
 ///
 /// All kinds of factors have the same prior probability. Half of it belongs to the joint itself,
 /// the other half to the other joints. Order k has 1/k² of the probability of order 1. The
 /// probability is divided by the number of trial values of an inner parameter.
-pub fn factors(known: &Quantities, own: usize) -> Vec<Factor> {
+pub fn factors(known: &Quantities, joint_of_site: usize) -> Vec<Factor> {
     let mut all: Vec<Factor> = Vec::new();
     let mut add = |form: Form, inner: Option<(f64, f64)>, ln_prior: f64| {
         all.push(Factor { form, inner, ln_prior });
     };
     let others = known.commands.len().saturating_sub(1).max(1) as f64;
-    let of_joint = |joint: usize| if joint == own { 0.5_f64.ln() } else { (0.5 / others).ln() };
+    let of_joint =
+        |joint: usize| if joint == joint_of_site { 0.5_f64.ln() } else { (0.5 / others).ln() };
     let orders: f64 = (1..=HIGHEST_ORDER).map(|k| f64::from(k).powi(-2)).sum();
     for (joint, values) in &known.commands {
         let (joint, ln_joint) = (*joint, of_joint(*joint));
