@@ -14,7 +14,9 @@ use flexcal::problem::Problem;
 use flexcal::remainder;
 use flexcal::report::{self, shell_word};
 use flexcal::results::{Document as _, ExportResult, ExportedErrors, Summary};
-use flexcal::urdf::{Chain, Robot, YamlFormat, export, joint_origins, yaml};
+use flexcal::urdf::{
+    Chain, Robot, YamlFormat, export_with_links, joint_origins, mounted_links, yaml,
+};
 
 use super::diagnostic;
 use super::estimate::Trust;
@@ -34,6 +36,7 @@ use super::region::numbers;
   flexcal export panda --estimate out/panda/estimate.json --urdf panda.urdf
   flexcal export panda --estimate out/panda/estimate.json --format ros-yaml --out kinematics.yaml
   flexcal export panda --estimate out/panda/estimate.json --format dh --best-rigid --workspace-mm=200,700,-400,400,0,800
+  flexcal export panda --estimate out/panda/estimate.json --format ros-camera --camera hand
   flexcal export panda --estimate out/panda/estimate.json --format c --out model"
 )]
 pub struct Arguments {
@@ -50,9 +53,12 @@ pub struct Arguments {
         conflicts_with = "format"
     )]
     urdf: Option<PathBuf>,
-    /// Origins of the joints as YAML, or the whole model as C, instead
+    /// Origins of the joints or a camera as YAML, or the whole model as C, instead
     #[arg(long, value_name = "FORMAT")]
     format: Option<Format>,
+    /// Name of the camera that --format ros-camera or opencv writes, if there are several
+    #[arg(long, value_name = "NAME", requires = "format")]
+    camera: Option<String>,
     /// Measurement files instead of those the problem names
     #[arg(long, value_name = "FILE", num_args = 1..)]
     data: Vec<PathBuf>,
@@ -86,8 +92,26 @@ enum Format {
     Mdh,
     /// Standard Denavit-Hartenberg parameters
     Dh,
+    /// A camera as a camera_info file of ROS
+    RosCamera,
+    /// A camera and its pose as a file storage of OpenCV
+    Opencv,
+    /// All cameras as a camera chain of Kalibr
+    Kalibr,
     /// The whole model as C99, into the folder --out
     C,
+}
+
+impl Format {
+    /// Returns the form and the default file name of a camera; `None` for forms of the arm.
+    fn camera(self) -> Option<(code::CameraFormat, &'static str)> {
+        match self {
+            Self::RosCamera => Some((code::CameraFormat::Ros, "camera_info.yaml")),
+            Self::Opencv => Some((code::CameraFormat::OpenCv, "camera.yaml")),
+            Self::Kalibr => Some((code::CameraFormat::Kalibr, "camchain.yaml")),
+            Self::UrYaml | Self::RosYaml | Self::Mdh | Self::Dh | Self::C => None,
+        }
+    }
 }
 
 /// Writes the identified geometry, and prints the parts of the model that the file cannot
@@ -116,12 +140,21 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         Some(best) => best.arm.clone(),
         None => model.arm(|k| x.get(k).copied().unwrap_or(0.0)),
     };
+    let camera = arguments.format.and_then(Format::camera);
+    let mut elsewhere = Vec::new();
     let (text, moved, default) = match (&arguments.urdf, arguments.format) {
         (Some(file), _) => {
             let robot = Robot::read(file)?;
-            let export = export(&Chain::from_problem(&robot, &problem)?, &problem, &arm)?;
+            let chain = Chain::from_problem(&robot, &problem)?;
+            let mounted = mounted_links(&problem, &model, x.as_slice());
+            let export = export_with_links(&chain, &problem, &arm, &mounted)?;
             let name = file.file_name().unwrap_or_default().to_owned();
+            elsewhere = export.elsewhere;
             (export.text, Some(export.moved), PathBuf::from(name))
+        }
+        (None, Some(_)) if let Some((form, name)) = camera => {
+            let chosen = arguments.camera.as_deref();
+            (code::camera_yaml(&problem, (&model, &x), form, chosen)?, None, PathBuf::from(name))
         }
         (None, format) => {
             let (text, name) = match format {
@@ -162,13 +195,18 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     {
         diagnostic::warn(&format!("errors are not judged: {} is not there", absent.display()));
     }
-    let errors = if at_hand {
+    let errors = if at_hand && camera.is_none() {
         Some(errors(&problem, files, (&estimates, best.as_ref()), flags)?)
     } else {
         None
     };
     results.write(&[(&name, &text)])?;
-    let result = ExportResult::new(&problem, &model, Some(&path), moved.as_deref(), errors);
+    let mut result = ExportResult::new(&problem, &model, Some(&path), moved.as_deref(), errors);
+    if camera.is_some() {
+        result.not_held.clear();
+    }
+    let stays = |link: String| format!("link {link}, which the URDF has on another link");
+    result.not_held.extend(elsewhere.into_iter().map(stays));
     flags.print_result(&result.to_json(), || {
         let [problem, estimate] = [&arguments.problem, &arguments.estimate].map(|path| shell_word(path));
         let of_workspace = best.as_ref().map_or_else(String::new, |best| {

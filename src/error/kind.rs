@@ -86,6 +86,11 @@ pub enum InputErrorKind {
     NotAVector { found: usize },
     #[error("expected 2 numbers, found {found}")]
     NotAPair { found: usize },
+    #[error(
+        "expected {expected} numbers ({names}), found {found}; write 0 for a coefficient that the \
+         lens does not have, or leave the key out if it has none"
+    )]
+    Coefficients { expected: usize, names: String, found: usize },
     #[error("{value} is below zero")]
     Negative { value: f64 },
     #[error("{value} is not above zero")]
@@ -196,6 +201,11 @@ pub enum InputErrorKind {
          camera and marker (at_m and rotation_deg), which views of one direction do not determine"
     )]
     PointBehindCamera,
+    #[error(
+        "the views do not determine the poses of camera \"{camera}\" and marker \"{marker}\": {why}; \
+         add such views, or declare at_m and rotation_deg of one of them"
+    )]
+    ViewsUndecided { camera: String, marker: String, why: &'static str },
     #[error("nothing is measured in this row: every column that could hold something is empty")]
     NothingMeasured,
     #[error("the column has no meaning in this problem; declare {write}")]

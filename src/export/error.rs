@@ -44,6 +44,30 @@ pub enum ExportError {
         /// Number of poses drawn.
         draws: usize,
     },
+    /// The problem declares no such camera.
+    #[error(
+        "no such camera; {}",
+        if known.is_empty() { "the problem declares none".to_owned() } else { format!("there are {}", known.join(", ")) }
+    )]
+    NoCamera {
+        /// Names of the declared cameras.
+        known: Vec<String>,
+    },
+    /// The form holds one camera, and the problem declares several.
+    #[error("choose a camera with --camera: {}", known.join(", "))]
+    SeveralCameras {
+        /// Names of the declared cameras.
+        known: Vec<String>,
+    },
+    /// Kalibr's lens model lacks a coefficient of the camera.
+    #[error(
+        "Kalibr's radtan model has no k3; identify with \"camera[{camera}].k3\" = {{ fixed = true }} \
+         and k3 = 0 in distortion, and export that"
+    )]
+    ThirdRadial {
+        /// Name of the camera.
+        camera: String,
+    },
     /// Problem and poses do not match.
     #[error(transparent)]
     Input(#[from] InputError),

@@ -6,6 +6,7 @@
 //! generated. The exported test program compares the C code with this library.
 
 mod answers;
+mod camera;
 mod error;
 mod formula;
 mod numbers;
@@ -15,6 +16,8 @@ mod source;
 mod tables;
 
 pub use answers::{Answers, answers};
+#[doc(hidden)]
+pub use camera::{CameraFormat, camera_yaml};
 pub use error::ExportError;
 pub use rigid::{RigidFit, best_rigid, rigid_errors};
 pub use source::{Sources, sources};

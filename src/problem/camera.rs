@@ -28,12 +28,13 @@ pub(super) struct Declared {
     pub carrier: Option<usize>,
     pub points: Vec<Vector3<f64>>,
     pub sigma: Option<f64>,
+    pub image: Option<[f64; 2]>,
 }
 
 impl Declared {
     /// Creates the properties of a fixture that stands in the measuring frame.
     pub fn new(kind: FixtureKind, known: Vec<Option<f64>>) -> Self {
-        Self { kind, known, carrier: None, points: Vec::new(), sigma: None }
+        Self { kind, known, carrier: None, points: Vec::new(), sigma: None, image: None }
     }
 }
 
@@ -49,29 +50,39 @@ pub(super) fn camera(
     let on = section.require("on", "on = \"joint6\", another frame of the arm, or \"world\"")?;
     let carrier = carrier(&on, carriers)?;
     let mut known = pose(section)?;
-    let item = section.require("focal_px", "focal_px = [fx, fy]")?;
-    let focal = item.pair()?;
-    if let Some(&value) = focal.iter().find(|focal| **focal <= 0.0) {
-        return Err(item.error(InputErrorKind::NotPositive { value }));
-    }
+    let focal = positive_pair(&section.require("focal_px", "focal_px = [fx, fy]")?)?;
     let centre = section.require("centre_px", "centre_px = [cx, cy]")?.pair()?;
     known.extend(focal.into_iter().chain(centre).map(Some));
     let count = kind.fields().len() - known.len();
     let mut distortion = vec![0.0; count];
     if let Some(item) = section.get("distortion") {
         let numbers = item.list("a list of numbers")?;
-        item.check_count("coefficients", numbers.len(), count)?;
+        if numbers.len() != count {
+            let names = kind.fields()[known.len()..].join(", ");
+            let found = numbers.len();
+            return Err(item.error(InputErrorKind::Coefficients { expected: count, names, found }));
+        }
         for (coefficient, number) in distortion.iter_mut().zip(&numbers) {
             *coefficient = number.number()?;
         }
     }
     known.extend(distortion.into_iter().map(Some));
+    let image = section.get("image_px").map(|item| positive_pair(&item)).transpose()?;
     let item = section.require("pixel_sigma", "pixel_sigma = 0.2, 1 σ of u and v in pixels")?;
     let sigma = item.number()?;
     if sigma <= 0.0 {
         return Err(item.error(InputErrorKind::NotPositive { value: sigma }));
     }
-    Ok(Declared { carrier, sigma: Some(sigma), ..Declared::new(kind, known) })
+    Ok(Declared { carrier, sigma: Some(sigma), image, ..Declared::new(kind, known) })
+}
+
+/// Reads two numbers above zero.
+fn positive_pair(item: &Item<'_, '_>) -> Result<[f64; 2], InputError> {
+    let pair = item.pair()?;
+    match pair.iter().find(|number| **number <= 0.0) {
+        Some(&value) => Err(item.error(InputErrorKind::NotPositive { value })),
+        None => Ok(pair),
+    }
 }
 
 /// Reads the remaining keys of a marker.

@@ -36,6 +36,8 @@ pub struct Fixture {
     pub points: Vec<Vector3<f64>>,
     /// 1 σ of a coordinate that a camera measures \[px\]; `None` for others.
     pub sigma: Option<f64>,
+    /// Width and height of a camera's image \[px\]; `None` if they are not declared, and for others.
+    pub image: Option<[f64; 2]>,
     /// Place in the file, for errors.
     pub location: Location,
 }
@@ -68,6 +70,12 @@ pub(crate) fn reference_cells(
     })
 }
 
+/// Returns the word of the frame that carries a camera or marker, "world" for the measuring frame.
+pub(crate) fn carrier_word(problem: &Problem, fixture: &Fixture) -> String {
+    let word = |carrier| frame_word(carrier, &problem.joints, problem.tool.joint);
+    fixture.carrier.map_or_else(|| "world".to_owned(), word)
+}
+
 /// Reads all fixtures in the order point, anchor, surface, camera, marker, and the known distances.
 pub(super) fn read(
     root: &mut Section<'_, '_>,
@@ -96,9 +104,9 @@ pub(super) fn read(
                 _ => marker(&mut section, carriers)?,
             };
             section.finish()?;
-            let Declared { kind, known, carrier, points, sigma } = declared;
+            let Declared { kind, known, carrier, points, sigma, image } = declared;
             let location = section.location();
-            fixtures.push(Fixture { name, kind, known, carrier, points, sigma, location });
+            fixtures.push(Fixture { name, kind, known, carrier, points, sigma, image, location });
         }
     }
     let distances =

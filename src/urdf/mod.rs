@@ -11,8 +11,10 @@ mod describe;
 mod export;
 mod free;
 mod lines;
+mod mounted;
 mod notes;
 mod number;
+mod patches;
 mod read;
 mod universal_robots;
 mod weights;
@@ -21,13 +23,15 @@ mod yaml;
 pub use chain::Chain;
 pub(crate) use describe::SIGMA_MM;
 pub use describe::{Description, describe};
-pub(crate) use export::MovedOrigin;
 pub use export::{Export, export};
+pub(crate) use patches::MovedOrigin;
 pub use read::Robot;
 // These items are public for the tests, the benches and the Python module only.
 #[doc(hidden)]
 pub use self::{
     describe::HELD_OUT,
+    export::export_with_links,
+    mounted::{MountedLink, mounted_links},
     yaml::{YamlFormat, joint_origins, yaml},
 };
 pub(crate) use yaml::key as yaml_key;

@@ -6,6 +6,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 
+mod camera;
 mod code;
 mod rigid;
 

@@ -1,12 +1,15 @@
 //! Export of identified geometry.
 
 use flexcal::mechanics::Arm;
-use flexcal::urdf::{Chain, Robot, YamlFormat, export, joint_origins, yaml};
+use flexcal::urdf::{
+    Chain, Robot, YamlFormat, describe, export, export_with_links, joint_origins, mounted_links,
+    yaml,
+};
 use nalgebra::{DVector, Vector3};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
-use super::common::arms::path;
+use super::common::arms::{parse, path};
 use super::common::made::{draw, model_of};
 use super::{apart, problem_of, robot, tips};
 use flexcal::measurement::Dataset;
@@ -90,6 +93,111 @@ fn exported_origins_have_the_identified_pose_and_nothing_else_moves() {
             .to_string()
             .contains("the problem rail, shoulder, knee")
     );
+}
+
+/// Cameras on two joints, on the last frame and on the base, and a marker whose link exists.
+const MOUNTED: &str = r#"
+[[camera]]
+name = "eye"
+on = "shoulder"
+at_m = [0.1, 0.2, 0.3]
+rotation_deg = [10, -20, 30]
+focal_px = [900, 900]
+centre_px = [640, 360]
+pixel_sigma = 0.2
+[[camera]]
+name = "wrist"
+on = "level"
+at_m = [0.01, -0.02, 0.03]
+rotation_deg = [0, 90, 0]
+focal_px = [900, 900]
+centre_px = [640, 360]
+pixel_sigma = 0.2
+[[camera]]
+name = "end"
+on = "tool"
+at_m = [0.05, 0, 0.02]
+rotation_deg = [5, 0, 80]
+focal_px = [900, 900]
+centre_px = [640, 360]
+pixel_sigma = 0.2
+[[marker]]
+name = "tag"
+on = "base"
+at_m = [0.4, 0.1, 0.2]
+rotation_deg = [0, 0, 45]
+points_mm = [[0, 0, 0]]
+"#;
+
+#[test]
+fn cameras_and_markers_on_the_arm_become_links() {
+    let mut rng = ChaCha8Rng::seed_from_u64(9);
+    let existing = "<link name=\"eye_optical_frame\"/>\n<joint name=\"eye_mount\" type=\"fixed\">\
+                    <parent link=\"upper\"/><child link=\"eye_optical_frame\"/></joint>\n";
+    let text = std::fs::read_to_string(path("tests/urdf/odd.urdf")).unwrap();
+    let text = text.replace("</robot>", &format!("{existing}</robot>"));
+    let original = Robot::parse(&text, std::path::Path::new("odd.urdf")).unwrap();
+    let chain = Chain::new(&original, None, Some("tool")).unwrap();
+    let described = describe(&chain).unwrap().text;
+    let (before, after) = described.split_at(described.find("[parameters]").unwrap());
+    let problem = parse(&format!("{before}{MOUNTED}{after}"));
+    let configurations: Vec<Vec<f64>> = (0..20)
+        .map(|_| {
+            let mut q: Vec<f64> =
+                problem.joints.iter().map(|_| rng.random_range(-2.0..2.0)).collect();
+            (q[0], q[4], q[6]) = (0.0, 0.0, 0.0);
+            q
+        })
+        .collect();
+    let model = model_of(&problem, &Dataset::poses(&configurations).measurements().unwrap());
+    let mut x = draw(&model, |_| 0.0, &mut rng);
+    for (x, parameter) in x.iter_mut().zip(&model.parameters) {
+        *x *= f64::from(u8::from(parameter.name.starts_with("joint")));
+    }
+    let mounted = mounted_links(&problem, &model, x.as_slice());
+    let names: Vec<&str> = mounted.iter().map(|mounted| mounted.link.as_str()).collect();
+    let links = ["eye_optical_frame", "wrist_optical_frame", "end_optical_frame", "tag_marker"];
+    assert_eq!(names, links);
+    let exported = export_with_links(&chain, &problem, &model.arm(|k| x[k]), &mounted).unwrap();
+    assert!(exported.elsewhere.is_empty());
+    assert!(exported.moved.iter().any(|origin| origin.joint == "eye_mount"));
+    let moved = Robot::parse(&exported.text, std::path::Path::new("moved.urdf")).unwrap();
+    for mounted in mounted.iter().filter(|mounted| mounted.carrier > 0) {
+        let of_link = problem_of(&Chain::new(&moved, Some("world"), Some(&mounted.link)).unwrap());
+        let of_link_q: Vec<Vec<f64>> = configurations
+            .iter()
+            .map(|q| {
+                let value = |name: &str| problem.joints.iter().position(|joint| joint.name == name);
+                of_link
+                    .joints
+                    .iter()
+                    .map(|joint| value(&joint.name).map_or(0.0, |k| q[k]))
+                    .collect()
+            })
+            .collect();
+        let rows = Dataset::poses(&of_link_q).measurements().unwrap();
+        let nominal = DVector::zeros(model_of(&of_link, &rows).parameters.len());
+        let mut carrier = problem.clone();
+        carrier.tool.joint = mounted.carrier - 1;
+        let seen = tips(&carrier, &configurations, &x);
+        let expected: Vec<[Vector3<f64>; 3]> = seen
+            .iter()
+            .map(|&[origin, x, z]| {
+                let axes = [x, z.cross(&x), z];
+                let turned = |v: &Vector3<f64>| axes[0] * v.x + axes[1] * v.y + axes[2] * v.z;
+                let [of_x, _, of_z] = &mounted.pose.axes;
+                [origin + turned(&mounted.pose.origin), turned(of_x), turned(of_z)]
+            })
+            .collect();
+        let off = apart(&expected, &tips(&of_link, &of_link_q, &nominal));
+        assert!(off < 1e-9, "{}: {off:e}", mounted.link);
+    }
+    // The camera on the upper arm cannot move to another parent.
+    let other = text.replace("<parent link=\"upper\"/><child", "<parent link=\"fore\"/><child");
+    let other = Robot::parse(&other, std::path::Path::new("odd.urdf")).unwrap();
+    let chain = Chain::new(&other, None, Some("tool")).unwrap();
+    let exported = export_with_links(&chain, &problem, &model.arm(|k| x[k]), &mounted).unwrap();
+    assert_eq!(exported.elsewhere, ["eye_optical_frame"]);
 }
 
 #[test]

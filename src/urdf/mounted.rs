@@ -1,0 +1,89 @@
+//! Cameras and markers on the arm as links of a URDF.
+
+use super::chain::Chain;
+use super::patches::Patches;
+use super::read::Kind;
+use crate::mechanics::Arm;
+use crate::model::Model;
+use crate::observation::FixtureValues;
+use crate::problem::{Fixture, JointKind, Problem};
+use crate::spatial::Frame;
+
+/// Camera or marker that a frame of the arm carries, as a link of a URDF.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MountedLink {
+    /// Name of the link: of a camera with the suffix `_optical_frame`, of a marker with `_marker`.
+    pub link: String,
+    /// Frame that carries it: 0 is the base, i the frame of joint i.
+    pub carrier: usize,
+    /// Pose in that frame.
+    pub pose: Frame<f64>,
+}
+
+/// Returns the cameras and markers on the arm with the parameters `x` of the model.
+pub fn mounted_links(problem: &Problem, model: &Model, x: &[f64]) -> Vec<MountedLink> {
+    let link = |(fixture, values): (&Fixture, FixtureValues<f64>)| {
+        let carrier = fixture.carrier.filter(|_| fixture.kind.has_pose())?;
+        let suffix = if fixture.kind.word() == "camera" { "_optical_frame" } else { "_marker" };
+        let name = fixture.name.strip_suffix(suffix).unwrap_or(&fixture.name);
+        Some(MountedLink { link: format!("{name}{suffix}"), carrier, pose: values.frame() })
+    };
+    problem.fixtures.iter().zip(model.fixtures(x)).filter_map(link).collect()
+}
+
+/// Adds a link with a fixed joint for each of the `mounted`, or moves the origin of that joint where
+/// the file has the link on the same parent. Returns the links that the file has elsewhere, which
+/// stay as they are.
+///
+/// `gauges` are the transforms from the chain's axis frames to those of the problem.
+pub(super) fn mount(
+    patches: &mut Patches,
+    chain: &Chain,
+    (problem, arm, gauges): (&Problem, &Arm<f64>, &[Frame<f64>]),
+    mounted: &[MountedLink],
+) -> Vec<String> {
+    let (robot, mut elsewhere) = (chain.robot, Vec::new());
+    for MountedLink { link, carrier, pose } in mounted {
+        let (parent, carried) = carrying_link(chain, (problem, arm, gauges), *carrier);
+        let origin = carried.compose(pose);
+        let Some(index) = robot.links.iter().position(|known| known.name == *link) else {
+            let name = robot.links.get(parent).map_or("", |link| link.name.as_str());
+            patches.append(link, name, &origin);
+            continue;
+        };
+        let joint = robot.joints.iter().position(|joint| {
+            joint.child == index && joint.parent == parent && joint.kind == Kind::Fixed
+        });
+        match joint.filter(|joint| !chain.joints.contains(joint)) {
+            Some(joint) => patches.place(joint, &origin),
+            None => elsewhere.push(link.clone()),
+        }
+    }
+    elsewhere
+}
+
+/// Returns the index of the link that moves with frame `carrier` of the problem, and that frame
+/// seen from the link: the tip for the last joint, otherwise the link behind the moving joint at or
+/// before the carrier.
+fn carrying_link(
+    chain: &Chain,
+    (problem, arm, gauges): (&Problem, &Arm<f64>, &[Frame<f64>]),
+    carrier: usize,
+) -> (usize, Frame<f64>) {
+    if carrier == problem.joints.len() {
+        return (chain.tip, Frame::identity());
+    }
+    let (mut parent, mut frame, mut moving) = (chain.base, Frame::identity(), 0);
+    for joint in arm.joints.iter().take(carrier) {
+        joint.advance_to_zero(&mut frame);
+        if joint.kind != JointKind::Fixed {
+            moving += 1;
+            if let (Some(stage), Some(gauge)) = (chain.stages.get(moving - 1), gauges.get(moving)) {
+                parent = chain.robot.joints.get(stage.joint).map_or(parent, |joint| joint.child);
+                frame = stage.axis.compose(gauge);
+            }
+        }
+        frame.rotate_y(joint.beta.sin_cos);
+    }
+    (parent, frame)
+}
