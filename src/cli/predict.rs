@@ -78,7 +78,14 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         _ => (fit::predict(&problem, estimate.as_ref(), &rows, split.as_ref())?, None),
     };
     let bounds = bounds.as_ref();
-    let table = predictions_csv(&problem, &rows, &prediction, bounds);
+    let is_position = |row: usize| rows.observation(row).is_position();
+    let is_told = bounds.is_some() && (0..rows.len()).all(is_position);
+    let errors = estimate
+        .as_ref()
+        .filter(|_| !is_told)
+        .map(|estimate| fit::standard_errors(&problem, estimate, &rows, &prediction.x))
+        .transpose()?;
+    let table = predictions_csv(&problem, &rows, &prediction, (bounds, errors.as_deref()));
     let mut texts = vec![("predictions.csv", table)];
     texts.extend(
         prediction

@@ -33,6 +33,8 @@ pub use apply::predict::Residual;
 pub(crate) use apply::predict_saved::ErrorsBySession;
 pub use apply::predict_saved::{PredictError, Prediction, predict};
 pub use apply::predicted_covariance::PredictedPosition;
+#[doc(hidden)]
+pub use apply::predicted_covariance::standard_errors;
 pub use apply::saved_estimate::{SavedEstimate, SavedEstimateError};
 #[doc(hidden)]
 pub use apply::tolerance::{Tolerance, ToleranceTest, Verdict};

@@ -97,6 +97,22 @@ fn predicted_image_rows_have_their_errors_in_mm_at_the_points() {
     let [low, high] = ["identification", "held_out"].map(|part| mean(&fitted[part]));
     let all = mean(&errors["all"]);
     assert!(low.min(high) <= all && all <= low.max(high), "{low} {all} {high}");
+    // Predictions carry the pixel with its standard error.
+    let (predictions, residuals) =
+        (folder.table("there/predictions.csv"), folder.table("there/residuals.csv"));
+    for axis in ["u", "v"] {
+        let column = format!("predicted_{axis}_px");
+        assert_eq!(predictions.numbers(&column), residuals.numbers(&column));
+        let errors = predictions.numbers(&format!("sigma_{axis}_px"));
+        assert!(errors.iter().all(|error| *error > 0.0 && *error < 0.2), "{axis}");
+    }
+    // Poses alone, of an arm that no position identified.
+    folder.write("poses.csv", "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n10,-80,20,30,60,-40\n");
+    folder
+        .flexcal("predict . --estimate fit/estimate.json --data poses.csv --out poses --quiet")
+        .success();
+    let sigma = folder.table("poses/predictions.csv").numbers("sigma_z_mm");
+    assert!(sigma.len() == 1 && sigma[0] > 0.0 && sigma[0] < 5.0, "{sigma:?}");
 }
 
 #[test]

@@ -34,6 +34,9 @@ const MAX_UNDETERMINED_SHARE: f64 = 1e-6;
 pub struct Prediction {
     /// Predicted position of each row, measuring frame \[m\]; NaN where the arm has no equilibrium.
     pub positions: Vec<Vector3<f64>>,
+    /// Predicted numbers of each row, in the units of its kind: a position \[m\], a pixel \[px\],
+    /// a distance \[m\], tilts \[rad\], followed by zeros.
+    pub numbers: Vec<Vector3<f64>>,
     /// Predicted orientation of each row, a rotation vector, measuring frame \[rad\]; `None` if
     /// orientation is not fitted.
     pub orientations: Option<Vec<Vector3<f64>>>,
@@ -236,7 +239,7 @@ pub fn predict(
     let errors = rows.position_measured.then(|| ErrorsBySession::new(rows, &errors, at_points));
     let placed = if rows.position_measured { missing } else { Vec::new() };
     let placed = placed.into_iter().map(|k| model.parameters[k].name.clone()).collect();
-    Ok(Prediction { positions, orientations, residuals, errors, spreads, placed, x })
+    Ok(Prediction { positions, numbers: seen, orientations, residuals, errors, spreads, placed, x })
 }
 
 /// Returns the error that the `estimate` lacks the parameter `name`, or that there is no estimate.

@@ -1,13 +1,17 @@
-//! Covariance of predicted positions, from the covariance of the estimates.
+//! Covariance of predicted positions, and standard errors of predicted rows, from the covariance of
+//! the estimates.
 
-use nalgebra::{DMatrix, Matrix3, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+use rayon::prelude::*;
 
 use crate::fit::IdentifyError;
+use crate::fit::apply::predict_saved::PredictError;
+use crate::fit::apply::saved_estimate::SavedEstimate;
 use crate::fit::outcome::Identification;
 use crate::fit::stages::placement::Placement;
 use crate::least_squares::{Block, LeastSquares as _};
 use crate::measurement::Measurements;
-use crate::model::PoseResiduals;
+use crate::model::{Model, Pose, PoseResiduals};
 use crate::problem::Problem;
 
 /// Predicted position of a row with its uncertainty.
@@ -54,16 +58,67 @@ impl Identification {
         });
         let poses = self.poses(rows, None);
         let residuals = PoseResiduals::new(&model, poses, unknowns, x.clone());
-        let (at, per_pose, n) =
-            (residuals.reduced(&x), residuals.rows_per_item(), residuals.parameters());
+        let at = residuals.reduced(&x);
         let of_row = |(row, position): (usize, Vector3<f64>)| {
-            let mut block = Block::zeros(per_pose, n);
-            residuals.linearise(&at, row..row + 1, &mut block);
-            let jacobian = DMatrix::from_fn(3, n, |i, j| block.column(j)[i]);
+            let jacobian = row_jacobian(&residuals, &at, row);
             let spread = &jacobian * &covariance * jacobian.transpose();
             let covariance = Matrix3::from_fn(|i, j| spread[(i, j)]);
             PredictedPosition { position, covariance }
         };
         Ok(positions.into_iter().enumerate().map(of_row).collect())
     }
+}
+
+/// Returns the derivatives of the numbers of a row with respect to the unknowns, shape = (3,
+/// unknowns) [1/σ of the row].
+fn row_jacobian(residuals: &PoseResiduals, at: &DVector<f64>, row: usize) -> DMatrix<f64> {
+    let mut block = Block::zeros(residuals.rows_per_item(), residuals.parameters());
+    residuals.linearise(at, row..row + 1, &mut block);
+    DMatrix::from_fn(3, residuals.parameters(), |i, j| block.column(j)[i])
+}
+
+/// Returns the standard error (1 σ) of each predicted number of `rows`, in the units of the row's
+/// kind, from the covariance of the estimates: neither measurement noise nor errors of the model
+/// count. `x` is the full parameter vector of the prediction.
+///
+/// NaN where a row depends on a parameter without a variance, for example one that the data do not
+/// determine.
+///
+/// # Errors
+/// Returns an error if problem and rows do not fit each other.
+pub fn standard_errors(
+    problem: &Problem,
+    estimate: &SavedEstimate,
+    rows: &Measurements,
+    x: &DVector<f64>,
+) -> Result<Vec<Vector3<f64>>, PredictError> {
+    let placement = Placement::of(rows);
+    let model = estimate.model(Model::new(problem, &placement.bases, &placement.targets)?);
+    let all: Vec<usize> = (0..rows.len()).collect();
+    let mut poses = placement.poses(rows, &all, 1.0);
+    estimate.count_time_in(&placement, &mut poses);
+    let poses: Vec<Pose> = poses.into_iter().map(|pose| Pose { sigma: 1.0, ..pose }).collect();
+    let of_values = &estimate.posterior().covariance;
+    let entry =
+        |k: usize| estimate.entries().position(|(name, ..)| name == model.parameters[k].name);
+    let entries: Vec<Option<usize>> = (0..model.parameters.len())
+        .map(|k| entry(k).filter(|&entry| of_values[(entry, entry)].is_finite()))
+        .collect();
+    let scale = |k: usize| model.parameters[k].value_error(x[k], 1.0);
+    let covariance = DMatrix::from_fn(entries.len(), entries.len(), |i, j| {
+        let both = entries[i].zip(entries[j]);
+        let value = both.map_or(0.0, |both| of_values[both]) / (scale(i) * scale(j));
+        if value.is_finite() { value } else { 0.0 }
+    });
+    let residuals = PoseResiduals::new(&model, poses, (0..entries.len()).collect(), x.clone());
+    let of_row = |row: usize| {
+        let jacobian = row_jacobian(&residuals, x, row);
+        let is_open = |k: usize| entries[k].is_none() && jacobian.column(k).amax() > 0.0;
+        if (0..entries.len()).any(is_open) {
+            return Vector3::from_element(f64::NAN);
+        }
+        let spread = &jacobian * &covariance * jacobian.transpose();
+        Vector3::from_fn(|i, _| spread[(i, i)].sqrt())
+    };
+    Ok((0..rows.len()).into_par_iter().map(of_row).collect())
 }

@@ -174,6 +174,34 @@ pub fn residuals_csv(problem: &Problem, rows: &Measurements, residuals: &[Residu
     to_csv(&residual_columns(problem, rows, residuals), residuals.len())
 }
 
+/// Returns the columns `word_<axis>_<unit>` of all kinds of rows that are not measured as positions;
+/// `numbers` has a vector for each row \[SI or px\], whose cells in the columns of other kinds are
+/// empty.
+pub(super) fn columns_of_kinds(
+    rows: &Measurements,
+    word: &str,
+    decimals: usize,
+    numbers: &[Vector3<f64>],
+) -> Columns {
+    let mut columns = Columns::new();
+    let is_position =
+        |kind: &&Kind| kind.residuals == Observation::Position.description().residuals;
+    for kind in kinds_of(rows).into_iter().filter(|kind| !is_position(kind)) {
+        let (group, axes) = kind.residuals;
+        let TableUnit { factor, suffix, .. } = kind.unit.in_tables();
+        for (k, axis) in axes.iter().enumerate() {
+            let cell = |(row, numbers): (usize, &Vector3<f64>)| {
+                let is_of_kind = rows.observation(row).description().residuals.0 == group;
+                if is_of_kind { numbers[k] * factor } else { f64::NAN }
+            };
+            let cells = numbers.iter().enumerate().map(cell).collect();
+            columns
+                .push((format!("{word}_{axis}_{suffix}"), Column::Numbers(cells, Some(decimals))));
+        }
+    }
+    columns
+}
+
 /// Returns the kinds of rows in a table, one for each group of residual columns.
 fn kinds_of(rows: &Measurements) -> Vec<&'static Kind> {
     let mut kinds: Vec<&Kind> = rows.kinds().into_iter().map(Observation::description).collect();

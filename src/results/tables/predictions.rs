@@ -1,6 +1,8 @@
 //! Tables of predictions and of commands.
 
-use super::columns::{self, COMMAND_DECIMALS, Column, Columns};
+use nalgebra::Vector3;
+
+use super::columns::{self, COMMAND_DECIMALS, Column, Columns, columns_of_kinds};
 use super::commanded::{commanded_joints, sessions, word};
 use crate::files::csv;
 use crate::fit::{Command, Prediction};
@@ -9,12 +11,16 @@ use crate::problem::Problem;
 use crate::quantity::format::fixed;
 use crate::remainder::Bounds;
 
-/// Returns predictions as CSV: columns that name the row, commands, and the predicted pose.
+/// Returns predictions as CSV: columns that name the row, commands, the predicted pose, and the
+/// predicted numbers of rows that measure no position.
+///
+/// `errors` are the standard errors of the predicted numbers of each row, if an estimate is known.
+/// With `bounds`, the uncertainty of positions is that of the bounds.
 pub fn predictions_csv(
     problem: &Problem,
     rows: &Measurements,
     prediction: &Prediction,
-    bounds: Option<&Bounds>,
+    (bounds, errors): (Option<&Bounds>, Option<&[Vector3<f64>]>),
 ) -> String {
     let all: Vec<usize> = (0..prediction.positions.len()).collect();
     let mut columns = columns::names(problem, rows, &all);
@@ -37,7 +43,22 @@ pub fn predictions_csv(
             add(format!("predicted_{axis}_deg"), 7, &|row| turns[row][k].to_degrees());
         }
     }
+    columns.extend(columns_of_kinds(rows, "predicted", 6, &prediction.numbers));
     columns.extend(bounds.into_iter().flat_map(uncertainty));
+    if let Some(errors) = errors {
+        let of_position = |row: usize, k: usize| {
+            let is_position = rows.observation(row).is_position();
+            if is_position { errors[row][k] * 1e3 } else { f64::NAN }
+        };
+        let is_told = |&row: &usize| rows.observation(row).is_position() && !errors[row].x.is_nan();
+        if bounds.is_none() && all.iter().any(is_told) {
+            for (k, axis) in ["x", "y", "z"].into_iter().enumerate() {
+                let cells = all.iter().map(|&row| of_position(row, k)).collect();
+                columns.push((format!("sigma_{axis}_mm"), Column::Numbers(cells, Some(4))));
+            }
+        }
+        columns.extend(columns_of_kinds(rows, "sigma", 6, errors));
+    }
     columns::to_csv(&columns, all.len())
 }
 
