@@ -11,6 +11,7 @@ use crate::error::TableErrorKind;
 use crate::fit::checks::checked_fit::CheckedFit;
 use crate::fit::checks::finding::{Finding, FindingCode};
 use crate::fit::checks::fitted_rows::influential_finding;
+use crate::fit::checks::lens::lens_finding;
 use crate::fit::checks::misreading::Explanations;
 use crate::fit::checks::outliers::outliers;
 use crate::fit::checks::payload_place::payload_finding;
@@ -114,6 +115,14 @@ pub fn identify_model(
         };
         found.influential_rows = influential_rows(&found, without);
         found.findings.extend(found.influential_rows.as_ref().map(influential_finding));
+    }
+    if !options.provisional && options.earlier.is_none() {
+        let values =
+            found.estimates.iter().map(|estimate| (estimate.name.clone(), estimate.estimate));
+        let start = values.collect();
+        let other = Options { progress: None, provisional: true, start, ..options.clone() };
+        let fit = |problem: &Problem| identify(problem, data, &other);
+        found.findings.extend(lens_finding(problem, data, &found, fit));
     }
     if options.influential_rows && !options.provisional && options.earlier.is_none() {
         let values =
@@ -249,6 +258,7 @@ fn fit_rows(
             outliers: &outliers,
             held_out_outliers: &held_out_outliers,
             whole: &whole,
+            triangle: &whitened_triangle,
             has_declared_noise,
             noise,
             noise_factor,

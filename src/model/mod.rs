@@ -291,6 +291,11 @@ impl Model {
             .is_some_and(Option::is_some)
     }
 
+    /// Returns the name of a fixture.
+    pub(crate) fn fixture_name(&self, fixture: usize) -> String {
+        self.declared.get(fixture).map_or_else(String::new, |fixture| fixture.name.clone())
+    }
+
     /// Returns the frame of the arm that carries each of a row's two fixtures: 0 is the base, i the
     /// frame of joint i. `None` if the fixture is at rest in the measuring frame.
     pub(crate) fn carriers(&self, observation: Observation) -> [Option<usize>; 2] {

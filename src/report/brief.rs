@@ -8,7 +8,7 @@ use super::parameters::correlated;
 use super::prior::summary;
 use super::render::text_within;
 use super::row_kinds::unsteady;
-use crate::fit::{Estimate, Identification, size_of_kind};
+use crate::fit::{Estimate, Finding, FindingCode, Identification, size_of_kind};
 use crate::problem::Problem;
 use crate::quantity::format::{counted, number};
 use crate::results::Knowledge;
@@ -91,5 +91,7 @@ fn remarks(found: &Identification) -> Vec<String> {
     ];
     let counts = counts.into_iter().filter(|part| part.0 > 0);
     points.extend(counts.map(|(n, noun, what)| format!("{} {what}", counted(n, noun))));
+    let is_open = |finding: &&Finding| finding.code == FindingCode::NotToldApart;
+    points.extend(found.findings.iter().filter(is_open).map(ToString::to_string));
     points
 }

@@ -1,12 +1,12 @@
 //! Parameters in words: their table, unidentifiable and weak combinations, correlations.
 
 use super::document::{Bar, Block, Table, first_of};
-use crate::fit::{Estimate, Identification, PriorSize};
+use crate::fit::{Estimate, Identification, PriorSize, open_quantities};
 use crate::least_squares::solver::AtBound;
 use crate::least_squares::{Identifiability, UnidentifiableCombination, WEAK_THRESHOLD};
 use crate::problem::Problem;
 use crate::quantity::format::{decimals, number, or_dash, two_digits};
-use crate::results::{Knowledge, ManyHarmonics, MissingReference};
+use crate::results::{Knowledge, ManyHarmonics};
 
 /// Number of decimals of a value without a standard error.
 const DEFAULT_DECIMALS: usize = 4;
@@ -165,22 +165,8 @@ pub(super) fn unidentifiable<'a>(
         MAX_LISTED,
         file,
     );
-    points.extend(MissingReference::all(unidentifiable, unknowns).into_iter().map(remedy));
+    points.extend(open_quantities(unidentifiable, unknowns));
     Block::Lines(words, points)
-}
-
-/// States how to supply a missing reference.
-fn remedy(missing: MissingReference) -> String {
-    match missing {
-        MissingReference::Place => {
-            "the pose of the base: no row refers to a known place in the measuring frame; fix \
-             base.* (fixed = true), or declare the place of a point or an anchor (at_m)"
-        }
-        MissingReference::Length => {
-            "the scale: no length is known; declare a [[distance]], or measure one"
-        }
-    }
-    .to_owned()
 }
 
 /// Lists the combinations that the data determine too weakly, if there are any.

@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 
 use crate::fit::Estimate;
-use crate::least_squares::UnidentifiableCombination;
 use crate::least_squares::solver::AtBound;
 use crate::model::effect;
 use crate::model::parameter::Regressor;
@@ -79,54 +78,6 @@ fn is_vague(estimate: &Estimate) -> bool {
         _ => f64::INFINITY,
     };
     estimate.std_error.is_none_or(|error| error > limit)
-}
-
-/// Reference that measurements without a tracker may lack.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum MissingReference {
-    /// No row refers to a known position in the measuring frame.
-    Place,
-    /// No row refers to a known length.
-    Length,
-}
-
-impl MissingReference {
-    /// Returns the missing references that explain undetermined `combinations` of the unknowns.
-    /// Without a known position the pose of the whole arm is undetermined, without a known length
-    /// its size.
-    pub fn all(combinations: &[UnidentifiableCombination], unknowns: &[String]) -> Vec<Self> {
-        let begins = |name: &str, words: &[&str]| words.iter().any(|word| name.starts_with(word));
-        let field = |name: &'_ str| name.rsplit('.').next().unwrap_or_default().to_owned();
-        let is_fixture = |name: &str| begins(name, &["point", "anchor", "surface"]);
-        let is_base = |name: &str| name.starts_with("base");
-        let is_joint = |name: &str| name.starts_with("joint");
-        let is_length = |name: &str| {
-            (is_joint(name) && ["a", "d"].contains(&&*field(name)))
-                || name.starts_with("tool")
-                || (is_fixture(name) && !["rx", "ry"].contains(&&*field(name)))
-        };
-        let leaves_place = |names: &[&str]| {
-            names.iter().any(|name| is_base(name))
-                && names.iter().all(|name| is_base(name) || is_fixture(name))
-        };
-        // A translation moves all points along one axis, a change of scale along all three.
-        let leaves_length = |names: &[&str]| {
-            let along =
-                |axis: &str| names.iter().any(|name| is_fixture(name) && field(name) == axis);
-            names.iter().all(|name| is_length(name))
-                && ["x", "y", "z"].into_iter().all(along)
-                && names.iter().any(|name| is_joint(name))
-        };
-        let leaves = |is: &dyn Fn(&[&str]) -> bool| {
-            combinations.iter().any(|combination| {
-                let names: Vec<&str> =
-                    combination.weights.iter().map(|&(k, _)| unknowns[k].as_str()).collect();
-                is(&names)
-            })
-        };
-        let place = leaves(&leaves_place).then_some(Self::Place);
-        place.into_iter().chain(leaves(&leaves_length).then_some(Self::Length)).collect()
-    }
 }
 
 /// Harmonics of joints that have too many coefficients to list one by one. Contains joint (from 1)

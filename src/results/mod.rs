@@ -45,9 +45,7 @@ pub use document::Document;
 pub(crate) use effect::NamedEffect;
 pub(crate) use export::Origin;
 pub use identification::IdentificationResult;
-pub(crate) use knowledge::{
-    Knowledge, MAX_COEFFICIENTS, MAX_SHOWN_HARMONICS, ManyHarmonics, MissingReference,
-};
+pub(crate) use knowledge::{Knowledge, MAX_COEFFICIENTS, MAX_SHOWN_HARMONICS, ManyHarmonics};
 pub use plots::PlotData;
 pub(crate) use plots::{
     BoundAt, Contribution, Point, PoseError, ScriptData, Stage, StageErrors, procedure_stages,

@@ -3,19 +3,22 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use flexcal::fit::{Options, Placement, identify};
+use flexcal::fit::{FindingCode, Identification, Options, Placement, identify};
 use flexcal::least_squares::{check_jacobian, jacobian};
 use flexcal::measurement::{Dataset, Measurements};
 use flexcal::model::{Model, PoseResiduals};
 use flexcal::problem::Problem;
 use flexcal::quantity::Unit;
+use flexcal::select::close;
 use nalgebra::{DVector, Vector3};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use serde_json::Value;
 
 use crate::bench::{ARM, problem};
+use crate::common::arms::parse;
 use crate::common::made::{draw, model_of, normal};
+use crate::common::program::assert_contains;
 use crate::common::reading::{assert_says, problem_error, read_table, table_error};
 
 /// Cameras on the hand, on the base and in the world, and markers on the hand, on a link and in the
@@ -287,6 +290,14 @@ fn wrong_rows_are_named() {
             "not above zero",
         ),
         ("[[camera]]\nname = \"a\"\non = \"knee\"\n", "no frame is called \"knee\""),
+        (
+            "[[camera]]\nname = \"a\"\non = \"elbow\"\nfocal_px = [1, 1]\ncentre_px = [1, 1]\ndistortion = [0.1, 0.2, 0]\n",
+            "distortion: expected 5 numbers (k1, k2, p1, p2, k3), found 3; write 0 for a coefficient",
+        ),
+        (
+            "[[camera]]\nname = \"a\"\nmodel = \"fisheye\"\non = \"elbow\"\nfocal_px = [1, 1]\ncentre_px = [1, 1]\ndistortion = [0.1, 0.2, 0, 0, 0]\n",
+            "distortion: expected 4 numbers (k1, k2, k3, k4), found 5",
+        ),
         ("[[marker]]\nname = \"a\"\n", "points_mm"),
         ("[[marker]]\nname = \"a\"\npoints_mm = []\n", "empty"),
     ] {
@@ -307,4 +318,114 @@ fn a_point_behind_the_camera_is_an_error_with_its_row() {
     let error = identify(&problem, &data, &Options::default()).map(|_| ()).unwrap_err().to_string();
     assert!(error.contains("the point is behind the camera"), "{error}");
     assert!(error.contains(':') && line > 1, "{error}");
+}
+
+/// Splits rows as the problem says.
+fn split(problem: &Problem, rows: Measurements) -> Dataset {
+    let split = flexcal::measurement::Split::new(problem, &rows).unwrap();
+    Dataset { measurements: rows, split }
+}
+
+/// Returns what the fit says to be left open.
+fn open(found: &Identification) -> Vec<&str> {
+    let is_open = |code| code == FindingCode::NotToldApart;
+    let open = found.findings.iter().filter(|finding| is_open(finding.code));
+    open.map(|finding| finding.word("what").unwrap()).collect()
+}
+
+#[test]
+fn a_scale_that_no_length_gives_is_named() {
+    let lights = |bar: &str| -> String {
+        let light = |(k, [x, y, z]): (usize, [f64; 3])| {
+            format!(
+                "[[marker]]\nname = \"light{k}\"\nat_m = [{x}, {y}, {z}]\nrotation_deg = [0, 0, 0]\n\
+                 points_mm = [[0, 0, 0]{}]\n",
+                if k == 0 { bar } else { "" }
+            )
+        };
+        let places = [[0.25, 0.0, -0.2], [0.45, 0.2, -0.1], [0.1, -0.2, -0.2], [0.5, -0.1, 0.0]];
+        places.into_iter().enumerate().map(light).collect()
+    };
+    let (head, after) = CAMERAS.split_once("[[camera]]").unwrap();
+    let hand = after.split_once("[[camera]]").unwrap().0;
+    let head = head.replace("\"base.*\" = { free = true }\n", "").replace(
+        "\"marker*\" = { free = true }",
+        "\"marker*.x\" = { free = true }\n\"marker*.y\" = { free = true }\n\"marker*.z\" = { free = true }",
+    );
+    let data = "[data]\nheld_out = { fraction = 0.2, seed = 1 }\n";
+    let found = |bar: &str| {
+        let mut problem = problem(&format!("{head}[[camera]]{hand}{}{data}", lights(bar)));
+        // Moments of known weights would depend on the lengths.
+        problem.joints.iter_mut().for_each(|joint| joint.stiffness = None);
+        problem.parameters.retain(|rule| !rule.pattern.contains("stiffness"));
+        let rows = "q1_rad,q2_rad,q3_rad,q4_rad,q5_rad,q6_rad,camera,marker,point,u_px,v_px\n";
+        let mut text = rows.to_owned();
+        for line in table(&problem, 60, false).lines().filter(|line| line.contains(",hand,")) {
+            writeln!(text, "{}", line.trim_end_matches(',')).unwrap();
+        }
+        let rows = read_table(&problem, &text);
+        let model = model_of(&problem, &rows);
+        let rows = measured(&model, &rows, &DVector::zeros(model.parameters.len()), 1.0);
+        identify(&problem, &split(&problem, rows), &Options::default()).unwrap()
+    };
+    let without = found("");
+    assert!(open(&without).contains(&"scale"), "{:?}", without.findings);
+    let said = without.findings.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n");
+    assert_contains(&said, &["the scale: no length is known (", "view a marker of several points"]);
+    let with = found(", [60, 0, 0]");
+    assert!(!open(&with).contains(&"scale"), "{:?}", with.findings);
+}
+
+#[test]
+fn poses_that_views_leave_open_are_refused_with_the_reason() {
+    let flat = CAMERAS.replace("[60, 60, 20]", "[60, 60, 0]");
+    let known = problem(&flat);
+    let mut text =
+        "q1_rad,q2_rad,q3_rad,q4_rad,q5_rad,q6_rad,camera,marker,point,u_px,v_px\n".to_owned();
+    for turn in 0..6 {
+        for point in 0..4 {
+            writeln!(text, "0,1,-1.6,0,0.9,{},hand,board,{point},1,1", 0.3 * f64::from(turn))
+                .unwrap();
+        }
+    }
+    let rows = read_table(&known, &text);
+    let model = model_of(&known, &rows);
+    let rows = measured(&model, &rows, &DVector::zeros(model.parameters.len()), 0.0);
+    assert!(rows.len() >= 16, "{}", rows.len());
+    let unknown = flat
+        .replace("at_m = [0.03, -0.05, 0.04]\nrotation_deg = [2, -3, 40]\n", "")
+        .replace("at_m = [0.25, 0, -0.2]\nrotation_deg = [3, 4, 5]\n", "");
+    let unknown = problem(&unknown);
+    let error = |rows: Measurements| {
+        let found = identify(&unknown, &split(&unknown, rows), &Options::default());
+        found.map(|_| ()).unwrap_err().to_string()
+    };
+    let first: Vec<usize> = (0..8).collect();
+    for (rows, why) in [
+        (rows.clone(), "the camera does not turn about two axes that are not parallel"),
+        (rows.select(&first), "fewer than three configurations show them together"),
+    ] {
+        let said = error(rows);
+        assert_contains(
+            &said,
+            &["camera \"hand\" and marker \"board\"", why, "declare at_m and rotation_deg"],
+        );
+    }
+}
+
+#[test]
+fn an_error_of_the_lens_is_not_called_one_of_the_arm() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/observations/camera");
+    let free = std::fs::read_to_string(folder.join("problem.toml")).unwrap();
+    // The distortion of the true lens is held at 0.
+    let held = parse(&free.replace("\"camera*\" = { free = true }\n", ""));
+    let table = std::fs::read_to_string(folder.join("data.csv")).unwrap();
+    let data = split(&held, read_table(&held, &table));
+    let closed = close(&held, &data, &Options::default()).unwrap();
+    let finding = closed.before.fit.finding(FindingCode::LensContradicted).unwrap();
+    let names = finding.value("parameters").unwrap().as_array().unwrap();
+    assert!(names.contains(&Value::from("camera[hand].k1")), "{finding}");
+    assert!(closed.effects.is_empty(), "{:?}", closed.effects);
+    let found = identify(&parse(&free), &data, &Options::default()).unwrap();
+    assert!(!found.has(FindingCode::LensContradicted) && found.is_trusted());
 }

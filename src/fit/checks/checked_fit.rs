@@ -45,6 +45,9 @@ pub(in crate::fit) struct CheckedFit<'a> {
     /// Stage with all unknowns and identification rows, with both the declared σ and those that the
     /// fit assumed.
     pub whole: &'a Stage<'a>,
+    /// Triangular factor of the whitened Jacobian of the unknowns of `whole`, without priors, at
+    /// the registered nominal arm.
+    pub triangle: &'a DMatrix<f64>,
     /// True if the problem or the table declares the σ of positions.
     pub has_declared_noise: bool,
     /// Source of the σ of positions.

@@ -115,6 +115,9 @@ finding_codes! {
     OrientationMisfit: Error "orientation-misfit" ["rms", "sigma", "conventions"]
         "The fitted arm misses the measured orientations by more than 2° and 20 σ.",
         "check the convention of the orientation columns and their frames";
+    LensContradicted: Error "lens-contradicted" ["parameters", "before", "after"]
+        "Held intrinsics of a camera cause most of the misfit: with them free it falls by more than half.",
+        "free them in [parameters] (\"camera*.f*\" = { free = true } …), or declare better ones";
     PriorsDecide: Warning "priors-decide" ["poses", "coordinates", "parameters"]
         "The poses measure fewer coordinates than parameters are fitted, so that priors decide part of the result.",
         "measure more different poses";
@@ -157,6 +160,9 @@ finding_codes! {
     PriorWidth: Note "prior-width" ["rule", "declared", "estimated"]
         "The fitted deviations speak for a prior σ that is more than twice as large or as small.",
         "declare the estimated σ, or leave the prior as it is where it is known better";
+    NotToldApart: Note "not-told-apart" ["what", "parameters"]
+        "The rows alone leave a quantity open: the pose of the base, the scale, a focal length, or parameters that move the same way.",
+        "hold some of the parameters, or measure what determines them";
 }
 
 /// Circumstance that a check of a fit reports.

@@ -10,10 +10,12 @@ pub(super) mod finding;
 pub(super) mod fitted_rows;
 pub(super) mod held_out;
 mod held_out_placed;
+pub(super) mod lens;
 pub(super) mod misfit;
 mod misread;
 pub(super) mod misreading;
 pub(super) mod nominal_error;
+pub(super) mod open_directions;
 mod orientation;
 pub(super) mod outliers;
 pub(super) mod parameter_limits;
@@ -56,6 +58,7 @@ const CHECKS: &[&dyn Check] = &[
     &fitted_rows::SteadyPoints,
     &fitted_rows::NoOutliers,
     &priors::PriorWidths,
+    &open_directions::NamedDirections,
 ];
 
 /// Runs every check on a fit.

@@ -81,6 +81,28 @@ pub(super) fn poses_from_views(
     known
 }
 
+/// Returns a camera and a marker whose poses the views do not determine, with the reason; `None` if
+/// they determine the poses of all `wanted` cameras and markers, or no view gives a marker's pose.
+pub(super) fn undecided(
+    model: &Model,
+    poses: &[Pose],
+    wanted: &[usize],
+    x: &DVector<f64>,
+) -> Option<([usize; 2], &'static str)> {
+    let known = poses_from_views(model, poses, wanted, x);
+    let is_open = |fixture: &usize| wanted.contains(fixture) && !known.contains_key(fixture);
+    let views = views(model, poses, &model.fixtures(x.as_slice()), x);
+    let open = views.iter().find(|view| is_open(&view.camera) && is_open(&view.marker))?;
+    let pair = [open.camera, open.marker];
+    let count = views.iter().filter(|view| [view.camera, view.marker] == pair).count();
+    let why = if count < MIN_VIEWS {
+        "fewer than three configurations show them together"
+    } else {
+        "the camera does not turn about two axes that are not parallel"
+    };
+    Some((pair, why))
+}
+
 /// Returns the views in which the marker has enough visible points to determine its pose.
 fn views(
     model: &Model,

@@ -7,7 +7,7 @@ use crate::fit::errors::of_kind;
 use crate::fit::stages::alternation::{Alternation, Anderson, contraction};
 use crate::fit::stages::custom_solver::CustomSolver;
 use crate::fit::stages::earlier_data::EarlierData;
-use crate::fit::stages::fixture_location::locate;
+use crate::fit::stages::fixture_location::{locate, undecided_views};
 use crate::fit::stages::gauge::Gauge;
 use crate::fit::stages::noise_model::NoiseModel;
 use crate::fit::stages::placement::HeldOutOnly;
@@ -241,10 +241,25 @@ impl<'a> Fitting<'a> {
             let kind = InputErrorKind::NoEquilibrium;
             let lost_pose = place.map(|k| self.measurements.location(of_cameras[k]).error(kind));
             let behind = InputErrorKind::PointBehindCamera;
-            lost_pose.or_else(|| lost(&of_cameras, &self.located(), behind))
+            lost_pose
+                .or_else(|| self.undecided(&of_cameras))
+                .or_else(|| lost(&of_cameras, &self.located(), behind))
         };
         lost(&others, &x, InputErrorKind::NoEquilibrium)
             .or_else(|| if of_cameras.is_empty() { None } else { behind() })
+    }
+
+    /// Returns an error at the first row of a camera and a marker whose poses the views leave open.
+    fn undecided(&self, rows: &[usize]) -> Option<InputError> {
+        let x = DVector::zeros(self.model.parameters.len());
+        let ([camera, marker], why) = undecided_views(self.model, &self.poses(rows), &x)?;
+        let is_of_pair = |row: &&usize| {
+            self.measurements.observation(**row).fixtures() == [Some(camera), Some(marker)]
+        };
+        let row = *rows.iter().find(is_of_pair)?;
+        let [camera, marker] = [camera, marker].map(|fixture| self.model.fixture_name(fixture));
+        let kind = InputErrorKind::ViewsUndecided { camera, marker, why };
+        Some(self.measurements.location(row).error(kind))
     }
 
     /// Returns the full parameter vector of the nominal arm, with free bases, targets and fixtures

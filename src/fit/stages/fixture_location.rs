@@ -3,7 +3,7 @@
 
 use nalgebra::{DMatrix, DVector, Matrix3, SymmetricEigen, Vector3};
 
-use super::camera_start::poses_from_views;
+use super::camera_start::{poses_from_views, undecided};
 use crate::model::parameter::{Parameter, ParameterSite};
 use crate::model::{Model, Pose};
 use crate::problem::FixtureKind;
@@ -30,19 +30,7 @@ pub(crate) fn locate(
     chosen: impl Fn(usize) -> bool,
     x: &mut DVector<f64>,
 ) {
-    let free = |(k, parameter): (usize, &Parameter)| match parameter.site {
-        ParameterSite::Fixture { fixture, kind, axis }
-            if parameter.sigma.is_none()
-                && !parameter.is_bounded()
-                && !model.is_declared(fixture, axis)
-                && chosen(k) =>
-        {
-            Some((fixture, kind, axis, k))
-        }
-        _ => None,
-    };
-    let free: Vec<(usize, FixtureKind, usize, usize)> =
-        model.parameters.iter().enumerate().filter_map(free).collect();
+    let free = free_numbers(model, chosen);
     if free.is_empty() {
         return;
     }
@@ -73,6 +61,49 @@ pub(crate) fn locate(
     }
 }
 
+/// Returns fixture, kind, axis and parameter of each number of a fixture that is located: free
+/// without prior and bounds, without a declared value, and chosen.
+fn free_numbers(
+    model: &Model,
+    chosen: impl Fn(usize) -> bool,
+) -> Vec<(usize, FixtureKind, usize, usize)> {
+    let free = |(k, parameter): (usize, &Parameter)| match parameter.site {
+        ParameterSite::Fixture { fixture, kind, axis }
+            if parameter.sigma.is_none()
+                && !parameter.is_bounded()
+                && !model.is_declared(fixture, axis)
+                && chosen(k) =>
+        {
+            Some((fixture, kind, axis, k))
+        }
+        _ => None,
+    };
+    model.parameters.iter().enumerate().filter_map(free).collect()
+}
+
+/// Returns the cameras and markers whose pose is free in all six coordinates.
+fn wanted_poses(free: &[(usize, FixtureKind, usize, usize)]) -> Vec<usize> {
+    let is_of_pose =
+        |(_, kind, axis, _): &&(usize, FixtureKind, usize, usize)| kind.has_pose() && *axis < 6;
+    let mut wanted: Vec<usize> = free.iter().map(|(fixture, ..)| *fixture).collect();
+    wanted.dedup();
+    wanted.retain(|fixture| {
+        free.iter().filter(is_of_pose).filter(|(of, ..)| of == fixture).count() == 6
+    });
+    wanted
+}
+
+/// Returns a camera and a marker whose free poses the views in `poses` do not determine at the full
+/// parameter vector `x`, with the reason.
+pub(crate) fn undecided_views(
+    model: &Model,
+    poses: &[Pose],
+    x: &DVector<f64>,
+) -> Option<([usize; 2], &'static str)> {
+    let wanted = wanted_poses(&free_numbers(model, |_| true));
+    if wanted.is_empty() { None } else { undecided(model, poses, &wanted, x) }
+}
+
 /// Sets the poses of cameras and markers that are free in all six coordinates.
 fn locate_cameras(
     model: &Model,
@@ -84,9 +115,7 @@ fn locate_cameras(
         free.iter()
             .filter(move |(of, kind, axis, _)| *of == fixture && kind.has_pose() && *axis < 6)
     };
-    let mut wanted: Vec<usize> = free.iter().map(|(fixture, ..)| *fixture).collect();
-    wanted.dedup();
-    wanted.retain(|&fixture| of_pose(fixture).count() == 6);
+    let wanted = wanted_poses(free);
     if wanted.is_empty() {
         return;
     }

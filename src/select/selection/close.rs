@@ -104,7 +104,12 @@ pub fn close_by(
     let declared = Fitted::new(problem.positions_alone(), &data, options)?;
     let before = trace_fit(&declared, &data);
     let mut state = SearchState::new(&stoppable, options, &declared);
-    let result = search(&mut state, declared.clone());
+    // An error of a lens would be taken for one of the arm.
+    let result = if declared.found.has(FindingCode::LensContradicted) {
+        Ok((declared.clone(), None))
+    } else {
+        search(&mut state, declared.clone())
+    };
     let interrupted = result.as_ref().is_err_and(IdentifyError::is_interrupted);
     options.report_progress(|| Progress::Finishing);
     state.data = &data;

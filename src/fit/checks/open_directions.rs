@@ -1,0 +1,354 @@
+//! Directions of the unknowns that no row determines, in words: the base in the measuring frame,
+//! the scale, the last link against a camera, a focal length against the distance.
+//!
+//! The unknowns are grouped by what they describe. A direction of the null space that lies in the
+//! unknowns of a few groups says which of them the rows do not tell apart.
+
+use nalgebra::{DMatrix, DVector, RowDVector};
+use serde_json::json;
+
+use super::checked_fit::{Check, CheckedFit};
+use super::finding::{Finding, FindingCode};
+use crate::fit::stages::parameter_size::plausible;
+use crate::least_squares::{UnidentifiableCombination, Weak};
+use crate::model::parameter::Parameter;
+use crate::quantity::Unit;
+
+/// Largest squared part of a unit direction outside a set of unknowns at which it lies in the set.
+const MAX_SQUARED_OUTSIDE: f64 = 1e-6;
+/// Smallest part of a unit direction outside earlier directions at which it is a further one.
+const MIN_FURTHER: f64 = 0.1;
+/// Smallest weight of an unknown in a unit direction at which it is named.
+const MIN_NAMED_WEIGHT: f64 = 0.02;
+/// Plausible deviation of a focal length or an image centre \[px\].
+const PLAUSIBLE_PIXELS: f64 = 1000.0;
+/// Maximum number of unknowns and groups that a sentence names.
+const MAX_NAMED: usize = 8;
+
+/// Kind of a quantity that the rows leave open.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Open {
+    Unseen,
+    Together,
+    Place,
+    Apart,
+    Focal,
+    Scale,
+}
+
+impl Open {
+    /// Returns the word in `numbers` of the finding.
+    const fn word(self) -> &'static str {
+        match self {
+            Self::Unseen => "unseen",
+            Self::Together => "together",
+            Self::Place => "place",
+            Self::Apart => "apart",
+            Self::Focal => "focal-length",
+            Self::Scale => "scale",
+        }
+    }
+
+    /// Returns a statement and a remedy; `names` are the unknowns and groups involved.
+    fn words(self, names: &str) -> [String; 2] {
+        let texts = match self {
+            Self::Unseen => {
+                (format!("no row depends on {names}"), "hold them, or measure rows that do")
+            }
+            Self::Together => (
+                format!("{names} can move together: no row refers to a known place"),
+                "declare the place of one of them (at_m, rotation_deg)",
+            ),
+            Self::Place => (
+                format!(
+                    "the pose of the base: no rows against known places determine it ({names})"
+                ),
+                "fix base.* (fixed = true), or declare the place of a point, an anchor or a marker (at_m)",
+            ),
+            Self::Apart => (format!("the rows do not tell {names} apart"), "hold some of them"),
+            Self::Focal => (
+                format!("the focal length against the distance ({names})"),
+                "view the board at an angle, hold fx and fy, or give them priors (sigma_px)",
+            ),
+            Self::Scale => (
+                format!("the scale: no length is known ({names})"),
+                "declare a [[distance]], measure one, or view a marker of several points",
+            ),
+        };
+        [texts.0, texts.1.to_owned()]
+    }
+}
+
+/// Check that names what rows other than positions leave open.
+pub(super) struct NamedDirections;
+
+impl Check for NamedDirections {
+    fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
+        if fit.kinds().iter().all(|kind| kind.observation.is_position()) {
+            return Vec::new();
+        }
+        let parameters: Vec<&Parameter> = fit.whole.parameters().collect();
+        let model = fit.fitting.model;
+        let size = |parameter: &&Parameter| {
+            let without_prior = Parameter { sigma: None, ..(*parameter).clone() };
+            plausible(model, &without_prior).unwrap_or(match parameter.unit() {
+                Unit::Length => model.reach(),
+                Unit::Pixel => PLAUSIBLE_PIXELS,
+                _ => 1.0,
+            })
+        };
+        let sizes: Vec<f64> = parameters.iter().map(size).collect();
+        let all: Vec<Option<f64>> = sizes.iter().copied().map(Some).collect();
+        let Some(Weak { rows, .. }) = Weak::of(fit.triangle, &all) else { return Vec::new() };
+        let scaled = DMatrix::from_fn(rows.nrows(), rows.ncols(), |i, j| rows[(i, j)] * sizes[j]);
+        let names: Vec<&str> = parameters.iter().map(|parameter| &*parameter.name).collect();
+        let finding = |(open, names): (Open, Vec<String>)| {
+            let [text, remedy] = open.words(&listed(&names));
+            let numbers = [json!(open.word()), json!(names)];
+            Finding::new(FindingCode::NotToldApart, numbers, text).with_remedy(remedy)
+        };
+        open_directions(&scaled, &names).into_iter().map(finding).collect()
+    }
+}
+
+/// Returns a sentence for each quantity that unidentifiable `combinations` of the unknowns leave
+/// open, with a remedy.
+pub(crate) fn open_quantities(
+    combinations: &[UnidentifiableCombination],
+    unknowns: &[String],
+) -> Vec<String> {
+    let mut rows = DMatrix::zeros(combinations.len(), unknowns.len());
+    for (i, combination) in combinations.iter().enumerate() {
+        combination.weights.iter().for_each(|&(j, weight)| rows[(i, j)] = weight);
+    }
+    let names: Vec<&str> = unknowns.iter().map(String::as_str).collect();
+    // A tracker sees positions in its own frame: combinations of the arm stand in the list.
+    if !names.iter().any(|name| is_fixture(name)) {
+        return Vec::new();
+    }
+    let sentence = |(open, names): (Open, Vec<String>)| open.words(&listed(&names)).join("; ");
+    open_directions(&rows, &names).into_iter().map(sentence).collect()
+}
+
+/// Returns what a parameter describes: the part of its name before the last point.
+fn group(name: &str) -> &str {
+    name.rsplit_once('.').map_or(name, |(group, _)| group)
+}
+
+fn field(name: &str) -> &str {
+    name.rsplit_once('.').map_or("", |(_, field)| field)
+}
+
+fn is_joint(name: &str) -> bool {
+    name.starts_with("joint")
+}
+
+fn is_base(name: &str) -> bool {
+    group(name) == "base" || name.starts_with("base[")
+}
+
+fn is_tool(name: &str) -> bool {
+    group(name) == "tool" || name.starts_with("tool[")
+}
+
+/// Returns true for the place of a point, anchor, surface, camera or marker.
+fn is_fixture(name: &str) -> bool {
+    let words = ["point[", "anchor[", "surface[", "camera[", "marker["];
+    words.iter().any(|word| name.starts_with(word)) && !is_lens(name) && field(name) != "radius"
+}
+
+fn is_lens(name: &str) -> bool {
+    let of_pose = ["x", "y", "z", "rx", "ry", "rz"];
+    name.starts_with("camera[") && !of_pose.contains(&field(name))
+}
+
+fn is_length(name: &str) -> bool {
+    let fields: &[&str] = match () {
+        () if is_joint(name) => &["a", "d", "x", "y", "z"],
+        () if is_base(name) || is_tool(name) || is_fixture(name) => &["x", "y", "z", "d"],
+        () => &[],
+    };
+    fields.contains(&field(name)) || field(name) == "radius"
+}
+
+/// Returns what the null space `rows`, shape = (combinations, unknowns), leaves open, with the
+/// names of the unknowns or groups involved.
+fn open_directions(rows: &DMatrix<f64>, names: &[&str]) -> Vec<(Open, Vec<String>)> {
+    let Some(null) = orthonormal(rows) else { return Vec::new() };
+    let mut found = Found { null, names, accounted: Vec::new() };
+    let mut open = Vec::new();
+    let unseen: Vec<usize> =
+        (0..names.len()).filter(|&j| !found.within(|k| k == j).is_empty()).collect();
+    let unseen: Vec<String> = unseen.into_iter().map(|j| names[j].to_owned()).collect();
+    if !unseen.is_empty() {
+        open.push((Open::Unseen, unseen));
+    }
+    let named = |k: usize, is: &dyn Fn(&str) -> bool| is(names[k]);
+    // The list of combinations names those of the arm alone.
+    found.within(|k| named(k, &is_joint));
+    let mut add = |kind, directions: Vec<RowDVector<f64>>| {
+        if !directions.is_empty() {
+            open.push((kind, involved(&directions, names)));
+        }
+    };
+    add(Open::Together, found.within(|k| named(k, &is_fixture)));
+    add(Open::Place, found.within(|k| named(k, &|name| is_base(name) || is_fixture(name))));
+    let set_up = |name: &str| is_base(name) || is_tool(name) || is_fixture(name);
+    add(Open::Apart, found.within(|k| named(k, &set_up)));
+    let mut joints: Vec<&str> =
+        names.iter().copied().filter(|name| is_joint(name)).map(group).collect();
+    joints.dedup();
+    for joint in joints.into_iter().rev() {
+        let part = |name: &str| is_fixture(name) || is_tool(name) || group(name) == joint;
+        add(Open::Apart, found.within(|k| named(k, &part)));
+        let part = |name: &str| set_up(name) || group(name) == joint;
+        add(Open::Apart, found.within(|k| named(k, &part)));
+    }
+    let mut lenses: Vec<&str> =
+        names.iter().copied().filter(|name| is_lens(name)).map(group).collect();
+    lenses.dedup();
+    for camera in lenses {
+        let part = |name: &str| set_up(name) || is_lens(name) && group(name) == camera;
+        add(Open::Focal, found.within(|k| named(k, &part)));
+    }
+    let scale = found.within(|k| named(k, &is_length));
+    let is_scale = |direction: &RowDVector<f64>| {
+        let involves = |is: fn(&str) -> bool| {
+            (0..names.len()).any(|k| is(names[k]) && direction[k].abs() > MIN_NAMED_WEIGHT)
+        };
+        involves(is_joint) && involves(|name| is_fixture(name) || is_tool(name))
+    };
+    add(Open::Scale, scale.into_iter().filter(is_scale).collect());
+    open
+}
+
+/// Null space with the directions that have been found in it.
+struct Found<'a> {
+    /// Orthonormal rows that span the null space.
+    null: DMatrix<f64>,
+    names: &'a [&'a str],
+    /// Orthonormal directions that are named already.
+    accounted: Vec<RowDVector<f64>>,
+}
+
+impl Found<'_> {
+    /// Returns the directions of the null space that lie in the unknowns for which `is_in_set` holds
+    /// and that are not accounted for, and accounts for them.
+    fn within(&mut self, is_in_set: impl Fn(usize) -> bool) -> Vec<RowDVector<f64>> {
+        let outside: Vec<usize> = (0..self.names.len()).filter(|&k| !is_in_set(k)).collect();
+        if outside.len() == self.names.len() {
+            return Vec::new();
+        }
+        let outside = self.null.select_columns(&outside);
+        let eigen = (&outside * outside.transpose()).symmetric_eigen();
+        let mut further = Vec::new();
+        for (value, vector) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
+            if *value > MAX_SQUARED_OUTSIDE {
+                continue;
+            }
+            let mut direction: RowDVector<f64> = vector.transpose() * &self.null;
+            for _ in 0..2 {
+                for known in &self.accounted {
+                    direction -= known * direction.dot(known);
+                }
+            }
+            if direction.norm() > MIN_FURTHER {
+                direction.normalize_mut();
+                self.accounted.push(direction.clone());
+                (0..direction.len()).filter(|&k| !is_in_set(k)).for_each(|k| direction[k] = 0.0);
+                further.push(direction);
+            }
+        }
+        further
+    }
+}
+
+/// Returns orthonormal rows that span the rows of a matrix; `None` if it has none.
+fn orthonormal(rows: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let norms: Vec<f64> = rows.row_iter().map(|row| row.norm()).collect();
+    if norms.is_empty() || norms.iter().any(|norm| !(*norm > 0.0 && norm.is_finite())) {
+        return None;
+    }
+    let scale = DVector::from_iterator(norms.len(), norms.iter().map(|norm| norm.recip()));
+    let unit = DMatrix::from_fn(rows.nrows(), rows.ncols(), |i, j| rows[(i, j)] * scale[i]);
+    Some(unit.transpose().qr().q().transpose())
+}
+
+/// Returns the unknowns with a weight in some of the `directions`; those of bases, tools and
+/// fixtures by their group.
+fn involved(directions: &[RowDVector<f64>], names: &[&str]) -> Vec<String> {
+    let mut involved: Vec<String> = Vec::new();
+    for (k, name) in names.iter().enumerate() {
+        let is_part = directions.iter().any(|direction| direction[k].abs() > MIN_NAMED_WEIGHT);
+        let is_single = is_joint(name) || is_lens(name);
+        let word = if is_single { (*name).to_owned() } else { group(name).to_owned() };
+        if is_part && !involved.contains(&word) {
+            involved.push(word);
+        }
+    }
+    involved
+}
+
+/// Returns names in a sentence, and the number of those left out.
+fn listed(names: &[String]) -> String {
+    let more = names.len().saturating_sub(MAX_NAMED);
+    let shown = names[..names.len() - more].join(", ");
+    if more > 0 { format!("{shown} and {more} more") } else { shown }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn directions_are_named_by_their_unknowns() {
+        let names = [
+            "joint1.d",
+            "joint2.a",
+            "joint6.d",
+            "base.x",
+            "tool.x",
+            "camera[eye].z",
+            "camera[eye].fx",
+            "marker[board].x",
+            "marker[board].z",
+        ];
+        let row = |weights: &[(usize, f64)]| {
+            let mut row = RowDVector::zeros(names.len());
+            weights.iter().for_each(|&(k, weight)| row[k] = weight);
+            row
+        };
+        let open = |rows: &[RowDVector<f64>]| {
+            let found = open_directions(&DMatrix::from_rows(rows), &names);
+            found
+                .into_iter()
+                .map(|(open, names)| (open.word(), names.join(" ")))
+                .collect::<Vec<_>>()
+        };
+        let unseen = row(&[(4, 1.0)]);
+        let place = row(&[(3, 1.0), (7, -1.0)]);
+        let last = row(&[(2, 1.0), (5, -1.0)]);
+        let focal = row(&[(6, 1.0), (5, 0.2), (8, -0.5)]);
+        let scale = row(&[(0, 0.4), (1, 0.6), (2, 0.1), (5, 0.2), (7, 0.3), (8, 0.9)]);
+        let expected = |word: &'static str, names: &str| (word, names.to_owned());
+        assert_eq!(open(&[unseen.clone()]), [expected("unseen", "tool.x")]);
+        assert_eq!(
+            // Mixed, the space is the same.
+            open(&[
+                unseen.clone() + &place,
+                &place - &last,
+                last.clone(),
+                focal + &last,
+                scale + place.clone()
+            ]),
+            [
+                expected("unseen", "tool.x"),
+                expected("place", "base marker[board]"),
+                expected("apart", "joint6.d camera[eye]"),
+                expected("focal-length", "camera[eye] camera[eye].fx marker[board]"),
+                expected("scale", "joint1.d joint2.a joint6.d base camera[eye] marker[board]"),
+            ]
+        );
+        assert_eq!(open_directions(&DMatrix::zeros(0, names.len()), &names), []);
+    }
+}
