@@ -23,8 +23,18 @@ pub struct Law {
     terms: Vec<Parsed>,
     parameters: Vec<LawParameter>,
     covariates: Vec<String>,
-    /// Log prior probability of a law that a search composed; `None` for a declared one.
-    description: Option<f64>,
+    /// What the search knows of a law that it composed; `None` for a declared one.
+    description: Option<Description>,
+}
+
+/// What a search knows of a law that it composed.
+#[derive(Debug, Clone, PartialEq)]
+struct Description {
+    /// ln of the prior probability among all laws that the search could compose at the site.
+    ln_prior: f64,
+    /// Laws of other form whose predictions noise does not tell apart in the measured poses, each
+    /// with its share of the probability.
+    rivals: Vec<(Law, f64)>,
 }
 
 /// Place of a law on the arm.
@@ -182,16 +192,24 @@ impl Law {
     }
 
     /// Returns the law marked as composed by a search, with ln of its prior probability among all
-    /// laws that the search could compose at its site.
+    /// laws that the search could compose at its site. `rivals` are the laws of other form whose
+    /// predictions noise does not tell apart in the measured poses, each with its share of the
+    /// probability that they and this law have together.
     #[must_use]
-    pub fn described(self, ln_prior: f64) -> Self {
-        Self { description: Some(ln_prior), ..self }
+    pub fn described(self, ln_prior: f64, rivals: Vec<(Self, f64)>) -> Self {
+        Self { description: Some(Description { ln_prior, rivals }), ..self }
     }
 
     /// Returns ln of the prior probability of a law that a search composed; `None` for a declared
     /// one.
     pub fn description(&self) -> Option<f64> {
-        self.description
+        self.description.as_ref().map(|description| description.ln_prior)
+    }
+
+    /// Returns the laws of other form whose predictions noise does not tell apart from this one in
+    /// the measured poses, each with its share of the probability; none for a declared law.
+    pub fn rivals(&self) -> &[(Self, f64)] {
+        self.description.as_ref().map_or(&[], |description| &description.rivals)
     }
 
     /// Returns the name of the law.

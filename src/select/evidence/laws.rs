@@ -21,7 +21,9 @@ use crate::problem::{Effect, Problem};
 use crate::residual_tests::Covariate;
 use crate::select::data::Data;
 use crate::select::fitted::Fitted;
-use crate::select::grammar::{MAX_POSES, Noise, Proposal, Quantities, WhitenedSite, proposals};
+use crate::select::grammar::{
+    MAX_POSES, Noise, Proposal, Quantities, WhitenedSite, Written, proposals,
+};
 
 /// Smallest probability of a set at which laws are searched in place of its members: at the
 /// coordinate of a joint, and elsewhere.
@@ -141,11 +143,15 @@ fn effect(problem: &Problem, at: &LawAt, proposal: &Proposal) -> Option<Effect> 
     let (slides, covariates) = (problem.slides(), problem.covariate_names());
     let vocabulary =
         Vocabulary { slides: &slides, covariates: &covariates, ..Vocabulary::default() };
-    let written = &proposal.law;
     let site = LawSite::parse(&at.name, problem.joints.len(), &[], &[]).ok()?;
-    let parameters = written.parameters.clone();
-    let law = Law::new(&written.name, site, &written.formulas, None, parameters, &vocabulary);
-    Some(Effect::Law(law.ok()?.described(proposal.ln_prior)))
+    let law = |written: &Written| {
+        let parameters = written.parameters.clone();
+        let site = site.clone();
+        Law::new(&written.name, site, &written.formulas, None, parameters, &vocabulary).ok()
+    };
+    let rival = |(written, share): &(Written, f64)| Some((law(written)?, *share));
+    let rivals = proposal.rivals.iter().filter_map(rival).collect();
+    Some(Effect::Law(law(&proposal.law)?.described(proposal.ln_prior, rivals)))
 }
 
 /// Returns the joint, counted from 0, at whose command coordinate or about whose axis a hypothesis

@@ -4,6 +4,7 @@ use nalgebra::DVector;
 
 use super::beam::Beam;
 use super::dictionary::{factors, factors_elsewhere};
+use super::factor::Form;
 use super::quantities::Quantities;
 use super::refinement::{Refined, Refiner};
 use super::site::{Noise, Weighted, WhitenedSite};
@@ -23,12 +24,21 @@ const MAX_CLASSES: usize = 8;
 const MAX_CELL_DIFFERENCE: f64 = 0.5;
 /// Largest difference between the predictions of two sums of one class, in units of the noise.
 const MAX_CLASS_DIFFERENCE: f64 = 2.0;
+/// Largest difference between the predictions of two sums that count as one form, in units of the
+/// noise.
+const MAX_FORM_DIFFERENCE: f64 = 1.0;
+/// Smallest share of the probability of a class at which another form is listed.
+const MIN_SHARE: f64 = 0.02;
+/// Maximum number of other forms of a class that are listed.
+const MAX_RIVALS: usize = 4;
 
 /// Formula proposed for a class of sums with nearly equal predictions.
 #[derive(Debug, Clone)]
 pub struct Proposal {
     /// Formulas and parameters of the simplest sum of the class.
     pub law: Written,
+    /// Sums of the class that are another form, each with its share of the probability of the class.
+    pub rivals: Vec<(Written, f64)>,
     /// ln of the prior probability of the class if its likelihood is that of the proposed formula.
     pub ln_prior: f64,
     /// ln of the posterior probability of the class, up to a constant of the residual.
@@ -38,9 +48,46 @@ pub struct Proposal {
 }
 
 struct Class {
+    /// Sum that represents the class.
     first: Refined,
+    others: Vec<Refined>,
     /// ln of the summed posteriors of the class.
     ln_posterior: f64,
+}
+
+impl Class {
+    /// Returns the sums of the class that are of another form than the first one, each with its
+    /// share of the probability of the class, the most probable first.
+    ///
+    /// Two sums are of one form if their predictions differ by less than the squared distance
+    /// `largest`, or if the second one adds terms to the first.
+    fn rivals(&self, terms: &Terms, largest: f64) -> Vec<(&Refined, f64)> {
+        let forms = |sum: &Sum| -> Vec<Vec<Form>> {
+            let of_term = |term: &Vec<u16>| {
+                term.iter().map(|&k| terms.factors[usize::from(k)].form).collect()
+            };
+            sum.iter().map(of_term).collect()
+        };
+        let is_one_form = |one: &Refined, other: &Refined| {
+            let of_other = forms(&other.sum);
+            one.prediction.squared_distance(&other.prediction) < largest
+                || forms(&one.sum).iter().all(|term| of_other.contains(term))
+        };
+        let mut others: Vec<&Refined> = self.others.iter().collect();
+        others.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
+        let mut rivals: Vec<(&Refined, f64)> = Vec::new();
+        for other in others.into_iter().filter(|other| !is_one_form(&self.first, other)) {
+            let share = (other.ln_posterior - self.ln_posterior).exp();
+            match rivals.iter_mut().find(|(rival, _)| is_one_form(rival, other)) {
+                Some((_, sum)) => *sum += share,
+                None => rivals.push((other, share)),
+            }
+        }
+        rivals.retain(|(_, share)| *share >= MIN_SHARE);
+        rivals.sort_by(|a, b| b.1.total_cmp(&a.1));
+        rivals.truncate(MAX_RIVALS);
+        rivals
+    }
 }
 
 /// Returns the most probable formulas of the error at a site, given as in files. `joint` is the
@@ -83,11 +130,13 @@ pub fn proposals(
             let is_simpler = refined.ln_prior > class.first.ln_prior + 1e-9
                 && refined.ln_posterior > class.first.ln_posterior - 0.5;
             if is_simpler {
-                class.first = refined;
+                class.others.push(std::mem::replace(&mut class.first, refined));
+            } else {
+                class.others.push(refined);
             }
         } else {
             let ln_posterior = refined.ln_posterior;
-            classes.push(Class { first: refined, ln_posterior });
+            classes.push(Class { first: refined, others: Vec::new(), ln_posterior });
         }
     }
     classes.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
@@ -105,9 +154,15 @@ pub fn proposals(
         }
         let is_near = |other: &Weighted| other.squared_distance(&first.prediction) < largest;
         let is_present = predictions.iter().any(is_near);
-        let law = written((&terms, known), at, &first.sum, &first.inner);
-        let ln_prior = class.ln_posterior - first.ln_evidence;
-        Some(Proposal { law, ln_prior, ln_posterior: class.ln_posterior, is_present })
+        let as_written = |sum: &Refined| written((&terms, known), at, &sum.sum, &sum.inner);
+        let rivals = class.rivals(&terms, MAX_FORM_DIFFERENCE.powi(2) * factor);
+        Some(Proposal {
+            law: as_written(first),
+            rivals: rivals.into_iter().map(|(rival, share)| (as_written(rival), share)).collect(),
+            ln_prior: class.ln_posterior - first.ln_evidence,
+            ln_posterior: class.ln_posterior,
+            is_present,
+        })
     };
     classes.into_iter().filter_map(proposal).take(MAX_CLASSES).collect()
 }

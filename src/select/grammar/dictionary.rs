@@ -1,8 +1,9 @@
 //! All factors at one joint, each with its prior probability.
 
 use std::collections::BTreeSet;
+use std::f64::consts::PI;
 
-use super::factor::{Factor, Form};
+use super::factor::{Factor, Form, STRUT_RATIOS};
 use super::quantities::{Quantities, range};
 
 /// Highest order of sin(kq) and cos(kq) of a joint's command.
@@ -18,6 +19,11 @@ const STEP_MARGIN: f64 = 0.04;
 const SETTLING_TIMES: (f64, f64, u32) = (0.08, 0.8, 4);
 /// Factors a and b of the trial angle sums a q + b q'.
 const ANGLE_FACTORS: [[i32; 2]; 6] = [[1, 1], [1, -1], [2, 1], [2, -1], [1, 2], [1, -2]];
+/// Number of trial angles of a gas spring over a revolution.
+const STRUT_ANGLES: u32 = 16;
+/// Prior weight of a gas spring relative to another kind of factor: an arm that has one is mostly
+/// declared with it.
+const STRUT_WEIGHT: f64 = 0.25;
 /// Smallest share of the poses that must have a moment of either sign for the sign to be a factor.
 const MIN_SIGN_SHARE: f64 = 0.1;
 
@@ -38,7 +44,7 @@ pub fn factors_elsewhere(known: &Quantities) -> Vec<Factor> {
     for factor in &mut all {
         factor.ln_prior = match factor.form {
             Form::Command(_) => of_joint,
-            Form::Wave { .. } => of_joint - 2.0_f64.ln(),
+            Form::Wave { .. } => of_joint,
             Form::Settling => -f64::from(SETTLING_TIMES.2).ln(),
             Form::Step => -f64::from(STEP_TIMES).ln(),
             Form::Covariate(_) => -(known.covariates.len().max(1) as f64).ln(),
@@ -51,7 +57,8 @@ pub fn factors_elsewhere(known: &Quantities) -> Vec<Factor> {
 /// Returns all factors of formulas at the coordinate of the joint `joint_of_site`, counted from 0.
 ///
 /// All kinds of factors have the same prior probability. Half of it belongs to the joint itself,
-/// the other half to the other joints. Order k has 1/k² of the probability of order 1. The
+/// the other half to the other joints; sine, cosine and their pair are kinds of their own, because
+/// geometry and weight act through them. Order k has 1/k² of the probability of order 1. The
 /// probability is divided by the number of trial values of an inner parameter.
 pub fn factors(known: &Quantities, joint_of_site: usize) -> Vec<Factor> {
     let mut all: Vec<Factor> = Vec::new();
@@ -73,11 +80,22 @@ pub fn factors(known: &Quantities, joint_of_site: usize) -> Vec<Factor> {
             add(Form::Kink(joint), Some((at, step)), ln_joint - f64::from(KINK_POSITIONS).ln());
         }
         for order in (1..=HIGHEST_ORDER).filter(|_| known.turns[joint]) {
-            let ln_prior = ln_joint - (f64::from(order).powi(2) * orders).ln() - 3.0_f64.ln();
+            let ln_prior = ln_joint - (f64::from(order).powi(2) * orders).ln();
             for cosine in [false, true] {
                 add(Form::Wave { joint, order, cosine }, None, ln_prior);
             }
             add(Form::Harmonic { joint, order }, None, ln_prior);
+        }
+        if known.turns[joint] && joint == own {
+            let step = 2.0 * PI / f64::from(STRUT_ANGLES);
+            let trials = f64::from(STRUT_ANGLES) * STRUT_RATIOS.len() as f64;
+            let ln_prior = (STRUT_WEIGHT / trials).ln();
+            for ratio in 0..STRUT_RATIOS.len() {
+                for k in 0..STRUT_ANGLES {
+                    let form = Form::Strut { joint, ratio };
+                    add(form, Some((step * f64::from(k) - PI, step)), ln_prior);
+                }
+            }
         }
     }
     let turning: Vec<usize> =

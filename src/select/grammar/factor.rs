@@ -2,6 +2,10 @@
 
 use super::quantities::{Quantities, quoted};
 
+/// Trial values of k = 2ab/(a² + b²) of a gas spring whose pivots lie at the distances a and b from
+/// the joint.
+pub const STRUT_RATIOS: [f64; 3] = [0.4, 0.65, 0.85];
+
 /// Function of one quantity of a pose, from which formulas are built; joints are counted from 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Form {
@@ -26,6 +30,15 @@ pub enum Form {
         joint: usize,
         /// Order k.
         order: u32,
+    },
+    /// Moment of a spring of constant force, a gas spring: sin(q − c)/√(1 + k cos(q − c)) of a
+    /// joint's command. The inner parameter c is the angle at which its two pivots and the joint
+    /// are in line.
+    Strut {
+        /// Joint, counted from 0.
+        joint: usize,
+        /// Index of the ratio k among [`STRUT_RATIOS`].
+        ratio: usize,
     },
     /// Wave sin(a q + b q') or cos(a q + b q') of two joints' commands.
     OfSum {
@@ -83,7 +96,10 @@ impl Form {
             Self::Command(_) => 0,
             Self::Square(_) => 1,
             Self::Kink(_) => 2,
-            Self::Wave { .. } | Self::Harmonic { .. } => 3,
+            Self::Wave { cosine: false, .. } => 3,
+            Self::Wave { cosine: true, .. } => 18,
+            Self::Harmonic { .. } => 19,
+            Self::Strut { .. } => 20,
             Self::OfSum { .. } => 4,
             Self::Side(_) => 5,
             Self::Moment(_) => 6,
@@ -169,6 +185,10 @@ impl Form {
             Self::Harmonic { joint, order } => {
                 return vec![wave(joint, order, false), wave(joint, order, true)];
             }
+            Self::Strut { joint, ratio } => of(q, joint, &|x| {
+                let (sin, cos) = (x - inner).sin_cos();
+                sin / (1.0 + STRUT_RATIOS[ratio] * cos).sqrt()
+            }),
             Self::OfSum { joints, factors, cosine } => {
                 let [one, other] = joints.map(|joint| of(q, joint, &|x| x));
                 let [a, b] = factors.map(f64::from);
@@ -195,8 +215,8 @@ impl Form {
     }
 
     /// Returns the formula of each column as text. `inner` is the name or the value of the inner
-    /// parameter.
-    pub fn texts(self, known: &Quantities, inner: &str) -> Vec<String> {
+    /// parameter, `ratio` the name of the ratio of a gas spring.
+    pub fn texts(self, known: &Quantities, inner: &str, ratio: &str) -> Vec<String> {
         let q = |joint: usize| format!("q{}", joint + 1);
         let angle = |joint: usize, order: u32| match order {
             1 => q(joint),
@@ -212,6 +232,10 @@ impl Form {
             Self::Wave { joint, order, cosine } => of(cosine, angle(joint, order)),
             Self::Harmonic { joint, order } => {
                 return [false, true].map(|cosine| of(cosine, angle(joint, order))).to_vec();
+            }
+            Self::Strut { joint, .. } => {
+                let angle = format!("{} - {inner}", q(joint));
+                format!("sin({angle})/sqrt(1 + {ratio}*cos({angle}))")
             }
             Self::OfSum { joints, factors, cosine } => {
                 let [first, second] = joints.map(q);

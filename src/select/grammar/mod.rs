@@ -28,6 +28,7 @@ pub(super) use classes::{Proposal, proposals};
 pub(super) use prior::ln_prior;
 pub(super) use quantities::Quantities;
 pub(super) use site::{Noise, WhitenedSite};
+pub(super) use written::Written;
 
 /// Maximum number of poses on which formulas are searched. The formulas found are then evaluated on
 /// all poses of the evidence.

@@ -3,13 +3,17 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::factor::Factor;
+use super::factor::{Factor, Form};
 use super::quantities::Quantities;
 use super::site::WhitenedSite;
 use crate::least_squares::kernel::{dot, sum_of_squares};
 
 /// Prior probability that a term has one, two or three factors.
 const FACTOR_COUNT_PROBABILITIES: [f64; 3] = [0.6, 0.3, 0.1];
+/// Prior probability of a sine or a cosine that is multiplied by no other one, relative to one that
+/// is. An error by one joint's command has any phase, which their pair fits; in products of sines
+/// and cosines, as rotations give them, the zero positions of the arm determine the phases.
+const LONE_WAVE: f64 = 1.0 / 3.0;
 /// Smallest share of a term's squared length that the fitted parameters must leave.
 const MIN_LEFT: f64 = 2e-3;
 /// Number of terms whose columns are multiplied together in one matrix product.
@@ -144,7 +148,10 @@ impl Terms {
     fn is_new(&self, term: &Product) -> bool {
         let of = |k: u16| &self.factors[usize::from(k)];
         let wide = term.iter().filter(|k| of(**k).form.width() > 1).count();
+        // A gas spring stands alone.
+        let is_lone = term.iter().any(|&k| matches!(of(k).form, Form::Strut { .. }));
         wide <= 1
+            && (term.len() == 1 || !is_lone)
             && term.iter().enumerate().all(|(k, &one)| {
                 term[k + 1..].iter().all(|&other| {
                     let (a, b) = (of(one), of(other));
@@ -170,9 +177,15 @@ impl Terms {
             _ => 1.0,
         };
         let factors = term.iter().map(|&k| self.factors[usize::from(k)].ln_prior);
+        let forms = || term.iter().map(|&k| self.factors[usize::from(k)].form);
+        let is_wave = |form: &Form| matches!(form, Form::Wave { .. } | Form::OfSum { .. });
+        let has_wave = forms().any(|form| matches!(form, Form::Wave { .. }));
+        let is_lone = has_wave && forms().filter(is_wave).count() == 1;
+        let of_phase = if is_lone { LONE_WAVE } else { 1.0 };
         FACTOR_COUNT_PROBABILITIES[term.len().clamp(1, 3) - 1].ln()
             + factors.sum::<f64>()
             + orderings.ln()
+            + of_phase.ln()
     }
 
     /// Returns the columns of a term, one value per pose.

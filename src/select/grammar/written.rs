@@ -1,6 +1,6 @@
 //! Sums as formulas of a law.
 
-use super::factor::Form;
+use super::factor::{Form, STRUT_RATIOS};
 use super::quantities::Quantities;
 use super::terms::Sum;
 use super::terms::Terms;
@@ -19,6 +19,10 @@ pub struct Written {
 
 /// Number of significant digits with which parameters inside a formula are written.
 const PARAMETER_DIGITS: i32 = 3;
+/// Standard deviation of the prior of the ratio k of a gas spring about its trial value.
+const STRUT_RATIO_SIGMA: f64 = 0.2;
+/// Largest ratio k of a gas spring; at 1 it would have no length in its dead point.
+const MAX_STRUT_RATIO: f64 = 0.99;
 
 /// Writes a sum as a law at a site, which is given as in files, with the values `inner` of its
 /// inner parameters.
@@ -43,11 +47,7 @@ pub fn written(
                 (form, Some((_, step))) => {
                     let (letter, unit) =
                         if form == Form::Settling { ("tau", span) } else { ("c", 1.0) };
-                    let same = parameters.iter().filter(|known| known.name.starts_with(letter));
-                    let name = match same.count() {
-                        0 => letter.to_owned(),
-                        count => format!("{letter}{}", count + 1),
-                    };
+                    let name = numbered(letter, &parameters);
                     parameters.push(LawParameter {
                         name: name.clone(),
                         start: digits(x * unit),
@@ -59,7 +59,17 @@ pub fn written(
                 }
                 _ => String::new(),
             };
-            let texts = factor.form.texts(known, &word);
+            let ratio = numbered("k", &parameters);
+            if let Form::Strut { ratio: index, .. } = factor.form {
+                parameters.push(LawParameter {
+                    name: ratio.clone(),
+                    start: STRUT_RATIOS[index],
+                    min: Some(0.0),
+                    max: Some(MAX_STRUT_RATIO),
+                    sigma: Some(STRUT_RATIO_SIGMA),
+                });
+            }
+            let texts = factor.form.texts(known, &word, &ratio);
             products = products
                 .iter()
                 .flat_map(|left| {
@@ -72,6 +82,14 @@ pub fn written(
         formulas.extend(products.iter().map(|factors| joined(factors)));
     }
     Written { name: name(site, &formulas), formulas, parameters }
+}
+
+/// Returns a letter as the name of a further parameter, with a number if the letter is taken.
+fn numbered(letter: &str, parameters: &[LawParameter]) -> String {
+    match parameters.iter().filter(|known| known.name.starts_with(letter)).count() {
+        0 => letter.to_owned(),
+        count => format!("{letter}{}", count + 1),
+    }
 }
 
 /// Joins factors by `*`; repeated factors become powers.
@@ -105,7 +123,13 @@ fn name(site: &str, formulas: &[String]) -> String {
                 format!("step{}", part.trim_start_matches(|c: char| c.is_ascii_digit() || c == '.'))
             }
         });
-        let text = searched.collect::<String>().replace("^2", "squared").replace("^3", "cubed");
+        let text = searched.collect::<String>();
+        // The law of a gas spring, by what it is.
+        let strut = text.split_once(")/sqrt(1 + ").and_then(|(sine, _)| sine.strip_prefix("sin("));
+        let text = strut.map_or(text.clone(), |angle| {
+            format!("gas spring {}", angle.split(' ').next().unwrap_or_default())
+        });
+        let text = text.replace("^2", "squared").replace("^3", "cubed");
         let text = text.replace(" - ", "-minus-").replace(" + ", "-plus-");
         let words = text.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty());
         for word in words {

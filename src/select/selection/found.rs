@@ -80,6 +80,7 @@ pub(super) fn found(
         let alternatives = best.map_or_else(Vec::new, |(evidence, _)| {
             alternatives(evidence, &effect, &parts, MIN_ALTERNATIVE_ODDS)
         });
+        let rivals = if let Effect::Law(law) = &effect { law.rivals() } else { &[] };
         let of_parts: Vec<&SubsetEvidence> =
             subsets.iter().filter(|subset| effect.covers(&subset.effect)).collect();
         let share = of_parts.iter().map(|subset| subset.share).reduce(f64::min);
@@ -102,6 +103,14 @@ pub(super) fn found(
                 None => claims,
             })
         });
+        let of_class = claims.as_ref().map_or(0.0, |claims| claims.law.1);
+        let shares = rivals.iter().map(|(_, share)| share).sum::<f64>();
+        let claims = claims.map(|mut claims| {
+            claims.law.1 *= (1.0 - shares).max(0.0);
+            claims
+        });
+        let rivals = rivals.iter().map(|(law, share)| (Effect::Law(law.clone()), of_class * share));
+        let alternatives = with_rivals(alternatives, rivals);
         let check = reference_check(fitted, data, &effect);
         let verdict = check.as_ref().map(|check| check.verdict);
         let gear = match &effect {
@@ -204,6 +213,21 @@ fn limited_to(mut claims: Claims, others: [f64; 3]) -> Claims {
     let limited = [&mut claims.place.1, &mut claims.depends_on.1, &mut claims.law.1];
     limited.into_iter().zip(others).for_each(|(p, other)| *p = p.min(other));
     claims
+}
+
+/// Returns alternatives with the rivals of a law that are not among them, the most probable first.
+fn with_rivals(
+    mut alternatives: Vec<(Effect, f64)>,
+    rivals: impl Iterator<Item = (Effect, f64)>,
+) -> Vec<(Effect, f64)> {
+    for (rival, probability) in rivals {
+        match alternatives.iter_mut().find(|(known, _)| known.is_same_as(&rival)) {
+            Some((_, sum)) => *sum += probability,
+            None => alternatives.push((rival, probability)),
+        }
+    }
+    alternatives.sort_by(|a, b| b.1.total_cmp(&a.1));
+    alternatives
 }
 
 /// Returns effects that may replace `effect` in a model with the effects `held`; of each family at
