@@ -82,7 +82,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let rows = predicted.as_ref().filter(|_| has_remainder).map(|of| of.rows.as_slice());
     let judged = fit::acceptance(&problem, &data, &found, rows)?;
     let file = common.problem_file();
-    let inputs = std::iter::once(&file).chain(common.files(&problem));
+    let inputs = std::iter::once(&file)
+        .chain(common.files(&problem))
+        .chain(problem.data.joint_log.iter().flat_map(|log| &log.files));
     let record = AcceptanceRecord {
         inputs: inputs.map(|file| (file.clone(), sha256(file))).collect(),
         commit: commit(&file),

@@ -30,6 +30,13 @@ pub fn after_fit(
                 "{look}; if they are right, flexcal loop {named} looks for what the model lacks"
             )
         }
+        None if found.has(FindingCode::Misread) => format!(
+            "correct the table or {} as the warning says, then flexcal identify {named}",
+            common.problem_file().display()
+        ),
+        None if found.has(FindingCode::PositionsComputed) => {
+            "measure the poses with an instrument".to_owned()
+        }
         // If the priors contradict the fit, neither a cause nor a correction follows from it.
         None if found.has(FindingCode::PriorContradicted) => {
             let rule = found

@@ -22,13 +22,16 @@ pub fn estimate_brief(
     bound: Option<String>,
     columns: usize,
 ) -> String {
-    let mut blocks = vec![
-        headline(problem, found),
+    let mut blocks = vec![headline(problem, found)];
+    if let Some(reason) = found.first_error() {
+        blocks.push(Block::Text(format!("Not to be trusted: {reason}.")));
+    }
+    blocks.extend([
         Block::Table(errors_by_axis(found)),
         Block::lines(
             [noise(problem, found)].into_iter().chain(bound).collect::<Vec<_>>().join("\n"),
         ),
-    ];
+    ]);
     blocks.extend(influential_rows(found));
     blocks.extend(found.prior.as_ref().map(|comparison| Block::Text(summary(comparison))));
     blocks.push(Block::Lines(parameters(&found.estimates), remarks(found)));

@@ -296,6 +296,18 @@ fn an_estimate_with_a_name_twice_is_refused() {
 }
 
 #[test]
+fn an_acceptance_lists_the_joint_table_too() {
+    let bench = bench();
+    let problem = crate::common::arms::path("problems/bench-arm/two-tables");
+    bench.flexcal(&format!("accept {} --out joined", problem.display())).success();
+    let inputs = bench.json("joined/acceptance.json")["inputs"].as_array().unwrap().clone();
+    let file = |input: &Value| PathBuf::from(input["file"].as_str().unwrap());
+    let names: Vec<String> =
+        inputs.iter().map(|i| file(i).file_name().unwrap().display().to_string()).collect();
+    assert_eq!(names, ["problem.toml", "tracker.csv", "controller.csv"]);
+}
+
+#[test]
 fn an_acceptance_is_of_the_files_that_were_read() {
     let bench = bench();
     // Three of the held-out rows in one configuration, 0.3 mm apart along x.

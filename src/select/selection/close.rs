@@ -248,6 +248,10 @@ fn found_or_declared(
     if anew.found.describes_arm() {
         return Ok((anew, None));
     }
+    // Nothing that is fitted to a misread table says anything about the arm.
+    if declared.found.has(FindingCode::Misread) {
+        return Ok((declared.clone(), None));
+    }
     let is_kept =
         |other: &Fitted| other.found.termination.converged() && is_better(other, declared);
     if is_kept(&fitted) {
