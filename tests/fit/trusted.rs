@@ -218,6 +218,35 @@ fn gross_mistakes_are_fitted_and_named() {
 }
 
 #[test]
+fn positions_that_a_controller_computes_are_not_measurements() {
+    let (problem, mut data) = based();
+    let zero = DVector::zeros(model_of(&problem, &data.measurements).parameters.len());
+    let mut rng = ChaCha8Rng::seed_from_u64(11);
+    // Written to a thousandth of a millimetre.
+    measure(&problem, &mut data.measurements, &zero, 3e-7, &mut rng);
+    let found = fit(&problem, &data);
+    assert!(found.has(FindingCode::PositionsComputed) && !found.is_trusted());
+    measure(&problem, &mut data.measurements, &zero, SIGMA, &mut rng);
+    assert!(!fit(&problem, &data).has(FindingCode::PositionsComputed));
+}
+
+#[test]
+fn commands_with_few_digits_are_named_as_a_cause() {
+    let rounded = |step_deg: f64| {
+        let (problem, mut data) = based();
+        let round = |q: &mut f64| *q = ((q.to_degrees() / step_deg).round() * step_deg).to_radians();
+        data.measurements.configurations.iter_mut().for_each(round);
+        fit(&problem, &data)
+    };
+    let found = rounded(0.1);
+    let finding = found.finding(FindingCode::CommandsRounded).unwrap();
+    assert!((finding.number("step_deg").unwrap() - 0.1).abs() < 1e-12, "{finding}");
+    let ratio = finding.number("rounding").unwrap() / finding.number("rms").unwrap();
+    assert!((0.7..1.4).contains(&ratio), "{ratio}");
+    assert!(!rounded(0.001).has(FindingCode::CommandsRounded));
+}
+
+#[test]
 fn a_sound_table_is_not_misread() {
     let (problem, data) = based();
     let found = fit(&problem, &data);

@@ -73,6 +73,9 @@ finding_codes! {
     Misread: Error "misread" ["explanations", "before", "after"]
         "Table or problem read in another way leaves less than a fifth of the error.",
         "correct units, signs, order or convention in the table or the problem";
+    PositionsComputed: Error "positions-computed" ["rms"]
+        "The registered nominal arm predicts the positions to 10 µm per metre of its reach and a fifth of σ, as no built arm does.",
+        "measure the positions with an instrument; those that the controller shows are computed from the joint angles";
     MissesMeasurements: Error "misses-measurements" ["kind", "rms", "spread"]
         "The fitted arm misses the measurements by more than 2 % of their spread and more than 100 σ.",
         "check units, signs of joints, and whether base and session are declared";
@@ -124,6 +127,9 @@ finding_codes! {
     NominalFarOff: Warning "nominal-far-off" ["kind", "rms", "spread", "explanations"]
         "The nominal arm misses the measurements by more than a tenth of their spread.",
         "check units, signs of joints, and whether the numbers are of this convention of frames";
+    CommandsRounded: Warning "commands-rounded" ["step_deg", "rounding", "rms"]
+        "All commands are multiples of a step, and rounding to that step would leave an error of the size of the residual.",
+        "log the joint angles with more digits";
     EarlierEstimateContradicted: Warning "earlier-estimate-contradicted" ["cause", "probability", "widened"]
         "New rows contradict the earlier estimate that is the prior, with a false alarm in at most one of 100 fits.",
         "look for what happened to the arm since; flexcal watch says more";

@@ -27,6 +27,7 @@ pub(super) mod priors;
 pub(super) mod required_columns;
 pub(super) mod row_kind;
 pub(super) mod set_aside;
+mod table_digits;
 
 use checked_fit::{Check, CheckedFit, Convergence, EnoughEquations};
 use finding::Finding;
@@ -35,6 +36,7 @@ use finding::Finding;
 const CHECKS: &[&dyn Check] = &[
     &EnoughEquations,
     &misread::ReadAsMeant,
+    &table_digits::PositionsAreMeasured,
     &misfit::Misfit,
     &misfit::SizeOfArm,
     &Convergence,
@@ -48,6 +50,7 @@ const CHECKS: &[&dyn Check] = &[
     &orientation::OrientationsFit,
     &priors::DataDecide,
     &nominal_error::NominalIsNear,
+    &table_digits::CommandsHaveDigits,
     &prediction::PredictionHolds,
     &prediction::NotWorseThanNominal,
     &bounds::BoundsAreSeen,

@@ -6,6 +6,7 @@ use super::checked_fit::{Check, CheckedFit};
 use super::finding::{Finding, FindingCode};
 use super::misreading::Misreading;
 use super::row_kind::{RowKind, measured, named, size};
+use crate::model::parameter::{Parameter, ParameterSite};
 
 /// Largest error of the registered nominal arm, relative to the spread of the measurements, that is
 /// not reported.
@@ -36,13 +37,21 @@ impl Check for NominalIsNear {
         let rms = fit.registered.identification.rms.norm;
         let RowKind { observation, spread, .. } = fit.kind(fit.fitting.measurements.leading());
         let kind = observation.kind();
-        vec![far_off_finding(kind, rms, spread, &fit.explanations().near)]
+        let is_of_base =
+            |parameter: &Parameter| matches!(parameter.site, ParameterSite::Base { .. });
+        let is_base_free = fit.fitting.model.parameters.iter().any(is_of_base);
+        vec![far_off_finding(kind, (rms, spread), is_base_free, &fit.explanations().near)]
     }
 }
 
 /// Reports an error `rms` of the nominal arm that is large relative to the `spread` of rows of a
 /// kind \[m\] or \[rad\]. Each of `explanations`, best first, would explain it alone.
-fn far_off_finding(kind: &str, rms: f64, spread: f64, explanations: &[Misreading]) -> Finding {
+fn far_off_finding(
+    kind: &str,
+    (rms, spread): (f64, f64),
+    is_base_free: bool,
+    explanations: &[Misreading],
+) -> Finding {
     let words: Vec<String> = explanations.iter().map(Misreading::to_string).collect();
     let numbers = [kind.into(), rms.into(), spread.into(), json!(words)];
     if !rms.is_finite() {
@@ -51,12 +60,21 @@ fn far_off_finding(kind: &str, rms: f64, spread: f64, explanations: &[Misreading
             .with_remedy("check their units".to_owned());
     }
     let (what, by, part) = (measured(kind), size(kind, rms, 1), 100.0 * rms / spread);
-    let standing = if kind == "position" { ", wherever its base stands" } else { "" };
+    let standing = match kind {
+        "position" if is_base_free => ", wherever its base stands",
+        "position" => " with its base where the problem holds it",
+        _ => "",
+    };
     let text =
         format!("the nominal arm misses the {what} by {by}, {part:.0} % of their spread{standing}");
     let finding = Finding::new(FindingCode::NominalFarOff, numbers, text);
     match words.is_empty() {
         false => finding.with_remedy(format!("this would explain it: {}", words.join(", or "))),
+        true if kind == "position" && !is_base_free => finding.with_remedy(
+            "free the base in [parameters]: \"base.*\" = { free = true }; or check units and signs of \
+             joints"
+                .to_owned(),
+        ),
         true if kind == "position" => finding,
         true => finding.with_remedy(format!("check units, signs of joints, and {}", named(kind))),
     }

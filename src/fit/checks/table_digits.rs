@@ -1,0 +1,123 @@
+//! Checks of the table itself: positions that a controller computed, and commands with few digits.
+
+use serde_json::json;
+
+use super::checked_fit::{Check, CheckedFit};
+use super::finding::{Finding, FindingCode};
+use super::row_kind::{RowKind, size};
+use crate::problem::JointKind;
+
+/// Largest error of the registered nominal arm, relative to its reach, at which its positions count
+/// as computed. Built arms err by a hundred times that.
+const MAX_COMPUTED_ERROR: f64 = 1e-5;
+/// Largest such error relative to the declared σ of a coordinate.
+const MAX_COMPUTED_SIGMAS: f64 = 0.2;
+/// Minimum number of measured coordinates for each one that base and tools place.
+const MIN_COORDINATES: usize = 3;
+/// Trial steps of commands of revolute joints \[deg\], the largest first.
+const STEPS_DEG: [f64; 7] = [1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01];
+/// Largest distance of a command from a multiple of a step, relative to the step.
+const MAX_OFF_STEP: f64 = 1e-5;
+/// Minimum number of different commands of a joint by which its step is known.
+const MIN_COMMANDS: usize = 10;
+/// Smallest residual, in units of the declared σ, for which a cause in the commands is searched.
+const MIN_SIGMAS: f64 = 3.0;
+/// Range of the ratio of the error that rounding leaves to the residual, in which it may be the
+/// cause.
+const ROUNDING_RATIOS: std::ops::Range<f64> = 0.5..2.0;
+
+/// Checks that the positions were measured: the nominal arm does not predict them to 10 µm per metre
+/// of its reach.
+pub(super) struct PositionsAreMeasured;
+
+impl Check for PositionsAreMeasured {
+    fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
+        let RowKind { observation, rows, declared_sigma, .. } =
+            fit.kind(fit.fitting.measurements.leading());
+        let placed = fit.fitting.placements().len();
+        let rms = fit.registered.identification.rms.norm;
+        let limit = MAX_COMPUTED_ERROR * fit.fitting.model.reach();
+        let is_below_noise = declared_sigma.is_none_or(|sigma| rms < MAX_COMPUTED_SIGMAS * sigma);
+        let is_computed = observation.is_position()
+            && 3 * rows.len() > MIN_COORDINATES * placed.max(1)
+            && rms < limit
+            && is_below_noise;
+        if !is_computed {
+            return Vec::new();
+        }
+        let text = format!(
+            "the nominal arm predicts the positions to {}: they were computed from the joint angles, \
+             as a controller does, not measured",
+            size("position", rms, 5)
+        );
+        vec![Finding::new(FindingCode::PositionsComputed, [rms.into()], text)]
+    }
+}
+
+/// Checks that the commands of the joints have enough digits: rounding them does not explain the
+/// size of the residual.
+pub(super) struct CommandsHaveDigits;
+
+impl Check for CommandsHaveDigits {
+    fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
+        let kind = fit.kind(fit.fitting.measurements.leading());
+        let Some(sigma) = kind.declared_sigma.filter(|_| kind.observation.is_position()) else {
+            return Vec::new();
+        };
+        let rms = fit.rms(&kind.rows, &fit.fitting.position_errors(&kind.rows, &fit.end.x));
+        if rms < MIN_SIGMAS * kind.observation.root() * sigma {
+            return Vec::new();
+        }
+        let steps: Vec<(usize, f64)> = revolute_joints(fit)
+            .filter_map(|joint| Some((joint, step(fit, &kind.rows, joint)?)))
+            .collect();
+        if steps.is_empty() || steps.len() < revolute_joints(fit).count() {
+            return Vec::new();
+        }
+        let poses = fit.fitting.poses(&kind.rows);
+        let slopes = fit.fitting.model.command_jacobian(fit.problem, poses, &fit.end.x);
+        // A number that is rounded to a step errs by a uniform distribution of variance step²/12.
+        let squares = |(joint, step): &(usize, f64)| {
+            let lever: f64 = slopes.iter().map(|slope| slope.column(*joint).norm_squared()).sum();
+            step.powi(2) / 12.0 * lever / slopes.len().max(1) as f64
+        };
+        let rounding = steps.iter().map(squares).sum::<f64>().sqrt();
+        if !ROUNDING_RATIOS.contains(&(rounding / rms)) {
+            return Vec::new();
+        }
+        let coarsest = steps.iter().map(|(_, step)| step.to_degrees()).fold(0.0, f64::max);
+        let text = format!(
+            "all commands are multiples of {coarsest}°; if the table rounds them, that alone moves \
+             the target by {} rms, as large as the residual of {}",
+            size("position", rounding, 3),
+            size("position", rms, 3)
+        );
+        let numbers = [json!(coarsest), rounding.into(), rms.into()];
+        vec![Finding::new(FindingCode::CommandsRounded, numbers, text)]
+    }
+}
+
+/// Returns the revolute joints that take a command, counted from 0.
+fn revolute_joints<'f>(fit: &'f CheckedFit) -> impl Iterator<Item = usize> + 'f {
+    let is_revolute = |joint: &usize| {
+        fit.problem.joints[*joint].command_kind() == JointKind::Revolute
+    };
+    (0..fit.problem.joints.len()).filter(is_revolute)
+}
+
+/// Returns the largest trial step \[rad\] of which all commands of a joint are multiples; `None` if
+/// there is none, or too few different commands.
+fn step(fit: &CheckedFit, rows: &[usize], joint: usize) -> Option<f64> {
+    let measurements = fit.fitting.measurements;
+    let command = |&row: &usize| measurements.configurations[row * measurements.joints + joint];
+    let mut degrees: Vec<f64> = rows.iter().map(|row| command(row).to_degrees()).collect();
+    degrees.sort_by(f64::total_cmp);
+    degrees.dedup();
+    if degrees.len() < MIN_COMMANDS {
+        return None;
+    }
+    let is_step = |step: &&f64| {
+        degrees.iter().all(|q| (q / **step - (q / **step).round()).abs() < MAX_OFF_STEP)
+    };
+    STEPS_DEG.iter().find(is_step).map(|step| step.to_radians())
+}
