@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use serde::Deserialize;
 use serde_json::value::RawValue;
 use serde_json::{Map, Value};
 
@@ -23,6 +24,15 @@ pub enum Changes {
     Accepted,
 }
 
+/// First version of a format whose files have digests.
+const FIRST_SEALED_VERSION: u32 = 2;
+
+/// Entry of a result file that holds the version of its format.
+#[derive(Deserialize)]
+struct Format {
+    version: u32,
+}
+
 /// Returns the JSON object `text` with the digests of its values under an additional last key. A
 /// text that is no JSON object is returned unchanged.
 pub(crate) fn sealed(text: &str) -> String {
@@ -34,8 +44,8 @@ pub(crate) fn sealed(text: &str) -> String {
 }
 
 /// Returns the first key of a JSON object whose value differs from the one that [`sealed`] wrote,
-/// or that was added or removed. Returns `None` if nothing changed, or if the file contains no
-/// digests.
+/// or that was added or removed; the key of the digests themselves if they were removed from a file
+/// of a format that has them. Returns `None` if nothing changed.
 ///
 /// # Errors
 /// Returns an error if the text is no JSON object.
@@ -43,7 +53,12 @@ pub(crate) fn changed_key(text: &str) -> serde_json::Result<Option<String>> {
     let mut found = digests(text)?;
     found.remove(DIGEST_KEY);
     let expected: BTreeMap<String, Box<RawValue>> = serde_json::from_str(text)?;
-    let Some(expected) = expected.get(DIGEST_KEY) else { return Ok(None) };
+    let Some(expected) = expected.get(DIGEST_KEY) else {
+        let format: Option<Format> =
+            expected.get("format").and_then(|format| serde_json::from_str(format.get()).ok());
+        let is_sealed = format.is_some_and(|format| format.version >= FIRST_SEALED_VERSION);
+        return Ok(is_sealed.then(|| DIGEST_KEY.to_owned()));
+    };
     let expected: BTreeMap<String, String> =
         serde_json::from_str(expected.get()).unwrap_or_default();
     let is_changed = |key: &&String| found.get(*key) != expected.get(*key);

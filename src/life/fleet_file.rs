@@ -92,17 +92,29 @@ impl FleetPrior {
         if format != FORMAT || version > VERSION {
             return Err(syntax(format!("format {format}, version {version}")));
         }
-        let entry = |(name, entry): (String, Entry)| (name, (entry.mean, entry.sigma()));
-        let parameters: BTreeMap<String, (f64, f64)> = parameters.into_iter().map(entry).collect();
-        let is_usable = |(mean, sigma): &(f64, f64)| mean.is_finite() && *sigma > 0.0;
-        match parameters.iter().find(|(_, entry)| !is_usable(entry)) {
-            Some((name, _)) => Err(syntax(format!("{name}: not finite, or without a spread"))),
-            None => Ok(Self { file: file.to_owned(), problem, arm_parts, parameters }),
+        if let Some((name, _)) = parameters.iter().find(|(_, entry)| !entry.is_usable()) {
+            return Err(syntax(format!(
+                "{name}: mean, mean_error and spread are finite numbers, and the latter two are 0 or \
+                 more and not both 0"
+            )));
         }
+        let entry = |(name, entry): (String, Entry)| (name, (entry.mean, entry.sigma()));
+        let parameters = parameters.into_iter().map(entry).collect();
+        Ok(Self { file: file.to_owned(), problem, arm_parts, parameters })
     }
 }
 
+/// Largest magnitude of a number of a prior that is read.
+const MAX_MAGNITUDE: f64 = 1e100;
+
 impl Entry {
+    /// Returns true if the numbers are those of a distribution.
+    fn is_usable(&self) -> bool {
+        self.mean.abs() < MAX_MAGNITUDE
+            && [self.mean_error, self.spread].iter().all(|size| (0.0..MAX_MAGNITUDE).contains(size))
+            && self.sigma() > 0.0
+    }
+
     /// Returns 1 σ of the next arm: spread and error of the mean together.
     fn sigma(&self) -> f64 {
         self.spread.hypot(self.mean_error)

@@ -147,11 +147,14 @@ fn an_estimate_of_another_arm_is_refused() {
     folder.edit("problem.toml", "mass_kg = 4.2", "mass_kg = 4.3");
     let run = compensate().code(2);
     assert_contains(&run.stderr, &["estimate.json: was identified with another declared arm"]);
-    // Estimates of older versions contain no digest of the arm.
+    // A digest that was removed is missed, but estimates of older versions contain none.
     let mut old = folder.json("estimate.json");
-    for digest in ["arm_digest", "digest"] {
-        assert!(old.as_object_mut().unwrap().remove(digest).is_some());
+    for key in ["arm_digest", "digest"] {
+        assert!(old.as_object_mut().unwrap().remove(key).is_some());
     }
+    folder.write("estimate.json", old.to_string());
+    assert_contains(&compensate().code(2).stderr, &["estimate.json", "digest"]);
+    old["format"]["version"] = 1.into();
     folder.write("estimate.json", old.to_string());
     compensate().success();
 }

@@ -288,7 +288,8 @@ fn a_target_seen_in_held_out_rows_alone_does_not_touch_the_arm() {
         parameters.iter().map(|parameter| parameter.name.starts_with("tool[late]")).collect();
     // Positions of the nominal arm itself would count as computed, not as measured.
     let deviation = |k: usize| if parameters[k].name == "joint3.a" { 2e-3 } else { 0.0 };
-    let truth = DVector::from_fn(parameters.len(), |k, _| if late[k] { 0.04 } else { deviation(k) });
+    let truth =
+        DVector::from_fn(parameters.len(), |k, _| if late[k] { 0.04 } else { deviation(k) });
     rows.positions = predicted(&problem, &rows, &truth);
     let found = fit(&problem, &rows, &split);
     assert!((&found.x - &truth).amax() < 1e-9, "{:e}", found.x - truth);

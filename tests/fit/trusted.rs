@@ -234,7 +234,8 @@ fn positions_that_a_controller_computes_are_not_measurements() {
 fn commands_with_few_digits_are_named_as_a_cause() {
     let rounded = |step_deg: f64| {
         let (problem, mut data) = based();
-        let round = |q: &mut f64| *q = ((q.to_degrees() / step_deg).round() * step_deg).to_radians();
+        let round =
+            |q: &mut f64| *q = ((q.to_degrees() / step_deg).round() * step_deg).to_radians();
         data.measurements.configurations.iter_mut().for_each(round);
         fit(&problem, &data)
     };

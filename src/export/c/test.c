@@ -112,8 +112,9 @@ int main(void)
         compared, command, correct_us, unsettled);
     if (failed > 0 || !(position <= MAX_POSITION) || !(axis <= MAX_AXIS) || !(command <= MAX_COMMAND)
         || unsettled > (compared + unsettled) / MAX_UNSETTLED) {
-        (void)printf("FAILED: %d without an answer; allowed are %.0e m, %.0e rad and every %dth near singular poses\n",
-            failed, MAX_POSITION, MAX_COMMAND, MAX_UNSETTLED);
+        (void)printf("FAILED: %d without an answer (allowed: 0), %d of %d commands near singular poses (allowed: every %dth), "
+            "or further off than %.0e m, %.0e rad\n",
+            failed, unsettled, compared + unsettled, MAX_UNSETTLED, MAX_POSITION, MAX_COMMAND);
         return 1;
     }
     return 0;

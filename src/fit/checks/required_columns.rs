@@ -14,15 +14,19 @@ pub fn check_columns(problem: &Problem, rows: &Measurements) -> Result<(), Input
     not_finite(problem, rows).map_or(Ok(()), Err)
 }
 
-/// Returns the error of the first declared law with a formula that has no finite value in a row;
-/// `None` if all are finite.
+/// Largest value of a formula. Products and squares of larger ones leave the range of numbers, and
+/// no unit of a law is so small.
+const MAX_FORMULA: f64 = 1e30;
+
+/// Returns the error of the first declared law with a formula that has no value in a row, or one
+/// beyond [`MAX_FORMULA`]; `None` if there is none.
 fn not_finite(problem: &Problem, rows: &Measurements) -> Option<InputError> {
     let starts = rows.session_starts();
     problem.effects.iter().find_map(|EffectDeclaration { effect, location }| {
         let Effect::Law(_) = effect else { return None };
         effect.terms(problem).into_iter().find_map(|term| {
-            let is_lost =
-                |row: &usize| !term.regressor.value(&rows.setup(*row, &starts)).is_finite();
+            let value = |row: usize| term.regressor.value(&rows.setup(row, &starts));
+            let is_lost = |row: &usize| value(*row).is_nan() || value(*row).abs() > MAX_FORMULA;
             let row = (0..rows.len()).find(is_lost)?;
             let kind = InputErrorKind::FormulaNotFinite {
                 formula: term.regressor.text(),

@@ -99,9 +99,8 @@ impl Check for CommandsHaveDigits {
 
 /// Returns the revolute joints that take a command, counted from 0.
 fn revolute_joints<'f>(fit: &'f CheckedFit) -> impl Iterator<Item = usize> + 'f {
-    let is_revolute = |joint: &usize| {
-        fit.problem.joints[*joint].command_kind() == JointKind::Revolute
-    };
+    let is_revolute =
+        |joint: &usize| fit.problem.joints[*joint].command_kind() == JointKind::Revolute;
     (0..fit.problem.joints.len()).filter(is_revolute)
 }
 

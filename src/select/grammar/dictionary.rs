@@ -86,7 +86,7 @@ pub fn factors(known: &Quantities, joint_of_site: usize) -> Vec<Factor> {
             }
             add(Form::Harmonic { joint, order }, None, ln_prior);
         }
-        if known.turns[joint] && joint == own {
+        if known.turns[joint] && joint == joint_of_site {
             let step = 2.0 * PI / f64::from(STRUT_ANGLES);
             let trials = f64::from(STRUT_ANGLES) * STRUT_RATIOS.len() as f64;
             let ln_prior = (STRUT_WEIGHT / trials).ln();
