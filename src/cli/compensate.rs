@@ -124,9 +124,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
             written.display()
         )
     })?;
-    let all = found.reaches_all();
-    if !all && common.quiet {
+    let are_reached = found.reaches_all();
+    if !are_reached && common.quiet {
         diagnostic::warn("a target is not reached; without --quiet it is named");
     }
-    Ok(Outcome::trusted(all && trusted))
+    Ok(Outcome::trusted(are_reached && trusted))
 }

@@ -94,8 +94,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
             .map(|all| ("residuals.csv", residuals_csv(&problem, &rows, all))),
     );
     let residuals = prediction.residuals.as_deref().unwrap_or_default();
-    let errors = prediction.errors.as_ref().map(|known| {
-        let errors = PredictionErrors::new(known, &prediction.spreads);
+    let errors = prediction.errors.as_ref().map(|errors_of_rows| {
+        let errors = PredictionErrors::new(errors_of_rows, &prediction.spreads);
         match bounds {
             Some(bounds) => errors.with_bounds(residuals, bounds).to_json(),
             None => errors.to_json(),

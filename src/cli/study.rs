@@ -194,10 +194,12 @@ fn misprints(common: &Common, study: &MisprintStudy) -> Result<Outcome, Box<dyn 
 fn fit(common: &Common, study: &Study, store: &Store, shard: Shard) -> Result<(), Box<dyn Error>> {
     let parts = study::pending(study, store, shard)?;
     let share = study.parts().into_iter().enumerate().filter(|(index, _)| shard.holds(*index));
-    let all: usize = share.map(|(_, part)| part.repetitions.len()).sum();
+    let repetitions: usize = share.map(|(_, part)| part.repetitions.len()).sum();
     let open: usize = parts.iter().map(|part| part.repetitions.len()).sum();
-    let bar =
-        common.flags.prints_text().then(|| CountBar::new("fits", all as u64, (all - open) as u64));
+    let bar = common
+        .flags
+        .prints_text()
+        .then(|| CountBar::new("fits", repetitions as u64, (repetitions - open) as u64));
     let done = study::run(study, store, &parts, || bar.iter().for_each(CountBar::advance));
     bar.iter().for_each(CountBar::clear);
     Ok(done?)

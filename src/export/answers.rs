@@ -59,11 +59,11 @@ pub fn answers(
         }
         None => fit::predict(problem, Some(estimate), &rows, None)?.positions,
     };
-    let all: Vec<usize> = (0..rows.len()).collect();
-    let mut poses = placement.poses(&rows, &all, 1.0);
+    let all_rows: Vec<usize> = (0..rows.len()).collect();
+    let mut poses = placement.poses(&rows, &all_rows, 1.0);
     estimate.count_time_in(&placement, &mut poses);
     let axes = model.orientations(&poses, x.as_slice());
-    let few = rows.select(&all[..commands.min(rows.len())]);
+    let few = rows.select(&all_rows[..commands.min(rows.len())]);
     let goals = fit::waypoints(problem, &model, &x, &few).ok();
     let found = match (&goals, correction) {
         (None, _) => Vec::new(),

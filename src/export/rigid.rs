@@ -57,8 +57,8 @@ pub fn best_rigid(
     let placement = Placement::of(&rows);
     let model = estimate.model(Model::new(problem, &placement.bases, &placement.targets)?);
     let x = estimate.vector(problem, &model)?;
-    let all: Vec<usize> = (0..rows.len()).collect();
-    let mut poses = placement.poses(&rows, &all, 1.0);
+    let all_rows: Vec<usize> = (0..rows.len()).collect();
+    let mut poses = placement.poses(&rows, &all_rows, 1.0);
     estimate.count_time_in(&placement, &mut poses);
     let targets = model.target_positions(x.as_slice());
     let frames = model.frames(&poses, x.as_slice());

@@ -237,8 +237,9 @@ impl Identification {
     /// [`STRONG_CORRELATION`], strongest first.
     #[doc(hidden)]
     pub fn strong_correlations(&self) -> Vec<(String, String, f64)> {
-        let all = self.correlations();
-        all.above(STRONG_CORRELATION)
+        let correlations = self.correlations();
+        correlations
+            .above(STRONG_CORRELATION)
             .into_iter()
             .map(|(a, b, rho)| (a.to_owned(), b.to_owned(), rho))
             .collect()

@@ -106,7 +106,7 @@ fn as_map<S: serde::Serializer>(
 impl Argument {
     /// Returns the value in TOML syntax.
     pub fn toml(&self) -> String {
-        let list = |all: Vec<String>| format!("[{}]", all.join(", "));
+        let list = |entries: Vec<String>| format!("[{}]", entries.join(", "));
         match self {
             Self::Joint(joint) => joint.to_string(),
             Self::Orders(orders) => list(orders.iter().map(u32::to_string).collect()),
@@ -116,11 +116,11 @@ impl Argument {
             Self::Point([x, y]) => format!("[{}, {}]", float(*x), float(*y)),
             Self::Number(number) | Self::Length(number) => float(*number),
             Self::Numbers(numbers) => {
-                let all: Vec<String> = numbers
+                let entries: Vec<String> = numbers
                     .iter()
                     .map(|(key, value)| format!("{key} = {}", float(*value)))
                     .collect();
-                format!("{{ {} }}", all.join(", "))
+                format!("{{ {} }}", entries.join(", "))
             }
         }
     }

@@ -267,9 +267,12 @@ impl Effect {
             return format!("law {}", law.name());
         }
         let searched = self.searched();
-        let known = self.arguments().into_iter().filter(|(key, _)| Some(*key) != searched);
-        let place =
-            known.filter_map(|(_, argument)| argument.place()).collect::<Vec<_>>().join(",");
+        let fixed_arguments =
+            self.arguments().into_iter().filter(|(key, _)| Some(*key) != searched);
+        let place = fixed_arguments
+            .filter_map(|(_, argument)| argument.place())
+            .collect::<Vec<_>>()
+            .join(",");
         if place.is_empty() { self.name().to_owned() } else { format!("{} {place}", self.name()) }
     }
 
@@ -415,9 +418,9 @@ const MAX_JOINTS: usize = 1000;
 
 /// Returns `name = { key = value }`, or `name = true` without arguments.
 pub(crate) fn declaration(name: &str, arguments: &[(&str, String)]) -> String {
-    let all: Vec<String> =
+    let entries: Vec<String> =
         arguments.iter().map(|(key, value)| format!("{key} = {value}")).collect();
-    match all.join(", ") {
+    match entries.join(", ") {
         none if none.is_empty() => format!("{name} = true"),
         all => format!("{name} = {{ {all} }}"),
     }

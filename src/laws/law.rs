@@ -240,7 +240,7 @@ impl Law {
 
     /// Returns true if a formula uses a named parameter.
     pub fn uses(&self, parameter: &str) -> bool {
-        let index = self.parameters.iter().position(|known| known.name == parameter);
+        let index = self.parameters.iter().position(|present| present.name == parameter);
         let uses = |term: &Parsed| index.is_some_and(|index| term.expression.uses(index));
         self.terms.iter().any(uses)
     }

@@ -187,10 +187,10 @@ pub struct Labels {
 impl<W: AsRef<str>> FromIterator<W> for Labels {
     fn from_iter<I: IntoIterator<Item = W>>(words: I) -> Self {
         let mut labels = Self::default();
-        let mut known = HashMap::new();
+        let mut place_of_word = HashMap::new();
         for word in words {
             let word = word.as_ref();
-            let place = *known.entry(word.to_owned()).or_insert_with(|| {
+            let place = *place_of_word.entry(word.to_owned()).or_insert_with(|| {
                 labels.names.push(word.to_owned());
                 labels.names.len() - 1
             });

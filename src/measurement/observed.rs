@@ -285,13 +285,14 @@ impl Measurements {
                 .filter(|&row| self.observation(row).is_of_arm())
                 .collect();
             let Some(&first) = rows.first() else { continue };
-            let known = problem
+            let distances_at_point = problem
                 .distances
                 .iter()
                 .filter(|distance| distance.between.contains(&index))
                 .count();
             let measured =
-                rows.iter().map(|&row| self.observation(row).coordinates()).sum::<usize>() + known;
+                rows.iter().map(|&row| self.observation(row).coordinates()).sum::<usize>()
+                    + distances_at_point;
             let numbers = fixture.known.iter().filter(|known| known.is_none()).count();
             if numbers > 0 && measured <= numbers {
                 let (what, name) = (fixture.kind.word(), fixture.name.clone());

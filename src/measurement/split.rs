@@ -69,13 +69,13 @@ fn with_known_distances(mut held_out: Vec<bool>, measurements: &Measurements) ->
         (0..measurements.len())
             .any(|row| !held_out[row] && measurements.observation(row) == Observation::Point(point))
     };
-    let known = |row: usize| match measurements.observation(row) {
+    let row_and_use = |row: usize| match measurements.observation(row) {
         Observation::Between(first, second) => {
             Some((row, !(touched(first as usize) && touched(second as usize))))
         }
         _ => None,
     };
-    for (row, is_held_out) in (0..measurements.len()).filter_map(known).collect::<Vec<_>>() {
+    for (row, is_held_out) in (0..measurements.len()).filter_map(row_and_use).collect::<Vec<_>>() {
         held_out[row] = is_held_out;
     }
     held_out

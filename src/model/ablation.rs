@@ -76,10 +76,12 @@ impl Model {
                 joint.beam = None;
             }
             let Some(beam) = &mut joint.beam else { continue };
-            let all = &mut beam.flexibility;
+            let flexibility = &mut beam.flexibility;
             match ablation {
-                Ablation::Rigid | Ablation::JointsOnly => *all = Flexibility::RIGID,
-                Ablation::BendingOnly => (all.axial, all.twist, all.coupling) = (0.0, 0.0, None),
+                Ablation::Rigid | Ablation::JointsOnly => *flexibility = Flexibility::RIGID,
+                Ablation::BendingOnly => {
+                    (flexibility.axial, flexibility.twist, flexibility.coupling) = (0.0, 0.0, None)
+                }
                 Ablation::LinksOnly | Ablation::All => {}
             }
         }

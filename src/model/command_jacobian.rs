@@ -126,8 +126,8 @@ impl Model {
             regressor: regressor.clone(),
             size,
         };
-        let all = of_arm.chain(shifts.iter().map(of_shift)).chain(turns.iter().map(of_turn));
-        all.filter(|term| term.regressor.follows_commands()).collect()
+        let terms = of_arm.chain(shifts.iter().map(of_shift)).chain(turns.iter().map(of_turn));
+        terms.filter(|term| term.regressor.follows_commands()).collect()
     }
 }
 

@@ -107,11 +107,11 @@ mod tests {
     #[test]
     fn a_series_is_the_sum_of_its_waves() {
         let site = TermSite::Joint(0);
-        let mut all: Vec<CommandTerm> = Vec::new();
+        let mut terms: Vec<CommandTerm> = Vec::new();
         for order in 1..=43 {
             let value = 1e-3 / f64::from(order);
-            all.push(CommandTerm { site, regressor: Regressor::Sine(1, order), value });
-            all.push(CommandTerm {
+            terms.push(CommandTerm { site, regressor: Regressor::Sine(1, order), value });
+            terms.push(CommandTerm {
                 site,
                 regressor: Regressor::Cosine(1, order),
                 value: -2.0 * value,
@@ -124,7 +124,7 @@ mod tests {
             regressor: Regressor::Sine(joint, order),
             value: 1.0,
         });
-        let mut left: Vec<CommandTerm> = all.iter().chain(&few).cloned().collect();
+        let mut left: Vec<CommandTerm> = terms.iter().chain(&few).cloned().collect();
         left.push(CommandTerm { site, regressor: Regressor::Unit, value: 1.0 });
         let series = HarmonicSum::take(&mut left);
         assert!(series.len() == 1 && left.len() == 4 && left[..3] == few);
@@ -132,7 +132,7 @@ mod tests {
             let configuration = [0.4, 0.21 * f64::from(k), 1.0];
             let pose = PoseView::from_configuration(&configuration);
             let expected: f64 =
-                all.iter().map(|term| term.value * term.regressor.value(&pose)).sum();
+                terms.iter().map(|term| term.value * term.regressor.value(&pose)).sum();
             assert!((series[0].value(&configuration) - expected).abs() < 1e-15);
         }
     }

@@ -70,10 +70,10 @@ fn add(document: &mut DocumentMut, effect: &Effect, comments: &[String]) {
     table.decor_mut().set_prefix(format!("{rest}\n{lines}"));
     let last = document.iter().map(|(_, item)| last_position(item)).max().unwrap_or(0);
     table.set_position(Some(last + 1));
-    let known =
+    let effects =
         document.entry("effect").or_insert_with(|| Item::ArrayOfTables(ArrayOfTables::new()));
-    if let Some(known) = known.as_array_of_tables_mut() {
-        known.push(table);
+    if let Some(tables) = effects.as_array_of_tables_mut() {
+        tables.push(table);
     }
 }
 

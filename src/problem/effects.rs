@@ -127,8 +127,8 @@ fn parse_written(
         location: item.location(),
     };
     check_alone(&declared, problem.statics, &problem.joints, &problem.data)?;
-    let all = [problem.effects.as_slice(), std::slice::from_ref(&declared)].concat();
-    check_compensators(&all, &problem.joints)?;
+    let effects = [problem.effects.as_slice(), std::slice::from_ref(&declared)].concat();
+    check_compensators(&effects, &problem.joints)?;
     Ok(declared)
 }
 

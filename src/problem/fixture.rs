@@ -125,12 +125,12 @@ fn surface(section: &mut Section<'_, '_>) -> Result<Declared, InputError> {
     let kinds = [FixtureKind::Plane, FixtureKind::Sphere];
     let kind = section.word("kind", &["plane", "sphere"], &kinds)?.unwrap_or(FixtureKind::Plane);
     if kind == FixtureKind::Sphere {
-        let mut known = place(section)?;
-        known.push(
+        let mut numbers = place(section)?;
+        numbers.push(
             section
                 .positive("radius", Unit::Length, |value| InputErrorKind::NotPositive { value })?,
         );
-        return Ok(Declared::new(kind, known));
+        return Ok(Declared::new(kind, numbers));
     }
     let at = section.vector("at", Unit::Length)?;
     let Some(item) = section.get("normal") else {
@@ -175,10 +175,10 @@ fn distance(
     let mut between = Vec::new();
     for point in &points {
         let name = point.text()?;
-        let known = fixtures
+        let index = fixtures
             .iter()
             .position(|fixture| fixture.kind == FixtureKind::Point && fixture.name == name);
-        between.push(known.ok_or_else(|| point.error(unknown("point", name, &names)))?);
+        between.push(index.ok_or_else(|| point.error(unknown("point", name, &names)))?);
     }
     let [first, second] = between[..] else {
         return Err(item.error(InputErrorKind::NotTwoPoints { found: points.len() }));

@@ -57,8 +57,8 @@ pub fn predict(
         Some(prediction) => prediction,
         None => fit::predict(problem, Some(estimate), rows, split)?,
     };
-    let all: Vec<usize> = (0..rows.len()).collect();
-    let mut poses = placement.poses(rows, &all, correction.sigma);
+    let all_rows: Vec<usize> = (0..rows.len()).collect();
+    let mut poses = placement.poses(rows, &all_rows, correction.sigma);
     estimate.count_time_in(&placement, &mut poses);
     let is_placed = |k: &usize| prediction.placed.contains(&model.parameters[*k].name);
     let placed: Vec<usize> = (0..model.parameters.len()).filter(is_placed).collect();
@@ -130,10 +130,10 @@ pub fn compensate(
     targets: &Measurements,
     correction: &Correction,
 ) -> Result<Vec<(Command, CorrectedPose)>, StageError> {
-    let all: Vec<usize> = (0..targets.len()).collect();
+    let all_rows: Vec<usize> = (0..targets.len()).collect();
     let corrected = |rows: &Measurements| {
         let placement = Placement::of(rows);
-        let mut poses = placement.poses(rows, &all, correction.sigma);
+        let mut poses = placement.poses(rows, &all_rows, correction.sigma);
         estimate.count_time_in(&placement, &mut poses);
         correction.at((problem, model, x), &[], &poses)
     };

@@ -178,7 +178,7 @@ impl Linearisation<'_> {
 /// Returns the index of each pose's configuration. It is equal for poses with the same session and
 /// the same commands.
 fn configurations(poses: &[Pose]) -> Vec<usize> {
-    let mut known = HashMap::new();
+    let mut index_of_key = HashMap::new();
     let key = |pose: &Pose| -> Vec<u64> {
         let commands = pose.setup.configuration.iter().map(|value| value.to_bits());
         commands.chain([pose.base as u64]).collect()
@@ -186,8 +186,8 @@ fn configurations(poses: &[Pose]) -> Vec<usize> {
     poses
         .iter()
         .map(|pose| {
-            let next = known.len();
-            *known.entry(key(pose)).or_insert(next)
+            let next = index_of_key.len();
+            *index_of_key.entry(key(pose)).or_insert(next)
         })
         .collect()
 }

@@ -121,8 +121,8 @@ impl Posterior {
         let lower = inducing_factor(&hyper, &inputs, &inducing)?;
         let standard = lower.tr_mul(&weights);
         let parameters = (change - &prior.mean).component_div(&prior.spread);
-        let all = standard.iter().chain(parameters.iter()).copied();
-        let weights = DVector::from_iterator(standard.len() + parameters.len(), all);
+        let values = standard.iter().chain(parameters.iter()).copied();
+        let weights = DVector::from_iterator(standard.len() + parameters.len(), values);
         let (inverse, inverse_factor) = (inverse_lower(&lower), inverse_lower(&factor));
         Some(Self { hyper, inputs, prior, inducing, inverse, factor, inverse_factor, weights })
     }
@@ -224,9 +224,9 @@ fn features(
     let kernel = product_with_upper(&cross, &inverse.transpose());
     let parameters = prior.scale(&rows.jacobian);
     let width = kernel.ncols();
-    let mut all = kernel.resize_horizontally(width + parameters.ncols(), 0.0);
-    all.columns_range_mut(width..).copy_from(&parameters);
-    all
+    let mut joined = kernel.resize_horizontally(width + parameters.ncols(), 0.0);
+    joined.columns_range_mut(width..).copy_from(&parameters);
+    joined
 }
 
 impl Training {

@@ -103,7 +103,7 @@ impl Correction {
         let Inducing { centres, knots } = &self.posterior.inducing;
         let change = self.posterior.parameters();
         let place = |name: &str| model.parameters.iter().position(|found| found.name == name);
-        let known: Vec<(usize, usize)> = (self.parameters.iter().enumerate())
+        let shared_columns: Vec<(usize, usize)> = (self.parameters.iter().enumerate())
             .filter_map(|(column, parameter)| Some((column, place(&parameter.name)?)))
             .collect();
         let parameter = |&(column, k): &(usize, usize)| {
@@ -113,7 +113,7 @@ impl Correction {
         let kernel = self.posterior.inducing.len();
         let explained = self.posterior.explained();
         let kept: Vec<usize> =
-            (0..kernel).chain(known.iter().map(|&(column, _)| kernel + column)).collect();
+            (0..kernel).chain(shared_columns.iter().map(|&(column, _)| kernel + column)).collect();
         let lower = |(i, &row): (usize, &usize)| {
             kept[..=i].iter().map(|&column| explained[(row, column)]).collect::<Vec<f64>>()
         };
@@ -146,7 +146,7 @@ impl Correction {
             slopes: rows(centres.sites.as_slice(), AXES * sites.len()),
             knots: knots.iter().map(|knot| (knot.site, knot.at)).collect(),
             weights: self.posterior.kernel_weights().as_slice().to_vec(),
-            parameters: known.iter().map(parameter).collect(),
+            parameters: shared_columns.iter().map(parameter).collect(),
             explained: kept.iter().enumerate().flat_map(lower).collect(),
         })
     }

@@ -55,8 +55,8 @@ fn blocks<'a>(problem: &Problem, check: &Check) -> Vec<Block<'a>> {
         Block::figures([growth_figure(check)]),
     ]);
     // Measured poses do not include the held-out ones.
-    let all = (check.predicted_at != PredictionPoses::HeldOut).then_some(forecast.poses);
-    blocks.extend(assumptions(problem, &forecast.expected, all));
+    let poses = (check.predicted_at != PredictionPoses::HeldOut).then_some(forecast.poses);
+    blocks.extend(assumptions(problem, &forecast.expected, poses));
     blocks.extend(detection::blocks(&check.detection));
     blocks
 }

@@ -220,8 +220,8 @@ pub(super) fn some_of(
     words: impl IntoIterator<Item = String>,
     most: usize,
 ) -> (Vec<String>, usize) {
-    let mut all: Vec<String> = words.into_iter().collect();
-    let more = all.len().saturating_sub(most);
-    all.truncate(most);
-    (all, more)
+    let mut listed: Vec<String> = words.into_iter().collect();
+    let more = listed.len().saturating_sub(most);
+    listed.truncate(most);
+    (listed, more)
 }

@@ -117,9 +117,10 @@ pub(super) fn unpredicted(arms: &[(&str, &Errors)]) -> Option<String> {
         }
     }
     let poses = parts.join("; ");
-    let all = arms.iter().flat_map(|(_, errors)| [&errors.held_out, &errors.identification]);
+    let errors_of_arms =
+        arms.iter().flat_map(|(_, errors)| [&errors.held_out, &errors.identification]);
     match poses.as_str() {
-        "" if all.into_iter().all(|of| of.rms.norm.is_finite()) => None,
+        "" if errors_of_arms.into_iter().all(|of| of.rms.norm.is_finite()) => None,
         "" => Some("Some errors are too large for their squares to be numbers.".to_owned()),
         _ => Some(format!("{poses}. Over such poses there is no mean, rms or largest error.")),
     }

@@ -128,12 +128,14 @@ pub(super) fn outliers<'a>(problem: &Problem, found: &Identification) -> Option<
     } else {
         "they count in full; a section [robust] would limit them, flexcal loop looks for a cause"
     };
-    let known = found.outliers.iter().filter(|outlier| outlier.kind == "known distance").count();
-    let (n, all) = (found.outliers.len(), rows_in(found, |errors| errors.identification) + known);
+    let known_distances =
+        found.outliers.iter().filter(|outlier| outlier.kind == "known distance").count();
+    let (n, all) =
+        (found.outliers.len(), rows_in(found, |errors| errors.identification) + known_distances);
     let point = |outlier: &Outlier| {
-        let known = if outlier.kind == "known distance" { " (known distance)" } else { "" };
+        let note = if outlier.kind == "known distance" { " (known distance)" } else { "" };
         format!(
-            "{}{known}: {}, {} × the typical scatter{}",
+            "{}{note}: {}, {} × the typical scatter{}",
             outlier.location,
             size_of_kind(outlier.kind, outlier.error.norm(), 3),
             number(outlier.distance, 1),

@@ -49,7 +49,7 @@ pub(super) fn row_kind_tables<'a>(found: &Identification) -> Vec<Block<'a>> {
 }
 
 /// Returns a sentence for each point whose spread is far larger than that of the others.
-pub(super) fn unsteady<'a>(all: impl IntoIterator<Item = &'a PointSpread>) -> Vec<String> {
+pub(super) fn unsteady<'a>(spreads: impl IntoIterator<Item = &'a PointSpread>) -> Vec<String> {
     let sentence = |(spread, times): (&PointSpread, f64)| {
         let [x, y, z] =
             [spread.along.x, spread.along.y, spread.along.z].map(|value| number(value, 2));
@@ -62,5 +62,5 @@ pub(super) fn unsteady<'a>(all: impl IntoIterator<Item = &'a PointSpread>) -> Ve
             number(100.0 * spread.share, 0),
         )
     };
-    PointSpread::unsteady(all).into_iter().map(sentence).collect()
+    PointSpread::unsteady(spreads).into_iter().map(sentence).collect()
 }

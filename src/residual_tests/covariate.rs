@@ -34,11 +34,11 @@ pub enum Covariate {
 }
 
 impl Covariate {
-    /// Returns the covariates through which `quantity` varies. `known` states whether directions of
-    /// approach are recorded, and whether times are. Without times, the row number replaces the
-    /// time; without directions, the commands replace them.
-    pub fn of(quantity: Quantity, problem: &Problem, known: (bool, bool)) -> Vec<Self> {
-        let (approach_known, time_measured) = known;
+    /// Returns the covariates through which `quantity` varies. `is_recorded` states whether
+    /// directions of approach are recorded, and whether times are. Without times, the row number
+    /// replaces the time; without directions, the commands replace them.
+    pub fn of(quantity: Quantity, problem: &Problem, is_recorded: (bool, bool)) -> Vec<Self> {
+        let (approach_known, time_measured) = is_recorded;
         match quantity {
             Quantity::Warming => vec![Self::Temperature],
             Quantity::Lagging { .. } => vec![Self::Temperature, Self::time(time_measured)],

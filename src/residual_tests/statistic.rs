@@ -99,11 +99,11 @@ pub(super) fn sequences(
         order
     });
     let same = by_rows == by_time;
-    let mut all = vec![(Sequence::Time, by_time)];
+    let mut sequences = vec![(Sequence::Time, by_time)];
     if !same {
-        all.push((Sequence::Rows, by_rows));
+        sequences.push((Sequence::Rows, by_rows));
     }
-    all
+    sequences
 }
 
 impl Order {
@@ -194,9 +194,9 @@ impl Cumulative {
     /// from 0.
     ///
     /// # Errors
-    /// Returns an error if `values` does not have `all` entries, or if the covariate is constant.
-    pub fn new(values: &[f64], all: usize, kept: &[usize]) -> Result<Self, Untestable> {
-        if values.len() != all {
+    /// Returns an error if `values` does not have `count` entries, or if the covariate is constant.
+    pub fn new(values: &[f64], count: usize, kept: &[usize]) -> Result<Self, Untestable> {
+        if values.len() != count {
             return Err(Untestable::SizeMismatch);
         }
         if !values.iter().all(|value| value.is_finite()) {
@@ -266,13 +266,13 @@ mod tests {
         let at = |pose: usize| Vector3::from(sample.centred[pose].map(|[value]| value));
         let distance = |i: usize, j: usize| -> f64 { f64::abs(x[i] - x[j]) };
         let mean = |i: usize| (0..6).map(|j| distance(i, j)).sum::<f64>() / 6.0;
-        let all = (0..6).map(mean).sum::<f64>() / 6.0;
+        let grand_mean = (0..6).map(mean).sum::<f64>() / 6.0;
         let (mut sum, mut norm, mut gram) = (0.0, 0.0, 0.0);
         for i in 0..6 {
             for j in 0..6 {
                 let product = at(i).dot(&at(j));
                 sum -= distance(i, j) * product;
-                norm += (distance(i, j) - mean(i) - mean(j) + all).powi(2);
+                norm += (distance(i, j) - mean(i) - mean(j) + grand_mean).powi(2);
                 gram += product * product;
             }
         }

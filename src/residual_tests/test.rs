@@ -73,20 +73,20 @@ fn permuted(fit: &FitResidual, kept: &Kept, seed: u64) -> Vec<Tried> {
 /// Returns the statistics of order and dependence on some of the poses, or the reasons why they
 /// cannot be computed.
 fn statistics(fit: &FitResidual, poses: &[usize]) -> Vec<(Test, Result<Statistic, Untestable>)> {
-    let mut all = Vec::new();
+    let mut statistics = Vec::new();
     for (sequence, order) in sequences(fit, poses) {
         let order = order.map(std::sync::Arc::new);
-        all.push((Test::Runs { sequence }, order.clone().map(Statistic::Runs)));
-        all.push((Test::LjungBox { sequence }, order.map(Statistic::LjungBox)));
+        statistics.push((Test::Runs { sequence }, order.clone().map(Statistic::Runs)));
+        statistics.push((Test::LjungBox { sequence }, order.map(Statistic::LjungBox)));
     }
     for CovariateValues { covariate, values } in fit.covariates {
         let statistic = Cumulative::new(values, fit.residual.len() / 3, poses);
-        all.push((
+        statistics.push((
             Test::Dependence { covariate: covariate.clone() },
             statistic.map(Statistic::Dependence),
         ));
     }
-    all
+    statistics
 }
 
 /// Returns all tests as impossible for the reason `why`.

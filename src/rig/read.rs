@@ -195,11 +195,11 @@ fn segments(mut section: Section<'_, '_>) -> Result<usize, InputError> {
 fn deviation(
     name: &str,
     item: &Item<'_, '_>,
-    known: &[TrueParameter],
+    parameters: &[TrueParameter],
 ) -> Result<Deviation, InputError> {
     let mut section = named(name, item)?;
-    let Some(parameter) = known.iter().find(|parameter| parameter.name == name) else {
-        let known = known.iter().map(|parameter| parameter.name.clone()).collect();
+    let Some(parameter) = parameters.iter().find(|parameter| parameter.name == name) else {
+        let known = parameters.iter().map(|parameter| parameter.name.clone()).collect();
         return Err(item.error(InputErrorKind::UnknownParameter { name: name.to_owned(), known }));
     };
     let units = parameter.unit.deviation_unit().suffixes();
@@ -228,7 +228,7 @@ fn deviation(
 fn random(
     pattern: &str,
     item: &Item<'_, '_>,
-    known: &[TrueParameter],
+    parameters: &[TrueParameter],
 ) -> Result<RandomRule, InputError> {
     let mut section = named(pattern, item)?;
     let mut sigma = |unit: Unit| match section.pick("sigma", unit)? {
@@ -242,9 +242,9 @@ fn random(
         (sigma(Unit::Angle)?, sigma(Unit::Length)?, sigma(Unit::Ratio)?);
     section.finish()?;
     let matched: Vec<_> =
-        known.iter().filter(|parameter| matches(pattern, &parameter.name)).collect();
+        parameters.iter().filter(|parameter| matches(pattern, &parameter.name)).collect();
     let Some(first) = matched.first() else {
-        let known = known.iter().map(|parameter| parameter.name.clone()).collect();
+        let known = parameters.iter().map(|parameter| parameter.name.clone()).collect();
         return Err(
             item.error(InputErrorKind::MatchesNothing { pattern: pattern.to_owned(), known })
         );

@@ -30,9 +30,9 @@ impl Candidates {
             effect: effect.clone(),
             untestable: effect.untestable(problem, &conditions),
         });
-        let all = effect::candidates(problem, &conditions).into_iter().chain(more);
+        let candidates = effect::candidates(problem, &conditions).into_iter().chain(more);
         let mut found = Self { testable: Vec::new(), untestable: Vec::new() };
-        for Candidate { effect, untestable } in all {
+        for Candidate { effect, untestable } in candidates {
             let parameters = || effect.parameters(problem);
             match untestable {
                 _ if problem.effects.iter().any(|declared| declared.effect.covers(&effect)) => {}
@@ -51,10 +51,10 @@ impl Candidates {
 /// Returns `effects` with the effect `new` appended. A harmonic of a joint that has one already is
 /// merged into that one.
 pub(super) fn joined(effects: &[Effect], new: &Effect) -> Vec<Effect> {
-    let mut all = effects.to_vec();
-    match all.iter_mut().find_map(|known| Some((known.joined(new)?, known))) {
+    let mut joined_effects = effects.to_vec();
+    match joined_effects.iter_mut().find_map(|known| Some((known.joined(new)?, known))) {
         Some((both, known)) => *known = both,
-        None => all.push(new.clone()),
+        None => joined_effects.push(new.clone()),
     }
-    all
+    joined_effects
 }

@@ -130,17 +130,19 @@ impl<'a> Data<'a> {
         };
         let varies =
             |values: Vec<f64>| values.iter().any(|value| value.to_bits() != values[0].to_bits());
-        let payload = measurements.payload.as_deref().map(|all| self.values_at_rows(all));
-        let temperature = measurements.temperature.as_deref().map(|all| self.values_at_rows(all));
+        let payload = measurements.payload.as_deref().map(|values| self.values_at_rows(values));
+        let temperature =
+            measurements.temperature.as_deref().map(|values| self.values_at_rows(values));
         let n = measurements.joints;
         let from = |joint: usize, side: f64| {
-            let came =
-                |all: &Vec<f64>| self.rows().iter().any(|&row| all[row * n + joint] * side > 0.0);
+            let came = |sides: &Vec<f64>| {
+                self.rows().iter().any(|&row| sides[row * n + joint] * side > 0.0)
+            };
             measurements.approach.as_ref().is_some_and(came)
         };
         DataCoverage {
             no_temperature: match temperature {
-                Some(all) if varies(all.clone()) => {
+                Some(values) if varies(values.clone()) => {
                     problem.data.reference_temperature.is_none().then_some(NO_REFERENCE)
                 }
                 _ => Some(NO_TEMPERATURE),
@@ -148,7 +150,7 @@ impl<'a> Data<'a> {
             approach: measurements.approach.is_some(),
             both_sides: (0..n).map(|joint| from(joint, 1.0) && from(joint, -1.0)).collect(),
             payload: payload
-                .map_or([problem.tool.payload_mass; 2].into(), |all| range(all.into_iter())),
+                .map_or([problem.tool.payload_mass; 2].into(), |masses| range(masses.into_iter())),
             ranges: (0..n).map(column).collect(),
             covariates: self.declared_covariates().map(varies).collect(),
             times: self.shift_times(),
@@ -170,9 +172,9 @@ impl<'a> Data<'a> {
     /// Returns the candidate times of a station shift: at most `MAX_SHIFT_TIMES` of
     /// [`Self::times_between_poses`], evenly chosen.
     pub fn shift_times(&self) -> Vec<f64> {
-        let all = self.times_between_poses();
-        let every = all.len().div_ceil(MAX_SHIFT_TIMES).max(1);
-        all.into_iter().step_by(every).collect()
+        let times = self.times_between_poses();
+        let every = times.len().div_ceil(MAX_SHIFT_TIMES).max(1);
+        times.into_iter().step_by(every).collect()
     }
 
     /// Returns times approximately half way between consecutive poses \[s\], ascending, written
@@ -254,10 +256,10 @@ pub(super) fn bits(values: &[f64]) -> Vec<u64> {
 
 /// Returns an identifier for each key: equal keys have equal numbers, in order of first appearance.
 pub(super) fn number<K: Ord>(keys: impl Iterator<Item = K>) -> Vec<usize> {
-    let mut known = BTreeMap::new();
+    let mut number_of_key = BTreeMap::new();
     keys.map(|key| {
-        let next = known.len();
-        *known.entry(key).or_insert(next)
+        let next = number_of_key.len();
+        *number_of_key.entry(key).or_insert(next)
     })
     .collect()
 }

@@ -228,8 +228,8 @@ impl Fitted {
             return self.linearised_at(data, data.rows(), effects);
         }
         let kept = || self.derivatives.lock().unwrap_or_else(PoisonError::into_inner);
-        let known = kept().clone();
-        let found = self.linearised_reusing(known, (data, data.rows()), effects, &[]);
+        let cached = kept().clone();
+        let found = self.linearised_reusing(cached, (data, data.rows()), effects, &[]);
         *kept() = Some(found.derivatives());
         found
     }
@@ -258,7 +258,7 @@ impl Fitted {
 
     fn linearised_reusing<'a>(
         &'a self,
-        known: Option<Arc<Derivatives>>,
+        cached: Option<Arc<Derivatives>>,
         (data, rows): (&Data<'a>, &[usize]),
         effects: &[Effect],
         slots: &[ParameterSite],
@@ -267,7 +267,7 @@ impl Fitted {
         let aside = poses.iter_mut().zip(rows).filter(|(_, row)| self.set_aside.contains(row));
         aside.for_each(|(pose, _)| pose.sigma *= SIGMA_FACTOR_OF_OUTLIERS);
         Linearised::new(
-            (&self.problem, known),
+            (&self.problem, cached),
             &self.model,
             poses,
             &self.unknowns,

@@ -58,17 +58,18 @@ struct Reading {
 
 /// Returns v and M of one point for 3 parameters (d) or 6 (d and ω); see the module's equations.
 fn point_information(readings: &[Reading], parameters: usize) -> (DVector<f64>, DMatrix<f64>) {
-    let all: f64 = readings.iter().map(|reading| reading.weight).sum();
-    let place =
-        readings.iter().map(|reading| reading.seen * reading.weight).sum::<Vector3<f64>>() / all;
-    let moved = readings.iter().map(|reading| reading.moved * reading.weight).sum::<f64>() / all;
-    let one = |reading: &Reading| {
+    let total_weight: f64 = readings.iter().map(|reading| reading.weight).sum();
+    let place = readings.iter().map(|reading| reading.seen * reading.weight).sum::<Vector3<f64>>()
+        / total_weight;
+    let moved =
+        readings.iter().map(|reading| reading.moved * reading.weight).sum::<f64>() / total_weight;
+    let vector_and_information = |reading: &Reading| {
         let f = reading.moved - moved;
         ((reading.seen - place) * (reading.weight * f), reading.weight * f * f)
     };
     let (sum, information) = readings
         .iter()
-        .map(one)
+        .map(vector_and_information)
         .fold((Vector3::zeros(), 0.0), |a: (Vector3<f64>, f64), b| (a.0 + b.0, a.1 + b.1));
     let turned = -place.cross_matrix();
     let moves =
@@ -96,15 +97,16 @@ fn twice_ln_odds(
     root.column_iter_mut()
         .zip(&eigen.eigenvalues)
         .for_each(|(mut column, value)| column *= value.max(0.0).sqrt());
-    let known = information * found;
-    let left = root.tr_mul(&(vector - &known));
+    let predicted_vector = information * found;
+    let whitened_difference = root.tr_mul(&(vector - &predicted_vector));
     let inner = (root.tr_mul(&(information * &root))
         + DMatrix::identity(root.ncols(), root.ncols()))
     .cholesky()?;
     let ln_determinant =
         2.0 * inner.l_dirty().diagonal().iter().map(|value| value.ln()).sum::<f64>();
     Some(
-        2.0 * found.dot(vector) - found.dot(&known) + left.dot(&inner.solve(&left))
+        2.0 * found.dot(vector) - found.dot(&predicted_vector)
+            + whitened_difference.dot(&inner.solve(&whitened_difference))
             - ln_determinant,
     )
 }
@@ -166,7 +168,7 @@ pub(super) fn reference_check(
     let nothing = (DVector::zeros(count), DMatrix::zeros(count, count));
     let (vector, information) = points
         .values()
-        .map(|all| point_information(all, count))
+        .map(|readings| point_information(readings, count))
         .fold(nothing, |a, b| (a.0 + b.0, a.1 + b.1));
     let gain = twice_ln_odds(&found, &spread, (&vector, &information))?;
     let verdict = if gain > MIN_TWICE_LN_ODDS {
@@ -220,7 +222,7 @@ mod tests {
             Vector3::new(0.5, -2.0, 1.5),
         ];
         let (moved, turned) = (Vector3::new(1e-3, -2e-3, 5e-4), Vector3::new(4e-4, 1e-4, -3e-4));
-        let all = |turn: f64| {
+        let readings_of = |turn: f64| {
             let of = |place: &Vector3<f64>| {
                 let at = |f: f64| {
                     let seen = place + (moved + turned.cross(place) * turn) * f;
@@ -236,11 +238,11 @@ mod tests {
         let found = DVector::from_iterator(6, moved.iter().chain(&turned).copied());
         let spread = DMatrix::identity(6, 6) * 1e-12;
         let odds = |turn: f64| {
-            let (vector, information) = all(turn);
+            let (vector, information) = readings_of(turn);
             super::twice_ln_odds(&found, &spread, (&vector, &information)).unwrap()
         };
         // The measured places are off by the motion itself, which hardly changes the estimate.
-        let (vector, information) = all(1.0);
+        let (vector, information) = readings_of(1.0);
         let read = information.cholesky().unwrap().solve(&vector);
         assert!((read - &found).norm() < 1e-3 * found.norm());
         assert!(odds(1.0) > 1e5 && odds(-2.0) < odds(1.0) - 1e4, "{} {}", odds(1.0), odds(-2.0));

@@ -104,10 +104,10 @@ pub(super) fn trace_fit(fitted: &Fitted, data: &Data) -> Trace {
     untestable.extend(scan.refused.iter().map(|effect| (effect.clone(), NOT_FINITE)));
     let mut best: Vec<Tried> = Vec::new();
     for tried in scan.ranking() {
-        let known = |other: &Tried| {
+        let is_same_place = |other: &Tried| {
             scan.effects[other.index].name_and_place() == scan.effects[tried.index].name_and_place()
         };
-        if !best.iter().any(known) {
+        if !best.iter().any(is_same_place) {
             best.push(tried);
         }
     }
@@ -120,9 +120,9 @@ pub(super) fn trace_fit(fitted: &Fitted, data: &Data) -> Trace {
     let poses = shuffled(data);
     let looked: Vec<Effect> =
         best.iter().take(MAX_COMPARED).map(|tried| scan.effects[tried.index].clone()).collect();
-    let all: Vec<usize> = (0..poses.len()).collect();
+    let all_poses: Vec<usize> = (0..poses.len()).collect();
     let elsewhere = Data { measurements: &poses, ..data.clone() };
-    let there = (looked_at > 0).then(|| fitted.linearised_at(&elsewhere, &all, &looked));
+    let there = (looked_at > 0).then(|| fitted.linearised_at(&elsewhere, &all_poses, &looked));
     let ranked = |(place, tried): (usize, &Tried)| {
         let close = place < looked_at;
         let cross_validated = without.filter(|_| close).and_then(|without| {

@@ -89,11 +89,11 @@ pub(super) fn without_law(
     data: &Data,
     (evidence, best): (&Evidence, &HypothesisSet),
 ) -> Vec<Unexplained> {
-    let mut all: Vec<(&Hypothesis, Unexplained)> = Vec::new();
+    let mut listed: Vec<(&Hypothesis, Unexplained)> = Vec::new();
     let are_all_sure = evidence.probability_of_as_many(best) >= data.rules.located;
     for hypothesis in best.hypotheses.iter().filter(|hypothesis| hypothesis.effect().is_none()) {
         let claims = evidence.claims(hypothesis);
-        let is_known = all.iter().any(|(known, _)| known.site == hypothesis.site);
+        let is_known = listed.iter().any(|(known, _)| known.site == hypothesis.site);
         if !are_all_sure && (claims.law.1 < data.rules.located || is_known) {
             continue;
         }
@@ -104,20 +104,20 @@ pub(super) fn without_law(
             claims: Some(claims),
             correction: None,
         };
-        all.push((hypothesis, found));
+        listed.push((hypothesis, found));
     }
     let place = |found: &Unexplained| found.claims.as_ref().map_or(0.0, |claims| claims.place.1);
-    all.sort_by(|a, b| place(&b.1).total_cmp(&place(&a.1)));
+    listed.sort_by(|a, b| place(&b.1).total_cmp(&place(&a.1)));
     // Neither an error with a free value per pose nor a wrong limit has a correction: the former
     // cannot be predicted, the latter is no function.
-    let first = all.iter().position(|(hypothesis, _)| {
+    let first = listed.iter().position(|(hypothesis, _)| {
         !matches!(hypothesis.kind, HypothesisKind::PerPose | HypothesisKind::Limit(_))
     });
     if let Some(first) = first.filter(|_| fitted.found.describes_arm()) {
-        let hypothesis = all[first].0.clone();
-        all[first].1.correction = correction(fitted, data, best, &hypothesis);
+        let hypothesis = listed[first].0.clone();
+        listed[first].1.correction = correction(fitted, data, best, &hypothesis);
     }
-    all.into_iter().map(|(_, found)| found).collect()
+    listed.into_iter().map(|(_, found)| found).collect()
 }
 
 /// Returns the structure that the residual tests detect, with unknown site and quantities; `None`

@@ -30,8 +30,8 @@ pub fn jacobian(
     let declared = Model::new(problem, &placement.bases, &placement.targets)?;
     let model =
         identified.map_or(declared.clone(), |identified| identified.strategy.model(declared));
-    let all: Vec<usize> = (0..rows.len()).collect();
-    let mut poses = placement.poses(rows, &all, 1.0);
+    let all_rows: Vec<usize> = (0..rows.len()).collect();
+    let mut poses = placement.poses(rows, &all_rows, 1.0);
     let mut x = DVector::zeros(model.parameters.len());
     if let Some(identified) = identified {
         x = identified.vector(&model)?;

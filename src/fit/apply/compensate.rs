@@ -85,8 +85,8 @@ pub fn waypoints(
             .zip(x)
             .map(|(parameter, x)| if parameter.site.is_placement() { *x } else { 0.0 }),
     );
-    let all: Vec<usize> = (0..rows.len()).collect();
-    let poses = placement.poses(rows, &all, 1.0);
+    let all_rows: Vec<usize> = (0..rows.len()).collect();
+    let poses = placement.poses(rows, &all_rows, 1.0);
     let mut targets = rows.clone();
     let tree = problem.tree();
     let commanded = |row: usize| {
@@ -98,12 +98,13 @@ pub fn waypoints(
             .filter(|(joint, _)| tree.path_contains(*joint, carrier));
         leads.filter(|(_, joint)| joint.command_kind() != JointKind::Fixed).count()
     };
-    let oriented: Vec<bool> = all.iter().map(|&row| commanded(row) >= POSE_COORDINATES).collect();
+    let oriented: Vec<bool> =
+        all_rows.iter().map(|&row| commanded(row) >= POSE_COORDINATES).collect();
     targets.orientations = oriented.contains(&true).then(|| {
         let none = Vector3::from_element(f64::NAN);
         let turns = model.orientations(&poses, nominal.as_slice()).into_iter().zip(&oriented);
-        let all = turns.map(|(turn, is_kept)| if *is_kept { turn } else { none });
-        all.map(UnitQuaternion::from_scaled_axis).collect()
+        let rotations = turns.map(|(turn, is_kept)| if *is_kept { turn } else { none });
+        rotations.map(UnitQuaternion::from_scaled_axis).collect()
     });
     targets.positions = model.predict(poses, &nominal);
     targets.position_measured = true;

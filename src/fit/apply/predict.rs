@@ -174,9 +174,9 @@ impl Identification {
         rows: &'a Measurements,
         turn: Option<f64>,
     ) -> Vec<Pose<'a>> {
-        let all: Vec<usize> = (0..rows.len()).collect();
+        let all_rows: Vec<usize> = (0..rows.len()).collect();
         let placement = Placement::of(rows);
-        let mut poses = placement.oriented_poses(rows, &all, (1.0, turn));
+        let mut poses = placement.oriented_poses(rows, &all_rows, (1.0, turn));
         placement.count_time_from(&self.start_times, &mut poses);
         poses
     }

@@ -123,10 +123,10 @@ impl ErrorsBySession {
             (!name.is_empty() && !chosen.is_empty()).then(|| (name.clone(), of(&chosen, &errors)))
         };
         let sessions = rows.session.names.iter().enumerate().filter_map(session).collect();
-        let all: Vec<usize> = (0..rows.len()).collect();
+        let all_rows: Vec<usize> = (0..rows.len()).collect();
         let each =
-            kinds.iter().filter(|_| kinds.len() > 1).map(|&kind| summary(&all, errors, kind));
-        Self { all: of(&all, errors), kinds: each.collect(), sessions }
+            kinds.iter().filter(|_| kinds.len() > 1).map(|&kind| summary(&all_rows, errors, kind));
+        Self { all: of(&all_rows, errors), kinds: each.collect(), sessions }
     }
 }
 
@@ -153,11 +153,11 @@ pub fn predict(
     if let Some(estimate) = estimate {
         estimate.check(problem, &model)?;
     }
-    let known = |name: &str| estimate.and_then(|estimate| estimate.value(name));
+    let estimated_value = |name: &str| estimate.and_then(|estimate| estimate.value(name));
     let mut x = DVector::zeros(model.parameters.len());
     let mut missing = Vec::new();
     for (k, parameter) in model.parameters.iter().enumerate() {
-        match known(&parameter.name) {
+        match estimated_value(&parameter.name) {
             Some(value) => x[k] = parameter.deviation(value),
             None if parameter.site.is_placement() => missing.push(k),
             None if estimate.is_none() => {}
@@ -166,9 +166,10 @@ pub fn predict(
     }
     let sigma =
         problem.data.position_sigma.or(estimate.and_then(|estimate| estimate.estimated_sigma));
-    let all: Vec<usize> = (0..rows.len()).collect();
+    let all_rows: Vec<usize> = (0..rows.len()).collect();
     let turn = problem.data.orientation_sigma.filter(|_| problem.data.fits_orientation);
-    let mut poses = placement.oriented_poses(rows, &all, (sigma.unwrap_or(ASSUMED_SIGMA), turn));
+    let mut poses =
+        placement.oriented_poses(rows, &all_rows, (sigma.unwrap_or(ASSUMED_SIGMA), turn));
     if let Some(estimate) = estimate {
         estimate.count_time_in(&placement, &mut poses);
     }
@@ -193,7 +194,8 @@ pub fn predict(
     } else if let (Some(&k), Some(_)) = (missing.first(), estimate) {
         return Err(missing_parameter_error(estimate, &model.parameters[k].name));
     }
-    let sigmas: Vec<Option<f64>> = all.iter().map(|&row| rows.sigma_of(row).or(sigma)).collect();
+    let sigmas: Vec<Option<f64>> =
+        all_rows.iter().map(|&row| rows.sigma_of(row).or(sigma)).collect();
     let orientations = turn.map(|_| model.orientations(&poses, x.as_slice()));
     let turns = turn
         .filter(|_| rows.orientations.is_some())
@@ -203,7 +205,7 @@ pub fn predict(
     let spreads = spreads(&model, &problem.fixtures, &poses, &x);
     let is_of_camera = |row: usize| rows.observation(row).description().needs == Needs::Carriers;
     let images: Vec<(usize, Pose)> =
-        all.iter().filter(|row| is_of_camera(**row)).map(|&row| (row, poses[row])).collect();
+        all_rows.iter().filter(|row| is_of_camera(**row)).map(|&row| (row, poses[row])).collect();
     let errors = model.residuals(poses, &x);
     let images: BTreeMap<usize, (Pose, Vector3<f64>)> =
         images.into_iter().map(|(row, pose)| (row, (pose, errors[row]))).collect();
@@ -231,8 +233,9 @@ pub fn predict(
         _ => targets[row]
             .map_or(Vector3::from_element(f64::NAN), |point| bases[base_of[row]].point(&point)),
     };
-    let positions = all.iter().map(|&row| position(row)).collect();
-    let numbers: Vec<usize> = all.iter().map(|&row| rows.observation(row).coordinates()).collect();
+    let positions = all_rows.iter().map(|&row| position(row)).collect();
+    let numbers: Vec<usize> =
+        all_rows.iter().map(|&row| rows.observation(row).coordinates()).collect();
     let residuals = rows.position_measured.then(|| {
         residuals((&errors, &seen), (&sigmas, &numbers), turns.as_deref().zip(turn), split)
     });

@@ -106,16 +106,17 @@ fn by_runs(values: &[f64], marked: &[bool]) -> f64 {
     }
     let runs = 1 + order.windows(2).filter(|pair| marked[pair[0]] != marked[pair[1]]).count();
     let marked = marked.iter().filter(|marked| **marked).count() as u64;
-    let all = values.len() as u64;
+    let count = values.len() as u64;
     // Number of ways to divide `of` values into `parts` runs, as a logarithm.
     let ways =
         |parts: u64, of: u64| (1..=of).contains(&parts).then(|| ln_binomial(of - 1, parts - 1));
     let both = |a: Option<f64>, b: Option<f64>| {
-        a.zip(b).map_or(0.0, |(a, b)| (a + b - ln_binomial(all, marked)).exp())
+        a.zip(b).map_or(0.0, |(a, b)| (a + b - ln_binomial(count, marked)).exp())
     };
     let exactly = |runs: u64| {
         let (a, b) = (runs / 2, runs - runs / 2);
-        both(ways(a, marked), ways(b, all - marked)) + both(ways(b, marked), ways(a, all - marked))
+        both(ways(a, marked), ways(b, count - marked))
+            + both(ways(b, marked), ways(a, count - marked))
     };
     (2..=runs as u64).map(exactly).sum::<f64>().min(1.0)
 }

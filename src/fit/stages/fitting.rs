@@ -126,8 +126,9 @@ impl<'a> Fitting<'a> {
     /// Returns the indices of the parameters for which `choose` is true, except bases and targets
     /// that only held-out rows use.
     fn choose(&self, choose: impl Fn(&Parameter) -> bool) -> Vec<usize> {
-        let all = self.model.parameters.iter().enumerate();
-        all.filter(|&(k, parameter)| !self.held_out_only.parameters[k] && choose(parameter))
+        let numbered = self.model.parameters.iter().enumerate();
+        numbered
+            .filter(|&(k, parameter)| !self.held_out_only.parameters[k] && choose(parameter))
             .map(|(k, _)| k)
             .collect()
     }
@@ -267,12 +268,12 @@ impl<'a> Fitting<'a> {
     fn located(&self) -> DVector<f64> {
         let mut x = DVector::zeros(self.model.parameters.len());
         let mut poses = self.poses(&self.split.identification);
-        let mut known = vec![false; self.placement.bases.len()];
+        let mut has_rows = vec![false; self.placement.bases.len()];
         for pose in &poses {
-            known[pose.base] = true;
+            has_rows[pose.base] = true;
         }
         let held_out = self.poses(&self.held_out_only.rows);
-        poses.extend(held_out.into_iter().filter(|pose| !known[pose.base]));
+        poses.extend(held_out.into_iter().filter(|pose| !has_rows[pose.base]));
         register(self.model, &poses, &mut x);
         let later = &self.held_out_only;
         locate(

@@ -139,7 +139,7 @@ fn fixture_of_contacts(
         return None;
     }
     let numbers = |place: Vector3<f64>, last: f64| [place.x, place.y, place.z, last];
-    let all = match kind {
+    let values = match kind {
         FixtureKind::Point => numbers(centre(contacts), 0.0),
         FixtureKind::Anchor => numbers(anchor(contacts), 0.0),
         FixtureKind::Sphere => {
@@ -149,7 +149,7 @@ fn fixture_of_contacts(
         FixtureKind::Plane => plane(contacts, base),
         FixtureKind::Camera | FixtureKind::Fisheye | FixtureKind::Marker => return None,
     };
-    all.iter().all(|number| number.is_finite()).then_some(all)
+    values.iter().all(|number| number.is_finite()).then_some(values)
 }
 
 /// Returns the centroid (mean position) of the predicted points of some contacts \[m\].

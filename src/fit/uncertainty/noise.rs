@@ -168,10 +168,10 @@ fn next_noise_models(
     let unmoved = stage.unmoved(&end.x);
     let count = poses.iter().map(Pose::coordinates).sum::<usize>() - unmoved.count() * poses.len();
     let turned = 3 * poses.iter().filter(|pose| pose.orientation.is_some()).count();
-    let all = poses.len() == stage.poses.len();
+    let are_all_poses = poses.len() == stage.poses.len();
     let residuals = stage.residuals_of(poses, &end.x);
     let x = residuals.reduced(&end.x);
-    let data = if all {
+    let data = if are_all_poses {
         stage.linearised(&end.x, Loss::Squares)
     } else {
         Fit::new(&residuals).linearise(&x)
@@ -194,9 +194,9 @@ fn next_noise_models(
     if (first && gain <= chance) || (!first && settled) {
         return Ok(None);
     }
-    let of = |all: &dyn Fn(usize) -> f64| {
+    let of = |value: &dyn Fn(usize) -> f64| {
         let of_arm = places.iter().filter(|&&place| stage.poses[place].observation.is_of_arm());
-        of_arm.map(|&place| all(place)).collect::<Vec<f64>>()
+        of_arm.map(|&place| value(place)).collect::<Vec<f64>>()
     };
     // One model error can apply to all rows only if all rows measure the same kind of quantity.
     let raised = if several_kinds { NoiseModel::scaled } else { NoiseModel::raised };
@@ -227,8 +227,8 @@ fn mean_square_ratios(whitened: &DVector<f64>, coordinates: usize, counts: [usiz
     let sums = [sum(|r| &r[..3]), sum(|r| &r[3..])];
     let mean = |sum: f64, count: usize| sum / count.max(1) as f64;
     let (position, turn) = (mean(sums[0], counts[0]), mean(sums[1], counts[1]));
-    let all = mean(sums[0] + sums[1], counts[0] + counts[1]);
-    if all > 0.0 { [position / all, turn / all] } else { [1.0; 2] }
+    let mean_of_both = mean(sums[0] + sums[1], counts[0] + counts[1]);
+    if mean_of_both > 0.0 { [position / mean_of_both, turn / mean_of_both] } else { [1.0; 2] }
 }
 
 /// Returns the noise variance that a stage assumed, relative to the declared one, and the σ that it
@@ -238,11 +238,11 @@ pub(in crate::fit) fn assumed_noise(stage: &Stage, kind: Observation) -> (f64, f
     let rows =
         stage.poses.iter().zip(&stage.declared).filter(|(pose, _)| pose.observation.is_of_arm());
     let (poses, declared): (Vec<&Pose>, Vec<f64>) = rows.unzip();
-    let all = together(poses.iter().map(|pose| pose.sigma));
+    let assumed = together(poses.iter().map(|pose| pose.sigma));
     let of_kind =
         poses.iter().filter(|pose| pose.observation.kind() == kind.kind()).map(|pose| pose.sigma);
     (
-        (all / together(declared.into_iter())).powi(2),
+        (assumed / together(declared.into_iter())).powi(2),
         together(of_kind.collect::<Vec<f64>>().into_iter()),
     )
 }

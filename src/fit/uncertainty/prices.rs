@@ -47,27 +47,30 @@ impl Stage<'_> {
             .with_rows(LinearRows { matrix: priors, constant })?
             .with_rows(self.earlier_rows(at))?;
         let found = fit.linearise(&x);
-        let mut left = found.triangle.tr_mul(&found.projected);
+        let mut gradient = found.triangle.tr_mul(&found.projected);
         let free: Vec<usize> = (0..n).filter(|&j| at_bound[j].is_none()).collect();
         let weight = |j: usize| found.triangle.column(j).norm().max(f64::MIN_POSITIVE).recip();
         let normals = DMatrix::from_fn(free.len(), active.len(), |i, k| {
             active[k].row[free[i]] * weight(free[i])
         });
-        let force = DVector::from_fn(free.len(), |i, _| left[free[i]] * weight(free[i]));
+        let force = DVector::from_fn(free.len(), |i, _| gradient[free[i]] * weight(free[i]));
         let forces = if active.is_empty() {
             DVector::zeros(0)
         } else {
             Factor::new(normals, -force, MIN_INDEPENDENT_LENGTH).gauss_newton()
         };
         for (held, force) in active.iter().zip(&forces) {
-            held.row.iter().enumerate().for_each(|(j, coefficient)| left[j] -= coefficient * force);
+            held.row
+                .iter()
+                .enumerate()
+                .for_each(|(j, coefficient)| gradient[j] -= coefficient * force);
         }
         // Only rows of the first kind count, because millimetres and degrees have no common mean.
         let leading = self.poses.first().map(|pose| pose.observation.kind());
         let is_leading = |place: &usize| Some(self.poses[*place].observation.kind()) == leading;
         let places: Vec<usize> = (0..self.poses.len()).filter(is_leading).collect();
-        let all = residuals.position_errors(&x);
-        let errors: Vec<_> = places.iter().map(|&place| all[place]).collect();
+        let errors_of_poses = residuals.position_errors(&x);
+        let errors: Vec<_> = places.iter().map(|&place| errors_of_poses[place]).collect();
         let count = errors.len().max(1) as f64;
         let rms = (errors.iter().map(nalgebra::Matrix::norm_squared).sum::<f64>() / count).sqrt();
         let variance =
@@ -91,7 +94,7 @@ impl Stage<'_> {
             bounds: (0..n)
                 .map(|j| {
                     at_bound[j].map(|side| {
-                        price(left[j], side, parameters[j].lower >= parameters[j].upper)
+                        price(gradient[j], side, parameters[j].lower >= parameters[j].upper)
                     })
                 })
                 .collect(),

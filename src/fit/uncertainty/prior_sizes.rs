@@ -203,10 +203,15 @@ mod tests {
             lower: f64::NEG_INFINITY,
             upper: f64::INFINITY,
         };
-        let all: Vec<Parameter> = (0..8).map(|joint| parameter(joint, JointField::Alpha)).collect();
-        let x: Vec<f64> = all.iter().map(|_| size * normal(&mut random)).collect();
+        let parameters: Vec<Parameter> =
+            (0..8).map(|joint| parameter(joint, JointField::Alpha)).collect();
+        let x: Vec<f64> = parameters.iter().map(|_| size * normal(&mut random)).collect();
         let variance = ((0.01 * size).powi(-2) + declared.powi(-2)).recip();
-        prior_sizes(&all.iter().collect::<Vec<_>>(), &x, &(DMatrix::identity(8, 8) * variance))
+        prior_sizes(
+            &parameters.iter().collect::<Vec<_>>(),
+            &x,
+            &(DMatrix::identity(8, 8) * variance),
+        )
     }
 
     #[test]

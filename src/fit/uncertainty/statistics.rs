@@ -153,7 +153,7 @@ impl Statistics {
         // A combination that the data determined at the start may be undetermined at the end, for
         // example if a rigidity went towards infinity.
         let seen = stage.gauge(&end.x, &held, &constraints).visible;
-        let known = (0..errors.len())
+        let is_determined = (0..errors.len())
             .map(|j| {
                 !held[j]
                     && !is_open(j)
@@ -163,7 +163,7 @@ impl Statistics {
         Ok(Self {
             covariance: uncertainty.covariance,
             errors,
-            known,
+            known: is_determined,
             identified,
             reduced_chi2: (freedom > 0.5).then_some(chi2 / freedom),
             chance: noise_interval(freedom),

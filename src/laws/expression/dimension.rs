@@ -64,7 +64,7 @@ impl Dimension {
     /// Returns the unit by which the coefficient of a formula with this unit is divided.
     pub fn per(self) -> Per {
         let is = |of: Self| self.powers == of.powers;
-        let known = [
+        let denominators = [
             (Self::ANGLE, Per::Angle),
             (Self::LENGTH, Per::Length),
             (Self::KELVIN, Per::Kelvin),
@@ -73,7 +73,7 @@ impl Dimension {
             (Self::TORQUE, Per::Torque),
             (Self::COVARIATE, Per::Covariate),
         ];
-        known.into_iter().find(|(of, _)| is(*of)).map_or(Per::Number, |(_, per)| per)
+        denominators.into_iter().find(|(of, _)| is(*of)).map_or(Per::Number, |(_, per)| per)
     }
 
     /// Returns true if a function such as `sin` accepts the expression: it has no unit, is an

@@ -256,7 +256,9 @@ impl<'a> Parser<'a> {
         };
         self.at += length + 2;
         let name = inner.get(..length).unwrap_or_default();
-        if let Some(index) = self.vocabulary.covariates.iter().position(|known| known == name) {
+        if let Some(index) =
+            self.vocabulary.covariates.iter().position(|covariate| covariate == name)
+        {
             Ok(covariate(index, start..self.at))
         } else {
             let near = nearest(name, self.vocabulary.covariates).cloned();
@@ -278,10 +280,14 @@ impl<'a> Parser<'a> {
         let of = |expression, dimension| Ok(Part { expression, dimension, span: span.clone() });
         let quantity = |quantity, dimension| of(Expression::Quantity(quantity), dimension);
         // Names that the problem declares take precedence over built-in words of the same spelling.
-        if let Some(index) = self.vocabulary.parameters.iter().position(|known| known == word) {
+        if let Some(index) =
+            self.vocabulary.parameters.iter().position(|parameter| parameter == word)
+        {
             return of(Expression::Parameter(index), Dimension::FLEXIBLE);
         }
-        if let Some(index) = self.vocabulary.covariates.iter().position(|known| known == word) {
+        if let Some(index) =
+            self.vocabulary.covariates.iter().position(|covariate| covariate == word)
+        {
             return Ok(covariate(index, span));
         }
         if let Some((_, joint)) = self.vocabulary.joints.iter().find(|(name, _)| name == word) {
@@ -318,18 +324,18 @@ impl<'a> Parser<'a> {
         let commands = (1..=slides.len()).map(|number| format!("q{number}"));
         let sides = (1..=slides.len()).map(|number| format!("approach{number}"));
         let moments = (1..=slides.len()).map(|number| format!("M{number}"));
-        let known = Vocabulary::QUANTITIES.map(str::to_owned).into_iter();
+        let quantities = Vocabulary::QUANTITIES.map(str::to_owned).into_iter();
         let functions = Function::ALL.iter().map(|(_, name)| (*name).to_owned());
         let names = joints.iter().map(|(name, _)| name.clone());
         let words = parameters.iter().chain(*covariates).cloned();
-        let all = words
+        let candidates = words
             .chain(names)
             .chain(commands)
             .chain(sides)
             .chain(moments)
-            .chain(known)
+            .chain(quantities)
             .chain(functions);
-        Mistake::UnknownWord { word: word.to_owned(), near: nearest(word, all) }
+        Mistake::UnknownWord { word: word.to_owned(), near: nearest(word, candidates) }
     }
 
     fn command(&self, joint: usize) -> Dimension {
@@ -390,9 +396,9 @@ impl<'a> Parser<'a> {
     }
 
     fn unknown_function(name: &str) -> Mistake {
-        let known = Function::ALL.iter().map(|(_, name)| *name);
-        let known = known.chain(Operator::CALLS.iter().map(|(_, name)| *name));
-        let near = nearest(name, known.chain(["lag", "friction"])).map(str::to_owned);
+        let functions = Function::ALL.iter().map(|(_, name)| *name);
+        let names_of_functions = functions.chain(Operator::CALLS.iter().map(|(_, name)| *name));
+        let near = nearest(name, names_of_functions.chain(["lag", "friction"])).map(str::to_owned);
         Mistake::UnknownFunction { word: name.to_owned(), near }
     }
 

@@ -64,7 +64,7 @@ type Arguments = Vec<(&'static str, Argument)>;
 /// Returns the places on an arm where the effects of a family act, each as a list of arguments. The
 /// argument that the search varies is left out.
 fn places(family: &Family, problem: &Problem) -> Vec<Arguments> {
-    let mut all: Vec<Arguments> = vec![Vec::new()];
+    let mut argument_lists: Vec<Arguments> = vec![Vec::new()];
     for &(key, kind) in family.arguments {
         let joints = |is_it: &dyn Fn(&Joint) -> bool| -> Vec<Argument> {
             let found = (1..).zip(&problem.joints).filter(|(_, joint)| is_it(joint));
@@ -90,7 +90,7 @@ fn places(family: &Family, problem: &Problem) -> Vec<Arguments> {
             ArgumentKind::Covariate => {
                 let covariates = problem.covariate_names();
                 // The candidates are ordered by covariate: each covariate at every place.
-                all = covariates
+                argument_lists = covariates
                     .into_iter()
                     .flat_map(|name| {
                         let with = |place: &Arguments| {
@@ -98,14 +98,14 @@ fn places(family: &Family, problem: &Problem) -> Vec<Arguments> {
                             place.push((key, Argument::Name(name.clone())));
                             place
                         };
-                        all.iter().map(with).collect::<Vec<_>>()
+                        argument_lists.iter().map(with).collect::<Vec<_>>()
                     })
                     .collect();
                 continue;
             }
             _ => continue,
         };
-        all = all
+        argument_lists = argument_lists
             .iter()
             .flat_map(|place| {
                 let others = values.iter().filter(|value| {
@@ -116,7 +116,7 @@ fn places(family: &Family, problem: &Problem) -> Vec<Arguments> {
             })
             .collect();
     }
-    all
+    argument_lists
 }
 
 /// Returns the arguments of a place, once for each value of the argument that the search varies or
@@ -247,8 +247,8 @@ impl Effect {
             Need::Loads | Need::Play => unless(data.weighs(), NO_LOADS),
             Need::Covariate => {
                 let name = self.covariate();
-                let mut known = problem.data.covariates.iter();
-                let index = known.position(|known| Some(&known.name) == name.as_ref());
+                let mut covariates = problem.data.covariates.iter();
+                let index = covariates.position(|covariate| Some(&covariate.name) == name.as_ref());
                 let varies = index.and_then(|index| data.covariates.get(index)).copied();
                 unless(varies.unwrap_or(false), "the covariate does not change in these poses")
             }

@@ -29,9 +29,10 @@ pub(super) const MIN_MOMENT: f64 = 10.0;
 /// Returns an upper estimate of the moment on a joint, counted from 1 [N·m]: weight of everything
 /// declared beyond it times the length of its longest branch.
 pub(super) fn greatest_moment(problem: &Problem, joint: usize) -> f64 {
-    let all = |bodies: &[Body]| bodies.iter().map(|body| body.mass).sum::<f64>();
-    let beam =
-        |joint: &Joint| joint.beam.as_ref().map_or(0.0, |beam| beam.mass + all(&beam.masses));
+    let total_mass = |bodies: &[Body]| bodies.iter().map(|body| body.mass).sum::<f64>();
+    let beam = |joint: &Joint| {
+        joint.beam.as_ref().map_or(0.0, |beam| beam.mass + total_mass(&beam.masses))
+    };
     let tree = problem.tree();
     let first = &problem.joints[joint - 1];
     let beyond = || {
@@ -42,8 +43,8 @@ pub(super) fn greatest_moment(problem: &Problem, joint: usize) -> f64 {
             .skip(joint)
             .filter(|(k, _)| tree.path_contains(joint - 1, *k))
     };
-    let mass = all(&first.bodies)
-        + beyond().map(|(_, joint)| all(&joint.bodies) + beam(joint)).sum::<f64>();
+    let mass = total_mass(&first.bodies)
+        + beyond().map(|(_, joint)| total_mass(&joint.bodies) + beam(joint)).sum::<f64>();
     let payload = if tree.path_contains(joint - 1, problem.tool.joint) {
         problem.tool.payload_mass
     } else {
@@ -51,10 +52,10 @@ pub(super) fn greatest_moment(problem: &Problem, joint: usize) -> f64 {
     };
     let carried = |joint: usize| {
         let targets = problem.targets.iter().map(|target| (target.joint, target.at));
-        let all = targets
+        let points_at_joint = targets
             .chain([(problem.tool.joint, problem.tool.target)])
             .filter(|(carrier, _)| *carrier == joint);
-        all.map(|(_, at)| at.norm()).fold(0.0, f64::max)
+        points_at_joint.map(|(_, at)| at.norm()).fold(0.0, f64::max)
     };
     let reach = |tip: usize| {
         let way = beyond().filter(|(k, _)| tree.path_contains(*k, tip));

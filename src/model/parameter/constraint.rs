@@ -50,18 +50,18 @@ pub fn constrain(
     parameters: &[Parameter],
 ) -> Result<Vec<LinearConstraint>, InputError> {
     let candidates = candidates(problem, bases, targets, effects);
-    let known: Vec<(String, Unit, f64)> =
+    let constrainable: Vec<(String, Unit, f64)> =
         candidates.into_iter().map(|c| (c.name.clone(), c.unit(), c.nominal)).collect();
     problem
         .constraints
         .iter()
-        .map(|constraint| resolve_constraint(constraint, &known, parameters))
+        .map(|constraint| resolve_constraint(constraint, &constrainable, parameters))
         .collect()
 }
 
 fn resolve_constraint(
     constraint: &Constraint,
-    known: &[(String, Unit, f64)],
+    constrainable: &[(String, Unit, f64)],
     parameters: &[Parameter],
 ) -> Result<LinearConstraint, InputError> {
     let mut terms = Vec::new();
@@ -69,8 +69,9 @@ fn resolve_constraint(
     let (mut nominal, mut sum) = (0.0, String::new());
     for term in &constraint.terms {
         let error = |kind| Err(term.location.clone().error(kind));
-        let Some((name, unit, value)) = known.iter().find(|(name, ..)| *name == term.name) else {
-            let known = known.iter().map(|(name, ..)| name.clone()).collect();
+        let Some((name, unit, value)) = constrainable.iter().find(|(name, ..)| *name == term.name)
+        else {
+            let known = constrainable.iter().map(|(name, ..)| name.clone()).collect();
             return error(InputErrorKind::UnknownParameter { name: term.name.clone(), known });
         };
         if !matches!(unit, Unit::Angle | Unit::Length) && !unit.is_relative() {

@@ -102,19 +102,21 @@ pub fn resolve(
             }
         }
         if !matched {
-            let mut known: Vec<String> = Vec::new();
+            let mut plain_names: Vec<String> = Vec::new();
             for Candidate { plain, .. } in &candidates {
-                if !known.contains(plain) {
-                    known.push(plain.clone());
+                if !plain_names.contains(plain) {
+                    plain_names.push(plain.clone());
                 }
             }
-            let undeclared = undeclared(problem, &rule.pattern, &known);
+            let undeclared = undeclared(problem, &rule.pattern, &plain_names);
             // Undeclared effects that a rule fixes are not searched for.
             if undeclared.is_some() && matches!(rule.freedom, Freedom::Fixed) {
                 continue;
             }
-            let kind = undeclared
-                .unwrap_or(InputErrorKind::MatchesNothing { pattern: rule.pattern.clone(), known });
+            let kind = undeclared.unwrap_or(InputErrorKind::MatchesNothing {
+                pattern: rule.pattern.clone(),
+                known: plain_names,
+            });
             return Err(rule.location.clone().error(kind));
         }
         check_kinds(rule, &candidates)?;
@@ -169,13 +171,13 @@ pub fn rule_of<'a>(problem: &'a Problem, parameter: &EffectParameter) -> Option<
         .find(|rule| parameter.is_named(rule) && applies_to_unit(rule, parameter.unit()))
 }
 
-/// Returns the error for a pattern that matches no parameter in `known` but effects which the
+/// Returns the error for a pattern that matches no parameter in `names` but effects which the
 /// problem does not declare; `None` if it matches no effect.
-fn undeclared(problem: &Problem, pattern: &str, known: &[String]) -> Option<InputErrorKind> {
+fn undeclared(problem: &Problem, pattern: &str, names: &[String]) -> Option<InputErrorKind> {
     // The word before the dot or bracket of `hoist-force.error`, `gear-ratio[3].error`.
     let head = |name: &str| name.split(['.', '[']).next().unwrap_or_default().to_owned();
     let wanted = head(pattern);
-    if known.iter().any(|name| matches(&wanted, &head(name))) {
+    if names.iter().any(|name| matches(&wanted, &head(name))) {
         return None;
     }
     let effects: Vec<&str> = NAMES.iter().copied().filter(|name| matches(&wanted, name)).collect();

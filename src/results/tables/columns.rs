@@ -58,8 +58,11 @@ pub(super) fn to_csv(columns: &Columns, rows: usize) -> String {
 /// fixtures.
 pub(super) fn names(problem: &Problem, rows: &Measurements, picked: &[usize]) -> Columns {
     let of_row = |of: &dyn Fn(usize) -> usize| picked.iter().map(|&row| of(row)).collect();
-    let labels = |all: &Labels| {
-        Column::Words(Labels { names: all.names.clone(), of_row: of_row(&|row| all.of_row[row]) })
+    let labels = |labels_of_rows: &Labels| {
+        Column::Words(Labels {
+            names: labels_of_rows.names.clone(),
+            of_row: of_row(&|row| labels_of_rows.of_row[row]),
+        })
     };
     let files: Labels = rows.files.iter().map(|file| file.display().to_string()).collect();
     let file = Labels {

@@ -49,8 +49,8 @@ pub fn poses_csv(problem: &Problem, poses: &Measurements) -> String {
     ];
     columns
         .extend(optional.into_iter().filter_map(|(name, column)| Some((name.to_owned(), column?))));
-    let known = poses.covariates.len() == problem.data.covariates.len() * poses.len();
-    columns.extend(problem.data.covariates.iter().enumerate().filter(|_| known).map(
+    let has_covariates = poses.covariates.len() == problem.data.covariates.len() * poses.len();
+    columns.extend(problem.data.covariates.iter().enumerate().filter(|_| has_covariates).map(
         |(which, covariate)| {
             let values = (0..poses.len()).map(|row| plain(poses.covariates_of(row)[which]));
             (covariate.name.clone(), values.collect())

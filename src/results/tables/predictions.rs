@@ -22,12 +22,12 @@ pub fn predictions_csv(
     prediction: &Prediction,
     (bounds, errors): (Option<&Bounds>, Option<&[Vector3<f64>]>),
 ) -> String {
-    let all: Vec<usize> = (0..prediction.positions.len()).collect();
-    let mut columns = columns::names(problem, rows, &all);
+    let all_rows: Vec<usize> = (0..prediction.positions.len()).collect();
+    let mut columns = columns::names(problem, rows, &all_rows);
     let mut add = |name: String, decimals, of: &dyn Fn(usize) -> f64| {
         columns.push((
             name,
-            Column::Numbers(all.iter().map(|&row| of(row)).collect(), Some(decimals)),
+            Column::Numbers(all_rows.iter().map(|&row| of(row)).collect(), Some(decimals)),
         ));
     };
     for joint in commanded_joints(problem) {
@@ -51,15 +51,15 @@ pub fn predictions_csv(
             if is_position { errors[row][k] * 1e3 } else { f64::NAN }
         };
         let is_told = |&row: &usize| rows.observation(row).is_position() && !errors[row].x.is_nan();
-        if bounds.is_none() && all.iter().any(is_told) {
+        if bounds.is_none() && all_rows.iter().any(is_told) {
             for (k, axis) in ["x", "y", "z"].into_iter().enumerate() {
-                let cells = all.iter().map(|&row| of_position(row, k)).collect();
+                let cells = all_rows.iter().map(|&row| of_position(row, k)).collect();
                 columns.push((format!("sigma_{axis}_mm"), Column::Numbers(cells, Some(4))));
             }
         }
         columns.extend(columns_of_kinds(rows, "sigma", 6, errors));
     }
-    columns::to_csv(&columns, all.len())
+    columns::to_csv(&columns, all_rows.len())
 }
 
 /// Returns the columns of the uncertainty of predictions: 1 σ along each axis, the bound of the

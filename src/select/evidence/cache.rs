@@ -15,11 +15,11 @@ impl<K, V> Default for Cache<K, V> {
 impl<K: Ord + Clone, V: Clone> Cache<K, V> {
     /// Returns the cached result of `key`, or computes and keeps it.
     pub fn get_or_compute(&self, key: &K, make: impl FnOnce() -> Option<V>) -> Option<V> {
-        let all = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let known = all().get(key).cloned();
-        known.or_else(|| {
+        let entries = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let cached = entries().get(key).cloned();
+        cached.or_else(|| {
             let new = make()?;
-            all().insert(key.clone(), new.clone());
+            entries().insert(key.clone(), new.clone());
             Some(new)
         })
     }

@@ -36,7 +36,7 @@ impl Candidate {
     /// Returns the blocks of candidates: columns with the fitted parameters projected out, and some
     /// poses left out.
     pub fn blocks(
-        all: &[&Self],
+        candidates: &[&Self],
         (fitted, fit): (&Fitted, &LinearNeighbourhood),
         left_out: &[usize],
     ) -> Vec<Block> {
@@ -49,8 +49,8 @@ impl Candidate {
             }
             (candidate.design.clone().without(left_out), candidate.ln_prior, coefficients)
         };
-        let mut blocks = Block::all(all.iter().map(design).collect(), fit);
-        for (block, candidate) in blocks.iter_mut().zip(all) {
+        let mut blocks = Block::all(candidates.iter().map(design).collect(), fit);
+        for (block, candidate) in blocks.iter_mut().zip(candidates) {
             block.family = candidate.hypothesis.effect().map(|effect| effect.name().to_owned());
             let effect = candidate.hypothesis.effect();
             block.joint = effect.filter(|effect| effect.acts_at_joint()).and_then(Effect::joint);

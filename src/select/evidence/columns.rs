@@ -62,7 +62,7 @@ impl<'a, 'l> Columns<'a, 'l> {
         only: Option<&'a Hypothesis>,
     ) -> (Vec<Candidate>, Vec<SampledCovariate>, f64) {
         let (candidates, shares, covariates) = (Vec::new(), Vec::new(), Vec::new());
-        let mut all = Self {
+        let mut new_columns = Self {
             problem,
             linearised,
             coverage,
@@ -73,9 +73,9 @@ impl<'a, 'l> Columns<'a, 'l> {
             shares,
             covariates,
         };
-        all.effects(effects);
-        all.functions();
-        all.into_candidates()
+        new_columns.effects(effects);
+        new_columns.functions();
+        new_columns.into_candidates()
     }
 
     pub(super) fn add(
@@ -140,9 +140,9 @@ impl<'a, 'l> Columns<'a, 'l> {
         variant: usize,
         columns: impl FnOnce() -> DMatrix<f64>,
     ) {
-        let known = self.candidates.len();
+        let count_before = self.candidates.len();
         self.add(family, 1.0, hypothesis.clone(), columns);
-        if let Some(candidate) = self.candidates.get_mut(known) {
+        if let Some(candidate) = self.candidates.get_mut(count_before) {
             candidate.variant = variant;
         }
     }
@@ -218,7 +218,7 @@ impl<'a, 'l> Columns<'a, 'l> {
     /// with their values in every pose.
     fn recorded_covariates(&self) -> Vec<SampledCovariate> {
         let poses = self.linearised.poses();
-        let mut all: Vec<(Covariate, Vec<f64>)> = Vec::new();
+        let mut covariates: Vec<(Covariate, Vec<f64>)> = Vec::new();
         let moving = self
             .problem
             .joints
@@ -226,7 +226,7 @@ impl<'a, 'l> Columns<'a, 'l> {
             .enumerate()
             .filter(|(_, joint)| joint.command_kind() != JointKind::Fixed);
         for (joint, _) in moving.clone() {
-            all.push((Covariate::Command(joint), self.command(joint)));
+            covariates.push((Covariate::Command(joint), self.command(joint)));
         }
         for covariate in [Covariate::Temperature, Covariate::Payload, Covariate::Hoist] {
             let of = |pose: &Pose| match covariate {
@@ -234,7 +234,7 @@ impl<'a, 'l> Columns<'a, 'l> {
                 Covariate::Payload => pose.setup.payload.copied(),
                 _ => pose.setup.hoist.copied(),
             };
-            all.extend(
+            covariates.extend(
                 poses
                     .iter()
                     .map(of)
@@ -244,7 +244,7 @@ impl<'a, 'l> Columns<'a, 'l> {
         }
         for which in 0..self.problem.data.covariates.len() {
             let values = poses.iter().map(|pose| pose.setup.covariates.get(which).copied());
-            all.extend(
+            covariates.extend(
                 values
                     .collect::<Option<Vec<f64>>>()
                     .map(|values| (Covariate::declared(which, self.problem), values)),
@@ -253,17 +253,18 @@ impl<'a, 'l> Columns<'a, 'l> {
         // Times count from the first pose of all sessions, because structure may continue from one
         // session to the next.
         let first = poses.iter().map(|pose| pose.setup.time).fold(f64::INFINITY, f64::min);
-        all.push((
+        covariates.push((
             Covariate::time(self.coverage.1),
             poses.iter().map(|pose| pose.setup.time - first).collect(),
         ));
         for (joint, _) in moving {
             let sides = poses.iter().map(|pose| pose.setup.approach.map(|all| all[joint]));
-            all.extend(
+            covariates.extend(
                 sides.collect::<Option<Vec<f64>>>().map(|v| (Covariate::Approach(joint), v)),
             );
         }
-        all.into_iter()
+        covariates
+            .into_iter()
             .filter_map(|(covariate, values)| {
                 SampledCovariate::new(covariate, values, self.weighed)
             })
@@ -328,8 +329,12 @@ impl<'a, 'l> Columns<'a, 'l> {
             )
             .filter(|known| known.levels > 3)
         };
-        let all = (0..self.problem.joints.len()).flat_map(|joint| pairs.map(|pair| (joint, pair)));
-        all.enumerate().filter_map(|(k, (joint, pair))| Some((k, of(joint, pair)?))).collect()
+        let axes_of_joints =
+            (0..self.problem.joints.len()).flat_map(|joint| pairs.map(|pair| (joint, pair)));
+        axes_of_joints
+            .enumerate()
+            .filter_map(|(k, (joint, pair))| Some((k, of(joint, pair)?)))
+            .collect()
     }
 
     /// Returns true if a candidate effect adds a term linear in this covariate at `site`, and
@@ -399,11 +404,11 @@ impl<'a, 'l> Columns<'a, 'l> {
 
     /// Adds functions of two covariates: of two commands, of a direction of approach and another
     /// quantity, or of temperature and time, all at `site`.
-    fn surfaces(&mut self, site: ParameterSite, at: &DVector<f64>, known: &[SampledCovariate]) {
-        for (k, one) in known.iter().enumerate() {
-            for other in &known[k + 1..] {
-                if goes_with(&one.covariate, &other.covariate) {
-                    self.surface("surface", site, &[at], (one, other));
+    fn surfaces(&mut self, site: ParameterSite, at: &DVector<f64>, recorded: &[SampledCovariate]) {
+        for (k, first) in recorded.iter().enumerate() {
+            for second in &recorded[k + 1..] {
+                if goes_with(&first.covariate, &second.covariate) {
+                    self.surface("surface", site, &[at], (first, second));
                 }
             }
         }
@@ -411,15 +416,15 @@ impl<'a, 'l> Columns<'a, 'l> {
 
     /// Adds functions of a joint's command whose amplitude is proportional to another quantity,
     /// such as a gear error that grows with temperature or payload.
-    fn scaled_by(&mut self, site: ParameterSite, at: &DVector<f64>, known: &[SampledCovariate]) {
+    fn scaled_by(&mut self, site: ParameterSite, at: &DVector<f64>, recorded: &[SampledCovariate]) {
         let ParameterSite::Joint { joint, .. } = site else { return };
         let Some(command) =
-            known.iter().find(|command| command.covariate == Covariate::Command(joint))
+            recorded.iter().find(|command| command.covariate == Covariate::Command(joint))
         else {
             return;
         };
         let reference = self.problem.data.reference_temperature;
-        for size in known.iter().filter(|of| of.is_size(reference)) {
+        for size in recorded.iter().filter(|of| of.is_size(reference)) {
             let (zero, length) = (size.zero(reference), SLOW_LENGTH);
             let hypothesis =
                 Hypothesis::smooth(site, vec![command.covariate.clone(), size.covariate.clone()]);
@@ -463,13 +468,13 @@ impl<'a, 'l> Columns<'a, 'l> {
                 families.push((family, weight, *share));
             }
         }
-        let all: f64 = families.iter().map(|(_, weight, _)| weight).sum();
+        let total_weight: f64 = families.iter().map(|(_, weight, _)| weight).sum();
         let mut candidates = self.candidates;
         for (candidate, (family, share)) in candidates.iter_mut().zip(&self.shares) {
             let entry = families.iter().find(|(known, ..)| *known == family.as_str());
             let (weight, sum) = entry.map_or((1.0, 1.0), |(_, weight, sum)| (*weight, *sum));
-            candidate.ln_prior = (share / sum * weight / all / 2.0).ln();
+            candidate.ln_prior = (share / sum * weight / total_weight / 2.0).ln();
         }
-        (candidates, self.covariates, -(2.0 * all.max(1.0)).ln())
+        (candidates, self.covariates, -(2.0 * total_weight.max(1.0)).ln())
     }
 }

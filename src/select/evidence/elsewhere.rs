@@ -17,7 +17,7 @@ use crate::select::settings::{ROUGH_LENGTHS, SLOW_LENGTH, SMOOTH_LENGTHS};
 impl Columns<'_, '_> {
     /// Adds hypotheses about the instrument: functions of one covariate, and of the measured
     /// position, that displace every measured position.
-    pub(super) fn measurement(&mut self, known: &[SampledCovariate]) {
+    pub(super) fn measurement(&mut self, recorded: &[SampledCovariate]) {
         let axes: Vec<DVector<f64>> = (0..3)
             .filter_map(|axis| self.linearised.place(ParameterSite::Shift { axis }))
             .collect();
@@ -25,12 +25,12 @@ impl Columns<'_, '_> {
             return;
         }
         let (site, at) = (ParameterSite::Shift { axis: 0 }, axes.iter().collect::<Vec<_>>());
-        for of in known {
+        for of in recorded {
             self.smooth("smooth in the measurement", (site, &at), of, (&SMOOTH_LENGTHS, 0));
         }
         let is_time =
             |of: &&SampledCovariate| matches!(of.covariate, Covariate::Time | Covariate::Row);
-        for of in known.iter().filter(is_time) {
+        for of in recorded.iter().filter(is_time) {
             self.wandering(site, &at, of);
         }
         let poses = self.linearised.poses();
@@ -90,14 +90,14 @@ impl Columns<'_, '_> {
 
     /// Adds rotations of the base as smooth functions of quantities other than commands, such as
     /// temperature, time or load.
-    pub(super) fn base(&mut self, known: &[SampledCovariate]) {
+    pub(super) fn base(&mut self, recorded: &[SampledCovariate]) {
         let axes: Vec<DVector<f64>> =
             (0..3).filter_map(|axis| self.linearised.place(ParameterSite::Turn { axis })).collect();
         let (site, at) = (ParameterSite::Turn { axis: 0 }, axes.iter().collect::<Vec<_>>());
         let is_command = |of: &&SampledCovariate| {
             matches!(of.covariate, Covariate::Command(_) | Covariate::Approach(_))
         };
-        for of in known.iter().filter(|of| axes.len() == 3 && !is_command(of)) {
+        for of in recorded.iter().filter(|of| axes.len() == 3 && !is_command(of)) {
             self.smooth("smooth at the base", (site, &at), of, (&SMOOTH_LENGTHS[..2], 0));
         }
     }
@@ -128,7 +128,7 @@ impl Columns<'_, '_> {
 
     /// Adds curvature and strain of beams as smooth functions of temperature and other quantities,
     /// in addition to the linear laws.
-    pub(super) fn warming(&mut self, known: &[SampledCovariate]) {
+    pub(super) fn warming(&mut self, recorded: &[SampledCovariate]) {
         if self.problem.data.reference_temperature.is_none() {
             return;
         }
@@ -148,9 +148,10 @@ impl Columns<'_, '_> {
                     columns.iter().collect::<Vec<_>>(),
                 );
                 let of_covariate =
-                    |wanted: &Covariate| known.iter().find(|known| known.covariate == *wanted);
-                for of in
-                    known.iter().filter(|known| !matches!(known.covariate, Covariate::Approach(_)))
+                    |wanted: &Covariate| recorded.iter().find(|known| known.covariate == *wanted);
+                for of in recorded
+                    .iter()
+                    .filter(|known| !matches!(known.covariate, Covariate::Approach(_)))
                 {
                     self.smooth("smooth in a link", (site, &at), of, (&SMOOTH_LENGTHS[..2], 0));
                 }

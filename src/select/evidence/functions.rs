@@ -258,14 +258,15 @@ mod tests {
 
     #[test]
     fn what_hardly_varies_from_its_zero_is_no_size_to_grow_with() {
-        let known = |values: &[f64]| {
+        let covariate = |values: &[f64]| {
             SampledCovariate::new(Covariate::Temperature, values.to_vec(), values.len()).unwrap()
         };
         assert!(
-            known(&[17.0, 20.0, 31.0]).is_size(Some(20.0)) && known(&[29.5, 30.5]).is_size(None)
+            covariate(&[17.0, 20.0, 31.0]).is_size(Some(20.0))
+                && covariate(&[29.5, 30.5]).is_size(None)
         );
-        assert!(!known(&[29.5, 30.5]).is_size(Some(20.0)));
-        let grown = growing(&[0.0, 0.5], &known(&[20.0, 31.0]), Some(20.0), 0.5);
+        assert!(!covariate(&[29.5, 30.5]).is_size(Some(20.0)));
+        let grown = growing(&[0.0, 0.5], &covariate(&[20.0, 31.0]), Some(20.0), 0.5);
         assert!(
             grown.row(0).iter().all(|value| *value == 0.0)
                 && grown.row(1).iter().any(|value| *value != 0.0),

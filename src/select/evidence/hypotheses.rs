@@ -58,13 +58,14 @@ impl<'a> Hypotheses<'a> {
         let linearised =
             fitted.linearised_with(data, rows, &candidates, &hypothesis_sites(&fitted.problem));
         let fit = linearised.fitted();
-        let known = added.iter().zip(&columns_of_part).map(|(part, columns_of_part)| {
-            // Only the coefficients of a law are removed from the fit; inner parameters keep their
-            // values.
-            let inner = if let Effect::Law(law) = part { law.parameters().len() } else { 0 };
-            let count = columns_of_part.len().saturating_sub(inner);
-            (part.clone(), fit.select_columns(&columns_of_part[..count]))
-        });
+        let projected_columns =
+            added.iter().zip(&columns_of_part).map(|(part, columns_of_part)| {
+                // Only the coefficients of a law are removed from the fit; inner parameters keep their
+                // values.
+                let inner = if let Effect::Law(law) = part { law.parameters().len() } else { 0 };
+                let count = columns_of_part.len().saturating_sub(inner);
+                (part.clone(), fit.select_columns(&columns_of_part[..count]))
+            });
         // No list can contain all waves, composed laws and moves. The prior probability of each of
         // them therefore does not depend on the other candidates.
         let is_unlisted = |effect: &Effect| {
@@ -73,7 +74,7 @@ impl<'a> Hypotheses<'a> {
                 || matches!(effect, Effect::StationMove { .. })
         };
         let (unlisted, known): (Vec<_>, Vec<_>) =
-            known.partition(|(effect, _)| is_unlisted(effect));
+            projected_columns.partition(|(effect, _)| is_unlisted(effect));
         let new =
             candidates.into_iter().map(|effect| (effect.clone(), linearised.columns(&effect)));
         let effects: Vec<(Effect, DMatrix<f64>)> = known.into_iter().chain(new).collect();

@@ -184,21 +184,21 @@ impl Hypothesis {
 }
 
 /// Returns the covariates on which a parameter's effect depends, through its regressor or the
-/// physics of its site. `known` states whether directions of approach and times are recorded.
+/// physics of its site. `is_recorded` states whether directions of approach and times are recorded.
 fn covariates(
     site: ParameterSite,
     regressor: &Regressor,
     problem: &Problem,
-    known: (bool, bool),
+    is_recorded: (bool, bool),
 ) -> Vec<Covariate> {
     let quantities = regressor.quantities();
     if !quantities.is_empty() {
-        let of = |quantity| Covariate::of(quantity, problem, known);
+        let of = |quantity| Covariate::of(quantity, problem, is_recorded);
         return quantities.into_iter().flat_map(of).collect();
     }
     vec![match site {
         ParameterSite::Joint { joint, field: JointField::Play | JointField::SlidingPlay }
-            if known.0 =>
+            if is_recorded.0 =>
         {
             Covariate::Approach(joint)
         }

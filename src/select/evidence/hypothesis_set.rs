@@ -36,11 +36,11 @@ impl HypothesisSet {
     /// Returns the members that are functions without a law, each with the index of the function
     /// chosen for it.
     pub(in crate::select) fn without_law(&self) -> Vec<(Hypothesis, usize)> {
-        let all = self
+        let without_effect = self
             .hypotheses
             .iter()
             .zip(&self.functions)
             .filter(|(member, _)| member.effect().is_none());
-        all.map(|(member, (variant, _))| (member.clone(), *variant)).collect()
+        without_effect.map(|(member, (variant, _))| (member.clone(), *variant)).collect()
     }
 }

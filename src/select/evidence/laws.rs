@@ -70,12 +70,12 @@ pub(super) fn promising(
         let fitted_effects = fitted.effects().iter().map(Effect::name_and_place).collect();
         let names = sites.iter().map(|at| at.name.as_str()).collect::<Vec<_>>().join(" ");
         let key = (names, member_names(hypotheses, &rest), left_out.to_vec(), fitted_effects);
-        let known = || data.proposed.lock().unwrap_or_else(PoisonError::into_inner);
-        let proposed = known().get(&key).cloned();
+        let proposals = || data.proposed.lock().unwrap_or_else(PoisonError::into_inner);
+        let proposed = proposals().get(&key).cloned();
         let proposed = proposed.unwrap_or_else(|| {
             let search = Search { hypotheses, fitted, data, left_out };
             let new = search.laws(&sites, &rest, products);
-            known().insert(key, new.clone());
+            proposals().insert(key, new.clone());
             new
         });
         for effect in proposed {
@@ -172,17 +172,17 @@ fn places(hypotheses: &Hypotheses, weighted: &[Weighted], products: &Products) -
     let problem = hypotheses.linearised.problem();
     let of = |member: usize| joint_of(&hypotheses.all[member].hypothesis, problem);
     // The probabilities of sets that differ only at the joint are added.
-    let mut all: BTreeMap<(usize, Vec<usize>), f64> = BTreeMap::new();
+    let mut probability_of_rest: BTreeMap<(usize, Vec<usize>), f64> = BTreeMap::new();
     for set in weighted.iter().filter(|set| !products.has_gear(&set.members)) {
         let joints: BTreeSet<usize> = set.members.iter().filter_map(|&member| of(member)).collect();
         for joint in joints {
             let mut rest: Vec<usize> =
                 set.members.iter().copied().filter(|&member| of(member) != Some(joint)).collect();
             rest.sort_unstable();
-            *all.entry((joint, rest)).or_default() += set.probability;
+            *probability_of_rest.entry((joint, rest)).or_default() += set.probability;
         }
     }
-    let mut found: Vec<((usize, Vec<usize>), f64)> = all
+    let mut found: Vec<((usize, Vec<usize>), f64)> = probability_of_rest
         .into_iter()
         .filter(|(_, probability)| *probability > MIN_SET_PROBABILITIES[0])
         .collect();
@@ -285,8 +285,8 @@ impl Search<'_, '_, '_> {
             return Vec::new();
         };
         let products = Products::new(&blocks, &target);
-        let all: Vec<usize> = (0..blocks.len()).collect();
-        let left = reduced_by(&all, &products);
+        let all_blocks: Vec<usize> = (0..blocks.len()).collect();
+        let left = reduced_by(&all_blocks, &products);
         left.map_or_else(Vec::new, |left| self.best(sites, &left, &products, &kept))
     }
 
@@ -302,14 +302,14 @@ impl Search<'_, '_, '_> {
             let proposals = self.proposals(at, (left, products), kept);
             proposals.into_iter().map(|proposal| (at.clone(), proposal)).collect::<Vec<_>>()
         };
-        let mut all: Vec<(LawAt, Proposal)> = sites.iter().flat_map(of_site).collect();
+        let mut laws_at_sites: Vec<(LawAt, Proposal)> = sites.iter().flat_map(of_site).collect();
         if sites.iter().all(|at| at.joint.is_none()) {
-            all.sort_by(|a, b| b.1.ln_posterior.total_cmp(&a.1.ln_posterior));
-            let most = all.first().map_or(0.0, |best| best.1.ln_posterior);
-            all.retain(|(_, law)| law.ln_posterior > most - MAX_LN_ODDS_ELSEWHERE);
-            all.truncate(MAX_ELSEWHERE);
+            laws_at_sites.sort_by(|a, b| b.1.ln_posterior.total_cmp(&a.1.ln_posterior));
+            let most = laws_at_sites.first().map_or(0.0, |best| best.1.ln_posterior);
+            laws_at_sites.retain(|(_, law)| law.ln_posterior > most - MAX_LN_ODDS_ELSEWHERE);
+            laws_at_sites.truncate(MAX_ELSEWHERE);
         }
-        let new = all.iter().filter(|(_, proposal)| !proposal.is_present);
+        let new = laws_at_sites.iter().filter(|(_, proposal)| !proposal.is_present);
         new.filter_map(|(at, proposal)| effect(&self.fitted.problem, at, proposal)).collect()
     }
 
@@ -338,9 +338,9 @@ impl Search<'_, '_, '_> {
         let noise = Noise::new(left.squares, products.target.noise.freedom, |squares| {
             products.over_noise(squares)
         });
-        let all = linearised.poses();
-        let poses: Vec<_> = kept.iter().map(|&pose| &all[pose]).collect();
-        let known = Quantities::new(problem, &poses, data.measurements.time_measured);
+        let poses_of_fit = linearised.poses();
+        let poses: Vec<_> = kept.iter().map(|&pose| &poses_of_fit[pose]).collect();
+        let quantities = Quantities::new(problem, &poses, data.measurements.time_measured);
         // The functions of laws that the fit contains follow from their columns and the lever.
         let is_present = |k: &usize| {
             let effect = hypotheses.all[*k].hypothesis.effect();
@@ -359,7 +359,7 @@ impl Search<'_, '_, '_> {
             columns.column_iter().map(|column| function(column.as_view())).collect()
         };
         let functions: Vec<Vec<DVector<f64>>> = present.iter().map(functions).collect();
-        proposals(&known, (&at.name, at.joint), (&site, &noise), &functions)
+        proposals(&quantities, (&at.name, at.joint), (&site, &noise), &functions)
     }
 }
 

@@ -104,8 +104,8 @@ pub(super) fn best_form(
     let weighed = hypotheses.linearised.poses().len();
     let gains = |forms: &[&Candidate]| {
         let (blocks, target) = blocks(fitted, data, hypotheses, forms, &[])?;
-        let all: Vec<usize> = (0..blocks.len()).collect();
-        let mut gains = search::gains_beside(&[], &all, &Products::new(&blocks, &target));
+        let all_blocks: Vec<usize> = (0..blocks.len()).collect();
+        let mut gains = search::gains_beside(&[], &all_blocks, &Products::new(&blocks, &target));
         gains.sort_by(|a, b| b.1.total_cmp(&a.1));
         Some(gains)
     };
@@ -212,8 +212,8 @@ fn evaluated_without<'a>(
         (BTreeMap::new(), Vec::new());
     let mut number = |member: usize| {
         *numbers.entry(member).or_insert_with(|| {
-            let known = distinct.iter().position(|&known| of(known).is_same_claim(of(member)));
-            known.unwrap_or_else(|| {
+            let place = distinct.iter().position(|&earlier| of(earlier).is_same_claim(of(member)));
+            place.unwrap_or_else(|| {
                 distinct.push(member);
                 distinct.len() - 1
             })
@@ -270,7 +270,7 @@ fn stand_ins(
     };
     let members: Vec<usize> =
         best.hypotheses.iter().zip(&best.functions).filter_map(number).collect();
-    let mut all = Vec::new();
+    let mut stand_ins = Vec::new();
     for &member in &members {
         let others: Vec<usize> = members.iter().copied().filter(|&other| other != member).collect();
         let mut gains = search::gains_beside(&others, &tried, products);
@@ -279,16 +279,16 @@ fn stand_ins(
         gains.retain(|(k, gain, _)| *gain > least && !members.contains(k));
         gains.sort_by(|a, b| b.1.total_cmp(&a.1));
         let name = |k: usize| effect(k).map(Effect::name_and_place).unwrap_or_default();
-        let mut known = vec![name(member)];
+        let mut listed_names = vec![name(member)];
         for (k, ..) in gains {
-            if !known.contains(&name(k)) && known.len() <= MAX_STAND_INS {
-                known.push(name(k));
-                all.push((
+            if !listed_names.contains(&name(k)) && listed_names.len() <= MAX_STAND_INS {
+                listed_names.push(name(k));
+                stand_ins.push((
                     hypotheses.all[member].hypothesis.clone(),
                     hypotheses.all[k].hypothesis.clone(),
                 ));
             }
         }
     }
-    all
+    stand_ins
 }

@@ -98,7 +98,7 @@ impl Evidence {
                 && matches!(differ(best, other).as_slice(), [only] if !only.is_limit())
                 && matches!(differ(other, best).as_slice(), [only] if only.effect().is_some())
         };
-        let mut all: Vec<HypothesisSet> =
+        let mut alternatives: Vec<HypothesisSet> =
             self.sets.iter().filter(is_exchange).take(most).cloned().collect();
         for (member, other) in self.stand_ins.iter().filter(|(member, _)| !member.is_limit()) {
             let Some(place) = best.hypotheses.iter().position(|known| known == member) else {
@@ -110,11 +110,11 @@ impl Evidence {
             let is_known = |known: &HypothesisSet| {
                 known.hypotheses.iter().all(|member| exchanged.hypotheses.contains(member))
             };
-            if !all.iter().any(is_known) && !best.hypotheses.contains(other) {
-                all.push(exchanged);
+            if !alternatives.iter().any(is_known) && !best.hypotheses.contains(other) {
+                alternatives.push(exchanged);
             }
         }
-        all
+        alternatives
     }
 
     /// Returns the evidence with the odds of some sets replaced by `odds`: ln odds to `best`, each
@@ -157,8 +157,11 @@ impl Evidence {
     ) -> Vec<(Effect, f64)> {
         // If a model has very many effects, most are in no set, and the search below is not
         // needed.
-        let mut all = self.sets.iter().flat_map(|explanation| &explanation.hypotheses);
-        if !all.by_ref().filter_map(Hypothesis::effect).any(|known| known.is_but_for_search(effect))
+        let mut hypotheses = self.sets.iter().flat_map(|explanation| &explanation.hypotheses);
+        if !hypotheses
+            .by_ref()
+            .filter_map(Hypothesis::effect)
+            .any(|known| known.is_but_for_search(effect))
         {
             return Vec::new();
         }
@@ -203,8 +206,9 @@ impl Evidence {
     /// Returns place, quantities and law of an effect with their probabilities; `None` if no set
     /// contains the effect.
     pub fn claims_of(&self, effect: &Effect) -> Option<Claims> {
-        let mut all = self.sets.iter().flat_map(|explanation| &explanation.hypotheses);
-        all.find(|hypothesis| hypothesis.effect() == Some(effect))
+        let mut hypotheses = self.sets.iter().flat_map(|explanation| &explanation.hypotheses);
+        hypotheses
+            .find(|hypothesis| hypothesis.effect() == Some(effect))
             .map(|hypothesis| self.claims(hypothesis))
     }
 

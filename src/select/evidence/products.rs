@@ -143,8 +143,8 @@ impl<'a> Products<'a> {
             cached().entry(set.clone()).or_default().extend(missing.into_iter().zip(gains));
         }
         let cached = cached();
-        let known = cached.get(&set);
-        tried.iter().filter_map(|block| known?.get(block).copied()).collect()
+        let entries_of_set = cached.get(&set);
+        tried.iter().filter_map(|block| entries_of_set?.get(block).copied()).collect()
     }
 
     /// Returns the converged sizes of a set and ln of its posterior; calls `settle` if they are not
@@ -319,11 +319,11 @@ impl ReducedProblem<'_, '_> {
         let counts = || tried.iter().map(|&block| blocks[block].product().len());
         // A gain does not depend on the hypotheses that are tried with it.
         let width = counts().sum::<usize>().max(MIN_SIDE);
-        let mut all = DMatrix::zeros(self.taken.len(), width);
+        let mut stacked = DMatrix::zeros(self.taken.len(), width);
         let mut first = 0;
         for &member in &self.members {
             let count = self.products.member(member).columns.ncols();
-            let mut target = all.rows_mut(first, count);
+            let mut target = stacked.rows_mut(first, count);
             let mut column = 0;
             for &block in tried {
                 let with = self.products.product(member, block);
@@ -334,7 +334,7 @@ impl ReducedProblem<'_, '_> {
         }
         self.gains_along(
             tried.iter().map(|&block| &blocks[block]),
-            &lower_product(&self.within, &all),
+            &lower_product(&self.within, &stacked),
         )
     }
 
@@ -342,11 +342,11 @@ impl ReducedProblem<'_, '_> {
     pub fn odds_of(&self, blocks: &[Block]) -> Vec<f64> {
         let columns: Vec<Arc<DMatrix<f64>>> =
             blocks.iter().map(|block| block.columns(&self.products.target.fit)).collect();
-        let all: Vec<_> = columns.iter().flat_map(|matrix| matrix.column_iter()).collect();
-        if all.is_empty() {
+        let new_columns: Vec<_> = columns.iter().flat_map(|matrix| matrix.column_iter()).collect();
+        if new_columns.is_empty() {
             return Vec::new();
         }
-        let along = self.reach() * DMatrix::from_columns(&all);
+        let along = self.reach() * DMatrix::from_columns(&new_columns);
         let gains = self.gains_along(blocks.iter(), &along);
         gains
             .into_iter()

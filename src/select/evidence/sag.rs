@@ -35,7 +35,7 @@ impl Columns<'_, '_> {
         if !weight_is_unknown(self.problem) {
             return;
         }
-        let mut all: Vec<DMatrix<f64>> = Vec::new();
+        let mut columns_of_joints: Vec<DMatrix<f64>> = Vec::new();
         for joint in (0..self.problem.joints.len())
             .filter(|&j| self.problem.joints[j].kind == JointKind::Revolute)
         {
@@ -50,17 +50,19 @@ impl Columns<'_, '_> {
                 depends_on: vec![Covariate::Load],
             };
             self.add("sag", 1.0, hypothesis, || columns.clone());
-            all.push(columns);
+            columns_of_joints.push(columns);
         }
-        if all.len() > 1 {
+        if columns_of_joints.len() > 1 {
             let hypothesis = Hypothesis {
                 kind: HypothesisKind::Sag,
                 site: Site::Arm,
                 coordinate: None,
                 depends_on: vec![Covariate::Load],
             };
-            let columns: Vec<_> = all.iter().flat_map(DMatrix::column_iter).collect();
-            self.add("sag", all.len() as f64, hypothesis, || DMatrix::from_columns(&columns));
+            let columns: Vec<_> = columns_of_joints.iter().flat_map(DMatrix::column_iter).collect();
+            self.add("sag", columns_of_joints.len() as f64, hypothesis, || {
+                DMatrix::from_columns(&columns)
+            });
         }
     }
 

@@ -126,21 +126,21 @@ impl Set {
 /// its members. If it is stopped, it returns only some sets.
 pub(super) fn search(products: &Products, present: &[usize]) -> Vec<Weighted> {
     let Products { blocks, .. } = *products;
-    let mut known: BTreeMap<Vec<usize>, Set> = BTreeMap::new();
+    let mut evaluated: BTreeMap<Vec<usize>, Set> = BTreeMap::new();
     let without = |k: usize| [&present[..k], &present[k + 1..]].concat();
     let starts = std::iter::once(Vec::new())
         .chain((0..present.len()).map(without))
         .chain([present.to_vec()]);
     for start in starts {
         if let Some(set) = assembled(&start, products) {
-            known.insert(sorted(&set.members), set);
+            evaluated.insert(sorted(&set.members), set);
         }
     }
     // A set with more members than the search allows is evaluated as it is, and with one more
     // member.
-    let (longer, front): (usize, Vec<Set>) = match known.get(&sorted(present)) {
+    let (longer, front): (usize, Vec<Set>) = match evaluated.get(&sorted(present)) {
         Some(all) if present.len() > MAX_EFFECTS => (1, vec![all.clone()]),
-        _ => (MAX_EFFECTS, known.values().cloned().collect()),
+        _ => (MAX_EFFECTS, evaluated.values().cloned().collect()),
     };
     let (mut front, mut promising): (Vec<Set>, Option<Vec<usize>>) = (front, None);
     let every: Vec<usize> = (0..blocks.len()).collect();
@@ -155,7 +155,7 @@ pub(super) fn search(products: &Products, present: &[usize]) -> Vec<Weighted> {
             let tried = promising.as_ref().filter(|_| place > 0).unwrap_or(&every);
             for longer in extended(set, tried, products) {
                 let key = sorted(&longer.members);
-                let best = next.get(&key).or_else(|| known.get(&key));
+                let best = next.get(&key).or_else(|| evaluated.get(&key));
                 if best.is_none_or(|other| longer.exceeds(other)) {
                     next.insert(key, longer);
                 }
@@ -165,10 +165,10 @@ pub(super) fn search(products: &Products, present: &[usize]) -> Vec<Weighted> {
         // with many orders count nevertheless, because they are fitted before other hypotheses are
         // searched.
         let is_limit = |set: &&Set| !set.has_wide(blocks) || products.has_gear(&set.members);
-        let can_grow = known.values().filter(is_limit);
+        let can_grow = evaluated.values().filter(is_limit);
         let best_known = can_grow.map(|set| set.ln_posterior).fold(f64::NEG_INFINITY, f64::max);
         let mut sets: Vec<Set> = next.values().cloned().collect();
-        known.extend(next);
+        evaluated.extend(next);
         sets.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
         promising.get_or_insert_with(|| {
             let mut promising: Vec<usize> = Vec::new();
@@ -186,29 +186,29 @@ pub(super) fn search(products: &Products, present: &[usize]) -> Vec<Weighted> {
             .collect::<Vec<_>>();
         front = best.into_par_iter().map(|set| set.settled(products)).collect();
         front.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
-        known.extend(front.iter().map(|set| (sorted(&set.members), set.clone())));
+        evaluated.extend(front.iter().map(|set| (sorted(&set.members), set.clone())));
         if front.first().is_none_or(|best| best.ln_posterior < best_known - LOG_ODDS_CUTOFF) {
             break;
         }
     }
-    add_replacements(&mut known, products);
-    add_gears(&mut known, products);
-    let mut likely: Vec<&Set> = known.values().collect();
+    add_replacements(&mut evaluated, products);
+    add_gears(&mut evaluated, products);
+    let mut likely: Vec<&Set> = evaluated.values().collect();
     likely.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
     let likely: Vec<Set> = likely.into_iter().take(MAX_SETTLED_SETS).cloned().collect();
     let settled: Vec<Set> = likely.into_par_iter().map(|set| set.settled(products)).collect();
-    known.extend(settled.into_iter().map(|set| (sorted(&set.members), set)));
-    let most = known.values().map(|set| set.ln_posterior).fold(f64::NEG_INFINITY, f64::max);
-    let total: f64 = known.values().map(|set| (set.ln_posterior - most).exp()).sum();
+    evaluated.extend(settled.into_iter().map(|set| (sorted(&set.members), set)));
+    let most = evaluated.values().map(|set| set.ln_posterior).fold(f64::NEG_INFINITY, f64::max);
+    let total: f64 = evaluated.values().map(|set| (set.ln_posterior - most).exp()).sum();
     let weighted = |Set { members, sizes, ln_posterior }| {
         let probability = (ln_posterior - most).exp() / total;
         Weighted { members, sizes, probability }
     };
-    let mut all: Vec<Weighted> = known.into_values().map(weighted).collect();
-    all.sort_by(|a, b| {
+    let mut weighted_sets: Vec<Weighted> = evaluated.into_values().map(weighted).collect();
+    weighted_sets.sort_by(|a, b| {
         b.probability.total_cmp(&a.probability).then_with(|| a.members.cmp(&b.members))
     });
-    all
+    weighted_sets
 }
 
 /// Extends the empty set, and the most probable set with a periodic error, by periodic errors as
@@ -217,13 +217,13 @@ pub(super) fn search(products: &Products, present: &[usize]) -> Vec<Weighted> {
 /// Sets with periodic errors are not extended otherwise, because they have many columns. Each of
 /// several such errors alone may gain less than smaller functions. Two errors of one joint, with a
 /// lower and a higher highest order, together describe coefficients that decrease with the order.
-fn add_gears(known: &mut BTreeMap<Vec<usize>, Set>, products: &Products) {
+fn add_gears(evaluated: &mut BTreeMap<Vec<usize>, Set>, products: &Products) {
     let blocks = products.blocks;
     let gears: Vec<usize> = (0..blocks.len()).filter(|&block| blocks[block].is_gear).collect();
     let by_posterior = |a: &Set, b: &Set| a.ln_posterior.total_cmp(&b.ln_posterior);
-    let with_gear = known.values().filter(|set| products.has_gear(&set.members));
+    let with_gear = evaluated.values().filter(|set| products.has_gear(&set.members));
     let best = with_gear.max_by(|a, b| by_posterior(a, b)).cloned();
-    for start in known.get(&Vec::new()).cloned().into_iter().chain(best) {
+    for start in evaluated.get(&Vec::new()).cloned().into_iter().chain(best) {
         let mut next = Some(start);
         while let Some(set) = next {
             let longer = extended(&set, &gears, products).into_iter().max_by(by_posterior);
@@ -231,7 +231,7 @@ fn add_gears(known: &mut BTreeMap<Vec<usize>, Set>, products: &Products) {
             // the first one too tightly.
             let longer = longer.map(|longer| longer.with_converged_sizes(products));
             next = longer.filter(|longer| longer.ln_posterior > set.ln_posterior);
-            known.extend(next.clone().map(|longer| (sorted(&longer.members), longer)));
+            evaluated.extend(next.clone().map(|longer| (sorted(&longer.members), longer)));
         }
     }
 }
@@ -250,7 +250,7 @@ fn extended(set: &Set, tried: &[usize], products: &Products) -> Vec<Set> {
 /// and each pair of members. It then tries one and two other hypotheses in their place. So it finds
 /// two causes that a third hypothesis, or a function of several covariates, explains almost as well
 /// alone. Two members are replaced by effects only, because free functions would always gain.
-fn add_replacements(known: &mut BTreeMap<Vec<usize>, Set>, products: &Products) {
+fn add_replacements(evaluated: &mut BTreeMap<Vec<usize>, Set>, products: &Products) {
     let Products { blocks, .. } = *products;
     let every: Vec<usize> = (0..blocks.len()).collect();
     let of = |is_of: &dyn Fn(&Block) -> bool| -> Vec<usize> {
@@ -262,7 +262,8 @@ fn add_replacements(known: &mut BTreeMap<Vec<usize>, Set>, products: &Products) 
     let instead: [[&[usize]; 2]; 3] = [[&every, &plain], [&every, &laws], [&laws, &laws]];
     let mut tried: BTreeSet<(Vec<usize>, usize)> = BTreeSet::new();
     for _ in 0..MAX_EXCHANGES {
-        let mut likely: Vec<&Set> = known.values().filter(|set| !set.has_wide(blocks)).collect();
+        let mut likely: Vec<&Set> =
+            evaluated.values().filter(|set| !set.has_wide(blocks)).collect();
         likely.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
         let Some(best) = likely.first().map(|set| set.ln_posterior) else { return };
         likely.retain(|set| set.ln_posterior > best - LOG_ODDS_CUTOFF);
@@ -298,7 +299,7 @@ fn add_replacements(known: &mut BTreeMap<Vec<usize>, Set>, products: &Products) 
             return;
         }
         for set in new.into_iter().flatten() {
-            let entry = known.entry(sorted(&set.members)).or_insert_with(|| set.clone());
+            let entry = evaluated.entry(sorted(&set.members)).or_insert_with(|| set.clone());
             if set.exceeds(entry) {
                 *entry = set;
             }

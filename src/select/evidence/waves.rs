@@ -75,8 +75,8 @@ pub(super) fn is_free(effect: &Effect, problem: &Problem) -> bool {
 
 /// Returns orders from `low` to `high` in equal steps, at most [`MAX_SCANNED_ORDERS`].
 fn equidistant(low: f64, high: f64, step: f64) -> Vec<f64> {
-    let all = std::iter::successors(Some(low), |order| Some(order + step));
-    all.take_while(|order| *order <= high).take(MAX_SCANNED_ORDERS).collect()
+    let orders = std::iter::successors(Some(low), |order| Some(order + step));
+    orders.take_while(|order| *order <= high).take(MAX_SCANNED_ORDERS).collect()
 }
 
 /// Search for waves of any order at the joints, in addition to the other hypotheses about a fit.
@@ -119,14 +119,14 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
             for (left, first) in left.iter().zip(first) {
                 // A wave that was found for one set represents all orders near its order for every
                 // set.
-                let known = || {
+                let listed_effects = || {
                     self.hypotheses
                         .all
                         .iter()
                         .chain(&found)
                         .filter_map(|candidate| candidate.hypothesis.effect())
                 };
-                let taken = known()
+                let taken = listed_effects()
                     .filter_map(order_of)
                     .filter(|(of, _)| *of == joint)
                     .map(|(_, order)| order);
@@ -143,7 +143,7 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
                 second.sort_by(f64::total_cmp);
                 second.dedup();
                 let gains = self.gains(joint, &second, std::slice::from_ref(left)).concat();
-                let is_new = |effect: &Effect| known().all(|known| known != effect);
+                let is_new = |effect: &Effect| listed_effects().all(|listed| listed != effect);
                 let new: Vec<Effect> = self
                     .effects_of_best_orders(joint, &gains, &taken)
                     .into_iter()
@@ -202,7 +202,7 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
     /// sets without one function of the joint's command, and without all of them; for prismatic
     /// joints also the whole sets.
     fn sets_without_functions(&self, weighted: &[Weighted]) -> BTreeMap<usize, Vec<Vec<usize>>> {
-        let mut all: BTreeMap<usize, Vec<Vec<usize>>> = BTreeMap::new();
+        let mut sets_of_function: BTreeMap<usize, Vec<Vec<usize>>> = BTreeMap::new();
         let of = |member: usize| {
             function_of_command(&self.hypotheses.all[member].hypothesis, &self.fitted.problem)
         };
@@ -212,7 +212,7 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
             let mut whole = set.members.clone();
             whole.sort_unstable();
             for &joint in &sliding {
-                let sets_of_joint = all.entry(joint).or_default();
+                let sets_of_joint = sets_of_function.entry(joint).or_default();
                 if !sets_of_joint.contains(&whole) && sets_of_joint.len() < MAX_REVISED_SETS {
                     sets_of_joint.push(whole.clone());
                 }
@@ -225,7 +225,7 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
                     rest.sort_unstable();
                     rest
                 };
-                let sets_of_joint = all.entry(joint).or_default();
+                let sets_of_joint = sets_of_function.entry(joint).or_default();
                 for rest in
                     [without(&|other| other == member), without(&|other| of(other) == Some(joint))]
                 {
@@ -235,7 +235,7 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
                 }
             }
         }
-        all
+        sets_of_function
     }
 
     /// Returns, for each of the residual problems `left`, the orders with the log odds that a wave
@@ -261,11 +261,11 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
             let odds = |k: usize| of_sets.iter().map(|odds| odds[k]).collect();
             orders.into_iter().enumerate().map(|(k, order)| (order, odds(k))).collect()
         };
-        let all: Vec<(f64, Vec<f64>)> =
+        let odds_of_orders: Vec<(f64, Vec<f64>)> =
             orders.par_chunks(HYPOTHESES_PER_PROJECTION).flat_map_iter(of).collect();
         let of_set = |k: usize| {
             let mut of_orders: Vec<(f64, f64)> =
-                all.iter().map(|(order, odds)| (*order, odds[k])).collect();
+                odds_of_orders.iter().map(|(order, odds)| (*order, odds[k])).collect();
             of_orders.sort_by(|a, b| b.1.total_cmp(&a.1));
             of_orders
         };
@@ -300,12 +300,12 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
         let harmonic = |order: f64| Effect::JointHarmonic { joint, orders: vec![order as u32] };
         let is_whole = |order: f64| !slides && order.fract() == 0.0;
         let is_beyond = |order: &f64| is_whole(*order) && *order > f64::from(HIGHEST_ORDER);
-        let mut all: Vec<Effect> = as_good().filter(is_beyond).map(harmonic).collect();
+        let mut effects: Vec<Effect> = as_good().filter(is_beyond).map(harmonic).collect();
         if !as_good().any(|order| taken.contains(&order)) {
             let wave = gains.iter().find(|(order, _)| !is_whole(*order));
-            all.extend(wave.map(|&(order, _)| Effect::JointWave { joint, order }));
+            effects.extend(wave.map(|&(order, _)| Effect::JointWave { joint, order }));
         }
-        all
+        effects
     }
 
     /// Returns the width of the likelihood about an order \[orders\]: its integral over its
@@ -347,10 +347,10 @@ impl Hypotheses<'_> {
             Effect::JointHarmonic { joint, orders } => (joint - 1, f64::from(*orders.first()?)),
             other => order_of(other)?,
         };
-        let known = self.known(&Covariate::Command(joint))?;
+        let command = self.known(&Covariate::Command(joint))?;
         let at = self.linearised.place(ParameterSite::coordinate(problem, joint + 1))?;
-        let waves = DMatrix::from_fn(known.values.len(), 2, |row, k| {
-            let (sin, cos) = (order * known.values[row]).sin_cos();
+        let waves = DMatrix::from_fn(command.values.len(), 2, |row, k| {
+            let (sin, cos) = (order * command.values[row]).sin_cos();
             if k == 0 { sin } else { cos }
         });
         self.entered(effect, times(&[&at], &waves), problem)

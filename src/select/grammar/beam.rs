@@ -57,7 +57,7 @@ struct Extension {
 pub struct Beam<'a> {
     /// Terms from which sums are built.
     terms: Terms,
-    known: &'a Quantities,
+    quantities: &'a Quantities,
     /// Products of columns at the joint's coordinate, with the fit projected out.
     site: &'a WhitenedSite,
     /// Likelihood of a residual, integrated over the noise scale.
@@ -73,13 +73,13 @@ impl<'a> Beam<'a> {
         known: &'a Quantities,
         (site, noise): (&'a WhitenedSite, &'a Noise),
     ) -> Self {
-        Self { terms, known, site, noise, explainable: site.explainable() }
+        Self { terms, quantities: known, site, noise, explainable: site.explainable() }
     }
 
     /// Returns all sums that were evaluated, with their scores, and the terms with the factors that
     /// the refinement added.
     pub fn search(mut self) -> (Terms, BTreeMap<Sum, Scored>) {
-        let mut known: BTreeMap<Sum, Scored> = BTreeMap::new();
+        let mut evaluated: BTreeMap<Sum, Scored> = BTreeMap::new();
         let mut extended: BTreeSet<Sum> = BTreeSet::new();
         let mut front: Vec<Sum> = vec![Vec::new()];
         let mut most = f64::NEG_INFINITY;
@@ -104,14 +104,14 @@ impl<'a> Beam<'a> {
             front = self.best(&next, EXTENDED_SUMS);
             let of_length = next.values().map(|scored| scored.ln_posterior);
             let of_length = of_length.fold(f64::NEG_INFINITY, f64::max);
-            known.extend(next);
+            evaluated.extend(next);
             // If the best sum with one more term hardly gains, longer sums do not gain either.
             if of_length < most - MAX_LN_LOSS_OF_TERM {
                 break;
             }
             most = of_length;
         }
-        (self.terms, known)
+        (self.terms, evaluated)
     }
 
     /// Extends each of `sums` by every term, and adds the new sums to `next` with their scores.
@@ -155,13 +155,14 @@ impl<'a> Beam<'a> {
     /// Adds the best sums with refined values of their inner parameters.
     fn refine(&mut self, next: &mut BTreeMap<Sum, Scored>) {
         for sum in self.best(next, REFINED_SUMS) {
-            let Self { terms, known, site, noise, .. } = &*self;
+            let Self { terms, quantities: known, site, noise, .. } = &*self;
             let refiner = Refiner { terms, known, site, noise };
             let Some(values) = refiner.values(&sum) else { continue };
             let with_values = |(term, values): (&Product, Vec<f64>)| {
                 let pairs = term.iter().zip(values);
-                let mut term: Product =
-                    pairs.map(|(&k, value)| self.terms.with_inner(k, value, self.known)).collect();
+                let mut term: Product = pairs
+                    .map(|(&k, value)| self.terms.with_inner(k, value, self.quantities))
+                    .collect();
                 term.sort_unstable();
                 term
             };
@@ -206,7 +207,7 @@ impl<'a> Beam<'a> {
                 let pairs = along.column(a).into_iter().zip(state.span.along.iter());
                 pairs.map(|(x, y)| f64::from(*x) * y).sum::<f64>()
             };
-            let mut all: Vec<Extension> = Vec::new();
+            let mut extensions: Vec<Extension> = Vec::new();
             for term in 0..chunk.terms.len() {
                 let (gain, new) = chunk.gain(term, product, taken);
                 if new == 0 {
@@ -214,12 +215,13 @@ impl<'a> Beam<'a> {
                 }
                 let prior = state.ln_prior + chunk.ln_prior[term] + further;
                 let scored = self.scored(before + gain, rank + new, prior);
-                all.push(Extension { place: (number, term), scored });
+                extensions.push(Extension { place: (number, term), scored });
             }
-            best_of(all)
+            best_of(extensions)
         };
-        let all: Vec<Extension> = chunks.par_iter().enumerate().flat_map_iter(of_chunk).collect();
-        best_of(all)
+        let extensions: Vec<Extension> =
+            chunks.par_iter().enumerate().flat_map_iter(of_chunk).collect();
+        best_of(extensions)
     }
 
     fn scored(&self, taken: f64, rank: usize, ln_prior: f64) -> Scored {
@@ -235,10 +237,10 @@ impl<'a> Beam<'a> {
 
     /// Returns the best `most` sums, alternately by posterior and by guide. Their predictions
     /// differ by at least `MIN_BEAM_DIFFERENCE`.
-    fn best(&self, all: &BTreeMap<Sum, Scored>, most: usize) -> Vec<Sum> {
+    fn best(&self, sums: &BTreeMap<Sum, Scored>, most: usize) -> Vec<Sum> {
         const MAX_COMPARED_SUMS: usize = 120;
         let by = |of: fn(&Scored) -> f64| {
-            let mut sorted: Vec<(&Sum, f64)> = all.iter().map(|(sum, s)| (sum, of(s))).collect();
+            let mut sorted: Vec<(&Sum, f64)> = sums.iter().map(|(sum, s)| (sum, of(s))).collect();
             sorted.sort_by(|a, b| b.1.total_cmp(&a.1));
             sorted.truncate(MAX_COMPARED_SUMS);
             sorted
@@ -296,17 +298,17 @@ fn best_of(mut all: Vec<Extension>) -> Vec<Extension> {
 /// Keeps the `most` extensions with the highest value of `of`, sorted, and returns the others. Of
 /// equal values the earlier place comes first.
 fn split_best(
-    all: &mut Vec<Extension>,
+    extensions: &mut Vec<Extension>,
     most: usize,
     of: impl Fn(&Scored) -> f64,
 ) -> Vec<Extension> {
     let order = |a: &Extension, b: &Extension| {
         of(&b.scored).total_cmp(&of(&a.scored)).then_with(|| a.place.cmp(&b.place))
     };
-    if all.len() > most {
-        all.select_nth_unstable_by(most, order);
+    if extensions.len() > most {
+        extensions.select_nth_unstable_by(most, order);
     }
-    let others = all.split_off(all.len().min(most));
-    all.sort_unstable_by(order);
+    let others = extensions.split_off(extensions.len().min(most));
+    extensions.sort_unstable_by(order);
     others
 }

@@ -94,13 +94,14 @@ impl Class {
 /// joint, counted from 0, if the site is its coordinate. `present` holds the columns of laws that
 /// the fit contains.
 pub fn proposals(
-    known: &Quantities,
+    quantities: &Quantities,
     (at, joint): (&str, Option<usize>),
     (site, noise): (&WhitenedSite, &Noise),
     present: &[Vec<DVector<f64>>],
 ) -> Vec<Proposal> {
-    let factors = joint.map_or_else(|| factors_elsewhere(known), |joint| factors(known, joint));
-    let beam = Beam::new(Terms::new(factors, known, site), known, (site, noise));
+    let factors =
+        joint.map_or_else(|| factors_elsewhere(quantities), |joint| factors(quantities, joint));
+    let beam = Beam::new(Terms::new(factors, quantities, site), quantities, (site, noise));
     let (terms, sums) = beam.search();
     let mut sums: Vec<(Sum, f64)> =
         sums.into_iter().map(|(sum, scored)| (sum, scored.ln_posterior)).collect();
@@ -108,19 +109,20 @@ pub fn proposals(
     let Some(best) = sums.first().map(|sum| sum.1) else { return Vec::new() };
     sums.retain(|(_, ln)| *ln > best - MAX_LN_ODDS);
     sums.truncate(MAX_SUMS);
-    let refiner = Refiner { terms: &terms, known, site, noise };
-    let mut all: Vec<Refined> = sums
+    let refiner = Refiner { terms: &terms, known: quantities, site, noise };
+    let mut refined_sums: Vec<Refined> = sums
         .into_iter()
         .enumerate()
         .map(|(place, (sum, _))| refiner.refined(sum, place < MAX_REFINED))
         .collect();
-    all.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
-    let all = distinct(all, &terms);
+    refined_sums.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
+    let distinct_sums = distinct(refined_sums, &terms);
     // The noise factor assumes that the residual of the best sum is only noise.
-    let factor = all.first().map_or(0.0, |best| noise.factor(best.prediction.squared_length()));
+    let factor =
+        distinct_sums.first().map_or(0.0, |best| noise.factor(best.prediction.squared_length()));
     let largest = MAX_CLASS_DIFFERENCE.powi(2) * factor;
     let mut classes: Vec<Class> = Vec::new();
-    for refined in all {
+    for refined in distinct_sums {
         let is_same = |class: &&mut Class| {
             class.first.prediction.squared_distance(&refined.prediction) < largest
         };
@@ -154,7 +156,7 @@ pub fn proposals(
         }
         let is_near = |other: &Weighted| other.squared_distance(&first.prediction) < largest;
         let is_present = predictions.iter().any(is_near);
-        let as_written = |sum: &Refined| written((&terms, known), at, &sum.sum, &sum.inner);
+        let as_written = |sum: &Refined| written((&terms, quantities), at, &sum.sum, &sum.inner);
         let rivals = class.rivals(&terms, MAX_FORM_DIFFERENCE.powi(2) * factor);
         Some(Proposal {
             law: as_written(first),
@@ -169,7 +171,7 @@ pub fn proposals(
 
 /// Returns the sums without those that an earlier one equals but for a fraction of a grid cell in
 /// the values of inner parameters.
-fn distinct(all: Vec<Refined>, terms: &Terms) -> Vec<Refined> {
+fn distinct(refined_sums: Vec<Refined>, terms: &Terms) -> Vec<Refined> {
     let parts = |refined: &Refined| {
         let part = |(term, inner): (&Vec<u16>, &Vec<f64>)| {
             let factor = |(&k, &value): (&u16, &f64)| {
@@ -188,7 +190,7 @@ fn distinct(all: Vec<Refined>, terms: &Terms) -> Vec<Refined> {
         parts.sort_by_key(|part| forms(part));
         parts.concat()
     };
-    let mut known: Vec<Vec<(String, f64)>> = Vec::new();
+    let mut listed: Vec<Vec<(String, f64)>> = Vec::new();
     let mut is_new = |refined: &Refined| {
         let parts = parts(refined);
         let is_same = |other: &Vec<(String, f64)>| {
@@ -198,13 +200,13 @@ fn distinct(all: Vec<Refined>, terms: &Terms) -> Vec<Refined> {
                     .zip(&parts)
                     .all(|(a, b)| a.0 == b.0 && (a.1 - b.1).abs() < MAX_CELL_DIFFERENCE)
         };
-        let is_new = !known.iter().any(is_same);
+        let is_new = !listed.iter().any(is_same);
         if is_new {
-            known.push(parts);
+            listed.push(parts);
         }
         is_new
     };
-    all.into_iter().filter(|refined| is_new(refined)).collect()
+    refined_sums.into_iter().filter(|refined| is_new(refined)).collect()
 }
 
 fn ln_add(a: f64, b: f64) -> f64 {
@@ -229,7 +231,7 @@ mod tests {
     fn found(function: impl Fn(&[f64; 3]) -> f64) -> Vec<Proposal> {
         let commands: Vec<(usize, Vec<f64>)> =
             (0..3).map(|joint| (joint, scattered(60, 1.0 + joint as f64))).collect();
-        let known = Quantities {
+        let quantities = Quantities {
             commands: commands.clone(),
             turns: vec![true; 3],
             sides: Vec::new(),
@@ -251,7 +253,7 @@ mod tests {
             product,
         };
         let noise = Noise::new(squares, 60.0, |squares| -0.5 * squares);
-        proposals(&known, ("joint1", Some(0)), (&site, &noise), &[])
+        proposals(&quantities, ("joint1", Some(0)), (&site, &noise), &[])
     }
 
     #[test]

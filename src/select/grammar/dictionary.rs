@@ -31,27 +31,29 @@ const MIN_SIGN_SHARE: f64 = 0.1;
 /// are conditions of a pose, and the commands with their sines and cosines.
 ///
 /// All kinds of factors have the same prior probability, and so have the joints.
-pub fn factors_elsewhere(known: &Quantities) -> Vec<Factor> {
+pub fn factors_elsewhere(quantities: &Quantities) -> Vec<Factor> {
     let is_listed = |factor: &Factor| match factor.form {
         Form::Command(_) => true,
         Form::Wave { order, .. } => order == 1,
         form => form.is_condition(),
     };
-    let of_joint = -(known.commands.len().max(1) as f64).ln();
-    let mut all: Vec<Factor> = factors(known, usize::MAX).into_iter().filter(is_listed).collect();
-    let families: BTreeSet<usize> = all.iter().map(|factor| factor.form.family()).collect();
+    let of_joint = -(quantities.commands.len().max(1) as f64).ln();
+    let mut listed_factors: Vec<Factor> =
+        factors(quantities, usize::MAX).into_iter().filter(is_listed).collect();
+    let families: BTreeSet<usize> =
+        listed_factors.iter().map(|factor| factor.form.family()).collect();
     let ln_families = (families.len().max(1) as f64).ln();
-    for factor in &mut all {
+    for factor in &mut listed_factors {
         factor.ln_prior = match factor.form {
             Form::Command(_) => of_joint,
             Form::Wave { .. } => of_joint,
             Form::Settling => -f64::from(SETTLING_TIMES.2).ln(),
             Form::Step => -f64::from(STEP_TIMES).ln(),
-            Form::Covariate(_) => -(known.covariates.len().max(1) as f64).ln(),
+            Form::Covariate(_) => -(quantities.covariates.len().max(1) as f64).ln(),
             _ => 0.0,
         } - ln_families;
     }
-    all
+    listed_factors
 }
 
 /// Returns all factors of formulas at the coordinate of the joint `joint_of_site`, counted from 0.
@@ -60,16 +62,16 @@ pub fn factors_elsewhere(known: &Quantities) -> Vec<Factor> {
 /// the other half to the other joints; sine, cosine and their pair are kinds of their own, because
 /// geometry and weight act through them. Order k has 1/k² of the probability of order 1. The
 /// probability is divided by the number of trial values of an inner parameter.
-pub fn factors(known: &Quantities, joint_of_site: usize) -> Vec<Factor> {
-    let mut all: Vec<Factor> = Vec::new();
+pub fn factors(quantities: &Quantities, joint_of_site: usize) -> Vec<Factor> {
+    let mut listed_factors: Vec<Factor> = Vec::new();
     let mut add = |form: Form, inner: Option<(f64, f64)>, ln_prior: f64| {
-        all.push(Factor { form, inner, ln_prior });
+        listed_factors.push(Factor { form, inner, ln_prior });
     };
-    let others = known.commands.len().saturating_sub(1).max(1) as f64;
+    let others = quantities.commands.len().saturating_sub(1).max(1) as f64;
     let of_joint =
         |joint: usize| if joint == joint_of_site { 0.5_f64.ln() } else { (0.5 / others).ln() };
     let orders: f64 = (1..=HIGHEST_ORDER).map(|k| f64::from(k).powi(-2)).sum();
-    for (joint, values) in &known.commands {
+    for (joint, values) in &quantities.commands {
         let (joint, ln_joint) = (*joint, of_joint(*joint));
         add(Form::Command(joint), None, ln_joint);
         add(Form::Square(joint), None, ln_joint);
@@ -79,14 +81,14 @@ pub fn factors(known: &Quantities, joint_of_site: usize) -> Vec<Factor> {
             let at = low + (f64::from(k) + 0.5) * step;
             add(Form::Kink(joint), Some((at, step)), ln_joint - f64::from(KINK_POSITIONS).ln());
         }
-        for order in (1..=HIGHEST_ORDER).filter(|_| known.turns[joint]) {
+        for order in (1..=HIGHEST_ORDER).filter(|_| quantities.turns[joint]) {
             let ln_prior = ln_joint - (f64::from(order).powi(2) * orders).ln();
             for cosine in [false, true] {
                 add(Form::Wave { joint, order, cosine }, None, ln_prior);
             }
             add(Form::Harmonic { joint, order }, None, ln_prior);
         }
-        if known.turns[joint] && joint == joint_of_site {
+        if quantities.turns[joint] && joint == joint_of_site {
             let step = 2.0 * PI / f64::from(STRUT_ANGLES);
             let trials = f64::from(STRUT_ANGLES) * STRUT_RATIOS.len() as f64;
             let ln_prior = (STRUT_WEIGHT / trials).ln();
@@ -98,8 +100,12 @@ pub fn factors(known: &Quantities, joint_of_site: usize) -> Vec<Factor> {
             }
         }
     }
-    let turning: Vec<usize> =
-        known.commands.iter().map(|(joint, _)| *joint).filter(|j| known.turns[*j]).collect();
+    let turning: Vec<usize> = quantities
+        .commands
+        .iter()
+        .map(|(joint, _)| *joint)
+        .filter(|j| quantities.turns[*j])
+        .collect();
     let pairs: Vec<[usize; 2]> = turning
         .iter()
         .enumerate()
@@ -113,10 +119,10 @@ pub fn factors(known: &Quantities, joint_of_site: usize) -> Vec<Factor> {
             }
         }
     }
-    for (joint, _) in &known.sides {
+    for (joint, _) in &quantities.sides {
         add(Form::Side(*joint), None, of_joint(*joint));
     }
-    for (joint, values) in &known.moments {
+    for (joint, values) in &quantities.moments {
         add(Form::Moment(*joint), None, of_joint(*joint));
         add(Form::CubicMoment(*joint), None, of_joint(*joint));
         let positive = values.iter().filter(|moment| **moment > 0.0).count() as f64;
@@ -125,14 +131,14 @@ pub fn factors(known: &Quantities, joint_of_site: usize) -> Vec<Factor> {
             add(Form::MomentSign(*joint), None, of_joint(*joint));
         }
     }
-    if known.warming.is_some() {
+    if quantities.warming.is_some() {
         add(Form::Warming, None, 0.0);
         add(Form::WarmingSquare, None, 0.0);
     }
-    if known.lag.is_some() {
+    if quantities.lag.is_some() {
         add(Form::Lag, None, 0.0);
     }
-    if known.elapsed.is_some() {
+    if quantities.elapsed.is_some() {
         add(Form::Elapsed, None, 0.0);
         let (first, last, count) = SETTLING_TIMES;
         for k in 0..count {
@@ -146,18 +152,19 @@ pub fn factors(known: &Quantities, joint_of_site: usize) -> Vec<Factor> {
             add(Form::Step, Some((at, width)), -f64::from(STEP_TIMES).ln());
         }
     }
-    if known.payload.is_some() {
+    if quantities.payload.is_some() {
         add(Form::Payload, None, 0.0);
         add(Form::PayloadSquare, None, 0.0);
     }
-    let covariates = known.covariates.len().max(1) as f64;
-    for k in 0..known.covariates.len() {
+    let covariates = quantities.covariates.len().max(1) as f64;
+    for k in 0..quantities.covariates.len() {
         add(Form::Covariate(k), None, -covariates.ln());
     }
-    let families: BTreeSet<usize> = all.iter().map(|factor| factor.form.family()).collect();
+    let families: BTreeSet<usize> =
+        listed_factors.iter().map(|factor| factor.form.family()).collect();
     let ln_families = (families.len().max(1) as f64).ln();
-    for factor in &mut all {
+    for factor in &mut listed_factors {
         factor.ln_prior -= ln_families;
     }
-    all
+    listed_factors
 }

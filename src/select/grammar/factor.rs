@@ -161,19 +161,19 @@ impl Form {
 
     /// Returns the values of the form in every pose, one list for each column, with `inner` as its
     /// inner parameter.
-    pub fn columns(self, known: &Quantities, inner: f64) -> Vec<Vec<f64>> {
-        let of = |all: &[(usize, Vec<f64>)], joint: usize, f: &dyn Fn(f64) -> f64| {
-            let values = all.iter().find(|(known, _)| *known == joint);
+    pub fn columns(self, quantities: &Quantities, inner: f64) -> Vec<Vec<f64>> {
+        let of = |values_of_joints: &[(usize, Vec<f64>)], joint: usize, f: &dyn Fn(f64) -> f64| {
+            let values = values_of_joints.iter().find(|(known, _)| *known == joint);
             values.map_or_else(Vec::new, |(_, values)| values.iter().map(|x| f(*x)).collect())
         };
         let plain = |values: &Option<Vec<f64>>, f: &dyn Fn(f64) -> f64| {
             values.iter().flatten().map(|x| f(*x)).collect()
         };
         let time = |f: &dyn Fn(f64) -> f64| {
-            let values = known.elapsed.iter().flat_map(|(values, _)| values);
+            let values = quantities.elapsed.iter().flat_map(|(values, _)| values);
             values.map(|t| f(*t)).collect()
         };
-        let q = &known.commands;
+        let q = &quantities.commands;
         let wave = |joint: usize, order: u32, cosine: bool| {
             of(q, joint, &|x| trigonometric(f64::from(order) * x, cosine))
         };
@@ -194,29 +194,29 @@ impl Form {
                 let [a, b] = factors.map(f64::from);
                 one.iter().zip(&other).map(|(x, y)| trigonometric(a * x + b * y, cosine)).collect()
             }
-            Self::Side(joint) => of(&known.sides, joint, &|x| x),
-            Self::Moment(joint) => of(&known.moments, joint, &|x| x),
-            Self::CubicMoment(joint) => of(&known.moments, joint, &|x| x.powi(3)),
+            Self::Side(joint) => of(&quantities.sides, joint, &|x| x),
+            Self::Moment(joint) => of(&quantities.moments, joint, &|x| x),
+            Self::CubicMoment(joint) => of(&quantities.moments, joint, &|x| x.powi(3)),
             Self::MomentSign(joint) => {
-                of(&known.moments, joint, &|x| if x == 0.0 { 0.0 } else { x.signum() })
+                of(&quantities.moments, joint, &|x| if x == 0.0 { 0.0 } else { x.signum() })
             }
-            Self::Warming => plain(&known.warming, &|x| x),
-            Self::WarmingSquare => plain(&known.warming, &|x| x * x),
-            Self::Lag => known.lag.iter().flat_map(|(_, values)| values).copied().collect(),
+            Self::Warming => plain(&quantities.warming, &|x| x),
+            Self::WarmingSquare => plain(&quantities.warming, &|x| x * x),
+            Self::Lag => quantities.lag.iter().flat_map(|(_, values)| values).copied().collect(),
             Self::Elapsed => time(&|t| t),
             Self::Settling => time(&|t| -(-t / inner.max(0.02)).exp_m1()),
             Self::Step => time(&|t| f64::from(t >= inner)),
-            Self::Payload => plain(&known.payload, &|x| x),
-            Self::PayloadSquare => plain(&known.payload, &|x| x * x),
+            Self::Payload => plain(&quantities.payload, &|x| x),
+            Self::PayloadSquare => plain(&quantities.payload, &|x| x * x),
             Self::Covariate(k) => {
-                known.covariates.get(k).map(|(_, values)| values.clone()).unwrap_or_default()
+                quantities.covariates.get(k).map(|(_, values)| values.clone()).unwrap_or_default()
             }
         }]
     }
 
     /// Returns the formula of each column as text. `inner` is the name or the value of the inner
     /// parameter, `ratio` the name of the ratio of a gas spring.
-    pub fn texts(self, known: &Quantities, inner: &str, ratio: &str) -> Vec<String> {
+    pub fn texts(self, quantities: &Quantities, inner: &str, ratio: &str) -> Vec<String> {
         let q = |joint: usize| format!("q{}", joint + 1);
         let angle = |joint: usize, order: u32| match order {
             1 => q(joint),
@@ -258,14 +258,14 @@ impl Form {
             Self::MomentSign(joint) => format!("sign(M{})", joint + 1),
             Self::Warming => "T".to_owned(),
             Self::WarmingSquare => "T^2".to_owned(),
-            Self::Lag => format!("lag(T, {})", known.lag.as_ref().map_or(0.0, |lag| lag.0)),
+            Self::Lag => format!("lag(T, {})", quantities.lag.as_ref().map_or(0.0, |lag| lag.0)),
             Self::Elapsed => "t".to_owned(),
             Self::Settling => format!("(1 - exp(-t/{inner}))"),
             Self::Step => format!("step(t - {inner})"),
             Self::Payload => "payload".to_owned(),
             Self::PayloadSquare => "payload^2".to_owned(),
             Self::Covariate(k) => {
-                let name = known.covariates.get(k).and_then(|(k, _)| known.names.get(*k));
+                let name = quantities.covariates.get(k).and_then(|(k, _)| quantities.names.get(*k));
                 quoted(name.map_or("", |name| name))
             }
         }]

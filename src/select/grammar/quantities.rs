@@ -48,8 +48,9 @@ impl Quantities {
             let of = |joint: usize| Some((joint, values(&format!("{name}{}", joint + 1))?));
             joints().filter(is_of).filter_map(of).collect::<Vec<_>>()
         };
-        let known = |is_known: fn(&Pose) -> bool| poses.iter().all(|pose| is_known(pose));
-        let has_temperature = known(|pose| pose.setup.temperature.is_some())
+        let is_given_everywhere =
+            |is_known: fn(&Pose) -> bool| poses.iter().all(|pose| is_known(pose));
+        let has_temperature = is_given_everywhere(|pose| pose.setup.temperature.is_some())
             && problem.data.reference_temperature.is_some();
         let warming = if has_temperature { values("T") } else { None };
         let elapsed = if time_measured { values("t") } else { None };
@@ -59,7 +60,7 @@ impl Quantities {
         let covariate = |(k, name): (usize, &String)| Some((k, values(&quoted(name))?));
         Self {
             commands: of_joints("q", &takes),
-            sides: if known(|pose| pose.setup.approach.is_some()) {
+            sides: if is_given_everywhere(|pose| pose.setup.approach.is_some()) {
                 of_joints("approach", &takes)
             } else {
                 Vec::new()

@@ -53,9 +53,11 @@ impl Noise {
             self.gain(squares * variance / (1.0 + variance))
                 - 0.5 * rank as f64 * (1.0 + variance).ln()
         };
-        let all = COEFFICIENT_VARIANCES.map(at);
-        let most = all.into_iter().fold(f64::NEG_INFINITY, f64::max);
-        most + (all.iter().map(|ln| (ln - most).exp()).sum::<f64>() / all.len() as f64).ln()
+        let ln_of_variances = COEFFICIENT_VARIANCES.map(at);
+        let most = ln_of_variances.into_iter().fold(f64::NEG_INFINITY, f64::max);
+        most + (ln_of_variances.iter().map(|ln| (ln - most).exp()).sum::<f64>()
+            / ln_of_variances.len() as f64)
+            .ln()
     }
 }
 

@@ -72,22 +72,23 @@ pub struct Terms {
 impl Terms {
     /// Creates the terms: all single factors, the best products of two, and products of three that
     /// extend the best pairs.
-    pub fn new(factors: Vec<Factor>, known: &Quantities, site: &WhitenedSite) -> Self {
+    pub fn new(factors: Vec<Factor>, quantities: &Quantities, site: &WhitenedSite) -> Self {
         let columns = |factor: &Factor| {
-            let columns = factor.form.columns(known, factor.inner.map_or(0.0, |inner| inner.0));
+            let columns =
+                factor.form.columns(quantities, factor.inner.map_or(0.0, |inner| inner.0));
             columns.into_iter().map(DVector::from_vec).collect()
         };
         let values: Vec<Vec<DVector<f64>>> = factors.iter().map(columns).collect();
         let count = factors.len().min(usize::from(u16::MAX));
-        let mut all = Self { factors, values, listed: count, chunks: Vec::new() };
+        let mut new_terms = Self { factors, values, listed: count, chunks: Vec::new() };
         let number = |k: usize| u16::try_from(k).unwrap_or(u16::MAX);
         let single: Vec<Product> = (0..count).map(|k| vec![number(k)]).collect();
         let pairs: Vec<Product> = (0..count)
             .flat_map(|a| (a..count).map(move |b| vec![number(a), number(b)]))
-            .filter(|pair| all.is_new(pair))
+            .filter(|pair| new_terms.is_new(pair))
             .collect();
-        let mut chunks = all.chunks_of(&single, site);
-        let pairs = all.best_of(&pairs, MAX_PAIRS, site);
+        let mut chunks = new_terms.chunks_of(&single, site);
+        let pairs = new_terms.best_of(&pairs, MAX_PAIRS, site);
         let mut extended: Vec<Product> = Self::best_terms(&pairs, MAX_EXTENDED)
             .into_iter()
             .flat_map(|pair| {
@@ -97,14 +98,14 @@ impl Terms {
                     term
                 })
             })
-            .filter(|term| all.is_new(term))
+            .filter(|term| new_terms.is_new(term))
             .collect();
         extended.sort_unstable();
         extended.dedup();
         chunks.extend(pairs);
-        chunks.extend(all.chunks_of(&extended, site));
-        all.chunks = chunks;
-        all
+        chunks.extend(new_terms.chunks_of(&extended, site));
+        new_terms.chunks = chunks;
+        new_terms
     }
 
     /// Returns the products of a term with every listed factor, in chunks; none for a term with the
@@ -119,25 +120,26 @@ impl Terms {
             term.sort_unstable();
             term
         };
-        let all: Vec<Product> =
+        let multiples: Vec<Product> =
             (0..self.listed).map(multiple).filter(|term| self.is_new(term)).collect();
-        self.chunks_of(&all, site)
+        self.chunks_of(&multiples, site)
     }
 
     /// Returns the index of a factor with another value of its inner parameter, which is added if
     /// it is not known.
-    pub fn with_inner(&mut self, factor: u16, value: f64, known: &Quantities) -> u16 {
+    pub fn with_inner(&mut self, factor: u16, value: f64, quantities: &Quantities) -> u16 {
         let Factor { form, inner, ln_prior } = self.factors[usize::from(factor)].clone();
         let Some((old, step)) = inner else { return factor };
         #[expect(clippy::float_cmp, reason = "the same value is the same factor")]
-        let is_same =
-            |known: &Factor| known.form == form && known.inner.is_some_and(|(at, _)| at == value);
+        let is_same = |listed: &Factor| {
+            listed.form == form && listed.inner.is_some_and(|(at, _)| at == value)
+        };
         if old.to_bits() == value.to_bits() {
             return factor;
         }
         let place = self.factors.iter().position(is_same).unwrap_or_else(|| {
             self.factors.push(Factor { form, inner: Some((value, step)), ln_prior });
-            let columns = form.columns(known, value);
+            let columns = form.columns(quantities, value);
             self.values.push(columns.into_iter().map(DVector::from_vec).collect());
             self.factors.len() - 1
         });
@@ -190,8 +192,8 @@ impl Terms {
 
     /// Returns the columns of a term, one value per pose.
     pub fn columns(&self, term: &[u16]) -> Vec<DVector<f64>> {
-        let all = term.iter().map(|&k| &self.values[usize::from(k)]);
-        product(all.map(Vec::as_slice)).unwrap_or_default()
+        let factor_columns = term.iter().map(|&k| &self.values[usize::from(k)]);
+        product(factor_columns.map(Vec::as_slice)).unwrap_or_default()
     }
 
     fn width(&self, term: &[u16]) -> usize {
@@ -208,12 +210,12 @@ impl Terms {
     /// are formed at a time, so that memory does not grow with the number of terms.
     fn best_of(&self, terms: &[Product], most: usize, site: &WhitenedSite) -> Vec<Chunk> {
         let chunk = |(width, terms): &(usize, Vec<&Product>)| self.chunk(*width, terms, site);
-        let mut all: Vec<Chunk> = Vec::new();
+        let mut best_chunks: Vec<Chunk> = Vec::new();
         for some in self.groups(terms).chunks(CHUNKS_AT_ONCE) {
-            all.extend(some.par_iter().map(chunk).collect::<Vec<Chunk>>());
-            all = Self::best(all, most);
+            best_chunks.extend(some.par_iter().map(chunk).collect::<Vec<Chunk>>());
+            best_chunks = Self::best(best_chunks, most);
         }
-        all
+        best_chunks
     }
 
     /// Returns terms in groups of one width.
@@ -291,17 +293,17 @@ impl Terms {
 
     /// Returns the `most` terms that alone reduce the residual most.
     fn best_terms(chunks: &[Chunk], most: usize) -> Vec<Product> {
-        let mut all: Vec<(f64, &Product)> =
+        let mut gains_and_terms: Vec<(f64, &Product)> =
             chunks.iter().flat_map(|chunk| chunk.lone_gains().zip(&chunk.terms)).collect();
         let order = |a: &(f64, &Product), b: &(f64, &Product)| {
             b.0.total_cmp(&a.0).then_with(|| a.1.cmp(b.1))
         };
-        if all.len() > most {
-            all.select_nth_unstable_by(most, order);
-            all.truncate(most);
+        if gains_and_terms.len() > most {
+            gains_and_terms.select_nth_unstable_by(most, order);
+            gains_and_terms.truncate(most);
         }
-        all.sort_unstable_by(order);
-        all.into_iter().map(|(_, term)| term.clone()).collect()
+        gains_and_terms.sort_unstable_by(order);
+        gains_and_terms.into_iter().map(|(_, term)| term.clone()).collect()
     }
 }
 

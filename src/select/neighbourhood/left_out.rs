@@ -109,8 +109,8 @@ impl PartSquares {
                 part.residual + 2.0 * part.product.dot(&step) + step.dot(&(&part.gram * &step));
             Some(part.rows as f64 * (squares / part.rows as f64).ln())
         };
-        let all: Option<Vec<f64>> = self.parts.par_iter().map(predicted).collect();
-        all.map(|all| all.iter().sum()).filter(|sum: &f64| sum.is_finite())
+        let terms: Option<Vec<f64>> = self.parts.par_iter().map(predicted).collect();
+        terms.map(|terms| terms.iter().sum()).filter(|sum: &f64| sum.is_finite())
     }
 }
 

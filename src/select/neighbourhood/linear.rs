@@ -103,13 +103,15 @@ impl LinearNeighbourhood {
     ) -> Self {
         let (rows, n) = jacobian.shape();
         let priors = unknowns.priors.iter().enumerate();
-        let known: Vec<(usize, f64)> = priors.filter_map(|(j, &sigma)| Some((j, sigma?))).collect();
-        let mut long = residual.resize_vertically(rows + known.len(), 0.0);
-        known
+        let columns_with_prior: Vec<(usize, f64)> =
+            priors.filter_map(|(j, &sigma)| Some((j, sigma?))).collect();
+        let mut long = residual.resize_vertically(rows + columns_with_prior.len(), 0.0);
+        columns_with_prior
             .iter()
             .enumerate()
             .for_each(|(row, &(j, sigma))| long[rows + row] = unknowns.x[j] / sigma);
-        let below: Vec<(usize, f64)> = known.iter().map(|&(j, sigma)| (j, sigma.recip())).collect();
+        let below: Vec<(usize, f64)> =
+            columns_with_prior.iter().map(|&(j, sigma)| (j, sigma.recip())).collect();
         let (basis, root) = if unknowns.active.is_empty() {
             orthonormal_above(jacobian, &below, None)
         } else {

@@ -80,7 +80,7 @@ impl Derivatives {
 
 impl<'a> Linearised<'a> {
     /// Linearises `model` about its full parameter vector `x`, with the parameters `unknowns`
-    /// fitted, at the sites of `effects` and at `places`. Derivatives in `known` are reused.
+    /// fitted, at the sites of `effects` and at `places`. Derivatives in `cached` are reused.
     pub fn new(
         (problem, known): (&'a Problem, Option<Arc<Derivatives>>),
         model: &Model,

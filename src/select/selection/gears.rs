@@ -63,12 +63,13 @@ pub(super) fn estimated_prior(
     let squares = PartSquares::new(linearised.fitted(), linearised.residual(), &parts);
     let parameters =
         fitted.unknowns.iter().map(|&k| (fitted.found.x[k], fitted.model.parameters[k].sigma));
-    let all = parameters.chain(linearised.relaxed().iter().map(|&sigma| (0.0, sigma)));
+    let values_and_sigmas =
+        parameters.chain(linearised.relaxed().iter().map(|&sigma| (0.0, sigma)));
     // If the fit assumed a σ larger than the declared one, its priors had a correspondingly larger
     // weight.
     let weight = fitted.found.noise_factor.max(1.0).sqrt();
     let priors: Vec<(f64, Option<f64>)> =
-        all.map(|(x, sigma)| (x, sigma.map(|sigma| sigma / weight))).collect();
+        values_and_sigmas.map(|(x, sigma)| (x, sigma.map(|sigma| sigma / weight))).collect();
     // Declared harmonics whose orders the prior does not contain keep their declared priors.
     let coefficients: Vec<(usize, u32)> = coefficients(fitted)
         .into_iter()

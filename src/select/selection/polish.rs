@@ -82,12 +82,12 @@ fn neighbouring_arguments(data: &Data, effect: &Effect) -> Vec<Effect> {
         Effect::StationShift { at_time } | Effect::StationMove { at_time } => *at_time,
         _ => return TRIAL_FACTORS.iter().filter_map(|factor| effect.scaled(*factor)).collect(),
     };
-    let all = data.times_between_poses();
+    let times = data.times_between_poses();
     // The evidence uses every n-th row, and the list of times contains every m-th time.
     let thinned = data.rows().len().div_ceil(data.evidence_rows().len().max(1));
-    let reach = 2 * thinned.max(all.len().div_ceil(MAX_SHIFT_TIMES));
-    let place = all.partition_point(|other| *other < time);
-    let near = all[place.saturating_sub(reach)..all.len().min(place + reach)].iter();
+    let reach = 2 * thinned.max(times.len().div_ceil(MAX_SHIFT_TIMES));
+    let place = times.partition_point(|other| *other < time);
+    let near = times[place.saturating_sub(reach)..times.len().min(place + reach)].iter();
     let at = |&at_time: &f64| match effect {
         Effect::StationMove { .. } => Effect::StationMove { at_time },
         _ => Effect::StationShift { at_time },

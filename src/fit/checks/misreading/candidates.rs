@@ -37,20 +37,20 @@ pub(super) fn candidates(problem: &Problem, table: &Measurements) -> Vec<Misread
     let long = problem.joints.iter().any(|joint| {
         lengths_of(&mut joint.clone()).iter().any(|length| length.abs() > MIN_MILLIMETRE_LENGTH)
     });
-    let mut all = Vec::new();
-    all.extend(turns(true).then_some(Misreading::Degrees));
-    all.extend(turns(false).then_some(Misreading::Radians));
-    all.extend(lengths(false).then_some(Misreading::Metres));
-    all.extend(lengths(true).then_some(Misreading::Millimetres));
-    all.extend(lengths(false).then_some(Misreading::Inches));
-    all.push(Misreading::Mirrored);
-    all.extend(is_far(problem).then_some(Misreading::TargetInMillimetres));
-    all.extend(long.then_some(Misreading::ArmInMillimetres));
-    all.extend(of_commands(problem));
-    all.extend(of_order(table));
-    all.extend(of_joint_table(problem));
-    all.extend(of_loads(problem, table));
-    all
+    let mut units = Vec::new();
+    units.extend(turns(true).then_some(Misreading::Degrees));
+    units.extend(turns(false).then_some(Misreading::Radians));
+    units.extend(lengths(false).then_some(Misreading::Metres));
+    units.extend(lengths(true).then_some(Misreading::Millimetres));
+    units.extend(lengths(false).then_some(Misreading::Inches));
+    units.push(Misreading::Mirrored);
+    units.extend(is_far(problem).then_some(Misreading::TargetInMillimetres));
+    units.extend(long.then_some(Misreading::ArmInMillimetres));
+    units.extend(of_commands(problem));
+    units.extend(of_order(table));
+    units.extend(of_joint_table(problem));
+    units.extend(of_loads(problem, table));
+    units
 }
 
 /// Returns true if the target of `[tool]` is so far away that it may be in millimetres.
@@ -67,31 +67,31 @@ fn of_commands(problem: &Problem) -> Vec<Misreading> {
         .collect();
     let turning = moving.iter().copied().filter(|&joint| kind(joint) == JointKind::Revolute);
     let turning: Vec<usize> = turning.collect();
-    let mut all: Vec<Misreading> =
+    let mut misreadings: Vec<Misreading> =
         moving.iter().map(|&joint| Misreading::reversed(&[joint])).collect();
     for (k, &joint) in moving.iter().enumerate().take(MAX_PAIRED) {
         for &with in &moving[k + 1..moving.len().min(MAX_PAIRED)] {
             if kind(joint) != kind(with) {
                 continue;
             }
-            all.push(Misreading::Exchanged { joint, with });
+            misreadings.push(Misreading::Exchanged { joint, with });
             for (joint, from) in [(joint, with), (with, joint)] {
                 let coupled = |is_opposite| Misreading::Coupled { joint, from, is_opposite };
-                all.extend([false, true].map(coupled));
+                misreadings.extend([false, true].map(coupled));
             }
         }
     }
     for &joint in &turning {
         let steps =
             (1 - 180 / ZERO_POSITION_STEP..=180 / ZERO_POSITION_STEP).filter(|&step| step != 0);
-        all.extend(
+        misreadings.extend(
             steps.map(|step| Misreading::Zero { joint, degrees: step * ZERO_POSITION_STEP }),
         );
     }
     for &joint in &moving {
-        all.extend(TRIAL_RATIOS.map(|percent| Misreading::Ratio { joint, percent }));
+        misreadings.extend(TRIAL_RATIOS.map(|percent| Misreading::Ratio { joint, percent }));
     }
-    all
+    misreadings
 }
 
 /// Returns the misreadings in which positions are shifted by rows against the configurations.
@@ -111,7 +111,7 @@ pub(super) fn shift_step(rows: usize) -> usize {
 /// Returns misreadings of the joint table: its convention, units and signs.
 fn of_joint_table(problem: &Problem) -> Vec<Misreading> {
     use JointField::{A, Alpha, Beta, D, Theta};
-    let mut all = vec![Misreading::StandardForm, Misreading::ModifiedForm];
+    let mut forms = vec![Misreading::StandardForm, Misreading::ModifiedForm];
     let fields = [Alpha, Theta, Beta];
     for field in fields {
         let mut counts = [0; 2];
@@ -119,19 +119,19 @@ fn of_joint_table(problem: &Problem) -> Vec<Misreading> {
             let mut declared = declared.clone();
             let Some(&mut angle) = number_of(&mut declared, field) else { continue };
             if (MIN_RADIANS..=2.0 * PI).contains(&angle.to_degrees().abs()) {
-                all.push(Misreading::TableRadians { joint, field });
+                forms.push(Misreading::TableRadians { joint, field });
                 counts[0] += 1;
             }
             if angle.abs() > 2.0 * PI {
-                all.push(Misreading::TableDegrees { joint, field });
+                forms.push(Misreading::TableDegrees { joint, field });
                 counts[1] += 1;
             }
             if angle != 0.0 {
-                all.push(Misreading::Sign { joint, field });
+                forms.push(Misreading::Sign { joint, field });
             }
         }
-        all.extend((counts[0] > 1).then_some(Misreading::TableRadians { joint: 0, field }));
-        all.extend((counts[1] > 1).then_some(Misreading::TableDegrees { joint: 0, field }));
+        forms.extend((counts[0] > 1).then_some(Misreading::TableRadians { joint: 0, field }));
+        forms.extend((counts[1] > 1).then_some(Misreading::TableDegrees { joint: 0, field }));
     }
     let count_long = |joint: &Joint| {
         lengths_of(&mut joint.clone())
@@ -147,7 +147,7 @@ fn of_joint_table(problem: &Problem) -> Vec<Misreading> {
             if length == 0.0 {
                 continue;
             }
-            all.push(Misreading::Sign { joint, field });
+            forms.push(Misreading::Sign { joint, field });
             let is_plausible = |power: &i8| {
                 PLAUSIBLE_LENGTHS.contains(&(length.abs() * 10.0_f64.powi((*power).into())))
             };
@@ -155,10 +155,10 @@ fn of_joint_table(problem: &Problem) -> Vec<Misreading> {
             let is_new =
                 |power: &i8| *power != -3 || length.abs() <= MIN_MILLIMETRE_LENGTH || long > 1;
             let powers = [-3, 3, -2, 2, -1, 1].into_iter().filter(is_plausible).filter(is_new);
-            all.extend(powers.map(|power| Misreading::Length { joint, field, power }));
+            forms.extend(powers.map(|power| Misreading::Length { joint, field, power }));
         }
     }
-    all
+    forms
 }
 
 /// Returns misreadings of masses, stiffnesses and gravity; none for a rigid arm.
@@ -170,16 +170,16 @@ pub(super) fn of_loads(problem: &Problem, table: &Measurements) -> Vec<Misreadin
     let masses = masses_of(&mut problem.clone()).len();
     let single = if masses > MAX_MASSES { 0 } else { masses };
     let of_mass = |mass: usize| powers.map(|power| Misreading::Mass { mass, power });
-    let mut all: Vec<Misreading> = (0..=single).flat_map(of_mass).collect();
+    let mut misreadings: Vec<Misreading> = (0..=single).flat_map(of_mass).collect();
     if table.payload.is_some() || problem.tool.payload_mass > 0.0 {
-        all.extend(powers.map(|power| Misreading::Payload { power }));
+        misreadings.extend(powers.map(|power| Misreading::Payload { power }));
     }
-    all.extend([-3, 3, 0].map(|power| Misreading::Stiffness { power }));
+    misreadings.extend([-3, 3, 0].map(|power| Misreading::Stiffness { power }));
     for axis in 0..3 {
         let of_sign = |is_negative| Misreading::Gravity { axis, is_negative };
-        all.extend([false, true].map(of_sign));
+        misreadings.extend([false, true].map(of_sign));
     }
-    all
+    misreadings
 }
 
 /// Returns true if a joint is revolute and its column may be in radians (`radians`), or else in

@@ -73,16 +73,16 @@ fn explanations(fit: &CheckedFit) -> Explanations {
     // If the target hardly moves, contacts with one point agree with any arm.
     let is_tested =
         |misreading: &Misreading| is_position || matches!(misreading, Misreading::Reversed { .. });
-    let all = if is_position && nominal < MAX_REACHES_OF_LOADS * model.reach() {
+    let listed = if is_position && nominal < MAX_REACHES_OF_LOADS * model.reach() {
         [of_loads(fit.problem, measurements), of_order(measurements)].concat()
     } else {
         candidates(fit.problem, measurements)
     };
-    let all: Vec<Misreading> = all.into_iter().filter(is_tested).collect();
-    let mut errors = trial.registered_errors(&all);
+    let tested: Vec<Misreading> = listed.into_iter().filter(is_tested).collect();
+    let mut errors = trial.registered_errors(&tested);
     errors.sort_by(|a, b| a.1.total_cmp(&b.1));
     let near_alone = near_misreadings(&errors, nominal);
-    errors.extend(trial.several_reversed(&all));
+    errors.extend(trial.several_reversed(&tested));
     errors.sort_by(|a, b| a.1.total_cmp(&b.1));
     if let Some(shift) = errors.iter_mut().find(|(found, _)| found.shifted_from().is_some()) {
         *shift = trial.with_best_start(*shift);
