@@ -59,20 +59,20 @@ pub fn standard_dh(problem: &Problem, arm: &Arm<f64>) -> Result<String, ExportEr
     let (mut rows, mut before) = (String::new(), Frame::identity());
     let moving = problem.joints.iter().filter(|joint| joint.kind != JointKind::Fixed);
     let last = links.len().saturating_sub(1);
-    let mut far = 0.0_f64;
+    let mut largest_offset = 0.0_f64;
     for (k, ((_, link), joint)) in links.iter().zip(moving).enumerate() {
         let link = before.compose(link);
         // All transforms after the last axis belong to the tool.
         let ([theta, d, a, alpha], after) =
             if k < last { standard(&link) } else { ([0.0; 4], link) };
-        far = far.max(d.abs());
+        largest_offset = largest_offset.max(d.abs());
         let _ = writeln!(rows, "  {}:", yaml_key(&joint.name));
         for (name, value) in [("theta_rad", theta), ("d_m", d), ("a_m", a), ("alpha_rad", alpha)] {
             let _ = writeln!(rows, "    {name}: {}", float(value));
         }
         before = after;
     }
-    if far > MIN_COMMENTED_OFFSET {
+    if largest_offset > MIN_COMMENTED_OFFSET {
         text.push_str("# Two axes are nearly parallel: their common normal lies far away, and rounding counts. Prefer mdh.\n");
     }
     for (name, frame) in [("base", base), ("tool", &before)] {

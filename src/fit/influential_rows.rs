@@ -37,32 +37,32 @@ pub(super) fn influential_rows(
     let (most, a_round) =
         ((count / MIN_ROWS_PER_INFLUENTIAL).max(1), (count / ROWS_PER_REMOVAL).max(1));
     let mut rows: Vec<Outlier> = Vec::new();
-    let mut rest: Option<Identification> = None;
+    let mut reduced_fit: Option<Identification> = None;
     loop {
-        let last = rest.as_ref().unwrap_or(found);
+        let last = reduced_fit.as_ref().unwrap_or(found);
         // Known distances are never left out.
-        let mut far: Vec<&Outlier> =
+        let mut largest: Vec<&Outlier> =
             last.outliers.iter().filter(|row| row.kind != "known distance").collect();
-        far.sort_by(|a, b| b.distance.total_cmp(&a.distance));
-        far.truncate(a_round);
-        let far: Vec<Outlier> = far.into_iter().cloned().collect();
-        if is_explained_by_sigma(last) || far.is_empty() || rows.len() + far.len() > most {
+        largest.sort_by(|a, b| b.distance.total_cmp(&a.distance));
+        largest.truncate(a_round);
+        let largest: Vec<Outlier> = largest.into_iter().cloned().collect();
+        if is_explained_by_sigma(last) || largest.is_empty() || rows.len() + largest.len() > most {
             break;
         }
-        let numbers: Vec<usize> = rows.iter().chain(&far).map(|outlier| outlier.row).collect();
+        let numbers: Vec<usize> = rows.iter().chain(&largest).map(|outlier| outlier.row).collect();
         let Some(next) = without(&numbers).filter(|fit| fit.termination.converged()) else { break };
         if variance_ratio(&next, last) > MAX_GAINFUL_RATIO {
             break;
         }
-        rows.extend(far);
-        rest = Some(next);
+        rows.extend(largest);
+        reduced_fit = Some(next);
     }
-    let rest = rest?;
+    let reduced_fit = reduced_fit?;
     rows.sort_by_key(|outlier| outlier.row);
-    let left = variance_ratio(&rest, found);
-    let is_better =
-        left < MAX_DECISIVE_RATIO || (left < MAX_INFLUENTIAL_RATIO && is_explained_by_sigma(&rest));
-    let Identification { reduced_chi2, sigma_taken, .. } = rest;
+    let ratio = variance_ratio(&reduced_fit, found);
+    let is_better = ratio < MAX_DECISIVE_RATIO
+        || (ratio < MAX_INFLUENTIAL_RATIO && is_explained_by_sigma(&reduced_fit));
+    let Identification { reduced_chi2, sigma_taken, .. } = reduced_fit;
     is_better.then_some(InfluentialRows { rows, reduced_chi2, sigma_taken })
 }
 

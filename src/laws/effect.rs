@@ -99,7 +99,7 @@ impl Effect {
             At::BaseShift(_) | At::BaseTurn(_) => self.joint().is_none(),
             _ => true,
         };
-        let one = |entry: &TermEntry, arguments: &[(&str, Argument)]| {
+        let term = |entry: &TermEntry, arguments: &[(&str, Argument)]| {
             let formula = match entry.formula {
                 "" => None,
                 formula => Some(parse(&filled(formula, arguments), vocabulary).ok()?),
@@ -124,10 +124,10 @@ impl Effect {
                         (*known, if known == key { order } else { argument.clone() })
                     };
                     let arguments: Vec<(&str, Argument)> = arguments.iter().map(single).collect();
-                    entries().filter_map(|entry| one(entry, &arguments)).collect::<Vec<_>>()
+                    entries().filter_map(|entry| term(entry, &arguments)).collect::<Vec<_>>()
                 })
                 .collect(),
-            _ => entries().filter_map(|entry| one(entry, &arguments)).collect(),
+            _ => entries().filter_map(|entry| term(entry, &arguments)).collect(),
         }
     }
 
@@ -381,8 +381,8 @@ impl Effect {
     /// else the effect itself.
     pub(crate) fn parts(&self) -> Vec<Self> {
         let Some((key, orders)) = self.orders() else { return vec![self.clone()] };
-        let one = |order: u32| self.with(key, &Argument::Orders(vec![order]));
-        orders.into_iter().filter_map(one).collect()
+        let with_order = |order: u32| self.with(key, &Argument::Orders(vec![order]));
+        orders.into_iter().filter_map(with_order).collect()
     }
 
     /// Returns the orders of both effects, with their key, if the effects differ only in them.

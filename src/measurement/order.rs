@@ -50,15 +50,15 @@ impl Chronology {
             places[row] = (begin, at);
         }
         let n = table.joints;
-        let one = |column: &[f64]| rows.iter().map(|&row| column[row]).collect();
-        let each = |column: &[f64]| {
+        let sorted_column = |column: &[f64]| rows.iter().map(|&row| column[row]).collect();
+        let sorted_joints = |column: &[f64]| {
             rows.iter().flat_map(|&row| &column[row * n..(row + 1) * n]).copied().collect()
         };
         let sorted = (!rows.is_sorted()).then(|| Past {
-            times: one(&table.time),
-            temperatures: table.temperature.as_deref().map(one).unwrap_or_default(),
-            configurations: each(&table.configurations),
-            approaches: table.approach.as_deref().map(each).unwrap_or_default(),
+            times: sorted_column(&table.time),
+            temperatures: table.temperature.as_deref().map(sorted_column).unwrap_or_default(),
+            configurations: sorted_joints(&table.configurations),
+            approaches: table.approach.as_deref().map(sorted_joints).unwrap_or_default(),
         });
         Self { places, sorted }
     }

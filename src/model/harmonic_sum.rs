@@ -49,13 +49,13 @@ impl HarmonicSum {
         found.retain(|(series, waves)| {
             *waves >= MIN_HARMONICS && *waves >= MIN_DENSITY * series.terms.len()
         });
-        let taken: Vec<Self> = found.into_iter().map(|(series, _)| series).collect();
+        let series_found: Vec<Self> = found.into_iter().map(|(series, _)| series).collect();
         terms.retain(|term| {
             wave(&term.regressor).is_none_or(|(joint, ..)| {
-                !taken.iter().any(|series| (series.site, series.joint) == (term.site, joint))
+                !series_found.iter().any(|series| (series.site, series.joint) == (term.site, joint))
             })
         });
-        taken
+        series_found
     }
 
     /// Returns the value of the sum at the commands `configuration` \[rad\] or \[m\].
@@ -124,10 +124,10 @@ mod tests {
             regressor: Regressor::Sine(joint, order),
             value: 1.0,
         });
-        let mut left: Vec<CommandTerm> = terms.iter().chain(&few).cloned().collect();
-        left.push(CommandTerm { site, regressor: Regressor::Unit, value: 1.0 });
-        let series = HarmonicSum::take(&mut left);
-        assert!(series.len() == 1 && left.len() == 4 && left[..3] == few);
+        let mut remaining: Vec<CommandTerm> = terms.iter().chain(&few).cloned().collect();
+        remaining.push(CommandTerm { site, regressor: Regressor::Unit, value: 1.0 });
+        let series = HarmonicSum::take(&mut remaining);
+        assert!(series.len() == 1 && remaining.len() == 4 && remaining[..3] == few);
         for k in -30..30 {
             let configuration = [0.4, 0.21 * f64::from(k), 1.0];
             let pose = PoseView::from_configuration(&configuration);

@@ -63,11 +63,11 @@ fn add(document: &mut DocumentMut, effect: &Effect, comments: &[String]) {
         return;
     }
     // Text at the end of the file stays before the added effects.
-    let rest = document.trailing().as_str().unwrap_or_default().to_owned();
+    let trailing = document.trailing().as_str().unwrap_or_default().to_owned();
     document.set_trailing(RawString::default());
     let mut table = Table::new();
     table.insert(effect.name(), Item::Value(arguments(effect)));
-    table.decor_mut().set_prefix(format!("{rest}\n{lines}"));
+    table.decor_mut().set_prefix(format!("{trailing}\n{lines}"));
     let last = document.iter().map(|(_, item)| last_position(item)).max().unwrap_or(0);
     table.set_position(Some(last + 1));
     let effects =

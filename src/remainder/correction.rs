@@ -196,14 +196,14 @@ impl Correction {
         let chunks = || {
             poses.chunks(POSES_PER_CHUNK).enumerate().map(|(k, poses)| (POSES_PER_CHUNK * k, poses))
         };
-        let mut taken = None;
+        let mut sums = None;
         for (first, poses) in chunks().filter(|_| placed.has_columns()) {
-            placed.add_to(&mut taken, first, &of_chunk(poses).1);
+            placed.add_to(&mut sums, first, &of_chunk(poses).1);
         }
         let corrected = |(first, poses): (usize, &[Pose])| {
             let (rows, mut factors) = of_chunk(poses);
             let mut noise_shares = vec![Vector3::repeat(1.0); poses.len()];
-            if let Some(taken) = &taken {
+            if let Some(taken) = &sums {
                 placed.subtract(taken, first, &mut factors);
                 for (k, share) in noise_shares.iter_mut().enumerate() {
                     *share = placed.shares_left(first + k);

@@ -24,7 +24,7 @@ pub(super) struct PlacementFit {
 
 /// Products of Qᵀ with the corrections of all rows: with their mean and with their covariance
 /// factor.
-pub(super) struct Taken {
+pub(super) struct CorrectionProducts {
     mean: DVector<f64>,
     spread: DMatrix<f64>,
 }
@@ -50,25 +50,30 @@ impl PlacementFit {
         self.basis.ncols() > 0
     }
 
-    /// Adds to `taken` the products of Qᵀ with the corrections of the rows from index `first` on.
-    pub fn add_to(&self, taken: &mut Option<Taken>, first: usize, factors: &RowFactors) {
+    /// Adds to `sums` the products of Qᵀ with the corrections of the rows from index `first` on.
+    pub fn add_to(
+        &self,
+        sums: &mut Option<CorrectionProducts>,
+        first: usize,
+        factors: &RowFactors,
+    ) {
         let basis = self.basis.rows(AXES * first, factors.mean.len());
         let (mean, spread) = (basis.tr_mul(&factors.mean), basis.tr_mul(&factors.spread));
-        match taken {
-            Some(taken) => {
-                taken.mean += mean;
-                taken.spread += spread;
+        match sums {
+            Some(sums) => {
+                sums.mean += mean;
+                sums.spread += spread;
             }
-            None => *taken = Some(Taken { mean, spread }),
+            None => *sums = Some(CorrectionProducts { mean, spread }),
         }
     }
 
     /// Subtracts from the corrections of the rows from index `first` on the part that the fit of
     /// bases and tools reproduces.
-    pub fn subtract(&self, taken: &Taken, first: usize, factors: &mut RowFactors) {
+    pub fn subtract(&self, sums: &CorrectionProducts, first: usize, factors: &mut RowFactors) {
         let basis = self.basis.rows(AXES * first, factors.mean.len());
-        factors.mean -= basis * &taken.mean;
-        factors.spread -= basis * &taken.spread;
+        factors.mean -= basis * &sums.mean;
+        factors.spread -= basis * &sums.spread;
     }
 
     /// Returns the fraction of the variance of independent noise that remains in each coordinate of
@@ -82,15 +87,15 @@ impl PlacementFit {
     /// Fits bases and tools to the residuals that remain after the shifts \[m\], and adds their
     /// motion to the shifts.
     pub fn refit(&self, shifts: &mut [Vector3<f64>], residuals: &[Vector3<f64>]) {
-        let left = residuals.iter().zip(shifts.iter()).flat_map(|(residual, shift)| {
-            let left = residual - shift;
-            let is_usable = left.iter().all(|value| value.is_finite());
-            (0..AXES).map(move |axis| if is_usable { left[axis] } else { 0.0 })
+        let remaining = residuals.iter().zip(shifts.iter()).flat_map(|(residual, shift)| {
+            let difference = residual - shift;
+            let is_usable = difference.iter().all(|value| value.is_finite());
+            (0..AXES).map(move |axis| if is_usable { difference[axis] } else { 0.0 })
         });
-        let left = DVector::from_iterator(AXES * residuals.len(), left);
-        let taken = &self.basis * self.basis.tr_mul(&left);
+        let remaining = DVector::from_iterator(AXES * residuals.len(), remaining);
+        let explained = &self.basis * self.basis.tr_mul(&remaining);
         for (row, shift) in shifts.iter_mut().enumerate() {
-            *shift += Vector3::from_fn(|axis, _| taken[AXES * row + axis]);
+            *shift += Vector3::from_fn(|axis, _| explained[AXES * row + axis]);
         }
     }
 }

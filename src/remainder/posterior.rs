@@ -190,7 +190,7 @@ impl Posterior {
 
     /// Predicts rows that were not used for training.
     pub fn left_out(&self, rows: &Rows) -> Vec<LeftOut> {
-        let one = |(row, predicted): (usize, RowPosterior)| {
+        let left_out = |(row, predicted): (usize, RowPosterior)| {
             let noise = self.hyper.noise_variance_of(rows.relative_sigma[row]);
             let measured = Vector3::from_fn(|axis, _| rows.residual[AXES * row + axis]);
             LeftOut {
@@ -198,7 +198,7 @@ impl Posterior {
                 covariance: predicted.covariance + Matrix3::from_diagonal_element(noise),
             }
         };
-        self.at(rows).into_iter().enumerate().map(one).collect()
+        self.at(rows).into_iter().enumerate().map(left_out).collect()
     }
 }
 
@@ -255,12 +255,12 @@ impl Training {
         for (group, factor) in &groups {
             let places = coordinates(group);
             let mut block = whitened.select_rows(&places);
-            let mut left = target.select_rows(&places);
+            let mut target_of_block = target.select_rows(&places);
             factor.solve_lower_triangular_mut(&mut block);
-            factor.solve_lower_triangular_mut(&mut left);
+            factor.solve_lower_triangular_mut(&mut target_of_block);
             for (k, &place) in places.iter().enumerate() {
                 whitened.row_mut(place).copy_from(&block.row(k));
-                target[place] = left[k];
+                target[place] = target_of_block[k];
             }
         }
         let n = whitened.ncols();

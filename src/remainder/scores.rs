@@ -21,10 +21,10 @@ const HALVINGS: usize = 50;
 /// Returns the share of a correction that is applied: 1 if the data determine the remainder, 0 if
 /// they do not.
 ///
-/// `left` is the posterior variance of the correction and `prior` the prior variance of the
+/// `posterior` is the posterior variance of the correction and `prior` the prior variance of the
 /// remainder, both as traces \[m²\].
-pub(super) fn fade(left: f64, prior: f64) -> f64 {
-    if prior > 0.0 { 1.0 - (left / prior).clamp(0.0, 1.0) } else { 0.0 }
+pub(super) fn fade(posterior: f64, prior: f64) -> f64 {
+    if prior > 0.0 { 1.0 - (posterior / prior).clamp(0.0, 1.0) } else { 0.0 }
 }
 
 /// Error of a row that was predicted without its configuration or its block.
@@ -47,7 +47,7 @@ pub(super) fn left_out_errors(
     alone: &[LeftOut],
     with: &[LeftOut],
 ) -> Vec<LeftOutError> {
-    let one = |(row, (alone, with)): (usize, (&LeftOut, &LeftOut))| {
+    let score = |(row, (alone, with)): (usize, (&LeftOut, &LeftOut))| {
         let noise = AXES as f64 * hyper.noise_variance_of(rows.relative_sigma[row]);
         let prior = variance(hyper, rows, row).trace();
         let whole = with.covariance.trace();
@@ -62,7 +62,7 @@ pub(super) fn left_out_errors(
             density: log_density(&error, &(with.covariance + faded)),
         }
     };
-    alone.iter().zip(with).enumerate().map(one).collect()
+    alone.iter().zip(with).enumerate().map(score).collect()
 }
 
 /// Returns the logarithm of a normal density with mean 0 at `error`; NaN if the covariance is not

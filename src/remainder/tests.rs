@@ -143,14 +143,14 @@ fn far_from_all_rows_only_the_parameters_are_corrected() {
         ..hyper()
     };
     let posterior = Training::new((&rows, &inputs), &prior, &hyper, &all(&rows)).unwrap().posterior;
-    let mut far = rows.select(&[3]);
-    far.inputs.fill(2.9);
-    let predicted = posterior.at(&far)[0];
+    let mut distant_pose = rows.select(&[3]);
+    distant_pose.inputs.fill(2.9);
+    let predicted = posterior.at(&distant_pose)[0];
     assert!(
         (predicted.covariance.trace() - predicted.prior) > -1e-6 * predicted.prior,
         "the prior is back"
     );
-    let parameters = &far.jacobian * posterior.parameters();
+    let parameters = &distant_pose.jacobian * posterior.parameters();
     assert!((predicted.mean - Vector3::from_column_slice(parameters.as_slice())).norm() < 1e-9);
     assert!(super::scores::fade(predicted.covariance.trace(), predicted.prior).abs() < 1e-15);
 }

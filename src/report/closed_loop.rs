@@ -61,8 +61,8 @@ pub fn loop_brief(
     }
     blocks.push(Block::heading("What was found"));
     let height = |points: &[Point]| text(&[Block::Ranking(points.to_vec())]).lines().count();
-    let rest = text(&blocks).lines().count() + end.lines().count();
-    let room = SCREEN_LINES.saturating_sub(rest);
+    let lines_used = text(&blocks).lines().count() + end.lines().count();
+    let room = SCREEN_LINES.saturating_sub(lines_used);
     let fits = |count: &usize| {
         // One line is reserved for the note that tells where the other entries are listed.
         let note = usize::from(*count < points.len());

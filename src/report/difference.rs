@@ -82,14 +82,14 @@ fn differences([a, b]: &[Side; 2]) -> Vec<Difference> {
     let variance = |side: &Side, k: usize| side.estimate.posterior().covariance[(k, k)];
     let others: Vec<(&str, f64, Option<f64>)> = b.estimate.entries().collect();
     let of = |(k, (name, value, _)): (usize, (&str, f64, Option<f64>))| {
-        let other = others.iter().position(|entry| entry.0 == name)?;
+        let place = others.iter().position(|entry| entry.0 == name)?;
         let (factor, symbol) = match a.estimate.unit_of(name).unwrap_or_default() {
             "rad" => (1_f64.to_degrees(), "°"),
             "m" => (1e3, "mm"),
             symbol => (1.0, symbol),
         };
-        let values = [value, others[other].1].map(|value| value * factor);
-        let sigma = (variance(a, k) + variance(b, other)).sqrt() * factor;
+        let values = [value, others[place].1].map(|value| value * factor);
+        let sigma = (variance(a, k) + variance(b, place)).sqrt() * factor;
         let sigma = Some(sigma).filter(|sigma| sigma.is_finite());
         Some(Difference {
             name: format!("{name} [{symbol}]"),

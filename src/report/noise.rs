@@ -80,7 +80,7 @@ fn other_sigma(problem: &Problem, found: &Identification) -> String {
     let is_larger = found.noise_factor > 1.0;
     let size = number(found.noise_factor.sqrt(), if is_larger { 1 } else { 3 });
     // Several kinds of rows may have several units: one factor holds for all of them.
-    let taken = if found.kinds.is_empty() {
+    let assumed = if found.kinds.is_empty() {
         format!("σ = {} {}", brief(errors, found.sigma_taken), unit(errors))
     } else {
         format!("every declared σ times {size}")
@@ -99,7 +99,7 @@ fn other_sigma(problem: &Problem, found: &Identification) -> String {
         None => "so that σ is too small or the model lacks something".to_owned(),
     };
     format!(
-        "The scatter is {size} × the declared σ{declared}, {cause}. Fit and standard errors assume {taken}, estimated from residuals and \
+        "The scatter is {size} × the declared σ{declared}, {cause}. Fit and standard errors assume {assumed}, estimated from residuals and \
          priors."
     )
 }
@@ -187,7 +187,7 @@ pub(super) fn influential_rows<'a>(found: &Identification) -> Option<Block<'a>> 
     let (cause, them) =
         if influential.rows.len() == 1 { ("causes", "it") } else { ("cause", "them") };
     let errors = &found.fitted.identification;
-    let left = match (influential.reduced_chi2, found.reduced_chi2) {
+    let comparison = match (influential.reduced_chi2, found.reduced_chi2) {
         (Some(without), Some(with)) => {
             format!("χ²/ν is {} instead of {}", short(without), short(with))
         }
@@ -198,7 +198,7 @@ pub(super) fn influential_rows<'a>(found: &Identification) -> Option<Block<'a>> 
         ),
     };
     Some(Block::Text(format!(
-        "{} {cause} most of the residual: {}. Without {them} {left}.",
+        "{} {cause} most of the residual: {}. Without {them} {comparison}.",
         counted(influential.rows.len(), noun(found)),
         named(influential.rows.iter().map(row), MAX_SHOWN_INFLUENTIAL, ", ")
     )))

@@ -145,14 +145,15 @@ fn others(study: &MisprintStudy, found: &ReplicaResults) -> Table {
 
 fn ratios(study: &MisprintStudy, found: &ReplicaResults) -> Table {
     let main = main_case(study, found);
-    let row = |name: &str, summary: &str, left: &dyn Fn(&Replica) -> HeldOutError| {
+    let row = |name: &str, summary: &str, error_of: &dyn Fn(&Replica) -> HeldOutError| {
         let ratio = |case: &Case| {
-            let ratios = found.of_case(case).map(|replica| replica.ratio(left(replica)));
+            let ratios = found.of_case(case).map(|replica| replica.ratio(error_of(replica)));
             shown(Spread::of(ratios), |value| number(value, 3))
         };
-        let of_z = |replica: &&Replica| left(replica).map(|left| left.mean.z / left.mean.norm);
+        let of_z = |replica: &&Replica| error_of(replica).map(|left| left.mean.z / left.mean.norm);
         let along = shown(Spread::of(main.iter().map(of_z)), |value| number(value, 2));
-        let largest = Spread::of(main.iter().map(|replica| replica.largest_ratio(left(replica))));
+        let largest =
+            Spread::of(main.iter().map(|replica| replica.largest_ratio(error_of(replica))));
         let cases: Vec<String> = study.cases.iter().map(ratio).collect();
         let largest = shown(largest, |value| number(value, 2));
         [vec![name.to_owned(), summary.to_owned()], cases, vec![along, largest]].concat()

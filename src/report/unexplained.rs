@@ -141,8 +141,8 @@ pub(super) fn unexplained(
 }
 
 /// Returns true if the structure is sag under a weight that is not declared.
-fn is_sag(left: &Structure) -> bool {
-    left.law.as_deref() == Some("sag")
+fn is_sag(structure: &Structure) -> bool {
+    structure.law.as_deref() == Some("sag")
 }
 
 /// Iterates over limits of the declared problem that are wrong with a probability above one half,
@@ -157,20 +157,20 @@ fn wrong_limits(result: &LoopResult) -> impl Iterator<Item = (&str, f64)> {
 }
 
 /// Describes the place and the inputs (quantities that it depends on) of one structure.
-fn located(left: &Structure) -> String {
-    let (place, inputs) = (&left.place, left.depends_on.join(", "));
-    let Some(claims) = &left.claims else {
+fn located(structure: &Structure) -> String {
+    let (place, inputs) = (&structure.place, structure.depends_on.join(", "));
+    let Some(claims) = &structure.claims else {
         let inputs = if inputs.is_empty() { inputs } else { format!(", dependent on {inputs}") };
-        return format!("Structure is left: {place}{inputs} (p {}).", p_value(left.p_value));
+        return format!("Structure is left: {place}{inputs} (p {}).", p_value(structure.p_value));
     };
-    let chance = format!("p at most {}", p_value(left.p_value));
+    let chance = format!("p at most {}", p_value(structure.p_value));
     let law = percent(claims.law.probability);
-    if let Some(limit) = &left.limit {
+    if let Some(limit) = &structure.limit {
         return format!(
             "The limit {limit}, which is active, is wrong or hides a cause: probability {law} ({chance})."
         );
     }
-    if is_sag(left) {
+    if is_sag(structure) {
         let what = if place == "arm" { "the arm" } else { place };
         return format!("Undeclared weight deflects {what}: probability {law} ({chance}).");
     }

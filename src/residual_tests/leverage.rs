@@ -69,14 +69,14 @@ impl<'a> Leverage<'a> {
     /// priors contribute to the residuals.
     pub fn prior_root(&self) -> DMatrix<f64> {
         let p = self.gram.nrows();
-        let mut left = DMatrix::identity(p, p) - &self.gram;
-        if p < MAX_EIGENVECTOR_DIRECTIONS || left.trace() <= MIN_PRIOR_SHARE {
-            return root_of_priors(left);
+        let mut prior_part = DMatrix::identity(p, p) - &self.gram;
+        if p < MAX_EIGENVECTOR_DIRECTIONS || prior_part.trace() <= MIN_PRIOR_SHARE {
+            return root_of_priors(prior_part);
         }
         // Every root of the matrix is valid. This one has a column for every direction; columns of
         // directions that data alone determine are almost zero.
-        (0..p).for_each(|k| left[(k, k)] += CHOLESKY_JITTER);
-        lower_factor(left.clone()).unwrap_or_else(|| root_of_priors(left))
+        (0..p).for_each(|k| prior_part[(k, k)] += CHOLESKY_JITTER);
+        lower_factor(prior_part.clone()).unwrap_or_else(|| root_of_priors(prior_part))
     }
 
     /// Returns (I − H)_bb^(−½) r_b of each pose b: residuals with unit covariance if the noise has
@@ -119,14 +119,14 @@ fn products(a: &DMatrix<f64>, b: &DMatrix<f64>, pose: usize) -> Matrix3<f64> {
     Matrix3::from_fn(|i, j| a.column(3 * pose + i).dot(&b.column(3 * pose + j)))
 }
 
-/// Returns S with S Sᵀ = `left` = I − QᵀQ, with one column for each direction that priors help to
-/// determine.
-fn root_of_priors(left: DMatrix<f64>) -> DMatrix<f64> {
-    let p = left.nrows();
-    if left.trace() <= MIN_PRIOR_SHARE {
+/// Returns S with S Sᵀ = `prior_part` = I − QᵀQ, with one column for each direction that priors
+/// help to determine.
+fn root_of_priors(prior_part: DMatrix<f64>) -> DMatrix<f64> {
+    let p = prior_part.nrows();
+    if prior_part.trace() <= MIN_PRIOR_SHARE {
         return DMatrix::zeros(p, 0);
     }
-    let eigen = left.symmetric_eigen();
+    let eigen = prior_part.symmetric_eigen();
     let by_priors: Vec<usize> =
         (0..p).filter(|&k| eigen.eigenvalues[k] > MIN_PRIOR_SHARE).collect();
     let entry = |i: usize, k: usize| {
@@ -219,15 +219,15 @@ pub(super) fn each_left_out(leverage: &Leverage, residual: &DVector<f64>) -> Vec
             let pose = first + number;
             let of_pose = |values: &DVector<f64>| values.fixed_rows::<3>(3 * pose).into_owned();
             let (residual_of_pose, again) = (of_pose(residual), of_pose(&again));
-            let taken = products(rows, rows, number);
-            let more = products(rows, &gram_rows, number) - taken * taken;
+            let hat_block = products(rows, rows, number);
+            let more = products(rows, &gram_rows, number) - hat_block * hat_block;
             let inverse = leverage.whiteners[pose] * leverage.whiteners[pose];
             let pull = inverse * residual_of_pose;
             let change =
-                2.0 * pull.dot(&(again - taken * residual_of_pose)) + pull.dot(&(more * pull));
+                2.0 * pull.dot(&(again - hat_block * residual_of_pose)) + pull.dot(&(more * pull));
             Others {
                 squares: total - residual_of_pose.norm_squared() + change,
-                freedom: leverage.freedom - leverage.coordinates[pose] as f64 + taken.trace()
+                freedom: leverage.freedom - leverage.coordinates[pose] as f64 + hat_block.trace()
                     - (inverse * more).trace(),
             }
         };
@@ -270,8 +270,11 @@ mod tests {
         for p in [9, 110] {
             let leverage_with_priors = leverage(p, true);
             let root = leverage_with_priors.prior_root();
-            let left = DMatrix::identity(p, p) - &leverage_with_priors.gram;
-            assert!(left.trace() > 1.0 && (&root * root.transpose() - left).amax() < 1e-6, "{p}");
+            let prior_part = DMatrix::identity(p, p) - &leverage_with_priors.gram;
+            assert!(
+                prior_part.trace() > 1.0 && (&root * root.transpose() - prior_part).amax() < 1e-6,
+                "{p}"
+            );
             assert_eq!(leverage(p, false).prior_root().shape(), (p, 0));
         }
     }

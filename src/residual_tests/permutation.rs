@@ -102,11 +102,11 @@ fn draw(
     };
     let columns = residuals.as_mut_slice().par_chunks_mut(rows.max(1)).zip(draws);
     let by_priors: Vec<DVector<f64>> = columns.map(permute).collect();
-    let mut taken = transposed_product(&leverage.fitted, residuals.as_view());
+    let mut components = transposed_product(&leverage.fitted, residuals.as_view());
     if prior.ncols() > 0 {
-        taken += prior * DMatrix::from_columns(&by_priors);
+        components += prior * DMatrix::from_columns(&by_priors);
     }
-    subtract_product(residuals.as_view_mut(), &leverage.fitted, &taken);
+    subtract_product(residuals.as_view_mut(), &leverage.fitted, &components);
 }
 
 /// Returns the statistics of each draw from its residuals, which are studentised in place.

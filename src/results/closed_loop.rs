@@ -398,19 +398,19 @@ impl ParameterValue {
 }
 
 impl Structure {
-    fn new(left: &select::Unexplained, trace: &Trace) -> Self {
-        let correction = left.correction.as_ref();
-        let law = left.claims.as_ref().map(|claims| &claims.law.0.kind);
+    fn new(unexplained: &select::Unexplained, trace: &Trace) -> Self {
+        let correction = unexplained.correction.as_ref();
+        let law = unexplained.claims.as_ref().map(|claims| &claims.law.0.kind);
         Self {
-            place: left.site.map_or_else(|| NOWHERE.to_owned(), |site| site.to_string()),
-            depends_on: left.depends_on.iter().map(ToString::to_string).collect(),
+            place: unexplained.site.map_or_else(|| NOWHERE.to_owned(), |site| site.to_string()),
+            depends_on: unexplained.depends_on.iter().map(ToString::to_string).collect(),
             law: law.map(|law| law_name(law).to_owned()),
             limit: law.and_then(|law| match law {
                 HypothesisKind::Limit(limit) => Some(limit.clone()),
                 _ => None,
             }),
-            claims: left.claims.as_ref().map(|claims| Claims::new(claims, trace)),
-            p_value: left.p_value,
+            claims: unexplained.claims.as_ref().map(|claims| Claims::new(claims, trace)),
+            p_value: unexplained.p_value,
             held_out_with_empirical_correction: correction
                 .map(|correction| Summary::of(&correction.held_out)),
             correction: correction.map(Correction::new),

@@ -219,28 +219,28 @@ impl MisprintResult {
 
 impl Specimen {
     fn new(replica: &Replica, found: &ReplicaResults) -> Self {
-        let left = |left: &HeldOutError| left.as_ref().map(Summary::of);
+        let summary = |left: &HeldOutError| left.as_ref().map(Summary::of);
         let reading = |(named, [known, declared, positions, differences]): (
             &study::NamedReading,
             &[HeldOutError; 4],
         )| Reading {
             reading: named.name.clone(),
-            stiffness_known: left(known),
-            as_declared: left(declared),
-            from_positions: left(positions),
-            from_load_differences: left(differences),
+            stiffness_known: summary(known),
+            as_declared: summary(declared),
+            from_positions: summary(positions),
+            from_load_differences: summary(differences),
         };
         let rivals = AlternativeModel::EACH.into_iter().zip(&replica.by_alternative);
         Self {
             scale: replica.scale,
             before: Summary::of(&replica.before),
-            rigid: left(&replica.rigid),
+            rigid: summary(&replica.rigid),
             geometry_only: Summary::of(&replica.geometry_only),
             joint: Summary::of(&replica.joint),
             joint_both_loads: Summary::of(&replica.joint_twice),
             readings: found.readings.iter().zip(&replica.by_reading).map(reading).collect(),
             rivals: rivals
-                .map(|(rival, error)| Rival { rival: rival.as_str(), held_out: left(error) })
+                .map(|(rival, error)| Rival { rival: rival.as_str(), held_out: summary(error) })
                 .collect(),
         }
     }

@@ -102,8 +102,8 @@ impl<'a> Data<'a> {
     /// evenly spaced in the order of the table.
     pub fn evidence_rows(&self) -> Vec<usize> {
         let rows = self.rows();
-        let taken = rows.len().min(self.rules.evidence_poses);
-        (0..taken).map(|k| rows[k * rows.len() / taken]).collect()
+        let count = rows.len().min(self.rules.evidence_poses);
+        (0..count).map(|k| rows[k * rows.len() / count]).collect()
     }
 
     /// Returns the time of each identification row \[s\].

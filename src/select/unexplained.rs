@@ -187,37 +187,37 @@ fn correction(
         *error += moved.fixed_rows::<3>(3 * pose) * held_out.poses()[pose].sigma;
     }
     let function = function_columns * coefficients;
-    let left = linearised.residual() + linearised.fitted() * parameters + &function;
+    let remaining = linearised.residual() + linearised.fitted() * parameters + &function;
     Some(Correction {
         ranges: hypotheses.ranges(hypothesis),
         beyond: reached.iter().filter(|reached| !**reached).count(),
         cross_validated,
         held_out: ErrorSummary::of_rows(data.measurements, there.iter().copied(), &errors),
-        curve: curve(&hypotheses, hypothesis, (&function, &left)),
+        curve: curve(&hypotheses, hypothesis, (&function, &remaining)),
     })
 }
 
 /// Returns a correction as a function of one covariate, from its displacement of the poses
-/// (`function`) and the remaining residual (`left`).
+/// (`function`) and the remaining residual (`remaining`).
 fn curve(
     hypotheses: &Hypotheses,
     hypothesis: &Hypothesis,
-    (function, left): (&DVector<f64>, &DVector<f64>),
+    (function, remaining): (&DVector<f64>, &DVector<f64>),
 ) -> Option<Curve> {
     let (covariate, site, values, lever) = hypotheses.coordinate(hypothesis)?;
     let point = |(pose, &value): (usize, &f64)| {
         // All vectors are in units of σ. The residual is measured − predicted, so the lever is
         // −∂r/∂(coordinate).
         let at = |column: &DVector<f64>| column.fixed_rows::<3>(3 * pose).into_owned();
-        let (lever, function, left) = (-at(&lever), -at(function), at(left));
+        let (lever, function, remaining) = (-at(&lever), -at(function), at(remaining));
         let correction = lever.dot(&function) / lever.norm_squared();
         PartialResidual {
             covariate: value,
             correction,
-            value: correction + lever.dot(&left) / lever.norm_squared(),
+            value: correction + lever.dot(&remaining) / lever.norm_squared(),
             lever: lever.norm() * hypotheses.linearised.poses()[pose].sigma,
         }
     };
-    let points = values.iter().take(left.len() / 3).enumerate().map(point).collect();
+    let points = values.iter().take(remaining.len() / 3).enumerate().map(point).collect();
     Some(Curve { covariate, unit: site.unit(), points })
 }

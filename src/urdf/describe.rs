@@ -80,8 +80,8 @@ pub fn describe(chain: &Chain) -> Result<Description, InputError> {
 /// Returns `name`, changed if a joint of the URDF has the same name, because columns are named
 /// after joints.
 fn avoid_joint_names(chain: &Chain, name: &str) -> String {
-    let taken = chain.robot.joints.iter().any(|joint| joint.name == name);
-    if taken { format!("{name} frame") } else { name.to_owned() }
+    let is_joint_name = chain.robot.joints.iter().any(|joint| joint.name == name);
+    if is_joint_name { format!("{name} frame") } else { name.to_owned() }
 }
 
 fn rows(chain: &Chain, notes: &mut Vec<String>) -> Vec<Row> {

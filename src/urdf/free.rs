@@ -92,9 +92,9 @@ fn independent(columns: &DMatrix<f64>, order: &[usize]) -> Vec<usize> {
         for direction in basis.iter().chain(&basis) {
             residual.axpy(-direction.dot(&residual), direction, 1.0);
         }
-        let left = residual.norm();
-        if left > MIN_INDEPENDENT_FRACTION * length && length > 0.0 {
-            basis.push(residual / left);
+        let independent_length = residual.norm();
+        if independent_length > MIN_INDEPENDENT_FRACTION * length && length > 0.0 {
+            basis.push(residual / independent_length);
             chosen.push(k);
         }
     }

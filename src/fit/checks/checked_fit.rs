@@ -109,12 +109,12 @@ impl CheckedFit<'_> {
             }
         };
         let declared = together(places.iter().map(|&place| self.whole.declared[place]));
-        let taken = together(places.iter().map(|&place| self.whole.poses[place].sigma));
+        let assumed = together(places.iter().map(|&place| self.whole.poses[place].sigma));
         RowKind {
             observation,
             spread: spread(placement, &rows, point),
             declared_sigma: self.has_declared_noise.then_some(declared),
-            taken_sigma: taken,
+            taken_sigma: assumed,
             rows,
         }
     }

@@ -74,8 +74,8 @@ pub(in crate::fit) fn outliers(
     let errors = fitting.position_errors(rows, x);
     let outlier = |place: usize| {
         let (row, distance) = (rows[place], lengths[place] / scatter);
-        let far = || Outlier::new(fitting.measurements, row, distance, errors[place]);
-        (distance > chances[place].1).then(far)
+        let outlier_of_row = || Outlier::new(fitting.measurements, row, distance, errors[place]);
+        (distance > chances[place].1).then(outlier_of_row)
     };
     (0..rows.len()).filter_map(outlier).collect()
 }

@@ -39,10 +39,10 @@ pub(in crate::fit) fn payload_finding(
     }
     let mut following = problem.clone();
     following.tool.payload_follows = true;
-    let other = fit(&following).ok()?;
+    let fit_following = fit(&following).ok()?;
     let before = deviance(problem, data, found, found.noise_factor)?;
-    let after = deviance(&following, data, &other, found.noise_factor)?;
-    let is_better = other.termination.converged() && before - after > MIN_FALL_OF_DEVIANCE;
+    let after = deviance(&following, data, &fit_following, found.noise_factor)?;
+    let is_better = fit_following.termination.converged() && before - after > MIN_FALL_OF_DEVIANCE;
     is_better.then(|| {
         let text = format!(
             "the measurements speak for a payload at the identified target instead of the nominal one: \

@@ -29,17 +29,19 @@ pub(in crate::fit) fn confine(
     let n = held.len();
     let scale: Vec<f64> =
         triangle.column_iter().map(|c| c.norm()).map(|s| if s > 0.0 { s } else { 1.0 }).collect();
-    let mut left: Vec<&Held> = constraints.iter().collect();
+    let mut remaining: Vec<&Held> = constraints.iter().collect();
     loop {
         let open = |row: &[f64]| (0..n).filter(|&j| row[j] != 0.0 && !held[j]).collect::<Vec<_>>();
-        let Some(alone) = left.iter().position(|found| open(&found.row).len() <= 1) else { break };
-        let unknowns = open(&left.remove(alone).row);
+        let Some(alone) = remaining.iter().position(|found| open(&found.row).len() <= 1) else {
+            break;
+        };
+        let unknowns = open(&remaining.remove(alone).row);
         for j in unknowns {
             held[j] = true;
         }
     }
-    let mut rows = gauge.clone().insert_rows(gauge.nrows(), left.len(), 0.0);
-    for (i, found) in left.iter().enumerate() {
+    let mut rows = gauge.clone().insert_rows(gauge.nrows(), remaining.len(), 0.0);
+    for (i, found) in remaining.iter().enumerate() {
         let scaled = found.row.iter().zip(&scale).zip(&*held).filter(|(_, held)| !**held);
         let length = scaled.map(|((a, s), _)| (a / s).powi(2)).sum::<f64>().sqrt();
         (0..n).for_each(|j| rows[(gauge.nrows() + i, j)] = found.row[j] / length);

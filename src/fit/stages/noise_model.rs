@@ -29,25 +29,25 @@ impl NoiseModel {
     }
 
     /// Creates the model that scales all `declared` σ by one factor. The mean variance of rows,
-    /// weighted by the σ `taken` in the last fit, grows by the factor `ratio`.
-    pub fn scaled(declared: &[f64], taken: &[f64], ratio: f64) -> Self {
+    /// weighted by the σ `assumed` in the last fit, grows by the factor `ratio`.
+    pub fn scaled(declared: &[f64], assumed: &[f64], ratio: f64) -> Self {
         let sum: f64 =
-            declared.iter().zip(taken).map(|(sigma, taken)| (sigma / taken).powi(2)).sum();
+            declared.iter().zip(assumed).map(|(sigma, assumed)| (sigma / assumed).powi(2)).sum();
         let largest = declared.iter().copied().fold(0.0, f64::max);
         let least = (MIN_SIGMA / largest).min(1.0);
         Self { scale: (declared.len() as f64 * ratio / sum).sqrt().max(least), model_error: 0.0 }
     }
 
     /// Creates the model that adds a model error e to all `declared` σ. The mean variance of poses,
-    /// weighted by the σ `taken` in the last fit, grows by the factor `ratio`.
+    /// weighted by the σ `assumed` in the last fit, grows by the factor `ratio`.
     ///
-    /// Solves Σ (σ² + e²) / taken² = N ratio for e; if no e ≥ 0 does, all σ are scaled by one
+    /// Solves Σ (σ² + e²) / assumed² = N ratio for e; if no e ≥ 0 does, all σ are scaled by one
     /// factor.
-    pub fn raised(declared: &[f64], taken: &[f64], ratio: f64) -> Self {
+    pub fn raised(declared: &[f64], assumed: &[f64], ratio: f64) -> Self {
         let n = declared.len() as f64;
         let sum: f64 =
-            declared.iter().zip(taken).map(|(sigma, taken)| (sigma / taken).powi(2)).sum();
-        let weights: f64 = taken.iter().map(|taken| taken.powi(-2)).sum();
+            declared.iter().zip(assumed).map(|(sigma, assumed)| (sigma / assumed).powi(2)).sum();
+        let weights: f64 = assumed.iter().map(|sigma| sigma.powi(-2)).sum();
         let squared = (n * ratio - sum) / weights;
         if squared > 0.0 {
             return Self { scale: 1.0, model_error: squared.sqrt() };

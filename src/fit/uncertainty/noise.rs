@@ -205,10 +205,10 @@ fn next_noise_models(
         &of(&|place| stage.poses[place].sigma),
         ratio * shares[0],
     );
-    let taken =
+    let assumed_turn =
         |place: usize| stage.poses[place].orientation.map_or(1.0, |orientation| orientation.sigma);
     let of_turn = match stage.declared_turn {
-        Some(sigma) => NoiseModel::raised(&of(&|_| sigma), &of(&taken), ratio * shares[1]),
+        Some(sigma) => NoiseModel::raised(&of(&|_| sigma), &of(&assumed_turn), ratio * shares[1]),
         None => NoiseModel::DECLARED,
     };
     let next = (of_position, of_turn);

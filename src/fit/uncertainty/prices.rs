@@ -21,10 +21,12 @@ pub(in crate::fit) struct Prices {
 }
 
 impl Stage<'_> {
-    /// Computes the prices of bounds and active constraints at the full parameter vector `at`.
+    /// Computes the prices of bounds and active constraints at the full parameter vector `at`. A
+    /// price is the multiplier of a limit.
     ///
-    /// At a minimum g = Aᵀμ + w, with the gradient g, rows A of active constraints and w of bounds:
-    /// μ ≥ 0 at a lower limit and μ ≤ 0 at an upper one; the same signs hold for w.
+    /// At a minimum g = Aᵀμ + w. Here g is the gradient, A holds the active constraints as rows, μ
+    /// are their multipliers, and w those of the bounds. A multiplier is ≥ 0 at a lower limit and ≤
+    /// 0 at an upper one.
     ///
     /// # Errors
     /// Returns an error if the rows of the priors do not match the unknowns.

@@ -147,11 +147,11 @@ impl Evidence {
         (0..held.len()).filter(|&j| held[j]).for_each(|j| x[j] = 0.0);
         let columns = data.triangle.select_columns(&free);
         let at_nominal = &data.projected - &data.triangle * x;
-        let rest = 2.0 * data.cost - data.projected.norm_squared();
+        let unexplained = 2.0 * data.cost - data.projected.norm_squared();
         Self {
             information: columns.tr_mul(&columns),
             vector: columns.tr_mul(&at_nominal),
-            squares: rest.max(0.0) + at_nominal.norm_squared(),
+            squares: unexplained.max(0.0) + at_nominal.norm_squared(),
             coordinates: stage.count() as f64,
             free,
             max_variance,

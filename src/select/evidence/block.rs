@@ -97,7 +97,8 @@ fn times_grouped(
     all
 }
 
-/// Returns AᵀA and Aᵀr of grouped columns, with the fitted parameters projected out.
+/// Returns AᵀA and Aᵀr of the columns A of [`Design::Grouped`], with the fitted parameters
+/// projected out.
 fn grouped(levers: &DMatrix<f64>, groups: &[Option<usize>], fit: &LinearNeighbourhood) -> Normal {
     let squares = levers.map(|value| value * value);
     let diagonal =
@@ -166,12 +167,12 @@ impl Block {
         all.column_iter_mut()
             .zip(columns)
             .for_each(|(mut target, column)| target.copy_from(&column));
-        let left = fit.projected_out(&all);
+        let all_projected = fit.projected_out(&all);
         let mut first = 0;
         let of = |(design, ln_prior, coefficients): (Design, f64, Coefficients)| {
             let (columns, normal) = match design {
                 Design::Dense(columns) => {
-                    let projected = left.columns(first, columns.ncols()).into_owned();
+                    let projected = all_projected.columns(first, columns.ncols()).into_owned();
                     first += columns.ncols();
                     let mut gram = DMatrix::zeros(projected.ncols(), projected.ncols());
                     // Transposing the narrow matrix gives the fastest product.
@@ -251,26 +252,35 @@ impl Block {
     /// Returns ln p(r | set and block) − ln p(r | set), and the most probable size of the block.
     ///
     /// `set` holds Z A and Z r, by which the set reduces columns and residual; `None` for the empty
-    /// set. `left` is the sum of squares that the set leaves, with its degrees of freedom.
+    /// set. `squares_and_freedom` are the sum of squares that the set leaves, and its degrees of
+    /// freedom.
     pub fn gain(
         &self,
         set: Option<(&DMatrix<f64>, &DVector<f64>)>,
-        (left, without): ((f64, f64), f64),
+        (squares_and_freedom, without): ((f64, f64), f64),
         grid: &NoiseGrid,
     ) -> (f64, f64) {
         let (with, size) = match set {
-            None => self.over_sizes(&self.normal, left, grid),
-            Some((along, taken)) => {
-                self.over_sizes(&self.normal.reduced_by(along, taken), left, grid)
-            }
+            None => self.over_sizes(&self.normal, squares_and_freedom, grid),
+            Some((along, residual_along)) => self.over_sizes(
+                &self.normal.reduced_by(along, residual_along),
+                squares_and_freedom,
+                grid,
+            ),
         };
         (with - without, size)
     }
 
-    /// Returns ln p(r | block), up to a constant, and the most probable size. `normal` and `left`
-    /// belong to the columns and the residual after the other members of the set.
-    pub fn over_sizes(&self, normal: &Normal, left: (f64, f64), grid: &NoiseGrid) -> (f64, f64) {
-        of_block(normal, left, grid, (&DISPLACEMENTS, &self.coefficients))
+    /// Returns ln p(r | block), up to a constant, and the most probable size. `normal` and
+    /// `squares_and_freedom` belong to the columns and the residual after the other members of the
+    /// set.
+    pub fn over_sizes(
+        &self,
+        normal: &Normal,
+        squares_and_freedom: (f64, f64),
+        grid: &NoiseGrid,
+    ) -> (f64, f64) {
+        of_block(normal, squares_and_freedom, grid, (&DISPLACEMENTS, &self.coefficients))
     }
 }
 
@@ -300,7 +310,7 @@ mod tests {
             fit.projected_out(&matrix(36, 9).columns(7, 2).into_owned()).transpose() * 0.2,
             Noise { freedom: 30.0, trust: 0.1, least: 0.0 }.grid(),
         );
-        let taken = &within * fit.residual();
+        let residual_along = &within * fit.residual();
         for is_beside in [true, false] {
             let groups = (0..12).map(|pose| (pose != 5).then_some(pose / 2)).collect();
             for grouped in [
@@ -315,7 +325,7 @@ mod tests {
                         Some(columns) => &within * columns,
                         None => block.times_grouped(&within),
                     };
-                    let set = is_beside.then_some((&along, &taken));
+                    let set = is_beside.then_some((&along, &residual_along));
                     (block.gain(set, ((100.0, 30.0), 0.0), &grid), block.columns(&fit))
                 });
                 assert!(

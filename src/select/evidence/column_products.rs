@@ -110,10 +110,10 @@ fn together(members: &[&Member], columns: &[&DMatrix<f64>]) -> DMatrix<f64> {
     let height: usize = members.iter().map(|member| member.columns.ncols()).sum();
     let width: usize = columns.iter().map(|columns| columns.ncols()).sum();
     let rows = columns.first().map_or(0, |columns| columns.nrows());
-    let mut left = DMatrix::zeros(height.max(MIN_SIDE), rows);
+    let mut stacked = DMatrix::zeros(height.max(MIN_SIDE), rows);
     let mut first = 0;
     for Member { transposed, .. } in members {
-        left.rows_mut(first, transposed.nrows()).copy_from(transposed);
+        stacked.rows_mut(first, transposed.nrows()).copy_from(transposed);
         first += transposed.nrows();
     }
     let mut right = DMatrix::zeros(rows, width.max(MIN_SIDE));
@@ -122,7 +122,7 @@ fn together(members: &[&Member], columns: &[&DMatrix<f64>]) -> DMatrix<f64> {
         right.columns_mut(first, columns.ncols()).copy_from(columns);
         first += columns.ncols();
     }
-    let product = left * right;
+    let product = stacked * right;
     product.view((0, 0), (height, width)).into_owned()
 }
 

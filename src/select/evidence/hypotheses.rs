@@ -197,7 +197,7 @@ impl<'a> Hypotheses<'a> {
             return Vec::new();
         };
         let ln_prior = -(Shape::all().len() as f64).ln();
-        let one = |shape: &Shape| {
+        let candidate_of_shape = |shape: &Shape| {
             let mut columns = DMatrix::from_columns(std::slice::from_ref(&lever));
             for (pose, at) in known.scaled.iter().enumerate() {
                 columns.rows_mut(3 * pose, 3).scale_mut(shape.value(*at));
@@ -215,7 +215,7 @@ impl<'a> Hypotheses<'a> {
                 },
             ))
         };
-        shapes.iter().filter_map(one).collect()
+        shapes.iter().filter_map(candidate_of_shape).collect()
     }
 
     /// Returns the values of a covariate in every pose; `None` if it does not vary.

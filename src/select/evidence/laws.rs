@@ -49,7 +49,7 @@ struct LawAt {
 /// Sites at which laws are searched together, and the other members of a probable set.
 struct Place {
     sites: Vec<LawAt>,
-    rest: Vec<usize>,
+    other_members: Vec<usize>,
 }
 
 /// Returns formulas that may replace the members of probable sets at one joint, and elsewhere.
@@ -62,7 +62,8 @@ pub(super) fn promising(
     let problem = &fitted.problem;
     let mut laws: Vec<Candidate> = Vec::new();
     let places = places(hypotheses, weighted, products);
-    for Place { sites, rest } in places.into_iter().chain(elsewhere(hypotheses, weighted, products))
+    for Place { sites, other_members: rest } in
+        places.into_iter().chain(elsewhere(hypotheses, weighted, products))
     {
         if products.target.stop.is_requested() {
             break;
@@ -176,10 +177,10 @@ fn places(hypotheses: &Hypotheses, weighted: &[Weighted], products: &Products) -
     for set in weighted.iter().filter(|set| !products.has_gear(&set.members)) {
         let joints: BTreeSet<usize> = set.members.iter().filter_map(|&member| of(member)).collect();
         for joint in joints {
-            let mut rest: Vec<usize> =
+            let mut other_members: Vec<usize> =
                 set.members.iter().copied().filter(|&member| of(member) != Some(joint)).collect();
-            rest.sort_unstable();
-            *probability_of_rest.entry((joint, rest)).or_default() += set.probability;
+            other_members.sort_unstable();
+            *probability_of_rest.entry((joint, other_members)).or_default() += set.probability;
         }
     }
     let mut found: Vec<((usize, Vec<usize>), f64)> = probability_of_rest
@@ -191,7 +192,7 @@ fn places(hypotheses: &Hypotheses, weighted: &[Weighted], products: &Products) -
     let place = |(joint, rest): (usize, Vec<usize>)| {
         let lever = ParameterSite::coordinate(problem, joint + 1);
         let at = LawAt { name: format!("joint{}", joint + 1), joint: Some(joint), lever };
-        Place { sites: vec![at], rest }
+        Place { sites: vec![at], other_members: rest }
     };
     found.into_iter().map(|(found, _)| place(found)).collect()
 }
@@ -226,9 +227,9 @@ fn elsewhere(hypotheses: &Hypotheses, weighted: &[Weighted], products: &Products
     if members.is_empty() {
         return None;
     }
-    let mut rest: Vec<usize> =
+    let mut other_members: Vec<usize> =
         set.members.iter().copied().filter(|member| !members.contains(member)).collect();
-    rest.sort_unstable();
+    other_members.sort_unstable();
     let mut sites: Vec<LawAt> = Vec::new();
     let mut add = |name: String, lever: ParameterSite| {
         sites.push(LawAt { name, joint: None, lever });
@@ -249,7 +250,7 @@ fn elsewhere(hypotheses: &Hypotheses, weighted: &[Weighted], products: &Products
         };
         add(format!("joint{}.{motion}", joint + 1), coordinate);
     }
-    Some(Place { sites, rest })
+    Some(Place { sites, other_members })
 }
 
 /// Search for formulas that explain the residual that some members of a set leave.
@@ -261,9 +262,9 @@ struct Search<'s, 'h, 'd> {
 }
 
 impl Search<'_, '_, '_> {
-    /// Returns the laws at some sites that best explain the residual that the members `rest` leave.
-    /// A class that contains a law of the fit is represented by that law.
-    fn laws(&self, sites: &[LawAt], rest: &[usize], products: &Products) -> Vec<Effect> {
+    /// Returns the laws at some sites that best explain the residual that `other_members` leave. A
+    /// class that contains a law of the fit is represented by that law.
+    fn laws(&self, sites: &[LawAt], other_members: &[usize], products: &Products) -> Vec<Effect> {
         let poses = self.hypotheses.linearised.poses();
         let kept: Vec<usize> =
             (0..poses.len()).filter(|pose| !self.left_out.contains(pose)).collect();
@@ -274,11 +275,12 @@ impl Search<'_, '_, '_> {
         };
         let dropped: Vec<usize> = (0..poses.len()).filter(|pose| !kept.contains(pose)).collect();
         if dropped.len() == self.left_out.len() {
-            let left = reduced_by(rest, products);
-            return left.map_or_else(Vec::new, |left| self.best(sites, &left, products, &kept));
+            let reduced = reduced_by(other_members, products);
+            return reduced
+                .map_or_else(Vec::new, |reduced| self.best(sites, &reduced, products, &kept));
         }
         let members: Vec<&Candidate> =
-            rest.iter().map(|&member| &self.hypotheses.all[member]).collect();
+            other_members.iter().map(|&member| &self.hypotheses.all[member]).collect();
         let Some((blocks, target)) =
             blocks(self.fitted, self.data, self.hypotheses, &members, &dropped)
         else {
@@ -286,20 +288,20 @@ impl Search<'_, '_, '_> {
         };
         let products = Products::new(&blocks, &target);
         let all_blocks: Vec<usize> = (0..blocks.len()).collect();
-        let left = reduced_by(&all_blocks, &products);
-        left.map_or_else(Vec::new, |left| self.best(sites, &left, &products, &kept))
+        let reduced = reduced_by(&all_blocks, &products);
+        reduced.map_or_else(Vec::new, |reduced| self.best(sites, &reduced, &products, &kept))
     }
 
     /// Returns the best laws of all sites, those of one site in the order of their probability.
     fn best(
         &self,
         sites: &[LawAt],
-        left: &ReducedProblem,
+        reduced: &ReducedProblem,
         products: &Products,
         kept: &[usize],
     ) -> Vec<Effect> {
         let of_site = |at: &LawAt| {
-            let proposals = self.proposals(at, (left, products), kept);
+            let proposals = self.proposals(at, (reduced, products), kept);
             proposals.into_iter().map(|proposal| (at.clone(), proposal)).collect::<Vec<_>>()
         };
         let mut laws_at_sites: Vec<(LawAt, Proposal)> = sites.iter().flat_map(of_site).collect();
@@ -367,11 +369,12 @@ impl Search<'_, '_, '_> {
 /// parameters and a set projected out. The products of the columns are diag(|l|²) − BᵀB; p are
 /// their products with the residual.
 fn along_lever(
-    left: &ReducedProblem,
+    reduced: &ReducedProblem,
     products: &Products,
     lever: &DVector<f64>,
 ) -> (DMatrix<f64>, DVector<f64>) {
-    let (fitted, reach, residual) = (products.target.fit.fitted(), left.reach(), left.residual());
+    let (fitted, reach, residual) =
+        (products.target.fit.fitted(), reduced.reach(), reduced.residual());
     let rows = [fitted.ncols(), reach.nrows()];
     let poses = lever.len() / 3;
     let mut less = DMatrix::zeros(rows[0] + rows[1], poses);

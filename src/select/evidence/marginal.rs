@@ -128,18 +128,18 @@ impl Normal {
     }
 
     /// Returns the products after a set is projected out of columns and residual, given Z A =
-    /// `along` and Z r = `taken`.
-    pub fn reduced_by(&self, along: &DMatrix<f64>, taken: &DVector<f64>) -> Self {
+    /// `along` and Z r = `residual_along`.
+    pub fn reduced_by(&self, along: &DMatrix<f64>, residual_along: &DVector<f64>) -> Self {
         match self {
             Self::Dense { gram, product } => {
                 let (mut gram, mut product) = (gram.clone(), product.clone());
                 gram.gemm(-1.0, &along.transpose(), along, 1.0);
-                product.gemv_tr(-1.0, along, taken, 1.0);
+                product.gemv_tr(-1.0, along, residual_along, 1.0);
                 Self::Dense { gram, product }
             }
             Self::LowRankCorrection { diagonal, less, product } => {
                 let mut product = product.clone();
-                product.gemv_tr(-1.0, along, taken, 1.0);
+                product.gemv_tr(-1.0, along, residual_along, 1.0);
                 let (few, more) = (less.nrows(), along.nrows());
                 let mut less = less.clone().resize_vertically(few + more, 0.0);
                 less.rows_mut(few, more).copy_from(along);
@@ -172,11 +172,11 @@ impl Normal {
                 // With 1/c² + G = L Lᵀ: det(1 + c² G) = c^2k det(L)², and the squares decrease by
                 // |L⁻¹ b|².
                 let lower = lower_factor(with_prior(gram, precision))?;
-                let mut taken = product.clone();
-                if !lower.solve_lower_triangular_mut(&mut taken) {
+                let mut whitened = product.clone();
+                if !lower.solve_lower_triangular_mut(&mut whitened) {
                     return None;
                 }
-                Some((ln_product(&lower.diagonal(), size), taken.norm_squared()))
+                Some((ln_product(&lower.diagonal(), size), whitened.norm_squared()))
             }
             Self::LowRankCorrection { diagonal, less, product } => {
                 // With E = 1/c² + D and K = 1 − L E⁻¹ Lᵀ: det(E − LᵀL) = det E det K, (E − LᵀL)⁻¹ =
@@ -186,12 +186,12 @@ impl Normal {
                 scaled.column_iter_mut().zip(&root).for_each(|(mut column, root)| column /= *root);
                 let along = product.component_div(&root);
                 let lower = lower_factor(remainder_of_gram(&scaled))?;
-                let mut beside = scaled * &along;
-                if !lower.solve_lower_triangular_mut(&mut beside) {
+                let mut correction = scaled * &along;
+                if !lower.solve_lower_triangular_mut(&mut correction) {
                     return None;
                 }
                 let determinant = ln_product(&root, size) + ln_product(&lower.diagonal(), 1.0);
-                Some((determinant, along.norm_squared() + beside.norm_squared()))
+                Some((determinant, along.norm_squared() + correction.norm_squared()))
             }
         }
     }
@@ -262,7 +262,7 @@ impl Coefficients {
 /// because its prior is narrower.
 pub(super) fn of_block(
     normal: &Normal,
-    left: (f64, f64),
+    squares_and_freedom: (f64, f64),
     grid: &NoiseGrid,
     (sizes, coefficients): (&[f64], &Coefficients),
 ) -> (f64, f64) {
@@ -270,14 +270,15 @@ pub(super) fn of_block(
     // All k columns together have a root mean square of 1, so each of them has 1/√k.
     let column = (k as f64).sqrt().recip();
     let plausible = coefficients.plausible(sizes, 0..k, column);
-    let (whole, size) = of_columns(normal, left, grid, (&plausible, &coefficients.never_negative));
+    let (whole, size) =
+        of_columns(normal, squares_and_freedom, grid, (&plausible, &coefficients.never_negative));
     let (gram, product) = match normal {
         Normal::Dense { gram, product } if coefficients.alone && gram.ncols() > 1 => {
             (gram, product)
         }
         _ => return (whole, size),
     };
-    let one = |j: usize| {
+    let ln_of_column = |j: usize| {
         let single = Normal::Dense {
             gram: gram.view((j, j), (1, 1)).into_owned(),
             product: product.rows(j, 1).into_owned(),
@@ -288,9 +289,9 @@ pub(super) fn of_block(
             .iter()
             .map(|size| size / column)
             .collect();
-        of_columns(&single, left, grid, (&sizes, &[sign])).0
+        of_columns(&single, squares_and_freedom, grid, (&sizes, &[sign])).0
     };
-    let all: Vec<f64> = std::iter::once(whole).chain((0..gram.ncols()).map(one)).collect();
+    let all: Vec<f64> = std::iter::once(whole).chain((0..gram.ncols()).map(ln_of_column)).collect();
     (ln_sum(all.iter().copied()) - (all.len() as f64).ln(), size)
 }
 
@@ -305,24 +306,24 @@ fn of_columns(
     (sizes, never_negative): (&[f64], &[bool]),
 ) -> (f64, f64) {
     let at = |size: f64| {
-        let Some((determinant, taken)) = normal.shrinkage_terms(size) else {
+        let Some((determinant, explained)) = normal.shrinkage_terms(size) else {
             return f64::NEG_INFINITY;
         };
-        let left = (squares - taken).max(0.0);
+        let remaining_squares = (squares - explained).max(0.0);
         let signs = match normal {
             Normal::Dense { gram, product } if never_negative.contains(&true) => {
                 with_prior(gram, (size * size).recip()).cholesky().map(|factor| {
                     signs(
                         &factor.inverse(),
                         product,
-                        (left / freedom).sqrt().max(1.0),
+                        (remaining_squares / freedom).sqrt().max(1.0),
                         never_negative,
                     )
                 })
             }
             _ => None,
         };
-        signs.unwrap_or(0.0) - determinant + grid.ln_likelihood(left)
+        signs.unwrap_or(0.0) - determinant + grid.ln_likelihood(remaining_squares)
     };
     // Sizes ascend, and above the most probable one the likelihood falls. The loop therefore ends
     // once larger sizes add nothing to the sum.
@@ -351,11 +352,11 @@ fn signs(
     never_negative: &[bool],
 ) -> f64 {
     let mean = -(covariance * product);
-    let one = |j: usize| {
+    let ln_factor = |j: usize| {
         let t = mean[j] / (scatter * covariance[(j, j)].sqrt());
         statrs::function::erf::erfc(-t / std::f64::consts::SQRT_2).max(f64::MIN_POSITIVE).ln()
     };
-    (0..mean.len()).filter(|&j| never_negative.get(j) == Some(&true)).map(one).sum()
+    (0..mean.len()).filter(|&j| never_negative.get(j) == Some(&true)).map(ln_factor).sum()
 }
 
 #[cfg(test)]
@@ -385,14 +386,16 @@ mod tests {
     #[test]
     fn what_one_of_two_columns_explains_is_not_the_other_effects_of_that_column() {
         let plausible = |count: usize| vec![f64::INFINITY; count];
-        let one = gain(1, &Coefficients { largest: plausible(1), ..Coefficients::default() });
-        let two = gain(2, &Coefficients { largest: plausible(2), ..Coefficients::default() });
+        let one_column =
+            gain(1, &Coefficients { largest: plausible(1), ..Coefficients::default() });
+        let two_columns =
+            gain(2, &Coefficients { largest: plausible(2), ..Coefficients::default() });
         let alone = gain(
             2,
             &Coefficients { largest: plausible(2), alone: true, ..Coefficients::default() },
         );
-        assert!(one > 50.0 && one - two > 2.0, "{one} {two}");
-        assert!((one - alone - 3.0_f64.ln()).abs() < 0.2, "{one} {alone}");
+        assert!(one_column > 50.0 && one_column - two_columns > 2.0, "{one_column} {two_columns}");
+        assert!((one_column - alone - 3.0_f64.ln()).abs() < 0.2, "{one_column} {alone}");
     }
 
     #[test]

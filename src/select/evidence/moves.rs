@@ -42,16 +42,17 @@ pub(super) fn promising(
         for gone in
             gone.iter().map(std::slice::from_ref).chain((gone.len() > 1).then_some(gone.as_slice()))
         {
-            let mut rest: Vec<usize> =
+            let mut remaining: Vec<usize> =
                 set.members.iter().copied().filter(|member| !gone.contains(member)).collect();
-            rest.sort_unstable();
+            remaining.sort_unstable();
             if rests.len() < MAX_REVISED_SETS {
-                rests.insert(rest);
+                rests.insert(remaining);
             }
         }
     }
-    let left: Vec<_> = rests.iter().filter_map(|rest| reduced_by(rest, products)).collect();
-    if left.is_empty() {
+    let reduced_problems: Vec<_> =
+        rests.iter().filter_map(|rest| reduced_by(rest, products)).collect();
+    if reduced_problems.is_empty() {
         return Vec::new();
     }
     let odds_of = |effects: &[Effect]| -> Vec<(Candidate, Vec<f64>)> {
@@ -67,7 +68,8 @@ pub(super) fn promising(
             (fitted, &products.target.fit),
             left_out,
         );
-        let odds: Vec<Vec<f64>> = left.iter().map(|left| left.odds_of(&blocks)).collect();
+        let odds: Vec<Vec<f64>> =
+            reduced_problems.iter().map(|left| left.odds_of(&blocks)).collect();
         some.into_iter()
             .enumerate()
             .map(|(k, candidate)| (candidate, odds.iter().map(|of| of[k]).collect()))
@@ -76,7 +78,7 @@ pub(super) fn promising(
     let all: Vec<(Candidate, Vec<f64>)> =
         new.par_chunks(HYPOTHESES_PER_PROJECTION).flat_map_iter(odds_of).collect();
     let mut found: Vec<Candidate> = Vec::new();
-    for k in 0..left.len() {
+    for k in 0..reduced_problems.len() {
         let best =
             all.iter().filter(|(_, odds)| odds[k] > 0.0).max_by(|a, b| a.1[k].total_cmp(&b.1[k]));
         if let Some((best, _)) = best

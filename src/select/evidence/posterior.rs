@@ -148,12 +148,12 @@ impl Evidence {
     }
 
     /// Returns effects that may replace `effect` in a model with the effects `held`, each with its
-    /// probability, best first. Each is at least `beside` times as probable as `effect`.
+    /// probability, best first. Each is at least `min_ratio` times as probable as `effect`.
     pub fn alternatives(
         &self,
         effect: &Effect,
         held: &[Effect],
-        beside: f64,
+        min_ratio: f64,
     ) -> Vec<(Effect, f64)> {
         // If a model has very many effects, most are in no set, and the search below is not
         // needed.
@@ -168,27 +168,27 @@ impl Evidence {
         let others: Vec<&Effect> = held.iter().filter(|other| *other != effect).collect();
         // Returns the effects of a set without the held ones. The searched argument of a held
         // effect may have another value in the set.
-        let beside_others = |explanation: &HypothesisSet| {
-            let mut rest = explanation.effects();
+        let without_others = |explanation: &HypothesisSet| {
+            let mut remaining = explanation.effects();
             for other in &others {
-                let exact = rest.iter().position(|known| known == *other);
-                let place =
-                    exact.or_else(|| rest.iter().position(|known| known.is_but_for_search(other)));
-                place.map(|place| rest.remove(place));
+                let exact = remaining.iter().position(|known| known == *other);
+                let place = exact
+                    .or_else(|| remaining.iter().position(|known| known.is_but_for_search(other)));
+                place.map(|place| remaining.remove(place));
             }
-            rest
+            remaining
         };
         let mut with = 0.0;
         // Sets are sorted by probability, so each effect gets the value of its searched argument in
         // the most probable set.
         let mut instead: Vec<(Effect, f64)> = Vec::new();
         for explanation in &self.sets {
-            let rest = beside_others(explanation);
-            if rest.iter().any(|known| known.is_but_for_search(effect)) {
+            let remaining = without_others(explanation);
+            if remaining.iter().any(|known| known.is_but_for_search(effect)) {
                 with += explanation.probability;
                 continue;
             }
-            for other in rest {
+            for other in remaining {
                 match instead.iter_mut().find(|(known, _)| known.is_but_for_search(&other)) {
                     Some((_, probability)) => *probability += explanation.probability,
                     None => instead.push((other, explanation.probability)),
@@ -198,7 +198,7 @@ impl Evidence {
         if with == 0.0 {
             return Vec::new();
         }
-        instead.retain(|(_, probability)| *probability >= with * beside);
+        instead.retain(|(_, probability)| *probability >= with * min_ratio);
         instead.sort_by(|a, b| b.1.total_cmp(&a.1));
         instead
     }

@@ -167,10 +167,10 @@ impl<'a> Products<'a> {
             scales.extend(std::iter::repeat_n(size, self.member(member).columns.ncols()));
         }
         let n = scales.len();
-        let (mut inner, mut taken) = (DMatrix::identity(n, n), DVector::zeros(n));
+        let (mut inner, mut residual_along) = (DMatrix::identity(n, n), DVector::zeros(n));
         for (i, (&one, &size)) in members.iter().zip(sizes).enumerate() {
             let product = self.blocks[one].product();
-            taken.rows_mut(begins[i], product.len()).axpy(size, product, 0.0);
+            residual_along.rows_mut(begins[i], product.len()).axpy(size, product, 0.0);
             for j in 0..=i {
                 // The factorisation reads only the lower half.
                 let gram = self.product(one, members[j]);
@@ -184,15 +184,15 @@ impl<'a> Products<'a> {
         }
         let mut within = inverse_factor(&inner)?;
         let ln_determinant = -within.diagonal().iter().map(|value| value.ln()).sum::<f64>();
-        let taken = &within * taken;
+        let residual_along = &within * residual_along;
         within.column_iter_mut().zip(scales).for_each(|(mut column, scale)| column *= scale);
-        let squares = self.squares - taken.norm_squared();
+        let squares = self.squares - residual_along.norm_squared();
         let without = self.over_noise(squares);
         Some(ReducedProblem {
             products: self,
             members: members.to_vec(),
             within,
-            taken,
+            residual_along,
             squares,
             without,
             ln_determinant,
@@ -215,7 +215,7 @@ pub(super) struct ReducedProblem<'p, 'a> {
     /// Matrix L⁻¹D.
     within: DMatrix<f64>,
     /// Vector Z r.
-    taken: DVector<f64>,
+    residual_along: DVector<f64>,
     pub squares: f64,
     /// Logarithm of the density of the residual that remains after the set is fitted, without the
     /// term in det L.
@@ -255,7 +255,7 @@ impl ReducedProblem<'_, '_> {
         let lower = lower_factor(rows.transpose() * &rows)?;
         let ln_determinant = lower.diagonal().iter().map(|value| value.ln()).sum::<f64>();
         let inverse = inverse_lower(&lower);
-        let along = rows.tr_mul(&self.taken.rows_range(first..));
+        let along = rows.tr_mul(&self.residual_along.rows_range(first..));
         let product = inverse.tr_mul(&(&inverse * &along));
         let squares = self.squares + along.dot(&product);
         let mut gram = inverse.transpose() * inverse;
@@ -267,22 +267,24 @@ impl ReducedProblem<'_, '_> {
 
     /// Returns the residual that the set leaves, with the fitted parameters projected out.
     pub fn residual(&self) -> DVector<f64> {
-        let mut left = self.products.target.fit.residual().clone();
-        let along = self.within.tr_mul(&self.taken);
+        let mut residual = self.products.target.fit.residual().clone();
+        let along = self.within.tr_mul(&self.residual_along);
         let mut first = 0;
         for &member in &self.members {
             let columns = &self.products.member(member).columns;
-            left.gemv(-1.0, columns.as_ref(), &along.rows(first, columns.ncols()), 1.0);
+            residual.gemv(-1.0, columns.as_ref(), &along.rows(first, columns.ncols()), 1.0);
             first += columns.ncols();
         }
-        left
+        residual
     }
 
     /// Returns the matrix Z, which reduces columns and residuals by the set.
     pub fn reach(&self) -> &DMatrix<f64> {
         self.reach.get_or_init(|| {
-            let mut all =
-                DMatrix::zeros(self.taken.len(), self.products.target.fit.residual().len());
+            let mut all = DMatrix::zeros(
+                self.residual_along.len(),
+                self.products.target.fit.residual().len(),
+            );
             let mut first = 0;
             for &member in &self.members {
                 let transposed = &self.products.member(member).transposed;
@@ -319,7 +321,7 @@ impl ReducedProblem<'_, '_> {
         let counts = || tried.iter().map(|&block| blocks[block].product().len());
         // A gain does not depend on the hypotheses that are tried with it.
         let width = counts().sum::<usize>().max(MIN_SIDE);
-        let mut stacked = DMatrix::zeros(self.taken.len(), width);
+        let mut stacked = DMatrix::zeros(self.residual_along.len(), width);
         let mut first = 0;
         for &member in &self.members {
             let count = self.products.member(member).columns.ncols();
@@ -363,14 +365,14 @@ impl ReducedProblem<'_, '_> {
         along: &DMatrix<f64>,
     ) -> Vec<(f64, f64)> {
         let Products { target, grid, .. } = self.products;
-        let left = ((self.squares, target.noise.freedom), self.without);
+        let squares_and_freedom = ((self.squares, target.noise.freedom), self.without);
         let mut first = 0;
         let gain = |block: &Block| {
             let along_block = along.columns(first, block.product().len()).into_owned();
             first += along_block.ncols();
             block.gain(
-                (!self.members.is_empty()).then_some((&along_block, &self.taken)),
-                left,
+                (!self.members.is_empty()).then_some((&along_block, &self.residual_along)),
+                squares_and_freedom,
                 grid,
             )
         };
@@ -411,7 +413,7 @@ mod tests {
         let target = Target { fit, noise, alike: 0.0, stop: Stop::default() };
         let products = Products::new(&blocks, &target);
         let (members, sizes) = ([0, 1, 2], [3.0, 0.3, 1.0]);
-        let left = products.reduced(&members, &sizes).unwrap();
+        let reduced = products.reduced(&members, &sizes).unwrap();
         let r = target.fit.residual();
         let mut covariance = DMatrix::identity(r.len(), r.len());
         for (&member, size) in members.iter().zip(sizes) {
@@ -420,10 +422,10 @@ mod tests {
         }
         let factor = covariance.cholesky().unwrap();
         let solved = factor.solve(r);
-        assert!((left.residual() - &solved).amax() < 1e-9);
-        assert!((left.squares / r.dot(&solved) - 1.0).abs() < 1e-9);
+        assert!((reduced.residual() - &solved).amax() < 1e-9);
+        assert!((reduced.squares / r.dot(&solved) - 1.0).abs() < 1e-9);
         let ln_determinant: f64 = factor.l().diagonal().iter().map(|value| value.ln()).sum();
-        assert!((left.ln_determinant - ln_determinant).abs() < 1e-9);
+        assert!((reduced.ln_determinant - ln_determinant).abs() < 1e-9);
         // The result for one member of a set equals the gain of adding it to the other members,
         // even for a size near zero.
         for (k, least) in [(0, 1.0), (1, 1.0), (2, 1.0), (1, 1e-6)] {

@@ -100,10 +100,11 @@ impl<'a> Reevaluation<'a> {
     fn single_influential_pose(&self, effect: &Effect, left_out: &[usize]) -> Option<usize> {
         let (blocks, target) = self.blocks(left_out)?;
         let products = Products::new(&blocks, &target);
-        let left = |of: &dyn Fn(&Hypothesis) -> bool| {
+        let residual_of = |of: &dyn Fn(&Hypothesis) -> bool| {
             Some(reduced_by(&self.members(of), &products)?.residual())
         };
-        let (with, without) = (left(&|_| true)?, left(&|known| known.effect() != Some(effect))?);
+        let (with, without) =
+            (residual_of(&|_| true)?, residual_of(&|known| known.effect() != Some(effect))?);
         let poses = self.hypotheses.linearised.poses().len();
         let gain = |pose: usize| {
             without.rows(3 * pose, 3).norm_squared() - with.rows(3 * pose, 3).norm_squared()

@@ -276,15 +276,15 @@ fn add_replacements(evaluated: &mut BTreeMap<Vec<usize>, Set>, products: &Produc
         });
         let mut rests: Vec<(Vec<usize>, Vec<usize>, usize)> = Vec::new();
         for (gone, set) in surfaces.take(MAX_SPLIT_SETS).chain(of_best) {
-            let rest: Vec<usize> =
+            let remaining: Vec<usize> =
                 set.members.iter().copied().filter(|member| !gone.contains(member)).collect();
             let kind = if gone.len() > 1 { 2 } else { usize::from(!gone.iter().any(is_surface)) };
-            let key = sorted(&rest);
+            let key = sorted(&remaining);
             // If a single member was replaced for the same rest before, most pairs of laws were
             // tried then.
             let is_tried = kind == 2 && tried.contains(&(key.clone(), 1));
             if !is_tried && tried.insert((key, kind)) {
-                rests.push((rest, gone, kind));
+                rests.push((remaining, gone, kind));
             }
         }
         if rests.is_empty() {
@@ -316,14 +316,15 @@ fn replaced(
     products: &Products,
 ) -> Vec<Set> {
     let Products { blocks, .. } = *products;
-    let rest = if products.target.stop.is_requested() { None } else { assembled(rest, products) };
-    let Some(rest) = rest else { return Vec::new() };
-    let mut one = extended(&rest, first, products);
-    one.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
+    let remaining =
+        if products.target.stop.is_requested() { None } else { assembled(rest, products) };
+    let Some(remaining) = remaining else { return Vec::new() };
+    let mut with_first = extended(&remaining, first, products);
+    with_first.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
     let second: BTreeSet<usize> =
         second.iter().copied().filter(|other| !gone.contains(other)).collect();
     let is_near = |set: &&Set| set.members.last().is_some_and(|last| second.contains(last));
-    let near: Vec<&Set> = one.iter().filter(is_near).take(MAX_EXTENDING).collect();
+    let near: Vec<&Set> = with_first.iter().filter(is_near).take(MAX_EXTENDING).collect();
     let promising: Vec<usize> = near.iter().filter_map(|set| set.members.last().copied()).collect();
     let second: Vec<usize> = second.into_iter().collect();
     let narrow: Vec<&Set> =
@@ -333,14 +334,14 @@ fn replaced(
         extended(set, if place == 0 { &second } else { &promising }, products)
     };
     let two: Vec<Set> = narrow.iter().enumerate().flat_map(longer).collect();
-    let mut new: Vec<Set> = one.into_iter().chain(two).collect();
+    let mut new: Vec<Set> = with_first.into_iter().chain(two).collect();
     new.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
     // With converged sizes, a set may be far more probable than with sizes found one after the
     // other.
     let rest_of_new = new.split_off(new.len().min(BEAM_WIDTH));
     let settled: Vec<Set> = new.into_par_iter().map(|set| set.settled(products)).collect();
     let probable = rest_of_new.into_iter().filter(|set| set.ln_posterior > least);
-    std::iter::once(rest).chain(settled).chain(probable).collect()
+    std::iter::once(remaining).chain(settled).chain(probable).collect()
 }
 
 /// Returns each member, and each pair of members if there are at most [`MAX_PAIRED_MEMBERS`].

@@ -109,14 +109,18 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
             ) {
                 continue;
             }
-            let left: Vec<ReducedProblem> =
+            let reduced_problems: Vec<ReducedProblem> =
                 rests.iter().filter_map(|rest| self.reduced_by_set(rest)).collect();
             let [step, finer] = PHASE_STEPS.map(|phase| phase / (high - low));
             // Orders with less than one cycle over the range of the joint are not searched.
-            let first = self.gains(joint, &equidistant(TAU / (high - low), highest, step), &left);
+            let first = self.gains(
+                joint,
+                &equidistant(TAU / (high - low), highest, step),
+                &reduced_problems,
+            );
             let tens = std::iter::successors(Some(1.0), |digit| Some(digit / 10.0));
             let digits = tens.take_while(|digit| *digit >= 2.0 * finer).count();
-            for (left, first) in left.iter().zip(first) {
+            for (left, first) in reduced_problems.iter().zip(first) {
                 // A wave that was found for one set represents all orders near its order for every
                 // set.
                 let listed_effects = || {
@@ -126,12 +130,12 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
                         .chain(&found)
                         .filter_map(|candidate| candidate.hypothesis.effect())
                 };
-                let taken = listed_effects()
+                let listed_orders = listed_effects()
                     .filter_map(order_of)
                     .filter(|(of, _)| *of == joint)
                     .map(|(_, order)| order);
-                let taken: Vec<f64> = taken.collect();
-                let mut second = taken.clone();
+                let listed_orders: Vec<f64> = listed_orders.collect();
+                let mut second = listed_orders.clone();
                 for (order, _) in first.into_iter().take(MAX_REFINED_ORDERS) {
                     let near = equidistant(order - step, order + step, finer);
                     second.extend(near.into_iter().map(|order| rounded_order(order, digits)));
@@ -145,7 +149,7 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
                 let gains = self.gains(joint, &second, std::slice::from_ref(left)).concat();
                 let is_new = |effect: &Effect| listed_effects().all(|listed| listed != effect);
                 let new: Vec<Effect> = self
-                    .effects_of_best_orders(joint, &gains, &taken)
+                    .effects_of_best_orders(joint, &gains, &listed_orders)
                     .into_iter()
                     .filter(is_new)
                     .collect();
@@ -167,18 +171,18 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
     /// Returns index and log prior factor of each wave among `effects`. A wave represents all
     /// orders near its order.
     pub fn spreads(&self, numbers: &[usize], effects: &[&Effect]) -> Vec<(usize, f64)> {
-        let one = |(&number, effect): (&usize, &&Effect)| {
+        let ln_width = |(&number, effect): (&usize, &&Effect)| {
             let (joint, order) = order_of(effect)?;
-            let rest: Vec<usize> =
+            let others: Vec<usize> =
                 numbers.iter().copied().filter(|&other| other != number).collect();
-            Some((number, self.likelihood_width(joint, order, &self.reduced_by_set(&rest)?).ln()))
+            Some((number, self.likelihood_width(joint, order, &self.reduced_by_set(&others)?).ln()))
         };
-        numbers.iter().zip(effects).filter_map(one).collect()
+        numbers.iter().zip(effects).filter_map(ln_width).collect()
     }
 
-    /// Returns the residual problem that the hypotheses `rest` leave.
-    fn reduced_by_set(&self, rest: &[usize]) -> Option<ReducedProblem<'w, 'a>> {
-        reduced_by(rest, self.products)
+    /// Returns the residual problem that the hypotheses `members` leave.
+    fn reduced_by_set(&self, members: &[usize]) -> Option<ReducedProblem<'w, 'a>> {
+        reduced_by(members, self.products)
     }
 
     /// Returns true if a joint, counted from 0, is prismatic.
@@ -220,10 +224,10 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
             for &member in &set.members {
                 let Some(joint) = of(member) else { continue };
                 let without = |gone: &dyn Fn(usize) -> bool| -> Vec<usize> {
-                    let mut rest: Vec<usize> =
+                    let mut remaining: Vec<usize> =
                         set.members.iter().copied().filter(|&other| !gone(other)).collect();
-                    rest.sort_unstable();
-                    rest
+                    remaining.sort_unstable();
+                    remaining
                 };
                 let sets_of_joint = sets_of_function.entry(joint).or_default();
                 for rest in
@@ -238,9 +242,14 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
         sets_of_function
     }
 
-    /// Returns, for each of the residual problems `left`, the orders with the log odds that a wave
-    /// of that order acts, best first.
-    fn gains(&self, joint: usize, orders: &[f64], left: &[ReducedProblem]) -> Vec<Vec<(f64, f64)>> {
+    /// Returns, for each residual problem, the orders with the log odds that a wave of that order
+    /// acts, best first.
+    fn gains(
+        &self,
+        joint: usize,
+        orders: &[f64],
+        reduced_problems: &[ReducedProblem],
+    ) -> Vec<Vec<(f64, f64)>> {
         let problem = &self.fitted.problem;
         let of = |orders: &[f64]| {
             if self.products.target.stop.is_requested() {
@@ -257,7 +266,8 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
                 orders.iter().filter_map(wave).unzip();
             let fit = (self.fitted, &self.products.target.fit);
             let blocks = Candidate::blocks(&waves.iter().collect::<Vec<_>>(), fit, self.left_out);
-            let of_sets: Vec<Vec<f64>> = left.iter().map(|left| left.odds_of(&blocks)).collect();
+            let of_sets: Vec<Vec<f64>> =
+                reduced_problems.iter().map(|left| left.odds_of(&blocks)).collect();
             let odds = |k: usize| of_sets.iter().map(|odds| odds[k]).collect();
             orders.into_iter().enumerate().map(|(k, order)| (order, odds(k))).collect()
         };
@@ -269,19 +279,19 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
             of_orders.sort_by(|a, b| b.1.total_cmp(&a.1));
             of_orders
         };
-        (0..left.len()).map(of_set).collect()
+        (0..reduced_problems.len()).map(of_set).collect()
     }
 
     /// Returns effects for the best orders. `gains` contains orders with their log odds, best
     /// first.
     ///
-    /// One is the wave with the best non-integer order, unless an order in `taken` is about as
-    /// good. The others are the unlisted harmonics that are about as good as the best order.
+    /// One is the wave with the best non-integer order, unless an order in `listed_orders` is about
+    /// as good. The others are the unlisted harmonics that are about as good as the best order.
     fn effects_of_best_orders(
         &self,
         joint: usize,
         gains: &[(f64, f64)],
-        taken: &[f64],
+        listed_orders: &[f64],
     ) -> Vec<Effect> {
         let Some(&(_, most)) = gains.first().filter(|(_, most)| *most > 0.0) else {
             return Vec::new();
@@ -301,7 +311,7 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
         let is_whole = |order: f64| !slides && order.fract() == 0.0;
         let is_beyond = |order: &f64| is_whole(*order) && *order > f64::from(HIGHEST_ORDER);
         let mut effects: Vec<Effect> = as_good().filter(is_beyond).map(harmonic).collect();
-        if !as_good().any(|order| taken.contains(&order)) {
+        if !as_good().any(|order| listed_orders.contains(&order)) {
             let wave = gains.iter().find(|(order, _)| !is_whole(*order));
             effects.extend(wave.map(|&(order, _)| Effect::JointWave { joint, order }));
         }
@@ -310,7 +320,7 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
 
     /// Returns the width of the likelihood about an order \[orders\]: its integral over its
     /// maximum, by the trapezoid rule.
-    fn likelihood_width(&self, joint: usize, order: f64, left: &ReducedProblem) -> f64 {
+    fn likelihood_width(&self, joint: usize, order: f64, reduced: &ReducedProblem) -> f64 {
         let Some((low, high)) = self.range(joint) else { return 1.0 };
         let range = high - low;
         let away =
@@ -320,7 +330,7 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
         let is_looked_for = |order: &f64| (TAU / range..=self.highest_order(joint)).contains(order);
         let mut orders: Vec<f64> = orders.filter(is_looked_for).chain([order]).collect();
         orders.sort_by(f64::total_cmp);
-        let mut gains = self.gains(joint, &orders, std::slice::from_ref(left)).concat();
+        let mut gains = self.gains(joint, &orders, std::slice::from_ref(reduced)).concat();
         gains.sort_by(|a, b| a.0.total_cmp(&b.0));
         let reference = gains
             .iter()

@@ -203,13 +203,13 @@ impl<'a> Beam<'a> {
                 let pairs = along.column(a).into_iter().zip(along.column(b));
                 pairs.map(|(x, y)| f64::from(*x) * f64::from(*y)).sum::<f64>()
             };
-            let taken = |a: usize| {
+            let explained = |a: usize| {
                 let pairs = along.column(a).into_iter().zip(state.span.along.iter());
                 pairs.map(|(x, y)| f64::from(*x) * y).sum::<f64>()
             };
             let mut extensions: Vec<Extension> = Vec::new();
             for term in 0..chunk.terms.len() {
-                let (gain, new) = chunk.gain(term, product, taken);
+                let (gain, new) = chunk.gain(term, product, explained);
                 if new == 0 {
                     continue;
                 }
@@ -224,14 +224,14 @@ impl<'a> Beam<'a> {
         best_of(extensions)
     }
 
-    fn scored(&self, taken: f64, rank: usize, ln_prior: f64) -> Scored {
-        let shrunk = taken * BEAM_VARIANCE / (1.0 + BEAM_VARIANCE);
+    fn scored(&self, explained: f64, rank: usize, ln_prior: f64) -> Scored {
+        let shrunk = explained * BEAM_VARIANCE / (1.0 + BEAM_VARIANCE);
         let occam = 0.5 * rank as f64 * (1.0 + BEAM_VARIANCE).ln();
         let poses = self.site.diagonal.len() as f64;
-        let left = (1.0 - shrunk / self.explainable.max(f64::MIN_POSITIVE)).max(1e-12);
+        let unexplained_share = (1.0 - shrunk / self.explainable.max(f64::MIN_POSITIVE)).max(1e-12);
         Scored {
             ln_posterior: self.noise.gain(shrunk) - occam + ln_prior,
-            guide: -0.5 * poses * left.ln() - occam + ln_prior,
+            guide: -0.5 * poses * unexplained_share.ln() - occam + ln_prior,
         }
     }
 

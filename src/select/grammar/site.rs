@@ -30,16 +30,17 @@ impl Noise {
         Self { squares, freedom: freedom.max(1.0), table }
     }
 
-    /// Returns the squared noise factor f² if columns explain the sum of squares `taken` and all
-    /// that remains is noise.
-    pub fn factor(&self, taken: f64) -> f64 {
-        ((self.squares - taken) / self.freedom).max(1e-12)
+    /// Returns the squared noise factor f² if columns reduce the sum of squares by `reduction` and
+    /// all that remains is noise.
+    pub fn factor(&self, reduction: f64) -> f64 {
+        ((self.squares - reduction) / self.freedom).max(1e-12)
     }
 
-    /// Returns the gain in ln p(residual) if columns reduce the sum of squares by `taken`.
-    pub fn gain(&self, taken: f64) -> f64 {
-        let left = ((self.squares - taken).max(0.0) / self.squares.max(f64::MIN_POSITIVE)).sqrt();
-        let place = left * NOISE_TABLE_POINTS as f64;
+    /// Returns the gain in ln p(residual) if columns reduce the sum of squares by `reduction`.
+    pub fn gain(&self, reduction: f64) -> f64 {
+        let relative_residual =
+            ((self.squares - reduction).max(0.0) / self.squares.max(f64::MIN_POSITIVE)).sqrt();
+        let place = relative_residual * NOISE_TABLE_POINTS as f64;
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "an index")]
         let low = (place as usize).min(NOISE_TABLE_POINTS - 1);
         let part = place - low as f64;

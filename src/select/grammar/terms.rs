@@ -315,32 +315,36 @@ impl Chunk {
 
     /// Returns the sum of squares that a term explains in addition to a span, and its number of
     /// independent directions. `less` returns the products of the term's columns within the span,
-    /// `taken` those with the residual.
+    /// `explained` those with the residual.
     pub fn gain(
         &self,
         term: usize,
         less: impl Fn(usize, usize) -> f64,
-        taken: impl Fn(usize) -> f64,
+        explained: impl Fn(usize) -> f64,
     ) -> (f64, usize) {
         const MIN_NEW: f64 = 1e-4;
         let first = term * self.width;
-        let one = |k: usize| {
-            let left = self.squares[k] - less(k, k);
-            let is_new = left > MIN_NEW * self.squares[k] && self.squares[k] > 0.0;
-            if is_new { ((self.along[k] - taken(k)).powi(2) / left, left) } else { (0.0, 0.0) }
+        let gain_and_square = |k: usize| {
+            let new_square = self.squares[k] - less(k, k);
+            let is_new = new_square > MIN_NEW * self.squares[k] && self.squares[k] > 0.0;
+            if is_new {
+                ((self.along[k] - explained(k)).powi(2) / new_square, new_square)
+            } else {
+                (0.0, 0.0)
+            }
         };
         if self.width == 1 {
-            let (gain, left) = one(first);
-            return (gain, usize::from(left > 0.0));
+            let (gain, new_square) = gain_and_square(first);
+            return (gain, usize::from(new_square > 0.0));
         }
-        let (a, b) = (one(first), one(first + 1));
+        let (a, b) = (gain_and_square(first), gain_and_square(first + 1));
         let mixed = self.mixed[term] - less(first, first + 1);
         let determinant = a.1 * b.1 - mixed * mixed;
         if a.1 <= 0.0 || b.1 <= 0.0 || determinant <= 1e-6 * a.1 * b.1 {
             let (gain, left) = if a.1 >= b.1 { a } else { b };
             return (gain, usize::from(left > 0.0));
         }
-        let [p, q] = [first, first + 1].map(|k| self.along[k] - taken(k));
+        let [p, q] = [first, first + 1].map(|k| self.along[k] - explained(k));
         ((b.1 * p * p - 2.0 * mixed * p * q + a.1 * q * q) / determinant, 2)
     }
 

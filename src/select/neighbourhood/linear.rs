@@ -141,8 +141,8 @@ impl LinearNeighbourhood {
         self.step += step;
         let before =
             if first == 0 { (self.rows - self.empty) as f64 } else { self.sums.data_freedom };
-        let taken = new.rows(0, self.rows).norm_squared();
-        self.sums = Sums::new(&self.residual, self.rows, before - taken);
+        let explained = new.rows(0, self.rows).norm_squared();
+        self.sums = Sums::new(&self.residual, self.rows, before - explained);
     }
 
     /// Decomposes columns of the data. Returns their components along the basis, the new
@@ -150,17 +150,17 @@ impl LinearNeighbourhood {
     /// these directions.
     fn directions(&self, columns: &DMatrix<f64>) -> (DMatrix<f64>, DMatrix<f64>, DMatrix<f64>) {
         let lengths: Vec<f64> = columns.column_iter().map(|column| column.norm()).collect();
-        let mut left = columns.clone().resize_vertically(self.residual.len(), 0.0);
+        let mut remaining = columns.clone().resize_vertically(self.residual.len(), 0.0);
         let mut along = DMatrix::zeros(self.basis.ncols(), columns.ncols());
         for _ in 0..2 {
-            let more = transposed_narrow_product(&self.basis, &left);
-            left -= product(&self.basis, &more);
+            let more = transposed_narrow_product(&self.basis, &remaining);
+            remaining -= product(&self.basis, &more);
             along += more;
-            if keeps_length(&left, &lengths) {
+            if keeps_length(&remaining, &lengths) {
                 break;
             }
         }
-        let (new, within) = orthonormal(&left, Some(&lengths));
+        let (new, within) = orthonormal(&remaining, Some(&lengths));
         (along, new, within)
     }
 
@@ -264,36 +264,37 @@ impl LinearNeighbourhood {
     /// Returns columns of the data, shape = (3 N, k), after the fitted parameters are projected
     /// out, shape = (3 N + priors, k).
     pub fn projected_out(&self, columns: &DMatrix<f64>) -> DMatrix<f64> {
-        let mut left = columns.clone().resize_vertically(self.residual.len(), 0.0);
+        let mut remaining = columns.clone().resize_vertically(self.residual.len(), 0.0);
         // The rows of the priors, below the data rows, are zero at first.
-        self.subtract_components(&mut left, self.rows);
+        self.subtract_components(&mut remaining, self.rows);
         let is_short = |k: &usize| {
-            left.column(*k).norm() < MIN_PART_OF_ONE_PROJECTION * columns.column(*k).norm()
+            remaining.column(*k).norm() < MIN_PART_OF_ONE_PROJECTION * columns.column(*k).norm()
         };
         let short: Vec<usize> = (0..columns.ncols()).filter(is_short).collect();
         if !short.is_empty() {
-            let mut again = left.select_columns(&short);
+            let mut again = remaining.select_columns(&short);
             self.subtract_components(&mut again, self.residual.len());
             short
                 .iter()
                 .zip(again.column_iter())
-                .for_each(|(&k, column)| left.set_column(k, &column));
+                .for_each(|(&k, column)| remaining.set_column(k, &column));
         }
-        left
+        remaining
     }
 
-    /// Subtracts from the columns `left` their components along the basis. Rows from `filled` on
-    /// are zero on entry.
-    fn subtract_components(&self, left: &mut DMatrix<f64>, filled: usize) {
-        if left.ncols() > MAX_SEQUENTIAL_COLUMNS {
+    /// Subtracts from the columns `remaining` their components along the basis. Rows from `filled`
+    /// on are zero.
+    fn subtract_components(&self, remaining: &mut DMatrix<f64>, filled: usize) {
+        if remaining.ncols() > MAX_SEQUENTIAL_COLUMNS {
             // Transposing the narrow matrix gives the fastest product.
-            let along = (left.rows(0, filled).transpose() * self.basis.rows(0, filled)).transpose();
-            left.gemm(-1.0, &self.basis, &along, 1.0);
+            let along =
+                (remaining.rows(0, filled).transpose() * self.basis.rows(0, filled)).transpose();
+            remaining.gemm(-1.0, &self.basis, &along, 1.0);
             return;
         }
-        let along = self.basis.rows(0, filled).tr_mul(&left.rows(0, filled));
+        let along = self.basis.rows(0, filled).tr_mul(&remaining.rows(0, filled));
         for (column, along) in self.basis.column_iter().zip(along.row_iter()) {
-            let pairs = left.column_iter_mut().zip(along.iter());
+            let pairs = remaining.column_iter_mut().zip(along.iter());
             pairs.for_each(|(mut left, along)| left.axpy(-along, &column, 1.0));
         }
     }
@@ -377,8 +378,9 @@ impl LinearNeighbourhood {
 
 /// Returns true if a projection leaves at least [`MIN_PART_OF_ONE_PROJECTION`] of the length of
 /// every column.
-fn keeps_length(left: &DMatrix<f64>, lengths: &[f64]) -> bool {
-    left.column_iter()
+fn keeps_length(remaining: &DMatrix<f64>, lengths: &[f64]) -> bool {
+    remaining
+        .column_iter()
         .zip(lengths)
         .all(|(column, length)| column.norm() >= MIN_PART_OF_ONE_PROJECTION * length)
 }
@@ -427,12 +429,12 @@ mod tests {
         };
         let without =
             residual - columns.columns(3, 2) * DVector::from_column_slice(&unknowns.x[3..]);
-        let rest =
+        let without_last =
             LinearNeighbourhood::new(&columns.columns(0, 3).into_owned(), &without, &fewer, 0);
         let lost = whole.loss_without(&[3, 4]).unwrap();
-        let expected = rest.sums().squares - whole.sums().squares;
+        let expected = without_last.sums().squares - whole.sums().squares;
         assert!((lost - expected).abs() < 1e-10 && lost > 0.01);
-        let with = rest.with(&columns.columns(3, 2).into_owned());
+        let with = without_last.with(&columns.columns(3, 2).into_owned());
         assert!((with.sums().squares - whole.sums().squares).abs() < 1e-10);
         assert!((with.optimum.rows(0, 3) - whole.optimum.rows(0, 3)).norm() < 1e-10);
     }
@@ -474,9 +476,9 @@ mod tests {
             priors: unknowns.priors[..3].to_vec(),
             ..Unknowns::default()
         };
-        let one = LinearNeighbourhood::new(&together, &residual, &three, 0);
-        assert!((held.sums().squares / one.sums().squares - 1.0).abs() < 1e-12);
-        let step = [one.step[0], one.step[1], one.step[2], 2.0 * one.step[2]];
+        let merged = LinearNeighbourhood::new(&together, &residual, &three, 0);
+        assert!((held.sums().squares / merged.sums().squares - 1.0).abs() < 1e-12);
+        let step = [merged.step[0], merged.step[1], merged.step[2], 2.0 * merged.step[2]];
         assert!((&held.step - DVector::from_row_slice(&step)).norm() < 1e-12);
     }
 

@@ -82,7 +82,7 @@ impl<'a> Linearised<'a> {
     /// Linearises `model` about its full parameter vector `x`, with the parameters `unknowns`
     /// fitted, at the sites of `effects` and at `places`. Derivatives in `cached` are reused.
     pub fn new(
-        (problem, known): (&'a Problem, Option<Arc<Derivatives>>),
+        (problem, cached): (&'a Problem, Option<Arc<Derivatives>>),
         model: &Model,
         poses: impl Into<Arc<Vec<Pose<'a>>>>,
         unknowns: &[usize],
@@ -126,9 +126,9 @@ impl<'a> Linearised<'a> {
                     at[first + index] = MASS_OF_DERIVATIVE;
                 }
             }
-            let all: Vec<usize> =
+            let probed: Vec<usize> =
                 parameters.iter().copied().chain(first..first + slots.len()).collect();
-            let residuals = PoseResiduals::new(&probing, Arc::clone(&poses), all, at.clone());
+            let residuals = PoseResiduals::new(&probing, Arc::clone(&poses), probed, at.clone());
             jacobian_and_residual(&residuals, &residuals.reduced(&at))
         };
         let new = |fitted: DMatrix<f64>, residual| Derivatives {
@@ -144,8 +144,8 @@ impl<'a> Linearised<'a> {
             others: Vec::new(),
         };
         let mut derivatives = if unknowns.len() < MANY_UNKNOWNS {
-            let all = [shared.as_slice(), &slots].concat();
-            let (jacobian, _) = pass(unknowns, &all);
+            let sites = [shared.as_slice(), &slots].concat();
+            let (jacobian, _) = pass(unknowns, &sites);
             let plain = PoseResiduals::new(model, Arc::clone(&poses), Vec::new(), x.clone());
             let (_, residual) = jacobian_and_residual(&plain, &DVector::zeros(0));
             let fitted = unknowns.len() + shared.len();
@@ -154,7 +154,7 @@ impl<'a> Linearised<'a> {
             derivatives.extend(&slots, beside.as_view());
             derivatives
         } else {
-            let mut derivatives = known.map_or_else(
+            let mut derivatives = cached.map_or_else(
                 || {
                     let (fitted, residual) = pass(unknowns, &shared);
                     new(fitted, residual)
@@ -195,18 +195,18 @@ impl<'a> Linearised<'a> {
 
     /// Returns the model with the rows of some poses set to zero.
     pub fn without(&self, poses: &[usize]) -> Self {
-        let mut rest = self.clone();
+        let mut reduced = self.clone();
         if poses.is_empty() {
-            return rest;
+            return reduced;
         }
-        let Derivatives { fitted, residual, others, .. } = Arc::make_mut(&mut rest.derivatives);
+        let Derivatives { fitted, residual, others, .. } = Arc::make_mut(&mut reduced.derivatives);
         for &pose in poses {
             Arc::make_mut(fitted).rows_mut(3 * pose, 3).fill(0.0);
             for column in others.iter_mut().chain([&mut *residual]) {
                 Arc::make_mut(column).rows_mut(3 * pose, 3).fill(0.0);
             }
         }
-        rest
+        reduced
     }
 
     /// Returns the columns of the fitted parameters, followed by those of relaxed parameters, shape

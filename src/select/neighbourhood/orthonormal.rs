@@ -89,9 +89,9 @@ fn independent(gram: &DMatrix<f64>, norms: &[f64], lengths: &[f64]) -> (Vec<usiz
             let value = (gram[(k, j)] / (norms[k] * norms[j]) - along) / known[row.len()];
             row.push(value);
         }
-        let left = 1.0 - row.iter().map(|value| value * value).sum::<f64>();
-        if left.max(0.0).sqrt() * norms[j] > MIN_INDEPENDENT_LENGTH * lengths[j] {
-            row.push(left.sqrt());
+        let independent_square = 1.0 - row.iter().map(|value| value * value).sum::<f64>();
+        if independent_square.max(0.0).sqrt() * norms[j] > MIN_INDEPENDENT_LENGTH * lengths[j] {
+            row.push(independent_square.sqrt());
             factor.push(row);
             kept.push(j);
         }
@@ -117,10 +117,10 @@ pub(super) fn open(active: &DMatrix<f64>, scale: &[f64]) -> Option<DMatrix<f64>>
         }
     }
     let eigen = (rows.transpose() * &rows).symmetric_eigen();
-    let left: Vec<usize> = (0..active.ncols())
+    let free_directions: Vec<usize> = (0..active.ncols())
         .filter(|&k| eigen.eigenvalues[k] < MIN_INDEPENDENT_LENGTH * MIN_INDEPENDENT_LENGTH)
         .collect();
-    Some(eigen.eigenvectors.select_columns(&left))
+    Some(eigen.eigenvectors.select_columns(&free_directions))
 }
 
 /// Returns Q and T of [`orthonormal`] for the Jacobian with additional rows `below`, each with one
@@ -165,10 +165,10 @@ mod tests {
             &[1., -1., 0., 0., 0., 0., 2., 0., 1., -1., 2., 0., 0., 0., 0., 0.],
         );
         let scale = [10.0, 1.0, 1e-3, 5.0];
-        let left = open(&active, &scale).unwrap_or_default();
-        assert_eq!(left.shape(), (4, 2));
-        assert!((left.transpose() * &left - DMatrix::identity(2, 2)).amax() < 1e-14);
-        let moved = DMatrix::from_fn(4, 2, |j, k| left[(j, k)] / scale[j]);
+        let basis = open(&active, &scale).unwrap_or_default();
+        assert_eq!(basis.shape(), (4, 2));
+        assert!((basis.transpose() * &basis - DMatrix::identity(2, 2)).amax() < 1e-14);
+        let moved = DMatrix::from_fn(4, 2, |j, k| basis[(j, k)] / scale[j]);
         assert!((active * moved).amax() < 1e-12);
         assert_eq!(open(&DMatrix::zeros(1, 3), &[1.0; 3]), None);
     }

@@ -72,14 +72,15 @@ impl Sums {
     pub fn gain_of(&self, squares: f64, freedom: usize) -> Option<Gain> {
         let degrees = self.freedom();
         let total = self.squares.max(ROUNDING.powi(2) * degrees);
-        let left = degrees - freedom as f64;
-        if left < 1.0 || freedom == 0 {
+        let remaining_degrees = degrees - freedom as f64;
+        if remaining_degrees < 1.0 || freedom == 0 {
             return None;
         }
         let part = (squares / total).clamp(0.0, 1.0 - 1e-15);
-        let f = part / (1.0 - part) * left / freedom as f64;
+        let f = part / (1.0 - part) * remaining_degrees / freedom as f64;
         // If the squares overflow, p is 1.
-        let chance = FisherSnedecor::new(freedom as f64, left).ok().filter(|_| !f.is_nan());
+        let chance =
+            FisherSnedecor::new(freedom as f64, remaining_degrees).ok().filter(|_| !f.is_nan());
         let p = chance.map_or(1.0, |chance| chance.sf(f)).max(f64::MIN_POSITIVE);
         let criterion = degrees * (-part).ln_1p() + freedom as f64 * degrees.ln();
         Some(Gain { squares, freedom, f, p, criterion })

@@ -76,7 +76,7 @@ pub(super) fn found(
             state.rounds.iter().find(|round| holds(round) && round.effects.iter().all(stays));
         round.map_or(fitted.found.fitted.held_out, |round| round.held_out)
     };
-    let one = |(effect, p_value): (Effect, f64)| {
+    let found_effect = |(effect, p_value): (Effect, f64)| {
         let alternatives = best.map_or_else(Vec::new, |(evidence, _)| {
             alternatives(evidence, &effect, &parts, MIN_ALTERNATIVE_ODDS)
         });
@@ -142,7 +142,7 @@ pub(super) fn found(
             effect,
         }
     };
-    added.iter().cloned().zip(p_values).map(one).collect()
+    added.iter().cloned().zip(p_values).map(found_effect).collect()
 }
 
 /// Returns, for each effect of a fit, the p-value of the F test of the fit against the fit without
@@ -231,16 +231,17 @@ fn with_rivals(
 }
 
 /// Returns effects that may replace `effect` in a model with the effects `held`; of each family at
-/// a place, only the most probable. Each is at least `beside` times as probable as `effect`.
+/// a place, only the most probable. Each is at least `min_ratio` times as probable as `effect`.
 fn alternatives(
     evidence: &Evidence,
     effect: &Effect,
     held: &[Effect],
-    beside: f64,
+    min_ratio: f64,
 ) -> Vec<(Effect, f64)> {
     let mut by_place: BTreeMap<String, usize> = BTreeMap::new();
     let mut found: Vec<(Effect, f64)> = Vec::new();
-    for other in effect.parts().iter().flat_map(|part| evidence.alternatives(part, held, beside)) {
+    for other in effect.parts().iter().flat_map(|part| evidence.alternatives(part, held, min_ratio))
+    {
         by_place.entry(other.0.name_and_place()).or_insert_with(|| {
             found.push(other);
             found.len()

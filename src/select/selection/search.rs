@@ -183,9 +183,12 @@ fn refitted(
     for (rival, ln_odds, next) in tried {
         // A function without a law is linear only about the fit for which it was built. A law that
         // replaces it must therefore also be confirmed by the evidence about its own fit.
-        let left = rival.without_law().len();
+        let functions_left = rival.without_law().len();
         let is_best = ln_odds > 0.0 && better.is_none();
-        if is_best && left < functions.len() && !is_confirmed(state, &next, left)? {
+        if is_best
+            && functions_left < functions.len()
+            && !is_confirmed(state, &next, functions_left)?
+        {
             continue;
         }
         ln_odds_of.push((rival, ln_odds));

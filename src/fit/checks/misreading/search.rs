@@ -166,12 +166,12 @@ impl Trial<'_> {
         let rows = misreading.undone(measurements, &self.chosen, (self.problem, joints));
         let split = Split { identification: (0..rows.len()).collect(), held_out: Vec::new() };
         let placement = Placement::of(&rows);
-        let other;
+        let rewritten_model;
         let model = match &rewritten {
             Some(problem) => {
                 let declared = Model::new(problem, &placement.bases, &placement.targets).ok()?;
-                other = self.fitting.strategy.model(declared);
-                &other
+                rewritten_model = self.fitting.strategy.model(declared);
+                &rewritten_model
             }
             None => model,
         };
