@@ -15,6 +15,8 @@ pub(super) struct Assessment {
     pub looks: Vec<(usize, f64)>,
     /// Causes, the most probable first.
     pub causes: Vec<AssessedCause>,
+    /// ln of the sum of the shares of all causes.
+    pub ln_sum: f64,
     /// Squared length rᵀ S⁻¹ r of all residuals: χ² with `coordinates` degrees of freedom if
     /// nothing changed.
     pub chi2: f64,
@@ -28,6 +30,8 @@ pub(super) struct AssessedCause {
     pub cause: usize,
     /// Row, if the cause is a gross row.
     pub row: Option<usize>,
+    /// First row that shows the change; 0 if it happened before the table.
+    pub onset: usize,
     /// Probability among all causes, given that something changed.
     pub probability: f64,
     /// Sizes (1 σ) of largest evidence.
@@ -41,21 +45,55 @@ pub(super) struct AssessedCause {
 impl AssessedCause {
     /// Returns the name of the cause; `location` names a row by its file and line.
     pub fn label(&self, causes: &[Cause], location: impl Fn(usize) -> String) -> String {
-        match self.row {
-            Some(row) => format!("{} is off", location(row)),
-            None => causes[self.cause].label.clone(),
+        match (self.row, self.onset) {
+            (Some(row), _) => format!("{} is off", location(row)),
+            (None, 0) => causes[self.cause].label.clone(),
+            (None, onset) => format!("{}, from {} on", causes[self.cause].label, location(onset)),
         }
     }
 }
 
-/// Weighted ln LR of a cause or of a gross row, with the amplitudes of the best size.
-struct Weighted {
-    cause: usize,
-    row: Option<usize>,
-    ln_share: f64,
+/// Weighted ln LR of a cause, with the amplitudes of the best size.
+pub(super) struct Weighted {
+    pub ln_share: f64,
     sizes: Vec<f64>,
     mean: DVector<f64>,
     covariance: DMatrix<f64>,
+}
+
+impl Weighted {
+    /// Creates the share of a cause that moves no column.
+    fn without_columns(ln_share: f64, mean: Vec<f64>) -> Self {
+        let covariance = DMatrix::zeros(mean.len(), mean.len());
+        Self { ln_share, sizes: Vec::new(), covariance, mean: DVector::from_vec(mean) }
+    }
+
+    /// Returns the cause with its amplitudes from the row `onset` on, its probability still open.
+    pub fn assessed(self, cause: usize, onset: usize) -> AssessedCause {
+        let Self { sizes, mean, covariance, .. } = self;
+        AssessedCause { cause, row: None, onset, probability: f64::NAN, sizes, mean, covariance }
+    }
+}
+
+/// Computes the share of a cause that moves columns; `columns` maps each column of the causes to
+/// one of the sums. Returns `None` for noise and gross rows, or if a number is not finite.
+pub(super) fn weighted_cause(
+    unchanged: &Unchanged,
+    cause: &Cause,
+    columns: &[usize],
+) -> Option<Weighted> {
+    let columns: Vec<usize> = cause.columns.iter().map(|&k| columns[k]).collect();
+    let tried: Vec<_> = cause
+        .sizes
+        .iter()
+        .zip(ln_size_priors(cause))
+        .filter_map(|(sizes, ln_prior)| Some((unchanged.cause(&columns, sizes)?, sizes, ln_prior)))
+        .collect();
+    let ratios = tried.iter().map(|((ratio, ..), _, ln_prior)| ratio + ln_prior);
+    let ln_share = ln_sum(ratios) + cause.ln_weight;
+    let best = tried.into_iter().max_by(|a, b| (a.0.0 + a.2).total_cmp(&(b.0.0 + b.2)));
+    let ((_, mean, covariance), sizes, _) = best?;
+    Some(Weighted { ln_share, sizes: sizes.clone(), mean, covariance })
 }
 
 /// Tests rows in their order. `factor` is F with F Fᵀ the covariance of the estimate, one row for
@@ -88,27 +126,24 @@ pub(super) fn assess(
         // Rows to come are as likely to be gross as these; they change nothing yet.
         let to_come = causes.iter().find(|cause| cause.kind == CauseKind::Row);
         let to_come = to_come.map(|cause| cause.ln_weight - (row as f64 + 2.0).ln());
-        let evidence = ln_sum(weighted.iter().map(|entry| entry.ln_share).chain(to_come));
+        let evidence = ln_sum(weighted.iter().map(|(.., entry)| entry.ln_share).chain(to_come));
         looks.push((row + 1, evidence));
         if is_last {
             last = Some((weighted, unchanged.squares));
         }
     }
     let (weighted, chi2) = last?;
-    let all = ln_sum(weighted.iter().map(|entry| entry.ln_share));
+    let all = ln_sum(weighted.iter().map(|(.., entry)| entry.ln_share));
     let mut causes: Vec<AssessedCause> = weighted
         .into_iter()
-        .map(|entry| AssessedCause {
-            cause: entry.cause,
-            row: entry.row,
+        .map(|(cause, row, entry)| AssessedCause {
+            row,
             probability: (entry.ln_share - all).exp(),
-            sizes: entry.sizes,
-            mean: entry.mean,
-            covariance: entry.covariance,
+            ..entry.assessed(cause, 0)
         })
         .collect();
     causes.sort_by(|a, b| b.probability.total_cmp(&a.probability));
-    Some(Assessment { looks, causes, chi2, coordinates: sums.coordinates })
+    Some(Assessment { looks, causes, ln_sum: all, chi2, coordinates: sums.coordinates })
 }
 
 /// Returns the logarithms of the prior probabilities of the sizes of a cause, the smallest size
@@ -120,22 +155,16 @@ fn ln_size_priors(cause: &Cause) -> impl Iterator<Item = f64> {
 }
 
 /// Computes the weighted likelihood ratio of each cause, and of each of the first `count` rows as a
-/// gross one. `noisier` are the sums with each of [`NOISE_RATIOS`].
+/// gross one, with the index of the cause and the row. `noisier` are the sums with each of
+/// [`NOISE_RATIOS`].
 fn ratios(
     rows: &SensitiveRows,
     count: usize,
     (sums, noisier, factor): (&Sums, &[Sums], &DMatrix<f64>),
     unchanged: &Unchanged,
     causes: &[Cause],
-) -> Vec<Weighted> {
-    let plain = |cause, row, ln_share, mean: Vec<f64>| Weighted {
-        cause,
-        row,
-        ln_share,
-        sizes: Vec::new(),
-        covariance: DMatrix::zeros(mean.len(), mean.len()),
-        mean: DVector::from_vec(mean),
-    };
+) -> Vec<(usize, Option<usize>, Weighted)> {
+    let every_column: Vec<usize> = (0..rows.sensitivity.ncols()).collect();
     let mut weighted = Vec::new();
     for (index, cause) in causes.iter().enumerate() {
         match cause.kind {
@@ -149,35 +178,19 @@ fn ratios(
                 let share = ln_sum(found.iter().map(|entry| entry.0))
                     - (NOISE_RATIOS.len() as f64).ln()
                     + cause.ln_weight;
-                weighted.extend(best.map(|(_, ratio)| plain(index, None, share, vec![ratio])));
+                let noise = |(_, ratio)| Weighted::without_columns(share, vec![ratio]);
+                weighted.extend(best.map(noise).map(|share| (index, None, share)));
             }
             // Row i has the prior probability 1 / (i (i + 1)), which sums to 1 over all i.
             CauseKind::Row => weighted.extend((0..count).filter_map(|row| {
                 let number = row as f64 + 1.0;
                 let share = unchanged.gross_row(rows, row, (sums, factor))? + cause.ln_weight
                     - (number * (number + 1.0)).ln();
-                Some(plain(index, Some(row), share, Vec::new()))
+                Some((index, Some(row), Weighted::without_columns(share, Vec::new())))
             })),
             _ => {
-                let tried: Vec<_> = cause
-                    .sizes
-                    .iter()
-                    .zip(ln_size_priors(cause))
-                    .filter_map(|(sizes, ln_prior)| {
-                        Some((unchanged.cause(&cause.columns, sizes)?, sizes, ln_prior))
-                    })
-                    .collect();
-                let share = ln_sum(tried.iter().map(|((ratio, ..), _, ln_prior)| ratio + ln_prior))
-                    + cause.ln_weight;
-                let best = tried.into_iter().max_by(|a, b| (a.0.0 + a.2).total_cmp(&(b.0.0 + b.2)));
-                weighted.extend(best.map(|((_, mean, covariance), sizes, _)| Weighted {
-                    cause: index,
-                    row: None,
-                    ln_share: share,
-                    sizes: sizes.clone(),
-                    mean,
-                    covariance,
-                }));
+                let found = weighted_cause(unchanged, cause, &every_column);
+                weighted.extend(found.map(|share| (index, None, share)));
             }
         }
     }

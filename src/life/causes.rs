@@ -11,7 +11,7 @@ use crate::quantity::Unit;
 /// Prior probability of a size relative to that of the next smaller one. A change of k times the
 /// size has k² times the evidence, so large changes are seen in spite of it. Causes of temperature
 /// have equally probable sizes.
-pub(super) const LARGER_SIZE: f64 = 0.5;
+pub(super) const LARGER_SIZE: f64 = 0.4;
 /// Sizes of a moved zero, 1 σ \[°\] or \[mm\], the smallest first.
 const ZERO_SIZES: [f64; 4] = [0.01, 0.05, 0.25, 1.2];
 /// Sizes of a moved point, 1 σ on each axis \[mm\].
@@ -59,17 +59,18 @@ worded! {
 }
 
 impl CauseKind {
-    /// Kinds with the prior probability of each, given a change; temperature is 20 times as probable
-    /// if the rows are warmer or colder than the reference.
+    /// Kinds with the prior probability of each, given a change. Collisions and exchanged motors
+    /// move zeros, so these make up half of it. Temperature is 20 times as probable if the rows are
+    /// warmer or colder than the reference.
     const WEIGHTS: [(Self, f64); 10] = [
-        (Self::Zero, 0.40),
-        (Self::Tool, 0.20),
-        (Self::Base, 0.12),
-        (Self::Link, 0.06),
+        (Self::Zero, 0.50),
+        (Self::Tool, 0.18),
+        (Self::Base, 0.08),
+        (Self::Link, 0.04),
         (Self::Noise, 0.05),
         (Self::Row, 0.05),
-        (Self::Stiffness, 0.05),
-        (Self::Temperature, 0.04),
+        (Self::Stiffness, 0.04),
+        (Self::Temperature, 0.03),
         (Self::Law, 0.02),
         (Self::Fixture, 0.01),
     ];

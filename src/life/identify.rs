@@ -108,7 +108,13 @@ pub fn identify_with_prior(
     loop {
         let options = options.clone().with_earlier(Arc::new(prior.data(&model)?));
         let mut found = fit::identify(&problem, &data, &options)?;
-        let (cause, now) = contradiction(&problem, &model, (&data, &placement), &found, &prior);
+        let (cause, now) = contradiction(
+            (&problem, declared_problem.data.position_sigma),
+            &model,
+            (&data, &placement),
+            &found,
+            &prior,
+        );
         chi2 = chi2.or(now);
         let is_new_cause = cause.as_ref().is_some_and(|cause: &Contradiction| {
             causes.iter().all(|earlier: &Contradiction| earlier.label != cause.label)
@@ -212,8 +218,10 @@ impl Contradiction {
 
 /// Tests whether the identification rows contradict the prior. Returns the most probable cause if
 /// they do, and χ² of the rows under the prior with its degrees of freedom and p-value.
+/// `declared_sigma` is the declared σ of a measured coordinate \[m\]; what the fit took beyond it is
+/// known misfit.
 fn contradiction(
-    problem: &Problem,
+    (problem, declared_sigma): (&Problem, Option<f64>),
     model: &Model,
     (data, placement): (&Dataset, &Placement),
     found: &Identification,
@@ -230,7 +238,11 @@ fn contradiction(
     let mut sensitive = SensitiveRows::new(&extended.model, poses, &extended.x);
     let warmth = warmth(problem, &data.measurements, rows);
     let causes = extended.causes(problem, &mut sensitive, warmth.as_deref());
-    let covariance = covariance(&extended, prior, sensitive.sensitivity.ncols());
+    let declared = declared_sigma.unwrap_or(found.sigma).min(found.sigma);
+    let misfit = 1.0 - (declared / found.sigma).powi(2);
+    let misfit = misfit * sensitive.coordinates.iter().sum::<usize>() as f64;
+    let warmed = warmth.as_ref().map(|_| (&*causes, misfit));
+    let covariance = covariance(&extended, prior, &sensitive, warmed);
     let assessed = assess(&sensitive, &factor(&covariance), &causes, false);
     let Some(assessed) = assessed else { return (None, None) };
     let p_value = ChiSquared::new(assessed.coordinates)
@@ -273,7 +285,17 @@ pub(super) fn warmth(
 
 /// Returns the covariance of the deviations of all columns: that of the earlier estimate, declared
 /// priors where it has none, and 0 for added columns.
-pub(super) fn covariance(extended: &Extended, prior: &Earlier, columns: usize) -> DMatrix<f64> {
+///
+/// Columns of temperature have a variance if the earlier fit left a misfit. `warmed` holds the
+/// causes and the sum of the squared misfits in units of the noise, if the rows state temperatures.
+/// An effect of temperature that the fit lacks may be all of its misfit, and was there before.
+pub(super) fn covariance(
+    extended: &Extended,
+    prior: &Earlier,
+    rows: &SensitiveRows,
+    warmed: Option<(&[Cause], f64)>,
+) -> DMatrix<f64> {
+    let columns = rows.sensitivity.ncols();
     let mut covariance = DMatrix::zeros(columns, columns);
     for (i, &k) in prior.places.iter().enumerate() {
         for (j, &l) in prior.places.iter().enumerate() {
@@ -286,6 +308,13 @@ pub(super) fn covariance(extended: &Extended, prior: &Earlier, columns: usize) -
             || parameter.unit().is_relative();
         let wide = if is_wide { WIDE } else { 0.0 };
         covariance[(k, k)] = parameter.sigma.unwrap_or(wide).powi(2);
+    }
+    let (causes, misfit) = warmed.unwrap_or_default();
+    for cause in causes.iter().filter(|cause| cause.kind == CauseKind::Temperature) {
+        for &k in &cause.columns {
+            let squares = rows.sensitivity.column(k).norm_squared();
+            covariance[(k, k)] = if squares > 0.0 { misfit / squares } else { 0.0 };
+        }
     }
     covariance
 }

@@ -128,6 +128,27 @@ impl SensitiveRows {
         self.sensitivity.set_column(column, &sum);
         column
     }
+
+    /// Returns these rows with copies of some columns that are 0 before the row `first`, and the
+    /// column of the copy of each.
+    pub fn masked_before(&self, first: usize, columns: &[usize]) -> (Self, Vec<usize>) {
+        let (before, mut masked) = (self.sensitivity.ncols(), self.clone());
+        let added = columns.len();
+        masked.sensitivity = masked.sensitivity.resize_horizontally(before + added, 0.0);
+        let changed = first * self.stride..self.residual.len();
+        for (place, &column) in columns.iter().enumerate() {
+            let copied = self.sensitivity.column(column);
+            let copied = copied.rows(changed.start, changed.len());
+            let mut target = masked.sensitivity.column_mut(before + place);
+            target.rows_mut(changed.start, changed.len()).copy_from(&copied);
+        }
+        (masked, (before..before + added).collect())
+    }
+
+    /// Returns the sum of the squared misfits of all residuals, in units of their noise.
+    pub fn misfit_squares(&self) -> f64 {
+        self.misfit.as_ref().map_or(0.0, |misfit| misfit.sigma.norm_squared())
+    }
 }
 
 impl Sums {

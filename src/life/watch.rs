@@ -9,7 +9,8 @@ use super::earlier::{EQUAL_SIGMA, Earlier};
 use super::error::PriorError;
 use super::evidence::{Unchanged, factor};
 use super::identify::{covariance, warmth};
-use super::rows::{SensitiveRows, SharedMisfit, Sums};
+use super::onset::{extended as extended_factor, sums_of, with_onsets};
+use super::rows::{SensitiveRows, SharedMisfit};
 use crate::fit::{self, Placement, SavedEstimate};
 use crate::measurement::Measurements;
 use crate::model::{Model, Pose};
@@ -67,6 +68,8 @@ pub struct WatchedCause {
     pub label: String,
     /// Gross row, counted from 0 among all rows of the table, if that is the cause.
     pub row: Option<usize>,
+    /// First row that shows the change, counted likewise; `None` if it happened before the table.
+    pub from_row: Option<usize>,
     /// Probability among all causes, given that something changed.
     pub probability: f64,
     /// Changes of what the cause moves; the ratio of the noise for larger noise.
@@ -156,11 +159,16 @@ pub fn watch(
     }
     let warmth = warmth(problem, &kept, &every_row);
     let causes = extended.causes(problem, &mut rows, warmth.as_deref());
-    let factor = factor(&covariance(&extended, &earlier, rows.sensitivity.ncols()));
-    let assessed = assess(&rows, &factor, &causes, true)
+    let warmed = warmth.as_ref().map(|_| (&*causes, rows.misfit_squares()));
+    let factor = factor(&covariance(&extended, &earlier, &rows, warmed));
+    let mut assessed = assess(&rows, &factor, &causes, true)
         .ok_or(PriorError::NotFinite { file: estimate.file.clone() })?;
     let threshold = -false_alarm_rate.ln();
     let changed_at = assessed.looks.iter().find(|look| look.1 >= threshold).map(|look| look.0);
+    if changed_at.is_some() {
+        assessed.causes = with_onsets(&assessed, &rows, &factor, &causes)
+            .ok_or(PriorError::NotFinite { file: estimate.file.clone() })?;
+    }
     let p_value = ChiSquared::new(assessed.coordinates)
         .map_or(f64::NAN, |distribution| distribution.sf(assessed.chi2));
     let report = Reporter { rows: &rows, factor: &factor, causes: &causes, leads: &leads };
@@ -176,6 +184,7 @@ pub fn watch(
     let watched = (0..reported.len())
         .map(|k| WatchedCause {
             row: reported[k].row.map(|row| new[row]),
+            from_row: Some(reported[k].onset).filter(|onset| *onset > 0).map(|row| new[row]),
             label: reported[k].label(&causes, location),
             ..report.cause(reported[k], reported.get(usize::from(k == 0)).copied())
         })
@@ -290,6 +299,7 @@ impl Reporter<'_> {
             kind: cause.kind,
             label: cause.label.clone(),
             row: assessed.row,
+            from_row: None,
             probability: assessed.probability,
             changes,
             left_out_error: match (cause.kind, assessed.row) {
@@ -325,22 +335,22 @@ impl Reporter<'_> {
     /// Returns the error of each row if only the cause is updated, as estimated without the row and
     /// its group.
     fn left_out_error(&self, cause: &Cause, assessed: &AssessedCause) -> Option<f64> {
-        let (rows, columns) = (self.rows, self.rows.sensitivity.ncols());
-        let mut sums = Sums::new(columns, 1.0);
-        (0..rows.len()).for_each(|row| sums.add(rows, row, 1.0));
+        let (rows, columns) = self.rows.masked_before(assessed.onset, &cause.columns);
+        let (rows, factor) = (&rows, extended_factor(self.factor, columns.len()));
+        let sums = sums_of(rows);
         let groups = rows.len().min(MAX_GROUPS);
         let means: Option<Vec<DVector<f64>>> = (0..groups)
             .map(|group| {
                 let mut others = sums.clone();
                 (group..rows.len()).step_by(groups).for_each(|row| others.add(rows, row, -1.0));
-                let unchanged = Unchanged::new(&others, self.factor)?;
-                Some(unchanged.cause(&cause.columns, &assessed.sizes)?.1)
+                let unchanged = Unchanged::new(&others, &factor)?;
+                Some(unchanged.cause(&columns, &assessed.sizes)?.1)
             })
             .collect();
         let means = means?;
         Some(self.rms(|row| {
-            let columns = rows.of_row(row).select_columns(&cause.columns);
-            rows.residual_of(row) - columns * &means[row % groups]
+            let moved = rows.of_row(row).select_columns(&columns);
+            rows.residual_of(row) - moved * &means[row % groups]
         }))
     }
 
@@ -359,22 +369,23 @@ impl Reporter<'_> {
         if cause.columns.is_empty() || other.columns.is_empty() {
             return None;
         }
-        let mut sums = Sums::new(self.rows.sensitivity.ncols(), 1.0);
-        (0..self.rows.len()).for_each(|row| sums.add(self.rows, row, 1.0));
-        let unchanged = Unchanged::new(&sums, self.factor)?;
+        let (rows, columns) = self.rows.masked_before(assessed.onset, &cause.columns);
+        let (rows, of_rival) = rows.masked_before(rival.onset, &other.columns);
+        let factor = extended_factor(self.factor, columns.len() + of_rival.len());
+        let unchanged = Unchanged::new(&sums_of(&rows), &factor)?;
         let part = |a: &[usize], b: &[usize]| {
             DMatrix::from_fn(a.len(), b.len(), |i, j| unchanged.information[(a[i], b[j])])
         };
         // The part of the change that the rival cannot imitate.
-        let shown = part(&cause.columns, &cause.columns) * &assessed.mean;
-        let seen = part(&other.columns, &cause.columns) * &assessed.mean;
-        let mut matrix = part(&other.columns, &other.columns);
+        let shown = part(&columns, &columns) * &assessed.mean;
+        let seen = part(&of_rival, &columns) * &assessed.mean;
+        let mut matrix = part(&of_rival, &of_rival);
         for (i, size) in rival.sizes.iter().enumerate() {
             matrix[(i, i)] += size.powi(-2);
         }
         let imitated = seen.dot(&matrix.cholesky()?.solve(&seen));
         let nats = 0.5 * (assessed.mean.dot(&shown) - imitated).max(0.0);
-        let of_pose = nats / self.rows.len() as f64;
+        let of_pose = nats / (rows.len() - assessed.onset) as f64;
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "small, ≥ 0")]
         let poses = (wanted / of_pose).ceil() as usize;
         (of_pose > LEAST_DIFFERENCE).then_some(poses)

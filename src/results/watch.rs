@@ -51,6 +51,8 @@ pub struct CauseResult {
     pub label: String,
     /// Gross row, counted from 1 among all rows of the table, if that is the cause.
     pub row: Option<usize>,
+    /// First row that shows the change, counted likewise; null if it happened before the table.
+    pub from_row: Option<usize>,
     /// Probability among all causes, given that something changed.
     pub probability: f64,
     pub changes: Vec<ChangeResult>,
@@ -112,6 +114,7 @@ impl CauseResult {
             kind: cause.kind.as_str(),
             label: cause.label.clone(),
             row: cause.row.map(|row| row + 1),
+            from_row: cause.from_row.map(|row| row + 1),
             probability: cause.probability,
             changes: cause.changes.iter().map(ChangeResult::new).collect(),
             left_out_error: cause.left_out_error.map(|error| error * factor),

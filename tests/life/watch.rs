@@ -2,11 +2,12 @@
 
 use flexcal::fit::SavedEstimate;
 use flexcal::life::{CauseKind, Watch, watch};
-use flexcal::measurement::Measurements;
+use flexcal::measurement::{Dataset, Measurements};
 use flexcal::problem::Problem;
 use nalgebra::Vector3;
 
 use crate::bench::{Bench, warmed, with_tool, with_zero};
+use crate::common::arms::path;
 use crate::common::program::{Folder, assert_contains};
 
 /// Poses of the calibration.
@@ -100,6 +101,48 @@ fn noise_a_gross_row_and_a_warm_arm_are_no_change_of_geometry() {
     let rows = bench.measure_at(&with_zero(&arm, 2, 0.03), Some(32.0), (12, 4008, 1.0));
     let warm = first(&rows);
     assert!(warm.is_changed() && warm.causes[0].kind == CauseKind::Temperature, "{warm:?}");
+}
+
+/// Returns the rows of all tables, in their order.
+fn joined(tables: &[Measurements]) -> Measurements {
+    let rows = || tables.iter().flat_map(|table| (0..table.len()).map(move |row| (table, row)));
+    let configurations = rows().map(|(table, row)| table.configuration(row).to_vec());
+    let positions: Vec<Vector3<f64>> = rows().map(|(table, row)| table.positions[row]).collect();
+    Dataset::builder(configurations, positions).measurements().unwrap()
+}
+
+#[test]
+fn a_change_in_the_middle_of_a_table_is_named_with_its_first_row() {
+    let bench = Bench::new();
+    let (arm, estimate) = calibrated(&bench, 5);
+    let before = bench.measure(&arm, 20, 4010, 1.0);
+    let after = bench.measure(&with_zero(&arm, 2, 0.03), 20, 4011, 1.0);
+    let verdict = judged(&bench, &estimate, &joined(&[before, after]));
+    let cause = verdict.named().unwrap();
+    let from_row = cause.from_row.unwrap();
+    assert_eq!(cause.kind, CauseKind::Zero, "{verdict:?}");
+    assert!(cause.label.starts_with("zero of joint 2, from ") && (18..=22).contains(&from_row));
+    assert!(verdict.changed_at.unwrap() > 20, "{verdict:?}");
+    let change = &cause.changes[0];
+    let off = change.change - 0.03_f64.to_radians();
+    assert!(off.abs() < 4.0 * change.std_error && change.std_error < 1e-4, "{change:?}");
+}
+
+#[test]
+fn temperature_that_the_model_lacks_is_no_change() {
+    let folder = Folder::with_lunar_sampler();
+    let (rows, problem) = ["measurements.csv", "problem.toml"]
+        .map(|file| {
+            std::fs::read_to_string(path(&format!("problems/lunar-sampler/{file}"))).unwrap()
+        })
+        .into();
+    folder.write("bowed/problem.toml", problem);
+    folder.write("bowed/measurements.csv", rows);
+    folder.flexcal("identify bowed --out first").success();
+    let run =
+        "watch bowed --estimate first/estimate.json --data bowed/measurements.csv --out watch";
+    let same = folder.flexcal(run).success();
+    assert_contains(&same.stdout, &["50 rows against the estimate", "Unchanged"]);
 }
 
 #[test]
