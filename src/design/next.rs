@@ -9,7 +9,7 @@ use super::misfit::Misfit;
 use super::travel::Travel;
 use super::workspace_error::{MisfitSize, WorkspaceError};
 use super::{Candidates, Criterion, DesignError, Exchange, Extremes, Sensitivity, Site, Workspace};
-use crate::fit::{self, Identification, IdentifyError, Options};
+use crate::fit::{self, FindingCode, Identification, IdentifyError, Options};
 use crate::measurement::{Dataset, Measurements};
 use crate::problem::{Effect, Problem};
 use crate::remainder::{self, Correction, SavedRemainderError};
@@ -103,7 +103,8 @@ pub struct NextPoses {
     pub misfit: f64,
     /// 1 σ of the noise of one coordinate \[m\].
     pub noise: f64,
-    /// Error over the workspace now; `None` with fewer than ten configurations.
+    /// Error over the workspace now; `None` with fewer than ten configurations, or with fewer
+    /// measured coordinates than fitted parameters.
     pub error: Option<WorkspaceError>,
     /// Expected error over the workspace after any number of poses \[m\]; `None` if it is unknown.
     pub attainable: Option<f64>,
@@ -213,7 +214,12 @@ pub fn next(
         Some(1.0),
     ));
     let cause = explanations.map(|of| cause_goal(&site, &of.parameters(&designed), &prediction));
-    let correction = correction(problem, data, &found, options)?;
+    // Bounds from left-out configurations need parameters that the data decide.
+    let correction = if found.has(FindingCode::PriorsDecide) {
+        None
+    } else {
+        correction(problem, data, &found, options)?
+    };
     let mut plain_site = Site::new(&plain, &[&measured])?;
     plain_site.at(&found);
     let error = correction.as_ref().and_then(|correction| {

@@ -1,6 +1,6 @@
 //! Errors of rows that were left out, and the error bounds of predictions that follow from them.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{FRAC_2_PI, TAU};
 
 use nalgebra::{Matrix3, Vector3};
 use statrs::distribution::{ChiSquared, ContinuousCDF as _};
@@ -141,12 +141,20 @@ impl Scores {
         (count > 0.0 && squares > 0.0).then(|| (squares / count).sqrt())
     }
 
+    /// Returns the relative standard error of the quantile `level` of the lengths of normal vectors
+    /// in three dimensions, as many as configurations. [David & Nagaraja 2003, eq. 10.2.1]
+    fn quantile_error(&self, level: f64) -> f64 {
+        let quantile = length_quantile(level);
+        let density = FRAC_2_PI.sqrt() * quantile.powi(2) * (-0.5 * quantile.powi(2)).exp();
+        (level * (1.0 - level) / self.configurations as f64).sqrt() / (density * quantile)
+    }
+
     /// Returns the length that the errors of poses with the expected lengths `sizes` do not exceed
     /// with probability `level`, over all poses together. The length is too small with at most the
     /// probability 1 − `confidence`, if the scores have `freedom` degrees of freedom.
     ///
     /// Errors are normal vectors whose scale the scores give, stretched if the scores have a longer
-    /// tail than such vectors.
+    /// tail than such vectors by more than the standard error of their quantile.
     pub(super) fn pooled_bound(
         &self,
         sizes: &[f64],
@@ -160,7 +168,8 @@ impl Scores {
         let tail = if self.configurations < MIN_FOR_TAIL {
             1.0
         } else {
-            (self.quantile(level) / (scale * normal)).max(1.0)
+            let error = self.quantile_error(level);
+            (self.quantile(level) / (scale * normal) - error).max(1.0)
         };
         let unit = scale * tail * (freedom / lowest).sqrt() / (AXES as f64).sqrt();
         let within = |bound: f64| {

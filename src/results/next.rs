@@ -31,7 +31,8 @@ pub struct NextResult {
     /// Probability with which an error in the workspace stays below the bound.
     pub level: f64,
     pub tolerance_mm: Option<f64>,
-    /// Error over the workspace; null with fewer than ten measured configurations.
+    /// Error over the workspace; null with fewer than ten measured configurations, or fewer measured
+    /// coordinates than fitted parameters.
     pub now: Option<WorkspaceError>,
     /// Expected error after any number of further poses.
     pub attainable_mm: Option<f64>,
