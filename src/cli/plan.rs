@@ -146,8 +146,13 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         let text = report::plan_text(&problem, criterion, &plan, separated.as_ref());
         let (problem, table) =
             (shell_word(common.problem()), shell_word(&results.path("plan.csv")));
+        let next = if plan.is_of_cameras {
+            "take an image in each of these poses, write a row for each point that is found"
+        } else {
+            "measure these poses, add the columns x_mm, y_mm, z_mm"
+        };
         format!(
-            "{text}{}Next: measure these poses, add the columns x_mm, y_mm, z_mm, then flexcal identify {problem} --data {table}\n",
+            "{text}{}Next: {next}, then flexcal identify {problem} --data {table}\n",
             results.written()
         )
     })?;

@@ -51,6 +51,9 @@ pub enum DesignError {
         "the nominal arm has no equilibrium under its loads in any pose; check stiffnesses and masses"
     )]
     NoEquilibrium,
+    /// The criterion weighs predicted positions, but cameras measure.
+    #[error("the criterion I weighs positions of the target; with cameras choose S, A, D or E")]
+    NoPositions,
     /// The measurements of these poses depend on no free parameter.
     #[error(
         "no free parameter moves the target in any pose; check lengths, ranges and their units"

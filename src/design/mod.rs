@@ -22,6 +22,7 @@ mod sensitivity;
 mod separate;
 mod site;
 mod travel;
+mod views;
 mod workspace;
 mod workspace_error;
 

@@ -11,7 +11,7 @@ use super::misfit::Misfit;
 use super::next::mean_square;
 use super::{
     Criterion, DesignError, Exchange, ExchangeResult, Extremes, Forecast, Sensitivity, Site,
-    Workspace,
+    Workspace, views,
 };
 use crate::measurement::Measurements;
 use crate::model::parameter::{Parameter, ParameterSite};
@@ -29,6 +29,8 @@ const REFINED_STARTS: usize = 4;
 const REFINEMENT_REACHES: [f64; 8] = [0.3, 0.2, 0.2, 0.1, 0.1, 0.05, 0.05, 0.02];
 /// Number of candidates in a refinement round.
 const ROUND_CANDIDATES: usize = 2500;
+/// Number of candidates in a refinement round if cameras measure them: each stands for many rows.
+const CAMERA_ROUND_CANDIDATES: usize = 640;
 /// Number of random sets of poses that a plan is compared with; odd, so that the median is one of
 /// them.
 pub(super) const RANDOM_SETS: usize = 75;
@@ -109,6 +111,9 @@ pub struct Plan {
     /// True if the plan determines all combinations that all candidates can, and measures at least
     /// as many coordinates as there are parameters without a prior.
     pub suffices: bool,
+    /// True if cameras measure the poses: every point of a marker in view counts.
+    #[doc(hidden)]
+    pub is_of_cameras: bool,
 }
 
 /// Chooses poses by exchange from several starts. The result depends on the seed, not on the number
@@ -145,7 +150,11 @@ pub fn plan(
     };
     let mut tables = vec![&uniform];
     tables.extend(given);
-    let site = Site::new(problem, &tables)?;
+    let pairs = views::pairs(problem, &uniform);
+    if !pairs.is_empty() && *criterion == Criterion::I {
+        return Err(DesignError::NoPositions);
+    }
+    let site = Site::with_cameras(problem, &tables, pairs)?;
     let admitted = |(table, sensitivity): (Measurements, Sensitivity)| match options.workspace {
         Some(workspace) => {
             let rows = site.inside(&table, workspace);
@@ -215,7 +224,9 @@ pub fn plan(
     let of_position = sensitivity.coordinates;
     let random_set = |set: usize| {
         let stream = RANDOM_SET_STREAM + set as u64;
-        forecast(&uniform.select(&choose(uniform.len(), poses, seed, stream)))
+        let rows = choose(uniform.len(), poses, seed, stream);
+        let of_points = site.all_points(&table.select(&rows));
+        forecast(&of_points.unwrap_or_else(|| uniform.select(&rows)))
     };
     let random = (0..RANDOM_SETS).into_par_iter().map(random_set).collect();
     let undetermined_now = |forecast: &Forecast| {
@@ -223,13 +234,16 @@ pub fn plan(
             .undetermined
             .saturating_sub(untouched(parameters, &[Some(&planned), given.as_ref()]))
     };
-    let planned_forecast = forecast(&planned);
+    let all_points = site.all_points(&chosen);
+    let planned_forecast = forecast(all_points.as_ref().unwrap_or(&planned));
     let distinct = |table: &Measurements| {
         coordinates(table, of_position, first_rows(&table.pose_numbers(problem)))
     };
     let distinct_coordinates = given_arm_rows.as_ref().map_or(0, distinct) + distinct(&chosen);
     let all_rows = |table: &Measurements| coordinates(table, of_position, 0..table.len());
-    let coordinates = given_table.as_ref().map_or(0, all_rows) + all_rows(&chosen);
+    let of_chosen =
+        all_points.as_ref().map_or_else(|| all_rows(&chosen), |points| 2 * points.len());
+    let coordinates = given_table.as_ref().map_or(0, all_rows) + of_chosen;
     let without_prior = parameters.iter().filter(|parameter| parameter.sigma.is_none()).count();
     Ok(Plan {
         poses: chosen,
@@ -244,6 +258,7 @@ pub fn plan(
         least_poses,
         coordinates,
         random,
+        is_of_cameras: all_points.is_some(),
     })
 }
 
@@ -385,7 +400,9 @@ impl Selection {
         exchange: &Exchange,
         (options, number): (&PlanOptions, u64),
     ) -> Self {
-        let variations = (ROUND_CANDIDATES / options.poses).max(1);
+        let is_of_cameras = site.is_of_cameras(&self.poses);
+        let count = if is_of_cameras { CAMERA_ROUND_CANDIDATES } else { ROUND_CANDIDATES };
+        let variations = (count / options.poses).max(1);
         for (round, reach) in (0..).zip(REFINEMENT_REACHES) {
             let stream = REFINEMENT_STREAM + number * REFINEMENT_REACHES.len() as u64 + round;
             let streams = (options.seed, stream);

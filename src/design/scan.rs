@@ -6,6 +6,7 @@ use nalgebra::{DMatrix, DMatrixView, DVector, SMatrix, SVector};
 use rayon::prelude::*;
 
 use super::criterion::{Measure, ScaledCriterion, block};
+use super::views::COMPRESSED_ROWS;
 use crate::numeric::bisect;
 
 /// Number of candidates whose products are computed in one matrix product.
@@ -80,6 +81,7 @@ impl<'a> CandidateScan<'a> {
     ) -> Option<(usize, f64)> {
         match coordinates {
             6 => self.best_of_all::<6>(candidates, may, limit),
+            COMPRESSED_ROWS => self.best_of_all::<COMPRESSED_ROWS>(candidates, may, limit),
             _ => self.best_of_all::<3>(candidates, may, limit),
         }
     }
@@ -209,7 +211,7 @@ macro_rules! small {
         }
     )*};
 }
-small!(3 6);
+small!(3 6 12);
 
 /// Returns I + J W.
 fn plus_identity<const R: usize>(j: &DMatrixView<f64>, w: &DMatrixView<f64>) -> Square<R> {

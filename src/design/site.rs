@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::{DesignError, Sensitivity, Workspace};
+use super::{DesignError, Sensitivity, Workspace, views};
 use crate::error::InputErrorKind;
 use crate::fit::{Identification, Placement, locate};
 use crate::measurement::Measurements;
@@ -37,6 +37,8 @@ pub struct Site<'a> {
     /// Full parameter vector of the nominal arm, with unknown fixtures at the points where that arm
     /// touches them.
     nominal: DVector<f64>,
+    /// Cameras and markers that measure rows without another measured quantity.
+    pairs: Vec<(usize, usize)>,
 }
 
 impl<'a> Site<'a> {
@@ -46,6 +48,20 @@ impl<'a> Site<'a> {
     /// Returns an error if rules of `[parameters]` do not match the arm, no parameter is free, σ is
     /// unknown, or distances are to be measured to an anchor at an unknown position.
     pub fn new(problem: &'a Problem, tables: &[&Measurements]) -> Result<Self, DesignError> {
+        Self::with_cameras(problem, tables, Vec::new())
+    }
+
+    /// Creates the site for all poses of `tables`, whose rows without another measured quantity the
+    /// `pairs` of a camera and a marker measure; positions if there are none.
+    ///
+    /// # Errors
+    /// Returns the errors of [`new`](Self::new), or an error if the pose of one of the pairs is
+    /// neither declared nor determined by the tables.
+    pub(super) fn with_cameras(
+        problem: &'a Problem,
+        tables: &[&Measurements],
+        pairs: Vec<(usize, usize)>,
+    ) -> Result<Self, DesignError> {
         let (mut bases, mut targets): (Vec<String>, Vec<String>) = Default::default();
         let add = |words: &mut Vec<String>, word: &String| {
             if !words.contains(word) {
@@ -58,7 +74,7 @@ impl<'a> Site<'a> {
                 add(&mut bases, &placement.bases[placement.base_of(row)]);
                 add(&mut targets, &placement.targets[placement.target_of(row)]);
             }
-            if !table.has_declared_noise(problem) {
+            if pairs.is_empty() && !table.has_declared_noise(problem) {
                 return Err(DesignError::no_sigma(problem));
             }
         }
@@ -67,8 +83,10 @@ impl<'a> Site<'a> {
             return Err(DesignError::nothing_free(problem));
         }
         let nominal = DVector::zeros(model.parameters.len());
-        let mut site = Self { model, problem, bases, targets, nominal };
-        let (mut located, mut planned_only) = (BTreeSet::new(), BTreeSet::new());
+        let used: Vec<usize> =
+            pairs.iter().flat_map(|&(camera, marker)| [camera, marker]).collect();
+        let mut site = Self { model, problem, bases, targets, nominal, pairs };
+        let (mut located, mut planned_only) = (BTreeSet::new(), BTreeSet::from_iter(used));
         for table in tables {
             let mut poses = site.poses(table, &Placement::of(table));
             for pose in &poses {
@@ -139,6 +157,9 @@ impl<'a> Site<'a> {
         at: &DVector<f64>,
     ) -> Sensitivity {
         let mut poses = self.poses(table, &Placement::of(table));
+        if self.is_of_cameras(table) {
+            return views::compressed((self.problem, &self.model), &self.pairs, (&poses, at));
+        }
         for pose in &mut poses {
             pose.sigma = unit.unwrap_or(pose.sigma);
             let turn =
@@ -150,6 +171,21 @@ impl<'a> Site<'a> {
                 .map(|sigma| MeasuredOrientation { measured: None, sigma });
         }
         Sensitivity::of(&self.model, &poses, at)
+    }
+
+    /// Returns true if cameras measure the rows of a table.
+    pub(super) fn is_of_cameras(&self, table: &Measurements) -> bool {
+        let is_plain = |row: usize| table.observation(row).is_position();
+        !self.pairs.is_empty() && (0..table.len()).all(is_plain)
+    }
+
+    /// Returns the sensitivity of all points that cameras see in the poses of a table at the nominal
+    /// arm; `None` if no camera measures them.
+    pub(super) fn all_points(&self, table: &Measurements) -> Option<Sensitivity> {
+        let poses = self.poses(table, &Placement::of(table));
+        let of_site = (self.problem, &self.model);
+        self.is_of_cameras(table)
+            .then(|| views::all_points(of_site, &self.pairs, (&poses, &self.nominal)))
     }
 
     /// Returns the problem of the site.

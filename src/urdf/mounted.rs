@@ -5,8 +5,7 @@ use super::patches::Patches;
 use super::read::Kind;
 use crate::mechanics::Arm;
 use crate::model::Model;
-use crate::observation::FixtureValues;
-use crate::problem::{Fixture, JointKind, Problem};
+use crate::problem::{JointKind, Problem};
 use crate::spatial::Frame;
 
 /// Camera or marker that a frame of the arm carries, as a link of a URDF.
@@ -22,13 +21,16 @@ pub struct MountedLink {
 
 /// Returns the cameras and markers on the arm with the parameters `x` of the model.
 pub fn mounted_links(problem: &Problem, model: &Model, x: &[f64]) -> Vec<MountedLink> {
-    let link = |(fixture, values): (&Fixture, FixtureValues<f64>)| {
-        let carrier = fixture.carrier.filter(|_| fixture.kind.has_pose())?;
-        let suffix = if fixture.kind.word() == "camera" { "_optical_frame" } else { "_marker" };
-        let name = fixture.name.strip_suffix(suffix).unwrap_or(&fixture.name);
-        Some(MountedLink { link: format!("{name}{suffix}"), carrier, pose: values.frame() })
-    };
-    problem.fixtures.iter().zip(model.fixtures(x)).filter_map(link).collect()
+    let fixtures = problem.fixtures.iter().zip(model.fixtures(x));
+    fixtures
+        .filter_map(|(fixture, values)| {
+            let carrier = fixture.carrier.filter(|_| fixture.kind.has_pose())?;
+            let is_camera = fixture.kind.word() == "camera";
+            let suffix = if is_camera { "_optical_frame" } else { "_marker" };
+            let name = fixture.name.strip_suffix(suffix).unwrap_or(&fixture.name);
+            Some(MountedLink { link: format!("{name}{suffix}"), carrier, pose: values.frame() })
+        })
+        .collect()
 }
 
 /// Adds a link with a fixed joint for each of the `mounted`, or moves the origin of that joint where

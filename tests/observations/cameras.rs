@@ -3,11 +3,12 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
+use flexcal::design::{self, Candidates, Criterion, PlanOptions};
 use flexcal::fit::{FindingCode, Identification, Options, Placement, identify};
 use flexcal::least_squares::{check_jacobian, jacobian};
 use flexcal::measurement::{Dataset, Measurements};
 use flexcal::model::{Model, PoseResiduals};
-use flexcal::problem::Problem;
+use flexcal::problem::{Observation, PoseRanges, Problem};
 use flexcal::quantity::Unit;
 use flexcal::select::close;
 use nalgebra::{DVector, Vector3};
@@ -428,4 +429,54 @@ fn an_error_of_the_lens_is_not_called_one_of_the_arm() {
     assert!(closed.effects.is_empty(), "{:?}", closed.effects);
     let found = identify(&parse(&free), &data, &Options::default()).unwrap();
     assert!(!found.has(FindingCode::LensContradicted) && found.is_trusted());
+}
+
+#[test]
+fn plans_with_a_camera_hold_configurations_that_see_the_board() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/observations/camera");
+    let problem = Problem::read(&folder).unwrap();
+    let (data, _) = Dataset::read(&problem).unwrap();
+    let rows = data.measurements;
+    // The first images show where camera and board are.
+    let first: Vec<usize> = (0..90).collect();
+    let given = rows.select(&first);
+    let ranges = PoseRanges::measured(&problem, &rows);
+    let options = PlanOptions {
+        poses: 8,
+        criterion: &Criterion::S,
+        seed: 1,
+        workspace: None,
+        progress: None,
+    };
+    let candidates = Candidates::Within(ranges);
+    let plan = design::plan(&problem, &candidates, Some(&given), &options).unwrap();
+    assert!(plan.is_of_cameras && plan.poses.len() == 8 && plan.coordinates > 180 + 16);
+    let model = model_of(&problem, &rows);
+    let found = identify(&problem, &split(&problem, rows.clone()), &Options::default()).unwrap();
+    for pose in 0..8 {
+        let mut seen = 0;
+        for point in 0..35 {
+            let mut planned = Placement::of(&plan.poses).poses(&plan.poses, &[pose], 0.2);
+            planned[0].observation = Observation::Pixel(0, 1, point);
+            let pixel = model.predict(planned, &found.x)[0];
+            let is_in_image =
+                pixel.x > -30.0 && pixel.x < 1310.0 && pixel.y > -30.0 && pixel.y < 750.0;
+            seen += usize::from(is_in_image);
+        }
+        assert!(seen > 0, "pose {pose} sees nothing");
+    }
+    let median = |k: usize| {
+        let errors = plan.random.iter().map(|set| set.expected[k].std_error);
+        let mut errors: Vec<f64> = errors.map(|error| error.unwrap_or(f64::INFINITY)).collect();
+        errors.sort_by(f64::total_cmp);
+        errors[errors.len() / 2]
+    };
+    let smaller: Vec<usize> = (0..plan.planned.expected.len())
+        .filter_map(|k| Some(usize::from(plan.planned.expected[k].std_error? < median(k))))
+        .collect();
+    println!("{} of {} smaller than random", smaller.iter().sum::<usize>(), smaller.len());
+    assert!(2 * smaller.iter().sum::<usize>() > smaller.len());
+    // Where the camera is, nobody can plan without.
+    let error = design::plan(&problem, &candidates, None, &options).map(|_| ()).unwrap_err();
+    assert_contains(&error.to_string(), &["the place of the camera \"hand\" is not declared"]);
 }

@@ -1,0 +1,207 @@
+//! Configurations that cameras measure: the points of markers in view, and their sensitivity.
+
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+use rayon::prelude::*;
+
+use super::Sensitivity;
+use crate::measurement::Measurements;
+use crate::model::{Model, Pose};
+use crate::observation::{FixtureValues, Scene};
+use crate::problem::{Fixture, Observation, Problem};
+use crate::quantity::Unit;
+use crate::spatial::Frame;
+
+/// Smallest cosine of the angle between the line of sight and the normal of a flat marker at which
+/// detectors find its points: 60°.
+const MIN_COS_INCIDENCE: f64 = 0.5;
+/// Largest ratio of the smallest to the largest spread of points at which a marker counts as flat.
+const MAX_FLAT_RATIO: f64 = 0.05;
+/// Maximum number of points of a view whose derivatives represent all of them in the search.
+const SEARCH_POINTS: usize = 8;
+/// Maximum number of points of a view whose derivatives represent all of them in forecasts.
+const FORECAST_POINTS: usize = 60;
+/// Number of rows to which the views of a configuration are compressed in the search: six of a pose
+/// and six of a lens or of a second view.
+pub(super) const COMPRESSED_ROWS: usize = 12;
+/// Deviations by which unknowns are compared when views are compressed: lengths \[m\], angles
+/// \[rad\], pixels, and coefficients of distortion.
+const SIZES: [f64; 4] = [1e-3, 1e-3, 1.0, 1e-2];
+
+/// Returns the pairs of a camera and a marker that measure configurations of `table`: those of the
+/// problem, where the rows name nothing that is measured and no σ of positions is declared.
+pub(super) fn pairs(problem: &Problem, table: &Measurements) -> Vec<(usize, usize)> {
+    let are_plain = (0..table.len()).all(|row| table.observation(row).is_position());
+    if problem.data.position_sigma.is_some() || !are_plain {
+        return Vec::new();
+    }
+    let of = |word: &'static str| {
+        let of_word = move |(_, fixture): &(usize, &Fixture)| fixture.kind.word() == word;
+        problem.fixtures.iter().enumerate().filter(of_word)
+    };
+    let sees = |camera: &Fixture, marker: &Fixture| camera.carrier != marker.carrier;
+    of("camera")
+        .flat_map(|(camera, its)| {
+            of("marker").filter_map(move |(marker, of)| sees(its, of).then_some((camera, marker)))
+        })
+        .collect()
+}
+
+/// Points of markers in view in each of `poses` at the full parameter vector `at`, as poses that
+/// measure their pixels: at most `most` of each view, with a σ that makes them count as all.
+fn in_view<'a>(
+    (problem, model): (&Problem, &Model),
+    pairs: &[(usize, usize)],
+    (poses, at): (&[Pose<'a>], &DVector<f64>),
+    most: usize,
+) -> Vec<Vec<Pose<'a>>> {
+    let pixel = |&(camera, marker): &(usize, usize), point: usize| {
+        let index = |index: usize| u32::try_from(index).unwrap_or(u32::MAX);
+        Observation::Pixel(index(camera), index(marker), index(point))
+    };
+    let of_pair = |pose: &Pose<'a>, pair, point| Pose { observation: pixel(pair, point), ..*pose };
+    let firsts: Vec<Pose> = poses
+        .iter()
+        .flat_map(|pose| pairs.iter().map(move |pair| of_pair(pose, pair, 0)))
+        .collect();
+    let carriers = model.carrier_frames(&firsts, at.as_slice());
+    let fixtures = model.fixtures(at.as_slice());
+    let normals: Vec<Option<Vector3<f64>>> =
+        problem.fixtures.iter().map(|fixture| normal(&fixture.points)).collect();
+    let of_pose = |(k, pose): (usize, &Pose<'a>)| {
+        let mut seen = Vec::new();
+        for (pair, carriers) in pairs.iter().zip(&carriers[k * pairs.len()..]) {
+            let (camera, marker) = (&problem.fixtures[pair.0], &problem.fixtures[pair.1]);
+            let Some(carriers) = carriers else { continue };
+            let view = View {
+                lens: fixtures[pair.0],
+                marker: fixtures[pair.1],
+                carriers: *carriers,
+                normal: normals[pair.1],
+                image: camera.image.unwrap_or_else(|| {
+                    let [_, _, _, _, _, _, _, _, cx, cy, ..] = fixtures[pair.0].numbers;
+                    [2.0 * cx, 2.0 * cy]
+                }),
+            };
+            let visible: Vec<usize> = (0..marker.points.len())
+                .filter(|&point| view.shows(pixel(pair, point), marker.points[point]))
+                .collect();
+            let used = visible.len().min(most);
+            let weight = (used as f64 / visible.len().max(1) as f64).sqrt();
+            let sigma = camera.sigma.unwrap_or(1.0) * weight;
+            seen.extend((0..used).map(|k| {
+                let point = visible[(2 * k + 1) * visible.len() / (2 * used)];
+                Pose { sigma, orientation: None, ..of_pair(pose, pair, point) }
+            }));
+        }
+        seen
+    };
+    poses.iter().enumerate().map(of_pose).collect()
+}
+
+/// View of a marker by a camera.
+struct View {
+    lens: FixtureValues<f64>,
+    marker: FixtureValues<f64>,
+    carriers: [Frame<f64>; 2],
+    /// Normal of a flat marker, marker frame; `None` for points in space.
+    normal: Option<Vector3<f64>>,
+    image: [f64; 2],
+}
+
+impl View {
+    /// Returns true if a point is in front of the camera and in its image, and the line of sight
+    /// makes at most 60° with the marker's normal.
+    fn shows(&self, pixel: Observation, point: Vector3<f64>) -> bool {
+        let Self { lens, marker, carriers, .. } = self;
+        let fixtures = [*lens, *marker];
+        let scene = Scene { fixtures, carriers: *carriers, point, ..Scene::default() };
+        let seen = pixel.predict(&scene);
+        let [width, height] = self.image;
+        let is_in_image = (0.0..width).contains(&seen.x) && (0.0..height).contains(&seen.y);
+        let place = carriers[1].point(&marker.frame().point(&point));
+        let sight = (place - carriers[0].point(&lens.position())).normalize();
+        let is_steep = self.normal.is_none_or(|normal| {
+            let normal = carriers[1].vector(&marker.frame().vector(&normal));
+            normal.dot(&sight).abs() >= MIN_COS_INCIDENCE
+        });
+        is_in_image && is_steep
+    }
+}
+
+/// Returns the unit normal of points in a plane; `None` for fewer than three or points in space.
+fn normal(points: &[Vector3<f64>]) -> Option<Vector3<f64>> {
+    let middle = points.iter().sum::<Vector3<f64>>() / points.len().max(1) as f64;
+    let spread: Matrix3<f64> =
+        points.iter().map(|point| (point - middle) * (point - middle).transpose()).sum();
+    let eigen = spread.symmetric_eigen();
+    let mut order = [0, 1, 2];
+    order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
+    let [first, second, third] = order.map(|k| eigen.eigenvalues[k].max(0.0).sqrt());
+    let is_flat = second > MAX_FLAT_RATIO * first && third < MAX_FLAT_RATIO * first;
+    is_flat.then(|| eigen.eigenvectors.column(order[2]).into_owned())
+}
+
+/// Returns the sensitivity of all points in view in some configurations, as rows of one table.
+pub(super) fn all_points(
+    (problem, model): (&Problem, &Model),
+    pairs: &[(usize, usize)],
+    (poses, at): (&[Pose], &DVector<f64>),
+) -> Sensitivity {
+    let seen = in_view((problem, model), pairs, (poses, at), FORECAST_POINTS).concat();
+    Sensitivity::of(model, &seen, at)
+}
+
+/// Returns the sensitivity of configurations, each compressed to the [`COMPRESSED_ROWS`] directions
+/// that its views determine best; not finite for a configuration without a point in view.
+pub(super) fn compressed(
+    (problem, model): (&Problem, &Model),
+    pairs: &[(usize, usize)],
+    (poses, at): (&[Pose], &DVector<f64>),
+) -> Sensitivity {
+    let n = model.parameters.len();
+    let size = |unit: Unit| match unit {
+        Unit::Length => SIZES[0],
+        Unit::Angle => SIZES[1],
+        Unit::Pixel => SIZES[2],
+        _ => SIZES[3],
+    };
+    let sizes = DVector::from_iterator(n, model.parameters.iter().map(|p| size(p.unit())));
+    let views = in_view((problem, model), pairs, (poses, at), SEARCH_POINTS);
+    let sensitivity = Sensitivity::of(model, &views.concat(), at);
+    let starts = views.iter().scan(0, |next, view| {
+        let start = *next;
+        *next += view.len();
+        Some(start)
+    });
+    let starts: Vec<usize> = starts.collect();
+    let columns: Vec<DMatrix<f64>> = views
+        .par_iter()
+        .zip(starts)
+        .map(|(view, start)| {
+            if view.is_empty() {
+                return DMatrix::from_element(n, COMPRESSED_ROWS, f64::NAN);
+            }
+            // A pixel has two numbers; the third row of a pose is zero.
+            let of_pose = sensitivity.coordinates;
+            let rows: Vec<usize> = (start..start + view.len())
+                .flat_map(|pose| [of_pose * pose, of_pose * pose + 1])
+                .collect();
+            let rows = sensitivity.rows.select_columns(&rows);
+            let mut scaled = rows.clone();
+            scaled.column_iter_mut().for_each(|mut column| column.component_mul_assign(&sizes));
+            let eigen = scaled.tr_mul(&scaled).symmetric_eigen();
+            let mut order: Vec<usize> = (0..eigen.eigenvalues.len()).collect();
+            order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
+            let mut columns = DMatrix::zeros(n, COMPRESSED_ROWS);
+            for (mut column, k) in columns.column_iter_mut().zip(order) {
+                column.copy_from(&(&rows * eigen.eigenvectors.column(k)));
+            }
+            columns
+        })
+        .collect();
+    let mut rows = DMatrix::zeros(n, COMPRESSED_ROWS * views.len());
+    for (k, columns) in columns.iter().enumerate() {
+        rows.columns_mut(COMPRESSED_ROWS * k, COMPRESSED_ROWS).copy_from(columns);
+    }
+    Sensitivity { rows, coordinates: COMPRESSED_ROWS }
+}
