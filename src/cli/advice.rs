@@ -107,13 +107,23 @@ pub fn after_loop(
     });
     let can_be_planned =
         |pair: &[String; 2]| PoseRanges::of(problem).is_ok() && plan::pair(pair, problem).is_ok();
+    let closed = shell_word(&results.path("problem.closed.toml"));
     if let Some([effect, rival]) = pairs.find(can_be_planned) {
-        return format!(
+        let plan = format!(
             "flexcal plan {named} --poses {SEPARATING_POSES} --separate '{effect}' '{rival}' chooses poses that tell the two apart"
         );
+        return if result.is_probably_explained() {
+            format!(
+                "flexcal identify {closed} writes the estimate to apply; to be sure of the cause, {plan}"
+            )
+        } else {
+            plan
+        };
     }
-    let closed = shell_word(&results.path("problem.closed.toml"));
     match result.verdict {
+        Verdict::Unexplained if result.is_probably_explained() => {
+            format!("flexcal identify {closed} writes the estimate to apply")
+        }
         Verdict::Unexplained => {
             format!("flexcal trace {named} ranks candidates and names what these data cannot show")
         }

@@ -117,9 +117,19 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     common.print_result(&result.to_json(), || {
         let written = results.path("commands.csv");
         let [problem_word, estimate] = [common.problem(), &arguments.estimate].map(shell_word);
+        let reached = commands.iter().filter(|command| command.is_reached()).count();
+        let next = if reached == 0 {
+            "check the unit and the frame of the targets (--frame base takes them in the frame of the base) and the limits of the \
+             joints"
+                .to_owned()
+        } else {
+            let these = if reached < commands.len() { "the commands of reached targets" } else { "these commands" };
+            format!(
+                "measure with {these}, then flexcal predict {problem_word} --estimate {estimate} --data MEASURED.csv judges them"
+            )
+        };
         format!(
-            "{}\nWritten to {}\n\
-             Next: measure with these commands, then flexcal predict {problem_word} --estimate {estimate} --data MEASURED.csv judges them\n",
+            "{}\nWritten to {}\nNext: {next}\n",
             report::commands_text(&problem, targets, commands, bounds),
             written.display()
         )

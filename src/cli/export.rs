@@ -6,11 +6,13 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 use flexcal::design::Workspace;
 use flexcal::export as code;
-use flexcal::fit::{ErrorSummary, Placement, SavedEstimate, check_columns};
+use flexcal::fit::{
+    self, ErrorSummary, Options, Placement, SavedEstimate, Strategy, check_columns,
+};
 use flexcal::measurement::{Dataset, Measurements};
 use flexcal::model::Model;
 use flexcal::nalgebra::Vector3;
-use flexcal::problem::Problem;
+use flexcal::problem::{Joint, Problem};
 use flexcal::remainder;
 use flexcal::report::{self, shell_word};
 use flexcal::results::{Document as _, ExportResult, ExportedErrors, Summary};
@@ -208,7 +210,6 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let stays = |link: String| format!("link {link}, which the URDF has on another link");
     result.not_held.extend(elsewhere.into_iter().map(stays));
     flags.print_result(&result.to_json(), || {
-        let [problem, estimate] = [&arguments.problem, &arguments.estimate].map(|path| shell_word(path));
         let of_workspace = best.as_ref().map_or_else(String::new, |best| {
             format!(
                 "In the workspace the whole model differs from the exported geometry by {:.4} mm on average ({:.4} at most), \
@@ -220,8 +221,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
             )
         });
         format!(
-            "{}\n{of_workspace}Next: flexcal predict {problem} --estimate {estimate} --data MEASURED.csv judges new measurements\n",
-            report::export_text(&result)
+            "{}\n{of_workspace}Next: {}\n",
+            report::export_text(&result),
+            next(arguments, &result, &path)
         )
     })?;
     if !estimates.trusted {
@@ -272,7 +274,8 @@ fn write_c(
     Ok(Outcome::trusted(estimate.trusted))
 }
 
-/// Computes the held-out errors of the whole model and of its rigid geometry.
+/// Computes the held-out errors of the whole model, of the exported geometry, and of the geometries
+/// that could be exported instead.
 fn errors(
     problem: &Problem,
     files: &[PathBuf],
@@ -289,12 +292,61 @@ fn errors(
     let mut errors = ExportedErrors::new(&model, &x, &data, Some(estimates));
     let held_out = &data.split.held_out;
     let poses = placement.poses(&data.measurements, held_out, 1.0);
-    if let Some(best) = best
-        && poses.iter().all(|pose| pose.observation.is_position())
-    {
+    if !poses.iter().all(|pose| pose.observation.is_position()) {
+        return Ok(errors);
+    }
+    let of_geometry = |best: &code::RigidFit| {
         let rigid = code::rigid_errors(problem, (&model, &x), &best.arm, &poses);
         let rows = held_out.iter().copied();
-        errors.rigid = Summary::of(&ErrorSummary::of_rows(&data.measurements, rows, &rigid));
+        Summary::of(&ErrorSummary::of_rows(&data.measurements, rows, &rigid))
+    };
+    if let Some(best) = best {
+        errors.identified = Some(std::mem::replace(&mut errors.rigid, of_geometry(best)));
     }
+    let is_elastic = |joint: &Joint| joint.stiffness.is_some() || joint.beam.is_some();
+    if problem.effects.is_empty() && !problem.joints.iter().any(is_elastic) {
+        return Ok(errors);
+    }
+    // The alternatives only inform: if one of them fails, its line is absent.
+    if best.is_none() {
+        let correction = remainder::of_estimate(problem, estimates)?;
+        let workspace = Workspace { corners: None, planes: Vec::new() };
+        let best = code::best_rigid(problem, estimates, correction.as_ref(), &workspace).ok();
+        errors.best_rigid = best.as_ref().map(of_geometry);
+    }
+    let mut rigid = problem.clone();
+    rigid.effects.clear();
+    let options = Options::default().with_strategy(Strategy::Rigid);
+    let alone = fit::identify(&rigid, &data, &options).ok();
+    errors.fitted_alone = alone.map(|alone| Summary::of(&alone.fitted.held_out));
     Ok(errors)
+}
+
+/// Returns the command to run next: the same export with the geometry of the smallest error, or the
+/// check of new measurements.
+fn next(arguments: &Arguments, result: &ExportResult, path: &Path) -> String {
+    let [problem, estimate] =
+        [&arguments.problem, &arguments.estimate].map(|path| shell_word(path));
+    if report::is_best_rigid_better(result) {
+        let form = match (&arguments.urdf, arguments.format) {
+            (Some(urdf), _) => format!("--urdf {}", shell_word(urdf)),
+            (None, format) => {
+                let word = format.and_then(|format| format.to_possible_value());
+                format!(
+                    "--format {}",
+                    word.map_or(String::new(), |word| word.get_name().to_owned())
+                )
+            }
+        };
+        let data: Vec<String> = arguments.data.iter().map(|file| shell_word(file)).collect();
+        let data =
+            if data.is_empty() { String::new() } else { format!(" --data {}", data.join(" ")) };
+        return format!(
+            "flexcal export {problem} --estimate {estimate} {form}{data} --best-rigid --out {} --force",
+            shell_word(path)
+        );
+    }
+    format!(
+        "flexcal predict {problem} --estimate {estimate} --data MEASURED.csv judges new measurements"
+    )
 }

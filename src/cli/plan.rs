@@ -108,6 +108,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         common.warn(&warnings);
         Some(given)
     };
+    if given.is_none() {
+        common.warn(&problem.plausibility_warnings());
+    }
     let criterion = Criterion::from(arguments.criterion);
     let line = common.prints_text().then(Line::new);
     let show = |PlanProgress { start, sweep, value }: PlanProgress| {

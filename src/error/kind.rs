@@ -49,8 +49,8 @@ pub enum InputErrorKind {
     HeaderNotUtf8,
     #[error("UTF-16 text, by its byte-order mark; save the file as UTF-8")]
     Utf16,
-    #[error("not valid TOML: {message}{}", near(near_text))]
-    Syntax { message: String, near_text: String },
+    #[error("not valid TOML: {message}{}{remedy}", near(near_text))]
+    Syntax { message: String, near_text: String, remedy: &'static str },
 
     // The following errors concern keys.
     #[error("unknown key{}; known here: {}", meant(key, known), known.join(", "))]

@@ -31,3 +31,46 @@ pub(super) fn in_quotes(names: &[String]) -> String {
 pub(super) fn list(verb: &str, names: &[String], none: &str) -> String {
     if names.is_empty() { none.to_owned() } else { format!("{verb} {}", names.join(", ")) }
 }
+
+/// Maximum number of unknown columns that an error lists.
+const MAX_LISTED_COLUMNS: usize = 12;
+
+/// Returns the remedy of a missing column: the similar column `near`, or else the `unknown` columns,
+/// and the section that maps such names.
+pub(super) fn named_otherwise(write: &str, near: Option<&str>, unknown: &[String]) -> String {
+    let is_usual = |name: &&str| name.ends_with("_deg") || name.ends_with("_mm");
+    let mut names = write.split(" or ");
+    let ours = names.clone().find(is_usual).or(names.next()).unwrap_or_default();
+    let map = |theirs: &str| format!("[data.columns] maps it, as in \"{theirs}\" = \"{ours}\"");
+    match (near, unknown.first()) {
+        (Some(near), _) if near.contains(' ') => format!(" (is it column {near}? {})", map(near)),
+        (Some(near), _) => format!(" (is it column {near}?)"),
+        (None, Some(first)) if !ours.contains(' ') => {
+            let listed: Vec<String> =
+                unknown.iter().take(MAX_LISTED_COLUMNS).map(|name| shortened(name, 40)).collect();
+            let more = if unknown.len() > MAX_LISTED_COLUMNS { ", …" } else { "" };
+            format!(
+                " (columns that flexcal does not know: {}{more}; if it is one of them, {})",
+                listed.join(", "),
+                map(first)
+            )
+        }
+        _ => String::new(),
+    }
+}
+
+/// Returns the remedy of a row with more fields than the header.
+pub(super) fn surplus(found: usize, expected: usize) -> &'static str {
+    if found > expected {
+        "; if its numbers have a decimal comma, separate the columns by ; or tab"
+    } else {
+        ""
+    }
+}
+
+/// Shows the keys of two tables that no row shares: of the measurements, and of the joint table.
+pub(super) fn compared(keys: &Option<[String; 2]>) -> String {
+    keys.as_ref().map_or_else(String::new, |[measured, joints]| {
+        format!(" (the measurements have {measured}, the joint table {joints})")
+    })
+}

@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use thiserror::Error;
 
-use super::near::{instead, meant, question};
-use super::phrases::{difference, in_quotes};
+use super::near::{meant, question};
+use super::phrases::{compared, difference, in_quotes, named_otherwise, surplus};
 use super::warning::nearest_in_time;
 
 /// Kind of error in a table of measurements; [`Location`](super::Location) holds the place.
@@ -29,10 +29,11 @@ pub enum TableErrorKind {
     #[error(
         "no row of the measurements has a partner in the joint table; check the column of the \
          join (pose or time) and \
-         tolerance_s{}",
-        nearest_in_time(gap.as_deref())
+         tolerance_s{}{}",
+        nearest_in_time(gap.as_deref()),
+        compared(keys)
     )]
-    NothingJoined { gap: Option<String> },
+    NothingJoined { gap: Option<String>, keys: Option<[String; 2]> },
     #[error("no rows below the header")]
     NoRowsBelowHeader,
     #[error("an Excel workbook; save its sheet as CSV")]
@@ -73,6 +74,11 @@ pub enum TableErrorKind {
          position_sigma_mm too, or a column sigma_mm"
     )]
     NoPositionSigma,
+    #[error(
+        "in \"{value}\" day and month may stand in either order; write the year first \
+         (2024-05-31 14:03:20), or the month first with AM or PM"
+    )]
+    AmbiguousDate { value: String },
     #[error("\"{value}\" is neither a number nor a time such as 2024-05-31T14:03:20.5")]
     NotATime { value: String },
     #[error(
@@ -86,8 +92,8 @@ pub enum TableErrorKind {
          thousands separators, or correct decimal"
     )]
     DecimalPoint { value: String },
-    #[error("missing; add {write}{}", instead("column ", near.as_deref()))]
-    MissingColumn { write: String, near: Option<String> },
+    #[error("missing; add {write}{}", named_otherwise(write, near.as_deref(), unknown))]
+    MissingColumn { write: String, near: Option<String>, unknown: Vec<String> },
     #[error("unknown column, one letter away from {meant}; write {meant}, or a less similar name")]
     MistypedColumn { meant: String },
     #[error("given already as column {first}; keep one of the two")]
@@ -96,10 +102,12 @@ pub enum TableErrorKind {
     ColumnsDiffer { other: PathBuf, has: bool },
     #[error("{found} values for {expected} rows")]
     ColumnLength { expected: usize, found: usize },
-    #[error("the row has {found} fields, the header {expected}")]
+    #[error("the row has {found} fields, the header {expected}{}", surplus(*found, *expected))]
     RowLength { expected: usize, found: usize },
     #[error("a quote is opened and not closed")]
     OpenQuote,
+    #[error("the row is empty; delete it")]
+    EmptyRow,
     #[error("the cell is empty")]
     EmptyCell,
     #[error("\"{value}\" is not a number")]

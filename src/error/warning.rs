@@ -37,7 +37,7 @@ pub enum WarningKind {
          = \"split\" }} follows the marks"
     )]
     SplitUnused,
-    #[error("joint {joint} has no coordinate q; ignored")]
+    #[error("joint {joint} is fixed, so the column is ignored")]
     JointIgnored { joint: usize },
     #[error("unknown column; ignored (write {write})")]
     UnitIgnored { write: String },
@@ -83,6 +83,11 @@ pub enum WarningKind {
     ManyTurns { value: String, turns: String },
     #[error("all temperatures are {least} °C or more; if these are kelvins, subtract 273.15")]
     Kelvins { least: String },
+    #[error(
+        "no joint turns by more than {widest}° from zero; if the limits are radians, write min_rad \
+         and max_rad instead of min_deg and max_deg"
+    )]
+    LimitsLookLikeRadians { widest: String },
     #[error(
         "{distance} m from the last frame, while all links together are {links} m long; if \
          these are millimetres, write target_mm"

@@ -54,7 +54,7 @@ impl Columns {
             None => Some("split"),
             Some(_) => None,
         };
-        let named = Names::map(table, &problem.data.dialect)?;
+        let named = Names::map(table, &problem.data.dialect, measured)?;
         let numbering = Numbering::detect(named.iter(), problem);
         let present: BTreeSet<&str> = named.iter().map(|name| split_unit(name).0).collect();
         let mut found: BTreeMap<Role, (String, Option<&ColumnRule>)> = BTreeMap::new();
@@ -125,7 +125,8 @@ impl Columns {
                 Meaning::Ignored(kind) => warnings.push(Warning { location: location(), kind }),
                 Meaning::Unknown if foreign => {
                     unknown.push(name);
-                    unmapped.extend((!name.is_empty()).then(|| name.to_owned()));
+                    let file = Location { key: None, ..table.column(name) };
+                    unmapped.extend((!name.is_empty()).then(|| (file, name.to_owned())));
                 }
                 Meaning::Unknown => {
                     unknown.push(name);
@@ -153,9 +154,11 @@ impl Columns {
             warnings
                 .push(Warning { location: table.column("split"), kind: WarningKind::SplitUnused });
         }
-        if !unmapped.is_empty() {
-            let location = Location { key: None, ..table.column("") };
-            warnings.push(Warning { location, kind: WarningKind::Unmapped { names: unmapped } });
+        for of_file in unmapped.chunk_by(|(a, _), (b, _)| a.file == b.file) {
+            let names = of_file.iter().map(|(_, name)| name.clone()).collect();
+            let location = of_file.iter().map(|(location, _)| location.clone()).next();
+            let kind = WarningKind::Unmapped { names };
+            warnings.extend(location.map(|location| Warning { location, kind }));
         }
         columns.read.sort_by_key(|column| column.role);
         if let Some(error) = shifted {
@@ -202,13 +205,15 @@ impl Columns {
         unknown: &[&str],
     ) -> Result<(), InputError> {
         let near = |name: &str| nearest(name, unknown).map(|near| (*near).to_owned());
+        let strangers = || unknown.iter().map(|name| (*name).to_owned()).collect();
         let missing = |bases: &[&str], unit: Unit| {
             let write =
                 bases.iter().map(|base| unit.alternatives(base)).collect::<Vec<_>>().join(" or ");
             let near =
                 bases.iter().flat_map(|base| unit.spellings(base)).find_map(|name| near(&name));
             let first = bases.first().copied().unwrap_or_default();
-            Err(table.column(first).error(TableErrorKind::MissingColumn { write, near }))
+            let kind = TableErrorKind::MissingColumn { write, near, unknown: strangers() };
+            Err(table.column(first).error(kind))
         };
         let (source, suffix): (fn(usize) -> Role, _) = match problem.data.joints {
             JointSource::Commanded => (Role::Joint, ""),
@@ -250,9 +255,9 @@ impl Columns {
             if !self.has(Role::Covariate(k)) && (measured || used()) {
                 let write =
                     format!("it, or take it out of [data.covariates] in {}", covariate.location);
-                return Err(table
-                    .column(&covariate.name)
-                    .error(TableErrorKind::MissingColumn { write, near: near(&covariate.name) }));
+                let near = near(&covariate.name);
+                let kind = TableErrorKind::MissingColumn { write, near, unknown: Vec::new() };
+                return Err(table.column(&covariate.name).error(kind));
             }
         }
         let has_field = |field: &&Field| self.has(Role::Field(field.name));
@@ -273,9 +278,9 @@ impl Columns {
                 let write = field.unit().map_or(field.name.to_owned(), |unit| {
                     format!("{}_{}", field.name, unit.in_tables().suffix)
                 });
-                return Err(table
-                    .column(&write)
-                    .error(TableErrorKind::MissingColumn { near: near(&write), write }));
+                let (column, near) = (table.column(&write), near(&write));
+                let kind = TableErrorKind::MissingColumn { write, near, unknown: strangers() };
+                return Err(column.error(kind));
             }
         }
         // A single coordinate is no position.
@@ -315,9 +320,9 @@ impl Columns {
             && self.marked.is_none()
         {
             let write = format!("it, or change held_out in {}", problem.data.held_out_location);
-            return Err(table
-                .column(name)
-                .error(TableErrorKind::MissingColumn { write, near: near(name) }));
+            let kind =
+                TableErrorKind::MissingColumn { write, near: near(name), unknown: Vec::new() };
+            return Err(table.column(name).error(kind));
         }
         Ok(())
     }

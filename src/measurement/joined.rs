@@ -7,7 +7,8 @@ use csv::ByteRecord;
 
 use super::cell_style::CellStyle;
 use super::mapped::Names;
-use super::table::Table;
+use super::table::{Table, shortened};
+use super::time::shown;
 use crate::error::{InputError, InputErrorKind, Location, TableErrorKind, Warning, WarningKind};
 use crate::problem::{Dialect, JoinRule, JointLog, Problem};
 use crate::quantity::Unit;
@@ -20,6 +21,8 @@ pub(super) struct JoinedLog {
     rule: JoinRule,
     location: Location,
     header: Vec<String>,
+    /// File and line of the header.
+    header_place: (PathBuf, usize),
     /// Names of the joint table's columns in flexcal's vocabulary.
     names: Vec<String>,
     style: CellStyle,
@@ -39,6 +42,10 @@ pub(super) struct JoinedLog {
     /// Time from each row without a partner to the nearest row of the log \[s\]; empty unless
     /// joined by time.
     gaps: Vec<f64>,
+    /// First name of a position without a partner, for a join by name.
+    unpaired_name: Option<String>,
+    /// Earliest and latest time of a position \[s\], for a join by time.
+    times: [f64; 2],
 }
 
 /// Column that pairs rows, and its conversion to seconds if it holds times.
@@ -68,6 +75,7 @@ impl JoinedLog {
             rule: log.by,
             location: log.location.clone(),
             header: Vec::new(),
+            header_place: (PathBuf::new(), 1),
             names: Vec::new(),
             style: CellStyle { delimiter: ',', decimal_comma: false },
             rows: Vec::new(),
@@ -80,6 +88,8 @@ impl JoinedLog {
             paired: 0,
             decoding_warnings: Vec::new(),
             gaps: Vec::new(),
+            unpaired_name: None,
+            times: [f64::INFINITY, f64::NEG_INFINITY],
         };
         for file in &log.files {
             let kind = InputErrorKind::DataFileMissing { path: file.clone() };
@@ -99,6 +109,7 @@ impl JoinedLog {
     fn read_file(&mut self, mut table: Table, dialect: &Dialect) -> Result<(), InputError> {
         if self.header.is_empty() {
             self.header.clone_from(&table.header);
+            self.header_place = table.header_place();
             let names = Names::map_present(&table, dialect);
             self.names = names.into_iter().map(str::to_owned).collect();
             self.style = table.style();
@@ -150,7 +161,8 @@ impl JoinedLog {
                 (with_unit.or_else(date), "time_s or time")
             }
         };
-        let kind = TableErrorKind::MissingColumn { write: write.to_owned(), near: None };
+        let unknown = names.iter().filter(|name| !name.is_empty()).cloned().collect();
+        let kind = TableErrorKind::MissingColumn { write: write.to_owned(), near: None, unknown };
         key.map(Some).ok_or_else(|| table.column(write).error(kind))
     }
 
@@ -169,7 +181,7 @@ impl JoinedLog {
         };
         self.appended = (0..self.header.len()).filter(is_new).collect();
         let headers = self.appended.iter().filter_map(|&place| self.header.get(place).cloned());
-        table.extend_header(headers.collect(), self.style);
+        table.extend_header(headers.collect(), self.style, self.header_place.clone());
         Ok(())
     }
 
@@ -180,9 +192,18 @@ impl JoinedLog {
     /// Returns an error if the key cell of the row is empty or invalid.
     pub fn complete(&mut self, table: &mut Table) -> Result<bool, InputError> {
         let partner = match (self.rule, self.key) {
-            (JoinRule::Name, Some(key)) => self.of_name.get(table.name(key.place)?).copied(),
+            (JoinRule::Name, Some(key)) => {
+                let name = table.name(key.place)?;
+                let partner = self.of_name.get(name).copied();
+                if partner.is_none() {
+                    self.unpaired_name.get_or_insert_with(|| name.to_owned());
+                }
+                partner
+            }
             (JoinRule::Time { tolerance }, Some(key)) => {
-                let nearest = self.nearest(table.time(key.place, key.to_si)?);
+                let time = table.time(key.place, key.to_si)?;
+                self.times = [self.times[0].min(time), self.times[1].max(time)];
+                let nearest = self.nearest(time);
                 self.gaps.extend(nearest.map(|(_, gap)| gap).filter(|gap| *gap > tolerance));
                 nearest.filter(|(_, gap)| *gap <= tolerance).map(|(row, _)| row)
             }
@@ -221,6 +242,20 @@ impl JoinedLog {
         Some(format!("{median:.1} s"))
     }
 
+    /// Shows the keys of both tables, to find why no row has a partner: one name of each, or the
+    /// ranges of their times; `None` for a join by order.
+    fn keys(&self) -> Option<[String; 2]> {
+        if let Some(name) = &self.unpaired_name {
+            let log = self.of_name.iter().min_by_key(|(_, row)| **row)?.0;
+            return Some([name, log].map(|name| format!("\"{}\"", shortened(name))));
+        }
+        let time =
+            |row: Option<&usize>| row.and_then(|&row| self.rows.get(row)).map(|row| row.time);
+        let log = [time(self.by_time.first())?, time(self.by_time.last())?];
+        let range = |[first, last]: [f64; 2]| format!("{} to {}", shown(first), shown(last));
+        (self.times[0] <= self.times[1]).then(|| [range(self.times), range(log)])
+    }
+
     /// Returns the files of the joint table.
     pub fn files(&self) -> Vec<PathBuf> {
         let mut files: Vec<PathBuf> = self.rows.iter().map(|row| row.file.clone()).collect();
@@ -238,7 +273,7 @@ impl JoinedLog {
             return Err(self
                 .location
                 .clone()
-                .error(TableErrorKind::NothingJoined { gap: self.gap() }));
+                .error(TableErrorKind::NothingJoined { gap: self.gap(), keys: self.keys() }));
         }
         let unused = self.rows.iter().filter(|row| !row.is_used);
         let unused: Vec<Location> = match self.rule {

@@ -22,11 +22,13 @@ impl<'a> Names<'a> {
     /// Applies the map to the columns of a table.
     ///
     /// A table that has none of the map's names is read by flexcal's names, so that files written
-    /// by flexcal are readable whatever the map says.
+    /// by flexcal are readable whatever the map says. In a table of poses that are not `measured`,
+    /// a rule whose column does not exist is skipped: such tables lack the measured columns.
     ///
     /// # Errors
-    /// Returns an error if the column of a rule does not exist or is ambiguous.
-    pub fn map(table: &'a Table, dialect: &'a Dialect) -> Result<Self, InputError> {
+    /// Returns an error if the column of a rule is ambiguous, or does not exist in a table of
+    /// measurements.
+    pub fn map(table: &'a Table, dialect: &'a Dialect, measured: bool) -> Result<Self, InputError> {
         let mut of_place: Vec<(&str, Option<&ColumnRule>)> =
             table.header.iter().map(|name| (name.as_str(), None)).collect();
         let has = |name: &String| table.header.contains(name);
@@ -58,7 +60,7 @@ impl<'a> Names<'a> {
                 ColumnSelector::Name(name) => only_place(rule, name, table)?,
             };
             let Some(entry) = place.and_then(|place| of_place.get_mut(place)) else {
-                if has(&rule.ours) || is_given_otherwise(rule) {
+                if !measured || has(&rule.ours) || is_given_otherwise(rule) {
                     continue;
                 }
                 return Err(no_such(rule, table));

@@ -3,6 +3,7 @@
 use super::columns::{Column, Columns};
 use super::role::Role;
 use super::table::{Table, shortened};
+use super::time::is_ambiguous;
 use crate::error::{InputError, TableErrorKind, Warning, WarningKind};
 use crate::quantity::Unit;
 
@@ -27,6 +28,12 @@ impl Columns {
             let (theirs, value) =
                 (table.name_of(column.place), shortened(table.text(column.place)?));
             let is_number = value.is_empty() || table.number(column.place).is_ok();
+            if is_ambiguous(&value) {
+                return Err(table
+                    .column(theirs)
+                    .at_line(table.line())
+                    .error(TableErrorKind::AmbiguousDate { value }));
+            }
             if !is_number && theirs != "time" {
                 return Err(table
                     .column(theirs)

@@ -10,7 +10,7 @@ use super::cell_style::CellStyle;
 use super::dialect::{HEADER_SEARCH_BYTES, Layout, NormalizedText};
 use super::latin::decoded_record;
 use super::lines::{Lines, MAX_RECORD_KIB};
-use super::time::date_time;
+use super::time::{date_time, is_ambiguous};
 use crate::error::{
     BYTE_ORDER_MARKS, Excerpt, InputError, InputErrorKind, Location, TableErrorKind, Warning,
     WarningKind, is_hidden, lines,
@@ -40,6 +40,8 @@ pub(super) struct Table {
     style: CellStyle,
     /// Format of the appended cells of another table, and the number of cells before them.
     appended: Option<(CellStyle, usize)>,
+    /// File and header line of the appended columns.
+    appended_header: Option<(PathBuf, usize)>,
     /// File and line from which the appended cells of the current row come.
     partner: Option<(PathBuf, usize)>,
     /// Number of the first line that was decoded from Windows-1252; `None` if there is none.
@@ -93,6 +95,7 @@ impl Table {
                 decimal_comma: dialect.decimal_comma,
             },
             appended: None,
+            appended_header: None,
             partner: None,
             decoded_line: None,
         };
@@ -137,7 +140,11 @@ impl Table {
         let expected = self.appended.map_or(self.header.len(), |(_, own_cells)| own_cells);
         if self.record.len() != expected {
             let found = self.record.len();
-            return Err(self.error(TableErrorKind::RowLength { expected, found }));
+            return Err(self.error(if self.is_empty_row() {
+                TableErrorKind::EmptyRow
+            } else {
+                TableErrorKind::RowLength { expected, found }
+            }));
         }
         if !self.record.as_slice().is_ascii() {
             for place in 0..self.record.len() {
@@ -207,8 +214,11 @@ impl Table {
 
     /// Appends columns of another table to the header; [`append_cells`](Self::append_cells) fills
     /// them row by row.
-    pub fn extend_header(&mut self, names: Vec<String>, style: CellStyle) {
+    ///
+    /// `place` is the file and the header line of the other table.
+    pub fn extend_header(&mut self, names: Vec<String>, style: CellStyle, place: (PathBuf, usize)) {
         self.appended = Some((style, self.header.len()));
+        self.appended_header = Some(place);
         self.header.extend(names);
     }
 
@@ -220,6 +230,11 @@ impl Table {
     ) {
         cells.for_each(|cell| self.record.push_field(cell));
         self.partner = Some((file.to_owned(), line));
+    }
+
+    /// Returns the file and the line of the header.
+    pub fn header_place(&self) -> (PathBuf, usize) {
+        (self.file.clone(), self.header_line)
     }
 
     /// Returns the line of the current row, counted from 1.
@@ -238,11 +253,20 @@ impl Table {
             .map_err(|_| self.cell_error(place, InputErrorKind::NotUtf8))
     }
 
+    /// Returns true if the current row has only white space and separators.
+    fn is_empty_row(&self) -> bool {
+        self.record.iter().all(|cell| cell.trim_ascii().is_empty())
+    }
+
     /// Returns a cell of the current row as a word that is not empty.
     pub fn word(&self, place: usize) -> Result<&str, InputError> {
         let word = self.text(place)?;
         if word.is_empty() {
-            Err(self.cell_error(place, TableErrorKind::EmptyCell))
+            Err(if self.is_empty_row() {
+                self.error(TableErrorKind::EmptyRow)
+            } else {
+                self.cell_error(place, TableErrorKind::EmptyCell)
+            })
         } else {
             Ok(word)
         }
@@ -298,6 +322,10 @@ impl Table {
         let word = self.word(place)?;
         match date_time(word) {
             Some(seconds) => Ok(seconds),
+            None if is_ambiguous(word) => {
+                Err(self
+                    .cell_error(place, TableErrorKind::AmbiguousDate { value: shortened(word) }))
+            }
             None if word.bytes().filter(|byte| b"-:T".contains(byte)).count() > 1 => {
                 Err(self.cell_error(place, TableErrorKind::NotATime { value: shortened(word) }))
             }
@@ -328,9 +356,13 @@ impl Table {
 
     /// Returns the location of a column in the header line, for errors.
     pub fn column(&self, name: &str) -> Location {
-        Location::file(&self.file)
-            .at_line(self.header_line)
-            .with_key(format!("column {}", shortened(name)))
+        let place = self.header.iter().position(|header| header == name);
+        let is_appended =
+            self.appended.is_some_and(|(_, own_cells)| place.is_some_and(|k| k >= own_cells));
+        let appended = self.appended_header.as_ref().filter(|_| is_appended);
+        let (file, line) =
+            appended.map_or((&self.file, self.header_line), |(file, line)| (file, *line));
+        Location::file(file).at_line(line).with_key(format!("column {}", shortened(name)))
     }
 
     /// Creates an error about the whole current row.

@@ -1,13 +1,75 @@
 //! Parsers of dates and times.
 
-/// Parses a date and time of ISO 8601, day first (`31.05.2024 14:03:20`) or with slashes behind the
-/// year (`2024/05/31 14:03:20`) and returns the seconds since 1970-01-01T00:00 UTC.
+/// Parses a date and time of ISO 8601, day first (`31.05.2024 14:03:20`), with slashes behind the
+/// year (`2024/05/31 14:03:20`) or month first (`05/31/2024 02:03:20 PM`) and returns the seconds
+/// since 1970-01-01T00:00 UTC.
 ///
-/// `05/06/2024` is not accepted, because day and month may stand in either order.
+/// The month stands first if the clock has AM or PM, or if the second number is above 12. Otherwise
+/// `05/06/2024` is not accepted ([`is_ambiguous`]), because day and month may stand in either order.
 pub(super) fn date_time(text: &str) -> Option<f64> {
     iso_8601(text)
         .or_else(|| iso_8601(&iso_from_day_first(text.trim())?))
         .or_else(|| iso_8601(&iso_from_slashes(text.trim())?))
+        .or_else(|| {
+            let (month_first, is_clear) = iso_from_month_first(text.trim())?;
+            iso_8601(&month_first).filter(|_| is_clear)
+        })
+}
+
+/// Returns true for a date with slashes whose day and month may stand in either order.
+pub(super) fn is_ambiguous(text: &str) -> bool {
+    iso_from_month_first(text.trim())
+        .is_some_and(|(date, is_clear)| !is_clear && iso_8601(&date).is_some())
+}
+
+/// Rewrites `11/25/2026 09:00:12 PM` as `2026-11-25 21:00:12`; the flag is true if the month is
+/// known to stand first.
+fn iso_from_month_first(text: &str) -> Option<(String, bool)> {
+    let (date, clock) = text.split_once(' ')?;
+    let [month, day, year] = date.split('/').collect::<Vec<_>>()[..] else { return None };
+    let is_short = |word: &str| (1..=2).contains(&word.len());
+    if year.len() != 4 || !is_short(month) || !is_short(day) {
+        return None;
+    }
+    let clock = clock.trim();
+    let half = |mark: &str| {
+        let place = clock.len().checked_sub(mark.len())?;
+        let (time, end) = (clock.get(..place)?, clock.get(place..)?);
+        end.eq_ignore_ascii_case(mark).then(|| time.trim_end())
+    };
+    let (time, noon) = match (half("AM"), half("PM")) {
+        (Some(time), _) => (time, Some(0)),
+        (_, Some(time)) => (time, Some(12)),
+        _ => (clock, None),
+    };
+    let (hour, rest) = time.split_once(':')?;
+    let hour: u32 = hour.parse().ok()?;
+    let hour = match noon {
+        Some(noon) if (1..=12).contains(&hour) => hour % 12 + noon,
+        Some(_) => return None,
+        None => hour,
+    };
+    let is_clear = noon.is_some() || day.parse::<u32>().is_ok_and(|day| day > 12);
+    Some((format!("{year}-{month:0>2}-{day:0>2} {hour:02}:{rest}"), is_clear))
+}
+
+/// Smallest time that [`shown`] writes as a date \[s\]: 1990-01-01. Smaller numbers are seconds of
+/// a clock that starts anywhere.
+const FIRST_DATE: f64 = 631_152_000.0;
+
+/// Returns a time as text: a date and time, or seconds.
+pub(super) fn shown(seconds: f64) -> String {
+    if seconds < FIRST_DATE {
+        return format!("{seconds:.1} s");
+    }
+    let whole = seconds as i64;
+    let (day, clock) = (whole.div_euclid(86_400), whole.rem_euclid(86_400));
+    let after = |&year: &i64| days(year, 1, 1) <= day;
+    let year = (1970..10_000).take_while(after).last().unwrap_or(1970);
+    let month = (1..=12).rev().find(|&month| days(year, month, 1) <= day).unwrap_or(1);
+    let date = day - days(year, month, 1) + 1;
+    let [hour, minute, second] = [clock / 3600, clock / 60 % 60, clock % 60];
+    format!("{year}-{month:02}-{date:02} {hour:02}:{minute:02}:{second:02}")
 }
 
 /// Rewrites `2024/5/31 14:03` as `2024-05-31 14:03`.
@@ -145,14 +207,21 @@ mod tests {
             ("1.2.2024 9:05", "2024-02-01T09:05"),
             ("31.05.2024 14:03:20+02:00", "2024-05-31T14:03:20+02:00"),
             ("2024/5/31 14:03:20", "2024-05-31T14:03:20"),
+            ("05/31/2024 14:03", "2024-05-31T14:03"),
+            ("11/05/2026 09:00:12 AM", "2026-11-05T09:00:12"),
+            ("11/25/2026 12:00:12 am", "2026-11-25T00:00:12"),
+            ("11/25/2026 1:00:12.5 PM", "2026-11-25T13:00:12.5"),
         ] {
             assert_eq!(date_time(text), iso_8601(iso), "{text}");
             assert!(date_time(text).is_some(), "{text}");
         }
         for text in
-            ["31.05.24 14:03", "31.05.2024", "05/31/2024 14:03", "32.05.2024 14:03", "1.2.3"]
+            ["31.05.24 14:03", "31.05.2024", "05/06/2024 14:03", "32.05.2024 14:03", "1.2.3"]
         {
             assert_eq!(date_time(text), None, "{text}");
         }
+        assert!(is_ambiguous("05/06/2024 14:03") && !is_ambiguous("05/31/2024 14:03"));
+        assert_eq!(shown(1_717_157_000.25), "2024-05-31 12:03:20");
+        assert_eq!(shown(12.5), "12.5 s");
     }
 }

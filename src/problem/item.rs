@@ -51,8 +51,35 @@ impl Document {
             let near_text =
                 self.text.get(span.clone()).unwrap_or_default().chars().take(40).collect();
             let message = error.message().to_owned();
-            self.locate(span).error(InputErrorKind::Syntax { message, near_text })
+            let remedy = self.syntax_remedy(span.start);
+            self.locate(span).error(InputErrorKind::Syntax { message, near_text, remedy })
         })
+    }
+
+    /// Returns the remedy of a usual mistake at a byte of the text; empty if none is recognised.
+    fn syntax_remedy(&self, place: usize) -> &'static str {
+        let (before, after) = (
+            self.text.get(..place).unwrap_or_default(),
+            self.text.get(place..).unwrap_or_default(),
+        );
+        let is_digit = |character: char| character.is_ascii_digit();
+        let has_decimal_comma = after
+            .strip_prefix(',')
+            .is_some_and(|next| next.starts_with(is_digit) && before.ends_with(is_digit))
+            || before
+                .strip_suffix(',')
+                .is_some_and(|number| number.ends_with(is_digit) && after.starts_with(is_digit));
+        let first = self.text.lines().next().unwrap_or_default();
+        if !before.contains('\n') && !first.contains('=') && first.contains([',', ';', '\t']) {
+            "; this is a table of measurements: PROBLEM is a problem.toml or its folder, and --data \
+             names tables"
+        } else if has_decimal_comma {
+            "; write numbers with a decimal point"
+        } else if after.starts_with(['*', '?']) {
+            "; write a pattern in quotes, as in \"base.*\""
+        } else {
+            ""
+        }
     }
 
     /// Returns the place of a span of the text.

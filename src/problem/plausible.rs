@@ -9,6 +9,8 @@ use crate::quantity::rounded_right_angle;
 
 /// Largest plausible length in the joint table \[m\]. Longer ones are probably in millimetres.
 const MAX_PLAUSIBLE_LENGTH: f64 = 20.0;
+/// Largest usual limit of a joint, as a number of radians. Limits of that many degrees are suspect.
+const MAX_RADIANS: f64 = TAU + 0.02;
 /// Minimum number of rows in which the form of a table can be recognised.
 const MIN_ROWS: usize = 3;
 
@@ -61,7 +63,21 @@ impl Problem {
     /// Returns warnings about values of the arm that are probably in another unit or convention.
     #[doc(hidden)]
     pub fn plausibility_warnings(&self) -> Vec<Warning> {
-        self.warnings.iter().cloned().chain(self.far_target()).collect()
+        let warnings = self.warnings.iter().cloned();
+        warnings.chain(self.far_target()).chain(self.narrow_limits()).collect()
+    }
+
+    /// Returns a warning if all turning joints have limits that would be usual numbers of radians.
+    fn narrow_limits(&self) -> Option<Warning> {
+        let turning: Vec<&Joint> =
+            self.joints.iter().filter(|joint| joint.kind == JointKind::Revolute).collect();
+        let widest = |joint: &&Joint| joint.limits.0.abs().max(joint.limits.1.abs());
+        let widest = turning.iter().map(widest).fold(0.0, f64::max).to_degrees();
+        let first = turning.first().filter(|_| turning.len() >= MIN_ROWS)?;
+        (widest > 0.0 && widest <= MAX_RADIANS).then(|| Warning {
+            location: first.location.clone(),
+            kind: WarningKind::LimitsLookLikeRadians { widest: format!("{widest:.1}") },
+        })
     }
 
     /// Returns a warning if a target is farther from its frame than twice the length of the arm.

@@ -33,6 +33,7 @@ pub fn acceptance_page(problem: &Problem, result: &AcceptanceResult) -> String {
         ],
         of: counted(result.poses, "held-out pose"),
         facts: Vec::new(),
+        is_doubtful: !result.trusted,
     };
     let trust = if result.trusted {
         "The fit is trusted."
@@ -109,7 +110,9 @@ pub fn tolerance_text(test: &TestedTolerance) -> String {
         )
     } else {
         let needed = test.poses_to_pass.map_or_else(String::new, |needed| {
-            format!(" {needed} held-out poses with no more of them beyond would pass.")
+            let more = needed.saturating_sub(test.poses);
+            let poses = counted(more, "more held-out pose");
+            format!(" Measure {poses}; if all stay within, it passes.")
         });
         format!(
             "Undecided: the held-out poses are too few to say whether {share} of the poses err by no \
@@ -150,8 +153,8 @@ fn judgement<'a>(result: &AcceptanceResult) -> Vec<Block<'a>> {
     };
     let bound = result.bound.as_ref().map(|bound| {
         Block::Text(format!(
-            "Bounds of {} % from the rows fitted: {} mm on average; {} % of the held-out rows lie \
-             within theirs.",
+            "The fit expects {} % of the errors to stay below a bound of {} mm on average; {} % of the \
+             held-out rows do stay below theirs.",
             (bound.bounds.level * 1e6).round() / 1e4,
             number(bound.bounds.mean_bound_mm, 4),
             number(bound.coverage * 100.0, 1),

@@ -46,7 +46,11 @@ fn blocks<'a>(problem: &Problem, check: &Check) -> Vec<Block<'a>> {
         Block::lines(enough(check)),
         Block::lines(prediction(check)),
         Block::Table(Table::new(&header, rows.collect(), &[0, 4, 5]).noted(&notes)),
-        conditioning(&forecast.identifiability, names.len(), check.coordinates),
+        Block::Page(vec![conditioning(
+            &forecast.identifiability,
+            names.len(),
+            check.coordinates,
+        )]),
         unidentifiable(&forecast.identifiability, &names, "check.json"),
         Block::lines(
             "With more or fewer such poses (rank; parameters of the arm identified to 90 % or more; error of predictions):",
@@ -57,7 +61,7 @@ fn blocks<'a>(problem: &Problem, check: &Check) -> Vec<Block<'a>> {
     // Measured poses do not include the held-out ones.
     let poses = (check.predicted_at != PredictionPoses::HeldOut).then_some(forecast.poses);
     blocks.extend(assumptions(problem, &forecast.expected, poses));
-    blocks.extend(detection::blocks(&check.detection));
+    blocks.extend(detection::blocks(problem, &check.detection));
     blocks
 }
 
@@ -188,7 +192,7 @@ fn growth(check: &Check) -> Table {
 fn enough(check: &Check) -> String {
     match check.growth.enough {
         Some(enough) => format!(
-            "{enough} poses suffice: they identify all that such poses can, and predictions are as accurate as one measured position."
+            "Measure {enough} poses; more barely help: then all that such poses can identify is identified, and predictions are as accurate as one measured position."
         ),
         None if check.noise.is_none() => {
             "No number of poses is recommended, because nothing measured is a length.".to_owned()

@@ -13,7 +13,7 @@ use super::parameters::parameters;
 use super::probability::percent;
 use super::render::{Report, report, text, text_within};
 use super::unexplained::{correction, places, to_declare, unexplained};
-use super::verdict::{alternative, causes, counts, title, verdict};
+use super::verdict::{alternative, causes, counts, stand_in, title, verdict};
 use super::{effect, residual_tests, trace};
 use crate::problem::Problem;
 use crate::quantity::format::{counted, decimals, number};
@@ -83,8 +83,12 @@ pub fn loop_brief(
 /// data cannot distinguish from it.
 fn cause(found: &FoundEffect) -> Point {
     let values = effect::values(&found.effect.effect, &found.parameters);
-    let mut facts: Vec<String> = values.iter().map(|value| without_effect(value)).collect();
+    // Values of a law that only stands for an unknown one inform nobody.
+    let is_stand_in = stand_in(found).is_some();
+    let mut facts: Vec<String> =
+        values.iter().filter(|_| !is_stand_in).map(|value| without_effect(value)).collect();
     let law = found.claims.as_ref().map(|claims| claims.law.probability);
+    let law = law.filter(|_| !is_stand_in);
     facts.extend(law.map(|law| format!("probability of the law {}", percent(law))));
     let others = match found.alternatives.as_slice() {
         [] => String::new(),
@@ -194,11 +198,18 @@ fn blocks<'a>(
         let rows = rows_of(fit, |errors| errors.held_out);
         format!("{rows} held out, which took no part in any choice")
     };
-    let counts = format!(
-        "{} from {}; {held_out}.",
-        counted(fit.unknowns.len(), "parameter"),
-        rows_of(fit, |errors| errors.identification),
-    );
+    let added = after.unknowns.len().saturating_sub(fit.unknowns.len());
+    let unknowns = if added > 0 {
+        format!(
+            "{} ({} as declared, {added} of what was found)",
+            counted(after.unknowns.len(), "parameter"),
+            fit.unknowns.len()
+        )
+    } else {
+        counted(fit.unknowns.len(), "parameter")
+    };
+    let counts =
+        format!("{unknowns} from {}; {held_out}.", rows_of(fit, |errors| errors.identification),);
     let mut blocks = vec![
         Block::Headline(headline(problem, closure, result)),
         Block::Text(verdict(result, after.sigma_scale < 1.0)),
@@ -263,7 +274,14 @@ fn headline(problem: &Problem, closure: &ClosedLoop, result: &LoopResult) -> Hea
     };
     let (_, unit) = result.after.errors.judged().norms();
     let mut facts = vec![
-        ("Verdict", result.verdict.as_str().replace('-', " ")),
+        (
+            "Verdict",
+            match result {
+                _ if !result.trusted => "not to be trusted".to_owned(),
+                _ if result.is_probably_explained() => "probably explained".to_owned(),
+                _ => result.verdict.as_str().replace('-', " "),
+            },
+        ),
         ("Effects found", counts(result)),
         poses(after),
         fitted_parameters(after),
@@ -272,11 +290,13 @@ fn headline(problem: &Problem, closure: &ClosedLoop, result: &LoopResult) -> Hea
         ("Held out, after", spread(&last)),
     ];
     facts.extend(correction.map(|_| ("Without the correction", format!("{} {unit}", mean(&last)))));
-    facts.extend(known_gain(result).map(|Gain { mean, interval_95: [low, high] }| {
-        let digits = decimals(high - low, 4).max(2);
-        let [mean, low, high] = [mean, low, high].map(|value| number(value, digits));
-        ("Gain of the effects", format!("{mean} {unit}, {low} to {high} {unit} (95 %)"))
-    }));
+    facts.extend(known_gain(result).filter(|_| result.trusted).map(
+        |Gain { mean, interval_95: [low, high] }| {
+            let digits = decimals(high - low, 4).max(2);
+            let [mean, low, high] = [mean, low, high].map(|value| number(value, digits));
+            ("Gain of the effects", format!("{mean} {unit}, {low} to {high} {unit} (95 %)"))
+        },
+    ));
     facts.extend(
         (!problem.effects.is_empty())
             .then(|| ("Effects declared", problem.effects.len().to_string())),
@@ -287,7 +307,7 @@ fn headline(problem: &Problem, closure: &ClosedLoop, result: &LoopResult) -> Hea
     if !result.effects.is_empty() || correction.is_some() {
         states.push((EXTENDED, mean(&best)));
     }
-    Headline { states, unit, of, facts }
+    Headline { states, unit, of, facts, is_doubtful: !result.trusted }
 }
 
 /// Returns reasons for doubt. The fit may not be trusted, or a limit may be active, so that an

@@ -29,16 +29,103 @@ pub fn compare_text(problem: &Problem, comparison: &Comparison) -> String {
         both_parts(joint)
     };
     let mut blocks = vec![Block::lines(format!("{}\n{parts_of}", problem.title))];
-    blocks.extend(as_paper_tables(comparison));
+    blocks.push(Block::Text(verdict(comparison)));
+    if concerns_paper(comparison) {
+        blocks.extend(as_paper_tables(comparison));
+    }
     blocks.extend(no_errors(joint).map(|words| Block::lines(format!("  –: {words}"))));
-    blocks.push(Block::Table(strategies(comparison, true)));
+    blocks.push(Block::Table(grouped(comparison)));
     if !comparison.paper.is_empty() && !problem.effects.is_empty() {
         blocks.push(Block::lines(
             "  paper: the closed forms of [Chen2021], without the declared effects",
         ));
     }
-    blocks.push(Block::Table(parts(comparison, true)));
+    if is_elastic(comparison) {
+        blocks.push(Block::Table(parts(comparison, true)));
+    }
     text(&blocks)
+}
+
+/// Returns true if the problem has the arm of the paper, or the paper's procedure was asked for.
+fn concerns_paper(comparison: &Comparison) -> bool {
+    comparison.is_papers_arm || !comparison.paper.is_empty()
+}
+
+/// Returns true if the arm has elasticity that fits can leave out.
+fn is_elastic(comparison: &Comparison) -> bool {
+    comparison.ablations.len() > 1
+}
+
+/// States which strategy and solver has the smallest held-out error, or that all agree.
+fn verdict(comparison: &Comparison) -> String {
+    let fits = named_strategies(comparison);
+    let mean = |(_, fit): &&NamedFit| fit.errors.judged().norms().0[0];
+    let is_finite = |fit: &&NamedFit| mean(fit).is_finite();
+    let by_mean = |a: &&NamedFit, b: &&NamedFit| mean(a).total_cmp(&mean(b));
+    let best = fits.iter().filter(is_finite).min_by(by_mean);
+    let worst = fits.iter().filter(is_finite).max_by(by_mean);
+    let (Some(best), Some(worst)) = (best, worst) else {
+        return "No strategy has an error to compare.".to_owned();
+    };
+    let unit = best.1.errors.judged().norms().1;
+    let size = |fit: &NamedFit| format!("{} {unit}", number(mean(&fit), 4));
+    let rows = held_out_rows(&comparison.joint);
+    if size(best) == size(worst) {
+        return format!(
+            "All {} combinations of strategy and solver agree: mean error of the {rows} {}.",
+            fits.len(),
+            size(best)
+        );
+    }
+    format!(
+        "Smallest mean error of the {rows}: {} ({}, {}); largest: {} ({}, {}).",
+        size(best),
+        best.0,
+        best.1.solver,
+        size(worst),
+        worst.0,
+        worst.1.solver
+    )
+}
+
+/// Returns the table of strategies and solvers without the fits whose errors are those of a row
+/// above, which a note names.
+fn grouped(comparison: &Comparison) -> Table {
+    let (mut shown, mut same): (Vec<NamedFit>, Vec<Vec<NamedFit>>) = (Vec::new(), Vec::new());
+    for fit in named_strategies(comparison) {
+        match shown.iter().position(|other| errors_in_digits(other) == errors_in_digits(&fit)) {
+            Some(place) => same[place].push(fit),
+            None => {
+                shown.push(fit);
+                same.push(Vec::new());
+            }
+        }
+    }
+    let mut table = side_by_side(comparison, "strategy", &shown, true);
+    for ((name, fit), others) in shown.iter().zip(&same).filter(|(_, others)| !others.is_empty()) {
+        let mut strategies: Vec<(&str, Vec<&str>)> = Vec::new();
+        for (strategy, other) in others {
+            match strategies.last_mut() {
+                Some((last, solvers)) if last == strategy => solvers.push(other.solver),
+                _ => strategies.push((strategy, vec![other.solver])),
+            }
+        }
+        let words =
+            strategies.iter().map(|(name, solvers)| format!("{name} ({})", solvers.join(", ")));
+        let unit = fit.errors.judged().norms().1;
+        table.notes.push(format!(
+            "the same to 0.0001 {unit} as {name}, {}: {}",
+            fit.solver,
+            words.collect::<Vec<_>>().join("; ")
+        ));
+    }
+    table
+}
+
+/// Returns the errors of a fit in the digits that the table shows.
+fn errors_in_digits((_, fit): &NamedFit) -> Vec<String> {
+    let summaries = [fit.errors.judged(), &fit.errors.identification];
+    summaries.iter().flat_map(|summary| summary.norms().0).map(|value| number(value, 4)).collect()
 }
 
 /// Returns true if every row of the data measures a position.
@@ -70,7 +157,7 @@ fn blocks<'a>(
 ) -> Vec<Block<'a>> {
     let joint = &comparison.joint;
     let held_out = joint.fitted.held_out;
-    let head = Headline {
+    let mut head = Headline {
         states: vec![(BEFORE, mean(&joint.registered.held_out)), ("identified", mean(&held_out))],
         unit: unit(&held_out),
         of: format!(
@@ -81,32 +168,35 @@ fn blocks<'a>(
                 held_out_rows(joint)
             }
         ),
-        facts: vec![
-            poses(joint),
-            fitted_parameters(joint),
-            (
-                "Elasticity ignored",
-                format!("{} {}", mean(&comparison.rigid.fitted.held_out), unit(&held_out)),
-            ),
-            size("Residual against σ", joint),
-        ],
+        facts: vec![poses(joint), fitted_parameters(joint), size("Residual against σ", joint)],
+        is_doubtful: !joint.is_trusted(),
     };
-    let mut blocks = vec![Block::Headline(head), Block::Text(counts(joint))];
+    if is_elastic(comparison) {
+        let error = mean(&comparison.rigid.fitted.held_out);
+        head.facts.push(("Elasticity ignored", format!("{error} {}", unit(&held_out))));
+    }
+    let mut blocks =
+        vec![Block::Headline(head), Block::Text(verdict(comparison)), Block::Text(counts(joint))];
     blocks.extend(fit_warnings(joint, plots));
     blocks.extend([
         Block::heading("Strategies and solvers side by side"),
         Block::Figures(vec![figures::strategies(comparison)]),
-        Block::Table(strategies(comparison, false)),
-        Block::heading("Gain of each part of the elasticity"),
-        Block::figures([figures::ablations(comparison)]),
-        Block::Table(parts(comparison, false)),
+        Block::Table(strategies(comparison)),
     ]);
-    if !comparison.procedures.is_empty() {
+    if is_elastic(comparison) {
+        blocks.extend([
+            Block::heading("Gain of each part of the elasticity"),
+            Block::figures([figures::ablations(comparison)]),
+            Block::Table(parts(comparison, false)),
+        ]);
+    }
+    let procedures = comparison.procedures.iter().filter(|_| concerns_paper(comparison));
+    if concerns_paper(comparison) && !comparison.procedures.is_empty() {
         blocks.push(Block::heading(
             "From each procedure, as in tables 2 and 3 and figure 13 of the paper",
         ));
     }
-    for procedure in &comparison.procedures {
+    for procedure in procedures {
         blocks.push(Block::Text(format!("{}.", title(procedure))));
         blocks.extend([
             Block::Table(table_2(procedure)),
@@ -132,12 +222,16 @@ fn blocks<'a>(
     blocks
 }
 
-/// Returns the table of every strategy and solver, those of the paper last.
-fn strategies(comparison: &Comparison, is_timed: bool) -> Table {
+/// Returns the fits of every strategy and solver, those of the paper last.
+fn named_strategies(comparison: &Comparison) -> Vec<NamedFit> {
     let strategies = comparison.strategies.iter().map(ComparedFit::from);
     let fits = strategies.chain(comparison.paper.iter().map(ComparedFit::from));
-    let named: Vec<NamedFit> = fits.map(|fit| (fit.strategy.clone(), fit)).collect();
-    side_by_side(comparison, "strategy", &named, is_timed)
+    fits.map(|fit| (fit.strategy.clone(), fit)).collect()
+}
+
+/// Returns the table of every strategy and solver.
+fn strategies(comparison: &Comparison) -> Table {
+    side_by_side(comparison, "strategy", &named_strategies(comparison), false)
 }
 
 /// Returns the table of the fits without some part of the elasticity, one row for each part.
@@ -166,13 +260,18 @@ fn side_by_side(
     let fitted = move |name: &'static str, which: usize| {
         Column::number(name, move |(_, fit): &NamedFit| norm(&fit.errors.identification, which))
     };
-    let rms = header(&comparison.joint.fitted.held_out, ["rms, mm", "rms, °", "rms, px"]);
+    let heading = |names: [&'static str; 3]| header(&comparison.joint.fitted.held_out, names);
+    let mean = heading(["held out mean, mm", "held out mean, °", "held out mean, px"]);
+    let rms = heading(["rms, mm", "rms, °", "rms, px"]);
+    let fitted_rms = heading(["fitted rms, mm", "fitted rms, °", "fitted rms, px"]);
+    let fitted_mean = heading(["fitted mean, mm", "fitted mean, °", "fitted mean, px"]);
+    let largest = heading(["held out max, mm", "held out max, °", "held out max, px"]);
     let mut columns = vec![
         Column::words(first, |(name, _): &NamedFit| name.clone()),
         Column::words("solver", |(_, fit): &NamedFit| fit.solver.to_owned()).minor(),
-        held_out("held out mean", 0),
+        held_out(mean, 0),
         held_out(rms, 1),
-        fitted("fitted rms", 1).minor(),
+        fitted(fitted_rms, 1).minor(),
         column("steps", |fit| fit.iterations.to_string()).minor(),
         column("evaluations", |fit| fit.evaluations.to_string()).minor(),
     ];
@@ -185,7 +284,7 @@ fn side_by_side(
     let termination = |(_, fit): &NamedFit| fit.termination.to_owned();
     columns.push(Column::words("termination", termination).minor());
     if !is_timed {
-        columns.extend([fitted("fitted mean", 0), held_out("held out, largest", 2)]);
+        columns.extend([fitted(fitted_mean, 0), held_out(largest, 2)]);
     }
     Table::of(fits, &columns)
 }

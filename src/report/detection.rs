@@ -3,17 +3,19 @@
 use super::document::{Block, Table, code};
 use super::effect;
 use super::forecast::size as shown;
-use crate::problem::Effect;
+use crate::problem::{Effect, JointKind, Problem};
 use crate::select::{Detectable, Detection, Size};
 
 /// Maximum number of effects of a family that a text lists.
 const MAX_SHOWN_EFFECTS: usize = 3;
+/// Effects that only a load shows.
+const LOAD_EFFECTS: [&str; 3] = ["joint-compliance", "link-bending", "base-compliance"];
 /// Note on the columns of the table.
-const COLUMNS: &str = "found from: in the hardest direction of its parameters (axis, phase); at best: in the easiest; –: not found in the hardest direction at any size";
+const COLUMNS: &str = "found from: size at which it is found whatever its axis or phase is; at best: with the axis or phase that shows most; –: not found at any size with some axis or phase";
 
 /// Returns the effects of each family that are hardest to detect, and those that the poses cannot
 /// show.
-pub(super) fn blocks<'a>(detection: &Detection) -> Vec<Block<'a>> {
+pub(super) fn blocks<'a>(problem: &Problem, detection: &Detection) -> Vec<Block<'a>> {
     let seen = |effect: &&Detectable| effect.sizes.iter().any(Size::is_within_prior);
     let (mut visible, mut hidden): (Vec<&Detectable>, Vec<&Detectable>) =
         detection.effects.iter().partition(seen);
@@ -49,6 +51,22 @@ pub(super) fn blocks<'a>(detection: &Detection) -> Vec<Block<'a>> {
             "Only if {} is measured too, a minute or so from pose to pose: {list}.",
             code("time_s")
         )));
+    }
+    let acts_by_load = |effect: &&Detectable| LOAD_EFFECTS.contains(&effect.effect.name());
+    if has_no_mass(problem) && hidden.iter().any(acts_by_load) {
+        let is_moving = |effect: &&&Detectable| {
+            let joint = effect.effect.joint().and_then(|joint| problem.joints.get(joint));
+            joint.is_none_or(|joint| joint.kind != JointKind::Fixed)
+        };
+        let loaded = hidden.iter().filter(|effect| acts_by_load(effect)).filter(is_moving);
+        let list = effect::listed(loaded.map(|effect| &effect.effect)).join("; ");
+        blocks.push(Block::Text(format!(
+            "Not visible, because no mass is declared, so no load acts: {list}. Give the links {} and {} in {}.",
+            code("mass_kg"),
+            code("com_m"),
+            code("[[joint.body]]")
+        )));
+        hidden.retain(|effect| !acts_by_load(&effect));
     }
     if !hidden.is_empty() {
         let list = effect::listed(hidden.into_iter().map(|effect| &effect.effect)).join("; ");
@@ -98,4 +116,9 @@ fn row(effect: &Effect, size: &Size) -> Vec<String> {
         unit.symbol.clone(),
         size.parameters.iter().map(short).collect::<Vec<_>>().join(", "),
     ]
+}
+
+/// Returns true if the problem declares no mass, so that no load deflects the arm.
+fn has_no_mass(problem: &Problem) -> bool {
+    problem.joints.iter().all(|joint| joint.bodies.is_empty() && joint.beam.is_none())
 }

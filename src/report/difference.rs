@@ -144,8 +144,8 @@ fn notes([a, b]: [&SavedEstimate; 2]) -> Vec<String> {
     let shared = a.posterior().fitted_rows.intersection(&b.posterior().fitted_rows).count();
     if shared > 0 {
         notes.push(format!(
-            "{} fitted in both: the standard errors of the differences, which assume different rows, are too large.",
-            counted(shared, "row")
+            "Both fits use {}: the true standard errors of the differences are smaller than shown.",
+            counted(shared, "common row")
         ));
     }
     for (name, estimate) in [("A", a), ("B", b)] {

@@ -120,6 +120,8 @@ pub(super) struct Headline {
     /// Description of the rows over which the headline's errors are averaged.
     pub of: String,
     pub facts: Vec<(&'static str, String)>,
+    /// True if the errors are of a fit that is not to be trusted, so that the last is no gain.
+    pub is_doubtful: bool,
 }
 
 impl Block<'_> {

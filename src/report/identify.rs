@@ -66,6 +66,7 @@ fn blocks<'a>(problem: &Problem, found: &'a Identification, plots: &'a PlotData)
             ("Strategy", found.strategy.as_str().to_owned()),
             ("Solver", format!("{}, {} steps", found.solver.as_str(), found.iterations)),
         ],
+        is_doubtful: !found.is_trusted(),
     };
     let mut blocks = vec![Block::Headline(head), Block::Text(counts(found))];
     blocks.extend(fit_warnings(found, plots));
@@ -106,9 +107,14 @@ pub(super) fn counts(found: &Identification) -> String {
 
 /// States counts, strategy and solver, then after `separator` how the fit ended.
 fn fitted(found: &Identification, separator: &str) -> String {
+    let end = if found.termination.converged() {
+        "Converged in".to_owned()
+    } else {
+        format!("{} after", found.termination)
+    };
     let reason = found.solver_reason.map(|reason| format!(" (auto: {reason})")).unwrap_or_default();
     format!(
-        "{} from {}, {} held out; strategy {}, solver {}{reason}{separator}{} after {}",
+        "{} from {}, {} held out; strategy {}, solver {}{reason}{separator}{end} {}",
         counted(found.unknowns.len(), "parameter"),
         measured(found),
         if found.fitted.is_left_out {
@@ -118,7 +124,6 @@ fn fitted(found: &Identification, separator: &str) -> String {
         },
         found.strategy.as_str(),
         found.solver.as_str(),
-        found.termination,
         counted(usize::try_from(found.iterations).unwrap_or(usize::MAX), "step"),
     )
 }

@@ -33,6 +33,7 @@ fn blocks<'a>(problem: &Problem, options: &NextOptions, next: &NextPoses) -> Vec
         counted(next.workspace_poses, "pose"),
     );
     let mut blocks = opening(&problem.title, counts).to_vec();
+    blocks.push(Block::Text(verdict(options, next)));
     blocks.push(Block::Text(match next.error {
         Some(error) => format!(
             "In the workspace the identified arm errs by {} ± {} mm (expected rms, noise included), and by less than {} mm with a \
@@ -41,7 +42,7 @@ fn blocks<'a>(problem: &Problem, options: &NextOptions, next: &NextPoses) -> Vec
             mm(error.expected_sigma),
             mm(error.bound),
             next.attainable
-                .map(|least| format!(" Any number of further poses would bring the rms to {} mm.", mm(least)))
+                .map(|least| format!(" No number of further poses brings the rms below {} mm.", mm(least)))
                 .unwrap_or_default(),
             mm(next.misfit),
             mm(next.noise),
@@ -53,7 +54,6 @@ fn blocks<'a>(problem: &Problem, options: &NextOptions, next: &NextPoses) -> Vec
             mm(next.noise),
         ),
     }));
-    blocks.extend(verdict(options, next).map(Block::Text));
     if !next.effects.is_empty() {
         let effects = next.effects.iter().map(crate::problem::Effect::describe);
         blocks
@@ -86,7 +86,7 @@ fn errors(options: &NextOptions, next: &NextPoses, percent: &str) -> Option<Draw
         options.tolerance.map(|most| (format!("tolerance {} mm", mm(most)), most * 1e3));
     let least = next
         .attainable
-        .map(|least| (format!("rms after any number of poses {} mm", mm(least)), least * 1e3));
+        .map(|least| (format!("least rms that poses can reach {} mm", mm(least)), least * 1e3));
     let caption = format!(
         "Error of predicted positions in the workspace, measurement noise included, now (0) and expected after each chosen pose: \
          the root mean square, and the bound that {percent} % of the errors do not exceed."
@@ -122,30 +122,31 @@ fn commands(problem: &Problem, next: &NextPoses) -> Table {
 }
 
 /// Returns the sentence that ends a series of measurements, or forecasts its end.
-fn verdict(options: &NextOptions, next: &NextPoses) -> Option<String> {
+fn verdict(options: &NextOptions, next: &NextPoses) -> String {
     let tolerance = options.tolerance.map(mm);
     match (next.stop, tolerance, next.enough_after(options.tolerance)) {
         (Some(StopReason::Enough), Some(tolerance), _) => {
-            Some(format!("Enough: the bound is below the tolerance of {tolerance} mm."))
+            format!("Enough: the bound is below the tolerance of {tolerance} mm.")
         }
-        (Some(StopReason::GainBelowNoise), Some(tolerance), _) => Some(format!(
+        (Some(StopReason::GainBelowNoise), Some(tolerance), _) => format!(
             "Further poses gain less than the uncertainty of the error itself, and the bound is above the tolerance of {tolerance} mm: \
              a better model is needed, not more poses."
-        )),
-        (Some(StopReason::GainBelowNoise), None, _) => Some(
-            "Enough: all that further poses can gain is less than the uncertainty of the error itself.".to_owned(),
         ),
-        (Some(StopReason::NoCandidates), ..) => {
-            Some("These are all poses of the pool that are not measured.".to_owned())
+        (Some(StopReason::GainBelowNoise), None, _) => {
+            "Enough: all that further poses can gain is less than the uncertainty of the error itself.".to_owned()
         }
-        (_, Some(tolerance), Some(poses)) => Some(format!(
-            "After {} the bound is expected to be below the tolerance of {tolerance} mm.",
+        (Some(StopReason::NoCandidates), ..) => {
+            "These are all poses of the pool that are not measured.".to_owned()
+        }
+        (_, Some(tolerance), Some(poses)) => format!(
+            "Not yet enough: after {} the bound is expected to be below the tolerance of {tolerance} mm.",
             counted(poses, "more pose")
-        )),
-        (_, Some(tolerance), None) if !next.steps.is_empty() && next.error.is_some() => Some(format!(
-            "After these poses the bound is still expected to be above the tolerance of {tolerance} mm."
-        )),
-        _ => None,
+        ),
+        (_, Some(tolerance), None) if !next.steps.is_empty() && next.error.is_some() => format!(
+            "Not yet enough: after these poses the bound is still expected to be above the tolerance of {tolerance} mm."
+        ),
+        _ if next.error.is_none() => "Not yet enough: too few poses are measured to judge the error.".to_owned(),
+        _ => "Not yet enough: further poses still lower the error.".to_owned(),
     }
 }
 
@@ -167,7 +168,7 @@ fn steps(options: &NextOptions, next: &NextPoses, percent: &str) -> Table {
         Purpose::Both => "sum of the variances of predictions and effects",
     };
     let note = format!(
-        "travel: largest move of a joint from the pose before, share of its range; gain: share of the present {goal}; rms, bound ({percent} %): \
+        "travel: largest move of a joint from the pose before, share of its range; gain: by how much the pose lowers the {goal}, in % of the present one; rms, bound ({percent} %): \
          expected in the workspace after the pose"
     );
     Table::new(&header, rows.collect(), &[]).noted(&[&note])

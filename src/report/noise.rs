@@ -49,8 +49,8 @@ pub(super) fn noise(problem: &Problem, found: &Identification) -> String {
                 if chi2 > 1.0 { ("larger", "explains") } else { ("smaller", "predicts") };
             format!(
                 "Reduced χ² is {}; {}: the residual is {size} than the declared σ {what}.\n\
-                 Fit and standard errors keep the declared σ: residuals and priors together give \
-                 no clear evidence for another one.",
+                 Standard errors assume the declared σ, because the data do not clearly contradict \
+                 it.",
                 short(chi2),
                 expected(found),
             )

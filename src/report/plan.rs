@@ -11,9 +11,8 @@ use crate::design::{Criterion, PairSeparation, Plan};
 use crate::problem::Problem;
 use crate::quantity::format::{counted, number, or_dash};
 
-/// States that the poses are too few to determine everything that such poses can determine; `None`
-/// if they suffice.
-fn too_few<'a>(plan: &Plan) -> Option<Block<'a>> {
+/// States whether the poses determine everything that such poses can determine.
+fn enough<'a>(plan: &Plan) -> Block<'a> {
     let Plan { attainable_rank, least_poses, .. } = *plan;
     let (rank, poses) = (plan.planned.identifiability.rank, plan.poses.len());
     let at_least = if least_poses > poses {
@@ -24,13 +23,17 @@ fn too_few<'a>(plan: &Plan) -> Option<Block<'a>> {
     } else {
         "more poses may determine more".to_owned()
     };
-    (rank < attainable_rank).then(|| {
-        Block::Text(format!(
-            "Too few poses: they determine {rank} of the {attainable_rank} combinations of the {} that such poses can determine; \
+    let parameters = counted(plan.planned.expected.len(), "parameter");
+    if rank >= attainable_rank {
+        return Block::Text(format!(
+            "Enough poses: they determine all {rank} combinations of the {parameters} that such poses can determine."
+        ));
+    }
+    Block::Text(format!(
+        "Too few poses: they determine {rank} of the {attainable_rank} combinations of the {} that such poses can determine; \
              {at_least}. The other combinations rest on priors, if there are any.",
-            counted(plan.planned.expected.len(), "parameter")
-        ))
-    })
+        parameters
+    ))
 }
 
 /// Returns the plan as text, ending in a line break; `separated` is given if it distinguishes two
@@ -81,9 +84,9 @@ fn blocks<'a>(
     let meaningful = plan.meaningful();
     let gain = plan.gain(&meaningful).map(|gain| {
         let (factor, than) = if gain < 1.0 { (1.0 / gain, "LARGER") } else { (gain, "smaller") };
-        Block::lines(format!(
-            "The {} parameters of the arm that random poses identify to 90 % or more: standard errors {factor:.2} times {than}\n\
-             than with random poses (geometric mean).",
+        Block::Text(format!(
+            "These poses make the standard errors {factor:.2} times {than} than random poses do (geometric mean of the {} parameters \
+             of the arm that random poses identify well).",
             meaningful.len()
         ))
     });
@@ -97,11 +100,15 @@ fn blocks<'a>(
         counted(plan.starts.len(), "start"),
     );
     let mut blocks = opening(&problem.title, counts).to_vec();
-    blocks.extend(too_few(plan));
+    blocks.push(enough(plan));
     blocks.extend(gain);
     blocks.push(Block::Table(Table::new(&header, rows.collect(), &[0, 6]).noted(&[&note])));
     blocks.push(Block::figures([gains(plan)]));
-    blocks.push(conditioning(&planned.identifiability, names.len(), plan.coordinates));
+    blocks.push(Block::Page(vec![conditioning(
+        &planned.identifiability,
+        names.len(),
+        plan.coordinates,
+    )]));
     blocks.push(unidentifiable(&planned.identifiability, &names, "plan.json"));
     blocks.extend(assumptions(problem, &planned.expected, Some(poses + given)));
     blocks.extend(separated.map(separation::blocks).unwrap_or_default());

@@ -26,13 +26,13 @@ pub fn remainder_text(found: &Identification, outcome: &Outcome) -> String {
     let [without, with] = [gain.without, gain.with].map(|error| number(error * 1e3, 4));
     match after {
         Some(after) => format!(
-            "A remainder (smooth correction) at {} is kept: mean error of left-out configurations {without} mm without it, \
-             {with} mm with it; of held-out poses {before} mm and {after} mm.",
+            "A remainder (smooth correction of {}) is kept, because it predicts poses that it was not fitted to better: the mean \
+             error of left-out configurations falls from {without} mm to {with} mm, that of held-out poses goes from {before} mm to {after} mm.",
             counted(outcome.joints, "joint"),
         ),
         None => format!(
-            "No remainder (smooth correction) is kept: mean error of left-out configurations {without} mm without it, \
-             {with} mm with it, a gain of {} standard errors (more than {} are needed); the log \
+            "No remainder (smooth correction) is kept, because it does not clearly predict left-out configurations better: mean error \
+             {without} mm without it, {with} mm with it, a gain of {} standard errors (more than {} are needed); the log \
              predictive density changes by {} per row, {} standard errors (more than {} are needed), \
              the log likelihood by {} (more than {} is needed).",
             number(gain.error.ratio(), 2),
@@ -87,7 +87,7 @@ pub(crate) fn bound_text(plots: &PlotData) -> Option<String> {
     let percent = (level * 1e6).round() / 1e4;
     mean.is_finite().then(|| {
         format!(
-            "Predictions in the workspace err by less than {} mm ({percent} %; mean of the bounds).",
+            "At {percent} % of poses the error of predictions stays below {} mm (mean over the workspace).",
             two_digits(mean * 1e3, 4)
         )
     })

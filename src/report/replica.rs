@@ -40,6 +40,7 @@ pub fn replica_report(study: &MisprintStudy, found: &ReplicaResults) -> Report {
             "Everything fitted at once",
             format!("{} mm", error(|replica| Some(replica.joint))),
         )],
+        is_doubtful: false,
     };
     let mut blocks = vec![Block::Headline(head), Block::Text(counts(study))];
     blocks.push(Block::Figures(vec![figures::misprints(study, found)]));

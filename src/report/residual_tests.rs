@@ -19,8 +19,7 @@ pub(super) fn other_reduced_chi2(tests: &ResidualTests, chi2: Option<f64>) -> Op
         .as_ref()
         .ok()?;
     (number(size.statistic, 2) != number(chi2?, 2)).then(|| {
-        "The tests have another χ²/ν than the fit, because they leave out outliers and fit stiffnesses separately that the problem \
-         holds equal."
+        "χ²/ν of these tests is not that of the fit: the tests leave out outliers, and fit each stiffness by itself."
             .to_owned()
     })
 }

@@ -40,6 +40,7 @@ pub(crate) fn trace_page(problem: &Problem, trace: &Trace, plots: &PlotData) -> 
 fn blocks<'a>(problem: &Problem, trace: &Trace, plots: Option<&PlotData>) -> Vec<Block<'a>> {
     let result = TraceResult::new(problem, trace);
     let mut blocks = opening(&problem.title, headline(&trace.fit)).to_vec();
+    blocks.push(Block::Text(verdict(&result)));
     blocks.extend(hypothesis_sets(&result));
     blocks.extend([
         Block::heading("Tests of the residual (measured − predicted) of the identification poses"),
@@ -85,6 +86,26 @@ fn headline(fit: &Identification) -> String {
     )
 }
 
+/// States what the residual points to.
+fn verdict(result: &TraceResult) -> String {
+    let structure = if result.structured {
+        "The residual has structure"
+    } else {
+        "The residual looks like noise"
+    };
+    let best = result.ranking.first().filter(|candidate| candidate.p_value < result.level);
+    let cause = match (result.explanations.first(), best) {
+        (Some(set), _) if !set.hypotheses.is_empty() => {
+            let words = set.hypotheses.iter().map(|hypothesis| hypothesis.description.clone());
+            let words: Vec<String> = words.collect();
+            format!("most probable cause: {} ({})", words.join("; and "), percent(set.probability))
+        }
+        (None, Some(candidate)) => format!("it points to: {}", candidate.effect.description),
+        _ => "no cause is visible".to_owned(),
+    };
+    format!("{structure}; {cause}.")
+}
+
 /// Lists the hypothesis sets with their probabilities, and the claims about the most probable one.
 fn hypothesis_sets<'a>(result: &TraceResult) -> Vec<Block<'a>> {
     let words = |hypothesis: &Hypothesis| hypothesis.description.clone();
@@ -98,15 +119,10 @@ fn hypothesis_sets<'a>(result: &TraceResult) -> Vec<Block<'a>> {
     if shown.is_empty() {
         return Vec::new();
     }
-    let mut blocks = vec![
-        Block::heading(
-            "Sets of causes with their probabilities, functions of unknown law included",
-        ),
-        Block::list(shown),
-    ];
+    let mut blocks = vec![Block::heading("Most probable explanations"), Block::list(shown)];
     if !result.claims.is_empty() {
         blocks.push(Block::heading(
-            "Probabilities of claims about the most probable set: the place of a cause, what it depends on, and its law",
+            "How sure the most probable explanation is: where it acts, what it depends on, and its law",
         ));
         blocks.push(Block::list(result.claims.iter().map(claimed)));
     }
@@ -171,8 +187,8 @@ pub(super) fn ranking<'a>(
     }
     if shown.iter().any(|candidate| !candidate.alike.is_empty()) {
         notes.push_str(
-            " In brackets: the angle between the displacements by the two effects after all parameters are fitted; at 0° these \
-             poses do not distinguish them, at 90° they are unrelated. The pose to measure is within the measured ranges.",
+            " In brackets: the angle between the displacements by the two effects after all parameters are fitted, a matter of \
+             geometry; at 0° no data at these poses distinguish them, at small angles only precise data do, and probabilities count that. The pose to measure is within the measured ranges.",
         );
     }
     vec![
@@ -202,7 +218,7 @@ fn point(problem: &Problem, candidate: &Candidate, unit: &str) -> Point {
         let alike =
             |other: &Confounded| format!("{} ({:.0}°)", other.effect.description, other.angle_deg);
         details.push(format!(
-            "hardly distinguishable from: {}",
+            "moves the arm much as: {}",
             named(candidate.alike.iter().map(alike), MAX_SHOWN_CONFOUNDED, "; ")
         ));
     }
@@ -241,7 +257,7 @@ pub(super) fn undetectable_effects<'a>(trace: &Trace) -> Vec<Block<'a>> {
     }
     if !trace.absorbed.is_empty() {
         blocks.push(Block::heading(
-            "Effects that the fitted parameters absorb completely, so that they would not show",
+            "Effects that these poses cannot show, because fitted parameters make up for them exactly",
         ));
         blocks.push(Block::list(effect::listed(&trace.absorbed)));
     }

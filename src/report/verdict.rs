@@ -67,6 +67,9 @@ fn outcome(result: &LoopResult, takes_less: bool) -> String {
             number(size, 1)
         );
     }
+    if result.is_probably_explained() {
+        return probable(result);
+    }
     let is_structured = result.unexplained.is_some();
     match (result.verdict, result.tested) {
         (Verdict::Unexplained, _) if is_structured => {
@@ -99,6 +102,28 @@ fn outcome(result: &LoopResult, takes_less: bool) -> String {
             }
         }
     }
+}
+
+/// States the outcome if at least one law is probable and the residual looks like noise: each
+/// probable cause with its probability and its first rival.
+fn probable(result: &LoopResult) -> String {
+    let cause = |found: &FoundEffect| {
+        let law = found.claims.as_ref().map(|claims| percent(claims.law.probability));
+        let law = law.map_or_else(String::new, |law| format!(" ({law})"));
+        let rival = found
+            .alternatives
+            .first()
+            .map_or_else(String::new, |rival| format!(", or else {}", alternative(rival)));
+        format!("{}{law}{rival}", found.effect.description)
+    };
+    let sure: Vec<&FoundEffect> = result.with_status(Status::Found).collect();
+    let probable: Vec<String> = result.with_status(Status::Probable).map(cause).collect();
+    let sure = match sure.as_slice() {
+        [] => String::new(),
+        [effect] => format!("{}; and probably ", effect.effect.description),
+        effects => format!("{} effects were found, and probably ", effects.len()),
+    };
+    format!("Probably explained: {sure}{}. What is left looks like noise.", probable.join("; and "))
 }
 
 /// States which effects were found, without the full stop.

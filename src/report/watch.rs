@@ -12,6 +12,8 @@ use crate::quantity::format::{counted, decimals, number, or_dash, p_value, two_d
 
 /// Header of the table of causes.
 const HEADER: [&str; 5] = ["cause", "probability", "change ± 1 σ", "error left out", "more poses"];
+/// Probability of an error as large by noise alone below which the text does not call it noise.
+const SIGNIFICANT: f64 = 0.01;
 /// Maximum number of decimals of a change.
 const MAX_DECIMALS: usize = 6;
 
@@ -37,24 +39,32 @@ fn blocks<'a>(problem: &Problem, watch: &Watch, drawn: Option<Drawing>) -> Vec<B
     );
     let _ = write!(
         head,
-        "\nError of the rows: {} rms; σ of a coordinate, known misfit included: {}; χ² {} of {coordinates:.0}, p {}",
+        "\nError of the rows: {} rms, {}",
         in_unit(watch.error),
-        in_unit(watch.sigma),
-        number(chi2, 1),
-        p_value(p)
+        if p < SIGNIFICANT {
+            "more than noise and the known misfit explain"
+        } else {
+            "as expected from noise and the known misfit"
+        }
     );
     if watch.left_out > 0 {
         let rows = counted(watch.left_out, "row");
         let _ = write!(head, "\n{rows} left out, because the estimate was fitted to them");
     }
     let mut blocks = opening(&problem.title, head).to_vec();
+    blocks.push(Block::Page(vec![Block::Text(format!(
+        "σ of a coordinate, known misfit included: {}; χ² {} of {coordinates:.0}, p {}.",
+        in_unit(watch.sigma),
+        number(chi2, 1),
+        p_value(p)
+    ))]));
     blocks.push(Block::figures([drawn]));
     if watch.is_changed() {
         let rows = watch.causes.iter().map(|cause| row(cause, &in_unit)).collect();
         let notes = [
             "probability: among all causes that were tried, given that something changed",
             "error left out: rms of the rows if only this is updated, each row predicted from the others",
-            "more poses: number of further poses like these that would tell this cause from the next one; –: none would",
+            "more poses: number of further poses like these that would distinguish this cause from the next one; –: none would",
         ];
         blocks.push(Block::Table(Table::new(&HEADER, rows, &[0, 2]).noted(&notes)));
     }

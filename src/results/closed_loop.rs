@@ -287,6 +287,20 @@ impl LoopResult {
         self.unexplained.iter().chain(&self.further)
     }
 
+    /// Returns true if at least one law is probable but not certain, every cause has a probable or a
+    /// certain law, and the residual with them looks like noise.
+    pub(crate) fn is_probably_explained(&self) -> bool {
+        let causes = || self.effects.iter().filter(|found| !found.is_only_with_others());
+        let is_named =
+            |found: &FoundEffect| matches!(found.status, Status::Found | Status::Probable);
+        self.verdict == Verdict::Unexplained
+            && (self.trusted && self.tested && !self.interrupted)
+            && self.unexplained.is_none()
+            && !self.is_contradicted()
+            && causes().any(|found| found.status == Status::Probable)
+            && causes().all(is_named)
+    }
+
     /// Returns the test of the size of the residual against the declared σ, if it could be made.
     fn size_test(&self) -> Option<(&ResidualTest, f64)> {
         let test = self.checks_after.iter().find(|test| test.check == "reduced-chi-squared")?;

@@ -42,11 +42,21 @@ pub struct Origin {
     pub turned_deg: f64,
 }
 
-/// Errors on held-out rows, of the whole model and of its rigid geometry alone.
+/// Errors on held-out rows, of the whole model and of geometries alone.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct ExportedErrors {
     pub whole: Summary,
+    /// Exported geometry.
     pub rigid: Summary,
+    /// Identified geometry without the other parts of the model, unless it was exported.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub identified: Option<Summary>,
+    /// Geometry of `--best-rigid`, unless it was exported.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub best_rigid: Option<Summary>,
+    /// Geometry fitted to the same rows by a rigid model without effects.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fitted_alone: Option<Summary>,
 }
 
 impl ExportResult {
@@ -98,7 +108,8 @@ impl ExportedErrors {
             let rows = split.held_out.iter().copied();
             Summary::of(&ErrorSummary::of_rows(measurements, rows, errors))
         };
-        Self { whole: of(&whole), rigid: of(&rigid) }
+        let (whole, rigid) = (of(&whole), of(&rigid));
+        Self { whole, rigid, identified: None, best_rigid: None, fitted_alone: None }
     }
 }
 

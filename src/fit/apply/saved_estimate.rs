@@ -416,7 +416,7 @@ impl SavedEstimate {
     pub(crate) fn differing_part(&self, other: &Self) -> Option<String> {
         let (parts, others) = (&self.arm_parts, &other.arm_parts);
         let differs = |name: &&String| parts.get(*name) != others.get(*name);
-        let part = parts.keys().chain(others.keys()).find(differs).cloned();
+        let part = parts.keys().chain(others.keys()).find(differs).map(|part| shown_part(part));
         part.or_else(|| {
             (self.arm_digest != other.arm_digest).then(|| "the declared arm".to_owned())
         })
@@ -453,7 +453,7 @@ impl SavedEstimate {
         let differs = |name: &&String| parts.get(*name) != self.arm_parts.get(*name);
         match self.arm_parts.keys().chain(parts.keys()).find(differs) {
             Some(part) if !self.arm_parts.is_empty() => {
-                let (file, part) = (self.file.clone(), part.clone());
+                let (file, part) = (self.file.clone(), shown_part(part));
                 Err(SavedEstimateError::OtherPart { file, part })
             }
             _ => checked,
@@ -475,4 +475,10 @@ impl SavedEstimate {
         let missing = |name| SavedEstimateError::Missing { file: self.file.clone(), name };
         model.parameter_vector(|name| self.value(name)).map_err(missing)
     }
+}
+
+/// Returns the name of a part of an arm for display. The names of effects are their declarations
+/// without the closing brace.
+fn shown_part(part: &str) -> String {
+    if part.contains('{') { format!("{} }}", part.trim_end()) } else { part.to_owned() }
 }

@@ -6,6 +6,8 @@ use super::prelude::*;
 const MAX_POSES: usize = 300;
 /// Smallest time span that is labelled in hours \[s\].
 const MIN_HOURS_SPAN: f64 = 7200.0;
+/// Shortest duration of measurements for which the time is shown in minutes \[s\].
+const MIN_MINUTES_SPAN: f64 = 180.0;
 
 /// Draws the residual coordinates of positions in order of time, with a band of ±2 σ.
 pub fn order(data: &PlotData) -> Option<Drawing> {
@@ -23,10 +25,13 @@ pub fn order(data: &PlotData) -> Option<Drawing> {
     let times = range(shown.iter().map(|residual| residual.time));
     let (factor, label) = match (data.time_measured, times.1 - times.0) {
         (false, _) => (1.0, "row"),
-        (true, span) if span > MIN_HOURS_SPAN => (1.0 / 3600.0, "time [h]"),
-        (true, _) => (1.0, "time [s]"),
+        (true, span) if span > MIN_HOURS_SPAN => (1.0 / 3600.0, "time from the first pose [h]"),
+        (true, span) if span > MIN_MINUTES_SPAN => (1.0 / 60.0, "time from the first pose [min]"),
+        (true, _) => (1.0, "time from the first pose [s]"),
     };
-    let across = with_margin((times.0 * factor, times.1 * factor), 0.02);
+    let start = if data.time_measured { times.0 } else { 0.0 };
+    let place = |residual: &PoseError| (residual.time - start) * factor;
+    let across = with_margin(((times.0 - start) * factor, (times.1 - start) * factor), 0.02);
     let sigma = shown.iter().map(|residual| residual.sigma).sum::<f64>() / shown.len() as f64 * 1e3;
     let values = shown.iter().flat_map(|residual| residual.error.iter().map(|x| x * 1e3));
     let limit = axis_limit(values).max(2.2 * sigma) * 1.08;
@@ -38,7 +43,7 @@ pub fn order(data: &PlotData) -> Option<Drawing> {
             let beyond = is_beyond(residual, axis);
             let paint = if beyond { Paint::line(WARM, 1.4) } else { Paint::fill(FAINT) };
             let value = (residual.error[axis] * 1e3).clamp(-limit, limit);
-            Shape::dot((residual.time * factor, value), 2.0, paint, Some(row))
+            Shape::dot((place(residual), value), 2.0, paint, Some(row))
         });
         let band = Shape::band((across.0, -2.0 * sigma), (across.1, 2.0 * sigma), ACCENT);
         Panel::new(80.0, bottom, Axis::linear((-limit, limit), name, 5))
@@ -62,7 +67,7 @@ pub fn order(data: &PlotData) -> Option<Drawing> {
     );
     let cells = shown.iter().map(|&residual| {
         let errors = residual.error.iter().map(|x| x * 1e3);
-        (residual, std::iter::once(residual.time * factor).chain(errors).collect())
+        (residual, std::iter::once(place(residual)).chain(errors).collect())
     });
     let first = if label == "row" { "number" } else { label };
     let columns = [first, "residual_x_mm", "residual_y_mm", "residual_z_mm"];

@@ -15,6 +15,9 @@ use crate::report::figures::Drawing;
 /// Half-width of a bar in standard errors. Larger changes end at its edge.
 const BAR_SIGMAS: f64 = 10.0;
 
+/// Number of columns above which headings may take several lines.
+const MANY_COLUMNS: usize = 9;
+
 /// Scripts of the page: interaction, and the three-dimensional view of the arm.
 const SCRIPTS: [&str; 2] = [include_str!("page.js"), include_str!("view.js")];
 
@@ -184,7 +187,7 @@ fn headline(headline: &Headline) -> Markup {
             @for (k, (label, error)) in headline.states.iter().enumerate() {
                 @if k > 0 { span.arrow { "→" } }
                 span.state {
-                    span class=(if k == last { "now" } else { "was" }) { (error) @if k == last { " " span.unit { (headline.unit) } } }
+                    span class=(if k == last && !headline.is_doubtful { "now" } else { "was" }) { (error) @if k == last { " " span.unit { (headline.unit) } } }
                     span.label { (label) }
                 }
             }
@@ -207,22 +210,22 @@ fn table(table: &Table) -> Markup {
     };
     let bars = table.bars.as_ref();
     html! {
-        @for note in &table.notes { p.o { (words(note)) } }
+        @for note in &table.notes { p { (words(note)) } }
         @if bars.is_some() {
-            p.o { "bars: the change from nominal in units of its standard error, limited to ±10, with an interval of one standard error; \
+            p.wide { "bars: the change from nominal in units of its standard error, limited to ±10, with an interval of one standard error; \
                 larger changes end at the edge, an orange mark there is a bound" }
         }
         // Rows that continue the row above cannot be sorted.
         @let sorts = table.rows.len() > 3 && table.rows.iter().all(|row| row.first().is_some_and(|cell| !cell.is_empty()));
-        div.scroll tabindex="0" role="region" aria-label={ "table: " (table.header.iter().find(|head| !head.is_empty()).unwrap_or(&"")) } { table.sort[sorts] {
+        div.scroll tabindex="0" role="region" aria-label={ "table: " (table.header.iter().find(|head| !head.is_empty()).unwrap_or(&"")) } { table.sort[sorts].many[table.header.len() > MANY_COLUMNS] {
             thead { tr {
                 @for (k, text) in table.header.iter().enumerate() { th class=[class(k)] { (text) } }
-                @if let Some((title, _)) = bars { th.l.o { (title) } }
+                @if let Some((title, _)) = bars { th.l.wide { (title) } }
             } }
             tbody {
                 @for (index, row) in table.rows.iter().enumerate() { tr {
                     @for (k, text) in row.iter().enumerate() { td class=[class(k)] { (words(&cell(k, text))) } }
-                    @if let Some((_, bars)) = bars { td.l.o { (bar(&bars[index])) } }
+                    @if let Some((_, bars)) = bars { td.l.wide { (bar(&bars[index])) } }
                 } }
             }
         } }

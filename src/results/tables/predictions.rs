@@ -103,8 +103,8 @@ fn degrees(angle: Option<f64>) -> String {
     angle.map_or_else(String::new, |angle| fixed(angle.to_degrees(), 6))
 }
 
-/// Returns commands as CSV, with the names and units of the table of targets. Columns are q of
-/// every moving joint (empty if the target is out of reach), desired pose and conditions, and
+/// Returns commands as CSV, with the names and units of the table of targets. Columns are the name
+/// of the pose, if the targets have one, q of every moving joint (empty if the target is out of reach), desired pose and conditions, and
 /// predicted distances.
 pub fn commands_csv(
     problem: &Problem,
@@ -117,6 +117,12 @@ pub fn commands_csv(
         header.push(name.to_owned());
         lines.iter_mut().zip(commands).for_each(|(line, command)| line.push(cell(command)));
     };
+    if let Some(pose) = &targets.pose {
+        add("pose", &|command| pose[command.row].to_string());
+    }
+    if let Some(names) = &targets.pose_names {
+        add("pose", &|command| word(names, command.row));
+    }
     for (joint, name, factor) in columns(problem, targets) {
         // A controller must not receive a command that misses the target.
         let show = |command: &Command| {
