@@ -3,7 +3,7 @@
 use super::document::{Block, Headline, Point, Table, code, first_of, named};
 use super::errors::{both_parts, held_out_rows, judging, measure, rows_of, unpredicted};
 use super::figures;
-use super::found_effects::{found, rounds, status_table};
+use super::found_effects::{found, found_heading, rounds, status_table};
 use super::identify::{
     BEFORE, fit_warnings, fitted_parameters, identifiability_with_figures, mean, poses, spread,
     why_not_trusted,
@@ -59,7 +59,7 @@ pub fn loop_brief(
     if points.is_empty() {
         return text(&blocks) + &end;
     }
-    blocks.push(Block::heading("What was found"));
+    blocks.push(Block::heading(found_heading(result)));
     let height = |points: &[Point]| text(&[Block::Ranking(points.to_vec())]).lines().count();
     let lines_used = text(&blocks).lines().count() + end.lines().count();
     let room = SCREEN_LINES.saturating_sub(lines_used);
@@ -290,13 +290,11 @@ fn headline(problem: &Problem, closure: &ClosedLoop, result: &LoopResult) -> Hea
         ("Held out, after", spread(&last)),
     ];
     facts.extend(correction.map(|_| ("Without the correction", format!("{} {unit}", mean(&last)))));
-    facts.extend(known_gain(result).filter(|_| result.trusted).map(
-        |Gain { mean, interval_95: [low, high] }| {
-            let digits = decimals(high - low, 4).max(2);
-            let [mean, low, high] = [mean, low, high].map(|value| number(value, digits));
-            ("Gain of the effects", format!("{mean} {unit}, {low} to {high} {unit} (95 %)"))
-        },
-    ));
+    facts.extend(known_gain(result).map(|Gain { mean, interval_95: [low, high] }| {
+        let digits = decimals(high - low, 4).max(2);
+        let [mean, low, high] = [mean, low, high].map(|value| number(value, digits));
+        ("Gain of the effects", format!("{mean} {unit}, {low} to {high} {unit} (95 %)"))
+    }));
     facts.extend(
         (!problem.effects.is_empty())
             .then(|| ("Effects declared", problem.effects.len().to_string())),
@@ -358,9 +356,12 @@ fn errors(closure: &ClosedLoop, result: &LoopResult) -> Table {
     Table { minor: vec![3, 4], ..Table::new(&header, rows, &[0, 1]) }
 }
 
-/// Returns the gain on held-out rows, if effects were found and the gain is finite.
+/// Returns the gain on held-out rows, if effects were found, the fit is trusted and the gain is
+/// finite.
 fn known_gain(result: &LoopResult) -> Option<Gain> {
-    result.gain().filter(|gain| !result.effects.is_empty() && gain.mean.is_finite())
+    let is_known =
+        |gain: &Gain| result.trusted && !result.effects.is_empty() && gain.mean.is_finite();
+    result.gain().filter(is_known)
 }
 
 /// States the gain on the held-out rows with its interval, and the size of the residual.

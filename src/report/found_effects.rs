@@ -10,6 +10,11 @@ use crate::quantity::format::{number, or_dash, p_value};
 use crate::results::{FoundEffect, LoopResult, Step, Witness};
 use crate::select::ClosedLoop;
 
+/// Returns the heading of the list of effects: nothing is claimed after a fit that is not trusted.
+pub(super) fn found_heading(result: &LoopResult) -> &'static str {
+    if result.trusted { "What was found" } else { "What the search added, and does not claim" }
+}
+
 /// Lists every effect of the extended problem with its status, at most `alternatives` alternatives
 /// each.
 pub(super) fn found<'a>(result: &LoopResult, alternatives: usize) -> Vec<Block<'a>> {
@@ -17,7 +22,7 @@ pub(super) fn found<'a>(result: &LoopResult, alternatives: usize) -> Vec<Block<'
         return Vec::new();
     }
     let points = result.effects.iter().map(|found| point(result, found, alternatives)).collect();
-    let mut blocks = vec![Block::heading("What was found"), Block::Ranking(points)];
+    let mut blocks = vec![Block::heading(found_heading(result)), Block::Ranking(points)];
     if let Some(prior) = &result.harmonic_prior {
         let sigmas = || prior.iter().map(|order| order.sigma_rad.to_degrees());
         blocks.push(Block::Text(format!(

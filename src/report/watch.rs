@@ -39,12 +39,12 @@ fn blocks<'a>(problem: &Problem, watch: &Watch, drawn: Option<Drawing>) -> Vec<B
     );
     let _ = write!(
         head,
-        "\nError of the rows: {} rms, {}",
+        "\nError of the rows: {} rms{}",
         in_unit(watch.error),
-        if p < SIGNIFICANT {
-            "more than noise and the known misfit explain"
-        } else {
-            "as expected from noise and the known misfit"
+        match p {
+            _ if watch.is_changed() => "",
+            p if p < SIGNIFICANT => ", more than noise and the known misfit explain",
+            _ => ", as expected from noise and the known misfit",
         }
     );
     if watch.left_out > 0 {

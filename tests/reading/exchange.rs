@@ -41,6 +41,13 @@ fn tables_with_names_of_flexcal_are_read_whatever_the_map_says() {
 }
 
 #[test]
+fn targets_need_not_have_the_measured_columns_of_the_map() {
+    let targets = "A1;A2;X;Y;Z\n1;2;3;4;5\n";
+    let (rows, _) = try_poses(&parse(&format!("{ARM}{MAP}")), targets).unwrap();
+    assert!((rows.positions[0].z - 5e-3).abs() < 1e-15 && rows.temperature.is_none());
+}
+
+#[test]
 fn numbers_have_the_declared_decimal_sign() {
     let table = "A1;A2;X;Y;Z;temp\n1,5;2;3;4;5;1.500\n";
     let error = read(MAP, table).unwrap_err();
@@ -53,6 +60,9 @@ fn dates_may_begin_with_the_day() {
     let table = |time: &str| format!("q1_deg,q2_deg,x_mm,y_mm,z_mm,time\n1,2,3,4,5,{time}\n");
     let time = |text| read("", &table(text)).unwrap().0.time[0].to_bits();
     assert_eq!(time("31.05.2024 14:03:20"), time("2024-05-31T14:03:20"));
+    assert_eq!(time("05/31/2024 02:03:20 PM"), time("2024-05-31T14:03:20"));
+    let error = read("", &table("05/06/2024 14:03:20")).unwrap_err();
+    assert_says(&error, &["day and month may stand in either order"]);
 }
 
 #[test]

@@ -24,6 +24,9 @@ fn whole_problems() {
         ("name = 'arm'\nname = 'leg'", &[":2: not valid TOML: duplicate key, near `name`"]),
         ("name = 'arm'\n\n[[joint]", &[":3: not valid TOML"]),
         ("name = 'arm", &[":1: not valid TOML"]),
+        ("name = 'arm'\n[[joint]]\nd_m = 0,1273\n", &["write numbers with a decimal point"]),
+        ("name = 'arm'\n[parameters]\nbase.* = 1\n", &["write a pattern in quotes"]),
+        ("q1_deg,x_mm\n1,2\n", &["PROBLEM is a problem.toml or its folder"]),
         ("name = 'arm'\nmass_kg = 3\n[[joint]]", &[":2: mass_kg: unknown key", "gravity_m_s2"]),
         (
             "name = 'arm'\ngravity = [0, 0, 1]\n[[joint]]",

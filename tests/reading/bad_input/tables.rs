@@ -4,11 +4,16 @@ use super::reading::{ARM, check, table};
 
 #[test]
 fn headers() {
-    let headers: [(&str, &[&str]); 17] = [
+    let headers: [(&str, &[&str]); 19] = [
         ("", &["rows.csv:1: the file is empty"]),
         ("\n\n", &["rows.csv:1: the file is empty"]),
         ("q1_deg,x_m,y_m,z_m\n", &["rows.csv:1: no rows below the header"]),
         ("x_m,y_m,z_m\n1,2,3\n", &["rows.csv:1: column q1: missing; add q1_deg or q1_rad"]),
+        (
+            "J1,X,Y,Z\n1,2,3,4\n",
+            &["flexcal does not know: J1, X, Y, Z; if it is one", "as in \"J1\" = \"q1_deg\""],
+        ),
+        ("q1 [deg],x_m,y_m,z_m\n1,2,3,4\n", &["(is it column q1 [deg]? [data.columns] maps it"]),
         ("q1_deg,x_m,z_m\n1,2,3\n", &["rows.csv:1: column y: missing; add y_m or y_mm"]),
         (
             "q1_deg,X_mm,y_m,z_m\n",
@@ -77,7 +82,7 @@ fn a_name_that_joints_share_is_no_column() {
 
 #[test]
 fn rows() {
-    let rows: [(&str, &[&str]); 20] = [
+    let rows: [(&str, &[&str]); 22] = [
         ("abc,1,2,3,", &["rows.csv:3: column q1_deg: \"abc\" is not a number"]),
         ("1,\"1,5\",2,3,", &["rows.csv:3: column x_mm: \"1,5\" is not a number"]),
         ("1,NaN,2,3,", &["rows.csv:3: column x_mm: NaN is not a finite number"]),
@@ -85,7 +90,9 @@ fn rows() {
         ("1,1,2,-1e999,", &["rows.csv:3: column z_mm: -1e999 is not a finite number"]),
         ("1,,2,3,", &["rows.csv:3: column x_mm: the cell is empty"]),
         ("1,2,3", &["rows.csv:3: the row has 3 fields, the header 5"]),
-        ("1,2,3,4,5,6", &["rows.csv:3: the row has 6 fields, the header 5"]),
+        ("1,2,3,4,5,6", &["rows.csv:3: the row has 6 fields, the header 5; if its numbers have a"]),
+        (",,,,", &["rows.csv:3: the row is empty; delete it"]),
+        ("  ", &["rows.csv:3: the row is empty; delete it"]),
         ("1,2,3,\"4,5", &["rows.csv:3: a quote is opened and not closed"]),
         ("\0\0\0", &["rows.csv:3: the row has 1 fields"]),
         ("\0,1,2,3,", &["rows.csv:3: column q1_deg: \"\\u{0}\" is not a number"]),
