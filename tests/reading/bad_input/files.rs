@@ -12,7 +12,7 @@ use crate::common::reading::{problem_error, read_tables};
 
 #[test]
 fn whole_problems() {
-    let mistakes: [(&str, &[&str]); 13] = [
+    let mistakes: [(&str, &[&str]); 16] = [
         ("", &["problem.toml:1: name: missing"]),
         ("name = ''", &[":1: name: empty"]),
         ("name = 'a/b'", &[":1: name: ", "cannot name a folder"]),
