@@ -290,6 +290,7 @@ fn headline(problem: &Problem, closure: &ClosedLoop, result: &LoopResult) -> Hea
         ("Held out, after", spread(&last)),
     ];
     facts.extend(correction.map(|_| ("Without the correction", format!("{} {unit}", mean(&last)))));
+    facts.retain(|(name, _)| result.trusted || *name != "Effects found");
     facts.extend(known_gain(result).map(|Gain { mean, interval_95: [low, high] }| {
         let digits = decimals(high - low, 4).max(2);
         let [mean, low, high] = [mean, low, high].map(|value| number(value, digits));

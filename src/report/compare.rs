@@ -34,7 +34,7 @@ pub fn compare_text(problem: &Problem, comparison: &Comparison) -> String {
         blocks.extend(as_paper_tables(comparison));
     }
     blocks.extend(no_errors(joint).map(|words| Block::lines(format!("  –: {words}"))));
-    blocks.push(Block::Table(grouped(comparison)));
+    blocks.push(Block::Table(grouped(comparison, true)));
     if !comparison.paper.is_empty() && !problem.effects.is_empty() {
         blocks.push(Block::lines(
             "  paper: the closed forms of [Chen2021], without the declared effects",
@@ -90,7 +90,7 @@ fn verdict(comparison: &Comparison) -> String {
 
 /// Returns the table of strategies and solvers without the fits whose errors are those of a row
 /// above, which a note names.
-fn grouped(comparison: &Comparison) -> Table {
+fn grouped(comparison: &Comparison, is_timed: bool) -> Table {
     let (mut shown, mut same): (Vec<NamedFit>, Vec<Vec<NamedFit>>) = (Vec::new(), Vec::new());
     for fit in named_strategies(comparison) {
         match shown.iter().position(|other| errors_in_digits(other) == errors_in_digits(&fit)) {
@@ -101,7 +101,7 @@ fn grouped(comparison: &Comparison) -> Table {
             }
         }
     }
-    let mut table = side_by_side(comparison, "strategy", &shown, true);
+    let mut table = side_by_side(comparison, "strategy", &shown, is_timed);
     for ((name, fit), others) in shown.iter().zip(&same).filter(|(_, others)| !others.is_empty()) {
         let mut strategies: Vec<(&str, Vec<&str>)> = Vec::new();
         for (strategy, other) in others {
@@ -181,7 +181,15 @@ fn blocks<'a>(
     blocks.extend([
         Block::heading("Strategies and solvers side by side"),
         Block::Figures(vec![figures::strategies(comparison)]),
-        Block::Table(strategies(comparison)),
+        Block::Words(vec![Block::Table(strategies(comparison))]),
+        Block::Page(vec![
+            Block::Table(grouped(comparison, false)),
+            Block::Folded(
+                "Every strategy and solver".to_owned(),
+                vec![Block::Table(strategies(comparison))],
+                "compare.json holds every strategy and solver.".to_owned(),
+            ),
+        ]),
     ]);
     if is_elastic(comparison) {
         blocks.extend([

@@ -108,7 +108,7 @@ pub(super) fn counts(found: &Identification) -> String {
 /// States counts, strategy and solver, then after `separator` how the fit ended.
 fn fitted(found: &Identification, separator: &str) -> String {
     let end = if found.termination.converged() {
-        "Converged in".to_owned()
+        if separator == "\n" { "Converged in" } else { "converged in" }.to_owned()
     } else {
         format!("{} after", found.termination)
     };

@@ -15,6 +15,8 @@ use crate::report::figures::Drawing;
 /// Half-width of a bar in standard errors. Larger changes end at its edge.
 const BAR_SIGMAS: f64 = 10.0;
 
+/// Number of characters above which a word of a table may be broken.
+const MAX_WORD: usize = 32;
 /// Number of columns above which headings may take several lines.
 const MANY_COLUMNS: usize = 9;
 
@@ -204,6 +206,14 @@ fn table(table: &Table) -> Markup {
         (false, true) => Some("o"),
         (false, false) => None,
     };
+    // Long words, such as digests, may be broken anywhere.
+    let classes = |k: usize, text: &str| {
+        let is_long = text.split_whitespace().any(|word| word.chars().count() > MAX_WORD);
+        match class(k) {
+            Some(class) if is_long => Some(format!("{class} long")),
+            class => class.map(str::to_owned),
+        }
+    };
     // Numbers get a minus sign instead of a hyphen; names keep their hyphens.
     let cell = |k: usize, text: &str| {
         if table.left.contains(&k) { text.to_owned() } else { text.replace('-', "−") }
@@ -224,7 +234,7 @@ fn table(table: &Table) -> Markup {
             } }
             tbody {
                 @for (index, row) in table.rows.iter().enumerate() { tr {
-                    @for (k, text) in row.iter().enumerate() { td class=[class(k)] { (words(&cell(k, text))) } }
+                    @for (k, text) in row.iter().enumerate() { td class=[classes(k, text)] { (words(&cell(k, text))) } }
                     @if let Some((_, bars)) = bars { td.l.wide { (bar(&bars[index])) } }
                 } }
             }
