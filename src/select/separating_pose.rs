@@ -8,6 +8,7 @@ use rand_chacha::ChaCha8Rng;
 use super::data::Data;
 use super::neighbourhood::{LinearNeighbourhood, Linearised};
 use crate::measurement::Measurements;
+use crate::observation::Needs;
 use crate::problem::Effect;
 
 /// Pose whose measurement would distinguish two effects.
@@ -31,7 +32,8 @@ pub struct SeparatingPose {
 }
 
 /// Returns random poses within the measured ranges: each quantity of a pose has the value of a
-/// randomly chosen identification row.
+/// randomly chosen identification row. Joints of image rows stay together, because cameras see
+/// nothing in most other configurations.
 pub(super) fn shuffled(data: &Data) -> Measurements {
     let mut rng = ChaCha8Rng::seed_from_u64(data.rules.seed);
     let (rows, count) = (data.rows(), MAX_SEPARATING_POSES);
@@ -40,7 +42,8 @@ pub(super) fn shuffled(data: &Data) -> Measurements {
     let mut from = || rows[rng.random_range(0..rows.len())];
     let (measured, n) = (data.measurements, poses.joints);
     for pose in 0..count {
-        for joint in 0..n {
+        let is_image = poses.observation(pose).description().needs == Needs::Carriers;
+        for joint in (0..n).filter(|_| !is_image) {
             poses.configurations[pose * n + joint] = measured.configurations[from() * n + joint];
         }
         let columns = [
