@@ -3,9 +3,7 @@
 use std::error::Error;
 
 use clap::Args;
-use flexcal::error::InputErrorKind;
 use flexcal::fit::{self, CompareOptions};
-use flexcal::problem::HeldOut;
 use flexcal::report;
 use flexcal::results::{ComparisonResult, Document as _, PlotData, exceeds_noise};
 
@@ -34,10 +32,6 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let common = &arguments.common;
     let Input { problem, data, results } =
         common.read("compare", &["compare.json", REPORT[0], REPORT[1]])?;
-    if problem.data.held_out == Some(HeldOut::Nothing) {
-        let location = problem.data.held_out_location.clone();
-        return Err(location.error(InputErrorKind::NoHeldOut).into());
-    }
     let comparison = Line::during(common.prints_text(), None, |progress| {
         fit::compare(&problem, &data, &CompareOptions { paper: arguments.paper, progress })
     })?;

@@ -44,6 +44,22 @@ fn strategies_and_solvers_are_what_they_say() {
     assert_contains(&run.stderr, &["does not keep the bounds"]);
 }
 
+#[test]
+fn a_comparison_without_held_out_rows_has_left_out_errors() {
+    let folder = Folder::with_lunar_sampler();
+    folder.map("problem.toml", |text| {
+        let held_out = text.lines().find(|line| line.starts_with("held_out")).unwrap().to_owned();
+        text.replace(&held_out, "held_out = \"none\"")
+    });
+    let compared = json(&folder, "compare .");
+    let rows = items(&compared["rows"]);
+    assert!(rows.len() > 3);
+    for row in rows {
+        assert!(row.get("held_out").is_none_or(Value::is_null), "{row}");
+        assert!(number(&row["left_out"]["rms_mm"]["norm"]) > 0.0, "{row}");
+    }
+}
+
 /// Returns the lunar sampler with declared effects and few other free parameters.
 fn arm_with_effects() -> Folder {
     let folder = Folder::with_lunar_sampler();

@@ -25,12 +25,12 @@ pub struct Comparison {
     /// One identification per strategy and solver, without strategies that have nothing to vary.
     pub strategies: Vec<Identification>,
     /// Results of the paper's procedure in every form that the data allow, the rigid one first;
-    /// empty if it was not requested.
+    /// empty if it was not requested, or if no row is held out.
     pub paper: Vec<Baseline>,
     /// Ablation and joint fit of the model without the ablated elasticity.
     pub ablations: Vec<(Ablation, Identification)>,
     /// Results of the joint fit and of every elastic form of the paper's procedure, as in the
-    /// paper's tables. Empty if some rows measure no position.
+    /// paper's tables. Empty if some rows measure no position, or none is held out.
     pub procedures: Vec<Procedure>,
     /// Errors before calibration as the paper defines them: those of the rigid nominal arm.
     pub before: Before,
@@ -110,7 +110,8 @@ pub fn compare(
     let is_papers_arm = is_published_arm(problem);
     // The paper's procedure and its tables concern positions.
     let of_positions = data.measurements.kinds().iter().all(|kind| kind.is_position());
-    let paper = if of_positions && (options.paper || is_papers_arm) {
+    let is_held_out = !data.split.held_out.is_empty();
+    let paper = if of_positions && is_held_out && (options.paper || is_papers_arm) {
         baselines(problem, data)
     } else {
         Vec::new()
@@ -122,7 +123,10 @@ pub fn compare(
     let of_joint_fit = Procedure::of_fit(problem, &joint, held_out(&model, &joint.x), ignoring);
     let papers = paper.iter().filter(|form| !elastic || form.stage != StiffnessStage::Rigid);
     let papers = papers.map(|form| form.procedure(paper.first().filter(|_| elastic)));
-    let procedures = std::iter::once(of_joint_fit).chain(papers).filter(|_| of_positions).collect();
+    let procedures = std::iter::once(of_joint_fit)
+        .chain(papers)
+        .filter(|_| of_positions && is_held_out)
+        .collect();
     let unknown = |parameter: &crate::model::parameter::Parameter| {
         parameter.site.is_placement() && parameter.sigma.is_none() && !parameter.is_bounded()
     };
