@@ -29,6 +29,5 @@ pub use fleet::{Fleet, FleetArm, FleetParameter, fleet};
 pub use fleet_file::FleetPrior;
 #[doc(hidden)]
 pub use identify::{PriorSource, identify_with_prior};
-pub(crate) use watch::NAMED;
 #[doc(hidden)]
 pub use watch::{Change, Watch, WatchedCause, watch};

@@ -23,7 +23,7 @@ const MAX_CAUSES: usize = 6;
 /// Smallest probability of a cause that is reported beside the first.
 const LEAST_PROBABILITY: f64 = 0.005;
 /// Probability from which a cause is named; below it is one of several.
-pub(crate) const NAMED: f64 = 0.9;
+const NAMED: f64 = 0.9;
 /// Largest number of groups of rows that are left out in turn.
 const MAX_GROUPS: usize = 60;
 /// Smallest evidence of a pose for one cause against another, in nats, that tells them apart.
@@ -101,9 +101,13 @@ impl Watch {
         self.changed_at.is_some()
     }
 
-    /// Returns the most probable cause if the arm has changed and no other is likely.
+    /// Returns the most probable cause if the arm has changed, no other is likely, and rows that are
+    /// left out are predicted better with the cause updated.
     pub fn named(&self) -> Option<&WatchedCause> {
-        self.causes.first().filter(|cause| self.is_changed() && cause.probability >= NAMED)
+        let is_named = |cause: &&WatchedCause| {
+            cause.probability >= NAMED && cause.left_out_error.is_none_or(|left| left < self.error)
+        };
+        self.causes.first().filter(|_| self.is_changed()).filter(is_named)
     }
 }
 

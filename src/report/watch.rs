@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use super::document::{Block, Table, last_parts, opening};
 use super::figures::{ACCENT, Curve, Drawing, Series};
 use super::render::{page, text};
-use crate::life::{Change, NAMED, Watch, WatchedCause};
+use crate::life::{Change, Watch, WatchedCause};
 use crate::measurement::Measurements;
 use crate::problem::Problem;
 use crate::quantity::format::{counted, decimals, number, or_dash, p_value, two_digits};
@@ -121,10 +121,10 @@ fn verdict(watch: &Watch) -> String {
             number(1.0 / watch.false_alarm_rate, 0)
         );
     };
-    let what = match watch.causes.first() {
-        Some(cause) if cause.probability >= NAMED => cause.label.clone(),
-        Some(cause) => format!("not certain what; first {}", cause.label),
-        None => String::new(),
+    let what = match (watch.named(), watch.causes.first()) {
+        (Some(cause), _) => cause.label.clone(),
+        (None, Some(cause)) => format!("not certain what; first {}", cause.label),
+        (None, None) => String::new(),
     };
     format!("Changed, seen after {}: {what}", counted(row, "row"))
 }
