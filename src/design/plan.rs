@@ -135,19 +135,9 @@ pub fn plan(
     if poses == 0 {
         return Err(DesignError::NoPoses);
     }
-    let draw = |ranges: &PoseRanges, count, extremes, stream| {
-        ranges.draw(problem, count, extremes, seed, stream)
-    };
     let given = with_known_distances(given, candidates);
     let given = given.as_ref();
-    let (uniform, extremes) = match candidates {
-        Candidates::Within(ranges) => {
-            let count = DRAWN_CANDIDATES.map(|count| count.max(2 * poses));
-            let extremes = draw(ranges, count[1], Extremes::Often, EXTREMES_STREAM);
-            (draw(ranges, count[0], Extremes::No, UNIFORM_STREAM), Some(extremes))
-        }
-        Candidates::Rows(rows) => (rows.as_ref().clone().arm_rows(), None),
-    };
+    let (uniform, extremes) = tables(problem, candidates, (poses, seed));
     let mut tables = vec![&uniform];
     tables.extend(given);
     let pairs = views::pairs(problem, &uniform);
@@ -260,6 +250,25 @@ pub fn plan(
         random,
         is_of_cameras: all_points.is_some(),
     })
+}
+
+/// Returns the candidates: the rows given, or poses drawn within ranges, and poses at the ends of
+/// the ranges.
+fn tables(
+    problem: &Problem,
+    candidates: &Candidates,
+    (poses, seed): (usize, u64),
+) -> (Measurements, Option<Measurements>) {
+    match candidates {
+        Candidates::Within(ranges) => {
+            let [uniform, extremes] = DRAWN_CANDIDATES.map(|count| count.max(2 * poses));
+            let draw =
+                |count, extremes, stream| ranges.draw(problem, count, extremes, seed, stream);
+            let extremes = draw(extremes, Extremes::Often, EXTREMES_STREAM);
+            (draw(uniform, Extremes::No, UNIFORM_STREAM), Some(extremes))
+        }
+        Candidates::Rows(rows) => (rows.as_ref().clone().arm_rows(), None),
+    }
 }
 
 /// Returns the number of combinations that given poses and all candidates determine together, and

@@ -69,8 +69,8 @@ pub(super) fn surplus(found: usize, expected: usize) -> &'static str {
 }
 
 /// Shows the keys of two tables that no row shares: of the measurements, and of the joint table.
-pub(super) fn compared(keys: &Option<[String; 2]>) -> String {
-    keys.as_ref().map_or_else(String::new, |[measured, joints]| {
+pub(super) fn compared(keys: Option<&[String; 2]>) -> String {
+    keys.map_or_else(String::new, |[measured, joints]| {
         format!(" (the measurements have {measured}, the joint table {joints})")
     })
 }

@@ -31,7 +31,7 @@ pub enum TableErrorKind {
          join (pose or time) and \
          tolerance_s{}{}",
         nearest_in_time(gap.as_deref()),
-        compared(keys)
+        compared(keys.as_ref())
     )]
     NothingJoined { gap: Option<String>, keys: Option<[String; 2]> },
     #[error("no rows below the header")]

@@ -62,6 +62,7 @@ pub(super) fn shown(seconds: f64) -> String {
     if seconds < FIRST_DATE {
         return format!("{seconds:.1} s");
     }
+    #[expect(clippy::cast_possible_truncation, reason = "whole seconds")]
     let whole = seconds as i64;
     let (day, clock) = (whole.div_euclid(86_400), whole.rem_euclid(86_400));
     let after = |&year: &i64| days(year, 1, 1) <= day;

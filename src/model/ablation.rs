@@ -80,7 +80,7 @@ impl Model {
             match ablation {
                 Ablation::Rigid | Ablation::JointsOnly => *flexibility = Flexibility::RIGID,
                 Ablation::BendingOnly => {
-                    (flexibility.axial, flexibility.twist, flexibility.coupling) = (0.0, 0.0, None)
+                    (flexibility.axial, flexibility.twist, flexibility.coupling) = (0.0, 0.0, None);
                 }
                 Ablation::LinksOnly | Ablation::All => {}
             }

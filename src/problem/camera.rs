@@ -58,7 +58,7 @@ pub(super) fn camera(
     if let Some(item) = section.get("distortion") {
         let numbers = item.list("a list of numbers")?;
         if numbers.len() != count {
-            let names = kind.fields()[known.len()..].join(", ");
+            let names = kind.fields().get(known.len()..).unwrap_or_default().join(", ");
             let found = numbers.len();
             return Err(item.error(InputErrorKind::Coefficients { expected: count, names, found }));
         }

@@ -209,7 +209,7 @@ fn blocks<'a>(
         counted(fit.unknowns.len(), "parameter")
     };
     let counts =
-        format!("{unknowns} from {}; {held_out}.", rows_of(fit, |errors| errors.identification),);
+        format!("{unknowns} from {}; {held_out}.", rows_of(fit, |errors| errors.identification));
     let mut blocks = vec![
         Block::Headline(headline(problem, closure, result)),
         Block::Text(verdict(result, after.sigma_scale < 1.0)),

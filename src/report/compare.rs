@@ -93,12 +93,12 @@ fn verdict(comparison: &Comparison) -> String {
 fn grouped(comparison: &Comparison, is_timed: bool) -> Table {
     let (mut shown, mut same): (Vec<NamedFit>, Vec<Vec<NamedFit>>) = (Vec::new(), Vec::new());
     for fit in named_strategies(comparison) {
-        match shown.iter().position(|other| errors_in_digits(other) == errors_in_digits(&fit)) {
-            Some(place) => same[place].push(fit),
-            None => {
-                shown.push(fit);
-                same.push(Vec::new());
-            }
+        let is_equal = |other: &NamedFit| errors_in_digits(other) == errors_in_digits(&fit);
+        if let Some(place) = shown.iter().position(is_equal) {
+            same[place].push(fit);
+        } else {
+            shown.push(fit);
+            same.push(Vec::new());
         }
     }
     let mut table = side_by_side(comparison, "strategy", &shown, is_timed);

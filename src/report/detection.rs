@@ -66,7 +66,7 @@ pub(super) fn blocks<'a>(problem: &Problem, detection: &Detection) -> Vec<Block<
             code("com_m"),
             code("[[joint.body]]")
         )));
-        hidden.retain(|effect| !acts_by_load(&effect));
+        hidden.retain(|effect| !acts_by_load(effect));
     }
     if !hidden.is_empty() {
         let list = effect::listed(hidden.into_iter().map(|effect| &effect.effect)).join("; ");

@@ -1,6 +1,8 @@
 //! Text of the command `export`: moved origins, errors, and the parts of the model that the file
 //! cannot represent.
 
+use std::fmt::Write as _;
+
 use super::document::{Block, Table};
 use super::render::text;
 use crate::fit::rows_of_kind;
@@ -81,11 +83,13 @@ fn compared<'a>(errors: &ExportedErrors, best_rigid_is_better: bool) -> Vec<Bloc
     );
     if best_rigid_is_better {
         let better = best_rigid.as_ref().map(size).unwrap_or_default();
-        verdict += &format!(
+        let _ = write!(
+            verdict,
             " Not the best that a rigid controller can have: with {BEST_RIGID} it would be {better}."
         );
     } else if is_worse && let Some(alone) = fitted_alone {
-        verdict += &format!(
+        let _ = write!(
+            verdict,
             " A geometry fitted alone would have {}: identify the problem without its effects (and \
              with --strategy rigid if joints or links are compliant), and export that.",
             size(alone)

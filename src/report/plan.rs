@@ -30,9 +30,8 @@ fn enough<'a>(plan: &Plan) -> Block<'a> {
         ));
     }
     Block::Text(format!(
-        "Too few poses: they determine {rank} of the {attainable_rank} combinations of the {} that such poses can determine; \
-             {at_least}. The other combinations rest on priors, if there are any.",
-        parameters
+        "Too few poses: they determine {rank} of the {attainable_rank} combinations of the {parameters} that such poses can determine; \
+         {at_least}. The other combinations rest on priors, if there are any."
     ))
 }
 

@@ -315,7 +315,9 @@ mod tests {
         ];
         let row = |weights: &[(usize, f64)]| {
             let mut row = RowDVector::zeros(names.len());
-            weights.iter().for_each(|&(k, weight)| row[k] = weight);
+            for &(k, weight) in weights {
+                row[k] = weight;
+            }
             row
         };
         let open = |rows: &[RowDVector<f64>]| {
@@ -331,7 +333,7 @@ mod tests {
         let focal = row(&[(6, 1.0), (5, 0.2), (8, -0.5)]);
         let scale = row(&[(0, 0.4), (1, 0.6), (2, 0.1), (5, 0.2), (7, 0.3), (8, 0.9)]);
         let expected = |word: &'static str, names: &str| (word, names.to_owned());
-        assert_eq!(open(&[unseen.clone()]), [expected("unseen", "tool.x")]);
+        assert_eq!(open(std::slice::from_ref(&unseen)), [expected("unseen", "tool.x")]);
         assert_eq!(
             // Mixed, the space is the same.
             open(&[
