@@ -24,7 +24,7 @@ pub struct Law {
     parameters: Vec<LawParameter>,
     covariates: Vec<String>,
     /// What the search knows of a law that it composed; `None` for a declared one.
-    description: Option<Description>,
+    description: Option<Box<Description>>,
 }
 
 /// What a search knows of a law that it composed.
@@ -197,7 +197,7 @@ impl Law {
     /// probability that they and this law have together.
     #[must_use]
     pub fn described(self, ln_prior: f64, rivals: Vec<(Self, f64)>) -> Self {
-        Self { description: Some(Description { ln_prior, rivals }), ..self }
+        Self { description: Some(Box::new(Description { ln_prior, rivals })), ..self }
     }
 
     /// Returns ln of the prior probability of a law that a search composed; `None` for a declared

@@ -45,8 +45,7 @@ pub fn factors_elsewhere(quantities: &Quantities) -> Vec<Factor> {
     let ln_families = (families.len().max(1) as f64).ln();
     for factor in &mut listed_factors {
         factor.ln_prior = match factor.form {
-            Form::Command(_) => of_joint,
-            Form::Wave { .. } => of_joint,
+            Form::Command(_) | Form::Wave { .. } => of_joint,
             Form::Settling => -f64::from(SETTLING_TIMES.2).ln(),
             Form::Step => -f64::from(STEP_TIMES).ln(),
             Form::Covariate(_) => -(quantities.covariates.len().max(1) as f64).ln(),
