@@ -26,7 +26,8 @@ fn enough<'a>(plan: &Plan) -> Block<'a> {
     let parameters = counted(plan.planned.expected.len(), "parameter");
     if rank >= attainable_rank {
         return Block::Text(format!(
-            "Enough poses: they determine all {rank} combinations of the {parameters} that such poses can determine."
+            "Enough poses: they determine all that such poses can (rank {rank} of {}).",
+            plan.planned.expected.len()
         ));
     }
     Block::Text(format!(

@@ -5,6 +5,7 @@ use std::f64::consts::PI;
 
 use super::factor::{Factor, Form, STRUT_RATIOS};
 use super::quantities::{Quantities, range};
+use super::terms::LONE_WAVE;
 
 /// Highest order of sin(kq) and cos(kq) of a joint's command.
 const HIGHEST_ORDER: u32 = 5;
@@ -45,7 +46,9 @@ pub fn factors_elsewhere(quantities: &Quantities) -> Vec<Factor> {
     let ln_families = (families.len().max(1) as f64).ln();
     for factor in &mut listed_factors {
         factor.ln_prior = match factor.form {
-            Form::Command(_) | Form::Wave { .. } => of_joint,
+            Form::Command(_) => of_joint,
+            // Sine and cosine are equally probable where they stand alone.
+            Form::Wave { .. } => of_joint - (2.0 * LONE_WAVE).ln(),
             Form::Settling => -f64::from(SETTLING_TIMES.2).ln(),
             Form::Step => -f64::from(STEP_TIMES).ln(),
             Form::Covariate(_) => -(quantities.covariates.len().max(1) as f64).ln(),
@@ -58,8 +61,7 @@ pub fn factors_elsewhere(quantities: &Quantities) -> Vec<Factor> {
 /// Returns all factors of formulas at the coordinate of the joint `joint_of_site`, counted from 0.
 ///
 /// All kinds of factors have the same prior probability. Half of it belongs to the joint itself,
-/// the other half to the other joints; sine, cosine and their pair are kinds of their own, because
-/// geometry and weight act through them. Order k has 1/k² of the probability of order 1. The
+/// the other half to the other joints. Order k has 1/k² of the probability of order 1. The
 /// probability is divided by the number of trial values of an inner parameter.
 pub fn factors(quantities: &Quantities, joint_of_site: usize) -> Vec<Factor> {
     let mut listed_factors: Vec<Factor> = Vec::new();
@@ -85,7 +87,8 @@ pub fn factors(quantities: &Quantities, joint_of_site: usize) -> Vec<Factor> {
             for cosine in [false, true] {
                 add(Form::Wave { joint, order, cosine }, None, ln_prior);
             }
-            add(Form::Harmonic { joint, order }, None, ln_prior);
+            // Sine, cosine and their pair are equally probable where they stand alone.
+            add(Form::Harmonic { joint, order }, None, ln_prior + LONE_WAVE.ln());
         }
         if quantities.turns[joint] && joint == joint_of_site {
             let step = 2.0 * PI / f64::from(STRUT_ANGLES);

@@ -13,7 +13,7 @@ const FACTOR_COUNT_PROBABILITIES: [f64; 3] = [0.6, 0.3, 0.1];
 /// Prior probability of a sine or a cosine that is multiplied by no other one, relative to one that
 /// is. An error by one joint's command has any phase, which their pair fits; in products of sines
 /// and cosines, as rotations give them, the zero positions of the arm determine the phases.
-const LONE_WAVE: f64 = 1.0 / 3.0;
+pub const LONE_WAVE: f64 = 1.0 / 3.0;
 /// Smallest share of a term's squared length that the fitted parameters must leave.
 const MIN_LEFT: f64 = 2e-3;
 /// Number of terms whose columns are multiplied together in one matrix product.
