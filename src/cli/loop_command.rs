@@ -4,7 +4,7 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use flexcal::fit::{Options, ProgressSink};
+use flexcal::fit::{FindingCode, Options, ProgressSink};
 use flexcal::measurement::Dataset;
 use flexcal::problem::{self, Problem};
 use flexcal::remainder::{self, Correction, Fitted};
@@ -116,8 +116,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
 }
 
 /// Fits a remainder in addition to the effects of the closed problem with text `closed`. Returns
-/// `None` if the text declares a different arm than was fitted, for example because an effect that
-/// data contradict was removed.
+/// `None` if the table was misread, or if the text declares a different arm than was fitted, for
+/// example because an effect that data contradict was removed.
 fn fitted(
     problem: &Problem,
     closed: &str,
@@ -125,7 +125,8 @@ fn fitted(
     data: &Dataset,
 ) -> Result<Option<Fitted>, Box<dyn Error>> {
     let declared = Problem::parse(closed, &problem.data.location.file)?;
-    if declared.digest() != closure.closed.digest() || closure.interrupted {
+    let is_misread = closure.after.has(FindingCode::Misread);
+    if declared.digest() != closure.closed.digest() || closure.interrupted || is_misread {
         return Ok(None);
     }
     Ok(remainder::fit(&closure.after, &closure.closed, data)?)

@@ -10,9 +10,9 @@ use crate::least_squares::kernel::{dot, sum_of_squares};
 
 /// Prior probability that a term has one, two or three factors.
 const FACTOR_COUNT_PROBABILITIES: [f64; 3] = [0.6, 0.3, 0.1];
-/// Prior probability of a sine or a cosine that is multiplied by no other one, relative to one that
-/// is. An error by one joint's command has any phase, which their pair fits; in products of sines
-/// and cosines, as rotations give them, the zero positions of the arm determine the phases.
+/// Prior probability of a sine or a cosine that is multiplied by none of another joint, relative to
+/// one that is. An error by one joint's command has any phase, which their pair fits; in products of
+/// several joints, as rotations give them, the zero positions of the arm determine the phases.
 pub const LONE_WAVE: f64 = 1.0 / 3.0;
 /// Smallest share of a term's squared length that the fitted parameters must leave.
 const MIN_LEFT: f64 = 2e-3;
@@ -180,14 +180,21 @@ impl Terms {
         };
         let factors = term.iter().map(|&k| self.factors[usize::from(k)].ln_prior);
         let forms = || term.iter().map(|&k| self.factors[usize::from(k)].form);
-        let is_wave = |form: &Form| matches!(form, Form::Wave { .. } | Form::OfSum { .. });
-        let has_wave = forms().any(|form| matches!(form, Form::Wave { .. }));
-        let is_lone = has_wave && forms().filter(is_wave).count() == 1;
-        let of_phase = if is_lone { LONE_WAVE } else { 1.0 };
+        let is_wave_elsewhere = |of: usize| {
+            forms().any(|form| match form {
+                Form::Wave { joint, .. } => joint != of,
+                form => matches!(form, Form::OfSum { .. }),
+            })
+        };
+        let phase = |form: Form| match form {
+            Form::Wave { joint, .. } if !is_wave_elsewhere(joint) => LONE_WAVE.ln(),
+            _ => 0.0,
+        };
+        let of_phases: f64 = forms().map(phase).sum();
         FACTOR_COUNT_PROBABILITIES[term.len().clamp(1, 3) - 1].ln()
             + factors.sum::<f64>()
             + orderings.ln()
-            + of_phase.ln()
+            + of_phases
     }
 
     /// Returns the columns of a term, one value per pose.
