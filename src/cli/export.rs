@@ -309,7 +309,7 @@ fn errors(
     }
     // The alternatives only inform: if one of them fails, its line is absent.
     if best.is_none() {
-        let correction = remainder::of_estimate(problem, estimates)?;
+        let correction = remainder::of_estimate(problem, estimates).ok().flatten();
         let workspace = Workspace { corners: None, planes: Vec::new() };
         let best = code::best_rigid(problem, estimates, correction.as_ref(), &workspace).ok();
         errors.best_rigid = best.as_ref().map(of_geometry);

@@ -23,7 +23,7 @@ type NamedFit = (String, ComparedFit);
 pub fn compare_text(problem: &Problem, comparison: &Comparison) -> String {
     let joint = &comparison.joint;
     let (poses, held_out) = (joint.fitted.identification.n, joint.fitted.held_out.n);
-    let parts_of = if of_positions(joint) {
+    let parts_of = if of_positions(joint) && !joint.fitted.is_left_out {
         format!("{} to identify, {held_out} held out", counted(poses, "pose"))
     } else {
         both_parts(joint)
@@ -269,11 +269,20 @@ fn side_by_side(
         Column::number(name, move |(_, fit): &NamedFit| norm(&fit.errors.identification, which))
     };
     let heading = |names: [&'static str; 3]| header(&comparison.joint.fitted.held_out, names);
-    let mean = heading(["held out mean, mm", "held out mean, °", "held out mean, px"]);
+    let is_left_out = comparison.joint.fitted.is_left_out;
+    let mean = if is_left_out {
+        heading(["left out mean, mm", "left out mean, °", "left out mean, px"])
+    } else {
+        heading(["held out mean, mm", "held out mean, °", "held out mean, px"])
+    };
     let rms = heading(["rms, mm", "rms, °", "rms, px"]);
     let fitted_rms = heading(["fitted rms, mm", "fitted rms, °", "fitted rms, px"]);
     let fitted_mean = heading(["fitted mean, mm", "fitted mean, °", "fitted mean, px"]);
-    let largest = heading(["held out max, mm", "held out max, °", "held out max, px"]);
+    let largest = if is_left_out {
+        heading(["left out max, mm", "left out max, °", "left out max, px"])
+    } else {
+        heading(["held out max, mm", "held out max, °", "held out max, px"])
+    };
     let mut columns = vec![
         Column::words(first, |(name, _): &NamedFit| name.clone()),
         Column::words("solver", |(_, fit): &NamedFit| fit.solver.to_owned()).minor(),

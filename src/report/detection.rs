@@ -118,7 +118,8 @@ fn row(effect: &Effect, size: &Size) -> Vec<String> {
     ]
 }
 
-/// Returns true if the problem declares no mass, so that no load deflects the arm.
+/// Returns true if the problem declares no mass and no payload, so that no load deflects the arm.
 fn has_no_mass(problem: &Problem) -> bool {
-    problem.joints.iter().all(|joint| joint.bodies.is_empty() && joint.beam.is_none())
+    problem.tool.payload_mass == 0.0
+        && problem.joints.iter().all(|joint| joint.bodies.is_empty() && joint.beam.is_none())
 }

@@ -124,6 +124,10 @@ fn commands(problem: &Problem, next: &NextPoses) -> Table {
 /// Returns the sentence that ends a series of measurements, or forecasts its end.
 fn verdict(options: &NextOptions, next: &NextPoses) -> String {
     let tolerance = options.tolerance.map(mm);
+    if !next.found.is_trusted() {
+        return "Not judged, because the fit to the measured poses is not to be trusted."
+            .to_owned();
+    }
     match (next.stop, tolerance, next.enough_after(options.tolerance)) {
         (Some(StopReason::Enough), Some(tolerance), _) => {
             format!("Enough: the bound is below the tolerance of {tolerance} mm.")

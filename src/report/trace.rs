@@ -88,6 +88,11 @@ fn headline(fit: &Identification) -> String {
 
 /// States what the residual points to.
 fn verdict(result: &TraceResult) -> String {
+    if !result.trusted {
+        return "No cause is claimed, because the fit is not to be trusted. Correct first what the \
+                warnings name."
+            .to_owned();
+    }
     let structure = if result.structured {
         "The residual has structure"
     } else {

@@ -128,7 +128,7 @@ finding_codes! {
         "The nominal arm misses the measurements by more than a tenth of their spread.",
         "check units, signs of joints, and whether the numbers are of this convention of frames";
     CommandsRounded: Warning "commands-rounded" ["step_deg", "rounding", "rms"]
-        "All commands are multiples of a step, and rounding to that step would leave an error of the size of the residual.",
+        "The commands of each joint are multiples of a step, and rounding to these steps would leave an error of the size of the residual.",
         "log the joint angles with more digits";
     EarlierEstimateContradicted: Warning "earlier-estimate-contradicted" ["cause", "probability", "widened"]
         "New rows contradict the earlier estimate that is the prior, with a false alarm in at most one of 100 fits.",

@@ -87,8 +87,8 @@ impl Check for CommandsHaveDigits {
         }
         let coarsest = steps.iter().map(|(_, step)| step.to_degrees()).fold(0.0, f64::max);
         let text = format!(
-            "all commands are multiples of {coarsest}°; if the table rounds them, that alone moves \
-             the target by {} rms, as large as the residual of {}",
+            "the commands of each joint are multiples of a step of up to {coarsest}°; if the table \
+             rounds them, that alone moves the target by {} rms, as large as the residual of {}",
             size("position", rounding, 3),
             size("position", rms, 3)
         );

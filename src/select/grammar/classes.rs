@@ -64,7 +64,7 @@ impl Class {
     fn rivals(&self, terms: &Terms, largest: f64) -> Vec<(&Refined, f64)> {
         let forms = |sum: &Sum| -> Vec<Vec<Form>> {
             let of_term = |term: &Vec<u16>| {
-                term.iter().map(|&k| terms.factors[usize::from(k)].form).collect()
+                term.iter().map(|&k| terms.factors[usize::from(k)].form.kind()).collect()
             };
             sum.iter().map(of_term).collect()
         };

@@ -90,6 +90,15 @@ pub struct Factor {
 }
 
 impl Form {
+    /// Returns the form with the first trial ratio of a gas spring: the ratio is fitted, so that
+    /// forms which differ in it alone are the same.
+    pub fn kind(self) -> Self {
+        match self {
+            Self::Strut { joint, .. } => Self::Strut { joint, ratio: 0 },
+            other => other,
+        }
+    }
+
     /// Returns the index of the form's kind, by which prior probabilities are shared.
     pub fn family(self) -> usize {
         match self {
