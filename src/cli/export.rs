@@ -120,6 +120,14 @@ impl Format {
 /// represent.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let flags = &arguments.flags;
+    let camera = arguments.format.and_then(Format::camera);
+    let is_rigid = camera.is_none() && !matches!(arguments.format, Some(Format::C));
+    if arguments.camera.is_some() && camera.is_none() {
+        return Err(code::ExportError::WithoutEffect { option: "--camera" }.into());
+    }
+    if arguments.best_rigid && !is_rigid {
+        return Err(code::ExportError::WithoutEffect { option: "--best-rigid" }.into());
+    }
     let problem = Problem::read(&arguments.problem)?;
     let estimates = arguments.trust.read(&arguments.estimate)?;
     if matches!(arguments.format, Some(Format::C)) {
@@ -142,7 +150,6 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         Some(best) => best.arm.clone(),
         None => model.arm(|k| x.get(k).copied().unwrap_or(0.0)),
     };
-    let camera = arguments.format.and_then(Format::camera);
     let mut elsewhere = Vec::new();
     let (text, moved, default) = match (&arguments.urdf, arguments.format) {
         (Some(file), _) => {

@@ -44,6 +44,12 @@ pub enum ExportError {
         /// Number of poses drawn.
         draws: usize,
     },
+    /// An option has no effect on the chosen form.
+    #[error("{option} has no effect on this --format; leave it out")]
+    WithoutEffect {
+        /// Option of the command line.
+        option: &'static str,
+    },
     /// The problem declares no such camera.
     #[error(
         "no such camera; {}",

@@ -87,13 +87,15 @@ fn compared<'a>(errors: &ExportedErrors, best_rigid_is_better: bool) -> Vec<Bloc
             verdict,
             " Not the best that a rigid controller can have: with {BEST_RIGID} it would be {better}."
         );
-    } else if is_worse && let Some(alone) = fitted_alone {
+    } else if is_worse && let Some(alone) = fitted_alone.as_ref().filter(|of| mean(of) <= least) {
         let _ = write!(
             verdict,
             " A geometry fitted alone would have {}: identify the problem without its effects (and \
              with --strategy rigid if joints or links are compliant), and export that.",
             size(alone)
         );
+    } else if is_worse && let Some((name, best)) = geometries.first() {
+        let _ = write!(verdict, " The best of them, {name}, would have {}.", size(best));
     } else if geometries.len() > 1 {
         verdict += " No other geometry alone is clearly better.";
     }

@@ -85,6 +85,13 @@ fn a_camera_that_a_form_cannot_hold_is_an_error_with_its_remedy() {
         &["problem.toml:", "camera[1].image_px", "write image_px = [width, height]"],
     );
     assert_contains(&error("--format opencv --camera head"), &["no such camera; there are hand"]);
+    for (arguments, option) in [
+        ("--format ros-yaml --camera hand", "--camera has no effect"),
+        ("--format opencv --best-rigid", "--best-rigid has no effect"),
+        ("--format c --best-rigid", "--best-rigid has no effect"),
+    ] {
+        assert_contains(&error(arguments), &[option]);
+    }
     let text = std::fs::read_to_string(folder.path("problem.toml")).unwrap();
     let text = text.replace("pixel_sigma = 0.2", "pixel_sigma = 0.2\nimage_px = [1280, 720]");
     std::fs::write(folder.path("problem.toml"), text).unwrap();
