@@ -51,6 +51,11 @@ pub enum DesignError {
         "the nominal arm has no equilibrium under its loads in any pose; check stiffnesses and masses"
     )]
     NoEquilibrium,
+    /// No candidate shows a point of a marker to a camera.
+    #[error(
+        "no candidate shows a point of a marker to a camera; widen the ranges of the joints, or check where cameras and markers are"
+    )]
+    NothingInView,
     /// The criterion weighs predicted positions, but cameras measure.
     #[error("the criterion I weighs positions of the target; with cameras choose S, A, D or E")]
     NoPositions,

@@ -135,8 +135,8 @@ pub fn plan(
     if poses == 0 {
         return Err(DesignError::NoPoses);
     }
-    let given = with_known_distances(given, candidates);
-    let given = given.as_ref();
+    let with_distances = with_known_distances(given, candidates);
+    let given = with_distances.as_ref();
     let (uniform, extremes) = tables(problem, candidates, (poses, seed));
     let mut tables = vec![&uniform];
     tables.extend(given);
@@ -144,6 +144,8 @@ pub fn plan(
     if !pairs.is_empty() && *criterion == Criterion::I {
         return Err(DesignError::NoPositions);
     }
+    let nothing =
+        if pairs.is_empty() { DesignError::NoEquilibrium } else { DesignError::NothingInView };
     let site = Site::with_cameras(problem, &tables, pairs)?;
     let admitted = |(table, sensitivity): (Measurements, Sensitivity)| match options.workspace {
         Some(workspace) => {
@@ -154,8 +156,8 @@ pub fn plan(
     };
     let parameters = &site.model.parameters;
     let given_arm_rows = given.map(|given| given.clone().arm_rows());
-    let given = given.map(|given| site.in_equilibrium(given));
-    let (given_table, given): (Option<Measurements>, Option<Sensitivity>) = given.unzip();
+    let (given_table, given): (Option<Measurements>, Option<Sensitivity>) =
+        given.map(|given| site.in_equilibrium(given)).unzip();
     let (mut table, uniform) = admitted(site.in_equilibrium(&uniform));
     let mut sensitivity = uniform.clone();
     if let Some(extremes) = extremes {
@@ -165,7 +167,7 @@ pub fn plan(
     }
     let tried = sensitivity.len();
     if sensitivity.is_empty() {
-        return Err(DesignError::NoEquilibrium);
+        return Err(nothing);
     }
     if tried < poses {
         return Err(DesignError::TooFewCandidates { poses, candidates: tried });
@@ -231,8 +233,7 @@ pub fn plan(
     };
     let distinct_coordinates = given_arm_rows.as_ref().map_or(0, distinct) + distinct(&chosen);
     let all_rows = |table: &Measurements| coordinates(table, of_position, 0..table.len());
-    let of_chosen =
-        all_points.as_ref().map_or_else(|| all_rows(&chosen), |points| 2 * points.len());
+    let of_chosen = all_points.as_ref().map_or(all_rows(&chosen), |points| 2 * points.len());
     let coordinates = given_table.as_ref().map_or(0, all_rows) + of_chosen;
     let without_prior = parameters.iter().filter(|parameter| parameter.sigma.is_none()).count();
     Ok(Plan {

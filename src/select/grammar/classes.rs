@@ -30,7 +30,7 @@ const MAX_FORM_DIFFERENCE: f64 = 1.0;
 /// Smallest share of the probability of a class at which another form is listed.
 const MIN_SHARE: f64 = 0.02;
 /// Maximum number of other forms of a class that are listed.
-const MAX_RIVALS: usize = 4;
+const MAX_RIVAL_FORMS: usize = 4;
 
 /// Formula proposed for a class of sums with nearly equal predictions.
 #[derive(Debug, Clone)]
@@ -85,7 +85,7 @@ impl Class {
         }
         rivals.retain(|(_, share)| *share >= MIN_SHARE);
         rivals.sort_by(|a, b| b.1.total_cmp(&a.1));
-        rivals.truncate(MAX_RIVALS);
+        rivals.truncate(MAX_RIVAL_FORMS);
         rivals
     }
 }

@@ -16,7 +16,7 @@ use crate::problem::{Effect, Freedom, ParameterRule, Problem, Quantities};
 const MM_PER_INCH: f64 = 25.4;
 
 /// Returns 10 to the given power.
-fn power_of_ten(power: i8) -> f64 {
+pub(super) fn power_of_ten(power: i8) -> f64 {
     10.0_f64.powi(power.into())
 }
 

@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use super::undo::power_of_ten;
 use super::{Misreading, numbers_of};
 use crate::model::parameter::JointField;
 
@@ -11,11 +12,6 @@ fn entry_name(joint: usize, field: JointField) -> String {
         0 => format!("{} of all joints", field.name()),
         _ => format!("{} of joint {joint}", field.name()),
     }
-}
-
-/// Returns a power of ten as a number, such as `0.001`.
-fn power_of_ten(power: i8) -> f64 {
-    10.0_f64.powi(power.into())
 }
 
 impl Misreading {
