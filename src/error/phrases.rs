@@ -74,3 +74,14 @@ pub(super) fn compared(keys: Option<&[String; 2]>) -> String {
         format!(" (the measurements have {measured}, the joint table {joints})")
     })
 }
+
+/// Returns the remedy of clocks that differ; `offset` is the value of `offset_s` that pairs the
+/// rows best.
+pub(super) fn clocks(offset: Option<&str>) -> String {
+    offset.map_or_else(String::new, |offset| {
+        format!(
+            "; with the clock of the joint table moved by {offset} s the rows have partners: the \
+             clocks differ, so write offset_s = {offset} in joints"
+        )
+    })
+}

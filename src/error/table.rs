@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use thiserror::Error;
 
 use super::near::{meant, question};
-use super::phrases::{compared, difference, in_quotes, named_otherwise, surplus};
-use super::warning::nearest_in_time;
+use super::phrases::{clocks, compared, difference, in_quotes, named_otherwise, surplus};
+use super::warning::{listed, nearest_in_time};
 
 /// Kind of error in a table of measurements; [`Location`](super::Location) holds the place.
 #[derive(Debug, Clone, PartialEq, Error)]
@@ -29,11 +29,43 @@ pub enum TableErrorKind {
     #[error(
         "no row of the measurements has a partner in the joint table; check the column of the \
          join (pose or time) and \
-         tolerance_s{}{}",
+         tolerance_s{}{}{}",
         nearest_in_time(gap.as_deref()),
-        compared(keys.as_ref())
+        compared(keys.as_ref()),
+        clocks(offset.as_deref())
     )]
-    NothingJoined { gap: Option<String>, keys: Option<[String; 2]> },
+    NothingJoined { gap: Option<String>, keys: Option<[String; 2]>, offset: Option<String> },
+    #[error(
+        "{left} of {rows} measured rows have no partner in the joint table{}{}",
+        nearest_in_time(gap.as_deref()),
+        clocks(offset.as_deref())
+    )]
+    MostUnpaired { left: usize, rows: usize, gap: Option<String>, offset: Option<String> },
+    #[error(
+        "{same} of {rows} measured rows have the same partner, {partner}, an end of the joint \
+         table; check whether both clocks agree, and tolerance_s{}{}",
+        compared(keys.as_ref()),
+        clocks(offset.as_deref())
+    )]
+    CommonPartner {
+        same: usize,
+        rows: usize,
+        partner: String,
+        keys: Option<[String; 2]>,
+        offset: Option<String>,
+    },
+    #[error(
+        "the rows of both tables are typically {gap} apart, less than tolerance_s allows, and \
+         may belong to different poses{}",
+        clocks(Some(offset.as_str()))
+    )]
+    ClocksDiffer { gap: String, offset: String },
+    #[error(
+        "the joint table has {logged} rows for {rows} measured rows, and by = \"order\" pairs the \
+         first with the first; write by = \"time\" or by = \"name\", or keep one row for each \
+         measured row"
+    )]
+    ManyRowsToPair { logged: usize, rows: usize },
     #[error("no rows below the header")]
     NoRowsBelowHeader,
     #[error("an Excel workbook; save its sheet as CSV")]
@@ -59,6 +91,12 @@ pub enum TableErrorKind {
         "every row has the position that marks missing measurements; check missing in [data.format]"
     )]
     AllMissing,
+    #[error(
+        "{rows} rows of different poses measure exactly 0, 0, 0, the first here{}; if the \
+         instrument writes zeros for a lost target, write missing = \"{write}\" in [data.format]",
+        listed(*rows, others)
+    )]
+    LostTargets { rows: usize, others: Vec<String>, write: String },
     #[error(
         "qx, qy, qz, qw are not a rotation, because their squares do not add up to 1; check the \
          columns"

@@ -30,6 +30,11 @@ pub enum WarningKind {
     ReadAsWindows1252,
     #[error("{rows} row{} without a measurement, the first here; left out", plural(*rows))]
     RowsMissing { rows: usize },
+    #[error(
+        "measures exactly 0, 0, 0; if the instrument writes zeros for a lost target, write missing \
+         = \"{write}\" in [data.format]"
+    )]
+    PositionZero { write: String },
     #[error("the search for effects uses positions only, not orientations")]
     OrientationLeftOut,
     #[error(
@@ -131,7 +136,7 @@ pub(super) fn nearest_in_time(gap: Option<&str>) -> String {
 }
 
 /// Names the other rows that a warning concerns; `rows` is their number.
-fn listed(rows: usize, others: &[String]) -> String {
+pub(super) fn listed(rows: usize, others: &[String]) -> String {
     let left = rows.saturating_sub(1 + others.len());
     let left = if left > 0 { format!(" and {left} more") } else { String::new() };
     if others.is_empty() { String::new() } else { format!(", then {}{left}", others.join(", ")) }

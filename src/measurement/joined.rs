@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use csv::ByteRecord;
 
 use super::cell_style::CellStyle;
+use super::clocks::{best_shift, nearest};
 use super::mapped::Names;
 use super::table::{Table, shortened};
 use super::time::shown;
@@ -15,6 +16,10 @@ use crate::quantity::Unit;
 
 /// Maximum number of rows without a partner that a warning lists.
 const MAX_LISTED_ROWS: usize = 10;
+/// Largest usual time between paired rows for which the clocks are not compared \[s\].
+const MAX_USUAL_GAP: f64 = 0.5;
+/// Smallest number of measured rows with which the pairing as a whole is checked.
+const MIN_CHECKED_ROWS: usize = 4;
 
 /// Rows of the joint table, with the keys by which they are paired with rows of positions.
 pub(super) struct JoinedLog {
@@ -30,6 +35,8 @@ pub(super) struct JoinedLog {
     of_name: HashMap<String, usize>,
     /// Row indices in the order of their times, for a join by time.
     by_time: Vec<usize>,
+    /// Times of the rows in ascending order, on the clock of the measurements \[s\].
+    log_times: Vec<f64>,
     /// Indices of the joint table's columns that are appended to the current table of positions.
     appended: Vec<usize>,
     /// Column of the key in the current table, and its conversion to seconds.
@@ -39,13 +46,10 @@ pub(super) struct JoinedLog {
     unpaired: Vec<Location>,
     paired: usize,
     decoding_warnings: Vec<Warning>,
-    /// Time from each row without a partner to the nearest row of the log \[s\]; empty unless
-    /// joined by time.
-    gaps: Vec<f64>,
     /// First name of a position without a partner, for a join by name.
     unpaired_name: Option<String>,
-    /// Earliest and latest time of a position \[s\], for a join by time.
-    times: [f64; 2],
+    /// Times of the measured rows \[s\], for a join by time.
+    times: Vec<f64>,
 }
 
 /// Column that pairs rows, and its conversion to seconds if it holds times.
@@ -60,7 +64,8 @@ struct LogRow {
     line: usize,
     cells: ByteRecord,
     time: f64,
-    is_used: bool,
+    /// Number of measured rows whose partner this row is.
+    uses: usize,
 }
 
 impl JoinedLog {
@@ -81,15 +86,15 @@ impl JoinedLog {
             rows: Vec::new(),
             of_name: HashMap::new(),
             by_time: Vec::new(),
+            log_times: Vec::new(),
             appended: Vec::new(),
             key: None,
             requested: 0,
             unpaired: Vec::new(),
             paired: 0,
             decoding_warnings: Vec::new(),
-            gaps: Vec::new(),
             unpaired_name: None,
-            times: [f64::INFINITY, f64::NEG_INFINITY],
+            times: Vec::new(),
         };
         for file in &log.files {
             let kind = InputErrorKind::DataFileMissing { path: file.clone() };
@@ -99,6 +104,7 @@ impl JoinedLog {
         let mut by_time: Vec<usize> = (0..joined.rows.len()).collect();
         let time = |row: &usize| joined.rows.get(*row).map_or(f64::NAN, |row| row.time);
         by_time.sort_by(|a, b| time(a).total_cmp(&time(b)));
+        joined.log_times = by_time.iter().map(time).collect();
         joined.by_time = by_time;
         if joined.rows.is_empty() {
             return Err(log.location.clone().error(TableErrorKind::NoDataFiles));
@@ -124,7 +130,9 @@ impl JoinedLog {
         while table.next_row()? {
             let mut time = f64::NAN;
             match (self.rule, key) {
-                (JoinRule::Time { .. }, Some(key)) => time = table.time(key.place, key.to_si)?,
+                (JoinRule::Time { offset, .. }, Some(key)) => {
+                    time = table.time(key.place, key.to_si)? + offset;
+                }
                 (JoinRule::Name, Some(key)) => {
                     let name = table.name(key.place)?.to_owned();
                     if let Some(&first) = self.of_name.get(&name) {
@@ -137,7 +145,7 @@ impl JoinedLog {
                 _ => {}
             }
             let (file, line, cells) = (table.file.clone(), table.line(), table.cells().clone());
-            self.rows.push(LogRow { file, line, cells, time, is_used: false });
+            self.rows.push(LogRow { file, line, cells, time, uses: 0 });
         }
         self.decoding_warnings.extend(table.decoding_warning());
         Ok(())
@@ -200,12 +208,12 @@ impl JoinedLog {
                 }
                 partner
             }
-            (JoinRule::Time { tolerance }, Some(key)) => {
+            (JoinRule::Time { tolerance, .. }, Some(key)) => {
                 let time = table.time(key.place, key.to_si)?;
-                self.times = [self.times[0].min(time), self.times[1].max(time)];
-                let nearest = self.nearest(time);
-                self.gaps.extend(nearest.map(|(_, gap)| gap).filter(|gap| *gap > tolerance));
-                nearest.filter(|(_, gap)| *gap <= tolerance).map(|(row, _)| row)
+                self.times.push(time);
+                nearest(&self.log_times, time)
+                    .filter(|(_, gap)| *gap <= tolerance)
+                    .and_then(|(place, _)| self.by_time.get(place).copied())
             }
             _ => Some(self.requested).filter(|&row| row < self.rows.len()),
         };
@@ -214,32 +222,90 @@ impl JoinedLog {
             self.unpaired.push(Location::file(&table.file).at_line(table.line()));
             return Ok(false);
         };
-        row.is_used = true;
+        row.uses += 1;
         self.paired += 1;
         let cells = self.appended.iter().map(|&place| row.cells.get(place).unwrap_or_default());
         table.append_cells(cells, (&row.file, row.line));
         Ok(true)
     }
 
-    /// Returns the index of the joint row nearest to a time \[s\], and the time between them \[s\].
-    fn nearest(&self, time: f64) -> Option<(usize, f64)> {
-        let time_of = |&row: &usize| self.rows.get(row).map_or(f64::NAN, |row| row.time);
-        let after = self.by_time.partition_point(|row| time_of(row) < time);
-        let around = [after.checked_sub(1), Some(after)].into_iter().flatten();
-        let candidates = around.filter_map(|place| self.by_time.get(place));
-        let distance = |row: &usize| (time_of(row) - time).abs();
-        candidates
-            .min_by(|a, b| distance(a).total_cmp(&distance(b)))
-            .map(|row| (*row, distance(row)))
+    /// Returns the times from measured rows to the nearest row of the log, in ascending order
+    /// \[s\]: of the rows without a partner, or of those that have one. Both are empty unless the
+    /// tables are joined by time.
+    fn gaps(&self, is_unpaired: bool) -> Vec<f64> {
+        let JoinRule::Time { tolerance, .. } = self.rule else { return Vec::new() };
+        let gap = |time: &f64| nearest(&self.log_times, *time).map(|(_, gap)| gap);
+        let mut gaps: Vec<f64> = self.times.iter().filter_map(gap).collect();
+        gaps.retain(|gap| (*gap > tolerance) == is_unpaired);
+        gaps.sort_by(f64::total_cmp);
+        gaps
     }
 
     /// Returns, in words, the usual time between a row without a partner and the nearest row of the
     /// log; `None` if the tables are not joined by time.
     fn gap(&self) -> Option<String> {
-        let mut gaps = self.gaps.clone();
-        gaps.sort_by(f64::total_cmp);
-        let median = gaps.get(gaps.len() / 2)?;
-        Some(format!("{median:.1} s"))
+        let gaps = self.gaps(true);
+        Some(format!("{:.1} s", gaps.get(gaps.len() / 2)?))
+    }
+
+    /// Returns the offset with which the rows of both tables pair best, as the value of `offset_s`;
+    /// `None` if the tables are not joined by time or no offset is certain.
+    fn offset(&self) -> Option<String> {
+        let JoinRule::Time { offset, .. } = self.rule else { return None };
+        let shift = best_shift(&self.times, &self.log_times)?;
+        Some(format!("{:.1}", offset + shift))
+    }
+
+    /// Returns the row of the log that is the partner of most measured rows because its time is the
+    /// first or the last of the log.
+    fn common_partner(&self) -> Option<&LogRow> {
+        let ends = [self.by_time.first(), self.by_time.last()].into_iter().flatten();
+        ends.filter_map(|&row| self.rows.get(row))
+            .find(|row| self.log_times.len() > 1 && 2 * row.uses > self.requested)
+    }
+
+    /// Checks the pairing as a whole.
+    ///
+    /// # Errors
+    /// Returns an error if most measured rows have no partner or the same one, if another offset
+    /// between the clocks pairs the rows far better, or if a join by order meets a joint table of
+    /// several rows for each measured row.
+    fn check_pairing(&self) -> Result<(), InputError> {
+        let error = |kind: TableErrorKind| Err(self.location.clone().error(kind));
+        if self.paired == 0 && self.requested > 0 {
+            let (gap, keys, offset) = (self.gap(), self.keys(), self.offset());
+            return error(TableErrorKind::NothingJoined { gap, keys, offset });
+        }
+        let (rows, logged) = (self.requested, self.rows.len());
+        if rows < MIN_CHECKED_ROWS {
+            return Ok(());
+        }
+        if self.rule == JoinRule::Order && logged >= 2 * rows {
+            return error(TableErrorKind::ManyRowsToPair { logged, rows });
+        }
+        if !matches!(self.rule, JoinRule::Time { .. }) {
+            return Ok(());
+        }
+        let left = self.unpaired.len();
+        if 2 * left > rows {
+            let (gap, offset) = (self.gap(), self.offset());
+            return error(TableErrorKind::MostUnpaired { left, rows, gap, offset });
+        }
+        if let Some(row) = self.common_partner() {
+            let partner = Location::file(&row.file).at_line(row.line).to_string();
+            let (same, keys, offset) = (row.uses, self.keys(), self.offset());
+            return error(TableErrorKind::CommonPartner { same, rows, partner, keys, offset });
+        }
+        let gaps = self.gaps(false);
+        let usual = gaps.get(gaps.len() / 2).copied().unwrap_or(0.0);
+        let offset = if usual > MAX_USUAL_GAP { self.offset() } else { None };
+        match offset {
+            Some(offset) => {
+                let gap = format!("{usual:.1} s");
+                error(TableErrorKind::ClocksDiffer { gap, offset })
+            }
+            None => Ok(()),
+        }
     }
 
     /// Shows the keys of both tables, to find why no row has a partner: one name of each, or the
@@ -253,7 +319,9 @@ impl JoinedLog {
             |row: Option<&usize>| row.and_then(|&row| self.rows.get(row)).map(|row| row.time);
         let log = [time(self.by_time.first())?, time(self.by_time.last())?];
         let range = |[first, last]: [f64; 2]| format!("{} to {}", shown(first), shown(last));
-        (self.times[0] <= self.times[1]).then(|| [range(self.times), range(log)])
+        let first = self.times.iter().copied().reduce(f64::min)?;
+        let last = self.times.iter().copied().reduce(f64::max)?;
+        Some([range([first, last]), range(log)])
     }
 
     /// Returns the files of the joint table.
@@ -267,15 +335,10 @@ impl JoinedLog {
     /// has more rows than there are positions, so its unused rows are not reported.
     ///
     /// # Errors
-    /// Returns an error if no row has a partner.
+    /// Returns an error if no row has a partner, or if the pairing as a whole is implausible.
     pub fn warnings(&self) -> Result<Vec<Warning>, InputError> {
-        if self.paired == 0 && self.requested > 0 {
-            return Err(self
-                .location
-                .clone()
-                .error(TableErrorKind::NothingJoined { gap: self.gap(), keys: self.keys() }));
-        }
-        let unused = self.rows.iter().filter(|row| !row.is_used);
+        self.check_pairing()?;
+        let unused = self.rows.iter().filter(|row| row.uses == 0);
         let unused: Vec<Location> = match self.rule {
             JoinRule::Time { .. } => Vec::new(),
             _ => unused.map(|row| Location::file(&row.file).at_line(row.line)).collect(),

@@ -8,6 +8,7 @@ mod builder;
 #[deny(clippy::indexing_slicing)]
 mod cell_style;
 mod cells;
+mod clocks;
 #[deny(clippy::indexing_slicing)]
 mod column_table;
 #[deny(clippy::indexing_slicing)]
@@ -26,6 +27,7 @@ mod limits;
 #[deny(clippy::indexing_slicing)]
 mod lines;
 #[deny(clippy::indexing_slicing)]
+mod lost;
 mod mapped;
 #[deny(clippy::indexing_slicing)]
 mod meaning;

@@ -209,6 +209,9 @@ impl<'a> Tables<'a> {
                 warnings.extend(measurements.many_turns(problem, &commands));
                 warnings.extend(measurements.kelvins());
                 if measured {
+                    let is_comma = problem.data.dialect.decimal_comma;
+                    let zeros = if is_comma { "0;0;0" } else { "0,0,0" };
+                    warnings.extend(measurements.lost_targets(zeros)?);
                     warnings.extend(measurements.beyond_limits(problem, &commands));
                 }
                 warnings.extend(problem.plausibility_warnings());

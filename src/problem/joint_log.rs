@@ -29,6 +29,8 @@ pub enum JoinRule {
     Time {
         /// Maximum time between two paired rows \[s\].
         tolerance: f64,
+        /// Time that is added to the clock of the joint table \[s\].
+        offset: f64,
     },
 }
 
@@ -56,6 +58,7 @@ pub(super) fn read(
             tolerance: section
                 .positive("tolerance", Unit::Time, not_positive)?
                 .unwrap_or(DEFAULT_TOLERANCE),
+            offset: section.number("offset", Unit::Time)?.unwrap_or(0.0),
         },
     };
     let source = section.word("source", &JointSource::WORDS, &JointSource::EACH)?;

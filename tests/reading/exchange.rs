@@ -7,8 +7,8 @@ use flexcal::problem::Problem;
 use crate::common::arms::parse;
 use crate::common::program::{Folder, assert_contains};
 use crate::common::reading::{
-    assert_says, assert_warned, problem_error, read_dataset, read_tables, try_dataset, try_poses,
-    try_table, words,
+    assert_says, assert_warned, problem_error, read_dataset, read_tables, table_error, try_dataset,
+    try_poses, try_table, words,
 };
 
 const ARM: &str = "name = 'arm'\n[[joint]]\n[[joint]]\na_m = 0.5\n";
@@ -166,6 +166,50 @@ fn a_joint_log_is_joined_by_name_order_or_time() {
     assert_says(&late, &["typically 10.2 s away; check whether both clocks agree"]);
     let twice = error(tracker, &log.replace("P2", "P1"));
     assert_says(&twice, &["controller.csv:3: column Point: the pose P1 is already on line 2"]);
+}
+
+#[test]
+fn clocks_that_differ_are_refused_with_the_offset() {
+    let times: Vec<f64> = (0..20).map(|k| f64::from(8 * k) + f64::from(k * k % 31) / 4.0).collect();
+    let log = |times: &[f64]| {
+        let row = |time: &f64| format!("{time},{},0\n", time / 9.0);
+        format!("time_s,A1,A2\n{}", times.iter().map(row).collect::<String>())
+    };
+    let tracker = |shift: f64| {
+        let row = |time: &f64| format!("1;2;3;{:.3}\n", time + shift);
+        format!("X;y_mm;z_mm;time_s\n{}", times.iter().map(row).collect::<String>())
+    };
+    let read = |by: &str, shift: f64| joined(by, &tracker(shift), &log(&times));
+    let offset = "write offset_s = 47.0 in joints";
+    let most = read("by = 'time'", 47.0).unwrap_err();
+    assert_says(&most, &["of 20 measured rows have no partner", offset]);
+    let wide = read("by = 'time', tolerance_s = 60", 47.0).unwrap_err();
+    assert_says(&wide, &["problem.toml", offset]);
+    let far = read("by = 'time', tolerance_s = 9999", 3600.0).unwrap_err();
+    assert_says(&far, &["20 of 20 measured rows have the same partner", "offset_s = 3600.0"]);
+    let (rows, warnings) = read("by = 'time', offset_s = 47", 47.0).unwrap();
+    assert_eq!((rows.len(), warnings), (20, Vec::new()));
+    let thrice: Vec<f64> = times.iter().flat_map(|time| [time - 0.1, *time, time + 0.1]).collect();
+    let many = joined("by = 'order'", &tracker(0.0), &log(&thrice)).unwrap_err();
+    assert_says(&many, &["the joint table has 60 rows for 20 measured rows", "by = \"time\""]);
+}
+
+#[test]
+fn zeros_of_a_lost_target_are_refused_and_one_is_said() {
+    let arm = parse(ARM);
+    let table = |second: &str| {
+        format!("q1_deg,q2_deg,x_mm,y_mm,z_mm\n1,2,300,1,2\n5,6,{second}\n7,8,0,0,0\n9,1,310,4,5\n")
+    };
+    let lost = table_error(&arm, &table("0,0.0,-0"));
+    let expected = ["rows.csv:3: 2 rows of different poses measure exactly 0, 0, 0", "rows.csv:4"];
+    assert_says(&lost, &expected);
+    assert_says(&lost, &["write missing = \"0,0,0\" in [data.format]"]);
+    let single = WarningKind::PositionZero { write: "0,0,0".to_owned() };
+    let (_, warnings) = try_table(&arm, &table("305,0,0")).unwrap();
+    assert_eq!(assert_warned(&warnings, &single), Some(4));
+    let told = parse(&format!("{ARM}[data.format]\nmissing = '0,0,0'\n"));
+    let (rows, _) = try_table(&told, &table("0,0.0,-0")).unwrap();
+    assert_eq!(rows.len(), 2);
 }
 
 /// Reads a tracker table with a joint log whose columns have other names and another format.

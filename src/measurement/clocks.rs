@@ -1,0 +1,93 @@
+//! Constant difference between the clocks of two tables that are joined by time.
+
+/// Maximum time between paired rows when a shift is searched \[s\].
+const MAX_PAIR_GAP: f64 = 0.5;
+/// Maximum number of rows of the joint table for which a shift is searched. A table with more rows
+/// is a continuous log, in which every shift finds partners.
+const MAX_LOG_ROWS: usize = 2000;
+/// Maximum number of measured rows with which a shift is tested.
+const MAX_TESTED_ROWS: usize = 200;
+/// Number of measured rows whose differences to all rows of the joint table are tried as shifts.
+const TRIAL_ROWS: usize = 8;
+/// Smallest number of pairs that shows a shift.
+const MIN_PAIRS: usize = 5;
+/// Smallest fraction of the tested rows that a shift must pair.
+const MIN_PAIRED_FRACTION: f64 = 0.8;
+/// Largest number of pairs of another shift, as a fraction of those of the best shift. If poses
+/// follow each other at equal intervals, several shifts pair nearly all rows and none is certain.
+const MAX_RIVAL_FRACTION: f64 = 0.7;
+
+/// Returns the shift \[s\] that must be added to the times of a joint table, so that its rows pair
+/// best with the rows measured at `times` \[s\].
+///
+/// `log` are the times of the joint table in ascending order \[s\]. Returns `None` if no shift
+/// pairs most rows, or if several do.
+pub(super) fn best_shift(times: &[f64], log: &[f64]) -> Option<f64> {
+    if log.len() > MAX_LOG_ROWS {
+        return None;
+    }
+    let tested = evenly(times, MAX_TESTED_ROWS);
+    let count = |shift: f64| {
+        let mut partners: Vec<usize> = pairs(&tested, log, shift).map(|(_, row)| row).collect();
+        partners.sort_unstable();
+        partners.dedup();
+        partners.len()
+    };
+    let shifts_of = |time: f64| log.iter().map(move |logged| time - logged);
+    let shifts = evenly(times, TRIAL_ROWS).into_iter().flat_map(shifts_of);
+    let counted: Vec<(usize, f64)> = shifts.map(|shift| (count(shift), shift)).collect();
+    let &(most, best) = counted.iter().max_by_key(|(pairs, _)| *pairs)?;
+    let is_rival = |&&(pairs, shift): &&(usize, f64)| {
+        (shift - best).abs() > 4.0 * MAX_PAIR_GAP && pairs as f64 > MAX_RIVAL_FRACTION * most as f64
+    };
+    let is_clear = most >= MIN_PAIRS && most as f64 >= MIN_PAIRED_FRACTION * tested.len() as f64;
+    if !is_clear || counted.iter().any(|counted| is_rival(&counted)) {
+        return None;
+    }
+    let mut differences: Vec<f64> = pairs(&tested, log, best)
+        .filter_map(|(time, row)| log.get(row).map(|logged| time - logged))
+        .collect();
+    differences.sort_by(f64::total_cmp);
+    differences.get(differences.len() / 2).copied()
+}
+
+/// Returns at most `most` of the times, evenly spaced.
+fn evenly(times: &[f64], most: usize) -> Vec<f64> {
+    times.iter().copied().step_by(times.len().div_ceil(most).max(1)).collect()
+}
+
+/// Iterates over the measured times that have a partner if the log is shifted, with the index of
+/// that partner.
+fn pairs(times: &[f64], log: &[f64], shift: f64) -> impl Iterator<Item = (f64, usize)> {
+    times.iter().filter_map(move |&time| {
+        let (row, gap) = nearest(log, time - shift)?;
+        (gap <= MAX_PAIR_GAP).then_some((time, row))
+    })
+}
+
+/// Returns the index of the entry of `log`, in ascending order, that is nearest to a time, and the
+/// time between them \[s\].
+pub(super) fn nearest(log: &[f64], time: f64) -> Option<(usize, f64)> {
+    let after = log.partition_point(|logged| *logged < time);
+    let around = [after.checked_sub(1), Some(after)].into_iter().flatten();
+    let gap = |row: usize| log.get(row).map(|logged| (row, (logged - time).abs()));
+    around.filter_map(gap).min_by(|(_, a), (_, b)| a.total_cmp(b))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_shift_of_a_clock_is_found_only_if_it_is_certain() {
+        let uneven: Vec<f64> =
+            (0..30).map(|k| f64::from(k * 8) + f64::from(k * k % 31) / 4.0).collect();
+        let late: Vec<f64> = uneven.iter().map(|time| time + 47.03).collect();
+        let shift = best_shift(&late, &uneven).unwrap_or(0.0);
+        assert!((shift - 47.03).abs() < 1e-9, "{shift}");
+        let even: Vec<f64> = (0..30).map(|k| f64::from(k * 8)).collect();
+        let late: Vec<f64> = even.iter().map(|time| time + 47.03).collect();
+        assert_eq!(best_shift(&late, &even), None);
+        assert_eq!(best_shift(&[], &even), None);
+    }
+}

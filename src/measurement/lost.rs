@@ -1,0 +1,38 @@
+//! Detection of zeros that an instrument writes for a lost target.
+
+use super::Measurements;
+use crate::error::{InputError, TableErrorKind, Warning, WarningKind};
+
+/// Largest fraction of rows at 0, 0, 0 that counts as lost targets. In a table with more of them
+/// the positions may be placeholders.
+const MAX_LOST_FRACTION: f64 = 0.5;
+/// Maximum number of such rows that a message lists.
+const MAX_LISTED_ROWS: usize = 10;
+
+impl Measurements {
+    /// Returns a warning about a row whose measured position is exactly 0, 0, 0. The message
+    /// proposes to `write` this value of `missing`.
+    ///
+    /// # Errors
+    /// Returns an error if several rows of different configurations measure this position, which no
+    /// arm reaches by chance.
+    pub(super) fn lost_targets(&self, write: &str) -> Result<Option<Warning>, InputError> {
+        let is_lost = |row: &usize| {
+            self.observation(*row).is_position()
+                && self.positions.get(*row).is_some_and(|position| position.norm() == 0.0)
+        };
+        let lost: Vec<usize> = (0..self.len()).filter(is_lost).collect();
+        let Some(&first) = lost.first() else { return Ok(None) };
+        if !self.position_measured || lost.len() as f64 > MAX_LOST_FRACTION * self.len() as f64 {
+            return Ok(None);
+        }
+        let (location, write) = (self.location(first), write.to_owned());
+        let differs = |row: &&usize| self.configuration(**row) != self.configuration(first);
+        if lost.iter().find(differs).is_none() {
+            return Ok(Some(Warning { location, kind: WarningKind::PositionZero { write } }));
+        }
+        let others = lost.iter().skip(1).take(MAX_LISTED_ROWS);
+        let others = others.map(|&row| self.location(row).to_string()).collect();
+        Err(location.error(TableErrorKind::LostTargets { rows: lost.len(), others, write }))
+    }
+}
