@@ -16,6 +16,12 @@ const MAX_TERMS: usize = 3;
 const EXTENDED_SUMS: usize = 8;
 /// Number of best sums in which each term is exchanged in turn, and multiplied by each factor.
 const EXCHANGED_SUMS: usize = 4;
+/// Number of best sums of each length beside which all products of two factors are tried again.
+const SCREENED_SUMS: usize = 2;
+/// Number of best terms alone that are tried as one of two terms.
+const FIRST_TERMS: usize = 300;
+/// Number of sums above which only the best are kept: a bound of memory.
+const MAX_UNSORTED_SUMS: usize = 4_000;
 /// Number of best sums of each length whose inner parameters are refined before further terms are
 /// added. Otherwise further terms would make up for a wrong value.
 const REFINED_SUMS: usize = 8;
@@ -47,9 +53,10 @@ struct State {
     weighted: DMatrix<f32>,
 }
 
-/// Term that extends a sum, with its index and scores.
+/// Term that extends a sum, with its scores.
 struct Extension {
-    place: (usize, usize),
+    /// Indices of the extended sum, of the chunk of the term, and of the term in it.
+    place: (usize, usize, usize),
     scored: Scored,
 }
 
@@ -98,6 +105,10 @@ impl<'a> Beam<'a> {
                     .collect();
                 let exchanged: Vec<Sum> = exchanged.into_iter().collect();
                 self.extend(&exchanged, &mut extended, &mut next);
+                self.extend_by_pairs(&front, &mut next);
+            }
+            if depth == 2 {
+                self.add_two_terms(&mut next);
             }
             self.multiply(&changed, &mut next);
             self.refine(&mut next);
@@ -123,10 +134,84 @@ impl<'a> Beam<'a> {
         }
     }
 
+    /// Extends the first of `sums` by the terms that explain most in addition to each, and adds the
+    /// new sums to `next` with their scores.
+    fn extend_by_pairs(&self, sums: &[Sum], next: &mut BTreeMap<Sum, Scored>) {
+        for sum in sums.iter().take(SCREENED_SUMS) {
+            let Span { weighted, along, .. } = self.state(sum).span;
+            let chunks = self.terms.beside((&weighted.transpose(), &along), self.site);
+            self.extend_by(&chunks, sum, next);
+        }
+    }
+
+    /// Adds the best sums of two terms with one column each. The first is one of the best terms
+    /// alone, of which many more are tried than of longer sums.
+    fn add_two_terms(&self, next: &mut BTreeMap<Sum, Scored>) {
+        let chunks: Vec<&Chunk> =
+            self.terms.chunks.iter().filter(|chunk| chunk.width == 1).collect();
+        let alone = |(number, chunk): (usize, &&Chunk)| {
+            let gains = chunk.lone_gains().zip(&chunk.ln_prior).enumerate();
+            let extension = |(term, (gain, ln_prior)): (usize, (f64, &f64))| {
+                let scored = self.scored(gain, 1, *ln_prior);
+                (gain > 0.0).then_some(Extension { place: (0, number, term), scored })
+            };
+            gains.filter_map(extension).collect::<Vec<Extension>>()
+        };
+        let mut first: Vec<Extension> = chunks.iter().enumerate().flat_map(alone).collect();
+        split_best(&mut first, FIRST_TERMS, |scored| scored.guide);
+        let n = self.site.diagonal.len();
+        let mut weighted = DMatrix::<f32>::zeros(first.len(), n);
+        let mut along = Vec::with_capacity(first.len());
+        for (mut row, Extension { place: (_, chunk, term), .. }) in weighted.row_iter_mut().zip(&first)
+        {
+            let chunk = chunks[*chunk];
+            let scale = chunk.squares[*term].sqrt().recip();
+            let column = chunk.columns.column(*term).map(|value| f64::from(value) * scale);
+            let [unit] = &self.site.weighted(vec![column])[..] else { continue };
+            #[expect(clippy::cast_possible_truncation, reason = "half the width is twice as fast")]
+            row.iter_mut().zip(unit.times.iter()).for_each(|(to, value)| *to = *value as f32);
+            along.push(chunk.along[*term] * scale);
+        }
+        // A sum explains more than the best term alone, or it is not worth its second term.
+        let least = along.iter().fold(0.0_f64, |most, along| most.max(along * along));
+        let of_chunk = |(number, chunk): (usize, &&Chunk)| {
+            let products = &weighted * &chunk.columns;
+            let mut sums: Vec<Extension> = Vec::new();
+            for term in 0..chunk.terms.len() {
+                let products = products.column(term);
+                for (k, (product, along)) in products.iter().zip(&along).enumerate() {
+                    let product = f64::from(*product);
+                    let (gain, new) = chunk.gain(term, |_, _| product * product, |_| product * along);
+                    let explained = along * along + gain;
+                    if new == 0 || explained <= least {
+                        continue;
+                    }
+                    let (_, first_chunk, first_term) = first[k].place;
+                    // Each further term halves the prior, and two terms have two orders.
+                    let ln_prior = chunks[first_chunk].ln_prior[first_term] + chunk.ln_prior[term];
+                    let scored = self.scored(explained, 2, ln_prior);
+                    sums.push(Extension { place: (k, number, term), scored });
+                }
+                if sums.len() > MAX_UNSORTED_SUMS {
+                    sums = best_of(sums);
+                }
+            }
+            best_of(sums)
+        };
+        let sums: Vec<Extension> = chunks.par_iter().enumerate().flat_map_iter(of_chunk).collect();
+        for Extension { place: (k, chunk, term), scored } in best_of(sums) {
+            let (_, first_chunk, first_term) = first[k].place;
+            let mut sum =
+                vec![chunks[first_chunk].terms[first_term].clone(), chunks[chunk].terms[term].clone()];
+            sum.sort();
+            next.entry(sum).or_insert(scored);
+        }
+    }
+
     /// Extends a sum by each term of `chunks`, and adds the new sums to `next` with their scores.
     fn extend_by(&self, chunks: &[Chunk], sum: &Sum, next: &mut BTreeMap<Sum, Scored>) {
         let state = self.state(sum);
-        for Extension { place: (chunk, term), scored } in self.extensions(&state, chunks) {
+        for Extension { place: (_, chunk, term), scored } in self.extensions(&state, chunks) {
             let term = &chunks[chunk].terms[term];
             if state.sum.contains(term) {
                 continue;
@@ -215,7 +300,7 @@ impl<'a> Beam<'a> {
                 }
                 let prior = state.ln_prior + chunk.ln_prior[term] + further;
                 let scored = self.scored(before + gain, rank + new, prior);
-                extensions.push(Extension { place: (number, term), scored });
+                extensions.push(Extension { place: (0, number, term), scored });
             }
             best_of(extensions)
         };

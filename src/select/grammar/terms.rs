@@ -24,6 +24,9 @@ const CHUNKS_AT_ONCE: usize = 8;
 const MAX_PAIRS: usize = 8_000;
 /// Maximum number of terms with two factors to which a third factor is added.
 const MAX_EXTENDED: usize = 40;
+/// Maximum number of terms with two factors that are kept because they explain most in addition to
+/// a sum.
+const MAX_PAIRS_BESIDE: usize = 300;
 
 /// Product of factors, given by their indices in ascending order.
 pub type Product = Vec<u16>;
@@ -67,6 +70,8 @@ pub struct Terms {
     listed: usize,
     /// Terms in groups of equal width.
     pub chunks: Vec<Chunk>,
+    /// All terms with two factors, without their columns.
+    pairs: Vec<Chunk>,
 }
 
 impl Terms {
@@ -80,7 +85,8 @@ impl Terms {
         };
         let values: Vec<Vec<DVector<f64>>> = factors.iter().map(columns).collect();
         let count = factors.len().min(usize::from(u16::MAX));
-        let mut new_terms = Self { factors, values, listed: count, chunks: Vec::new() };
+        let (chunks, pairs) = (Vec::new(), Vec::new());
+        let mut new_terms = Self { factors, values, listed: count, chunks, pairs };
         let number = |k: usize| u16::try_from(k).unwrap_or(u16::MAX);
         let single: Vec<Product> = (0..count).map(|k| vec![number(k)]).collect();
         let pairs: Vec<Product> = (0..count)
@@ -88,41 +94,69 @@ impl Terms {
             .filter(|pair| new_terms.is_new(pair))
             .collect();
         let mut chunks = new_terms.chunks_of(&single, site);
-        let pairs = new_terms.best_of(&pairs, MAX_PAIRS, site);
-        let mut extended: Vec<Product> = Self::best_terms(&pairs, MAX_EXTENDED)
-            .into_iter()
-            .flat_map(|pair| {
-                (0..count).map(move |c| {
-                    let mut term = [pair.as_slice(), &[number(c)]].concat();
-                    term.sort_unstable();
-                    term
-                })
-            })
-            .filter(|term| new_terms.is_new(term))
-            .collect();
-        extended.sort_unstable();
-        extended.dedup();
-        chunks.extend(pairs);
+        let (best_pairs, all_pairs) = new_terms.best_of(&pairs, MAX_PAIRS, site);
+        let extended = new_terms.multiplied(&Self::best_terms(&best_pairs, MAX_EXTENDED));
+        chunks.extend(best_pairs);
         chunks.extend(new_terms.chunks_of(&extended, site));
-        new_terms.chunks = chunks;
+        (new_terms.chunks, new_terms.pairs) = (chunks, all_pairs);
         new_terms
+    }
+
+    /// Returns the products of `terms` with every listed factor.
+    fn multiplied(&self, terms: &[Product]) -> Vec<Product> {
+        let number = |k: usize| u16::try_from(k).unwrap_or(u16::MAX);
+        let multiple = |term: &Product, factor: usize| {
+            let mut term = [term.as_slice(), &[number(factor)]].concat();
+            term.sort_unstable();
+            term
+        };
+        let multiples = terms
+            .iter()
+            .filter(|term| term.len() < FACTOR_COUNT_PROBABILITIES.len())
+            .flat_map(|term| (0..self.listed).map(move |factor| multiple(term, factor)));
+        let mut multiples: Vec<Product> = multiples.filter(|term| self.is_new(term)).collect();
+        multiples.sort_unstable();
+        multiples.dedup();
+        multiples
+    }
+
+    /// Returns the terms with two factors that explain most of the residual in addition to a span,
+    /// and products of the best of them with every listed factor. `weighted` holds the functions of
+    /// the span times W, transposed; `along` their products with the residual.
+    ///
+    /// A term that alone explains little may explain most of what other terms leave.
+    pub fn beside(
+        &self,
+        (weighted, along): (&DMatrix<f64>, &DVector<f64>),
+        site: &WhitenedSite,
+    ) -> Vec<Chunk> {
+        let n = site.diagonal.len();
+        let gains = |(number, chunk): (usize, &Chunk)| {
+            let terms: Vec<&Product> = chunk.terms.iter().collect();
+            let products = weighted * self.unit_columns(chunk.width, &terms, n);
+            let gain = |term: usize| (chunk.gain_beside(term, (&products, along)).0, number, term);
+            (0..chunk.terms.len()).map(gain).collect::<Vec<_>>()
+        };
+        let order = |a: &(f64, usize, usize), b: &(f64, usize, usize)| {
+            b.0.total_cmp(&a.0).then_with(|| (a.1, a.2).cmp(&(b.1, b.2)))
+        };
+        let mut gains: Vec<(f64, usize, usize)> =
+            self.pairs.par_iter().enumerate().flat_map_iter(gains).collect();
+        if gains.len() > MAX_PAIRS_BESIDE {
+            gains.select_nth_unstable_by(MAX_PAIRS_BESIDE, order);
+            gains.truncate(MAX_PAIRS_BESIDE);
+        }
+        gains.sort_unstable_by(order);
+        let mut terms: Vec<Product> =
+            gains.into_iter().map(|(_, chunk, term)| self.pairs[chunk].terms[term].clone()).collect();
+        terms.extend(self.multiplied(&terms[..terms.len().min(MAX_EXTENDED)]));
+        self.chunks_of(&terms, site)
     }
 
     /// Returns the products of a term with every listed factor, in chunks; none for a term with the
     /// largest number of factors.
     pub fn multiples(&self, term: &Product, site: &WhitenedSite) -> Vec<Chunk> {
-        if term.len() >= FACTOR_COUNT_PROBABILITIES.len() {
-            return Vec::new();
-        }
-        let number = |k: usize| u16::try_from(k).unwrap_or(u16::MAX);
-        let multiple = |k: usize| {
-            let mut term = [term.as_slice(), &[number(k)]].concat();
-            term.sort_unstable();
-            term
-        };
-        let multiples: Vec<Product> =
-            (0..self.listed).map(multiple).filter(|term| self.is_new(term)).collect();
-        self.chunks_of(&multiples, site)
+        self.chunks_of(&self.multiplied(std::slice::from_ref(term)), site)
     }
 
     /// Returns the index of a factor with another value of its inner parameter, which is added if
@@ -213,16 +247,24 @@ impl Terms {
         self.groups(terms).par_iter().map(chunk).collect()
     }
 
-    /// Returns the `most` of `terms` that alone reduce the residual most, in chunks. A few chunks
-    /// are formed at a time, so that memory does not grow with the number of terms.
-    fn best_of(&self, terms: &[Product], most: usize, site: &WhitenedSite) -> Vec<Chunk> {
+    /// Returns the `most` of `terms` that alone reduce the residual most, in chunks, and all terms
+    /// without their columns. A few chunks are formed at a time, so that memory hardly grows with
+    /// the number of terms.
+    fn best_of(
+        &self,
+        terms: &[Product],
+        most: usize,
+        site: &WhitenedSite,
+    ) -> (Vec<Chunk>, Vec<Chunk>) {
         let chunk = |(width, terms): &(usize, Vec<&Product>)| self.chunk(*width, terms, site);
-        let mut best_chunks: Vec<Chunk> = Vec::new();
+        let (mut best_chunks, mut all_chunks) = (Vec::<Chunk>::new(), Vec::new());
         for some in self.groups(terms).chunks(CHUNKS_AT_ONCE) {
-            best_chunks.extend(some.par_iter().map(chunk).collect::<Vec<Chunk>>());
+            let new = some.par_iter().map(chunk).collect::<Vec<Chunk>>();
+            all_chunks.extend(new.iter().map(Chunk::without_columns));
+            best_chunks.extend(new);
             best_chunks = Self::best(best_chunks, most);
         }
-        best_chunks
+        (best_chunks, all_chunks)
     }
 
     /// Returns terms in groups of one width.
@@ -235,8 +277,9 @@ impl Terms {
         [groups(1, narrow), groups(2, wide)].concat()
     }
 
-    fn chunk(&self, width: usize, terms: &[&Product], site: &WhitenedSite) -> Chunk {
-        let n = site.diagonal.len();
+    /// Returns the columns of terms, each scaled to length 1, because powers of large numbers would
+    /// exceed the range of single precision.
+    fn unit_columns(&self, width: usize, terms: &[&Product], n: usize) -> DMatrix<f64> {
         let mut columns = DMatrix::<f64>::zeros(n, terms.len() * width);
         for (k, target) in columns.as_mut_slice().chunks_exact_mut(n.max(1)).enumerate() {
             target.fill(1.0);
@@ -246,14 +289,18 @@ impl Terms {
                 let values = values[(k % width).min(values.len() - 1)].as_slice();
                 target.iter_mut().zip(values).for_each(|(value, factor)| *value *= factor);
             }
-            // Each column is scaled to length 1, because powers of large numbers would exceed the
-            // range of single precision.
             let norm = sum_of_squares(target).sqrt();
             let scale = if norm > 0.0 { norm } else { 1.0 };
             for value in target {
                 *value /= scale;
             }
         }
+        columns
+    }
+
+    fn chunk(&self, width: usize, terms: &[&Product], site: &WhitenedSite) -> Chunk {
+        let n = site.diagonal.len();
+        let columns = self.unit_columns(width, terms, n);
         let less = &site.less * &columns;
         let mut weighted = vec![0.0; n];
         let mut inner = |a: usize, b: usize| {
@@ -316,7 +363,7 @@ impl Terms {
 
 impl Chunk {
     /// Returns the sum of squares that each term alone explains.
-    fn lone_gains(&self) -> impl Iterator<Item = f64> + '_ {
+    pub fn lone_gains(&self) -> impl Iterator<Item = f64> + '_ {
         (0..self.terms.len()).map(|term| self.gain(term, |_, _| 0.0, |_| 0.0).0)
     }
 
@@ -353,6 +400,31 @@ impl Chunk {
         }
         let [p, q] = [first, first + 1].map(|k| self.along[k] - explained(k));
         ((b.1 * p * p - 2.0 * mixed * p * q + a.1 * q * q) / determinant, 2)
+    }
+
+    /// Returns the sum of squares that a term explains in addition to a span, and its number of
+    /// independent directions. `products` holds the products of the terms' columns with the
+    /// orthonormal functions of the span, `along` those of the functions with the residual.
+    fn gain_beside(
+        &self,
+        term: usize,
+        (products, along): (&DMatrix<f64>, &DVector<f64>),
+    ) -> (f64, usize) {
+        let column = |k: usize| column(products, k);
+        self.gain(term, |a, b| dot(column(a), column(b)), |a| dot(column(a), along.as_slice()))
+    }
+
+    /// Returns the terms with their products, without their columns.
+    fn without_columns(&self) -> Self {
+        Self {
+            width: self.width,
+            terms: self.terms.clone(),
+            ln_prior: self.ln_prior.clone(),
+            columns: DMatrix::zeros(0, 0),
+            squares: self.squares.clone(),
+            mixed: self.mixed.clone(),
+            along: self.along.clone(),
+        }
     }
 
     /// Keeps the terms that alone explain more than the sum of squares `least`.
