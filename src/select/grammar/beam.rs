@@ -17,17 +17,17 @@ const EXTENDED_SUMS: usize = 8;
 /// Number of best sums in which each term is exchanged in turn, and multiplied by each factor.
 const EXCHANGED_SUMS: usize = 4;
 /// Number of best sums of each length beside which all products of two factors are tried again.
-const SCREENED_SUMS: usize = 2;
+const SCREENED_SUMS: usize = 4;
 /// Number of best terms alone that are tried as one of two terms.
-const FIRST_TERMS: usize = 300;
+const FIRST_TERMS: usize = 400;
 /// Number of sums above which only the best are kept: a bound of memory.
 const MAX_UNSORTED_SUMS: usize = 4_000;
 /// Number of best sums of each length whose inner parameters are refined before further terms are
 /// added. Otherwise further terms would make up for a wrong value.
-const REFINED_SUMS: usize = 8;
+const REFINED_SUMS: usize = 24;
 /// Maximum number of extensions of a sum that are kept: by posterior, and by the guide
 /// [`Scored::guide`].
-const KEPT_EXTENSIONS: [usize; 2] = [100, 40];
+const KEPT_EXTENSIONS: [usize; 2] = [120, 60];
 /// Loss of ln posterior by the best further term above which no further terms are added.
 const MAX_LN_LOSS_OF_TERM: f64 = 1.0;
 /// Smallest difference between the predictions of two sums that are both kept, in units of the
@@ -162,7 +162,8 @@ impl<'a> Beam<'a> {
         let n = self.site.diagonal.len();
         let mut weighted = DMatrix::<f32>::zeros(first.len(), n);
         let mut along = Vec::with_capacity(first.len());
-        for (mut row, Extension { place: (_, chunk, term), .. }) in weighted.row_iter_mut().zip(&first)
+        for (mut row, Extension { place: (_, chunk, term), .. }) in
+            weighted.row_iter_mut().zip(&first)
         {
             let chunk = chunks[*chunk];
             let scale = chunk.squares[*term].sqrt().recip();
@@ -181,7 +182,8 @@ impl<'a> Beam<'a> {
                 let products = products.column(term);
                 for (k, (product, along)) in products.iter().zip(&along).enumerate() {
                     let product = f64::from(*product);
-                    let (gain, new) = chunk.gain(term, |_, _| product * product, |_| product * along);
+                    let (gain, new) =
+                        chunk.gain(term, |_, _| product * product, |_| product * along);
                     let explained = along * along + gain;
                     if new == 0 || explained <= least {
                         continue;
@@ -201,8 +203,10 @@ impl<'a> Beam<'a> {
         let sums: Vec<Extension> = chunks.par_iter().enumerate().flat_map_iter(of_chunk).collect();
         for Extension { place: (k, chunk, term), scored } in best_of(sums) {
             let (_, first_chunk, first_term) = first[k].place;
-            let mut sum =
-                vec![chunks[first_chunk].terms[first_term].clone(), chunks[chunk].terms[term].clone()];
+            let mut sum = vec![
+                chunks[first_chunk].terms[first_term].clone(),
+                chunks[chunk].terms[term].clone(),
+            ];
             sum.sort();
             next.entry(sum).or_insert(scored);
         }
@@ -323,7 +327,7 @@ impl<'a> Beam<'a> {
     /// Returns the best `most` sums, alternately by posterior and by guide. Their predictions
     /// differ by at least `MIN_BEAM_DIFFERENCE`.
     fn best(&self, sums: &BTreeMap<Sum, Scored>, most: usize) -> Vec<Sum> {
-        const MAX_COMPARED_SUMS: usize = 120;
+        const MAX_COMPARED_SUMS: usize = 200;
         let by = |of: fn(&Scored) -> f64| {
             let mut sorted: Vec<(&Sum, f64)> = sums.iter().map(|(sum, s)| (sum, of(s))).collect();
             sorted.sort_by(|a, b| b.1.total_cmp(&a.1));

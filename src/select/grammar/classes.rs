@@ -62,12 +62,7 @@ impl Class {
     /// Two sums are of one form if their predictions differ by less than the squared distance
     /// `largest`, or if the second one adds terms to the first.
     fn rivals(&self, terms: &Terms, largest: f64) -> Vec<(&Refined, f64)> {
-        let forms = |sum: &Sum| -> Vec<Vec<Form>> {
-            let of_term = |term: &Vec<u16>| {
-                term.iter().map(|&k| terms.factors[usize::from(k)].form.kind()).collect()
-            };
-            sum.iter().map(of_term).collect()
-        };
+        let forms = |sum: &Sum| forms(terms, sum);
         let is_one_form = |one: &Refined, other: &Refined| {
             let of_other = forms(&other.sum);
             one.prediction.squared_distance(&other.prediction) < largest
@@ -123,8 +118,11 @@ pub fn proposals(
     let largest = MAX_CLASS_DIFFERENCE.powi(2) * factor;
     let mut classes: Vec<Class> = Vec::new();
     for refined in distinct_sums {
+        // Sums that differ only in the values of inner parameters are one law, whose parameters are
+        // uncertain.
         let is_same = |class: &&mut Class| {
             class.first.prediction.squared_distance(&refined.prediction) < largest
+                || is_one_law(&terms, &class.first.sum, &refined.sum)
         };
         if let Some(class) = classes.iter_mut().find(is_same) {
             class.ln_posterior = ln_add(class.ln_posterior, refined.ln_posterior);
@@ -167,6 +165,28 @@ pub fn proposals(
         })
     };
     classes.into_iter().filter_map(proposal).take(MAX_CLASSES).collect()
+}
+
+/// Returns the forms of the factors of each term.
+fn forms(terms: &Terms, sum: &Sum) -> Vec<Vec<Form>> {
+    let of_term =
+        |term: &Vec<u16>| term.iter().map(|&k| terms.factors[usize::from(k)].form.kind()).collect();
+    sum.iter().map(of_term).collect()
+}
+
+/// Returns true if two sums have the same terms, up to their order and inner parameters.
+fn is_one_law(terms: &Terms, one: &Sum, other: &Sum) -> bool {
+    let sorted = |sum: &Sum| {
+        let word = |forms: Vec<Form>| {
+            let mut words: Vec<String> = forms.iter().map(|form| format!("{form:?}")).collect();
+            words.sort();
+            words.join(" ")
+        };
+        let mut words: Vec<String> = forms(terms, sum).into_iter().map(word).collect();
+        words.sort();
+        words
+    };
+    one.len() == other.len() && sorted(one) == sorted(other)
 }
 
 /// Returns the sums without those that an earlier one equals but for a fraction of a grid cell in

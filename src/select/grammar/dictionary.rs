@@ -12,7 +12,7 @@ const HIGHEST_ORDER: u32 = 5;
 /// Number of trial positions of a kink over the range of a joint.
 const KINK_POSITIONS: u32 = 9;
 /// Number of trial times of a step over the measured duration.
-const STEP_TIMES: u32 = 16;
+const STEP_TIMES: u32 = 32;
 /// Fraction of the measured duration at either end in which no step is tried.
 const STEP_MARGIN: f64 = 0.04;
 /// Smallest and largest time constant of a settling, as fractions of the measured duration, and

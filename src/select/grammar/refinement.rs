@@ -8,6 +8,8 @@ use super::terms::{Sum, Terms, ln_prior, product};
 
 /// Number of trial values of an inner parameter on either side of its value, within one step.
 const TRIAL_VALUES: i32 = 8;
+/// Maximum number of passes over the inner parameters of a sum in the beam search.
+const MAX_PASSES: usize = 2;
 /// Loss of ln evidence at a trial value next to the best one, above which values between them are
 /// tried.
 const MAX_LN_LOSS: f64 = 0.5;
@@ -57,7 +59,11 @@ impl Refiner<'_> {
             return None;
         }
         let mut inner = self.starts(sum);
-        self.refine(sum, &mut inner);
+        let count = sum.iter().flatten().filter(|k| has_inner(k)).count();
+        // The best value of one parameter depends on those of the others.
+        for _ in 0..count.min(MAX_PASSES) {
+            self.refine(sum, &mut inner);
+        }
         Some(inner)
     }
 

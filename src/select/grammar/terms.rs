@@ -147,8 +147,10 @@ impl Terms {
             gains.truncate(MAX_PAIRS_BESIDE);
         }
         gains.sort_unstable_by(order);
-        let mut terms: Vec<Product> =
-            gains.into_iter().map(|(_, chunk, term)| self.pairs[chunk].terms[term].clone()).collect();
+        let mut terms: Vec<Product> = gains
+            .into_iter()
+            .map(|(_, chunk, term)| self.pairs[chunk].terms[term].clone())
+            .collect();
         terms.extend(self.multiplied(&terms[..terms.len().min(MAX_EXTENDED)]));
         self.chunks_of(&terms, site)
     }
