@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::quantities::Quantities;
 use super::refinement::Refiner;
 use super::site::{BEAM_VARIANCE, Noise, Span, Weighted, WhitenedSite};
-use super::terms::{Chunk, Product, Sum, Terms, ln_prior};
+use super::terms::{Chunk, Product, Sum, Terms, is_separated, ln_prior};
 
 /// Maximum number of terms of a sum.
 const MAX_TERMS: usize = 3;
@@ -208,7 +208,9 @@ impl<'a> Beam<'a> {
                 chunks[chunk].terms[term].clone(),
             ];
             sum.sort();
-            next.entry(sum).or_insert(scored);
+            if self.is_separated(&sum) {
+                next.entry(sum).or_insert(scored);
+            }
         }
     }
 
@@ -222,11 +224,21 @@ impl<'a> Beam<'a> {
             }
             let mut longer = [state.sum.as_slice(), std::slice::from_ref(term)].concat();
             longer.sort();
+            if !self.is_separated(&longer) {
+                continue;
+            }
             let entry = next.entry(longer).or_insert(scored);
             if scored.ln_posterior > entry.ln_posterior {
                 *entry = scored;
             }
         }
+    }
+
+    /// Returns true if no two terms are nearly the same.
+    fn is_separated(&self, sum: &Sum) -> bool {
+        let Self { terms, quantities: known, site, noise, .. } = self;
+        sum.len() < 2
+            || is_separated(terms, sum, &Refiner { terms, known, site, noise }.starts(sum))
     }
 
     /// Multiplies each term of some sums by every factor. A term that alone explains little gets
@@ -257,6 +269,9 @@ impl<'a> Beam<'a> {
             };
             let mut refined: Sum = sum.iter().zip(values).map(with_values).collect();
             refined.sort();
+            if !self.is_separated(&refined) {
+                continue;
+            }
             let span = self.state(&refined).span;
             let prior = ln_prior(&self.terms, &refined);
             let scored = self.scored(span.explained_squares(), span.along.len(), prior);

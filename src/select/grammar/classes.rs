@@ -8,7 +8,7 @@ use super::factor::Form;
 use super::quantities::Quantities;
 use super::refinement::{Refined, Refiner};
 use super::site::{Noise, Weighted, WhitenedSite};
-use super::terms::{Sum, Terms};
+use super::terms::{Sum, Terms, is_separated};
 use super::written::{Written, written};
 
 /// Log odds to the best sum beyond which sums are dropped.
@@ -110,6 +110,7 @@ pub fn proposals(
         .enumerate()
         .map(|(place, (sum, _))| refiner.refined(sum, place < MAX_REFINED))
         .collect();
+    refined_sums.retain(|refined| is_separated(&terms, &refined.sum, &refined.inner));
     refined_sums.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
     let distinct_sums = distinct(refined_sums, &terms);
     // The noise factor assumes that the residual of the best sum is only noise.

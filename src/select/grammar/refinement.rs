@@ -68,7 +68,7 @@ impl Refiner<'_> {
     }
 
     /// Returns the listed values of the inner parameters of a sum; 0 for factors without one.
-    fn starts(&self, sum: &Sum) -> Vec<Vec<f64>> {
+    pub fn starts(&self, sum: &Sum) -> Vec<Vec<f64>> {
         let start = |&k: &u16| self.terms.factors[usize::from(k)].inner.map_or(0.0, |at| at.0);
         sum.iter().map(|term| term.iter().map(start).collect()).collect()
     }

@@ -16,6 +16,9 @@ const FACTOR_COUNT_PROBABILITIES: [f64; 3] = [0.6, 0.3, 0.1];
 pub const LONE_WAVE: f64 = 1.0 / 3.0;
 /// Smallest share of a term's squared length that the fitted parameters must leave.
 const MIN_LEFT: f64 = 2e-3;
+/// Smallest difference between the inner parameters of two terms of a sum that are otherwise the
+/// same, in grid steps.
+const MIN_STEPS_APART: f64 = 1.9;
 /// Number of terms whose columns are multiplied together in one matrix product.
 const TERMS_PER_PRODUCT: usize = 1024;
 /// Number of such products that are formed at a time: a bound of memory.
@@ -41,6 +44,25 @@ pub fn ln_prior(terms: &Terms, sum: &Sum) -> f64 {
     let orderings: f64 = (1..=count).map(|k| k as f64).product();
     let of_terms: f64 = sum.iter().map(|term| terms.ln_prior(term)).sum();
     of_terms + (count - 1) as f64 * 0.5_f64.ln() + orderings.ln()
+}
+
+/// Returns true if no two terms of a sum differ only in the place of a kink, or in inner parameters
+/// with nearly the same values `inner`. Such a sum approximates another function, such as a ramp or
+/// a pulse, and is no law.
+pub fn is_separated(terms: &Terms, sum: &Sum, inner: &[Vec<f64>]) -> bool {
+    let is_apart = |a: usize, b: usize| {
+        let factors = |k: usize| sum[k].iter().map(|&k| &terms.factors[usize::from(k)]);
+        let is_other = sum[a].len() != sum[b].len()
+            || factors(a).zip(factors(b)).any(|(one, other)| one.form != other.form);
+        let mut pairs = factors(a).zip(inner[a].iter().zip(&inner[b]));
+        is_other
+            || pairs.any(|(factor, (one, other))| {
+                let is_far = |step: f64| (one - other).abs() >= MIN_STEPS_APART * step;
+                !matches!(factor.form, Form::Kink(_))
+                    && factor.inner.is_some_and(|(_, step)| is_far(step))
+            })
+    };
+    (0..sum.len()).all(|a| (a + 1..sum.len()).all(|b| is_apart(a, b)))
 }
 
 /// Group of terms that have the same number of columns, with the columns.
