@@ -1,6 +1,7 @@
 //! Access to files: reads with a size limit, atomic writes, a record of written files, and CSV
 //! text.
 
+mod format;
 mod lock;
 mod record;
 mod sealed;
@@ -10,6 +11,8 @@ use std::fs::{self, File};
 use std::io::{self, Read as _};
 use std::path::Path;
 
+pub(crate) use format::Format;
+pub use format::{FORMAT_VERSION, PROGRAM};
 pub use lock::FolderLock;
 pub use record::{FolderRecord, digest};
 pub use sealed::Changes;
@@ -26,8 +29,8 @@ pub fn read_limited(path: &Path, max_bytes: u64) -> io::Result<Vec<u8>> {
     if bytes.len() as u64 > max_bytes { Err(io::ErrorKind::FileTooLarge.into()) } else { Ok(bytes) }
 }
 
-/// Opens a file for reading. Returns an error for FIFOs, sockets and devices, which could block or
-/// never end. The standard input is allowed as `/dev/stdin`, `/dev/fd/N` or `/proc/self/fd/N`.
+/// Opens a file for reading. Returns an error for FIFOs, sockets, devices and files of the kernel
+/// (`/proc`, `/sys`), which could block or never end. The standard input is allowed as `/dev/stdin`, `/dev/fd/N` or `/proc/self/fd/N`.
 ///
 /// # Errors
 /// Returns an error if the file cannot be opened, or is neither a regular file nor a folder.
@@ -35,10 +38,14 @@ pub fn open(path: &Path) -> io::Result<File> {
     let kind = fs::metadata(path)?.file_type();
     let descriptors = ["/dev/stdin", "/dev/fd", "/proc/self/fd"];
     let is_descriptor = descriptors.iter().any(|start| path.starts_with(start));
-    if kind.is_file() || kind.is_dir() || is_descriptor {
+    let is_of_kernel = || {
+        let real = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+        ["/proc", "/sys"].iter().any(|folder| real.starts_with(folder))
+    };
+    if is_descriptor || ((kind.is_file() || kind.is_dir()) && !is_of_kernel()) {
         File::open(path)
     } else {
-        let message = "it is a FIFO, socket or device; give a regular file";
+        let message = "it is a FIFO, socket, device or a file of the kernel; give a regular file";
         Err(io::Error::new(io::ErrorKind::InvalidInput, message))
     }
 }

@@ -3,35 +3,19 @@
 use super::arm::Arm;
 use super::forward::Bend;
 use super::workspace::{Event, Workspace};
-use crate::problem::{PoseView, Problem};
+use crate::problem::PoseView;
 use crate::scalar::Scalar;
 
 /// Largest rounding of a moment, relative to the sum of the moments of all loads about the base.
 const MAX_MOMENT_ROUNDING: f64 = 1e-12;
 
 /// Undeflected arm whose loads have a moment about every joint's axis.
-///
-/// The masses, payload and hoists are those that the problem declares; what deflects or is an error
-/// of a load is left out.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AxisMoments<S> {
     arm: Arm<S>,
 }
 
 impl AxisMoments<f64> {
-    /// Creates the arm of a problem.
-    pub fn new(problem: &Problem) -> Self {
-        let mut arm = Arm::nominal(problem);
-        (arm.mounting, arm.rope, arm.mixing) = (None, None, None);
-        for joint in &mut arm.joints {
-            // With a flexibility of 0 the joint stays rigid, but the pass sums the moment about its
-            // axis.
-            joint.flexibility = Some(0.0);
-            (joint.nonlinear, joint.lateral, joint.slide) = (None, None, None);
-        }
-        Self { arm }
-    }
-
     /// Converts the arm to another scalar, the coordinate of one joint being `seeded`.
     pub fn seeded<S: Scalar>(&self, joint: usize, seed: S) -> AxisMoments<S> {
         let mut arm: Arm<S> = self.arm.lift();
@@ -46,6 +30,19 @@ impl AxisMoments<f64> {
 }
 
 impl<S: Scalar> AxisMoments<S> {
+    /// Creates the moments of an arm's loads: masses, payload, hoists, springs. What deflects is
+    /// left out.
+    pub fn new(mut arm: Arm<S>) -> Self {
+        (arm.mounting, arm.mixing) = (None, None);
+        for joint in &mut arm.joints {
+            // With a flexibility of 0 the joint stays rigid, but the pass sums the moment about its
+            // axis.
+            joint.flexibility = Some(S::from(0.0));
+            (joint.nonlinear, joint.lateral, joint.slide) = (None, None, None);
+        }
+        Self { arm }
+    }
+
     /// Returns the moment of everything beyond each joint about its axis [N·m], shape = (joints).
     pub fn at(&self, setup: &PoseView) -> Vec<S> {
         let arm = &self.arm;

@@ -20,7 +20,11 @@ impl Model {
         let parameters = commands(problem, &arm, Joint::command_kind);
         Self {
             nominal: arm,
-            fixed_terms: CommandTerm::all(&self.fixed_terms, &self.parameters, x.as_slice()),
+            fixed_terms: CommandTerm::all(
+                &self.fixed_terms,
+                &self.parameters_at(x.as_slice()),
+                x.as_slice(),
+            ),
             instrument: self.instrument_at(x.as_slice()),
             bases: self.base_poses(x.as_slice()),
             targets: self.target_positions(x.as_slice()),

@@ -2,7 +2,8 @@
 //! site.
 
 use super::Model;
-use crate::model::parameter::{ParameterSite, Regressor, slope_regressor};
+use super::load_moments::Column;
+use crate::model::parameter::{ParameterSite, Regressor};
 
 /// Scalar quantity of the arm, with the Jacobian columns of the parameters that act on it.
 #[derive(Debug, Clone)]
@@ -17,34 +18,28 @@ pub(super) struct Input {
     pub regressors: Vec<(usize, Regressor)>,
 }
 
-/// Returns the inputs of the arm that the `unknowns` act on, at the full parameter vector `x`.
-/// Column j belongs to the parameter `unknowns[j]`.
-pub(super) fn inputs(model: &Model, x: &[f64], unknowns: &[usize]) -> Vec<Input> {
+/// Returns the inputs of the arm that the parameters of these Jacobian columns act on.
+pub(super) fn inputs(model: &Model, columns: &[Column]) -> Vec<Input> {
     let mut inputs: Vec<Input> = Vec::new();
-    for (column, &k) in unknowns.iter().enumerate() {
-        let parameter = &model.parameters[k];
+    for (index_of_column, column) in columns.iter().enumerate() {
+        let site = column.site;
         let is_of_arm = matches!(
-            parameter.site,
+            site,
             ParameterSite::Joint { .. } | ParameterSite::Beam { .. } | ParameterSite::Arm(_)
         );
-        if !is_of_arm && model.payload_axis(parameter.site).is_none() {
+        if !is_of_arm && model.payload_axis(site).is_none() {
             continue;
         }
-        let existing = inputs.iter().position(|input| input.site == parameter.site);
+        let existing = inputs.iter().position(|input| input.site == site);
         let index = existing.unwrap_or_else(|| {
-            inputs.push(Input {
-                site: parameter.site,
-                parameter: None,
-                column: None,
-                regressors: Vec::new(),
-            });
+            inputs.push(Input { site, parameter: None, column: None, regressors: Vec::new() });
             inputs.len() - 1
         });
         let input = &mut inputs[index];
-        if parameter.regressor.is_constant() {
-            (input.parameter, input.column) = (Some(k), Some(column));
+        if column.regressor.is_constant() {
+            (input.parameter, input.column) = (column.parameter, Some(index_of_column));
         } else {
-            input.regressors.push((column, slope_regressor(&model.parameters, x, k)));
+            input.regressors.push((index_of_column, column.regressor.clone()));
         }
     }
     inputs

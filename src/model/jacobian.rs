@@ -11,6 +11,7 @@ use super::derivatives::{ArmDerivatives, Base, Target};
 use super::elastic::Elastic;
 use super::inputs::inputs;
 use super::instrument::Instrument;
+use super::load_moments::Column;
 use super::orientation;
 use super::pose::Pose;
 use super::predictor::fixtures_of;
@@ -18,7 +19,7 @@ use super::rigid::Rigid;
 use super::rows::{Rows, clear};
 use super::tilt::TiltDerivatives;
 use crate::least_squares::Block;
-use crate::model::parameter::{ParameterSite, Regressor, slope_regressor};
+use crate::model::parameter::{ParameterSite, Regressor};
 use crate::observation::{FixtureValues, MAX_NUMBERS, Needs, Scene, Slopes};
 use crate::spatial::Frame;
 
@@ -44,12 +45,12 @@ pub(super) struct JacobianWriter<'m> {
 }
 
 impl<'m> JacobianWriter<'m> {
-    /// Creates a writer at the full parameter vector `x`; `unknowns[j]` is the parameter of column
-    /// j. `oriented` is required for rows with orientations, `tilted` for rows with tilts.
+    /// Creates a writer of these `columns` at the full parameter vector `x`. `oriented` is required
+    /// for rows with orientations, `tilted` for rows with tilts.
     pub fn new(
         model: &'m Model,
         x: &[f64],
-        unknowns: &[usize],
+        columns: &[Column],
         (oriented, tilted): (bool, bool),
     ) -> Self {
         let arm = model.arm(|k| x[k]);
@@ -62,10 +63,9 @@ impl<'m> JacobianWriter<'m> {
         let fixtures = model.fixtures(x);
         let mut fixture_columns = vec![[None; MAX_NUMBERS]; fixtures.len()];
         let (mut instrument_columns, mut base_rotations) = (Vec::new(), Vec::new());
-        let regressor = |k| slope_regressor(&model.parameters, x, k);
-        for (column, &k) in unknowns.iter().enumerate() {
-            let parameter = &model.parameters[k];
-            match parameter.site {
+        for (column, of_column) in columns.iter().enumerate() {
+            let (site, regressor) = (of_column.site, || of_column.regressor.clone());
+            match site {
                 ParameterSite::Base { base, axis } => bases[base].columns[axis] = Some(column),
                 ParameterSite::Target { target, axis } => {
                     targets[target].columns[axis] = Some(column);
@@ -73,18 +73,18 @@ impl<'m> JacobianWriter<'m> {
                 ParameterSite::Fixture { fixture, axis, .. } => {
                     fixture_columns[fixture][axis] = Some(column);
                 }
-                ParameterSite::Turn { axis } => base_rotations.push((axis, regressor(k), column)),
+                ParameterSite::Turn { axis } => base_rotations.push((axis, regressor(), column)),
                 ParameterSite::Scale
                 | ParameterSite::Strain { .. }
                 | ParameterSite::Shift { .. } => {
-                    instrument_columns.push((parameter.site, regressor(k), column));
+                    instrument_columns.push((site, regressor(), column));
                 }
                 ParameterSite::Joint { .. }
                 | ParameterSite::Beam { .. }
                 | ParameterSite::Arm(_) => {}
             }
         }
-        let inputs = inputs(model, x, unknowns);
+        let inputs = inputs(model, columns);
         let tilts = tilted.then(|| TiltDerivatives::new(model, x, arm.clone(), inputs.clone()));
         let arm = if arm.is_elastic() {
             ArmDerivatives::Elastic(Box::new(Elastic::new(model, x, arm, inputs)))
@@ -108,7 +108,7 @@ impl<'m> JacobianWriter<'m> {
             fixture_columns,
             tilts,
             arm,
-            points: Block::zeros(point_rows, unknowns.len()),
+            points: Block::zeros(point_rows, columns.len()),
         }
     }
 

@@ -16,6 +16,7 @@ mod inputs;
 mod instrument;
 mod jacobian;
 mod linear_model;
+mod load_moments;
 mod orientation;
 #[doc(hidden)]
 pub mod parameter;
@@ -202,9 +203,19 @@ impl Model {
     /// as declared.
     #[doc(hidden)]
     pub fn arm<S: Scalar>(&self, x: impl Fn(usize) -> S) -> Arm<S> {
+        self.arm_with(x, |_| true)
+    }
+
+    /// Returns the arm whose parameter k deviates by `x(k)` from nominal if it is `selected`.
+    fn arm_with<S: Scalar>(
+        &self,
+        x: impl Fn(usize) -> S,
+        selected: impl Fn(&Parameter) -> bool,
+    ) -> Arm<S> {
         let mut arm = self.nominal.lift();
         let mut tilt = [S::from(0.0); 2];
-        for (k, parameter) in self.parameters.iter().enumerate() {
+        let parameters = self.parameters.iter().enumerate();
+        for (k, parameter) in parameters.filter(|(_, parameter)| selected(parameter)) {
             if parameter.regressor.is_constant() {
                 sites::set_site(&mut arm, parameter.site, parameter.nominal, x(k), &mut tilt);
             }
@@ -233,12 +244,12 @@ impl Model {
 
     /// Returns the terms that add to the joints' commands at the full parameter vector `x`.
     fn commands(&self, x: &[f64]) -> CommandTerms {
-        CommandTerms::new(&self.fixed_terms, &self.parameters, x)
+        CommandTerms::new(&self.fixed_terms, &self.parameters_at(x), x)
     }
 
     /// Returns the instrument at the full parameter vector `x`.
     fn instrument_at(&self, x: &[f64]) -> Instrument {
-        self.instrument.with(&self.parameters, x)
+        self.instrument.with(&self.parameters_at(x), x)
     }
 
     /// Returns the base poses at `x`, measuring frame: translation \[m\] and rotation vector

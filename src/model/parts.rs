@@ -80,10 +80,11 @@ impl Model {
             };
             PartTerm { site, regressor, value }
         };
-        let mut terms: Vec<PartTerm> = CommandTerm::all(&self.fixed_terms, &self.parameters, x)
-            .into_iter()
-            .map(of_joint)
-            .collect();
+        let mut terms: Vec<PartTerm> =
+            CommandTerm::all(&self.fixed_terms, &self.parameters_at(x), x)
+                .into_iter()
+                .map(of_joint)
+                .collect();
         let instrument = self.instrument_at(x);
         let [shifts, rotations] = instrument.terms();
         terms.extend(shifts.iter().map(|(axis, regressor, value)| PartTerm {

@@ -9,6 +9,7 @@ use rayon::prelude::*;
 use super::Model;
 use super::jacobian::JacobianWriter;
 use super::linear_model::LinearModel;
+use super::load_moments::Columns;
 use super::pose::Pose;
 use super::predictor::{Prediction, Predictor};
 use crate::least_squares::{Block, CHUNK_ITEMS, LeastSquares};
@@ -151,10 +152,13 @@ impl LeastSquares for PoseResiduals<'_> {
         let full = self.full(x);
         let write = |unknowns: &[usize], block: &mut Block| {
             let kinds = (self.residuals_per_row == POSE_RESIDUALS, self.measures_tilts);
-            let mut writer = JacobianWriter::new(self.model, full.as_slice(), unknowns, kinds);
-            for (k, pose) in self.poses[items.clone()].iter().enumerate() {
-                writer.write(pose, block, self.residuals_per_row * k);
-            }
+            let columns = Columns::new(self.model, full.as_slice(), unknowns);
+            let mut writer = JacobianWriter::new(self.model, full.as_slice(), columns.all(), kinds);
+            columns.write(block, |block| {
+                for (k, pose) in self.poses[items.clone()].iter().enumerate() {
+                    writer.write(pose, block, self.residuals_per_row * k);
+                }
+            });
         };
         let usable = self.linear_model.filter(|_| self.residuals_per_row == POSITION_RESIDUALS);
         let is_reused = usable.is_some_and(|linear_model| {

@@ -43,6 +43,7 @@ pub use fit::{Fitted, fit};
 pub(crate) use gain::Gain;
 pub(crate) use joint_errors::{JointError, JointErrorPoint};
 pub(crate) use residuals::residuals;
+pub(crate) use saved::{FORMAT, SavedRemainder};
 // These items are public for the tests, the benches and the Python module only.
 #[doc(hidden)]
 pub use self::{

@@ -4,6 +4,7 @@
 use std::collections::HashMap;
 
 use nalgebra::{DMatrix, DVector};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::problem::PoseView;
@@ -35,7 +36,7 @@ pub(super) struct Site {
 }
 
 /// Quantity of a joint that may be in error.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub(super) enum SiteKind {
     /// Coordinate of the joint. Its error is a function of its own command plus a function of all

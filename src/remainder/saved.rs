@@ -4,6 +4,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use nalgebra::{DMatrix, DVector};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::value::{RawValue, to_raw_value};
 
@@ -14,13 +15,13 @@ use super::posterior::Posterior;
 use super::prior::ParameterPrior;
 use super::rows::{AXES, Inputs, Layout, Rows, Site, SiteKind, Source};
 use super::scores::Scores;
-use crate::files::{Changes, changed_key, read_limited, sealed};
+use crate::files::{Changes, FORMAT_VERSION, Format, PROGRAM, changed_key, read_limited, sealed};
 use crate::problem::Problem;
 
 /// Largest size of a `remainder.json` that is read \[MiB\].
 const MAX_FILE_MIB: u64 = 256;
-/// Name and version of the file format.
-const FORMAT: (&str, u32) = ("flexcal-remainder", 2);
+/// Name of the file format.
+pub const FORMAT: &str = "flexcal-remainder";
 /// Value of the key `kind`: the only kind of correction that this version reads.
 const KIND: &str = "gaussian-process-at-joints";
 /// Value of the key `kernel`: the correlation function of all processes.
@@ -45,13 +46,7 @@ pub enum SavedRemainderError {
     OtherArm { file: PathBuf },
 }
 
-#[derive(Serialize, Deserialize)]
-struct Format {
-    name: String,
-    version: u32,
-}
-
-#[derive(Serialize, Deserialize)]
+#[derive(Serialize, Deserialize, JsonSchema)]
 struct SavedSite {
     /// Joint, counted from 1.
     joint: usize,
@@ -70,7 +65,7 @@ struct SavedSite {
     constant_amplitude_m: f64,
 }
 
-#[derive(Serialize, Deserialize)]
+#[derive(Serialize, Deserialize, JsonSchema)]
 struct Input {
     /// Name of the input: `q1`, …, `temperature`, `payload` or `hoist`.
     name: String,
@@ -84,7 +79,7 @@ struct Input {
     joint_length: f64,
 }
 
-#[derive(Serialize, Deserialize)]
+#[derive(Serialize, Deserialize, JsonSchema)]
 struct Parameter {
     name: String,
     /// Estimated value about which the arm is linearised, SI.
@@ -97,15 +92,16 @@ struct Parameter {
     prior_sigma: f64,
 }
 
-#[derive(Serialize, Deserialize)]
+#[derive(Serialize, Deserialize, JsonSchema)]
 struct ScoreLists {
     configurations: usize,
     single: Vec<f64>,
     blocks: Vec<f64>,
 }
 
-#[derive(Serialize, Deserialize)]
-struct Document {
+/// Content of a `remainder.json`.
+#[derive(Serialize, Deserialize, JsonSchema)]
+pub struct SavedRemainder {
     format: Format,
     program: String,
     problem: String,
@@ -120,16 +116,20 @@ struct Document {
     parameters: Vec<Parameter>,
     scores: ScoreLists,
     /// Standardised inputs of each centre, one array per centre.
+    #[schemars(with = "Vec<Vec<f64>>")]
     centres: Vec<Box<RawValue>>,
     /// Derivatives with respect to the sites at each centre: for each of three coordinates, one
     /// number per site.
+    #[schemars(with = "Vec<Vec<f64>>")]
     columns: Vec<Box<RawValue>>,
     /// Kernel weights of each centre, three coordinates per array.
+    #[schemars(with = "Vec<[f64; 3]>")]
     weights: Vec<Box<RawValue>>,
     /// Knots: number of the site, counted from 1, standardised input, and kernel weight.
     #[serde(default)]
     knots: Vec<(usize, f64, f64)>,
     /// Lower triangular factor L, row by row, of the precision A = L Lᵀ of the feature weights.
+    #[schemars(with = "Vec<Vec<f64>>")]
     covariance_factor: Vec<Box<RawValue>>,
 }
 
@@ -185,9 +185,9 @@ impl Correction {
             prior_sigma: prior.spread[k],
         };
         let of_site = AXES * centres.sites.nrows();
-        let document = Document {
-            format: Format { name: FORMAT.0.to_owned(), version: FORMAT.1 },
-            program: format!("flexcal {}", env!("CARGO_PKG_VERSION")),
+        let document = SavedRemainder {
+            format: Format::current(FORMAT),
+            program: PROGRAM.to_owned(),
             problem: self.problem.clone(),
             arm_digest: self.arm_digest.clone(),
             kind: KIND.to_owned(),
@@ -252,9 +252,11 @@ impl Correction {
     pub fn parse(text: &str, file: &Path) -> Result<Self, SavedRemainderError> {
         let syntax = |source| SavedRemainderError::Syntax { file: file.to_owned(), source };
         let wrong = |what| SavedRemainderError::Format { file: file.to_owned(), what };
-        let document: Document = serde_json::from_str(text).map_err(syntax)?;
+        let document: SavedRemainder = serde_json::from_str(text).map_err(syntax)?;
         let Format { name, version } = &document.format;
-        if (name.as_str(), *version) != FORMAT || document.kind != KIND || document.kernel != KERNEL
+        if (&**name, *version) != (FORMAT, FORMAT_VERSION)
+            || document.kind != KIND
+            || document.kernel != KERNEL
         {
             return Err(wrong("another format, kind or kernel"));
         }

@@ -6,13 +6,7 @@ use schemars::{JsonSchema, Schema};
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use crate::files::{DIGEST_KEY, sealed};
-
-/// Version of the result formats. It increases when a key is removed or changes its meaning.
-pub const FORMAT_VERSION: u32 = 2;
-
-/// Name and version of the program that writes the results.
-pub const PROGRAM: &str = concat!("flexcal ", env!("CARGO_PKG_VERSION"));
+use crate::files::{DIGEST_KEY, FORMAT_VERSION, Format, PROGRAM, sealed};
 
 /// Result that is written as a JSON document with its own format name and schema.
 pub trait Document: Serialize + JsonSchema + Sized {
@@ -26,7 +20,7 @@ pub trait Document: Serialize + JsonSchema + Sized {
     /// Returns the JSON text of the result, ending in a line break: `format` and `program` first,
     /// then its own keys. Numbers that are not finite are written as null.
     fn to_json(&self) -> String {
-        let format = Format { name: Self::FORMAT, version: FORMAT_VERSION };
+        let format = Format::current(Self::FORMAT);
         let file = File { format, program: PROGRAM, content: self };
         let mut text = serde_json::to_string_pretty(&file).unwrap_or_default();
         text.push('\n');
@@ -35,35 +29,32 @@ pub trait Document: Serialize + JsonSchema + Sized {
 
     /// Returns the JSON Schema (draft 2020-12) of the format, ending in a line break.
     fn schema() -> String {
-        let settings = SchemaSettings::draft2020_12().for_serialize();
-        let mut schema = settings.into_generator().into_root_schema_for::<File<Self>>();
-        RecursiveTransform(adapted).transform(&mut schema);
-        schema.remove("description");
-        schema.insert("title".to_owned(), Self::FORMAT.into());
-        if let Some(format) = schema.pointer_mut("/$defs/Format/properties") {
-            *format = json!({ "name": { "const": Self::FORMAT }, "version": { "const": FORMAT_VERSION } });
-        }
-        if Self::IS_READ_BACK
-            && let Some(Value::Object(properties)) = schema.get_mut("properties")
-        {
-            let digests = json!({
-                "description": "Digest of the value of each other key.",
-                "type": "object",
-                "additionalProperties": { "type": "string" }
-            });
-            properties.insert(DIGEST_KEY.to_owned(), digests);
-        }
-        let mut text = serde_json::to_string_pretty(&schema).unwrap_or_default();
-        text.push('\n');
-        text
+        schema_of::<File<Self>>(Self::FORMAT, Self::IS_READ_BACK)
     }
 }
 
-/// Name and version of the format of a file.
-#[derive(Serialize, JsonSchema)]
-struct Format {
-    name: &'static str,
-    version: u32,
+/// Returns the JSON Schema (draft 2020-12) of the format with this name, whose files hold a `T`,
+/// ending in a line break. `is_sealed` is true if the files end in a digest of each key.
+pub(super) fn schema_of<T: JsonSchema>(name: &'static str, is_sealed: bool) -> String {
+    let settings = SchemaSettings::draft2020_12().for_serialize();
+    let mut schema = settings.into_generator().into_root_schema_for::<T>();
+    RecursiveTransform(adapted).transform(&mut schema);
+    schema.remove("description");
+    schema.insert("title".to_owned(), name.into());
+    if let Some(format) = schema.pointer_mut("/$defs/Format/properties") {
+        *format = json!({ "name": { "const": name }, "version": { "const": FORMAT_VERSION } });
+    }
+    if is_sealed && let Some(Value::Object(properties)) = schema.get_mut("properties") {
+        let digests = json!({
+            "description": "Digest of the value of each other key.",
+            "type": "object",
+            "additionalProperties": { "type": "string" }
+        });
+        properties.insert(DIGEST_KEY.to_owned(), digests);
+    }
+    let mut text = serde_json::to_string_pretty(&schema).unwrap_or_default();
+    text.push('\n');
+    text
 }
 
 /// Result with its format and program, as written to a file.

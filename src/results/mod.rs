@@ -42,6 +42,7 @@ pub(crate) use closed_loop::{Gain, ParameterValue, Step, Structure, Witness};
 pub(crate) use comparison::ComparedFit;
 pub(crate) use design::SeparationResult;
 pub use document::Document;
+use document::schema_of;
 pub(crate) use effect::NamedEffect;
 pub(crate) use export::Origin;
 pub use identification::IdentificationResult;
@@ -72,7 +73,6 @@ pub use self::{
     closed_loop::{AlternativeEffect, Correction, Fit, FoundEffect, Row},
     comparison::ComparisonResult,
     design::{CheckResult, ExpectedParameter, PlanResult},
-    document::{FORMAT_VERSION, PROGRAM},
     effect::Untestable,
     export::{ExportResult, ExportedErrors},
     fleet::FleetResult,
@@ -84,6 +84,8 @@ pub use self::{
     summary::Errors,
     tables::{Column, commands_csv, poses_csv, residual_columns, study_csv, study_parameters_csv},
 };
+#[doc(hidden)]
+pub use crate::files::{FORMAT_VERSION, PROGRAM};
 
 /// Returns the name of every format with its JSON Schema.
 #[doc(hidden)]
@@ -91,7 +93,7 @@ pub fn schemas() -> Vec<(&'static str, String)> {
     macro_rules! schemas {
         ($($document:ty),+ $(,)?) => { vec![$((<$document>::FORMAT, <$document>::schema())),+] };
     }
-    schemas![
+    let mut schemas = schemas![
         AcceptanceResult,
         CheckResult,
         ComparisonResult,
@@ -108,5 +110,14 @@ pub fn schemas() -> Vec<(&'static str, String)> {
         StudyResult,
         TraceResult,
         WatchResult,
-    ]
+    ];
+    schemas.push((
+        crate::rig::TRUTH_FORMAT,
+        schema_of::<crate::rig::SavedTruth>(crate::rig::TRUTH_FORMAT, false),
+    ));
+    schemas.push((
+        crate::remainder::FORMAT,
+        schema_of::<crate::remainder::SavedRemainder>(crate::remainder::FORMAT, true),
+    ));
+    schemas
 }

@@ -6,7 +6,7 @@ use serde::Serialize;
 use serde_json::value::{RawValue, to_raw_value};
 
 use super::summary::Summary;
-use crate::fit::Identification;
+use crate::fit::{Estimate, Identification};
 use crate::remainder::{Bounds, Fitted};
 
 /// Name of the file that holds a remainder.
@@ -81,6 +81,9 @@ pub(super) fn prediction(fitted: &Fitted) -> Option<Box<RawValue>> {
 
 /// Returns the rows of the posterior covariance of all free parameters, SI, each as one line of
 /// JSON text. They are in the order of the estimates; entries of held parameters are 0.
+///
+/// The correlations are those of the uncertainty of predictions. The variances are the squares of
+/// the standard errors, where an estimate has one.
 pub(super) fn covariance(found: &Identification, fitted: &Fitted) -> Vec<Box<RawValue>> {
     let n = found.estimates.len();
     let (names, posterior) = fitted.alone.parameter_covariance();
@@ -98,6 +101,12 @@ pub(super) fn covariance(found: &Identification, fitted: &Fitted) -> Vec<Box<Raw
             }
         }
     }
+    let factor = |(k, estimate): (usize, &Estimate)| {
+        let spread = f64::sqrt(covariance[(k, k)]);
+        estimate.std_error.filter(|_| spread > 0.0).map_or(1.0, |error| error / spread)
+    };
+    let factors: Vec<f64> = found.estimates.iter().enumerate().map(factor).collect();
+    let covariance = DMatrix::from_fn(n, n, |k, l| factors[k] * covariance[(k, l)] * factors[l]);
     let rows = (0..n).map(|k| covariance.row(k).iter().copied().collect::<Vec<f64>>());
     rows.filter_map(|row| to_raw_value(&row).ok()).collect()
 }

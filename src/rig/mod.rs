@@ -39,6 +39,7 @@ use equilibrium::Equilibrium;
 pub(crate) use draw::Draw;
 pub(crate) use draw::standard_normals;
 pub use draw::{Simulation, SimulationError, simulate};
+pub(crate) use output::{SavedTruth, TRUTH_FORMAT};
 pub(crate) use parameters::TrueParameter;
 pub(crate) use truth::RandomRule;
 pub use truth::Truth;

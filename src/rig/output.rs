@@ -1,20 +1,25 @@
 //! Output of a simulation: table of measurements and its truth.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
 use super::draw::{Row, Simulation};
 use super::effect::{Cause, Shape, TrueEffect, keys};
 use super::parameters::TrueParameter;
-use crate::files::csv;
+use crate::files::{Format, PROGRAM, csv};
 use crate::observation::{Field, Kind, kinds};
 use crate::problem::fixture::reference_cells;
 use crate::problem::{Joint, JointKind};
 use crate::quantity::Unit;
 
-#[derive(Serialize)]
-struct Document<'a> {
-    format: Value,
+/// Name of the format of `truth.json`.
+pub const TRUTH_FORMAT: &str = "flexcal-truth";
+
+/// Content of a `truth.json`.
+#[derive(Serialize, JsonSchema)]
+pub struct SavedTruth<'a> {
+    format: Format,
     program: &'static str,
     problem: &'a str,
     seed: u64,
@@ -26,7 +31,7 @@ struct Document<'a> {
     parameters: Vec<Parameter<'a>>,
 }
 
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 struct Parameter<'a> {
     name: &'a str,
     unit: &'static str,
@@ -142,9 +147,9 @@ impl Simulation {
     /// Returns the text of `truth.json`.
     #[doc(hidden)]
     pub fn truth_json(&self) -> String {
-        let document = Document {
-            format: serde_json::json!({ "name": "flexcal-truth", "version": 2 }),
-            program: concat!("flexcal ", env!("CARGO_PKG_VERSION")),
+        let document = SavedTruth {
+            format: Format::current(TRUTH_FORMAT),
+            program: PROGRAM,
             problem: &self.problem,
             seed: self.seed,
             poses: self.rows.len(),

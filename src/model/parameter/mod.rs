@@ -16,7 +16,9 @@ pub use crate::laws::{BeamField, JointField};
 pub use constraint::LinearConstraint;
 pub(crate) use constraint::constrain;
 
-pub(crate) use inner::{slope_regressor, value_regressor};
+pub(crate) use inner::{
+    load_regressor, slope_regressor, uses_moments, value_regressor, with_moments,
+};
 pub(crate) use regressor::Regressor;
 pub(crate) use resolve::{EffectParameter, resolve};
 pub(crate) use resolve::{holds_all, refuses, rule_of};

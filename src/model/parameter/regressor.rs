@@ -6,7 +6,7 @@ use num_dual::Dual64;
 
 use crate::laws::Quantity;
 use crate::laws::expression::{Expression, FormulaError, Names, Parsed, Per, Vocabulary, parse};
-use crate::mechanics::AxisMoments;
+use crate::mechanics::{Arm, AxisMoments};
 use crate::problem::{PoseView, Problem, ThermalLag};
 
 /// Function of a pose that multiplies a parameter at its site.
@@ -28,28 +28,43 @@ pub enum Regressor {
     Formula(Arc<Formula>),
     /// Marker of a parameter inside formulas: it multiplies nothing (value 0).
     Inner,
-    /// Derivative of formulas with respect to a parameter inside them.
+    /// Derivative of formulas with respect to a parameter inside them, or to a load whose moments
+    /// they use.
     Slope(Arc<Slope>),
 }
 
-/// Derivative of a sum of terms c f(pose; p) with respect to one parameter p inside the formulas.
+/// Derivative of a sum of terms c f(pose; p) with respect to one parameter p.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Slope {
-    /// Coefficient c, formula f with its parameter values, and index of p among f's parameters, for
+    /// Coefficient c, formula f with its parameter values, and way in which f depends on p, for
     /// each term.
-    terms: Vec<(f64, Arc<Formula>, usize)>,
+    terms: Vec<(f64, Arc<Formula>, Variable)>,
+}
+
+/// Way in which a formula depends on a parameter.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Variable {
+    /// Parameter inside the formula, by its index among the formula's parameters.
+    Inner(usize),
+    /// Load whose moments the formula uses; the load is the dual number's variable.
+    Load(Arc<AxisMoments<Dual64>>),
 }
 
 impl Slope {
-    /// Creates the derivative from the coefficient, the formula and the parameter index of each
-    /// term.
-    pub(super) fn new(terms: Vec<(f64, Arc<Formula>, usize)>) -> Self {
+    /// Creates the derivative from the coefficient, the formula and the dependence of each term.
+    pub(super) fn new(terms: Vec<(f64, Arc<Formula>, Variable)>) -> Self {
         Self { terms }
     }
 
     /// Returns the value in a pose.
     pub(super) fn value(&self, setup: &PoseView) -> f64 {
-        self.terms.iter().map(|(c, formula, p)| c * formula.parameter_slope(setup, *p)).sum()
+        let slope = |(c, formula, variable): &(f64, Arc<Formula>, Variable)| {
+            c * match variable {
+                Variable::Inner(index) => formula.parameter_slope(setup, *index),
+                Variable::Load(moments) => formula.load_slope(setup, moments),
+            }
+        };
+        self.terms.iter().map(slope).sum()
     }
 }
 
@@ -150,6 +165,16 @@ impl Formula {
         Self { parameters, ..self.clone() }
     }
 
+    /// Returns true if the formula uses moments of the arm's loads.
+    pub(super) fn uses_moments(&self) -> bool {
+        self.moments.is_some()
+    }
+
+    /// Returns the formula with the moments of other loads.
+    pub(super) fn with_moments(&self, moments: Arc<AxisMoments<f64>>) -> Self {
+        Self { moments: Some(moments), ..self.clone() }
+    }
+
     fn value(&self, setup: &PoseView) -> f64 {
         let at = |quantity| self.quantity(quantity, setup);
         match self.expression {
@@ -172,6 +197,21 @@ impl Formula {
         };
         let values: Vec<Dual64> = self.parameters.iter().enumerate().map(seeded).collect();
         let at = |quantity| Dual64::from(self.quantity(quantity, setup));
+        self.expression.evaluate(&at, &values).eps
+    }
+
+    /// Returns the derivative of the formula's value in a pose with respect to a load. `moments`
+    /// has this load as its variable.
+    fn load_slope(&self, setup: &PoseView, moments: &AxisMoments<Dual64>) -> f64 {
+        let moments = moments.at(setup);
+        let at = |quantity| match quantity {
+            Quantity::Moment(joint) => {
+                moments.get(joint).copied().unwrap_or_else(|| Dual64::from(0.0))
+            }
+            _ => Dual64::from(self.quantity(quantity, setup)),
+        };
+        let values: Vec<Dual64> =
+            self.parameters.iter().map(|parameter| Dual64::from(parameter.1)).collect();
         self.expression.evaluate(&at, &values).eps
     }
 }
@@ -205,7 +245,7 @@ impl Regressor {
                 .quantities()
                 .iter()
                 .any(follows_loads)
-                .then(|| Arc::new(AxisMoments::new(problem))),
+                .then(|| Arc::new(AxisMoments::new(Arm::nominal(problem)))),
             moves_base,
         }))
     }

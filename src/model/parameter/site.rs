@@ -156,6 +156,20 @@ impl ParameterSite {
         }
     }
 
+    /// Returns true for errors of masses, payload, hoists, springs and gravity.
+    pub(crate) fn is_load(self) -> bool {
+        match self {
+            Self::Joint { field, .. } => {
+                matches!(field, JointField::SpringRate | JointField::SpringPreload)
+            }
+            Self::Beam { field, .. } => matches!(field, BeamField::AddedMass | BeamField::AddedAt),
+            Self::Arm(field) => {
+                !matches!(field, ArmField::Mixing | ArmField::MountingX | ArmField::MountingY)
+            }
+            _ => false,
+        }
+    }
+
     /// Returns true for the orientation of a target, which positions do not depend on.
     pub fn turns_target(self) -> bool {
         matches!(self, Self::Target { axis: 3.., .. })

@@ -54,7 +54,8 @@ pub fn of(
     let partial = poses.errors(&without, &poses.rows());
     let all_poses = poses.all(1.0);
     let term = |&k: &usize| {
-        let regressor = value_regressor(&arm.model.parameters, arm.x.as_slice(), k)?;
+        let regressor =
+            value_regressor(&arm.model.parameters_at(arm.x.as_slice()), arm.x.as_slice(), k)?;
         Some(((regressor, arm.x[k]), arm.model.parameters[k].site))
     };
     let (terms, sites) = indices.iter().filter_map(term).unzip();

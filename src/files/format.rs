@@ -1,0 +1,26 @@
+//! Head of every JSON file that flexcal writes.
+
+use std::borrow::Cow;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Version of the result formats. It increases when a key is removed or changes its meaning.
+pub const FORMAT_VERSION: u32 = 2;
+
+/// Name and version of the program that writes the files.
+pub const PROGRAM: &str = concat!("flexcal ", env!("CARGO_PKG_VERSION"));
+
+/// Name and version of the format of a file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub(crate) struct Format {
+    pub name: Cow<'static, str>,
+    pub version: u32,
+}
+
+impl Format {
+    /// Returns the current version of the format with this name.
+    pub fn current(name: &'static str) -> Self {
+        Self { name: Cow::Borrowed(name), version: FORMAT_VERSION }
+    }
+}
