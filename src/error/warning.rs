@@ -53,6 +53,10 @@ pub enum WarningKind {
     )]
     NotADate { value: String, write: String },
     #[error(
+        "{value} is read month first, as {read}; if its day comes first, write dates as YYYY-MM-DD"
+    )]
+    MonthFirst { value: String, read: String },
+    #[error(
         "equal to {first} in all digits{}; measurements do not repeat so exactly, and a copied \
          row counts twice",
         repeated_rows(*rows, others)

@@ -3,7 +3,7 @@
 use super::columns::{Column, Columns};
 use super::role::Role;
 use super::table::{Table, shortened};
-use super::time::is_ambiguous;
+use super::time::{assumed_month_first, is_ambiguous};
 use crate::error::{InputError, TableErrorKind, Warning, WarningKind};
 use crate::quantity::Unit;
 
@@ -19,6 +19,14 @@ impl Columns {
         table: &Table,
         warnings: &mut Vec<Warning>,
     ) -> Result<(), InputError> {
+        let times = self.read.iter().find(|column| column.role == Role::Time);
+        if let Some(place) = times.map(|column| column.place)
+            && let value = table.text(place)?
+            && let Some(read) = assumed_month_first(value)
+        {
+            let kind = WarningKind::MonthFirst { value: shortened(value), read };
+            warnings.push(Warning { location: table.column(table.name_of(place)), kind });
+        }
         let has_times =
             |column: &Column| (column.to_si)(0.0).is_finite() || table.is_date(column.place);
         if let Some(place) =

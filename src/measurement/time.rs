@@ -22,6 +22,15 @@ pub(super) fn is_ambiguous(text: &str) -> bool {
         .is_some_and(|(date, is_clear)| !is_clear && iso_8601(&date).is_some())
 }
 
+/// Returns the date, as `2026-11-05`, of a time that is read month first only because its clock has
+/// AM or PM, although the day may come first.
+pub(super) fn assumed_month_first(text: &str) -> Option<String> {
+    let (date, is_clear) = iso_from_month_first(text.trim())?;
+    let [month, day] = [date.get(5..7)?, date.get(8..10)?];
+    let may_be_day_first = is_clear && day <= "12" && month != day;
+    (may_be_day_first && iso_8601(&date).is_some()).then(|| date.get(..10).map(str::to_owned))?
+}
+
 /// Rewrites `11/25/2026 09:00:12 PM` as `2026-11-25 21:00:12`; the flag is true if the month is
 /// known to stand first.
 fn iso_from_month_first(text: &str) -> Option<(String, bool)> {
@@ -222,6 +231,11 @@ mod tests {
             assert_eq!(date_time(text), None, "{text}");
         }
         assert!(is_ambiguous("05/06/2024 14:03") && !is_ambiguous("05/31/2024 14:03"));
+        let assumed = |text: &str| assumed_month_first(text);
+        assert_eq!(assumed("11/05/2026 09:00:12 AM").as_deref(), Some("2026-11-05"));
+        for clear in ["11/25/2026 09:00:12 AM", "11/11/2026 9:00 PM", "05/31/2024 14:03", "2.5"] {
+            assert_eq!(assumed(clear), None, "{clear}");
+        }
         assert_eq!(shown(1_717_157_000.25), "2024-05-31 12:03:20");
         assert_eq!(shown(12.5), "12.5 s");
     }

@@ -30,8 +30,8 @@ impl AxisMoments<f64> {
 }
 
 impl<S: Scalar> AxisMoments<S> {
-    /// Creates the moments of an arm's loads: masses, payload, hoists, springs. What deflects is
-    /// left out.
+    /// Creates the moments of an arm's loads: masses, payload and hoists. What deflects is left
+    /// out, and so are gravity compensators.
     pub fn new(mut arm: Arm<S>) -> Self {
         (arm.mounting, arm.mixing) = (None, None);
         for joint in &mut arm.joints {
@@ -39,6 +39,7 @@ impl<S: Scalar> AxisMoments<S> {
             // axis.
             joint.flexibility = Some(S::from(0.0));
             (joint.nonlinear, joint.lateral, joint.slide) = (None, None, None);
+            joint.compensator = None;
         }
         Self { arm }
     }

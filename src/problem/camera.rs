@@ -67,13 +67,23 @@ pub(super) fn camera(
         }
     }
     known.extend(distortion.into_iter().map(Some));
-    let image = section.get("image_px").map(|item| positive_pair(&item)).transpose()?;
+    let image = section.get("image_px").map(|item| image_size(&item)).transpose()?;
     let item = section.require("pixel_sigma", "pixel_sigma = 0.2, 1 σ of u and v in pixels")?;
     let sigma = item.number()?;
     if sigma <= 0.0 {
         return Err(item.error(InputErrorKind::NotPositive { value: sigma }));
     }
     Ok(Declared { carrier, sigma: Some(sigma), image, ..Declared::new(kind, known) })
+}
+
+/// Reads width and height of images, two whole numbers above zero.
+fn image_size(item: &Item<'_, '_>) -> Result<[f64; 2], InputError> {
+    let size = positive_pair(item)?;
+    if size.iter().all(|pixels| pixels.fract() == 0.0) {
+        Ok(size)
+    } else {
+        Err(item.wrong_type("whole numbers of pixels, [width, height]"))
+    }
 }
 
 /// Reads two numbers above zero.

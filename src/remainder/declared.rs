@@ -6,7 +6,7 @@ use super::correction::Correction;
 use super::saved::SavedRemainderError;
 use crate::files::Changes;
 use crate::fit::SavedEstimate;
-use crate::problem::Problem;
+use crate::problem::{Problem, RemainderDeclaration};
 
 /// Reads the correction of joint errors from the file that the section `[remainder]` names. Returns
 /// `None` if the problem lacks the section or sets `use = false` in it.
@@ -24,7 +24,16 @@ fn of_problem(
     changes: Changes,
 ) -> Result<Option<Correction>, SavedRemainderError> {
     let used = problem.remainder.as_ref().filter(|declared| declared.is_used);
-    used.map(|declared| read(problem, &declared.file, changes)).transpose()
+    let read = |declared: &RemainderDeclaration| {
+        read(problem, &declared.file, changes).map_err(|source| match source {
+            unreadable @ SavedRemainderError::Unreadable { .. } => SavedRemainderError::Declared {
+                location: declared.location.clone(),
+                source: Box::new(unreadable),
+            },
+            other => other,
+        })
+    };
+    used.map(read).transpose()
 }
 
 /// Reads the correction for predictions with `estimate`: the remainder of the problem, else that of

@@ -15,6 +15,7 @@ use super::posterior::Posterior;
 use super::prior::ParameterPrior;
 use super::rows::{AXES, Inputs, Layout, Rows, Site, SiteKind, Source};
 use super::scores::Scores;
+use crate::error::Location;
 use crate::files::{Changes, FORMAT_VERSION, Format, PROGRAM, changed_key, read_limited, sealed};
 use crate::problem::Problem;
 
@@ -44,6 +45,10 @@ pub enum SavedRemainderError {
     OtherProblem { file: PathBuf, found: String, expected: String },
     #[error("{}: was fitted to another declared arm (a fixed value, a mass, gravity or an effect has changed since); fit it again with flexcal identify --remainder", file.display())]
     OtherArm { file: PathBuf },
+    #[error(
+        "{location}: {source}; fit a remainder with flexcal identify --remainder, or write use = false"
+    )]
+    Declared { location: Location, source: Box<SavedRemainderError> },
 }
 
 #[derive(Serialize, Deserialize, JsonSchema)]

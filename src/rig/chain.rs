@@ -191,17 +191,23 @@ impl Chain {
         self.springs.extend(springs.map(|spring| Spring { piece, ..spring }));
     }
 
-    /// Returns the sum of force times point of action over all loads, with every hinge undeformed
-    /// [N·m]. Its differences are the work of the loads.
-    pub fn work(&self) -> f64 {
+    /// Returns the sum, over all loads, of the force here times the point of action in the `moved`
+    /// chain, with every hinge undeformed [N·m]. Its differences are the work of the loads.
+    pub fn work(&self, moved: &Self) -> f64 {
+        let forces = self.loads.iter().zip(self.points());
+        let forces = forces.map(|(load, point)| load.force.at(&point));
+        forces.zip(moved.points()).map(|(force, point)| force.dot(&point)).sum()
+    }
+
+    /// Returns the point of action of each load, with every hinge undeformed, base frame \[m\].
+    fn points(&self) -> Vec<Vector3<f64>> {
         let mut frames: Vec<Frame<f64>> = Vec::with_capacity(self.pieces.len());
         for Piece { root, .. } in &self.pieces {
             let carrier = root.piece.and_then(|piece| frames.get(piece));
             frames.push(carrier.map_or(root.frame, |carrier| carrier.compose(&root.frame)));
         }
-        let point = |load: &Load| Some(frames.get(load.piece)?.point(&load.at));
-        let placed = self.loads.iter().filter_map(|load| Some((load, point(load)?)));
-        placed.map(|(load, point)| load.force.at(&point).dot(&point)).sum()
+        let point = |load: &Load| frames.get(load.piece).map(|frame| frame.point(&load.at));
+        self.loads.iter().filter_map(point).collect()
     }
 
     /// Adds a load at a point \[m\] relative to the current end of the chain.

@@ -83,9 +83,24 @@ impl Rig {
     }
 
     /// Returns the moment of the loads about the axis of a joint, counted from 0, on the
-    /// undeflected arm without effects [N·m]. It is the work of the loads per turn of the joint.
+    /// undeflected arm [N·m]. It is the work of the loads, with their errors, per turn of the joint.
     fn moment(&self, joint: usize, conditions: &PoseConditions) -> f64 {
-        let mut bare = Self::new(self.arm.clone(), Vec::new()).with_segments(1);
+        let errors_of_loads = self.effects.iter().filter(|effect| {
+            matches!(
+                effect.catalogued(),
+                Some((
+                    Effect::PayloadMass
+                        | Effect::UnmodelledMass { .. }
+                        | Effect::HoistForce
+                        | Effect::HoistDirection
+                        | Effect::GravityDirection,
+                    _
+                ))
+            )
+        });
+        let mut bare =
+            Self::new(self.arm.clone(), errors_of_loads.cloned().collect()).with_segments(1);
+        let loaded = bare.chain(conditions).0;
         let mut work = |step: f64| {
             if let Some(joint) = bare.arm.joints.get_mut(joint) {
                 match joint.kind {
@@ -93,7 +108,7 @@ impl Rig {
                     _ => joint.theta += step,
                 }
             }
-            bare.chain(conditions).0.work()
+            loaded.work(&bare.chain(conditions).0)
         };
         (work(MOMENT_STEP) - work(-2.0 * MOMENT_STEP)) / (2.0 * MOMENT_STEP)
     }

@@ -46,7 +46,9 @@ fn strategies_and_solvers_are_what_they_say() {
 
 #[test]
 fn a_comparison_without_held_out_rows_has_left_out_errors() {
-    let folder = Folder::with_lunar_sampler();
+    let folder = Folder::new();
+    folder.copy("problems/service-arm/problem.toml", "problem.toml");
+    folder.copy("problems/service-arm/measurements.csv", "measurements.csv");
     folder.map("problem.toml", |text| {
         let held_out = text.lines().find(|line| line.starts_with("held_out")).unwrap().to_owned();
         text.replace(&held_out, "held_out = \"none\"")

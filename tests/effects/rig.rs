@@ -155,3 +155,49 @@ fn every_effect_is_inert_at_zero() {
         }
     }
 }
+
+#[test]
+fn moments_in_laws_are_those_of_the_loads_with_their_errors() {
+    let (arm, _) = lunar();
+    let rows = poses(&arm, 20, true, &mut ChaCha8Rng::seed_from_u64(11));
+    let link = || "A".to_owned();
+    let text = "law = { name = 'm', at = 'joint2', terms = ['M2', 'M3*sin(q1)'] }";
+    let law = arm.effect(text, Path::new("law")).unwrap().effect;
+    let errors: [Strong; 5] = [
+        (Effect::PayloadMass, vec![1.5]),
+        (Effect::UnmodelledMass { link: link() }, vec![3.0, 0.7]),
+        (Effect::HoistForce, vec![0.2]),
+        (Effect::HoistDirection, vec![0.05, 0.03, 0.04]),
+        (Effect::GravityDirection, vec![0.03, -0.02]),
+    ];
+    let size = vec![2e-5, -3e-5];
+    for error in &errors {
+        // The law's own displacement, with the error of the loads and without it.
+        let of_law = |loads: &[Strong]| {
+            let with_law = [loads, &[(law.clone(), size.clone())]].concat();
+            let model = |effects: &[Strong]| {
+                let kinds: Vec<Effect> = effects.iter().map(|effect| effect.0.clone()).collect();
+                let values: Vec<f64> = effects.iter().flat_map(|effect| effect.1.clone()).collect();
+                let arm = declared(&arm, &kinds);
+                predicted(&arm, &rows, &strengths(&model_of(&arm, &rows), &values))
+            };
+            let (by_model, rest) = (model(&with_law), model(loads));
+            let (by_rig, rig_rest) =
+                (measured(&arm, &with_law, &rows), measured(&arm, loads, &rows));
+            let moved =
+                |with: Vec<Vector3<f64>>, without: Vec<Vector3<f64>>| -> Vec<Vector3<f64>> {
+                    with.into_iter().zip(without).map(|(with, without)| with - without).collect()
+                };
+            (moved(by_model, rest), moved(by_rig, rig_rest))
+        };
+        let (by_model, by_rig) = of_law(std::slice::from_ref(error));
+        let (without_error, _) = of_law(&[]);
+        let mut change = 0.0_f64;
+        for row in 0..rows.len() {
+            let off = (by_model[row] - by_rig[row]).norm();
+            assert!(off < PART * by_rig[row].norm() + FLOOR, "{:?}, row {row}: {off} m", error.0);
+            change = change.max((by_model[row] - without_error[row]).norm());
+        }
+        assert!(change > 20.0 * FLOOR, "{:?} changes the law by {change} m only", error.0);
+    }
+}

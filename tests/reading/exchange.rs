@@ -63,6 +63,12 @@ fn dates_may_begin_with_the_day() {
     assert_eq!(time("05/31/2024 02:03:20 PM"), time("2024-05-31T14:03:20"));
     let error = read("", &table("05/06/2024 14:03:20")).unwrap_err();
     assert_says(&error, &["day and month may stand in either order"]);
+    let warnings = |text| words(&read("", &table(text)).unwrap().1);
+    assert_contains(
+        &warnings("05/06/2024 02:03:20 PM"),
+        &["05/06/2024 02:03:20 PM is read month first, as 2024-05-06"],
+    );
+    assert_eq!(warnings("05/31/2024 02:03:20 PM"), "");
 }
 
 #[test]

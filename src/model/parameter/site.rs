@@ -156,12 +156,9 @@ impl ParameterSite {
         }
     }
 
-    /// Returns true for errors of masses, payload, hoists, springs and gravity.
+    /// Returns true for errors of masses, payload, hoists and gravity.
     pub(crate) fn is_load(self) -> bool {
         match self {
-            Self::Joint { field, .. } => {
-                matches!(field, JointField::SpringRate | JointField::SpringPreload)
-            }
             Self::Beam { field, .. } => matches!(field, BeamField::AddedMass | BeamField::AddedAt),
             Self::Arm(field) => {
                 !matches!(field, ArmField::Mixing | ArmField::MountingX | ArmField::MountingY)
