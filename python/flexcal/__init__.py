@@ -13,6 +13,8 @@ otherwise (``x_mm``, ``mean_mm``, ``temperature_C``).
 
 from __future__ import annotations
 
+from importlib.metadata import version
+
 from ._applied import Compensation, Export
 from ._designs import Check, Next, Plan, Simulation, Study
 from ._fits import ClosedLoop, Comparison, Identification, Trace
@@ -22,6 +24,8 @@ from ._least_squares import LeastSquares
 from ._problem import Problem, study
 from ._progress import Progress
 from .errors import FlexcalWarning, InputError
+
+__version__ = version("flexcal")
 
 __all__ = [
     "Check",

@@ -15,6 +15,16 @@ use super::plan;
 /// Number of poses that a suggested plan has to distinguish two effects.
 const SEPARATING_POSES: usize = 12;
 
+/// Findings that speak for a mistake in table or problem, not for an effect that the model lacks.
+const CONTRADICTIONS: [FindingCode; 6] = [
+    FindingCode::MissesMeasurements,
+    FindingCode::NoBetterThanNominal,
+    FindingCode::OtherSize,
+    FindingCode::BeyondPrior,
+    FindingCode::BeyondArmSize,
+    FindingCode::GivesWayUpwards,
+];
+
 /// Returns the command to run after a fit. `is_structured` is true if the residual has structure;
 /// `estimate` is the file written.
 pub fn after_fit(
@@ -48,6 +58,10 @@ pub fn after_fit(
                 common.problem_file().display()
             )
         }
+        None if CONTRADICTIONS.iter().any(|code| found.has(*code)) => format!(
+            "correct the table or {} as the warning says, then flexcal identify {named}",
+            common.problem_file().display()
+        ),
         None if found.has(FindingCode::NoiseBeyondDeclared) => {
             format!("flexcal loop {named} looks for what the model lacks")
         }
@@ -125,7 +139,15 @@ pub fn after_loop(
             format!("flexcal identify {closed} writes the estimate to apply")
         }
         Verdict::Unexplained => {
-            format!("flexcal trace {named} ranks candidates and names what these data cannot show")
+            let trace = format!(
+                "flexcal trace {named} ranks candidates and names what these data cannot show"
+            );
+            let is_better = !result.effects.is_empty() || result.remainder.is_some();
+            if is_better {
+                format!("flexcal identify {closed} writes the estimate to apply; {trace}")
+            } else {
+                trace
+            }
         }
         Verdict::NothingFound => format!("flexcal identify {named} writes the estimate to apply"),
         Verdict::Explained => {

@@ -59,9 +59,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     }
     results.write(&[(PAGE, &report::difference_page(&sides))])?;
     if !quiet {
-        let [first, second] = [first, second].map(|file| shell_word(file));
+        let first = shell_word(first);
         output::print(&format!(
-            "{}{}Next: flexcal fleet {first} {second} if these are two arms; flexcal watch PROBLEM --estimate {first} --data FILE if it is one\n",
+            "{}{}Next: flexcal watch PROBLEM --estimate {first} --data FILE says whether new rows contradict an estimate\n",
             report::difference_text(&sides),
             results.written()
         ))?;

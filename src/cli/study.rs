@@ -221,7 +221,10 @@ fn finish(
         (NAMES[4], &report::study_page(study, &found)),
     ];
     results.write(&texts)?;
-    common.flags.print_result(&json, || report::study_text(study, &found) + &results.written())?;
+    common.flags.print_result(&json, || {
+        let next = "Next: parameters.csv has bias, scatter and coverage of each parameter; docs/study.md explains the columns\n";
+        report::study_text(study, &found) + &results.written() + next
+    })?;
     let has_failed = |cell: &CellResult| cell.tally.failed() == cell.tally.fits;
     Ok(Outcome::trusted(!found.cells.iter().any(has_failed)))
 }

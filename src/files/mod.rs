@@ -42,11 +42,15 @@ pub fn open(path: &Path) -> io::Result<File> {
         let real = path.canonicalize().unwrap_or_else(|_| path.to_owned());
         ["/proc", "/sys"].iter().any(|folder| real.starts_with(folder))
     };
-    if is_descriptor || ((kind.is_file() || kind.is_dir()) && !is_of_kernel()) {
-        File::open(path)
-    } else {
-        let message = "it is a FIFO, socket, device or a file of the kernel; give a regular file";
+    let refused = |what: &str| {
+        let message = format!("{what}; give a regular file");
         Err(io::Error::new(io::ErrorKind::InvalidInput, message))
+    };
+    match (kind.is_file() || kind.is_dir(), is_of_kernel()) {
+        _ if is_descriptor => File::open(path),
+        (false, _) => refused("it is a FIFO, socket or device"),
+        (true, true) => refused("it is a file of the kernel"),
+        (true, false) => File::open(path),
     }
 }
 

@@ -115,7 +115,7 @@ impl<'a> Tables<'a> {
     fn read(&mut self, index: usize, mut table: Table) -> Result<(), InputError> {
         let dialect = &self.problem.data.dialect;
         let joint_log = self.problem.data.joint_log.as_ref();
-        let is_joined = self.measured && !Columns::has_joints(&table, self.problem);
+        let is_joined = !Columns::has_joints(&table, self.problem);
         let mut log = match (joint_log.filter(|_| is_joined), self.log.take()) {
             (Some(_), Some(log)) => Some(log),
             (Some(declared), None) => Some(JoinedLog::read(declared, self.problem)?),

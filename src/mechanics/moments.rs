@@ -57,7 +57,8 @@ impl<S: Scalar> AxisMoments<S> {
             _ => 0.0,
         };
         let least = MAX_MOMENT_ROUNDING * ws.events.iter().map(term).sum::<f64>();
-        let mut next = 0;
+        // The coordinates of the hooks of ropes that may lean come before all moments.
+        let mut next = 2 * ws.hooks.len();
         // Three moments for each element of a beam come before that of its joint.
         let moment = |joint: &super::Joint<S>| {
             let of_beam = if joint.beam.is_some() { 3 * arm.beam_elements } else { 0 };

@@ -70,7 +70,10 @@ impl Document {
                 .strip_suffix(',')
                 .is_some_and(|number| number.ends_with(is_digit) && after.starts_with(is_digit));
         let first = self.text.lines().next().unwrap_or_default();
-        if !before.contains('\n') && !first.contains('=') && first.contains([',', ';', '\t']) {
+        if first.trim_start().starts_with('<') {
+            "; this is XML: flexcal init FILE makes a problem.toml of a URDF"
+        } else if !before.contains('\n') && !first.contains('=') && first.contains([',', ';', '\t'])
+        {
             "; this is a table of measurements: PROBLEM is a problem.toml or its folder, and --data \
              names tables"
         } else if has_decimal_comma {

@@ -36,7 +36,7 @@ pub fn acceptance_page(problem: &Problem, result: &AcceptanceResult) -> String {
         is_doubtful: !result.trusted,
     };
     let trust = if result.trusted {
-        "The fit is trusted."
+        "No check of the fit reports an error."
     } else {
         "Warning: the fit is not to be trusted."
     };

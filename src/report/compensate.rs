@@ -50,7 +50,7 @@ pub fn commands_text(
             number(before, 4)
         );
     }
-    if let Some(bounds) = bounds {
+    if let Some(bounds) = bounds.filter(|_| result.reached > 0) {
         let _ = write!(words, ".\n{}", bounded(bounds, None));
     }
     let point = |command: &Command| {

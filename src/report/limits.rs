@@ -25,7 +25,7 @@ pub(super) fn active_limits<'a>(found: &Identification) -> Option<Block<'a>> {
     let points: Vec<String> =
         bounds.chain(found.active_constraints.iter().map(constraint)).collect();
     let words = "Active limits and their cost: fall of the rms residual if the limit moves out \
-                 by so much\n(standard errors are along active constraints):"
+                 by so much\n(standard errors hold with these limits kept):"
         .to_owned();
     (!points.is_empty()).then_some(Block::Lines(words, points))
 }

@@ -86,6 +86,9 @@ fn other_sigma(problem: &Problem, found: &Identification) -> String {
         format!("every declared σ times {size}")
     };
     let cause = match &found.influential_rows {
+        _ if !is_larger && found.reduced_chi2.is_some_and(|chi2| chi2 > 1.0) => {
+            "although χ² is too large: a part of the rows is far off".to_owned()
+        }
         _ if !is_larger => "so the declared σ is too large".to_owned(),
         Some(influential) => {
             let cause = match influential.rows.len() {

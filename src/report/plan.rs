@@ -26,7 +26,7 @@ fn enough<'a>(plan: &Plan) -> Block<'a> {
     let parameters = counted(plan.planned.expected.len(), "parameter");
     if rank >= attainable_rank {
         return Block::Text(format!(
-            "Enough poses: they determine all that such poses can (rank {rank} of {}).",
+            "Enough poses: more such poses determine nothing further (rank {rank} of {}).",
             plan.planned.expected.len()
         ));
     }

@@ -93,6 +93,16 @@ pub(crate) fn bound_text(plots: &PlotData) -> Option<String> {
     })
 }
 
+/// Largest error of positions that were computed by the model, relative to the expected error. Tables
+/// round positions to 0.1 µm.
+const MAX_COMPUTED_ERROR: f64 = 2e-3;
+
+/// Returns true if no measurement agrees so closely with predictions as these residuals.
+fn are_predicted(bounds: &Bounds, residuals: &[Residual]) -> bool {
+    let largest = residuals.iter().map(|row| row.position.norm()).fold(0.0, f64::max);
+    !residuals.is_empty() && largest <= MAX_COMPUTED_ERROR * bounds.expected()
+}
+
 /// Returns the expected error and its bound in words. If there are `residuals`, adds the share of
 /// rows within their bounds.
 pub(super) fn bounded(bounds: &Bounds, residuals: Option<&[Residual]>) -> String {
@@ -102,7 +112,12 @@ pub(super) fn bounded(bounds: &Bounds, residuals: Option<&[Residual]>) -> String
         (bounds.level * 1e6).round() / 1e4,
         number(bounds.mean() * 1e3, 3),
     );
-    if let Some(residuals) = residuals {
+    if let Some(residuals) = residuals
+        && are_predicted(bounds, residuals)
+    {
+        words += "; the positions of these rows are predictions of the model, such as targets of commands.csv, so their errors verify \
+                  nothing";
+    } else if let Some(residuals) = residuals {
         let share = bounds.coverage(residuals.iter().map(|pose| pose.position.norm()));
         let _ = write!(words, "; {} % of these rows lie within theirs", number(share * 100.0, 1));
     }

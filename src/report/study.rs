@@ -1,5 +1,7 @@
 //! Text and page of the command `study`.
 
+use std::fmt::Write as _;
+
 use super::document::{Block, Column, Table, opening};
 use super::figures::{Drawing, Forest, INK};
 use super::render::{page, text};
@@ -65,18 +67,44 @@ fn blocks<'a>(study: &Study, results: &Results) -> Vec<Block<'a>> {
         "largest bias: of any parameter, over the spread of its estimates; ms: median time of a fit",
     ]);
     let [titled, untitled] = opening(&study.title, head);
-    vec![titled, untitled, Block::Table(table), Block::figures([errors(&cells)])]
+    let conclusion = Block::lines(conclusion(&cells));
+    vec![titled, untitled, conclusion, Block::Table(table), Block::figures([errors(&cells)])]
+}
+
+/// States the cell with the least held-out error, and the cells in which every fit failed.
+fn conclusion(cells: &[Timed]) -> String {
+    let rms = |cell: &&Timed| cell.0.held_out_mm.rms.unwrap_or(f64::INFINITY);
+    let best = cells.iter().filter(|cell| cell.0.held_out_mm.rms.is_some());
+    let best = best.min_by(|a, b| rms(a).total_cmp(&rms(b)));
+    let mut words = match best {
+        Some(cell) => format!(
+            "Least error at held-out poses: {} mm rms ({})",
+            number(rms(&cell), 4),
+            name(&cell.0)
+        ),
+        None => "No fit succeeded".to_owned(),
+    };
+    let is_lost = |(cell, _): &&Timed| cell.failure_rate >= 1.0;
+    let lost: Vec<String> = cells.iter().filter(is_lost).map(|cell| name(&cell.0)).collect();
+    if !lost.is_empty() {
+        let _ = write!(words, ". Every fit failed or is not to be trusted: {}", lost.join("; "));
+    }
+    words
+}
+
+/// Returns the conditions of a cell in words.
+fn name(cell: &Cell) -> String {
+    format!(
+        "{} mm, {} poses, {} {}",
+        cell.position_sigma_mm, cell.identification_poses, cell.strategy, cell.solver
+    )
 }
 
 /// Draws the held-out error of each cell.
 fn errors(cells: &[Timed]) -> Option<Drawing> {
     let row = |(cell, _): &Timed| {
-        let name = format!(
-            "{} mm, {} poses, {} {}",
-            cell.position_sigma_mm, cell.identification_poses, cell.strategy, cell.solver
-        );
         let rms = cell.held_out_mm.rms?;
-        Some((name, vec![Some((rms, cell.held_out_mm.rms_sd.unwrap_or_default()))]))
+        Some((name(cell), vec![Some((rms, cell.held_out_mm.rms_sd.unwrap_or_default()))]))
     };
     Forest {
         names: ("study-errors", "Held-out error of each cell"),

@@ -113,6 +113,7 @@ const STOREYS: &[(&str, &[&[&str]])] = &[
                 "select",
                 "design",
                 "study",
+                "rig",
                 "files",
                 "urdf",
             ],

@@ -97,6 +97,9 @@ finding_codes! {
     BeyondArmSize: Error "beyond-arm-size" ["parameter", "sizes"]
         "A parameter deviates by more than the size of the arm, half a turn, or a factor of 100.",
         "give it a prior, or check units and the table's columns";
+    GivesWayUpwards: Error "gives-way-upwards" ["parameter", "compliance", "sigmas"]
+        "A part gives way against its load: its compliance as a whole is negative by more than 5 standard errors.",
+        "check the sign of gravity_m_s2, whether the base is inverted, and the places of masses and payload";
     HeldOutCopied: Error "held-out-copied" ["rows"]
         "Every held-out row is an identification row again, so that held-out errors judge nothing.",
         "hold out rows that were not fitted";

@@ -42,6 +42,7 @@ const CHECKS: &[&dyn Check] = &[
     &Convergence,
     &parameter_limits::WithinPriors,
     &parameter_limits::WithinArmSize,
+    &parameter_limits::GivesWayToLoads,
     &held_out::NotAllCopied,
     &held_out::HeldOutReached,
     &held_out::BetterThanNominal,

@@ -3,7 +3,7 @@
 use super::checked_fit::{Check, CheckedFit};
 use super::finding::{Finding, FindingCode};
 use crate::fit::stages::parameter_size::largest;
-use crate::model::parameter::{JointField, Parameter, ParameterSite};
+use crate::model::parameter::{ArmField, JointField, Parameter, ParameterSite};
 use crate::quantity::Unit;
 
 /// Largest deviation of an arm parameter, in σ of its prior, that is not reported. Chance exceeds 5
@@ -63,6 +63,51 @@ impl Check for WithinArmSize {
         };
         let largest = largest_ratio(fit, ratio).filter(|(_, sizes)| *sizes > 1.0);
         largest.map(finding).into_iter().collect()
+    }
+}
+
+/// Checks that joints and base give way along their loads: no compliance as a whole is negative by
+/// more than [`MAX_NEGATIVE_SIGMAS`] standard errors.
+pub(super) struct GivesWayToLoads;
+
+/// Largest number of standard errors by which a compliance may be negative.
+const MAX_NEGATIVE_SIGMAS: f64 = 5.0;
+
+impl Check for GivesWayToLoads {
+    fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
+        let of_unknown = |(place, &k): (usize, &usize)| {
+            let parameter = &fit.fitting.model.parameters[k];
+            let declared = match parameter.site {
+                ParameterSite::Joint { joint, field: JointField::Compliance } => {
+                    fit.problem.joints.get(joint)?.stiffness.map_or(0.0, f64::recip)
+                }
+                ParameterSite::Joint {
+                    field: JointField::LateralX | JointField::LateralY, ..
+                }
+                | ParameterSite::Arm(ArmField::MountingX | ArmField::MountingY) => 0.0,
+                _ => return None,
+            };
+            let compliance = declared + fit.end.x[k];
+            let sigmas = -compliance / fit.covariance[(place, place)].sqrt();
+            (parameter.regressor.is_constant() && sigmas.is_finite())
+                .then_some((parameter, compliance, sigmas))
+        };
+        let unknowns = fit.whole.unknowns.iter().enumerate();
+        let worst = unknowns.filter_map(of_unknown).max_by(|a, b| a.2.total_cmp(&b.2));
+        let finding = |(parameter, compliance, sigmas): (&Parameter, f64, f64)| {
+            let name = &parameter.name;
+            let text = format!(
+                "{name} is {:.3} µrad/(N·m), {sigmas:.0} standard errors below 0: the arm bends against its load",
+                compliance * 1e6
+            );
+            let numbers = [name.as_str().into(), compliance.into(), sigmas.into()];
+            Finding::new(FindingCode::GivesWayUpwards, numbers, text)
+        };
+        worst
+            .filter(|(_, _, sigmas)| *sigmas > MAX_NEGATIVE_SIGMAS)
+            .map(finding)
+            .into_iter()
+            .collect()
     }
 }
 

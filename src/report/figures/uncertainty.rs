@@ -151,8 +151,8 @@ pub fn joint_errors(data: &PlotData) -> Option<Drawing> {
         joints.iter().filter_map(|joint| Some((command(joint.joint)?, joint))).collect();
     let caption = "Error of each joint's coordinate that follows its own command, as motion of the \
                    target at the root mean square lever of the joint, with a band of ± 1 σ; the mean \
-                   over the range is taken off. What the remainder corrects in the direction that \
-                   each joint moves the target.";
+                   over the range is taken off. Only the part of the remainder along the motion \
+                   that each joint gives the target is shown.";
     let rows = named.iter().flat_map(|(command, joint)| {
         joint.points.iter().map(|point| {
             let [mean, sigma] = [point.mean, point.sigma].map(|value| fixed(value * 1e3, 6));
