@@ -153,7 +153,12 @@ fn spoiled_ones() -> Vec<Case> {
         case.1.replace_range(joints..tool + "[tool]".len(), swapped);
         case
     };
+    let mistyped = |mut case: Case| {
+        case.1 = case.1.replacen("a_m = 0.6\n", "a_m = 0.5\n", 1);
+        case
+    };
     vec![
+        mistyped(spoiled("a mistyped length", priors, 1, "(600 mm with one other digit?)", |_| ())),
         spoiled("nothing wrong", priors, 0, "explains the data", |_| ()),
         spoiled("held-out rows shifted", priors, 1, "held-out", |data| {
             positions(data)[60..].rotate_left(1);

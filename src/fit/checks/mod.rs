@@ -5,6 +5,7 @@
 
 pub(super) mod bounds;
 pub(super) mod checked_fit;
+mod contradicted_entry;
 mod convention;
 pub(super) mod finding;
 pub(super) mod fitted_rows;

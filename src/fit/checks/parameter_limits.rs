@@ -1,6 +1,7 @@
 //! Checks of the size of the fitted deviations.
 
 use super::checked_fit::{Check, CheckedFit};
+use super::contradicted_entry::contradicted_entry;
 use super::finding::{Finding, FindingCode};
 use crate::fit::stages::parameter_size::largest;
 use crate::model::parameter::{ArmField, JointField, Parameter, ParameterSite};
@@ -30,11 +31,24 @@ impl Check for WithinPriors {
         let ratio = |parameter: &Parameter, x: f64| {
             Some(x.abs() / parameter.sigma.filter(|_| is_of_arm(parameter))?)
         };
+        let is_far = |parameter: &Parameter, x: f64| {
+            ratio(parameter, x).is_some_and(|sigmas| sigmas > MAX_PRIOR_SIGMAS)
+        };
         let finding = |(parameter, sigmas): (&Parameter, f64)| {
             let name = &parameter.name;
             let text = format!("{name} moved by {sigmas:.0} times the σ of its prior");
             let numbers = [name.as_str().into(), sigmas.into()];
-            Finding::new(FindingCode::BeyondPrior, numbers, text)
+            let fitted = fit.fitting.model.parameters.iter().zip(&fit.end.x);
+            let entry = fitted
+                .filter(|(other, _)| std::ptr::eq(*other, parameter))
+                .find_map(|(_, x)| contradicted_entry(fit, (parameter, *x), is_far));
+            match entry {
+                Some(entry) => {
+                    let text = format!("{text}: {}", entry.words);
+                    Finding::new(FindingCode::BeyondPrior, numbers, text).with_remedy(entry.remedy)
+                }
+                None => Finding::new(FindingCode::BeyondPrior, numbers, text),
+            }
         };
         let largest = largest_ratio(fit, ratio).filter(|(_, sigmas)| *sigmas > MAX_PRIOR_SIGMAS);
         largest.map(finding).into_iter().collect()

@@ -1,0 +1,191 @@
+//! Numbers of the problem that the measurements contradict, with a remedy that names them.
+
+use nalgebra::Vector3;
+
+use super::checked_fit::CheckedFit;
+use super::row_kind::size;
+use crate::error::Location;
+use crate::model::parameter::{Parameter, ParameterSite};
+use crate::problem::{Joint, JointKind, Problem};
+use crate::quantity::Unit;
+
+/// Largest residual, as a fraction of the displacement that a deviation causes, at which the
+/// deviation explains the measurements.
+const MAX_REMAINING_FRACTION: f64 = 0.1;
+/// Largest distance of a number with one changed or two exchanged digits from the fitted number, as
+/// a fraction of the deviation.
+const MAX_DIGIT_MISMATCH: f64 = 0.02;
+/// Largest distance of the fitted target from the one turned by 180°, as a fraction of its distance
+/// from the z axis.
+const MAX_TURN_MISMATCH: f64 = 0.1;
+/// Smallest distance of a target from the z axis for which a turn is considered \[m\].
+const MIN_TURNED_RADIUS: f64 = 1e-3;
+
+/// Declared number, in words, that a single deviation of the fit contradicts.
+pub(super) struct ContradictedEntry {
+    /// Declared and fitted number, with the residual that the fitted one leaves.
+    pub words: String,
+    /// Remedy.
+    pub remedy: String,
+}
+
+/// Returns the declared entry of the joint table, or the declared target, that the measurements
+/// contradict; `None` unless this entry alone is far off and the fit explains the measurements.
+///
+/// `parameter` is the one with the largest deviation x, in σ of its prior; `is_far` returns true for
+/// a parameter and its deviation if the deviation is beyond the prior.
+pub(super) fn contradicted_entry(
+    fit: &CheckedFit,
+    (parameter, x): (&Parameter, f64),
+    is_far: impl Fn(&Parameter, f64) -> bool,
+) -> Option<ContradictedEntry> {
+    let kind = fit.kind(fit.fitting.measurements.leading());
+    let errors = fit.fitting.position_errors(&kind.rows, &fit.end.x);
+    let rms = fit.rms(&kind.rows, &errors);
+    let displacement = match parameter.unit() {
+        Unit::Length => x.abs(),
+        Unit::Angle => x.abs() * fit.fitting.model.reach(),
+        _ => return None,
+    };
+    if !kind.observation.is_position() || rms > MAX_REMAINING_FRACTION * displacement {
+        return None;
+    }
+    let is_same = |site: ParameterSite| match (parameter.site, site) {
+        (ParameterSite::Target { target, .. }, ParameterSite::Target { target: other, axis }) => {
+            target == other && axis < 3
+        }
+        (site, other) => site == other,
+    };
+    let fitted = || fit.fitting.model.parameters.iter().zip(&fit.end.x);
+    if fitted().any(|(other, x)| !is_same(other.site) && is_far(other, *x)) {
+        return None;
+    }
+    let left = size(kind.observation.kind(), rms, 2);
+    match parameter.site {
+        ParameterSite::Joint { joint, .. } => {
+            Some(of_joint(fit.problem.joints.get(joint)?, parameter, x, &left))
+        }
+        ParameterSite::Target { axis: 0..3, .. } if fit.problem.targets.is_empty() => {
+            let declared = fit.problem.tool.target;
+            let mut moved = declared;
+            for (other, x) in fitted().filter(|(other, _)| is_same(other.site)) {
+                if let ParameterSite::Target { axis, .. } = other.site {
+                    moved[axis] += x;
+                }
+            }
+            Some(of_tool(fit.problem, declared, moved, &left))
+        }
+        _ => None,
+    }
+}
+
+/// Describes an entry of a joint.
+fn of_joint(joint: &Joint, parameter: &Parameter, x: f64, left: &str) -> ContradictedEntry {
+    let display = parameter.unit().display(parameter.nominal);
+    let shown = |value: f64| value * display.factor;
+    let (declared, fitted) = (shown(parameter.nominal), shown(parameter.value(x)));
+    let symbol = &display.symbol;
+    let gap = if symbol == "°" { "" } else { " " };
+    let place = Location { key: None, ..joint.location.clone() };
+    let words = format!(
+        "{}{gap}{symbol} is declared ({place}), the measurements say {fitted:.2}{gap}{symbol}, which \
+         leaves {left} of error",
+        rounded(declared)
+    );
+    let digits = typing_error(declared, fitted)
+        .map_or_else(String::new, |(meant, how)| format!(" ({} with {how}?)", rounded(meant)));
+    let remedy = format!(
+        "if the entry is mistyped{digits}, correct it; if it is right, check the columns and axes, \
+         or declare a larger σ"
+    );
+    ContradictedEntry { words, remedy }
+}
+
+/// Describes the target of `[tool]`, declared and as the fit found it \[m\].
+fn of_tool(
+    problem: &Problem,
+    declared: Vector3<f64>,
+    fitted: Vector3<f64>,
+    left: &str,
+) -> ContradictedEntry {
+    let vector = |v: Vector3<f64>, decimals: usize| {
+        let number = |value: &f64| {
+            if decimals == 0 { rounded(value * 1e3) } else { format!("{:.decimals$}", value * 1e3) }
+        };
+        v.iter().map(number).collect::<Vec<_>>().join(", ")
+    };
+    let words = format!(
+        "the target is declared at [{}] mm, the measurements say [{}] mm, which leaves {left} of \
+         error",
+        vector(declared, 0),
+        vector(fitted, 1)
+    );
+    // A fixed joint without a turn carries the tool in the axes of the flange.
+    let carrier = problem.joints.get(problem.tool.joint).filter(|joint| {
+        joint.kind == JointKind::Fixed && joint.placement.is_some_and(|at| at.rpy.norm() == 0.0)
+    });
+    let offset = carrier
+        .and_then(|joint| joint.placement)
+        .map_or_else(Vector3::zeros, |placement| placement.xyz);
+    let (from, to) = (declared + offset, fitted + offset);
+    let turned = Vector3::new(-from.x, -from.y, from.z);
+    let radius = from.xy().norm();
+    let is_turned = radius > MIN_TURNED_RADIUS && (to - turned).norm() < MAX_TURN_MISMATCH * radius;
+    let remedy = if is_turned {
+        "the tool is turned by 180° about z: correct x and y of the tool or of its fixed joint"
+    } else {
+        "enter the target in [tool] if the tool was declared wrongly or not at all; an error in d \
+         of the last joint looks the same"
+    };
+    ContradictedEntry { words, remedy: remedy.to_owned() }
+}
+
+/// Returns a number without the digits that its conversion added.
+fn rounded(value: f64) -> String {
+    ((value * 1e6).round() / 1e6 + 0.0).to_string()
+}
+
+/// Returns the number that the declared one becomes with two neighbouring digits exchanged or one
+/// digit changed, and the words for it; `None` unless it is near the fitted number.
+fn typing_error(declared: f64, fitted: f64) -> Option<(f64, &'static str)> {
+    let digits = rounded(declared).into_bytes();
+    let is_digit = |place: usize| digits.get(place).is_some_and(u8::is_ascii_digit);
+    let exchanged = (1..digits.len()).filter_map(|place| {
+        let first = if is_digit(place - 1) { place - 1 } else { place.checked_sub(2)? };
+        let mut changed = digits.clone();
+        (is_digit(first) && is_digit(place)).then(|| changed.swap(first, place))?;
+        Some((changed, "two digits exchanged"))
+    });
+    let replaced = (0..digits.len()).filter(|&place| is_digit(place)).flat_map(|place| {
+        let digits = &digits;
+        (b'0'..=b'9').map(move |digit| {
+            let mut changed = digits.clone();
+            changed[place] = digit;
+            (changed, "one other digit")
+        })
+    });
+    let near = |(changed, how): (Vec<u8>, &'static str)| {
+        let meant: f64 = String::from_utf8(changed).ok()?.parse().ok()?;
+        let is_near = (meant - fitted).abs() < MAX_DIGIT_MISMATCH * (fitted - declared).abs();
+        is_near.then_some((meant, how))
+    };
+    let distance = |(meant, _): &(f64, &str)| (meant - fitted).abs();
+    let closest = |found: &mut dyn Iterator<Item = (f64, &'static str)>| {
+        found.min_by(|a, b| distance(a).total_cmp(&distance(b)))
+    };
+    closest(&mut exchanged.filter_map(near)).or_else(|| closest(&mut replaced.filter_map(near)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn mistyped_digits_are_recognised() {
+        assert_eq!(typing_error(-325.0, -425.3), Some((-425.0, "one other digit")));
+        assert_eq!(typing_error(194.65, 94.7), Some((94.65, "one other digit")));
+        assert_eq!(typing_error(240.0, 420.2), Some((420.0, "two digits exchanged")));
+        assert_eq!(typing_error(82.3, 113.0), None);
+        assert_eq!(rounded(0.0892 * 1e3), "89.2");
+    }
+}
