@@ -236,7 +236,7 @@ fn fit_rows(
     } else {
         Vec::new()
     };
-    let findings = if asked {
+    let (findings, misread) = if asked {
         let held: Vec<bool> = end.at_bound.iter().map(Option::is_some).collect();
         let refuted_priors = match (noise, fitting.loss) {
             (Noise::Declared, Loss::Squares) if options.earlier.is_none() => refuted_priors(
@@ -248,7 +248,7 @@ fn fit_rows(
             ),
             _ => Vec::new(),
         };
-        findings(&CheckedFit {
+        let checked = CheckedFit {
             fitting: &fitting,
             problem,
             registered_x: &start,
@@ -277,12 +277,18 @@ fn fit_rows(
             } else {
                 OnceCell::from(Explanations::default())
             },
-        })
+        };
+        let findings = findings(&checked);
+        let is_misread = findings.iter().any(|finding| finding.code == FindingCode::Misread);
+        let explanations = checked.explanations.get().filter(|_| is_misread);
+        let misread = explanations.and_then(|explanations| explanations.effect(fitting.sigma));
+        (findings, misread)
     } else {
-        not_converged.into_iter().collect()
+        (not_converged.into_iter().collect(), None)
     };
     Ok(Identification {
         provisional: options.provisional,
+        misread,
         findings,
         poses: enough.poses,
         several_targets: enough.several_targets,

@@ -5,6 +5,7 @@ use std::sync::OnceLock;
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::fit::checks::finding::{Finding, FindingCode, Severity};
+use crate::fit::checks::misreading::MisreadEffect;
 use crate::fit::stages::fitting::FitEnd;
 use crate::fit::stages::noise_model::NoiseModel;
 use crate::fit::stages::stage::Stage;
@@ -70,6 +71,8 @@ pub struct Identification {
     pub solver_reason: Option<&'static str>,
     /// Reason why the last fit stopped.
     pub termination: Termination,
+    /// Effect that expresses the misreading of the table that the checks found.
+    pub(crate) misread: Option<MisreadEffect>,
     /// Findings of the checks, errors first; a provisional fit is only checked for convergence.
     pub findings: Vec<Finding>,
     /// Number of different poses of the arm that were fitted; several targets in one pose count

@@ -24,6 +24,12 @@ impl LeftOutGain {
         Some(Self(before.iter().zip(&after).map(|(before, after)| before - after).collect()))
     }
 
+    /// Returns ln of the odds of the new fit to the old one by the predictive density of the poses,
+    /// for noise with standard deviation `sigma` \[m\] in each coordinate.
+    pub fn ln_odds(&self, sigma: f64) -> f64 {
+        self.0.iter().sum::<f64>() / (2.0 * sigma * sigma)
+    }
+
     /// Returns true if the mean decrease exceeds its standard error: the rule by which the plainer
     /// of two models is kept. [Breiman et al. 1984, sec. 3.4.3]
     pub fn exceeds_standard_error(&self) -> bool {

@@ -4,7 +4,8 @@
 use flexcal::fit::{FindingCode, Misreading, Options, identify};
 use flexcal::measurement::Dataset;
 use flexcal::model::PoseResiduals;
-use flexcal::problem::Problem;
+use flexcal::problem::{Effect, Problem};
+use flexcal::select::{Status, close};
 use nalgebra::{DVector, UnitQuaternion, Vector3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -215,6 +216,28 @@ fn gross_mistakes_are_fitted_and_named() {
         }
     });
     assert!(standard.contains("standard DH form"), "{standard}");
+}
+
+#[test]
+fn a_coupling_or_ratio_of_joints_is_found_as_an_effect_and_no_other_mistake_is() {
+    let looped = |change: &dyn Fn(&mut [f64])| {
+        let (problem, mut data) = based();
+        data.measurements.configurations.chunks_exact_mut(5).for_each(change);
+        close(&problem, &data, &Options::default()).unwrap()
+    };
+    let is_found = |effect: Effect, size: f64, change: &dyn Fn(&mut [f64])| {
+        let closure = looped(change);
+        assert!(closure.before.fit.has(FindingCode::Misread));
+        let [only] = closure.effects.as_slice() else { panic!("{:?}", closure.effects) };
+        assert_eq!((&only.effect, only.status), (&effect, Status::Found));
+        assert!((only.estimates[0].estimate - size).abs() < 1e-3, "{:?}", only.estimates);
+        assert!(closure.after.is_trusted(), "{:?}", closure.after.findings);
+        assert!(closure.after.fitted.held_out.rms.norm < 3.0 * SIGMA);
+    };
+    is_found(Effect::JointCoupling { joint: 3, from: 2 }, -1.0, &|q| q[2] += q[1]);
+    is_found(Effect::GearRatio { joint: 3 }, 0.7, &|q| q[2] /= 1.7);
+    let exchanged = looped(&|q| q.swap(1, 3));
+    assert!(exchanged.effects.is_empty() && exchanged.after.has(FindingCode::Misread));
 }
 
 #[test]

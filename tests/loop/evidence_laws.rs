@@ -5,6 +5,7 @@ use std::fs;
 use std::path::Path;
 
 use crate::common::arms::parse;
+use crate::common::made::{divided, measure, model_of};
 use crate::evidence::{STATED, stated};
 use flexcal::fit::Options;
 use flexcal::measurement::{Dataset, NestReading, Split};
@@ -13,7 +14,9 @@ use flexcal::residual_tests::Covariate;
 use flexcal::rig::{Truth, simulate};
 use flexcal::select::{ReferenceVerdict, Site, Status, Verdict, close, trace};
 use flexcal::study::table;
-use nalgebra::{Rotation3, Vector3};
+use nalgebra::{DVector, Rotation3, Vector3};
+use rand::SeedableRng as _;
+use rand_chacha::ChaCha8Rng;
 
 #[test]
 fn a_fixed_point_measured_again_speaks_for_or_against_a_drift() {
@@ -367,5 +370,88 @@ fn an_order_between_whole_numbers_is_neither_where_a_joint_moves_little() {
         });
         let law = evidence.claims_of(&harmonic(12)).unwrap().law.1;
         assert!(law > wave && wave > 0.02, "{seed}: {law} {wave}");
+    }
+}
+
+/// Arm of six joints with heavy links, declared rigid.
+const HEAVY: &str = "name = 'six'
+[[joint]]
+d_m = 0.5
+[[joint]]
+alpha_deg = -90
+a_m = 0.15
+[[joint.body]]
+name = 'upper arm'
+mass_kg = 48
+com_m = [0.4, 0.05, 0.12]
+[[joint]]
+a_m = 0.85
+[[joint.body]]
+name = 'forearm'
+mass_kg = 30
+com_m = [0.08, 0.1, -0.05]
+[[joint]]
+alpha_deg = -90
+a_m = 0.12
+d_m = 0.82
+[[joint.body]]
+name = 'wrist'
+mass_kg = 14
+com_m = [0, 0, -0.1]
+[[joint]]
+alpha_deg = 90
+[[joint]]
+alpha_deg = -90
+d_m = 0.11
+[tool]
+target_m = [0.08, 0.03, 0.14]
+[parameters]
+'joint*' = { sigma_deg = 0.5, sigma_mm = 3 }
+'tool.*' = { sigma_mm = 5 }
+'base.*' = { free = true }
+[data]
+position_sigma_mm = 0.05
+";
+
+/// Ten values of each joint in turn; the other joints rest.
+fn sweeps() -> Vec<[f64; 6]> {
+    let rest = [10.0_f64, -70.0, 5.0, 20.0, 30.0, 15.0];
+    let reach = [120.0, 45.0, 60.0, 150.0, 110.0, 170.0];
+    let pose = |k: usize| {
+        let mut pose = rest;
+        pose[k / 10] += reach[k / 10] * ((k % 10) as f64 / 4.5 - 1.0);
+        pose.map(f64::to_radians)
+    };
+    (0..60).map(pose).collect()
+}
+
+#[test]
+fn two_compliances_that_sweeps_of_single_joints_confound_are_no_bending_link() {
+    let problem = parse(HEAVY);
+    let effects = "[[effect]]\njoint-compliance = { joint = 2 }\n[[effect]]\njoint-compliance = { joint = 3 }\n";
+    let compliant = parse(&format!("{HEAVY}{effects}"));
+    for seed in [1, 2] {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let poses = sweeps();
+        let rows = Dataset::builder(poses.iter(), vec![Vector3::zeros(); poses.len()]);
+        let mut rows = rows.measurements().unwrap();
+        let size = |name: &str| match name {
+            "joint-compliance[2].compliance" => 3e-6,
+            "joint-compliance[3].compliance" => 4e-6,
+            _ => 0.0,
+        };
+        let parameters = model_of(&compliant, &rows).parameters;
+        let truth = parameters.iter().map(|parameter| size(&parameter.name));
+        let truth = DVector::from_iterator(parameters.len(), truth);
+        measure(&compliant, &mut rows, &truth, 5e-5, &mut rng);
+        let closed = close(&problem, &divided(60, &rows), &Options::default()).unwrap();
+        for found in &closed.effects {
+            let is_true = matches!(found.effect, Effect::JointCompliance { joint: 2 | 3 });
+            assert!(is_true || found.status != Status::Found, "{seed}: {:?}", found.effect);
+            if let Effect::LinkBending { .. } = found.effect {
+                let named: Vec<&Effect> = found.alternatives.iter().map(|(of, _)| of).collect();
+                assert!(named.contains(&&Effect::JointCompliance { joint: 2 }), "{named:?}");
+            }
+        }
     }
 }

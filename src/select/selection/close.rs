@@ -5,12 +5,14 @@ use std::collections::BTreeSet;
 
 use super::found::{Found, found};
 use super::interval;
+use super::misread::with_misread_effect;
 use super::search::search;
 use super::state::{Round, SearchState};
 use super::status::{Status, Verdict};
 use crate::error::Location;
 use crate::fit::{
-    ErrorSummary, Errors, FindingCode, Identification, IdentifyError, Options, Progress,
+    ErrorSummary, Errors, Finding, FindingCode, Identification, IdentifyError, Options, Progress,
+    identify,
 };
 use crate::measurement::Dataset;
 use crate::numeric::Interval;
@@ -108,7 +110,8 @@ pub fn close_by(
     let result = if declared.found.has(FindingCode::LensContradicted) {
         Ok((declared.clone(), None))
     } else {
-        search(&mut state, declared.clone())
+        with_misread_effect(&mut state, &declared)
+            .and_then(|first| search(&mut state, first.unwrap_or_else(|| declared.clone())))
     };
     let interrupted = result.as_ref().is_err_and(IdentifyError::is_interrupted);
     options.report_progress(|| Progress::Finishing);
@@ -163,11 +166,13 @@ pub fn close_by(
     let aside: BTreeSet<usize> = fitted.set_aside.iter().copied().chain(carried).collect();
     let set_aside = aside.into_iter().map(|row| data.measurements.location(row)).collect();
     let has_gear = state.added(&fitted).iter().any(is_gear);
+    let mut after = fitted.found;
+    after.findings.splice(0..0, orientation_finding(problem, &data, &unstoppable));
     Ok(ClosedLoop {
         verdict,
         interrupted,
         before,
-        after: fitted.found,
+        after,
         with_found,
         residual_tests,
         closed: fitted.problem,
@@ -179,6 +184,17 @@ pub fn close_by(
         set_aside,
         rules: rules.clone(),
     })
+}
+
+/// Returns the finding that the declared problem does not fit the measured orientations; `None` if
+/// it does, or if it fits none. The loop itself fits positions alone.
+fn orientation_finding(problem: &Problem, data: &Data, options: &Options) -> Option<Finding> {
+    if !problem.data.fits_orientation {
+        return None;
+    }
+    let options = Options { influential_rows: false, progress: None, ..options.clone() };
+    let found = identify(problem, data.dataset, &options).ok()?;
+    found.finding(FindingCode::OrientationMisfit).cloned()
 }
 
 /// Fit that the loop ends with, and what is claimed about it.

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 
 use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
 
+use super::plainer::plainer;
 use super::ranges::ranges;
 use super::state::{Round, SearchState};
 use super::status::Status;
@@ -69,6 +70,7 @@ pub(super) fn found(
     let subsets =
         best.map(|best| subset_evidence(fitted, data, best, &reconsidered)).unwrap_or_default();
     let p_values = p_values(state, fitted, &added);
+    let plainer = plainer(state, fitted);
     let held_out_after = |effect: &Effect| {
         let stays = |known: &Effect| added.iter().any(|kept| kept.covers(known));
         let holds = |round: &&Round| round.effects.iter().any(|known| effect.covers(known));
@@ -121,7 +123,25 @@ pub(super) fn found(
         };
         // An effect that was evaluated but belongs to no probable set has no claims.
         let is_evaluated = best.is_some() && reconsidered.iter().any(|known| effect.covers(known));
+        let rival = plainer.iter().find(|plainer| plainer.effect == effect);
+        let claims = claims.map(|mut claims| {
+            if let Some(rival) = rival {
+                let claimed = [&mut claims.place.1, &mut claims.depends_on.1, &mut claims.law.1];
+                claimed.into_iter().for_each(|probability| *probability *= rival.share);
+            }
+            claims
+        });
+        let instead = rival.into_iter().flat_map(|rival| {
+            rival.instead.iter().map(|cause| (cause.clone(), of_class * (1.0 - rival.share)))
+        });
+        let alternatives = with_rivals(alternatives, instead);
+        let misread = state.misread.as_ref().filter(|misread| misread.effect == effect);
+        let claims = claims.map(|claims| match misread {
+            Some(misread) => limited_to(claims, [1.0, 1.0, misread.probability]),
+            None => claims,
+        });
         let law = claims.as_ref().map(|claims| claims.law.1).or(gear);
+        let law = law.or_else(|| misread.map(|misread| misread.probability));
         let law = law.or_else(|| is_evaluated.then_some(0.0));
         let is_significant = p_value < rules.leaving_level;
         let status = Status::of(law, rules.stated, (is_significant, verdict));

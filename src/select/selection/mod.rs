@@ -5,6 +5,8 @@
 //! - `state`: the fits made so far.
 //! - `gears`: the common prior of harmonics.
 //! - `polish`: refines searched arguments on all rows.
+//! - `misread`: begins with the effect that expresses a misread table.
+//! - `plainer`: compares an effect with plainer causes that together do the same.
 //! - `close`: runs the loop from the declared problem to its result.
 //! - `found`, `status`, `interval`: the claims about each effect, the verdict, and the gain on
 //!   held-out poses.
@@ -13,6 +15,8 @@ mod close;
 mod found;
 mod gears;
 mod interval;
+mod misread;
+mod plainer;
 mod polish;
 mod ranges;
 mod search;

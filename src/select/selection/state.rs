@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::fit::{ErrorSummary, IdentifyError, Options, Progress};
+use crate::fit::{ErrorSummary, IdentifyError, MisreadEffect, Options, Progress};
 use crate::model::parameter::ParameterSite;
 use crate::problem::{Effect, ParameterRule, Problem};
 use crate::select::candidates::joined;
@@ -42,6 +42,8 @@ pub(super) struct SearchState<'a> {
     /// Probability, by joint counted from 1, of the joint's periodic error when it was added to the
     /// fit.
     pub gear_probability: BTreeMap<usize, f64>,
+    /// Effect that expresses the misreading of the table, if the search began with it.
+    pub misread: Option<MisreadEffect>,
     pub rounds: Vec<Round>,
     /// Fit of the latest round; before the first round, that of the declared problem.
     pub latest: Fitted,
@@ -62,6 +64,7 @@ impl<'a> SearchState<'a> {
             prior: None,
             prior_of_latest: None,
             gear_probability: BTreeMap::new(),
+            misread: None,
             rounds: Vec::new(),
             latest: first.clone(),
             evidence: None,
@@ -87,11 +90,14 @@ impl<'a> SearchState<'a> {
     }
 
     /// Returns the added effects that the evidence removes from the fit and evaluates again.
-    /// Periodic errors with many orders stay in the fit; if there are more than `MAX_RECONSIDERED`
-    /// effects, all stay.
+    /// Periodic errors with many orders stay in the fit, and so does the effect that expresses a
+    /// misread table: it is far larger than any size that the evidence tries. If there are more
+    /// than `MAX_RECONSIDERED` effects, all stay.
     pub fn reconsidered(&self, fitted: &Fitted) -> Vec<Effect> {
+        let misread = self.misread.as_ref().map(|misread| &misread.effect);
+        let stays = |effect: &Effect| is_gear(effect) || misread == Some(effect);
         let effects: Vec<Effect> =
-            self.added(fitted).into_iter().filter(|effect| !is_gear(effect)).collect();
+            self.added(fitted).into_iter().filter(|effect| !stays(effect)).collect();
         let count = effects.iter().flat_map(Effect::parts).count();
         if count > MAX_RECONSIDERED { Vec::new() } else { effects }
     }

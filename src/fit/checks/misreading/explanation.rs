@@ -1,6 +1,7 @@
 //! Misreadings that explain why an arm does not fit its measurements.
 
 use super::Misreading;
+use crate::problem::Effect;
 
 /// Misreading with which a full fit explains the measurements.
 #[derive(Debug, Clone, PartialEq)]
@@ -9,6 +10,30 @@ pub(in crate::fit) struct Explanation {
     pub words: String,
     /// Root mean squared error that the fit leaves \[m\], with the deviations from priors.
     pub rms: f64,
+    /// Effect that expresses the misreading, with the size that the fit found; `None` if no effect
+    /// does.
+    pub effect: Option<(Effect, f64)>,
+    /// Misfit of poses that are left out, which compares the misreadings.
+    pub left_out: LeftOutMisfit,
+}
+
+/// Squared errors of rows that are left out one configuration at a time, with the prior of the fit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in crate::fit) struct LeftOutMisfit {
+    /// Mean squared error of a row \[m²\].
+    pub mean_square: f64,
+    /// Sum of the squared deviations from priors \[σ²\].
+    pub deviations: f64,
+    /// Number of rows.
+    pub rows: usize,
+}
+
+impl LeftOutMisfit {
+    /// Returns −2 ln of the predictive density of the rows for noise with standard deviation
+    /// `sigma` \[m\], but for a constant.
+    fn deviance(&self, sigma: f64) -> f64 {
+        self.mean_square * self.rows as f64 / sigma.powi(2) + self.deviations
+    }
 }
 
 /// Misreadings that would explain the misfit, best first.
@@ -20,4 +45,35 @@ pub(in crate::fit) struct Explanations {
     pub fitted: Vec<Explanation>,
     /// Root mean squared error without a misreading, deviations from priors included \[m\].
     pub as_read: f64,
+}
+
+/// Effect that expresses the misreading of a table: with it the model fits the table as it is.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct MisreadEffect {
+    /// Effect with one parameter.
+    pub effect: Effect,
+    /// Value of the parameter that a fit found.
+    pub size: f64,
+    /// Probability of the effect among the misreadings that explain the measurements.
+    pub probability: f64,
+}
+
+impl Explanations {
+    /// Returns the effect that expresses the most probable misreading, if one does. Each misreading
+    /// has the same prior probability; `sigma` is the declared noise of a coordinate \[m\].
+    ///
+    /// The probability follows from predictions of configurations that are left out
+    /// [Geisser and Eddy 1979]. The noise is the larger of `sigma` and what the best misreading
+    /// leaves.
+    pub fn effect(&self, sigma: f64) -> Option<MisreadEffect> {
+        let squares = self.fitted.iter().map(|explanation| explanation.left_out.mean_square / 3.0);
+        let sigma = squares.fold(f64::INFINITY, f64::min).sqrt().max(sigma);
+        let deviances: Vec<f64> =
+            self.fitted.iter().map(|explanation| explanation.left_out.deviance(sigma)).collect();
+        let least = deviances.iter().copied().fold(f64::INFINITY, f64::min);
+        let best = deviances.iter().position(|deviance| *deviance == least)?;
+        let (effect, size) = self.fitted[best].effect.clone()?;
+        let weights = deviances.iter().map(|deviance| ((least - deviance) / 2.0).exp());
+        Some(MisreadEffect { effect, size, probability: weights.sum::<f64>().recip() })
+    }
 }

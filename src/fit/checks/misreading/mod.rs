@@ -12,6 +12,7 @@ mod undo;
 mod words;
 
 pub(in crate::fit) use explanation::Explanations;
+pub(crate) use explanation::MisreadEffect;
 
 use crate::model::parameter::JointField;
 

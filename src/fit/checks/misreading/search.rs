@@ -1,14 +1,14 @@
 //! Search for the misreadings that explain why an arm does not fit its measurements.
 
-use nalgebra::DVector;
+use nalgebra::{DVector, Vector3};
 use rayon::prelude::*;
 
 use super::Misreading;
 use super::candidates::{candidates, of_loads, of_order, shift_step};
-use super::explanation::{Explanation, Explanations};
+use super::explanation::{Explanation, Explanations, LeftOutMisfit};
 use crate::fit::checks::checked_fit::CheckedFit;
 use crate::fit::checks::parameter_limits::is_of_arm;
-use crate::fit::stages::fitting::Fitting;
+use crate::fit::stages::fitting::{FitEnd, Fitting};
 use crate::fit::{Placement, SolverChoice};
 use crate::least_squares::{LinearisationCache, Loss};
 use crate::measurement::{Measurements, Split};
@@ -42,6 +42,16 @@ const TRIAL_TOLERANCE: f64 = 1e-4;
 /// rows.
 const MAX_SET_ASIDE_SHARE: f64 = 0.3;
 
+/// Result of a trial with a misreading corrected.
+struct Outcome {
+    /// Root mean squared error \[m\]; after a full fit with the deviations from priors.
+    rms: f64,
+    /// Size of the misreading that a full fit found, if it has one.
+    size: Option<f64>,
+    /// Misfit of configurations that are left out of a full fit.
+    left_out: Option<LeftOutMisfit>,
+}
+
 /// Rows and problem with which misreadings are tried.
 struct Trial<'a> {
     fitting: &'a Fitting<'a>,
@@ -67,8 +77,8 @@ fn explanations(fit: &CheckedFit) -> Explanations {
     let chosen: Vec<usize> = split.identification.iter().copied().step_by(step).collect();
     let trial = Trial { fitting: fit.fitting, problem: fit.problem, chosen };
     // This trial leaves out orientations, as all trials do. Reversing no joint changes nothing.
-    let as_declared = trial.rms(Misreading::Reversed { joints: 0 }, false);
-    let nominal = as_declared.map_or(nominal, |(error, _)| error.min(nominal));
+    let as_declared = trial.outcome(Misreading::Reversed { joints: 0 }, false);
+    let nominal = as_declared.map_or(nominal, |outcome| outcome.rms.min(nominal));
     let is_position = measurements.leading().is_position();
     // If the target hardly moves, contacts with one point agree with any arm.
     let is_tested =
@@ -98,6 +108,14 @@ fn explanations(fit: &CheckedFit) -> Explanations {
     explanations
 }
 
+/// Returns the sum of the squared deviations of a fit from its priors \[σ²\]. Declared effects do
+/// not count, because they may be far larger than their priors.
+fn deviations(fitting: &Fitting, x: &DVector<f64>) -> f64 {
+    let parameters = fitting.model.parameters.iter().zip(x);
+    let of_arm = parameters.filter(|(parameter, _)| is_of_arm(parameter));
+    of_arm.filter_map(|(parameter, x)| Some((x / parameter.sigma?).powi(2))).sum()
+}
+
 /// Returns the misreadings with which the nominal arm is far nearer than with the error `nominal`.
 /// `errors` is in ascending order.
 fn near_misreadings(errors: &[(Misreading, f64)], nominal: f64) -> Vec<Misreading> {
@@ -109,7 +127,8 @@ fn near_misreadings(errors: &[(Misreading, f64)], nominal: f64) -> Vec<Misreadin
 impl Trial<'_> {
     /// Returns the error of the registered nominal arm with each misreading corrected \[m\].
     fn registered_errors(&self, misreadings: &[Misreading]) -> Vec<(Misreading, f64)> {
-        let error = |&misreading: &Misreading| Some((misreading, self.rms(misreading, false)?.0));
+        let error =
+            |&misreading: &Misreading| Some((misreading, self.outcome(misreading, false)?.rms));
         let errors: Vec<_> = misreadings.par_iter().map(error).collect();
         errors.into_iter().flatten().collect()
     }
@@ -130,13 +149,18 @@ impl Trial<'_> {
             .take(MAX_FITTED_MISREADINGS)
             .collect();
         let explanation = |&misreading: &Misreading| {
-            let (rms, size) = self.rms(misreading, true)?;
+            let Outcome { rms, size, left_out } = self.outcome(misreading, true)?;
             // A negative ratio means that the joint turns against its command.
             if size.is_some_and(|size| matches!(misreading, Misreading::Ratio { .. }) && size < 0.0)
             {
                 return None;
             }
-            Some(Explanation { words: misreading.described(size), rms })
+            Some(Explanation {
+                words: misreading.described(size),
+                rms,
+                effect: size.and_then(|size| misreading.expressed(size)),
+                left_out: left_out?,
+            })
         };
         let explained: Vec<_> = chosen.par_iter().map(explanation).collect();
         let mut explained: Vec<Explanation> = explained
@@ -150,10 +174,9 @@ impl Trial<'_> {
         explained
     }
 
-    /// Returns the remaining error \[m\] with a misreading corrected: that of the registered
-    /// nominal arm or, if `is_fitted`, of a full fit. Also returns the size of the misreading that
-    /// the fit found. `None` if it cannot be corrected or fitted.
-    fn rms(&self, misreading: Misreading, is_fitted: bool) -> Option<(f64, Option<f64>)> {
+    /// Returns what is left with a misreading corrected: with the registered nominal arm or, if
+    /// `is_fitted`, after a full fit. `None` if it cannot be corrected or fitted.
+    fn outcome(&self, misreading: Misreading, is_fitted: bool) -> Option<Outcome> {
         let Fitting { model, measurements, .. } = *self.fitting;
         let needs_problem = misreading.rewritten(self.problem);
         if needs_problem.is_none() && misreading.concerns_problem() {
@@ -195,30 +218,43 @@ impl Trial<'_> {
         let registered =
             if is_fitted { fitting.registered() } else { fitting.registered_to(TRIAL_TOLERANCE) };
         let registered = registered.ok()?;
-        let x = if is_fitted { fitting.run(&registered).ok()?.x } else { registered };
-        let error = if is_fitted {
-            self.penalised(&fitting, &split.identification, &x)
-        } else {
-            self.error(&fitting, &split.identification, &x)
-        };
+        if !is_fitted {
+            let rms = self.error(&fitting, &split.identification, &registered);
+            return rms.is_finite().then_some(Outcome { rms, size: None, left_out: None });
+        }
+        let end = fitting.run(&registered).ok()?;
+        let x = &end.x;
+        let rms = self.penalised(&fitting, &split.identification, x);
         let value = |name: &str| {
             let place = model.parameters.iter().position(|parameter| parameter.name == name)?;
             Some(x[place])
         };
         let name = misreading.size(0.0).map(|(name, _)| name);
         let size = name.and_then(|name| Some(misreading.size(value(&name)?)?.1));
-        error.is_finite().then_some((error, size.filter(|_| is_fitted)))
+        let left_out = Some(self.left_out(&fitting, &end));
+        rms.is_finite().then_some(Outcome { rms, size, left_out })
+    }
+
+    /// Returns the misfit of a fit with each configuration left out.
+    fn left_out(&self, fitting: &Fitting, end: &FitEnd) -> LeftOutMisfit {
+        let whole = fitting.whole();
+        let free = whole.unknowns.iter().zip(&end.at_bound).filter(|(_, bound)| bound.is_none());
+        let unknowns: Vec<usize> = free.map(|(&k, _)| k).collect();
+        let configurations = fitting.measurements.configurations(self.problem).0;
+        let errors = fitting.left_out_errors(&end.x, &unknowns, &configurations);
+        let of_kind = Self::of_leading_kind(fitting, &fitting.split.identification);
+        let errors: Vec<Vector3<f64>> = of_kind.into_iter().map(|row| errors[row]).collect();
+        LeftOutMisfit {
+            mean_square: self.mean_square(&errors),
+            deviations: deviations(fitting, &end.x),
+            rows: errors.len(),
+        }
     }
 
     /// Returns the root mean squared error of `rows` at the full parameter vector `x` \[m\].
     /// Deviations from priors count like measured numbers: √((Σ e² + σ² Σ (x/σₚ)²) / n).
     fn penalised(&self, fitting: &Fitting, rows: &[usize], x: &DVector<f64>) -> f64 {
-        // Deviations of declared effects do not count, because they may be far larger than their
-        // priors.
-        let parameters = fitting.model.parameters.iter().zip(x);
-        let of_arm = parameters.filter(|(parameter, _)| is_of_arm(parameter));
-        let squares = of_arm.filter_map(|(parameter, x)| Some((x / parameter.sigma?).powi(2)));
-        let deviations = squares.sum::<f64>() / rows.len().max(1) as f64;
+        let deviations = deviations(fitting, x) / rows.len().max(1) as f64;
         let square = self.error(fitting, rows, x).powi(2);
         (square + fitting.sigma.powi(2) * deviations).sqrt()
     }
@@ -245,18 +281,28 @@ impl Trial<'_> {
     /// Returns the root mean squared error of `rows` at the full parameter vector `x` \[m\]. With a
     /// robust loss, the rows with the largest errors are excluded.
     fn error(&self, fitting: &Fitting, rows: &[usize], x: &DVector<f64>) -> f64 {
+        let rows = Self::of_leading_kind(fitting, rows);
+        self.mean_square(&fitting.position_errors(&rows, x)).sqrt()
+    }
+
+    /// Returns those of `rows` that measure the leading kind of quantity.
+    fn of_leading_kind(fitting: &Fitting, rows: &[usize]) -> Vec<usize> {
         let measurements: &Measurements = fitting.measurements;
         let kind = measurements.leading().kind();
         let is_of_kind = |row: &usize| measurements.observation(*row).kind() == kind;
-        let rows: Vec<usize> = rows.iter().copied().filter(is_of_kind).collect();
-        let errors = fitting.position_errors(&rows, x);
+        rows.iter().copied().filter(is_of_kind).collect()
+    }
+
+    /// Returns the mean squared length of errors \[m²\]. With a robust loss, the largest errors are
+    /// excluded.
+    fn mean_square(&self, errors: &[Vector3<f64>]) -> f64 {
         let mut squares: Vec<f64> = errors.iter().map(nalgebra::Matrix::norm_squared).collect();
         if self.fitting.loss != Loss::Squares {
             squares.sort_by(f64::total_cmp);
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a count")]
             squares.truncate(((1.0 - MAX_SET_ASIDE_SHARE) * squares.len() as f64).ceil() as usize);
         }
-        (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()
+        squares.iter().sum::<f64>() / squares.len().max(1) as f64
     }
 
     /// Returns the set of two or more joints that, if reversed, leave the smallest error, with that

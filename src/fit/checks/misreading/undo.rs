@@ -15,6 +15,12 @@ use crate::problem::{Effect, Freedom, ParameterRule, Problem, Quantities};
 /// Length of an inch \[mm\].
 const MM_PER_INCH: f64 = 25.4;
 
+/// Ratios of a number to the same quantity in another unit: degrees and radians, millimetres and
+/// metres.
+const UNIT_RATIOS: [f64; 4] = [PI / 180.0, 180.0 / PI, 1e-3, 1e3];
+/// Largest relative deviation from such a ratio that gears leave.
+const UNIT_RATIO_TOLERANCE: f64 = 0.05;
+
 /// Returns 10 to the given power.
 pub(super) fn power_of_ten(power: i8) -> f64 {
     10.0_f64.powi(power.into())
@@ -97,13 +103,8 @@ impl Misreading {
     /// `None` if it has no size.
     pub(super) fn with_free_size(self, problem: &Problem) -> Option<Problem> {
         let (pattern, _) = self.size(0.0)?;
-        let mut problem = match self {
-            Self::Ratio { joint, .. } => problem.with_effect(Effect::GearRatio { joint }),
-            Self::Coupled { joint, from, .. } => {
-                problem.with_effect(Effect::JointCoupling { joint, from })
-            }
-            _ => problem.clone(),
-        };
+        let mut problem =
+            self.effect().map_or_else(|| problem.clone(), |effect| problem.with_effect(effect));
         let none = Quantities::default();
         problem.parameters.push(ParameterRule {
             pattern,
@@ -111,6 +112,29 @@ impl Misreading {
             location: problem.data.location.clone(),
         });
         Some(problem)
+    }
+
+    /// Returns the effect whose parameter is the size of the misreading; `None` if no effect is.
+    fn effect(self) -> Option<Effect> {
+        match self {
+            Self::Ratio { joint, .. } => Some(Effect::GearRatio { joint }),
+            Self::Coupled { joint, from, .. } => Some(Effect::JointCoupling { joint, from }),
+            _ => None,
+        }
+    }
+
+    /// Returns the effect with which the model fits the table as it is, and the value of its
+    /// parameter if the misreading has this `size`. `None` if no effect does, or if the ratio is
+    /// that of two units.
+    pub(super) fn expressed(self, size: f64) -> Option<(Effect, f64)> {
+        let effect = self.effect()?;
+        match effect {
+            Effect::GearRatio { .. } => {
+                let is_unit = |ratio: &f64| (size / ratio - 1.0).abs() < UNIT_RATIO_TOLERANCE;
+                (!UNIT_RATIOS.iter().any(is_unit)).then_some((effect, size - 1.0))
+            }
+            _ => Some((effect, size)),
+        }
     }
 
     /// Returns the name of the parameter for the size of the misreading, and the size if that
