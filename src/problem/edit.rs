@@ -120,22 +120,29 @@ fn arguments(effect: &Effect) -> Value {
     Value::InlineTable(arguments.into_iter().filter_map(value).collect())
 }
 
-/// Adds rules to the end of `[parameters]`: pairs of pattern and 1 σ \[rad\]; `comment` precedes
-/// the first.
+/// Adds rules to the end of `[parameters]`: pairs of pattern and 1 σ \[rad\], or `None` for
+/// parameters that are free without a prior. `comment` precedes the first.
 ///
 /// # Errors
 /// Returns an error if the text is not TOML.
 pub(crate) fn with_rules(
     text: &str,
-    rules: &[(String, f64)],
+    rules: &[(String, Option<f64>)],
     comment: &str,
 ) -> Result<String, TomlError> {
     let mut document: DocumentMut = text.parse()?;
+    if rules.is_empty() {
+        return Ok(text.to_owned());
+    }
     let parameters = document.entry("parameters").or_insert_with(|| Item::Table(Table::new()));
     if let Some(parameters) = parameters.as_table_like_mut() {
         for (pattern, sigma) in rules {
-            let sigma = InlineTable::from_iter([("sigma_rad", Value::from(*sigma))]);
-            parameters.insert(pattern, Item::Value(Value::InlineTable(sigma)));
+            let freedom = match sigma {
+                Some(sigma) => ("sigma_rad", Value::from(*sigma)),
+                None => ("free", Value::from(true)),
+            };
+            let freedom = InlineTable::from_iter([freedom]);
+            parameters.insert(pattern, Item::Value(Value::InlineTable(freedom)));
         }
     }
     // An inline table cannot hold a comment.
@@ -234,13 +241,16 @@ mod tests {
             "parameters = {}\n",
             "name = \"x\"\n",
         ] {
-            let rule = |name: &str, sigma: f64| (format!("joint-harmonic.{name}"), sigma);
-            let rules = [rule("sin1", 2.5e-5), rule("cos17", 4.1e-5)];
+            let rule = |name: &str, sigma: f64| (format!("joint-harmonic.{name}"), Some(sigma));
+            let free = ("joint-coupling[3,2].factor".to_owned(), None);
+            let rules = [rule("sin1", 2.5e-5), rule("cos17", 4.1e-5), free];
             let ruled = with_rules(text, &rules, "found").unwrap();
             let read: toml::Table = ruled.parse().unwrap();
             let sigma = |name: &str| read["parameters"][name]["sigma_rad"].as_float();
             assert_eq!(sigma("joint-harmonic.sin1"), Some(2.5e-5), "{ruled}");
             assert_eq!(sigma("joint-harmonic.cos17"), Some(4.1e-5), "{ruled}");
+            let free = read["parameters"]["joint-coupling[3,2].factor"]["free"].as_bool();
+            assert_eq!(free, Some(true), "{ruled}");
         }
     }
 

@@ -41,10 +41,15 @@ pub fn closed_problem(
             )
         });
     let edited = edit::with_effects(text, &declared, &closed.collect::<Vec<_>>(), files)?;
+    let free: Vec<_> = closure.freed.iter().map(|name| (name.clone(), None)).collect();
+    let comment = "Found by flexcal loop: larger than the prior of the effect.";
+    let edited = edit::with_rules(&edited, &free, comment)?;
     match &closure.harmonic_prior {
         Some(prior) => {
             let comment = "Found by flexcal loop: this prior predicts left-out poses best.";
-            edit::with_rules(&edited, &prior.rules().collect::<Vec<_>>(), comment)
+            let rules: Vec<_> =
+                prior.rules().map(|(pattern, sigma)| (pattern, Some(sigma))).collect();
+            edit::with_rules(&edited, &rules, comment)
         }
         None => Ok(edited),
     }

@@ -50,6 +50,9 @@ pub struct ClosedLoop {
     pub rounds: Vec<Round>,
     /// Common prior of the harmonics in the extended problem, if a joint has many orders.
     pub harmonic_prior: Option<HarmonicPrior>,
+    /// Parameters of the extended problem that have no prior, because their effect expresses a
+    /// misread table.
+    pub(crate) freed: Vec<String>,
     /// Structure without a law, the most probable first.
     pub unexplained: Vec<Unexplained>,
     /// Mean reduction of the error on held-out poses, with its confidence interval \[m\].
@@ -166,6 +169,9 @@ pub fn close_by(
     let aside: BTreeSet<usize> = fitted.set_aside.iter().copied().chain(carried).collect();
     let set_aside = aside.into_iter().map(|row| data.measurements.location(row)).collect();
     let has_gear = state.added(&fitted).iter().any(is_gear);
+    let misread =
+        state.misread.as_ref().filter(|misread| state.added(&fitted).contains(&misread.effect));
+    let freed = misread.map_or_else(Vec::new, |misread| misread.parameters(&fitted.problem));
     let mut after = fitted.found;
     after.findings.splice(0..0, orientation_finding(problem, &data, &unstoppable));
     Ok(ClosedLoop {
@@ -179,6 +185,7 @@ pub fn close_by(
         effects,
         rounds: state.rounds,
         harmonic_prior: state.prior.filter(|_| has_gear),
+        freed,
         unexplained,
         gain,
         set_aside,

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 
 use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
 
+use super::misread;
 use super::plainer::plainer;
 use super::ranges::ranges;
 use super::state::{Round, SearchState};
@@ -136,12 +137,11 @@ pub(super) fn found(
         });
         let alternatives = with_rivals(alternatives, instead);
         let misread = state.misread.as_ref().filter(|misread| misread.effect == effect);
-        let claims = claims.map(|claims| match misread {
-            Some(misread) => limited_to(claims, [1.0, 1.0, misread.probability]),
+        let claims = match misread {
+            Some(misread) => Some(misread::claims(misread, &fitted.problem)),
             None => claims,
-        });
+        };
         let law = claims.as_ref().map(|claims| claims.law.1).or(gear);
-        let law = law.or_else(|| misread.map(|misread| misread.probability));
         let law = law.or_else(|| is_evaluated.then_some(0.0));
         let is_significant = p_value < rules.leaving_level;
         let status = Status::of(law, rules.stated, (is_significant, verdict));

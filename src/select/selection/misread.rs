@@ -2,7 +2,9 @@
 
 use super::state::SearchState;
 use crate::fit::{IdentifyError, MisreadEffect, Options};
+use crate::problem::Problem;
 use crate::select::candidates::Candidates;
+use crate::select::evidence::{Claims, Hypothesis};
 use crate::select::fitted::Fitted;
 use crate::select::left_out_gain::LeftOutGain;
 
@@ -19,22 +21,31 @@ pub(super) fn with_misread_effect(
     declared: &Fitted,
 ) -> Result<Option<Fitted>, IdentifyError> {
     let Some(misread) = declared.found.misread.clone() else { return Ok(None) };
-    let MisreadEffect { effect, size, .. } = &misread;
+    let MisreadEffect { effect, size, .. } = misread.clone();
     let candidates = Candidates::new(&declared.problem, state.data);
-    if !candidates.testable.contains(effect) {
+    if !candidates.testable.contains(&effect) {
         return Ok(None);
     }
-    let parameters = effect.parameters(&declared.problem).into_iter();
-    let start = parameters.map(|parameter| (parameter.name, *size)).collect();
+    let names = misread.parameters(&declared.problem).into_iter();
+    let start = names.map(|name| (name, size)).collect();
     let options = Options { start, influential_rows: false, ..state.options.clone() };
-    let problem = state.problem(declared, std::slice::from_ref(effect));
+    state.misread = Some(misread);
+    let problem = state.problem(declared, &[effect]);
     let fitted = declared.next(problem, state.data, &options)?;
     let gain = LeftOutGain::new(&fitted, declared, state.data);
     if !gain.is_some_and(|gain| gain.is_significant()) {
+        state.misread = None;
         return Ok(None);
     }
-    state.misread = Some(misread);
     state.is_new(&fitted);
     state.record(&fitted);
     Ok(Some(fitted))
+}
+
+/// Returns the claims about the effect: its law, and with it place and quantity, has its
+/// probability among the misreadings.
+pub(super) fn claims(misread: &MisreadEffect, problem: &Problem) -> Claims {
+    let law = Hypothesis::of_effect(&misread.effect, problem, (false, false));
+    let p = misread.probability;
+    Claims { place: (law.site, p), depends_on: (law.depends_on.clone(), p), law: (law, p) }
 }

@@ -149,6 +149,11 @@ impl<'a> SearchState<'a> {
         {
             prior.add_to(&mut problem);
         }
+        if let Some(misread) = &self.misread
+            && added.contains(&misread.effect)
+        {
+            misread.free_in(&mut problem);
+        }
         problem
     }
 

@@ -1,7 +1,7 @@
 //! Misreadings that explain why an arm does not fit its measurements.
 
 use super::Misreading;
-use crate::problem::Effect;
+use crate::problem::{Effect, Freedom, ParameterRule, Problem, Quantities};
 
 /// Misreading with which a full fit explains the measurements.
 #[derive(Debug, Clone, PartialEq)]
@@ -56,6 +56,26 @@ pub(crate) struct MisreadEffect {
     pub size: f64,
     /// Probability of the effect among the misreadings that explain the measurements.
     pub probability: f64,
+}
+
+impl MisreadEffect {
+    /// Returns the names of the effect's parameters.
+    pub fn parameters(&self, problem: &Problem) -> Vec<String> {
+        self.effect.parameters(problem).into_iter().map(|parameter| parameter.name).collect()
+    }
+
+    /// Frees the effect's parameters in a problem: their priors in the catalogue are for small
+    /// errors.
+    pub fn free_in(&self, problem: &mut Problem) {
+        let none = Quantities::default();
+        let rule = |pattern| ParameterRule {
+            pattern,
+            freedom: Freedom::Free { sigma: none, min: none, max: none },
+            location: problem.data.location.clone(),
+        };
+        let rules: Vec<ParameterRule> = self.parameters(problem).into_iter().map(rule).collect();
+        problem.parameters.extend(rules);
+    }
 }
 
 impl Explanations {
