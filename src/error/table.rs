@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use thiserror::Error;
 
-use super::near::{meant, question};
+use super::near::{instead, meant, question};
 use super::phrases::{clocks, compared, difference, in_quotes, named_otherwise, surplus};
 use super::warning::{listed, nearest_in_time};
 
@@ -148,6 +148,32 @@ pub enum TableErrorKind {
     EmptyRow,
     #[error("the cell is empty")]
     EmptyCell,
+    #[error(
+        "\"{value}\" has separators of thousands; write the number without them, as in 1874.383"
+    )]
+    ThousandsSeparator { value: String },
+    #[error(
+        "\"{value}\" is a number with a unit; remove {unit} from the cells, because the names of \
+         the columns hold the units"
+    )]
+    NumberWithUnit { value: String, unit: String },
+    #[error(
+        "the header is repeated here; remove this line, or write the second table to a file of its \
+         own and name both in `files`"
+    )]
+    HeaderRepeated,
+    #[error(
+        "the row begins with {mark}; if it is a comment, write comment = \"{mark}\" in \
+         [data.format], otherwise it has {found} fields and the header {expected}"
+    )]
+    CommentRow { mark: &'static str, found: usize, expected: usize },
+    #[error(
+        "the first line holds numbers instead of the names of the columns; write a header line \
+         above it, such as q1_deg,q2_deg,x_mm,y_mm,z_mm"
+    )]
+    NoHeader,
+    #[error("the numbers of joints in column names begin with 1; rename q0 to q1, q1 to q2, …")]
+    JointsFromZero,
     #[error("\"{value}\" is not a number")]
     NotANumber { value: String },
     #[error(
@@ -157,6 +183,9 @@ pub enum TableErrorKind {
     UnitRow { value: String },
     #[error("{value} is not a direction; write -1, 0 or 1")]
     NotADirection { value: f64 },
-    #[error("\"{word}\" is neither identification nor validation")]
-    UnknownSplit { word: String },
+    #[error(
+        "\"{word}\" is neither identification nor validation, the two words of this column{}",
+        instead("", *meant)
+    )]
+    UnknownSplit { word: String, meant: Option<&'static str> },
 }

@@ -90,6 +90,11 @@ pub enum WarningKind {
     LooksLikeStandardForm,
     #[error("{value} is {turns} turns; if these are degrees, the columns end in _deg")]
     ManyTurns { value: String, turns: String },
+    #[error(
+        "{value} s is after the year 5000; if these are milliseconds, divide them by 1000, because \
+         time_s means seconds"
+    )]
+    LooksLikeMilliseconds { value: String },
     #[error("all temperatures are {least} °C or more; if these are kelvins, subtract 273.15")]
     Kelvins { least: String },
     #[error(

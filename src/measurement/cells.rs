@@ -43,7 +43,15 @@ pub(super) fn is_validation(table: &Table, place: usize) -> Result<bool, InputEr
         "validation" => Ok(true),
         "identification" => Ok(false),
         word => {
-            Err(table.cell_error(place, TableErrorKind::UnknownSplit { word: shortened(word) }))
+            let meant = match word.to_lowercase().as_str() {
+                "validation" | "valid" | "val" | "test" | "held_out" | "held-out" | "holdout" => {
+                    Some("validation")
+                }
+                "identification" | "ident" | "train" | "training" | "fit" => Some("identification"),
+                _ => None,
+            };
+            let kind = TableErrorKind::UnknownSplit { word: shortened(word), meant };
+            Err(table.cell_error(place, kind))
         }
     }
 }

@@ -170,15 +170,11 @@ impl Columns {
         }
         let required = columns.require(table, problem, measured, &numbering, &unknown);
         required.map_err(|error| match (hidden, named.unused) {
-            (Some(hidden), _) => blame_rule(error, hidden),
-            (None, Some(rule))
-                if matches!(
-                    *error.kind,
-                    InputErrorKind::Table(TableErrorKind::MissingColumn { .. })
-                ) =>
-            {
-                no_such(rule, table)
+            _ if is_missing_column(&error) && holds_numbers(&table.header) => {
+                Location { key: None, ..table.column("") }.error(TableErrorKind::NoHeader)
             }
+            (Some(hidden), _) => blame_rule(error, hidden),
+            (None, Some(rule)) if is_missing_column(&error) => no_such(rule, table),
             _ => error,
         })?;
         mistyped.map_or(Ok(columns), Err)
@@ -224,6 +220,10 @@ impl Columns {
                 && !self.has(source(index))
             {
                 let number = format!("q{}{suffix}", numbering.number(index));
+                let is_zero = |name: &&String| split_unit(name).0 == "q0";
+                if let Some(zero) = self.names.iter().find(is_zero) {
+                    return Err(table.column(zero).error(TableErrorKind::JointsFromZero));
+                }
                 let namesakes = || {
                     problem.joints.iter().enumerate().filter(|(_, other)| other.name == joint.name)
                 };
@@ -393,6 +393,17 @@ impl Columns {
         self.file == Some(role)
             || self.read.binary_search_by_key(&role, |column| column.role).is_ok()
     }
+}
+
+/// Returns true for the error of a missing column.
+fn is_missing_column(error: &InputError) -> bool {
+    matches!(*error.kind, InputErrorKind::Table(TableErrorKind::MissingColumn { .. }))
+}
+
+/// Returns true if most names of a header are numbers, as in a table without a header.
+fn holds_numbers(header: &[String]) -> bool {
+    let numbers = header.iter().filter(|name| name.replace(',', ".").parse::<f64>().is_ok());
+    header.len() > 2 && 2 * numbers.count() > header.len()
 }
 
 /// Returns true for a column name that occurs only in result tables of flexcal.

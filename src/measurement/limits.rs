@@ -11,6 +11,9 @@ const MIN_SUSPICIOUS_TURNS: f64 = 2.0;
 /// Highest plausible temperature [°C]. Above it, a warning suggests kelvins; a cold room in kelvins
 /// exceeds it.
 const MAX_PLAUSIBLE_TEMPERATURE: f64 = 200.0;
+/// Largest plausible time \[s\], counted from 1970. Later times are in the year 5138, whereas
+/// milliseconds since 1970 exceed this limit from 1973 on.
+const MAX_PLAUSIBLE_TIME: f64 = 1e11;
 
 /// Column with the commands of a joint.
 pub(super) struct Commands<'a> {
@@ -54,6 +57,15 @@ impl Measurements {
         let location = self.location(row).with_key("temperature_C");
         (least > MAX_PLAUSIBLE_TEMPERATURE)
             .then(|| Warning { location, kind: WarningKind::Kelvins { least: format!("{least}") } })
+    }
+
+    /// Returns a warning, located at the first row, if all times are implausibly large.
+    pub(super) fn milliseconds(&self) -> Option<Warning> {
+        let first = *self.time.first().filter(|_| self.time_measured)?;
+        let is_late = self.time.iter().all(|time| *time > MAX_PLAUSIBLE_TIME);
+        let location = self.location(0).with_key("time");
+        let kind = WarningKind::LooksLikeMilliseconds { value: format!("{first}") };
+        is_late.then_some(Warning { location, kind })
     }
 
     /// Returns a warning, located at the largest angle, if a column in radians exceeds

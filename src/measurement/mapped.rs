@@ -124,9 +124,14 @@ pub(super) fn no_such(rule: &ColumnRule, table: &Table) -> InputError {
         ColumnSelector::Place(place) => format!("#{place}"),
         ColumnSelector::File => "#file".to_owned(),
     };
+    let is_of_joint = rule.ours.starts_with('q');
+    let (file, known) = table
+        .appended_columns()
+        .filter(|_| is_of_joint)
+        .unwrap_or((table.file.as_path(), table.header.as_slice()));
     rule.location.clone().error(TableErrorKind::NoSuchColumn {
-        file: table.file.clone(),
+        file: file.to_owned(),
         name,
-        known: table.header.clone(),
+        known: known.to_vec(),
     })
 }

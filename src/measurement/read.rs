@@ -208,6 +208,7 @@ impl<'a> Tables<'a> {
                 let commands = commands(&columns);
                 warnings.extend(measurements.many_turns(problem, &commands));
                 warnings.extend(measurements.kelvins());
+                warnings.extend(measurements.milliseconds());
                 if measured {
                     let is_comma = problem.data.dialect.decimal_comma;
                     let zeros = if is_comma { "0;0;0" } else { "0,0,0" };

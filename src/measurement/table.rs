@@ -22,6 +22,10 @@ use crate::problem::item::MAX_MAGNITUDE;
 /// Maximum number of columns of a table.
 const MAX_COLUMNS: usize = 10_000;
 
+/// Units that tables of other programs write into cells.
+const UNITS: [&str; 12] =
+    ["degrees", "degree", "deg", "°C", "°", "rad", "mm", "kg", "m", "s", "N", "C"];
+
 /// First bytes of a spreadsheet workbook, which is a ZIP archive.
 const WORKBOOK_SIGNATURE: &[u8] = b"PK\x03\x04";
 
@@ -142,6 +146,8 @@ impl Table {
             let found = self.record.len();
             return Err(self.error(if self.is_empty_row() {
                 TableErrorKind::EmptyRow
+            } else if let Some(mark) = self.comment_mark() {
+                TableErrorKind::CommentRow { mark, found, expected }
             } else {
                 TableErrorKind::RowLength { expected, found }
             }));
@@ -237,6 +243,13 @@ impl Table {
         (self.file.clone(), self.header_line)
     }
 
+    /// Returns the file of the appended columns of another table, and their names.
+    pub fn appended_columns(&self) -> Option<(&Path, &[String])> {
+        let (file, _) = self.appended_header.as_ref()?;
+        let (_, own_cells) = self.appended?;
+        Some((file, self.header.get(own_cells..)?))
+    }
+
     /// Returns the line of the current row, counted from 1.
     pub fn line(&self) -> usize {
         self.line
@@ -251,6 +264,11 @@ impl Table {
         std::str::from_utf8(self.cell(place))
             .map(unescape_cell)
             .map_err(|_| self.cell_error(place, InputErrorKind::NotUtf8))
+    }
+
+    /// Returns the usual mark of comments with which the current row begins, if there is one.
+    fn comment_mark(&self) -> Option<&'static str> {
+        ["//", "#", "%"].into_iter().find(|mark| self.cell(0).starts_with(mark.as_bytes()))
     }
 
     /// Returns true if the current row has only white space and separators.
@@ -298,22 +316,34 @@ impl Table {
                 Err(self.cell_error(place, InputErrorKind::MagnitudeTooLarge { value: value() }))
             }
             Ok(_) => Err(self.cell_error(place, InputErrorKind::NotFinite { value: value() })),
+            Err(_) if word == self.name_of(place) => {
+                Err(self.error(TableErrorKind::HeaderRepeated))
+            }
+            Err(_) if !decimal_comma && has_thousands(word) => {
+                Err(self.cell_error(place, TableErrorKind::ThousandsSeparator { value: value() }))
+            }
             Err(_) if word.contains(',') && !decimal_comma => {
                 Err(self.cell_error(place, TableErrorKind::DecimalComma { value: value() }))
             }
             Err(_) if self.is_unit_below_header(word) => {
                 Err(self.cell_error(place, TableErrorKind::UnitRow { value: value() }))
             }
-            Err(_) => Err(self.cell_error(place, TableErrorKind::NotANumber { value: value() })),
+            Err(_) => Err(self.cell_error(
+                place,
+                match unit_behind(word) {
+                    Some(unit) => {
+                        TableErrorKind::NumberWithUnit { value: value(), unit: unit.to_owned() }
+                    }
+                    None => TableErrorKind::NotANumber { value: value() },
+                },
+            )),
         }
     }
 
     /// Returns true if the word is one of the units in the row below the header.
     fn is_unit_below_header(&self, word: &str) -> bool {
         let unit = word.trim_matches(['[', ']', '(', ')', ' ']);
-        self.line == self.header_line + 1
-            && ["deg", "°", "rad", "mm", "m", "s", "kg", "N", "C", "°C", "degree", "degrees"]
-                .contains(&unit)
+        self.line == self.header_line + 1 && UNITS.contains(&unit)
     }
 
     /// Returns a cell of the current row as a time: a number with a unit \[s\], or a date and time
@@ -390,6 +420,25 @@ impl Table {
         let excerpt = Excerpt { text: Arc::from(text), first_line: line, span };
         Location { excerpt: Some(excerpt), ..Location::file(file).at_line(line) }
     }
+}
+
+/// Returns true for a number with a decimal point whose thousands are separated by commas, such as
+/// `1,874.383`.
+fn has_thousands(word: &str) -> bool {
+    let Some((whole, _)) = word.split_once('.') else { return false };
+    let mut groups = whole.trim_start_matches(['-', '+']).split(',');
+    let is_digits = |group: &str| group.bytes().all(|byte| byte.is_ascii_digit());
+    groups.next().is_some_and(|first| (1..=3).contains(&first.len()) && is_digits(first))
+        && groups.all(|group| group.len() == 3 && is_digits(group))
+        && word.replace(',', "").parse::<f64>().is_ok()
+}
+
+/// Returns the unit that follows a number in the same cell, such as `°` in `118.1°`.
+fn unit_behind(word: &str) -> Option<&'static str> {
+    UNITS.into_iter().find(|unit| {
+        let number = word.strip_suffix(unit).map(|number| number.trim_end().replace(',', "."));
+        number.is_some_and(|number| number.parse::<f64>().is_ok())
+    })
 }
 
 /// Returns the first 40 characters of a text, with a mark if it is longer.

@@ -201,6 +201,21 @@ fn clocks_that_differ_are_refused_with_the_offset() {
 }
 
 #[test]
+fn a_column_that_the_joint_log_lacks_is_missed_there() {
+    let tracker = "Point;X;y_mm;z_mm\nP1;1;0;0\n";
+    let lacks = joined("by = 'name'", tracker, "Point,A1\nP1,11\n").unwrap_err();
+    assert_says(&lacks, &["columns.A2", "controller.csv has no such column", "\"A1\""]);
+}
+
+#[test]
+fn times_in_milliseconds_are_said() {
+    let table = "q1_deg,q2_deg,x_mm,y_mm,z_mm,time_s\n1,2,3,4,5,1763042707000\n";
+    let (_, warnings) = try_table(&parse(ARM), table).unwrap();
+    let value = "1763042707000".to_owned();
+    assert_eq!(assert_warned(&warnings, &WarningKind::LooksLikeMilliseconds { value }), Some(2));
+}
+
+#[test]
 fn zeros_of_a_lost_target_are_refused_and_one_is_said() {
     let arm = parse(ARM);
     let table = |second: &str| {

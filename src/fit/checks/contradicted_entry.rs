@@ -14,7 +14,7 @@ use crate::quantity::Unit;
 const MAX_REMAINING_FRACTION: f64 = 0.1;
 /// Largest distance of a number with one changed or two exchanged digits from the fitted number, as
 /// a fraction of the deviation.
-const MAX_DIGIT_MISMATCH: f64 = 0.02;
+const MAX_DIGIT_MISMATCH: f64 = 0.03;
 /// Largest distance of the fitted target from the one turned by 180°, as a fraction of its distance
 /// from the z axis.
 const MAX_TURN_MISMATCH: f64 = 0.1;

@@ -4,9 +4,14 @@ use super::reading::{ARM, check, table};
 
 #[test]
 fn headers() {
-    let headers: [(&str, &[&str]); 19] = [
+    let headers: [(&str, &[&str]); 21] = [
         ("", &["rows.csv:1: the file is empty"]),
         ("\n\n", &["rows.csv:1: the file is empty"]),
+        ("10,1.5,2,3\n20,1,2,3\n", &["rows.csv:1: the first line holds numbers"]),
+        (
+            "q0_deg,x_m,y_m,z_m\n1,2,3,4\n",
+            &["rows.csv:1: column q0_deg: the numbers of joints in column names begin with 1"],
+        ),
         ("q1_deg,x_m,y_m,z_m\n", &["rows.csv:1: no rows below the header"]),
         ("x_m,y_m,z_m\n1,2,3\n", &["rows.csv:1: column q1: missing; add q1_deg or q1_rad"]),
         (
@@ -82,9 +87,14 @@ fn a_name_that_joints_share_is_no_column() {
 
 #[test]
 fn rows() {
-    let rows: [(&str, &[&str]); 22] = [
+    let rows: [(&str, &[&str]); 27] = [
         ("abc,1,2,3,", &["rows.csv:3: column q1_deg: \"abc\" is not a number"]),
         ("1,\"1,5\",2,3,", &["rows.csv:3: column x_mm: \"1,5\" is not a number"]),
+        ("1,\"1,874.5\",2,3,", &["column x_mm: \"1,874.5\" has separators of thousands"]),
+        ("1.5°,1,2,3,", &["rows.csv:3: column q1_deg: \"1.5°\" is a number with a unit; remove °"]),
+        ("q1_deg,x_mm,y_mm,z_mm,note", &["rows.csv:3: the header is repeated here"]),
+        ("// second block", &["rows.csv:3: the row begins with //; if it is a comment, write"]),
+        ("1,1,2,3,Test|split", &["two words of this column (is it validation?)"]),
         ("1,NaN,2,3,", &["rows.csv:3: column x_mm: NaN is not a finite number"]),
         ("1,1,inf,3,", &["rows.csv:3: column y_mm: inf is not a finite number"]),
         ("1,1,2,-1e999,", &["rows.csv:3: column z_mm: -1e999 is not a finite number"]),
