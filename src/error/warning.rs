@@ -102,6 +102,13 @@ pub enum WarningKind {
          and max_rad instead of min_deg and max_deg"
     )]
     LimitsLookLikeRadians { widest: String },
+    #[error("{mass} kg is heavy for a part of an arm; if these are grams, divide by 1000")]
+    LooksLikeGrams { mass: String },
+    #[error(
+        "the centre of mass is {distance} m from the frame of its joint; if these are \
+         millimetres, write com_mm"
+    )]
+    FarBody { distance: String },
     #[error(
         "{distance} m from the last frame, while all links together are {links} m long; if \
          these are millimetres, write target_mm"

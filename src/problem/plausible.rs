@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::section::Section;
-use super::{Joint, JointKind, Problem};
+use super::{Body, Joint, JointKind, Problem};
 use crate::error::{Location, Warning, WarningKind};
 use crate::quantity::rounded_right_angle;
 
@@ -59,12 +59,40 @@ pub(super) fn form(joints: &[Joint]) -> Option<Warning> {
     })
 }
 
+/// Largest plausible mass of one body of an arm \[kg\]. The heaviest industrial arms weigh some
+/// thousands of kilograms in all.
+const MAX_BODY_MASS: f64 = 1000.0;
+/// Largest plausible distance of a centre of mass from the frame of its joint \[m\].
+const MAX_BODY_DISTANCE: f64 = 10.0;
+
 impl Problem {
     /// Returns warnings about values of the arm that are probably in another unit or convention.
     #[doc(hidden)]
     pub fn plausibility_warnings(&self) -> Vec<Warning> {
         let warnings = self.warnings.iter().cloned();
-        warnings.chain(self.far_target()).chain(self.narrow_limits()).collect()
+        warnings.chain(self.far_target()).chain(self.narrow_limits()).chain(self.bodies()).collect()
+    }
+
+    /// Returns a warning for the first mass of a joint that is too heavy for an arm, and for the
+    /// first one whose centre is too far away.
+    fn bodies(&self) -> Vec<Warning> {
+        let bodies = || {
+            self.joints.iter().flat_map(|joint| joint.bodies.iter().map(move |body| (joint, body)))
+        };
+        let warning = |(joint, body): (&Joint, &Body), kind: WarningKind| {
+            let location = Location { excerpt: None, ..joint.location.clone() };
+            Warning { location: location.with_key(format!("body {}", body.name)), kind }
+        };
+        let heavy = bodies().find(|(_, body)| body.mass > MAX_BODY_MASS).map(|found| {
+            let mass = found.1.mass.to_string();
+            warning(found, WarningKind::LooksLikeGrams { mass })
+        });
+        let far = bodies().find(|(_, body)| body.position.norm() > MAX_BODY_DISTANCE);
+        let far = far.map(|found| {
+            let distance = format!("{:.3}", found.1.position.norm());
+            warning(found, WarningKind::FarBody { distance })
+        });
+        heavy.into_iter().chain(far).collect()
     }
 
     /// Returns a warning if all turning joints have limits that would be usual numbers of radians.

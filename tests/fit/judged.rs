@@ -211,6 +211,10 @@ fn what_may_have_been_misread_is_said() {
         data.measurements.configurations.iter_mut().skip(2).step_by(5).for_each(|q| *q = -*q);
     });
     assert_eq!(reversed, [Misreading::reversed(&[3]).to_string()]);
+    let opposite = with(&|_, data| {
+        data.measurements.configurations.chunks_exact_mut(5).for_each(<[f64]>::reverse);
+    });
+    assert_eq!(opposite, [Misreading::OppositeOrder.to_string()]);
     // A free tool moves to its true position, far beyond its prior.
     let held = arm("'joint*' = { sigma_deg = 0.3, sigma_mm = 2 }\n'base.*' = { free = true }");
     let far = with(&|problem, _| {

@@ -87,6 +87,14 @@ fn sizes_that_no_arm_has_are_said() {
         &["problem.toml: tool.target: 237.697 m from the last frame", "0.500 m long"],
     );
     assert_eq!(said(&arm("target_mm = [220, 0, -90]"), &table("deg")), "");
+    let body = |mass: f64, centre: f64| {
+        parse(&format!("{ARM}[[joint.body]]\nmass_kg = {mass}\ncom_m = [{centre}, 0, 0]\n"))
+    };
+    assert_contains(
+        &said(&body(6000.0, 180.0), &table("deg")),
+        &["6000 kg is heavy", "180.000 m from the frame of its joint; if these are millimetres"],
+    );
+    assert_eq!(said(&body(6.0, 0.18), &table("deg")), "");
     // An unmapped column of the user.
     assert_contains(
         &said(&arm(""), "q1_deg,q2_deg,x_m,y_m,z_m,humidity\n1,2,3,4,5,40\n"),

@@ -40,6 +40,7 @@ pub(super) fn candidates(problem: &Problem, table: &Measurements) -> Vec<Misread
     let mut units = Vec::new();
     units.extend(turns(true).then_some(Misreading::Degrees));
     units.extend(turns(false).then_some(Misreading::Radians));
+    units.extend(turns(false).then_some(Misreading::Gradians));
     units.extend(lengths(false).then_some(Misreading::Metres));
     units.extend(lengths(true).then_some(Misreading::Millimetres));
     units.extend(lengths(false).then_some(Misreading::Inches));
@@ -65,10 +66,12 @@ fn of_commands(problem: &Problem) -> Vec<Misreading> {
     let moving: Vec<usize> = (1..=problem.joints.len().min(64))
         .filter(|&joint| kind(joint) != JointKind::Fixed)
         .collect();
+    let is_ordered = moving.len() > 3 && moving.iter().all(|&joint| kind(joint) == kind(moving[0]));
     let turning = moving.iter().copied().filter(|&joint| kind(joint) == JointKind::Revolute);
     let turning: Vec<usize> = turning.collect();
     let mut misreadings: Vec<Misreading> =
         moving.iter().map(|&joint| Misreading::reversed(&[joint])).collect();
+    misreadings.extend(is_ordered.then_some(Misreading::OppositeOrder));
     for (k, &joint) in moving.iter().enumerate().take(MAX_PAIRED) {
         for &with in &moving[k + 1..moving.len().min(MAX_PAIRED)] {
             if kind(joint) != kind(with) {

@@ -25,6 +25,8 @@ pub enum Misreading {
     Degrees,
     /// Joint angles are in radians, declared as degrees.
     Radians,
+    /// Joint angles are in gradians (400 to a turn), declared as degrees.
+    Gradians,
     /// Positions are in metres, declared as millimetres.
     Metres,
     /// Positions are in millimetres, declared as metres.
@@ -46,6 +48,8 @@ pub enum Misreading {
         /// Second joint.
         with: usize,
     },
+    /// The columns of all joints are in the opposite order.
+    OppositeOrder,
     /// The angle of a joint contains the command of another joint (mechanical coupling). Joints are
     /// counted from 1.
     Coupled {

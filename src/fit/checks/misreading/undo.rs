@@ -10,7 +10,7 @@ use super::candidates::{
 use super::{Misreading, numbers_of};
 use crate::measurement::Measurements;
 use crate::model::parameter::JointField;
-use crate::problem::{Effect, Freedom, ParameterRule, Problem, Quantities};
+use crate::problem::{Effect, Freedom, JointKind, ParameterRule, Problem, Quantities};
 
 /// Length of an inch \[mm\].
 const MM_PER_INCH: f64 = 25.4;
@@ -20,6 +20,9 @@ const MM_PER_INCH: f64 = 25.4;
 const UNIT_RATIOS: [f64; 4] = [PI / 180.0, 180.0 / PI, 1e-3, 1e3];
 /// Largest relative deviation from such a ratio that gears leave.
 const UNIT_RATIO_TOLERANCE: f64 = 0.05;
+
+/// Size of a gradian \[°\].
+const DEGREES_PER_GRADIAN: f64 = 0.9;
 
 /// Returns 10 to the given power.
 pub(super) fn power_of_ten(power: i8) -> f64 {
@@ -209,6 +212,17 @@ impl Misreading {
                 let factor = if is_radians { PI / 180.0 } else { 180.0 / PI };
                 let turning = (0..q.len()).filter(|&j| turns_in(problem, table, j, is_radians));
                 turning.for_each(|joint| q[joint] *= factor);
+            }
+            Self::Gradians => {
+                let turning = (0..q.len()).filter(|&j| turns_in(problem, table, j, false));
+                turning.for_each(|joint| q[joint] *= DEGREES_PER_GRADIAN);
+            }
+            Self::OppositeOrder => {
+                let commanded: Vec<usize> = (0..q.len().min(problem.joints.len()))
+                    .filter(|&joint| problem.joints[joint].command_kind() != JointKind::Fixed)
+                    .collect();
+                let values: Vec<f64> = commanded.iter().map(|&joint| q[joint]).collect();
+                commanded.iter().rev().zip(values).for_each(|(&joint, value)| q[joint] = value);
             }
             Self::Reversed { joints } => {
                 numbers_of(joints).for_each(|joint| q[joint - 1] = -q[joint - 1]);

@@ -38,6 +38,8 @@ impl fmt::Display for Misreading {
         match *self {
             Self::Degrees => f.write_str("joint angles that are degrees, declared as radians"),
             Self::Radians => f.write_str("joint angles that are radians, declared as degrees"),
+            Self::Gradians => f.write_str("joint angles that are gradians, declared as degrees"),
+            Self::OppositeOrder => f.write_str("columns of all joints in the opposite order"),
             Self::Metres => f.write_str("positions that are metres, declared as millimetres"),
             Self::Millimetres => f.write_str("positions that are millimetres, declared as metres"),
             Self::Inches => f.write_str("positions that are inches, declared as millimetres"),
