@@ -267,6 +267,7 @@ impl Estimate {
     pub(super) fn unfitted(parameter: &Parameter, time_measured: bool) -> Self {
         let unit = match parameter.unit() {
             Unit::Speed if !time_measured => Unit::LengthPerRow,
+            Unit::AngularSpeed if !time_measured => Unit::AnglePerRow,
             unit => unit,
         };
         Self {

@@ -50,8 +50,26 @@ pub enum Unit {
     LengthPerMass,
     /// Number per length [1/m].
     PerLength,
+    /// Curvature per payload mass [1/(m·kg)].
+    CurvaturePerMass,
+    /// Curvature per time [1/(m·s)].
+    CurvaturePerTime,
+    /// Curvature per unit of a declared covariate [1/(m·unit)].
+    CurvaturePerUnit,
+    /// Strain per payload mass [1/kg].
+    StrainPerMass,
+    /// Strain per time [1/s].
+    StrainPerTime,
+    /// Strain per torque [1/(N·m)].
+    StrainPerTorque,
+    /// Strain per unit of a declared covariate [1/unit].
+    StrainPerUnit,
     /// Speed [m/s].
     Speed,
+    /// Angular speed [rad/s].
+    AngularSpeed,
+    /// Length per torque [m/(N·m)].
+    LengthPerTorque,
     /// Length per angle [m/rad].
     LengthPerAngle,
     /// Angle per length [rad/m].
@@ -62,6 +80,8 @@ pub enum Unit {
     LengthPerUnit,
     /// Length per table row, used when no time was measured [m/row].
     LengthPerRow,
+    /// Angle per table row, used when no time was measured [rad/row].
+    AnglePerRow,
     /// Ratio of equal units (rad/rad or m/m) that is small, displayed in ‰.
     Ratio,
     /// Dimensionless number of order 1.
@@ -200,6 +220,28 @@ impl Unit {
                 [si("m_per_s"), mm("mm_per_s"), Suffix { name: "mm_per_h", to_si: |x| x / 3.6e6 }],
                 As(3.6e6, "mm/h")
             ),
+            Self::AngularSpeed => row!(
+                "an angular speed",
+                "rad/s",
+                [deg("deg_per_s"), si("rad_per_s")],
+                As(3600.0 * DEGREES, "°/h")
+            ),
+            Self::LengthPerTorque => {
+                row!("a length per torque", "m/(N·m)", [], As(1e3, "mm/(N·m)"))
+            }
+            Self::CurvaturePerMass => row!("a curvature per kg", "1/(m·kg)", [], Plain),
+            Self::CurvaturePerTime => row!("a curvature per time", "1/(m·s)", [], Plain),
+            Self::CurvaturePerUnit => {
+                row!("a curvature per unit of a covariate", "1/(m·unit)", [], Plain)
+            }
+            Self::StrainPerMass => row!("a strain per kg", "1/kg", [], As(1e6, "10⁻⁶/kg")),
+            Self::StrainPerTime => row!("a strain per time", "1/s", [], As(3.6e9, "10⁻⁶/h")),
+            Self::StrainPerTorque => {
+                row!("a strain per torque", "1/(N·m)", [], As(1e6, "10⁻⁶/(N·m)"))
+            }
+            Self::StrainPerUnit => {
+                row!("a strain per unit of a covariate", "1/unit", [], As(1e6, "10⁻⁶/unit"))
+            }
             Self::LengthPerAngle => row!("a length per angle", "m/rad", [], As(1e3, "mm/rad")),
             Self::AnglePerLength => row!("an angle per length", "rad/m", [], As(DEGREES, "°/m")),
             Self::AnglePerUnit => row!(
@@ -215,6 +257,7 @@ impl Unit {
                 As(1e3, "mm/unit")
             ),
             Self::LengthPerRow => row!("a length per row", "m/row", [], As(1e3, "mm/row")),
+            Self::AnglePerRow => row!("an angle per row", "rad/row", [], As(DEGREES, "°/row")),
             Self::Ratio => row!("a ratio", "1", [si("relative")], As(1e3, "‰")),
             Self::Number => row!("a ratio", "1", [si("relative")], Plain),
         }
