@@ -13,6 +13,7 @@ use super::rules::SelectionRules;
 use crate::fit::Stop;
 use crate::measurement::{Dataset, Measurements, Split};
 use crate::model::effect::{DataCoverage, NO_REFERENCE, NO_TEMPERATURE};
+use crate::observation::Needs;
 use crate::problem::{Effect, JointKind, Problem};
 use crate::residual_tests::Covariate;
 use crate::residual_tests::CovariateValues;
@@ -48,6 +49,10 @@ pub(super) type Proposed = Arc<Mutex<BTreeMap<ProposalKey, Vec<Effect>>>>;
 /// Key of cached laws: names of the sites, names of the other hypotheses assumed, poses left out,
 /// and names of the fitted effects.
 pub(super) type ProposalKey = (String, Vec<String>, Vec<usize>, Vec<String>);
+
+/// Number of points in images that count as one pose in the limit of the rows of evidence. A point
+/// has less information than a position, and a view has many.
+const IMAGE_ROWS_PER_POSE: usize = 6;
 
 impl<'a> Data<'a> {
     pub fn new(problem: &Problem, dataset: &'a Dataset, rules: &'a SelectionRules) -> Self {
@@ -99,10 +104,16 @@ impl<'a> Data<'a> {
     }
 
     /// Returns the identification rows on which evidence is evaluated: at most `evidence_poses`,
-    /// evenly spaced in the order of the table.
+    /// or [`IMAGE_ROWS_PER_POSE`] times as many if most of them are points in images, evenly spaced
+    /// in the order of the table.
     pub fn evidence_rows(&self) -> Vec<usize> {
         let rows = self.rows();
-        let count = rows.len().min(self.rules.evidence_poses);
+        let is_image = |row: &&usize| {
+            self.measurements.observation(**row).description().needs == Needs::Carriers
+        };
+        let images = rows.iter().filter(is_image).count();
+        let factor = if 2 * images > rows.len() { IMAGE_ROWS_PER_POSE } else { 1 };
+        let count = rows.len().min(factor * self.rules.evidence_poses);
         (0..count).map(|k| rows[k * rows.len() / count]).collect()
     }
 
