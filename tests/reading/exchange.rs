@@ -182,8 +182,8 @@ fn clocks_that_differ_are_refused_with_the_offset() {
         format!("time_s,A1,A2\n{}", times.iter().map(row).collect::<String>())
     };
     let tracker = |shift: f64| {
-        let row = |time: &f64| format!("1;2;3;{:.3}\n", time + shift);
-        format!("X;y_mm;z_mm;time_s\n{}", times.iter().map(row).collect::<String>())
+        let row = |time: &f64| format!("P{time};1;2;3;{:.3}\n", time + shift);
+        format!("Point;X;y_mm;z_mm;time_s\n{}", times.iter().map(row).collect::<String>())
     };
     let read = |by: &str, shift: f64| joined(by, &tracker(shift), &log(&times));
     let offset = "write offset_s = 47.0 in joints";
