@@ -13,7 +13,7 @@ otherwise (``x_mm``, ``mean_mm``, ``temperature_C``).
 
 from __future__ import annotations
 
-from importlib.metadata import version
+from importlib.metadata import PackageNotFoundError, version
 
 from ._applied import Compensation, Export
 from ._designs import Check, Next, Plan, Simulation, Study
@@ -25,7 +25,10 @@ from ._problem import Problem, study
 from ._progress import Progress
 from .errors import FlexcalWarning, InputError
 
-__version__ = version("flexcal")
+try:
+    __version__ = version("flexcal")
+except PackageNotFoundError:  # imported from a folder that is not installed
+    __version__ = "unknown"
 
 __all__ = [
     "Check",

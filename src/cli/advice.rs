@@ -16,13 +16,12 @@ use super::plan;
 const SEPARATING_POSES: usize = 12;
 
 /// Findings that speak for a mistake in table or problem, not for an effect that the model lacks.
-const CONTRADICTIONS: [FindingCode; 6] = [
+const CONTRADICTIONS: [FindingCode; 5] = [
     FindingCode::MissesMeasurements,
     FindingCode::NoBetterThanNominal,
     FindingCode::OtherSize,
     FindingCode::BeyondPrior,
     FindingCode::BeyondArmSize,
-    FindingCode::GivesWayUpwards,
 ];
 
 /// Returns the command to run after a fit. `is_structured` is true if the residual has structure;
@@ -59,7 +58,7 @@ pub fn after_fit(
             )
         }
         None if CONTRADICTIONS.iter().any(|code| found.has(*code)) => format!(
-            "correct the table or {} as the warning says, then flexcal identify {named}",
+            "correct the table or {} as the warning says, then flexcal identify {named}; if the input is right, flexcal loop {named} looks for what the model lacks",
             common.problem_file().display()
         ),
         None if found.has(FindingCode::NoiseBeyondDeclared) => {

@@ -18,7 +18,7 @@ use super::input::{Common, Input};
 use super::outcome::Outcome;
 use super::output::REPORT;
 use super::progress::Line;
-use super::{advice, diagnostic, interrupt, output};
+use super::{advice, diagnostic, interrupt};
 
 /// Arguments of `flexcal identify`.
 #[derive(Debug, Args)]
@@ -150,7 +150,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
                 "\n{}\n",
                 textwrap::fill(
                     &report::remainder_text(&identification, &corrected.outcome()),
-                    output::columns().min(110)
+                    report::text_width()
                 )
             )
         })
@@ -177,7 +177,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
             report::estimate_text(&problem, &identification)
         } else {
             let bound = report::bound_text(&shown);
-            report::estimate_brief(&problem, &identification, bound, output::columns())
+            report::estimate_brief(&problem, &identification, bound)
         };
         let sources = sources.as_ref().map_or_else(String::new, |words| format!("\n{words}\n"));
         let is_structured = shown.residual_tests.is_structured();

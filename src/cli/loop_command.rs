@@ -17,7 +17,7 @@ use super::outcome::Outcome;
 use super::output::REPORT;
 use super::progress::Line;
 use super::unfinished::Unfinished;
-use super::{advice, diagnostic, interrupt, output};
+use super::{advice, diagnostic, interrupt};
 
 /// Arguments of `flexcal loop`.
 #[derive(Debug, Args)]
@@ -92,7 +92,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
             "\n{}\n",
             textwrap::fill(
                 &report::remainder_text(&closure.after, &corrected.outcome()),
-                output::columns().min(110)
+                report::text_width()
             )
         )
     });
@@ -103,7 +103,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         let told = if arguments.verbose {
             report::loop_text(&problem, &closure)
         } else {
-            report::loop_brief(&problem, &closure, report::bound_text(&shown), output::columns())
+            report::loop_brief(&problem, &closure, report::bound_text(&shown))
         };
         let next = advice::after_loop(common, &problem, &closure.before.fit, &result, &results);
         format!("{told}{words}{}Next: {next}\n", results.written())

@@ -53,7 +53,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let common = &arguments.common;
     let problem = Problem::read(common.problem())?;
     let results = common.results("predict", &problem, arguments.estimate.as_slice(), &RESULTS)?;
-    let (rows, warnings) = Measurements::read_poses(common.files(&problem), &problem)?;
+    let (rows, warnings) = Measurements::read_to_predict(common.files(&problem), &problem)?;
     let rows = rows.arm_rows();
     common.warn(&warnings);
     let read = |file| arguments.trust.read(file);

@@ -221,7 +221,9 @@ impl Columns {
             {
                 let number = format!("q{}{suffix}", numbering.number(index));
                 let is_zero = |name: &&String| split_unit(name).0 == "q0";
-                if let Some(zero) = self.names.iter().find(is_zero) {
+                if let Some(zero) = self.names.iter().find(is_zero)
+                    && !problem.joints.iter().any(|joint| joint.name == "q0")
+                {
                     return Err(table.column(zero).error(TableErrorKind::JointsFromZero));
                 }
                 let namesakes = || {

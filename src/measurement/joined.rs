@@ -253,7 +253,8 @@ impl JoinedLog {
     fn offset(&self) -> Option<String> {
         let JoinRule::Time { offset, .. } = self.rule else { return None };
         let shift = best_shift(&self.times, &self.log_times)?;
-        Some(format!("{:.1}", offset + shift))
+        let offset = format!("{:.3}", offset + shift);
+        Some(offset.trim_end_matches('0').trim_end_matches('.').to_owned())
     }
 
     /// Returns the row of the log that is the partner of most measured rows because its time is the
@@ -287,17 +288,19 @@ impl JoinedLog {
             return Ok(());
         }
         let left = self.unpaired.len();
-        if 2 * left > rows {
-            let (gap, offset) = (self.gap(), self.offset());
-            return error(TableErrorKind::MostUnpaired { left, rows, gap, offset });
+        if 2 * left > rows
+            && let Some(offset) = self.offset()
+        {
+            let gap = self.gap();
+            return error(TableErrorKind::MostUnpaired { left, rows, gap, offset: Some(offset) });
         }
-        if let Some(row) = self.common_partner() {
+        let gaps = self.gaps(false);
+        let usual = gaps.get(gaps.len() / 2).copied().unwrap_or(0.0);
+        if let Some(row) = self.common_partner().filter(|_| usual > MAX_USUAL_GAP) {
             let partner = Location::file(&row.file).at_line(row.line).to_string();
             let (same, keys, offset) = (row.uses, self.keys(), self.offset());
             return error(TableErrorKind::CommonPartner { same, rows, partner, keys, offset });
         }
-        let gaps = self.gaps(false);
-        let usual = gaps.get(gaps.len() / 2).copied().unwrap_or(0.0);
         let offset = if usual > MAX_USUAL_GAP { self.offset() } else { None };
         match offset {
             Some(offset) => {

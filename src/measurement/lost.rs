@@ -28,7 +28,7 @@ impl Measurements {
         }
         let (location, write) = (self.location(first), write.to_owned());
         let differs = |row: &&usize| self.configuration(**row) != self.configuration(first);
-        if lost.iter().find(differs).is_none() {
+        if !lost.iter().any(|row| differs(&row)) {
             return Ok(Some(Warning { location, kind: WarningKind::PositionZero { write } }));
         }
         let others = lost.iter().skip(1).take(MAX_LISTED_ROWS);

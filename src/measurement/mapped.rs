@@ -124,7 +124,8 @@ pub(super) fn no_such(rule: &ColumnRule, table: &Table) -> InputError {
         ColumnSelector::Place(place) => format!("#{place}"),
         ColumnSelector::File => "#file".to_owned(),
     };
-    let is_of_joint = rule.ours.starts_with('q');
+    let number = rule.ours.strip_prefix('q').unwrap_or_default();
+    let is_of_joint = number.starts_with(|character: char| character.is_ascii_digit());
     let (file, known) = table
         .appended_columns()
         .filter(|_| is_of_joint)

@@ -28,6 +28,7 @@ mod limits;
 mod lines;
 #[deny(clippy::indexing_slicing)]
 mod lost;
+#[deny(clippy::indexing_slicing)]
 mod mapped;
 #[deny(clippy::indexing_slicing)]
 mod meaning;

@@ -12,7 +12,7 @@ use super::table::Table;
 use super::{ColumnTable, Measurements};
 use crate::error::{InputError, InputErrorKind, Location, TableErrorKind, Warning, WarningKind};
 use crate::files::same_file;
-use crate::problem::{Missing, Problem};
+use crate::problem::{JoinRule, Missing, Problem};
 
 impl Measurements {
     /// Reads files one after the other; also returns warnings, for example about ignored columns.
@@ -21,7 +21,7 @@ impl Measurements {
     /// Returns the first error in the files, or an error if a file cannot be read.
     #[doc(hidden)]
     pub fn read(files: &[PathBuf], problem: &Problem) -> Result<(Self, Vec<Warning>), InputError> {
-        Self::read_table(files, problem, true)
+        Self::read_table(files, problem, Use::Measured)
     }
 
     /// Reads poses that may still be unmeasured; missing positions are zero.
@@ -32,7 +32,20 @@ impl Measurements {
         files: &[PathBuf],
         problem: &Problem,
     ) -> Result<(Self, Vec<Warning>), InputError> {
-        Self::read_table(files, problem, false)
+        Self::read_table(files, problem, Use::Planned)
+    }
+
+    /// Reads poses to predict, which may be unmeasured. Tables without joint columns are joined with
+    /// the joint table of the problem; by order only if they are the problem's own tables.
+    ///
+    /// # Errors
+    /// Returns the first error in the files, or an error if a file cannot be read.
+    #[doc(hidden)]
+    pub fn read_to_predict(
+        files: &[PathBuf],
+        problem: &Problem,
+    ) -> Result<(Self, Vec<Warning>), InputError> {
+        Self::read_table(files, problem, Use::Predicted)
     }
 
     /// Reads a table in memory; also returns warnings, for example about ignored columns.
@@ -43,7 +56,7 @@ impl Measurements {
         table: ColumnTable,
         problem: &Problem,
     ) -> Result<(Self, Vec<Warning>), InputError> {
-        Self::read_column_table(table, problem, true)
+        Self::read_column_table(table, problem, Use::Measured)
     }
 
     /// Reads poses from a table in memory that may still be unmeasured; missing positions are zero.
@@ -55,15 +68,15 @@ impl Measurements {
         table: ColumnTable,
         problem: &Problem,
     ) -> Result<(Self, Vec<Warning>), InputError> {
-        Self::read_column_table(table, problem, false)
+        Self::read_column_table(table, problem, Use::Planned)
     }
 
     fn read_table(
         files: &[PathBuf],
         problem: &Problem,
-        measured: bool,
+        table_use: Use,
     ) -> Result<(Self, Vec<Warning>), InputError> {
-        let mut tables = Tables::new(files, problem, measured);
+        let mut tables = Tables::new(files, problem, table_use);
         for (index, file) in files.iter().enumerate() {
             if files.iter().take(index).any(|other| other == file || same_file(other, file)) {
                 let again = TableErrorKind::RepeatedFile { path: file.clone() };
@@ -85,37 +98,64 @@ impl Measurements {
     fn read_column_table(
         table: ColumnTable,
         problem: &Problem,
-        measured: bool,
+        table_use: Use,
     ) -> Result<(Self, Vec<Warning>), InputError> {
         let name = table.name().to_owned();
-        let mut tables = Tables::new(std::slice::from_ref(&name), problem, measured);
+        let mut tables = Tables::new(std::slice::from_ref(&name), problem, table_use);
         let dialect = problem.data.dialect.in_memory();
         tables.read(0, Table::from_reader(&name, &dialect, Box::new(table.into_text()))?)?;
         tables.finish()
     }
 }
 
+/// What tables are read for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Use {
+    /// Rows that have to be measured.
+    Measured,
+    /// Rows whose predictions may be compared with measurements.
+    Predicted,
+    /// Planned poses and targets, which carry their commands.
+    Planned,
+}
+
 /// Reader of several tables, one after the other.
 struct Tables<'a> {
     files: &'a [PathBuf],
     problem: &'a Problem,
-    /// True if the table must contain measurements, false for planned poses.
+    /// True if the table must contain measurements.
     measured: bool,
+    /// True if tables without joint columns are joined with the joint table of the problem.
+    joins: bool,
     warnings: Vec<Warning>,
     builder: Option<RowsBuilder>,
     log: Option<JoinedLog>,
 }
 
 impl<'a> Tables<'a> {
-    fn new(files: &'a [PathBuf], problem: &'a Problem, measured: bool) -> Self {
-        Self { files, problem, measured, warnings: Vec::new(), builder: None, log: None }
+    fn new(files: &'a [PathBuf], problem: &'a Problem, table_use: Use) -> Self {
+        let by_order = problem.data.joint_log.as_ref().is_some_and(|log| log.by == JoinRule::Order);
+        let joins = match table_use {
+            Use::Measured => true,
+            Use::Predicted => !by_order || files == problem.data.files,
+            Use::Planned => false,
+        };
+        Self {
+            files,
+            problem,
+            measured: table_use == Use::Measured,
+            joins,
+            warnings: Vec::new(),
+            builder: None,
+            log: None,
+        }
     }
 
     /// Reads all rows of a table; `index` is the number of its file.
     fn read(&mut self, index: usize, mut table: Table) -> Result<(), InputError> {
         let dialect = &self.problem.data.dialect;
         let joint_log = self.problem.data.joint_log.as_ref();
-        let is_joined = !Columns::has_joints(&table, self.problem);
+        let is_joined = self.joins && !Columns::has_joints(&table, self.problem);
         let mut log = match (joint_log.filter(|_| is_joined), self.log.take()) {
             (Some(_), Some(log)) => Some(log),
             (Some(declared), None) => Some(JoinedLog::read(declared, self.problem)?),

@@ -64,7 +64,8 @@ impl<S: Scalar> AxisMoments<S> {
             let of_beam = if joint.beam.is_some() { 3 * arm.beam_elements } else { 0 };
             next += of_beam + 1;
             let moment = ws.next_moments.get(next - 1).copied();
-            moment.filter(|moment| moment.re().abs() > least).unwrap_or_else(|| S::from(0.0))
+            let moment = moment.unwrap_or_else(|| S::from(0.0));
+            if moment.re().abs() > least { moment } else { moment - moment.re() }
         };
         arm.joints.iter().map(moment).collect()
     }

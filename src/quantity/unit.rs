@@ -52,6 +52,8 @@ pub enum Unit {
     PerLength,
     /// Curvature per payload mass [1/(m·kg)].
     CurvaturePerMass,
+    /// Curvature per length [1/m²].
+    CurvaturePerLength,
     /// Curvature per time [1/(m·s)].
     CurvaturePerTime,
     /// Curvature per unit of a declared covariate [1/(m·unit)].
@@ -230,6 +232,7 @@ impl Unit {
                 row!("a length per torque", "m/(N·m)", [], As(1e3, "mm/(N·m)"))
             }
             Self::CurvaturePerMass => row!("a curvature per kg", "1/(m·kg)", [], Plain),
+            Self::CurvaturePerLength => row!("a curvature per length", "1/m²", [], Plain),
             Self::CurvaturePerTime => row!("a curvature per time", "1/(m·s)", [], Plain),
             Self::CurvaturePerUnit => {
                 row!("a curvature per unit of a covariate", "1/(m·unit)", [], Plain)

@@ -6,7 +6,7 @@ use super::identify::{errors_by_axis, headline};
 use super::noise::{influential_rows, noise};
 use super::parameters::correlated;
 use super::prior::summary;
-use super::render::text_within;
+use super::render::text;
 use super::row_kinds::unsteady;
 use crate::fit::{Estimate, Finding, FindingCode, Identification, size_of_kind};
 use crate::problem::Problem;
@@ -14,14 +14,8 @@ use crate::quantity::format::{counted, number};
 use crate::results::Knowledge;
 
 /// Returns a summary of a fit for one screen, ending in a line break: errors, size of the residual,
-/// parameters and remarks. Lines have at most `columns` characters; `bound` is a sentence on the
-/// error bound of predictions.
-pub fn estimate_brief(
-    problem: &Problem,
-    found: &Identification,
-    bound: Option<String>,
-    columns: usize,
-) -> String {
+/// parameters and remarks. `bound` is a sentence on the error bound of predictions.
+pub fn estimate_brief(problem: &Problem, found: &Identification, bound: Option<String>) -> String {
     let mut blocks = vec![headline(problem, found)];
     if let Some(reason) = found.first_error() {
         blocks.push(Block::Text(format!("Not to be trusted: {reason}.")));
@@ -35,7 +29,7 @@ pub fn estimate_brief(
     blocks.extend(influential_rows(found));
     blocks.extend(found.prior.as_ref().map(|comparison| Block::Text(summary(comparison))));
     blocks.push(Block::Lines(parameters(&found.estimates), remarks(found)));
-    text_within(&blocks, columns)
+    text(&blocks)
 }
 
 /// Returns true if the data determine no parameter of the fit.

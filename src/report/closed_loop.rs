@@ -11,7 +11,7 @@ use super::identify::{
 use super::noise::{expected, influential_rows, short, size};
 use super::parameters::parameters;
 use super::probability::percent;
-use super::render::{Report, report, text, text_within};
+use super::render::{Report, report, text};
 use super::unexplained::{correction, places, to_declare, unexplained};
 use super::verdict::{alternative, causes, counts, stand_in, title, verdict};
 use super::{effect, residual_tests, trace};
@@ -33,16 +33,10 @@ const SCREEN_LINES: usize = 22;
 /// Name of the arm with the effects of the extended problem.
 const EXTENDED: &str = "with what was found";
 
-/// Returns a summary of the outcome for one screen, ending in a line break. Lines have at most
-/// `columns` characters; `bound` is a sentence on the error bound of predictions.
-pub fn loop_brief(
-    problem: &Problem,
-    closure: &ClosedLoop,
-    bound: Option<String>,
-    columns: usize,
-) -> String {
+/// Returns a summary of the outcome for one screen, ending in a line break. `bound` is a sentence on
+/// the error bound of predictions.
+pub fn loop_brief(problem: &Problem, closure: &ClosedLoop, bound: Option<String>) -> String {
     let result = &LoopResult::new(problem, closure);
-    let text = |blocks: &[Block]| text_within(blocks, columns);
     let mut blocks = head(problem, closure, result);
     // The summary shows the held-out rows without their column of χ², which is empty.
     let mut table = errors(closure, result);

@@ -60,6 +60,8 @@ pub(crate) use plan::plan_page;
 pub(crate) use predict::{prediction_page, prediction_text};
 pub(crate) use remainder::bound_text;
 pub use render::Report;
+#[doc(hidden)]
+pub use render::{limit_text_width, text_width};
 pub(crate) use replica::{replica_report, replica_text};
 pub(crate) use shell::shell_word;
 pub(crate) use study::study_page;

@@ -76,7 +76,9 @@ fn blocks<'a>(
             &[0],
         )));
     }
+    // Rows to which base or tool are fitted say nothing if they are too few.
     let residuals = prediction.residuals.as_deref();
+    let residuals = residuals.filter(|rows| 3 * rows.len() > prediction.placed.len());
     blocks.extend(bounds.map(|bounds| Block::lines(bounded(bounds, residuals))));
     let unsteady = unsteady(&prediction.spreads);
     if !unsteady.is_empty() {

@@ -99,8 +99,11 @@ const MAX_COMPUTED_ERROR: f64 = 2e-3;
 
 /// Returns true if no measurement agrees so closely with predictions as these residuals.
 fn are_predicted(bounds: &Bounds, residuals: &[Residual]) -> bool {
-    let largest = residuals.iter().map(|row| row.position.norm()).fold(0.0, f64::max);
-    !residuals.is_empty() && largest <= MAX_COMPUTED_ERROR * bounds.expected()
+    let lengths = || residuals.iter().map(|row| row.position.norm());
+    let largest = lengths().fold(0.0, f64::max);
+    !residuals.is_empty()
+        && lengths().all(f64::is_finite)
+        && largest <= MAX_COMPUTED_ERROR * bounds.expected()
 }
 
 /// Returns the expected error and its bound in words. If there are `residuals`, adds the share of

@@ -148,6 +148,9 @@ fn rounded(value: f64) -> String {
 /// Returns the number that the declared one becomes with two neighbouring digits exchanged or one
 /// digit changed, and the words for it; `None` unless it is near the fitted number.
 fn typing_error(declared: f64, fitted: f64) -> Option<(f64, &'static str)> {
+    if declared == 0.0 {
+        return None;
+    }
     let digits = rounded(declared).into_bytes();
     let is_digit = |place: usize| digits.get(place).is_some_and(u8::is_ascii_digit);
     let exchanged = (1..digits.len()).filter_map(|place| {
@@ -156,7 +159,9 @@ fn typing_error(declared: f64, fitted: f64) -> Option<(f64, &'static str)> {
         (is_digit(first) && is_digit(place)).then(|| changed.swap(first, place))?;
         Some((changed, "two digits exchanged"))
     });
-    let replaced = (0..digits.len()).filter(|&place| is_digit(place)).flat_map(|place| {
+    // Another last digit is near many numbers.
+    let last = (0..digits.len()).rev().find(|&place| is_digit(place)).unwrap_or(0);
+    let replaced = (0..last).filter(|&place| is_digit(place)).flat_map(|place| {
         let digits = &digits;
         (b'0'..=b'9').map(move |digit| {
             let mut changed = digits.clone();
@@ -186,6 +191,8 @@ mod tests {
         assert_eq!(typing_error(194.65, 94.7), Some((94.65, "one other digit")));
         assert_eq!(typing_error(240.0, 420.2), Some((420.0, "two digits exchanged")));
         assert_eq!(typing_error(82.3, 113.0), None);
+        assert_eq!(typing_error(800.0, 805.05), None);
+        assert_eq!(typing_error(0.0, 5.0), None);
         assert_eq!(rounded(0.0892 * 1e3), "89.2");
     }
 }

@@ -97,9 +97,6 @@ finding_codes! {
     BeyondArmSize: Error "beyond-arm-size" ["parameter", "sizes"]
         "A parameter deviates by more than the size of the arm, half a turn, or a factor of 100.",
         "give it a prior, or check units and the table's columns";
-    GivesWayUpwards: Error "gives-way-upwards" ["parameter", "compliance", "sigmas"]
-        "A part gives way against its load: its compliance as a whole is negative by more than 5 standard errors.",
-        "check the sign of gravity_m_s2, whether the base is inverted, and the places of masses and payload";
     HeldOutCopied: Error "held-out-copied" ["rows"]
         "Every held-out row is an identification row again, so that held-out errors judge nothing.",
         "hold out rows that were not fitted";
@@ -130,6 +127,9 @@ finding_codes! {
     NominalFarOff: Warning "nominal-far-off" ["kind", "rms", "spread", "explanations"]
         "The nominal arm misses the measurements by more than a tenth of their spread.",
         "check units, signs of joints, and whether the numbers are of this convention of frames";
+    GivesWayUpwards: Warning "gives-way-upwards" ["parameter", "compliance", "sigmas"]
+        "A joint gives way against its load: its compliance as a whole is negative by more than 5 standard errors.",
+        "check the sign of gravity_m_s2, the places of masses and payload, and whether a spring, counterweight or hoist is missing";
     CommandsRounded: Warning "commands-rounded" ["step_deg", "rounding", "rms"]
         "The commands of each joint are multiples of a step, and rounding to these steps would leave an error of the size of the residual.",
         "log the joint angles with more digits";

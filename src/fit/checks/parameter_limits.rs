@@ -4,7 +4,7 @@ use super::checked_fit::{Check, CheckedFit};
 use super::contradicted_entry::contradicted_entry;
 use super::finding::{Finding, FindingCode};
 use crate::fit::stages::parameter_size::largest;
-use crate::model::parameter::{ArmField, JointField, Parameter, ParameterSite};
+use crate::model::parameter::{JointField, Parameter, ParameterSite};
 use crate::quantity::Unit;
 
 /// Largest deviation of an arm parameter, in σ of its prior, that is not reported. Chance exceeds 5
@@ -80,8 +80,7 @@ impl Check for WithinArmSize {
     }
 }
 
-/// Checks that joints and base give way along their loads: no compliance as a whole is negative by
-/// more than [`MAX_NEGATIVE_SIGMAS`] standard errors.
+/// Checks that joints give way along their loads: no compliance as a whole is negative by more than [`MAX_NEGATIVE_SIGMAS`] standard errors.
 pub(super) struct GivesWayToLoads;
 
 /// Largest number of standard errors by which a compliance may be negative.
@@ -91,16 +90,12 @@ impl Check for GivesWayToLoads {
     fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
         let of_unknown = |(place, &k): (usize, &usize)| {
             let parameter = &fit.fitting.model.parameters[k];
-            let declared = match parameter.site {
-                ParameterSite::Joint { joint, field: JointField::Compliance } => {
-                    fit.problem.joints.get(joint)?.stiffness.map_or(0.0, f64::recip)
-                }
-                ParameterSite::Joint {
-                    field: JointField::LateralX | JointField::LateralY, ..
-                }
-                | ParameterSite::Arm(ArmField::MountingX | ArmField::MountingY) => 0.0,
-                _ => return None,
+            let ParameterSite::Joint { joint, field: JointField::Compliance } = parameter.site
+            else {
+                return None;
             };
+            let stiffness = fit.problem.joints.get(joint)?.stiffness;
+            let declared = stiffness.map_or(0.0, f64::recip);
             let compliance = declared + fit.end.x[k];
             let sigmas = -compliance / fit.covariance[(place, place)].sqrt();
             (parameter.regressor.is_constant() && sigmas.is_finite())

@@ -105,7 +105,8 @@ pub(crate) fn unit(site: ParameterSite, regressor: &Regressor) -> Unit {
         (Per::Covariate, _) => Unit::LengthPerUnit,
         (Per::Angle, Unit::Length) => Unit::LengthPerAngle,
         (Per::Length, Unit::Angle) => Unit::AnglePerLength,
-        (Per::Angle, Unit::PerLength) => Unit::PerLength,
+        (Per::Angle, Unit::PerLength) | (Per::Length, Unit::Ratio) => Unit::PerLength,
+        (Per::Length, Unit::PerLength) => Unit::CurvaturePerLength,
         (Per::Angle | Per::Length, _) => Unit::Ratio,
         (_, unit) => unit,
     }

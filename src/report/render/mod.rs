@@ -8,4 +8,5 @@ mod text;
 
 pub use html::Report;
 pub(super) use html::{page, report};
-pub(super) use text::{text, text_within};
+pub(super) use text::text;
+pub use text::{limit_text_width, text_width};

@@ -1,5 +1,7 @@
 //! Text report for terminals.
 
+use std::sync::atomic::{AtomicUsize, Ordering};
+
 use comfy_table::{CellAlignment, presets::NOTHING};
 
 use crate::report::document::{Block, CODE, Mark, Point, Table};
@@ -7,14 +9,26 @@ use crate::report::document::{Block, CODE, Mark, Point, Table};
 /// Maximum width of running text in columns; tables may be wider.
 const MAX_TEXT_WIDTH: usize = 110;
 
-/// Renders blocks as text, ending in a line break.
-pub(in crate::report) fn text(blocks: &[Block]) -> String {
-    text_within(blocks, MAX_TEXT_WIDTH)
+/// Width of running text in this process: that of its terminal, at most [`MAX_TEXT_WIDTH`].
+static TEXT_WIDTH: AtomicUsize = AtomicUsize::new(MAX_TEXT_WIDTH);
+
+/// Wraps the running text of all reports of this process to at most `columns` characters.
+pub fn limit_text_width(columns: usize) {
+    TEXT_WIDTH.store(columns.min(MAX_TEXT_WIDTH), Ordering::Relaxed);
 }
 
-/// Renders blocks as text; running text is wrapped to at most `columns` characters.
-pub(in crate::report) fn text_within(blocks: &[Block], columns: usize) -> String {
-    let width = columns.min(MAX_TEXT_WIDTH);
+/// Returns the width of running text in columns.
+pub fn text_width() -> usize {
+    TEXT_WIDTH.load(Ordering::Relaxed)
+}
+
+/// Renders blocks as text, ending in a line break.
+pub(in crate::report) fn text(blocks: &[Block]) -> String {
+    text_within(blocks, text_width())
+}
+
+/// Renders blocks as text; running text is wrapped to `width` characters.
+fn text_within(blocks: &[Block], width: usize) -> String {
     let mut text = String::new();
     let mut follows_heading = false;
     for block in flat(blocks) {

@@ -172,8 +172,9 @@ pub fn close_by(
     let misread =
         state.misread.as_ref().filter(|misread| state.added(&fitted).contains(&misread.effect));
     let freed = misread.map_or_else(Vec::new, |misread| misread.parameters(&fitted.problem));
+    let orientations = orientation_finding(&fitted.problem, &data, &unstoppable);
     let mut after = fitted.found;
-    after.findings.splice(0..0, orientation_finding(problem, &data, &unstoppable));
+    after.findings.splice(0..0, orientations);
     Ok(ClosedLoop {
         verdict,
         interrupted,
@@ -193,7 +194,7 @@ pub fn close_by(
     })
 }
 
-/// Returns the finding that the declared problem does not fit the measured orientations; `None` if
+/// Returns the finding that the extended problem does not fit the measured orientations; `None` if
 /// it does, or if it fits none. The loop itself fits positions alone.
 fn orientation_finding(problem: &Problem, data: &Data, options: &Options) -> Option<Finding> {
     if !problem.data.fits_orientation {

@@ -133,7 +133,9 @@ pub(super) fn found(
             claims
         });
         let instead = rival.into_iter().flat_map(|rival| {
-            rival.instead.iter().map(|cause| (cause.clone(), of_class * (1.0 - rival.share)))
+            // They act together; each of them bears its part of their probability.
+            let each = of_class * (1.0 - rival.share) / rival.instead.len() as f64;
+            rival.instead.iter().map(move |cause| (cause.clone(), each))
         });
         let alternatives = with_rivals(alternatives, instead);
         let misread = state.misread.as_ref().filter(|misread| misread.effect == effect);

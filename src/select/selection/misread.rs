@@ -31,7 +31,14 @@ pub(super) fn with_misread_effect(
     let options = Options { start, influential_rows: false, ..state.options.clone() };
     state.misread = Some(misread);
     let problem = state.problem(declared, &[effect]);
-    let fitted = declared.next(problem, state.data, &options)?;
+    let fitted = match declared.next(problem, state.data, &options) {
+        Ok(fitted) => fitted,
+        Err(error) if error.is_interrupted() => return Err(error),
+        Err(_) => {
+            state.misread = None;
+            return Ok(None);
+        }
+    };
     let gain = LeftOutGain::new(&fitted, declared, state.data);
     if !gain.is_some_and(|gain| gain.is_significant()) {
         state.misread = None;

@@ -93,7 +93,8 @@ impl Explanations {
         let least = deviances.iter().copied().fold(f64::INFINITY, f64::min);
         let best = deviances.iter().position(|deviance| *deviance == least)?;
         let (effect, size) = self.fitted[best].effect.clone()?;
-        let weights = deviances.iter().map(|deviance| ((least - deviance) / 2.0).exp());
+        let finite = deviances.iter().filter(|deviance| deviance.is_finite());
+        let weights = finite.map(|deviance| ((least - deviance) / 2.0).exp());
         Some(MisreadEffect { effect, size, probability: weights.sum::<f64>().recip() })
     }
 }
