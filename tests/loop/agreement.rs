@@ -51,7 +51,7 @@ fn verdict_and_statuses_agree_in_data_text_report_and_json() {
         let report = loop_report(&problem, &closure, &plots);
         let texts = [
             loop_text(&problem, &closure),
-            loop_brief(&problem, &closure, None, 110),
+            loop_brief(&problem, &closure, None),
             report.markdown,
             report.html,
         ];

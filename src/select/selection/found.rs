@@ -128,7 +128,9 @@ pub(super) fn found(
         let claims = claims.map(|mut claims| {
             if let Some(rival) = rival {
                 let claimed = [&mut claims.place.1, &mut claims.depends_on.1, &mut claims.law.1];
-                claimed.into_iter().for_each(|probability| *probability *= rival.share);
+                for probability in claimed {
+                    *probability *= rival.share;
+                }
             }
             claims
         });

@@ -90,8 +90,8 @@ impl Explanations {
         let sigma = squares.fold(f64::INFINITY, f64::min).sqrt().max(sigma);
         let deviances: Vec<f64> =
             self.fitted.iter().map(|explanation| explanation.left_out.deviance(sigma)).collect();
-        let least = deviances.iter().copied().fold(f64::INFINITY, f64::min);
-        let best = deviances.iter().position(|deviance| *deviance == least)?;
+        let finite = deviances.iter().enumerate().filter(|(_, deviance)| deviance.is_finite());
+        let (best, &least) = finite.min_by(|a, b| a.1.total_cmp(b.1))?;
         let (effect, size) = self.fitted[best].effect.clone()?;
         let finite = deviances.iter().filter(|deviance| deviance.is_finite());
         let weights = finite.map(|deviance| ((least - deviance) / 2.0).exp());
