@@ -30,28 +30,29 @@ pub fn read_limited(path: &Path, max_bytes: u64) -> io::Result<Vec<u8>> {
 }
 
 /// Opens a file for reading. Returns an error for FIFOs, sockets, devices and files of the kernel
-/// (`/proc`, `/sys`), which could block or never end. The standard input is allowed as `/dev/stdin`, `/dev/fd/N` or `/proc/self/fd/N`.
+/// (`/proc`, `/sys`), which could block or never end. The standard input is allowed as `/dev/stdin`,
+/// `/dev/fd/N` or `/proc/self/fd/N`.
 ///
 /// # Errors
 /// Returns an error if the file cannot be opened, or is neither a regular file nor a folder.
 pub fn open(path: &Path) -> io::Result<File> {
     let kind = fs::metadata(path)?.file_type();
     let descriptors = ["/dev/stdin", "/dev/fd", "/proc/self/fd"];
-    let is_descriptor = descriptors.iter().any(|start| path.starts_with(start));
-    let is_of_kernel = || {
-        let real = path.canonicalize().unwrap_or_else(|_| path.to_owned());
-        ["/proc", "/sys"].iter().any(|folder| real.starts_with(folder))
-    };
+    if descriptors.iter().any(|start| path.starts_with(start)) {
+        return File::open(path);
+    }
     let refused = |what: &str| {
-        let message = format!("{what}; give a regular file");
+        let message = format!("it is a {what}; give a regular file");
         Err(io::Error::new(io::ErrorKind::InvalidInput, message))
     };
-    match (kind.is_file() || kind.is_dir(), is_of_kernel()) {
-        _ if is_descriptor => File::open(path),
-        (false, _) => refused("it is a FIFO, socket or device"),
-        (true, true) => refused("it is a file of the kernel"),
-        (true, false) => File::open(path),
+    if !kind.is_file() && !kind.is_dir() {
+        return refused("FIFO, socket or device");
     }
+    let real = path.canonicalize()?;
+    if real.starts_with("/proc") || real.starts_with("/sys") {
+        return refused("file of the kernel");
+    }
+    File::open(path)
 }
 
 /// Reads a text file of any size; see [`open`] for the files that are refused.

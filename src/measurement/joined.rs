@@ -253,8 +253,8 @@ impl JoinedLog {
     fn offset(&self) -> Option<String> {
         let JoinRule::Time { offset, .. } = self.rule else { return None };
         let shift = best_shift(&self.times, &self.log_times)?;
-        let offset = format!("{:.3}", offset + shift);
-        Some(offset.trim_end_matches('0').trim_end_matches('.').to_owned())
+        let seconds = ((offset + shift) * 1e3).round() / 1e3;
+        Some(format!("{seconds:?}"))
     }
 
     /// Returns the row of the log that is the partner of most measured rows because its time is the

@@ -168,9 +168,9 @@ impl<'a> Beam<'a> {
             let chunk = chunks[*chunk];
             let scale = chunk.squares[*term].sqrt().recip();
             let column = chunk.columns.column(*term).map(|value| f64::from(value) * scale);
-            let [unit] = &self.site.weighted(vec![column])[..] else { continue };
+            let unit = self.site.times(&column);
             #[expect(clippy::cast_possible_truncation, reason = "half the width is twice as fast")]
-            row.iter_mut().zip(unit.times.iter()).for_each(|(to, value)| *to = *value as f32);
+            row.iter_mut().zip(unit.iter()).for_each(|(to, value)| *to = *value as f32);
             along.push(chunk.along[*term] * scale);
         }
         // A sum explains more than the best term alone, or it is not worth its second term.

@@ -96,7 +96,7 @@ pub struct Span {
 
 impl WhitenedSite {
     /// Returns the weight matrix W times a function of the pose.
-    fn times(&self, function: &DVector<f64>) -> DVector<f64> {
+    pub fn times(&self, function: &DVector<f64>) -> DVector<f64> {
         let mut out = self.diagonal.component_mul(function);
         let along = &self.less * function;
         out.gemv_tr(-1.0, &self.less, &along, 1.0);

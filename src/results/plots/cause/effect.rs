@@ -53,9 +53,9 @@ pub fn of(
     }
     let partial = poses.errors(&without, &poses.rows());
     let all_poses = poses.all(1.0);
+    let free = arm.model.parameters_at(arm.x.as_slice());
     let term = |&k: &usize| {
-        let regressor =
-            value_regressor(&arm.model.parameters_at(arm.x.as_slice()), arm.x.as_slice(), k)?;
+        let regressor = value_regressor(&free, arm.x.as_slice(), k)?;
         Some(((regressor, arm.x[k]), arm.model.parameters[k].site))
     };
     let (terms, sites) = indices.iter().filter_map(term).unzip();
