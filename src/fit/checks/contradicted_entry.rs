@@ -92,8 +92,9 @@ fn of_joint(joint: &Joint, parameter: &Parameter, x: f64, left: &str) -> Contrad
          leaves {left} of error",
         rounded(declared)
     );
-    let digits = typing_error(declared, fitted)
-        .map_or_else(String::new, |(meant, how)| format!(" ({} with {how}?)", rounded(meant)));
+    let digits = typing_error(declared, fitted).map_or_else(String::new, |(meant, how)| {
+        format!(" ({}{gap}{symbol} with {how}?)", rounded(meant))
+    });
     let remedy = format!(
         "if the entry is mistyped{digits}, correct it; if it is right, check the columns and axes, \
          or declare a larger σ"
