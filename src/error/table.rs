@@ -38,9 +38,9 @@ pub enum TableErrorKind {
     #[error(
         "{left} of {rows} measured rows have no partner in the joint table{}{}",
         nearest_in_time(gap.as_deref()),
-        clocks(offset.as_deref())
+        clocks(Some(offset.as_str()))
     )]
-    MostUnpaired { left: usize, rows: usize, gap: Option<String>, offset: Option<String> },
+    MostUnpaired { left: usize, rows: usize, gap: Option<String>, offset: String },
     #[error(
         "{same} of {rows} measured rows have the same partner, {partner}, an end of the joint \
          table; check whether both clocks agree, and tolerance_s{}{}",

@@ -268,9 +268,9 @@ impl JoinedLog {
     /// Checks the pairing as a whole.
     ///
     /// # Errors
-    /// Returns an error if most measured rows have no partner or the same one, if another offset
-    /// between the clocks pairs the rows far better, or if a join by order meets a joint table of
-    /// several rows for each measured row.
+    /// Returns an error if no measured row has a partner, if another offset between the clocks
+    /// certainly pairs the rows and this one does not, if most rows have the same, distant partner,
+    /// or if a join by order meets a joint table of several rows for each measured row.
     fn check_pairing(&self) -> Result<(), InputError> {
         let error = |kind: TableErrorKind| Err(self.location.clone().error(kind));
         if self.paired == 0 && self.requested > 0 {
@@ -292,7 +292,7 @@ impl JoinedLog {
             && let Some(offset) = self.offset()
         {
             let gap = self.gap();
-            return error(TableErrorKind::MostUnpaired { left, rows, gap, offset: Some(offset) });
+            return error(TableErrorKind::MostUnpaired { left, rows, gap, offset });
         }
         let gaps = self.gaps(false);
         let usual = gaps.get(gaps.len() / 2).copied().unwrap_or(0.0);

@@ -246,8 +246,8 @@ impl Table {
     /// Returns the file of the appended columns of another table, and their names.
     pub fn appended_columns(&self) -> Option<(&Path, &[String])> {
         let (file, _) = self.appended_header.as_ref()?;
-        let (_, own_cells) = self.appended?;
-        Some((file, self.header.get(own_cells..)?))
+        let (_, cells_before) = self.appended?;
+        Some((file, self.header.get(cells_before..)?))
     }
 
     /// Returns the line of the current row, counted from 1.

@@ -80,7 +80,8 @@ impl Check for WithinArmSize {
     }
 }
 
-/// Checks that joints give way along their loads: no compliance as a whole is negative by more than [`MAX_NEGATIVE_SIGMAS`] standard errors.
+/// Checks that joints give way along their loads: no compliance as a whole is negative by more than
+/// [`MAX_NEGATIVE_SIGMAS`] standard errors.
 pub(super) struct GivesWayToLoads;
 
 /// Largest number of standard errors by which a compliance may be negative.
