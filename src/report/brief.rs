@@ -1,7 +1,7 @@
 //! Result of the command `identify` on one screen.
 
 use super::document::Block;
-use super::errors::noun;
+use super::errors::{held_out_rows, noun, with_unit};
 use super::identify::{errors_by_axis, headline};
 use super::noise::{influential_rows, noise};
 use super::parameters::correlated;
@@ -11,15 +11,16 @@ use super::row_kinds::unsteady;
 use crate::fit::{Estimate, Finding, FindingCode, Identification, size_of_kind};
 use crate::problem::Problem;
 use crate::quantity::format::{counted, number};
-use crate::results::Knowledge;
+use crate::results::{Knowledge, ResidualSize};
 
 /// Returns a summary of a fit for one screen, ending in a line break: errors, size of the residual,
 /// parameters and remarks. `bound` is a sentence on the error bound of predictions.
 pub fn estimate_brief(problem: &Problem, found: &Identification, bound: Option<String>) -> String {
     let mut blocks = vec![headline(problem, found)];
-    if let Some(reason) = found.first_error() {
-        blocks.push(Block::Text(format!("Not to be trusted: {reason}.")));
-    }
+    blocks.push(Block::Text(match found.first_error() {
+        Some(reason) => format!("Not to be trusted: {reason}."),
+        None => outcome(found),
+    }));
     blocks.extend([
         Block::Table(errors_by_axis(found)),
         Block::lines(
@@ -30,6 +31,24 @@ pub fn estimate_brief(problem: &Problem, found: &Identification, bound: Option<S
     blocks.extend(found.prior.as_ref().map(|comparison| Block::Text(summary(comparison))));
     blocks.push(Block::Lines(parameters(&found.estimates), remarks(found)));
     text(&blocks)
+}
+
+/// States the held-out error before and after a fit that is to be trusted, and whether its
+/// residual is larger than noise explains.
+fn outcome(found: &Identification) -> String {
+    let [before, after] = [&found.registered, &found.fitted].map(|errors| &errors.held_out);
+    let falls = if after.mean.norm < before.mean.norm { "falls" } else { "does not fall: it goes" };
+    let is_larger = match ResidualSize::of(found) {
+        ResidualSize::Contradicted(chi2) | ResidualSize::Unclear(chi2) => chi2 > 1.0,
+        _ => false,
+    };
+    format!(
+        "The fit is to be trusted. The mean error of the {} {falls} from {} to {}.{}",
+        held_out_rows(found),
+        with_unit(before, before.mean.norm),
+        with_unit(after, after.mean.norm),
+        if is_larger { " The residual is larger than the declared σ explains." } else { "" }
+    )
 }
 
 /// Returns true if the data determine no parameter of the fit.

@@ -9,7 +9,7 @@ use super::identify::{
     why_not_trusted,
 };
 use super::noise::{expected, influential_rows, short, size};
-use super::parameters::parameters;
+use super::parameters::{against_priors, parameters};
 use super::probability::percent;
 use super::render::{Report, report, text};
 use super::unexplained::{correction, places, to_declare, unexplained};
@@ -214,6 +214,19 @@ fn blocks<'a>(
     blocks.extend([
         Block::Table(errors(closure, result)),
         gain(closure, result),
+        Block::Words(found(result, MAX_SHOWN_ALTERNATIVES)),
+        Block::Page(found(result, 2 * MAX_SHOWN_ALTERNATIVES)),
+        Block::figures(
+            plots
+                .causes
+                .iter()
+                .zip(1..)
+                .map(|(cause, k)| Some(figures::effect(cause, k, &plots.shown))),
+        ),
+    ]);
+    blocks.extend(status_table(closure, result));
+    blocks.extend([
+        Block::Page(vec![Block::heading("Errors of the poses")]),
         Block::figures([figures::errors(plots), figures::vectors(plots)]),
         Block::Poses(plots),
         Block::heading("What the declared problem leaves"),
@@ -226,13 +239,6 @@ fn blocks<'a>(
     blocks.extend(ranking);
     blocks.push(Block::Page(trace::undetectable_effects(&closure.before)));
     blocks.extend(rounds(closure, result));
-    blocks.extend(status_table(closure, result));
-    blocks.push(Block::Words(found(result, MAX_SHOWN_ALTERNATIVES)));
-    blocks.push(Block::Page(found(result, 2 * MAX_SHOWN_ALTERNATIVES)));
-    let causes = plots.causes.iter().zip(1..);
-    blocks.push(Block::figures(
-        causes.map(|(cause, number)| Some(figures::effect(cause, number, &plots.shown))),
-    ));
     blocks.push(Block::heading("What remains"));
     let unexplained = unexplained(problem, closure, result).into_iter().map(Point::from);
     let (tests, page) = (
@@ -252,7 +258,10 @@ fn blocks<'a>(
     blocks.extend(super::remainder::uncertainty(after, plots));
     blocks.push(Block::heading("Parameters of the final fit"));
     blocks.extend(parameters(&closure.closed, after, &file));
-    blocks.push(Block::figures([figures::contributions(&plots.contributions)]));
+    blocks.push(Block::figures([
+        against_priors(after),
+        figures::contributions(&plots.contributions),
+    ]));
     blocks.push(Block::Page(identifiability_with_figures(after, plots, &file)));
     blocks
 }

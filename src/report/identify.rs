@@ -8,7 +8,8 @@ use super::figures;
 use super::limits::{active_limits, alternation};
 use super::noise::{influential_rows, noise, outliers, size};
 use super::parameters::{
-    conditioning, correlations, more_unidentifiable, parameters, unidentifiable, weak,
+    against_priors, conditioning, correlations, more_unidentifiable, parameters, unidentifiable,
+    weak,
 };
 use super::prior::prior;
 use super::render::{Report, report, text};
@@ -234,7 +235,10 @@ pub(super) fn fit_details<'a>(
     );
     blocks.push(Block::heading("Parameters"));
     blocks.extend(parameters(problem, found, file));
-    blocks.push(Block::figures([figures::contributions(&plots.contributions)]));
+    blocks.push(Block::figures([
+        against_priors(found),
+        figures::contributions(&plots.contributions),
+    ]));
     blocks.push(Block::Page(limits(found)));
     blocks.extend(identifiability_with_figures(found, plots, file));
     blocks

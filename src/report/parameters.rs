@@ -1,6 +1,7 @@
 //! Parameters in words: their table, unidentifiable and weak combinations, correlations.
 
 use super::document::{Bar, Block, Table, first_of};
+use super::figures::{ACCENT, Drawing, Forest};
 use crate::fit::{Estimate, Identification, PriorSize, open_quantities};
 use crate::least_squares::solver::AtBound;
 use crate::least_squares::{Identifiability, UnidentifiableCombination, WEAK_THRESHOLD};
@@ -138,6 +139,31 @@ fn identified(estimate: &Estimate) -> String {
         Knowledge::Hardly => format!("{share}  hardly"),
         Knowledge::NotAtAll => format!("{share}  not at all"),
     }
+}
+
+/// Draws the estimates in units of their prior σ; `None` if no fitted parameter has a prior.
+pub(super) fn against_priors(found: &Identification) -> Option<Drawing> {
+    let row = |estimate: &Estimate| {
+        let (prior, error) = (estimate.prior_sigma?, estimate.std_error?);
+        let is_logarithm = estimate.unit.is_relative();
+        let (change, error) = if is_logarithm {
+            ((estimate.estimate / estimate.nominal).ln(), error / estimate.estimate)
+        } else {
+            (estimate.estimate - estimate.nominal, error)
+        };
+        Some((estimate.name.clone(), vec![Some((change / prior, error / prior))]))
+    };
+    Forest {
+        names: ("priors", "Estimates against their priors"),
+        caption: "Change of each parameter from nominal ± 1 σ, in units of its prior σ. The prior is at 0; its ± 1 σ and ± 3 σ are \
+                  lines. A short interval means that the data determine the parameter, one from −1 to 1 that the prior does."
+            .to_owned(),
+        label: "change from nominal [prior σ]",
+        legend: vec![("estimate", ACCENT)],
+        references: vec![0.0, -1.0, 1.0, -3.0, 3.0],
+        rows: found.estimates.iter().filter_map(row).collect(),
+    }
+    .drawing()
 }
 
 /// Lists the combinations of parameters that no measurement determines; `file` contains all of

@@ -48,6 +48,7 @@ const NAMES: &[&str] = &[
     "earlier-estimate",
     "held-out-errors",
     "misprints",
+    "priors",
     "ranking",
     "remainder-joints",
     "residual-histogram",

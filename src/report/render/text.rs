@@ -2,33 +2,37 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use comfy_table::{CellAlignment, presets::NOTHING};
+use comfy_table::presets::NOTHING;
+use comfy_table::{CellAlignment, ColumnConstraint, ContentArrangement, Width};
+use textwrap::core::display_width;
 
 use crate::report::document::{Block, CODE, Mark, Point, Table};
 
-/// Maximum width of running text in columns; tables may be wider.
+/// Maximum width of running text in columns; tables may be wider on wide terminals.
 const MAX_TEXT_WIDTH: usize = 110;
 
-/// Width of running text in this process: that of its terminal, at most [`MAX_TEXT_WIDTH`].
-static TEXT_WIDTH: AtomicUsize = AtomicUsize::new(MAX_TEXT_WIDTH);
+/// Width of this process's output in columns: that of its terminal, unlimited without one.
+static WIDTH: AtomicUsize = AtomicUsize::new(usize::MAX);
 
-/// Wraps the running text of all reports of this process to at most `columns` characters.
+/// Limits text and tables of all reports of this process to `columns` characters a line.
 pub fn limit_text_width(columns: usize) {
-    TEXT_WIDTH.store(columns.min(MAX_TEXT_WIDTH), Ordering::Relaxed);
+    WIDTH.store(columns, Ordering::Relaxed);
 }
 
 /// Returns the width of running text in columns.
 pub fn text_width() -> usize {
-    TEXT_WIDTH.load(Ordering::Relaxed)
+    WIDTH.load(Ordering::Relaxed).min(MAX_TEXT_WIDTH)
 }
 
 /// Renders blocks as text, ending in a line break.
 pub(in crate::report) fn text(blocks: &[Block]) -> String {
-    text_within(blocks, text_width())
+    text_within(blocks, WIDTH.load(Ordering::Relaxed))
 }
 
-/// Renders blocks as text; running text is wrapped to `width` characters.
-fn text_within(blocks: &[Block], width: usize) -> String {
+/// Renders blocks as text. Lines hold at most `columns` characters, running text at most
+/// [`MAX_TEXT_WIDTH`].
+fn text_within(blocks: &[Block], columns: usize) -> String {
+    let width = columns.min(MAX_TEXT_WIDTH);
     let mut text = String::new();
     let mut follows_heading = false;
     for block in flat(blocks) {
@@ -57,7 +61,7 @@ fn text_within(blocks: &[Block], width: usize) -> String {
                 }
             }
             Block::Table(content) => {
-                text.push_str(&table(content));
+                text.push_str(&table(content, columns));
                 text.extend(content.notes.iter().map(|note| wrapped(note, ("  ", "  "), width)));
             }
             // Other blocks are for the page only.
@@ -140,17 +144,66 @@ fn plain(words: &str) -> String {
     words.chars().filter(|c| !c.is_control() || *c == '\n').collect()
 }
 
-/// Renders a table without ruled lines.
-fn table(table: &Table) -> String {
+/// Renders a table without ruled lines. The cells of a table wider than `width` are wrapped at
+/// spaces. If it is still too wide, a last line names the minor columns that are omitted.
+fn table(table: &Table, width: usize) -> String {
+    let header = table.header.iter().map(|&name| name.to_owned()).collect();
+    let mut lines: Vec<Vec<String>> = vec![header];
+    lines.extend(table.rows.iter().map(|row| row.iter().map(|cell| plain(cell)).collect()));
+    let (widths, omitted) = column_widths(&lines, &table.minor, width);
     let mut shown = comfy_table::Table::new();
-    let rows = table.rows.iter().map(|row| row.iter().map(|cell| plain(cell)).collect::<Vec<_>>());
-    shown.load_style(NOTHING).set_header(table.header.clone()).add_rows(rows);
-    for (index, column) in shown.column_iter_mut().enumerate() {
-        column.set_padding((if index == 0 { 2 } else { 1 }, 1));
+    shown.load_style(NOTHING).set_header(lines.remove(0)).add_rows(lines);
+    shown.set_content_arrangement(ContentArrangement::Dynamic);
+    for ((index, column), &width) in shown.column_iter_mut().enumerate().zip(&widths) {
+        let padding = (if index == 0 { 2 } else { 1 }, 1);
         let left = table.left.contains(&index);
+        column.set_padding(padding);
         column.set_cell_alignment(if left { CellAlignment::Left } else { CellAlignment::Right });
+        let width = u16::try_from(width).unwrap_or(u16::MAX).saturating_add(padding.0 + padding.1);
+        let is_omitted = omitted.contains(&index);
+        let constraint = ColumnConstraint::Absolute(Width::Fixed(width));
+        column.set_constraint(if is_omitted { ColumnConstraint::Hidden } else { constraint });
     }
-    shown.lines().flat_map(|line| [line.trim_end().to_owned(), "\n".to_owned()]).collect()
+    let mut text: String = shown.lines().map(|line| line.trim_end().to_owned() + "\n").collect();
+    let names: Vec<&str> = table
+        .header
+        .iter()
+        .enumerate()
+        .filter_map(|(k, name)| omitted.contains(&k).then_some(*name))
+        .collect();
+    if !names.is_empty() {
+        let note = format!("omitted on this narrow terminal: {}", names.join("; "));
+        text.push_str(&wrapped(&note, ("  ", "  "), width));
+    }
+    text
+}
+
+/// Returns the width of each column so that a table of `lines` takes at most `width` if possible,
+/// and the columns of `minor` to omit.
+fn column_widths(lines: &[Vec<String>], minor: &[usize], width: usize) -> (Vec<usize>, Vec<usize>) {
+    let columns = 0..lines.first().map_or(0, Vec::len);
+    let cells = |k: usize| lines.iter().filter_map(move |line| line.get(k));
+    let whole = |k| cells(k).map(|cell| display_width(cell)).max().unwrap_or(0);
+    let longest_word =
+        |k| cells(k).flat_map(|cell| cell.split(' ')).map(display_width).max().unwrap_or(0);
+    let mut widths: Vec<usize> = columns.clone().map(whole).collect();
+    let least: Vec<usize> = columns.clone().map(longest_word).collect();
+    let mut omitted = Vec::new();
+    let total = |widths: &[usize], omitted: &[usize]| {
+        let shown = columns.clone().filter(|k| !omitted.contains(k));
+        shown.map(|k| widths[k] + 2).sum::<usize>() + 1
+    };
+    for &column in minor.iter().rev() {
+        if total(&least, &omitted) > width {
+            omitted.push(column);
+        }
+    }
+    while total(&widths, &omitted) > width {
+        let shrinkable = columns.clone().filter(|k| !omitted.contains(k) && widths[*k] > least[*k]);
+        let Some(widest) = shrinkable.max_by_key(|k| widths[*k]) else { break };
+        widths[widest] -= 1;
+    }
+    (widths, omitted)
 }
 
 #[cfg(test)]
@@ -185,6 +238,22 @@ mod tests {
         assert_eq!(text(&story), "link ` is *off*: link = \"a`*\"[31m\n");
         let expected = "# A \\` and \\*\n\nlink \\` is \\*off\\*: `` link = \"a`*\" ``[31m\n";
         assert_eq!(markdown("A ` and *", &story), expected);
+    }
+
+    #[test]
+    fn wide_tables_are_wrapped_and_omit_minor_columns() {
+        let rows = vec![vec!["joint = { q = 1 }".to_owned(), "0.25".into(), "17".into()]];
+        let mut wide = Table::new(&["name of effect", "mean error", "steps"], rows, &[0]);
+        wide.minor = vec![2];
+        let whole =
+            "  name of effect     mean error  steps\n  joint = { q = 1 }        0.25     17\n";
+        assert_eq!(table(&wide, 39), whole);
+        let wrapped = "  name of effect   mean  steps\n                  error\n  \
+                       joint = { q =    0.25     17\n  1 }\n";
+        assert_eq!(table(&wide, 31), wrapped);
+        let least = "  name     mean\n  of      error\n  effect\n  joint    0.25\n  = { q\n  = 1 }\n  \
+                     omitted on this\n  narrow\n  terminal: steps\n";
+        assert_eq!(table(&wide, 17), least);
     }
 
     #[test]

@@ -69,6 +69,11 @@
   const ends = [0, 1, 2].map((k) => [Math.min(...places.map((p) => p[k])), Math.max(...places.map((p) => p[k]))]);
   const middle = ends.map(([low, high]) => (low + high) / 2);
   const reach = Math.max(1, ...places.map((p) => Math.hypot(p[0] - middle[0], p[1] - middle[1], p[2] - middle[2])));
+  /* Height of the floor, and side of its squares: 1, 2 or 5 times a power of ten [mm]. */
+  const bodies = data.poses.flatMap((pose) => pose.rigid || []);
+  const ground = Math.min(ends[2][0], ...bodies.filter((_, k) => k % 3 === 2));
+  const decade = 10 ** Math.floor(Math.log10(reach / 3));
+  const square = decade * [1, 2, 5, 10].filter((k) => k * decade <= reach / 3).pop();
   const most = Math.max(...data.poses.flatMap((pose) => (pose.give ? pose.give.map(Math.abs) : [0])), 0);
   const sizes = data.poses.map((pose) => norm(pose.after)).filter(Number.isFinite).sort((a, b) => a - b);
   const large = sizes[Math.floor(sizes.length * 0.95)] || 1;
@@ -141,8 +146,19 @@
     const factor = most > 0 ? 10 ** Number(give.value) : 1;
     const lengthen = 10 ** Number(input("length").value) * 0.12 * reach;
 
+    /* The floor below everything, with squares of a round size. */
+    const floor = [];
+    const [low, high] = [0, 1].map((k) => middle.map((at, j) => (k ? at + 1.15 * reach : at - 1.15 * reach)));
+    for (let j = 0; j < 2; j++) {
+      for (let at = Math.ceil(low[j] / square) * square; at <= high[j]; at += square) {
+        const line = (end) => (j === 0 ? [at, end[1], ground] : [end[0], at, ground]);
+        segment(floor, line(low), line(high), NONE, NONE, [...faint, 0.45], 1 * ratio);
+      }
+    }
+    draw("line", floor, matrix, 0);
+
     /* The arm in up to 24 poses evenly, and in the one that is chosen. */
-    const arms = [];
+    const [arms, joints] = [[], []];
     const bodies = poses.filter((pose) => pose.rigid);
     const every = Math.max(1, Math.ceil(bodies.length / 24));
     const drawn = input("arms").checked ? bodies.filter((_, k) => k % every === 0) : [];
@@ -152,10 +168,14 @@
       for (let k = 0; k + 5 < pose.rigid.length; k += 3) {
         const at = (list, j) => list.slice(j, j + 3);
         if (main) segment(arms, at(pose.rigid, k), at(pose.rigid, k + 3), NONE, NONE, [...muted, 0.8], 1 * ratio);
-        segment(arms, at(pose.rigid, k), at(pose.rigid, k + 3), pose.give ? at(pose.give, k) : NONE, pose.give ? at(pose.give, k + 3) : NONE, main ? [...accent, 1] : [...muted, 0.4], (main ? 2.6 : 1.3) * ratio);
+        segment(arms, at(pose.rigid, k), at(pose.rigid, k + 3), pose.give ? at(pose.give, k) : NONE, pose.give ? at(pose.give, k + 3) : NONE, main ? [...accent, 1] : [...muted, 0.4], (main ? 5 : 1.3) * ratio);
+        if (main) joints.push(...pose.rigid.slice(k, k + 3).map((x, j) => x + (pose.give ? factor * pose.give[k + j] : 0)), ...ink, 1, 8 * ratio);
       }
+      const foot = pose.rigid.slice(0, 3);
+      if (main) segment(arms, foot, [foot[0], foot[1], ground], NONE, NONE, [...muted, 0.9], 7 * ratio);
     }
     draw("line", arms, matrix, factor);
+    draw("point", joints, matrix, 0);
 
     /* The measuring frame, each axis with its letter, which faces the eye and keeps its size. */
     const axes = [];
@@ -188,7 +208,7 @@
     draw("point", dots, matrix, 0);
 
     const scale = (value) => String(Number(value.toPrecision(2)));
-    legend.textContent = poses.length + " poses; axes of the measuring frame" + (most > 0 ? "; deflection \u00d7 " + scale(factor) : "; the model is rigid") +
+    legend.textContent = poses.length + " poses; axes of the measuring frame; squares of the floor: " + scale(square) + " mm" + (most > 0 ? "; deflection \u00d7 " + scale(factor) : "; the model is rigid") +
       (input("vectors").value === "none" ? "" : "; lines \u00d7 " + scale(lengthen / unit)) +
       (by === "kind" ? "; strong: held out, faint: fitted" : "; blue to orange: " + scale(ends[0]) + " to " + scale(ends[1]) + " " + (traced ? traced[0] : "mm"));
     box.dataset.drawn = String(poses.length);
