@@ -10,7 +10,7 @@ use super::cell_style::CellStyle;
 use super::dialect::{HEADER_SEARCH_BYTES, Layout, NormalizedText};
 use super::latin::decoded_record;
 use super::lines::{Lines, MAX_RECORD_KIB};
-use super::time::{date_time, is_ambiguous};
+use super::time::{DateOrder, date_time, is_ambiguous};
 use crate::error::{
     BYTE_ORDER_MARKS, Excerpt, InputError, InputErrorKind, Location, TableErrorKind, Warning,
     WarningKind, is_hidden, lines,
@@ -42,6 +42,8 @@ pub(super) struct Table {
     record: ByteRecord,
     line: usize,
     style: CellStyle,
+    /// Order of day and month, by the first lines.
+    pub date_order: DateOrder,
     /// Format of the appended cells of another table, and the number of cells before them.
     appended: Option<(CellStyle, usize)>,
     /// File and header line of the appended columns.
@@ -80,6 +82,7 @@ impl Table {
             return Err(Location::file(file).error(TableErrorKind::Workbook));
         }
         let layout = Layout::detect(&beginning, dialect);
+        let date_order = DateOrder::of(&beginning);
         let lines =
             Lines::new(BufReader::with_capacity(1 << 16, Cursor::new(beginning).chain(input)));
         let reader = ReaderBuilder::new()
@@ -98,6 +101,7 @@ impl Table {
                 delimiter: char::from(layout.byte()),
                 decimal_comma: dialect.decimal_comma,
             },
+            date_order,
             appended: None,
             appended_header: None,
             partner: None,
@@ -350,9 +354,9 @@ impl Table {
     /// \[s since 1970\].
     pub fn time(&self, place: usize, to_si: fn(f64) -> f64) -> Result<f64, InputError> {
         let word = self.word(place)?;
-        match date_time(word) {
+        match date_time(word, self.date_order) {
             Some(seconds) => Ok(seconds),
-            None if is_ambiguous(word) => {
+            None if is_ambiguous(word, self.date_order) => {
                 Err(self
                     .cell_error(place, TableErrorKind::AmbiguousDate { value: shortened(word) }))
             }
@@ -370,7 +374,7 @@ impl Table {
 
     /// Returns true if a cell of the current row is a date and time.
     pub fn is_date(&self, place: usize) -> bool {
-        self.text(place).is_ok_and(|word| date_time(word).is_some())
+        self.text(place).is_ok_and(|word| date_time(word, self.date_order).is_some())
     }
 
     /// Returns the name of a column in the header.

@@ -1,45 +1,98 @@
 //! Parsers of dates and times.
 
-/// Parses a date and time of ISO 8601, day first (`31.05.2024 14:03:20`), with slashes behind the
-/// year (`2024/05/31 14:03:20`) or month first (`05/31/2024 02:03:20 PM`) and returns the seconds
-/// since 1970-01-01T00:00 UTC.
+/// Order of day and month in dates with slashes and the year last, as `05/31/2024`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) enum DateOrder {
+    #[default]
+    Unknown,
+    DayFirst,
+    MonthFirst,
+}
+
+impl DateOrder {
+    /// Returns the order of the dates in a text, in which numbers above 12 are days.
+    pub fn of(text: &[u8]) -> Self {
+        let words = text.split(|byte| !(byte.is_ascii_digit() || *byte == b'/'));
+        let orders = words.filter_map(|word| Self::of_date(slashed(str::from_utf8(word).ok()?)?));
+        let (mut day_first, mut month_first) = (false, false);
+        for order in orders {
+            day_first |= order == Self::DayFirst;
+            month_first |= order == Self::MonthFirst;
+        }
+        match (day_first, month_first) {
+            (true, false) => Self::DayFirst,
+            (false, true) => Self::MonthFirst,
+            _ => Self::Unknown,
+        }
+    }
+
+    /// Returns the order of a date of which one number is above 12; `None` for other dates.
+    fn of_date([first, second, _]: [u32; 3]) -> Option<Self> {
+        match (first > 12, second > 12) {
+            (true, false) => Some(Self::DayFirst),
+            (false, true) => Some(Self::MonthFirst),
+            _ => None,
+        }
+    }
+}
+
+/// Parses a date and time of ISO 8601, day first (`31.05.2024 14:03:20`), or with slashes
+/// (`2024/05/31 14:03:20`, `05/31/2024 02:03:20 PM`) and returns the seconds since 1970-01-01T00:00
+/// UTC.
 ///
-/// The month stands first if the clock has AM or PM, or if the second number is above 12. Otherwise
-/// `05/06/2024` is not accepted ([`is_ambiguous`]), because day and month may stand in either order.
-pub(super) fn date_time(text: &str) -> Option<f64> {
+/// If the year stands last after slashes, `order` and numbers above 12 tell day and month apart. A
+/// date that they leave open has its month first if its clock has AM or PM, and is not accepted
+/// otherwise ([`is_ambiguous`]).
+pub(super) fn date_time(text: &str, order: DateOrder) -> Option<f64> {
     iso_8601(text)
         .or_else(|| iso_8601(&iso_from_day_first(text.trim())?))
         .or_else(|| iso_8601(&iso_from_slashes(text.trim())?))
         .or_else(|| {
-            let (month_first, is_clear) = iso_from_month_first(text.trim())?;
-            iso_8601(&month_first).filter(|_| is_clear)
+            let (date, basis) = iso_from_year_last(text.trim(), order)?;
+            iso_8601(&date).filter(|_| basis != Basis::Guess)
         })
 }
 
 /// Returns true for a date with slashes whose day and month may stand in either order.
-pub(super) fn is_ambiguous(text: &str) -> bool {
-    iso_from_month_first(text.trim())
-        .is_some_and(|(date, is_clear)| !is_clear && iso_8601(&date).is_some())
+pub(super) fn is_ambiguous(text: &str, order: DateOrder) -> bool {
+    iso_from_year_last(text.trim(), order)
+        .is_some_and(|(date, basis)| basis == Basis::Guess && iso_8601(&date).is_some())
 }
 
 /// Returns the date, as `2026-11-05`, of a time that is read month first only because its clock has
 /// AM or PM, although the day may come first.
-pub(super) fn assumed_month_first(text: &str) -> Option<String> {
-    let (date, is_clear) = iso_from_month_first(text.trim())?;
-    let [month, day] = [date.get(5..7)?, date.get(8..10)?];
-    let may_be_day_first = is_clear && day <= "12" && month != day;
-    (may_be_day_first && iso_8601(&date).is_some()).then(|| date.get(..10).map(str::to_owned))?
+pub(super) fn assumed_month_first(text: &str, order: DateOrder) -> Option<String> {
+    let (date, basis) = iso_from_year_last(text.trim(), order)?;
+    let differs = date.get(5..7)? != date.get(8..10)?;
+    let is_assumed = basis == Basis::HalfOfDay && differs && iso_8601(&date).is_some();
+    is_assumed.then(|| date.get(..10).map(str::to_owned))?
 }
 
-/// Rewrites `11/25/2026 09:00:12 PM` as `2026-11-25 21:00:12`; the flag is true if the month is
-/// known to stand first.
-fn iso_from_month_first(text: &str) -> Option<(String, bool)> {
-    let (date, clock) = text.split_once(' ')?;
-    let [month, day, year] = date.split('/').collect::<Vec<_>>()[..] else { return None };
+/// Reason for the order in which day and month of a date were read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Basis {
+    /// A number above 12 in this date or in the other dates of its table.
+    Numbers,
+    /// AM or PM, which go with dates that have their month first.
+    HalfOfDay,
+    /// No reason: the month is taken to stand first.
+    Guess,
+}
+
+/// Splits a date such as `31/05/2024` into its numbers.
+fn slashed(date: &str) -> Option<[u32; 3]> {
+    let [first, second, year] = date.split('/').collect::<Vec<_>>()[..] else { return None };
     let is_short = |word: &str| (1..=2).contains(&word.len());
-    if year.len() != 4 || !is_short(month) || !is_short(day) {
+    if year.len() != 4 || !is_short(first) || !is_short(second) {
         return None;
     }
+    Some([first.parse().ok()?, second.parse().ok()?, year.parse().ok()?])
+}
+
+/// Rewrites `11/25/2026 09:00:12 PM` as `2026-11-25 21:00:12`, and `25/11/2026` likewise.
+fn iso_from_year_last(text: &str, order: DateOrder) -> Option<(String, Basis)> {
+    let (date, clock) = text.split_once(' ')?;
+    let numbers @ [first, second, year] = slashed(date)?;
     let clock = clock.trim();
     let half = |mark: &str| {
         let place = clock.len().checked_sub(mark.len())?;
@@ -58,8 +111,14 @@ fn iso_from_month_first(text: &str) -> Option<(String, bool)> {
         Some(_) => return None,
         None => hour,
     };
-    let is_clear = noon.is_some() || day.parse::<u32>().is_ok_and(|day| day > 12);
-    Some((format!("{year}-{month:0>2}-{day:0>2} {hour:02}:{rest}"), is_clear))
+    let (order, basis) = match (order, DateOrder::of_date(numbers)) {
+        (DateOrder::Unknown, Some(order)) => (order, Basis::Numbers),
+        (DateOrder::Unknown, None) if noon.is_some() => (DateOrder::MonthFirst, Basis::HalfOfDay),
+        (DateOrder::Unknown, None) => (DateOrder::MonthFirst, Basis::Guess),
+        (order, _) => (order, Basis::Numbers),
+    };
+    let (month, day) = if order == DateOrder::DayFirst { (second, first) } else { (first, second) };
+    Some((format!("{year}-{month:02}-{day:02} {hour:02}:{rest}"), basis))
 }
 
 /// Smallest time that [`shown`] writes as a date \[s\]: 1990-01-01. Smaller numbers are seconds of
@@ -218,20 +277,22 @@ mod tests {
             ("31.05.2024 14:03:20+02:00", "2024-05-31T14:03:20+02:00"),
             ("2024/5/31 14:03:20", "2024-05-31T14:03:20"),
             ("05/31/2024 14:03", "2024-05-31T14:03"),
+            ("28/05/2024 14:03", "2024-05-28T14:03"),
             ("11/05/2026 09:00:12 AM", "2026-11-05T09:00:12"),
             ("11/25/2026 12:00:12 am", "2026-11-25T00:00:12"),
             ("11/25/2026 1:00:12.5 PM", "2026-11-25T13:00:12.5"),
         ] {
-            assert_eq!(date_time(text), iso_8601(iso), "{text}");
-            assert!(date_time(text).is_some(), "{text}");
+            assert_eq!(date_time(text, DateOrder::Unknown), iso_8601(iso), "{text}");
+            assert!(date_time(text, DateOrder::Unknown).is_some(), "{text}");
         }
         for text in
             ["31.05.24 14:03", "31.05.2024", "05/06/2024 14:03", "32.05.2024 14:03", "1.2.3"]
         {
-            assert_eq!(date_time(text), None, "{text}");
+            assert_eq!(date_time(text, DateOrder::Unknown), None, "{text}");
         }
+        let is_ambiguous = |text| is_ambiguous(text, DateOrder::Unknown);
         assert!(is_ambiguous("05/06/2024 14:03") && !is_ambiguous("05/31/2024 14:03"));
-        let assumed = |text: &str| assumed_month_first(text);
+        let assumed = |text: &str| assumed_month_first(text, DateOrder::Unknown);
         assert_eq!(assumed("11/05/2026 09:00:12 AM").as_deref(), Some("2026-11-05"));
         for clear in [
             "25/11/2026 09:00:12 AM",
@@ -242,6 +303,12 @@ mod tests {
         ] {
             assert_eq!(assumed(clear), None, "{clear}");
         }
+        let day_first = DateOrder::of(b"time,x\n05/06/2024 14:03,1\n13/06/2024 14:03,2/3\n");
+        assert_eq!(day_first, DateOrder::DayFirst);
+        assert_eq!(date_time("05/06/2024 2:03 PM", day_first), iso_8601("2024-06-05T14:03"));
+        assert_eq!(date_time("06/13/2024 14:03", day_first), None);
+        assert_eq!(DateOrder::of(b"13/06/2024;06/13/2024"), DateOrder::Unknown);
+        assert_eq!(DateOrder::of(b"06/13/2024;1/2;12/12/2024"), DateOrder::MonthFirst);
         assert_eq!(shown(1_717_157_000.25), "2024-05-31 12:03:20");
         assert_eq!(shown(12.5), "12.5 s");
     }
