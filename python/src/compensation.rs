@@ -76,7 +76,8 @@ impl Compensation {
         let poses = detached(py, || Poses::read(input, &problem))?;
         let Poses { rows, mut warnings } = poses.map_err(|error| raised(&error))?;
         let missing = missing_target_columns(&problem, &rows);
-        let text = |missing| format!("{missing}; commands leave out what depends on it");
+        let text =
+            |missing| format!("{missing}; the commands neglect the effects that depend on it");
         warnings.extend(missing.iter().map(text));
         let estimate = SavedEstimate::parse(estimate, Path::new("estimate.json"))
             .map_err(|error| raised(&error))?;

@@ -86,7 +86,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     // Targets may be waypoints without positions.
     for missing in fit::missing_target_columns(&problem, &targets).iter().filter(|_| !common.quiet)
     {
-        diagnostic::warn(&format!("{missing}; commands leave out what depends on it"));
+        diagnostic::warn(&format!("{missing}; the commands neglect the effects that depend on it"));
     }
     let estimate = arguments.trust.read(&arguments.estimate)?;
     let trusted = estimate.trusted;

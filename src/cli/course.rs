@@ -117,7 +117,7 @@ impl Step {
 impl fmt::Display for Course {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if self.finishing {
-            f.write_str("weighing what was found")?;
+            f.write_str("computing the probabilities of the causes")?;
         }
         if let Some(round) = &self.round {
             let plural = if round.effects == 1 { "" } else { "s" };
@@ -205,6 +205,6 @@ mod tests {
             "{course}"
         );
         course.take(&Progress::Finishing, 20.0);
-        assert_eq!(course.to_string(), "weighing what was found");
+        assert_eq!(course.to_string(), "computing the probabilities of the causes");
     }
 }

@@ -202,7 +202,10 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     if let Some(absent) =
         files.iter().find(|file| !file.is_file()).filter(|_| !at_hand && !flags.quiet)
     {
-        diagnostic::warn(&format!("errors are not judged: {} is not there", absent.display()));
+        diagnostic::warn(&format!(
+            "no errors are computed, because {} does not exist",
+            absent.display()
+        ));
     }
     let errors = if at_hand && camera.is_none() {
         Some(errors(&problem, files, (&estimates, best.as_ref()), flags)?)

@@ -116,8 +116,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
 }
 
 /// Fits a remainder in addition to the effects of the closed problem with text `closed`. Returns
-/// `None` if the table was misread, or if the text declares a different arm than was fitted, for
-/// example because an effect that data contradict was removed.
+/// `None` if the loop was interrupted or the table was misread. Also if the text declares another
+/// arm than was fitted, for example because an effect that data contradict was removed.
 fn fitted(
     problem: &Problem,
     closed: &str,

@@ -14,10 +14,11 @@ const PRIOR_DOMINATED: f64 = 0.5;
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Criterion {
-    /// Determinant of C over the arm's parameters; its root is proportional to the volume of their
-    /// confidence ellipsoid. Units do not change the choice of poses.
+    /// Determinant of C over the arm's parameters; its square root is proportional to the volume of
+    /// their confidence ellipsoid. Units do not change the choice of poses.
     D,
-    /// Product Π C_kk of the variances; its root is the geometric mean of the standard errors.
+    /// Product Π C_kk of the n variances; its 2n-th root is the geometric mean of the standard
+    /// errors.
     /// Independent of units.
     S,
     /// Sum Σ C_kk / C̄_kk, the mean variance relative to the covariance C̄ of as many average

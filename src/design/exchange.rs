@@ -46,7 +46,7 @@ pub(super) struct Unknowns {
 }
 
 impl Unknowns {
-    /// Returns the properties of the free parameters.
+    /// Returns, for each free parameter, its prior σ and whether it belongs to a base or target.
     pub fn of(parameters: &[Parameter]) -> Self {
         Self {
             sigmas: parameters.iter().map(|parameter| parameter.sigma).collect(),

@@ -23,7 +23,7 @@ const STREAMS: [u64; 3] = [400, 401, 402];
 /// Share of the largest gain above which candidates count as equal; the least travel then decides.
 const EQUAL_GAIN: f64 = 0.98;
 /// Multiplications for one unknown of one candidate when a pose is chosen.
-const OPERATIONS: f64 = 90.0;
+const MULTIPLICATIONS_PER_UNKNOWN: f64 = 90.0;
 /// Maximum number of multiplications of a request; some ten minutes on one core.
 const MAX_OPERATIONS: f64 = 2e12;
 /// Maximum number of entries of the matrices of all candidates, 3 GB.
@@ -398,7 +398,8 @@ fn check_size(
     unknowns: usize,
 ) -> Result<(), NextError> {
     let entries = 3.0 * (candidates * coordinates) as f64 * unknowns as f64;
-    let operations = OPERATIONS / 9.0 * entries * poses as f64 + entries * unknowns as f64;
+    let operations =
+        MULTIPLICATIONS_PER_UNKNOWN / 9.0 * entries * poses as f64 + entries * unknowns as f64;
     if entries > MAX_ENTRIES || operations > MAX_OPERATIONS {
         return Err(NextError::TooLarge { poses, candidates, unknowns });
     }

@@ -139,7 +139,7 @@ impl<'a> CandidateScan<'a> {
         for k in (0..range.len()).filter(|&k| may(range.start + k)) {
             let (j, w, products) =
                 (rows.columns(R * k, R), w_all.columns(R * k, R), products.columns(R * k, R));
-            let s: Square<R> = plus_identity(&j, &w);
+            let s: Square<R> = identity_plus_product(&j, &w);
             let value = match &self.state {
                 State::Determinant(_) => {
                     let ratio = s.volume() / self.nuisance_s::<R>(&j, &products).volume();
@@ -214,7 +214,7 @@ macro_rules! small {
 small!(3 6 12);
 
 /// Returns I + J W.
-fn plus_identity<const R: usize>(j: &DMatrixView<f64>, w: &DMatrixView<f64>) -> Square<R> {
+fn identity_plus_product<const R: usize>(j: &DMatrixView<f64>, w: &DMatrixView<f64>) -> Square<R> {
     Square::from_fn(|a, b| f64::from(u8::from(a == b)) + j.column(a).dot(&w.column(b)))
 }
 

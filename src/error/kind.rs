@@ -293,8 +293,8 @@ pub enum InputErrorKind {
     #[error("column {column} of the formula: {mistake}")]
     Formula { column: usize, mistake: String },
     #[error(
-        "{formula} has no finite value in row {row} ({place}); keep log, sqrt and divisions off \
-         their edges"
+        "{formula} has no finite value in row {row} ({place}); keep arguments of log and sqrt \
+         positive, and denominators away from 0"
     )]
     FormulaNotFinite { formula: String, row: usize, place: String },
     #[error("{reason}")]

@@ -60,7 +60,7 @@ pub(super) fn named_otherwise(write: &str, near: Option<&str>, unknown: &[String
 }
 
 /// Returns the remedy of a row with more fields than the header.
-pub(super) fn surplus(found: usize, expected: usize) -> &'static str {
+pub(super) fn decimal_comma_remedy(found: usize, expected: usize) -> &'static str {
     if found > expected {
         "; if its numbers have a decimal comma, separate the columns by ; or tab"
     } else {
@@ -77,7 +77,7 @@ pub(super) fn compared(keys: Option<&[String; 2]>) -> String {
 
 /// Returns the remedy of clocks that differ; `offset` is the value of `offset_s` that pairs the
 /// rows best.
-pub(super) fn clocks(offset: Option<&str>) -> String {
+pub(super) fn clock_offset_remedy(offset: Option<&str>) -> String {
     offset.map_or_else(String::new, |offset| {
         format!(
             "; with the clock of the joint table moved by {offset} s the rows have partners: the \

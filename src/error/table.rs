@@ -5,7 +5,9 @@ use std::path::PathBuf;
 use thiserror::Error;
 
 use super::near::{instead, meant, question};
-use super::phrases::{clocks, compared, difference, in_quotes, named_otherwise, surplus};
+use super::phrases::{
+    clock_offset_remedy, compared, decimal_comma_remedy, difference, in_quotes, named_otherwise,
+};
 use super::warning::{listed, nearest_in_time};
 
 /// Kind of error in a table of measurements; [`Location`](super::Location) holds the place.
@@ -32,20 +34,20 @@ pub enum TableErrorKind {
          tolerance_s{}{}{}",
         nearest_in_time(gap.as_deref()),
         compared(keys.as_ref()),
-        clocks(offset.as_deref())
+        clock_offset_remedy(offset.as_deref())
     )]
     NothingJoined { gap: Option<String>, keys: Option<[String; 2]>, offset: Option<String> },
     #[error(
         "{left} of {rows} measured rows have no partner in the joint table{}{}",
         nearest_in_time(gap.as_deref()),
-        clocks(Some(offset.as_str()))
+        clock_offset_remedy(Some(offset.as_str()))
     )]
     MostUnpaired { left: usize, rows: usize, gap: Option<String>, offset: String },
     #[error(
         "{same} of {rows} measured rows have the same partner, {partner}, an end of the joint \
          table; check whether both clocks agree, and tolerance_s{}{}",
         compared(keys.as_ref()),
-        clocks(offset.as_deref())
+        clock_offset_remedy(offset.as_deref())
     )]
     CommonPartner {
         same: usize,
@@ -57,7 +59,7 @@ pub enum TableErrorKind {
     #[error(
         "the rows of both tables are typically {gap} apart, less than tolerance_s allows, and \
          may belong to different poses{}",
-        clocks(Some(offset.as_str()))
+        clock_offset_remedy(Some(offset.as_str()))
     )]
     ClocksDiffer { gap: String, offset: String },
     #[error(
@@ -140,7 +142,7 @@ pub enum TableErrorKind {
     ColumnsDiffer { other: PathBuf, has: bool },
     #[error("{found} values for {expected} rows")]
     ColumnLength { expected: usize, found: usize },
-    #[error("the row has {found} fields, the header {expected}{}", surplus(*found, *expected))]
+    #[error("the row has {found} fields, the header {expected}{}", decimal_comma_remedy(*found, *expected))]
     RowLength { expected: usize, found: usize },
     #[error("a quote is opened and not closed")]
     OpenQuote,

@@ -133,7 +133,7 @@ impl Effect {
 
     /// Returns the parameters without reference to a particular arm: any joint and covariate is
     /// accepted.
-    fn loose_entries(&self) -> Vec<EffectTerm> {
+    fn entries_without_arm(&self) -> Vec<EffectTerm> {
         let covariates: Vec<String> = self.covariate().into_iter().collect();
         let slides = [false; MAX_JOINTS];
         self.entries(&Vocabulary {
@@ -146,7 +146,7 @@ impl Effect {
     /// Returns the quantities that multiply its parameters, without duplicates.
     pub(crate) fn quantities(&self) -> Vec<Quantity> {
         let mut found = Vec::new();
-        for formula in self.loose_entries().into_iter().filter_map(|entry| entry.formula) {
+        for formula in self.entries_without_arm().into_iter().filter_map(|entry| entry.formula) {
             for quantity in formula.expression.quantities() {
                 if !found.contains(&quantity) {
                     found.push(quantity);
@@ -202,7 +202,7 @@ impl Effect {
     /// function of one command alone.
     pub(crate) fn function_of(&self) -> Option<(usize, usize)> {
         let joint = self.joint()?;
-        let entries = self.loose_entries();
+        let entries = self.entries_without_arm();
         if entries.is_empty() || entries.iter().any(|entry| entry.at != At::Coordinate) {
             return None;
         }
@@ -219,7 +219,7 @@ impl Effect {
         let wave = |entry: EffectTerm| {
             entry.formula.and_then(|formula| Some(formula.expression.wave()?.1))
         };
-        let waves = self.loose_entries().into_iter().filter_map(wave);
+        let waves = self.entries_without_arm().into_iter().filter_map(wave);
         let mut orders: Vec<f64> = waves.filter(|_| joint == from).collect();
         orders.dedup();
         orders.into_iter().map(|order| (joint, order)).collect()

@@ -25,8 +25,8 @@ pub enum Quantity {
     },
     /// Time since the first pose of the session \[s\], written `t`.
     Elapsed,
-    /// Time as in the table \[s\], written `time`; the row number, counted from 1, if no time is
-    /// recorded.
+    /// Time as in the table \[s\], written `time`; the number of the row, counted from 0, if no
+    /// time is recorded.
     Time,
     /// Payload \[kg\], written `payload`; the declared one in a pose that records none.
     Payload,

@@ -22,7 +22,7 @@ pub(super) const NOISE_RATIOS: [f64; 4] = [1.5, 2.0, 3.0, 5.0];
 /// Errors of a gross row that are tried, in units of its σ.
 const GROSS_SIZES: [f64; 3] = [10.0, 50.0, 500.0];
 /// Smallest eigenvalue of a correlation matrix, relative to the largest, that counts.
-const ROUNDING: f64 = 1e-13;
+const MIN_RELATIVE_EIGENVALUE: f64 = 1e-13;
 
 /// Density of the rows if nothing changed, with everything that the ratios need.
 pub(super) struct Unchanged {
@@ -49,8 +49,9 @@ pub(super) fn factor(covariance: &DMatrix<f64>) -> DMatrix<f64> {
     });
     let eigen = correlation.symmetric_eigen();
     let largest = if free.is_empty() { 0.0 } else { eigen.eigenvalues.amax() };
-    let kept: Vec<usize> =
-        (0..free.len()).filter(|&k| eigen.eigenvalues[k] > ROUNDING * largest).collect();
+    let kept: Vec<usize> = (0..free.len())
+        .filter(|&k| eigen.eigenvalues[k] > MIN_RELATIVE_EIGENVALUE * largest)
+        .collect();
     let mut factor = DMatrix::zeros(scale.len(), kept.len());
     for (column, &k) in kept.iter().enumerate() {
         let root = eigen.eigenvalues[k].sqrt();

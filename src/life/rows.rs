@@ -204,8 +204,9 @@ impl Sums {
         self.ln_det += weight * (squares / self.variance).ln_1p();
     }
 
-    /// Returns the measured coordinates e of one row of these sums: eᵀΣ⁻¹K, eᵀΣ⁻¹r, and the
-    /// diagonal of eᵀΣ⁻¹e.
+    /// Returns the lines of Σ⁻¹K and Σ⁻¹r for the measured coordinates of one row of these sums,
+    /// and the diagonal entries of Σ⁻¹ there. Shapes = (coordinates, columns), (coordinates),
+    /// (coordinates).
     pub fn of_row(
         &self,
         rows: &SensitiveRows,

@@ -173,7 +173,7 @@ impl Columns {
             _ if is_missing_column(&error) && holds_numbers(&table.header) => {
                 Location { key: None, ..table.column("") }.error(TableErrorKind::NoHeader)
             }
-            (Some(hidden), _) => blame_rule(error, hidden),
+            (Some(hidden), _) => with_rule_as_cause(error, hidden),
             (None, Some(rule)) if is_missing_column(&error) => no_such(rule, table),
             _ => error,
         })?;
@@ -450,7 +450,7 @@ fn display_name(name: &str, theirs: Option<&String>) -> String {
 
 /// Returns the error for a missing column `name`. If a rule of `[data.columns]` gave that name to
 /// another column, the message names the rule as the cause.
-fn blame_rule(error: InputError, (rule, name): (&ColumnRule, &str)) -> InputError {
+fn with_rule_as_cause(error: InputError, (rule, name): (&ColumnRule, &str)) -> InputError {
     match *error.kind {
         InputErrorKind::Table(TableErrorKind::MissingColumn { write, .. }) => rule
             .location

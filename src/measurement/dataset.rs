@@ -70,7 +70,7 @@ impl Dataset {
     /// # Errors
     /// Returns an error if a part of the split is empty, the held-out session does not exist, or no
     /// split is declared. Also if an unknown point, anchor or surface has too few rows to
-    /// contribute information.
+    /// contribute information, or too many bases or tools would be fitted.
     #[doc(hidden)]
     pub fn from_measurements(
         problem: &Problem,

@@ -109,7 +109,7 @@ pub struct Measurements {
     pub hoist: Option<Vec<f64>>,
     /// Temperature of each row [°C]; `None` without a column.
     pub temperature: Option<Vec<f64>>,
-    /// Time of each row \[s\]; the row number without a column.
+    /// Time of each row \[s\]; without a column, the number of the row, counted from 0.
     pub time: Vec<f64>,
     /// True if `time` was recorded, false if it is the row number.
     pub time_measured: bool,

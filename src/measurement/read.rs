@@ -172,7 +172,7 @@ impl<'a> Tables<'a> {
                 .at_line(line)
                 .error(TableErrorKind::NoRowsBelowHeader));
         }
-        columns.settle_time(&table, &mut self.warnings)?;
+        columns.decide_time_column(&table, &mut self.warnings)?;
         let rows = self
             .builder
             .get_or_insert_with(|| RowsBuilder::new(self.files, &table, &columns, self.problem));

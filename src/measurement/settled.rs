@@ -14,7 +14,7 @@ impl Columns {
     /// # Errors
     /// Returns an error if `[data.columns]` maps the column to `time`, and its first cell is
     /// neither a time nor a number.
-    pub fn settle_time(
+    pub fn decide_time_column(
         &mut self,
         table: &Table,
         warnings: &mut Vec<Warning>,

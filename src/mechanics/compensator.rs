@@ -13,7 +13,7 @@ pub struct Compensator<S> {
     /// End A on the part before the joint \[m\]: x and y of the frame before the joint's rotation,
     /// whose origin lies on the axis.
     pub anchor: [f64; 2],
-    /// End B on the link \[m\]: x and y of the rotated frame.
+    /// End B on the link behind the joint \[m\]: x and y of the frame after the joint's rotation.
     pub lever: [f64; 2],
     /// Length l₀ at which the pull equals the preload \[m\].
     pub free_length: f64,

@@ -9,7 +9,7 @@ use crate::scalar::Scalar;
 /// Largest rounding of a moment, relative to the sum of the moments of all loads about the base.
 const MAX_MOMENT_ROUNDING: f64 = 1e-12;
 
-/// Undeflected arm whose loads have a moment about every joint's axis.
+/// Moments of an arm's loads about its joint axes, with every part undeflected.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AxisMoments<S> {
     arm: Arm<S>,

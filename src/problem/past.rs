@@ -176,7 +176,8 @@ impl ThermalLag {
         Self { time_constant, progress: None }
     }
 
-    /// Returns T̃ [°C] at the time and temperature `now` (\[s\], [°C]).
+    /// Advances to the time and temperature `now` (\[s\], [°C]) and returns the lagged temperature
+    /// T̃ [°C] there. `past` holds the earlier poses of the session.
     pub fn advance(&mut self, past: &Past<&[f64]>, now: (f64, f64)) -> f64 {
         self.advance_from(0, past, now)
     }

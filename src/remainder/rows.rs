@@ -170,7 +170,8 @@ impl Rows {
         &self.inputs.as_slice()[n * row..n * (row + 1)]
     }
 
-    /// Returns the derivatives of one coordinate of the position with respect to all sites.
+    /// Returns the derivatives of a row's position along one axis with respect to all sites, shape
+    /// = (sites). `coordinate` is 3 · row + axis.
     pub fn sites_of(&self, coordinate: usize) -> &[f64] {
         let n = self.sites.nrows();
         &self.sites.as_slice()[n * coordinate..n * (coordinate + 1)]

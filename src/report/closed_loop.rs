@@ -86,10 +86,13 @@ fn cause(found: &FoundEffect) -> Point {
     facts.extend(law.map(|law| format!("probability of the law {}", percent(law))));
     let others = match found.alternatives.as_slice() {
         [] => String::new(),
-        [first] => format!("; not told from: {}", alternative(first)),
+        [first] => format!("; not distinguishable from: {}", alternative(first)),
         [first, others @ ..] => {
             let count = others.len();
-            format!("; not told from: {} ({count} more in loop.json)", alternative(first))
+            format!(
+                "; not distinguishable from: {} ({count} more in loop.json)",
+                alternative(first)
+            )
         }
     };
     let details = if facts.is_empty() { Vec::new() } else { vec![facts.join("; ")] };
@@ -142,7 +145,7 @@ fn set_aside<'a>(problem: &Problem, result: &LoopResult) -> Option<Block<'a>> {
         None => row.file.clone(),
     };
     let words = format!(
-        "{} took no part in the choice of effects, as far from the others as gross errors are: {}. \
+        "{} were excluded from the choice of effects, because they are as far from the others as gross errors: {}. \
          {treatment}.",
         counted(rows.len(), "pose"),
         first_of(rows.iter().map(location), MAX_SHOWN_ROWS, "loop.json").join(", ")
@@ -163,7 +166,7 @@ pub fn loop_text(problem: &Problem, closure: &ClosedLoop) -> String {
     blocks.extend(found(result, MAX_SHOWN_ALTERNATIVES));
     let failed = residual_tests::failed(&closure.residual_tests);
     if result.unexplained.is_some() || (!failed.is_empty() && !result.effects.is_empty()) {
-        blocks.push(Block::heading("What remains"));
+        blocks.push(Block::heading("Remaining residual"));
         let unexplained = unexplained(problem, closure, result).into_iter();
         // Without found effects, the failed tests are already listed above.
         let failed = failed.into_iter().filter(|_| !result.effects.is_empty());
@@ -229,7 +232,7 @@ fn blocks<'a>(
         Block::Page(vec![Block::heading("Errors of the poses")]),
         Block::figures([figures::errors(plots), figures::vectors(plots)]),
         Block::Poses(plots),
-        Block::heading("What the declared problem leaves"),
+        Block::heading("Residual of the declared problem"),
     ]);
     blocks.extend(residual_tests::blocks(&closure.before.residual_tests));
     let traced = TraceResult::new(problem, &closure.before);
@@ -239,7 +242,7 @@ fn blocks<'a>(
     blocks.extend(ranking);
     blocks.push(Block::Page(trace::undetectable_effects(&closure.before)));
     blocks.extend(rounds(closure, result));
-    blocks.push(Block::heading("What remains"));
+    blocks.push(Block::heading("Remaining residual"));
     let unexplained = unexplained(problem, closure, result).into_iter().map(Point::from);
     let (tests, page) = (
         residual_tests::all(&closure.residual_tests),

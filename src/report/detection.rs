@@ -11,7 +11,7 @@ const MAX_SHOWN_EFFECTS: usize = 3;
 /// Effects that only a load shows.
 const LOAD_EFFECTS: [&str; 3] = ["joint-compliance", "link-bending", "base-compliance"];
 /// Note on the columns of the table.
-const COLUMNS: &str = "found from: size at which it is found whatever its axis or phase is; at best: with the axis or phase that shows most; –: not found at any size with some axis or phase";
+const COLUMNS: &str = "found from: smallest size that is found for every axis or phase; at best: for the most visible axis or phase; –: for some axis or phase, no size is found";
 
 /// Returns the effects of each family that are hardest to detect, and those that the poses cannot
 /// show.

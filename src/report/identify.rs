@@ -204,7 +204,7 @@ fn orientation<'a>(found: &Identification) -> Option<Block<'a>> {
 fn at_points(held_out: &ErrorSummary) -> Option<String> {
     let [mean, max, rms] = held_out.at_point?.map(|sizes| number(sizes.norm * 1e3, 4));
     Some(format!(
-        "At the points seen, held-out errors stand for mean {mean} mm, rms {rms} mm, max {max} mm."
+        "Held-out image errors correspond to {mean} mm (mean), {rms} mm (rms), {max} mm (max) at the observed points."
     ))
 }
 
@@ -284,7 +284,7 @@ pub fn joint_sources_text(sources: &JointSources) -> String {
         format!("write joints = \"{}\" in [data]", better.as_str())
     };
     format!(
-        "Joints: commands leave {} mm rms of the fitted rows, readings {} mm; the {} ones fit better: {advice}.",
+        "Residual of the fitted rows: {} mm rms with joint commands, {} mm with joint readings. The {} coordinates fit better: {advice}.",
         mm(commanded, 4),
         mm(read, 4),
         better.as_str(),

@@ -24,8 +24,8 @@ pub(super) fn active_limits<'a>(found: &Identification) -> Option<Block<'a>> {
     let bounds = found.estimates.iter().filter_map(bound);
     let points: Vec<String> =
         bounds.chain(found.active_constraints.iter().map(constraint)).collect();
-    let words = "Active limits and their cost: fall of the rms residual if the limit moves out \
-                 by so much\n(standard errors hold with these limits kept):"
+    let words = "Active limits and their cost: decrease of the rms residual if the limit is moved outwards \
+                 by the stated amount\n(standard errors hold with these limits kept):"
         .to_owned();
     (!points.is_empty()).then_some(Block::Lines(words, points))
 }

@@ -48,7 +48,7 @@ fn blocks<'a>(problem: &Problem, options: &NextOptions, next: &NextPoses) -> Vec
             mm(next.noise),
         ),
         None => format!(
-            "The error in the workspace is stated from ten measured configurations on that measure as many coordinates as parameters are \
+            "The error in the workspace is stated once ten configurations are measured, and as many coordinates as parameters are \
              fitted; until then a misfit of {} mm per axis is assumed besides {} mm of noise.",
             mm(next.misfit),
             mm(next.noise),

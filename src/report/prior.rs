@@ -24,8 +24,8 @@ pub(super) fn prior<'a>(found: &Identification) -> Vec<Block<'a>> {
     let Some(comparison) = &found.prior else { return Vec::new() };
     let rows = comparison.parameters.iter().map(row).collect();
     let note =
-        "new rows: what they say together with the earlier estimate of the other parameters; \
-                –: they say less than a thousandth of what was known, or the parameter is at a bound"
+        "new rows: estimate from them and the earlier estimate of the other parameters; –: they add less \
+         than a thousandth to the earlier information, or the parameter is at a bound"
             .to_owned();
     let table = Table { notes: vec![note], ..Table::new(&HEADER, rows, &[0]) };
     vec![

@@ -51,7 +51,7 @@ pub fn replica_report(study: &MisprintStudy, found: &ReplicaResults) -> Report {
 fn counts(study: &MisprintStudy) -> String {
     format!(
         "{} specimens of each of {} cases, measured by the virtual test rig: {} poses to identify, {} held out,\n\
-         noise {} mm per axis; as elastic as makes the rigid fit leave {} mm",
+         noise {} mm per axis; elasticity scaled so that the rigid fit errs by {} mm",
         study.specimens,
         study.cases.len(),
         study.identification,
@@ -70,9 +70,9 @@ fn tables<'a>(study: &MisprintStudy, found: &ReplicaResults) -> Vec<Block<'a>> {
     vec![
         Block::heading("Procedures and readings: mean error of the held-out poses, mm"),
         Block::Table(procedures(study, found)),
-        Block::heading("Beside them"),
+        Block::heading("For comparison"),
         Block::Table(others(study, found)),
-        Block::heading("Over what the rigid fit leaves, stiffness known"),
+        Block::heading("Ratio to the error of the rigid fit, stiffness known"),
         Block::Table(ratios(study, found)),
     ]
 }
@@ -182,11 +182,8 @@ fn ratios(study: &MisprintStudy, found: &ReplicaResults) -> Table {
     header.extend(std::iter::repeat_n("mean/mean", study.cases.len()));
     header.extend(["z/sum", "max/max"]);
     let words: Vec<String> = study.cases.iter().map(Case::name).collect();
-    let note = format!(
-        "mean/mean: of {}; links: their flexibility over that of joints, as multiples",
-        words.join(", ")
-    );
-    let rest =
-        "of what is declared; one load: every pose under the same; z/sum and max/max: of the first";
+    let note =
+        format!("mean/mean: of {}; links: ratio of link to joint flexibility,", words.join(", "));
+    let rest = "relative to the declared ratio; one load: all poses under one load; z/sum and max/max: of the first case";
     Table::new(&header, rows, &[0, 1]).noted(&[&note, rest])
 }

@@ -87,7 +87,7 @@ fn outcome(result: &LoopResult, takes_less: bool) -> String {
             format!("Unexplained: {}.{noise}", lower(&found))
         }
         (Verdict::Explained, true) => {
-            format!("Explained: {}, and what is left looks like noise.", lower(&found))
+            format!("Explained: {}, and the residual looks like noise.", lower(&found))
         }
         (Verdict::NothingFound, true) => {
             if let Some(ratio) = result.overstated_sigma() {
@@ -98,7 +98,9 @@ fn outcome(result: &LoopResult, takes_less: bool) -> String {
                     1 => "apart from 1 pose that stands out, ".to_owned(),
                     rows => format!("apart from {rows} poses that stand out, "),
                 };
-                format!("Nothing found: {apart}what the declared problem leaves looks like noise.")
+                format!(
+                    "Nothing found: {apart}the residual of the declared problem looks like noise."
+                )
             }
         }
     }
@@ -123,7 +125,7 @@ fn probable(result: &LoopResult) -> String {
         [effect] => format!("{}; and probably ", effect.effect.description),
         effects => format!("{} effects were found, and probably ", effects.len()),
     };
-    format!("Probably explained: {sure}{}. What is left looks like noise.", probable.join("; and "))
+    format!("Probably explained: {sure}{}. The residual looks like noise.", probable.join("; and "))
 }
 
 /// States which effects were found, without the full stop.

@@ -32,7 +32,7 @@ fn blocks<'a>(problem: &Problem, watch: &Watch, drawn: Option<Drawing>) -> Vec<B
     let in_unit = |error: f64| format!("{} {}", two_digits(error * unit.factor, 4), unit.symbol);
     let (chi2, coordinates, p) = watch.chi2;
     let mut head = format!(
-        "{} against the estimate; false alarms of all looks together: at most {} %\n\n{}",
+        "{} against the estimate; probability of a false alarm at any look: at most {} %\n\n{}",
         counted(watch.rows, "row"),
         two_digits(100.0 * watch.false_alarm_rate, 3),
         verdict(watch)

@@ -7,7 +7,7 @@ use super::outcome::Untestable;
 
 /// Root mean square residual, in units of the declared σ, below which it counts as rounding error
 /// and is not tested.
-pub(crate) const ROUNDING: f64 = 1e-3;
+pub(crate) const MIN_RESIDUAL_SIGMAS: f64 = 1e-3;
 
 /// Values of a covariate, one for each pose.
 #[derive(Debug, Clone, PartialEq)]
@@ -74,7 +74,7 @@ impl FitResidual<'_> {
     /// error.
     pub(super) fn above_rounding(&self) -> Result<(), Untestable> {
         let size = self.residual.norm_squared() / self.residual.len().max(1) as f64;
-        let is_rounding = self.sigma_is_declared && size < ROUNDING.powi(2);
+        let is_rounding = self.sigma_is_declared && size < MIN_RESIDUAL_SIGMAS.powi(2);
         if is_rounding { Err(Untestable::Rounding) } else { Ok(()) }
     }
 }

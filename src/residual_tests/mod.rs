@@ -24,7 +24,7 @@ mod statistic;
 mod test;
 
 pub use covariate::Covariate;
-pub(crate) use fit_residual::ROUNDING;
+pub(crate) use fit_residual::MIN_RESIDUAL_SIGMAS;
 pub use fit_residual::{CovariateValues, FitResidual};
 pub use outcome::{Outcome, ResidualTest, ResidualTests, Sequence, Test, Untestable};
 pub use test::test_residual;

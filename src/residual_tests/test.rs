@@ -41,14 +41,14 @@ pub fn test_residual(fit: &FitResidual, level: f64, seed: u64) -> ResidualTests 
     let found = outliers::find(fit, &leverage, level / most as f64);
     let kept = found.kept.unwrap_or_else(|| Kept::all(fit, leverage));
     let mut tried = vec![size::reduced_chi_squared(fit, &kept), size::lack_of_fit(fit, &kept)];
-    tried.extend(permuted(fit, &kept, seed));
+    tried.extend(order_and_dependence_tests(fit, &kept, seed));
     tried.push(found.tried);
     tried.push(size::anderson_darling(&studentised));
     judge(tried, level, (0..poses).filter(|pose| kept.poses.binary_search(pose).is_err()).collect())
 }
 
 /// Returns the tests of order and dependence.
-fn permuted(fit: &FitResidual, kept: &Kept, seed: u64) -> Vec<Tried> {
+fn order_and_dependence_tests(fit: &FitResidual, kept: &Kept, seed: u64) -> Vec<Tried> {
     let statistics = statistics(fit, &kept.poses);
     let working: Vec<&Statistic> =
         statistics.iter().filter_map(|(_, statistic)| statistic.as_ref().ok()).collect();

@@ -46,7 +46,7 @@ pub struct Origin {
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct ExportedErrors {
     pub whole: Summary,
-    /// Exported geometry.
+    /// Errors of the exported geometry alone.
     pub rigid: Summary,
     /// Identified geometry without the other parts of the model, unless it was exported.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -54,7 +54,8 @@ pub enum Sizes {
 }
 
 impl Summary {
-    /// Creates the summary of rows, in ° if their errors are angles.
+    /// Creates the summary of rows in the unit of their kind: mm for lengths, ° for angles, px for
+    /// image errors.
     pub fn of(errors: &ErrorSummary) -> Self {
         let kind = Some(errors.kind).filter(|kind| !matches!(*kind, "" | "position"));
         Self { kind, n: errors.n, sizes: Sizes::of(errors, errors.unit()) }

@@ -211,7 +211,7 @@ pub(super) fn moved(frame: &Frame<f64>, joint: &Joint, q: f64) -> Frame<f64> {
 }
 
 /// Returns, for each link, the joint that has it as child and that joint's parent link; `None` for
-/// the root.
+/// the root. A link with two parents and a loop of joints are errors.
 fn parents(robot: &Robot) -> Result<Vec<Option<(usize, usize)>>, InputError> {
     let mut above: Vec<Option<(usize, usize)>> = vec![None; robot.links.len()];
     let link =

@@ -130,7 +130,11 @@ fn targets_without_what_an_effect_follows_are_reached_without_it() {
         .flexcal("compensate . --estimate estimate.json --data targets.csv --out there")
         .success();
     // There is one warning for each of the two effects.
-    assert_eq!(run.stderr.matches("commands leave out what depends on it").count(), 2, "{run:?}");
+    assert_eq!(
+        run.stderr.matches("the commands neglect the effects that depend on it").count(),
+        2,
+        "{run:?}"
+    );
     assert!(folder.has("there/commands.csv"), "{run:?}");
 }
 

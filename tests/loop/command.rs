@@ -193,7 +193,7 @@ fn structure_without_a_name_is_said_to_be_left() {
         &printed(&folder, "loop arm -v"),
         &[
             "Unexplained",
-            "What remains",
+            "Remaining residual",
             left["where"].as_str().unwrap(),
             "it keeps its last value",
         ],
@@ -220,7 +220,7 @@ fn the_loop_tells_its_story() {
             "# Surface sampling arm",
             "| joint2.stiffness |",
             "## Rounds",
-            "## What remains",
+            "## Remaining residual",
             "| :-- |",
         ],
     );

@@ -55,7 +55,7 @@ pub struct ToleranceTest {
     pub verdict: Verdict,
     /// Number of poses.
     pub poses: usize,
-    /// Number of tested poses with an error above the tolerance.
+    /// Number of tested poses with an error above the tolerance, or without a prediction.
     pub beyond: usize,
     /// Lower and upper confidence bound of the share of all poses that are within the tolerance.
     /// Each bound is wrong with at most the probability `risk`. [Clopper & Pearson 1934]

@@ -88,8 +88,8 @@ fn of_joint(joint: &Joint, parameter: &Parameter, x: f64, left: &str) -> Contrad
     let gap = if symbol == "°" { "" } else { " " };
     let place = Location { key: None, ..joint.location.clone() };
     let words = format!(
-        "{}{gap}{symbol} is declared ({place}), the measurements say {fitted:.2}{gap}{symbol}, which \
-         leaves {left} of error",
+        "{}{gap}{symbol} is declared ({place}), the measurements say {fitted:.2}{gap}{symbol}, with \
+         which the error is {left}",
         rounded(declared)
     );
     let digits = typing_error(declared, fitted).map_or_else(String::new, |(meant, how)| {
@@ -116,8 +116,8 @@ fn of_tool(
         v.iter().map(number).collect::<Vec<_>>().join(", ")
     };
     let words = format!(
-        "the target is declared at [{}] mm, the measurements say [{}] mm, which leaves {left} of \
-         error",
+        "the target is declared at [{}] mm, the measurements say [{}] mm, with which the error \
+         is {left}",
         vector(declared, 0),
         vector(fitted, 1)
     );

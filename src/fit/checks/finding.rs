@@ -71,7 +71,7 @@ finding_codes! {
         "The measured points of a base leave its pose open, as points on a line do.",
         "measure more poses of this session, or give its base a prior";
     Misread: Error "misread" ["explanations", "before", "after"]
-        "Table or problem read in another way leaves less than a fifth of the error.",
+        "With another reading of the table or the problem, less than a fifth of the error remains.",
         "correct units, signs, order or convention in the table or the problem";
     PositionsComputed: Error "positions-computed" ["rms"]
         "The registered nominal arm predicts the positions to 10 µm per metre of its reach and a fifth of σ, as no built arm does.",
@@ -110,10 +110,10 @@ finding_codes! {
         "The data refute the σ of a rule of `[parameters]`: with a σ 3 and more times as large the residual falls by more than half.",
         "declare a larger σ, or check the nominal values and their units";
     NoiseBeyondDeclared: Error "noise-beyond-declared" ["noise_factor", "sigma_taken"]
-        "Residuals and priors speak for a noise variance of more than 1000 times the declared one.",
+        "Residuals and priors indicate a noise variance of more than 1000 times the declared one.",
         "look for what the model lacks with flexcal loop, or check the unit of the declared σ";
     PayloadAtTarget: Error "payload-at-target" ["before", "after"]
-        "The measurements speak for a payload at the identified target, where the problem leaves its place open.",
+        "The measurements indicate that the payload hangs at the identified target; the problem does not declare its place.",
         "declare payload_at = \"target\" in [tool], or its place as payload_at_m";
     OrientationMisfit: Error "orientation-misfit" ["rms", "sigma", "conventions"]
         "The fitted arm misses the measured orientations by more than 2° and 20 σ.",
@@ -167,7 +167,7 @@ finding_codes! {
         "Some identification rows are farther from the fit than noise explains.",
         "look at these rows; a section [robust] limits their influence";
     PriorWidth: Note "prior-width" ["rule", "declared", "estimated"]
-        "The fitted deviations speak for a prior σ that is more than twice as large or as small.",
+        "The fitted deviations indicate a prior σ that is more than twice as large, or less than half.",
         "declare the estimated σ, or leave the prior as it is where it is known better";
     NotToldApart: Note "not-told-apart" ["what", "parameters"]
         "The rows alone leave a quantity open: the pose of the base, the scale, a focal length, or parameters that move the same way.",

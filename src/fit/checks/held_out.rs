@@ -183,7 +183,7 @@ impl Check for BetterThanNominal {
             return Vec::new();
         }
         let text = format!(
-            "held-out {} are met worse than by the nominal arm ({} rms before, {} after)",
+            "the fitted arm misses held-out {} by more than the nominal arm ({} rms before, {} after)",
             noun(kind),
             size(kind, before, 3),
             size(kind, after, 3)

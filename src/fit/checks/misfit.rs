@@ -83,7 +83,7 @@ fn misfit_finding(kind: &RowKind, rms: f64) -> Option<Finding> {
             format!("check units, signs of joints, and {}", named(kind)),
         )
     } else {
-        let text = "the fitted arm misses the measurements by more than numbers hold";
+        let text = "the fitted arm misses the measurements by more than can be computed";
         (text.to_owned(), "check their units".to_owned())
     };
     let numbers = [kind.into(), rms.into(), spread.into()];

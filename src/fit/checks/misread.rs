@@ -43,7 +43,7 @@ impl Check for ReadAsMeant {
         let more = if more > 0 { format!(", or {more} more") } else { String::new() };
         let name = kind.observation.kind();
         let text = format!(
-            "read in another way the measurements fit: {}{more} would leave {} of error instead of {}",
+            "the measurements fit if they are read in another way: with {}{more}, the error would be {} instead of {}",
             words[..words.len().min(MAX_NAMED)].join(", or "),
             size(name, best.rms, 3),
             size(name, explanations.as_read, 3)

@@ -55,7 +55,7 @@ fn far_off_finding(
     let words: Vec<String> = explanations.iter().map(Misreading::to_string).collect();
     let numbers = [kind.into(), rms.into(), spread.into(), json!(words)];
     if !rms.is_finite() {
-        let text = "the nominal arm misses the measurements by more than numbers hold";
+        let text = "the nominal arm misses the measurements by more than can be computed";
         return Finding::new(FindingCode::NominalFarOff, numbers, text.to_owned())
             .with_remedy("check their units".to_owned());
     }

@@ -16,7 +16,8 @@ pub struct Outlier {
     pub location: Location,
     /// Kind of the row ([`Observation::kind`](crate::problem::Observation::kind)).
     pub kind: &'static str,
-    /// Length of the whitened residual, as a multiple of the typical scatter (1 σ) of all rows.
+    /// Length of the whitened residual, as a multiple of the typical scatter (1 σ) of all rows; for
+    /// a held-out row, of the σ of its prediction.
     pub distance: f64,
     /// Typical scatter that `distance` refers to; `None` for held-out rows, whose distance refers
     /// to the uncertainty of their prediction.

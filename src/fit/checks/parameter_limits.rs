@@ -36,7 +36,8 @@ impl Check for WithinPriors {
         };
         let finding = |(parameter, sigmas): (&Parameter, f64)| {
             let name = &parameter.name;
-            let text = format!("{name} moved by {sigmas:.0} times the σ of its prior");
+            let text =
+                format!("{name} deviates from nominal by {sigmas:.0} times the σ of its prior");
             let numbers = [name.as_str().into(), sigmas.into()];
             let fitted = fit.fitting.model.parameters.iter().zip(&fit.end.x);
             let entry = fitted
@@ -70,8 +71,9 @@ impl Check for WithinArmSize {
                 _ => "a factor of 100",
             };
             let name = &parameter.name;
-            let text =
-                format!("{name} moved by {sizes:.1} times {unit}: more than an arm can be off");
+            let text = format!(
+                "{name} deviates from nominal by {sizes:.1} times {unit}: more than is possible on an arm"
+            );
             let numbers = [name.as_str().into(), sizes.into()];
             Finding::new(FindingCode::BeyondArmSize, numbers, text)
         };

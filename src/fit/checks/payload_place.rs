@@ -45,7 +45,7 @@ pub(in crate::fit) fn payload_finding(
     let is_better = fit_following.termination.converged() && before - after > MIN_FALL_OF_DEVIANCE;
     is_better.then(|| {
         let text = format!(
-            "the measurements speak for a payload at the identified target instead of the nominal one: \
+            "the measurements indicate a payload at the identified target instead of the nominal one: \
              χ² with the priors falls from {before:.1} to {after:.1}"
         );
         Finding::new(FindingCode::PayloadAtTarget, [before.into(), after.into()], text)

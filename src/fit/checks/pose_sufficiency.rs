@@ -187,7 +187,7 @@ fn undetermined_base_finding(
     let of_base = rows.iter().copied().filter(|&row| placement.base_of(row) == base);
     let (of, poses) = (label("base", &placement.bases[base]), count_distinct(numbers, of_base));
     let text = format!(
-        "{of}: its points, of {poses} different poses, are too few or lie on a line, which leaves a turn about it open"
+        "{of}: its points, of {poses} different poses, are too few or lie on a line, so that a rotation of the base about it is not determined"
     );
     Some(Finding::new(FindingCode::BaseNotDetermined, [of.into(), poses.into()], text))
 }

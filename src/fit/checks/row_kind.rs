@@ -48,7 +48,7 @@ const MIN_SCIENTIFIC_LENGTH: f64 = 1e6;
 /// decimal, others \[m\] in millimetres.
 pub(crate) fn size(kind: &str, error: f64, decimals: usize) -> String {
     match kind_named(kind).unit {
-        _ if !error.is_finite() => "more than numbers hold".to_owned(),
+        _ if !error.is_finite() => "more than can be computed".to_owned(),
         Unit::Angle => format!("{:.*}°", decimals + 1, error.to_degrees()),
         Unit::Pixel => format!("{error:.decimals$} px"),
         _ if error < MIN_SCIENTIFIC_LENGTH => format!("{:.*} mm", decimals, error * 1e3),
@@ -78,7 +78,7 @@ mod tests {
     #[test]
     fn an_error_without_a_number_is_said_in_words() {
         for error in [f64::INFINITY, f64::NAN] {
-            assert_eq!(size("position", error, 3), "more than numbers hold");
+            assert_eq!(size("position", error, 3), "more than can be computed");
         }
         assert_eq!(
             (size("position", 1e-3, 2), size("tilt", 0.0, 1)),

@@ -11,13 +11,15 @@ use crate::least_squares::jacobian_and_residual;
 const RIDGE: f64 = 1e-9;
 
 impl Fitting<'_> {
-    /// Predicts each configuration of the identification rows by a fit without it, linearised at
-    /// the full parameter vector `x`; returns the errors measured − predicted, measuring frame
-    /// \[m\].
+    /// Returns the error measured − predicted of each identification row, measuring frame \[m\],
+    /// shape = (identification rows). Each row is predicted by a fit without its configuration,
+    /// linearised at the full parameter vector `x`.
     ///
-    /// r₋ = (I − H)⁻¹ r with the block H of J (JᵀJ + Λ)⁻¹ Jᵀ of the configuration and the priors Λ
-    /// [Cook and Weisberg 1982]. `configurations` numbers those of all rows, and `unknowns` are the
-    /// parameters that were fitted and rest on no bound.
+    /// r₋ = (I − H)⁻¹ r with the block H of J (JᵀJ + Λ)⁻¹ Jᵀ of the configuration [Cook and
+    /// Weisberg 1982]. Λ holds priors and earlier data; rows are weighted by the robust loss. If (I
+    /// − H) or JᵀJ + Λ is singular, r₋ = r. `configurations` holds the number of the configuration
+    /// of every row of the table. `unknowns` are the parameters that were fitted and rest on no
+    /// bound.
     pub fn left_out_errors(
         &self,
         x: &DVector<f64>,

@@ -98,7 +98,7 @@ impl SecondOrder {
     ///
     /// After convergence with S, linearised residuals refine the solution: their condition number
     /// is not squared.
-    pub fn retire(&mut self) -> bool {
+    pub fn stop_second_derivatives(&mut self) -> bool {
         self.is_retired = true;
         self.matrix.take().is_some()
     }
@@ -263,9 +263,9 @@ mod tests {
         second_order.check_straightness(0.1);
         assert!(second_order.accelerates());
         // Without S there is nothing to refine.
-        assert!(!second_order.retire() && !second_order.accelerates());
+        assert!(!second_order.stop_second_derivatives() && !second_order.accelerates());
         second_order.set_matrix(Some(DMatrix::identity(2, 2)));
-        assert!(second_order.retire() && !second_order.retire());
+        assert!(second_order.stop_second_derivatives() && !second_order.stop_second_derivatives());
     }
 
     #[test]

@@ -387,7 +387,8 @@ impl<O: Objective, S: Subproblem> Solver<O, State> for TrustRegion<S> {
         let size = self.scale.component_mul(if is_accepted { &step.point } else { &x }).norm();
         let log = kv!("ratio" => trial.ratio; "radius" => radius; "length" => trial.length;);
         let mut termination = self.test_convergence(&trial, size);
-        let retired = termination.is_some_and(Termination::converged) && self.second_order.retire();
+        let retired = termination.is_some_and(Termination::converged)
+            && self.second_order.stop_second_derivatives();
         if retired {
             termination = None;
         }

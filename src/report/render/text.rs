@@ -248,8 +248,8 @@ mod tests {
         let whole =
             "  name of effect     mean error  steps\n  joint = { q = 1 }        0.25     17\n";
         assert_eq!(table(&wide, 39), whole);
-        let wrapped = "  name of effect   mean  steps\n                  error\n  \
-                       joint = { q =    0.25     17\n  1 }\n";
+        let wrapped = "  name of          mean  steps\n  effect          error\n  \
+                       joint = {        0.25     17\n  q = 1 }\n";
         assert_eq!(table(&wide, 31), wrapped);
         let least = "  name     mean\n  of      error\n  effect\n  joint    0.25\n  = { q\n  = 1 }\n  \
                      omitted on this\n  narrow\n  terminal: steps\n";

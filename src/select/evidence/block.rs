@@ -155,8 +155,9 @@ impl Block {
         Self::all(vec![(design, ln_prior, coefficients)], fit).remove(0)
     }
 
-    /// Creates blocks from several designs of root mean square 1. Their columns are projected
-    /// together, because one product of many columns is faster.
+    /// Creates a block from each design of root mean square 1, the logarithm of its prior
+    /// probability, and the prior on its coefficients. All columns are projected in one product,
+    /// which is faster.
     pub fn all(designs: Vec<(Design, f64, Coefficients)>, fit: &LinearNeighbourhood) -> Vec<Self> {
         let dense = designs.iter().filter_map(|(design, ..)| {
             if let Design::Dense(columns) = design { Some(columns) } else { None }

@@ -150,7 +150,7 @@ impl<'a> Beam<'a> {
         let chunks: Vec<&Chunk> =
             self.terms.chunks.iter().filter(|chunk| chunk.width == 1).collect();
         let alone = |(number, chunk): (usize, &&Chunk)| {
-            let gains = chunk.lone_gains().zip(&chunk.ln_prior).enumerate();
+            let gains = chunk.single_term_gains().zip(&chunk.ln_prior).enumerate();
             let extension = |(term, (gain, ln_prior)): (usize, (f64, &f64))| {
                 let scored = self.scored(gain, 1, *ln_prior);
                 (gain > 0.0).then_some(Extension { place: (0, number, term), scored })

@@ -3,7 +3,7 @@
 use nalgebra::DVector;
 
 use super::beam::Beam;
-use super::dictionary::{factors, factors_elsewhere};
+use super::dictionary::{factors, factors_at_other_sites};
 use super::factor::Form;
 use super::quantities::Quantities;
 use super::refinement::{Refined, Refiner};
@@ -94,8 +94,8 @@ pub fn proposals(
     (site, noise): (&WhitenedSite, &Noise),
     present: &[Vec<DVector<f64>>],
 ) -> Vec<Proposal> {
-    let factors =
-        joint.map_or_else(|| factors_elsewhere(quantities), |joint| factors(quantities, joint));
+    let factors = joint
+        .map_or_else(|| factors_at_other_sites(quantities), |joint| factors(quantities, joint));
     let beam = Beam::new(Terms::new(factors, quantities, site), quantities, (site, noise));
     let (terms, sums) = beam.search();
     let mut sums: Vec<(Sum, f64)> =

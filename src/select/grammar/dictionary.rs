@@ -32,7 +32,7 @@ const MIN_SIGN_SHARE: f64 = 0.1;
 /// are conditions of a pose, and the commands with their sines and cosines.
 ///
 /// All kinds of factors have the same prior probability, and so have the joints.
-pub fn factors_elsewhere(quantities: &Quantities) -> Vec<Factor> {
+pub fn factors_at_other_sites(quantities: &Quantities) -> Vec<Factor> {
     let is_listed = |factor: &Factor| match factor.form {
         Form::Command(_) => true,
         Form::Wave { order, .. } => order == 1,

@@ -361,7 +361,7 @@ impl Terms {
 
     /// Returns the `most` terms that alone reduce the residual most, in chunks.
     fn best(chunks: Vec<Chunk>, most: usize) -> Vec<Chunk> {
-        let mut gains: Vec<f64> = chunks.iter().flat_map(Chunk::lone_gains).collect();
+        let mut gains: Vec<f64> = chunks.iter().flat_map(Chunk::single_term_gains).collect();
         if gains.len() <= most {
             return chunks;
         }
@@ -372,7 +372,7 @@ impl Terms {
     /// Returns the `most` terms that alone reduce the residual most.
     fn best_terms(chunks: &[Chunk], most: usize) -> Vec<Product> {
         let mut gains_and_terms: Vec<(f64, &Product)> =
-            chunks.iter().flat_map(|chunk| chunk.lone_gains().zip(&chunk.terms)).collect();
+            chunks.iter().flat_map(|chunk| chunk.single_term_gains().zip(&chunk.terms)).collect();
         let order = |a: &(f64, &Product), b: &(f64, &Product)| {
             b.0.total_cmp(&a.0).then_with(|| a.1.cmp(b.1))
         };
@@ -387,7 +387,7 @@ impl Terms {
 
 impl Chunk {
     /// Returns the sum of squares that each term alone explains.
-    pub fn lone_gains(&self) -> impl Iterator<Item = f64> + '_ {
+    pub fn single_term_gains(&self) -> impl Iterator<Item = f64> + '_ {
         (0..self.terms.len()).map(|term| self.gain(term, |_, _| 0.0, |_| 0.0).0)
     }
 
@@ -453,7 +453,7 @@ impl Chunk {
 
     /// Keeps the terms that alone explain more than the sum of squares `least`.
     fn explaining_more_than(self, least: f64) -> Self {
-        let gains: Vec<f64> = self.lone_gains().collect();
+        let gains: Vec<f64> = self.single_term_gains().collect();
         let kept: Vec<usize> = (0..gains.len()).filter(|&k| gains[k] > least).collect();
         if kept.len() == gains.len() {
             return self;

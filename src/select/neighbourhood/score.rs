@@ -1,6 +1,6 @@
 //! Score of columns that were not fitted, and the F test of its gain.
 
-use crate::residual_tests::ROUNDING;
+use crate::residual_tests::MIN_RESIDUAL_SIGMAS;
 use crate::select::settings::MIN_NEW_LENGTH;
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
@@ -71,7 +71,7 @@ impl Sums {
     /// directions; `None` if no degrees of freedom remain.
     pub fn gain_of(&self, squares: f64, freedom: usize) -> Option<Gain> {
         let degrees = self.freedom();
-        let total = self.squares.max(ROUNDING.powi(2) * degrees);
+        let total = self.squares.max(MIN_RESIDUAL_SIGMAS.powi(2) * degrees);
         let remaining_degrees = degrees - freedom as f64;
         if remaining_degrees < 1.0 || freedom == 0 {
             return None;

@@ -315,7 +315,7 @@ fn fit_with_found(
     let sure: Vec<Effect> = sure.map(|found| found.effect.clone()).collect();
     let problem = state.problem(fitted, &sure);
     // Only the errors of this fit are reported, so a fit of many unknowns is not checked.
-    let options = if state.paid_fits(fitted) > 1 {
+    let options = if state.affordable_fits(fitted) > 1 {
         fitted.continuing(options)
     } else {
         Options { provisional: true, ..fitted.succeeding(options, true) }

@@ -18,8 +18,8 @@ const MAX_POLISHING_PASSES: usize = 8;
 const TRIAL_FACTORS: [f64; 10] = [0.8, 0.86, 0.91, 0.95, 0.98, 1.02, 1.05, 1.1, 1.16, 1.25];
 
 /// Returns the fit with refined arguments. Each searched argument is replaced by the one that
-/// explains all identification rows best in the linear neighbourhood, if that is clearly better;
-/// `None` if none is.
+/// explains all identification rows best in the linear neighbourhood, if that is clearly better.
+/// Returns `None` if none is, or if the evidence already used all rows and times.
 ///
 /// # Errors
 /// Returns an error if the fit fails or the search was stopped.

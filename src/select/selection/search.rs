@@ -151,7 +151,7 @@ fn refitted(
     };
     let functions = best.without_law();
     let mut rivals = evidence.exchanged(&best, MAX_RIVALS);
-    rivals.truncate(state.paid_fits(fitted) - 1);
+    rivals.truncate(state.affordable_fits(fitted) - 1);
     let mut tried: Vec<(HypothesisSet, f64, Fitted)> = Vec::new();
     // The map holds ln posterior of the present set for each set of outliers.
     let mut of_held: BTreeMap<BTreeSet<usize>, Option<f64>> = BTreeMap::new();

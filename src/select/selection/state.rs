@@ -123,7 +123,7 @@ impl<'a> SearchState<'a> {
 
     /// Returns the number of fits, with as many unknowns as this one, that the budget `fit_work`
     /// allows; at least one.
-    pub fn paid_fits(&self, fitted: &Fitted) -> usize {
+    pub fn affordable_fits(&self, fitted: &Fitted) -> usize {
         self.paid_fits_of(fitted.unknowns.len())
     }
 

@@ -85,7 +85,7 @@ impl Rows<'_> {
                 (Quantity::temperature(), each(&value), Box::new(law))
             }
             // This case applies if the lagged temperature itself multiplies every term.
-            LawQuantity::Lagging { time_constant } if self.is_each(quantity) => {
+            LawQuantity::Lagging { time_constant } if self.has_only_regressor(quantity) => {
                 let sum: f64 = self.terms.iter().map(|term| term.1).sum();
                 let regressor = &self.terms.first()?.0;
                 let values = each(&|pose| regressor.value(pose) + reference);
@@ -119,7 +119,7 @@ impl Rows<'_> {
     }
 
     /// Returns true if the regressor of every term is this quantity itself.
-    pub fn is_each(&self, quantity: LawQuantity) -> bool {
+    pub fn has_only_regressor(&self, quantity: LawQuantity) -> bool {
         self.terms.iter().all(|(regressor, _)| regressor.as_quantity() == Some(quantity))
     }
 

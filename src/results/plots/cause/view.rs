@@ -117,7 +117,10 @@ pub fn beyond_joints<'a>(found: &Effect, problem: &Problem, rows: &'a Rows) -> V
 fn at_link<'a>(found: &Effect, problem: &Problem, rows: &'a Rows) -> Option<View<'a>> {
     let is_strain = |site: &ParameterSite| matches!(site, ParameterSite::Beam { field, .. } if field.is_strain());
     let &[quantity] = rows.quantities().as_slice() else { return None };
-    if !(quantity.is_thermal() && rows.sites.iter().all(is_strain) && rows.is_each(quantity)) {
+    if !(quantity.is_thermal()
+        && rows.sites.iter().all(is_strain)
+        && rows.has_only_regressor(quantity))
+    {
         return None;
     }
     let (across, values, _) = rows.over_quantity(quantity, problem)?;
