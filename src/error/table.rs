@@ -68,6 +68,18 @@ pub enum TableErrorKind {
          measured row"
     )]
     ManyRowsToPair { logged: usize, rows: usize },
+    #[error(
+        "by = \"order\" pairs {} with {}, and most of these names occur in both tables; write by = \
+         \"name\", or sort the tables alike",
+        pair[0], pair[1]
+    )]
+    OrderContradicted { pair: [String; 2] },
+    #[error(
+        "{left} of {rows} measured rows have no partner of the same name in the joint table, but \
+         most differ from one only in spelling, as {} and {}; write the names alike",
+        pair[0], pair[1]
+    )]
+    NamesWrittenOtherwise { left: usize, rows: usize, pair: [String; 2] },
     #[error("no rows below the header")]
     NoRowsBelowHeader,
     #[error("an Excel workbook; save its sheet as CSV")]
@@ -138,7 +150,10 @@ pub enum TableErrorKind {
     MistypedColumn { meant: String },
     #[error("given already as column {first}; keep one of the two")]
     RepeatedColumn { first: String },
-    #[error("{}; give every file the same columns", difference(other, *has))]
+    #[error(
+        "{}; give every file the same columns (a column without values may be left out of all)",
+        difference(other, *has)
+    )]
     ColumnsDiffer { other: PathBuf, has: bool },
     #[error("{found} values for {expected} rows")]
     ColumnLength { expected: usize, found: usize },

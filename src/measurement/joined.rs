@@ -1,6 +1,6 @@
 //! Join of a table of measured positions with a table of joint coordinates.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::path::PathBuf;
 
 use csv::ByteRecord;
@@ -46,8 +46,12 @@ pub(super) struct JoinedLog {
     unpaired: Vec<Location>,
     paired: usize,
     decoding_warnings: Vec<Warning>,
-    /// First name of a position without a partner, for a join by name.
-    unpaired_name: Option<String>,
+    /// Names of the positions without a partner, for a join by name.
+    unpaired_names: Vec<String>,
+    /// Column of the name in the current table and in the joint table, for a join by order.
+    name_columns: Option<(usize, usize)>,
+    /// Names of both rows of each pair that is joined by order and whose names differ.
+    unlike_pairs: Vec<[String; 2]>,
     /// Times of the measured rows \[s\], for a join by time.
     times: Vec<f64>,
 }
@@ -66,6 +70,20 @@ struct LogRow {
     time: f64,
     /// Number of measured rows whose partner this row is.
     uses: usize,
+}
+
+/// Returns the column with names of poses.
+fn name_column(names: &[String]) -> Option<usize> {
+    let place = |wanted: &str| names.iter().position(|name| name == wanted);
+    place("pose").or_else(|| place("name"))
+}
+
+/// Returns a name in lower case, without spaces, marks and the zeros before a number.
+fn plain_name(name: &str) -> String {
+    let letters: Vec<char> =
+        name.to_lowercase().chars().filter(|letter| letter.is_alphanumeric()).collect();
+    let runs = letters.chunk_by(|a, b| a.is_ascii_digit() == b.is_ascii_digit());
+    runs.map(|run| run.iter().collect::<String>().trim_start_matches('0').to_owned()).collect()
 }
 
 impl JoinedLog {
@@ -93,7 +111,9 @@ impl JoinedLog {
             unpaired: Vec::new(),
             paired: 0,
             decoding_warnings: Vec::new(),
-            unpaired_name: None,
+            unpaired_names: Vec::new(),
+            name_columns: None,
+            unlike_pairs: Vec::new(),
             times: Vec::new(),
         };
         for file in &log.files {
@@ -156,10 +176,10 @@ impl JoinedLog {
         let place = |wanted: &str| names.iter().position(|name| name == wanted);
         let (key, write) = match self.rule {
             JoinRule::Order => return Ok(None),
-            JoinRule::Name => {
-                let named = place("pose").or_else(|| place("name"));
-                (named.map(|place| Key { place, to_si: std::convert::identity }), "pose or name")
-            }
+            JoinRule::Name => (
+                name_column(names).map(|place| Key { place, to_si: std::convert::identity }),
+                "pose or name",
+            ),
             JoinRule::Time { .. } => {
                 let with_unit = Unit::Time.suffixes().iter().find_map(|suffix| {
                     let place = place(&format!("time_{}", suffix.name))?;
@@ -182,6 +202,9 @@ impl JoinedLog {
         let names: Vec<String> =
             Names::map_present(table, dialect).into_iter().map(str::to_owned).collect();
         self.key = self.find_key(table, &names)?;
+        if self.rule == JoinRule::Order {
+            self.name_columns = name_column(&names).zip(name_column(&self.names));
+        }
         let is_new = |place: &usize| {
             let (name, header) = (self.names.get(*place), self.header.get(*place));
             name.is_some_and(|name| !names.contains(name))
@@ -204,7 +227,7 @@ impl JoinedLog {
                 let name = table.name(key.place)?;
                 let partner = self.of_name.get(name).copied();
                 if partner.is_none() {
-                    self.unpaired_name.get_or_insert_with(|| name.to_owned());
+                    self.unpaired_names.push(name.to_owned());
                 }
                 partner
             }
@@ -224,6 +247,14 @@ impl JoinedLog {
         };
         row.uses += 1;
         self.paired += 1;
+        if let Some((place, of_log)) = self.name_columns
+            && let Ok(name) = table.text(place)
+        {
+            let other = String::from_utf8_lossy(row.cells.get(of_log).unwrap_or_default());
+            if name != other.trim() {
+                self.unlike_pairs.push([name.to_owned(), other.trim().to_owned()]);
+            }
+        }
         let cells = self.appended.iter().map(|&place| row.cells.get(place).unwrap_or_default());
         table.append_cells(cells, (&row.file, row.line));
         Ok(true)
@@ -269,8 +300,9 @@ impl JoinedLog {
     ///
     /// # Errors
     /// Returns an error if no measured row has a partner, if another offset between the clocks
-    /// certainly pairs the rows and this one does not, if most rows have the same, distant partner,
-    /// or if a join by order meets a joint table of several rows for each measured row.
+    /// certainly pairs the rows and this one does not, or if most rows have the same, distant partner.
+    /// Also if names show that most rows are paired wrongly, or not at all, and if a join by order
+    /// meets a joint table of several rows for each measured row.
     fn check_pairing(&self) -> Result<(), InputError> {
         let error = |kind: TableErrorKind| Err(self.location.clone().error(kind));
         if self.paired == 0 && self.requested > 0 {
@@ -284,10 +316,19 @@ impl JoinedLog {
         if self.rule == JoinRule::Order && logged >= 2 * rows {
             return error(TableErrorKind::ManyRowsToPair { logged, rows });
         }
+        let quoted = |pair: [&str; 2]| pair.map(|name| format!("\"{}\"", shortened(name)));
+        if let Some(pair) = self.order_contradicted_by_names() {
+            return error(TableErrorKind::OrderContradicted { pair: quoted(pair) });
+        }
+        let left = self.unpaired.len();
+        if 2 * left > rows
+            && let Some(pair) = self.names_written_otherwise()
+        {
+            return error(TableErrorKind::NamesWrittenOtherwise { left, rows, pair: quoted(pair) });
+        }
         if !matches!(self.rule, JoinRule::Time { .. }) {
             return Ok(());
         }
-        let left = self.unpaired.len();
         if 2 * left > rows
             && let Some(offset) = self.offset()
         {
@@ -311,10 +352,33 @@ impl JoinedLog {
         }
     }
 
+    /// Returns the names of one pair that is joined by order, if most pairs have different names, and
+    /// most of these names occur in both tables.
+    fn order_contradicted_by_names(&self) -> Option<[&str; 2]> {
+        let of_log: HashSet<&str> =
+            self.unlike_pairs.iter().map(|[_, other]| other.as_str()).collect();
+        let misplaced = || self.unlike_pairs.iter().filter(|pair| of_log.contains(&*pair[0]));
+        let [name, other] = misplaced().next()?;
+        (2 * misplaced().count() > self.requested).then_some([name, other])
+    }
+
+    /// Returns a name of a position without a partner, and the name of a joint row that differs from
+    /// it only in case, spaces, marks or leading zeros, if most names without a partner have one.
+    fn names_written_otherwise(&self) -> Option<[&str; 2]> {
+        let plain: HashMap<String, &str> =
+            self.of_name.keys().map(|name| (plain_name(name), name.as_str())).collect();
+        let mut pairs = self.unpaired_names.iter().filter_map(|name| {
+            let other = plain.get(&plain_name(name))?;
+            Some([name.as_str(), *other])
+        });
+        let first = pairs.next()?;
+        (2 * (1 + pairs.count()) > self.unpaired_names.len()).then_some(first)
+    }
+
     /// Shows the keys of both tables, to find why no row has a partner: one name of each, or the
     /// ranges of their times; `None` for a join by order.
     fn keys(&self) -> Option<[String; 2]> {
-        if let Some(name) = &self.unpaired_name {
+        if let Some(name) = self.unpaired_names.first() {
             let log = self.of_name.iter().min_by_key(|(_, row)| **row)?.0;
             return Some([name, log].map(|name| format!("\"{}\"", shortened(name))));
         }
@@ -346,15 +410,16 @@ impl JoinedLog {
             JoinRule::Time { .. } => Vec::new(),
             _ => unused.map(|row| Location::file(&row.file).at_line(row.line)).collect(),
         };
-        let warning = |rows: &[Location], gap: Option<String>| {
+        // A lost measurement is a loss, an unused joint row is not.
+        let warning = |rows: &[Location], gap: Option<String>, listed: usize| {
             let location = rows.first()?.clone();
-            let listed = rows.iter().skip(1).take(MAX_LISTED_ROWS).map(ToString::to_string);
-            let others = listed.collect();
+            let others = rows.iter().skip(1).take(listed).map(ToString::to_string).collect();
             let kind = WarningKind::WithoutPartner { rows: rows.len(), others, gap };
             Some(Warning { location, kind })
         };
         let unpaired =
-            [warning(&self.unpaired, self.gap()), warning(&unused, None)].into_iter().flatten();
+            [warning(&self.unpaired, self.gap(), MAX_LISTED_ROWS), warning(&unused, None, 0)];
+        let unpaired = unpaired.into_iter().flatten();
         Ok(self.decoding_warnings.iter().cloned().chain(unpaired).collect())
     }
 }

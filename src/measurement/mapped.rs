@@ -75,14 +75,26 @@ impl<'a> Names<'a> {
     }
 
     /// Returns the names that rules of `[data.columns]` assign to existing columns of this table.
-    /// Rules without a column are skipped, because another table may have it.
+    /// Rules without a column are skipped, because another table may have it. A rule by place gives
+    /// way to rules by name.
     pub fn map_present(table: &'a Table, dialect: &'a Dialect) -> Vec<&'a str> {
-        let theirs = |header: &String| ColumnSelector::Name(header.clone());
-        let ours = |header: &'a String| {
-            let rule = dialect.columns.iter().find(|rule| rule.theirs == theirs(header));
-            rule.map_or(header.as_str(), |rule| rule.ours.as_str())
+        let by_name = |header: &String| {
+            let theirs = ColumnSelector::Name(header.clone());
+            dialect.columns.iter().find(|rule| rule.theirs == theirs)
         };
-        table.header.iter().map(ours).collect()
+        let named: Vec<Option<&ColumnRule>> = table.header.iter().map(by_name).collect();
+        let is_given = |ours: &str| named.iter().flatten().any(|rule| rule.ours == ours);
+        let by_place = |place: usize| {
+            let theirs = ColumnSelector::Place(place + 1);
+            let rule = dialect.columns.iter().find(|rule| rule.theirs == theirs);
+            rule.filter(|rule| !is_given(&rule.ours))
+        };
+        let columns = table.header.iter().zip(&named).enumerate();
+        columns
+            .map(|(place, (header, named))| {
+                named.or_else(|| by_place(place)).map_or(header.as_str(), |rule| &rule.ours)
+            })
+            .collect()
     }
 
     /// Iterates over flexcal's names of the columns.

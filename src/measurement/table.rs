@@ -16,8 +16,8 @@ use crate::error::{
     WarningKind, is_hidden, lines,
 };
 use crate::files::{open, unescape_cell};
-use crate::problem::Dialect;
 use crate::problem::item::MAX_MAGNITUDE;
+use crate::problem::{ColumnRule, ColumnSelector, Dialect};
 
 /// Maximum number of columns of a table.
 const MAX_COLUMNS: usize = 10_000;
@@ -42,6 +42,8 @@ pub(super) struct Table {
     record: ByteRecord,
     line: usize,
     style: CellStyle,
+    /// True if the first record is a row that was not returned yet, because there is no header.
+    starts_with_row: bool,
     /// Order of day and month, by the first lines.
     pub date_order: DateOrder,
     /// Format of the appended cells of another table, and the number of cells before them.
@@ -101,6 +103,7 @@ impl Table {
                 delimiter: char::from(layout.byte()),
                 decimal_comma: dialect.decimal_comma,
             },
+            starts_with_row: false,
             date_order,
             appended: None,
             appended_header: None,
@@ -132,6 +135,10 @@ impl Table {
                 _ => return Err(header_error(InputErrorKind::HeaderNotUtf8)),
             }
         }
+        if table.has_no_header(&dialect.columns) {
+            table.header = (1..=table.header.len()).map(|place| format!("#{place}")).collect();
+            table.starts_with_row = true;
+        }
         if let [only] = table.header.as_slice()
             && let Some(found) = only.chars().find(|c| ";\t|".contains(*c))
         {
@@ -140,9 +147,22 @@ impl Table {
         Ok(table)
     }
 
+    /// Returns true if the first record is a row of numbers: `rules` select columns by their places,
+    /// and the cells there are numbers that do not count the columns.
+    fn has_no_header(&self, rules: &[ColumnRule]) -> bool {
+        let cell = |rule: &ColumnRule| match rule.theirs {
+            ColumnSelector::Place(place) => self.header.get(place.checked_sub(1)?),
+            _ => None,
+        };
+        let is_number = |cell: &String| cell.replace(',', ".").parse::<f64>().is_ok();
+        let counts =
+            |from: usize| (from..).zip(&self.header).all(|(k, name)| *name == k.to_string());
+        rules.iter().filter_map(cell).any(is_number) && !counts(0) && !counts(1)
+    }
+
     /// Reads the next row; returns false at the end.
     pub fn next_row(&mut self) -> Result<bool, InputError> {
-        if !self.advance()? {
+        if !std::mem::take(&mut self.starts_with_row) && !self.advance()? {
             return Ok(false);
         }
         let expected = self.appended.map_or(self.header.len(), |(_, own_cells)| own_cells);

@@ -10,7 +10,7 @@ use crate::model::parameter::{Parameter, ParameterSite};
 
 /// Largest error of the registered nominal arm, relative to the spread of the measurements, that is
 /// not reported.
-const MAX_NOMINAL_MISS: f64 = 0.1;
+pub(super) const MAX_NOMINAL_MISS: f64 = 0.1;
 /// Smallest spread of contacts, relative to the arm's reach, that is used as a scale. With a
 /// smaller one, all contacts are at one place, and their predicted spread is only the arm's error.
 const MIN_RELATIVE_SPREAD: f64 = 0.05;
@@ -29,6 +29,15 @@ pub(super) fn is_nominal_far_off(fit: &CheckedFit) -> bool {
     spread > least && rms > MAX_NOMINAL_MISS * spread
 }
 
+impl CheckedFit<'_> {
+    /// Returns true if a coordinate of a base is a free parameter.
+    pub fn is_base_free(&self) -> bool {
+        let is_of_base =
+            |parameter: &Parameter| matches!(parameter.site, ParameterSite::Base { .. });
+        self.fitting.model.parameters.iter().any(is_of_base)
+    }
+}
+
 impl Check for NominalIsNear {
     fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
         if !is_nominal_far_off(fit) {
@@ -37,10 +46,7 @@ impl Check for NominalIsNear {
         let rms = fit.registered.identification.rms.norm;
         let RowKind { observation, spread, .. } = fit.kind(fit.fitting.measurements.leading());
         let kind = observation.kind();
-        let is_of_base =
-            |parameter: &Parameter| matches!(parameter.site, ParameterSite::Base { .. });
-        let is_base_free = fit.fitting.model.parameters.iter().any(is_of_base);
-        vec![far_off_finding(kind, (rms, spread), is_base_free, &fit.explanations().near)]
+        vec![far_off_finding(kind, (rms, spread), fit.is_base_free(), &fit.explanations().near)]
     }
 }
 

@@ -115,6 +115,8 @@ pub enum Misreading {
         /// Exponent of the power of ten by which the length must be multiplied.
         power: i8,
     },
+    /// The base stands elsewhere than declared, and the problem holds it there.
+    HeldBase,
     /// The target of `[tool]` is in millimetres, declared as metres.
     TargetInMillimetres,
     /// Lengths of joints are in millimetres, declared as metres; likewise a target longer than 1 m.

@@ -88,7 +88,8 @@ fn explanations(fit: &CheckedFit) -> Explanations {
     } else {
         candidates(fit.problem, measurements)
     };
-    let tested: Vec<Misreading> = listed.into_iter().filter(is_tested).collect();
+    let mut tested: Vec<Misreading> = listed.into_iter().filter(is_tested).collect();
+    tested.extend((is_position && !fit.is_base_free()).then_some(Misreading::HeldBase));
     let mut errors = trial.registered_errors(&tested);
     errors.sort_by(|a, b| a.1.total_cmp(&b.1));
     let near_alone = near_misreadings(&errors, nominal);

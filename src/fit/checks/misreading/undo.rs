@@ -48,6 +48,13 @@ impl Misreading {
     pub(super) fn rewritten(self, declared: &Problem) -> Option<Problem> {
         let mut problem = declared.clone();
         match self {
+            Self::HeldBase => {
+                let (pattern, none) = ("base*".to_owned(), Quantities::default());
+                let freedom = Freedom::Free { sigma: none, min: none, max: none };
+                let location = problem.data.location.clone();
+                problem.parameters.push(ParameterRule { pattern, freedom, location });
+                return Some(problem);
+            }
             Self::TargetInMillimetres => {}
             Self::ArmInMillimetres => {
                 let lengths = problem.joints.iter_mut().flat_map(lengths_of);

@@ -106,6 +106,9 @@ impl fmt::Display for Misreading {
                     power_of_ten(power)
                 )
             }
+            Self::HeldBase => f.write_str(
+                "a base that stands elsewhere than declared (free it in [parameters]: \"base.*\" = { free = true })",
+            ),
             Self::TargetInMillimetres => {
                 f.write_str("a target of [tool] that is in millimetres, declared in metres")
             }
