@@ -107,6 +107,12 @@ pub fn after_loop(
     if !result.trusted {
         return format!("flexcal identify {named} -v, once the input is corrected");
     }
+    if report::lacks_masses(result) {
+        return format!(
+            "declare the masses in {}, then flexcal loop {named}",
+            common.problem_file().display()
+        );
+    }
     if result.structures().any(|left| left.limit.is_some()) {
         return format!(
             "flexcal identify {named} -v shows how far the error would fall if a limit moved out; widen those that may be wrong"

@@ -102,13 +102,15 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         }
     });
     texts.extend(errors.clone().map(|json| ("errors.json", json)));
+    let fitted = estimate.as_ref().map_or_else(Vec::new, |estimate| estimate.fitted_among(&rows));
     let arm = if estimate.is_some() { "the identified arm" } else { "the nominal arm" };
-    texts.push((RESULTS[3], report::prediction_page(&problem, arm, &prediction, bounds)));
+    texts
+        .push((RESULTS[3], report::prediction_page(&problem, arm, &prediction, (bounds, &fitted))));
     let borrowed: Vec<(&str, &str)> =
         texts.iter().map(|(name, text)| (*name, text.as_str())).collect();
     results.write(&borrowed)?;
     common.print_result(errors.as_deref().unwrap_or(&PredictionErrors::default().to_json()), || {
-        let text = report::prediction_text(&problem, arm, &prediction, bounds);
+        let text = report::prediction_text(&problem, arm, &prediction, (bounds, &fitted));
         let names: Vec<&str> = texts.iter().map(|(name, _)| *name).collect();
         let problem = shell_word(common.problem());
         let next = match &arguments.estimate {

@@ -305,26 +305,25 @@ impl JoinedLog {
     /// meets a joint table of several rows for each measured row.
     fn check_pairing(&self) -> Result<(), InputError> {
         let error = |kind: TableErrorKind| Err(self.location.clone().error(kind));
+        let quoted = |pair: [&str; 2]| pair.map(|name| format!("\"{}\"", shortened(name)));
+        let (left, rows, logged) = (self.unpaired.len(), self.requested, self.rows.len());
+        if 2 * left > rows
+            && let Some(pair) = self.names_written_otherwise()
+        {
+            return error(TableErrorKind::NamesWrittenOtherwise { left, rows, pair: quoted(pair) });
+        }
         if self.paired == 0 && self.requested > 0 {
             let (gap, keys, offset) = (self.gap(), self.keys(), self.offset());
             return error(TableErrorKind::NothingJoined { gap, keys, offset });
         }
-        let (rows, logged) = (self.requested, self.rows.len());
         if rows < MIN_CHECKED_ROWS {
             return Ok(());
         }
         if self.rule == JoinRule::Order && logged >= 2 * rows {
             return error(TableErrorKind::ManyRowsToPair { logged, rows });
         }
-        let quoted = |pair: [&str; 2]| pair.map(|name| format!("\"{}\"", shortened(name)));
         if let Some(pair) = self.order_contradicted_by_names() {
             return error(TableErrorKind::OrderContradicted { pair: quoted(pair) });
-        }
-        let left = self.unpaired.len();
-        if 2 * left > rows
-            && let Some(pair) = self.names_written_otherwise()
-        {
-            return error(TableErrorKind::NamesWrittenOtherwise { left, rows, pair: quoted(pair) });
         }
         if !matches!(self.rule, JoinRule::Time { .. }) {
             return Ok(());

@@ -3,7 +3,7 @@
 use super::detection;
 use super::document::{Block, Column, Table, opening};
 use super::figures::{ACCENT, Curve, Drawing, FAINT, INK, Series};
-use super::forecast::{assumptions, cells};
+use super::forecast::{assumptions, cells, measured_for};
 use super::parameters::{conditioning, unidentifiable};
 use super::render::{page, text};
 use crate::design::{Check, ExpectedParameter, Forecast, GrowthStep, Prediction, PredictionPoses};
@@ -43,7 +43,7 @@ fn blocks<'a>(problem: &Problem, check: &Check) -> Vec<Block<'a>> {
         format!("{}, {}", counted(names.len(), "parameter"), counted(forecast.poses, "pose"));
     let mut blocks = opening(&problem.title, counts).to_vec();
     blocks.extend([
-        Block::lines(enough(check)),
+        Block::lines(enough(problem, check)),
         Block::lines(prediction(check)),
         Block::Table(Table::new(&header, rows.collect(), &[0, 4, 5]).noted(&notes)),
         Block::Page(vec![conditioning(
@@ -189,8 +189,12 @@ fn growth(check: &Check) -> Table {
     )
 }
 
-fn enough(check: &Check) -> String {
+fn enough(problem: &Problem, check: &Check) -> String {
     match check.growth.enough {
+        Some(enough) if let Some(measured) = measured_for(problem, enough) => format!(
+            "Measure {measured} poses, of which held_out removes {}; more barely help: then all that such poses can identify is identified, and predictions are as accurate as one measured position.",
+            measured - enough
+        ),
         Some(enough) => format!(
             "Measure {enough} poses; more barely help: then all that such poses can identify is identified, and predictions are as accurate as one measured position."
         ),

@@ -33,11 +33,11 @@ pub(super) fn assumptions<'a>(
     fitted: Option<usize>,
 ) -> Option<Block<'a>> {
     let mut points = Vec::new();
-    if let (Some(HeldOut::Fraction { fraction, .. }), Some(fitted)) =
-        (&problem.data.held_out, fitted)
+    if let Some(HeldOut::Fraction { fraction, .. }) = &problem.data.held_out
+        && let Some(fitted) = fitted
+        && let Some(measured) = measured_for(problem, fitted)
     {
-        let (share, measured) =
-            (100.0 * fraction, (fitted as f64 / (1.0 - fraction) - 1e-9).ceil());
+        let share = 100.0 * fraction;
         points.push(format!(
             "All {} are fitted. held_out in [data] removes {} % of the measured poses from the fit: measure {measured} poses to fit as \
              many.",
@@ -56,6 +56,15 @@ pub(super) fn assumptions<'a>(
         );
     }
     (!points.is_empty()).then(|| Block::Lines("These figures assume:".to_owned(), points))
+}
+
+/// Returns the number of poses to measure so that `fitted` are fitted; `None` unless a fraction of
+/// the poses is held out.
+pub(super) fn measured_for(problem: &Problem, fitted: usize) -> Option<usize> {
+    let Some(HeldOut::Fraction { fraction, .. }) = &problem.data.held_out else { return None };
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a count of poses")]
+    let measured = (fitted as f64 / (1.0 - fraction) - 1e-9).ceil() as usize;
+    Some(measured)
 }
 
 /// Formats a size \[SI\] with two significant digits.

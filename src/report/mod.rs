@@ -66,6 +66,7 @@ pub(crate) use replica::{replica_report, replica_text};
 pub(crate) use shell::shell_word;
 pub(crate) use study::study_page;
 pub(crate) use trace::trace_page;
+pub(crate) use unexplained::lacks_masses;
 pub(crate) use verdict::interrupted;
 pub(crate) use watch::{watch_page, watch_text};
 // These items are public for the tests, the benches and the Python module only.

@@ -4,6 +4,7 @@ use super::document::{Block, Table, opening};
 use super::figures::{ACCENT, Curve, Drawing, INK, Series};
 use super::render::{page, text};
 use crate::design::{NextOptions, NextPoses, Purpose, StopReason, WorkspaceError};
+use crate::measurement::Measurements;
 use crate::problem::Problem;
 use crate::quantity::format::{counted, number, or_dash};
 use crate::results::{CommandedJoint, commanded_joints};
@@ -56,15 +57,17 @@ fn blocks<'a>(problem: &Problem, options: &NextOptions, next: &NextPoses) -> Vec
     }));
     if !next.effects.is_empty() {
         let effects = next.effects.iter().map(crate::problem::Effect::describe);
-        blocks
-            .push(Block::Lines("Effects that the poses tell apart:".to_owned(), effects.collect()));
+        blocks.push(Block::Lines(
+            "Effects that the poses distinguish:".to_owned(),
+            effects.collect(),
+        ));
     }
     blocks.push(Block::figures([errors(options, next, percent)]));
     if !next.steps.is_empty() {
         blocks.push(Block::Table(steps(options, next, percent)));
         blocks.push(Block::Page(vec![
             Block::heading("The chosen poses, in the order of measurement"),
-            Block::Table(commands(problem, next)),
+            Block::Table(commands(problem, &next.poses)),
         ]));
     }
     blocks
@@ -105,11 +108,11 @@ fn errors(options: &NextOptions, next: &NextPoses, percent: &str) -> Option<Draw
     .drawing()
 }
 
-/// Returns the table of the commands of the chosen poses.
-fn commands(problem: &Problem, next: &NextPoses) -> Table {
+/// Returns the table of the commands of chosen poses.
+pub(super) fn commands(problem: &Problem, poses: &Measurements) -> Table {
     let joints = commanded_joints(problem);
-    let rows = (0..next.poses.len()).map(|pose| {
-        let q = next.poses.configuration(pose);
+    let rows = (0..poses.len()).map(|pose| {
+        let q = poses.configuration(pose);
         let value = |joint: &CommandedJoint| {
             let command = q.get(joint.joint).copied().unwrap_or(f64::NAN) * joint.factor();
             let space = if joint.symbol() == "°" { "" } else { " " };

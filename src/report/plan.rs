@@ -1,9 +1,10 @@
 //! Text and page of the command `plan`: the poses to measure and the accuracy that they are
 //! expected to give.
 
-use super::document::{Block, Table, opening};
+use super::document::{Block, Table, code, opening};
 use super::figures::{ACCENT, Drawing, Forest};
 use super::forecast::{assumptions, cells};
+use super::next::commands;
 use super::parameters::{conditioning, unidentifiable};
 use super::render::{page, text};
 use super::separation;
@@ -102,6 +103,7 @@ fn blocks<'a>(
     let mut blocks = opening(&problem.title, counts).to_vec();
     blocks.push(enough(plan));
     blocks.extend(gain);
+    blocks.extend(at_limits(problem, plan).map(Block::Text));
     blocks.push(Block::Table(Table::new(&header, rows.collect(), &[0, 6]).noted(&[&note])));
     blocks.push(Block::figures([gains(plan)]));
     blocks.push(Block::Page(vec![conditioning(
@@ -112,7 +114,32 @@ fn blocks<'a>(
     blocks.push(unidentifiable(&planned.identifiability, &names, "plan.json"));
     blocks.extend(assumptions(problem, &planned.expected, Some(poses + given)));
     blocks.extend(separated.map(separation::blocks).unwrap_or_default());
+    blocks.push(Block::Page(vec![
+        Block::heading("The planned poses"),
+        Block::Table(commands(problem, &plan.poses)),
+    ]));
     blocks
+}
+
+/// States how many poses command a joint to its limit, where controllers may refuse them; `None` if
+/// no pose does.
+fn at_limits(problem: &Problem, plan: &Plan) -> Option<String> {
+    let is_at_limit = |pose: &usize| {
+        let joints = plan.poses.configuration(*pose).iter().zip(&problem.joints);
+        joints.into_iter().any(|(q, joint)| {
+            let (low, high) = joint.limits;
+            low < high && (*q <= low || *q >= high)
+        })
+    };
+    let count = (0..plan.poses.len()).filter(is_at_limit).count();
+    (count > 0).then(|| {
+        format!(
+            "{count} of the poses have a joint at its limit. If the controller refuses such commands, declare limits with a margin ({}, \
+             {}) and plan again.",
+            code("min_deg"),
+            code("max_deg")
+        )
+    })
 }
 
 /// Draws the standard error of each parameter after random poses over that after planned ones.

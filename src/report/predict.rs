@@ -10,17 +10,18 @@ use super::render::{page, text};
 use super::row_kinds::unsteady;
 use crate::fit::{ErrorSummary, Prediction};
 use crate::problem::Problem;
-use crate::quantity::format::counted;
+use crate::quantity::format::{counted, mm};
 use crate::remainder::Bounds;
 
-/// Returns the predictions as text; `arm` describes the arm that was used.
+/// Returns the predictions as text; `arm` describes the arm that was used, and `fitted` lists the
+/// rows to which it was fitted.
 pub fn prediction_text(
     problem: &Problem,
     arm: &str,
     prediction: &Prediction,
-    bounds: Option<&Bounds>,
+    (bounds, fitted): (Option<&Bounds>, &[usize]),
 ) -> String {
-    text(&blocks(problem, arm, prediction, bounds))
+    text(&blocks(problem, arm, prediction, (bounds, fitted)))
 }
 
 /// Returns the predictions as a page, with the errors of measured rows.
@@ -28,16 +29,16 @@ pub(crate) fn prediction_page(
     problem: &Problem,
     arm: &str,
     prediction: &Prediction,
-    bounds: Option<&Bounds>,
+    (bounds, fitted): (Option<&Bounds>, &[usize]),
 ) -> String {
-    page(&problem.title, "predictions", &blocks(problem, arm, prediction, bounds))
+    page(&problem.title, "predictions", &blocks(problem, arm, prediction, (bounds, fitted)))
 }
 
 fn blocks<'a>(
     problem: &Problem,
     arm: &str,
     prediction: &Prediction,
-    bounds: Option<&Bounds>,
+    (bounds, fitted): (Option<&Bounds>, &[usize]),
 ) -> Vec<Block<'a>> {
     let mut words = format!("{} predicted for {arm}", counted(prediction.positions.len(), "pose"));
     let lost = prediction
@@ -79,6 +80,7 @@ fn blocks<'a>(
     // Rows to which base or tool are fitted say nothing if they are too few.
     let residuals = prediction.residuals.as_deref();
     let residuals = residuals.filter(|rows| 3 * rows.len() > prediction.placed.len());
+    blocks.extend(of_fitted_rows(prediction, fitted).map(Block::Text));
     blocks.extend(bounds.map(|bounds| Block::lines(bounded(bounds, residuals))));
     let unsteady = unsteady(&prediction.spreads);
     if !unsteady.is_empty() {
@@ -88,11 +90,40 @@ fn blocks<'a>(
     blocks
 }
 
+/// Returns true if all rows measure positions.
+fn is_of_positions(prediction: &Prediction) -> bool {
+    let errors = prediction.errors.as_ref();
+    errors.is_some_and(|errors| errors.kinds.is_empty() && errors.all.kind == "position")
+}
+
+/// States how many of the rows were fitted, and the error of the others if all rows measure
+/// positions; `None` if no row was fitted.
+fn of_fitted_rows(prediction: &Prediction, fitted: &[usize]) -> Option<String> {
+    let residuals = prediction.residuals.as_ref().filter(|_| !fitted.is_empty())?;
+    let others = residuals.iter().enumerate().filter(|(row, _)| !fitted.contains(row));
+    let errors: Vec<f64> = others.map(|(_, residual)| residual.position.norm()).collect();
+    let count = residuals.len() - errors.len();
+    if errors.is_empty() {
+        let words = "The arm was fitted to all of these rows: errors of new poses are larger.";
+        return Some(words.to_owned());
+    }
+    if !is_of_positions(prediction) {
+        return Some(format!("The arm was fitted to {count} of these rows."));
+    }
+    let mean = errors.iter().sum::<f64>() / errors.len() as f64;
+    let largest = errors.iter().copied().fold(0.0, f64::max);
+    let [mean, largest] = [mean, largest].map(|length| mm(length, 4));
+    Some(format!(
+        "The arm was fitted to {count} of these rows; the error of the {} others is {mean} mm in the \
+         mean, {largest} mm at most.",
+        errors.len()
+    ))
+}
+
 /// Draws the error of each row against its bound, or against its number if there are no bounds;
 /// `None` unless all rows measure positions.
 fn errors(prediction: &Prediction, bounds: Option<&Bounds>) -> Option<Drawing> {
-    let of_rows = prediction.errors.as_ref()?;
-    if !of_rows.kinds.is_empty() || of_rows.all.kind != "position" {
+    if !is_of_positions(prediction) {
         return None;
     }
     let residuals = prediction.residuals.as_ref()?;

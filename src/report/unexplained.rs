@@ -33,7 +33,7 @@ pub(super) fn to_declare(
     result: &LoopResult,
 ) -> Vec<String> {
     let mut declarations = Vec::new();
-    if result.structures().any(is_sag) {
+    if lacks_masses(result) {
         declarations.push(format!(
             "Declare the masses: gravity acts, and the problem declares none. Give each link {} and {} in {}, and each compliant \
              joint or link its stiffness or {}.",
@@ -138,6 +138,11 @@ pub(super) fn unexplained(
         Some(correction) => sentences.extend(corrected(problem, closure, correction)),
     }
     sentences
+}
+
+/// Returns true if the loop found sag under weights that the problem does not declare.
+pub(crate) fn lacks_masses(result: &LoopResult) -> bool {
+    result.structures().any(is_sag)
 }
 
 /// Returns true if the structure is sag under a weight that is not declared.

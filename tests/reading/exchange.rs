@@ -201,6 +201,33 @@ fn clocks_that_differ_are_refused_with_the_offset() {
 }
 
 #[test]
+fn tables_that_are_paired_wrongly_are_refused_with_the_names() {
+    let row = |k: usize, name: &str| format!("{name};{k};2;3\n");
+    let tracker: String = (1..=9).map(|k| row(k, &format!("CAL_{k}"))).collect();
+    let tracker = format!("Point;X;y_mm;z_mm\n{tracker}");
+    let log = |name: fn(usize) -> String| {
+        let rows: String = (1..=9).map(|k| format!("{},{k},0\n", name(k))).collect();
+        format!("Point,A1,A2\n{rows}")
+    };
+    let padded = joined("by = 'name'", &tracker, &log(|k| format!("Cal 0{k}"))).unwrap_err();
+    assert_says(&padded, &["9 of 9 measured rows", "\"CAL_1\" and \"Cal 01\""]);
+    let shifted = log(|k| format!("CAL_{}", k % 9 + 1));
+    let order = joined("by = 'order'", &tracker, &shifted).unwrap_err();
+    assert_says(&order, &["pairs \"CAL_1\" with \"CAL_2\"", "write by = \"name\""]);
+    assert!(joined("by = 'name'", &tracker, &shifted).unwrap().1.is_empty());
+    assert!(joined("by = 'order'", &tracker, &log(|k| format!("move {k}"))).is_ok());
+}
+
+#[test]
+fn tables_without_a_header_keep_their_first_row() {
+    let rules = "[data.columns]\n'#1' = 'q1_deg'\n'#2' = 'q2_deg'\n'#3' = 'x_mm'\n'#4' = 'y_mm'\n'#5' = 'z_mm'\n";
+    let read = |table: &str| try_table(&parse(&format!("{ARM}{rules}")), table).unwrap().0.len();
+    assert_eq!(read("1,2,3,4,5\n2,3,4,5,6\n"), 2);
+    assert_eq!(read("a,b,c,d,e\n2,3,4,5,6\n"), 1);
+    assert_eq!(read("0,1,2,3,4\n2,3,4,5,6\n"), 1);
+}
+
+#[test]
 fn a_column_that_the_joint_log_lacks_is_missed_there() {
     let tracker = "Point;X;y_mm;z_mm\nP1;1;0;0\n";
     let lacks = joined("by = 'name'", tracker, "Point,A1\nP1,11\n").unwrap_err();

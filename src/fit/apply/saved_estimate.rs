@@ -11,7 +11,7 @@ use serde_json::value::RawValue;
 use crate::error::one_line;
 use crate::files::{Changes, changed_key, read_limited};
 use crate::fit::{Placement, Strategy};
-use crate::measurement::StartTimes;
+use crate::measurement::{Measurements, StartTimes};
 use crate::model::parameter::Parameter;
 use crate::model::{Model, Pose};
 use crate::problem::Problem;
@@ -379,6 +379,13 @@ impl SavedEstimate {
     /// lacks it.
     pub(crate) fn value(&self, name: &str) -> Option<f64> {
         self.parameters.iter().find(|entry| entry.name == name).map(|entry| entry.estimate)
+    }
+
+    /// Returns the rows of `table` to which the arm was fitted.
+    #[doc(hidden)]
+    pub fn fitted_among(&self, table: &Measurements) -> Vec<usize> {
+        let fitted = &self.posterior().fitted_rows;
+        (0..table.len()).filter(|&row| fitted.contains(&table.row_digest(row))).collect()
     }
 
     /// Returns the uncertainty of the estimate.
