@@ -48,7 +48,8 @@ class Export(Result):
 
     @once
     def errors(self) -> pd.DataFrame:
-        """Errors on the held-out rows [mm]: of the ``whole`` model, and of the ``rigid`` geometry that the file holds."""
+        """Errors on the held-out rows [mm]: of the ``whole`` model, of the ``rigid`` geometry that the file holds, and of those that it
+        could hold instead (``identified``, ``best_rigid``, ``fitted_alone``), unless they are the same."""
         import pandas as pd
 
         return pd.DataFrame([error_row(arm, own) for arm, own in self._document["held_out"].items()]).set_index("arm")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -14,7 +15,7 @@ from ._forward import _Bounded, Forward, Prediction
 from ._frames import compared_frame, effects_frame, errors_frame, parameters_frame, residuals_frame
 from ._restored import Restored, Spec, said
 from ._result import Array, Result, once
-from ._tables import Data, Path, source, warn
+from ._tables import Data, Path, region, source, warn
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -250,15 +251,46 @@ class Identification(Fit, Forward):
         warn(core.warnings, stacklevel=2)
         return Compensation(core)
 
-    def export_urdf(self, urdf: Path) -> Export:
+    def export_urdf(
+        self,
+        urdf: Path,
+        best_rigid: bool = False,
+        *,
+        fitted_alone: bool = False,
+        workspace_mm: Sequence[float] | None = None,
+    ) -> Export:
         """The URDF that the problem came from, with the origins of its chain as they were identified.
+
+        Warns (:class:`FlexcalWarning`) where another geometry has a clearly smaller error on the held-out rows, and where the fit is
+        not to be trusted.
+
+        Parameters
+        ----------
+        urdf
+            The URDF that the problem came from; it is not changed.
+        best_rigid
+            Write the rigid geometry that is nearest to the whole model (stiffnesses, effects, remainder), instead of the identified
+            one.
+        fitted_alone
+            Write the geometry that a rigid model without effects gives, fitted to the same rows. Its base and tool, which
+            :meth:`Export.summary` lists, belong to it.
+        workspace_mm
+            Box x0, x1, y0, y1, z0, z1 of the target in which ``best_rigid`` approximates, frame of the arm's base [mm]; everywhere
+            within the limits of the joints by default.
 
         Raises
         ------
         InputError
             It is the URDF of another arm, or its chain ends where no origin could hold what was identified.
         """
-        return Export(self._fit.export_urdf(urdf))
+        if best_rigid and fitted_alone:
+            raise TypeError("best_rigid and fitted_alone: keep one of the two")
+        if workspace_mm is not None and not best_rigid:
+            raise TypeError("workspace_mm: has no effect without best_rigid=True")
+        box, _ = region(workspace_mm, ())
+        core = self._fit.export_urdf(urdf, best_rigid, fitted_alone, box)
+        warn(core.warnings, stacklevel=2)
+        return Export(core)
 
     def _repr_html_(self) -> str:
         return _html.identification(self)

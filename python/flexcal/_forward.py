@@ -100,7 +100,7 @@ class Forward:
             ``q_rad``.
         q_rad, q_deg
             Configurations instead, shape (poses, joints) or (joints,), [rad] or [°], of joints that slide [m]; joints are those that
-            move, or all.
+            move, or all. Or a table of poses whose columns bear the names of the joints, without a unit.
         columns
             What else is known of the poses, by the names of columns: ``payload_kg``, ``hoist_N``, ``temperature_C``, ``time_s``,
             ``session``, ``target``, ``approach`` …; one value a pose, or one for all.
@@ -144,7 +144,9 @@ class Forward:
         units: list[str | None] = list(self._reader.units)
         if name == "q_deg":
             units = ["deg" if unit == "rad" else unit for unit in units]
-        source, shape = configurations(q, units, columns)
+        # The name of the argument states the unit of columns that bear the names of joints alone.
+        joints = () if name == "q" else self._reader.joints
+        source, shape = configurations(q, units, columns, joints)
         poses = self._reader.poses(source)
         warn(poses.warnings, stacklevel=3)
         return poses, shape

@@ -18,6 +18,7 @@ from ._least_squares import LeastSquares
 from ._progress import Told, told
 from ._restored import Prior, Spec
 from ._tables import Data, Path, Source, count, region, source, warn
+from .errors import InputError
 
 Strategy: TypeAlias = Literal["joint", "sequential", "sequential-one-sweep", "geometry-only", "stiffness-only", "rigid"]
 Solver: TypeAlias = Literal[
@@ -411,7 +412,16 @@ class Problem(Forward):
         return Next(core)
 
     def _given_data(self, data: Data | None) -> Source:
-        return self.files if data is None else source(data)
+        if data is not None:
+            return source(data)
+        missing = [file for file in self.files if not os.path.exists(file)]
+        if missing and str(self._core.file) == TEXT:
+            message = (
+                f"no such file: {os.fspath(missing[0])}, which [data] of this problem in memory names; pass data=, or work in the "
+                "folder of that file"
+            )
+            raise InputError(message, file=TEXT, key="data.files")
+        return self.files
 
     def _read(self, given: Source) -> _core.Data:
         read = self._core.data(given)

@@ -55,15 +55,19 @@ class Shape(NamedTuple):
     """An array with a column for every joint, fixed ones as well."""
 
 
-def configurations(q: Any, units: Sequence[str | None], columns: Mapping[str, Any]) -> tuple[Source, Shape]:
+def configurations(
+    q: Any, units: Sequence[str | None], columns: Mapping[str, Any], joints: Sequence[str] = ()
+) -> tuple[Source, Shape]:
     """Configurations with further columns as a table, and how they were given.
 
     ``units`` holds for each joint the unit of its command, None at fixed joints. A value of ``columns`` may be one for all rows.
+    Columns of a table that bear the names of ``joints`` without a unit have these units.
     """
     if isinstance(q, (str, os.PathLike, Mapping)) or hasattr(q, "columns") or hasattr(q, "column_names"):
         if columns:
             raise TypeError("columns go into the table of poses itself")
-        return source(q), Shape(single=False, every_joint=False)
+        table = _with_units(q, units, joints) if joints else q
+        return source(table), Shape(single=False, every_joint=False)
     values = _plain("q", q, "q")
     if values.dtype.kind not in "fiu":
         raise _no_numbers("q", str(values.dtype), "q")
@@ -86,6 +90,15 @@ def configurations(q: Any, units: Sequence[str | None], columns: Mapping[str, An
     return source(table), Shape(single, every_joint)
 
 
+def _with_units(q: Any, units: Sequence[str | None], joints: Sequence[str]) -> Any:
+    """A table of poses whose columns of joints all name their unit."""
+    if isinstance(q, (str, os.PathLike)):
+        return q
+    moving = [(name, unit) for name, unit in zip(joints, units, strict=True) if unit is not None]
+    named = dict(moving) | {f"q{k + 1}": unit for k, (_, unit) in enumerate(moving)}
+    return {f"{name}_{named[name]}" if name in named else name: values for name, values in _columns(q)}
+
+
 def table(text: str) -> pd.DataFrame:
     """A CSV text as a frame, its numbers to the last bit."""
     import pandas as pd
@@ -96,6 +109,9 @@ def table(text: str) -> pd.DataFrame:
 
 
 def _parsed(cells: Sequence[str]) -> Any:
+    known = set(cells)
+    if known and known <= {"true", "false"}:
+        return np.array([cell == "true" for cell in cells], dtype=np.bool_)
     for kind in (int, float):
         try:
             return [kind(cell) for cell in cells]

@@ -3,6 +3,8 @@
 use std::path::PathBuf;
 use std::sync::{Arc, OnceLock};
 
+use flexcal::design::Workspace;
+use flexcal::export::{ExportError, GeometryChoice};
 use flexcal::fit::{self, IdentifyError, Placement};
 use flexcal::measurement::{Dataset, Measurements};
 use flexcal::model::Model;
@@ -284,10 +286,33 @@ impl Identification {
         Ok(points(py, &found.map_err(|error: IdentifyError| raised(&error))?))
     }
 
-    /// The URDF that the problem came from, with the origins that were identified.
-    fn export_urdf(&self, py: Python<'_>, urdf: PathBuf) -> PyResult<Export> {
-        detached(py, || Export::new(&urdf, &self.problem, &self.data, &self.found))?
-            .map_err(|error| raised(&error))
+    /// Writes the identified geometry into the URDF that the problem came from, or the geometry
+    /// nearest to the whole model in a box [mm], or one that a rigid model gives.
+    fn export_urdf(
+        &self,
+        py: Python<'_>,
+        urdf: PathBuf,
+        best_rigid: bool,
+        fitted_alone: bool,
+        workspace_mm: Option<[f64; 6]>,
+    ) -> PyResult<Export> {
+        let corners = workspace_mm.map(|[x0, x1, y0, y1, z0, z1]| {
+            [Vector3::new(x0, y0, z0), Vector3::new(x1, y1, z1)].map(|corner| corner * 1e-3)
+        });
+        let choice = match (best_rigid, fitted_alone) {
+            (true, _) => GeometryChoice::BestRigid(Workspace { corners, planes: Vec::new() }),
+            (_, true) => GeometryChoice::FittedAlone,
+            _ => GeometryChoice::Identified,
+        };
+        let estimate = self.json(py)?;
+        let exported = detached(py, || {
+            let fitted = (estimate.as_str(), self.remainder());
+            Export::new(&urdf, (&self.problem, &self.data), &self.found, fitted, &choice)
+        })?;
+        exported.map_err(|error| match &error {
+            ExportError::Input(input) => raised(input),
+            _ => raised(&error),
+        })
     }
 
     /// ∂p/∂q of the identified arm, corrected by its remainder, shape = (poses, 3, joints).

@@ -101,6 +101,12 @@ impl Problem {
         self.declared.data.files.clone()
     }
 
+    /// Names of the joints, from the base outwards.
+    #[getter]
+    fn joints(&self) -> Vec<String> {
+        self.declared.joints.iter().map(|joint| joint.name.clone()).collect()
+    }
+
     /// Unit of each joint's command, from the base outwards; None at fixed joints.
     #[getter]
     fn units(&self) -> Vec<Option<&'static str>> {

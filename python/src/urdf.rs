@@ -2,14 +2,15 @@
 
 use std::path::Path;
 
-use flexcal::error::InputError;
-use flexcal::fit::{Identification, Placement};
+use flexcal::export::{ExportError, Geometry, GeometryChoice};
+use flexcal::fit::{Identification, Placement, SavedEstimate};
 use flexcal::measurement::Dataset;
 use flexcal::model::Model;
 use flexcal::problem::Problem;
-use flexcal::report;
+use flexcal::remainder::Correction;
+use flexcal::report::{self, ExportRemarks};
 use flexcal::results::{Document as _, ExportResult, ExportedErrors};
-use flexcal::urdf::{Chain, Robot, export};
+use flexcal::urdf::{Chain, Robot, export_with_links, mounted_links};
 use pyo3::prelude::*;
 
 /// A URDF with moved origins.
@@ -18,6 +19,9 @@ pub struct Export {
     /// The whole file.
     #[pyo3(get)]
     text: String,
+    /// Reasons not to use the file as it is.
+    #[pyo3(get)]
+    warnings: Vec<String>,
     json: String,
     summary: String,
 }
@@ -36,23 +40,47 @@ impl Export {
 }
 
 impl Export {
-    /// The geometry of an identified arm in the URDF that its problem came from.
+    /// Writes the chosen geometry of an identified arm into the URDF that its problem came from.
+    /// `estimate` is its estimate.json, `correction` its remainder.
     pub fn new(
         urdf: &Path,
-        problem: &Problem,
-        data: &Dataset,
+        (problem, data): (&Problem, &Dataset),
         found: &Identification,
-    ) -> Result<Self, InputError> {
+        (estimate, correction): (&str, Option<&Correction>),
+        choice: &GeometryChoice,
+    ) -> Result<Self, ExportError> {
         let robot = Robot::read(urdf)?;
         let chain = Chain::from_problem(&robot, problem)?;
         let placement = Placement::of(&data.measurements);
         let model =
             found.strategy.model(Model::new(problem, &placement.bases, &placement.targets)?);
-        let arm = model.arm(|k| found.x.get(k).copied().unwrap_or(0.0));
-        let moved = export(&chain, problem, &arm)?;
-        let errors = Some(ExportedErrors::new(&model, &found.x, data, None));
-        let result = ExportResult::new(problem, &model, None, Some(&moved.moved), errors);
-        let (json, summary) = (result.to_json(), report::export_text(&result));
-        Ok(Self { text: moved.text, json, summary })
+        let estimate = SavedEstimate::parse(estimate, Path::new("estimate.json"))?;
+        let fitted = (&estimate, correction);
+        let geometry = Geometry::new(problem, fitted, (&model, &found.x), Some(data), choice)?;
+        let mounted = mounted_links(problem, &model, found.x.as_slice());
+        let moved = export_with_links(&chain, problem, &geometry.arm, &mounted)?;
+        let errors = ExportedErrors::new(&model, &found.x, data, None)
+            .with_geometries(geometry.errors(problem, fitted, data)?);
+        let result = ExportResult::new(problem, &model, None, Some(&moved.moved), Some(errors));
+        let remarks = ExportRemarks::new(
+            geometry.best_rigid.as_ref().map(|best| [best.best, best.identified]),
+            geometry.fitted_alone.as_ref(),
+        );
+        let mut warnings = Vec::new();
+        if !found.is_trusted() {
+            warnings.push(report::why_not_trusted(found));
+        }
+        if let Some(alone) = geometry.fitted_alone.as_ref().filter(|alone| !alone.is_trusted()) {
+            warnings.push(format!("geometry alone: {}", report::why_not_trusted(alone)));
+        }
+        warnings.extend(report::better_geometry(&result).map(|option| {
+            let argument = option.trim_start_matches('-').replace('-', "_");
+            format!(
+                "the exported geometry is not the best that a rigid controller can have: {argument}=True gives a smaller error on \
+                 held-out poses; errors lists all of them"
+            )
+        }));
+        let (json, summary) = (result.to_json(), report::export_text(&result, &remarks));
+        Ok(Self { text: moved.text, warnings, json, summary })
     }
 }

@@ -6,16 +6,14 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 use flexcal::design::Workspace;
 use flexcal::export as code;
-use flexcal::fit::{
-    self, ErrorSummary, Options, Placement, SavedEstimate, Strategy, check_columns,
-};
+use flexcal::fit::{SavedEstimate, check_columns};
 use flexcal::measurement::{Dataset, Measurements};
 use flexcal::model::Model;
 use flexcal::nalgebra::Vector3;
-use flexcal::problem::{Joint, Problem};
+use flexcal::problem::Problem;
 use flexcal::remainder;
 use flexcal::report::{self, shell_word};
-use flexcal::results::{Document as _, ExportResult, ExportedErrors, Summary};
+use flexcal::results::{Document as _, ExportResult, ExportedErrors};
 use flexcal::urdf::{
     Chain, Robot, YamlFormat, export_with_links, joint_origins, mounted_links, yaml,
 };
@@ -68,6 +66,9 @@ pub struct Arguments {
     /// identified one
     #[arg(long)]
     best_rigid: bool,
+    /// Write the geometry that a rigid model without effects gives, fitted to the same measurements
+    #[arg(long, conflicts_with = "best_rigid")]
+    fitted_alone: bool,
     /// Box of the target in which --best-rigid fits, frame of the arm's base
     #[arg(long, value_name = "X0,X1,Y0,Y1,Z0,Z1", value_parser = numbers::<6>, allow_hyphen_values = true, requires = "best_rigid")]
     workspace_mm: Option<[f64; 6]>,
@@ -125,8 +126,12 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     if arguments.camera.is_some() && camera.is_none() {
         return Err(code::ExportError::WithoutEffect { option: "--camera" }.into());
     }
-    if arguments.best_rigid && !is_rigid {
-        return Err(code::ExportError::WithoutEffect { option: "--best-rigid" }.into());
+    for (is_set, option) in
+        [(arguments.best_rigid, "--best-rigid"), (arguments.fitted_alone, "--fitted-alone")]
+    {
+        if is_set && !is_rigid {
+            return Err(code::ExportError::WithoutEffect { option }.into());
+        }
     }
     let problem = Problem::read(&arguments.problem)?;
     let estimates = arguments.trust.read(&arguments.estimate)?;
@@ -136,27 +141,41 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let model =
         estimates.model(Model::new(&problem, &estimates.words("base"), &estimates.words("tool"))?);
     let x = estimates.vector(&problem, &model)?;
-    let best = if arguments.best_rigid {
-        let correction = remainder::of_estimate(&problem, &estimates)?;
+    let correction = remainder::of_estimate(&problem, &estimates);
+    let files = if arguments.data.is_empty() { &problem.data.files } else { &arguments.data };
+    // Measurements that the problem names may have been removed.
+    let at_hand =
+        !arguments.data.is_empty() || !files.is_empty() && files.iter().all(|file| file.is_file());
+    let data =
+        if at_hand && camera.is_none() { Some(read_data(&problem, files, flags)?) } else { None };
+    let choice = if arguments.best_rigid {
         let corners = arguments.workspace_mm.map(|[x0, x1, y0, y1, z0, z1]| {
             [Vector3::new(x0, y0, z0), Vector3::new(x1, y1, z1)].map(|corner| corner * 1e-3)
         });
-        let workspace = Workspace { corners, planes: Vec::new() };
-        Some(code::best_rigid(&problem, &estimates, correction.as_ref(), &workspace)?)
+        code::GeometryChoice::BestRigid(Workspace { corners, planes: Vec::new() })
+    } else if arguments.fitted_alone {
+        code::GeometryChoice::FittedAlone
     } else {
-        None
+        code::GeometryChoice::Identified
     };
-    let arm = match &best {
-        Some(best) => best.arm.clone(),
-        None => model.arm(|k| x.get(k).copied().unwrap_or(0.0)),
+    // A geometry without corrections needs no remainder, whose file may have been removed.
+    let correction = match choice {
+        code::GeometryChoice::BestRigid(_) => correction?,
+        _ => correction.ok().flatten(),
     };
+    let fitted = (&estimates, correction.as_ref());
+    let geometry = code::Geometry::new(&problem, fitted, (&model, &x), data.as_ref(), &choice)?;
+    let arm = &geometry.arm;
+    let alone = geometry.fitted_alone.as_ref();
+    let workspace = geometry.best_rigid.as_ref().map(|best| [best.best, best.identified]);
+    let mut remarks = report::ExportRemarks::new(workspace, alone);
     let mut elsewhere = Vec::new();
     let (text, moved, default) = match (&arguments.urdf, arguments.format) {
         (Some(file), _) => {
             let robot = Robot::read(file)?;
             let chain = Chain::from_problem(&robot, &problem)?;
             let mounted = mounted_links(&problem, &model, x.as_slice());
-            let export = export_with_links(&chain, &problem, &arm, &mounted)?;
+            let export = export_with_links(&chain, &problem, arm, &mounted)?;
             let name = file.file_name().unwrap_or_default().to_owned();
             elsewhere = export.elsewhere;
             (export.text, Some(export.moved), PathBuf::from(name))
@@ -167,15 +186,20 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         }
         (None, format) => {
             let (text, name) = match format {
-                Some(Format::Mdh) => (code::modified_dh(&problem, &arm), "mdh.yaml"),
-                Some(Format::Dh) => (code::standard_dh(&problem, &arm)?, "dh.yaml"),
+                Some(Format::Mdh) => (code::modified_dh(&problem, arm), "mdh.yaml"),
+                Some(Format::Dh) => {
+                    let table = code::StandardTable::new(&problem, arm)?;
+                    remarks.table = table.cells();
+                    remarks.notes = table.notes();
+                    (table.yaml(), "dh.yaml")
+                }
                 Some(Format::UrYaml) => {
                     let form = YamlFormat::UniversalRobots;
-                    (yaml(&joint_origins(&problem, &arm, form)?, form), "kinematics.yaml")
+                    (yaml(&joint_origins(&problem, arm, form)?, form), "kinematics.yaml")
                 }
                 _ => {
                     let form = YamlFormat::Ros;
-                    (yaml(&joint_origins(&problem, &arm, form)?, form), "kinematics.yaml")
+                    (yaml(&joint_origins(&problem, arm, form)?, form), "kinematics.yaml")
                 }
             };
             (text, None, PathBuf::from(name))
@@ -193,12 +217,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     } else {
         arguments.problem.clone()
     };
-    let files = if arguments.data.is_empty() { &problem.data.files } else { &arguments.data };
     let inputs = [&[file, arguments.estimate.clone()], arguments.urdf.as_slice(), files].concat();
     let results = Results::claim("export", folder, inputs, &[&name], (flags.force, flags.quiet))?;
-    // Measurements that the problem names may have been removed.
-    let at_hand =
-        !arguments.data.is_empty() || !files.is_empty() && files.iter().all(|file| file.is_file());
     if let Some(absent) =
         files.iter().find(|file| !file.is_file()).filter(|_| !at_hand && !flags.quiet)
     {
@@ -207,10 +227,12 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
             absent.display()
         ));
     }
-    let errors = if at_hand && camera.is_none() {
-        Some(errors(&problem, files, (&estimates, best.as_ref()), flags)?)
-    } else {
-        None
+    let errors = match &data {
+        Some(data) => {
+            let errors = ExportedErrors::new(&model, &x, data, Some(&estimates));
+            Some(errors.with_geometries(geometry.errors(&problem, fitted, data)?))
+        }
+        None => None,
     };
     results.write(&[(&name, &text)])?;
     let mut result = ExportResult::new(&problem, &model, Some(&path), moved.as_deref(), errors);
@@ -220,22 +242,15 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let stays = |link: String| format!("link {link}, which the URDF has on another link");
     result.not_held.extend(elsewhere.into_iter().map(stays));
     flags.print_result(&result.to_json(), || {
-        let of_workspace = best.as_ref().map_or_else(String::new, |best| {
-            format!(
-                "In the workspace the whole model differs from the exported geometry by {:.4} mm on average ({:.4} at most), \
-                 from the identified geometry by {:.4} mm ({:.4}).\n",
-                best.best.mean.norm * 1e3,
-                best.best.max.norm * 1e3,
-                best.identified.mean.norm * 1e3,
-                best.identified.max.norm * 1e3
-            )
-        });
         format!(
-            "{}\n{of_workspace}Next: {}\n",
-            report::export_text(&result),
+            "{}\nNext: {}\n",
+            report::export_text(&result, &remarks),
             next(arguments, &result, &path)
         )
     })?;
+    if let Some(alone) = alone.filter(|alone| !alone.is_trusted()) {
+        diagnostic::warn(&format!("geometry alone: {}", report::why_not_trusted(alone)));
+    }
     if !estimates.trusted {
         diagnostic::warn("the estimate is not to be trusted, so this file is not either");
     }
@@ -284,52 +299,16 @@ fn write_c(
     Ok(Outcome::trusted(estimate.trusted))
 }
 
-/// Computes the held-out errors of the whole model, of the exported geometry, and of the geometries
-/// that could be exported instead.
-fn errors(
+/// Reads the measurements of an export.
+fn read_data(
     problem: &Problem,
     files: &[PathBuf],
-    (estimates, best): (&SavedEstimate, Option<&code::RigidFit>),
     flags: &Flags,
-) -> Result<ExportedErrors, Box<dyn Error>> {
+) -> Result<Dataset, Box<dyn Error>> {
     let (rows, warnings) = Measurements::read(files, problem)?;
     flags.warn(&warnings);
     check_columns(problem, &rows)?;
-    let data = Dataset::from_measurements(problem, rows)?;
-    let placement = Placement::of(&data.measurements);
-    let model = estimates.model(Model::new(problem, &placement.bases, &placement.targets)?);
-    let x = estimates.vector(problem, &model)?;
-    let mut errors = ExportedErrors::new(&model, &x, &data, Some(estimates));
-    let held_out = &data.split.held_out;
-    let poses = placement.poses(&data.measurements, held_out, 1.0);
-    if !poses.iter().all(|pose| pose.observation.is_position()) {
-        return Ok(errors);
-    }
-    let of_geometry = |best: &code::RigidFit| {
-        let rigid = code::rigid_errors(problem, (&model, &x), &best.arm, &poses);
-        let rows = held_out.iter().copied();
-        Summary::of(&ErrorSummary::of_rows(&data.measurements, rows, &rigid))
-    };
-    if let Some(best) = best {
-        errors.identified = Some(std::mem::replace(&mut errors.rigid, of_geometry(best)));
-    }
-    let is_elastic = |joint: &Joint| joint.stiffness.is_some() || joint.beam.is_some();
-    if problem.effects.is_empty() && !problem.joints.iter().any(is_elastic) {
-        return Ok(errors);
-    }
-    // The alternatives only inform: if one of them fails, its line is absent.
-    if best.is_none() {
-        let correction = remainder::of_estimate(problem, estimates).ok().flatten();
-        let workspace = Workspace { corners: None, planes: Vec::new() };
-        let best = code::best_rigid(problem, estimates, correction.as_ref(), &workspace).ok();
-        errors.best_rigid = best.as_ref().map(of_geometry);
-    }
-    let mut rigid = problem.clone();
-    rigid.effects.clear();
-    let options = Options::default().with_strategy(Strategy::Rigid);
-    let alone = fit::identify(&rigid, &data, &options).ok();
-    errors.fitted_alone = alone.map(|alone| Summary::of(&alone.fitted.held_out));
-    Ok(errors)
+    Ok(Dataset::from_measurements(problem, rows)?)
 }
 
 /// Returns the command to run next: the same export with the geometry of the smallest error, or the
@@ -337,7 +316,7 @@ fn errors(
 fn next(arguments: &Arguments, result: &ExportResult, path: &Path) -> String {
     let [problem, estimate] =
         [&arguments.problem, &arguments.estimate].map(|path| shell_word(path));
-    if report::is_best_rigid_better(result) {
+    if let Some(better) = report::better_geometry(result) {
         let form = match (&arguments.urdf, arguments.format) {
             (Some(urdf), _) => format!("--urdf {}", shell_word(urdf)),
             (None, format) => {
@@ -352,7 +331,7 @@ fn next(arguments: &Arguments, result: &ExportResult, path: &Path) -> String {
         let data =
             if data.is_empty() { String::new() } else { format!(" --data {}", data.join(" ")) };
         return format!(
-            "flexcal export {problem} --estimate {estimate} {form}{data} --best-rigid --out {} --force",
+            "flexcal export {problem} --estimate {estimate} {form}{data} {better} --out {} --force",
             shell_word(path)
         );
     }

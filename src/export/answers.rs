@@ -7,7 +7,7 @@ use super::error::ExportError;
 use crate::fit::{self, Placement, SavedEstimate};
 use crate::measurement::{Dataset, Measurements};
 use crate::model::Model;
-use crate::problem::{JointKind, Problem};
+use crate::problem::{Joint, JointKind, Problem};
 use crate::random::stream;
 use crate::remainder::{self, Correction};
 use crate::spatial::rotation_axes;
@@ -123,6 +123,18 @@ fn columns(turn: &Vector3<f64>) -> Vec<f64> {
     rotation_axes(turn).iter().flat_map(|axis| axis.iter().copied()).collect()
 }
 
+/// Returns the range from which commands of a joint are drawn: its limits, within
+/// [`UNLIMITED_HALF_WIDTH`].
+pub(super) fn command_range(joint: &Joint) -> (f64, f64) {
+    let wide = if joint.kind == JointKind::Prismatic {
+        UNLIMITED_HALF_WIDTH.1
+    } else {
+        UNLIMITED_HALF_WIDTH.0
+    };
+    let (low, high) = joint.limits;
+    (low.max(-wide), high.min(wide))
+}
+
 /// Draws random poses over all bases and targets, and over those conditions on which predictions
 /// depend.
 pub(super) fn random_rows(
@@ -131,21 +143,12 @@ pub(super) fn random_rows(
     count: usize,
 ) -> Result<Measurements, ExportError> {
     let mut random = stream(SEED, 0);
-    let range = |joint: &crate::problem::Joint| {
-        let wide = if joint.kind == JointKind::Prismatic {
-            UNLIMITED_HALF_WIDTH.1
-        } else {
-            UNLIMITED_HALF_WIDTH.0
-        };
-        let (low, high) = joint.limits;
-        (low.max(-wide), high.min(wide))
-    };
     let mut between = |(low, high): (f64, f64)| low + (high - low) * random.random::<f64>();
     let configurations: Vec<Vec<f64>> = (0..count)
         .map(|_| {
-            let commanded = |joint: &crate::problem::Joint| match joint.command_kind() {
+            let commanded = |joint: &Joint| match joint.command_kind() {
                 JointKind::Fixed => 0.0,
-                _ => between(range(joint)),
+                _ => between(command_range(joint)),
             };
             problem.joints.iter().map(commanded).collect()
         })

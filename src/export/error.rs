@@ -1,7 +1,7 @@
 //! Errors of exports.
 
 use crate::error::InputError;
-use crate::fit::{PredictError, SavedEstimateError, StageError};
+use crate::fit::{IdentifyError, PredictError, SavedEstimateError, StageError};
 use crate::measurement::DatasetError;
 
 /// Error of a model that cannot be written as C.
@@ -74,6 +74,12 @@ pub enum ExportError {
         /// Name of the camera.
         camera: String,
     },
+    /// A geometry fitted alone needs measurements.
+    #[error("--fitted-alone fits the measurements: name them with --data")]
+    NeedsData,
+    /// The rigid model cannot be fitted.
+    #[error("the geometry alone: {0}")]
+    Alone(#[from] IdentifyError),
     /// Problem and poses do not match.
     #[error(transparent)]
     Input(#[from] InputError),

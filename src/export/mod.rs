@@ -9,16 +9,20 @@ mod answers;
 mod camera;
 mod error;
 mod formula;
+mod geometries;
 mod numbers;
 mod remainder;
 mod rigid;
 mod source;
+mod standard;
 mod tables;
 
 pub use answers::{Answers, answers};
 #[doc(hidden)]
 pub use camera::{CameraFormat, camera_yaml};
 pub use error::ExportError;
-pub use rigid::{RigidFit, best_rigid, rigid_errors};
+pub use geometries::{Geometry, GeometryChoice};
+pub use rigid::RigidFit;
 pub use source::{Sources, sources};
-pub use tables::{modified_dh, standard_dh};
+pub use standard::StandardTable;
+pub use tables::modified_dh;

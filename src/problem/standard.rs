@@ -72,17 +72,21 @@ impl Problem {
         Some(self.with_chain(modified(self.joints.clone())))
     }
 
+    /// Returns the joints that are rows of a standard DH table; `None` for tables in another form.
+    pub(crate) fn standard_rows(&self) -> Option<&[Joint]> {
+        let (flange, rows) = self.joints.split_last()?;
+        let last = rows.last()?;
+        // The added joint has the place of the last row in the file.
+        let is_added = flange.kind == JointKind::Fixed
+            && flange.name == FLANGE
+            && flange.location == last.location;
+        (self.is_chain() && is_added).then_some(rows)
+    }
+
     /// Returns the problem with the rows of its joint table interpreted as modified DH, for a table
     /// declared as standard DH. Returns `None` for other tables.
     pub(crate) fn read_as_modified(&self) -> Option<Self> {
-        let (last, rows) = self.joints.split_last()?;
-        let is_standard = last.kind == JointKind::Fixed && last.name == FLANGE;
-        let first = rows.first()?;
-        let is_shifted = (first.a, first.alpha) == (0.0, 0.0);
-        if !(self.is_chain() && is_standard && is_shifted) {
-            return None;
-        }
-        let mut joints = rows.to_vec();
+        let mut joints = self.standard_rows()?.to_vec();
         for (joint, next) in joints.iter_mut().zip(self.joints.iter().skip(1)) {
             (joint.a, joint.alpha) = (next.a, next.alpha);
             let link = link((next.a, next.alpha));

@@ -4,7 +4,7 @@ use super::detection;
 use super::document::{Block, Column, Table, opening};
 use super::figures::{ACCENT, Curve, Drawing, FAINT, INK, Series};
 use super::forecast::{assumptions, cells, measured_for};
-use super::parameters::{conditioning, unidentifiable};
+use super::parameters::{conditioning, rows_of_sheet, unidentifiable};
 use super::render::{page, text};
 use crate::design::{Check, ExpectedParameter, Forecast, GrowthStep, Prediction, PredictionPoses};
 use crate::fit::rows_of_kind;
@@ -39,6 +39,8 @@ fn blocks<'a>(problem: &Problem, check: &Check) -> Vec<Block<'a>> {
             "two shares: the first at the nominal arm, where the parameter is confounded with others (below), the second over arms drawn from the priors",
         );
     }
+    let sheet = rows_of_sheet(problem);
+    notes.extend(sheet.as_deref());
     let counts =
         format!("{}, {}", counted(names.len(), "parameter"), counted(forecast.poses, "pose"));
     let mut blocks = opening(&problem.title, counts).to_vec();

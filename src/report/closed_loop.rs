@@ -240,7 +240,7 @@ fn blocks<'a>(
     let mut ranking = trace::ranking(problem, &traced, MAX_SHOWN_CANDIDATES, &every);
     ranking.insert(1, Block::figures([figures::ranking(&closure.before)]));
     blocks.extend(ranking);
-    blocks.push(Block::Page(trace::undetectable_effects(&closure.before)));
+    blocks.push(Block::Page(trace::undetectable_effects(problem, &closure.before)));
     blocks.extend(rounds(closure, result));
     blocks.push(Block::heading("Remaining residual"));
     let unexplained = unexplained(problem, closure, result).into_iter().map(Point::from);

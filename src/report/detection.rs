@@ -3,7 +3,7 @@
 use super::document::{Block, Table, code};
 use super::effect;
 use super::forecast::size as shown;
-use crate::problem::{Effect, JointKind, Problem};
+use crate::problem::{Effect, Problem};
 use crate::select::{Detectable, Detection, Size};
 
 /// Maximum number of effects of a family that a text lists.
@@ -24,6 +24,7 @@ pub(super) fn blocks<'a>(problem: &Problem, detection: &Detection) -> Vec<Block<
     hidden.retain(|effect| {
         !effect.effect.is_searched() || !places.contains(&effect.effect.name_and_place())
     });
+    hidden.retain(|effect| effect::is_at_moving_joint(problem, &effect.effect));
     let needs_times = |effect: &&Detectable| detection.times_assumed && effect.effect.has_memory();
     let if_timed: Vec<&Effect> =
         visible.iter().copied().filter(needs_times).map(|effect| &effect.effect).collect();
@@ -54,11 +55,7 @@ pub(super) fn blocks<'a>(problem: &Problem, detection: &Detection) -> Vec<Block<
     }
     let acts_by_load = |effect: &&Detectable| LOAD_EFFECTS.contains(&effect.effect.name());
     if has_no_mass(problem) && hidden.iter().any(acts_by_load) {
-        let is_moving = |effect: &&&Detectable| {
-            let joint = effect.effect.joint().and_then(|joint| problem.joints.get(joint));
-            joint.is_none_or(|joint| joint.kind != JointKind::Fixed)
-        };
-        let loaded = hidden.iter().filter(|effect| acts_by_load(effect)).filter(is_moving);
+        let loaded = hidden.iter().filter(|effect| acts_by_load(effect));
         let list = effect::listed(loaded.map(|effect| &effect.effect)).join("; ");
         blocks.push(Block::Text(format!(
             "Not visible, because no mass is declared, so no load acts: {list}. Give the links {} and {} in {}.",
@@ -74,9 +71,12 @@ pub(super) fn blocks<'a>(problem: &Problem, detection: &Detection) -> Vec<Block<
             "Not visible with these poses, even at the size of their prior: {list}."
         )));
     }
-    if !detection.untestable.is_empty() {
+    let untestable = detection.untestable.iter();
+    let untestable: Vec<_> =
+        untestable.filter(|(of, _)| effect::is_at_moving_joint(problem, of)).cloned().collect();
+    if !untestable.is_empty() {
         blocks.push(Block::heading("Not visible with measurements of this kind"));
-        blocks.push(Block::List(effect::reasons(detection.untestable.iter().cloned())));
+        blocks.push(Block::List(effect::reasons(untestable)));
     }
     blocks
 }

@@ -2,7 +2,7 @@
 
 use super::document::{Point, code};
 use crate::laws::ArgumentKind;
-use crate::problem::Effect;
+use crate::problem::{Effect, JointKind, Problem};
 use crate::quantity::format::{decimals, number};
 use crate::results::{MAX_COEFFICIENTS, MAX_SHOWN_HARMONICS, ParameterValue, joined};
 
@@ -42,6 +42,15 @@ fn value(parameter: &ParameterValue) -> String {
         }
         None => format!("{} {}, no standard error", number(scaled, MAX_DECIMALS), unit.symbol),
     }
+}
+
+/// Returns true if an effect acts at a moving joint or at no joint. Fixed joints, such as the flange
+/// of a standard DH table, are left out of lists of effects that nothing shows.
+pub(super) fn is_at_moving_joint(problem: &Problem, effect: &Effect) -> bool {
+    let index = effect.joint().and_then(|number| number.checked_sub(1));
+    index
+        .and_then(|index| problem.joints.get(index))
+        .is_none_or(|joint| joint.kind != JointKind::Fixed)
 }
 
 /// Groups effects by family and reason. Returns a list item for each group: the effects, then the

@@ -5,37 +5,95 @@ use std::fmt::Write as _;
 
 use super::document::{Block, Table};
 use super::render::text;
-use crate::fit::rows_of_kind;
-use crate::quantity::format::number;
+use crate::fit::{ErrorSummary, Estimate, Identification, rows_of_kind};
+use crate::quantity::format::{mm, number};
 use crate::results::{ExportResult, ExportedErrors, Origin, Summary};
 
 /// Ratio of mean errors above which another geometry counts as better than the exported one.
 const MIN_WORSE_RATIO: f64 = 1.1;
 
-/// Option that exports the geometry nearest to the whole model.
-const BEST_RIGID: &str = "--best-rigid";
+/// Options that export another rigid geometry than the identified one: the one nearest to the whole
+/// model, and the one fitted alone.
+const OPTIONS: [&str; 2] = ["--best-rigid", "--fitted-alone"];
 
-/// Returns true if the geometry of `--best-rigid` was not exported, has the smallest error of all
-/// geometries on held-out poses, and is clearly better than the exported one.
-pub fn is_best_rigid_better(result: &ExportResult) -> bool {
-    let mean = |summary: &Summary| summary.norms().0[0];
-    result.held_out.as_ref().is_some_and(|errors| {
-        let is_least = |best: f64| {
-            errors.fitted_alone.as_ref().is_none_or(|alone| mean(alone) * MIN_WORSE_RATIO >= best)
-        };
-        errors
-            .best_rigid
-            .as_ref()
-            .map(mean)
-            .is_some_and(|best| is_least(best) && mean(&errors.rigid) > MIN_WORSE_RATIO * best)
-    })
+/// Statements on an export that its result does not hold.
+#[derive(Debug, Default)]
+pub struct ExportRemarks {
+    /// Errors of the exported and the identified geometry relative to the whole model in poses of
+    /// the workspace, if the exported one approximates the whole model.
+    pub workspace: Option<[ErrorSummary; 2]>,
+    /// Base and tool of a geometry that was fitted alone.
+    pub set_up: Option<Vec<String>>,
+    /// Lines of an exported table, its header first; empty for other files.
+    pub table: Vec<Vec<String>>,
+    /// Notes below that table.
+    pub notes: Vec<String>,
+}
+
+impl ExportRemarks {
+    /// Collects the remarks on a geometry, from its errors in a workspace and the fit of a geometry
+    /// alone.
+    pub fn new(
+        workspace: Option<[ErrorSummary; 2]>,
+        fitted_alone: Option<&Identification>,
+    ) -> Self {
+        Self { workspace, set_up: fitted_alone.map(set_up_values), ..Self::default() }
+    }
+}
+
+/// Returns the option that exports a clearly better geometry than the exported one; the better of
+/// them, if there are two.
+pub fn better_geometry(result: &ExportResult) -> Option<&'static str> {
+    let errors = result.held_out.as_ref()?;
+    let alternatives = [&errors.best_rigid, &errors.fitted_alone].into_iter().zip(OPTIONS);
+    let known =
+        alternatives.filter_map(|(summary, option)| Some((mean(summary.as_ref()?), option)));
+    let (least, option) = known.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    (mean(&errors.rigid) > MIN_WORSE_RATIO * least).then_some(option)
+}
+
+/// Returns the values of base and tool of a fit, a line for each.
+fn set_up_values(found: &Identification) -> Vec<String> {
+    let is_set_up = |estimate: &&Estimate| {
+        ["base", "tool", "target"].iter().any(|owner| estimate.name.starts_with(owner))
+    };
+    let line = |estimate: &Estimate| {
+        let unit = estimate.unit.display(estimate.nominal);
+        format!(
+            "{} = {} {}",
+            estimate.name,
+            number(estimate.estimate * unit.factor, 4),
+            unit.symbol
+        )
+    };
+    found.estimates.iter().filter(is_set_up).map(line).collect()
+}
+
+/// Returns the mean length of the errors.
+fn mean(summary: &Summary) -> f64 {
+    summary.norms().0[0]
 }
 
 /// Returns the result as text: the verdict on the exported geometry first.
-pub fn export_text(result: &ExportResult) -> String {
+pub fn export_text(result: &ExportResult, remarks: &ExportRemarks) -> String {
     let mut blocks = Vec::new();
     if let Some(errors) = &result.held_out {
-        blocks.extend(compared(errors, is_best_rigid_better(result)));
+        blocks.extend(compared(errors, better_geometry(result), remarks));
+    }
+    blocks.extend(remarks.workspace.as_ref().map(|[exported, identified]| {
+        let [mean, max] = [exported.mean.norm, exported.max.norm].map(|of| mm(of, 4));
+        let [other_mean, other_max] = [identified.mean.norm, identified.max.norm].map(|of| mm(of, 4));
+        Block::Text(format!(
+            "In the workspace the whole model differs from the exported geometry by {mean} mm on average ({max} at most), from the \
+             identified geometry by {other_mean} mm ({other_max})."
+        ))
+    }));
+    if let Some((_, rows)) = remarks.table.split_first() {
+        let header = ["joint", "theta, °", "d, mm", "a, mm", "alpha, °", "beta, °"];
+        let columns = rows.first().map_or(0, Vec::len).min(header.len());
+        let header = header.get(..columns).unwrap_or_default();
+        let notes = remarks.notes.clone();
+        blocks.push(Block::Table(Table { notes, ..Table::new(header, rows.to_vec(), &[0]) }));
     }
     if let Some(origins) = &result.origins {
         let row = |origin: &Origin| {
@@ -48,25 +106,35 @@ pub fn export_text(result: &ExportResult) -> String {
         let words = "Parts of the model that the file cannot hold".to_owned();
         blocks.push(Block::Lines(words, result.not_held.clone()));
     }
+    if let Some(values) = remarks.set_up.as_ref().filter(|values| !values.is_empty()) {
+        let words =
+            "Base and tool of this geometry, which replace those of the estimate".to_owned();
+        blocks.push(Block::Lines(words, values.clone()));
+    }
     blocks.extend(result.file.iter().map(|file| Block::lines(format!("Written to {file}"))));
     text(&blocks)
 }
 
 /// Compares the errors of the exported geometry with those of the whole model and of the geometries
 /// that could be exported instead, the best first.
-fn compared<'a>(errors: &ExportedErrors, best_rigid_is_better: bool) -> Vec<Block<'a>> {
+fn compared<'a>(
+    errors: &ExportedErrors,
+    better: Option<&'static str>,
+    remarks: &ExportRemarks,
+) -> Vec<Block<'a>> {
     let ExportedErrors { whole, rigid, identified, best_rigid, fitted_alone } = errors;
-    let mean = |summary: &Summary| summary.norms().0[0];
     let unit = rigid.norms().1;
     let size = |summary: &Summary| format!("{} {unit}", number(mean(summary), 4));
     let rows = rows_of_kind(whole.kind.unwrap_or("position"));
-    let exported = if identified.is_some() {
-        "geometry nearest to the whole model (--best-rigid), exported"
-    } else {
-        "identified geometry, exported"
+    let exported = match identified {
+        None => "identified geometry, exported",
+        Some(_) if remarks.set_up.is_some() => {
+            "geometry fitted alone, without effects and elasticity, exported"
+        }
+        Some(_) => "geometry nearest to the whole model (--best-rigid), exported",
     };
     let nearest = "geometry nearest to the whole model (--best-rigid)";
-    let alone = "geometry fitted alone, without effects and elasticity";
+    let alone = "geometry fitted alone (--fitted-alone)";
     let mut geometries: Vec<(&str, &Summary)> = vec![(exported, rigid)];
     geometries.extend(identified.as_ref().map(|errors| ("identified geometry", errors)));
     geometries.extend(best_rigid.as_ref().map(|errors| (nearest, errors)));
@@ -81,23 +149,29 @@ fn compared<'a>(errors: &ExportedErrors, best_rigid_is_better: bool) -> Vec<Bloc
         size(rigid),
         size(whole)
     );
-    if best_rigid_is_better {
-        let better = best_rigid.as_ref().map(size).unwrap_or_default();
+    let better_summary = match better {
+        Some(option) if option == OPTIONS[0] => best_rigid.as_ref(),
+        Some(_) => fitted_alone.as_ref(),
+        None => None,
+    };
+    if let Some((option, summary)) = better.zip(better_summary) {
         let _ = write!(
             verdict,
-            " Not the best that a rigid controller can have: with {BEST_RIGID} it would be {better}."
-        );
-    } else if is_worse && let Some(alone) = fitted_alone.as_ref().filter(|of| mean(of) <= least) {
-        let _ = write!(
-            verdict,
-            " A geometry fitted alone would have {}: identify the problem without its effects (and \
-             with --strategy rigid if joints or links are compliant), and export that.",
-            size(alone)
+            " Not the best that a rigid controller can have: with {option} it would be {}.",
+            size(summary)
         );
     } else if is_worse && let Some((name, best)) = geometries.first() {
         let _ = write!(verdict, " The best of them, {name}, would have {}.", size(best));
     } else if geometries.len() > 1 {
         verdict += " No other geometry alone is clearly better.";
+    }
+    let nearest_summary = best_rigid.as_ref().or_else(|| remarks.workspace.and(Some(rigid)));
+    let is_surpassed =
+        |(nearest, alone): (&Summary, &Summary)| mean(nearest) > MIN_WORSE_RATIO * mean(alone);
+    if nearest_summary.zip(fitted_alone.as_ref()).is_some_and(is_surpassed) {
+        verdict += " --best-rigid is worse here than a geometry fitted alone, because it approximates the whole model over the \
+                    whole range of the joints (or --workspace-mm) with base and tool of the whole model; a fit alone adapts base and \
+                    tool as well, to the measured poses.";
     }
     let row = |&(name, summary): &(&str, &Summary)| {
         let [mean, rms, max] = summary.norms().0.map(|value| number(value, 4));

@@ -49,7 +49,6 @@ pub(crate) use brief::{determines_nothing, estimate_brief};
 pub(crate) use check::check_page;
 pub use closed_loop::{loop_report, loop_text};
 pub(crate) use difference::{Side, difference_page, difference_text};
-pub(crate) use export::is_best_rigid_better;
 pub(crate) use fleet::{fleet_page, fleet_text};
 pub(crate) use identify::joint_sources_text;
 pub use identify::{estimate_text, identification_report};
@@ -77,7 +76,7 @@ pub use self::{
     closed_problem::closed_problem,
     compare::{compare_text, comparison_report},
     compensate::commands_text,
-    export::export_text,
+    export::{ExportRemarks, better_geometry, export_text},
     figures::is_figure,
     identify::why_not_trusted,
     next::next_text,

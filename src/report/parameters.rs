@@ -71,6 +71,7 @@ pub(super) fn parameters<'a>(
          parameter's prior, a bound, or the start value along unidentifiable combinations"
             .to_owned(),
     );
+    notes.extend(rows_of_sheet(problem));
     notes.extend(sizes(&found.prior_sizes));
     let mut blocks = vec![Block::Table(Table { notes, ..table(shown) })];
     if count > 0 {
@@ -80,6 +81,16 @@ pub(super) fn parameters<'a>(
         blocks.push(Block::Folded(title, folded, on_paper));
     }
     blocks
+}
+
+/// States which row of a standard DH table each parameter belongs to; `None` for other tables.
+pub(super) fn rows_of_sheet(problem: &Problem) -> Option<String> {
+    let flange = problem.standard_rows()?.len() + 1;
+    Some(format!(
+        "standard DH: θ and d of row i of the sheet are joint(i).theta and joint(i).d; its a and α are joint(i+1).a and \
+         joint(i+1).alpha, so that joint{flange}, the flange, has those of row {}",
+        flange - 1
+    ))
 }
 
 /// States the prior widths that the estimated deviations suggest if they contradict the declared

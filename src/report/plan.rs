@@ -5,7 +5,7 @@ use super::document::{Block, Table, code, opening};
 use super::figures::{ACCENT, Drawing, Forest};
 use super::forecast::{assumptions, cells};
 use super::next::commands;
-use super::parameters::{conditioning, unidentifiable};
+use super::parameters::{conditioning, rows_of_sheet, unidentifiable};
 use super::render::{page, text};
 use super::separation;
 use crate::design::{Criterion, PairSeparation, Plan};
@@ -104,7 +104,8 @@ fn blocks<'a>(
     blocks.push(enough(plan));
     blocks.extend(gain);
     blocks.extend(at_limits(problem, plan).map(Block::Text));
-    blocks.push(Block::Table(Table::new(&header, rows.collect(), &[0, 6]).noted(&[&note])));
+    let notes: Vec<String> = [note].into_iter().chain(rows_of_sheet(problem)).collect();
+    blocks.push(Block::Table(Table { notes, ..Table::new(&header, rows.collect(), &[0, 6]) }));
     blocks.push(Block::figures([gains(plan)]));
     blocks.push(Block::Page(vec![conditioning(
         &planned.identifiability,

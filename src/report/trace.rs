@@ -10,7 +10,7 @@ use super::render::{page, text};
 use super::verdict::declared;
 use super::{effect, figures, residual_tests};
 use crate::fit::Identification;
-use crate::problem::Problem;
+use crate::problem::{Effect, Problem};
 use crate::quantity::Unit;
 use crate::quantity::format::{counted, number, p_value};
 use crate::results::{
@@ -59,7 +59,7 @@ fn blocks<'a>(problem: &Problem, trace: &Trace, plots: Option<&PlotData>) -> Vec
             figures::histogram(plots),
         ])
     }));
-    blocks.extend(undetectable_effects(trace));
+    blocks.extend(undetectable_effects(problem, trace));
     blocks
 }
 
@@ -254,17 +254,21 @@ fn pose_words(problem: &Problem, pose: &SeparatingPose) -> String {
 }
 
 /// Lists the effects that these data cannot show.
-pub(super) fn undetectable_effects<'a>(trace: &Trace) -> Vec<Block<'a>> {
+pub(super) fn undetectable_effects<'a>(problem: &Problem, trace: &Trace) -> Vec<Block<'a>> {
+    let is_listed = |of: &Effect| effect::is_at_moving_joint(problem, of);
+    let untestable: Vec<_> =
+        trace.untestable.iter().filter(|(of, _)| is_listed(of)).cloned().collect();
+    let absorbed: Vec<&Effect> = trace.absorbed.iter().filter(|of| is_listed(of)).collect();
     let mut blocks = Vec::new();
-    if !trace.untestable.is_empty() {
+    if !untestable.is_empty() {
         blocks.push(Block::heading("Effects that these data cannot show"));
-        blocks.push(Block::List(effect::reasons(trace.untestable.iter().cloned())));
+        blocks.push(Block::List(effect::reasons(untestable)));
     }
-    if !trace.absorbed.is_empty() {
+    if !absorbed.is_empty() {
         blocks.push(Block::heading(
             "Effects that these poses cannot show, because fitted parameters make up for them exactly",
         ));
-        blocks.push(Block::list(effect::listed(&trace.absorbed)));
+        blocks.push(Block::list(effect::listed(absorbed)));
     }
     blocks
 }

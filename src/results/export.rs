@@ -54,7 +54,7 @@ pub struct ExportedErrors {
     /// Geometry of `--best-rigid`, unless it was exported.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub best_rigid: Option<Summary>,
-    /// Geometry fitted to the same rows by a rigid model without effects.
+    /// Geometry fitted to the same rows by a rigid model without effects, unless it was exported.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fitted_alone: Option<Summary>,
 }
@@ -110,6 +110,21 @@ impl ExportedErrors {
         };
         let (whole, rigid) = (of(&whole), of(&rigid));
         Self { whole, rigid, identified: None, best_rigid: None, fitted_alone: None }
+    }
+
+    /// Adds the errors of the exported geometry, if it is not the identified one, of the geometry
+    /// of `--best-rigid`, and of a geometry fitted alone.
+    #[must_use]
+    pub fn with_geometries(
+        mut self,
+        [exported, best_rigid, fitted_alone]: [Option<ErrorSummary>; 3],
+    ) -> Self {
+        if let Some(exported) = exported {
+            self.identified = Some(std::mem::replace(&mut self.rigid, Summary::of(&exported)));
+        }
+        self.best_rigid = best_rigid.as_ref().map(Summary::of);
+        self.fitted_alone = fitted_alone.as_ref().map(Summary::of);
+        self
     }
 }
 

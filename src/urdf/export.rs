@@ -32,7 +32,7 @@ pub struct Export {
 ///
 /// They regroup the joint transforms: `C_k` = Ry(`β_{k−1}`) … Rx(`α_k`) Tx(`a_k`) Rz(`θ_k`)
 /// Tz(`d_k`), with fixed joints in between.
-pub(super) struct Steps {
+pub(crate) struct Steps {
     pub before: Vec<Frame<f64>>,
     pub end: Frame<f64>,
 }

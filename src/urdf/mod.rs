@@ -23,6 +23,7 @@ mod yaml;
 pub use chain::Chain;
 pub(crate) use describe::SIGMA_MM;
 pub use describe::{Description, describe};
+pub(crate) use export::Steps;
 pub use export::{Export, export};
 pub(crate) use patches::MovedOrigin;
 pub use read::Robot;

@@ -1,0 +1,125 @@
+//! Rigid geometries that may stand for a whole model, and their errors on held-out rows.
+
+use nalgebra::DVector;
+
+use super::error::ExportError;
+use super::rigid::{RigidFit, best_rigid, rigid_errors};
+use crate::design::Workspace;
+use crate::fit::{self, ErrorSummary, Options, Placement, SavedEstimate, Strategy};
+use crate::measurement::Dataset;
+use crate::mechanics::Arm;
+use crate::model::Model;
+use crate::problem::{Joint, Problem};
+use crate::remainder::Correction;
+
+/// Choice of the rigid geometry to export.
+#[derive(Debug, Clone)]
+pub enum GeometryChoice {
+    /// Identified geometry without the other parts of the model.
+    Identified,
+    /// Geometry that approximates the whole model best in a workspace.
+    BestRigid(Workspace),
+    /// Geometry that a rigid model without effects gives, fitted to the same rows.
+    FittedAlone,
+}
+
+/// Rigid geometry to export.
+#[derive(Debug, Clone)]
+pub struct Geometry {
+    /// Arm with this geometry.
+    pub arm: Arm<f64>,
+    /// Approximation of the whole model; `None` for other choices.
+    pub best_rigid: Option<RigidFit>,
+    /// Fit of the rigid model, with its base and tool; `None` for other choices.
+    pub fitted_alone: Option<fit::Identification>,
+}
+
+impl Geometry {
+    /// Computes the chosen geometry from an estimate with the full parameter vector `x`. `data` are
+    /// needed for a geometry fitted alone.
+    ///
+    /// # Errors
+    /// Returns an error if too few poses reach the workspace, or if the rigid fit lacks data or
+    /// fails.
+    pub fn new(
+        problem: &Problem,
+        (estimate, correction): (&SavedEstimate, Option<&Correction>),
+        (model, x): (&Model, &DVector<f64>),
+        data: Option<&Dataset>,
+        choice: &GeometryChoice,
+    ) -> Result<Self, ExportError> {
+        let arm = |model: &Model, x: &DVector<f64>| model.arm(|k| x.get(k).copied().unwrap_or(0.0));
+        match choice {
+            GeometryChoice::Identified => {
+                Ok(Self { arm: arm(model, x), best_rigid: None, fitted_alone: None })
+            }
+            GeometryChoice::BestRigid(workspace) => {
+                let best = best_rigid(problem, estimate, correction, workspace)?;
+                Ok(Self { arm: best.arm.clone(), best_rigid: Some(best), fitted_alone: None })
+            }
+            GeometryChoice::FittedAlone => {
+                let data = data.ok_or(ExportError::NeedsData)?;
+                let (rigid, found) = fit_alone(problem, data)?;
+                let placement = Placement::of(&data.measurements);
+                let model = Model::new(&rigid, &placement.bases, &placement.targets)?;
+                let model = found.strategy.model(model);
+                let arm = arm(&model, &found.x);
+                Ok(Self { arm, best_rigid: None, fitted_alone: Some(found) })
+            }
+        }
+    }
+
+    /// Computes errors on the held-out rows: of this geometry (`None` if it is the identified one),
+    /// and of the approximation of the whole model and of the geometry fitted alone, unless they
+    /// are this one or are no different.
+    ///
+    /// # Errors
+    /// Returns an error if the estimate does not match the data.
+    pub fn errors(
+        &self,
+        problem: &Problem,
+        (estimate, correction): (&SavedEstimate, Option<&Correction>),
+        data: &Dataset,
+    ) -> Result<[Option<ErrorSummary>; 3], ExportError> {
+        let placement = Placement::of(&data.measurements);
+        let model = estimate.model(Model::new(problem, &placement.bases, &placement.targets)?);
+        let x = estimate.vector(problem, &model)?;
+        let held_out = &data.split.held_out;
+        let poses = placement.poses(&data.measurements, held_out, 1.0);
+        if !poses.iter().all(|pose| pose.observation.is_position()) {
+            return Ok([None; 3]);
+        }
+        let of_arm = |best: &RigidFit| {
+            let rigid = rigid_errors(problem, (&model, &x), &best.arm, &poses);
+            ErrorSummary::of_rows(&data.measurements, held_out.iter().copied(), &rigid)
+        };
+        let alone = self.fitted_alone.as_ref().map(|alone| alone.fitted.held_out);
+        let exported = self.best_rigid.as_ref().map(of_arm).or(alone);
+        let is_elastic = |joint: &Joint| joint.stiffness.is_some() || joint.beam.is_some();
+        if problem.effects.is_empty() && !problem.joints.iter().any(is_elastic) {
+            return Ok([exported, None, None]);
+        }
+        // The alternatives only inform: if one of them fails, its line is absent.
+        let best = self.best_rigid.is_none().then(|| {
+            let workspace = Workspace { corners: None, planes: Vec::new() };
+            best_rigid(problem, estimate, correction, &workspace).ok()
+        });
+        let alone = self.fitted_alone.is_none().then(|| fit_alone(problem, data).ok());
+        Ok([
+            exported,
+            best.flatten().as_ref().map(of_arm),
+            alone.flatten().map(|(_, alone)| alone.fitted.held_out),
+        ])
+    }
+}
+
+/// Fits a rigid model without effects, and returns its problem too.
+fn fit_alone(
+    problem: &Problem,
+    data: &Dataset,
+) -> Result<(Problem, fit::Identification), ExportError> {
+    let rigid = Problem { effects: Vec::new(), ..problem.clone() };
+    let options = Options::default().with_strategy(Strategy::Rigid);
+    let found = fit::identify(&rigid, data, &options)?;
+    Ok((rigid, found))
+}
