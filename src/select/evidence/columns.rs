@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::block::Design;
 use super::candidate::{Candidate, even};
-use super::functions::{SampledCovariate, basis, goes_with, growing, merge, products_of, times};
+use super::functions::{SampledCovariate, goes_with, growing, merge, products_of, times};
 use super::hypothesis::Hypothesis;
 use super::marginal::Coefficients;
 use super::sites::{acts_along_axes, geometry_sites};
@@ -376,18 +376,14 @@ impl<'a, 'l> Columns<'a, 'l> {
             _ => lengths.len(),
         };
         for (variant, &length) in lengths.iter().take(told).enumerate() {
-            self.add_variant(family, &hypothesis, first + variant, || {
-                times(at, &basis(&of.scaled, length))
-            });
+            self.add_variant(family, &hypothesis, first + variant, || times(at, &of.basis(length)));
         }
         if matches!(of.covariate, Covariate::Time | Covariate::Row) && of.levels > 2 {
             // A settling quantity changes fast at first, so functions of log time are tried, too.
             let range = of.values[..self.weighed].iter().copied().fold(0.0, f64::max);
             let logarithm = of.values.iter().map(|t| (t.max(0.0) + range / 30.0).ln()).collect();
             if let Some(of) = SampledCovariate::new(of.covariate.clone(), logarithm, self.weighed) {
-                self.add_variant(family, &hypothesis, warped, || {
-                    times(at, &basis(&of.scaled, 0.25))
-                });
+                self.add_variant(family, &hypothesis, warped, || times(at, &of.basis(0.25)));
             }
         }
         // With two different values, every function is a straight line.
@@ -429,7 +425,7 @@ impl<'a, 'l> Columns<'a, 'l> {
             let hypothesis =
                 Hypothesis::smooth(site, vec![command.covariate.clone(), size.covariate.clone()]);
             self.add("surface", 1.0, hypothesis, || {
-                times(&[at], &growing(&command.scaled, size, zero, length))
+                times(&[at], &growing(command, size, zero, length))
             });
         }
     }
@@ -444,9 +440,7 @@ impl<'a, 'l> Columns<'a, 'l> {
         let mut depends_on = vec![one.covariate.clone(), other.covariate.clone()];
         depends_on.sort();
         let (hypothesis, length) = (Hypothesis::smooth(site, depends_on), SURFACE_LENGTH);
-        self.add(family, 1.0, hypothesis, || {
-            times(at, &products_of(&[&one.scaled, &other.scaled], length))
-        });
+        self.add(family, 1.0, hypothesis, || times(at, &products_of(&[one, other], length)));
     }
 
     /// Returns the candidates with their prior probabilities. The odds of each further hypothesis

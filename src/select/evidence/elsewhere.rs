@@ -59,7 +59,7 @@ impl Columns<'_, '_> {
             self.add("field", 1.0, hypothesis(HypothesisKind::Linear), || times(&at, &linear));
         }
         if let [x, y, z] = coordinates.as_slice() {
-            let plane = products_of(&[&x.scaled, &y.scaled, &z.scaled], SLOW_LENGTH);
+            let plane = products_of(&[x, y, z], SLOW_LENGTH);
             self.add("field", 1.0, hypothesis(HypothesisKind::Smooth), || times(&at, &plane));
         }
         self.covariates.extend(coordinates);

@@ -1,10 +1,12 @@
 //! Functions of recorded quantities of a pose, as sums of a few basis functions.
 
 use std::f64::consts::PI;
+use std::sync::OnceLock;
 
 use nalgebra::{DMatrix, DVector};
 
 use crate::residual_tests::Covariate;
+use crate::select::settings::SMOOTH_LENGTHS;
 
 /// Margin by which the cosine basis extends on either side of the covariate's range, as a fraction
 /// of the range. Functions then need not be flat at the ends of the range.
@@ -77,6 +79,8 @@ pub(super) struct SampledCovariate {
     pub range: (f64, f64),
     /// Number of different values in those poses.
     pub levels: usize,
+    /// Cosines of the basis with the shortest of [`SMOOTH_LENGTHS`], shape = (poses, functions).
+    cosines: OnceLock<DMatrix<f64>>,
 }
 
 impl SampledCovariate {
@@ -113,7 +117,27 @@ impl SampledCovariate {
         sorted.dedup();
         let scaled =
             values.iter().map(|value| ((value - low) / (high - low)).clamp(0.0, 1.0)).collect();
-        Some(Self { covariate, values, scaled, range: (low, high), levels: sorted.len() })
+        let (levels, cosines) = (sorted.len(), OnceLock::new());
+        Some(Self { covariate, values, scaled, range: (low, high), levels, cosines })
+    }
+
+    /// Returns the cosines of the basis, which hypotheses at all sites share.
+    fn cosines(&self) -> &DMatrix<f64> {
+        self.cosines.get_or_init(|| {
+            let count = SMOOTH_LENGTHS.map(|length| weights(length).len()).into_iter().max();
+            DMatrix::from_fn(self.scaled.len(), count.unwrap_or(0), |row, k| {
+                cosine(k, self.scaled[row])
+            })
+        })
+    }
+
+    /// Returns cosines over the range and its margin as columns, each scaled to the standard
+    /// deviation that a Gaussian process has along it. The process has squared-exponential
+    /// covariance with the given length, at least the shortest of [`SMOOTH_LENGTHS`]
+    /// [Solin & Särkkä 2020]; shape = (poses, functions).
+    pub fn basis(&self, length: f64) -> DMatrix<f64> {
+        let (weights, cosines) = (weights(length), self.cosines());
+        DMatrix::from_fn(cosines.nrows(), weights.len(), |row, k| weights[k] * cosines[(row, k)])
     }
 }
 
@@ -142,14 +166,6 @@ pub(super) fn goes_with(one: &Covariate, other: &Covariate) -> bool {
         (Command(_), Command(_)) | (Temperature, Time | Row) | (Time | Row, Temperature) => true,
         _ => false,
     }
-}
-
-/// Returns cosines over the range and its margin as columns, each scaled to the standard deviation
-/// that a Gaussian process has along it. The process has squared-exponential covariance with the
-/// given length [Solin & Särkkä 2020]; shape = (poses, functions).
-pub(super) fn basis(scaled: &[f64], length: f64) -> DMatrix<f64> {
-    let weights = weights(length);
-    DMatrix::from_fn(scaled.len(), weights.len(), |row, k| weights[k] * cosine(k, scaled[row]))
 }
 
 /// Returns basis functions of a Gaussian process with exponential covariance exp(−|Δ|/length),
@@ -181,16 +197,16 @@ fn weights(length: f64) -> Vec<f64> {
     (0..count).map(|k| variance(k).sqrt()).collect()
 }
 
-/// Returns functions of a covariate (`scaled`) whose amplitude is proportional to a quantity
+/// Returns functions of a covariate `of` whose amplitude is proportional to a quantity
 /// (`size`): basis functions times the quantity. If its `zero` is unknown, the basis functions
 /// alone are included, too. Shape = (poses, functions).
 pub(super) fn growing(
-    scaled: &[f64],
+    of: &SampledCovariate,
     size: &SampledCovariate,
     zero: Option<f64>,
     length: f64,
 ) -> DMatrix<f64> {
-    let plain = basis(scaled, length);
+    let plain = of.basis(length);
     let (low, high) = size.range;
     let (from, kept) =
         (zero.unwrap_or(0.5 * (low + high)), if zero.is_some() { 0 } else { plain.ncols() });
@@ -201,10 +217,10 @@ pub(super) fn growing(
 }
 
 /// Returns products of cosines, one factor for each covariate, as columns.
-pub(super) fn products_of(scaled: &[&[f64]], length: f64) -> DMatrix<f64> {
+pub(super) fn products_of(covariates: &[&SampledCovariate], length: f64) -> DMatrix<f64> {
     let weights = weights(length);
     let mut indices: Vec<Vec<usize>> = vec![Vec::new()];
-    for _ in scaled {
+    for _ in covariates {
         let longer = |index: &Vec<usize>| {
             (0..weights.len()).map(|k| [index.as_slice(), &[k]].concat()).collect::<Vec<_>>()
         };
@@ -212,10 +228,11 @@ pub(super) fn products_of(scaled: &[&[f64]], length: f64) -> DMatrix<f64> {
     }
     let weight = |index: &[usize]| index.iter().map(|&k| weights[k]).product::<f64>();
     indices.retain(|index| weight(index).powi(2) > MIN_BASIS_VARIANCE);
-    DMatrix::from_fn(scaled[0].len(), indices.len(), |row, j| {
-        let index = &indices[j];
-        weight(index)
-            * index.iter().zip(scaled).map(|(&k, scaled)| cosine(k, scaled[row])).product::<f64>()
+    let weights: Vec<f64> = indices.iter().map(|index| weight(index)).collect();
+    let cosines: Vec<&DMatrix<f64>> = covariates.iter().map(|of| of.cosines()).collect();
+    DMatrix::from_fn(covariates[0].scaled.len(), indices.len(), |row, j| {
+        let factors = indices[j].iter().zip(&cosines);
+        weights[j] * factors.map(|(&k, cosines)| cosines[(row, k)]).product::<f64>()
     })
 }
 
@@ -223,9 +240,15 @@ pub(super) fn products_of(scaled: &[&[f64]], length: f64) -> DMatrix<f64> {
 /// functions).
 pub(super) fn times(at: &[&DVector<f64>], functions: &DMatrix<f64>) -> DMatrix<f64> {
     let k = functions.ncols();
-    DMatrix::from_fn(3 * functions.nrows(), at.len() * k, |row, j| {
-        at[j / k][row] * functions[(row / 3, j % k)]
-    })
+    let mut out = DMatrix::zeros(3 * functions.nrows(), at.len() * k);
+    for (j, mut column) in out.column_iter_mut().enumerate() {
+        let poses = column.as_mut_slice().as_chunks_mut::<3>().0.iter_mut();
+        let levers = at[j / k].as_slice().as_chunks::<3>().0;
+        for ((out, lever), value) in poses.zip(levers).zip(&functions.column(j % k)) {
+            *out = lever.map(|lever| lever * value);
+        }
+    }
+    out
 }
 
 #[cfg(test)]
@@ -266,7 +289,7 @@ mod tests {
                 && covariate(&[29.5, 30.5]).is_size(None)
         );
         assert!(!covariate(&[29.5, 30.5]).is_size(Some(20.0)));
-        let grown = growing(&[0.0, 0.5], &covariate(&[20.0, 31.0]), Some(20.0), 0.5);
+        let grown = growing(&covariate(&[0.0, 0.5]), &covariate(&[20.0, 31.0]), Some(20.0), 0.5);
         assert!(
             grown.row(0).iter().all(|value| *value == 0.0)
                 && grown.row(1).iter().any(|value| *value != 0.0),

@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::block::Design;
 use super::columns::Columns;
-use super::functions::{SampledCovariate, basis, times};
+use super::functions::{SampledCovariate, times};
 use super::hypothesis::{Hypothesis, HypothesisKind, Site};
 use crate::model::parameter::ParameterSite;
 use crate::problem::{Effect, EffectDeclaration, JointKind};
@@ -40,7 +40,7 @@ impl Columns<'_, '_> {
         else {
             return;
         };
-        let slow = basis(&known.scaled, SLOW_LENGTH);
+        let slow = known.basis(SLOW_LENGTH);
         for order in 1..=MAX_NEAR_ORDER {
             let waves = || {
                 let (k, mut waves) = (slow.ncols(), DMatrix::zeros(slow.nrows(), 2 * slow.ncols()));
