@@ -9,7 +9,7 @@ use crate::fit::IdentifyError;
 use crate::problem::Effect;
 use crate::select::data::Data;
 use crate::select::fitted::Fitted;
-use crate::select::neighbourhood::{LinearNeighbourhood, Score};
+use crate::select::neighbourhood::{Linearised, Score};
 use crate::select::settings::{LN_ODDS_OF_ANOTHER_ARGUMENT, MAX_SHIFT_TIMES};
 
 /// Maximum number of moves of one argument to the best of its neighbouring values.
@@ -35,8 +35,16 @@ pub(super) fn polished(
         return Ok(None);
     }
     let added = state.added(fitted);
+    let searched: Vec<Effect> =
+        added.iter().filter(|effect| effect.is_searched()).cloned().collect();
+    if searched.is_empty() {
+        return Ok(None);
+    }
+    // An effect with another argument acts at the same sites.
+    let linearised = fitted.linearised_at(data, data.rows(), &searched);
     let polished = |effect: &Effect| {
-        let better = effect.is_searched().then(|| better_argument(fitted, data, effect));
+        let of_effect = || better_argument((fitted, &linearised), data, effect);
+        let better = effect.is_searched().then(of_effect);
         better.flatten().unwrap_or_else(|| effect.clone())
     };
     let effects: Vec<Effect> = added.iter().map(polished).collect();
@@ -45,19 +53,19 @@ pub(super) fn polished(
 
 /// Returns the effect with the argument that explains all rows best; `None` if it is not clearly
 /// better than the present one. The argument moves to the best neighbouring value at most
-/// `MAX_POLISHING_PASSES` times.
-fn better_argument(fitted: &Fitted, data: &Data, effect: &Effect) -> Option<Effect> {
+/// `MAX_POLISHING_PASSES` times. `linearised` has the sites of the effect at all rows.
+fn better_argument(
+    (fitted, linearised): (&Fitted, &Linearised),
+    data: &Data,
+    effect: &Effect,
+) -> Option<Effect> {
     let sums = fitted.around(data).sums();
     let variance = sums.squares / sums.freedom();
-    let mut without: Option<LinearNeighbourhood> = None;
+    let fit = fitted.neighbourhood_without(linearised, &fitted.unknowns_of(effect));
     let (mut best, mut gain_of_present) = ((f64::NEG_INFINITY, effect.clone()), f64::INFINITY);
     for _ in 0..MAX_POLISHING_PASSES {
         let tried: Vec<Effect> =
             [vec![best.1.clone()], neighbouring_arguments(data, &best.1)].concat();
-        let linearised = fitted.linearised_at(data, data.rows(), &tried);
-        let fit = without.get_or_insert_with(|| {
-            fitted.neighbourhood_without(&linearised, &fitted.unknowns_of(effect))
-        });
         let columns: Vec<DMatrix<f64>> =
             tried.iter().map(|effect| linearised.columns(effect)).collect();
         let gain = |score: &Score| fit.sums().gain(score).map_or(0.0, |gain| gain.squares);
