@@ -201,18 +201,22 @@ fn certain_null(scaled: &DMatrix<f64>) -> Option<DMatrix<f64>> {
 /// must be orthonormal.
 pub(super) fn complement(basis: &DMatrix<f64>) -> DMatrix<f64> {
     let (n, r) = basis.shape();
-    let mut projector = DMatrix::identity(n, n) - basis * basis.transpose();
-    let mut rows = DMatrix::zeros(n - r, n);
-    for mut row in rows.row_iter_mut() {
-        let longest = (0..n)
-            .max_by(|&i, &j| projector.column(i).norm().total_cmp(&projector.column(j).norm()))
-            .unwrap_or(0);
-        let direction = projector.column(longest).normalize();
-        let along = direction.transpose() * &projector;
-        projector -= &direction * along;
-        row.copy_from(&direction.transpose());
+    // Squared length of each unit vector outside the span of `basis` and of earlier rows: its
+    // projection, whose squared length is its own diagonal entry.
+    let mut outside: Vec<f64> = basis.row_iter().map(|row| 1.0 - row.norm_squared()).collect();
+    let mut rows = DMatrix::zeros(n, n - r);
+    for k in 0..n - r {
+        let order = |&i: &usize, &j: &usize| outside[i].total_cmp(&outside[j]);
+        let longest = (0..n).max_by(order).unwrap_or(0);
+        let mut direction = basis * basis.row(longest).transpose() * -1.0;
+        direction[longest] += 1.0;
+        let earlier = rows.columns(0, k);
+        direction.gemv(-1.0, &earlier, &earlier.row(longest).transpose(), 1.0);
+        direction.normalize_mut();
+        outside.iter_mut().zip(&direction).for_each(|(outside, value)| *outside -= value * value);
+        rows.set_column(k, &direction);
     }
-    rows
+    rows.transpose()
 }
 
 /// Returns the unidentifiable combinations as the reduced row echelon form of the null space
