@@ -6,8 +6,8 @@ use std::sync::OnceLock;
 use nalgebra::{DMatrix, DMatrixView, DVector};
 use rayon::prelude::*;
 
-use super::kernel::sum_of_squares;
 use super::{Block, LeastSquares, Linearisation, Triangle};
+use crate::numeric::kernel::sum_of_squares;
 use crate::numeric::{gram, inverse_factor};
 
 /// Largest relative linearisation error ‖ρ‖ / ‖J₀ δ‖ at which the derivatives of the base point are

@@ -3,7 +3,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::kernel::{dot, norm};
+use crate::numeric::kernel::{dot, norm};
 
 /// Returns R⁻¹ if every singular value of R is certainly above `least` times the largest; `None`
 /// otherwise, or if R is not upper triangular.

@@ -1,7 +1,7 @@
 //! Robust losses, which limit the influence of gross errors.
 
 use super::Block;
-use super::kernel::{norm, sum_of_squares};
+use crate::numeric::kernel::{norm, sum_of_squares};
 
 /// Number of lengths at which the moments of a loss are summed.
 const MOMENT_STEPS: u32 = 2000;

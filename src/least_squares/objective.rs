@@ -8,12 +8,12 @@ use rayon::prelude::*;
 
 use super::chord::{Base, Chunk};
 use super::curvature::by_differences;
-use super::kernel::{dot, sum_of_squares};
 use super::linearisation_cache::Key;
 use super::{
     Block, LeastSquares, LinearRows, Linearisation, LinearisationCache, Loss, MANY_UNKNOWNS,
     Objective, RowsError, Triangle, slopes,
 };
+use crate::numeric::kernel::{dot, sum_of_squares};
 
 /// Number of items reduced together. Larger problems keep only n × n factors, never the m × n
 /// matrix.

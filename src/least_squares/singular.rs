@@ -5,7 +5,7 @@ use multiversion::multiversion;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::kernel::dot;
+use crate::numeric::kernel::dot;
 
 /// Maximum number of sweeps over all pairs of columns. Usually five suffice.
 const MAX_SWEEPS: usize = 60;
@@ -197,7 +197,7 @@ impl ColumnGroup {
 
 /// Rotates two columns (entries, squared norm, projected constant) so that they become orthogonal.
 /// Returns false if they already are, within rounding.
-#[multiversion(targets("x86_64+avx2"))]
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
 fn rotate((a, aa, ca): &mut Column, (b, bb, cb): &mut Column) -> bool {
     let product = dot(a, b);
     let tolerance = (a.len() as f64).sqrt() * f64::EPSILON;
@@ -206,8 +206,12 @@ fn rotate((a, aa, ca): &mut Column, (b, bb, cb): &mut Column) -> bool {
     }
     let (cosine, tangent) = rotation(**aa, **bb, product);
     let sine = cosine * tangent;
-    for (a, b) in a.iter_mut().zip(b.iter_mut()) {
-        (*a, *b) = (cosine * *a - sine * *b, sine * *a + cosine * *b);
+    let rows = a.len().min(b.len());
+    let (left, right) = (&mut a[..rows], &mut b[..rows]);
+    for i in 0..rows {
+        let (x, y) = (left[i], right[i]);
+        left[i] = cosine * x - sine * y;
+        right[i] = sine * x + cosine * y;
     }
     **aa = updated(**aa, -tangent * product, a);
     **bb = updated(**bb, tangent * product, b);
@@ -224,6 +228,8 @@ fn rotation(aa: f64, bb: f64, ab: f64) -> (f64, f64) {
 }
 
 /// Returns `square` + `change`, recomputed from the column if the sum cancels.
+#[inline(always)]
+#[expect(clippy::inline_always, reason = "for every kind of processor")]
 fn updated(square: f64, change: f64, column: &[f64]) -> f64 {
     let sum = square + change;
     if sum > 0.25 * square { sum } else { dot(column, column) }

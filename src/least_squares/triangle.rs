@@ -4,8 +4,8 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, DMatrixView, DMatrixViewMut, DVector};
 
-use super::kernel::{PANEL, dot, dots, norm, subtract, sum_of_squares};
 use super::{Block, Linearisation};
+use crate::numeric::kernel::{PANEL, dot, dots, norm, subtract, sum_of_squares};
 
 /// Widths of the panels of reflectors applied as matrix products, each with the number of remaining
 /// columns from which it is used.

@@ -3,9 +3,10 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::inverse::inverse_rows;
-use super::singular::SingularValues;
+use super::tridiagonal::eigenvalues_along;
 use super::uncertainty::CONSTRAINT_WEIGHT;
 use super::{Linearisation, Triangle};
+use crate::numeric::{gram_of_lower, inverse_lower};
 
 /// Range of ln s² that is searched, s² being relative to the assumed variance.
 const LOG_VARIANCE_RANGE: (f64, f64) = (-60.0, 60.0);
@@ -93,20 +94,9 @@ impl VarianceLikelihood {
             let free_rows = free_rows - k as f64;
             return Self { directions: Vec::new(), residual_squares, free_rows };
         }
-        // The left singular vectors are the right singular vectors of the transpose.
-        let SingularValues { values, right } = SingularValues::of(&prior_block.transpose());
-        let along = right.tr_mul(&y);
-        let mut directions: Vec<(f64, f64)> =
-            values.iter().zip(along.iter()).map(|(a, c)| (a * a, c * c)).collect();
-        let outside = (y.norm_squared() - along.norm_squared()).max(0.0);
-        directions.retain(|(a, _)| *a > 0.0);
-        let nonzero = directions.len() as f64;
-        directions.retain(|(a, _)| *a <= MAX_PRIOR_RATIO);
-        Self {
-            directions,
-            residual_squares: residual_squares + outside,
-            free_rows: free_rows - nonzero,
-        }
+        let directions = spectrum(&prior_block, &y);
+        let free_rows = free_rows - k as f64;
+        Self { directions, residual_squares, free_rows }
     }
 
     /// Returns −2 ln L at ln s² = `log`.
@@ -134,6 +124,25 @@ impl VarianceLikelihood {
         let log = 0.5 * (low + high);
         (log.exp(), self.at(0.0) - self.at(log))
     }
+}
+
+/// Returns a² and c² of the directions of A with a² up to [`MAX_PRIOR_RATIO`], for y = A z + e and
+/// c = Uᵀy.
+///
+/// They are eigenvalues of (1 + A Aᵀ)⁻¹, which are exact to rounding where a² is small; the factor
+/// of 1 + A Aᵀ is that of the rows of Aᵀ and 1. Directions with a = 0 count, although only noise
+/// is in them.
+fn spectrum(a: &DMatrix<f64>, y: &DVector<f64>) -> Vec<(f64, f64)> {
+    let k = a.ncols();
+    let mut stack = DMatrix::zeros(2 * k, k);
+    stack.rows_mut(0, k).tr_copy_from(a);
+    stack.rows_mut(k, k).fill_with_identity();
+    let inverse = inverse_lower(&Triangle::factor(&stack).transpose());
+    let Some(spectrum) = eigenvalues_along(gram_of_lower(&inverse), y) else {
+        return Vec::new();
+    };
+    let squares = spectrum.into_iter().map(|(value, c)| ((value.recip() - 1.0).max(0.0), c * c));
+    squares.filter(|(square, _)| *square <= MAX_PRIOR_RATIO).collect()
 }
 
 #[cfg(test)]

@@ -8,8 +8,8 @@ use nalgebra::{DMatrix, DVector};
 
 use super::pose::Pose;
 use crate::least_squares::Block;
-use crate::least_squares::kernel::sum_of_squares;
 use crate::model::parameter::Parameter;
+use crate::numeric::kernel::sum_of_squares;
 
 /// Largest relative difference at which two numbers, or two residual vectors, count as equal. It is
 /// far above rounding errors and far below any significant change.

@@ -1,6 +1,8 @@
 //! Cholesky factors and triangular inverses by blocked matrix products.
 
-use nalgebra::{Cholesky, DMatrix, DMatrixViewMut, DVector};
+use nalgebra::{DMatrix, DMatrixViewMut, DVector};
+
+use super::kernel::{add_product, factor_in_place};
 
 /// Largest number of rows for which a triangular solve or inverse proceeds column by column.
 const MAX_UNBLOCKED_ROWS: usize = 24;
@@ -15,12 +17,14 @@ const PANEL: usize = 64;
 pub(crate) fn lower_factor(mut matrix: DMatrix<f64>) -> Option<DMatrix<f64>> {
     let n = matrix.nrows();
     if n <= PANEL {
-        return matrix.cholesky().map(Cholesky::unpack);
+        let is_factored = factor_in_place(n, matrix.as_mut_slice());
+        matrix.fill_upper_triangle(0.0, 1);
+        return is_factored.then_some(matrix);
     }
     for first in (0..n).step_by(PANEL) {
         let wide = PANEL.min(n - first);
         let behind = first + wide;
-        let diagonal = matrix.view((first, first), (wide, wide)).into_owned().cholesky()?.unpack();
+        let diagonal = lower_factor(matrix.view((first, first), (wide, wide)).into_owned())?;
         matrix.view_mut((first, first), (wide, wide)).copy_from(&diagonal);
         let (mut left, mut right) = matrix.columns_range_pair_mut(first..behind, behind..);
         let mut panel = left.rows_mut(behind, n - behind);
@@ -51,7 +55,8 @@ fn solve_right(lower: &DMatrix<f64>, right: &mut DMatrixViewMut<f64>) {
         for j in 0..count {
             for k in 0..j {
                 let (solved, mut column) = block.columns_range_pair_mut(k, j);
-                column.axpy(-lower[(first + j, first + k)], &solved, 1.0);
+                let factor = -lower[(first + j, first + k)];
+                add_product(column.as_mut_slice(), (solved.as_slice(), 0), &[factor]);
             }
             block.column_mut(j).unscale_mut(lower[(first + j, first + j)]);
         }

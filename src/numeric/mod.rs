@@ -2,15 +2,16 @@
 
 mod bootstrap;
 mod factor;
+pub(crate) mod kernel;
 mod product;
 
 pub use bootstrap::Interval;
 pub(crate) use bootstrap::mean_interval;
 pub(crate) use factor::{inverse_factor, inverse_lower, lower_factor, solve_positive};
 pub(crate) use product::{
-    gram, gram_of_lower, lower_product, multiply_by_upper, product, product_with_upper,
-    product_with_upper_padded, subtract_product, transposed_narrow_product, transposed_product,
-    zeros,
+    gram, gram_of_lower, lower_product, multiply_by_upper, product, product_with_lower,
+    product_with_upper, product_with_upper_padded, subtract_product, transposed_narrow_product,
+    transposed_product, zeros,
 };
 
 /// Returns the median of some values, or `None` if there are none. For an even number of values it

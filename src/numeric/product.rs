@@ -1,6 +1,8 @@
 //! Parallel products of tall matrices. The partition depends only on the sizes, so results are the
 //! same to the bit for any number of threads.
 
+use std::ops::Range;
+
 use nalgebra::{DMatrix, DMatrixView, DMatrixViewMut, Dyn, MatrixView};
 use rayon::prelude::*;
 
@@ -28,7 +30,14 @@ pub(crate) fn product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
         return narrow_product(a, b);
     }
     let mut out = zeros(a.nrows(), b.ncols());
-    product_to(a, b, &mut out, |_| a.ncols());
+    product_to(a, b, &mut out, |_| 0..a.ncols());
+    out
+}
+
+/// Returns A B for a square lower triangle B.
+pub(crate) fn product_with_lower(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
+    let mut out = zeros(a.nrows(), b.ncols());
+    product_to(a, b, &mut out, |columns| columns.start..b.nrows());
     out
 }
 
@@ -44,7 +53,7 @@ pub(crate) fn product_with_upper_padded(
     extra: usize,
 ) -> DMatrix<f64> {
     let mut out = zeros(a.nrows() + extra, b.ncols());
-    product_to(a, b, &mut out, |columns| columns);
+    product_to(a, b, &mut out, |columns| 0..columns.end);
     out
 }
 
@@ -90,13 +99,13 @@ fn by_rows(
     rayon::join(|| by_rows(upper, first, form), || by_rows(lower, first + half, form));
 }
 
-/// Writes A B into the first rows of `out`. `filled(k)` bounds the non-zero rows of the first k
-/// columns of B.
+/// Writes A B into the first rows of `out`. `filled` returns the rows of B outside which a range of
+/// its columns is zero.
 fn product_to(
     a: &DMatrix<f64>,
     b: &DMatrix<f64>,
     out: &mut DMatrix<f64>,
-    filled: impl Fn(usize) -> usize + Sync,
+    filled: impl Fn(Range<usize>) -> Range<usize> + Sync,
 ) {
     let (rows, inner, columns) = (a.nrows(), a.ncols(), b.ncols());
     if rows * inner * columns < MIN_PARALLEL_WORK || inner == 0 {
@@ -105,12 +114,12 @@ fn product_to(
     let height = out.nrows();
     let form = |(part, entries): (usize, &mut [f64])| {
         let (first, count) = (part * BLOCK_COLUMNS, entries.len() / height);
-        let filled = filled(first + count);
+        let filled = filled(first..first + count);
         let mut block = DMatrixViewMut::from_slice(entries, height, count);
         block.rows_mut(0, rows).gemm(
             1.0,
-            &a.columns(0, filled),
-            &b.view((0, first), (filled, count)),
+            &a.columns_range(filled.clone()),
+            &b.view((filled.start, first), (filled.len(), count)),
             0.0,
         );
     };
@@ -300,6 +309,7 @@ mod tests {
             multiply_by_upper(&mut in_place, &upper);
             assert!((in_place - expected).amax() <= scale);
             let (lower, wide) = (upper.transpose(), b.columns(0, columns.min(inner)).into_owned());
+            assert!((product_with_lower(&a, &lower) - &a * &lower).amax() <= scale);
             assert!((lower_product(&lower, &wide) - &lower * &wide).amax() <= scale);
             let square_of_lower = gram_of_lower(&lower);
             assert!(

@@ -8,7 +8,9 @@ use rayon::prelude::*;
 use super::kernel::{Hyperparameters, carry, embedded, matern, squared_distances};
 use super::prior::ParameterPrior;
 use super::rows::{AXES, Inputs, Rows, SiteFunctions, Source};
-use crate::numeric::{gram, gram_of_lower, inverse_lower, lower_factor, product};
+use crate::numeric::{
+    gram, gram_of_lower, inverse_lower, lower_factor, product_with_lower, product_with_upper,
+};
 
 /// 1 σ of the prior of the mean of ln ℓ, about 0, in each family of lengths. Two σ span lengths
 /// from 0.05 to 20 rad or standard deviations.
@@ -39,8 +41,8 @@ pub(super) struct MarginalLikelihood<'a> {
     inputs: &'a Inputs,
     /// Vector y = r − J m: residuals at the mean of the parameters' prior.
     target: DVector<f64>,
-    /// Scaled Jacobian J S½.
-    scaled: DMatrix<f64>,
+    /// Transpose of the scaled Jacobian J S½.
+    scaled_transposed: DMatrix<f64>,
     /// For each amplitude, the kind of function and the sites that it scales. All constants share
     /// one amplitude.
     amplitudes: Vec<(Function, Vec<usize>)>,
@@ -99,8 +101,18 @@ impl<'a> MarginalLikelihood<'a> {
             pairs.flat_map(|second| squared_distances(of_row(first), of_row(second))).collect()
         };
         let distances = (0..rows.len()).into_par_iter().map(behind).collect();
-        let size = size.ln();
-        Self { rows, inputs, target, scaled, amplitudes, singles, shares_noise, size, distances }
+        let (size, scaled_transposed) = (size.ln(), scaled.transpose());
+        Self {
+            rows,
+            inputs,
+            target,
+            scaled_transposed,
+            amplitudes,
+            singles,
+            shares_noise,
+            size,
+            distances,
+        }
     }
 
     /// Returns the number of hyperparameters: the amplitudes, the lengths ℓᵤ and ℓᵥ, σ and, if
@@ -189,15 +201,16 @@ impl<'a> MarginalLikelihood<'a> {
         let lower = lower_factor(matrix)?;
         let log_det_c = 2.0 * lower.diagonal().iter().map(|value| value.ln()).sum::<f64>();
         let inverse = inverse_lower(&lower);
-        // These are C⁻¹J S½ and H.
-        let whitened = product(&inverse, &self.scaled);
-        let n = self.scaled.ncols();
+        // With C⁻¹ = LᵀL and H = M Mᵀ, these are L J S½ and Z = M⁻¹(L J S½)ᵀL: K⁻¹ = LᵀL − ZᵀZ.
+        let transposed = inverse.transpose();
+        let whitened = product_with_upper(&self.scaled_transposed, &transposed).transpose();
+        let n = whitened.ncols();
         let outer = lower_factor(DMatrix::identity(n, n) + gram(&whitened))?;
         let log_det_h = 2.0 * outer.diagonal().iter().map(|value| value.ln()).sum::<f64>();
-        let reach = product(&whitened, &inverse_lower(&outer).transpose());
-        let reach = product(&inverse.transpose(), &reach);
+        let reach = product_with_upper(&whitened, &inverse_lower(&outer).transpose());
+        let reach = product_with_lower(&reach.transpose(), &inverse);
         let mut inverse = gram_of_lower(&inverse);
-        inverse -= product(&reach, &reach.transpose());
+        inverse -= gram(&reach);
         let weights = &inverse * &self.target;
         let mut value = 0.5 * (self.target.dot(&weights) + log_det_c + log_det_h);
         // Half the trace is ½ tr((K⁻¹ − α αᵀ) ∂C).

@@ -66,6 +66,7 @@ const STOREYS: &[(&str, &[&[&str]])] = &[
             "problem",
             "mechanics",
             "least_squares",
+            "numeric",
         ]],
     ),
     // The paper is a check of the model, so it shares no mechanics with it.

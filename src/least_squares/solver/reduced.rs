@@ -2,8 +2,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::least_squares::kernel::dot;
 use crate::least_squares::triangle::reflector;
+use crate::numeric::kernel::dot;
 
 /// Returns R and c′ with Rᵀ R = `Bᵀ B` and Rᵀ c′ = `Bᵀ c`, for B with at least as many rows as
 /// columns.

@@ -327,16 +327,11 @@ impl Search<'_, '_, '_> {
         let linearised = &hypotheses.linearised;
         let lever = linearised.place(at.lever).filter(|lever| lever.norm_squared() > 0.0);
         let Some(lever) = lever else { return Vec::new() };
-        let (less, product) = along_lever(left, products, &lever);
+        let (less, product) = along_lever(left, products, (&lever, kept));
         let of_pose = |pose: &usize| lever.rows(3 * pose, 3);
-        let site = WhitenedSite {
-            diagonal: DVector::from_iterator(
-                kept.len(),
-                kept.iter().map(|pose| of_pose(pose).norm_squared()),
-            ),
-            less: less.select_columns(kept),
-            product: product.select_rows(kept),
-        };
+        let squares = kept.iter().map(|pose| of_pose(pose).norm_squared());
+        let diagonal = DVector::from_iterator(kept.len(), squares);
+        let site = WhitenedSite::new(diagonal, &less, product);
         let noise = Noise::new(left.squares, products.target.noise.freedom, |squares| {
             products.over_noise(squares)
         });
@@ -365,27 +360,26 @@ impl Search<'_, '_, '_> {
     }
 }
 
-/// Returns B and p of columns along one lever l, one column for each pose, with the fitted
+/// Returns B and p of columns along one lever l, one column for each of the `poses`, with the fitted
 /// parameters and a set projected out. The products of the columns are diag(|l|²) − BᵀB; p are
 /// their products with the residual.
 fn along_lever(
     reduced: &ReducedProblem,
     products: &Products,
-    lever: &DVector<f64>,
+    (lever, poses): (&DVector<f64>, &[usize]),
 ) -> (DMatrix<f64>, DVector<f64>) {
     let (fitted, reach, residual) =
         (products.target.fit.fitted(), reduced.reach(), reduced.residual());
     let rows = [fitted.ncols(), reach.nrows()];
-    let poses = lever.len() / 3;
-    let mut less = DMatrix::zeros(rows[0] + rows[1], poses);
-    let mut product = DVector::zeros(poses);
-    for pose in 0..poses {
+    let mut less = DMatrix::zeros(rows[0] + rows[1], poses.len());
+    let mut product = DVector::zeros(poses.len());
+    for (k, pose) in poses.iter().enumerate() {
         let lever = lever.rows(3 * pose, 3);
-        let mut column = less.column_mut(pose);
+        let mut column = less.column_mut(k);
         column.rows_mut(0, rows[0]).gemv_tr(1.0, &fitted.rows(3 * pose, 3), &lever, 0.0);
         let mut below = column.rows_mut(rows[0], rows[1]);
         below.gemv(1.0, &reach.columns(3 * pose, 3), &lever, 0.0);
-        product[pose] = lever.dot(&residual.rows(3 * pose, 3));
+        product[k] = lever.dot(&residual.rows(3 * pose, 3));
     }
     (less, product)
 }

@@ -14,6 +14,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::numeric::kernel::few_transposed_times;
 use crate::numeric::lower_factor;
 
 /// Largest |ln f| of the grid over the noise factor f, a factor of 33 in either direction. The step
@@ -30,6 +31,8 @@ const NEGLIGIBLE_LN_ODDS: f64 = 40.0;
 /// Number of rows of L relative to its columns above which G = D − LᵀL is factored as a full
 /// matrix. Two factors of G then take less work than two of 1 − L E⁻¹ Lᵀ.
 const MIN_DENSE_SHARE: f64 = 0.8;
+/// Largest number of columns whose Gram matrix is formed by dot products.
+const MAX_NARROW_GRAM: usize = 6;
 /// Number of rows of a symmetric product that are formed together.
 const GRAM_ROWS: usize = 48;
 
@@ -133,7 +136,11 @@ impl Normal {
         match self {
             Self::Dense { gram, product } => {
                 let (mut gram, mut product) = (gram.clone(), product.clone());
-                gram.gemm(-1.0, &along.transpose(), along, 1.0);
+                if gram.ncols() <= MAX_NARROW_GRAM {
+                    gram -= few_transposed_times(along, along);
+                } else {
+                    gram.gemm(-1.0, &along.transpose(), along, 1.0);
+                }
                 product.gemv_tr(-1.0, along, residual_along, 1.0);
                 Self::Dense { gram, product }
             }
@@ -168,6 +175,11 @@ impl Normal {
     fn shrinkage_terms(&self, size: f64) -> Option<(f64, f64)> {
         let precision = (size * size).recip();
         match self {
+            // One column needs no memory.
+            Self::Dense { gram, product } if product.len() == 1 => {
+                let lower = (gram[0] + precision).sqrt();
+                (lower > 0.0).then(|| ((lower * size).ln(), (product[0] / lower).powi(2)))
+            }
             Self::Dense { gram, product } => {
                 // With 1/c² + G = L Lᵀ: det(1 + c² G) = c^2k det(L)², and the squares decrease by
                 // |L⁻¹ b|².

@@ -9,6 +9,7 @@ use super::quantities::Quantities;
 use super::refinement::Refiner;
 use super::site::{BEAM_VARIANCE, Noise, Span, Weighted, WhitenedSite};
 use super::terms::{Chunk, Product, Sum, Terms, is_separated, ln_prior};
+use crate::numeric::kernel::few_transposed_times;
 
 /// Maximum number of terms of a sum.
 const MAX_TERMS: usize = 3;
@@ -49,7 +50,7 @@ struct State {
     sum: Sum,
     ln_prior: f64,
     span: Span,
-    /// Columns of the sum times the weights W, transposed, shape = (k, poses).
+    /// Columns of the sum times the weights W, shape = (poses, k).
     weighted: DMatrix<f32>,
 }
 
@@ -139,7 +140,7 @@ impl<'a> Beam<'a> {
     fn extend_by_pairs(&self, sums: &[Sum], next: &mut BTreeMap<Sum, Scored>) {
         for sum in sums.iter().take(SCREENED_SUMS) {
             let Span { weighted, along, .. } = self.state(sum).span;
-            let chunks = self.terms.beside((&weighted.transpose(), &along), self.site);
+            let chunks = self.terms.beside((&weighted, &along), self.site);
             self.extend_by(&chunks, sum, next);
         }
     }
@@ -291,7 +292,7 @@ impl<'a> Beam<'a> {
             span.extend(&self.weighted(term), &self.site.product);
         }
         #[expect(clippy::cast_possible_truncation, reason = "half the width is twice as fast")]
-        let weighted = span.weighted.transpose().map(|value| value as f32);
+        let weighted = span.weighted.map(|value| value as f32);
         let ln_prior = if sum.is_empty() { 0.0 } else { ln_prior(&self.terms, sum) };
         State { sum: sum.clone(), ln_prior, span, weighted }
     }
@@ -302,7 +303,7 @@ impl<'a> Beam<'a> {
         let further = if state.sum.is_empty() { 0.0 } else { 0.5_f64.ln() + (count + 1.0).ln() };
         let (before, rank) = (state.span.explained_squares(), state.span.along.len());
         let of_chunk = |(number, chunk): (usize, &Chunk)| {
-            let along = &state.weighted * &chunk.columns;
+            let along = few_transposed_times(&state.weighted, &chunk.columns);
             let product = |a: usize, b: usize| {
                 let pairs = along.column(a).into_iter().zip(along.column(b));
                 pairs.map(|(x, y)| f64::from(*x) * f64::from(*y)).sum::<f64>()

@@ -268,11 +268,7 @@ mod tests {
         let at = |pose: usize| std::array::from_fn(|joint| commands[joint].1[pose]);
         let product = DVector::from_fn(60, |pose, _| function(&at(pose)) + noise[pose]);
         let squares = product.norm_squared();
-        let site = WhitenedSite {
-            diagonal: DVector::repeat(60, 1.0),
-            less: DMatrix::zeros(0, 60),
-            product,
-        };
+        let site = WhitenedSite::new(DVector::repeat(60, 1.0), &DMatrix::zeros(0, 60), product);
         let noise = Noise::new(squares, 60.0, |squares| -0.5 * squares);
         proposals(&quantities, ("joint1", Some(0)), (&site, &noise), &[])
     }

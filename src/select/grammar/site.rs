@@ -2,6 +2,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::least_squares::Triangle;
+use crate::numeric::kernel::{add_product, few_transposed_times};
+
 /// Number of points of the table of the likelihood, which is integrated over the noise.
 const NOISE_TABLE_POINTS: usize = 400;
 /// Trial prior variances of the coefficients, relative to the variance of their estimates; equally
@@ -13,6 +16,9 @@ pub const BEAM_VARIANCE: f64 = 3000.0;
 /// Smallest share of a column's squared length, outside the span of other columns, at which the
 /// column counts as independent.
 const MIN_LEFT: f64 = 1e-4;
+
+/// Number of rows of the triangular factor R that are multiplied together.
+const ROWS_PER_PRODUCT: usize = 40;
 
 /// Table of ln p(residual) by its sum of squares, integrated over the noise.
 pub struct Noise {
@@ -67,8 +73,8 @@ impl Noise {
 pub struct WhitenedSite {
     /// Vector d: squared length of the lever in each pose, shape = (poses).
     pub diagonal: DVector<f64>,
-    /// Matrix B, shape = (directions, poses).
-    pub less: DMatrix<f64>,
+    /// Upper triangular factor R with RᵀR = BᵀB, shape = (poses, poses).
+    less: DMatrix<f64>,
     /// Vector p, shape = (poses).
     pub product: DVector<f64>,
 }
@@ -95,12 +101,33 @@ pub struct Span {
 }
 
 impl WhitenedSite {
+    /// Creates the site from the vector d, the matrix B with one column for each pose, and the
+    /// vector p.
+    pub fn new(diagonal: DVector<f64>, b: &DMatrix<f64>, product: DVector<f64>) -> Self {
+        Self { diagonal, less: Triangle::factor(b), product }
+    }
+
+    /// Returns R times functions of the pose, one in each column.
+    pub fn within(&self, functions: &DMatrix<f64>) -> DMatrix<f64> {
+        let poses = self.less.nrows();
+        let mut out = DMatrix::zeros(poses, functions.ncols());
+        for first in (0..poses).step_by(ROWS_PER_PRODUCT) {
+            let (count, filled) = (ROWS_PER_PRODUCT.min(poses - first), poses - first);
+            let rows = self.less.view((first, first), (count, filled));
+            out.rows_mut(first, count).gemm(1.0, &rows, &functions.rows(first, filled), 0.0);
+        }
+        out
+    }
+
     /// Returns the weight matrix W times a function of the pose.
     pub fn times(&self, function: &DVector<f64>) -> DVector<f64> {
-        let mut out = self.diagonal.component_mul(function);
-        let along = &self.less * function;
-        out.gemv_tr(-1.0, &self.less, &along, 1.0);
-        out
+        let mut along = DMatrix::zeros(self.less.nrows(), 1);
+        let columns = (self.less.as_slice(), self.less.nrows());
+        add_product(along.as_mut_slice(), columns, function.as_slice());
+        let within = few_transposed_times(&along, &self.less);
+        let weighted = self.diagonal.iter().zip(function.iter());
+        let values = weighted.zip(within.iter()).map(|((d, f), less)| d * f - less);
+        DVector::from_iterator(function.len(), values)
     }
 
     /// Returns the largest sum of squares that functions of the pose can explain: that of one free

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::factor::{Factor, Form};
 use super::quantities::Quantities;
 use super::site::WhitenedSite;
-use crate::least_squares::kernel::{dot, sum_of_squares};
+use crate::numeric::kernel::{dot, few_transposed_times, sum_of_squares};
 
 /// Prior probability that a term has one, two or three factors.
 const FACTOR_COUNT_PROBABILITIES: [f64; 3] = [0.6, 0.3, 0.1];
@@ -144,7 +144,7 @@ impl Terms {
 
     /// Returns the terms with two factors that explain most of the residual in addition to a span,
     /// and products of the best of them with every listed factor. `weighted` holds the functions of
-    /// the span times W, transposed; `along` their products with the residual.
+    /// the span times W, `along` their products with the residual.
     ///
     /// A term that alone explains little may explain most of what other terms leave.
     pub fn beside(
@@ -155,7 +155,8 @@ impl Terms {
         let n = site.diagonal.len();
         let gains = |(number, chunk): (usize, &Chunk)| {
             let terms: Vec<&Product> = chunk.terms.iter().collect();
-            let products = weighted * self.unit_columns(chunk.width, &terms, n);
+            let columns = self.unit_columns(chunk.width, &terms, n);
+            let products = few_transposed_times(weighted, &columns);
             let gain = |term: usize| (chunk.gain_beside(term, (&products, along)).0, number, term);
             (0..chunk.terms.len()).map(gain).collect::<Vec<_>>()
         };
@@ -325,7 +326,7 @@ impl Terms {
     fn chunk(&self, width: usize, terms: &[&Product], site: &WhitenedSite) -> Chunk {
         let n = site.diagonal.len();
         let columns = self.unit_columns(width, terms, n);
-        let less = &site.less * &columns;
+        let less = site.within(&columns);
         let mut weighted = vec![0.0; n];
         let mut inner = |a: usize, b: usize| {
             let pairs = column(&columns, a).iter().zip(site.diagonal.as_slice());

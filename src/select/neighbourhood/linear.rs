@@ -3,7 +3,7 @@
 
 use std::borrow::Cow;
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DMatrixView, DVector};
 use rayon::prelude::*;
 
 use super::orthonormal::{held, lengthened, orthonormal, orthonormal_above};
@@ -218,8 +218,8 @@ impl LinearNeighbourhood {
     }
 
     /// Returns the data rows of Q, so that H = Q Qᵀ is the hat matrix.
-    pub fn fitted(&self) -> DMatrix<f64> {
-        self.basis.rows(0, self.rows).into_owned()
+    pub fn fitted(&self) -> DMatrixView<'_, f64> {
+        self.basis.rows(0, self.rows)
     }
 
     /// Returns the data rows of Q and of the whitened residual, without copying.

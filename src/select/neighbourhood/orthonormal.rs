@@ -5,6 +5,7 @@ use std::borrow::Cow;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
+use crate::numeric::kernel::{dot, sum_of_squares};
 use crate::numeric::{
     gram, inverse_factor, inverse_lower, multiply_by_upper, product, product_with_upper,
     product_with_upper_padded, zeros,
@@ -85,11 +86,11 @@ fn independent(gram: &DMatrix<f64>, norms: &[f64], lengths: &[f64]) -> (Vec<usiz
     {
         let mut row: Vec<f64> = Vec::with_capacity(kept.len() + 1);
         for (&k, known) in kept.iter().zip(&factor) {
-            let along: f64 = known.iter().zip(&row).map(|(a, b)| a * b).sum();
+            let along = dot(&known[..row.len()], &row);
             let value = (gram[(k, j)] / (norms[k] * norms[j]) - along) / known[row.len()];
             row.push(value);
         }
-        let independent_square = 1.0 - row.iter().map(|value| value * value).sum::<f64>();
+        let independent_square = 1.0 - sum_of_squares(&row);
         if independent_square.max(0.0).sqrt() * norms[j] > MIN_INDEPENDENT_LENGTH * lengths[j] {
             row.push(independent_square.sqrt());
             factor.push(row);
