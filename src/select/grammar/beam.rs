@@ -138,10 +138,10 @@ impl<'a> Beam<'a> {
     /// Extends the first of `sums` by the terms that explain most in addition to each, and adds the
     /// new sums to `next` with their scores.
     fn extend_by_pairs(&self, sums: &[Sum], next: &mut BTreeMap<Sum, Scored>) {
-        for sum in sums.iter().take(SCREENED_SUMS) {
-            let Span { weighted, along, .. } = self.state(sum).span;
-            let chunks = self.terms.beside((&weighted, &along), self.site);
-            self.extend_by(&chunks, sum, next);
+        let sums = &sums[..sums.len().min(SCREENED_SUMS)];
+        let spans: Vec<Span> = sums.iter().map(|sum| self.state(sum).span).collect();
+        for (sum, terms) in sums.iter().zip(self.terms.beside(&spans, self.site)) {
+            self.extend_by(&self.terms.chunks_of(&terms, self.site), sum, next);
         }
     }
 

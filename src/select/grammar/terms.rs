@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::factor::{Factor, Form};
 use super::quantities::Quantities;
-use super::site::WhitenedSite;
+use super::site::{Span, WhitenedSite};
 use crate::numeric::kernel::{dot, few_transposed_times, sum_of_squares};
 
 /// Prior probability that a term has one, two or three factors.
@@ -142,40 +142,45 @@ impl Terms {
         multiples
     }
 
-    /// Returns the terms with two factors that explain most of the residual in addition to a span,
-    /// and products of the best of them with every listed factor. `weighted` holds the functions of
-    /// the span times W, `along` their products with the residual.
+    /// Returns, for each span, the terms with two factors that explain most of the residual in
+    /// addition to it, and products of the best of them with every listed factor.
     ///
     /// A term that alone explains little may explain most of what other terms leave.
-    pub fn beside(
-        &self,
-        (weighted, along): (&DMatrix<f64>, &DVector<f64>),
-        site: &WhitenedSite,
-    ) -> Vec<Chunk> {
+    pub fn beside(&self, spans: &[Span], site: &WhitenedSite) -> Vec<Vec<Product>> {
         let n = site.diagonal.len();
         let gains = |(number, chunk): (usize, &Chunk)| {
             let terms: Vec<&Product> = chunk.terms.iter().collect();
             let columns = self.unit_columns(chunk.width, &terms, n);
-            let products = few_transposed_times(weighted, &columns);
-            let gain = |term: usize| (chunk.gain_beside(term, (&products, along)).0, number, term);
-            (0..chunk.terms.len()).map(gain).collect::<Vec<_>>()
+            let of_span = |Span { weighted, along, .. }: &Span| {
+                let products = few_transposed_times(weighted, &columns);
+                let gain = |term: usize| chunk.gain_beside(term, (&products, along)).0;
+                (0..terms.len()).map(|term| (gain(term), number, term)).collect::<Vec<_>>()
+            };
+            spans.iter().map(of_span).collect::<Vec<_>>()
         };
+        let gains: Vec<Vec<Vec<(f64, usize, usize)>>> =
+            self.pairs.par_iter().enumerate().map(gains).collect();
+        let of_span =
+            |span: usize| self.best_beside(gains.iter().flat_map(|of| &of[span]).copied());
+        (0..spans.len()).map(of_span).collect()
+    }
+
+    /// Returns the terms with the largest gains, each given with the indices of its chunk and of
+    /// the term in it, and products of the best of them with every listed factor.
+    fn best_beside(&self, gains: impl Iterator<Item = (f64, usize, usize)>) -> Vec<Product> {
         let order = |a: &(f64, usize, usize), b: &(f64, usize, usize)| {
             b.0.total_cmp(&a.0).then_with(|| (a.1, a.2).cmp(&(b.1, b.2)))
         };
-        let mut gains: Vec<(f64, usize, usize)> =
-            self.pairs.par_iter().enumerate().flat_map_iter(gains).collect();
+        let mut gains: Vec<(f64, usize, usize)> = gains.collect();
         if gains.len() > MAX_PAIRS_BESIDE {
             gains.select_nth_unstable_by(MAX_PAIRS_BESIDE, order);
             gains.truncate(MAX_PAIRS_BESIDE);
         }
         gains.sort_unstable_by(order);
-        let mut terms: Vec<Product> = gains
-            .into_iter()
-            .map(|(_, chunk, term)| self.pairs[chunk].terms[term].clone())
-            .collect();
+        let term = |(_, chunk, term): (f64, usize, usize)| self.pairs[chunk].terms[term].clone();
+        let mut terms: Vec<Product> = gains.into_iter().map(term).collect();
         terms.extend(self.multiplied(&terms[..terms.len().min(MAX_EXTENDED)]));
-        self.chunks_of(&terms, site)
+        terms
     }
 
     /// Returns the products of a term with every listed factor, in chunks; none for a term with the
@@ -267,7 +272,7 @@ impl Terms {
     }
 
     /// Returns all of `terms` with their columns, in chunks.
-    fn chunks_of(&self, terms: &[Product], site: &WhitenedSite) -> Vec<Chunk> {
+    pub fn chunks_of(&self, terms: &[Product], site: &WhitenedSite) -> Vec<Chunk> {
         let chunk = |(width, terms): &(usize, Vec<&Product>)| self.chunk(*width, terms, site);
         self.groups(terms).par_iter().map(chunk).collect()
     }
