@@ -1,5 +1,6 @@
 //! Arguments and work of `flexcal compare-results`.
 
+use std::collections::BTreeMap;
 use std::error::Error;
 use std::path::{Path, PathBuf};
 
@@ -88,5 +89,23 @@ fn side(file: &Path, trust: Trust) -> Result<Side, Box<dyn Error>> {
             errors.extend(norm.map(|norm| (format!("{name}, {size}, {symbol}"), norm)));
         }
     }
-    Ok(Side { estimate, errors })
+    Ok(Side { estimate, errors, held_out: held_out_errors(file) })
+}
+
+/// Returns the size of each held-out position error \[mm\] by file and line, from the residuals.csv
+/// beside an estimate; empty if there is none.
+fn held_out_errors(estimate: &Path) -> BTreeMap<(String, String), f64> {
+    let Ok(text) = flexcal::files::read_text(&estimate.with_file_name("residuals.csv")) else {
+        return BTreeMap::new();
+    };
+    let mut table = csv::Reader::from_reader(text.as_bytes());
+    let header = table.headers().cloned().unwrap_or_default();
+    let error = |row: &csv::StringRecord| {
+        let cell = |name: &str| row.get(header.iter().position(|column| column == name)?);
+        let number = |name: &str| cell(name)?.parse::<f64>().ok();
+        let [x, y, z] = ["residual_x_mm", "residual_y_mm", "residual_z_mm"].map(number);
+        let row = (cell("file")?.to_owned(), cell("line")?.to_owned());
+        (cell("held_out")? == "true").then_some((row, x?.hypot(y?).hypot(z?)))
+    };
+    table.records().flatten().filter_map(|row| error(&row)).collect()
 }

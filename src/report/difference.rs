@@ -1,17 +1,28 @@
 //! Text and page of the command `compare-results`: two estimates of one arm side by side.
 
+use std::collections::BTreeMap;
+
 use statrs::distribution::{ContinuousCDF as _, Normal};
 
 use super::document::{Block, Column, Table};
 use super::figures::{ACCENT, Drawing, Forest};
 use super::render::{page, text};
 use crate::fit::SavedEstimate;
+use crate::numeric::{Interval, mean_interval};
 use crate::quantity::format::{counted, decimals, number, or_dash};
 
 /// Probability that any parameter of two estimates of an unchanged arm is said to differ.
 const FALSE_ALARMS: f64 = 0.01;
 /// Maximum number of parameters that the terminal lists.
 const MAX_LISTED: usize = 20;
+/// Smallest number of rows in common from which the held-out errors are compared.
+const MIN_PAIRS: usize = 8;
+/// Number of bootstrap resamples of an interval.
+const RESAMPLES: usize = 5000;
+/// Probability with which an interval covers the mean difference.
+const INTERVAL_LEVEL: f64 = 0.95;
+/// Seed of the bootstrap.
+const SEED: u64 = 1;
 /// Maximum number of decimals of a value.
 const MAX_DECIMALS: usize = 6;
 
@@ -20,6 +31,8 @@ pub(crate) struct Side {
     pub estimate: SavedEstimate,
     /// Names of errors with their values, for example `held out, mean_mm`.
     pub errors: Vec<(String, f64)>,
+    /// Size of each held-out position error \[mm\] by file and line; empty if it is not known.
+    pub held_out: BTreeMap<(String, String), f64>,
 }
 
 /// Parameter that both estimates have, in the unit of tables.
@@ -65,6 +78,7 @@ fn blocks<'a>(sides: &[Side; 2]) -> Vec<Block<'a>> {
         .iter()
         .map(|(name, _)| vec![name.clone(), error(&sides[0], name), error(&sides[1], name)]);
     blocks.push(Block::Table(Table::new(&["error", "A", "B"], rows.collect(), &[0])));
+    blocks.extend(paired(sides).map(Block::Text));
     blocks.push(Block::figures([drawn(&differences, limit)]));
     let listed = &differences[..differences.len().min(MAX_LISTED)];
     blocks.push(Block::Words(vec![Block::Table(table(listed))]));
@@ -133,6 +147,28 @@ fn verdict(differences: &[Difference], tested: usize, limit: f64) -> String {
             counted(count, "parameter")
         ),
     }
+}
+
+/// States the mean difference of the held-out errors of rows that both results predict, with its
+/// interval; `None` if there are fewer than [`MIN_PAIRS`].
+fn paired([a, b]: &[Side; 2]) -> Option<String> {
+    let change = |(row, of_b): (_, &f64)| Some((of_b - a.held_out.get(row)?, 1.0));
+    let changes: Vec<(f64, f64)> = b.held_out.iter().filter_map(change).collect();
+    if changes.len() < MIN_PAIRS {
+        return None;
+    }
+    let Interval { value, low, high } = mean_interval(&changes, RESAMPLES, INTERVAL_LEVEL, SEED);
+    let verdict = match (low > 0.0, high < 0.0) {
+        (true, _) => "B predicts them worse",
+        (_, true) => "B predicts them better",
+        _ => "neither predicts them better",
+    };
+    let [value, low, high] = [value, low, high].map(|length| number(length, 4));
+    Some(format!(
+        "On the {} that both predict and neither fitted: {verdict} (mean error of B minus A {value} mm, {low} to {high} mm, {} %).",
+        counted(changes.len(), "row"),
+        number(100.0 * INTERVAL_LEVEL, 0)
+    ))
 }
 
 /// Lists what limits the comparison.
