@@ -31,13 +31,12 @@ pub fn commands_text(
         let _ = match bounds {
             Some(_) => write!(
                 words,
-                "; with the commands in the file the identified arm misses them by {before} mm on \
-                 average"
+                "; without correction the identified arm would miss them by {before} mm on average"
             ),
             None => write!(
                 words,
-                ": {} mm from them on average with these commands, {before} mm with those in the \
-                 file, as the identified arm predicts",
+                ": the identified arm misses them by {} mm on average with the corrected commands, by \
+                 {before} mm without correction",
                 number(after, 4)
             ),
         };
@@ -45,7 +44,7 @@ pub fn commands_text(
     if let (Some(before), Some(after)) = (result.mean_turn_before_deg, result.mean_turn_deg) {
         let _ = write!(
             words,
-            "; turned by {}° on average, {}° before",
+            "; its orientation errs by {}° on average with the corrected commands, by {}° without",
             number(after, 4),
             number(before, 4)
         );

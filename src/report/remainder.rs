@@ -87,7 +87,8 @@ pub(crate) fn bound_text(plots: &PlotData) -> Option<String> {
     let percent = (level * 1e6).round() / 1e4;
     mean.is_finite().then(|| {
         format!(
-            "At {percent} % of poses the error of predictions stays below {} mm (mean over the workspace).",
+            "The error of a prediction, measurement noise included, stays below {} mm with a probability of {percent} % (mean of this bound \
+             over the workspace).",
             two_digits(mean * 1e3, 4)
         )
     })
@@ -110,7 +111,7 @@ fn are_predicted(bounds: &Bounds, residuals: &[Residual]) -> bool {
 /// rows within their bounds.
 pub(super) fn bounded(bounds: &Bounds, residuals: Option<&[Residual]>) -> String {
     let mut words = format!(
-        "Expected error {} mm rms; the {} % bound is {} mm on average",
+        "Expected error {} mm rms, measurement noise included; the {} % bound is {} mm on average",
         number(bounds.expected() * 1e3, 3),
         (bounds.level * 1e6).round() / 1e4,
         number(bounds.mean() * 1e3, 3),

@@ -223,7 +223,7 @@ fn point(problem: &Problem, candidate: &Candidate, unit: &str) -> Point {
         let alike =
             |other: &Confounded| format!("{} ({:.0}°)", other.effect.description, other.angle_deg);
         details.push(format!(
-            "moves the arm in a similar way (0°: the same displacements): {}",
+            "moves the arm in a similar way (angle between the displacements; 0°: the same): {}",
             named(candidate.alike.iter().map(alike), MAX_SHOWN_CONFOUNDED, "; ")
         ));
     }

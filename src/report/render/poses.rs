@@ -94,7 +94,7 @@ fn view(data: &PlotData) -> Markup {
         }
         @if coverage.tried > 0 {
             p { (number(share, 0)) " % of " (coverage.tried) " end-point positions, of configurations spread evenly over the joint limits (or measured \
-                ranges, if no limit is declared), lie within " (mm(coverage.near, 0)) " mm of a fitted pose." }
+                ranges, if no limit is declared), lie within " (mm(coverage.near, 0)) " mm of a fitted pose (a tenth of the diagonal of all positions)." }
         }
     }
 }
