@@ -9,7 +9,7 @@ use crate::select::{Detectable, Detection, Size};
 /// Maximum number of effects of a family that a text lists.
 const MAX_SHOWN_EFFECTS: usize = 3;
 /// Effects that only a load shows.
-const LOAD_EFFECTS: [&str; 3] = ["joint-compliance", "link-bending", "base-compliance"];
+pub(super) const LOAD_EFFECTS: [&str; 3] = ["joint-compliance", "link-bending", "base-compliance"];
 /// Note on the columns of the table.
 const COLUMNS: &str = "found from: smallest size that is found for every axis or phase; at best: for the most visible axis or phase; –: for some axis or phase, no size is found";
 
@@ -119,7 +119,7 @@ fn row(effect: &Effect, size: &Size) -> Vec<String> {
 }
 
 /// Returns true if the problem declares no mass and no payload, so that no load deflects the arm.
-fn has_no_mass(problem: &Problem) -> bool {
+pub(super) fn has_no_mass(problem: &Problem) -> bool {
     problem.tool.payload_mass == 0.0
         && problem.joints.iter().all(|joint| joint.bodies.is_empty() && joint.beam.is_none())
 }

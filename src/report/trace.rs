@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use super::detection::{LOAD_EFFECTS, has_no_mass};
 use super::document::{Block, Point, named, opening};
 use super::errors::{held_out_rows, rows_of, without_equilibrium};
 use super::noise::short;
@@ -263,6 +264,15 @@ pub(super) fn undetectable_effects<'a>(problem: &Problem, trace: &Trace) -> Vec<
     if !untestable.is_empty() {
         blocks.push(Block::heading("Effects that these data cannot show"));
         blocks.push(Block::List(effect::reasons(untestable)));
+    }
+    let (unloaded, absorbed): (Vec<&Effect>, Vec<&Effect>) = absorbed
+        .into_iter()
+        .partition(|of| has_no_mass(problem) && LOAD_EFFECTS.contains(&of.name()));
+    if !unloaded.is_empty() {
+        blocks.push(Block::heading(
+            "Effects that these data cannot show, because no mass is declared, so that no load acts",
+        ));
+        blocks.push(Block::list(effect::listed(unloaded)));
     }
     if !absorbed.is_empty() {
         blocks.push(Block::heading(
