@@ -23,3 +23,5 @@ mod overstated;
 mod recovery;
 #[path = "observations/results.rs"]
 mod results;
+#[path = "observations/views.rs"]
+mod views;

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use clap::Args;
 use flexcal::report;
 use flexcal::results::{Document as _, InitResult};
-use flexcal::urdf::{Chain, Robot, describe};
+use flexcal::urdf::{Chain, Robot, describe_measured};
 
 use super::flags::Flags;
 use super::outcome::Outcome;
@@ -17,6 +17,7 @@ use super::outcome::Outcome;
     mut_arg("out", |arg| arg.help("Folder for problem.toml [default: out/<name of the robot>]")),
     after_help = "Examples:
   flexcal init panda.urdf --tip panda_link8 --out panda
+  flexcal init panda.urdf --tip panda_link8 --out panda --board 9x6x25
   flexcal identify panda --data measurements.csv"
 )]
 pub struct Arguments {
@@ -29,21 +30,45 @@ pub struct Arguments {
     /// Link at its tip, which carries the target [default: the only leaf]
     #[arg(long, value_name = "LINK")]
     tip: Option<String>,
+    /// Board that a camera on the tip sees: inner corners along and across, and their distance in
+    /// mm. The problem then measures its pixels instead of positions
+    #[arg(long, value_name = "9x6x25", value_parser = board)]
+    board: Option<Board>,
     #[command(flatten)]
     flags: Flags,
+}
+
+/// Numbers of corners along and across a board, and their distance \[mm\].
+type Board = ([usize; 2], f64);
+
+/// Parses the size of a board such as `9x6x25`.
+fn board(text: &str) -> Result<Board, String> {
+    let parts: Vec<&str> = text.split(['x', '×']).collect();
+    let [columns, rows, distance] = parts[..] else {
+        return Err("corners along, across and their distance in mm, such as 9x6x25".to_owned());
+    };
+    let count = |text: &str| match text.parse::<usize>() {
+        Ok(count @ 2..=100) => Ok(count),
+        _ => Err(format!("{text} is no number of corners from 2 to 100")),
+    };
+    let distance = distance.parse::<f64>().ok().filter(|mm| *mm > 0.0 && mm.is_finite());
+    let distance = distance.ok_or("the distance of the corners in mm has to be above 0")?;
+    Ok(([count(columns)?, count(rows)?], distance))
 }
 
 /// Writes the chain between two links as `problem.toml`.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let robot = Robot::read(&arguments.urdf)?;
     let chain = Chain::new(&robot, arguments.base.as_deref(), arguments.tip.as_deref())?;
-    let description = describe(&chain)?;
+    let description = describe_measured(&chain, arguments.board)?;
     let flags = &arguments.flags;
     let results =
         flags.claim("init", &description.name, vec![arguments.urdf.clone()], &["problem.toml"])?;
     results.write(&[("problem.toml", &description.text)])?;
     let file = results.path("problem.toml");
     let json = InitResult::new(&chain, &description, &file).to_json();
-    flags.print_result(&json, || report::init_text(&chain, &description, &results.folder))?;
+    flags.print_result(&json, || {
+        report::init_text(&chain, &description, (&results.folder, arguments.board.is_some()))
+    })?;
     Ok(Outcome::Done)
 }

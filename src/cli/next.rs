@@ -150,8 +150,13 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         let (file, named) = (results.path("next.csv"), shell_word(common.problem()));
         let files: Vec<String> =
             common.files(&problem).iter().map(|file| shell_word(file)).collect();
+        let measure = if next.is_of_cameras {
+            "take an image in each of these poses, write a row for each point that is found, then"
+        } else {
+            "measure these poses, add the columns x_mm, y_mm, z_mm, then"
+        };
         format!(
-            "{text}{written}Next: {lacks}measure these poses, add the columns x_mm, y_mm, z_mm, then\n\
+            "{text}{written}Next: {lacks}{measure}\n\
              flexcal next {named} --data {1} {0}\n",
             shell_word(&file),
             files.join(" "),

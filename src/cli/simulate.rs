@@ -88,8 +88,10 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
 }
 
 fn summary(simulation: &Simulation, table: &Path) -> String {
-    let (poses, held_out) = (simulation.rows.len(), simulation.held_out());
-    let identify = poses - held_out;
+    let (poses, rows) = (simulation.poses(), simulation.rows.len());
+    let held_out = simulation.held_out();
+    let identify = rows - held_out;
+    let of_rows = if rows > poses { format!(", {rows} rows") } else { String::new() };
     let noise = if simulation.rows.iter().any(|row| row.observation.is_position()) {
         format!("{} mm per axis, 1 σ", simulation.truth.noise_sigma * 1e3)
     } else {
@@ -97,7 +99,7 @@ fn summary(simulation: &Simulation, table: &Path) -> String {
     };
     let table = table.display();
     format!(
-        "{poses} pose{s}: {identify} to identify, {held_out} held out; noise {noise}\n\
+        "{poses} pose{s}{of_rows}: {identify} to identify, {held_out} held out; noise {noise}\n\
          Effects: {effects}\n\n\
          Written to {table}, what is true to truth.json beside it\n",
         s = if poses == 1 { "" } else { "s" },

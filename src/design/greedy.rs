@@ -5,6 +5,7 @@ use std::ops::Range;
 use nalgebra::{DMatrix, SMatrix};
 use rayon::prelude::*;
 
+use super::views::COMPRESSED_ROWS;
 use crate::numeric::product;
 
 /// Number of candidates that one thread evaluates at a time.
@@ -14,7 +15,7 @@ const BLOCK_CANDIDATES: usize = 128;
 ///
 /// A further pose J changes C to C − W S⁻¹ Wᵀ with W = C Jᵀ and S = I + J C Jᵀ. The goal tr(C M)
 /// falls by tr(S⁻¹ Wᵀ M W). V = C Jᵀ and T = M V of all candidates follow each chosen pose by
-/// updates of rank 3 (6 with orientation). One pose costs a number of operations proportional to
+/// updates of rank 3 (6 with orientation, 12 for views of cameras). One pose costs a number of operations proportional to
 /// unknowns times candidates. [Fedorov 1972, ch. 3]
 pub(super) struct Greedy<'a> {
     /// Jᵀ of all candidates, shape = (unknowns, coordinates · candidates).
@@ -59,6 +60,7 @@ impl<'a> Greedy<'a> {
             .flat_map_iter(|block| {
                 block.map(|k| match self.coordinates {
                     6 => self.gain::<6>(k),
+                    COMPRESSED_ROWS => self.gain::<COMPRESSED_ROWS>(k),
                     _ => self.gain::<3>(k),
                 })
             })

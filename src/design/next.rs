@@ -8,7 +8,9 @@ use super::greedy::Greedy;
 use super::misfit::Misfit;
 use super::travel::Travel;
 use super::workspace_error::{MisfitSize, WorkspaceError};
-use super::{Candidates, Criterion, DesignError, Exchange, Extremes, Sensitivity, Site, Workspace};
+use super::{
+    Candidates, Criterion, DesignError, Exchange, Extremes, Sensitivity, Site, Workspace, views,
+};
 use crate::fit::{self, FindingCode, Identification, IdentifyError, Options};
 use crate::measurement::{Dataset, Measurements};
 use crate::problem::{Effect, Problem};
@@ -99,9 +101,9 @@ pub struct NextPoses {
     pub candidates: usize,
     /// Number of poses over which predictions are judged.
     pub workspace_poses: usize,
-    /// Size of the misfit along each axis, root mean square \[m\].
+    /// Size of the misfit along each axis, root mean square \[m\]; NaN if cameras measure.
     pub misfit: f64,
-    /// 1 σ of the noise of one coordinate \[m\].
+    /// 1 σ of the noise of one coordinate \[m\]; NaN if cameras measure.
     pub noise: f64,
     /// Error over the workspace now; `None` with fewer than ten configurations, or with fewer
     /// measured coordinates than fitted parameters.
@@ -112,6 +114,10 @@ pub struct NextPoses {
     pub stop: Option<StopReason>,
     /// Effects that the poses tell apart.
     pub effects: Vec<Effect>,
+    /// True if cameras measure the poses: predictions are pixels of the points in view, and their
+    /// error is not judged.
+    #[doc(hidden)]
+    pub is_of_cameras: bool,
     /// Fit to the measured poses.
     pub found: Identification,
 }
@@ -164,7 +170,8 @@ pub enum NextError {
 ///
 /// The goal is tr(C M), with C the covariance of parameters and misfit after all measured and
 /// chosen poses. For accuracy it is the mean variance of predictions over the workspace. This is
-/// the table of candidates, or poses drawn from the ranges. The result depends on the seed, not on
+/// the table of candidates, or poses drawn from the ranges. If cameras measure, predictions are
+/// pixels of the points in view, and no misfit is assumed. The result depends on the seed, not on
 /// the number of threads.
 ///
 /// # Errors
@@ -189,42 +196,63 @@ pub fn next(
     }
     let mut plain = problem.clone();
     let has_declared_noise = data.measurements.has_declared_noise(problem);
-    plain.data.position_sigma = plain.data.position_sigma.or(Some(found.sigma));
+    let pairs = views::pairs(
+        problem,
+        &match candidates {
+            Candidates::Rows(rows) => rows.as_ref().clone().arm_rows(),
+            Candidates::Within(_) => data.measurements.select(&[]),
+        },
+    );
+    let is_of_cameras = !pairs.is_empty();
+    if !is_of_cameras {
+        plain.data.position_sigma = plain.data.position_sigma.or(Some(found.sigma));
+    }
     let designed = explanations.map_or_else(|| plain.clone(), |of| of.declared(&plain));
     let rows: Vec<usize> = data.split.identification.clone();
     let measured = data.measurements.select(&rows);
-    let mut site = Site::new(&designed, &[&measured])?;
+    let mut site = Site::with_cameras(&designed, &[&measured], pairs)?;
     site.at(&found);
     let (pool, reference) = pool_and_workspace(&designed, candidates, &site, &measured, options);
     let (pool, sensitivity) = site.in_equilibrium(&pool);
+    let reference = if is_of_cameras { site.in_equilibrium(&reference).0 } else { reference };
     if pool.is_empty() || reference.is_empty() {
-        return Err(DesignError::NoEquilibrium.into());
+        let nothing =
+            if is_of_cameras { DesignError::NothingInView } else { DesignError::NoEquilibrium };
+        return Err(nothing.into());
     }
     let size = MisfitSize::of(&found, has_declared_noise);
-    let misfit = Misfit::new(&site, &reference, size.misfit, seed);
-    let unknowns = Unknowns::of(&site.model.parameters).and_standard(misfit.weights());
+    let misfit = (!is_of_cameras).then(|| Misfit::new(&site, &reference, size.misfit, seed));
+    let unknowns = Unknowns::of(&site.model.parameters);
+    let unknowns = match &misfit {
+        Some(misfit) => unknowns.and_standard(misfit.weights()),
+        None => unknowns,
+    };
     check_size(poses, (pool.len(), sensitivity.coordinates), unknowns.sigmas.len())?;
+    let extended = |rows: &Measurements, of: Sensitivity, unit| match &misfit {
+        Some(misfit) => misfit.extend(&site, rows, &of, unit),
+        None => of,
+    };
     let (given_rows, given) = site.in_equilibrium(&measured);
-    let given = misfit.extend(&site, &given_rows, &given, None);
-    let sensitivity = misfit.extend(&site, &pool, &sensitivity, None);
-    let prediction = mean_square(&misfit.extend(
-        &site,
-        &reference,
-        &site.sensitivity(&reference, Some(1.0)),
-        Some(1.0),
-    ));
+    let given = extended(&given_rows, given, None);
+    let sensitivity = extended(&pool, sensitivity, None);
+    let unit = (!is_of_cameras).then_some(1.0);
+    let predicted = extended(&reference, site.sensitivity(&reference, unit), unit);
+    let prediction = mean_square(&predicted);
     let cause = explanations.map(|of| cause_goal(&site, &of.parameters(&designed), &prediction));
     // Bounds from left-out configurations need parameters that the data decide.
-    let correction = if found.has(FindingCode::PriorsDecide) {
+    let correction = if is_of_cameras || found.has(FindingCode::PriorsDecide) {
         None
     } else {
         correction(problem, data, &found, options)?
     };
-    let mut plain_site = Site::new(&plain, &[&measured])?;
-    plain_site.at(&found);
-    let error = correction.as_ref().and_then(|correction| {
-        WorkspaceError::of(correction, &plain_site, &reference, (options.level, size.freedom))
-    });
+    let error = match &correction {
+        Some(correction) => {
+            let mut site = Site::new(&plain, &[&measured])?;
+            site.at(&found);
+            WorkspaceError::of(correction, &site, &reference, (options.level, size.freedom))
+        }
+        None => None,
+    };
     let exchange = |goal: &DMatrix<f64>| {
         Exchange::of(&unknowns, &sensitivity, Some(&given), poses, (&Criterion::I, Some(goal)))
             .ok_or(NextError::Design(DesignError::NoEquilibrium))
@@ -257,12 +285,13 @@ pub fn next(
         measured: measured.len(),
         candidates: pool.len(),
         workspace_poses: reference.len(),
-        misfit: size.misfit,
-        noise: size.noise,
+        misfit: if is_of_cameras { f64::NAN } else { size.misfit },
+        noise: if is_of_cameras { f64::NAN } else { size.noise },
         error,
         attainable: error.map(|error| error.least),
         stop,
         effects: explanations.map_or_else(Vec::new, |of| of.open().cloned().collect()),
+        is_of_cameras,
         found,
     };
     if stop.is_some() {

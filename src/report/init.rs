@@ -6,8 +6,13 @@ use std::path::Path;
 use super::shell::shell_word;
 use crate::urdf::{Chain, Description, HELD_OUT, SIGMA_MM};
 
-/// Returns a description of the problem that was made from a URDF, and the next steps.
-pub fn init_text(chain: &Chain, description: &Description, folder: &Path) -> String {
+/// Returns a description of the problem in a folder that was made from a URDF, and the next steps;
+/// with `has_camera`, for a camera that sees a board.
+pub fn init_text(
+    chain: &Chain,
+    description: &Description,
+    (folder, has_camera): (&Path, bool),
+) -> String {
     let (base, tip) = chain.ends();
     let joints = chain.joint_names();
     let mut words = format!(
@@ -21,6 +26,20 @@ pub fn init_text(chain: &Chain, description: &Description, folder: &Path) -> Str
     }
     let file = folder.join("problem.toml");
     let (written, word) = (file.display(), shell_word(folder));
+    if has_camera {
+        let _ = write!(
+            words,
+            "\nWritten to {written}. Fill in there\n  \
+             focal_px, centre_px  of your camera, roughly; they are fitted\n  \
+             image_px             width and height of its images\n  \
+             pixel_sigma          1 σ of a found corner\n  \
+             on                   the frame that carries the camera and the board; now {tip} and the world\n\
+             and put measurements.csv beside it (its columns stand there, too): a row for each corner of each image. Where camera and\n\
+             board are need not be known; the views decide it.\n\
+             Next: flexcal identify {word}, then flexcal loop {word}\n"
+        );
+        return words;
+    }
     let _ = write!(
         words,
         "\nWritten to {written}. Fill in there\n  \

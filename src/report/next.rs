@@ -48,6 +48,9 @@ fn blocks<'a>(problem: &Problem, options: &NextOptions, next: &NextPoses) -> Vec
             mm(next.misfit),
             mm(next.noise),
         ),
+        None if next.is_of_cameras => "Cameras measure: the choice lowers the mean variance of predicted pixels of the points in view, \
+             over configurations of the workspace that show one. No error in mm is stated, and no misfit of the model is assumed."
+            .to_owned(),
         None => format!(
             "The error in the workspace is stated once ten configurations are measured, and as many coordinates as parameters are \
              fitted; until then a misfit of {} mm per axis is assumed besides {} mm of noise.",
@@ -152,6 +155,8 @@ fn verdict(options: &NextOptions, next: &NextPoses) -> String {
         (_, Some(tolerance), None) if !next.steps.is_empty() && next.error.is_some() => format!(
             "Not yet enough: after these poses the bound is still expected to be above the tolerance of {tolerance} mm."
         ),
+        _ if next.is_of_cameras => "Further poses lower the variance of predictions as the table says; the error itself is not judged."
+            .to_owned(),
         _ if next.error.is_none() => "Not yet enough: too few poses are measured to judge the error.".to_owned(),
         _ => "Not yet enough: further poses still lower the error.".to_owned(),
     }

@@ -24,9 +24,10 @@ pub struct NextResult {
     pub candidates: usize,
     /// Number of poses over which predictions are judged.
     pub workspace_poses: usize,
-    /// 1 σ of the noise of one coordinate.
+    /// 1 σ of the noise of one coordinate; null if cameras measure.
     pub noise_mm: f64,
-    /// Root mean square misfit of the model along each axis that the choice allows for.
+    /// Root mean square misfit of the model along each axis that the choice allows for; null if
+    /// cameras measure.
     pub misfit_mm: f64,
     /// Probability with which an error in the workspace stays below the bound.
     pub level: f64,

@@ -92,6 +92,15 @@ pub enum SimulationError {
         /// Number of the pose, from 1.
         pose: usize,
     },
+    /// No configuration shows a point of a marker to a camera.
+    #[error(
+        "pose {pose} of the simulation: no configuration was found that shows a point of a marker to a camera; check the true poses of \
+         cameras and markers, and the ranges"
+    )]
+    NothingInView {
+        /// Number of the pose, from 1.
+        pose: usize,
+    },
 }
 
 /// Random arm, poses and noise, before any measurement.
@@ -169,13 +178,22 @@ pub fn simulate_counted(
     seed: u64,
     measured: &(dyn Fn() + Sync),
 ) -> Result<Simulation, SimulationError> {
-    let drawn = match poses {
-        SimulatedPoses::Random(poses) => draw(problem, truth, poses, seed),
-        SimulatedPoses::Given(poses) => {
-            draw_in(problem, truth, given_rows(problem, truth, poses, seed), seed)
+    match poses {
+        SimulatedPoses::Random(poses) => {
+            let drawn = draw(problem, truth, poses, seed);
+            measure(problem, truth, (drawn, true), seed, measured)
         }
-    };
-    measure(problem, truth, drawn, seed, measured)
+        SimulatedPoses::Given(mut poses) => {
+            if problem.fixtures.iter().any(|fixture| fixture.sigma.is_some()) {
+                // Rows of several points of one image are one pose.
+                poses.dedup_by(|next, pose| {
+                    next.0.configuration == pose.0.configuration && next.0.time == pose.0.time
+                });
+            }
+            let drawn = draw_in(problem, truth, given_rows(problem, truth, poses, seed), seed);
+            measure(problem, truth, (drawn, false), seed, measured)
+        }
+    }
 }
 
 /// Measures the true arm in given poses, each with the name of its target, one after the other.
@@ -219,24 +237,31 @@ fn given_rows(
     rows
 }
 
-/// Measures a drawn arm in the drawn poses; calls `measured` after each pose.
+/// Measures a drawn arm in the drawn poses; calls `measured` after each pose. If `may_move`, other
+/// configurations are drawn for images that show nothing; otherwise they have no rows.
 fn measure(
     problem: &Problem,
     truth: &Truth,
-    draw: Draw,
+    (draw, may_move): (Draw, bool),
     seed: u64,
     measured: &(dyn Fn() + Sync),
 ) -> Result<Simulation, SimulationError> {
-    let Draw { arm, parameters, mut rows } = draw;
-    let poses = rows.len();
+    let Draw { arm, parameters, rows: mut poses } = draw;
     let rig = Rig::new(arm, truth.effects.clone()).with_segments(truth.segments);
-    hold_out(&mut rows, truth.held_out.count(poses), &mut stream(seed, SPLIT_STREAM));
+    let count = poses.len();
+    hold_out(&mut poses, truth.held_out.count(count), &mut stream(seed, SPLIT_STREAM));
+    let is_image = |row: &Row| matches!(row.observation, Observation::Pixel(..));
     let measure_row = |(row, stream_of): (&mut Row, u64)| {
-        let outcome = rig.measure(row, truth, &mut stream(seed, stream_of));
+        let random = &mut stream(seed, stream_of);
+        let outcome = if is_image(row) {
+            rig.take_images(row, truth, may_move, random)
+        } else {
+            rig.measure(row, truth, random).map(|found| found.map(|()| Vec::new()))
+        };
         measured();
         outcome
     };
-    let streams: Vec<u64> = (FIRST_CONTACT_STREAM..).take(poses).collect();
+    let streams: Vec<u64> = (FIRST_CONTACT_STREAM..).take(count).collect();
     let outcomes: Vec<_> = if truth.has_memory() {
         let mut past = Past::default();
         let measure_after_past = |(row, stream_of): (&mut Row, u64)| {
@@ -246,14 +271,23 @@ fn measure(
             row.conditions.append_to(&mut past);
             outcome
         };
-        rows.iter_mut().zip(streams).map(measure_after_past).collect()
+        poses.iter_mut().zip(streams).map(measure_after_past).collect()
     } else {
-        rows.par_iter_mut().zip(streams).map(measure_row).collect()
+        poses.par_iter_mut().zip(streams).map(measure_row).collect()
     };
-    for (index, outcome) in outcomes.into_iter().enumerate() {
-        let pose = index + 1;
-        let contact = outcome.map_err(|source| SimulationError::NoEquilibrium { pose, source })?;
-        contact.ok_or(SimulationError::OutOfReach { pose })?;
+    let mut rows = Vec::with_capacity(count);
+    for ((pose, row), outcome) in (1..).zip(poses).zip(outcomes) {
+        let points = outcome.map_err(|source| SimulationError::NoEquilibrium { pose, source })?;
+        match points {
+            Some(points) if is_image(&row) => rows.extend(points),
+            Some(_) => rows.push(row),
+            None if !is_image(&row) => return Err(SimulationError::OutOfReach { pose }),
+            None if may_move => return Err(SimulationError::NothingInView { pose }),
+            None => {}
+        }
+    }
+    if rows.is_empty() && count > 0 {
+        return Err(SimulationError::NothingInView { pose: 1 });
     }
     let has_covariates = rows.first().is_some_and(|row| !row.conditions.covariates.is_empty());
     let covariates = problem.data.covariates.iter().filter(|_| has_covariates);

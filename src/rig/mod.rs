@@ -10,6 +10,8 @@
 //! declared one, and [`simulate`] measures it in random poses.
 
 mod build;
+#[deny(clippy::indexing_slicing)]
+mod camera;
 mod chain;
 mod command;
 mod contact;

@@ -10,7 +10,7 @@ use super::parameters::TrueParameter;
 use crate::files::{Format, PROGRAM, csv};
 use crate::observation::{Field, Kind, kinds};
 use crate::problem::fixture::reference_cells;
-use crate::problem::{Joint, JointKind};
+use crate::problem::{Joint, JointKind, Observation};
 use crate::quantity::Unit;
 
 /// Name of the format of `truth.json`.
@@ -43,8 +43,31 @@ struct Parameter<'a> {
 impl Simulation {
     /// Returns the text of `measurements.csv`.
     pub fn csv(&self) -> String {
-        let rows = self.rows.iter().enumerate().map(|(index, row)| self.cells(index + 1, row));
-        csv(self.header(), rows)
+        let rows = self.pose_numbers().into_iter().zip(&self.rows);
+        csv(self.header(), rows.map(|(pose, row)| self.cells(pose, row)))
+    }
+
+    /// Returns the number of the pose of each row, from 1: points of one image have one pose.
+    fn pose_numbers(&self) -> Vec<usize> {
+        let is_point = |row: &Row| matches!(row.observation, Observation::Pixel(..));
+        let mut before: Option<&Row> = None;
+        let number = |pose: &mut usize, row| {
+            let is_same = before.is_some_and(|before: &Row| {
+                is_point(row)
+                    && is_point(before)
+                    && before.conditions.time.to_bits() == row.conditions.time.to_bits()
+                    && before.conditions.configuration == row.conditions.configuration
+            });
+            before = Some(row);
+            *pose += usize::from(!is_same);
+            Some(*pose)
+        };
+        self.rows.iter().scan(0, number).collect()
+    }
+
+    /// Returns the number of poses.
+    pub(crate) fn poses(&self) -> usize {
+        self.pose_numbers().last().copied().unwrap_or(0)
     }
 
     /// Returns the commanded joints: index, and true for a revolute joint.
@@ -152,7 +175,7 @@ impl Simulation {
             program: PROGRAM,
             problem: &self.problem,
             seed: self.seed,
-            poses: self.rows.len(),
+            poses: self.poses(),
             held_out: self.held_out(),
             position_sigma_mm: self.truth.noise_sigma * 1e3,
             segments: self.truth.segments,

@@ -70,7 +70,9 @@ fn truth(document: &Document, problem: &Problem) -> Result<Truth, InputError> {
     let sigma = |kind: &'static Kind| {
         let sigma = given.get(kind.name).filter(|_| kind.name != POSITION).copied();
         let declared = problem.data.kind_sigmas.get(kind.name).copied().unwrap_or(0.0);
-        let sigma = sigma.or_else(|| (kind.unit != Unit::Length).then_some(declared));
+        // Each camera declares the σ of its pixels.
+        let has_default = kind.unit != Unit::Length && kind.needs != Needs::Carriers;
+        let sigma = sigma.or_else(|| has_default.then_some(declared));
         Some((kind.name, sigma?))
     };
     let kind_sigmas = kinds().filter_map(sigma).collect();

@@ -88,17 +88,10 @@ impl Truth {
             .any(|(effect, _)| effect.has_memory())
     }
 
-    /// Returns the quantity that each of `rows` rows measures: positions first, then fixtures and
-    /// tilted frames in turn. Without fixtures and tilts, all rows measure positions.
+    /// Returns the quantity that each of `rows` rows measures: positions first, then fixtures,
+    /// tilted frames and images in turn. Without them, all rows measure positions.
     pub(super) fn observations(&self, fixtures: &[Fixture], rows: usize) -> Vec<Observation> {
-        let observation = |(index, fixture): (usize, &Fixture)| {
-            let mut kinds = kinds().filter(|kind| kind.references().count() == 1);
-            let kind = kinds.find(|kind| kind.field(fixture.kind.word()).is_some())?;
-            Observation::new(kind, &[index])
-        };
-        let fixtures = fixtures.iter().enumerate().filter_map(observation);
-        let kinds: Vec<Observation> =
-            fixtures.chain(self.tilts.iter().map(|&frame| Observation::Tilt(frame))).collect();
+        let kinds = self.kinds(fixtures);
         let of_row = |row: usize| match row.checked_sub(self.positions) {
             Some(turn) if !kinds.is_empty() => kinds[turn % kinds.len()],
             _ => Observation::Position,
@@ -106,11 +99,32 @@ impl Truth {
         (0..rows).map(of_row).collect()
     }
 
+    /// Returns what is measured in turn: fixtures, tilted frames, and images of all cameras
+    /// together, which the first point of the first pair of a camera and a marker stands for.
+    fn kinds(&self, fixtures: &[Fixture]) -> Vec<Observation> {
+        let observation = |(index, fixture): (usize, &Fixture)| {
+            let mut kinds = kinds().filter(|kind| kind.references().count() == 1);
+            let kind = kinds.find(|kind| kind.field(fixture.kind.word()).is_some())?;
+            Observation::new(kind, &[index])
+        };
+        let touched = fixtures.iter().enumerate().filter_map(observation);
+        let first = |word: &str| {
+            let place = fixtures.iter().position(|fixture| fixture.kind.word() == word)?;
+            u32::try_from(place).ok()
+        };
+        let images = first("camera").zip(first("marker"));
+        let images = images.map(|(camera, marker)| Observation::Pixel(camera, marker, 0));
+        touched
+            .chain(self.tilts.iter().map(|&frame| Observation::Tilt(frame)))
+            .chain(images)
+            .collect()
+    }
+
     /// Returns the number of successive rows with one target. With fixtures, there is one row for
     /// each fixture and tilted frame, so that each target is measured against all of them.
     /// Otherwise there is one row.
     pub(super) fn rows_per_target(&self, fixtures: &[Fixture]) -> usize {
-        if fixtures.is_empty() { 1 } else { fixtures.len() + self.tilts.len() }
+        if fixtures.is_empty() { 1 } else { self.kinds(fixtures).len().max(1) }
     }
 
     /// Returns the standard deviation of a measurement \[m\], or of a tilt \[rad\].

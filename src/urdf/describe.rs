@@ -33,6 +33,10 @@ const MAX_NAME_CHARS: usize = 60;
 const CONTINUOUS_RANGE: &str = "# A joint without limits: poses are planned within one turn.\n\
      min_deg = -180\nmax_deg = 180\n";
 
+/// Section of the measured point, to be filled in.
+const TOOL: &str = "\n[tool]\ntarget_m = [0, 0, 0]                             # fill in: the measured \
+                    point, in the frame of the tip\n";
+
 /// Problem made from a chain.
 #[derive(Debug, Clone)]
 pub struct Description {
@@ -64,6 +68,19 @@ struct Row {
 /// # Errors
 /// Returns an error if a number of the URDF is too large for a problem.
 pub fn describe(chain: &Chain) -> Result<Description, InputError> {
+    describe_measured(chain, None)
+}
+
+/// Converts a chain like [`describe`]. A `board` (numbers of corners along and across, their
+/// distance \[mm\]) makes a problem of a camera at the tip that sees it; otherwise positions are
+/// measured.
+///
+/// # Errors
+/// Returns the errors of [`describe`].
+pub(crate) fn describe_measured(
+    chain: &Chain,
+    board: Option<([usize; 2], f64)>,
+) -> Result<Description, InputError> {
     let mut notes = Vec::new();
     let rows = rows(chain, &mut notes);
     let name = name(&chain.robot.name);
@@ -71,9 +88,12 @@ pub fn describe(chain: &Chain) -> Result<Description, InputError> {
     // Only numbers of excessive size cause an error here.
     let problem = Problem::parse(&arm, Path::new("problem.toml"))
         .map_err(|error| chain.robot.as_problem(&error))?;
-    let free = distinguishable_parameters(&problem)?;
+    let free = distinguishable_parameters(&problem, board.is_some())?;
     notes.extend(notes::of_chain(chain));
-    let text = format!("{arm}\n{}\n{}", parameters(&rows, &free), data(chain, &rows));
+    let view = board.map_or_else(|| TOOL.to_owned(), |(corners, distance)| view(corners, distance));
+    let (parameters, data) =
+        (parameters(&rows, &free, board.is_some()), data(chain, &rows, board.is_some()));
+    let text = format!("{arm}{view}\n{parameters}\n{data}");
     Ok(Description { name, text, notes })
 }
 
@@ -216,7 +236,7 @@ fn list(values: &Vector3<f64>, text: impl Fn(f64) -> String) -> String {
     format!("[{}]", values.iter().map(|value| text(*value)).collect::<Vec<_>>().join(", "))
 }
 
-/// Writes the problem up to the section `[parameters]`.
+/// Writes the problem up to the section `[tool]`.
 fn arm(chain: &Chain, name: &str, rows: &[Row]) -> String {
     let (base, tip) = chain.ends();
     let file = chain.robot.file().file_name().unwrap_or_default().to_string_lossy().into_owned();
@@ -286,23 +306,48 @@ fn arm(chain: &Chain, name: &str, rows: &[Row]) -> String {
                 write!(text, "\n[[joint.body]]\nname = {name}\nmass_kg = {mass}\ncom_m = {com}\n");
         }
     }
-    text.push_str(
-        "\n[tool]\ntarget_m = [0, 0, 0]                             # fill in: the measured \
-         point, in the frame of the tip\n",
-    );
     text
 }
 
-/// Writes `[parameters]`: priors for all parameters, and rules that fix those which positions
-/// cannot distinguish.
-fn parameters(rows: &[Row], free: &[String]) -> String {
+/// Writes a camera on the tip and a board in the world, numbered as OpenCV numbers its corners.
+fn view([columns, rows]: [usize; 2], distance: f64) -> String {
+    let corner = |k: usize| {
+        let place = |count: usize| number(count as f64 * distance);
+        format!("[{}, {}, 0]", place(k % columns), place(k / columns))
+    };
+    let corners: Vec<String> = (0..columns * rows).map(corner).collect();
+    format!(
+        "\n[[camera]]\nname = \"camera\"\non = \"tool\"                                     # the frame that carries it; \"world\" if it stands apart\n\
+         focal_px = [900, 900]                            # fill in, roughly: it is fitted\n\
+         centre_px = [640, 360]                           # fill in: half of the image\n\
+         image_px = [1280, 720]                           # fill in: width and height\n\
+         distortion = [0, 0, 0, 0, 0]                     # k1, k2, p1, p2, k3\n\
+         pixel_sigma = 0.3                                # fill in: 1 σ of u and v of a found corner\n\n\
+         [[marker]]\nname = \"board\"\non = \"world\"                                     # or a frame of the arm, \"tool\" for one\n\
+         points_mm = [{}]\n",
+        corners.join(", ")
+    )
+}
+
+/// Writes `[parameters]`: priors for all parameters, and rules that fix those which positions, or
+/// the views of a camera, cannot distinguish.
+fn parameters(rows: &[Row], free: &[String], has_camera: bool) -> String {
     let mut text = "[parameters]                                     # how far off the nominal arm may be, 1 σ\n\
-                    \"joint*.*\" = { sigma_deg = 0.5, sigma_mm = 2.0 }\n\
-                    \"tool.*\" = { sigma_mm = 100.0 }                    # where the target sits on the tip\n\
-                    \"base.*\" = { free = true }                       # pose in the measuring frame, found from the points\n\
-                    # Held are those that positions cannot tell from the ones above.\n\
-                    \"joint*.beta\" = { fixed = true }\n"
+                    \"joint*.*\" = { sigma_deg = 0.5, sigma_mm = 2.0 }\n"
         .to_owned();
+    text.push_str(if has_camera {
+        "\"camera*.f*\" = { free = true }                    # the lens; poses of camera and board are free, too\n\
+         \"camera*.c*\" = { free = true }\n\
+         \"camera*.k*\" = { free = true }\n\
+         \"camera*.p*\" = { free = true }\n\
+         \"camera*.k3\" = { fixed = true }\n\
+         # Held are those that views of the board cannot tell from the ones above.\n"
+    } else {
+        "\"tool.*\" = { sigma_mm = 100.0 }                    # where the target sits on the tip\n\
+         \"base.*\" = { free = true }                       # pose in the measuring frame, found from the points\n\
+         # Held are those that positions cannot tell from the ones above.\n"
+    });
+    text.push_str("\"joint*.beta\" = { fixed = true }\n");
     for (number, row) in (1..).zip(rows) {
         let is_free =
             |field: &str| free.iter().any(|name| *name == format!("joint{number}.{field}"));
@@ -323,13 +368,22 @@ fn parameters(rows: &[Row], free: &[String]) -> String {
 }
 
 /// Writes the section `[data]`.
-fn data(chain: &Chain, rows: &[Row]) -> String {
+fn data(chain: &Chain, rows: &[Row], has_camera: bool) -> String {
     let moving = rows.iter().filter(|row| row.kind != "fixed" && row.mimic.is_none());
     let column =
         |row: &Row| format!("{}_{}", row.name, if row.kind == "prismatic" { "m" } else { "rad" });
     let columns: Vec<String> = moving.map(column).collect();
     let mut text = "# Columns of the measurements (q1_deg, … and x_m, … do as well):\n".to_owned();
     columns.chunks(4).for_each(|some| _ = writeln!(text, "#   {},", some.join(", ")));
+    if has_camera {
+        let _ = write!(
+            text,
+            "#   camera, marker: the names above; point: number of the corner from 0, row by row as OpenCV counts; u_px, v_px\n\
+             [data]\nfiles = [\"measurements.csv\"]\n\
+             held_out = {{ fraction = {HELD_OUT}, seed = 1 }}          # images that judge and are not fitted\n"
+        );
+        return text;
+    }
     let _ = write!(
         text,
         "#   x_mm, y_mm, z_mm: the target, which moves with {}, in the measuring frame\n\

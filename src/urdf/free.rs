@@ -6,7 +6,7 @@ use rand::RngExt as _;
 use crate::error::{InputError, Location};
 use crate::least_squares::jacobian;
 use crate::model::parameter::Parameter;
-use crate::model::{Model, Pose, PoseResiduals};
+use crate::model::{MeasuredOrientation, Model, Pose, PoseResiduals};
 use crate::problem::{
     Freedom, JointKind, Observation, ParameterRule, PoseView, Problem, Quantities,
 };
@@ -19,12 +19,20 @@ const MIN_INDEPENDENT_FRACTION: f64 = 1e-3;
 const MAX_SAMPLED_ANGLE: f64 = 3.0;
 const MAX_SAMPLED_TRAVEL: f64 = 0.5;
 
-/// Returns the names of the parameters that measured positions of an off-axis target distinguish.
+/// Returns the names of the parameters that measured positions of an off-axis target distinguish,
+/// or positions with orientations, as views of a board give them, with `are_oriented`.
 ///
 /// Base and tool come first, then α, a, θ, d of all joints, then β. A parameter is chosen if its
 /// Jacobian column is independent of the chosen ones, at random poses within the joint limits.
-pub(super) fn distinguishable_parameters(problem: &Problem) -> Result<Vec<String>, InputError> {
+pub(super) fn distinguishable_parameters(
+    problem: &Problem,
+    are_oriented: bool,
+) -> Result<Vec<String>, InputError> {
     let mut problem = problem.clone();
+    if are_oriented {
+        problem.data.fits_orientation = true;
+        problem.data.orientation_sigma = Some(1.0);
+    }
     let location = Location::file(&problem.data.location.file);
     let freedom = Freedom::Free {
         sigma: Quantities::default(),
@@ -58,7 +66,7 @@ pub(super) fn distinguishable_parameters(problem: &Problem) -> Result<Vec<String
             observation: Observation::default(),
             measured: &measured,
             sigma: 1.0,
-            orientation: None,
+            orientation: are_oriented.then_some(MeasuredOrientation { measured: None, sigma: 1.0 }),
         });
     }
     let zero = DVector::zeros(count);

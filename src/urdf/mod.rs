@@ -21,8 +21,8 @@ mod weights;
 mod yaml;
 
 pub use chain::Chain;
-pub(crate) use describe::SIGMA_MM;
 pub use describe::{Description, describe};
+pub(crate) use describe::{SIGMA_MM, describe_measured};
 pub(crate) use export::Steps;
 pub use export::{Export, export};
 pub(crate) use patches::MovedOrigin;

@@ -110,6 +110,16 @@ fn table(problem: &Problem, configurations: usize, position: bool) -> String {
 /// Returns the rows that are predicted with the parameters `x`, with these numbers and `noise` in
 /// units of σ.
 fn measured(model: &Model, rows: &Measurements, x: &DVector<f64>, noise: f64) -> Measurements {
+    measured_with(model, rows, x, (noise, 3))
+}
+
+/// Returns the rows of [`measured`] with noise of a seed.
+pub fn measured_with(
+    model: &Model,
+    rows: &Measurements,
+    x: &DVector<f64>,
+    (noise, seed): (f64, u64),
+) -> Measurements {
     let all: Vec<usize> = (0..rows.len()).collect();
     let predicted = model.predict(Placement::of(rows).poses(rows, &all, 5e-5), x);
     let in_view = |row: &usize| {
@@ -118,7 +128,7 @@ fn measured(model: &Model, rows: &Measurements, x: &DVector<f64>, noise: f64) ->
         pixel.iter().all(|x| x.is_finite()) && !(of_camera && pixel.norm() > 3e3)
     };
     let kept: Vec<usize> = all.into_iter().filter(in_view).collect();
-    let mut random = ChaCha8Rng::seed_from_u64(3);
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
     let mut rows = rows.select(&kept);
     for (place, row) in kept.iter().enumerate() {
         let sigma = noise * rows.sigma.as_ref().unwrap()[place];
@@ -322,7 +332,7 @@ fn a_point_behind_the_camera_is_an_error_with_its_row() {
 }
 
 /// Splits rows as the problem says.
-fn split(problem: &Problem, rows: Measurements) -> Dataset {
+pub fn split(problem: &Problem, rows: Measurements) -> Dataset {
     let split = flexcal::measurement::Split::new(problem, &rows).unwrap();
     Dataset { measurements: rows, split }
 }

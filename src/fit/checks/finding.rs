@@ -73,6 +73,9 @@ finding_codes! {
     Misread: Error "misread" ["explanations", "before", "after"]
         "With another reading of the table or the problem, less than a fifth of the error remains.",
         "correct units, signs, order or convention in the table or the problem";
+    ViewsReversed: Error "views-reversed" ["views", "before", "after"]
+        "Some views number the points of a marker from the other end.",
+        "reverse the column point in these views or leave them out; a board that looks different after half a turn prevents it";
     PositionsComputed: Error "positions-computed" ["rms"]
         "The registered nominal arm predicts the positions to 10 µm per metre of its reach and a fifth of σ, as no built arm does.",
         "measure the positions with an instrument; those that the controller shows are computed from the joint angles";
@@ -119,7 +122,7 @@ finding_codes! {
         "The fitted arm misses the measured orientations by more than 2° and 20 σ.",
         "check the convention of the orientation columns and their frames";
     LensContradicted: Error "lens-contradicted" ["parameters", "before", "after"]
-        "Held intrinsics of a camera cause most of the misfit: with them free it falls by more than half.",
+        "Held intrinsics of a camera cause most of the misfit: with them free it falls by more than half of what exceeds noise, and beyond chance (F test, probability below 0.0001).",
         "free them in [parameters] (\"camera*.f*\" = { free = true } …), or declare better ones";
     PriorsDecide: Warning "priors-decide" ["poses", "coordinates", "parameters"]
         "The poses measure fewer coordinates than parameters are fitted, so that priors decide part of the result.",

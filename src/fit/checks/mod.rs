@@ -29,6 +29,7 @@ pub(super) mod required_columns;
 pub(super) mod row_kind;
 pub(super) mod set_aside;
 mod table_digits;
+mod view_order;
 
 use checked_fit::{Check, CheckedFit, Convergence, EnoughEquations};
 use finding::Finding;
@@ -37,6 +38,7 @@ use finding::Finding;
 const CHECKS: &[&dyn Check] = &[
     &EnoughEquations,
     &misread::ReadAsMeant,
+    &view_order::PointsInOrder,
     &table_digits::PositionsAreMeasured,
     &misfit::Misfit,
     &misfit::SizeOfArm,

@@ -1,0 +1,148 @@
+//! Views of boards: errors of the lens, the order of corners, and simulated images.
+
+use std::path::Path;
+
+use flexcal::fit::{FindingCode, Options, identify};
+
+use crate::cameras::{measured_with, split};
+use crate::common::arms::parse;
+use crate::common::made::model_of;
+use crate::common::program::{Folder, items, number};
+use crate::common::reading::read_table;
+
+/// Returns the finding about the lens of a fit to rows of the true arm, with the true lens or with
+/// the declaration `from` replaced by `to` in the problem; and whether χ² / ν is within chance.
+fn lens_finding(from: &str, to: &str, seed: u64) -> (Option<String>, bool) {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/observations/camera");
+    let text = std::fs::read_to_string(folder.join("problem.toml")).unwrap();
+    let text = text.replace("\"camera*\" = { free = true }\n", "");
+    let table = std::fs::read_to_string(folder.join("data.csv")).unwrap();
+    let [known, held] = [text.clone(), text.replace(from, to)].map(|text| parse(&text));
+    let rows = read_table(&known, &table);
+    let fitted = identify(&known, &split(&known, rows.clone()), &Options::default()).unwrap();
+    let model = model_of(&known, &rows);
+    let rows = measured_with(&model, &rows, &fitted.x, (1.0, seed));
+    let found = identify(&held, &split(&held, rows), &Options::default()).unwrap();
+    let is_within =
+        found.reduced_chi2.zip(found.chance).is_some_and(|(chi2, (_, most))| chi2 < most);
+    (found.finding(FindingCode::LensContradicted).map(ToString::to_string), is_within)
+}
+
+#[test]
+fn a_lens_is_contradicted_only_if_it_is_wrong() {
+    let mut within = 0;
+    let focal = "focal_px = [900, 900]";
+    let lens = "distortion = [0, 0, 0, 0, 0]";
+    for (seed, (from, to, names)) in [
+        (focal, "focal_px = [901.2, 901.2]", ["fx", "fy"]),
+        ("centre_px = [640, 360]", "centre_px = [641, 360.7]", ["cx", "cy"]),
+        (lens, "distortion = [0.006, 0, 0, 0, 0]", ["k1", "k1"]),
+        (lens, "distortion = [0, 0, 0.0005, 0, 0]", ["p1", "cy"]),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let (said, is_within) = lens_finding(from, to, seed as u64);
+        println!("{to}: {said:?}, within chance: {is_within}");
+        let said = said.unwrap();
+        assert!(names.iter().any(|name| said.contains(&format!("camera[hand].{name}"))), "{said}");
+        within += usize::from(is_within);
+    }
+    assert!(within > 0);
+    for seed in 0..20 {
+        let (said, _) = lens_finding("", "", 100 + seed);
+        assert_eq!(said, None, "seed {seed}");
+    }
+}
+
+/// Truth of the bench arm with a camera on its tip and a board in front of it.
+const TRUTH: &str = r#"
+[parameters]
+"camera[camera].x" = { mm = 20 }
+"camera[camera].y" = { mm = -10 }
+"camera[camera].z" = { mm = 15 }
+"camera[camera].rx" = { deg = 2 }
+"camera[camera].ry" = { deg = -3 }
+"camera[camera].rz" = { deg = 30 }
+"camera[camera].k1" = { relative = -0.08 }
+"marker[board].x" = { mm = 380 }
+"marker[board].y" = { mm = -60 }
+"marker[board].z" = { mm = 50 }
+"marker[board].rx" = { deg = 1 }
+"marker[board].ry" = { deg = 2 }
+"marker[board].rz" = { deg = 3 }
+[random]
+"joint*.*" = { sigma_deg = 0.2, sigma_mm = 1 }
+[noise]
+pixel_sigma_px = 0.3
+[poses]
+q1_deg = [-40, 40]
+q2_deg = [-30, 60]
+q3_deg = [-60, 40]
+q4_deg = [-60, 60]
+q5_deg = [20, 105]
+q6_deg = [-120, 120]
+held_out = 0.3
+"#;
+
+#[test]
+fn a_camera_problem_begins_with_a_urdf_alone() {
+    let folder = Folder::with([("TRUTH.toml", TRUTH)]);
+    folder.copy("problems/bench-arm/arm.urdf", "arm.urdf");
+    folder.flexcal("init arm.urdf --board 9x6x25 --out arm").success();
+    folder.flexcal("simulate arm --truth TRUTH.toml --poses 50 --seed 1 --out arm").success();
+    let truth = folder.json("arm/truth.json");
+    assert_eq!(truth["poses"], 50);
+    let table = folder.table("arm/measurements.csv");
+    assert!(table.rows.len() > 500, "{}", table.rows.len());
+    let result = folder.flexcal("identify arm --out fit").success();
+    println!("{}", result.stdout);
+    let estimate = folder.json("fit/estimate.json");
+    let mut worst = 0.0_f64;
+    for parameter in items(&estimate["parameters"]) {
+        let name = parameter["name"].as_str().unwrap();
+        let known = items(&truth["parameters"]).iter().find(|of| of["name"] == name).unwrap();
+        let field = name.strip_prefix("camera[camera].").unwrap_or_default();
+        if !["fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2"].contains(&field) {
+            continue;
+        }
+        let deviation = number(&parameter["estimate"]) - number(&known["true"]);
+        worst = worst.max((deviation / number(&parameter["std_error"])).abs());
+    }
+    assert!(worst < 4.5, "{worst}");
+
+    // The detector begins at the other end in two images.
+    let (pose, point) = (table.place("pose"), table.place("point"));
+    let whole = table.rows.iter().filter(|cells| cells[point] == "0");
+    let is_whole = |cells: &&Vec<String>| {
+        table.rows.iter().filter(|other| other[pose] == cells[pose]).count() == 54
+    };
+    let turned: Vec<&String> = whole.filter(is_whole).map(|cells| &cells[pose]).take(2).collect();
+    let reversed = |cells: &[String]| {
+        let mut cells = cells.to_vec();
+        if turned.contains(&&cells[pose]) {
+            cells[point] = (53 - cells[point].parse::<usize>().unwrap()).to_string();
+        }
+        cells.join(",") + "\n"
+    };
+    let rows: String = table.rows.iter().map(|cells| reversed(cells)).collect();
+    folder.write("turned.csv", table.columns.join(",") + "\n" + &rows);
+    let result = folder.flexcal("identify arm --data turned.csv --out turned");
+    println!("{}{}", result.stdout, result.stderr);
+    let findings = folder.json("turned/estimate.json");
+    let findings = items(&findings["findings"]);
+    let finding = findings.iter().find(|finding| finding["code"] == "views-reversed").unwrap();
+    assert_eq!(finding["numbers"]["views"], 2);
+
+    // Further images show the board.
+    let next = folder.flexcal("next arm --poses 3 --truth TRUTH.toml --out next --json").success();
+    let steps = next.json();
+    let steps = items(&steps["poses"]);
+    assert!(steps.len() == 3 && steps.iter().all(|step| number(&step["gain"]) > 0.0));
+    folder
+        .flexcal("simulate arm --truth TRUTH.toml --data next/next.csv --seed 2 --out seen")
+        .success();
+    let seen = folder.table("seen/measurements.csv");
+    let poses: std::collections::BTreeSet<&String> = seen.rows.iter().map(|row| &row[0]).collect();
+    assert_eq!(poses.len(), 3);
+}
