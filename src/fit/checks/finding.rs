@@ -122,7 +122,7 @@ finding_codes! {
         "The fitted arm misses the measured orientations by more than 2° and 20 σ.",
         "check the convention of the orientation columns and their frames";
     LensContradicted: Error "lens-contradicted" ["parameters", "before", "after"]
-        "Held intrinsics of a camera cause most of the misfit: with them free it falls by more than half of what exceeds noise, and beyond chance (F test, probability below 0.0001).",
+        "Held intrinsics of a camera cause most of the misfit: with them free it falls by three quarters of what exceeds noise, and beyond chance (F test, probability below 0.0001).",
         "free them in [parameters] (\"camera*.f*\" = { free = true } …), or declare better ones";
     PriorsDecide: Warning "priors-decide" ["poses", "coordinates", "parameters"]
         "The poses measure fewer coordinates than parameters are fitted, so that priors decide part of the result.",

@@ -18,6 +18,11 @@ const MAX_CHANCE_PROBABILITY: f64 = 1e-4;
 const LEAST_STATED_CHANCE: f64 = 1e-16;
 /// Smallest deviation of a coefficient from its declared value at which it is named \[σ\].
 const MIN_NAMED_SIGMAS: f64 = 3.0;
+/// Smallest ratio of the gain to the misfit that remains beyond noise at which the intrinsics are
+/// the cause: they remove three quarters of the misfit.
+const MIN_GAIN_RATIO: f64 = 3.0;
+/// Multiple of the standard deviation of the remaining misfit by chance that is subtracted from it.
+const REMAINING_SIGMAS: f64 = 2.0;
 /// Smallest number of degrees of freedom within views that determines the noise of pixels: its
 /// relative standard error is then √(2/200) = 10 %.
 const MIN_NOISE_FREEDOM: f64 = 200.0;
@@ -26,9 +31,9 @@ const MIN_NOISE_FREEDOM: f64 = 200.0;
 /// distortion. Returns a finding if these are a cause of the misfit.
 ///
 /// Two conditions hold then. An F test shows that the gain in χ² for each freed parameter is not
-/// noise of the fit with a free lens. The gain also exceeds the misfit that remains beyond the
-/// noise of pixels; otherwise the arm or a marker may be the cause, of which a free lens takes up a
-/// part. The noise of pixels is that within views ([`noise_within_views`]), or the declared one.
+/// noise of the fit with a free lens. The gain is also several times the misfit that remains beyond
+/// the noise of pixels; otherwise the arm or a marker may be the cause, of which a free lens takes
+/// up a part. The noise of pixels is that within views ([`noise_within_views`]), or the declared one.
 ///
 /// `fit` repeats the fit with another problem. There is nothing to compare without pixels, or if
 /// all intrinsics are free.
@@ -79,8 +84,10 @@ pub(in crate::fit) fn lens_finding(
     if chance > MAX_CHANCE_PROBABILITY {
         return None;
     }
-    let noise = noise_within_views(&freed, data, &other).unwrap_or(1.0);
-    if gain <= (after - noise) * freedom {
+    let (noise, within) = noise_within_views(&freed, data, &other).unwrap_or((1.0, 0.0));
+    let by_chance = REMAINING_SIGMAS * noise * (2.0 * (freedom - within).max(0.0)).sqrt();
+    let remaining = (after - noise) * freedom - by_chance;
+    if gain <= MIN_GAIN_RATIO * remaining {
         return None;
     }
     let sigmas = |estimate: &Estimate| {
@@ -110,13 +117,17 @@ pub(in crate::fit) fn lens_finding(
     Some(Finding::new(FindingCode::LensContradicted, numbers, text))
 }
 
-/// Returns the variance of pixels within views, relative to the declared one; `None` if the views
-/// have too few points.
+/// Returns the variance of pixels within views, relative to the declared one, and its degrees of
+/// freedom; `None` if the views have too few points.
 ///
 /// The arm only moves the camera relative to the marker. In each view, the residuals are therefore
 /// projected onto the complement of the six motions of the camera: what remains is noise, if lens
 /// and marker are right. With the derivatives M of a view, χ² = r·r − (Mᵀr)ᵀ (MᵀM)⁺ Mᵀr.
-fn noise_within_views(problem: &Problem, data: &Dataset, found: &Identification) -> Option<f64> {
+fn noise_within_views(
+    problem: &Problem,
+    data: &Dataset,
+    found: &Identification,
+) -> Option<(f64, f64)> {
     let Dataset { measurements, split } = data;
     let placement = Placement::of(measurements);
     let model = Model::new(problem, &placement.bases, &placement.targets).ok()?;
@@ -157,5 +168,5 @@ fn noise_within_views(problem: &Problem, data: &Dataset, found: &Identification)
             freedom += f64::from(numbers - 6);
         }
     }
-    (freedom >= MIN_NOISE_FREEDOM && chi2.is_finite()).then(|| chi2 / freedom)
+    (freedom >= MIN_NOISE_FREEDOM && chi2.is_finite()).then(|| (chi2 / freedom, freedom))
 }
