@@ -3,7 +3,7 @@
 use std::error::Error;
 use std::path::PathBuf;
 
-use clap::{Args, value_parser};
+use clap::Args;
 use flexcal::design::{self, CheckedPoses};
 use flexcal::measurement::{Dataset, Measurements};
 use flexcal::problem::Problem;
@@ -13,7 +13,7 @@ use flexcal::results::{CheckResult, Document as _};
 use super::diagnostic;
 use super::input::Common;
 use super::outcome::Outcome;
-use super::poses::Source;
+use super::poses::{Source, count};
 
 /// Arguments of `flexcal check`.
 #[derive(Debug, Args)]
@@ -30,7 +30,7 @@ pub struct Arguments {
     #[command(flatten)]
     common: Common,
     /// Number of poses to draw
-    #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=10_000))]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = count::<10_000>)]
     poses: Option<u32>,
     #[command(flatten)]
     source: Source,

@@ -30,8 +30,15 @@ pub fn print(error: &(dyn Error + 'static)) {
 
 /// Returns advice on the argument that would avoid an error in the input, if there is one.
 fn with_argument(error: &InputError) -> Option<String> {
-    matches!(*error.kind, InputErrorKind::Table(TableErrorKind::NoDataFiles))
-        .then(|| format!("{error} or with --data"))
+    match *error.kind {
+        InputErrorKind::Table(TableErrorKind::NoDataFiles) => {
+            Some(format!("{error} or with --data"))
+        }
+        InputErrorKind::GivenFileMissing if error.location.file.to_str()?.contains(',') => {
+            Some(format!("{error}; spaces separate files, as in --data a.csv b.csv"))
+        }
+        _ => None,
+    }
 }
 
 /// Returns the message for an error of a design in terms of the arguments that caused it, if there

@@ -54,7 +54,7 @@ pub struct Arguments {
     )]
     urdf: Option<PathBuf>,
     /// Origins of the joints or a camera as YAML, or the whole model as C, instead
-    #[arg(long, value_name = "FORMAT")]
+    #[arg(long, value_name = "FORMAT", ignore_case = true)]
     format: Option<Format>,
     /// Name of the camera that --format ros-camera or opencv writes, if there are several
     #[arg(long, value_name = "NAME", requires = "format")]

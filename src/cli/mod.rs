@@ -21,6 +21,7 @@ mod input;
 mod interrupt;
 mod loop_command;
 mod man;
+mod mistaken;
 mod next;
 mod outcome;
 mod output;
@@ -114,9 +115,11 @@ enum Command {
 /// 0 done, 1 the fit is not to be trusted or the arm does not pass a tolerance, 2 bad input, 3 the
 /// arm has changed since its estimate, 130 interrupted with nothing written.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
-    let cli = match Cli::try_parse_from(arguments) {
+    let words: Vec<OsString> = arguments.into_iter().collect();
+    let cli = match Cli::try_parse_from(&words) {
         Ok(cli) => cli,
         Err(error) => {
+            let error = mistaken::with_tip(error, &words, &Cli::command());
             // If the message cannot be printed, nothing more can be reported.
             let _ = error.print();
             return if error.use_stderr() { 2 } else { 0 };

@@ -3,7 +3,7 @@
 use std::error::Error;
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum, value_parser};
+use clap::{Args, ValueEnum};
 use flexcal::design::{self, Candidates, Explanations, NextOptions, Purpose, StopReason};
 use flexcal::fit::Options;
 use flexcal::problem::PoseRanges;
@@ -12,7 +12,7 @@ use flexcal::results::{Document as _, NextResult, poses_csv};
 
 use super::input::{Common, Input};
 use super::outcome::Outcome;
-use super::poses::Source;
+use super::poses::{Source, count};
 use super::progress::Line;
 use super::region::Region;
 use super::{diagnostic, interrupt};
@@ -37,7 +37,7 @@ pub struct Arguments {
     #[command(flatten)]
     common: Common,
     /// Number of poses to choose
-    #[arg(long, value_name = "K", default_value_t = 5, value_parser = value_parser!(u32).range(1..=10_000))]
+    #[arg(long, value_name = "K", default_value_t = 5, allow_negative_numbers = true, value_parser = count::<10_000>)]
     poses: u32,
     /// Say "enough" once errors in the workspace are below this, with the probability of --level
     #[arg(long, value_name = "MM", value_parser = positive)]

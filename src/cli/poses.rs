@@ -11,6 +11,12 @@ use flexcal::rig::Truth;
 
 use super::flags::Flags;
 
+/// Parses a number of poses from 1 to `MOST`.
+pub fn count<const MOST: u32>(text: &str) -> Result<u32, String> {
+    let number = text.parse().ok().filter(|number| (1..=MOST).contains(number));
+    number.ok_or_else(|| format!("a whole number from 1 to {MOST} is needed, such as 40"))
+}
+
 /// Ranges or tables of poses.
 #[derive(Debug, Args)]
 pub struct Source {

@@ -7,7 +7,7 @@ use thiserror::Error;
 
 use super::NoRows;
 use super::near::{instead, meant};
-use super::phrases::{list, near, plural};
+use super::phrases::{commas, list, near, plural, then};
 use super::study::StudyErrorKind;
 use super::table::TableErrorKind;
 use super::urdf::UrdfErrorKind;
@@ -49,12 +49,16 @@ pub enum InputErrorKind {
     HeaderNotUtf8,
     #[error("UTF-16 text, by its byte-order mark; save the file as UTF-8")]
     Utf16,
-    #[error("not valid TOML: {message}{}{remedy}", near(near_text))]
-    Syntax { message: String, near_text: String, remedy: &'static str },
+    #[error("{found}, not {expected}")]
+    OtherFormat { found: &'static str, expected: &'static str },
+    #[error("not valid TOML: {message}{}{}", near(near_text), then(*remedy))]
+    Syntax { message: String, near_text: String, remedy: Option<&'static str> },
 
     // The following errors concern keys.
     #[error("unknown key{}; known here: {}", meant(key, known), known.join(", "))]
     UnknownKey { key: String, known: Vec<String> },
+    #[error("does not belong here: {place}")]
+    MisplacedKey { place: String },
     #[error("missing; write {write}{}", instead("", near.as_deref()))]
     MissingKey { write: String, near: Option<String> },
     #[error("expected {expected}, found {found}")]
@@ -78,14 +82,19 @@ pub enum InputErrorKind {
          mark); remove it"
     )]
     Hidden { code: u32 },
+    #[error(
+        "a \\ in double quotes begins an escape sequence, here of U+{code:04X}; in a path write / \
+         in its place, or put the path in single quotes, as in 'C:\\temp\\new.csv'"
+    )]
+    EscapedPath { code: u32 },
     #[error("{value} is not a whole number of at least {least}")]
     NotWhole { value: String, least: u64 },
     #[error("{value} is too large; at most {most}")]
     TooLarge { value: u64, most: u64 },
-    #[error("a vector has 3 numbers, found {found}")]
-    NotAVector { found: usize },
-    #[error("expected 2 numbers, found {found}")]
-    NotAPair { found: usize },
+    #[error("a vector has 3 numbers, found {found}{}", commas(*has_close_commas))]
+    NotAVector { found: usize, has_close_commas: bool },
+    #[error("expected 2 numbers, found {found}{}", commas(*has_close_commas))]
+    NotAPair { found: usize, has_close_commas: bool },
     #[error(
         "expected {expected} numbers ({names}), found {found}; write 0 for a coefficient that the \
          lens does not have, or leave the key out if it has none"
@@ -402,7 +411,8 @@ pub enum InputErrorKind {
 
     // The following errors concern held-out rows.
     #[error(
-        "give one of column, fraction (with seed) or session, or held_out = \"none\" to fit all rows"
+        "give one of column, fraction (with seed) or session, as in held_out = {{ fraction = 0.3, \
+         seed = 1 }}, or held_out = \"none\" to fit all rows"
     )]
     NotOneHeldOut,
     #[error(
@@ -425,4 +435,20 @@ pub enum InputErrorKind {
         list("is", sessions, "is no column session")
     )]
     UnknownSession { session: String, sessions: Vec<String> },
+}
+
+impl InputErrorKind {
+    /// Returns the input that a file was expected to be, from the error that it would have if it
+    /// did not exist.
+    pub(crate) fn expected_file(&self) -> &'static str {
+        match self {
+            Self::Urdf(_) => {
+                "a URDF; export the arm as a URDF, or write its problem.toml by hand \
+                 (docs/own_arm.md)"
+            }
+            Self::TruthMissing => "a TRUTH.toml",
+            Self::Study(_) => "a STUDY.toml",
+            _ => "a problem.toml; PROBLEM is that file or its folder",
+        }
+    }
 }

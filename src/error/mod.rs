@@ -1,6 +1,7 @@
 //! Errors in the input, each with file, line and key.
 
 mod causes;
+mod file_format;
 mod kind;
 mod near;
 mod no_rows;
@@ -8,6 +9,7 @@ mod phrases;
 mod plain;
 mod study;
 mod table;
+mod typography;
 mod urdf;
 mod warning;
 
@@ -16,12 +18,14 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+pub(crate) use file_format::{JSON, TABLE, TOML, XML, binary_format, text_format};
 pub use kind::InputErrorKind;
 pub(crate) use near::{nearest, one_typo};
 pub(crate) use no_rows::NoRows;
 pub(crate) use plain::{escape_hidden, mask_hidden, one_line};
 pub(crate) use study::StudyErrorKind;
-pub(crate) use table::TableErrorKind;
+pub(crate) use table::{JOINED, TableErrorKind};
+pub(crate) use typography::typographic;
 pub(crate) use urdf::UrdfErrorKind;
 #[doc(hidden)]
 pub use warning::WarningKind;

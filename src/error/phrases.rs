@@ -14,6 +14,20 @@ pub(super) fn near(text: &str) -> String {
     if text.is_empty() { String::new() } else { format!(", near `{text}`") }
 }
 
+/// Returns `; ` and a remedy, or an empty text.
+pub(super) fn then(remedy: Option<&str>) -> String {
+    remedy.map_or_else(String::new, |remedy| format!("; {remedy}"))
+}
+
+/// Returns the remedy of a list with too many numbers if some follow a comma without a space.
+pub(super) fn commas(has_close_commas: bool) -> &'static str {
+    if has_close_commas {
+        "; if a comma is a decimal one, write a point: 0.18 for 0,18"
+    } else {
+        ""
+    }
+}
+
 /// States which of two files has a column: the present one if `has`, else `other`.
 pub(super) fn difference(other: &Path, has: bool) -> String {
     let says = if has { "has this column, this file does not" } else { "does not have it" };

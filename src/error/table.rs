@@ -7,8 +7,13 @@ use thiserror::Error;
 use super::near::{instead, meant, question};
 use super::phrases::{
     clock_offset_remedy, compared, decimal_comma_remedy, difference, in_quotes, named_otherwise,
+    then,
 };
 use super::warning::{listed, nearest_in_time};
+
+/// Declaration that joins two tables.
+pub(crate) const JOINED: &str =
+    "joints = { files = [\"…\"], by = \"name\" } (or \"order\" or \"time\")";
 
 /// Kind of error in a table of measurements; [`Location`](super::Location) holds the place.
 #[derive(Debug, Clone, PartialEq, Error)]
@@ -82,16 +87,29 @@ pub enum TableErrorKind {
     NamesWrittenOtherwise { left: usize, rows: usize, pair: [String; 2] },
     #[error("no rows below the header")]
     NoRowsBelowHeader,
-    #[error("an Excel workbook; save its sheet as CSV")]
-    Workbook,
+    #[error(
+        "the table has poses and no measurement; measure these poses, then add the columns x_mm, \
+         y_mm and z_mm"
+    )]
+    NotMeasured,
+    #[error(
+        "missing; add {write}, or, if another table holds the joints, write {JOINED} in [data]"
+    )]
+    NoJoints { write: String },
     #[error(
         "the columns are separated by {found:?}; write delimiter = \"{found}\" in [data.format]"
     )]
     OtherDelimiter { found: char },
     #[error("a decimal comma needs another delimiter than the comma; write delimiter = \";\"")]
     DecimalDelimiter,
-    #[error("{} has no such column{}; {}", file.display(), meant(name, known), in_quotes(known))]
-    NoSuchColumn { file: PathBuf, name: String, known: Vec<String> },
+    #[error(
+        "{} has no such column{}; {}{}",
+        file.display(),
+        meant(name, known),
+        in_quotes(known),
+        then(remedy.as_deref())
+    )]
+    NoSuchColumn { file: PathBuf, name: String, known: Vec<String>, remedy: Option<String> },
     #[error(
         "{} has several columns with this name; select one by its place, as in \"#{place}\"",
         file.display()
@@ -193,6 +211,8 @@ pub enum TableErrorKind {
     JointsFromZero,
     #[error("\"{value}\" is not a number")]
     NotANumber { value: String },
+    #[error("\"{value}\" contains {found}; {remedy}")]
+    Typographic { value: String, found: String, remedy: &'static str },
     #[error(
         "\"{value}\" is a unit, not a number; remove the line of units below the header, because \
          the names of the columns hold the units"

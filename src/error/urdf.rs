@@ -19,10 +19,6 @@ pub enum UrdfErrorKind {
     DocumentType,
     #[error("not a URDF: its outermost element is <{found}>, not <robot>{}", conversion(found))]
     NotARobot { found: String },
-    #[error(
-        "{what}, not a URDF; export the arm as a URDF, or write its problem.toml by hand (docs/own_arm.md)"
-    )]
-    OtherFormat { what: &'static str },
     #[error("<origin> has both rpy and quat_xyzw; keep one of the two")]
     TwoRotations,
     #[error("quat_xyzw \"{text}\" is not a rotation, because its squares do not add up to 1")]

@@ -29,12 +29,12 @@ pub fn read_limited(path: &Path, max_bytes: u64) -> io::Result<Vec<u8>> {
     if bytes.len() as u64 > max_bytes { Err(io::ErrorKind::FileTooLarge.into()) } else { Ok(bytes) }
 }
 
-/// Opens a file for reading. Returns an error for FIFOs, sockets, devices and files of the kernel
+/// Opens a file for reading. Returns an error for folders, FIFOs, sockets, devices and files of the kernel
 /// (`/proc`, `/sys`), which could block or never end. The standard input is allowed as `/dev/stdin`,
 /// `/dev/fd/N` or `/proc/self/fd/N`.
 ///
 /// # Errors
-/// Returns an error if the file cannot be opened, or is neither a regular file nor a folder.
+/// Returns an error if the file cannot be opened, or is no regular file.
 pub fn open(path: &Path) -> io::Result<File> {
     let kind = fs::metadata(path)?.file_type();
     let descriptors = ["/dev/stdin", "/dev/fd", "/proc/self/fd"];
@@ -45,7 +45,10 @@ pub fn open(path: &Path) -> io::Result<File> {
         let message = format!("it is a {what}; give a regular file");
         Err(io::Error::new(io::ErrorKind::InvalidInput, message))
     };
-    if !kind.is_file() && !kind.is_dir() {
+    if kind.is_dir() {
+        return refused("folder");
+    }
+    if !kind.is_file() {
         return refused("FIFO, socket or device");
     }
     let real = path.canonicalize()?;

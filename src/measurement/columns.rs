@@ -174,7 +174,9 @@ impl Columns {
                 Location { key: None, ..table.column("") }.error(TableErrorKind::NoHeader)
             }
             (Some(hidden), _) => with_rule_as_cause(error, hidden),
-            (None, Some(rule)) if is_missing_column(&error) => no_such(rule, table),
+            (None, Some(rule)) if is_missing_column(&error) => {
+                no_such(rule, &problem.data.dialect.columns, table)
+            }
             _ => error,
         })?;
         mistyped.map_or(Ok(columns), Err)
@@ -203,6 +205,11 @@ impl Columns {
         let near = |name: &str| nearest(name, unknown).map(|near| (*near).to_owned());
         let strangers = || unknown.iter().map(|name| (*name).to_owned()).collect();
         let missing = |bases: &[&str], unit: Unit| {
+            if let Some(error) =
+                bases.iter().find_map(|base| self.in_foreign_unit(table, base, unit))
+            {
+                return Err(error);
+            }
             let write =
                 bases.iter().map(|base| unit.alternatives(base)).collect::<Vec<_>>().join(" or ");
             let near =
@@ -241,6 +248,16 @@ impl Columns {
                     return Err(table
                         .column(column)
                         .error(TableErrorKind::SharedJointName { name, write }));
+                }
+                let has_joint = |role: &Role| matches!(role, Role::Joint(_) | Role::Reading(_));
+                if measured
+                    && unknown.is_empty()
+                    && self.in_foreign_unit(table, &number, unit).is_none()
+                    && problem.data.dialect.columns.is_empty()
+                    && !self.read.iter().any(|column| has_joint(&column.role))
+                {
+                    let write = unit.alternatives(&number);
+                    return Err(table.column(&number).error(TableErrorKind::NoJoints { write }));
                 }
                 let usable = |name: &&str| suffix.is_empty() && !name.contains(' ') && !is_shared;
                 let named = Some(joint.name.as_str()).filter(usable);
@@ -299,7 +316,14 @@ impl Columns {
         }
         for (role, name) in POSITION.into_iter().zip(["x", "y", "z"]) {
             if !self.has(role) {
-                return missing(&[name], Unit::Length);
+                let is_unmeasured = !has_position && unknown.is_empty();
+                return missing(&[name], Unit::Length).map_err(|error| {
+                    if is_unmeasured && is_missing_column(&error) {
+                        Location { key: None, ..*error.location }.error(TableErrorKind::NotMeasured)
+                    } else {
+                        error
+                    }
+                });
             }
         }
         if let (true, true) = self.orientations() {
@@ -308,6 +332,20 @@ impl Columns {
                 .error(TableErrorKind::RepeatedColumn { first: "rx".to_owned() }));
         }
         self.require_marked(table, problem, measured, near)
+    }
+
+    /// Returns the error of a column with the name `base` and a unit that files do not use.
+    fn in_foreign_unit(&self, table: &Table, base: &str, unit: Unit) -> Option<InputError> {
+        let of_base = |name: &String| {
+            let suffix = name.strip_prefix(base)?.strip_prefix('_')?;
+            Some((suffix.to_owned(), unit.convert_foreign(suffix, 1.0)?))
+        };
+        let (name, (suffix, factor)) =
+            self.names.iter().find_map(|name| Some((name, of_base(name)?)))?;
+        let (write, symbol) = (unit.alternatives(base), unit.in_tables().suffix);
+        let write = format!("{write}, and convert the numbers: 1 {suffix} is {factor} {symbol}");
+        let kind = InputErrorKind::WrongUnit { noun: unit.noun(), suffix, write };
+        Some(table.column(name).error(kind))
     }
 
     /// Checks that the column of held-out rows exists if the problem names one.

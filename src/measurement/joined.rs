@@ -8,6 +8,7 @@ use csv::ByteRecord;
 use super::cell_style::CellStyle;
 use super::clocks::{best_shift, nearest};
 use super::mapped::Names;
+use super::meaning::is_numbered_or_position;
 use super::table::{Table, shortened};
 use super::time::shown;
 use crate::error::{InputError, InputErrorKind, Location, TableErrorKind, Warning, WarningKind};
@@ -189,7 +190,11 @@ impl JoinedLog {
                 (with_unit.or_else(date), "time_s or time")
             }
         };
-        let unknown = names.iter().filter(|name| !name.is_empty()).cloned().collect();
+        let is_unknown = |(ours, theirs): &(&String, &String)| {
+            ours == theirs && !ours.is_empty() && !is_numbered_or_position(ours)
+        };
+        let names = names.iter().zip(&table.header).filter(is_unknown);
+        let unknown = names.map(|(name, _)| name.clone()).collect();
         let kind = TableErrorKind::MissingColumn { write: write.to_owned(), near: None, unknown };
         key.map(Some).ok_or_else(|| table.column(write).error(kind))
     }

@@ -1,7 +1,8 @@
 //! Names of a table's columns after the map of `[data.columns]`.
 
+use super::meaning::split_unit;
 use super::table::Table;
-use crate::error::{InputError, TableErrorKind};
+use crate::error::{InputError, JOINED, TableErrorKind};
 use crate::problem::{ColumnRule, ColumnSelector, Dialect};
 
 /// Names of a table's columns, as in the table and in flexcal's vocabulary.
@@ -63,7 +64,7 @@ impl<'a> Names<'a> {
                 if !measured || has(&rule.ours) || is_given_otherwise(rule) {
                     continue;
                 }
-                return Err(no_such(rule, table));
+                return Err(no_such(rule, rules, table));
             };
             if let Some(first) = entry.1 {
                 let first = first.ours.clone();
@@ -129,22 +130,54 @@ fn only_place(rule: &ColumnRule, name: &str, table: &Table) -> Result<Option<usi
     }
 }
 
+/// Returns true if a rule names the coordinate of a joint by its number, such as `q1_deg`.
+fn is_joint(rule: &ColumnRule) -> bool {
+    let number = rule.ours.strip_prefix('q').unwrap_or_default();
+    number.starts_with(|character: char| character.is_ascii_digit())
+}
+
+/// Returns true if a rule names a coordinate of the measured position.
+fn is_position(rule: &ColumnRule) -> bool {
+    ["x", "y", "z"].contains(&split_unit(&rule.ours).0)
+}
+
 /// Returns the error of a rule whose column does not exist.
-pub(super) fn no_such(rule: &ColumnRule, table: &Table) -> InputError {
+///
+/// A table that has no column of any rule for joints, or for positions, is probably one of two
+/// tables that belong together.
+pub(super) fn no_such(rule: &ColumnRule, rules: &[ColumnRule], table: &Table) -> InputError {
     let name = match &rule.theirs {
         ColumnSelector::Name(name) => name.clone(),
         ColumnSelector::Place(place) => format!("#{place}"),
         ColumnSelector::File => "#file".to_owned(),
     };
-    let number = rule.ours.strip_prefix('q').unwrap_or_default();
-    let is_of_joint = number.starts_with(|character: char| character.is_ascii_digit());
+    let is_of_joint = is_joint(rule);
     let (file, known) = table
         .appended_columns()
         .filter(|_| is_of_joint)
         .unwrap_or((table.file.as_path(), table.header.as_slice()));
+    let lacks_each = |is_kind: fn(&ColumnRule) -> bool| {
+        let is_absent = |rule: &ColumnRule| match &rule.theirs {
+            ColumnSelector::Name(name) => !table.header.contains(name),
+            ColumnSelector::Place(_) | ColumnSelector::File => false,
+        };
+        let mut of_kind = rules.iter().filter(|rule| is_kind(rule));
+        is_kind(rule) && of_kind.clone().nth(1).is_some() && of_kind.all(is_absent)
+    };
+    let remedy = if lacks_each(is_joint) {
+        Some(format!("if another table holds the joints, leave it out of files and write {JOINED}"))
+    } else if lacks_each(is_position) {
+        Some(format!(
+            "if these poses are still to be measured, measure them and add x_mm, y_mm and z_mm; if \
+             another table holds the positions, name that table alone in files and write {JOINED}"
+        ))
+    } else {
+        None
+    };
     rule.location.clone().error(TableErrorKind::NoSuchColumn {
         file: file.to_owned(),
         name,
         known: known.to_vec(),
+        remedy,
     })
 }

@@ -12,8 +12,8 @@ use super::latin::decoded_record;
 use super::lines::{Lines, MAX_RECORD_KIB};
 use super::time::{DateOrder, date_time, is_ambiguous};
 use crate::error::{
-    BYTE_ORDER_MARKS, Excerpt, InputError, InputErrorKind, Location, TableErrorKind, Warning,
-    WarningKind, is_hidden, lines,
+    BYTE_ORDER_MARKS, Excerpt, InputError, InputErrorKind, Location, TABLE, TableErrorKind,
+    Warning, WarningKind, binary_format, is_hidden, lines, text_format, typographic,
 };
 use crate::files::{open, unescape_cell};
 use crate::problem::item::MAX_MAGNITUDE;
@@ -26,8 +26,11 @@ const MAX_COLUMNS: usize = 10_000;
 const UNITS: [&str; 12] =
     ["degrees", "degree", "deg", "°C", "°", "rad", "mm", "kg", "m", "s", "N", "C"];
 
-/// First bytes of a spreadsheet workbook, which is a ZIP archive.
-const WORKBOOK_SIGNATURE: &[u8] = b"PK\x03\x04";
+/// Input that is expected in place of a file of another format.
+const A_TABLE: &str = "a table; save or export it as CSV, text with one row per pose";
+/// Maximum number of cells into which the first line of a file in another format falls, if it
+/// has no mark of its own.
+const MAX_CELLS_OF_KEY: usize = 2;
 
 /// Text whose beginning has already been read.
 type TextFromStart = Chain<Cursor<Vec<u8>>, Box<dyn Read>>;
@@ -80,8 +83,9 @@ impl Table {
         let unreadable = |source| Location::file(file).error(InputErrorKind::Unreadable { source });
         let mut beginning = Vec::new();
         input.by_ref().take(HEADER_SEARCH_BYTES).read_to_end(&mut beginning).map_err(unreadable)?;
-        if beginning.starts_with(WORKBOOK_SIGNATURE) {
-            return Err(Location::file(file).error(TableErrorKind::Workbook));
+        let other_format = |found| InputErrorKind::OtherFormat { found, expected: A_TABLE };
+        if let Some(found) = binary_format(&beginning) {
+            return Err(Location::file(file).error(other_format(found)));
         }
         let layout = Layout::detect(&beginning, dialect);
         let date_order = DateOrder::of(&beginning);
@@ -138,6 +142,8 @@ impl Table {
         if table.has_no_header(&dialect.columns) {
             table.header = (1..=table.header.len()).map(|place| format!("#{place}")).collect();
             table.starts_with_row = true;
+        } else if let Some(found) = table.other_format(dialect) {
+            return Err(Location::file(file).at_line(table.line).error(other_format(found)));
         }
         if let [only] = table.header.as_slice()
             && let Some(found) = only.chars().find(|c| ";\t|".contains(*c))
@@ -158,6 +164,24 @@ impl Table {
         let counts =
             |from: usize| (from..).zip(&self.header).all(|(k, name)| *name == k.to_string());
         rules.iter().filter_map(cell).any(is_number) && !counts(0) && !counts(1)
+    }
+
+    /// Returns the format of the text if the header is no header of a table, but the first line of
+    /// a file in another format.
+    fn other_format(&self, dialect: &Dialect) -> Option<&'static str> {
+        let has_column = |rule: &ColumnRule| match &rule.theirs {
+            ColumnSelector::Name(name) => self.header.contains(name),
+            ColumnSelector::Place(_) | ColumnSelector::File => false,
+        };
+        if dialect.columns.iter().any(has_column) {
+            return None;
+        }
+        let line = self.header.join(" ") + "\n";
+        let is_marked = line.starts_with(['<', '{', '[', '-', '%'])
+            || self.header.iter().any(|cell| cell == "=");
+        text_format(&line).filter(|format| {
+            *format != TABLE && (is_marked || self.header.len() <= MAX_CELLS_OF_KEY)
+        })
     }
 
     /// Reads the next row; returns false at the end.
@@ -354,11 +378,14 @@ impl Table {
             }
             Err(_) => Err(self.cell_error(
                 place,
-                match unit_behind(word) {
-                    Some(unit) => {
+                match (unit_behind(word), typographic(word)) {
+                    (Some(unit), _) => {
                         TableErrorKind::NumberWithUnit { value: value(), unit: unit.to_owned() }
                     }
-                    None => TableErrorKind::NotANumber { value: value() },
+                    (None, Some((found, remedy))) => {
+                        TableErrorKind::Typographic { value: value(), found, remedy }
+                    }
+                    (None, None) => TableErrorKind::NotANumber { value: value() },
                 },
             )),
         }

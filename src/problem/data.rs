@@ -154,6 +154,9 @@ pub(super) fn read(root: &mut Section<'_, '_>) -> Result<Data, InputError> {
         held_out = Some(match item.text() {
             Ok("none") => HeldOut::Nothing,
             Ok(_) => return Err(item.error(InputErrorKind::NotOneHeldOut)),
+            Err(_) if !item.holds_tables() => {
+                return Err(item.error(InputErrorKind::NotOneHeldOut));
+            }
             Err(_) => held_out_rows(item.section()?)?,
         });
     }

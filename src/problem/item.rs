@@ -9,8 +9,11 @@ use nalgebra::Vector3;
 use toml::Spanned;
 use toml::de::{DeInteger, DeString, DeTable, DeValue};
 
-use crate::error::{BYTE_ORDER_MARKS, InputError, InputErrorKind, Location, is_hidden, lines};
+use crate::error::{
+    BYTE_ORDER_MARKS, InputError, InputErrorKind, Location, binary_format, is_hidden, lines,
+};
 use crate::files::read_limited;
+use crate::quantity::Unit;
 
 /// Maximum size of a TOML file that is read \[MiB\].
 const MAX_TEXT_MIB: u64 = 4;
@@ -26,6 +29,7 @@ pub(crate) struct Document {
 impl Document {
     /// Reads a text file; `missing` is the error if the file does not exist.
     pub fn read(file: &Path, missing: InputErrorKind) -> Result<Self, InputError> {
+        let expected = missing.expected_file();
         let bytes = read_limited(file, MAX_TEXT_MIB << 20).map_err(|source| {
             Location::file(file).error(match source.kind() {
                 io::ErrorKind::NotFound => missing,
@@ -35,6 +39,9 @@ impl Document {
         })?;
         if BYTE_ORDER_MARKS.iter().any(|mark| bytes.starts_with(mark)) {
             return Err(Location::file(file).at_line(1).error(InputErrorKind::Utf16));
+        }
+        if let Some(found) = binary_format(&bytes) {
+            return Err(Location::file(file).error(InputErrorKind::OtherFormat { found, expected }));
         }
         let text = String::from_utf8(bytes).map_err(|error| {
             let valid =
@@ -48,41 +55,8 @@ impl Document {
     pub fn table(&self) -> Result<Spanned<DeTable<'_>>, InputError> {
         DeTable::parse(&self.text).map_err(|error| {
             let span = error.span().unwrap_or(self.text.len()..self.text.len());
-            let near_text =
-                self.text.get(span.clone()).unwrap_or_default().chars().take(40).collect();
-            let message = error.message().to_owned();
-            let remedy = self.syntax_remedy(span.start);
-            self.locate(span).error(InputErrorKind::Syntax { message, near_text, remedy })
+            self.locate(span).error(self.syntax_error(&error))
         })
-    }
-
-    /// Returns the remedy of a usual mistake at a byte of the text; empty if none is recognised.
-    fn syntax_remedy(&self, place: usize) -> &'static str {
-        let (before, after) = (
-            self.text.get(..place).unwrap_or_default(),
-            self.text.get(place..).unwrap_or_default(),
-        );
-        let is_digit = |character: char| character.is_ascii_digit();
-        let has_decimal_comma = after
-            .strip_prefix(',')
-            .is_some_and(|next| next.starts_with(is_digit) && before.ends_with(is_digit))
-            || before
-                .strip_suffix(',')
-                .is_some_and(|number| number.ends_with(is_digit) && after.starts_with(is_digit));
-        let first = self.text.lines().next().unwrap_or_default();
-        if first.trim_start().starts_with('<') {
-            "; this is XML: flexcal init FILE makes a problem.toml of a URDF"
-        } else if !before.contains('\n') && !first.contains('=') && first.contains([',', ';', '\t'])
-        {
-            "; this is a table of measurements: PROBLEM is a problem.toml or its folder, and --data \
-             names tables"
-        } else if has_decimal_comma {
-            "; write numbers with a decimal point"
-        } else if after.starts_with(['*', '?']) {
-            "; write a pattern in quotes, as in \"base.*\""
-        } else {
-            ""
-        }
     }
 
     /// Returns the place of a span of the text.
@@ -186,6 +160,22 @@ impl<'a, 'i> Item<'a, 'i> {
         }
     }
 
+    /// Converts the number or numbers of this value from a unit that files do not use to that of
+    /// tables, as text. Returns `None` for another value.
+    pub(super) fn converted(&self, unit: Unit, suffix: &str) -> Option<String> {
+        let number = |item: &Self| {
+            let converted = unit.convert_foreign(suffix, item.number().ok()?);
+            converted.map(|value| value.to_string())
+        };
+        match self.value {
+            DeValue::Array(_) => {
+                let numbers = self.list("").ok()?.iter().map(number).collect::<Option<Vec<_>>>();
+                numbers.map(|numbers| format!("[{}]", numbers.join(", ")))
+            }
+            _ => number(self),
+        }
+    }
+
     /// Returns an integer of at least `least`.
     pub fn whole(&self, least: u64) -> Result<u64, InputError> {
         let written = match self.value {
@@ -235,9 +225,18 @@ impl<'a, 'i> Item<'a, 'i> {
         let text = self.value.as_str().ok_or_else(|| self.wrong_type("text in quotes"))?;
         match text.chars().find(|&character| is_hidden(character)) {
             _ if text.trim().is_empty() => Err(self.error(InputErrorKind::Empty)),
+            Some(hidden) if hidden.is_control() && self.has_escape() => {
+                Err(self.error(InputErrorKind::EscapedPath { code: hidden.into() }))
+            }
             Some(hidden) => Err(self.error(InputErrorKind::Hidden { code: hidden.into() })),
             None => Ok(text),
         }
+    }
+
+    /// Returns true if the value has an escape sequence of a letter, as a path of Windows has.
+    fn has_escape(&self) -> bool {
+        let written = self.document.text.get(self.span.clone()).unwrap_or_default();
+        ["\\t", "\\n", "\\r", "\\b", "\\f", "\\e"].iter().any(|escape| written.contains(escape))
     }
 
     /// Returns text, which may be empty.
@@ -263,7 +262,10 @@ impl<'a, 'i> Item<'a, 'i> {
         let elements = self.list("a list of 2 numbers")?;
         match elements.as_slice() {
             [x, y] => Ok([x.number()?, y.number()?]),
-            _ => Err(self.error(InputErrorKind::NotAPair { found: elements.len() })),
+            _ => {
+                let (found, has_close_commas) = (elements.len(), has_close_commas(&elements, 2));
+                Err(self.error(InputErrorKind::NotAPair { found, has_close_commas }))
+            }
         }
     }
 
@@ -271,11 +273,25 @@ impl<'a, 'i> Item<'a, 'i> {
     pub fn vector(&self) -> Result<Vector3<f64>, InputError> {
         let elements = self.list("a list of 3 numbers")?;
         if elements.len() != 3 {
-            return Err(self.error(InputErrorKind::NotAVector { found: elements.len() }));
+            let (found, has_close_commas) = (elements.len(), has_close_commas(&elements, 3));
+            return Err(self.error(InputErrorKind::NotAVector { found, has_close_commas }));
         }
         let numbers = elements.iter().map(Self::number).collect::<Result<Vec<_>, _>>()?;
         Ok(Vector3::from_column_slice(&numbers))
     }
+}
+
+/// Returns true if a list has up to twice as many numbers as `expected`, and a digit follows the
+/// comma behind one of them directly, as in `[0,18, 0, 0]`.
+fn has_close_commas(elements: &[Item<'_, '_>], expected: usize) -> bool {
+    let is_close = |pair: &[Item<'_, '_>]| match pair {
+        [first, second] => {
+            let is_whole = |item: &Item<'_, '_>| matches!(item.value, DeValue::Integer(_));
+            first.span.end + 1 == second.span.start && is_whole(first) && is_whole(second)
+        }
+        _ => false,
+    };
+    (expected + 1..=2 * expected).contains(&elements.len()) && elements.windows(2).any(is_close)
 }
 
 /// Converts an integer of any size to a float.

@@ -28,12 +28,14 @@ mod law;
 mod parameters;
 mod past;
 pub(crate) mod pattern;
+mod place;
 mod plausible;
 pub(crate) mod read;
 mod remainder;
 mod robust;
 pub(crate) mod section;
 mod standard;
+mod syntax;
 mod target;
 mod tree;
 

@@ -116,6 +116,10 @@ fn rule(pattern: &str, item: &Item<'_, '_>) -> Result<ParameterRule, InputError>
         return Err(item.error(InputErrorKind::Empty));
     }
     item.check_count("characters in a pattern", pattern.len(), MAX_PATTERN_BYTES)?;
+    if !item.holds_tables() {
+        let expected = "a table such as { free = true }, { fixed = true } or { sigma_mm = 1.0 }";
+        return Err(item.wrong_type(expected));
+    }
     let mut section = item.section()?;
     // TOML reads `tool.x = { … }` without quotes as a table `tool` with a table `x`.
     if let Some((inner, _)) = section.entries().into_iter().find(|(_, inner)| inner.holds_tables())

@@ -6,6 +6,7 @@ use nalgebra::Vector3;
 use toml::de::DeTable;
 
 use super::item::{Document, Item, join};
+use super::place::proper_place;
 use crate::error::{InputError, InputErrorKind, Location, nearest, shortened};
 use crate::quantity::{Suffix, Unit};
 
@@ -133,6 +134,17 @@ impl<'a, 'i> Section<'a, 'i> {
     ) -> Result<Option<(Item<'a, 'i>, Suffix)>, InputError> {
         let mut found: Option<(Item<'a, 'i>, Suffix)> = None;
         let mut first_key = String::new();
+        for suffix in unit.foreign_suffixes() {
+            if let Some(item) = self.peek(&format!("{base}_{suffix}")) {
+                let write = [unit.alternatives(base)].into_iter();
+                let here = item
+                    .converted(unit, suffix)
+                    .map(|value| format!("here {base}_{} = {value}", unit.in_tables().suffix));
+                let write = write.chain(here).collect::<Vec<_>>().join(", ");
+                let (noun, suffix) = (unit.noun(), suffix.to_owned());
+                return Err(item.error(InputErrorKind::WrongUnit { noun, suffix, write }));
+            }
+        }
         for suffix in unit.suffixes() {
             let key = format!("{base}_{}", suffix.name);
             if let Some(item) = self.get(&key) {
@@ -217,9 +229,12 @@ impl<'a, 'i> Section<'a, 'i> {
     pub fn finish(&self) -> Result<(), InputError> {
         let unknown = self.entries().into_iter().find(|(key, _)| !self.was_read(key));
         match unknown {
-            Some((key, item)) => Err(item.error(InputErrorKind::UnknownKey {
-                key: shortened(key, 80),
-                known: self.keys_read.clone(),
+            Some((key, item)) => Err(item.error(match proper_place(key, &self.keys_read) {
+                Some(place) => InputErrorKind::MisplacedKey { place },
+                None => InputErrorKind::UnknownKey {
+                    key: shortened(key, 80),
+                    known: self.keys_read.clone(),
+                },
             })),
             None => Ok(()),
         }

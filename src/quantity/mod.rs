@@ -1,6 +1,7 @@
 //! Physical quantities and their units: SI inside the program, unit suffixes in files, convenient
 //! units on screens.
 
+mod foreign;
 pub(crate) mod format;
 mod right_angle;
 mod unit;

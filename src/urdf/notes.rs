@@ -19,6 +19,7 @@ pub(super) fn of_chain(chain: &Chain) -> Vec<String> {
     notes.extend(right_angles(&joints));
     notes.extend(joints.iter().filter_map(|joint| degrees(joint)));
     notes.extend(joints.iter().filter_map(|joint| millimetres(joint)));
+    notes.extend(limits_in_degrees(&joints));
     notes.extend(joints.iter().filter_map(|joint| unlimited_slide(joint)));
     let beside =
         chain.robot.joints.iter().enumerate().filter(|(index, _)| !chain.joints.contains(index));
@@ -63,6 +64,22 @@ fn millimetres(joint: &Joint) -> Option<String> {
          and run init again",
         joint.name
     ))
+}
+
+/// Returns a note if limits of revolute joints look like degrees.
+fn limits_in_degrees(joints: &[&Joint]) -> Option<String> {
+    let limits = |joint: &&Joint| {
+        let (lower, upper) = joint.limits_in_degrees?;
+        Some(format!("{} ({lower} to {upper})", joint.name))
+    };
+    let named: Vec<String> = joints.iter().filter_map(limits).collect();
+    (!named.is_empty()).then(|| {
+        format!(
+            "limits of more than two turns, which a URDF gives in radians, are taken as none: {}; if \
+             they are degrees, convert them and run init again",
+            named.join(", ")
+        )
+    })
 }
 
 /// Returns a note if a prismatic joint has no limits, which planning needs.

@@ -1,6 +1,6 @@
 //! Reader of links and joints from the text of a URDF.
 
-use std::f64::consts::FRAC_PI_2;
+use std::f64::consts::{FRAC_PI_2, TAU};
 use std::ops::Range;
 use std::path::Path;
 
@@ -8,7 +8,9 @@ use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use roxmltree::{Document as Xml, Node};
 
 use super::number::numbers;
-use crate::error::{InputError, InputErrorKind, Location, UrdfErrorKind, is_hidden, shortened};
+use crate::error::{
+    InputError, InputErrorKind, Location, UrdfErrorKind, XML, is_hidden, shortened, text_format,
+};
 use crate::problem::item::Document;
 use crate::quantity::rounded_right_angle;
 use crate::spatial::Frame;
@@ -18,6 +20,10 @@ const MAX_QUATERNION_NORM_ERROR: f64 = 1e-3;
 /// Largest deviation of an angle from a right angle that is taken for rounding of a quaternion with
 /// seven decimals \[rad\].
 const MAX_QUATERNION_ROUNDING: f64 = 2e-7;
+
+/// Largest plausible limit of a revolute joint \[rad\]: two turns. Larger limits are probably
+/// degrees.
+const MAX_REVOLUTE_LIMIT: f64 = 2.0 * TAU + 0.01;
 
 /// Numbers with their byte range in the text.
 type Placed<const N: usize> = ([f64; N], Range<usize>);
@@ -64,6 +70,8 @@ pub(super) struct Joint {
     /// Limits \[rad\] or \[m\] as (lower, upper) that are ignored because the lower one is above
     /// the upper one; `None` if the limits are valid.
     pub reversed_limits: Option<(f64, f64)>,
+    /// Limits as written that are ignored because they look like degrees; `None` for other limits.
+    pub limits_in_degrees: Option<(f64, f64)>,
     /// Index of the joint that a mimic joint follows, factor and offset; `None` for other joints.
     pub mimic: Option<(usize, f64, f64)>,
     /// Error of a `<mimic>` that names no joint or is invalid. It is reported only if the chain
@@ -116,10 +124,11 @@ impl Robot {
 
     fn from_document(source: Document) -> Result<Self, InputError> {
         let text = source.text.clone();
-        if let Some(what) = other_format(&text) {
+        if let Some(found) = text_format(&text).filter(|format| *format != XML) {
+            let expected = InputErrorKind::from(UrdfErrorKind::Missing).expected_file();
             return Err(Location::file(&source.file)
                 .at_line(1)
-                .error(UrdfErrorKind::OtherFormat { what }));
+                .error(InputErrorKind::OtherFormat { found, expected }));
         }
         let xml = Xml::parse(&text).map_err(|error| {
             let location = Location::file(&source.file).at_line(error.pos().row as usize);
@@ -171,22 +180,6 @@ impl Robot {
 fn right_angle_of_quaternion(angle: f64) -> f64 {
     let right = (angle / FRAC_PI_2).round() * FRAC_PI_2;
     if (angle - right).abs() < MAX_QUATERNION_ROUNDING { right } else { angle }
-}
-
-/// Returns the name of the format of a text that is not XML; `None` for XML and unknown formats.
-fn other_format(text: &str) -> Option<&'static str> {
-    let start = text.trim_start();
-    let formats = [
-        ("#usda", "a USD scene"),
-        ("PXR-USDC", "a USD scene"),
-        ("PK\u{3}\u{4}", "a ZIP archive"),
-        ("{", "a JSON file"),
-        ("solid ", "a mesh (STL)"),
-        ("ISO-10303-21", "a STEP file"),
-        ("%YAML", "a YAML file"),
-        ("---", "a YAML file"),
-    ];
-    formats.into_iter().find(|(mark, _)| start.starts_with(mark)).map(|(_, what)| what)
 }
 
 struct Reader<'a> {
@@ -360,9 +353,12 @@ impl Reader<'_> {
             }
             None => None,
         };
+        let in_degrees = written.filter(|limits| {
+            kind == Kind::Revolute && limits.0.abs().max(limits.1.abs()) > MAX_REVOLUTE_LIMIT
+        });
         // Absent limits are 0; an empty range means no limits.
         let limits = written
-            .filter(|(lower, upper)| lower < upper)
+            .filter(|(lower, upper)| lower < upper && in_degrees.is_none())
             .unwrap_or((f64::NEG_INFINITY, f64::INFINITY));
         let reversed_limits = written.filter(|(lower, upper)| lower > upper);
         let mimic = child("mimic").filter(|_| moves).map(|element| self.mimic(element, names));
@@ -383,6 +379,7 @@ impl Reader<'_> {
             axis,
             limits,
             reversed_limits,
+            limits_in_degrees: in_degrees,
             mimic,
             broken_mimic,
             span: node.range(),

@@ -201,6 +201,24 @@ fn wrong_arguments_end_with_status_two_and_help_with_zero() {
     let folder = Folder::new();
     folder.flexcal("identify").code(2);
     folder.flexcal("identify . --strategy guess").code(2);
+    folder.write("problem.toml", "");
+    for (arguments, words) in [
+        ("identify . --heldout 0.3", "tip: the problem says which poses are held out"),
+        ("loop . -d x.csv", "tip: --data FILE names measurement files"),
+        ("check . --poses -3", "'-3' for '--poses <N>': a whole number from 1 to 10000 is needed"),
+        ("check . --poses 40.5", "'40.5' for '--poses <N>': a whole number from 1 to 10000"),
+        (
+            "-v identify .",
+            "tip: write options behind the command, as in flexcal identify PROBLEM -v",
+        ),
+        ("problem.toml", "tip: write a command first, as in flexcal identify problem.toml"),
+        ("export . --estimate e.json --format URDF", "tip: leave --format out to write a URDF"),
+        ("init .", "it is a folder; give a regular file"),
+    ] {
+        assert_contains(&folder.flexcal(arguments).code(2).stderr, &[words]);
+    }
+    let commas = Folder::with_lunar_sampler().flexcal("identify . --data=a.csv,b.csv").code(2);
+    assert_contains(&commas.stderr, &["spaces separate files, as in --data a.csv b.csv"]);
     folder.flexcal("--help").success();
     folder.flexcal("identify --help").success();
 }

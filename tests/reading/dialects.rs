@@ -169,6 +169,23 @@ fn wrong_maps_are_named() {
         let map = good.replacen(from, to, 1);
         assert_says(&table_error(&problem(&map), table), words);
     }
+    let by_name = good.replace("#5", "Height");
+    for (table, words) in [
+        (
+            "X,Y,Height\n1,2,3\n",
+            ["columns.A1: ", "leave it out of files and write joints = { files"],
+        ),
+        (
+            "A1,A2\n1,2\n",
+            ["columns.X: ", "if these poses are still to be measured, measure them and"],
+        ),
+        (
+            "q1_deg,q2_deg\n1,2\n",
+            ["rows.csv:1: ", "measure these poses, then add the columns x_mm"],
+        ),
+    ] {
+        assert_says(&table_error(&problem(&by_name), table), &words);
+    }
     for (format, words) in [
         ("delimiter = '/'", "problem.toml:6: data.format.delimiter: \"/\" is none of ,, ;, |"),
         (
@@ -189,7 +206,10 @@ fn wrong_maps_are_named() {
             "q1_deg;q2_deg;x_m;y_m;z_m\n1,5;2;3;4;5\n",
             "rows.csv:2: column q1_deg: \"1,5\" is not a number; if numbers have a decimal comma",
         ),
-        ("PK\u{3}\u{4}...", "rows.csv: an Excel workbook; save its sheet as CSV"),
+        (
+            "PK\u{3}\u{4}...",
+            "rows.csv: a ZIP archive or a workbook (XLSX, ODS), not a table; save or export it as CSV",
+        ),
         (
             "q1_deg,q2_deg,x_m,y_m,z_m,time_s\n1,2,3,4,5,2024-05-31T25:00:00\n",
             "is neither a number nor a time such as",

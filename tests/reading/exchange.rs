@@ -232,6 +232,12 @@ fn a_column_that_the_joint_log_lacks_is_missed_there() {
     let tracker = "Point;X;y_mm;z_mm\nP1;1;0;0\n";
     let lacks = joined("by = 'name'", tracker, "Point,A1\nP1,11\n").unwrap_err();
     assert_says(&lacks, &["columns.A2", "controller.csv has no such column", "\"A1\""]);
+    let keyless = joined("by = 'time'", "time_s;X;y_mm;z_mm\n1;1;0;0\n", "Note,A1,A2\nP1,11,1\n");
+    let said = keyless.unwrap_err();
+    assert_says(
+        &said,
+        &["column time_s or time: missing", "flexcal does not know: Note; if it is"],
+    );
 }
 
 #[test]

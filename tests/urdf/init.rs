@@ -219,6 +219,12 @@ fn other_units_and_broken_followers_are_noted() {
     assert!(said.contains("j2: rpy holds 90 rad") && said.contains("degrees"), "{said}");
     let said = notes("xyz=\"200 0 0\"", "");
     assert!(said.contains("j2: xyz holds 200 m") && said.contains("millimetres"), "{said}");
+    let degrees = arm("xyz=\"0.2 0 0\"", "").replace("-1\" upper=\"1", "-170\" upper=\"170");
+    let robot = Robot::parse(&degrees, Path::new("r.urdf")).unwrap();
+    let described = describe(&Chain::new(&robot, None, Some("c")).unwrap()).unwrap();
+    let said = described.notes.join("\n");
+    assert!(said.contains("are taken as none: j2 (-170 to 170); if they are degrees"), "{said}");
+    assert_eq!(described.text.matches("\nmax_deg = 180\n").count(), 2, "{}", described.text);
     let mimic = "<mimic joint=\"finger\"/>";
     let said = notes("xyz=\"0.2 0 0\"", mimic);
     assert!(said.contains("g: <mimic>: no joint is called \"finger\""), "{said}");

@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DVector};
 use serde::Deserialize;
 use serde_json::value::RawValue;
 
-use crate::error::one_line;
+use crate::error::{JSON, TABLE, binary_format, one_line, text_format};
 use crate::files::{Changes, changed_key, read_limited};
 use crate::fit::{Placement, Strategy};
 use crate::measurement::{Measurements, StartTimes};
@@ -126,6 +126,25 @@ struct RemainderEntry {
     file: Option<String>,
 }
 
+/// Head of another file that flexcal writes.
+#[derive(Debug, Deserialize)]
+struct Head {
+    format: Format,
+}
+
+/// Returns the error of a text that cannot be parsed as an estimate, which names what it is
+/// instead if that is recognised.
+fn not_an_estimate(text: &str, file: PathBuf, source: serde_json::Error) -> SavedEstimateError {
+    let head = serde_json::from_str(text).ok().map(|Head { format }| format.name);
+    match (head, text_format(text)) {
+        (Some(name), _) if name != FORMAT.0 => {
+            SavedEstimateError::OtherFormat { file, name: one_line(&name) }
+        }
+        (_, Some(found)) if found != JSON => SavedEstimateError::OtherFile { file, found },
+        _ => SavedEstimateError::Syntax { file, source },
+    }
+}
+
 /// Error of an `estimate.json` that cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -135,8 +154,10 @@ pub enum SavedEstimateError {
     Unreadable { file: PathBuf, source: io::Error },
     #[error("{}: not an estimate.json: {source}", file.display())]
     Syntax { file: PathBuf, source: serde_json::Error },
-    #[error("{}: format: a file of {name}, not an estimate.json", file.display())]
+    #[error("{}: format: a file of {name}, not an estimate.json; flexcal identify writes one", file.display())]
     OtherFormat { file: PathBuf, name: String },
+    #[error("{}: {found}, not an estimate.json; flexcal identify writes one{}", file.display(), if *found == TABLE { ", and --data names tables" } else { "" })]
+    OtherFile { file: PathBuf, found: &'static str },
     #[error("{}: format: version {version}, and this program reads versions up to {}; use a newer flexcal, or identify again", file.display(), FORMAT.1)]
     NewerFormat { file: PathBuf, version: u32 },
     #[error("{}: {key}: changed since flexcal wrote it; identify again, or take it as it is with --trust", file.display())]
@@ -194,6 +215,9 @@ impl SavedEstimate {
                 io::ErrorKind::FileTooLarge => SavedEstimateError::TooLarge { file: named() },
                 _ => SavedEstimateError::Unreadable { file: named(), source },
             })?;
+        if let Some(found) = binary_format(&bytes) {
+            return Err(SavedEstimateError::OtherFile { file: named(), found });
+        }
         let text =
             String::from_utf8(bytes).map_err(|_| SavedEstimateError::NotUtf8 { file: named() })?;
         Self::parse_with(&text, file, changes)
@@ -230,7 +254,7 @@ impl SavedEstimate {
             prior,
         } = match serde_json::from_str(text) {
             Ok(document) => document,
-            Err(source) => return Err(SavedEstimateError::Syntax { file, source }),
+            Err(source) => return Err(not_an_estimate(text, file, source)),
         };
         if let Some(Format { name, version }) = format {
             if name != FORMAT.0 {

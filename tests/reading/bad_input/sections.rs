@@ -161,7 +161,56 @@ fn other_sections() {
         ("[tool]\ntarget_m = [\n1,\n2,\nnan]", &[":7: tool.target_m[3]: nan"]),
         ("[tool]\ntarget = [1, 2, 3]", &[":4: tool.target: a length needs a unit"]),
         ("[tool]\npayload_kg = -1", &[":4: tool.payload_kg: -1 is below zero"]),
-        ("[tool]\npayload_g = 1", &[":4: tool.payload_g: unknown key"]),
+        (
+            "[tool]\npayload_g = 1",
+            &[
+                "tool.payload_g: a mass is not given in g; write payload_kg, here payload_kg = 0.001",
+            ],
+        ),
+        (
+            "[tool]\ntarget_m = [0,18, 0, 0]",
+            &["3 numbers, found 4; if a comma is a decimal one, write a point: 0.18 for 0,18"],
+        ),
+        (
+            "[tool]\ntarget_in = [1, 0, 2]",
+            &["not given in in; write target_m or target_mm, here target_mm = [25.4, 0, 50.8]"],
+        ),
+        (
+            "[data]\nposition_sigma_um = 50",
+            &[
+                ":4: data.position_sigma_um: a length is not given in um; write position_sigma_m or \
+                 position_sigma_mm, here position_sigma_mm = 0.05",
+            ],
+        ),
+        ("[data]\nposition_sigma_px = 5", &["data.position_sigma_px: unknown key"]),
+        (
+            "[data]\ngravity_m_s2 = [0, 0, 1]",
+            &[
+                ":4: data.gravity_m_s2: does not belong here: ",
+                "write it above the first [section]",
+            ],
+        ),
+        (
+            "[data]\ngear-ratio = { joint = 1 }",
+            &[
+                ":4: data.gear-ratio: does not belong here: an effect stands below a line [[effect]]",
+            ],
+        ),
+        (
+            "[columns]\nA1 = 'q1_deg'",
+            &[":3: columns: does not belong here: ", "is a part of [data]; write [data.columns]"],
+        ),
+        ("[tool]\nfiles = ['a.csv']", &[":4: tool.files: ", "write it below the line [data]"]),
+        (
+            "[data]\nfiles = [\"C:\\temp\\new.csv\"]",
+            &[":4: data.files[1]: a \\ in double quotes", "here of U+0009", "in single quotes"],
+        ),
+        (
+            "[data]\nheld_out = true",
+            &[":4: data.held_out: give one of column, fraction (with seed)"],
+        ),
+        ("[data]\nheld_out = 0.3", &["as in held_out = { fraction = 0.3, seed = 1 }"]),
+        ("[data]\nheld_out = [1, 2]", &[":4: data.held_out: give one of column"]),
         ("[base]\nrotation_m = [0, 0, 0]", &[":4: base.rotation_m: an angle is not given in m"]),
         ("[base]\nyaw_deg = 1", &[":4: base.yaw_deg: unknown key"]),
         ("[data]\nposition_sigma_mm = 0", &[":4: data.position_sigma_mm: 0 is not above zero"]),
@@ -198,9 +247,10 @@ fn other_sections() {
 
 #[test]
 fn rules_of_parameters() {
-    let rules: [(&str, &[&str]); 14] = [
+    let rules: [(&str, &[&str]); 15] = [
         ("'tool.x' = {}", &[":4: parameters.\"tool.x\": the rule is empty"]),
         ("'tool.x' = true", &[":4: parameters.\"tool.x\": expected a table"]),
+        ("'base.*' = 'free'", &["expected a table such as { free = true }", "found text"]),
         ("tool.x = { free = true }", &[":4: parameters.tool: ", "needs quotes: \"tool.x\""]),
         ("a = { sigma = 1 }", &[":4: parameters.a.sigma: ", "needs a unit", "sigma_mm"]),
         ("a = { sigma_mm = 0 }", &[":4: parameters.a.sigma_mm: 0 is not above zero"]),

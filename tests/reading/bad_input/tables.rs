@@ -4,7 +4,7 @@ use super::reading::{ARM, check, table};
 
 #[test]
 fn headers() {
-    let headers: [(&str, &[&str]); 21] = [
+    let headers: [(&str, &[&str]); 33] = [
         ("", &["rows.csv:1: the file is empty"]),
         ("\n\n", &["rows.csv:1: the file is empty"]),
         ("10,1.5,2,3\n20,1,2,3\n", &["rows.csv:1: the first line holds numbers"]),
@@ -19,6 +19,35 @@ fn headers() {
             &["flexcal does not know: J1, X, Y, Z; if it is one", "as in \"J1\" = \"q1_deg\""],
         ),
         ("q1 [deg],x_m,y_m,z_m\n1,2,3,4\n", &["(is it column q1 [deg]? [data.columns] maps it"]),
+        (
+            "x_m,y_m,z_m\n1,2,3\n",
+            &[
+                "add q1_deg or q1_rad, or, if another table holds the joints, write joints = { files",
+            ],
+        ),
+        (
+            "q1_deg,pose\n1,2\n",
+            &["rows.csv:1: the table has poses and no measurement; measure these poses, then add"],
+        ),
+        (
+            "[{\"q1\":1,\"x\":2}]\n",
+            &["rows.csv:1: a JSON file, not a table; save or export it as CSV"],
+        ),
+        ("{\n\"q1\": 1}\n", &["rows.csv:1: a JSON file, not a table"]),
+        ("<!DOCTYPE html>\n<html><head>\n", &["rows.csv:1: an HTML page, not a table"]),
+        ("---\nq1: 1\n", &["rows.csv:1: a YAML file, not a table"]),
+        ("name: arm\nq1: 1\n", &["rows.csv:1: a YAML file, not a table"]),
+        ("# From arm.urdf\nname = \"arm\"\n", &["rows.csv:2: a TOML file, not a table"]),
+        (
+            "q1_deg,x_in,y_in,z_in\n",
+            &[
+                "rows.csv:1: column x_in: a length is not given in in; write x_m or x_mm, and convert \
+                 the numbers: 1 in is 25.4 mm",
+            ],
+        ),
+        ("q1_deg,x_cm,y_cm,z_cm\n", &["column x_cm: ", "1 cm is 10 mm"]),
+        ("q1_deg,x_um,y_um,z_um\n", &["column x_um: ", "1 um is 0.001 mm"]),
+        ("q1_grad,x_m,y_m,z_m\n", &["column q1_grad: an angle is not given in grad", "is 0.9 deg"]),
         ("q1_deg,x_m,z_m\n1,2,3\n", &["rows.csv:1: column y: missing; add y_m or y_mm"]),
         (
             "q1_deg,X_mm,y_m,z_m\n",
@@ -87,11 +116,16 @@ fn a_name_that_joints_share_is_no_column() {
 
 #[test]
 fn rows() {
-    let rows: [(&str, &[&str]); 27] = [
+    let rows: [(&str, &[&str]); 29] = [
         ("abc,1,2,3,", &["rows.csv:3: column q1_deg: \"abc\" is not a number"]),
         ("1,\"1,5\",2,3,", &["rows.csv:3: column x_mm: \"1,5\" is not a number"]),
         ("1,\"1,874.5\",2,3,", &["column x_mm: \"1,874.5\" has separators of thousands"]),
         ("1.5°,1,2,3,", &["rows.csv:3: column q1_deg: \"1.5°\" is a number with a unit; remove °"]),
+        (
+            "1,−1.5,2,3,",
+            &["x_mm: \"−1.5\" contains a typographic minus sign or dash (U+2212); write"],
+        ),
+        ("1,1\u{a0}5,2,3,", &["x_mm: ", "an invisible or no-break space (U+00A0); write a plain"]),
         ("q1_deg,x_mm,y_mm,z_mm,note", &["rows.csv:3: the header is repeated here"]),
         ("// second block", &["rows.csv:3: the row begins with //; if it is a comment, write"]),
         ("1,1,2,3,Test|split", &["two words of this column (is it validation?)"]),

@@ -1,0 +1,104 @@
+//! Formats of files, recognised by their beginning, to name what a wrong file is.
+
+/// Format whose files an error may take for another input.
+pub(crate) const JSON: &str = "a JSON file";
+/// Format of tables.
+pub(crate) const TABLE: &str = "a table in text (CSV)";
+/// Format of problems, truths and studies.
+pub(crate) const TOML: &str = "a TOML file";
+/// Format of URDFs.
+pub(crate) const XML: &str = "an XML file";
+
+/// Formats of binary files by their first bytes.
+const SIGNATURES: [(&[u8], &str); 18] = [
+    (b"PK\x03\x04", "a ZIP archive or a workbook (XLSX, ODS)"),
+    (b"\xd0\xcf\x11\xe0", "a workbook or document of old Office programs (XLS, DOC)"),
+    (b"%PDF", "a PDF document"),
+    (b"\x1f\x8b", "a file compressed by gzip"),
+    (b"\xfd7zXZ", "a file compressed by xz"),
+    (b"\x28\xb5\x2f\xfd", "a file compressed by zstd"),
+    (b"7z\xbc\xaf", "a 7-Zip archive"),
+    (b"\x93NUMPY", "a NumPy array"),
+    (b"\x80\x04\x95", "a Python pickle"),
+    (b"MATLAB ", "a MATLAB file"),
+    (b"\x89HDF", "an HDF5 file"),
+    (b"PAR1", "a Parquet file"),
+    (b"\x89PNG", "a PNG image"),
+    (b"\xff\xd8\xff", "a JPEG image"),
+    (b"#ROSBAG", "a ROS bag"),
+    (b"\x89MCAP", "a ROS 2 bag (MCAP)"),
+    (b"SQLite format 3", "a SQLite database (such as a ROS 2 bag)"),
+    (b"PXR-USDC", "a USD scene"),
+];
+
+/// Formats of text by their first characters, in lower case.
+const MARKS: [(&str, &str); 9] = [
+    ("<!doctype html", "an HTML page"),
+    ("<html", "an HTML page"),
+    ("<", XML),
+    ("#usda", "a USD scene"),
+    ("solid ", "a mesh (STL)"),
+    ("iso-10303-21", "a STEP file"),
+    ("%yaml", YAML),
+    ("{", JSON),
+    ("---\n", YAML),
+];
+const YAML: &str = "a YAML file";
+
+/// Returns the format of a binary file from its first bytes; `None` for text and unknown formats.
+pub(crate) fn binary_format(bytes: &[u8]) -> Option<&'static str> {
+    SIGNATURES.iter().find(|(signature, _)| bytes.starts_with(signature)).map(|(_, format)| *format)
+}
+
+/// Returns the format that the first line with content of a text has; `None` if it is unknown.
+///
+/// Lines that begin with `#` are skipped as comments.
+pub(crate) fn text_format(text: &str) -> Option<&'static str> {
+    let start = text.trim_start_matches(|c: char| c.is_whitespace() || c == '\u{feff}');
+    let beginning: String =
+        start.chars().filter(|&c| c != '\r').take(20).collect::<String>().to_ascii_lowercase();
+    if let Some((_, format)) = MARKS.iter().find(|(mark, _)| beginning.starts_with(mark)) {
+        return Some(format);
+    }
+    let mut lines = start.lines().map(str::trim);
+    let line = lines.find(|line| !line.is_empty() && !line.starts_with('#'))?;
+    let is_key = |key: &str| {
+        !key.is_empty() && key.chars().all(|c| c.is_alphanumeric() || "_-.\"' ".contains(c))
+    };
+    let has_key = |sign| line.split_once(sign).is_some_and(|(key, _)| is_key(key.trim()));
+    if line.strip_prefix('[').is_some_and(|inner| inner.trim_start().starts_with('{')) {
+        Some(JSON)
+    } else if has_key('=') || (line.starts_with('[') && is_key(line.trim_matches(['[', ']']))) {
+        Some(TOML)
+    } else if has_key(':') && !line.contains(['\t', ';']) {
+        Some(YAML)
+    } else {
+        line.contains([',', ';', '\t']).then_some(TABLE)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn formats_are_recognised_by_the_first_line_with_content() {
+        for (text, format) in [
+            ("\u{feff}\n<!DOCTYPE HTML>", Some("an HTML page")),
+            ("<?xml version='1.0'?>", Some(XML)),
+            ("{\n \"a\": 1}", Some(JSON)),
+            ("[ {\"q1\": 1}]", Some(JSON)),
+            ("---\r\na: 1", Some(YAML)),
+            ("# arm\nname: arm", Some(YAML)),
+            ("# arm\n\nname = 'arm'", Some(TOML)),
+            ("[[joint]]\n", Some(TOML)),
+            ("q1_deg,x_mm\n1,2", Some(TABLE)),
+            ("-----\nq1 x\n", None),
+            ("", None),
+        ] {
+            assert_eq!(text_format(text), format, "{text:?}");
+        }
+        assert_eq!(binary_format(b"%PDF-1.7"), Some("a PDF document"));
+        assert_eq!(binary_format(b"q1_deg"), None);
+    }
+}

@@ -1,0 +1,107 @@
+//! Usual mistakes by which a text is not TOML.
+
+use super::item::Document;
+use crate::error::{InputErrorKind, JSON, TABLE, TOML, XML, text_format, typographic};
+
+/// Words that stand for true, false or nothing in other formats and languages.
+const OTHER_WORDS: [&str; 12] =
+    ["true", "false", "yes", "no", "on", "off", "none", "null", "wahr", "falsch", "vrai", "faux"];
+
+impl Document {
+    /// Returns the error of a syntax `error` of the parser, which names the usual mistake if one is
+    /// recognised, or the format of the file if that is another one.
+    pub(super) fn syntax_error(&self, error: &toml::de::Error) -> InputErrorKind {
+        let span = error.span().unwrap_or(self.text.len()..self.text.len());
+        let (before, after) = (
+            self.text.get(..span.start).unwrap_or_default(),
+            self.text.get(span.start..).unwrap_or_default(),
+        );
+        let line_start = before.rfind('\n').map_or(0, |place| place + 1);
+        let (previous_lines, before_in_line) = before.split_at(line_start);
+        let has_no_content =
+            |line: &str| line.trim().is_empty() || line.trim_start().starts_with('#');
+        if previous_lines.lines().all(has_no_content)
+            && let Some(found) = text_format(&self.text).filter(|format| *format != TOML)
+        {
+            return InputErrorKind::OtherFormat { found, expected: expected_instead_of(found) };
+        }
+        let near_text: String =
+            self.text.get(span).unwrap_or_default().trim().chars().take(40).collect();
+        let line_after = after.lines().next().unwrap_or_default();
+        let (message, remedy) = usual_mistake(before_in_line, line_after, error.message())
+            .map_or_else(
+                || (error.message().to_owned(), None),
+                |(what, remedy)| (what, Some(remedy)),
+            );
+        InputErrorKind::Syntax { message, near_text, remedy }
+    }
+}
+
+/// Returns the input that is expected in place of a file of another format, with the place of such
+/// files.
+fn expected_instead_of(format: &str) -> &'static str {
+    match format {
+        XML => "TOML; flexcal init FILE makes a problem.toml of a URDF",
+        TABLE => "TOML; PROBLEM is a problem.toml or its folder, and --data names tables",
+        JSON => {
+            "TOML; PROBLEM is a problem.toml or its folder, and --estimate names an estimate.json"
+        }
+        _ => "TOML; PROBLEM is a problem.toml or its folder",
+    }
+}
+
+/// Returns the usual mistake at a place of a line, split there into `before` and `after`, with its
+/// remedy.
+fn usual_mistake(before: &str, after: &str, message: &str) -> Option<(String, &'static str)> {
+    let word = after.split([' ', '\t', ',', ']', '}', '#']).next().unwrap_or_default();
+    let is_digit = |character: char| character.is_ascii_digit();
+    let has_decimal_comma = after
+        .strip_prefix(',')
+        .is_some_and(|next| next.starts_with(is_digit) && before.ends_with(is_digit))
+        || before
+            .strip_suffix(',')
+            .is_some_and(|number| number.ends_with(is_digit) && after.starts_with(is_digit));
+    let is_in_escape = (message.contains("escape") || message.contains("unicode"))
+        && (after.starts_with('\\')
+            || before.rsplit('"').next().is_some_and(|text| text.contains('\\')));
+    let is_expression = word.contains(is_digit)
+        && word.contains(['/', '*', '^', 'p'])
+        && word.chars().all(|c| is_digit(c) || "+-*/^().piPI".contains(c));
+    let mistake = |what: &str, remedy| Some((what.to_owned(), remedy));
+    if let Some((what, remedy)) = typographic(word) {
+        Some((what, remedy))
+    } else if has_decimal_comma {
+        mistake("a decimal comma", "write numbers with a decimal point")
+    } else if after.starts_with(['*', '?']) {
+        mistake("a pattern without quotes", "write a pattern in quotes, as in \"base.*\"")
+    } else if is_in_escape {
+        mistake(
+            "a \\ in double quotes begins an escape sequence",
+            "in a path write / in its place, or put the path in single quotes, as in \
+             'C:\\data\\rows.csv'",
+        )
+    } else if OTHER_WORDS.contains(&word.to_lowercase().as_str()) {
+        mistake("a word that TOML does not have", "write true or false, or text in quotes")
+    } else if is_expression {
+        mistake(
+            "a calculation",
+            "write its result, such as 0.333 for 1/3, or an angle in degrees with a key in _deg",
+        )
+    } else if message.contains("key with no value") && line_has_spaced_key(after) {
+        mistake("a key with a space", "put the key in quotes, as in \"Joint 1\" = \"q1_deg\"")
+    } else if message.contains("key with no value") {
+        mistake(
+            "the line is no `key = value`, no [section] and no comment",
+            "write it as one, or begin it with #",
+        )
+    } else {
+        None
+    }
+}
+
+/// Returns true if further words and an equals sign follow the first word of a key.
+fn line_has_spaced_key(after: &str) -> bool {
+    after.split_once('=').is_some_and(|(words, _)| {
+        !words.trim().is_empty() && words.chars().all(|c| c.is_alphanumeric() || c == ' ')
+    })
+}
