@@ -241,7 +241,7 @@ fn an_own_arm_goes_the_way_of_the_readme_to_its_end() {
         exported,
         &["(--best-rigid), exported", "The exported geometry alone misses 18 held-out poses by 0."],
     );
-    assert!(!exported.contains("geometry fitted alone would"), "{exported}");
+    assert!(!exported.contains("with --fitted-alone it would"), "{exported}");
     assert!(folder.has("out/calibrated.urdf") && folder.has("out/bench-closed/report.html"));
     let two_tables = "identify problems/bench-arm/two-tables --out out/two-tables";
     let told = folder.flexcal(two_tables).success().stdout;
