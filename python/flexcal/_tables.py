@@ -95,7 +95,9 @@ def _with_units(q: Any, units: Sequence[str | None], joints: Sequence[str]) -> A
     if isinstance(q, (str, os.PathLike)):
         return q
     moving = [(name, unit) for name, unit in zip(joints, units, strict=True) if unit is not None]
-    named = dict(moving) | {f"q{k + 1}": unit for k, (_, unit) in enumerate(moving)}
+    # Numbers count the moving joints, or all joints.
+    numbered = {f"q{k + 1}": unit for k, unit in enumerate(units) if unit is not None}
+    named = numbered | dict(moving) | {f"q{k + 1}": unit for k, (_, unit) in enumerate(moving)}
     return {f"{name}_{named[name]}" if name in named else name: values for name, values in _columns(q)}
 
 

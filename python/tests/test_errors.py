@@ -91,6 +91,9 @@ def test_arguments(lunar: flexcal.Problem, tmp_path: Path) -> None:
         with pytest.raises(flexcal.InputError, match="missing|nothing to identify") as caught:
             flexcal.Problem(text).check(poses=5, truth=truth)
         assert (caught.value.file, caught.value.key) == ("<text>", key)
+    with pytest.raises(flexcal.InputError, match="absent.csv.*pass data=") as caught:
+        flexcal.Problem(TEXT.replace("measurements.csv", "absent.csv")).identify()
+    assert (caught.value.file, caught.value.key) == ("<text>", "data.files")
     with pytest.raises(TypeError, match="not int"):
         lunar.identify(7)
     again = pickle.loads(pickle.dumps(caught.value))

@@ -118,3 +118,15 @@ def test_shapes_that_fit_no_arm(lunar: flexcal.Problem) -> None:
     assert caught.value.key == "q"
     with pytest.raises(flexcal.InputError, match="finite"):
         lunar.predict(np.full((2, 4), np.nan))
+
+
+def test_tables_whose_unit_the_argument_states() -> None:
+    problem = flexcal.Problem(FOLLOWING)
+    q = np.random.default_rng(3).uniform(-1.0, 1.0, (4, 3))
+    expected = problem.predict(q_rad=q)
+    table = pd.DataFrame(q, columns=["q1", "q2", "q3"])
+    assert np.array_equal(problem.predict(q_rad=table), expected)
+    degrees = table.assign(q1=np.degrees(table["q1"]), q3=np.degrees(table["q3"]))
+    assert np.allclose(problem.predict(q_deg=degrees), expected, rtol=0.0, atol=1e-12)
+    with pytest.raises(flexcal.InputError, match="unit"):
+        problem.predict(table)

@@ -83,6 +83,9 @@ def test_compensate(identified: flexcal.Identification, command: Command, tmp_pa
     _, out = command("compensate", LUNAR, "--estimate", tmp_path / "estimate.json", "--data", targets)
     found = identified.compensate(exact(targets))
     assert found.reached and found.commands.equals(exact(out / "commands.csv"))
+    # Words for true and false become truth values, which select rows.
+    assert found.commands["reached"].dtype == bool and found.commands["extrapolated"].dtype == bool
+    assert len(found.commands[found.commands["reached"]]) == len(found.commands)
     with pytest.raises(flexcal.InputError, match="frame"):
         identified.compensate(targets, frame="tool")  # type: ignore[arg-type]
     with pytest.raises(flexcal.InputError, match="level"):

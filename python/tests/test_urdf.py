@@ -70,6 +70,13 @@ def test_export_urdf(command: Command, tmp_path: Path) -> None:
     assert exported.errors["n"].tolist() == 2 * [int(result.residuals["held_out"].sum())]
     assert exported.errors["mean_mm"]["whole"] == pytest.approx(result.errors["mean_mm"]["identified", "held_out"])
     assert any("base and target" in what for what in exported.not_held)
+    # The same geometry, since nothing else is in the model; arguments without effect are refused.
+    alone = result.export_urdf(ODD, fitted_alone=True)
+    assert list(alone.errors.index) == ["whole", "rigid", "identified"] and "Base and tool" in alone.summary()
+    with pytest.raises(TypeError, match="workspace_mm"):
+        result.export_urdf(ODD, workspace_mm=[0, 1, 0, 1, 0, 1])
+    with pytest.raises(TypeError, match="keep one"):
+        result.export_urdf(ODD, True, fitted_alone=True)
     # The URDF of another arm is refused.
     other = tmp_path / "other.urdf"
     other.write_text(ODD.read_text().replace("0.45 0 0.02", "0.55 0 0.02"))

@@ -83,6 +83,13 @@ fn standard_parameters_describe_the_identified_arm() {
     let line = &said[said.find("In the workspace").unwrap()..];
     let values: Vec<f64> = line.split([' ', '(']).filter_map(|word| word.parse().ok()).collect();
     assert!(values[0] < 0.9 * values[2], "{line}");
+    // A rigid arm fitted to the measured poses is nearer to them, and the next command says so.
+    assert!(said.contains("--format mdh --fitted-alone"), "{said}");
+    let (alone, said) = export("mdh", "--fitted-alone");
+    assert!(alone != modified && alone != best);
+    assert!(said.contains("Base and tool of this geometry"), "{said}");
+    assert!(said.contains("tool.x = "), "{said}");
+    assert!(!said.contains("Not the best"), "{said}");
 }
 
 /// Six axes of a data sheet: axes 2 and 3 are parallel, axes 4 to 6 meet in a point.
