@@ -1,7 +1,7 @@
 //! Result of the command `identify` on one screen.
 
 use super::document::Block;
-use super::errors::{held_out_rows, noun, with_unit};
+use super::errors::{judging, noun, with_unit};
 use super::identify::{errors_by_axis, headline};
 use super::noise::{influential_rows, noise};
 use super::parameters::correlated;
@@ -42,12 +42,15 @@ fn outcome(found: &Identification) -> String {
         ResidualSize::Contradicted(chi2) | ResidualSize::Unclear(chi2) => chi2 > 1.0,
         _ => false,
     };
+    if !(before.mean.norm.is_finite() && after.mean.norm.is_finite()) {
+        return "The fit is to be trusted.".to_owned();
+    }
     format!(
-        "The fit is to be trusted. The mean error of the {} {falls} from {} to {}.{}",
-        held_out_rows(found),
+        "Trusted: the mean {} error {falls} from {} to {}.{}",
+        judging(&found.fitted).replace(' ', "-"),
         with_unit(before, before.mean.norm),
         with_unit(after, after.mean.norm),
-        if is_larger { " The residual is larger than the declared σ explains." } else { "" }
+        if is_larger { " The residual exceeds the declared σ." } else { "" }
     )
 }
 

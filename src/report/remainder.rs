@@ -87,8 +87,7 @@ pub(crate) fn bound_text(plots: &PlotData) -> Option<String> {
     let percent = (level * 1e6).round() / 1e4;
     mean.is_finite().then(|| {
         format!(
-            "The error of a prediction, measurement noise included, stays below {} mm with a probability of {percent} % (mean of this bound \
-             over the workspace).",
+            "Error bound of a prediction ({percent} %, measurement noise included): {} mm, mean over the workspace.",
             two_digits(mean * 1e3, 4)
         )
     })

@@ -135,7 +135,7 @@ fn a_session_needs_points_that_tie_its_base_down() {
     of_b(FindingCode::HeldOutBaseNotDetermined, with(&[70, 71]));
     assert_eq!(with(&[70, 71, 72]), None);
     let open = of_b(FindingCode::BaseNotDetermined, with(&[10, 11]));
-    assert!(open.contains("leaves a turn"), "{open}");
+    assert!(open.contains("a rotation of the base about it is not determined"), "{open}");
     assert_eq!(with(&[10, 11, 12]), None);
 }
 

@@ -179,7 +179,7 @@ fn spoiled_ones() -> Vec<Case> {
             "10 of 30 held-out rows are identification rows again",
             copied(10),
         ),
-        spoiled("two poses for a base", based, 1, "leaves a turn", session(&[10, 11])),
+        spoiled("two poses for a base", based, 1, "is not determined", session(&[10, 11])),
         spoiled(
             "two held-out poses for a base",
             based,

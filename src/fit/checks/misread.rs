@@ -4,7 +4,7 @@ use serde_json::json;
 
 use super::checked_fit::{Check, CheckedFit};
 use super::finding::{Finding, FindingCode};
-use super::nominal_error::{MAX_NOMINAL_MISS, is_nominal_far_off};
+use super::nominal_error::is_nominal_far_off;
 use super::parameter_limits::WithinPriors;
 use super::row_kind::size;
 
@@ -36,10 +36,7 @@ impl Check for ReadAsMeant {
             return Vec::new();
         }
         let explanations = fit.explanations();
-        // With a correct reading, the fitted arm is nearer than a nominal arm has to be.
-        let is_near = |error: f64| error <= MAX_NOMINAL_MISS * kind.spread;
-        let best = explanations.fitted.first().filter(|best| is_near(best.rms));
-        let Some(best) = best else { return Vec::new() };
+        let Some(best) = explanations.fitted.first() else { return Vec::new() };
         let words: Vec<&str> =
             explanations.fitted.iter().map(|explanation| explanation.words.as_str()).collect();
         let more = words.len().saturating_sub(MAX_NAMED);

@@ -10,7 +10,7 @@ use crate::model::parameter::{Parameter, ParameterSite};
 
 /// Largest error of the registered nominal arm, relative to the spread of the measurements, that is
 /// not reported.
-pub(super) const MAX_NOMINAL_MISS: f64 = 0.1;
+const MAX_NOMINAL_MISS: f64 = 0.1;
 /// Smallest spread of contacts, relative to the arm's reach, that is used as a scale. With a
 /// smaller one, all contacts are at one place, and their predicted spread is only the arm's error.
 const MIN_RELATIVE_SPREAD: f64 = 0.05;

@@ -251,7 +251,7 @@ mod tests {
         let wrapped = "  name of          mean  steps\n  effect          error\n  \
                        joint = {        0.25     17\n  q = 1 }\n";
         assert_eq!(table(&wide, 31), wrapped);
-        let least = "  name     mean\n  of      error\n  effect\n  joint    0.25\n  = { q\n  = 1 }\n  \
+        let least = "  name      mean\n  of       error\n  effect\n  joint     0.25\n  = { q\n  = 1 }\n  \
                      omitted on this\n  narrow\n  terminal: steps\n";
         assert_eq!(table(&wide, 17), least);
     }
