@@ -35,7 +35,8 @@ pub use apply::predict_saved::{PredictError, Prediction, predict};
 pub use apply::predicted_covariance::PredictedPosition;
 #[doc(hidden)]
 pub use apply::predicted_covariance::standard_errors;
-pub use apply::saved_estimate::{SavedEstimate, SavedEstimateError};
+pub use apply::saved_estimate::SavedEstimate;
+pub use apply::saved_estimate_error::SavedEstimateError;
 #[doc(hidden)]
 pub use apply::tolerance::{Tolerance, ToleranceTest, Verdict};
 pub use checks::finding::{Finding, FindingCode, Severity};

@@ -9,4 +9,5 @@ pub(super) mod predict;
 pub(super) mod predict_saved;
 pub(super) mod predicted_covariance;
 pub(super) mod saved_estimate;
+pub(super) mod saved_estimate_error;
 pub(super) mod tolerance;

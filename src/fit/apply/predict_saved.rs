@@ -6,7 +6,8 @@ use nalgebra::{DVector, Vector3};
 
 use crate::error::{InputError, InputErrorKind};
 use crate::fit::apply::predict::{Residual, in_space};
-use crate::fit::apply::saved_estimate::{SavedEstimate, SavedEstimateError};
+use crate::fit::apply::saved_estimate::SavedEstimate;
+use crate::fit::apply::saved_estimate_error::SavedEstimateError;
 use crate::fit::checks::point_spread::{PointSpread, spreads};
 use crate::fit::checks::required_columns::check_columns;
 use crate::fit::errors::of_kind;

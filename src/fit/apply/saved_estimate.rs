@@ -8,7 +8,10 @@ use nalgebra::{DMatrix, DVector};
 use serde::Deserialize;
 use serde_json::value::RawValue;
 
-use crate::error::{JSON, TABLE, binary_format, one_line, text_format};
+use super::saved_estimate_error::{
+    FORMAT, Format, MAX_FILE_MIB, SavedEstimateError, not_an_estimate,
+};
+use crate::error::{binary_format, one_line};
 use crate::files::{Changes, changed_key, read_limited};
 use crate::fit::{Placement, Strategy};
 use crate::measurement::{Measurements, StartTimes};
@@ -16,11 +19,6 @@ use crate::model::parameter::Parameter;
 use crate::model::{Model, Pose};
 use crate::problem::Problem;
 use crate::problem::item::MAX_MAGNITUDE;
-
-/// Name of the file format, and the newest version that can be read.
-const FORMAT: (&str, u32) = ("flexcal-estimate", 2);
-/// Maximum size of an `estimate.json` \[MiB\].
-const MAX_FILE_MIB: u64 = 256;
 
 /// Smallest identified share of a parameter that counts as determined.
 const MIN_IDENTIFIED_SHARE: f64 = 0.99;
@@ -89,12 +87,6 @@ struct Entry {
 }
 
 #[derive(Debug, Deserialize)]
-struct Format {
-    name: String,
-    version: u32,
-}
-
-#[derive(Debug, Deserialize)]
 struct Document {
     /// Name and version of the file format; `None` in files of older versions.
     format: Option<Format>,
@@ -124,66 +116,6 @@ struct PriorEntry {
 #[derive(Debug, Deserialize)]
 struct RemainderEntry {
     file: Option<String>,
-}
-
-/// Head of another file that flexcal writes.
-#[derive(Debug, Deserialize)]
-struct Head {
-    format: Format,
-}
-
-/// Returns the error of a text that cannot be parsed as an estimate, which names what it is
-/// instead if that is recognised.
-fn not_an_estimate(text: &str, file: PathBuf, source: serde_json::Error) -> SavedEstimateError {
-    let head = serde_json::from_str(text).ok().map(|Head { format }| format.name);
-    match (head, text_format(text)) {
-        (Some(name), _) if name != FORMAT.0 => {
-            SavedEstimateError::OtherFormat { file, name: one_line(&name) }
-        }
-        (_, Some(found)) if found != JSON => SavedEstimateError::OtherFile { file, found },
-        _ => SavedEstimateError::Syntax { file, source },
-    }
-}
-
-/// Error of an `estimate.json` that cannot be used.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-#[expect(missing_docs, reason = "the message of each variant says what it stands for")]
-pub enum SavedEstimateError {
-    #[error("{}: cannot be read: {source}", file.display())]
-    Unreadable { file: PathBuf, source: io::Error },
-    #[error("{}: not an estimate.json: {source}", file.display())]
-    Syntax { file: PathBuf, source: serde_json::Error },
-    #[error("{}: format: a file of {name}, not an estimate.json; flexcal identify writes one", file.display())]
-    OtherFormat { file: PathBuf, name: String },
-    #[error("{}: {found}, not an estimate.json; flexcal identify writes one{}", file.display(), if *found == TABLE { ", and --data names tables" } else { "" })]
-    OtherFile { file: PathBuf, found: &'static str },
-    #[error("{}: format: version {version}, and this program reads versions up to {}; use a newer flexcal, or identify again", file.display(), FORMAT.1)]
-    NewerFormat { file: PathBuf, version: u32 },
-    #[error("{}: {key}: changed since flexcal wrote it; identify again, or take it as it is with --trust", file.display())]
-    Changed { file: PathBuf, key: String },
-    #[error("{}: has no estimate of {name}; identify the same problem and sessions", file.display())]
-    Missing { file: PathBuf, name: String },
-    #[error("{}: identifies problem {found}, not {expected}", file.display())]
-    OtherProblem { file: PathBuf, found: String, expected: String },
-    #[error("{}: {name} is {found} nominally there, {expected} in the problem; identify again", file.display())]
-    OtherNominal { file: PathBuf, name: String, found: f64, expected: f64 },
-    #[error("{}: was identified with another declared arm (a fixed value, a mass, gravity or an effect has changed since); identify again", file.display())]
-    OtherArm { file: PathBuf },
-    #[error("{}: {part} is declared differently in the problem; identify again without the earlier estimate", file.display())]
-    OtherPart { file: PathBuf, part: String },
-    #[error("{}: has no estimate of {name}, which is free in the problem; identify again without the earlier estimate", file.display())]
-    LacksParameter { file: PathBuf, name: String },
-    #[error("{}: {name} was identified, but is not free in the problem; give the problem that was identified (after loop, problem.closed.toml)", file.display())]
-    NotFree { file: PathBuf, name: String },
-    #[error("{}: {name} stands there twice; keep one of the two", file.display())]
-    Twice { file: PathBuf, name: String },
-    #[error("{}: {name} has a value larger than 1e150, the largest number that is accepted", file.display())]
-    MagnitudeTooLarge { file: PathBuf, name: String },
-    #[error("{}: larger than {MAX_FILE_MIB} MiB; is it the right file?", file.display())]
-    TooLarge { file: PathBuf },
-    #[error("{}: not UTF-8 text, so no estimate.json", file.display())]
-    NotUtf8 { file: PathBuf },
 }
 
 impl SavedEstimate {

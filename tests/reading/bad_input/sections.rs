@@ -172,17 +172,12 @@ fn other_sections() {
             &["3 numbers, found 4; if a comma is a decimal one, write a point: 0.18 for 0,18"],
         ),
         (
-            "[tool]\ntarget_in = [1, 0, 2]",
-            &["not given in in; write target_m or target_mm, here target_mm = [25.4, 0, 50.8]"],
-        ),
-        (
             "[data]\nposition_sigma_um = 50",
             &[
                 ":4: data.position_sigma_um: a length is not given in um; write position_sigma_m or \
                  position_sigma_mm, here position_sigma_mm = 0.05",
             ],
         ),
-        ("[data]\nposition_sigma_px = 5", &["data.position_sigma_px: unknown key"]),
         (
             "[data]\ngravity_m_s2 = [0, 0, 1]",
             &[
@@ -210,7 +205,6 @@ fn other_sections() {
             &[":4: data.held_out: give one of column, fraction (with seed)"],
         ),
         ("[data]\nheld_out = 0.3", &["as in held_out = { fraction = 0.3, seed = 1 }"]),
-        ("[data]\nheld_out = [1, 2]", &[":4: data.held_out: give one of column"]),
         ("[base]\nrotation_m = [0, 0, 0]", &[":4: base.rotation_m: an angle is not given in m"]),
         ("[base]\nyaw_deg = 1", &[":4: base.yaw_deg: unknown key"]),
         ("[data]\nposition_sigma_mm = 0", &[":4: data.position_sigma_mm: 0 is not above zero"]),

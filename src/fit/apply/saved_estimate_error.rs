@@ -1,0 +1,84 @@
+//! Errors of an `estimate.json` that cannot be used.
+
+use std::io;
+use std::path::PathBuf;
+
+use serde::Deserialize;
+
+use crate::error::{JSON, TABLE, one_line, text_format};
+
+/// Name of the file format, and the newest version that can be read.
+pub(super) const FORMAT: (&str, u32) = ("flexcal-estimate", 2);
+/// Maximum size of an `estimate.json` \[MiB\].
+pub(super) const MAX_FILE_MIB: u64 = 256;
+
+/// Name and version of the format of a file.
+#[derive(Debug, Deserialize)]
+pub(super) struct Format {
+    pub name: String,
+    pub version: u32,
+}
+
+/// Head of another file that flexcal writes.
+#[derive(Debug, Deserialize)]
+struct Head {
+    format: Format,
+}
+
+/// Returns the error of a text that cannot be parsed as an estimate, which names what it is
+/// instead if that is recognised.
+pub(super) fn not_an_estimate(
+    text: &str,
+    file: PathBuf,
+    source: serde_json::Error,
+) -> SavedEstimateError {
+    let head = serde_json::from_str(text).ok().map(|Head { format }| format.name);
+    match (head, text_format(text)) {
+        (Some(name), _) if name != FORMAT.0 => {
+            SavedEstimateError::OtherFormat { file, name: one_line(&name) }
+        }
+        (_, Some(found)) if found != JSON => SavedEstimateError::OtherFile { file, found },
+        _ => SavedEstimateError::Syntax { file, source },
+    }
+}
+
+/// Error of an `estimate.json` that cannot be used.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+#[expect(missing_docs, reason = "the message of each variant says what it stands for")]
+pub enum SavedEstimateError {
+    #[error("{}: cannot be read: {source}", file.display())]
+    Unreadable { file: PathBuf, source: io::Error },
+    #[error("{}: not an estimate.json: {source}", file.display())]
+    Syntax { file: PathBuf, source: serde_json::Error },
+    #[error("{}: format: a file of {name}, not an estimate.json; flexcal identify writes one", file.display())]
+    OtherFormat { file: PathBuf, name: String },
+    #[error("{}: {found}, not an estimate.json; flexcal identify writes one{}", file.display(), if *found == TABLE { ", and --data names tables" } else { "" })]
+    OtherFile { file: PathBuf, found: &'static str },
+    #[error("{}: format: version {version}, and this program reads versions up to {}; use a newer flexcal, or identify again", file.display(), FORMAT.1)]
+    NewerFormat { file: PathBuf, version: u32 },
+    #[error("{}: {key}: changed since flexcal wrote it; identify again, or take it as it is with --trust", file.display())]
+    Changed { file: PathBuf, key: String },
+    #[error("{}: has no estimate of {name}; identify the same problem and sessions", file.display())]
+    Missing { file: PathBuf, name: String },
+    #[error("{}: identifies problem {found}, not {expected}", file.display())]
+    OtherProblem { file: PathBuf, found: String, expected: String },
+    #[error("{}: {name} is {found} nominally there, {expected} in the problem; identify again", file.display())]
+    OtherNominal { file: PathBuf, name: String, found: f64, expected: f64 },
+    #[error("{}: was identified with another declared arm (a fixed value, a mass, gravity or an effect has changed since); identify again", file.display())]
+    OtherArm { file: PathBuf },
+    #[error("{}: {part} is declared differently in the problem; identify again without the earlier estimate", file.display())]
+    OtherPart { file: PathBuf, part: String },
+    #[error("{}: has no estimate of {name}, which is free in the problem; identify again without the earlier estimate", file.display())]
+    LacksParameter { file: PathBuf, name: String },
+    #[error("{}: {name} was identified, but is not free in the problem; give the problem that was identified (after loop, problem.closed.toml)", file.display())]
+    NotFree { file: PathBuf, name: String },
+    #[error("{}: {name} stands there twice; keep one of the two", file.display())]
+    Twice { file: PathBuf, name: String },
+    #[error("{}: {name} has a value larger than 1e150, the largest number that is accepted", file.display())]
+    MagnitudeTooLarge { file: PathBuf, name: String },
+    #[error("{}: larger than {MAX_FILE_MIB} MiB; is it the right file?", file.display())]
+    TooLarge { file: PathBuf },
+    #[error("{}: not UTF-8 text, so no estimate.json", file.display())]
+    NotUtf8 { file: PathBuf },
+}
