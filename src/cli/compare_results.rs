@@ -92,20 +92,28 @@ fn side(file: &Path, trust: Trust) -> Result<Side, Box<dyn Error>> {
     Ok(Side { estimate, errors, held_out: held_out_errors(file) })
 }
 
-/// Returns the size of each held-out position error \[mm\] by file and line, from the residuals.csv
-/// beside an estimate; empty if there is none.
-fn held_out_errors(estimate: &Path) -> BTreeMap<(String, String), f64> {
-    let Ok(text) = flexcal::files::read_text(&estimate.with_file_name("residuals.csv")) else {
-        return BTreeMap::new();
-    };
+/// Returns the size of each held-out position error \[mm\] with its configuration, by file and line,
+/// from the residuals.csv that `flexcal identify` writes beside an estimate.json; empty if there is
+/// none.
+fn held_out_errors(estimate: &Path) -> BTreeMap<(String, String), (f64, String)> {
+    let is_identified = estimate.file_name().is_some_and(|name| name == "estimate.json");
+    let file = estimate.with_file_name("residuals.csv");
+    let text = is_identified.then(|| flexcal::files::read_text(&file).ok()).flatten();
+    let text = text.unwrap_or_default();
     let mut table = csv::Reader::from_reader(text.as_bytes());
     let header = table.headers().cloned().unwrap_or_default();
+    let is_joint = |name: &str| {
+        name.strip_prefix('q').is_some_and(|rest| rest.starts_with(|c: char| c.is_ascii_digit()))
+    };
     let error = |row: &csv::StringRecord| {
         let cell = |name: &str| row.get(header.iter().position(|column| column == name)?);
         let number = |name: &str| cell(name)?.parse::<f64>().ok();
         let [x, y, z] = ["residual_x_mm", "residual_y_mm", "residual_z_mm"].map(number);
+        let joints = header.iter().zip(row).filter(|(name, _)| is_joint(name));
+        let configuration = joints.map(|(_, cell)| cell).collect::<Vec<_>>().join(",");
         let row = (cell("file")?.to_owned(), cell("line")?.to_owned());
-        (cell("held_out")? == "true").then_some((row, x?.hypot(y?).hypot(z?)))
+        let length = x?.hypot(y?).hypot(z?);
+        (cell("held_out")? == "true").then_some((row, (length, configuration)))
     };
     table.records().flatten().filter_map(|row| error(&row)).collect()
 }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 use flexcal::design::Workspace;
 use flexcal::export as code;
-use flexcal::fit::{SavedEstimate, check_columns};
+use flexcal::fit::{Placement, SavedEstimate, check_columns};
 use flexcal::measurement::{Dataset, Measurements};
 use flexcal::model::Model;
 use flexcal::nalgebra::Vector3;
@@ -229,6 +229,11 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     }
     let errors = match &data {
         Some(data) => {
+            // Bases and tools are those of the data, which may lack some of the fit.
+            let placement = Placement::of(&data.measurements);
+            let (bases, targets) = (&placement.bases, &placement.targets);
+            let model = estimates.model(Model::new(&problem, bases, targets)?);
+            let x = estimates.vector(&problem, &model)?;
             let errors = ExportedErrors::new(&model, &x, data, Some(&estimates));
             Some(errors.with_geometries(geometry.errors(&problem, fitted, data)?))
         }
@@ -248,13 +253,14 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
             next(arguments, &result, &path)
         )
     })?;
+    let is_trusted = estimates.trusted && alone.is_none_or(|alone| alone.is_trusted());
     if let Some(alone) = alone.filter(|alone| !alone.is_trusted()) {
         diagnostic::warn(&format!("geometry alone: {}", report::why_not_trusted(alone)));
     }
     if !estimates.trusted {
         diagnostic::warn("the estimate is not to be trusted, so this file is not either");
     }
-    Ok(Outcome::trusted(estimates.trusted))
+    Ok(Outcome::trusted(is_trusted))
 }
 
 /// Names of the files of `--format c`.

@@ -86,14 +86,14 @@ impl Geometry {
         let x = estimate.vector(problem, &model)?;
         let held_out = &data.split.held_out;
         let poses = placement.poses(&data.measurements, held_out, 1.0);
+        let alone = self.fitted_alone.as_ref().map(|alone| alone.fitted.held_out);
         if !poses.iter().all(|pose| pose.observation.is_position()) {
-            return Ok([None; 3]);
+            return Ok([alone, None, None]);
         }
         let of_arm = |best: &RigidFit| {
             let rigid = rigid_errors(problem, (&model, &x), &best.arm, &poses);
             ErrorSummary::of_rows(&data.measurements, held_out.iter().copied(), &rigid)
         };
-        let alone = self.fitted_alone.as_ref().map(|alone| alone.fitted.held_out);
         let exported = self.best_rigid.as_ref().map(of_arm).or(alone);
         let is_elastic = |joint: &Joint| joint.stiffness.is_some() || joint.beam.is_some();
         if problem.effects.is_empty() && !problem.joints.iter().any(is_elastic) {

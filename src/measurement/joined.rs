@@ -256,7 +256,7 @@ impl JoinedLog {
             && let Ok(name) = table.text(place)
         {
             let other = String::from_utf8_lossy(row.cells.get(of_log).unwrap_or_default());
-            if name != other.trim() {
+            if !name.is_empty() && name != other.trim() {
                 self.unlike_pairs.push([name.to_owned(), other.trim().to_owned()]);
             }
         }
@@ -356,9 +356,17 @@ impl JoinedLog {
         }
     }
 
-    /// Returns the names of one pair that is joined by order, if most pairs have different names, and
-    /// most of these names occur in both tables.
+    /// Returns the names of one pair that is joined by order, if most pairs have different names,
+    /// and most of these names occur in both tables. Counters that begin at different numbers are
+    /// no names.
     fn order_contradicted_by_names(&self) -> Option<[&str; 2]> {
+        let difference = |[name, other]: &[String; 2]| {
+            Some(name.parse::<i64>().ok()?.wrapping_sub(other.parse().ok()?))
+        };
+        let first = difference(self.unlike_pairs.first()?);
+        if first.is_some() && self.unlike_pairs.iter().all(|pair| difference(pair) == first) {
+            return None;
+        }
         let of_log: HashSet<&str> =
             self.unlike_pairs.iter().map(|[_, other]| other.as_str()).collect();
         let misplaced = || self.unlike_pairs.iter().filter(|pair| of_log.contains(&*pair[0]));
@@ -366,11 +374,20 @@ impl JoinedLog {
         (2 * misplaced().count() > self.requested).then_some([name, other])
     }
 
-    /// Returns a name of a position without a partner, and the name of a joint row that differs from
-    /// it only in case, spaces, marks or leading zeros, if most names without a partner have one.
+    /// Returns a name of a position without a partner, and the name of an unused joint row that
+    /// differs from it only in case, spaces, marks or leading zeros, if most names without a
+    /// partner have one.
     fn names_written_otherwise(&self) -> Option<[&str; 2]> {
+        let is_unused = |row: usize| self.rows.get(row).is_some_and(|row| row.uses == 0);
+        let mut unused: Vec<&str> = self
+            .of_name
+            .iter()
+            .filter(|(_, row)| is_unused(**row))
+            .map(|(name, _)| &**name)
+            .collect();
+        unused.sort_unstable();
         let plain: HashMap<String, &str> =
-            self.of_name.keys().map(|name| (plain_name(name), name.as_str())).collect();
+            unused.into_iter().rev().map(|name| (plain_name(name), name)).collect();
         let mut pairs = self.unpaired_names.iter().filter_map(|name| {
             let other = plain.get(&plain_name(name))?;
             Some([name.as_str(), *other])
@@ -414,7 +431,7 @@ impl JoinedLog {
             JoinRule::Time { .. } => Vec::new(),
             _ => unused.map(|row| Location::file(&row.file).at_line(row.line)).collect(),
         };
-        // A lost measurement is a loss, an unused joint row is not.
+        // Measured rows are listed, because they are lost; unused joint rows are only counted.
         let warning = |rows: &[Location], gap: Option<String>, listed: usize| {
             let location = rows.first()?.clone();
             let others = rows.iter().skip(1).take(listed).map(ToString::to_string).collect();

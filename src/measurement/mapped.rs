@@ -76,26 +76,20 @@ impl<'a> Names<'a> {
     }
 
     /// Returns the names that rules of `[data.columns]` assign to existing columns of this table.
-    /// Rules without a column are skipped, because another table may have it. A rule by place gives
-    /// way to rules by name.
+    /// Rules without a column are skipped, because another table may have it. Rules by place hold in
+    /// tables without a header alone.
     pub fn map_present(table: &'a Table, dialect: &'a Dialect) -> Vec<&'a str> {
-        let by_name = |header: &String| {
-            let theirs = ColumnSelector::Name(header.clone());
-            dialect.columns.iter().find(|rule| rule.theirs == theirs)
+        let ours = |(place, header): (usize, &'a String)| {
+            let place = ColumnSelector::Place(place + 1);
+            let selector = if *header == place.to_string() {
+                place
+            } else {
+                ColumnSelector::Name(header.clone())
+            };
+            let rule = dialect.columns.iter().find(|rule| rule.theirs == selector);
+            rule.map_or(header.as_str(), |rule| rule.ours.as_str())
         };
-        let named: Vec<Option<&ColumnRule>> = table.header.iter().map(by_name).collect();
-        let is_given = |ours: &str| named.iter().flatten().any(|rule| rule.ours == ours);
-        let by_place = |place: usize| {
-            let theirs = ColumnSelector::Place(place + 1);
-            let rule = dialect.columns.iter().find(|rule| rule.theirs == theirs);
-            rule.filter(|rule| !is_given(&rule.ours))
-        };
-        let columns = table.header.iter().zip(&named).enumerate();
-        columns
-            .map(|(place, (header, named))| {
-                named.or_else(|| by_place(place)).map_or(header.as_str(), |rule| &rule.ours)
-            })
-            .collect()
+        table.header.iter().enumerate().map(ours).collect()
     }
 
     /// Iterates over flexcal's names of the columns.
@@ -146,11 +140,7 @@ fn is_position(rule: &ColumnRule) -> bool {
 /// A table that has no column of any rule for joints, or for positions, is probably one of two
 /// tables that belong together.
 pub(super) fn no_such(rule: &ColumnRule, rules: &[ColumnRule], table: &Table) -> InputError {
-    let name = match &rule.theirs {
-        ColumnSelector::Name(name) => name.clone(),
-        ColumnSelector::Place(place) => format!("#{place}"),
-        ColumnSelector::File => "#file".to_owned(),
-    };
+    let name = rule.theirs.to_string();
     let is_of_joint = is_joint(rule);
     let (file, known) = table
         .appended_columns()

@@ -154,16 +154,18 @@ impl Table {
     }
 
     /// Returns true if the first record is a row of numbers: `rules` select columns by their places,
-    /// and the cells there are numbers that do not count the columns.
+    /// a cell there is a number, and the numbers of the record do not count its columns.
     fn has_no_header(&self, rules: &[ColumnRule]) -> bool {
+        let number = |cell: &String| {
+            cell.replace(',', ".").parse::<f64>().ok().filter(|number| number.is_finite())
+        };
         let cell = |rule: &ColumnRule| match rule.theirs {
             ColumnSelector::Place(place) => self.header.get(place.checked_sub(1)?),
             _ => None,
         };
-        let is_number = |cell: &String| cell.replace(',', ".").parse::<f64>().is_ok();
-        let counts =
-            |from: usize| (from..).zip(&self.header).all(|(k, name)| *name == k.to_string());
-        rules.iter().filter_map(cell).any(is_number) && !counts(0) && !counts(1)
+        let numbers: Vec<f64> = self.header.iter().filter_map(number).collect();
+        let counts = |from: usize| numbers.iter().enumerate().all(|(k, &n)| n == (from + k) as f64);
+        rules.iter().filter_map(cell).any(|cell| number(cell).is_some()) && !counts(0) && !counts(1)
     }
 
     /// Returns the format of the text if the header is no header of a table, but the first line of

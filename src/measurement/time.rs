@@ -112,6 +112,8 @@ fn iso_from_year_last(text: &str, order: DateOrder) -> Option<(String, Basis)> {
         None => hour,
     };
     let (order, basis) = match (order, DateOrder::of_date(numbers)) {
+        // Other dates of the table were read month first because of AM or PM.
+        (DateOrder::Unknown, Some(DateOrder::DayFirst)) if noon.is_some() => return None,
         (DateOrder::Unknown, Some(order)) => (order, Basis::Numbers),
         (DateOrder::Unknown, None) if noon.is_some() => (DateOrder::MonthFirst, Basis::HalfOfDay),
         (DateOrder::Unknown, None) => (DateOrder::MonthFirst, Basis::Guess),

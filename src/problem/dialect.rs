@@ -1,5 +1,7 @@
 //! Reader of `[data.columns]` and `[data.format]`: tables in the format of other programs.
 
+use std::fmt;
+
 use super::section::Section;
 use crate::error::{InputError, InputErrorKind, Location, TableErrorKind};
 
@@ -67,6 +69,16 @@ pub enum ColumnSelector {
     Place(usize),
     /// Name of the file as the value of every row: `"#file"`.
     File,
+}
+
+impl fmt::Display for ColumnSelector {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Name(name) => f.write_str(name),
+            Self::Place(place) => write!(f, "#{place}"),
+            Self::File => f.write_str("#file"),
+        }
+    }
 }
 
 /// Separator between the columns of a table.

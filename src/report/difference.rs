@@ -15,7 +15,7 @@ use crate::quantity::format::{counted, decimals, number, or_dash};
 const FALSE_ALARMS: f64 = 0.01;
 /// Maximum number of parameters that the terminal lists.
 const MAX_LISTED: usize = 20;
-/// Smallest number of rows in common from which the held-out errors are compared.
+/// Smallest number of configurations in common from which the held-out errors are compared.
 const MIN_PAIRS: usize = 8;
 /// Number of bootstrap resamples of an interval.
 const RESAMPLES: usize = 5000;
@@ -31,8 +31,9 @@ pub(crate) struct Side {
     pub estimate: SavedEstimate,
     /// Names of errors with their values, for example `held out, mean_mm`.
     pub errors: Vec<(String, f64)>,
-    /// Size of each held-out position error \[mm\] by file and line; empty if it is not known.
-    pub held_out: BTreeMap<(String, String), f64>,
+    /// Size of each held-out position error \[mm\] with its configuration in words, by file and
+    /// line; empty if it is not known.
+    pub held_out: BTreeMap<(String, String), (f64, String)>,
 }
 
 /// Parameter that both estimates have, in the unit of tables.
@@ -150,13 +151,19 @@ fn verdict(differences: &[Difference], tested: usize, limit: f64) -> String {
 }
 
 /// States the mean difference of the held-out errors of rows that both results predict, with its
-/// interval; `None` if there are fewer than [`MIN_PAIRS`].
+/// interval over configurations; `None` if there are fewer than [`MIN_PAIRS`].
 fn paired([a, b]: &[Side; 2]) -> Option<String> {
-    let change = |(row, of_b): (_, &f64)| Some((of_b - a.held_out.get(row)?, 1.0));
-    let changes: Vec<(f64, f64)> = b.held_out.iter().filter_map(change).collect();
-    if changes.len() < MIN_PAIRS {
+    let mut of_configurations: BTreeMap<&str, (f64, f64)> = BTreeMap::new();
+    for (row, (of_b, configuration)) in &b.held_out {
+        let Some((of_a, _)) = a.held_out.get(row) else { continue };
+        let sum = of_configurations.entry(configuration).or_default();
+        *sum = (sum.0 + of_b - of_a, sum.1 + 1.0);
+    }
+    let changes: Vec<(f64, f64)> = of_configurations.into_values().collect();
+    if changes.len() < MIN_PAIRS || a.estimate.file == b.estimate.file {
         return None;
     }
+    let rows = changes.iter().map(|(_, count)| count).sum::<f64>();
     let Interval { value, low, high } = mean_interval(&changes, RESAMPLES, INTERVAL_LEVEL, SEED);
     let verdict = match (low > 0.0, high < 0.0) {
         (true, _) => "B predicts them worse",
@@ -165,8 +172,7 @@ fn paired([a, b]: &[Side; 2]) -> Option<String> {
     };
     let [value, low, high] = [value, low, high].map(|length| number(length, 4));
     Some(format!(
-        "On the {} that both predict and neither fitted: {verdict} (mean error of B minus A {value} mm, {low} to {high} mm, {} %).",
-        counted(changes.len(), "row"),
+        "On the {rows} rows that both predict and neither fitted: {verdict} (mean error of B minus A {value} mm, {low} to {high} mm, {} %).",
         number(100.0 * INTERVAL_LEVEL, 0)
     ))
 }

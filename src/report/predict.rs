@@ -100,7 +100,7 @@ fn is_of_positions(prediction: &Prediction) -> bool {
 /// positions; `None` if no row was fitted.
 fn of_fitted_rows(prediction: &Prediction, fitted: &[usize]) -> Option<String> {
     let residuals = prediction.residuals.as_ref().filter(|_| !fitted.is_empty())?;
-    let others = residuals.iter().enumerate().filter(|(row, _)| !fitted.contains(row));
+    let others = residuals.iter().enumerate().filter(|(row, _)| fitted.binary_search(row).is_err());
     let errors: Vec<f64> = others.map(|(_, residual)| residual.position.norm()).collect();
     let count = residuals.len() - errors.len();
     if errors.is_empty() {

@@ -1,6 +1,6 @@
 //! Reader of links and joints from the text of a URDF.
 
-use std::f64::consts::{FRAC_PI_2, TAU};
+use std::f64::consts::FRAC_PI_2;
 use std::ops::Range;
 use std::path::Path;
 
@@ -21,9 +21,9 @@ const MAX_QUATERNION_NORM_ERROR: f64 = 1e-3;
 /// seven decimals \[rad\].
 const MAX_QUATERNION_ROUNDING: f64 = 2e-7;
 
-/// Largest plausible limit of a revolute joint \[rad\]: two turns. Larger limits are probably
-/// degrees.
-const MAX_REVOLUTE_LIMIT: f64 = 2.0 * TAU + 0.01;
+/// Largest plausible limit of a revolute joint \[rad\]: nearly five turns, more than joints with
+/// several turns have. Larger limits are probably degrees.
+const MAX_REVOLUTE_LIMIT: f64 = 30.0;
 
 /// Numbers with their byte range in the text.
 type Placed<const N: usize> = ([f64; N], Range<usize>);

@@ -173,7 +173,7 @@ finding_codes! {
         "The fitted deviations indicate a prior σ that is more than twice as large, or less than half.",
         "declare the estimated σ, or leave the prior as it is where it is known better";
     ResidualBeyondDeclared: Note "residual-beyond-declared" ["noise_factor", "sigma_taken"]
-        "Residuals and priors speak for a noise variance above the declared one, by a factor of up to 1000.",
+        "Residuals and priors indicate a noise variance above the declared one, by a factor of up to 1000.",
         "look for what the model lacks with flexcal loop, or declare a larger σ";
     NotToldApart: Note "not-told-apart" ["what", "parameters"]
         "The rows alone leave a quantity open: the pose of the base, the scale, a focal length, or parameters that move the same way.",

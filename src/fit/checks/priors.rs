@@ -68,7 +68,7 @@ impl Check for PriorsHold {
 }
 
 /// Largest ratio of the noise variance to the declared one at which they count as equal.
-const MIN_NOISE_FACTOR: f64 = 1.0 + 1e-9;
+const MAX_EQUAL_NOISE_FACTOR: f64 = 1.0 + 1e-9;
 /// Largest ratio of the noise variance to the declared one that counts as noise. Above it, σ would
 /// be 30 times too small.
 const MAX_NOISE_FACTOR: f64 = 1000.0;
@@ -80,14 +80,14 @@ pub(super) struct NoiseIsDeclared;
 
 impl Check for NoiseIsDeclared {
     fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
-        if fit.noise != Noise::Declared || fit.noise_factor <= MIN_NOISE_FACTOR {
+        if fit.noise != Noise::Declared || fit.noise_factor <= MAX_EQUAL_NOISE_FACTOR {
             return Vec::new();
         }
         let ratio = fit.noise_factor.sqrt();
         let numbers = [fit.noise_factor.into(), fit.sigma_taken.into()];
         if fit.noise_factor <= MAX_NOISE_FACTOR {
             let text = format!(
-                "the residual is {ratio:.1} times as large as the declared σ, so that σ is too small or the model lacks something"
+                "the residual is {ratio:.2} times as large as the declared σ, so that σ is too small or the model lacks something"
             );
             return vec![Finding::new(FindingCode::ResidualBeyondDeclared, numbers, text)];
         }

@@ -49,10 +49,12 @@ impl Misreading {
         let mut problem = declared.clone();
         match self {
             Self::HeldBase => {
-                let (pattern, none) = ("base*".to_owned(), Quantities::default());
-                let freedom = Freedom::Free { sigma: none, min: none, max: none };
-                let location = problem.data.location.clone();
-                problem.parameters.push(ParameterRule { pattern, freedom, location });
+                let none = Quantities::default();
+                problem.parameters.extend(["base.*", "base[*"].map(|pattern| ParameterRule {
+                    pattern: pattern.to_owned(),
+                    freedom: Freedom::Free { sigma: none, min: none, max: none },
+                    location: declared.data.location.clone(),
+                }));
                 return Some(problem);
             }
             Self::TargetInMillimetres => {}
