@@ -16,11 +16,11 @@ use crate::results::{Knowledge, ResidualSize};
 /// Returns a summary of a fit for one screen, ending in a line break: errors, size of the residual,
 /// parameters and remarks. `bound` is a sentence on the error bound of predictions.
 pub fn estimate_brief(problem: &Problem, found: &Identification, bound: Option<String>) -> String {
-    let mut blocks = vec![headline(problem, found)];
-    blocks.push(Block::Text(match found.first_error() {
+    let outcome = match found.first_error() {
         Some(reason) => format!("Not to be trusted: {reason}."),
         None => outcome(found),
-    }));
+    };
+    let mut blocks = vec![Block::lines(format!("{}\n{outcome}", headline(problem, found)))];
     blocks.extend([
         Block::Table(errors_by_axis(found)),
         Block::lines(

@@ -26,7 +26,7 @@ const FILE: &str = "estimate.json";
 /// Returns the full result as text, ending in a line break.
 pub fn estimate_text(problem: &Problem, found: &Identification) -> String {
     let mut blocks = vec![
-        headline(problem, found),
+        Block::lines(headline(problem, found)),
         Block::Table(errors_by_axis(found)),
         Block::lines(noise(problem, found)),
     ];
@@ -91,9 +91,9 @@ pub fn why_not_trusted(found: &Identification) -> String {
 }
 
 /// States in three lines which parameters were fitted to which rows, and how the fit ended.
-pub(super) fn headline<'a>(problem: &Problem, found: &Identification) -> Block<'a> {
+pub(super) fn headline(problem: &Problem, found: &Identification) -> String {
     let seconds = found.seconds;
-    Block::lines(format!("{}\n{}, {seconds:.3} s", problem.title, fitted(found, "\n")))
+    format!("{}\n{}, {seconds:.3} s", problem.title, fitted(found, "\n"))
 }
 
 /// States the number of fitted parameters and rows, strategy and solver, and how the fit ended.

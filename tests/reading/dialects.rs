@@ -380,19 +380,19 @@ fn a_misspelt_joint_of_a_map_does_not_put_the_blame_on_another() {
 
 #[test]
 fn times_that_are_no_dates_are_named_with_what_is_expected() {
-    let table = "q1_deg,q2_deg,x_mm,y_mm,z_mm,when\n1,2,3,4,5,31/05/2024 14:00\n";
+    let table = "q1_deg,q2_deg,x_mm,y_mm,z_mm,when\n1,2,3,4,5,31/31/2024 14:00\n";
     let warnings = try_table(&problem(""), &table.replace("when", "time")).unwrap().1;
     let kind =
-        WarningKind::NotADate { value: "31/05/2024 14:00".to_owned(), write: "time_s".to_owned() };
+        WarningKind::NotADate { value: "31/31/2024 14:00".to_owned(), write: "time_s".to_owned() };
     assert_warned(&warnings, &kind);
     assert_contains(
         &words(&warnings),
-        &["column time: \"31/05/2024 14:00\" is not a date and time such as 2024-05-31T14:03"],
+        &["column time: \"31/31/2024 14:00\" is not a date and time such as 2024-05-31T14:03"],
     );
     // A column named in the map is used.
     let map = "\"when\" = \"time\"\n\"q1_deg\" = \"q1_deg\"";
     assert_says(
         &table_error(&problem(map), table),
-        &["rows.csv:2: column when: \"31/05/2024 14:00\" is neither a number nor a time"],
+        &["rows.csv:2: column when: \"31/31/2024 14:00\" is neither a number nor a time"],
     );
 }

@@ -222,7 +222,7 @@ fn tables_that_are_paired_wrongly_are_refused_with_the_names() {
 fn tables_without_a_header_keep_their_first_row() {
     let rules = "[data.columns]\n'#1' = 'q1_deg'\n'#2' = 'q2_deg'\n'#3' = 'x_mm'\n'#4' = 'y_mm'\n'#5' = 'z_mm'\n";
     let read = |table: &str| try_table(&parse(&format!("{ARM}{rules}")), table).unwrap().0.len();
-    assert_eq!(read("1,2,3,4,5\n2,3,4,5,6\n"), 2);
+    assert_eq!(read("1.5,2,3,4,5\n2,3,4,5,6\n"), 2);
     assert_eq!(read("a,b,c,d,e\n2,3,4,5,6\n"), 1);
     assert_eq!(read("0,1,2,3,4\n2,3,4,5,6\n"), 1);
 }
