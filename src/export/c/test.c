@@ -94,16 +94,19 @@ int main(void)
         status = flexcal_correct(&pose, &goal, q, &left);
         corrected += 1;
         if (number[IS_REACHED] > 0.0) {
-            if (status == FLEXCAL_NOT_REACHED || left.last_step > (flexcal_real)MAX_LAST_STEP) {
+            double differs = 0.0;
+            for (k = 0; k < FLEXCAL_JOINTS; ++k) {
+                differs = larger(differs, (double)q[k] - number[COMMAND + k]);
+            }
+            if (status == FLEXCAL_NOT_REACHED
+                || (left.last_step > (flexcal_real)MAX_LAST_STEP && differs > MAX_COMMAND)) {
                 /* Near a singular pose it is still on its way to the target or to the nearest command. */
                 unsettled += 1;
                 continue;
             }
             failed += status != FLEXCAL_OK;
             compared += 1;
-            for (k = 0; k < FLEXCAL_JOINTS; ++k) {
-                command = larger(command, (double)q[k] - number[COMMAND + k]);
-            }
+            command = larger(command, differs);
         }
     }
     correct_us = 1e6 * (double)(clock() - start) / CLOCKS_PER_SEC / (corrected > 0 ? corrected : 1);
