@@ -8,14 +8,15 @@ use flexcal::design::Workspace;
 use flexcal::export as code;
 use flexcal::fit::{Placement, SavedEstimate, check_columns};
 use flexcal::measurement::{Dataset, Measurements};
+use flexcal::mechanics::Arm;
 use flexcal::model::Model;
-use flexcal::nalgebra::Vector3;
+use flexcal::nalgebra::{DVector, Vector3};
 use flexcal::problem::Problem;
 use flexcal::remainder;
 use flexcal::report::{self, shell_word};
 use flexcal::results::{Document as _, ExportResult, ExportedErrors};
 use flexcal::urdf::{
-    Chain, Robot, YamlFormat, export_with_links, joint_origins, mounted_links, yaml,
+    Chain, MovedOrigin, Robot, YamlFormat, export_with_links, joint_origins, mounted_links, yaml,
 };
 
 use super::diagnostic;
@@ -169,42 +170,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let alone = geometry.fitted_alone.as_ref();
     let workspace = geometry.best_rigid.as_ref().map(|best| [best.best, best.identified]);
     let mut remarks = report::ExportRemarks::new(workspace, alone);
-    let mut elsewhere = Vec::new();
-    let (text, moved, default) = match (&arguments.urdf, arguments.format) {
-        (Some(file), _) => {
-            let robot = Robot::read(file)?;
-            let chain = Chain::from_problem(&robot, &problem)?;
-            let mounted = mounted_links(&problem, &model, x.as_slice());
-            let export = export_with_links(&chain, &problem, arm, &mounted)?;
-            let name = file.file_name().unwrap_or_default().to_owned();
-            elsewhere = export.elsewhere;
-            (export.text, Some(export.moved), PathBuf::from(name))
-        }
-        (None, Some(_)) if let Some((form, name)) = camera => {
-            let chosen = arguments.camera.as_deref();
-            (code::camera_yaml(&problem, (&model, &x), form, chosen)?, None, PathBuf::from(name))
-        }
-        (None, format) => {
-            let (text, name) = match format {
-                Some(Format::Mdh) => (code::modified_dh(&problem, arm), "mdh.yaml"),
-                Some(Format::Dh) => {
-                    let table = code::StandardTable::new(&problem, arm)?;
-                    remarks.table = table.cells();
-                    remarks.notes = table.notes();
-                    (table.yaml(), "dh.yaml")
-                }
-                Some(Format::UrYaml) => {
-                    let form = YamlFormat::UniversalRobots;
-                    (yaml(&joint_origins(&problem, arm, form)?, form), "kinematics.yaml")
-                }
-                _ => {
-                    let form = YamlFormat::Ros;
-                    (yaml(&joint_origins(&problem, arm, form)?, form), "kinematics.yaml")
-                }
-            };
-            (text, None, PathBuf::from(name))
-        }
-    };
+    let Rendered { text, moved, name: default, elsewhere } =
+        rendered(arguments, &problem, (&model, &x), (arm, &mut remarks))?;
     let path = flags.out.clone().unwrap_or_else(|| flags.folder(&problem.name).join(default));
     let folder = path
         .parent()
@@ -261,6 +228,55 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     }
     // A rigid geometry for an elastic arm always misses by more than σ, so it does not count.
     Ok(Outcome::trusted(estimates.trusted))
+}
+
+/// Text of the exported file.
+struct Rendered {
+    text: String,
+    /// Origins of a URDF that were moved; `None` for other formats.
+    moved: Option<Vec<MovedOrigin>>,
+    /// File name without the option `--out`.
+    name: PathBuf,
+    /// Links that the URDF has on another link than the problem.
+    elsewhere: Vec<String>,
+}
+
+/// Renders the arm in the format of the arguments; adds the table of a standard DH sheet to the
+/// `remarks`.
+fn rendered(
+    arguments: &Arguments,
+    problem: &Problem,
+    (model, x): (&Model, &DVector<f64>),
+    (arm, remarks): (&Arm<f64>, &mut report::ExportRemarks),
+) -> Result<Rendered, Box<dyn Error>> {
+    if let Some(file) = &arguments.urdf {
+        let robot = Robot::read(file)?;
+        let chain = Chain::from_problem(&robot, problem)?;
+        let mounted = mounted_links(problem, model, x.as_slice());
+        let export = export_with_links(&chain, problem, arm, &mounted)?;
+        let name = PathBuf::from(file.file_name().unwrap_or_default());
+        let (text, elsewhere) = (export.text, export.elsewhere);
+        return Ok(Rendered { text, moved: Some(export.moved), name, elsewhere });
+    }
+    let yaml_of = |form: YamlFormat| -> Result<_, Box<dyn Error>> {
+        Ok((yaml(&joint_origins(problem, arm, form)?, form), "kinematics.yaml"))
+    };
+    let (text, name) = match arguments.format {
+        Some(format) if let Some((form, name)) = format.camera() => {
+            let chosen = arguments.camera.as_deref();
+            (code::camera_yaml(problem, (model, x), form, chosen)?, name)
+        }
+        Some(Format::Mdh) => (code::modified_dh(problem, arm), "mdh.yaml"),
+        Some(Format::Dh) => {
+            let table = code::StandardTable::new(problem, arm)?;
+            remarks.table = table.cells();
+            remarks.notes = table.notes();
+            (table.yaml(), "dh.yaml")
+        }
+        Some(Format::UrYaml) => yaml_of(YamlFormat::UniversalRobots)?,
+        _ => yaml_of(YamlFormat::Ros)?,
+    };
+    Ok(Rendered { text, moved: None, name: PathBuf::from(name), elsewhere: Vec::new() })
 }
 
 /// Names of the files of `--format c`.

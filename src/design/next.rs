@@ -297,11 +297,27 @@ pub fn next(
     if stop.is_some() {
         return Ok(result);
     }
-    let travel = Travel::of(&pool);
-    let mut last = measured.configuration(measured.len() - 1).to_vec();
+    let last = measured.configuration(measured.len() - 1);
+    let share = |greedy: &Greedy| if before > 0.0 { left(greedy) / before } else { 1.0 };
+    let chosen = take_poses((&mut result, &mut greedy), (&pool, last), poses, share);
+    result.poses = pool.select(&chosen);
+    Ok(result)
+}
+
+/// Takes up to `count` poses of the `pool` one after the other, each with the largest gain; of equal
+/// ones the nearest to the `last` configuration. Enters them as steps of `result`, and returns their
+/// rows. `share` is the part of the present mean square error that remains.
+fn take_poses(
+    (result, greedy): (&mut NextPoses, &mut Greedy),
+    (pool, last): (&Measurements, &[f64]),
+    count: usize,
+    share: impl Fn(&Greedy) -> f64,
+) -> Vec<usize> {
+    let travel = Travel::of(pool);
+    let mut last = last.to_vec();
     let (mut chosen, mut is_chosen) = (Vec::new(), vec![false; pool.len()]);
     let first = greedy.value();
-    while chosen.len() < poses {
+    while chosen.len() < count {
         let gains = greedy.gains();
         let free = || (0..pool.len()).filter(|&k| !is_chosen[k]);
         let largest = free().map(|k| gains[k]).fold(0.0, f64::max);
@@ -314,18 +330,17 @@ pub fn next(
         };
         let moved = move_to(pose);
         greedy.take(pose);
-        let share = if before > 0.0 { left(&greedy) / before } else { 1.0 };
+        let share = share(greedy);
         result.steps.push(NextStep {
             travel: moved,
             gain: gains[pose] / first,
-            error: error.map(|error| error.with_parameters(share)),
+            error: result.error.map(|error| error.with_parameters(share)),
         });
         is_chosen[pose] = true;
         chosen.push(pose);
         last = pool.configuration(pose).to_vec();
     }
-    result.poses = pool.select(&chosen);
-    Ok(result)
+    chosen
 }
 
 /// Returns the candidates that are not measured yet, and the poses of the workspace.

@@ -19,8 +19,8 @@ pub(super) fn eigenvalues_along(
 ) -> Option<Vec<(f64, f64)>> {
     let (mut along, n) = (vector.as_slice().to_vec(), matrix.ncols());
     let mut beside = vec![0.0; n];
-    for j in 0..n.saturating_sub(1) {
-        beside[j] = reflect(&mut matrix, j, &mut along);
+    for (j, entry) in beside.iter_mut().enumerate().take(n.saturating_sub(1)) {
+        *entry = reflect(&mut matrix, j, &mut along);
     }
     let mut diagonal = matrix.diagonal().as_slice().to_vec();
     diagonalise(&mut diagonal, &mut beside, &mut along)?;

@@ -279,29 +279,7 @@ impl Columns {
                 return Err(table.column(&covariate.name).error(kind));
             }
         }
-        let has_field = |field: &&Field| self.has(Role::Field(field.name));
-        let declared = kinds().filter(|kind| is_declared(kind, problem));
-        for kind in declared.filter(|kind| !kind.declared_by.is_empty()) {
-            let has_number = kind.measured_fields().any(|field| has_field(&field));
-            let is_named = kind.references().any(|field| {
-                field.required && field.content != Content::Index && has_field(&field)
-            });
-            let lacks = |field: &&Field| {
-                let is_needed = field.unit().is_none() || has_number || (measured && is_named);
-                field.required && is_needed && !has_field(field)
-            };
-            if !has_number && !is_named {
-                continue;
-            }
-            if let Some(field) = kind.fields.iter().find(lacks) {
-                let write = field.unit().map_or(field.name.to_owned(), |unit| {
-                    format!("{}_{}", field.name, unit.in_tables().suffix)
-                });
-                let (column, near) = (table.column(&write), near(&write));
-                let kind = TableErrorKind::MissingColumn { write, near, unknown: strangers() };
-                return Err(column.error(kind));
-            }
-        }
+        self.require_fields(table, problem, measured, unknown)?;
         // A single coordinate is no position.
         let has_position = POSITION.iter().any(|role| self.has(*role));
         if !has_position && (!measured || self.observes()) {
@@ -332,6 +310,43 @@ impl Columns {
                 .error(TableErrorKind::RepeatedColumn { first: "rx".to_owned() }));
         }
         self.require_marked(table, problem, measured, near)
+    }
+
+    /// Checks that the columns of every declared kind of rows exist; `unknown` columns are suggested
+    /// for missing ones.
+    fn require_fields(
+        &self,
+        table: &Table,
+        problem: &Problem,
+        measured: bool,
+        unknown: &[&str],
+    ) -> Result<(), InputError> {
+        let near = |name: &str| nearest(name, unknown).map(|near| (*near).to_owned());
+        let has_field = |field: &&Field| self.has(Role::Field(field.name));
+        let declared = kinds().filter(|kind| is_declared(kind, problem));
+        for kind in declared.filter(|kind| !kind.declared_by.is_empty()) {
+            let has_number = kind.measured_fields().any(|field| has_field(&field));
+            let is_named = kind.references().any(|field| {
+                field.required && field.content != Content::Index && has_field(&field)
+            });
+            let lacks = |field: &&Field| {
+                let is_needed = field.unit().is_none() || has_number || (measured && is_named);
+                field.required && is_needed && !has_field(field)
+            };
+            if !has_number && !is_named {
+                continue;
+            }
+            if let Some(field) = kind.fields.iter().find(lacks) {
+                let write = field.unit().map_or(field.name.to_owned(), |unit| {
+                    format!("{}_{}", field.name, unit.in_tables().suffix)
+                });
+                let strangers = unknown.iter().map(|name| (*name).to_owned()).collect();
+                let (column, near) = (table.column(&write), near(&write));
+                let kind = TableErrorKind::MissingColumn { write, near, unknown: strangers };
+                return Err(column.error(kind));
+            }
+        }
+        Ok(())
     }
 
     /// Returns the error of a column with the name `base` and a unit that files do not use.

@@ -164,8 +164,12 @@ impl Table {
             _ => None,
         };
         let numbers: Vec<f64> = self.header.iter().filter_map(number).collect();
-        let counts = |from: usize| numbers.iter().enumerate().all(|(k, &n)| n == (from + k) as f64);
-        rules.iter().filter_map(cell).any(|cell| number(cell).is_some()) && !counts(0) && !counts(1)
+        let counts = |from: f64| {
+            let expected = |k: usize| from + k as f64;
+            numbers.iter().enumerate().all(|(k, number)| (number - expected(k)).abs() < 1e-9)
+        };
+        let is_selected = rules.iter().filter_map(cell).any(|cell| number(cell).is_some());
+        is_selected && !counts(0.0) && !counts(1.0)
     }
 
     /// Returns the format of the text if the header is no header of a table, but the first line of

@@ -114,10 +114,9 @@ fn iso_from_year_last(text: &str, order: DateOrder) -> Option<(String, Basis)> {
     let (order, basis) = match (order, DateOrder::of_date(numbers)) {
         // Other dates of the table were read month first because of AM or PM.
         (DateOrder::Unknown, Some(DateOrder::DayFirst)) if noon.is_some() => return None,
-        (DateOrder::Unknown, Some(order)) => (order, Basis::Numbers),
         (DateOrder::Unknown, None) if noon.is_some() => (DateOrder::MonthFirst, Basis::HalfOfDay),
         (DateOrder::Unknown, None) => (DateOrder::MonthFirst, Basis::Guess),
-        (order, _) => (order, Basis::Numbers),
+        (DateOrder::Unknown, Some(order)) | (order, _) => (order, Basis::Numbers),
     };
     let (month, day) = if order == DateOrder::DayFirst { (second, first) } else { (first, second) };
     Some((format!("{year}-{month:02}-{day:02} {hour:02}:{rest}"), basis))

@@ -260,13 +260,11 @@ impl<'a, 'i> Item<'a, 'i> {
     /// Returns a list of two numbers.
     pub fn pair(&self) -> Result<[f64; 2], InputError> {
         let elements = self.list("a list of 2 numbers")?;
-        match elements.as_slice() {
-            [x, y] => Ok([x.number()?, y.number()?]),
-            _ => {
-                let (found, has_close_commas) = (elements.len(), has_close_commas(&elements, 2));
-                Err(self.error(InputErrorKind::NotAPair { found, has_close_commas }))
-            }
+        if let [x, y] = elements.as_slice() {
+            return Ok([x.number()?, y.number()?]);
         }
+        let (found, has_close_commas) = (elements.len(), has_close_commas(&elements, 2));
+        Err(self.error(InputErrorKind::NotAPair { found, has_close_commas }))
     }
 
     /// Returns a list of three numbers.

@@ -35,6 +35,10 @@ pub(super) fn proper_place(key: &str, known: &[String]) -> Option<String> {
         ));
     }
     let (section, _) = PLACES.iter().find(|(_, keys)| keys.contains(&key))?;
+    // A joint with a placement or a leader has no such keys, so its section is the right one.
+    if *section == "joint" && known.iter().any(|known| known == "kind") {
+        return None;
+    }
     Some(match *section {
         "" => format!("{key} is a key of the top level; write it above the first [section]"),
         "joint" => format!("{key} is a key of a joint; write it below its line [[joint]]"),

@@ -187,7 +187,8 @@ pub fn simulate_counted(
             if problem.fixtures.iter().any(|fixture| fixture.sigma.is_some()) {
                 // Rows of several points of one image are one pose.
                 poses.dedup_by(|next, pose| {
-                    next.0.configuration == pose.0.configuration && next.0.time == pose.0.time
+                    next.0.configuration == pose.0.configuration
+                        && next.0.time.to_bits() == pose.0.time.to_bits()
                 });
             }
             let drawn = draw_in(problem, truth, given_rows(problem, truth, poses, seed), seed);

@@ -206,8 +206,8 @@ fn tables_that_are_paired_wrongly_are_refused_with_the_names() {
     let tracker: String = (1..=9).map(|k| row(k, &format!("CAL_{k}"))).collect();
     let tracker = format!("Point;X;y_mm;z_mm\n{tracker}");
     let log = |name: fn(usize) -> String| {
-        let rows: String = (1..=9).map(|k| format!("{},{k},0\n", name(k))).collect();
-        format!("Point,A1,A2\n{rows}")
+        let rows: Vec<String> = (1..=9).map(|k| format!("{},{k},0\n", name(k))).collect();
+        format!("Point,A1,A2\n{}", rows.concat())
     };
     let padded = joined("by = 'name'", &tracker, &log(|k| format!("Cal 0{k}"))).unwrap_err();
     assert_says(&padded, &["9 of 9 measured rows", "\"CAL_1\" and \"Cal 01\""]);
