@@ -49,7 +49,11 @@ impl<'a> Names<'a> {
         let is_given_otherwise = |rule: &ColumnRule| {
             rules.iter().any(|other| {
                 other.ours == rule.ours
-                    && matches!(&other.theirs, ColumnSelector::Name(name) if has(name))
+                    && match &other.theirs {
+                        ColumnSelector::Name(name) => has(name),
+                        ColumnSelector::Place(number) => has(&format!("#{number}")),
+                        ColumnSelector::File => false,
+                    }
             })
         };
         for rule in rules {

@@ -206,6 +206,11 @@ fn gross_mistakes_are_fitted_and_named() {
     };
     let radians = declared(&|problem| problem.joints[1].alpha = 1.57_f64.to_radians());
     assert!(radians.contains("alpha of joint 2 that is in radians"), "{radians}");
+    let (mut problem, mut data) = based();
+    problem.parameters.retain(|rule| rule.pattern != "base.*");
+    data.measurements.positions.iter_mut().for_each(|at| *at += Vector3::new(0.4, -0.2, 0.1));
+    let held = misread(&problem, &data);
+    assert!(held.contains("a base that stands elsewhere than declared"), "{held}");
     let long = declared(&|problem| problem.joints[3].d *= 1e3);
     assert!(long.contains("lengths of joints that are in millimetres"), "{long}");
     // Rows of a standard table: a and α of a joint belong to the next one.

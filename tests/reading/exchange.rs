@@ -225,6 +225,19 @@ fn tables_without_a_header_keep_their_first_row() {
     assert_eq!(read("1.5,2,3,4,5\n2,3,4,5,6\n"), 2);
     assert_eq!(read("a,b,c,d,e\n2,3,4,5,6\n"), 1);
     assert_eq!(read("0,1,2,3,4\n2,3,4,5,6\n"), 1);
+    // A tracker table without a header, joined to a log with one.
+    let text = format!(
+        "{ARM}[data]\nfiles = ['tracker.csv']\njoints = {{ files = ['log.csv'], by = 'name' }}\n\
+         [data.columns]\n'#1' = 'pose'\n'#2' = 'x_mm'\n'#3' = 'y_mm'\n'#4' = 'z_mm'\n'Point' = 'pose'\n\
+         'A1' = 'q1_deg'\n'A2' = 'q2_deg'\n"
+    );
+    let log = "Point,A1,A2\nP1,11,-1\nP2,12,-2\n";
+    let tracker = "P1,1.5,2,3\nP2,2.5,3,4\n";
+    let folder =
+        Folder::with([("problem.toml", &*text), ("tracker.csv", tracker), ("log.csv", log)]);
+    let problem = Problem::read(&folder.path("problem.toml")).unwrap();
+    let (rows, _) = Measurements::read(&problem.data.files, &problem).unwrap();
+    assert_eq!(rows.positions.len(), 2);
 }
 
 #[test]

@@ -50,11 +50,11 @@ impl Misreading {
         match self {
             Self::HeldBase => {
                 let none = Quantities::default();
-                problem.parameters.extend(["base.*", "base[*"].map(|pattern| ParameterRule {
-                    pattern: pattern.to_owned(),
+                problem.parameters.push(ParameterRule {
+                    pattern: "base*".to_owned(),
                     freedom: Freedom::Free { sigma: none, min: none, max: none },
                     location: declared.data.location.clone(),
-                }));
+                });
                 return Some(problem);
             }
             Self::TargetInMillimetres => {}
