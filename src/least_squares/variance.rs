@@ -192,6 +192,17 @@ mod tests {
     }
 
     #[test]
+    fn directions_that_the_data_determine_are_no_noise() {
+        let turn = nalgebra::Rotation3::from_euler_angles(0.3, -0.7, 1.1).into_inner();
+        let size = nalgebra::Vector3::new(1e9, 3e9, 1e-3);
+        let a = turn * nalgebra::Matrix3::from_diagonal(&size) * turn.transpose();
+        let y = a * nalgebra::Vector3::new(1.0, -1.0, 2.0);
+        let a = DMatrix::from_column_slice(3, 3, a.as_slice());
+        let counted = spectrum(&a, &DVector::from_column_slice(y.as_slice()));
+        assert!(matches!(counted[..], [(square, c)] if square < 1e-4 && c < 1.0), "{counted:?}");
+    }
+
+    #[test]
     fn unknowns_far_beyond_their_prior_are_no_noise() {
         let maximum = likelihood(200, 1.0, [30.0, 7.0]).maximum();
         assert!((maximum.0.sqrt() - 1.0).abs() < 0.3, "{maximum:?}");

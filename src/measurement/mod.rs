@@ -18,6 +18,7 @@ mod dataset;
 mod dialect;
 #[deny(clippy::indexing_slicing)]
 mod duplicates;
+mod headerless;
 #[deny(clippy::indexing_slicing)]
 mod joined;
 #[deny(clippy::indexing_slicing)]
@@ -41,8 +42,9 @@ mod orientation;
 mod read;
 mod repeats;
 #[deny(clippy::indexing_slicing)]
-mod role;
+mod required;
 #[deny(clippy::indexing_slicing)]
+mod role;
 mod rows;
 mod settled;
 mod split;

@@ -8,6 +8,7 @@ use csv::{ByteRecord, Reader, ReaderBuilder};
 
 use super::cell_style::CellStyle;
 use super::dialect::{HEADER_SEARCH_BYTES, Layout, NormalizedText};
+use super::headerless::is_row_of_numbers;
 use super::latin::decoded_record;
 use super::lines::{Lines, MAX_RECORD_KIB};
 use super::time::{DateOrder, date_time, is_ambiguous};
@@ -139,7 +140,7 @@ impl Table {
                 _ => return Err(header_error(InputErrorKind::HeaderNotUtf8)),
             }
         }
-        if table.has_no_header(&dialect.columns) {
+        if is_row_of_numbers(&table.header, &dialect.columns) {
             table.header = (1..=table.header.len()).map(|place| format!("#{place}")).collect();
             table.starts_with_row = true;
         } else if let Some(found) = table.other_format(dialect) {
@@ -151,25 +152,6 @@ impl Table {
             return Err(table.error(TableErrorKind::OtherDelimiter { found }));
         }
         Ok(table)
-    }
-
-    /// Returns true if the first record is a row of numbers: `rules` select columns by their places,
-    /// a cell there is a number, and the numbers of the record do not count its columns.
-    fn has_no_header(&self, rules: &[ColumnRule]) -> bool {
-        let number = |cell: &String| {
-            cell.replace(',', ".").parse::<f64>().ok().filter(|number| number.is_finite())
-        };
-        let cell = |rule: &ColumnRule| match rule.theirs {
-            ColumnSelector::Place(place) => self.header.get(place.checked_sub(1)?),
-            _ => None,
-        };
-        let numbers: Vec<f64> = self.header.iter().filter_map(number).collect();
-        let counts = |from: f64| {
-            let expected = |k: usize| from + k as f64;
-            numbers.iter().enumerate().all(|(k, number)| (number - expected(k)).abs() < 1e-9)
-        };
-        let is_selected = rules.iter().filter_map(cell).any(|cell| number(cell).is_some());
-        is_selected && !counts(0.0) && !counts(1.0)
     }
 
     /// Returns the format of the text if the header is no header of a table, but the first line of
