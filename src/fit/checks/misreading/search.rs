@@ -7,6 +7,7 @@ use super::Misreading;
 use super::candidates::{candidates, of_loads, of_order, shift_step};
 use super::explanation::{Explanation, Explanations, LeftOutMisfit};
 use crate::fit::checks::checked_fit::CheckedFit;
+use crate::fit::checks::nominal_error::is_nominal_far_off;
 use crate::fit::checks::parameter_limits::is_of_arm;
 use crate::fit::stages::fitting::{FitEnd, Fitting};
 use crate::fit::{Placement, SolverChoice};
@@ -89,7 +90,9 @@ fn explanations(fit: &CheckedFit) -> Explanations {
         candidates(fit.problem, measurements)
     };
     let mut tested: Vec<Misreading> = listed.into_iter().filter(is_tested).collect();
-    tested.extend((is_position && !fit.is_base_free()).then_some(Misreading::HeldBase));
+    // A base that is only a little off is no misreading.
+    let is_base_held = is_position && !fit.is_base_free() && is_nominal_far_off(fit);
+    tested.extend(is_base_held.then_some(Misreading::HeldBase));
     let mut errors = trial.registered_errors(&tested);
     errors.sort_by(|a, b| a.1.total_cmp(&b.1));
     let near_alone = near_misreadings(&errors, nominal);
