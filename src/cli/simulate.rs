@@ -91,7 +91,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
 fn summary(simulation: &Simulation, table: &Path) -> String {
     let (poses, rows) = (simulation.poses(), simulation.rows.len());
     let held_out = simulation.held_out();
-    let identify = rows - held_out;
+    let identify = poses - held_out;
     let of_rows = if rows > poses { format!(", {rows} rows") } else { String::new() };
     let noise = if simulation.rows.iter().any(|row| row.observation.is_position()) {
         format!("{} mm per axis, 1 σ", simulation.truth.noise_sigma * 1e3)

@@ -29,9 +29,9 @@ pub fn read_limited(path: &Path, max_bytes: u64) -> io::Result<Vec<u8>> {
     if bytes.len() as u64 > max_bytes { Err(io::ErrorKind::FileTooLarge.into()) } else { Ok(bytes) }
 }
 
-/// Opens a file for reading. Returns an error for folders, FIFOs, sockets, devices and files of the kernel
-/// (`/proc`, `/sys`), which could block or never end. The standard input is allowed as `/dev/stdin`,
-/// `/dev/fd/N` or `/proc/self/fd/N`.
+/// Opens a file for reading. Returns an error for folders, FIFOs, sockets, devices and files of the
+/// kernel (`/proc`, `/sys`), which could block or never end. The standard input is allowed as
+/// `/dev/stdin`, `/dev/fd/N` or `/proc/self/fd/N`.
 ///
 /// # Errors
 /// Returns an error if the file cannot be opened, or is no regular file.

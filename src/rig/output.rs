@@ -203,9 +203,13 @@ impl Simulation {
         self.truth.effects.iter().map(name).collect()
     }
 
-    /// Returns the number of held-out rows.
+    /// Returns the number of held-out poses.
     pub(crate) fn held_out(&self) -> usize {
-        self.rows.iter().filter(|row| row.held_out).count()
+        let rows = self.pose_numbers().into_iter().zip(&self.rows);
+        let mut held_out: Vec<usize> =
+            rows.filter(|(_, row)| row.held_out).map(|(pose, _)| pose).collect();
+        held_out.dedup();
+        held_out.len()
     }
 }
 
