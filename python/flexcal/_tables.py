@@ -98,7 +98,13 @@ def _with_units(q: Any, units: Sequence[str | None], joints: Sequence[str]) -> A
     # Numbers count the moving joints, or all joints.
     numbered = {f"q{k + 1}": unit for k, unit in enumerate(units) if unit is not None}
     named = numbered | dict(moving) | {f"q{k + 1}": unit for k, (_, unit) in enumerate(moving)}
-    return {f"{name}_{named[name]}" if name in named else name: values for name, values in _columns(q)}
+    renamed: dict[str, Any] = {}
+    for name, values in _columns(q):
+        written = f"{name}_{named[name]}" if name in named else name
+        if written in renamed:
+            raise InputError(f"column {name}: given already as {written}; keep one of the two", key=f"column {name}")
+        renamed[written] = values
+    return renamed
 
 
 def table(text: str) -> pd.DataFrame:

@@ -130,3 +130,5 @@ def test_tables_whose_unit_the_argument_states() -> None:
     assert np.allclose(problem.predict(q_deg=degrees), expected, rtol=0.0, atol=1e-12)
     with pytest.raises(flexcal.InputError, match="unit"):
         problem.predict(table)
+    with pytest.raises(flexcal.InputError, match="keep one of the two"):
+        problem.predict(q_rad=table.assign(q1_rad=0.0))
