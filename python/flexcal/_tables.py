@@ -66,8 +66,8 @@ def configurations(
     if isinstance(q, (str, os.PathLike, Mapping)) or hasattr(q, "columns") or hasattr(q, "column_names"):
         if columns:
             raise TypeError("columns go into the table of poses itself")
-        table = _with_units(q, units, joints) if joints else q
-        return source(table), Shape(single=False, every_joint=False)
+        poses = _with_units(q, units, joints) if joints else q
+        return source(poses), Shape(single=False, every_joint=False)
     values = _plain("q", q, "q")
     if values.dtype.kind not in "fiu":
         raise _no_numbers("q", str(values.dtype), "q")
