@@ -62,8 +62,12 @@ def assert_written(residuals: pd.DataFrame, file: Path) -> None:
     for name in map(str, written):
         count = decimals.get("mm" if "tilt" in name else name.rpartition("_")[2])
         if count is None:
-            words = [word if isinstance(word, str) else str(word).lower() for word in residuals[name]]
-            assert words == written[name].tolist(), name
+            # Truth values are true and false in the file.
+            words, kept = (
+                [value if isinstance(value, str) else str(value).lower() for value in table[name]]
+                for table in (residuals, written)
+            )
+            assert words == kept, name
         else:
             # What a row of another kind has none of is an empty cell.
             cells = pd.to_numeric(written[name], errors="coerce")
