@@ -105,12 +105,14 @@ impl Measurements {
         group_rows(&columns, &(0..self.len()).collect::<Vec<_>>()).0
     }
 
+    /// Returns the commands of the joints that both the problem and the table have.
     fn joint_columns(&self, problem: &Problem) -> Vec<Column> {
         let column = |(index, kind): (usize, JointKind)| Column {
             values: (0..self.len()).map(|row| self.configuration(row)[index]).collect(),
             step: if kind == JointKind::Prismatic { LENGTH_STEP } else { ANGLE_STEP },
         };
-        problem.joints.iter().map(|joint| joint.kind).enumerate().map(column).collect()
+        let kinds = problem.joints.iter().map(|joint| joint.kind);
+        kinds.take(self.joints).enumerate().map(column).collect()
     }
 }
 

@@ -224,6 +224,23 @@ fn gross_mistakes_are_fitted_and_named() {
 }
 
 #[test]
+fn gross_mistakes_with_a_standard_table_are_fitted_and_named() {
+    // Read as a modified table, the same rows have one joint fewer than the measurements.
+    let problem = parse(&format!(
+        "dh = 'standard'\n{}",
+        text(&format!("{PRIORS}\n'base.*' = {{ free = true }}"))
+    ));
+    let data = measured(&problem, 8);
+    assert!(fit(&problem, &data).is_trusted());
+    let mut metres = data.clone();
+    metres.measurements.positions.iter_mut().for_each(|at| *at *= 1e-3);
+    metres.measurements.position_unit = Some(1e-3);
+    let found = fit(&problem, &metres);
+    let finding = found.finding(FindingCode::Misread).unwrap().to_string();
+    assert!(finding.contains("positions that are metres, declared as millimetres"), "{finding}");
+}
+
+#[test]
 fn a_coupling_or_ratio_of_joints_is_found_as_an_effect_and_no_other_mistake_is() {
     let looped = |change: &dyn Fn(&mut [f64])| {
         let (problem, mut data) = based();

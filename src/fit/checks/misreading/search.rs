@@ -235,16 +235,18 @@ impl Trial<'_> {
         };
         let name = misreading.size(0.0).map(|(name, _)| name);
         let size = name.and_then(|name| Some(misreading.size(value(&name)?)?.1));
-        let left_out = Some(self.left_out(&fitting, &end));
+        let corrected = rewritten.as_ref().unwrap_or(self.problem);
+        let left_out = Some(self.left_out(&fitting, &end, corrected));
         rms.is_finite().then_some(Outcome { rms, size, left_out })
     }
 
-    /// Returns the misfit of a fit with each configuration left out.
-    fn left_out(&self, fitting: &Fitting, end: &FitEnd) -> LeftOutMisfit {
+    /// Returns the misfit of a fit with each configuration left out. `problem` is that of the fit,
+    /// because a correction may change the number of joints.
+    fn left_out(&self, fitting: &Fitting, end: &FitEnd, problem: &Problem) -> LeftOutMisfit {
         let whole = fitting.whole();
         let free = whole.unknowns.iter().zip(&end.at_bound).filter(|(_, bound)| bound.is_none());
         let unknowns: Vec<usize> = free.map(|(&k, _)| k).collect();
-        let configurations = fitting.measurements.configurations(self.problem).0;
+        let configurations = fitting.measurements.configurations(problem).0;
         let errors = fitting.left_out_errors(&end.x, &unknowns, &configurations);
         let of_kind = Self::of_leading_kind(fitting, &fitting.split.identification);
         let errors: Vec<Vector3<f64>> = of_kind.into_iter().map(|row| errors[row]).collect();

@@ -81,7 +81,7 @@ impl fmt::Display for Misreading {
                 f.write_str("a joint table in standard DH form (declare dh = \"standard\")")
             }
             Self::ModifiedForm => {
-                f.write_str("a joint table in modified DH form, declared as standard")
+                f.write_str("a joint table in modified DH form, declared as standard (declare dh = \"modified\")")
             }
             Self::TableRadians { joint, field } => {
                 write!(f, "{} that is in radians, declared in degrees", entry_name(joint, field))
