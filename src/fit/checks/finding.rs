@@ -212,6 +212,22 @@ impl Finding {
         Self { remedy, ..self }
     }
 
+    /// Replaces a remedy that suggests `flexcal loop` by one that applies after the loop.
+    pub(crate) fn set_remedy_after_loop(&mut self) {
+        let remedy = match self.code {
+            FindingCode::HeldOutBeyondPrediction => {
+                "measure poses like the held-out ones and fit them too"
+            }
+            FindingCode::NoiseBeyondDeclared => "check the unit of the declared σ",
+            FindingCode::ResidualBeyondDeclared => {
+                "declare a larger σ if the instrument is less accurate"
+            }
+            FindingCode::RowsSetAside => "check these rows",
+            _ => return,
+        };
+        self.remedy = format!("the effects that the loop tried do not remove this, so {remedy}");
+    }
+
     /// Returns the severity of the finding.
     pub const fn severity(&self) -> Severity {
         self.code.entry().severity

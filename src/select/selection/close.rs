@@ -172,9 +172,14 @@ pub fn close_by(
     let misread =
         state.misread.as_ref().filter(|misread| state.added(&fitted).contains(&misread.effect));
     let freed = misread.map_or_else(Vec::new, |misread| misread.parameters(&fitted.problem));
-    let orientations = orientation_finding(&fitted.problem, &data, &unstoppable);
+    let mut with_orientations = fitted.problem.clone();
+    with_orientations.data.fits_orientation = problem.data.fits_orientation;
+    let orientations = orientation_finding(&with_orientations, &data, &unstoppable);
     let mut after = fitted.found;
     after.findings.splice(0..0, orientations);
+    if !interrupted {
+        after.findings.iter_mut().for_each(Finding::set_remedy_after_loop);
+    }
     Ok(ClosedLoop {
         verdict,
         interrupted,
