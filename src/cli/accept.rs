@@ -113,7 +113,21 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     common.print_result(&json, || {
         let text = report::acceptance_text(&problem, &result);
         let page = results.path("acceptance.html");
-        format!("{text}{}Next: print {} and sign it\n", results.written(), page.display())
+        let verdict = result.tolerance.as_ref().map(|tested| tested.verdict);
+        let next = if !found.is_trusted() {
+            format!("flexcal identify {} says what to correct", common.named())
+        } else if verdict == Some(Verdict::Fail.as_str()) {
+            let page = page.display();
+            format!(
+                "flexcal loop {} looks for what the model lacks; {page} records the failure",
+                common.named()
+            )
+        } else if verdict == Some(Verdict::Undecided.as_str()) {
+            "measure and hold out more poses, then the same command again".to_owned()
+        } else {
+            format!("print {} and sign it", page.display())
+        };
+        format!("{text}{}Next: {next}\n", results.written())
     })?;
     let outcome = diagnostic::judged(&found, common.quiet);
     match &result.tolerance {

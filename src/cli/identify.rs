@@ -173,10 +173,10 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     results.write_report(&texts, &told)?;
     let sources = sources.as_ref().map(report::joint_sources_text);
     common.print_result(&json, || {
+        let bound = report::bound_text(&shown);
         let told = if arguments.verbose {
-            report::estimate_text(&problem, &identification)
+            report::estimate_text(&problem, &identification, bound)
         } else {
-            let bound = report::bound_text(&shown);
             report::estimate_brief(&problem, &identification, bound)
         };
         let sources = sources.as_ref().map_or_else(String::new, |words| format!("\n{words}\n"));

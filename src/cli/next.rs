@@ -138,15 +138,15 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     common.print_result(&json, || {
         let text = report::next_text(&problem, &options, &next);
         let (named, written) = (common.named(), results.written());
-        if next.poses.is_empty() {
-            return format!("{text}{written}Next: flexcal identify {named}\n");
-        }
         // More poses cannot correct a model that lacks an effect.
         let lacks = if next.error.is_some() && next.misfit > next.noise {
             format!("flexcal loop {named} looks for what the model lacks, because the misfit exceeds the noise; or ")
         } else {
             String::new()
         };
+        if next.poses.is_empty() {
+            return format!("{text}{written}Next: {lacks}flexcal identify {named} writes the estimate to apply\n");
+        }
         let (file, named) = (results.path("next.csv"), shell_word(common.problem()));
         let files: Vec<String> =
             common.files(&problem).iter().map(|file| shell_word(file)).collect();

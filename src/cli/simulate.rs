@@ -102,7 +102,7 @@ fn summary(simulation: &Simulation, table: &Path) -> String {
     format!(
         "{poses} pose{s}{of_rows}: {identify} to identify, {held_out} held out; noise {noise}\n\
          Effects: {effects}\n\n\
-         Written to {table}, what is true to truth.json beside it\n",
+         Written to {table}; the true values are in truth.json beside it\n",
         s = if poses == 1 { "" } else { "s" },
         effects = match simulation.effect_names().join(", ") {
             none if none.is_empty() => "none".to_owned(),

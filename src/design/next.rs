@@ -148,7 +148,7 @@ pub enum NextError {
     Remainder(#[from] SavedRemainderError),
     /// No effects are to be told apart.
     #[error(
-        "no explanation is left to decide between: loop.json has no doubted effect and no alternative; use --for accuracy"
+        "there is nothing to tell apart: in loop.json every effect that was found is certain and has no alternative; use --for accuracy"
     )]
     NothingToSeparate,
     /// The request would take too long, or too much memory.

@@ -221,7 +221,7 @@ catalogue! {
     /// Coupling of joints: Δθ of one joint = k q of another.
     JointCoupling "joint-coupling" { joint: usize = MovingJoint, from: usize = OtherJoint } => Family {
         terms: &[TermEntry::driven(At::Coordinate, "factor", "q{from}", RELATIVE_SIGMA)],
-        says: "joint {from} moves joint {joint} along",
+        says: "joint {joint} is coupled to joint {from}",
         needs: &[Need::Moves("from")],
         ..Family::PLAIN
     };

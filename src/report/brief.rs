@@ -16,11 +16,8 @@ use crate::results::{Knowledge, ResidualSize};
 /// Returns a summary of a fit for one screen, ending in a line break: errors, size of the residual,
 /// parameters and remarks. `bound` is a sentence on the error bound of predictions.
 pub fn estimate_brief(problem: &Problem, found: &Identification, bound: Option<String>) -> String {
-    let outcome = match found.first_error() {
-        Some(reason) => format!("Not to be trusted: {reason}."),
-        None => outcome(found),
-    };
-    let mut blocks = vec![Block::lines(format!("{}\n{outcome}", headline(problem, found)))];
+    let outcome = outcome(found, bound.is_some());
+    let mut blocks = vec![Block::lines(headline(problem, found, &outcome))];
     blocks.extend([
         Block::Table(errors_by_axis(found)),
         Block::lines(
@@ -33,9 +30,12 @@ pub fn estimate_brief(problem: &Problem, found: &Identification, bound: Option<S
     text(&blocks)
 }
 
-/// States the held-out error before and after a fit that is to be trusted, and whether its
-/// residual is larger than noise explains.
-fn outcome(found: &Identification) -> String {
+/// States whether the fit is to be trusted, the held-out error before and after it, and how much
+/// its residual exceeds the declared noise. `has_bound` is true if the text states an error bound.
+pub(super) fn outcome(found: &Identification, has_bound: bool) -> String {
+    if let Some(reason) = found.first_error() {
+        return format!("Not to be trusted: {reason}.");
+    }
     let [before, after] = [&found.registered, &found.fitted].map(|errors| &errors.held_out);
     let falls = if after.mean.norm < before.mean.norm { "falls" } else { "does not fall: it goes" };
     let is_larger = match ResidualSize::of(found) {
@@ -45,12 +45,22 @@ fn outcome(found: &Identification) -> String {
     if !(before.mean.norm.is_finite() && after.mean.norm.is_finite()) {
         return "The fit is to be trusted.".to_owned();
     }
+    let scope = if is_larger && has_bound { " within the error bound below" } else { "" };
+    let size = if found.noise_factor > 1.0 {
+        format!("{} × the declared σ", number(found.noise_factor.sqrt(), 1))
+    } else {
+        "larger than the declared σ explains".to_owned()
+    };
     format!(
-        "Trusted: the mean {} error {falls} from {} to {}.{}",
+        "Trusted{scope}: the mean {} error {falls} from {} to {}.{}",
         judging(&found.fitted).replace(' ', "-"),
         with_unit(before, before.mean.norm),
         with_unit(after, after.mean.norm),
-        if is_larger { " The residual exceeds the declared σ." } else { "" }
+        if is_larger {
+            format!(" Not fully explained: the residual is {size}.")
+        } else {
+            String::new()
+        }
     )
 }
 
@@ -67,8 +77,11 @@ fn parameters(estimates: &[Estimate]) -> String {
     let well = count(Knowledge::is_identified);
     let others = [
         (count(|knowledge| knowledge == Knowledge::InPart), "in part"),
-        (count(|knowledge| matches!(knowledge, Knowledge::Hardly | Knowledge::NotAtAll)), "hardly"),
-        (count(Knowledge::is_held), "held"),
+        (
+            count(|knowledge| matches!(knowledge, Knowledge::Hardly | Knowledge::NotAtAll)),
+            "hardly or not at all",
+        ),
+        (count(Knowledge::is_held), "at a bound or fixed"),
     ];
     let others = others.iter().filter(|part| part.0 > 0).map(|(n, how)| format!(", {n} {how}"));
     format!(
@@ -101,7 +114,7 @@ fn remarks(found: &Identification) -> Vec<String> {
     }));
     points.extend(unsteady(found.spreads.iter().map(|spread| &spread.1)));
     let of_parameters =
-        format!("of {} not identifiable", counted(found.unknowns.len(), "parameter"));
+        format!("of the {} cannot be identified", counted(found.unknowns.len(), "parameter"));
     let counts = [
         (found.identifiability().unidentifiable.len(), "combination", of_parameters.as_str()),
         (found.weak.len(), "combination", "determined too weakly"),

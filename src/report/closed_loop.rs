@@ -13,7 +13,7 @@ use super::parameters::{against_priors, parameters};
 use super::probability::percent;
 use super::render::{Report, report, text};
 use super::unexplained::{correction, places, to_declare, unexplained};
-use super::verdict::{alternative, causes, counts, stand_in, title, verdict};
+use super::verdict::{alternative, causes, counts, has_place, stand_in, title, verdict};
 use super::{effect, residual_tests, trace};
 use crate::problem::Problem;
 use crate::quantity::format::{counted, decimals, number};
@@ -84,15 +84,12 @@ fn cause(found: &FoundEffect) -> Point {
     let law = found.claims.as_ref().map(|claims| claims.law.probability);
     let law = law.filter(|_| !is_stand_in);
     facts.extend(law.map(|law| format!("probability of the law {}", percent(law))));
+    let label = if has_place(found) { "not distinguishable from" } else { "candidates" };
     let others = match found.alternatives.as_slice() {
         [] => String::new(),
-        [first] => format!("; not distinguishable from: {}", alternative(first)),
+        [first] => format!("; {label}: {}", alternative(first)),
         [first, others @ ..] => {
-            let count = others.len();
-            format!(
-                "; not distinguishable from: {} ({count} more in loop.json)",
-                alternative(first)
-            )
+            format!("; {label}: {} and {} more in loop.json", alternative(first), others.len())
         }
     };
     let details = if facts.is_empty() { Vec::new() } else { vec![facts.join("; ")] };
@@ -394,7 +391,7 @@ fn gain_sentence(closure: &ClosedLoop, result: &LoopResult) -> Option<String> {
     let is_overstated = has_effects && after.sigma_scale < 1.0;
     let overstated = if is_overstated { " The declared σ is too large." } else { "" };
     let chi2 =
-        size.map(|size| format!("χ²/ν of the residual: {size}; {}.{overstated}", expected(after)));
+        size.map(|size| format!("Reduced χ² (χ²/ν): {size}; {}.{overstated}", expected(after)));
     let words: Vec<String> = gain.into_iter().chain(chi2).collect();
     (!words.is_empty()).then(|| words.join(" "))
 }
@@ -404,7 +401,7 @@ fn remaining_structure(closure: &ClosedLoop, result: &LoopResult) -> Option<Stri
     let failed = residual_tests::failed(&closure.residual_tests).len();
     let places = if result.size_alone().is_none() { places(result) } else { Vec::new() };
     let structure = (!places.is_empty())
-        .then(|| format!("structure without a known law ({})", places.join(", ")));
+        .then(|| format!("structure without a known law ({})", places.join("; ")));
     let tests = (failed > 0).then(|| format!("{} failed", counted(failed, "residual test")));
     let parts: Vec<String> = structure.into_iter().chain(tests).collect();
     (!parts.is_empty())

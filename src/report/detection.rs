@@ -49,7 +49,7 @@ pub(super) fn blocks<'a>(problem: &Problem, detection: &Detection) -> Vec<Block<
     if !if_timed.is_empty() {
         let list = effect::listed(if_timed).join("; ");
         blocks.push(Block::Text(format!(
-            "Only if {} is measured too, a minute or so from pose to pose: {list}.",
+            "These effects can be seen only if the table records {} (the figures assume about one minute between poses): {list}.",
             code("time_s")
         )));
     }

@@ -1,5 +1,6 @@
 //! Texts of the command `identify`: full text for the terminal, and report on one fit.
 
+use super::brief::outcome;
 use super::document::{Block, Headline, Table};
 use super::errors::{
     axes, brief, held_out_rows, judging, measure, rows_of, shown, unit, unpredicted,
@@ -23,12 +24,15 @@ use crate::results::{PlotData, nominal_arm, rows_in};
 /// Name of the file with the complete result.
 const FILE: &str = "estimate.json";
 
-/// Returns the full result as text, ending in a line break.
-pub fn estimate_text(problem: &Problem, found: &Identification) -> String {
+/// Returns the full result as text, ending in a line break. `bound` is a sentence on the error bound
+/// of predictions.
+pub fn estimate_text(problem: &Problem, found: &Identification, bound: Option<String>) -> String {
     let mut blocks = vec![
-        Block::lines(headline(problem, found)),
+        Block::lines(headline(problem, found, &outcome(found, bound.is_some()))),
         Block::Table(errors_by_axis(found)),
-        Block::lines(noise(problem, found)),
+        Block::lines(
+            [noise(problem, found)].into_iter().chain(bound).collect::<Vec<_>>().join("\n"),
+        ),
     ];
     blocks.extend(influential_rows(found));
     blocks.extend(prior(found));
@@ -90,10 +94,11 @@ pub fn why_not_trusted(found: &Identification) -> String {
     }
 }
 
-/// States in three lines which parameters were fitted to which rows, and how the fit ended.
-pub(super) fn headline(problem: &Problem, found: &Identification) -> String {
+/// States in one line each the title, the `outcome`, which parameters were fitted to which rows, and
+/// how the fit ended.
+pub(super) fn headline(problem: &Problem, found: &Identification, outcome: &str) -> String {
     let seconds = found.seconds;
-    format!("{}\n{}, {seconds:.3} s", problem.title, fitted(found, "\n"))
+    format!("{}\n{outcome}\n{}, {seconds:.3} s", problem.title, fitted(found, "\n"))
 }
 
 /// States the number of fitted parameters and rows, strategy and solver, and how the fit ended.

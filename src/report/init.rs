@@ -46,8 +46,9 @@ pub fn init_text(
          target_m           where the measured point sits in the frame of {tip}, roughly; now its origin\n  \
          position_sigma_mm  1 σ of a coordinate that your instrument measures; now {SIGMA_MM}\n  \
          held_out           now {} % of the poses judge and are not fitted, so measure more than check and plan count\n\
-         and put measurements.csv beside it (its columns stand there, too). No link is declared elastic, for a URDF has none: effects of links\n\
-         are looked for where a [joint.beam] names one; those of temperature take reference_temperature_C and a column temperature_C, too.\n\
+         and put measurements.csv beside it (its columns stand there, too). A URDF declares no elastic links. To look for elastic\n\
+         effects of a link, declare it in [joint.beam]. To look for effects of temperature, give reference_temperature_C and a column\n\
+         temperature_C.\n\
          Next: flexcal check {word} --poses 40, then flexcal loop {word}\n",
         100.0 * HELD_OUT
     );

@@ -136,7 +136,13 @@ fn verdict(options: &NextOptions, next: &NextPoses) -> String {
     }
     match (next.stop, tolerance, next.enough_after(options.tolerance)) {
         (Some(StopReason::Enough), Some(tolerance), _) => {
-            format!("Enough: the bound is below the tolerance of {tolerance} mm.")
+            let incomplete = if next.misfit > next.noise {
+                let ratio = number(next.misfit / next.noise, 1);
+                format!(" A better model would lower the error further: the misfit is {ratio} × the noise.")
+            } else {
+                String::new()
+            };
+            format!("Enough: the bound is below the tolerance of {tolerance} mm.{incomplete}")
         }
         (Some(StopReason::GainBelowNoise), Some(tolerance), _) => format!(
             "Further poses gain less than the uncertainty of the error itself, and the bound is above the tolerance of {tolerance} mm: \

@@ -35,20 +35,20 @@ pub(super) fn noise(problem: &Problem, found: &Identification) -> String {
             "There are too few measurements to judge the declared σ.".to_owned()
         }
         ResidualSize::Contradicted(chi2) => format!(
-            "Reduced χ² is {}; {}.\n{}",
+            "Reduced χ² (χ²/ν) is {}; {}.\n{}",
             short(chi2),
             expected(found),
             other_sigma(problem, found)
         ),
         ResidualSize::Expected(chi2) => format!(
-            "Reduced χ² is {}: the model explains the data to the declared σ.",
+            "Reduced χ² (χ²/ν) is {}: the model explains the data to the declared σ.",
             number(chi2, 2)
         ),
         ResidualSize::Unclear(chi2) => {
             let (size, what) =
                 if chi2 > 1.0 { ("larger", "explains") } else { ("smaller", "predicts") };
             format!(
-                "Reduced χ² is {}; {}: the residual is {size} than the declared σ {what}.\n\
+                "Reduced χ² (χ²/ν) is {}; {}: the residual is {size} than the declared σ {what}.\n\
                  Standard errors assume the declared σ, because the data do not clearly contradict \
                  it.",
                 short(chi2),
@@ -87,7 +87,8 @@ fn other_sigma(problem: &Problem, found: &Identification) -> String {
     };
     let cause = match &found.influential_rows {
         _ if !is_larger && found.reduced_chi2.is_some_and(|chi2| chi2 > 1.0) => {
-            "although χ² is too large: a part of the rows is far off".to_owned()
+            "but χ² is too large: some rows, or one kind of rows, fit badly; -v lists them"
+                .to_owned()
         }
         _ if !is_larger => "so the declared σ is too large".to_owned(),
         Some(influential) => {
@@ -99,11 +100,11 @@ fn other_sigma(problem: &Problem, found: &Identification) -> String {
             let rows = counted(influential.rows.len(), noun(found));
             format!("mostly because of {rows} {cause}")
         }
-        None => "so that σ is too small or the model lacks something".to_owned(),
+        None => "so the declared σ is too small or the model lacks something".to_owned(),
     };
     format!(
-        "The scatter is {size} × the declared σ{declared}, {cause}. Fit and standard errors assume {assumed}, estimated from residuals and \
-         priors."
+        "The σ estimated from residuals and priors is {size} × the declared one{declared}, {cause}. Fit and standard errors assume \
+         {assumed}."
     )
 }
 

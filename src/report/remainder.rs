@@ -26,7 +26,7 @@ pub fn remainder_text(found: &Identification, outcome: &Outcome) -> String {
     let [without, with] = [gain.without, gain.with].map(|error| number(error * 1e3, 4));
     match after {
         Some(after) => format!(
-            "A remainder (smooth correction) at {} is kept, because it predicts poses that it was not fitted to better: the mean \
+            "A remainder (smooth correction) at {} is kept, because it improves the prediction of poses left out of its fit: the mean \
              error of left-out configurations falls from {without} mm to {with} mm, that of held-out poses goes from {before} mm to {after} mm.",
             counted(outcome.joints, "joint"),
         ),

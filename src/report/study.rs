@@ -63,7 +63,7 @@ fn blocks<'a>(study: &Study, results: &Results) -> Vec<Block<'a>> {
         ],
     );
     let table = table.noted(&[
-        "held out: measured − predicted, noise included; covered: share of estimates within 1.96 standard errors, 95 % if these are right;",
+        "held out: measured − predicted, noise included; covered: share of estimates within 1.96 standard errors of the truth, 95 % if the standard errors are right;",
         "largest bias: largest ratio of bias to standard deviation of the estimates, over all parameters; ms: median time of a fit",
     ]);
     let [titled, untitled] = opening(&study.title, head);

@@ -16,7 +16,7 @@ use crate::quantity::Unit;
 use crate::quantity::format::{counted, number, p_value};
 use crate::results::{
     Candidate, Claims, Confounded, Hypothesis, HypothesisSet, PlotData, SeparatingPose, Summary,
-    TraceResult,
+    TraceResult, at_place,
 };
 use crate::results::{CommandedJoint, commanded_joints};
 use crate::select::Trace;
@@ -104,7 +104,7 @@ fn verdict(result: &TraceResult) -> String {
         (Some(set), _) if !set.hypotheses.is_empty() => {
             let words = set.hypotheses.iter().map(|hypothesis| hypothesis.description.clone());
             let words: Vec<String> = words.collect();
-            format!("most probable cause: {} ({})", words.join("; and "), percent(set.probability))
+            format!("most probable cause: {} ({})", numbered(&words), percent(set.probability))
         }
         (None, Some(candidate)) => format!("it points to: {}", candidate.effect.description),
         _ => "no cause is visible".to_owned(),
@@ -112,13 +112,23 @@ fn verdict(result: &TraceResult) -> String {
     format!("{structure}; {cause}.")
 }
 
+/// Joins the causes of one explanation, with numbers if there are several: "(1) …, (2) …".
+fn numbered(causes: &[String]) -> String {
+    match causes {
+        [cause] => cause.clone(),
+        causes => {
+            let entries = causes.iter().zip(1..).map(|(cause, k)| format!("({k}) {cause}"));
+            entries.collect::<Vec<_>>().join(", ")
+        }
+    }
+}
+
 /// Lists the hypothesis sets with their probabilities, and the claims about the most probable one.
 fn hypothesis_sets<'a>(result: &TraceResult) -> Vec<Block<'a>> {
     let words = |hypothesis: &Hypothesis| hypothesis.description.clone();
     let point = |set: &HypothesisSet| {
         let causes: Vec<String> = set.hypotheses.iter().map(words).collect();
-        let causes =
-            if causes.is_empty() { "noise alone".to_owned() } else { causes.join("; and ") };
+        let causes = if causes.is_empty() { "noise alone".to_owned() } else { numbered(&causes) };
         format!("{}: {causes}", percent(set.probability))
     };
     let shown: Vec<String> = result.explanations.iter().take(MAX_SHOWN_SETS).map(point).collect();
@@ -148,7 +158,7 @@ pub(super) fn claimed(claims: &Claims) -> String {
         let inputs = depends_on.value.join(" and ");
         format!("; depends on {inputs}: {}", percent(depends_on.probability))
     };
-    format!("acts at {}: {}{inputs}; {words}", place.value, percent(place.probability))
+    format!("acts {}: {}{inputs}; {words}", at_place(&place.value), percent(place.probability))
 }
 
 /// Lists at most `most` significant candidates and explains how to read them; `where_all` states
@@ -193,8 +203,9 @@ pub(super) fn ranking<'a>(
     }
     if shown.iter().any(|candidate| !candidate.alike.is_empty()) {
         notes.push_str(
-            " In brackets: the angle between the displacements by the two effects after all parameters are fitted, a matter of \
-             geometry; at 0° no data at these poses distinguish them, at small angles only precise data do, and probabilities count that. The pose to measure is within the measured ranges.",
+            " The angle in brackets lies between the displacements by the two effects after all parameters are fitted. At 0° these \
+             poses cannot distinguish the effects, at small angles only precise data can; the probabilities take this into account. \
+             The pose to measure is within the measured ranges.",
         );
     }
     vec![
@@ -224,7 +235,7 @@ fn point(problem: &Problem, candidate: &Candidate, unit: &str) -> Point {
         let alike =
             |other: &Confounded| format!("{} ({:.0}°)", other.effect.description, other.angle_deg);
         details.push(format!(
-            "moves the arm in a similar way (angle between the displacements; 0°: the same): {}",
+            "hard to tell from: {}",
             named(candidate.alike.iter().map(alike), MAX_SHOWN_CONFOUNDED, "; ")
         ));
     }

@@ -10,7 +10,7 @@ use crate::model::parameter::holds_all;
 use crate::problem::{Effect, JointKind, Problem};
 use crate::quantity::format::{number, p_value};
 use crate::residual_tests::Covariate;
-use crate::results::{LoopResult, Structure, Summary};
+use crate::results::{LoopResult, Structure, Summary, at_place};
 use crate::select::{ClosedLoop, Correction, HELD_FIXED, REFUSED};
 
 /// Returns the empirical correction of structure without a law, if there is one.
@@ -58,8 +58,8 @@ pub(super) fn to_declare(
     }
     declarations.extend(wrong_limits(result).map(|(limit, probability)| {
         format!(
-            "Move the limit {limit} out, or remove it: with probability {} it is wrong, or hides a cause. flexcal identify -v shows \
-             how far the error would fall.",
+            "Check the limit {limit}, at which the fit stops: with probability {} it is wrong, or it restrains a parameter that stands \
+             in for something the model lacks. Widen it if it may be wrong.",
             percent(probability)
         )
     }));
@@ -72,9 +72,19 @@ pub(super) fn places(result: &LoopResult) -> Vec<String> {
     let mut places: Vec<(&str, String)> = Vec::new();
     for left in result.structures() {
         if places.iter().all(|(place, _)| *place != left.place) {
-            let probability = left.claims.as_ref().map(|claims| percent(claims.place.probability));
-            let words = probability.map_or_else(String::new, |percent| format!(": {percent}"));
-            places.push((&left.place, format!("{}{words}", left.place)));
+            let claims = left.claims.as_ref();
+            let mut words = at_place(&left.place);
+            if let Some(claims) = claims {
+                let _ = write!(words, ", probability {}", percent(claims.place.probability));
+            }
+            if let (Some(limit), Some(claims)) = (&left.limit, claims) {
+                let _ = write!(
+                    words,
+                    "; the limit {limit} causes it with probability {}",
+                    percent(claims.law.probability)
+                );
+            }
+            places.push((&left.place, words));
         }
     }
     places.into_iter().map(|(_, words)| words).collect()
@@ -166,13 +176,18 @@ fn located(structure: &Structure) -> String {
     let (place, inputs) = (&structure.place, structure.depends_on.join(", "));
     let Some(claims) = &structure.claims else {
         let inputs = if inputs.is_empty() { inputs } else { format!(", dependent on {inputs}") };
-        return format!("Structure is left: {place}{inputs} (p {}).", p_value(structure.p_value));
+        return format!(
+            "Structure is left {}{inputs} (p {}).",
+            at_place(place),
+            p_value(structure.p_value)
+        );
     };
     let chance = format!("p at most {}", p_value(structure.p_value));
     let law = percent(claims.law.probability);
     if let Some(limit) = &structure.limit {
         return format!(
-            "The limit {limit}, which is active, is wrong or hides a cause: probability {law} ({chance})."
+            "The limit {limit}, which is active, is wrong, or it restrains a parameter that stands in for something the model lacks: \
+             probability {law} ({chance})."
         );
     }
     if is_sag(structure) {
@@ -182,11 +197,13 @@ fn located(structure: &Structure) -> String {
     let at = percent(claims.place.probability);
     if inputs.is_empty() {
         return format!(
-            "Error at {place} ({at}); its inputs and its law are not known ({chance})."
+            "An error acts {} (probability {at}); its inputs and its law are not known ({chance}).",
+            at_place(place)
         );
     }
     format!(
-        "Error at {place} ({at}) that depends on {inputs} ({}); its law is not known ({chance}).",
+        "An error acts {} (probability {at}) and depends on {inputs} (probability {}); its law is not known ({chance}).",
+        at_place(place),
         percent(claims.depends_on.probability)
     )
 }

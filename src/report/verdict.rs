@@ -142,9 +142,9 @@ fn found(result: &LoopResult) -> String {
         [] => String::new(),
         [cause] => {
             let rival = cause.alternatives.first();
-            let or_else = rival.map_or_else(String::new, |rival| {
-                format!(", or else {}", rival.effect.description)
-            });
+            let link = if has_place(cause) { "or else" } else { "one candidate:" };
+            let or_else = rival
+                .map_or_else(String::new, |rival| format!(", {link} {}", rival.effect.description));
             format!("; {}{or_else}", claim(cause, &cause.effect.description))
         }
         causes => format!("; {} causes are probable or located", causes.len()),
@@ -200,7 +200,8 @@ fn claim(found: &FoundEffect, words: &str) -> String {
         }
         (Status::Located, Some(claims)) => {
             let place = (claims.place.value.as_str(), claims.place.probability);
-            format!("{status}: {}", located(place, claims.law.probability, words))
+            let unknown = located(place, claims.law.probability, words);
+            if has_place(found) { format!("{status}: {unknown}") } else { unknown }
         }
         (Status::Located, None) => {
             format!("{status}: only together with the others, not significant by itself; {words}")
@@ -209,13 +210,18 @@ fn claim(found: &FoundEffect, words: &str) -> String {
     }
 }
 
+/// Returns true if the place of a cause is more probable than not.
+pub(super) fn has_place(found: &FoundEffect) -> bool {
+    found.claims.as_ref().is_none_or(|claims| claims.place.probability >= MIN_PROBABLE)
+}
+
 /// Returns the claim about a cause whose law is unknown: `place` with its probability `at`, and the
 /// law's probability.
 fn located((place, at): (&str, f64), law: f64, words: &str) -> String {
     let unknown = if at >= MIN_PROBABLE {
         format!("{place} ({}), law not known", percent(at))
     } else {
-        "place and law not known".to_owned()
+        "structure of unknown place and law".to_owned()
     };
     match law {
         MIN_CANDIDATE_PROBABILITY.. => {
@@ -247,9 +253,9 @@ mod tests {
         let words = |at: f64, law: f64| located(("joint 2", at), law, "a wave");
         let candidate = "; one candidate law: a wave (39 %)";
         assert_eq!(words(0.8, 0.39), format!("joint 2 (80 %), law not known{candidate}"));
-        assert_eq!(words(0.45, 0.39), format!("place and law not known{candidate}"));
+        assert_eq!(words(0.45, 0.39), format!("structure of unknown place and law{candidate}"));
         assert_eq!(words(0.999, 0.0), "joint 2 (over 99 %), law not known");
-        assert_eq!(words(0.2, 0.001), "place and law not known");
+        assert_eq!(words(0.2, 0.001), "structure of unknown place and law");
     }
 
     #[test]

@@ -116,7 +116,7 @@ fn verdict(watch: &Watch) -> String {
     let evidence = watch.looks.last().map_or(0.0, |look| look.1.exp());
     let Some(row) = watch.changed_at else {
         return format!(
-            "Unchanged: these rows are {} times as probable if the arm has changed; an alarm takes {} times",
+            "No change shown: these rows are {} times as probable if the arm has changed as if it has not; an alarm is raised from {} times on",
             two_digits(evidence, 4),
             number(1.0 / watch.false_alarm_rate, 0)
         );

@@ -86,36 +86,53 @@ pub(super) fn law_name(law: &HypothesisKind) -> &str {
 
 /// Describes a hypothesis in words; `effect_words` describes an effect.
 fn describe(hypothesis: &select::Hypothesis, effect_words: impl Fn(&Effect) -> String) -> String {
-    let (place, inputs) = (hypothesis.site, joined_words(&hypothesis.depends_on));
+    let (place, inputs) =
+        (at_place(&hypothesis.site.to_string()), joined_words(&hypothesis.depends_on));
     match &hypothesis.kind {
         HypothesisKind::Effect(effect) => effect_words(effect),
         HypothesisKind::NearHarmonic(1) => {
-            format!("{place}: a function of {inputs} with a period of one revolution, law unknown")
+            format!(
+                "an error {place} that depends on {inputs} with a period of one revolution, law unknown"
+            )
         }
         HypothesisKind::NearHarmonic(order) => {
             format!(
-                "{place}: a function of {inputs} with about {order} periods a revolution, law unknown"
+                "an error {place} that depends on {inputs} with about {order} periods a revolution, law unknown"
             )
         }
         HypothesisKind::Gear(highest) => {
-            format!("{place}: periodic error of all orders up to {highest} a turn")
+            format!("a periodic error {place} with all orders up to {highest} a turn")
         }
         HypothesisKind::PerPose => {
-            format!("{place}: an error that differs in every pose and depends on no known quantity")
+            format!(
+                "an error {place} that varies from pose to pose and depends on no known quantity (extra noise)"
+            )
         }
         HypothesisKind::Wandering => format!(
-            "{place}: a random drift in {inputs}, in which each reading follows the one before"
+            "a random drift {place} in {inputs}, in which each reading follows the one before"
         ),
         HypothesisKind::Linear => format!(
-            "{place}: an error linear in the position, such as a scale for each axis, or shear"
+            "an error {place} that is linear in the position, such as a scale for each axis, or shear"
         ),
         HypothesisKind::Sag => {
-            format!("{place}: deflection under weight that the problem does not declare")
+            format!("a deflection {place} under weight that the problem does not declare")
         }
         HypothesisKind::Limit(limit) => {
-            format!("{place}: the limit {limit}, which is active, is wrong")
+            format!("a wrong limit {limit}, which is active")
         }
-        _ => format!("{place}: a smooth function of {inputs}, law unknown"),
+        _ => format!("an error {place} that is a smooth function of {inputs}, law unknown"),
+    }
+}
+
+/// Place in result files of structure that only the residual tests detect.
+pub(super) const NOWHERE: &str = "nowhere in particular";
+
+/// Returns the name of a place in result files with its preposition: "at joint 2", "at the base".
+pub(crate) fn at_place(place: &str) -> String {
+    match place {
+        NOWHERE => place.to_owned(),
+        joint if joint.starts_with("joint ") => format!("at {joint}"),
+        other => format!("at the {other}"),
     }
 }
 

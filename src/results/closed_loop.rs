@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::claims::{Claims, law_name};
+use super::claims::{Claims, NOWHERE, law_name};
 use super::document::Document;
 use super::effect::{EffectKeys, NamedEffect};
 use super::hints::resembled;
@@ -17,9 +17,6 @@ use crate::quantity::Unit;
 use crate::remainder::Fitted;
 use crate::residual_tests::Covariate;
 use crate::select::{self, ClosedLoop, HypothesisKind, ReferenceVerdict, Status, Trace, Verdict};
-
-/// Place of structure that only the residual tests detect.
-const NOWHERE: &str = "nowhere in particular";
 
 /// Result of the search for missing effects.
 #[derive(Debug, Serialize, JsonSchema)]

@@ -36,7 +36,7 @@ mod watch;
 
 pub(crate) use acceptance::{AcceptanceRecord, AcceptanceResult, PoseAccuracy, TestedTolerance};
 pub(crate) use application::{InitResult, PredictionErrors};
-pub(crate) use claims::Claims;
+pub(crate) use claims::{Claims, at_place};
 pub use closed_loop::LoopResult;
 pub(crate) use closed_loop::{Gain, ParameterValue, Step, Structure, Witness};
 pub(crate) use comparison::ComparedFit;

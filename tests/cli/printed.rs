@@ -172,7 +172,10 @@ fn limits_that_hold_the_declared_fit_are_said_beside_what_was_found() {
         (&"limit".into(), &"of joint4.a".into())
     );
     let printed = run_in_package("loop problems/service-arm").words();
-    assert_contains(&printed, &["Move the limit of joint4.a out, or remove it: with probability"]);
+    assert_contains(
+        &printed,
+        &["Check the limit of joint4.a, at which the fit stops: with probability"],
+    );
     for printed in [printed, run_in_package("loop tests/cases").words()] {
         assert!(!printed.contains("Limits are active"), "{printed}");
     }

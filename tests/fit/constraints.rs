@@ -104,7 +104,7 @@ fn an_active_constraint_holds_exactly_and_is_named() {
             && words[1].starts_with("joint3.a + joint4.a ≤ "),
         "{words:?}"
     );
-    let text = estimate_text(&problem, &held);
+    let text = estimate_text(&problem, &held, None);
     assert!(text.contains("Active limits") && text.contains(words[1]), "{text}");
     let json: serde_json::Value =
         serde_json::from_str(&IdentificationResult::new(&problem, &held).to_json()).unwrap();
@@ -283,7 +283,7 @@ fn shadow_prices_are_differences_of_fits() {
     assert_eq!(per, "mm");
     let gained = 1e3 * (fall(&tight) - fall(&loose)) / 0.01;
     assert!(price > 0.0 && (gained / price - 1.0).abs() < 0.3, "{price} against {gained}");
-    assert!(estimate_text(&problem(""), &tight).contains("Active limits and their cost"));
+    assert!(estimate_text(&problem(""), &tight, None).contains("Active limits and their cost"));
     assert!(
         IdentificationResult::new(&problem(""), &tight).to_json().contains("\"shadow_price\": {")
     );
@@ -304,7 +304,7 @@ fn the_service_arm_shows_which_limit_is_wrong() {
     assert!(dear > 20.0 * cheap, "{dear} against {cheap}");
     assert!(found.reduced_chi2 > found.chance.map(|(_, most)| most));
     let page = fs::read_to_string(arms::path("problems/service-arm/README.md")).unwrap();
-    let printed = estimate_text(&problem, &found);
+    let printed = estimate_text(&problem, &found, None);
     let (_, block) = page.split_once("```text\n").unwrap();
     for line in block.split("```").next().unwrap().lines() {
         assert!(printed.contains(line), "{line}");

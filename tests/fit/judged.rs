@@ -77,7 +77,7 @@ fn held_out_rows_are_judged() {
             words.contains("1 of 30 held-out poses is too far off") && words.len() < 200,
             "{words}"
         );
-        let text = estimate_text(&problem, &wrong);
+        let text = estimate_text(&problem, &wrong, None);
         assert!(!text.contains("NaN") && !text.contains("inf "), "{text}");
     }
 }
@@ -295,7 +295,7 @@ fn targets_of_one_pose_are_points_not_poses() {
     assert!(found.poses == 7 && found.several_targets);
     assert_eq!(model.parameters.len(), 40);
     assert!(!found.has(FindingCode::PriorsDecide));
-    assert!(estimate_text(&problem, &found).contains("from 21 points in 7 different poses"));
+    assert!(estimate_text(&problem, &found, None).contains("from 21 points in 7 different poses"));
     let found = fit(&problem, &divided(18, &rows));
     let fewer = found.finding(FindingCode::PriorsDecide).unwrap();
     for (name, expected) in [("poses", 6.0), ("coordinates", 39.0), ("parameters", 40.0)] {

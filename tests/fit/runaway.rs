@@ -83,7 +83,7 @@ fn what_is_seen_too_weakly_is_held_and_named() {
             assert!(named.contains(&"joint3.d") && !named.contains(&"joint1.a"), "{at}: {named:?}");
             assert_eq!(found.estimate("joint3.d").unwrap().std_error, None);
             assert!(found.estimate("joint5.d").unwrap().std_error.unwrap() < 1e-3, "{at}");
-            assert!(estimate_text(&problem, &found).contains("too weakly"), "{at}");
+            assert!(estimate_text(&problem, &found, None).contains("too weakly"), "{at}");
         }
     }
 }

@@ -40,7 +40,9 @@ fn a_sigma_that_fits_is_taken_as_declared() {
         let (problem, found) = fit(name, 5e-5);
         assert_eq!((found.noise_factor, found.sigma_scale), (1.0, 1.0), "{name}");
         assert!((found.sigma_taken / 5e-5 - 1.0).abs() < 1e-12, "{name}");
-        assert!(estimate_text(&problem, &found).contains("explains the data to the declared σ"));
+        assert!(
+            estimate_text(&problem, &found, None).contains("explains the data to the declared σ")
+        );
     }
 }
 
@@ -73,7 +75,7 @@ fn a_sigma_that_is_wrong_changes_no_estimate() {
                 (chi2 * factor * factor / expected.reduced_chi2.unwrap() - 1.0).abs() < 0.2,
                 "{name}: {chi2}"
             );
-            let text = estimate_text(&problem, &found);
+            let text = estimate_text(&problem, &found, None);
             let cause = if factor > 1.0 { "is too large" } else { "the model lacks something" };
             assert!(text.contains(cause) && text.contains("if only noise is left"), "{text}");
         }

@@ -142,7 +142,7 @@ fn temperature_that_the_model_lacks_is_no_change() {
     let run =
         "watch bowed --estimate first/estimate.json --data bowed/measurements.csv --out watch";
     let same = folder.flexcal(run).success();
-    assert_contains(&same.stdout, &["50 rows against the estimate", "Unchanged"]);
+    assert_contains(&same.stdout, &["50 rows against the estimate", "No change shown"]);
 }
 
 #[test]
@@ -153,7 +153,7 @@ fn the_command_has_exit_status_3_for_a_changed_arm() {
     let same = folder.flexcal(&format!("{run} --data a-none.csv")).success();
     assert_contains(
         &same.stdout,
-        &["50 rows against the estimate", "Unchanged", "28 rows left out"],
+        &["50 rows against the estimate", "No change shown", "28 rows left out"],
     );
     // Every position lies 5 mm higher.
     let text = folder.read("a-none.csv");

@@ -65,7 +65,7 @@ fn claim(found: &FoundEffect) -> String {
     let words = plain(&found.effect.description);
     match (found.status, &found.claims) {
         (Status::Located, Some(claims)) if claims.place.probability < 0.5 => {
-            "located: place and law not known".to_owned()
+            "structure of unknown place and law".to_owned()
         }
         (Status::Located, Some(claims)) => {
             format!("located: {} (", claims.place.value)

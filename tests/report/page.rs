@@ -198,7 +198,7 @@ fn the_picture_holds_the_errors_that_the_tables_sum_up() {
     let report = report::identification_report(&titled, &found, &shown);
     check(&report);
     assert!(report.markdown.starts_with("# A \\` \\<b> & \\*[31m\n"), "{}", report.markdown);
-    let all = report::estimate_text(&titled, &found) + &report.markdown + &report.html;
+    let all = report::estimate_text(&titled, &found, None) + &report.markdown + &report.html;
     assert!(!all.contains(['\u{1}', '\u{1b}']));
 }
 
@@ -235,7 +235,7 @@ fn poses_without_an_equilibrium_are_counted_and_left_out() {
     assert_eq!(dots(&page) + 12, dots(&report::identification_report(&problem, &found, &whole)));
     for text in [
         report::identification_report(&problem, &found, &shown).markdown,
-        report::estimate_text(&problem, &found),
+        report::estimate_text(&problem, &found, None),
     ] {
         assert!(text.contains(&words) && !text.contains("NaN"), "{text}");
     }

@@ -83,7 +83,7 @@ fn readings(kind: RotationKind) -> Vec<(String, Reading)> {
             UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z))
         };
         let letters: Vec<&str> = order.iter().map(|&place| ["x", "y", "z", "w"][place]).collect();
-        let name = format!("quaternions whose columns hold {}", letters.join(", "));
+        let name = format!("quaternions in the order {}", letters.join(", "));
         readings.push((
             format!("the inverse of {name}"),
             Box::new(move |q| vec![reordered(q).inverse()]),

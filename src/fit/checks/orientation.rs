@@ -41,7 +41,7 @@ impl Check for OrientationsFit {
         let finding = Finding::new(FindingCode::OrientationMisfit, numbers, text);
         vec![match conventions.first() {
             Some(convention) => finding.with_remedy(format!(
-                "the columns fit as {convention}: convert them to rotation vectors or quaternions"
+                "the measured orientations fit if the columns are read as {convention}: correct the order or the meaning of the columns"
             )),
             None => finding,
         }]

@@ -103,7 +103,7 @@ fn view(data: &PlotData) -> Markup {
 fn ranges(data: &PlotData) -> Markup {
     html! {
         div.brush id="brush" hidden {
-            p { "Select the poses in which each joint is between two values; a box of the map of joints does the same:" }
+            p { "Show only poses with each joint within these limits. A click on a box of the figure “Residual by ranges of each joint” does the same:" }
             @for (k, command) in data.commands.iter().enumerate() {
                 fieldset {
                     legend { (command.name()) " " span data-range=(k) {} }
