@@ -15,7 +15,7 @@ pub struct AxisValues {
     pub y: f64,
     /// Value along the z axis \[m\].
     pub z: f64,
-    /// Value for the Euclidean norm.
+    /// Value for the Euclidean norm of the error vector, in the unit of its axes.
     pub norm: f64,
 }
 
@@ -25,7 +25,7 @@ pub struct ErrorSummary {
     /// Kind of the rows ([`Observation::kind`](crate::problem::Observation::kind)). Errors of other
     /// kinds than positions are residuals of the measured quantity; a single number counts along x.
     pub kind: &'static str,
-    /// Number of poses.
+    /// Number of rows whose errors are summarised.
     pub n: usize,
     /// Number of poses without an equilibrium; their errors, and so mean, max and rms, are NaN.
     pub unpredicted: usize,
@@ -58,9 +58,9 @@ pub struct Errors {
 #[doc(hidden)]
 #[derive(Debug, Clone, PartialEq)]
 pub struct OrientationErrors {
-    /// Errors of the registered nominal arm.
+    /// Errors of the registered nominal arm (base and target fitted where they are free).
     pub registered: Errors,
-    /// Errors of the identified arm.
+    /// Errors of the arm with all parameters fitted.
     pub fitted: Errors,
     /// Standard deviation (1 σ) of orientations about each axis that the fit assumed \[rad\].
     pub sigma_taken: f64,
@@ -84,13 +84,13 @@ pub(super) fn of_kind(
 }
 
 impl ErrorSummary {
-    /// Returns the unit of the errors: lengths, or angles for tilts.
+    /// Returns the unit of the errors: length for positions, angle for tilts, pixels for images.
     pub(crate) fn unit(&self) -> Unit {
         kind_named(self.kind).unit
     }
 
-    /// Converts an error from \[m\] or \[rad\] to the unit in which errors of this kind are shown:
-    /// mm or °.
+    /// Converts an error from \[m\], \[rad\] or \[px\] to the unit in which errors of this kind are
+    /// shown: mm, ° or px.
     pub(crate) fn in_unit(&self, value: f64) -> f64 {
         value * self.unit().in_tables().factor
     }

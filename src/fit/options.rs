@@ -53,7 +53,7 @@ impl Options {
         Self { strategy, ..self }
     }
 
-    /// Sets the solver.
+    /// Sets the solver of the least-squares problems.
     #[must_use]
     pub fn with_solver(self, solver: SolverChoice) -> Self {
         Self { solver, ..self }

@@ -32,13 +32,13 @@ const MAX_UNIDENTIFIED_SHARE: f64 = 1e-6;
 /// Free parameter after the fit; SI units.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Estimate {
-    /// Name as in the problem file.
+    /// Name of the parameter as in the problem file, such as `joint2.stiffness`.
     pub name: String,
     /// Kind of quantity, which determines the SI unit of the values.
     pub unit: Unit,
-    /// Nominal value, SI.
+    /// Nominal value, in the SI unit of the parameter.
     pub nominal: f64,
-    /// Estimated value, SI.
+    /// Estimated value, in the SI unit of the parameter.
     pub estimate: f64,
     /// Standard error of the value, SI. `None` if it was not fitted, rests on a bound, belongs to
     /// an undetermined combination, or if the data do not determine it.
@@ -63,13 +63,13 @@ pub struct Estimate {
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct Identification {
-    /// Strategy of the fit.
+    /// Strategy of the fit: which parameters are fitted together, in which order.
     pub strategy: Strategy,
     /// Solver that was used.
     pub solver: SolverChoice,
     /// Reason for the choice of the solver, if `auto` chose it.
     pub solver_reason: Option<&'static str>,
-    /// Reason why the last fit stopped.
+    /// Reason why the last least-squares fit stopped.
     pub termination: Termination,
     /// Effect that expresses the misreading of the table that the checks found.
     pub(crate) misread: Option<MisreadEffect>,
@@ -142,7 +142,7 @@ pub struct Identification {
     pub(super) noise_models: (NoiseModel, NoiseModel),
     /// Estimates of every free parameter, in the order of the model.
     pub estimates: Vec<Estimate>,
-    /// Covariance of the estimates.
+    /// Covariance of the estimates \[product of their SI units\].
     pub covariance: Covariance,
     /// Prior widths that the fitted deviations contradict; empty for a provisional fit.
     #[doc(hidden)]
@@ -192,14 +192,14 @@ impl Identification {
         findings.all(|finding| finding.severity() != Severity::Error || is_noise(finding))
     }
 
-    /// Returns the first error among the findings, which is the reason not to trust the fit; `None`
-    /// if there is none.
+    /// Returns the first finding that is an error, which is the reason not to trust the fit; `None`
+    /// if the fit is to be trusted.
     #[doc(hidden)]
     pub fn first_error(&self) -> Option<&Finding> {
         self.findings.iter().find(|finding| finding.severity() == Severity::Error)
     }
 
-    /// Returns the first finding with a code.
+    /// Returns the first finding with the code `code`; `None` if no check reported it.
     pub fn finding(&self, code: FindingCode) -> Option<&Finding> {
         self.findings.iter().find(|finding| finding.code == code)
     }
@@ -225,13 +225,14 @@ impl Identification {
         found.get_or_init(|| Identifiability::of(triangle))
     }
 
-    /// Returns the texts of [`cautions`](Self::cautions).
+    /// Returns the texts of the warnings, [`cautions`](Self::cautions), with their remedies.
     #[doc(hidden)]
     pub fn reasons_to_ask(&self) -> Vec<String> {
         self.cautions().map(ToString::to_string).collect()
     }
 
-    /// Returns the estimate of a parameter by its name, such as `joint2.stiffness`.
+    /// Returns the estimate of a parameter by its name, such as `joint2.stiffness`; `None` if no
+    /// parameter has this name.
     pub fn estimate(&self, name: &str) -> Option<&Estimate> {
         self.estimates.iter().find(|estimate| estimate.name == name)
     }

@@ -112,7 +112,7 @@ impl ResidualFunction {
         DVector::from_vec(measured.into_iter().chain(priors).collect())
     }
 
-    /// Returns ∂r/∂x, shape = (residuals, unknowns).
+    /// Returns the derivatives ∂r/∂x of the whitened residuals, shape = (residuals, unknowns).
     pub fn jacobian(&self, x: &DVector<f64>) -> DMatrix<f64> {
         let measured = jacobian_and_residual(&self.rows(), x).0;
         let origins = self.origins();

@@ -341,8 +341,9 @@ impl Effect {
         self == other || (self.is_searched() && is_alike())
     }
 
-    /// Returns the effect with its searched argument multiplied by `factor`, rounded to three
-    /// digits. `None` if the data cannot distinguish values between the candidates.
+    /// Returns the effect with its time constant or distance multiplied by `factor`, rounded to
+    /// three digits. `None` if the effect has no such argument, or if the product is zero or not
+    /// finite.
     pub(crate) fn scaled(&self, factor: f64) -> Option<Self> {
         let (key, _) = self.key_of(ArgumentKind::is_scalable)?;
         let Some(Argument::Number(number)) = self.argument(key) else { return None };

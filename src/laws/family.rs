@@ -198,7 +198,7 @@ pub enum Need {
     Temperature,
     /// Requires recorded times, so that the order of the poses is known.
     Clock,
-    /// Requires a time with enough poses before and after it.
+    /// Requires recorded times with enough poses before and after some instant.
     Times,
     /// Requires gravity and poses with a payload.
     Payload,

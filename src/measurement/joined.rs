@@ -17,7 +17,8 @@ use crate::quantity::Unit;
 
 /// Maximum number of rows without a partner that a warning lists.
 const MAX_LISTED_ROWS: usize = 10;
-/// Largest usual time between paired rows for which the clocks are not compared \[s\].
+/// Median time between paired rows above which the pairing is suspect \[s\]: the clocks may differ,
+/// so their offset is searched.
 const MAX_USUAL_GAP: f64 = 0.5;
 /// Smallest number of measured rows with which the pairing as a whole is checked.
 const MIN_CHECKED_ROWS: usize = 4;

@@ -22,7 +22,7 @@ struct Pair {
 /// Anderson acceleration of x ← g(x).
 ///
 /// The differences of earlier residuals approximate the current residual, and the same combination
-/// of image differences is taken off g(x). [Anderson 1965; Walker & Ni 2011]
+/// of differences of g(x) is subtracted from g(x). [Anderson 1965; Walker & Ni 2011]
 #[derive(Debug, Clone, Default)]
 pub(super) struct Anderson {
     pairs: [Pair; MAX_PAIRS],

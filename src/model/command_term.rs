@@ -12,7 +12,7 @@ pub(super) enum TermSite {
     Joint(usize),
     /// Strain that a joint's beam has without load: elongation or a curvature.
     Strain {
-        /// Index of the joint.
+        /// Index of the joint that carries the beam, from 0.
         joint: usize,
         /// Index 0, 1 or 2 of the strain.
         which: usize,

@@ -13,7 +13,7 @@ use crate::spatial::{Frame, rotation_axes};
 /// Base frame with its derivatives, and the Jacobian column of each of its six coordinates.
 #[derive(Clone)]
 pub(super) struct Base {
-    /// Frame of the base, measuring frame.
+    /// Frame of the base, expressed in the measuring frame.
     pub frame: Frame<f64>,
     /// Unit vectors along which the translation coordinates x, y and z move the base, measuring
     /// frame.

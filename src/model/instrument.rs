@@ -13,7 +13,7 @@ use crate::spatial::Frame;
 /// frame's origin by the rotation vector Σ ωᵢ·regressorᵢ.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct Instrument {
-    /// Relative scale error s.
+    /// Relative scale error s of the instrument: measured lengths are 1 + s times the true ones.
     pub scale: f64,
     /// Strain E of the measuring frame; `None` counts as zero.
     strain: Option<Matrix3<f64>>,

@@ -233,7 +233,9 @@ impl Model {
         arm
     }
 
-    /// Returns the axis along which a parameter moves the payload with the target.
+    /// Returns the axis of the target's frame (0 to 2) along which a parameter moves the payload
+    /// with the target; `None` if the parameter does not shift the target, or if the payload does
+    /// not follow it.
     fn payload_axis(&self, site: ParameterSite) -> Option<usize> {
         match site {
             ParameterSite::Target { axis: axis @ 0..3, .. } => Some(axis),

@@ -44,7 +44,7 @@ pub enum PartSite {
 /// Term of a prediction: value × regressor adds to the quantity of a site.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PartTerm {
-    /// Quantity that the term adds to.
+    /// Place whose quantity the term adds to.
     pub site: PartSite,
     /// Function of the pose.
     pub regressor: Regressor,
@@ -63,7 +63,7 @@ pub struct ModelParts {
     pub scale: f64,
     /// Strain E of the measuring frame, entries xx, yy, zz, xy, xz, yz.
     pub strain: [f64; 6],
-    /// Bases in the measuring frame.
+    /// Frames of the bases, expressed in the measuring frame.
     pub bases: Vec<Frame<f64>>,
     /// Index of the joint that carries each target, and the target's frame in it.
     pub targets: Vec<(usize, Frame<f64>)>,

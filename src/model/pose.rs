@@ -9,9 +9,9 @@ use crate::problem::{Observation, PoseView};
 pub struct Pose<'a> {
     /// Configuration and conditions of the row.
     pub setup: PoseView<'a>,
-    /// Index of the base.
+    /// Index of the base on which the arm stands in this row.
     pub base: usize,
-    /// Index of the target.
+    /// Index of the target that the row measures.
     pub target: usize,
     /// Quantity that is measured.
     pub observation: Observation,
@@ -38,12 +38,13 @@ pub struct MeasuredOrientation<'a> {
     /// Orientation in the measuring frame; `None` for planned poses, which are treated as measured
     /// without error.
     pub measured: Option<&'a UnitQuaternion<f64>>,
-    /// 1 σ about each axis \[rad\].
+    /// Declared standard deviation of the orientation about each axis \[rad\].
     pub sigma: f64,
 }
 
 impl MeasuredOrientation<'_> {
-    /// Returns the measured axes, measuring frame, if the orientation was measured.
+    /// Returns the measured x, y and z axis of the target's frame, as unit vectors in the measuring
+    /// frame; `None` if the row has no orientation.
     pub fn axes(&self) -> Option<[Vector3<f64>; 3]> {
         let measured = self.measured?;
         Some([Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| measured * axis))

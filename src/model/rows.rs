@@ -11,7 +11,7 @@ use crate::problem::PoseView;
 pub(super) struct Rows<'a> {
     /// Block that holds the rows.
     pub block: &'a mut Block,
-    /// First of the three rows.
+    /// Index of the first of the three rows of the vector.
     pub row: usize,
     /// Factor from a derivative of the prediction to one of the residual (measured − predicted) /
     /// σ.

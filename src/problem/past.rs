@@ -79,7 +79,7 @@ impl<'a> LazyPast<'a> {
     }
 }
 
-/// Refers to the past of a single pose.
+/// Borrows the earlier poses of a single pose, as row 0.
 impl<'a> From<&'a Past> for LazyPast<'a> {
     fn from(past: &'a Past) -> Self {
         Self::row(past, 0)

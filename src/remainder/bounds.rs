@@ -7,7 +7,7 @@ use super::correction::{CorrectedPose, Correction};
 pub struct Bounds {
     /// Probability with which a bound holds, 0 to 1.
     pub level: f64,
-    /// Correction and uncertainty of each pose.
+    /// Correction and uncertainty of the prediction in each pose.
     pub poses: Vec<CorrectedPose>,
     /// Ratio of a pose's error bound to its expected error length ([`CorrectedPose::size`]).
     factor: f64,

@@ -124,7 +124,7 @@ impl Correction {
     }
 
     /// Returns the root mean square ratio of the errors of left-out configurations to their
-    /// expected lengths; `None` if none was left out.
+    /// expected lengths; 1 is expected. `None` if no configuration was left out.
     pub(crate) fn left_out_scale(&self) -> Option<f64> {
         self.scores.scale()
     }

@@ -62,8 +62,8 @@ impl Fitted {
         }
     }
 
-    /// Returns the correction of predictions: with the remainder if it is kept, else with the
-    /// uncertainty alone.
+    /// Returns the correction of predictions: with the remainder if one is kept, else one that only
+    /// states the uncertainty.
     pub(crate) fn correction(&self) -> &Correction {
         self.remainder.as_ref().unwrap_or(&self.alone)
     }

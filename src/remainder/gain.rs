@@ -16,9 +16,9 @@ const FALSE_DENSITY_GAIN_PROBABILITY: f64 = 0.1;
 /// Mean difference over the configurations, with its standard error.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MeanDifference {
-    /// Mean of the differences.
+    /// Mean of the differences over the left-out configurations.
     pub mean: f64,
-    /// Standard error of the mean.
+    /// Standard error of the mean difference.
     pub std_error: f64,
 }
 

@@ -31,8 +31,9 @@ fn likelihood<'a>(training: &'a TrainingRows, rows: &'a Rows) -> MarginalLikelih
     MarginalLikelihood::new(rows, &training.prior, shares_noise, training.size)
 }
 
-/// Searches a local maximum of the marginal likelihood. The search runs on few rows from every
-/// start; the optimum that predicts left-out rows best is then refined on more rows.
+/// Searches the hyperparameters of the remainder: local maxima of the marginal likelihood on few
+/// rows, one from each start. The optimum that predicts left-out rows best is refined on more rows.
+/// `None` if no search succeeds.
 pub(super) fn search(training: &TrainingRows) -> Option<Searched> {
     let [few, more] =
         MAX_SEARCH_ROWS.map(|count| training.rows.select(&training.some_rows(count, 0)));
@@ -54,8 +55,8 @@ pub(super) fn search(training: &TrainingRows) -> Option<Searched> {
     Some(Searched { hyper, minimum, evidence })
 }
 
-/// Returns the optimum for `rows`, searched from the optimum `near` that was found on `count` other
-/// rows.
+/// Returns the optimum of the marginal likelihood of `rows`, searched from the optimum `near` that
+/// was found on `count` other rows; `None` if the likelihood cannot be evaluated.
 fn refine(training: &TrainingRows, rows: &Rows, near: &Minimum, count: usize) -> Option<Minimum> {
     let refined = likelihood(training, rows);
     let inverse = &near.inverse * (count as f64 / rows.len() as f64);

@@ -10,7 +10,7 @@ use super::rows::{AXES, Rows, Site, SiteKind};
 /// position that all modelled errors of the joint cause.
 #[derive(Debug, Clone, PartialEq)]
 pub struct JointError {
-    /// Joint, counted from 0.
+    /// Index of the joint, from 0.
     pub joint: usize,
     /// Length ℓᵤ of the function of the joint's own command: \[rad\], or \[m\] for a prismatic
     /// joint.
@@ -27,7 +27,7 @@ pub struct JointError {
 /// Error of a joint at one value of its command.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct JointErrorPoint {
-    /// Command \[rad\] or \[m\].
+    /// Command of the joint \[rad\], or \[m\] for a prismatic joint.
     pub command: f64,
     /// Mean error as a motion of the position: error times the joint's lever \[m\].
     pub mean: f64,

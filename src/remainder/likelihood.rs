@@ -25,7 +25,8 @@ const LENGTH_BOUNDS: (f64, f64) = (-3.912_023, 2.079_441_5);
 const AMPLITUDE_BOUNDS: (f64, f64) = (-7.0, 2.0);
 /// Bounds of ln σ and ln σ_c relative to ln(root mean square residual).
 pub(super) const NOISE_BOUNDS: (f64, f64) = (-4.0, 2.0);
-/// Initial values of σ and σ_c in the search, as fractions of the root mean square residual.
+/// Initial values of σ (noise of a coordinate) and σ_c (noise that the rows of one configuration
+/// share) in the search, as fractions of the root mean square residual.
 pub(super) const NOISE_STARTS: [f64; 2] = [0.7, 0.3];
 
 /// Negative logarithm of marginal likelihood times hyperparameter priors, as a function of the
@@ -164,7 +165,7 @@ impl<'a> MarginalLikelihood<'a> {
         (0..self.len()).map(bound).collect()
     }
 
-    /// Converts the logarithms to hyperparameters.
+    /// Converts the logarithms that the search varies to hyperparameters.
     pub fn hyperparameters(&self, logarithms: &DVector<f64>) -> Hyperparameters {
         let (sites, noise) = (self.inputs.sites.len(), self.joint_lengths().end);
         let mut hyper = Hyperparameters {

@@ -64,8 +64,8 @@ impl NoiseLikelihood {
         }
     }
 
-    /// Returns the negative logarithm of the likelihood at (ln σ, ln σ_c), or at (ln σ) if no noise
-    /// is shared.
+    /// Returns the negative logarithm of the likelihood at (ln σ, ln σ_c), or at (ln σ) if the rows
+    /// of a configuration share no noise; `None` if it is not finite.
     fn value(&self, logarithms: &DVector<f64>) -> Option<f64> {
         let variance = (2.0 * logarithms[0]).exp();
         let shared = logarithms.get(1).map_or(0.0, |shared| (2.0 * shared).exp());

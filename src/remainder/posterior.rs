@@ -29,14 +29,14 @@ pub(super) struct Posterior {
     pub hyper: Hyperparameters,
     pub inputs: Inputs,
     pub prior: ParameterPrior,
-    /// Inducing variables z.
+    /// Inducing variables z that stand for the error functions.
     pub inducing: Inducing,
     /// Inverse L⁻¹ of the factor of K_z.
     inverse: DMatrix<f64>,
     /// Lower triangular factor of A, and its inverse.
     pub factor: DMatrix<f64>,
     inverse_factor: DMatrix<f64>,
-    /// Posterior mean ŵ of the weights.
+    /// Posterior mean ŵ of the weights of the inducing variables.
     pub weights: DVector<f64>,
 }
 
@@ -88,7 +88,7 @@ fn outer_block(of: &DMatrix<f64>, row: usize, columns: usize) -> Matrix3<f64> {
 /// Prediction of a row from the other rows.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct LeftOut {
-    /// Measured − predicted position \[m\].
+    /// Measured − predicted position \[m\], measuring frame.
     pub error: Vector3<f64>,
     /// Covariance of the error, including measurement noise \[m²\].
     pub covariance: Matrix3<f64>,

@@ -9,7 +9,7 @@ use super::rows::Rows;
 pub(super) struct ParameterPrior {
     /// Mean m: the declared prior's mean minus the fitted value; 0 without a declared prior.
     pub mean: DVector<f64>,
-    /// Standard deviations: the diagonal of S½.
+    /// Prior standard deviations of the parameters: the diagonal of S½.
     pub spread: DVector<f64>,
 }
 
@@ -19,7 +19,7 @@ impl ParameterPrior {
         (&rows.residual - &rows.jacobian * &self.mean, self.scale(&rows.jacobian))
     }
 
-    /// Returns the scaled Jacobian J S½.
+    /// Returns the Jacobian J with each column scaled by the prior σ of its parameter, J S½.
     pub fn scale(&self, jacobian: &DMatrix<f64>) -> DMatrix<f64> {
         let mut scaled = jacobian.clone();
         for (mut column, spread) in scaled.column_iter_mut().zip(self.spread.iter()) {

@@ -20,7 +20,7 @@ use crate::spatial::Frame;
 pub struct CorrectedResiduals {
     /// Residual of each row, in the order of the rows.
     pub rows: Vec<Residual>,
-    /// Correction and uncertainty of each row.
+    /// Correction and uncertainty of the prediction of each row.
     pub poses: Vec<CorrectedPose>,
     /// Errors of identification and held-out rows; in tables with several kinds of rows, those of
     /// the leading kind.

@@ -17,7 +17,7 @@ pub(super) const AXES: usize = 3;
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Layout {
     pub sites: Vec<Site>,
-    /// Inputs of the error functions.
+    /// Inputs of the error functions, such as commands and loads.
     pub inputs: Inputs,
 }
 
@@ -108,7 +108,7 @@ pub(super) struct SiteFunctions {
 /// Inputs of the remainder: the commands of the moving joints, and conditions that vary.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Inputs {
-    /// Error functions at each site.
+    /// Error functions at each site (joint) of the remainder.
     pub sites: Vec<SiteFunctions>,
     pub sources: Vec<Source>,
     /// For each input, true if it is an angle. Distances between angles are chords, so that q and q
@@ -149,7 +149,7 @@ pub(super) struct Rows {
     /// Derivatives of the position with respect to each site's quantity, divided by the site's
     /// lever, shape = (sites, 3 rows).
     pub sites: DMatrix<f64>,
-    /// Standardised inputs, shape = (inputs, rows).
+    /// Standardised inputs (mean 0, spread 1 over the training rows), shape = (inputs, rows).
     pub inputs: DMatrix<f64>,
     /// Index of each row's configuration. Rows with the same session and the same commands share
     /// it.

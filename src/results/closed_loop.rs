@@ -298,14 +298,15 @@ impl LoopResult {
             && causes().all(is_named)
     }
 
-    /// Returns the test of the size of the residual against the declared σ, if it could be made.
+    /// Returns the test of the size of the residual against the declared σ, with its χ²/ν; `None`
+    /// if the test could not be made.
     fn size_test(&self) -> Option<(&ResidualTest, f64)> {
         let test = self.checks_after.iter().find(|test| test.check == "reduced-chi-squared")?;
         Some((test, test.statistic?))
     }
 
-    /// Returns the ratio of residual to declared σ, if only the size of the residual is significant
-    /// and no structure is detected in it.
+    /// Returns the ratio of the residual to the declared σ if only the size of the residual is
+    /// significant; `None` if other tests fail too, or if structure is located.
     pub(crate) fn size_alone(&self) -> Option<f64> {
         let (size, chi2) = self.size_test()?;
         let failed = self.checks_after.iter().filter(|test| test.structure && test.failed);
@@ -316,14 +317,16 @@ impl LoopResult {
         (is_alone && is_nowhere).then(|| chi2.sqrt())
     }
 
-    /// Returns the ratio of residual to declared σ, if it is significantly less than 1.
+    /// Returns the ratio of the residual to the declared σ if it is significantly less than 1;
+    /// `None` if it is not, or if no σ is declared.
     pub(crate) fn overstated_sigma(&self) -> Option<f64> {
         let (size, chi2) = self.size_test()?;
         let (low, _) = size.bounds?;
         (chi2 < low).then(|| chi2.max(0.0).sqrt())
     }
 
-    /// Returns the decrease of the mean held-out error, in the unit of its key: mm, ° or px.
+    /// Returns the decrease of the mean held-out error by the effects, in the unit of its key: mm,
+    /// ° or px; `None` if it is not known.
     pub(crate) fn gain(&self) -> Option<Gain> {
         self.held_out_gain_mm.or(self.held_out_gain_deg).or(self.held_out_gain_px)
     }

@@ -63,8 +63,8 @@ pub(super) fn resembled(effect: &Effect) -> Option<String> {
     Some(format!("as {} would", hint.cause))
 }
 
-/// Returns a formula with `#` for the number of `joint`, `*` for those of other joints, and without
-/// the time of a step.
+/// Returns the pattern of a formula, by which laws at different joints are compared: `#` stands for
+/// the number of `joint`, `*` for those of other joints, and the time of a step is left out.
 fn pattern(formula: &str, joint: Option<usize>) -> String {
     let of_law = joint.map(|joint| joint.to_string());
     let mut out = String::new();

@@ -131,8 +131,8 @@ impl ManyHarmonics {
         })
     }
 
-    /// Returns the joint of a coefficient and the number of its smaller harmonics, if there are
-    /// any.
+    /// Returns the joint of a harmonic coefficient (from 1) and the number of smaller harmonics of
+    /// the joint that are not listed; `None` for other parameters, or if all harmonics are listed.
     pub fn joint_of(&self, name: &str) -> Option<(usize, usize)> {
         let (joint, _) = self.coefficients.get(name)?;
         let (_, smaller) = self.largest.get(joint)?;

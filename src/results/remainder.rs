@@ -35,7 +35,8 @@ pub struct Remainder {
 }
 
 impl Remainder {
-    /// Summarises the remainder if one was accepted; `found` holds the errors without it.
+    /// Summarises the remainder that was accepted; `found` holds the errors without it. `None` if
+    /// none was accepted.
     pub(super) fn new(found: &Identification, fitted: &Fitted) -> Option<Self> {
         let remainder = fitted.remainder.as_ref()?;
         let joints = remainder.joints().into_iter();
@@ -74,7 +75,8 @@ impl BoundSummary {
     }
 }
 
-/// Returns the uncertainty of predictions without a remainder as JSON text.
+/// Returns the uncertainty of predictions without a remainder as JSON text; `None` if the text is
+/// not valid JSON.
 pub(super) fn prediction(fitted: &Fitted) -> Option<Box<RawValue>> {
     RawValue::from_string(fitted.alone.to_text().trim_end().to_owned()).ok()
 }

@@ -93,7 +93,7 @@ impl<'a> Data<'a> {
         Self { stop, ..self }
     }
 
-    /// Returns the identification rows.
+    /// Returns the indices of the identification rows in the table.
     pub fn rows(&self) -> &'a [usize] {
         &self.split.identification
     }

@@ -49,7 +49,7 @@ pub struct Detectable {
 pub struct Size {
     /// Names of the parameters, such as `joint-harmonic[3].sin1`.
     pub parameters: Vec<String>,
-    /// Unit of the parameters.
+    /// Unit of the effect's parameters.
     pub unit: Unit,
     /// Standard deviation (1 σ) of the catalogue's prior on the parameters, SI. Real effects are
     /// rarely much larger.

@@ -197,7 +197,7 @@ impl Fitted {
         self.problem.effects.iter().map(|declared| declared.effect.clone()).collect()
     }
 
-    /// Returns the poses of some rows.
+    /// Returns the poses of the table rows with the indices `rows`.
     pub fn poses<'a>(&self, data: &Data<'a>, rows: &[usize]) -> Vec<Pose<'a>> {
         let mut poses = Placement::of(data.measurements).poses(data.measurements, rows, self.sigma);
         if data.measurements.sigma.is_some() {

@@ -13,7 +13,7 @@ pub(super) const MIN_GEAR_ORDERS: usize = 12;
 /// Common prior of the harmonics of all joints: for each order, 1 σ of its coefficients about 0.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HarmonicPrior {
-    /// Orders, ascending, with σ \[rad\].
+    /// Orders of the harmonics, ascending, each with 1 σ of its coefficients \[rad\].
     pub by_order: Vec<(u32, f64)>,
 }
 

@@ -52,7 +52,7 @@ struct Reading {
     seen: Vector3<f64>,
     /// Value f(t) of the motion's time function at the reading; the motion is (d, ω) f(t).
     moved: f64,
-    /// Weight 1/σ² of a coordinate [1/m²].
+    /// Weight 1/σ² of a measured coordinate [1/m²].
     weight: f64,
 }
 

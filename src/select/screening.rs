@@ -37,7 +37,7 @@ pub struct Ranked {
 /// Result of `trace`: effects that the residual of the declared problem's fit points to.
 #[derive(Debug, Clone)]
 pub struct Trace {
-    /// Fit of the declared problem.
+    /// Fit of the declared problem to the identification rows.
     pub fit: Identification,
     /// Tests of the residual of that fit.
     pub residual_tests: ResidualTests,
@@ -56,7 +56,7 @@ pub struct Trace {
     /// Evidence for sets of hypotheses; `None` if only the ranking was requested, or the residual
     /// is not finite.
     pub evidence: Option<Evidence>,
-    /// Settings of the search.
+    /// Settings of the search for effects.
     pub rules: SelectionRules,
     /// True if times were measured; otherwise row numbers replace them.
     pub time_measured: bool,

@@ -14,7 +14,7 @@ use crate::problem::Effect;
 /// Pose whose measurement would distinguish two effects.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SeparatingPose {
-    /// Second of the two effects.
+    /// Second of the two effects that the pose distinguishes.
     pub other: Effect,
     /// Configuration within the measured ranges, shape = (joints) \[rad\] or \[m\].
     pub configuration: Vec<f64>,

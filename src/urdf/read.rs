@@ -15,7 +15,8 @@ use crate::problem::item::Document;
 use crate::quantity::rounded_right_angle;
 use crate::spatial::Frame;
 
-/// Largest deviation of a quaternion's norm from 1 that is taken for rounding of its numbers.
+/// Largest deviation of a quaternion's norm from 1 that is attributed to rounding of its
+/// components.
 const MAX_QUATERNION_NORM_ERROR: f64 = 1e-3;
 /// Largest deviation of an angle from a right angle that is taken for rounding of a quaternion with
 /// seven decimals \[rad\].

@@ -186,7 +186,8 @@ pub fn acceptance(
     })
 }
 
-/// Returns the repeatability RP = l̄ + 3 `S_l` of measured positions \[m\]  [ISO 9283, 7.2.2].
+/// Returns the repeatability RP = l̄ + 3 `S_l` of positions measured in one pose \[m\] \[ISO 9283,
+/// 7.2.2\]; `None` if there are fewer than [`MIN_CYCLES`].
 fn repeatability(positions: &[Vector3<f64>]) -> Option<f64> {
     let n = positions.len() as f64;
     if positions.len() < MIN_CYCLES {

@@ -10,7 +10,7 @@ use crate::problem::{JointSource, Problem};
 /// joint values.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct JointSources {
-    /// Source that the problem uses.
+    /// Source of the joint values that the problem uses.
     pub used: JointSource,
     /// Root mean square position error of the fit with commanded joint values \[m\].
     pub commanded: f64,
@@ -19,7 +19,7 @@ pub struct JointSources {
 }
 
 impl JointSources {
-    /// Returns the source that fits better.
+    /// Returns the source of joint values that leaves the smaller error.
     pub fn better(&self) -> JointSource {
         if self.read < self.commanded { JointSource::Read } else { JointSource::Commanded }
     }

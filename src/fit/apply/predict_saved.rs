@@ -83,7 +83,7 @@ pub enum PredictError {
         "{name} is not in the estimate, and its rows do not determine it; measure more poses there"
     )]
     Open {
-        /// Name of the parameter.
+        /// Name of the parameter that the rows do not determine.
         name: String,
     },
     /// There is no estimate, and the rows do not determine the pose of base or tool.
@@ -91,7 +91,7 @@ pub enum PredictError {
         "the rows do not determine {name}, and there is no estimate to take it from; measure more poses there"
     )]
     OpenWithoutEstimate {
-        /// Name of the parameter.
+        /// Name of the parameter that the rows do not determine.
         name: String,
     },
     /// Bases and tools of new sessions could not be fitted.

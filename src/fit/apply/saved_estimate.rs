@@ -32,7 +32,7 @@ pub struct SavedEstimate {
     pub changes: Changes,
     /// First key of the file that was changed since flexcal wrote it; `None` if nothing changed.
     pub changed_key: Option<String>,
-    /// True if the fit was trusted.
+    /// True if no check of the fit reported an error.
     pub trusted: bool,
     /// Standard deviation (1 σ) of a measured coordinate, estimated from the scatter of the fit
     /// \[m\]; `None` if the problem declares σ.
@@ -359,7 +359,8 @@ impl SavedEstimate {
         self.parameters.iter().find(|entry| entry.name == name).map(|entry| entry.nominal)
     }
 
-    /// Returns the symbol of the SI unit of a parameter.
+    /// Returns the symbol of the SI unit of a parameter; `None` if the file has no such parameter,
+    /// or no unit for it.
     pub(crate) fn unit_of(&self, name: &str) -> Option<&str> {
         self.parameters.iter().find(|entry| entry.name == name)?.unit.as_deref()
     }
@@ -374,8 +375,8 @@ impl SavedEstimate {
         &self.arm_parts
     }
 
-    /// Returns the first part of the declared arm, or the first free parameter of the arm, in which
-    /// two estimates differ.
+    /// Returns the name of the first part of the declared arm in which two estimates differ; `None`
+    /// if both are of the same declared arm.
     pub(crate) fn differing_part(&self, other: &Self) -> Option<String> {
         let (parts, others) = (&self.arm_parts, &other.arm_parts);
         let differs = |name: &&String| parts.get(*name) != others.get(*name);

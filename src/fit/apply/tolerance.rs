@@ -53,7 +53,7 @@ pub struct ToleranceTest {
     pub tolerance: Tolerance,
     /// Result of the test.
     pub verdict: Verdict,
-    /// Number of poses.
+    /// Number of tested poses.
     pub poses: usize,
     /// Number of tested poses with an error above the tolerance, or without a prediction.
     pub beyond: usize,

@@ -34,9 +34,9 @@ pub(in crate::fit) struct CheckedFit<'a> {
     pub registered_x: &'a DVector<f64>,
     /// Result of the fit: parameters and active bounds at its end.
     pub end: &'a FitEnd,
-    /// Errors of the registered nominal arm.
+    /// Errors of the registered nominal arm (base and target fitted where they are free).
     pub registered: &'a Errors,
-    /// Errors of the fitted arm.
+    /// Errors of the arm with all parameters fitted.
     pub fitted: &'a Errors,
     /// Identification rows whose residual is too long to be noise.
     pub outliers: &'a [Outlier],

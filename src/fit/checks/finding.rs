@@ -228,7 +228,7 @@ impl Finding {
         self.remedy = format!("the effects that the loop tried do not remove this, so {remedy}");
     }
 
-    /// Returns the severity of the finding.
+    /// Returns the severity of the finding, which its code determines.
     pub const fn severity(&self) -> Severity {
         self.code.entry().severity
     }

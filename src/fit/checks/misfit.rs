@@ -90,9 +90,10 @@ fn misfit_finding(kind: &RowKind, rms: f64) -> Option<Finding> {
     Some(Finding::new(FindingCode::MissesMeasurements, numbers, text).with_remedy(remedy))
 }
 
-/// Reports a fit that predicts rows other than positions no better than the nominal arm; `before`
-/// and `after` are the errors of nominal and fitted arm. The spread of such rows may carry no
-/// information.
+/// Returns the finding that a fit predicts rows other than positions no better than the nominal
+/// arm; `before` and `after` are the errors of the nominal and the fitted arm. `None` for
+/// positions, or if the fit improves on the nominal arm or misses by little. The spread of such
+/// rows may carry no information.
 fn no_better_finding(kind: &RowKind, before: f64, after: f64) -> Option<Finding> {
     let RowKind { observation, declared_sigma, .. } = *kind;
     let is_far = declared_sigma.is_some_and(|sigma| after > MIN_REPORTED_ERROR * sigma);
@@ -111,8 +112,9 @@ fn no_better_finding(kind: &RowKind, before: f64, after: f64) -> Option<Finding>
     Some(Finding::new(FindingCode::NoBetterThanNominal, numbers, text).with_remedy(remedy))
 }
 
-/// Reports measured points whose spread `measured` \[m\] differs much from the spread `expected`
-/// \[m\] of the nominal arm's points. They belong to an arm of another size.
+/// Returns the finding that the spread `measured` \[m\] of the measured points differs much from
+/// the spread `expected` \[m\] of the points that the nominal arm predicts: they belong to an arm
+/// of another size. `None` if the two are alike.
 fn other_size_finding(measured: f64, expected: f64) -> Option<Finding> {
     let is_same = (expected / MAX_SIZE_RATIO..=expected * MAX_SIZE_RATIO).contains(&measured);
     let text = format!(

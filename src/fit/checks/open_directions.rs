@@ -227,7 +227,7 @@ struct Found<'a> {
     /// Orthonormal rows that span the null space.
     null: DMatrix<f64>,
     names: &'a [&'a str],
-    /// Orthonormal directions that are named already.
+    /// Orthonormal directions, in the space of the unknowns, that earlier calls have accounted for.
     accounted: Vec<RowDVector<f64>>,
 }
 

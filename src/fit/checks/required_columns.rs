@@ -19,7 +19,7 @@ pub fn check_columns(problem: &Problem, rows: &Measurements) -> Result<(), Input
 const MAX_FORMULA: f64 = 1e30;
 
 /// Returns the error of the first declared law with a formula that has no value in a row, or one
-/// beyond [`MAX_FORMULA`]; `None` if there is none.
+/// beyond [`MAX_FORMULA`]; `None` if every formula has a value in every row.
 fn not_finite(problem: &Problem, rows: &Measurements) -> Option<InputError> {
     let starts = rows.session_starts();
     problem.effects.iter().find_map(|EffectDeclaration { effect, location }| {

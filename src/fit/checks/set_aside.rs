@@ -31,8 +31,8 @@ pub(crate) struct Selection {
     pub p_value: f64,
 }
 
-/// Returns the quantity that decides which of `rows` are outliers; `None` if there are few or
-/// chance explains them.
+/// Returns the quantity that decides which of `rows` are outliers; `None` if there are few
+/// outliers, or if chance explains them.
 pub(crate) fn selection(
     table: &Measurements,
     rows: &[usize],

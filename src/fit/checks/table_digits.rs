@@ -105,7 +105,7 @@ fn revolute_joints<'f>(fit: &'f CheckedFit) -> impl Iterator<Item = usize> + 'f 
 }
 
 /// Returns the largest trial step \[rad\] of which all commands of a joint are multiples; `None` if
-/// there is none, or too few different commands.
+/// they are multiples of no trial step, or if too few commands differ.
 fn step(fit: &CheckedFit, rows: &[usize], joint: usize) -> Option<f64> {
     let measurements = fit.fitting.measurements;
     let command = |&row: &usize| measurements.configurations[row * measurements.joints + joint];

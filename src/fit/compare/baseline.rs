@@ -16,7 +16,7 @@ use crate::problem::{Joint, Problem};
 pub struct Baseline {
     /// Form of the equations: as printed, or with the misprints corrected.
     pub form: Form,
-    /// Source of the stiffness.
+    /// Stage of the procedure that supplies the stiffness.
     pub stage: StiffnessStage,
     /// Table 2 of the paper: α, a, θ, d, β of each joint.
     pub geometry: Vec<[TableEntry; 5]>,

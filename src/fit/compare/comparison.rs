@@ -47,7 +47,7 @@ pub struct Before {
     pub registered: bool,
 }
 
-/// Options of a comparison.
+/// Settings of a comparison of strategies and solvers on one problem.
 #[derive(Clone, Default)]
 pub struct CompareOptions {
     /// True to run the paper's procedure. It always runs if the problem declares the paper's arm.

@@ -22,7 +22,7 @@ struct View {
     marker: usize,
     /// Frame of the camera's carrier in the frame of the marker's carrier.
     carrier: Isometry3<f64>,
-    /// Marker in the camera's frame.
+    /// Pose of the marker in the camera's frame, translation \[m\].
     marker_in_camera: Isometry3<f64>,
 }
 

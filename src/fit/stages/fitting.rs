@@ -68,7 +68,7 @@ pub(in crate::fit) struct Fitting<'a> {
     pub noise_model: NoiseModel,
     /// Noise model of orientations.
     pub turn_noise_model: NoiseModel,
-    /// Linearisations that the fits share.
+    /// Cache of linearisations, shared by the fits of one problem.
     pub cache: &'a LinearisationCache,
     /// Jacobian at the optimum of an earlier fit, reused if this fit starts there.
     pub linear_model: Option<&'a LinearModel>,
@@ -222,7 +222,8 @@ impl<'a> Fitting<'a> {
     }
 
     /// Returns an error about the first row that the nominal arm cannot predict, because its pose
-    /// has no equilibrium or a point is behind its camera. `None` if there is none.
+    /// has no equilibrium or a point is behind its camera. `None` if the nominal arm predicts every
+    /// row.
     pub fn unpredictable(&self) -> Option<InputError> {
         let is_of_camera = |row: &usize| {
             let kind = self.measurements.observation(*row).description();

@@ -168,7 +168,7 @@ fn principal(contacts: &[(Vector3<f64>, f64)], centre: &Vector3<f64>) -> [(Vecto
     order.map(|k| (eigen.eigenvectors.column(k).into_owned(), eigen.eigenvalues[k]))
 }
 
-/// Returns the least-squares solution u of rows (a, b) of a·u = b.
+/// Returns the least-squares solution u of rows (a, b) of a·u = b; `None` if there are no rows.
 fn least_squares(rows: &[(Vec<f64>, f64)]) -> Option<DVector<f64>> {
     let n = rows.first()?.0.len();
     let matrix = DMatrix::from_fn(rows.len(), n, |i, j| rows[i].0[j]);

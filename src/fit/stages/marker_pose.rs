@@ -27,8 +27,10 @@ pub(super) fn marker_in_camera(
     refined(start, &places, &slopes)
 }
 
-/// Returns the pose by the direct linear transform. In the principal axes of the points, it solves
-/// for the columns of (r₁ r₂ t), or (r₁ r₂ r₃ t) for points in space, up to scale.
+/// Returns the pose of a marker in the camera's frame by the direct linear transform, from its
+/// points `places` \[m\], marker frame, and their image slopes. In the principal axes of the
+/// points, it solves for the columns of (r₁ r₂ t), or (r₁ r₂ r₃ t) for points in space, up to
+/// scale. `None` if the points are too few or lie on a line.
 fn linear_pose(places: &[Vector3<f64>], slopes: &[[f64; 2]]) -> Option<Isometry3<f64>> {
     let middle = places.iter().sum::<Vector3<f64>>() / places.len() as f64;
     let spread: Matrix3<f64> =

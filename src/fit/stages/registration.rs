@@ -72,8 +72,8 @@ pub fn register(model: &Model, poses: &[Pose], x: &mut DVector<f64>) {
     turn_targets(model, &oriented, x, turns);
 }
 
-/// Returns the three axes of the measured orientation of a pose, measuring frame; `None` if none
-/// was measured.
+/// Returns the three axes of the measured orientation of a pose, measuring frame; `None` if the row
+/// has no orientation.
 fn axes(pose: &Pose) -> Option<[Vector3<f64>; 3]> {
     pose.orientation?.axes()
 }

@@ -49,7 +49,8 @@ impl SolverChoice {
     /// Names of the choices.
     pub(crate) const NAMES: &[&'static str] = Self::WORDS.split_at(Self::CHOICES.len()).0;
 
-    /// Returns the method by which the solver keeps bounds; `None` if it cannot.
+    /// Returns the method by which the solver keeps bounds; `None` if the solver cannot keep
+    /// bounds.
     #[doc(hidden)]
     pub fn within(self) -> Option<BoundMethod> {
         match self {

@@ -60,7 +60,7 @@ pub(in crate::fit) struct Stage<'a> {
     pub declared: Vec<f64>,
     /// Declared 1 σ of the orientations, where these are fitted \[rad\].
     pub declared_turn: Option<f64>,
-    /// Indices of the parameters that vary.
+    /// Indices, among all parameters of the model, of those that the stage varies.
     pub unknowns: Vec<usize>,
     pub solver: SolverChoice,
     /// Solver of the caller, required by [`SolverChoice::Custom`].
@@ -78,13 +78,13 @@ pub(in crate::fit) struct Stage<'a> {
     /// Jacobian at the optimum of an earlier fit of the identification rows, reused if this stage
     /// starts there.
     pub linear_model: Option<&'a LinearModel>,
-    /// Earlier data that join the fit.
+    /// Earlier data that join the rows of the fit; `None` without an earlier estimate.
     pub earlier: Option<&'a EarlierData>,
     pub progress: Option<&'a ProgressSink>,
     pub stop: Option<&'a Stop>,
 }
 
-/// Result of a stage.
+/// Result of one least-squares fit (stage).
 pub(in crate::fit) struct StageEnd {
     /// Full parameter vector at the end of the stage.
     pub x: DVector<f64>,
@@ -121,7 +121,7 @@ impl<'a> Stage<'a> {
         }
     }
 
-    /// Returns the parameters that vary.
+    /// Returns the parameters that the stage varies.
     pub fn parameters(&self) -> impl Iterator<Item = &'a Parameter> + '_ {
         self.unknowns.iter().map(|&k| &self.model.parameters[k])
     }
@@ -228,7 +228,8 @@ impl<'a> Stage<'a> {
         }
     }
 
-    /// Returns, for each unknown, its plausible deviation if it has no prior, else `None`.
+    /// Returns, for each unknown without a prior, its plausible deviation in SI; `None` for
+    /// unknowns with a prior.
     fn sizes(&self) -> Vec<Option<f64>> {
         self.parameters().map(|parameter| plausible(self.model, parameter)).collect()
     }

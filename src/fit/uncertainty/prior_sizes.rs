@@ -148,7 +148,9 @@ impl GeometryLikelihood {
         Some((covariance, mean, -half))
     }
 
-    /// Returns the logarithm of the evidence, up to a constant.
+    /// Returns the logarithm of the evidence for priors whose σ are multiplied by `factors`, one
+    /// for each of the groups, up to a constant; `None` if the normal matrix is not positive
+    /// definite.
     fn evidence(&self, groups: &[Group], factors: &[f64]) -> Option<f64> {
         let (_, mean, half) = self.posterior(groups, factors)?;
         let priors: f64 = groups

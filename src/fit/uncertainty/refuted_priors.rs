@@ -35,10 +35,10 @@ const MAX_UNKNOWNS: usize = 150;
 /// Precision of unknowns without a prior, relative to that of the data.
 const FLAT_PRIOR_PRECISION: f64 = 1e-12;
 
-/// Rule whose σ the data refute.
+/// Rule of `[parameters]` whose declared σ the data refute.
 #[derive(Debug, Clone, PartialEq)]
 pub(in crate::fit) struct RefutedPrior {
-    /// Pattern of the rule.
+    /// Pattern of the rule, as in the problem file.
     pub rule: String,
     /// Factor by which the declared σ of the rule is too small.
     pub factor: f64,
@@ -159,7 +159,8 @@ impl Evidence {
     }
 
     /// Returns the noise variance with the largest evidence for priors with these σ. The variance
-    /// is relative to the declared one, and at least 1.
+    /// is relative to the declared one, and at least 1. `None` if no trial variance has an
+    /// evidence.
     fn best(&self, sigmas: &[Option<f64>]) -> Option<Best> {
         let step = self.max_variance.ln() / f64::from(TRIAL_VARIANCES - 1);
         let variances = (0..TRIAL_VARIANCES).map(|k| (f64::from(k) * step).exp());

@@ -15,7 +15,8 @@ use crate::numeric::median;
 const FALSE_ALARM_PROBABILITY: f64 = 0.01;
 
 /// Returns two lengths \[σ\] for residuals of `coordinates` coordinates: the median √χ², and the
-/// one that any of `count` residuals exceeds with probability 0.01 \[Bonferroni\].
+/// one that any of `count` residuals exceeds with probability 0.01 \[Bonferroni\]. `None` if
+/// `coordinates` is 0.
 pub(in crate::fit) fn chance(count: usize, coordinates: usize) -> Option<(f64, f64)> {
     let squares = ChiSquared::new(coordinates as f64).ok()?;
     Some((
@@ -59,7 +60,7 @@ pub(crate) enum TypicalScatter {
     Declared(f64),
 }
 
-/// Lengths of the whitened residuals of some poses, and their outlier limits.
+/// Declared σ of a coordinate, because it exceeds the median scatter of the residuals.
 #[derive(Debug, Clone)]
 pub(in crate::fit) struct Lengths {
     /// Length ‖r‖ of the residual of each pose, in units of the declared σ.

@@ -20,7 +20,7 @@ const MAX_UNIDENTIFIABLE_SHARE: f64 = 1e-3;
 /// Statistics of the unknowns of a fit.
 #[derive(Debug, Clone)]
 pub(in crate::fit) struct Statistics {
-    /// Standard error of each unknown.
+    /// Standard error of each unknown, in its SI unit.
     pub errors: Vec<f64>,
     /// True if data and priors determine each unknown: it rests on no bound and takes part in no
     /// unidentifiable combination.
@@ -220,8 +220,8 @@ fn sandwich(
     uncertainty
 }
 
-/// Returns the interval in which χ² / ν of pure noise lies with probability 0.999, with ν =
-/// `freedom`.
+/// Returns the interval in which χ²/ν of pure noise lies with probability 0.999, with ν =
+/// `freedom`; `None` if ν is at most 0.5.
 fn noise_interval(freedom: f64) -> Option<(f64, f64)> {
     let distribution = ChiSquared::new(freedom).ok().filter(|_| freedom > 0.5)?;
     let bound = |p: f64| distribution.inverse_cdf(p) / freedom;

@@ -19,7 +19,7 @@ const MAX_DEPTH: usize = 60;
 pub struct Parsed {
     /// Parsed expression.
     pub expression: Expression,
-    /// Unit of the expression.
+    /// Physical dimension of the expression.
     pub dimension: Dimension,
 }
 

@@ -66,11 +66,11 @@ pub(super) const NO_LOADS: &str = "no gravity, so no loads";
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[expect(clippy::struct_excessive_bools, reason = "each says whether a column is there")]
 pub struct Columns {
-    /// True if temperatures are present.
+    /// True if the table has temperatures.
     pub temperature: bool,
     /// True if directions of approach are present.
     pub approach: bool,
-    /// True if times are present.
+    /// True if the table has times.
     pub time: bool,
     /// True if all covariates of the problem are present.
     pub covariates: bool,

@@ -56,7 +56,7 @@ impl Slope {
         Self { terms }
     }
 
-    /// Returns the value in a pose.
+    /// Returns the value of the derivative in a pose.
     pub(super) fn value(&self, setup: &PoseView) -> f64 {
         let slope = |(c, formula, variable): &(f64, Arc<Formula>, Variable)| {
             c * match variable {
@@ -170,7 +170,7 @@ impl Formula {
         self.moments.is_some()
     }
 
-    /// Returns the formula with the moments of other loads.
+    /// Returns the formula with its axis moments replaced by `moments`, those of other loads.
     pub(super) fn with_moments(&self, moments: Arc<AxisMoments<f64>>) -> Self {
         Self { moments: Some(moments), ..self.clone() }
     }

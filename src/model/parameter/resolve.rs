@@ -162,7 +162,8 @@ pub fn resolve(
     Ok(parameters)
 }
 
-/// Returns the rule of `problem` that decides on a parameter of an effect, declared or not.
+/// Returns the last rule in `[parameters]` whose pattern and unit match a parameter of an effect,
+/// declared or not; `None` if none matches.
 pub fn rule_of<'a>(problem: &'a Problem, parameter: &EffectParameter) -> Option<&'a ParameterRule> {
     problem
         .parameters

@@ -236,7 +236,8 @@ impl Block {
         self.normal.product()
     }
 
-    /// Returns the projected columns if they are stored as a full matrix.
+    /// Returns the projected columns if they are stored as a full matrix; `None` if they are stored
+    /// as groups.
     pub fn dense(&self) -> Option<&DMatrix<f64>> {
         if let Columns::Dense(columns) = &self.columns { Some(columns) } else { None }
     }

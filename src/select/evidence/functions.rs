@@ -71,7 +71,7 @@ impl Shape {
 /// Covariate with its value in every pose.
 pub(super) struct SampledCovariate {
     pub covariate: Covariate,
-    /// Values in every pose.
+    /// Value of the covariate in every pose, SI.
     pub values: Vec<f64>,
     /// Values scaled so that the range is 0 to 1; values outside are clamped to the nearer end.
     pub scaled: Vec<f64>,
@@ -94,8 +94,9 @@ impl SampledCovariate {
         }
     }
 
-    /// Returns true if an error may grow in proportion to this quantity. It must be a temperature,
-    /// load or declared covariate, and vary at least by half its largest distance from zero.
+    /// Returns true if an error may grow in proportion to this covariate. The covariate must be a
+    /// temperature, a load or a declared one, and vary at least by half its largest distance from
+    /// zero. `reference` is the reference temperature \[°C\].
     pub(super) fn is_size(&self, reference: Option<f64>) -> bool {
         use Covariate::{Declared, Hoist, Payload, Temperature};
         let (low, high) = self.range;
@@ -104,8 +105,8 @@ impl SampledCovariate {
             && self.zero(reference).is_none_or(varies)
     }
 
-    /// Creates a covariate from its values; `None` if it does not vary over the first `weighed`
-    /// poses.
+    /// Creates a covariate from its values in every pose; `None` if it does not vary over the first
+    /// `weighed` poses, which count for the evidence.
     pub fn new(covariate: Covariate, values: Vec<f64>, weighed: usize) -> Option<Self> {
         let low = values[..weighed].iter().copied().fold(f64::INFINITY, f64::min);
         let high = values[..weighed].iter().copied().fold(f64::NEG_INFINITY, f64::max);
@@ -121,7 +122,8 @@ impl SampledCovariate {
         Some(Self { covariate, values, scaled, range: (low, high), levels, cosines })
     }
 
-    /// Returns the cosines of the basis, which hypotheses at all sites share.
+    /// Returns the cosine functions of the scaled covariate at every pose: the basis of smooth
+    /// functions, which the hypotheses at all sites share. Shape = (poses, functions).
     fn cosines(&self) -> &DMatrix<f64> {
         self.cosines.get_or_init(|| {
             let count = SMOOTH_LENGTHS.map(|length| weights(length).len()).into_iter().max();

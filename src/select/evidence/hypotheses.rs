@@ -218,7 +218,8 @@ impl<'a> Hypotheses<'a> {
         shapes.iter().filter_map(candidate_of_shape).collect()
     }
 
-    /// Returns the values of a covariate in every pose; `None` if it does not vary.
+    /// Returns the values of a covariate in every pose; `None` if the table does not record it, or
+    /// if it does not vary.
     pub(super) fn known(&self, covariate: &Covariate) -> Option<&SampledCovariate> {
         self.covariates.iter().find(|known| known.covariate == *covariate)
     }

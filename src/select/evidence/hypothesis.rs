@@ -166,7 +166,8 @@ impl Hypothesis {
         matches!(self.kind, HypothesisKind::Limit(_))
     }
 
-    /// Returns the joint, from 0, if the hypothesis is a periodic error of many orders.
+    /// Returns the joint, from 0, if the hypothesis is a periodic error of many orders; `None` for
+    /// other hypotheses.
     pub(super) fn gear_joint(&self) -> Option<usize> {
         match (&self.kind, self.site) {
             (HypothesisKind::Gear(_), Site::Joint(joint)) => Some(joint),

@@ -72,7 +72,7 @@ impl Noise {
 pub(super) struct NoiseGrid {
     /// For each f, ln(prior(f) f^−ν) and 1 / (2 f²).
     terms: Vec<(f64, f64)>,
-    /// Degrees of freedom ν.
+    /// Degrees of freedom ν of the residual.
     freedom: f64,
     /// Largest difference of ln prior(f) on the grid.
     prior_range: f64,

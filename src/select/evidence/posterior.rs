@@ -37,7 +37,7 @@ pub(in crate::select) fn odds_against(probability: f64) -> f64 {
 }
 
 impl Evidence {
-    /// Returns the most probable set.
+    /// Returns the hypotheses of the most probable set; empty if noise alone is most probable.
     pub fn best(&self) -> &[Hypothesis] {
         self.sets.first().map_or(&[], |best| &best.hypotheses)
     }
@@ -59,7 +59,7 @@ impl Evidence {
     }
 
     /// Returns the most probable set whose number of members is certain enough: at least so many
-    /// hypotheses act with probability `level` or more. `None` if there is none.
+    /// hypotheses act with probability `level` or more. `None` if no set is certain enough.
     pub fn certain_set(&self, level: f64) -> Option<&HypothesisSet> {
         self.sets.iter().find(|explanation| self.probability_of_as_many(explanation) >= level)
     }

@@ -157,8 +157,9 @@ impl<'a> Products<'a> {
         self.cache.settled.get_or_compute(&sized_set(members, sizes), settle)
     }
 
-    /// Returns the residual problem that a set with given sizes leaves; `None` if its matrix has no
-    /// factor.
+    /// Returns the problem that remains once the hypotheses `members` are fitted with the prior
+    /// standard deviations `sizes` of their coefficients; `None` if the Cholesky factorisation
+    /// fails.
     pub fn reduced(&self, members: &[usize], sizes: &[f64]) -> Option<ReducedProblem<'_, 'a>> {
         let mut scales = Vec::new();
         let mut begins = Vec::new();
@@ -220,7 +221,7 @@ pub(super) struct ReducedProblem<'p, 'a> {
     /// Logarithm of the density of the residual that remains after the set is fitted, without the
     /// term in det L.
     without: f64,
-    /// Log determinant of L.
+    /// Logarithm of the determinant of the Cholesky factor L.
     ln_determinant: f64,
     /// Matrix Z, computed when columns of other hypotheses are first needed.
     reach: OnceLock<DMatrix<f64>>,

@@ -81,7 +81,8 @@ impl<'a> Reevaluation<'a> {
         blocks(self.fitted, self.data, self.hypotheses, &self.probable_candidates(), left_out)
     }
 
-    /// Returns the evidence about the probable hypotheses, evaluated without the poses `left_out`.
+    /// Returns the evidence about the probable hypotheses, evaluated without the poses `left_out`;
+    /// `None` if these poses cannot be left out of the linear model.
     fn without(&self, left_out: &[usize]) -> Option<Evidence> {
         let (blocks, target) = self.blocks(left_out)?;
         let present = self.members(|known| known.effect().is_some());
@@ -95,8 +96,9 @@ impl<'a> Reevaluation<'a> {
         Some(Evidence { sets: sets.collect(), stand_ins: Vec::new(), left_out: left_out.to_vec() })
     }
 
-    /// Returns the pose whose squared residual decreases most when `effect` is added to all other
-    /// members of the best set.
+    /// Returns the index of the pose whose squared residual decreases most when `effect` is added
+    /// to all other members of the best set; `None` if the set cannot be evaluated without the
+    /// poses `left_out`.
     fn single_influential_pose(&self, effect: &Effect, left_out: &[usize]) -> Option<usize> {
         let (blocks, target) = self.blocks(left_out)?;
         let products = Products::new(&blocks, &target);

@@ -66,8 +66,10 @@ impl Columns<'_, '_> {
         }
     }
 
-    /// Returns the lever of a joint times the moments about it, shape = (3 N, functions); `None` if
-    /// gravity exerts no moment about it.
+    /// Returns the displacements of the points by a compliance of the joint: the derivative of each
+    /// position by the joint angle (`lever`) times each moment function about its axis. Linearly
+    /// dependent functions are dropped. Shape = (3 N, functions); `None` if gravity exerts no
+    /// moment about the joint.
     fn sag_columns(&self, joint: usize, lever: &DVector<f64>) -> Option<DMatrix<f64>> {
         let moments = moments(
             self.problem,

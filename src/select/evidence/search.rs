@@ -89,7 +89,8 @@ impl Set {
         self
     }
 
-    /// Returns the converged sizes of the members and ln of the posterior at them.
+    /// Returns the converged sizes (prior σ of the coefficients) of the members and ln of the
+    /// posterior at them; `None` if a Cholesky factorisation fails.
     fn converged_sizes(&self, products: &Products) -> Option<(Vec<f64>, f64)> {
         let (members, mut sizes) = (&self.members, self.sizes.clone());
         let mut all = products.reduced(members, &sizes)?;
@@ -355,7 +356,7 @@ fn members_and_pairs(members: &[usize]) -> Vec<Vec<usize>> {
     single.chain(pairs).collect()
 }
 
-/// Returns ln p(r | all blocks together) plus ln of their prior.
+/// Returns ln p(r | all blocks together) plus ln of their prior; `None` if a factorisation fails.
 pub(super) fn ln_posterior(products: &Products) -> Option<f64> {
     let all: Vec<usize> = (0..products.blocks.len()).collect();
     Some(assembled(&all, products)?.ln_posterior + products.over_noise(products.squares))
@@ -384,8 +385,8 @@ pub(super) fn gains_beside(
     tried.iter().zip(left.gains(tried)).map(gain).collect()
 }
 
-/// Creates a set from these members. The size of each is the most probable one when it is added to
-/// the earlier members.
+/// Creates a set from the hypotheses `members`. The size of each is the most probable one when it
+/// is added to the earlier members. `None` if a Cholesky factorisation fails.
 fn assembled(members: &[usize], products: &Products) -> Option<Set> {
     let mut set = Set { members: Vec::new(), sizes: Vec::new(), ln_posterior: 0.0 };
     for &member in members {

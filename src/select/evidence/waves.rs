@@ -180,7 +180,8 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
         numbers.iter().zip(effects).filter_map(ln_width).collect()
     }
 
-    /// Returns the residual problem that the hypotheses `members` leave.
+    /// Returns the problem that remains once the hypotheses `members` are fitted; `None` if a
+    /// Cholesky factorisation fails.
     fn reduced_by_set(&self, members: &[usize]) -> Option<ReducedProblem<'w, 'a>> {
         reduced_by(members, self.products)
     }
@@ -351,7 +352,8 @@ fn rounded_order(order: f64, digits: usize) -> f64 {
 }
 
 impl Hypotheses<'_> {
-    /// Returns the candidate for an effect that is a wave of its joint's command, with its columns.
+    /// Returns the candidate for an effect that is a wave of its joint's command, with its columns;
+    /// `None` if the effect is no such wave, or the command does not vary.
     fn function_of(&self, effect: &Effect, problem: &Problem) -> Option<Candidate> {
         let (joint, order) = match effect {
             Effect::JointHarmonic { joint, orders } => (joint - 1, f64::from(*orders.first()?)),

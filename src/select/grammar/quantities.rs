@@ -19,7 +19,8 @@ pub struct Quantities {
     pub sides: Vec<(usize, Vec<f64>)>,
     /// Joints with the moments of the loads about their axes [N·m].
     pub moments: Vec<(usize, Vec<f64>)>,
-    /// Temperature above the reference \[K\].
+    /// Temperature above the reference temperature in each pose \[K\]; `None` if no temperature or
+    /// no reference is known.
     pub warming: Option<Vec<f64>>,
     /// Time constant \[s\] and lagged temperature above the reference \[K\].
     pub lag: Option<(f64, Vec<f64>)>,

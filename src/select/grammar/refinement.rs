@@ -52,7 +52,8 @@ impl Refiner<'_> {
         }
     }
 
-    /// Returns the best values of the inner parameters of a sum, or `None` if it has none.
+    /// Returns the best values of the inner parameters (such as time constants) of a sum of terms;
+    /// `None` if the sum has no inner parameter.
     pub fn values(&self, sum: &Sum) -> Option<Vec<Vec<f64>>> {
         let has_inner = |&k: &u16| self.terms.factors[usize::from(k)].inner.is_some();
         if !sum.iter().flatten().any(has_inner) {

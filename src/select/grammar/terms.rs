@@ -489,7 +489,7 @@ fn column(matrix: &DMatrix<f64>, k: usize) -> &[f64] {
 }
 
 /// Returns the products of the factors' columns: one column for each choice of one column from
-/// every factor.
+/// every factor; `None` if there are no factors.
 pub fn product<'a>(factors: impl Iterator<Item = &'a [DVector<f64>]>) -> Option<Vec<DVector<f64>>> {
     factors.map(<[DVector<f64>]>::to_vec).reduce(|left, right| {
         left.iter()

@@ -39,7 +39,7 @@ impl PartSquares {
     }
 
     /// Returns the values of the unknowns fitted to all parts, and their variances; priors are as
-    /// in [`Self::left_out`].
+    /// in [`Self::left_out`]. `None` if the normal matrix is not positive definite.
     pub fn posterior(&self, priors: &[(f64, Option<f64>)]) -> Option<(DVector<f64>, DVector<f64>)> {
         let (normal, pull) = self.normal_of_all(priors);
         let root = inverse_factor(&normal)?;
@@ -51,8 +51,8 @@ impl PartSquares {
         Some((x, DVector::from_iterator(root.ncols(), variances)))
     }
 
-    /// Returns −2 ln p(r) of all parts for noise of variance φ, up to a constant. Priors are as in
-    /// [`Self::left_out`], with 1 σ divided by √φ.
+    /// Returns −2 ln p(r) of all parts for noise of variance φ, up to a constant; `None` if it is
+    /// not finite. Priors are as in [`Self::left_out`], with 1 σ divided by √φ.
     ///
     /// With W = diag(1/σ²), G = JᵀJ + W, g = Jᵀr + W x₀ and x₀ the present values, it is ln det G −
     /// Σ ln (1/σ²) + (x₀ᵀW x₀ − gᵀG⁻¹g)/φ.

@@ -348,8 +348,8 @@ impl LinearNeighbourhood {
         cosines.iter().copied().reduce(f64::min).map(|cosine| cosine.clamp(0.0, 1.0).acos())
     }
 
-    /// Returns the sum of squared residuals of poses that are left out, block by block, predicted
-    /// by the fit without them.
+    /// Returns the sum of squared whitened residuals of poses that are left out, block by block,
+    /// predicted by the fit without them; `None` if it is not finite.
     ///
     /// `block` holds the block of each pose. A left-out residual is (I − H_bb)⁻¹ r_b, by Woodbury's
     /// identity r_b + Q_b (I − Q_bᵀQ_b)⁻¹ Q_bᵀ r_b. Along a direction that the block alone
@@ -358,8 +358,8 @@ impl LinearNeighbourhood {
         self.left_out_squares(block).map(|sums| sums.iter().sum())
     }
 
-    /// Returns the sum of squared left-out residuals for each block; see
-    /// [`cross_validate`](Self::cross_validate).
+    /// Returns the sum of squared left-out residuals for each block, as in
+    /// [`cross_validate`](Self::cross_validate); `None` if a sum is not finite.
     pub fn left_out_squares(&self, block: &[usize]) -> Option<Vec<f64>> {
         let blocks = block.iter().max().map_or(0, |last| last + 1);
         let n = self.basis.ncols();

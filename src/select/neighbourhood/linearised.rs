@@ -222,7 +222,8 @@ impl<'a> Linearised<'a> {
         (Arc::unwrap_or_clone(fitted), Arc::unwrap_or_clone(residual))
     }
 
-    /// Returns the prior σ of the relaxed parameters, in the order of their columns.
+    /// Returns the prior σ of the relaxed parameters, in the order of their columns; `None` for a
+    /// parameter without a prior.
     pub fn relaxed(&self) -> &[Option<f64>] {
         &self.derivatives.relaxed
     }

@@ -11,7 +11,7 @@ use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
 pub(crate) struct Score {
     /// Gram matrix C̃ᵀC̃ of the projected columns.
     pub gram: DMatrix<f64>,
-    /// Product C̃ᵀr with the residual.
+    /// Product C̃ᵀr of the projected columns with the residual.
     pub product: DVector<f64>,
     /// Squared length ‖C‖² of each column before the projection.
     pub lengths: Vec<f64>,
@@ -24,7 +24,7 @@ pub(crate) struct Sums {
     pub squares: f64,
     /// Sum of squared whitened residuals of the data alone.
     data_squares: f64,
-    /// Degrees of freedom of the data.
+    /// Degrees of freedom of the residuals of the data.
     pub data_freedom: f64,
 }
 

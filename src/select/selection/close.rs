@@ -30,7 +30,7 @@ use crate::select::unexplained::{self, Unexplained};
 /// Result of the loop, from the declared to the extended problem.
 #[derive(Debug, Clone)]
 pub struct ClosedLoop {
-    /// Outcome of the loop.
+    /// Verdict of the search: explained, unexplained, or nothing found.
     pub verdict: Verdict,
     /// True if the loop was stopped before the search ended, so that there may be more effects.
     pub interrupted: bool,
@@ -59,7 +59,7 @@ pub struct ClosedLoop {
     pub gain: Interval,
     /// Identification rows with gross errors, which were excluded from the choice of effects.
     pub set_aside: Vec<Location>,
-    /// Settings of the search.
+    /// Settings with which the search ran.
     pub rules: SelectionRules,
 }
 

@@ -29,14 +29,14 @@ const MIN_SEVERAL_ORDERS: usize = 3;
 pub struct Found {
     /// Effect that was added to the model.
     pub effect: Effect,
-    /// Strongest claim about the effect.
+    /// Strongest claim about the effect that the data allow.
     pub status: Status,
     /// Claims with their probabilities; `None` if no evidence about the effect was evaluated, or no
     /// probable set contains it.
     pub claims: Option<Claims>,
     /// Probability that chance alone gains as much, corrected for the candidates tried.
     pub p_value: f64,
-    /// Estimates of the effect's parameters.
+    /// Estimates of the effect's parameters, fitted together with all others.
     pub estimates: Vec<Estimate>,
     /// Effects that the data cannot distinguish from the found one, best first, each with the
     /// probability that it acts instead.
@@ -200,7 +200,8 @@ fn p_values(state: &SearchState, fitted: &Fitted, effects: &[Effect]) -> Vec<f64
 }
 
 /// Returns the claims about an effect. For a harmonic of few orders they are those of the least
-/// probable order, for one of several orders those of the most probable one.
+/// probable order, for one of several orders those of the most probable one. `None` if the evidence
+/// does not contain the effect.
 fn claims(evidence: &Evidence, effect: &Effect) -> Option<Claims> {
     let parts = effect.parts();
     let claims =

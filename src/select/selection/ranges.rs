@@ -27,8 +27,8 @@ pub(super) fn ranges(
     depends_on.into_iter().filter_map(range).collect()
 }
 
-/// Returns the value of a covariate in a pose; `None` if it is not recorded. `names` are those of
-/// the declared covariates.
+/// Returns the value of a covariate in a pose; `None` if the table does not record it. `names` are
+/// those of the declared covariates.
 fn value(covariate: &Covariate, setup: &PoseView, names: &[String]) -> Option<f64> {
     match covariate {
         Covariate::Command(joint) => setup.configuration.get(*joint).copied(),

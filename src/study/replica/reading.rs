@@ -2,7 +2,7 @@
 
 use crate::paper::{Form, Misprint, Reading};
 
-/// Reading of the formulas with its name.
+/// Interpretation of the formulas of the paper, with its name.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NamedReading {
     /// Name of the reading in results.

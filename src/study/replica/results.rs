@@ -40,7 +40,7 @@ pub struct ReplicaResults {
     /// Largest displacement of the end point by each misprint \[m\], in the order of
     /// [`Misprint::EACH`](crate::paper::Misprint::EACH).
     pub sizes: Vec<f64>,
-    /// Readings that were compared.
+    /// Interpretations of the paper's formulas (printed or corrected) that were compared.
     pub readings: Vec<NamedReading>,
     /// Specimens, case by case.
     pub replicas: Vec<Replica>,

@@ -79,12 +79,12 @@ impl MisreadEffect {
 }
 
 impl Explanations {
-    /// Returns the effect that expresses the most probable misreading, if one does. Each misreading
-    /// has the same prior probability; `sigma` is the declared noise of a coordinate \[m\].
+    /// Returns the effect that expresses the most probable misreading, with its probability; `None`
+    /// if no effect expresses it, or if no misreading has a finite deviance. Each misreading has
+    /// the same prior probability; `sigma` is the declared noise of a coordinate \[m\].
     ///
-    /// The probability follows from predictions of configurations that are left out
-    /// [Geisser and Eddy 1979]. The noise is the larger of `sigma` and what the best misreading
-    /// leaves.
+    /// The probability follows from predictions of configurations that are left out [Geisser and
+    /// Eddy 1979]. The noise is the larger of `sigma` and what the best misreading leaves.
     pub fn effect(&self, sigma: f64) -> Option<MisreadEffect> {
         let squares = self.fitted.iter().map(|explanation| explanation.left_out.mean_square / 3.0);
         let sigma = squares.fold(f64::INFINITY, f64::min).sqrt().max(sigma);

@@ -43,9 +43,9 @@ pub enum Misreading {
     },
     /// The columns of two joints, by number, are exchanged.
     Exchanged {
-        /// First joint.
+        /// Number of the first joint, from 1.
         joint: usize,
-        /// Second joint.
+        /// Number of the second joint, from 1.
         with: usize,
     },
     /// The columns of all joints are in the opposite order.

@@ -311,8 +311,9 @@ impl Trial<'_> {
         squares.iter().sum::<f64>() / squares.len().max(1) as f64
     }
 
-    /// Returns the set of two or more joints that, if reversed, leave the smallest error, with that
-    /// error \[m\]. Of sets that are about as good, it is the smallest.
+    /// Returns the set of two or more joints that, if reversed, leave the smallest error of the
+    /// registered nominal arm, with that error \[m\]. Of sets that are about as good, it is the
+    /// smallest. `None` if fewer than two joints can be reversed.
     fn several_reversed(&self, singles: &[Misreading]) -> Option<(Misreading, f64)> {
         let joint = |misreading: &Misreading| match misreading {
             Misreading::Reversed { joints } => Some(*joints),

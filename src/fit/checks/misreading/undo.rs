@@ -24,7 +24,7 @@ const UNIT_RATIO_TOLERANCE: f64 = 0.05;
 /// Size of a gradian \[°\].
 const DEGREES_PER_GRADIAN: f64 = 0.9;
 
-/// Returns 10 to the given power.
+/// Returns 10 to the power `power`, the factor between two units of a length or a mass.
 pub(super) fn power_of_ten(power: i8) -> f64 {
     10.0_f64.powi(power.into())
 }
