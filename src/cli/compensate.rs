@@ -138,5 +138,5 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     if !are_reached && common.quiet {
         diagnostic::warn("a target is not reached; without --quiet it is named");
     }
-    Ok(Outcome::trusted(are_reached && trusted))
+    Ok(Outcome::from_trust(are_reached && trusted))
 }

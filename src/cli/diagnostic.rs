@@ -81,7 +81,7 @@ pub fn judged(fit: &Identification, quiet: bool) -> Outcome {
             |caution: &&Finding| fit.is_trusted() || caution.code != FindingCode::PriorsDecide;
         fit.cautions().filter(is_shown).for_each(|caution| warn(&caution.to_string()));
     }
-    Outcome::trusted(fit.is_trusted())
+    Outcome::from_trust(fit.is_trusted())
 }
 
 fn show(level: Level<'_>, message: &str, location: Option<&Location>) {

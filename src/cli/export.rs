@@ -227,7 +227,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         diagnostic::warn("the estimate is not to be trusted, so this file is not either");
     }
     // A rigid geometry for an elastic arm always misses by more than σ, so it does not count.
-    Ok(Outcome::trusted(estimates.trusted))
+    Ok(Outcome::from_trust(estimates.trusted))
 }
 
 /// Text of the exported file.
@@ -318,7 +318,7 @@ fn write_c(
     if !estimate.trusted {
         diagnostic::warn("the estimate is not to be trusted, so this code is not either");
     }
-    Ok(Outcome::trusted(estimate.trusted))
+    Ok(Outcome::from_trust(estimate.trusted))
 }
 
 /// Reads the measurements of an export.

@@ -17,7 +17,7 @@ pub enum Outcome {
 
 impl Outcome {
     /// Returns the outcome of a command whose result is to be trusted or not.
-    pub fn trusted(is_trusted: bool) -> Self {
+    pub fn from_trust(is_trusted: bool) -> Self {
         if is_trusted { Self::Done } else { Self::NotTrusted }
     }
 }

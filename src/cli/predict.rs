@@ -128,7 +128,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         let folder = results.folder.display();
         format!("{text}\nWritten to {folder}: {}\nNext: {next}\n", names.join(", "))
     })?;
-    Ok(Outcome::trusted(trusted))
+    Ok(Outcome::from_trust(trusted))
 }
 
 /// Returns true if the share of rows within their bounds is below the level of the bounds by more

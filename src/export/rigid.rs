@@ -13,7 +13,7 @@ use crate::remainder::Correction;
 use crate::spatial::Frame;
 
 /// Number of poses to which the geometry is fitted, and number of other poses that judge it.
-const FITTED_POSES: usize = 300;
+const POSES_PER_SET: usize = 300;
 /// Maximum number of drawn poses for each one needed inside the workspace.
 const MAX_DRAWS_PER_POSE: usize = 40;
 /// Distance of two additional points from the target, by which its orientation is fitted \[m\].
@@ -53,7 +53,7 @@ pub fn best_rigid(
     correction: Option<&Correction>,
     workspace: &Workspace,
 ) -> Result<RigidFit, ExportError> {
-    let rows = random_rows(problem, estimate, MAX_DRAWS_PER_POSE * FITTED_POSES)?;
+    let rows = random_rows(problem, estimate, MAX_DRAWS_PER_POSE * POSES_PER_SET)?;
     let placement = Placement::of(&rows);
     let model = estimate.model(Model::new(problem, &placement.bases, &placement.targets)?);
     let x = estimate.vector(problem, &model)?;
@@ -66,11 +66,11 @@ pub fn best_rigid(
         let frame = frame?;
         workspace.contains(&frame.point(&targets[pose.target])).then_some((pose, frame))
     });
-    let (poses, frames): (Vec<Pose>, Vec<Frame<f64>>) = inside.take(2 * FITTED_POSES).unzip();
-    if poses.len() < 2 * FITTED_POSES {
+    let (poses, frames): (Vec<Pose>, Vec<Frame<f64>>) = inside.take(2 * POSES_PER_SET).unzip();
+    if poses.len() < 2 * POSES_PER_SET {
         return Err(ExportError::Unreachable {
             found: poses.len(),
-            draws: MAX_DRAWS_PER_POSE * FITTED_POSES,
+            draws: MAX_DRAWS_PER_POSE * POSES_PER_SET,
         });
     }
     let bases = model.base_frames(x.as_slice());
@@ -93,7 +93,7 @@ pub fn best_rigid(
         .map(|((pose, frame), shift)| points(frame, pose.target).map(|point| point + shift))
         .collect();
     let residual = |arm: &Arm<f64>| {
-        let each = poses[..FITTED_POSES].iter().zip(&wanted);
+        let each = poses[..POSES_PER_SET].iter().zip(&wanted);
         let of_pose = |(pose, wanted): (&Pose, &[Vector3<f64>; 3])| {
             rigid(arm, pose)
                 .iter()
@@ -129,7 +129,7 @@ pub fn best_rigid(
     let judged = |arm: &Arm<f64>| {
         let of_pose = |(pose, wanted): (&Pose, &[Vector3<f64>; 3])| wanted[0] - rigid(arm, pose)[0];
         let errors: Vec<Vector3<f64>> =
-            poses[FITTED_POSES..].iter().zip(&wanted[FITTED_POSES..]).map(of_pose).collect();
+            poses[POSES_PER_SET..].iter().zip(&wanted[POSES_PER_SET..]).map(of_pose).collect();
         ErrorSummary::of(&errors)
     };
     Ok(RigidFit { identified: judged(&identified), best: judged(&arm), arm })

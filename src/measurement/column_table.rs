@@ -77,7 +77,7 @@ impl ColumnTable {
     pub(super) fn into_text(self) -> impl Read {
         let header =
             self.columns.iter().map(|(name, _)| quoted(name)).collect::<Vec<_>>().join(",") + "\n";
-        Text { table: self, row: 0, chunk: header, read: 0 }
+        TableTextReader { table: self, row: 0, chunk: header, bytes_read: 0 }
     }
 }
 
@@ -103,18 +103,18 @@ impl ColumnValues {
 }
 
 /// Reader that generates the text of a table a few rows at a time.
-struct Text {
+struct TableTextReader {
     table: ColumnTable,
     /// Next row to generate.
     row: usize,
     chunk: String,
-    read: usize,
+    bytes_read: usize,
 }
 
-impl Text {
+impl TableTextReader {
     fn next_rows(&mut self) {
         self.chunk.clear();
-        self.read = 0;
+        self.bytes_read = 0;
         while self.row < self.table.rows && self.chunk.len() < CHUNK_BYTES {
             for (k, (_, values)) in self.table.columns.iter().enumerate() {
                 if k > 0 {
@@ -128,15 +128,15 @@ impl Text {
     }
 }
 
-impl Read for Text {
+impl Read for TableTextReader {
     fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
-        if self.read == self.chunk.len() {
+        if self.bytes_read == self.chunk.len() {
             self.next_rows();
         }
-        let left = self.chunk.as_bytes().get(self.read..).unwrap_or_default();
+        let left = self.chunk.as_bytes().get(self.bytes_read..).unwrap_or_default();
         let count = left.len().min(out.len());
         out.iter_mut().zip(left).for_each(|(out, byte)| *out = *byte);
-        self.read += count;
+        self.bytes_read += count;
         Ok(count)
     }
 }

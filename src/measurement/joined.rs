@@ -19,7 +19,7 @@ use crate::quantity::Unit;
 const MAX_LISTED_ROWS: usize = 10;
 /// Median time between paired rows above which the pairing is suspect \[s\]: the clocks may differ,
 /// so their offset is searched.
-const MAX_USUAL_GAP: f64 = 0.5;
+const MAX_PLAUSIBLE_MEDIAN_GAP: f64 = 0.5;
 /// Smallest number of measured rows with which the pairing as a whole is checked.
 const MIN_CHECKED_ROWS: usize = 4;
 
@@ -342,12 +342,12 @@ impl JoinedLog {
         }
         let gaps = self.gaps(false);
         let usual = gaps.get(gaps.len() / 2).copied().unwrap_or(0.0);
-        if let Some(row) = self.common_partner().filter(|_| usual > MAX_USUAL_GAP) {
+        if let Some(row) = self.common_partner().filter(|_| usual > MAX_PLAUSIBLE_MEDIAN_GAP) {
             let partner = Location::file(&row.file).at_line(row.line).to_string();
             let (same, keys, offset) = (row.uses, self.keys(), self.offset());
             return error(TableErrorKind::CommonPartner { same, rows, partner, keys, offset });
         }
-        let offset = if usual > MAX_USUAL_GAP { self.offset() } else { None };
+        let offset = if usual > MAX_PLAUSIBLE_MEDIAN_GAP { self.offset() } else { None };
         match offset {
             Some(offset) => {
                 let gap = format!("{usual:.1} s");

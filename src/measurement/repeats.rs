@@ -7,15 +7,15 @@ use super::Measurements;
 use crate::problem::{Effect, JointKind, Observation, Problem};
 
 /// Difference up to which angles count as equal: 0.01° \[rad\].
-const ANGLE_STEP: f64 = 0.01 * std::f64::consts::PI / 180.0;
+const ANGLE_TOLERANCE: f64 = 0.01 * std::f64::consts::PI / 180.0;
 /// Difference up to which lengths count as equal \[m\].
-const LENGTH_STEP: f64 = 1e-4;
+const LENGTH_TOLERANCE: f64 = 1e-4;
 /// Difference up to which payloads and hoist forces count as equal, as a fraction of the largest.
-const LOAD_STEP: f64 = 0.01;
+const LOAD_TOLERANCE: f64 = 0.01;
 /// Difference up to which temperatures count as equal \[K\].
-const TEMPERATURE_STEP: f64 = 1.0;
+const TEMPERATURE_TOLERANCE: f64 = 1.0;
 /// Difference below which integer codes of words and directions count as equal: less than one.
-const WORD_STEP: f64 = 0.5;
+const WORD_TOLERANCE: f64 = 0.5;
 
 impl Measurements {
     /// Returns the number of each row's configuration and the number of distinct configurations.
@@ -64,7 +64,7 @@ impl Measurements {
         let mut columns = self.joint_columns(problem);
         let words = |of_row: &[usize]| Column {
             values: of_row.iter().map(|&word| word as f64).collect(),
-            step: WORD_STEP,
+            step: WORD_TOLERANCE,
         };
         columns.push(words(&self.session.of_row));
         columns
@@ -85,21 +85,21 @@ impl Measurements {
         if is_elastic || !problem.effects.is_empty() {
             for load in [&self.payload, &self.hoist].into_iter().flatten() {
                 let largest = load.iter().fold(0.0, |largest: f64, value| largest.max(value.abs()));
-                let step = if largest > 0.0 { LOAD_STEP * largest } else { 1.0 };
+                let step = if largest > 0.0 { LOAD_TOLERANCE * largest } else { 1.0 };
                 columns.push(Column { values: load.clone(), step });
             }
         }
         if let Some(temperature) =
             self.temperature.as_ref().filter(|_| declared(Effect::is_thermal))
         {
-            columns.push(Column { values: temperature.clone(), step: TEMPERATURE_STEP });
+            columns.push(Column { values: temperature.clone(), step: TEMPERATURE_TOLERANCE });
         }
         if let Some(approach) = self.approach.as_ref().filter(|_| declared(Effect::has_sides)) {
             let side = |joint: usize| {
                 (0..self.len()).map(|row| approach[row * self.joints + joint]).collect()
             };
             columns.extend(
-                (0..self.joints).map(|joint| Column { values: side(joint), step: WORD_STEP }),
+                (0..self.joints).map(|joint| Column { values: side(joint), step: WORD_TOLERANCE }),
             );
         }
         group_rows(&columns, &(0..self.len()).collect::<Vec<_>>()).0
@@ -109,7 +109,7 @@ impl Measurements {
     fn joint_columns(&self, problem: &Problem) -> Vec<Column> {
         let column = |(index, kind): (usize, JointKind)| Column {
             values: (0..self.len()).map(|row| self.configuration(row)[index]).collect(),
-            step: if kind == JointKind::Prismatic { LENGTH_STEP } else { ANGLE_STEP },
+            step: if kind == JointKind::Prismatic { LENGTH_TOLERANCE } else { ANGLE_TOLERANCE },
         };
         let kinds = problem.joints.iter().map(|joint| joint.kind);
         kinds.take(self.joints).enumerate().map(column).collect()

@@ -106,12 +106,12 @@ pub(super) struct Load {
 
 /// Sum of forces, and of their moments about the base origin.
 #[derive(Default)]
-struct Sums {
+struct Wrench {
     force: Vector3<f64>,
     moment: Vector3<f64>,
 }
 
-impl Sums {
+impl Wrench {
     fn add(&mut self, load: &Load) {
         self.force += load.force;
         self.moment += load.at.cross(&load.force);
@@ -208,23 +208,23 @@ impl LinearisedArm {
 
     /// Sums the forces and moments of the loads beyond every section, after all steps were added.
     pub fn sum_loads(&mut self) {
-        let mut sums = Sums::default();
+        let mut beyond = Wrench::default();
         let mut ends = Vec::new();
         for step in self.steps.iter_mut().rev() {
             match step {
-                Step::Load(load) => sums.add(&self.loads[*load]),
+                Step::Load(load) => beyond.add(&self.loads[*load]),
                 Step::Segment(segment) => {
-                    self.loads[segment.loads.clone()].iter().for_each(|load| sums.add(load));
+                    self.loads[segment.loads.clone()].iter().for_each(|load| beyond.add(load));
                 }
                 Step::Section(section) => {
-                    section.force = sums.force;
-                    section.moment = sums.moment - section.at.cross(&sums.force);
+                    section.force = beyond.force;
+                    section.moment = beyond.moment - section.at.cross(&beyond.force);
                 }
-                Step::Branch => ends.push(std::mem::take(&mut sums)),
+                Step::Branch => ends.push(std::mem::take(&mut beyond)),
                 Step::Fork { branches } => {
                     for branch in (0..*branches).filter_map(|_| ends.pop()) {
-                        sums.force += branch.force;
-                        sums.moment += branch.moment;
+                        beyond.force += branch.force;
+                        beyond.moment += branch.moment;
                     }
                 }
             }

@@ -149,7 +149,7 @@ pub(super) struct Rows {
     /// Derivatives of the position with respect to each site's quantity, divided by the site's
     /// lever, shape = (sites, 3 rows).
     pub sites: DMatrix<f64>,
-    /// Standardised inputs (mean 0, spread 1 over the training rows), shape = (inputs, rows).
+    /// Standardised inputs, shape = (inputs, rows).
     pub inputs: DMatrix<f64>,
     /// Index of each row's configuration. Rows with the same session and the same commands share
     /// it.

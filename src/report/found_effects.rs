@@ -115,7 +115,7 @@ pub(super) fn rounds<'a>(closure: &'a ClosedLoop, result: &LoopResult) -> Vec<Bl
     ];
     vec![
         Block::heading("Rounds"),
-        Block::figures([figures::rounds(closure)]),
+        Block::figures([figures::draw_rounds(closure)]),
         Block::Table(Table::of(&steps, &columns)),
     ]
 }

@@ -41,7 +41,7 @@ const MAX_ROWS_SIDE_BY_SIDE: usize = 1 << 18;
 /// no σ. Without priors, the p-values do not depend on the unit of the residuals. All statistics
 /// share the draws. Each draw has a separate random stream, so that results do not depend on the
 /// number of threads.
-pub(super) fn chances(
+pub(super) fn p_values(
     leverage: &Leverage,
     studentised: &[Vector3<f64>],
     statistics: &[&Statistic],

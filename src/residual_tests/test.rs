@@ -53,13 +53,13 @@ fn order_and_dependence_tests(fit: &FitResidual, kept: &Kept, seed: u64) -> Vec<
     let working: Vec<&Statistic> =
         statistics.iter().filter_map(|(_, statistic)| statistic.as_ref().ok()).collect();
     let studentised = kept.leverage.studentise(kept.residual.as_slice());
-    let mut chances =
-        permutation::chances(&kept.leverage, &studentised, &working, seed).into_iter();
+    let mut p_values =
+        permutation::p_values(&kept.leverage, &studentised, &working, seed).into_iter();
     let coordinates: Vec<[f64; 3]> = studentised.into_iter().map(Into::into).collect();
     let sample = Sample::of([&coordinates]);
     let tried = statistics.iter().map(|(test, statistic)| {
         let trial = statistic.as_ref().map_err(Clone::clone).and_then(|statistic| {
-            let chance = chances.next().flatten().ok_or(Untestable::NoFreedom)?;
+            let chance = p_values.next().flatten().ok_or(Untestable::NoFreedom)?;
             let shown =
                 if matches!(test, Test::Dependence { .. }) { f64::sqrt } else { |value| value };
             let [statistic] = statistic.evaluate(&sample);

@@ -10,7 +10,7 @@ use super::hints::resembled;
 use super::identification::{FindingKeys, InfluentialRowSet};
 use super::remainder::Remainder;
 use super::residual_test::ResidualTest;
-use super::summary::{Errors, KindErrors, Summary, by_unit};
+use super::summary::{Errors, KindErrors, Summary, in_mm_deg_px};
 use crate::fit::{Estimate, Finding, FindingCode, Identification};
 use crate::problem::{Effect, Problem};
 use crate::quantity::Unit;
@@ -437,7 +437,7 @@ impl Correction {
         let (without, with) = correction.cross_validated;
         let unit = correction.held_out.unit();
         let [(without_mm, without_deg, without_px), (with_mm, with_deg, with_px)] =
-            [without, with].map(|value| by_unit(unit, value));
+            [without, with].map(|value| in_mm_deg_px(unit, value));
         let range = |(input, range): &(Covariate, (f64, f64))| (input.to_string(), *range);
         Self {
             ranges: correction.ranges.iter().map(range).collect(),

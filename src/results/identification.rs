@@ -9,7 +9,7 @@ use serde_json::value::{RawValue, to_raw_value};
 use super::document::Document;
 use super::prior::PriorUse;
 use super::remainder::{self, Remainder};
-use super::summary::{Errors, KindErrors, by_unit};
+use super::summary::{Errors, KindErrors, in_mm_deg_px};
 use crate::fit::{
     self, ActiveConstraint, Estimate, Finding, Identification, InfluentialRows, Noise,
     OrientationErrors, Outlier, PointSpread, ShadowPrice,
@@ -281,7 +281,8 @@ impl IdentificationResult {
     pub fn new(problem: &Problem, found: &Identification) -> Self {
         let identifiability = found.identifiability();
         let unit = found.fitted.identification.unit();
-        let (sigma_taken_mm, sigma_taken_deg, sigma_taken_px) = by_unit(unit, found.sigma_taken);
+        let (sigma_taken_mm, sigma_taken_deg, sigma_taken_px) =
+            in_mm_deg_px(unit, found.sigma_taken);
         let name = |k: usize| found.unknowns[k].clone();
         let spread = |(before, after, held_out): &(PointSpread, PointSpread, bool)| {
             let change = SpreadChange {
@@ -402,7 +403,7 @@ impl Constraint {
 impl OutlierRow {
     fn new(outlier: &Outlier) -> Self {
         let (error_mm, error_deg, error_px) =
-            by_unit(kind_named(outlier.kind).unit, outlier.error.norm());
+            in_mm_deg_px(kind_named(outlier.kind).unit, outlier.error.norm());
         Self {
             file: outlier.location.file.display().to_string(),
             line: outlier.location.line,

@@ -165,7 +165,7 @@ impl KindErrors {
 
 /// Returns a value \[m\], \[rad\] or \[px\] in the entry for `…_mm`, `…_deg` or `…_px`, converted
 /// to that unit; the others are `None`.
-pub(super) fn by_unit(unit: Unit, value: f64) -> (Option<f64>, Option<f64>, Option<f64>) {
+pub(super) fn in_mm_deg_px(unit: Unit, value: f64) -> (Option<f64>, Option<f64>, Option<f64>) {
     let value = value * unit.in_tables().factor;
     let only = |wanted: Unit| (unit == wanted).then_some(value);
     (only(Unit::Length), only(Unit::Angle), only(Unit::Pixel))

@@ -8,7 +8,7 @@ use super::document::Document;
 use super::effect::{EffectKeys, NamedEffect, Untestable, joined};
 use super::identification::FindingKeys;
 use super::residual_test::ResidualTest;
-use super::summary::{Errors, by_unit};
+use super::summary::{Errors, in_mm_deg_px};
 use crate::fit::{ErrorSummary, Finding};
 use crate::problem::{Effect, Problem};
 use crate::select::{self, Trace};
@@ -188,16 +188,16 @@ impl Candidate {
     }
 
     fn new(ranked: &select::Ranked, trace: &Trace, errors: &ErrorSummary) -> Self {
-        let by_unit = |value: f64| by_unit(errors.unit(), value);
-        let (expected_gain_mm, expected_gain_deg, expected_gain_px) = by_unit(ranked.gain);
+        let in_mm_deg_px = |value: f64| in_mm_deg_px(errors.unit(), value);
+        let (expected_gain_mm, expected_gain_deg, expected_gain_px) = in_mm_deg_px(ranked.gain);
         let (cross_validated_gain_mm, cross_validated_gain_deg, cross_validated_gain_px) =
-            ranked.cross_validated.map_or((None, None, None), by_unit);
+            ranked.cross_validated.map_or((None, None, None), in_mm_deg_px);
         let alike = |(effect, angle): &(Effect, f64)| Confounded {
             effect: NamedEffect::new(effect, trace),
             angle_deg: angle.to_degrees(),
         };
         let told_apart = |pose: &select::SeparatingPose| {
-            let (difference_mm, difference_deg, difference_px) = by_unit(pose.difference);
+            let (difference_mm, difference_deg, difference_px) = in_mm_deg_px(pose.difference);
             SeparatingPose {
                 from: pose.other.clone(),
                 q: pose.configuration.clone(),

@@ -58,8 +58,9 @@ impl<'a> Data<'a> {
     pub fn new(problem: &Problem, dataset: &'a Dataset, rules: &'a SelectionRules) -> Self {
         let Dataset { measurements, split } = dataset;
         let rows = &split.identification;
-        let setup = number(rows.iter().map(|&row| conditions_of(measurements, row)));
-        let configurations = number(rows.iter().map(|&row| bits(measurements.configuration(row))));
+        let setup = numbered(rows.iter().map(|&row| conditions_of(measurements, row)));
+        let configurations =
+            numbered(rows.iter().map(|&row| bits(measurements.configuration(row))));
         let count = configurations.iter().max().map_or(0, |last| last + 1);
         let mut order: Vec<usize> = (0..count).collect();
         order.shuffle(&mut ChaCha8Rng::seed_from_u64(rules.seed));
@@ -266,7 +267,7 @@ pub(super) fn bits(values: &[f64]) -> Vec<u64> {
 }
 
 /// Returns an identifier for each key: equal keys have equal numbers, in order of first appearance.
-pub(super) fn number<K: Ord>(keys: impl Iterator<Item = K>) -> Vec<usize> {
+pub(super) fn numbered<K: Ord>(keys: impl Iterator<Item = K>) -> Vec<usize> {
     let mut number_of_key = BTreeMap::new();
     keys.map(|key| {
         let next = number_of_key.len();

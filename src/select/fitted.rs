@@ -147,9 +147,9 @@ impl Fitted {
             return Ok(self);
         }
         let continuing = if self.found.provisional {
-            self.succeeding(options, true)
+            self.warm_started_options(options, true)
         } else {
-            self.continuing(options)
+            self.options_from_estimates(options)
         };
         self.next(self.problem.clone(), data, &continuing)
     }
@@ -164,7 +164,7 @@ impl Fitted {
 
     /// Returns options for a fit of the same problem that starts where this one ended and does not
     /// search for influential rows.
-    pub fn continuing(&self, options: &Options) -> Options {
+    pub fn options_from_estimates(&self, options: &Options) -> Options {
         let values =
             self.found.estimates.iter().map(|estimate| (estimate.name.clone(), estimate.estimate));
         Options { start: values.collect(), influential_rows: false, ..options.clone() }
@@ -172,13 +172,13 @@ impl Fitted {
 
     /// Returns options for the next fit with the state that it reuses: the registered nominal arm
     /// and the derivatives at the optimum. If the fits are `alike`, it also reuses the noise scale.
-    pub fn succeeding(&self, options: &Options, alike: bool) -> Options {
+    pub fn warm_started_options(&self, options: &Options, alike: bool) -> Options {
         let derivatives = self.derivatives.lock().unwrap_or_else(PoisonError::into_inner).clone();
         let at = (self.model.parameters.as_slice(), &self.found.x);
         let linear_model =
             derivatives.map(|derivatives| derivatives.linear_model(at, &self.unknowns));
         let warm_start = self.found.warm_start(alike).with_linear_model(linear_model);
-        Options { warm_start: Some(Arc::new(warm_start)), ..self.continuing(options) }
+        Options { warm_start: Some(Arc::new(warm_start)), ..self.options_from_estimates(options) }
     }
 
     /// Returns the problem with other effects declared.

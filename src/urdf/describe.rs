@@ -84,7 +84,7 @@ pub(crate) fn describe_measured(
     let mut notes = Vec::new();
     let rows = rows(chain, &mut notes);
     let name = name(&chain.robot.name);
-    let arm = arm(chain, &name, &rows);
+    let arm = arm_toml(chain, &name, &rows);
     // Only numbers of excessive size cause an error here.
     let problem = Problem::parse(&arm, Path::new("problem.toml"))
         .map_err(|error| chain.robot.as_problem(&error))?;
@@ -237,7 +237,7 @@ fn list(values: &Vector3<f64>, text: impl Fn(f64) -> String) -> String {
 }
 
 /// Writes the problem up to the section `[tool]`.
-fn arm(chain: &Chain, name: &str, rows: &[Row]) -> String {
+fn arm_toml(chain: &Chain, name: &str, rows: &[Row]) -> String {
     let (base, tip) = chain.ends();
     let file = chain.robot.file().file_name().unwrap_or_default().to_string_lossy().into_owned();
     let title: String = format!("{}, {base} to {tip}", chain.robot.name);

@@ -34,7 +34,7 @@ pub(super) use misprints::misprints;
 pub(super) use order::order;
 pub(super) use ranking::ranking;
 pub(super) use spectrum::spectrum;
-pub(super) use strategies::{ablations, rounds, strategies};
+pub(super) use strategies::{ablations, draw_rounds, strategies};
 pub(super) use svg::{ACCENT, Colour, FAINT, GRID, INK, MUTED, WARM};
 pub(super) use uncertainty::{bounds_over_workspace, joint_errors};
 pub(super) use vectors::vectors;

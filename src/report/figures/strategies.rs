@@ -64,7 +64,7 @@ pub fn ablations(comparison: &Comparison) -> Option<Drawing> {
 }
 
 /// Draws the errors after each round of a loop, with the effects that it added.
-pub fn rounds(closure: &ClosedLoop) -> Option<Drawing> {
+pub fn draw_rounds(closure: &ClosedLoop) -> Option<Drawing> {
     let after = |(k, round): (usize, &Round)| {
         let errors = Errors {
             identification: round.identification,

@@ -11,7 +11,7 @@ use super::hypothesis::{Hypothesis, HypothesisKind, Site};
 use crate::model::parameter::{BeamField, ParameterSite};
 use crate::problem::Effect;
 use crate::residual_tests::Covariate;
-use crate::select::data::{bits, number};
+use crate::select::data::{bits, numbered};
 use crate::select::settings::{ROUGH_LENGTHS, SLOW_LENGTH, SMOOTH_LENGTHS};
 
 impl Columns<'_, '_> {
@@ -110,7 +110,7 @@ impl Columns<'_, '_> {
         let poses = self.linearised.poses();
         let configurations: Vec<Vec<u64>> =
             poses.iter().map(|pose| bits(pose.setup.configuration)).collect();
-        let numbers = number(configurations[..self.weighed].iter().cloned());
+        let numbers = numbered(configurations[..self.weighed].iter().cloned());
         let count = numbers.iter().max().map_or(0, |last| last + 1);
         if count == self.weighed || axes.len() < 3 {
             return;

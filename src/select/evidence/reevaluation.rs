@@ -6,7 +6,7 @@ use rand::seq::SliceRandom as _;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
-use super::super::data::{Data, bits, number};
+use super::super::data::{Data, bits, numbered};
 use super::super::fitted::Fitted;
 use super::block::Block;
 use super::blocks::blocks;
@@ -165,7 +165,8 @@ pub(in crate::select) fn subset_evidence(
     added: &[Effect],
 ) -> Vec<SubsetEvidence> {
     let rows = data.evidence_rows();
-    let configurations = number(rows.iter().map(|&row| bits(data.measurements.configuration(row))));
+    let configurations =
+        numbered(rows.iter().map(|&row| bits(data.measurements.configuration(row))));
     let count = configurations.iter().max().map_or(0, |last| last + 1);
     if best.effects().is_empty() || count < 2 {
         return Vec::new();

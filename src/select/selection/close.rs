@@ -321,9 +321,9 @@ fn fit_with_found(
     let problem = state.problem(fitted, &sure);
     // Only the errors of this fit are reported, so a fit of many unknowns is not checked.
     let options = if state.affordable_fits(fitted) > 1 {
-        fitted.continuing(options)
+        fitted.options_from_estimates(options)
     } else {
-        Options { provisional: true, ..fitted.succeeding(options, true) }
+        Options { provisional: true, ..fitted.warm_started_options(options, true) }
     };
     fitted.next(problem, state.data, &options)
 }

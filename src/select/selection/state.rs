@@ -172,7 +172,7 @@ impl<'a> SearchState<'a> {
         let steps = STEPS_PER_PAID_FIT * paid as u64;
         let max_steps = Some(self.options.max_steps.map_or(steps, |most| most.min(steps)));
         let provisional = paid == 1;
-        let options = from.succeeding(self.options, true);
+        let options = from.warm_started_options(self.options, true);
         let options = Options { max_steps, provisional, ..options };
         from.next(problem, self.data, &options)
     }
