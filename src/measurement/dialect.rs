@@ -151,8 +151,11 @@ fn mark_bytes(line: &str, comment: Option<&str>) -> Option<usize> {
 /// Returns true if commas separate a header line and the declared delimiter does not occur in it,
 /// as in files written by flexcal.
 fn is_separated_otherwise(line: &str, declared: Delimiter) -> bool {
-    let Delimiter::Byte(declared) = declared else { return false };
-    line.contains(',') && !line.contains(char::from(declared))
+    let occurs = match declared {
+        Delimiter::Byte(byte) => line.contains(char::from(byte)),
+        Delimiter::Spaces => line.trim().contains([' ', '\t']),
+    };
+    line.contains(',') && !occurs
 }
 
 /// Returns the most frequent delimiter of a header line.

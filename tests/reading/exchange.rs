@@ -41,6 +41,15 @@ fn tables_with_names_of_flexcal_are_read_whatever_the_map_says() {
 }
 
 #[test]
+fn tables_of_flexcal_are_read_where_others_have_spaces() {
+    let map = "[data.format]\ndelimiter = 'spaces'\ndecimal = ','\n";
+    let (rows, _) = try_poses(&parse(&format!("{ARM}{map}")), "q1_deg,q2_deg\n1.5,2\n").unwrap();
+    assert!((rows.configuration(0)[0].to_degrees() - 1.5).abs() < 1e-12);
+    let (rows, _) = read(map, "q1_deg q2_deg  x_mm y_mm z_mm\n1,5 2  3 4 5\n").unwrap();
+    assert!((rows.configuration(0)[0].to_degrees() - 1.5).abs() < 1e-12);
+}
+
+#[test]
 fn targets_need_not_have_the_measured_columns_of_the_map() {
     let targets = "A1;A2;X;Y;Z\n1;2;3;4;5\n";
     let (rows, _) = try_poses(&parse(&format!("{ARM}{MAP}")), targets).unwrap();
