@@ -41,6 +41,16 @@ pub(crate) fn number(value: f64, decimals: usize) -> String {
     }
 }
 
+/// Formats 10 to the power of a whole number: "10⁻⁶".
+pub(crate) fn power_of_ten(exponent: f64) -> String {
+    let superscript = |digit: char| match digit {
+        '-' => Some('⁻'),
+        digit => "⁰¹²³⁴⁵⁶⁷⁸⁹".chars().nth(digit.to_digit(10)? as usize),
+    };
+    let exponent: String = format!("{exponent:.0}").chars().filter_map(superscript).collect();
+    format!("10{exponent}")
+}
+
 /// Formats `value` with `decimals` decimals for tables that programs read, never as "-0"; empty if
 /// it is not finite.
 pub(crate) fn fixed(value: f64, decimals: usize) -> String {

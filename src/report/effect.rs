@@ -3,11 +3,13 @@
 use super::document::{Point, code};
 use crate::laws::ArgumentKind;
 use crate::problem::{Effect, JointKind, Problem};
-use crate::quantity::format::{decimals, number};
+use crate::quantity::format::{decimals, number, power_of_ten};
 use crate::results::{MAX_COEFFICIENTS, MAX_SHOWN_HARMONICS, ParameterValue, joined};
 
 /// Maximum number of decimals of a value.
 const MAX_DECIMALS: usize = 6;
+/// Smallest standard error that has two digits within [`MAX_DECIMALS`].
+const MIN_PLAIN_ERROR: f64 = 1e-5;
 
 /// Lists the parameters of an effect with their values. For many harmonics, it lists the amplitudes
 /// of the largest.
@@ -31,17 +33,24 @@ pub(super) fn values(effect: &Effect, parameters: &[ParameterValue]) -> Vec<Stri
     highest.chain((lower > 0).then(|| format!("{lower} smaller ones in loop.json"))).collect()
 }
 
-/// Returns a value with its standard error in a convenient unit: `4.12 ± 0.05 µrad/(m·K)`.
+/// Returns a value with its standard error in a convenient unit: `4.12 ± 0.05 µrad/(m·K)`. If the
+/// error has no digit within [`MAX_DECIMALS`], both are multiples of a power of ten:
+/// `(9.82 ± 0.31)·10⁻⁶ °`.
 fn value(parameter: &ParameterValue) -> String {
     let unit = parameter.unit.display(parameter.estimate);
     let scaled = parameter.estimate * unit.factor;
-    match parameter.std_error.map(|error| error * unit.factor) {
-        Some(error) => {
-            let digits = decimals(error, MAX_DECIMALS);
-            format!("{} ± {} {}", number(scaled, digits), number(error, digits), unit.symbol)
-        }
-        None => format!("{} {}, no standard error", number(scaled, MAX_DECIMALS), unit.symbol),
+    let Some(error) = parameter.std_error.map(|error| error * unit.factor) else {
+        return format!("{} {}, no standard error", number(scaled, MAX_DECIMALS), unit.symbol);
+    };
+    if error > 0.0 && error < MIN_PLAIN_ERROR {
+        let power = scaled.abs().max(error).log10().floor();
+        let digits = decimals(error / 10.0_f64.powf(power), MAX_DECIMALS);
+        let shown = |value: f64| number(value / 10.0_f64.powf(power), digits);
+        let (scaled, error, power) = (shown(scaled), shown(error), power_of_ten(power));
+        return format!("({scaled} ± {error})·{power} {}", unit.symbol);
     }
+    let digits = decimals(error, MAX_DECIMALS);
+    format!("{} ± {} {}", number(scaled, digits), number(error, digits), unit.symbol)
 }
 
 /// Returns true if an effect acts at a moving joint or at no joint. Fixed joints, such as the flange
@@ -162,6 +171,21 @@ fn ranges(numbers: &[u32]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::quantity::Unit;
+
+    #[test]
+    fn small_coefficients_keep_their_digits() {
+        let shown = |estimate: f64, error: f64| {
+            value(&ParameterValue {
+                name: "1".to_owned(),
+                unit: Unit::Angle,
+                estimate: estimate.to_radians(),
+                std_error: Some(error.to_radians()),
+            })
+        };
+        assert_eq!(shown(0.0123, 0.0004), "0.01230 ± 0.00040 °");
+        assert_eq!(shown(-9.82e-6, 3.1e-7), "(-9.82 ± 0.31)·10⁻⁶ °");
+    }
 
     #[test]
     fn many_effects_take_one_line() {

@@ -1,7 +1,7 @@
 //! Axes with round tick values.
 
 use super::svg::{Colour, MUTED};
-use crate::quantity::format::number;
+use crate::quantity::format::{number, power_of_ten};
 
 /// Fraction of the values, the inner ones, that the axis always includes.
 const INNER_FRACTION: f64 = 0.95;
@@ -96,12 +96,8 @@ fn power(exponent: f64, step: f64) -> String {
         let digits = whole(-exponent) + usize::from(step.fract() > 0.0 && exponent < 1.0);
         return number(step * 10.0_f64.powf(exponent), digits);
     }
-    let superscript = |digit: char| match digit {
-        '-' => Some('⁻'),
-        digit => "⁰¹²³⁴⁵⁶⁷⁸⁹".chars().nth(digit.to_digit(10)? as usize),
-    };
-    let exponent: String = format!("{exponent:.0}").chars().filter_map(superscript).collect();
-    if step > 1.0 { format!("{step}·10{exponent}") } else { format!("10{exponent}") }
+    let power = power_of_ten(exponent);
+    if step > 1.0 { format!("{step}·{power}") } else { power }
 }
 
 /// Returns the integer part of a small number, 0 for a negative one.
