@@ -282,10 +282,24 @@ impl Law {
         }
     }
 
+    /// Returns the site in words: "joint 2", or "curvature of link A about z".
+    fn place_in_words(&self) -> String {
+        match (&self.place, self.at) {
+            (LawPlace::Link(link), At::Beam(BeamField::BowY)) => {
+                format!("curvature of link {link} about y")
+            }
+            (LawPlace::Link(link), At::Beam(BeamField::BowZ)) => {
+                format!("curvature of link {link} about z")
+            }
+            (LawPlace::Link(link), _) => format!("strain of link {link}"),
+            _ => self.site().replace("joint", "joint "),
+        }
+    }
+
     /// Returns the description of the law in words.
     pub(super) fn describe(&self) -> String {
         if self.description.is_some() {
-            let place = self.site().replace("joint", "joint ");
+            let place = self.place_in_words();
             let formulas = self.formulas();
             return match formulas.split_last() {
                 Some((last, [])) => format!("{place} errs by a multiple of {last}"),

@@ -1,7 +1,7 @@
 //! Arguments of effects, read and checked against the arm.
 
 use super::section::Section;
-use super::{Joint, JointKind, Problem};
+use super::{Joint, JointKind, Problem, beam_names};
 use crate::error::{InputError, InputErrorKind};
 use crate::laws::{Argument, ArgumentKind, quoted};
 use crate::quantity::Unit;
@@ -124,13 +124,11 @@ impl<'s, 'a, 'i> Reader<'s, 'a, 'i> {
     fn beam(&mut self, key: &str) -> Result<Argument, InputError> {
         let item = self.section.require(key, &format!("{key} = \"…\", the name of a beam"))?;
         let link = item.text()?.to_owned();
-        let links = || {
-            self.joints.iter().filter_map(|joint| joint.beam.as_ref()).map(|beam| beam.name.clone())
-        };
-        if links().any(|known| known == link) {
+        let links = beam_names(self.joints);
+        if links.contains(&link) {
             Ok(Argument::Name(link))
         } else {
-            Err(item.error(InputErrorKind::UnknownLink { link, links: links().collect() }))
+            Err(item.error(InputErrorKind::UnknownLink { link, links }))
         }
     }
 

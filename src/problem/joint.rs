@@ -99,6 +99,11 @@ pub struct Beam {
     pub hoist: Option<Hoist>,
 }
 
+/// Returns the names of the beams, in order of the joints.
+pub(crate) fn beam_names(joints: &[Joint]) -> Vec<String> {
+    joints.iter().filter_map(|joint| Some(joint.beam.as_ref()?.name.clone())).collect()
+}
+
 /// Point mass carried by a frame or beam.
 #[derive(Debug, Clone)]
 pub struct Body {

@@ -2,7 +2,7 @@
 
 use super::item::Item;
 use super::section::Section;
-use super::{Data, Joint, JointKind};
+use super::{Data, Joint, JointKind, beam_names};
 use crate::error::{InputError, InputErrorKind};
 use crate::laws::expression::{FormulaError, Vocabulary};
 use crate::laws::{At, BeamField, Effect, Law, LawParameter, LawPrior, LawSite};
@@ -27,8 +27,7 @@ pub(super) fn read(
     let named = word(&name, name.text()?, "a law")?;
     let names: Vec<(String, usize)> =
         joints.iter().enumerate().map(|(k, joint)| (joint.name.clone(), k)).collect();
-    let links: Vec<String> =
-        joints.iter().filter_map(|joint| Some(joint.beam.as_ref()?.name.clone())).collect();
+    let links = beam_names(joints);
     let site = LawSite::parse(at.text()?, joints.len(), &names, &links)
         .map_err(|reason| at.error(InputErrorKind::LawSite { reason }))?;
     let prior = prior(&mut section, law_unit(site.at, site.joint(), joints))?;

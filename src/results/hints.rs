@@ -1,5 +1,6 @@
 //! Physical causes that a law of the search resembles, as hints in words.
 
+use crate::laws::At;
 use crate::problem::Effect;
 
 /// Cause that a law resembles.
@@ -18,7 +19,7 @@ const fn hint(site: &'static str, formula: &'static str, cause: &'static str) ->
 }
 
 /// Causes by site and formula of a law with one term. Each is one of several possible ones.
-const HINTS: [Hint; 26] = [
+const HINTS: [Hint; 27] = [
     hint("joint", "q#^2", "an encoder scale that changes over the range"),
     hint("joint", "abs(q# - c)", "a tooth flank that changes at c, or a cable that tightens there"),
     hint("joint", "sin(q#)", "a spring across the joint, or an eccentric encoder"),
@@ -39,6 +40,7 @@ const HINTS: [Hint; 26] = [
     hint("joint", "t", "creep, or a drive that warms slowly"),
     hint("joint", "1 - exp(-t/tau)", "a drive that warms up"),
     hint("joint", "step(t)", "a slip at that time"),
+    hint("link", "T^2", "an expansion that grows with temperature"),
     hint("tool", "T", "a tool that expands"),
     hint("tool", "payload", "a tool that bends under its load"),
     hint("measurement", "t", "an instrument that drifts"),
@@ -54,7 +56,10 @@ pub(super) fn resembled(effect: &Effect) -> Option<String> {
     law.description()?;
     let [formula] = law.formulas().try_into().ok()?;
     let site = law.site();
-    let kind = site.split('.').next().unwrap_or_default();
+    let kind = match law.at() {
+        At::Beam(_) => "link",
+        _ => site.split('.').next().unwrap_or_default(),
+    };
     let is_small_motion = site.contains('.') && law.joint().is_some();
     let kind = kind.trim_end_matches(|c: char| c.is_ascii_digit());
     let pattern = pattern(&formula, law.joint());

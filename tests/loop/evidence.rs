@@ -129,6 +129,19 @@ fn causes_that_the_catalogue_holds_by_now_are_named() {
 }
 
 #[test]
+fn a_link_that_bends_with_the_square_of_temperature_is_no_error_of_a_joint() {
+    let evidence = of("out.toml", UNKNOWN, "out-t-20-2-bending-of-a-28");
+    let is_it = |hypothesis: &Hypothesis| {
+        let law = hypothesis.effect().and_then(|effect| match effect {
+            Effect::Law(law) => Some((law.site(), law.formulas())),
+            _ => None,
+        });
+        law == Some(("A.curvature_z".to_owned(), vec!["T^2".to_owned()]))
+    };
+    assert!(evidence.probability(is_it) >= STATED, "{:?}", evidence.best());
+}
+
+#[test]
 fn effects_of_a_heavy_arm_are_named() {
     for (name, truth) in truths("six-") {
         let evidence = of("six.toml", "", &name);

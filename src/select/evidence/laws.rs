@@ -1,5 +1,5 @@
 //! Search for laws of the grammar in place of members of probable sets: at the coordinates of
-//! joints, at the tool, in the measurement and at the base.
+//! joints, at the tool, in the measurement, at the base and in links that warm.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::PoisonError;
@@ -16,13 +16,13 @@ use super::sites::tool_site;
 use super::waves::is_free;
 use crate::laws::expression::Vocabulary;
 use crate::laws::{Law, LawSite};
-use crate::model::parameter::{JointField, ParameterSite};
-use crate::problem::{Effect, Problem};
+use crate::model::parameter::{BeamField, JointField, ParameterSite};
+use crate::problem::{Effect, Joint, Problem, beam_names};
 use crate::residual_tests::Covariate;
 use crate::select::data::Data;
 use crate::select::fitted::Fitted;
 use crate::select::grammar::{
-    MAX_POSES, Noise, Proposal, Quantities, WhitenedSite, Written, proposals,
+    FormulaSite, MAX_POSES, Noise, Proposal, Quantities, WhitenedSite, Written, proposals,
 };
 
 /// Smallest probability of a set at which laws are searched in place of its members: at the
@@ -40,10 +40,17 @@ const MAX_LN_ODDS_ELSEWHERE: f64 = 8.0;
 struct LawAt {
     /// Site as in files.
     name: String,
-    /// Joint, counted from 0, if the site is its coordinate.
-    joint: Option<usize>,
+    /// Part of the arm, which determines the factors of formulas.
+    place: FormulaSite,
     /// Parameter site with the displacements of the target by the law.
     lever: ParameterSite,
+}
+
+impl LawAt {
+    /// Returns true if the site is the coordinate of a joint.
+    fn is_coordinate(&self) -> bool {
+        matches!(self.place, FormulaSite::Joint(_))
+    }
 }
 
 /// Sites at which laws are searched together, and the other members of a probable set.
@@ -62,9 +69,9 @@ pub(super) fn promising(
     let problem = &fitted.problem;
     let mut laws: Vec<Candidate> = Vec::new();
     let places = places(hypotheses, weighted, products);
-    for Place { sites, other_members: rest } in
-        places.into_iter().chain(elsewhere(hypotheses, weighted, products))
-    {
+    let elsewhere = elsewhere(hypotheses, weighted, products);
+    let links = warming_links(hypotheses, weighted, products);
+    for Place { sites, other_members: rest } in places.into_iter().chain(elsewhere).chain(links) {
         if products.target.stop.is_requested() {
             break;
         }
@@ -110,7 +117,7 @@ fn coefficients(
     let site = law.site();
     let lever = sites
         .iter()
-        .find(|at| at.joint.is_none() && at.name == site)
+        .find(|at| !at.is_coordinate() && at.name == site)
         .and_then(|at| linearised.place(at.lever));
     let Some(lever) = lever else {
         return linearised.columns(effect).columns(0, count).into_owned();
@@ -144,7 +151,8 @@ fn effect(problem: &Problem, at: &LawAt, proposal: &Proposal) -> Option<Effect> 
     let (slides, covariates) = (problem.slides(), problem.covariate_names());
     let vocabulary =
         Vocabulary { slides: &slides, covariates: &covariates, ..Vocabulary::default() };
-    let site = LawSite::parse(&at.name, problem.joints.len(), &[], &[]).ok()?;
+    let links = beam_names(&problem.joints);
+    let site = LawSite::parse(&at.name, problem.joints.len(), &[], &links).ok()?;
     let law = |written: &Written| {
         let parameters = written.parameters.clone();
         let site = site.clone();
@@ -191,7 +199,8 @@ fn places(hypotheses: &Hypotheses, weighted: &[Weighted], products: &Products) -
     found.truncate(MAX_SEARCHED);
     let place = |(joint, rest): (usize, Vec<usize>)| {
         let lever = ParameterSite::coordinate(problem, joint + 1);
-        let at = LawAt { name: format!("joint{}", joint + 1), joint: Some(joint), lever };
+        let at =
+            LawAt { name: format!("joint{}", joint + 1), place: FormulaSite::Joint(joint), lever };
         Place { sites: vec![at], other_members: rest }
     };
     found.into_iter().map(|(found, _)| place(found)).collect()
@@ -232,7 +241,7 @@ fn elsewhere(hypotheses: &Hypotheses, weighted: &[Weighted], products: &Products
     other_members.sort_unstable();
     let mut sites: Vec<LawAt> = Vec::new();
     let mut add = |name: String, lever: ParameterSite| {
-        sites.push(LawAt { name, joint: None, lever });
+        sites.push(LawAt { name, place: FormulaSite::Elsewhere, lever });
     };
     for (axis, letter) in ["x", "y", "z"].into_iter().enumerate() {
         add(format!("tool.{letter}"), tool_site(problem, axis));
@@ -251,6 +260,43 @@ fn elsewhere(hypotheses: &Hypotheses, weighted: &[Weighted], products: &Products
         add(format!("joint{}.{motion}", joint + 1), coordinate);
     }
     Some(Place { sites, other_members })
+}
+
+/// Returns the links at which laws are searched: every link with a beam, in place of the members of
+/// the most probable set that depend on temperature and act at a joint or in a link. A joint that
+/// errs with temperature and a link that bends have similar levers, so that both are compared.
+fn warming_links(
+    hypotheses: &Hypotheses,
+    weighted: &[Weighted],
+    products: &Products,
+) -> Option<Place> {
+    let problem = hypotheses.linearised.problem();
+    problem.data.reference_temperature?;
+    let set = weighted.first().filter(|set| {
+        set.probability > MIN_SET_PROBABILITIES[1] && !products.has_gear(&set.members)
+    })?;
+    let depends_on_temperature = |member: usize| {
+        let hypothesis = &hypotheses.all[member].hypothesis;
+        matches!(hypothesis.site, Site::Joint(_) | Site::LinkBefore(_))
+            && hypothesis.depends_on.contains(&Covariate::Temperature)
+    };
+    let (members, other_members): (Vec<usize>, Vec<usize>) =
+        set.members.iter().partition(|&&member| depends_on_temperature(member));
+    let names = ["strain", "curvature_y", "curvature_z"];
+    let of_joint = |(joint, of): (usize, &Joint)| {
+        let beam = of.beam.as_ref()?;
+        let at = |(field, name): (BeamField, &str)| LawAt {
+            name: format!("{}.{name}", beam.name),
+            place: FormulaSite::Link,
+            lever: ParameterSite::Beam { joint, field },
+        };
+        Some(BeamField::STRAINS.into_iter().zip(names).map(at).collect::<Vec<_>>())
+    };
+    let sites: Vec<LawAt> =
+        problem.joints.iter().enumerate().filter_map(of_joint).flatten().collect();
+    let mut other_members = other_members;
+    other_members.sort_unstable();
+    (!members.is_empty() && !sites.is_empty()).then_some(Place { sites, other_members })
 }
 
 /// Search for formulas that explain the residual that some members of a set leave.
@@ -305,7 +351,7 @@ impl Search<'_, '_, '_> {
             proposals.into_iter().map(|proposal| (at.clone(), proposal)).collect::<Vec<_>>()
         };
         let mut laws_at_sites: Vec<(LawAt, Proposal)> = sites.iter().flat_map(of_site).collect();
-        if sites.iter().all(|at| at.joint.is_none()) {
+        if !sites.iter().any(LawAt::is_coordinate) {
             laws_at_sites.sort_by(|a, b| b.1.ln_posterior.total_cmp(&a.1.ln_posterior));
             let most = laws_at_sites.first().map_or(0.0, |best| best.1.ln_posterior);
             laws_at_sites.retain(|(_, law)| law.ln_posterior > most - MAX_LN_ODDS_ELSEWHERE);
@@ -356,7 +402,7 @@ impl Search<'_, '_, '_> {
             columns.column_iter().map(|column| function(column.as_view())).collect()
         };
         let functions: Vec<Vec<DVector<f64>>> = present.iter().map(functions).collect();
-        proposals(&quantities, (&at.name, at.joint), (&site, &noise), &functions)
+        proposals(&quantities, (&at.name, at.place), (&site, &noise), &functions)
     }
 }
 

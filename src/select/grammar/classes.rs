@@ -4,7 +4,7 @@ use nalgebra::DVector;
 
 use super::beam::Beam;
 use super::dictionary::{factors, factors_at_other_sites};
-use super::factor::Form;
+use super::factor::{Form, FormulaSite};
 use super::quantities::Quantities;
 use super::refinement::{Refined, Refiner};
 use super::site::{Noise, Weighted, WhitenedSite};
@@ -85,17 +85,25 @@ impl Class {
     }
 }
 
-/// Returns the most probable formulas of the error at a site, given as in files. `joint` is the
-/// joint, counted from 0, if the site is its coordinate. `present` holds the columns of laws that
-/// the fit contains.
+/// Returns the most probable formulas of the error at a site, given as in files, that is part of
+/// `place`. `present` holds the columns of laws that the fit contains.
 pub fn proposals(
     quantities: &Quantities,
-    (at, joint): (&str, Option<usize>),
+    (at, place): (&str, FormulaSite),
     (site, noise): (&WhitenedSite, &Noise),
     present: &[Vec<DVector<f64>>],
 ) -> Vec<Proposal> {
-    let factors = joint
-        .map_or_else(|| factors_at_other_sites(quantities), |joint| factors(quantities, joint));
+    let factors = match place {
+        FormulaSite::Joint(joint) => factors(quantities, joint),
+        FormulaSite::Elsewhere => factors_at_other_sites(quantities),
+        // A link that follows a lagged temperature is an effect of the catalogue, whose time constant
+        // is searched. Products with a lag of fixed time constant only imitate another constant.
+        FormulaSite::Link => {
+            let mut factors = factors_at_other_sites(quantities);
+            factors.retain(|factor| factor.form != Form::Lag);
+            factors
+        }
+    };
     let beam = Beam::new(Terms::new(factors, quantities, site), quantities, (site, noise));
     let (terms, sums) = beam.search();
     let mut sums: Vec<(Sum, f64)> =
@@ -108,7 +116,7 @@ pub fn proposals(
     let mut refined_sums: Vec<Refined> = sums
         .into_iter()
         .enumerate()
-        .map(|(place, (sum, _))| refiner.refined(sum, place < MAX_REFINED))
+        .map(|(rank, (sum, _))| refiner.refined(sum, rank < MAX_REFINED))
         .collect();
     refined_sums.retain(|refined| is_separated(&terms, &refined.sum, &refined.inner));
     refined_sums.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
@@ -146,9 +154,7 @@ pub fn proposals(
     let proposal = |class: Class| {
         let first = &class.first;
         let is_catalogued = first.sum.iter().all(|term| {
-            let is_catalogued =
-                |joint: usize, k: u16| terms.factors[usize::from(k)].form.is_catalogued(joint);
-            matches!((term.as_slice(), joint), (&[k], Some(joint)) if is_catalogued(joint, k))
+            matches!(term.as_slice(), &[k] if terms.factors[usize::from(k)].form.is_catalogued(place))
         });
         if is_catalogued {
             return None;
@@ -270,7 +276,7 @@ mod tests {
         let squares = product.norm_squared();
         let site = WhitenedSite::new(DVector::repeat(60, 1.0), &DMatrix::zeros(0, 60), product);
         let noise = Noise::new(squares, 60.0, |squares| -0.5 * squares);
-        proposals(&quantities, ("joint1", Some(0)), (&site, &noise), &[])
+        proposals(&quantities, ("joint1", FormulaSite::Joint(0)), (&site, &noise), &[])
     }
 
     #[test]

@@ -6,6 +6,17 @@ use super::quantities::{Quantities, quoted};
 /// the joint.
 pub const STRUT_RATIOS: [f64; 3] = [0.4, 0.65, 0.85];
 
+/// Part of the arm or of the measurement at which formulas are searched.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum FormulaSite {
+    /// Coordinate of a joint, counted from 0.
+    Joint(usize),
+    /// Curvature or strain of a link.
+    Link,
+    /// Tool, measurement, base, or a small motion of a joint.
+    Elsewhere,
+}
+
 /// Function of one quantity of a pose, from which formulas are built; joints are counted from 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Form {
@@ -151,16 +162,19 @@ impl Form {
         )
     }
 
-    /// Returns true if the catalogue contains this form alone as an effect at the coordinate of
-    /// `joint`.
-    pub fn is_catalogued(self, joint: usize) -> bool {
-        match self {
-            Self::Command(_) | Self::Warming | Self::Lag | Self::Covariate(_) => true,
-            Self::Harmonic { joint: of, .. }
-            | Self::Wave { joint: of, .. }
-            | Self::Side(of)
-            | Self::Moment(of)
-            | Self::CubicMoment(of) => of == joint,
+    /// Returns true if the catalogue contains this form alone as an effect at `place`.
+    pub fn is_catalogued(self, place: FormulaSite) -> bool {
+        match (place, self) {
+            (FormulaSite::Joint(_), Self::Command(_) | Self::Covariate(_) | Self::Lag)
+            | (FormulaSite::Joint(_) | FormulaSite::Link, Self::Warming) => true,
+            (
+                FormulaSite::Joint(joint),
+                Self::Harmonic { joint: of, .. }
+                | Self::Wave { joint: of, .. }
+                | Self::Side(of)
+                | Self::Moment(of)
+                | Self::CubicMoment(of),
+            ) => of == joint,
             _ => false,
         }
     }

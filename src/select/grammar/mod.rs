@@ -25,6 +25,7 @@ mod terms;
 mod written;
 
 pub(super) use classes::{Proposal, proposals};
+pub(super) use factor::FormulaSite;
 pub(super) use prior::ln_prior;
 pub(super) use quantities::Quantities;
 pub(super) use site::{Noise, WhitenedSite};

@@ -7,10 +7,10 @@ use crate::problem::{Effect, Joint, JointKind, Problem};
 /// of effects. There are about twenty families of formulas, each less common than a family of the
 /// catalogue.
 const PRIOR_OF_GRAMMAR: f64 = 8.0;
-/// Prior weight of all laws of the grammar at each of the other sites: tool, measurement, base, and
-/// small motions of all joints. Fewer formulas are searched there.
+/// Prior weight of all laws of the grammar at each of the other sites: tool, measurement, base,
+/// small motions of all joints, and links. Fewer formulas are searched there.
 const PRIOR_ELSEWHERE: f64 = 2.0;
-/// Number of sites of laws at the tool, at the measurement and at the base: one for each axis.
+/// Number of sites of laws at the tool, at the measurement, at the base and in a link.
 const AXES: f64 = 3.0;
 /// Number of small motions of a joint at which laws are searched.
 const MOTIONS: f64 = 4.0;
@@ -29,6 +29,10 @@ fn ln_weight(law: &Law, problem: &Problem) -> f64 {
     match law.at() {
         At::Coordinate => (PRIOR_OF_GRAMMAR / joints).ln(),
         At::Before(_) | At::After(_) => (PRIOR_ELSEWHERE / MOTIONS / joints).ln(),
+        At::Beam(_) => {
+            let links = problem.joints.iter().filter(|joint| joint.beam.is_some()).count().max(1);
+            (PRIOR_ELSEWHERE / AXES / links as f64).ln()
+        }
         _ => (PRIOR_ELSEWHERE / AXES).ln(),
     }
 }
