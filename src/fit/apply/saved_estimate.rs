@@ -264,8 +264,9 @@ impl SavedEstimate {
         }
     }
 
-    /// Checks that the estimate belongs to `problem` with model `model`. Bases and tools of
-    /// sessions that the model lacks are ignored.
+    /// Checks that the estimate belongs to `problem` with model `model`. Bases and tools that the
+    /// model lacks are ignored: those of sessions without rows, and those of an estimate without
+    /// sessions if the rows name sessions.
     ///
     /// # Errors
     /// Returns an error if the estimate belongs to another problem, or to a different version of
@@ -280,7 +281,7 @@ impl SavedEstimate {
             let name = || entry.name.clone();
             let Some(parameter) = model.parameters.iter().find(|known| known.name == entry.name)
             else {
-                if entry.name.starts_with("base[") || entry.name.starts_with("tool[") {
+                if is_other_placement(&entry.name, model) {
                     continue;
                 }
                 return Err(SavedEstimateError::NotFree { file: file(), name: name() });
@@ -439,6 +440,17 @@ impl SavedEstimate {
         let missing = |name| SavedEstimateError::Missing { file: self.file.clone(), name };
         model.parameter_vector(|name| self.value(name)).map_err(missing)
     }
+}
+
+/// Returns true if a saved parameter is of a base or tool, and `model` has others of that kind with
+/// names in brackets, or the saved one has such a name.
+fn is_other_placement(name: &str, model: &Model) -> bool {
+    ["base", "tool"].iter().any(|kind| {
+        let (bracketed, single) = (format!("{kind}["), format!("{kind}."));
+        let has_names =
+            || model.parameters.iter().any(|parameter| parameter.name.starts_with(&bracketed));
+        name.starts_with(&bracketed) || name.starts_with(&single) && has_names()
+    })
 }
 
 /// Returns the name of a part of an arm for display. The names of effects are their declarations
