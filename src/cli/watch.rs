@@ -66,7 +66,12 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     common.print_result(&json, || {
         let [problem_word, estimate] = [common.problem(), &arguments.estimate].map(shell_word);
         let first = watch.causes.first().map(|cause| cause.kind);
-        let next = if watch.is_changed() && first == Some(CauseKind::Noise) {
+        let next = if watch.is_changed() && first == Some(CauseKind::Other) {
+            format!(
+                "flexcal identify {} names units, signs, columns and orders of joints that are read wrongly",
+                common.named()
+            )
+        } else if watch.is_changed() && first == Some(CauseKind::Noise) {
             "measure a few of these poses again. If watch.html shows the evidence rise from some row on, give the rows from there on alone"
                 .to_owned()
         } else if watch.is_changed() && first == Some(CauseKind::Row) {

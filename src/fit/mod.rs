@@ -63,6 +63,7 @@ pub use stages::custom_solver::CustomSolver;
 pub(crate) use stages::earlier_data::EarlierData;
 pub(crate) use stages::fixture_location::locate;
 pub use stages::progress::{Progress, ProgressSink, Stop};
+pub(crate) use stages::registration::register;
 pub use stages::solver_choice::SolverChoice;
 pub(crate) use stages::stage::COST_TOLERANCE;
 pub use stages::stage::StageError;

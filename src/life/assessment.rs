@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::causes::{Cause, CauseKind, LARGER_SIZE};
-use super::evidence::{NOISE_RATIOS, Unchanged, ln_sum};
+use super::evidence::{NOISE_RATIOS, OTHER_RATIOS, Unchanged, ln_sum};
 use super::rows::{SensitiveRows, Sums};
 
 /// Rows at which the sequential test looks; more rows are looked at in equal steps.
@@ -36,7 +36,8 @@ pub(super) struct AssessedCause {
     pub probability: f64,
     /// Sizes (1 σ) of largest evidence.
     pub sizes: Vec<f64>,
-    /// Posterior mean of the amplitudes with these sizes; the noise ratio for larger noise.
+    /// Posterior mean of the amplitudes with these sizes; the ratio to the assumed noise for larger
+    /// noise and for something else.
     pub mean: DVector<f64>,
     /// Posterior covariance of the amplitudes.
     pub covariance: DMatrix<f64>,
@@ -108,13 +109,16 @@ pub(super) fn assess(
 ) -> Option<Assessment> {
     let columns = rows.sensitivity.ncols();
     let mut sums = Sums::new(columns, 1.0);
-    let mut noisier = NOISE_RATIOS.map(|ratio| Sums::new(columns, ratio));
+    let of_ratios = |ratios: &[f64]| -> Vec<(f64, Sums)> {
+        ratios.iter().map(|&ratio| (ratio, Sums::new(columns, ratio))).collect()
+    };
+    let mut noisier = [of_ratios(&NOISE_RATIOS), of_ratios(&OTHER_RATIOS)];
     let step = rows.len().div_ceil(MAX_LOOKS).max(1);
     let mut looks = Vec::new();
     let mut last = None;
     for row in 0..rows.len() {
         sums.add(rows, row, 1.0);
-        for sums in &mut noisier {
+        for (_, sums) in noisier.iter_mut().flatten() {
             sums.add(rows, row, 1.0);
         }
         let is_last = row + 1 == rows.len();
@@ -155,12 +159,12 @@ fn ln_size_priors(cause: &Cause) -> impl Iterator<Item = f64> {
 }
 
 /// Computes the weighted likelihood ratio of each cause, and of each of the first `count` rows as a
-/// gross one, with the index of the cause and the row. `noisier` are the sums with each of
-/// [`NOISE_RATIOS`].
+/// gross one, with the index of the cause and the row. `noisier` holds the sums with each of
+/// [`NOISE_RATIOS`], then those with each of [`OTHER_RATIOS`].
 fn ratios(
     rows: &SensitiveRows,
     count: usize,
-    (sums, noisier, factor): (&Sums, &[Sums], &DMatrix<f64>),
+    (sums, noisier, factor): (&Sums, &[Vec<(f64, Sums)>; 2], &DMatrix<f64>),
     unchanged: &Unchanged,
     causes: &[Cause],
 ) -> Vec<(usize, Option<usize>, Weighted)> {
@@ -168,15 +172,14 @@ fn ratios(
     let mut weighted = Vec::new();
     for (index, cause) in causes.iter().enumerate() {
         match cause.kind {
-            CauseKind::Noise => {
-                let ratio = |(sums, ratio): (&Sums, f64)| {
-                    Some((unchanged.against(&Unchanged::new(sums, factor)?), ratio))
+            CauseKind::Noise | CauseKind::Other => {
+                let noisier = &noisier[usize::from(cause.kind == CauseKind::Other)];
+                let ratio = |(ratio, sums): &(f64, Sums)| {
+                    Some((unchanged.against(&Unchanged::new(sums, factor)?), *ratio))
                 };
-                let found: Vec<(f64, f64)> =
-                    noisier.iter().zip(NOISE_RATIOS).filter_map(ratio).collect();
+                let found: Vec<(f64, f64)> = noisier.iter().filter_map(ratio).collect();
                 let best = found.iter().copied().max_by(|a, b| a.0.total_cmp(&b.0));
-                let share = ln_sum(found.iter().map(|entry| entry.0))
-                    - (NOISE_RATIOS.len() as f64).ln()
+                let share = ln_sum(found.iter().map(|entry| entry.0)) - (noisier.len() as f64).ln()
                     + cause.ln_weight;
                 let noise = |(_, ratio)| Weighted::without_columns(share, vec![ratio]);
                 weighted.extend(best.map(noise).map(|share| (index, None, share)));

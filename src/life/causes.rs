@@ -55,6 +55,8 @@ worded! {
         Noise = "noise";
         /// Gross error of one row.
         Row = "row";
+        /// Something else than these causes: none of them explains the rows.
+        Other = "other";
     }
 }
 
@@ -62,7 +64,7 @@ impl CauseKind {
     /// Kinds with the prior probability of each, given a change. Collisions and exchanged motors
     /// move zeros, so these make up half of it. Temperature is 20 times as probable if the rows are
     /// warmer or colder than the reference.
-    const WEIGHTS: [(Self, f64); 10] = [
+    const WEIGHTS: [(Self, f64); 11] = [
         (Self::Zero, 0.50),
         (Self::Tool, 0.18),
         (Self::Base, 0.08),
@@ -73,6 +75,7 @@ impl CauseKind {
         (Self::Temperature, 0.03),
         (Self::Law, 0.02),
         (Self::Fixture, 0.01),
+        (Self::Other, 0.01),
     ];
 }
 
@@ -286,6 +289,7 @@ impl Extended {
         };
         causes.push(none(CauseKind::Noise, "noise of the measurement"));
         causes.push(none(CauseKind::Row, "one gross row"));
+        causes.push(none(CauseKind::Other, "something else"));
         weigh(&mut causes, warmth);
         causes
     }

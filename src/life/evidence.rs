@@ -7,7 +7,7 @@
 //!
 //! ln LR = −½ ln det(I + D A D) + ½ bᵀ D (I + D A D)⁻¹ D b            [Bishop 2006, §2.3]
 //!
-//! Larger noise: its part of Σ becomes κ² I. One gross row i: S + λ² on the coordinates of row i.
+//! Larger noise, and something else: their part of Σ becomes κ² I. One gross row i: S + λ² on the coordinates of row i.
 //!
 //! Each ratio is a density of all rows so far over that of "unchanged", so it is a martingale while
 //! the arm is unchanged, and so is a mixture of them. It exceeds 1/α at any time with a probability
@@ -17,8 +17,11 @@ use nalgebra::{DMatrix, DVector};
 
 use super::rows::{SensitiveRows, Sums};
 
-/// Ratios of the noise to the assumed one that are tried.
+/// Ratios of the noise to the assumed one that are tried for larger noise.
 pub(super) const NOISE_RATIOS: [f64; 4] = [1.5, 2.0, 3.0, 5.0];
+/// Ratios of the errors to the assumed noise that are tried for something else than the listed
+/// causes: errors without a pattern that are too large to be noise.
+pub(super) const OTHER_RATIOS: [f64; 5] = [30.0, 300.0, 3e3, 3e4, 3e5];
 /// Errors of a gross row that are tried, in units of its σ.
 const GROSS_SIZES: [f64; 3] = [10.0, 50.0, 500.0];
 /// Smallest eigenvalue of a correlation matrix, relative to the largest, that counts.

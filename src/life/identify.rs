@@ -237,7 +237,9 @@ fn contradiction(
     let poses = placement.oriented_poses(&data.measurements, rows, (found.sigma, turn));
     let mut sensitive = SensitiveRows::new(&extended.model, poses, &extended.x);
     let warmth = warmth(problem, &data.measurements, rows);
-    let causes = extended.causes(problem, &mut sensitive, warmth.as_deref());
+    let mut causes = extended.causes(problem, &mut sensitive, warmth.as_deref());
+    // The most probable of the listed causes is widened, however large its change is.
+    causes.retain(|cause| cause.kind != CauseKind::Other);
     let declared = declared_sigma.unwrap_or(found.sigma).min(found.sigma);
     let misfit = 1.0 - (declared / found.sigma).powi(2);
     let misfit = misfit * sensitive.coordinates.iter().sum::<usize>() as f64;

@@ -15,6 +15,7 @@ mod evidence;
 mod fleet;
 mod fleet_file;
 mod identify;
+mod known_noise;
 mod onset;
 mod rows;
 mod watch;

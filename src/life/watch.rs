@@ -5,14 +5,16 @@ use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 
 use super::assessment::{AssessedCause, assess};
 use super::causes::{Cause, CauseKind, Extended};
-use super::earlier::{EQUAL_SIGMA, Earlier};
+use super::earlier::Earlier;
 use super::error::PriorError;
 use super::evidence::{Unchanged, factor};
 use super::identify::{covariance, warmth};
+use super::known_noise::KnownNoise;
 use super::onset::{extended as extended_factor, sums_of, with_onsets};
 use super::rows::{SensitiveRows, SharedMisfit};
-use crate::fit::{self, Placement, SavedEstimate};
+use crate::fit::{self, Placement, SavedEstimate, register};
 use crate::measurement::Measurements;
+use crate::model::parameter::ParameterSite;
 use crate::model::{Model, Pose};
 use crate::observation::kind_named;
 use crate::problem::Problem;
@@ -26,11 +28,10 @@ const LEAST_PROBABILITY: f64 = 0.005;
 const NAMED: f64 = 0.9;
 /// Largest number of groups of rows that are left out in turn.
 const MAX_GROUPS: usize = 60;
+/// Prior probability that something else changed together with the base, relative to the base alone.
+const SECOND_CHANGE: f64 = 0.05;
 /// Smallest evidence of a pose for one cause against another, in nats, that tells them apart.
 const LEAST_DIFFERENCE: f64 = 1e-3;
-/// Number of standard errors by which the noise of predictions exceeds the declared one for the
-/// difference to be misfit.
-const BEYOND_SCATTER: f64 = 2.0;
 
 /// Verdict on an arm since its estimate.
 #[derive(Debug, Clone)]
@@ -72,10 +73,11 @@ pub struct WatchedCause {
     pub from_row: Option<usize>,
     /// Probability among all causes, given that something changed.
     pub probability: f64,
-    /// Changes of what the cause moves; the ratio of the noise for larger noise.
+    /// Changes of what the cause moves; the ratio to the assumed noise for larger noise and for
+    /// something else.
     pub changes: Vec<Change>,
     /// Root mean square error of each row, predicted with this cause as estimated without the row
-    /// \[m\] or \[rad\]; `None` for noise.
+    /// \[m\] or \[rad\]; `None` for noise and for something else.
     pub left_out_error: Option<f64>,
     /// Number of further poses like these after which this cause and the next one are expected to
     /// be told apart; `None` if no number of them would, or there is no other.
@@ -140,7 +142,6 @@ pub fn watch(
     let model = Model::new(problem, &placement.bases, &placement.targets)?;
     let earlier = Earlier::of_estimate(estimate, problem, &model, days)?;
     let x = fit::predict(problem, Some(estimate), &kept, None)?.x;
-    let extended = Extended::new(problem, &model, &x, [&placement.bases, &placement.targets]);
     let every_row: Vec<usize> = (0..kept.len()).collect();
     let turn = problem.data.orientation_sigma.filter(|_| problem.data.fits_orientation);
     let known = KnownNoise::of(problem, estimate);
@@ -154,28 +155,20 @@ pub fn watch(
     let leading = kept.leading();
     let leads: Vec<bool> =
         every_row.iter().map(|&row| kept.observation(row).kind() == leading.kind()).collect();
-    let mut rows = SensitiveRows::new(&extended.model, poses, &extended.x);
-    if let Some(misfit) = misfit {
-        let coordinate = |place: usize| misfit[place / rows.stride].get(place % rows.stride);
-        let sigma = (0..rows.residual.len()).map(|k| coordinate(k).copied().unwrap_or(0.0));
-        let sigma = DVector::from_iterator(rows.residual.len(), sigma);
-        rows.share(SharedMisfit { configuration: kept.pose_numbers(problem), sigma });
-    }
-    let warmth = warmth(problem, &kept, &every_row);
-    let causes = extended.causes(problem, &mut rows, warmth.as_deref());
-    let warmed = warmth.as_ref().map(|_| (&*causes, rows.misfit_squares()));
-    let factor = factor(&covariance(&extended, &earlier, &rows, warmed));
-    let mut assessed = assess(&rows, &factor, &causes, true)
-        .ok_or(PriorError::NotFinite { file: estimate.file.clone() })?;
+    let tested = Tested { problem, model: &model, placement: &placement, kept: &kept, misfit };
+    let not_finite = || PriorError::NotFinite { file: estimate.file.clone() };
+    let at_estimate = tested.linearised(&poses, &x, &earlier);
+    let mut assessed = assess(&at_estimate.rows, &at_estimate.factor, &at_estimate.causes, true)
+        .ok_or_else(not_finite)?;
     let threshold = -false_alarm_rate.ln();
     let changed_at = assessed.looks.iter().find(|look| look.1 >= threshold).map(|look| look.0);
     if changed_at.is_some() {
-        assessed.causes = with_onsets(&assessed, &rows, &factor, &causes)
-            .ok_or(PriorError::NotFinite { file: estimate.file.clone() })?;
+        let Linearised { rows, factor, causes, .. } = &at_estimate;
+        assessed.causes = with_onsets(&assessed, rows, factor, causes).ok_or_else(not_finite)?;
     }
     let p_value = ChiSquared::new(assessed.coordinates)
         .map_or(f64::NAN, |distribution| distribution.sf(assessed.chi2));
-    let report = Reporter { rows: &rows, factor: &factor, causes: &causes, leads: &leads };
+    let report = at_estimate.reporter(&leads);
     let reported: Vec<&AssessedCause> = assessed
         .causes
         .iter()
@@ -185,14 +178,19 @@ pub fn watch(
         .take(MAX_CAUSES)
         .collect();
     let location = |row: usize| kept.location(row).to_string();
-    let watched = (0..reported.len())
+    let mut watched: Vec<WatchedCause> = (0..reported.len())
         .map(|k| WatchedCause {
             row: reported[k].row.map(|row| new[row]),
             from_row: Some(reported[k].onset).filter(|onset| *onset > 0).map(|row| new[row]),
-            label: reported[k].label(&causes, location),
+            label: reported[k].label(&at_estimate.causes, location),
             ..report.cause(reported[k], reported.get(usize::from(k == 0)).copied())
         })
         .collect();
+    let is_unexplained = watched.first().is_some_and(|cause| cause.kind == CauseKind::Other);
+    if changed_at.is_some() && is_unexplained {
+        let moved = tested.moved_base(&poses, &x, (&earlier, &leads), threshold);
+        watched = moved.map_or(watched, |base| vec![base]);
+    }
     Ok(Watch {
         false_alarm_rate,
         estimate_trusted: estimate.trusted,
@@ -201,71 +199,100 @@ pub fn watch(
         looks: assessed.looks,
         changed_at,
         chi2: (assessed.chi2, assessed.coordinates, p_value),
-        error: report.rms(|row| rows.residual_of(row)),
+        error: report.rms(|row| at_estimate.rows.residual_of(row)),
         unit: kind_named(leading.kind()).unit,
         sigma: leads
             .iter()
             .position(|leads| *leads)
-            .map_or(f64::NAN, |first| rows.total_sigma(first)),
+            .map_or(f64::NAN, |first| at_estimate.rows.total_sigma(first)),
         causes: watched,
     })
 }
 
-/// Noise of new rows, and the misfit that the earlier fit found beyond it.
-struct KnownNoise {
-    /// Standard deviation (1 σ) of a position's coordinate in rows that state none \[m\]; `None`
-    /// if nothing states it.
-    sigma: Option<f64>,
-    /// Standard deviation (1 σ) of the misfit of a position's coordinate \[m\].
-    misfit: f64,
-    /// Standard deviation (1 σ) of the misfit of other coordinates, in units of their noise.
-    other_misfit: f64,
+/// Rows that are tested against an estimate, with the model of the estimate.
+struct Tested<'a> {
+    problem: &'a Problem,
+    model: &'a Model,
+    placement: &'a Placement,
+    kept: &'a Measurements,
+    /// Misfit of each coordinate of each pose in units of its noise; `None` without a misfit.
+    misfit: Option<Vec<Vec<f64>>>,
 }
 
-impl KnownNoise {
-    /// Returns the declared noise, or else that of the earlier fit. The misfit is what exceeds it
-    /// in the larger of two: the σ that the earlier fit took, and the noise of its predictions
-    /// where that is certainly larger than declared.
-    fn of(problem: &Problem, estimate: &SavedEstimate) -> Self {
-        let saved = estimate.posterior();
-        let declared = problem.data.position_sigma.or(estimate.estimated_sigma);
-        // Rows that were fitted with the σ of a column: that of the fit without its misfit.
-        let of_rows = |taken: f64| taken / saved.noise_factor.max(1.0).sqrt();
-        let sigma = declared.or(saved.sigma_taken.map(of_rows));
-        let of_predictions = |sigma: f64| {
-            let text = estimate.prediction.as_ref()?;
-            let prediction: serde_json::Value = serde_json::from_str(text).ok()?;
-            let number = |key: &str| prediction.get(key)?.as_f64();
-            let noise = number("noise_m")?.hypot(number("configuration_noise_m")?);
-            // Known to the scatter of its own estimate, of about half the fitted coordinates.
-            let configurations = prediction.get("scores")?.get("configurations")?.as_f64()?;
-            let scatter = (2.0 / (1.5 * configurations).max(1.0)).sqrt();
-            Some(noise).filter(|noise| (noise / sigma).powi(2) > 1.0 + BEYOND_SCATTER * scatter)
-        };
-        let misfit = sigma.map_or(0.0, |sigma| {
-            let taken = saved.sigma_taken.filter(|taken| *taken > sigma * (1.0 + EQUAL_SIGMA));
-            let largest = taken.unwrap_or(0.0).max(of_predictions(sigma).unwrap_or(0.0));
-            (largest * largest - sigma * sigma).max(0.0).sqrt()
-        });
-        let excess = saved.noise_factor - 1.0;
-        let other_misfit = if excess > EQUAL_SIGMA { excess.sqrt() } else { 0.0 };
-        Self { sigma, misfit, other_misfit }
+/// Rows that are linearised at a parameter vector, with the causes of a change.
+struct Linearised {
+    extended: Extended,
+    rows: SensitiveRows,
+    causes: Vec<Cause>,
+    /// Matrix F with F Fᵀ the covariance of the estimate.
+    factor: DMatrix<f64>,
+}
+
+impl Linearised {
+    fn reporter<'a>(&'a self, leads: &'a [bool]) -> Reporter<'a> {
+        Reporter { rows: &self.rows, factor: &self.factor, causes: &self.causes, leads }
+    }
+}
+
+impl Tested<'_> {
+    /// Linearises the rows at the full parameter vector `x`, for an estimate with the covariance of
+    /// `earlier`.
+    fn linearised(&self, poses: &[Pose], x: &DVector<f64>, earlier: &Earlier) -> Linearised {
+        let Self { problem, model, placement, kept, .. } = *self;
+        let extended = Extended::new(problem, model, x, [&placement.bases, &placement.targets]);
+        let mut rows = SensitiveRows::new(&extended.model, poses.to_vec(), &extended.x);
+        if let Some(misfit) = &self.misfit {
+            let coordinate = |place: usize| misfit[place / rows.stride].get(place % rows.stride);
+            let sigma = (0..rows.residual.len()).map(|k| coordinate(k).copied().unwrap_or(0.0));
+            let sigma = DVector::from_iterator(rows.residual.len(), sigma);
+            rows.share(SharedMisfit { configuration: kept.pose_numbers(problem), sigma });
+        }
+        let every_row: Vec<usize> = (0..kept.len()).collect();
+        let warmth = warmth(problem, kept, &every_row);
+        let causes = extended.causes(problem, &mut rows, warmth.as_deref());
+        let warmed = warmth.as_ref().map(|_| (&*causes, rows.misfit_squares()));
+        let factor = factor(&covariance(&extended, earlier, &rows, warmed));
+        Linearised { extended, rows, causes, factor }
     }
 
-    /// Returns the misfit of each coordinate of each pose in units of its noise; `None` without a
-    /// misfit.
-    fn misfit_of(&self, poses: &[Pose]) -> Option<Vec<Vec<f64>>> {
-        if self.misfit == 0.0 && self.other_misfit == 0.0 {
+    /// Returns a move of the only base as the cause, if the rows are unchanged once the base is
+    /// registered to them: ln of the evidence for a further change is below `threshold`.
+    ///
+    /// The causes are linear in their changes; a base that turns by degrees is not.
+    fn moved_base(
+        &self,
+        poses: &[Pose],
+        x: &DVector<f64>,
+        (earlier, leads): (&Earlier, &[bool]),
+        threshold: f64,
+    ) -> Option<WatchedCause> {
+        if self.placement.bases.len() != 1 {
             return None;
         }
-        let of_pose = |pose: &Pose| {
-            let is_position = pose.observation.is_position();
-            let first = if is_position { self.misfit / pose.sigma } else { self.other_misfit };
-            let mut misfit = vec![first; pose.observation.coordinates()];
-            misfit.resize(pose.coordinates(), self.other_misfit);
-            misfit
-        };
-        Some(poses.iter().map(of_pose).collect())
+        // Without priors and bounds, because the base was moved.
+        let mut model = self.model.clone();
+        for parameter in &mut model.parameters {
+            (parameter.sigma, parameter.lower, parameter.upper) =
+                (None, f64::NEG_INFINITY, f64::INFINITY);
+        }
+        let mut registered = x.clone();
+        register(&model, poses, &mut registered);
+        for (k, parameter) in model.parameters.iter().enumerate() {
+            if !matches!(parameter.site, ParameterSite::Base { .. }) {
+                registered[k] = x[k];
+            }
+        }
+        let at_base = self.linearised(poses, &registered, earlier);
+        let assessed = assess(&at_base.rows, &at_base.factor, &at_base.causes, false)?;
+        let (_, evidence) = *assessed.looks.last()?;
+        let is_base = |cause: &&AssessedCause| at_base.causes[cause.cause].kind == CauseKind::Base;
+        let base = assessed.causes.iter().find(is_base).filter(|_| evidence < threshold)?;
+        let mut watched = at_base.reporter(leads).cause(base, None);
+        for (change, &k) in watched.changes.iter_mut().zip(&at_base.causes[base.cause].columns) {
+            change.change += at_base.extended.x[k] - x.get(k).copied().unwrap_or(0.0);
+        }
+        watched.probability = 1.0 / (1.0 + SECOND_CHANGE * evidence.exp());
+        Some(watched)
     }
 }
 
@@ -294,7 +321,7 @@ impl Reporter<'_> {
             std_error: assessed.covariance[(i, i)].sqrt(),
         });
         let mut changes: Vec<Change> = changes.collect();
-        if cause.kind == CauseKind::Noise {
+        if matches!(cause.kind, CauseKind::Noise | CauseKind::Other) {
             let (parameter, unit) = ("ratio of the noise".to_owned(), Unit::Number);
             changes.push(Change { parameter, unit, change: assessed.mean[0], std_error: f64::NAN });
         }
@@ -307,7 +334,7 @@ impl Reporter<'_> {
             probability: assessed.probability,
             changes,
             left_out_error: match (cause.kind, assessed.row) {
-                (CauseKind::Noise, _) => None,
+                (CauseKind::Noise | CauseKind::Other, _) => None,
                 (_, Some(off)) => {
                     Some(self.rms_of(|row| row != off, |row| self.rows.residual_of(row)))
                 }

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use super::document::{Block, Table, last_parts, opening};
 use super::figures::{ACCENT, Curve, Drawing, Series};
 use super::render::{page, text};
-use crate::life::{Change, Watch, WatchedCause};
+use crate::life::{CauseKind, Change, Watch, WatchedCause};
 use crate::measurement::Measurements;
 use crate::problem::Problem;
 use crate::quantity::format::{counted, decimals, number, or_dash, p_value, two_digits};
@@ -122,6 +122,9 @@ fn verdict(watch: &Watch) -> String {
         );
     };
     let what = match (watch.named(), watch.causes.first()) {
+        (Some(cause), _) if cause.kind == CauseKind::Other => {
+            "none of the causes that are tried explains the rows".to_owned()
+        }
         (Some(cause), _) => cause.label.clone(),
         (None, Some(cause)) => format!("not certain what; first {}", cause.label),
         (None, None) => String::new(),

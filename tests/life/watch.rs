@@ -4,7 +4,7 @@ use flexcal::fit::SavedEstimate;
 use flexcal::life::{CauseKind, Watch, watch};
 use flexcal::measurement::{Dataset, Measurements};
 use flexcal::problem::Problem;
-use nalgebra::Vector3;
+use nalgebra::{Rotation3, Vector3};
 
 use crate::bench::{Bench, warmed, with_tool, with_zero};
 use crate::common::arms::path;
@@ -101,6 +101,38 @@ fn noise_a_gross_row_and_a_warm_arm_are_no_change_of_geometry() {
     let rows = bench.measure_at(&with_zero(&arm, 2, 0.03), Some(32.0), (12, 4008, 1.0));
     let warm = first(&rows);
     assert!(warm.is_changed() && warm.causes[0].kind == CauseKind::Temperature, "{warm:?}");
+}
+
+#[test]
+fn a_base_that_was_turned_far_is_named_with_its_move() {
+    let bench = Bench::new();
+    let (arm, estimate) = calibrated(&bench, 6);
+    let mut rows = bench.measure(&arm, 12, 4012, 1.0);
+    let turn = Rotation3::from_scaled_axis(Vector3::new(0.0, 0.1, 1.2));
+    for position in &mut rows.positions {
+        *position = turn * *position + Vector3::new(0.5, -0.3, 0.1);
+    }
+    let verdict = judged(&bench, &estimate, &rows);
+    let cause = verdict.named().unwrap();
+    assert_eq!(cause.kind, CauseKind::Base, "{verdict:?}");
+    // Moved by the estimate's base and then by this turn; the base is close to the origin.
+    let near = |place: usize, value: f64, by: f64| {
+        assert!((cause.changes[place].change - value).abs() < by, "{:?}", cause.changes);
+    };
+    near(0, 0.5, 1e-2);
+    near(1, -0.3, 1e-2);
+    near(5, 1.2, 1e-2);
+    assert!(cause.left_out_error.unwrap() < 0.3e-3, "{cause:?}");
+}
+
+#[test]
+fn rows_that_no_cause_explains_are_called_so() {
+    let bench = Bench::new();
+    let (arm, estimate) = calibrated(&bench, 7);
+    let mut rows = bench.measure(&arm, 12, 4013, 1.0);
+    rows.positions.iter_mut().for_each(|position| *position *= 1e-3);
+    let verdict = judged(&bench, &estimate, &rows);
+    assert_eq!(verdict.named().unwrap().kind, CauseKind::Other, "{verdict:?}");
 }
 
 /// Returns the rows of all tables, in their order.
