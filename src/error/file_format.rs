@@ -61,7 +61,11 @@ pub(crate) fn text_format(text: &str) -> Option<&'static str> {
         return Some(format);
     }
     let mut lines = start.lines().map(str::trim);
-    let line = lines.find(|line| !line.is_empty() && !line.starts_with('#'))?;
+    let line = lines.find(|line| !line.is_empty() && !line.starts_with(['#', '%']))?;
+    if line.starts_with("//") {
+        // Neither TOML nor YAML has this mark of comments; tables of other programs do.
+        return has_rows(start).then_some(TABLE);
+    }
     let is_key = |key: &str| {
         !key.is_empty() && key.chars().all(|c| c.is_alphanumeric() || "_-.\"' ".contains(c))
     };
@@ -75,6 +79,15 @@ pub(crate) fn text_format(text: &str) -> Option<&'static str> {
     } else {
         line.contains([',', ';', '\t']).then_some(TABLE)
     }
+}
+
+/// Returns true if a line of the text has three numbers between delimiters.
+fn has_rows(text: &str) -> bool {
+    let is_number = |cell: &&str| cell.trim().replace(',', ".").parse::<f64>().is_ok();
+    let counts = |line: &str| {
+        [',', ';', '\t', ' '].map(|delimiter| line.split(delimiter).filter(is_number).count())
+    };
+    text.lines().any(|line| counts(line).into_iter().any(|count| count >= 3))
 }
 
 #[cfg(test)]
@@ -93,6 +106,8 @@ mod tests {
             ("# arm\n\nname = 'arm'", Some(TOML)),
             ("[[joint]]\n", Some(TOML)),
             ("q1_deg,x_mm\n1,2", Some(TABLE)),
+            ("// Export\n// q1, x\nP1, 1.5, 2, 3\n", Some(TABLE)),
+            ("// Export\nname = 'arm'\n", None),
             ("-----\nq1 x\n", None),
             ("", None),
         ] {

@@ -61,6 +61,8 @@ pub enum InputErrorKind {
     MisplacedKey { place: String },
     #[error("missing; write {write}{}", instead("", near.as_deref()))]
     MissingKey { write: String, near: Option<String> },
+    #[error("a section is expected here; write {write}")]
+    NotASection { write: String },
     #[error("expected {expected}, found {found}")]
     WrongType { expected: &'static str, found: &'static str },
     #[error("{noun} needs a unit; write {write}")]
@@ -151,6 +153,10 @@ pub enum InputErrorKind {
     BranchEnded { parent: u64 },
     #[error("a fixed joint cannot follow another one; leave mimic out, or write another kind")]
     FixedJointMimics,
+    #[error(
+        "joint {joint} cannot follow itself; name the joint that it follows, or leave mimic out"
+    )]
+    MimicsItself { joint: usize },
     #[error(
         "joint {joint} takes no command that another joint could follow; name a commanded joint"
     )]

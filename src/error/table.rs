@@ -7,7 +7,7 @@ use thiserror::Error;
 use super::near::{instead, meant, question};
 use super::phrases::{
     clock_offset_remedy, compared, decimal_comma_remedy, difference, in_quotes, named_otherwise,
-    then,
+    plural, then,
 };
 use super::warning::{listed, nearest_in_time};
 
@@ -117,6 +117,11 @@ pub enum TableErrorKind {
     AmbiguousColumn { file: PathBuf, place: usize },
     #[error("the table has another column {name} and lacks {write}; is {write} meant here?")]
     MappedNameTaken { name: String, write: String },
+    #[error(
+        "the map is written theirs = ours, and \"{ours}\" is a name of flexcal; write \
+         \"{theirs}\" = \"{ours}\""
+    )]
+    MapReversed { theirs: String, ours: String },
     #[error("not a column of flexcal{}", question(meant.as_deref()))]
     UnknownMeaning { meant: Option<String> },
     #[error(
@@ -173,16 +178,53 @@ pub enum TableErrorKind {
         difference(other, *has)
     )]
     ColumnsDiffer { other: PathBuf, has: bool },
+    #[error(
+        "the name stands in the header twice, and {missing} is missing; if the second one is \
+         {missing}, correct its name"
+    )]
+    RepeatedForAnother { missing: String },
     #[error("{found} values for {expected} rows")]
     ColumnLength { expected: usize, found: usize },
     #[error("the row has {found} fields, the header {expected}{}", decimal_comma_remedy(*found, *expected))]
     RowLength { expected: usize, found: usize },
+    #[error(
+        "the row has {found} cells, the header {expected}, and the cells beyond the header are \
+         empty: the row ends with a delimiter; remove it from the ends of the rows, or give the \
+         header a name for the last column"
+    )]
+    TrailingDelimiter { expected: usize, found: usize },
+    #[error(
+        "the line begins with a word and has {found} cell{}, the header {expected}; if it is no row \
+         of the table (the title or foot of a page, with a repeated header below), remove it",
+        plural(*found)
+    )]
+    TextLine { expected: usize, found: usize },
     #[error("a quote is opened and not closed")]
     OpenQuote,
     #[error("the row is empty; delete it")]
     EmptyRow,
     #[error("the cell is empty")]
     EmptyCell,
+    #[error(
+        "the cell is empty; if nothing was measured here, write missing = \"\" in [data.format], \
+         and such rows are left out"
+    )]
+    EmptyMeasurement,
+    #[error(
+        "\"{value}\" is not a number; if it stands for a point that was not measured, write \
+         missing = \"{value}\" in [data.format], and such rows are left out"
+    )]
+    WordForMeasurement { value: String },
+    #[error(
+        "the row begins with \"{word}\" and has {empty} empty cells; if it is a summary and no \
+         row of the table, remove it, or write comment = \"{word}\" in [data.format]"
+    )]
+    SummaryRow { word: String, empty: usize },
+    #[error(
+        "\"{value}\" is a date that a spreadsheet made of a number; import the column as text, \
+         and export the table again"
+    )]
+    SpreadsheetDate { value: String },
     #[error(
         "\"{value}\" has separators of thousands; write the number without them, as in 1874.383"
     )]

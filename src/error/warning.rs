@@ -97,6 +97,8 @@ pub enum WarningKind {
     LooksLikeMilliseconds { value: String },
     #[error("all temperatures are {least} °C or more; if these are kelvins, subtract 273.15")]
     Kelvins { least: String },
+    #[error("{value} °C is hot for a reference temperature; if it is in kelvins, subtract 273.15")]
+    HotReference { value: String },
     #[error(
         "no joint turns by more than {widest}° from zero; if the limits are radians, write min_rad \
          and max_rad instead of min_deg and max_deg"
@@ -104,6 +106,39 @@ pub enum WarningKind {
     LimitsLookLikeRadians { widest: String },
     #[error("{mass} kg is heavy for a part of an arm; if these are grams, divide by 1000")]
     LooksLikeGrams { mass: String },
+    #[error(
+        "{mass} kg is a heavy payload for this arm{}; if these are grams, divide by 1000",
+        carrying(arm.as_deref())
+    )]
+    HeavyPayload { mass: String, arm: Option<String> },
+    #[error(
+        "a gravity of {size} m/s² is {}; the standard value is 9.80665 m/s²",
+        if *is_unit { "a direction without a size" } else { "large; is it in mm/s²?" }
+    )]
+    UnusualGravity { size: String, is_unit: bool },
+    #[error(
+        "gravity on the masses beyond this joint has a moment of up to {moment} N·m, which would \
+         turn it by {angle} rad with this stiffness; a stiffness in N·m/arcmin times 3438, or in \
+         N·m/° times 57.3, is one in N·m/rad"
+    )]
+    SoftJoint { moment: String, angle: String },
+    #[error(
+        "the radius of gyration √(EI/EA) would be {radius} m, more than the {length} m of the \
+         beam; if the bending stiffness is in N·mm², divide it by 1e6"
+    )]
+    StiffBeam { radius: String, length: String },
+    #[error(
+        "each of the {rows} rows has a session of its own, so nothing is common to two rows; a \
+         session is a setting-up of the instrument or arm: leave the column out if it holds times \
+         or names of rows"
+    )]
+    SessionPerRow { rows: usize },
+    #[error(
+        "the table has the columns reached and miss_mm of commands.csv, whose positions are \
+         targets and not measurements; put what the instrument measured into x_mm, y_mm and z_mm, \
+         and remove these two columns"
+    )]
+    TargetsAsMeasurements,
     #[error(
         "the centre of mass is {distance} m from the frame of its joint; if these are \
          millimetres, write com_mm"
@@ -114,6 +149,10 @@ pub enum WarningKind {
          these are millimetres, write target_mm"
     )]
     FarTarget { distance: String, links: String },
+}
+
+fn carrying(arm: Option<&str>) -> String {
+    arm.map_or_else(String::new, |arm| format!(", whose declared masses add up to {arm} kg"))
 }
 
 fn repeated_rows(rows: usize, named: &[String]) -> String {

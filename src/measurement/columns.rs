@@ -4,7 +4,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::convert::identity;
 
 use super::mapped::{Names, no_such};
-use super::meaning::{Meaning, Numbering, affects_results, split_unit, unit_of, word_of_row};
+use super::meaning::{
+    Meaning, Numbering, affects_results, lacking_neighbour, split_unit, unit_of, word_of_row,
+};
 use super::role::{POINT, POSITION, Role};
 use super::table::Table;
 use crate::error::{
@@ -72,7 +74,12 @@ impl Columns {
             let called = display_name(name, table.header.get(place));
             let first = names.insert(name, called.clone()).filter(|_| !name.is_empty() && !foreign);
             if let Some(first) = first {
-                return Err(error(TableErrorKind::RepeatedColumn { first }.into()));
+                let missing = lacking_neighbour(name, &present, problem)
+                    .filter(|_| rule.is_none() && first == called);
+                return Err(error(match missing {
+                    Some(missing) => TableErrorKind::RepeatedForAnother { missing }.into(),
+                    None => TableErrorKind::RepeatedColumn { first }.into(),
+                }));
             }
             let is_marked = marked_name == Some(name);
             if is_marked {
@@ -148,6 +155,10 @@ impl Columns {
                 }
             }
         }
+        if measured && ["reached", "miss_mm"].iter().all(|name| named.iter().any(|n| n == *name)) {
+            let kind = WarningKind::TargetsAsMeasurements;
+            warnings.push(Warning { location: table.column("miss_mm"), kind });
+        }
         if let (Some(HeldOut::Fraction { .. }), true) =
             (&problem.data.held_out, measured && columns.has_split())
         {
@@ -174,7 +185,7 @@ impl Columns {
                 Location { key: None, ..table.column("") }.error(TableErrorKind::NoHeader)
             }
             (Some(hidden), _) => with_rule_as_cause(error, hidden),
-            (None, Some(rule)) if is_missing_column(&error) => {
+            (None, Some(rule)) if measured && is_missing_column(&error) => {
                 no_such(rule, &problem.data.dialect.columns, table)
             }
             _ => error,

@@ -93,13 +93,29 @@ impl Layout {
             has_names(line.get(mark_bytes..)?).then_some(mark_bytes)
         };
         let marked = || lines.iter().copied().find(|(_, line)| mark_before_names(line).is_some());
-        let header = named
+        // Rows between a marked header and a later line of names belong to the marked one, and the
+        // later line repeats it.
+        let marked_above_rows = || {
+            let (first, header) = marked()?;
+            let count =
+                cells(header.get(mark_before_names(header)?..)?, delimiter_of(header)).len();
+            let is_row = |line: &str| {
+                let cells = cells(line, delimiter_of(header));
+                let is_number = |cell: &String| cell.replace(',', ".").parse::<f64>().is_ok();
+                cells.len() == count && cells.iter().filter(|cell| is_number(cell)).count() > 1
+            };
+            let (later, _) = has_known()?;
+            let between = |line: &&(usize, &str)| (first + 1..later).contains(&line.0);
+            let has_rows = candidates.iter().filter(between).any(|(_, line)| is_row(line));
+            has_rows.then_some((first, header))
+        };
+        let header = marked_above_rows().or(named
             .filter(|(_, line)| has_names(line) && !is_marked(line))
             .or_else(has_known)
             .or_else(marked)
             .or(named)
             .or_else(first_unmarked)
-            .or(candidates.first().copied());
+            .or(candidates.first().copied()));
         let Some((line_index, line)) = header else {
             let delimiter = declared.unwrap_or(Delimiter::Byte(b','));
             return Self { delimiter, skipped: 0, mark_bytes: 0 };

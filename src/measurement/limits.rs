@@ -11,6 +11,13 @@ const MIN_SUSPICIOUS_TURNS: f64 = 2.0;
 /// Highest plausible temperature [°C]. Above it, a warning suggests kelvins; a cold room in kelvins
 /// exceeds it.
 const MAX_PLAUSIBLE_TEMPERATURE: f64 = 200.0;
+/// Largest plausible payload \[kg\]. The strongest industrial arms carry 2300 kg.
+const MAX_PAYLOAD: f64 = 3000.0;
+/// Largest plausible ratio of a payload to the declared masses of the arm. Arms carry up to about
+/// their own mass.
+const MAX_PAYLOAD_RATIO: f64 = 10.0;
+/// Minimum number of rows at which a session for each of them is implausible.
+const MIN_SESSION_ROWS: usize = 10;
 /// Largest plausible time \[s\], counted from 1970. Later times are in the year 5138, whereas
 /// milliseconds since 1970 exceed this limit from 1973 on.
 const MAX_PLAUSIBLE_TIME: f64 = 1e11;
@@ -57,6 +64,29 @@ impl Measurements {
         let location = self.location(row).with_key("temperature_C");
         (least > MAX_PLAUSIBLE_TEMPERATURE)
             .then(|| Warning { location, kind: WarningKind::Kelvins { least: format!("{least}") } })
+    }
+
+    /// Returns a warning, located at the heaviest payload, if that is implausible for the arm.
+    pub(super) fn heavy_payload(&self, problem: &Problem) -> Option<Warning> {
+        let payloads = self.payload.iter().flatten().enumerate();
+        let (row, &heaviest) = payloads.max_by(|(_, a), (_, b)| a.total_cmp(b))?;
+        let arm = problem.declared_mass();
+        let is_heavy_for_arm = arm > 0.0 && heaviest > MAX_PAYLOAD_RATIO * arm;
+        let kind = WarningKind::HeavyPayload {
+            mass: heaviest.to_string(),
+            arm: is_heavy_for_arm.then(|| format!("{arm:.1}")),
+        };
+        let location = self.location(row).with_key("payload_kg");
+        (is_heavy_for_arm || heaviest > MAX_PAYLOAD).then_some(Warning { location, kind })
+    }
+
+    /// Returns a warning, located at the first row, if each of several rows has its own session.
+    pub(super) fn session_per_row(&self) -> Option<Warning> {
+        let rows = self.len();
+        let location = self.location(0).with_key("session");
+        let kind = WarningKind::SessionPerRow { rows };
+        (rows >= MIN_SESSION_ROWS && self.session.names.len() == rows)
+            .then_some(Warning { location, kind })
     }
 
     /// Returns a warning, located at the first row, if all times are implausibly large.

@@ -1,6 +1,6 @@
 //! Names of a table's columns after the map of `[data.columns]`.
 
-use super::meaning::split_unit;
+use super::meaning::{is_numbered_or_position, split_unit};
 use super::table::Table;
 use crate::error::{InputError, JOINED, TableErrorKind};
 use crate::problem::{ColumnRule, ColumnSelector, Dialect};
@@ -34,6 +34,9 @@ impl<'a> Names<'a> {
             table.header.iter().map(|name| (name.as_str(), None)).collect();
         let has = |name: &String| table.header.contains(name);
         let rules = &dialect.columns;
+        if let Some(error) = rules.iter().find_map(|rule| reversed(rule, table)) {
+            return Err(error);
+        }
         let of_file = rules.iter().find(|rule| rule.theirs == ColumnSelector::File);
         let is_foreign = |rule: &&ColumnRule| match &rule.theirs {
             ColumnSelector::Name(name) => has(name),
@@ -111,6 +114,18 @@ impl<'a> Names<'a> {
         columns.sort_by_key(|(_, _, rule)| rule.is_none());
         columns
     }
+}
+
+/// Returns the error of a rule that is written ours = theirs: the table has a column of the second
+/// name and none of the first, and the first alone is a name of flexcal.
+fn reversed(rule: &ColumnRule, table: &Table) -> Option<InputError> {
+    let ColumnSelector::Name(name) = &rule.theirs else { return None };
+    let is_reversed = is_numbered_or_position(name)
+        && !is_numbered_or_position(&rule.ours)
+        && table.header.contains(&rule.ours)
+        && !table.header.contains(name);
+    let kind = TableErrorKind::MapReversed { theirs: rule.ours.clone(), ours: name.clone() };
+    is_reversed.then(|| rule.location.clone().error(kind))
 }
 
 /// Returns the index of the column named `name`; `None` if there is none. Two such columns are an

@@ -222,6 +222,30 @@ pub(super) fn split_unit(name: &str) -> (&str, Option<&str>) {
     name.split_once('_').map_or((name, None), |(base, suffix)| (base, Some(suffix)))
 }
 
+/// Returns the column of the position or of a joint that is missing in a header beside `name`, if
+/// there is just one. `present` are the names of the header without their units.
+pub(super) fn lacking_neighbour(
+    name: &str,
+    present: &BTreeSet<&str>,
+    problem: &Problem,
+) -> Option<String> {
+    let (base, Some(unit)) = split_unit(name) else { return None };
+    let bases: Vec<String> = if ["x", "y", "z"].contains(&base) {
+        ["x", "y", "z"].map(str::to_owned).to_vec()
+    } else {
+        let commanded = (1..).zip(&problem.joints);
+        commanded
+            .filter(|(_, joint)| unit_of(joint.command_kind()).is_some())
+            .map(|(number, _)| format!("q{number}"))
+            .collect()
+    };
+    let mut missing = bases.iter().filter(|other| !present.contains(other.as_str()));
+    match (bases.iter().any(|known| known == base), missing.next(), missing.next()) {
+        (true, Some(missing), None) => Some(format!("{missing}_{unit}")),
+        _ => None,
+    }
+}
+
 /// Returns true for the name of a numbered joint or of a coordinate with a unit, such as `q1_deg`
 /// or `x_mm`. Such names occur in the header of every table of flexcal.
 pub(super) fn is_numbered_or_position(name: &str) -> bool {

@@ -7,6 +7,7 @@
 mod builder;
 #[deny(clippy::indexing_slicing)]
 mod cell_style;
+mod cell_words;
 mod cells;
 mod clocks;
 #[deny(clippy::indexing_slicing)]
@@ -53,6 +54,7 @@ mod start_times;
 mod table;
 #[deny(clippy::indexing_slicing)]
 mod time;
+mod unmeasured;
 
 use std::collections::HashMap;
 use std::path::PathBuf;

@@ -249,6 +249,8 @@ impl<'a> Tables<'a> {
                 warnings.extend(measurements.many_turns(problem, &commands));
                 warnings.extend(measurements.kelvins());
                 warnings.extend(measurements.milliseconds());
+                warnings.extend(measurements.heavy_payload(problem));
+                warnings.extend(measurements.session_per_row());
                 if measured {
                     let is_comma = problem.data.dialect.decimal_comma;
                     let zeros = if is_comma { "0;0;0" } else { "0,0,0" };

@@ -226,7 +226,11 @@ impl RowsBuilder {
                     if let Some((axis, field)) = field.filter(|(_, field)| {
                         (field.required && measured) || is_filled(table, column.place)
                     }) {
-                        let value = number()?;
+                        let value = if POSITION.contains(&column.role) {
+                            table.measured_number(column.place).map(column.to_si)?
+                        } else {
+                            number()?
+                        };
                         if matches!(field.content, Content::Positive(_)) && value <= 0.0 {
                             let kind = InputErrorKind::NotPositive { value };
                             return Err(table.cell_error(column.place, kind));

@@ -7,6 +7,7 @@ use std::sync::Arc;
 use csv::{ByteRecord, Reader, ReaderBuilder};
 
 use super::cell_style::CellStyle;
+use super::cell_words::{UNITS, has_thousands, is_spreadsheet_date, unit_behind};
 use super::dialect::{HEADER_SEARCH_BYTES, Layout, NormalizedText};
 use super::headerless::is_row_of_numbers;
 use super::latin::decoded_record;
@@ -22,10 +23,6 @@ use crate::problem::{ColumnRule, ColumnSelector, Dialect};
 
 /// Maximum number of columns of a table.
 const MAX_COLUMNS: usize = 10_000;
-
-/// Units that tables of other programs write into cells.
-const UNITS: [&str; 12] =
-    ["degrees", "degree", "deg", "°C", "°", "rad", "mm", "kg", "m", "s", "N", "C"];
 
 /// Input that is expected in place of a file of another format.
 const A_TABLE: &str = "a table; save or export it as CSV, text with one row per pose";
@@ -184,6 +181,11 @@ impl Table {
                 TableErrorKind::EmptyRow
             } else if let Some(mark) = self.comment_mark() {
                 TableErrorKind::CommentRow { mark, found, expected }
+            } else if found > expected && (expected..found).all(|place| self.cell(place).is_empty())
+            {
+                TableErrorKind::TrailingDelimiter { expected, found }
+            } else if found < expected && self.is_line_of_words() {
+                TableErrorKind::TextLine { expected, found }
             } else {
                 TableErrorKind::RowLength { expected, found }
             }));
@@ -291,7 +293,7 @@ impl Table {
         self.line
     }
 
-    fn cell(&self, place: usize) -> &[u8] {
+    pub(super) fn cell(&self, place: usize) -> &[u8] {
         self.record.get(place).unwrap_or_default().trim_ascii()
     }
 
@@ -308,22 +310,14 @@ impl Table {
     }
 
     /// Returns true if the current row has only white space and separators.
-    fn is_empty_row(&self) -> bool {
+    pub(super) fn is_empty_row(&self) -> bool {
         self.record.iter().all(|cell| cell.trim_ascii().is_empty())
     }
 
     /// Returns a cell of the current row as a word that is not empty.
     pub fn word(&self, place: usize) -> Result<&str, InputError> {
         let word = self.text(place)?;
-        if word.is_empty() {
-            Err(if self.is_empty_row() {
-                self.error(TableErrorKind::EmptyRow)
-            } else {
-                self.cell_error(place, TableErrorKind::EmptyCell)
-            })
-        } else {
-            Ok(word)
-        }
+        if word.is_empty() { Err(self.empty_cell(place)) } else { Ok(word) }
     }
 
     /// Returns a cell of the current row as a word without invisible characters.
@@ -342,6 +336,9 @@ impl Table {
         let word = self.word(place)?;
         let value = || shortened(word);
         let CellStyle { delimiter, decimal_comma } = self.style_of(place);
+        if is_spreadsheet_date(word) {
+            return Err(self.cell_error(place, TableErrorKind::SpreadsheetDate { value: value() }));
+        }
         if decimal_comma && delimiter != ',' && word.contains('.') {
             return Err(self.cell_error(place, TableErrorKind::DecimalPoint { value: value() }));
         }
@@ -459,25 +456,6 @@ impl Table {
         let excerpt = Excerpt { text: Arc::from(text), first_line: line, span };
         Location { excerpt: Some(excerpt), ..Location::file(file).at_line(line) }
     }
-}
-
-/// Returns true for a number with a decimal point whose thousands are separated by commas, such as
-/// `1,874.383`.
-fn has_thousands(word: &str) -> bool {
-    let Some((whole, _)) = word.split_once('.') else { return false };
-    let mut groups = whole.trim_start_matches(['-', '+']).split(',');
-    let is_digits = |group: &str| group.bytes().all(|byte| byte.is_ascii_digit());
-    groups.next().is_some_and(|first| (1..=3).contains(&first.len()) && is_digits(first))
-        && groups.all(|group| group.len() == 3 && is_digits(group))
-        && word.replace(',', "").parse::<f64>().is_ok()
-}
-
-/// Returns the unit that follows a number in the same cell, such as `°` in `118.1°`.
-fn unit_behind(word: &str) -> Option<&'static str> {
-    UNITS.into_iter().find(|unit| {
-        let number = word.strip_suffix(unit).map(|number| number.trim_end().replace(',', "."));
-        number.is_some_and(|number| number.parse::<f64>().is_ok())
-    })
 }
 
 /// Returns the first 40 characters of a text, with a mark if it is longer.

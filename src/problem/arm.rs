@@ -16,6 +16,10 @@ pub(super) fn joints(
     root: &mut Section<'_, '_>,
     warnings: &mut Vec<Warning>,
 ) -> Result<(Vec<Joint>, bool), InputError> {
+    if let Some(item) = root.peek("joints").filter(Item::holds_tables) {
+        let known = vec!["joint".to_owned()];
+        return Err(item.error(InputErrorKind::UnknownKey { key: "joints".to_owned(), known }));
+    }
     let form_is_declared = root.peek("dh").is_some();
     let form = root
         .word("dh", &["modified", "standard"], &[Form::Modified, Form::Standard])?
@@ -24,20 +28,22 @@ pub(super) fn joints(
         (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     for mut section in root.sections("joint")? {
         let mimic = section.section("mimic")?;
+        let number = joints.len() + 1;
+        if let Some(leader) = mimic.as_ref().and_then(|mimic| mimic.peek("joint"))
+            && leader.whole(0)? == number as u64
+        {
+            return Err(leader.error(InputErrorKind::MimicsItself { joint: number }));
+        }
         let parent = section.get("parent");
         if let Some(item) = parent.as_ref().filter(|_| form == Form::Standard) {
             return Err(item.error(InputErrorKind::NotInStandardForm));
         }
         parents.push(parent);
         warnings.extend(plausible::joint(&section));
-        joints.push(joint(section, joints.len() + 1, (form, mimic.is_some()), &mut beams)?);
+        joints.push(joint(section, number, (form, mimic.is_some()), &mut beams)?);
         mimics.push(mimic);
     }
     if joints.is_empty() {
-        if let Some(item) = root.peek("joints") {
-            let known = vec!["joint".to_owned()];
-            return Err(item.error(InputErrorKind::UnknownKey { key: "joints".to_owned(), known }));
-        }
         return Err(root.location().with_key("joint").error(InputErrorKind::NoJoints));
     }
     let can_lead: Vec<bool> = joints
@@ -113,6 +119,7 @@ fn joint(
     if placement.is_none() && form == Form::Modified {
         beta = section.number("beta", Unit::Angle)?.unwrap_or(0.0);
     }
+    check_company(&section, number, (follows, placement.is_some()))?;
     let limits = limits(&mut section, if follows { JointKind::Fixed } else { kind })?;
     let stiffness = stiff(&mut section, "stiffness", Unit::TorsionalStiffness)?;
     let beam = match section.section("beam")? {
@@ -146,6 +153,37 @@ fn joint(
     })
 }
 
+/// Keys of the row of a joint table, and of the limits of a joint, without their units.
+const ROW_KEYS: [&str; 5] = ["alpha", "a", "theta", "d", "beta"];
+const LIMIT_KEYS: [&str; 2] = ["min", "max"];
+
+/// Checks that a joint has no key that another of its keys makes meaningless: limits if it follows
+/// another joint, and a row of the joint table if it is placed by `xyz_m` and `rpy_deg`.
+fn check_company(
+    section: &Section<'_, '_>,
+    number: usize,
+    (follows, is_placed): (bool, bool),
+) -> Result<(), InputError> {
+    let is_one_of = |key: &str, bases: &[&str]| {
+        let suffixes = || Unit::Angle.suffixes().iter().chain(Unit::Length.suffixes());
+        bases.iter().any(|base| suffixes().any(|suffix| key == format!("{base}_{}", suffix.name)))
+    };
+    for (key, item) in section.entries() {
+        let place = if follows && is_one_of(key, &LIMIT_KEYS) {
+            format!("joint {number} follows another joint, so it has no limits; leave {key} out")
+        } else if is_placed && is_one_of(key, &ROW_KEYS) {
+            format!(
+                "joint {number} is placed by xyz_m and rpy_deg; write either these or the row \
+                 alpha, a, theta, d"
+            )
+        } else {
+            continue;
+        };
+        return Err(item.error(InputErrorKind::MisplacedKey { place }));
+    }
+    Ok(())
+}
+
 /// Reads `xyz_m` and `rpy_deg` in URDF convention; returns `None` if both are absent.
 pub(super) fn placement(section: &mut Section<'_, '_>) -> Result<Option<Placement>, InputError> {
     let (xyz, rpy) = (section.vector("xyz", Unit::Length)?, section.vector("rpy", Unit::Angle)?);
@@ -161,7 +199,8 @@ fn limits(section: &mut Section<'_, '_>, kind: JointKind) -> Result<(f64, f64), 
         JointKind::Fixed => return Ok((f64::NEG_INFINITY, f64::INFINITY)),
     };
     let mut limit = |base| -> Result<_, InputError> {
-        let Some((item, suffix)) = section.quantity(base, unit)? else { return Ok(None) };
+        let found = section.quantity(base, unit).map_err(|error| of_other_kind(error, kind))?;
+        let Some((item, suffix)) = found else { return Ok(None) };
         Ok(Some(((suffix.to_si)(item.number()?), item)))
     };
     match (limit("min")?, limit("max")?) {
@@ -170,6 +209,26 @@ fn limits(section: &mut Section<'_, '_>, kind: JointKind) -> Result<(f64, f64), 
             min.map_or(f64::NEG_INFINITY, |(min, _)| min),
             max.map_or(f64::INFINITY, |(max, _)| max),
         )),
+    }
+}
+
+/// Adds to the error of a limit in the unit of another kind of joint that the kind may be wrong.
+fn of_other_kind(error: InputError, kind: JointKind) -> InputError {
+    match *error.kind {
+        InputErrorKind::WrongUnit { noun, suffix, write } => {
+            let is_of = |unit: Unit| unit.suffix(&suffix).is_some();
+            let write = match kind {
+                JointKind::Revolute if is_of(Unit::Length) => {
+                    format!("{write}, or kind = \"prismatic\" if the joint slides")
+                }
+                JointKind::Prismatic if is_of(Unit::Angle) => {
+                    format!("{write}, or kind = \"revolute\" if the joint turns")
+                }
+                _ => write,
+            };
+            error.location.error(InputErrorKind::WrongUnit { noun, suffix, write })
+        }
+        kind => error.location.error(kind),
     }
 }
 

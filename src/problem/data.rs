@@ -11,7 +11,7 @@ use super::joint_source::JointSource;
 use super::section::Section;
 use crate::error::{InputError, InputErrorKind, Location};
 use crate::observation::{Needs, Observation, kinds};
-use crate::quantity::Unit;
+use crate::quantity::{Suffix, Unit};
 
 /// Maximum number of measurement files.
 const MAX_FILES: usize = 1000;
@@ -25,6 +25,9 @@ pub struct Data {
     pub files: Vec<PathBuf>,
     /// Standard deviation of a measured coordinate \[m\]; `None` if unknown.
     pub position_sigma: Option<f64>,
+    /// Place of `position_sigma_mm`, or else of `[data]`, for messages.
+    #[doc(hidden)]
+    pub position_sigma_location: Location,
     /// Standard deviations of other kinds of rows by their name \[m\] or \[rad\]. Tilts are not
     /// read without one.
     pub kind_sigmas: BTreeMap<&'static str, f64>,
@@ -112,6 +115,7 @@ pub(super) fn read(root: &mut Section<'_, '_>) -> Result<Data, InputError> {
         return Ok(Data {
             files: Vec::new(),
             position_sigma: None,
+            position_sigma_location: location.clone(),
             kind_sigmas: BTreeMap::new(),
             held_out: None,
             reference_temperature: None,
@@ -138,6 +142,10 @@ pub(super) fn read(root: &mut Section<'_, '_>) -> Result<Data, InputError> {
         }
         files_location = item.location();
     }
+    let of_suffix = |suffix: &Suffix| section.peek(&format!("position_sigma_{}", suffix.name));
+    let position_sigma_location = Unit::Length.suffixes().iter().find_map(of_suffix);
+    let position_sigma_location =
+        position_sigma_location.map_or_else(|| location.clone(), |item| item.location());
     let mut kind_sigmas = BTreeMap::new();
     // The σ of a known distance is declared with the distance, that of a pixel with the camera.
     let beside = [Needs::Fixtures, Needs::Carriers];
@@ -180,6 +188,7 @@ pub(super) fn read(root: &mut Section<'_, '_>) -> Result<Data, InputError> {
     Ok(Data {
         files,
         position_sigma,
+        position_sigma_location,
         kind_sigmas,
         held_out,
         reference_temperature,

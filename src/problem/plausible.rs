@@ -45,6 +45,35 @@ pub(super) fn joint(section: &Section<'_, '_>) -> Vec<Warning> {
     warnings
 }
 
+/// Returns warnings about the conditions of the problem in `root`: the size of gravity and the
+/// reference temperature.
+pub(super) fn conditions(root: &Section<'_, '_>) -> Vec<Warning> {
+    let mut warnings = Vec::new();
+    if let Some(item) = root.peek("gravity_m_s2")
+        && let Ok(gravity) = item.vector()
+    {
+        let size = gravity.norm();
+        let is_unit = (size - 1.0).abs() < UNIT_TOLERANCE;
+        if is_unit || size > MAX_GRAVITY {
+            let kind = WarningKind::UnusualGravity { size: size.to_string(), is_unit };
+            warnings.push(Warning { location: item.location(), kind });
+        }
+    }
+    let data = root.peek("data").and_then(|item| item.section().ok());
+    if let Some(item) = data.and_then(|data| data.peek("reference_temperature_C"))
+        && let Some(value) = item.number().ok().filter(|value| *value > MAX_REFERENCE_TEMPERATURE)
+    {
+        let kind = WarningKind::HotReference { value: value.to_string() };
+        warnings.push(Warning { location: item.location(), kind });
+    }
+    warnings
+}
+
+/// Returns the sum of masses \[kg\].
+fn total(bodies: &[Body]) -> f64 {
+    bodies.iter().map(|body| body.mass).sum()
+}
+
 /// Returns a warning if a joint table without the key `dh` has the zeros of a standard DH table. In
 /// such a table α of the first row is not zero, and both α and a of the last row are.
 pub(super) fn form(joints: &[Joint]) -> Option<Warning> {
@@ -62,6 +91,14 @@ pub(super) fn form(joints: &[Joint]) -> Option<Warning> {
 /// Largest plausible mass of one body of an arm \[kg\]. The heaviest industrial arms weigh some
 /// thousands of kilograms in all.
 const MAX_BODY_MASS: f64 = 1000.0;
+/// Largest plausible size of gravity \[m/s²\]; that of Jupiter is 25.
+const MAX_GRAVITY: f64 = 30.0;
+/// Largest plausible angle by which gravity turns an elastic joint \[rad\].
+const MAX_SAG: f64 = 1.0;
+/// Highest plausible reference temperature \[°C\]. A cold room in kelvins exceeds it.
+const MAX_REFERENCE_TEMPERATURE: f64 = 200.0;
+/// Largest difference from 1 at which the size of gravity counts as that of a unit vector.
+const UNIT_TOLERANCE: f64 = 1e-6;
 /// Largest plausible distance of a centre of mass from the frame of its joint \[m\].
 const MAX_BODY_DISTANCE: f64 = 10.0;
 
@@ -70,7 +107,8 @@ impl Problem {
     #[doc(hidden)]
     pub fn plausibility_warnings(&self) -> Vec<Warning> {
         let warnings = self.warnings.iter().cloned();
-        warnings.chain(self.far_target()).chain(self.narrow_limits()).chain(self.bodies()).collect()
+        let warnings = warnings.chain(self.far_target()).chain(self.narrow_limits());
+        warnings.chain(self.bodies()).chain(self.soft_joint()).chain(self.stiff_beam()).collect()
     }
 
     /// Returns a warning for the first mass of a joint that is too heavy for an arm, and for the
@@ -93,6 +131,67 @@ impl Problem {
             warning(found, WarningKind::FarBody { distance })
         });
         heavy.into_iter().chain(far).collect()
+    }
+
+    /// Returns the sum of the declared masses of the arm \[kg\], without the payload.
+    pub(crate) fn declared_mass(&self) -> f64 {
+        let beams = self.joints.iter().filter_map(|joint| joint.beam.as_ref());
+        let of_beams = beams.map(|beam| beam.mass + total(&beam.masses));
+        of_beams.chain(self.joints.iter().map(|joint| total(&joint.bodies))).sum()
+    }
+
+    /// Returns a warning for the joint that gravity would turn furthest if that is more than
+    /// [`MAX_SAG`]. The moment is an upper bound, with all links stretched out.
+    fn soft_joint(&self) -> Option<Warning> {
+        let gravity = self.gravity.norm();
+        if !self.is_chain() || gravity > MAX_GRAVITY {
+            return None;
+        }
+        let length = |joint: &Joint| {
+            joint.a.abs()
+                + joint.d.abs()
+                + joint.placement.as_ref().map_or(0.0, |placement| placement.xyz.norm())
+        };
+        let moment = |first: usize| {
+            let (mut reach, mut moment) = (0.0, 0.0);
+            for joint in self.joints.iter().skip(first) {
+                let bodies = joint.bodies.iter().map(|body| (body.mass, body.position.norm()));
+                if let Some(beam) = &joint.beam {
+                    moment += (beam.mass + total(&beam.masses)) * (reach + joint.a.abs());
+                }
+                reach += length(joint);
+                moment += bodies.map(|(mass, distance)| mass * (reach + distance)).sum::<f64>();
+            }
+            let at = reach + self.tool.payload_at.norm();
+            gravity * (moment + self.tool.payload_mass * at)
+        };
+        let sags = self.joints.iter().enumerate().filter_map(|(index, joint)| {
+            let moment = moment(index);
+            Some((joint, moment, moment / joint.stiffness?))
+        });
+        let (joint, moment, angle) = sags.max_by(|a, b| a.2.total_cmp(&b.2))?;
+        let location = Location { excerpt: None, ..joint.location.clone() };
+        let kind =
+            WarningKind::SoftJoint { moment: format!("{moment:.1}"), angle: format!("{angle:.1}") };
+        (angle > MAX_SAG)
+            .then(|| Warning { location: location.with_key("stiffness_N_m_per_rad"), kind })
+    }
+
+    /// Returns a warning for the first beam whose radius of gyration, by its rigidities, exceeds
+    /// its length.
+    fn stiff_beam(&self) -> Option<Warning> {
+        self.joints.iter().find_map(|joint| {
+            let beam = joint.beam.as_ref()?;
+            let rigidity = beam.ei_y.into_iter().chain(beam.ei_z).fold(0.0, f64::max);
+            let (radius, length) = ((rigidity / beam.ea?).sqrt(), joint.a.abs());
+            let location = Location { excerpt: None, ..joint.location.clone() };
+            let key = format!("beam {}.EI", beam.name);
+            let kind = WarningKind::StiffBeam {
+                radius: format!("{radius:.3}"),
+                length: format!("{length:.3}"),
+            };
+            (radius > length).then(|| Warning { location: location.with_key(key), kind })
+        })
     }
 
     /// Returns a warning if all turning joints have limits that would be usual numbers of radians.

@@ -11,7 +11,7 @@ use super::section::Section;
 use super::target::CarrierJoints;
 use super::{
     BasePose, Effect, EffectDeclaration, Equilibrium, Placement, Problem, Statics, UrdfEnds, arm,
-    constraints, data, effects, fixture, parameters, remainder, robust, target,
+    constraints, data, effects, fixture, parameters, plausible, remainder, robust, target,
 };
 use crate::error::{InputError, InputErrorKind, Location};
 use crate::quantity::Unit;
@@ -92,7 +92,7 @@ fn problem(mut root: Section<'_, '_>) -> Result<Problem, InputError> {
     let gravity =
         root.vector("gravity", Unit::Acceleration)?.unwrap_or(Vector3::new(0.0, 0.0, -9.80665));
     let statics = statics(root.section("statics")?)?;
-    let mut warnings = Vec::new();
+    let mut warnings = plausible::conditions(&root);
     let (joints, is_standard) = arm::joints(&mut root, &mut warnings)?;
     let carriers = CarrierJoints { joints: &joints, is_standard };
     let tool = target::tool(root.section("tool")?, &carriers)?;
@@ -178,12 +178,40 @@ fn urdf(mut section: Section<'_, '_>) -> Result<UrdfEnds, InputError> {
     Ok(UrdfEnds { base, tip })
 }
 
+/// Checks that a base with `xyz_m` or `rpy_deg` has no key of the other form, `translation_m` and
+/// `rotation_deg`.
+fn check_one_form(section: &Section<'_, '_>) -> Result<(), InputError> {
+    let entries = section.entries();
+    let of_base = |base: &'static str| {
+        entries.iter().find(|(key, _)| {
+            key.strip_prefix(base).is_some_and(|unit| unit.is_empty() || unit.starts_with('_'))
+        })
+    };
+    for (other, same, unit) in
+        [("translation", "xyz", Unit::Length), ("rotation", "rpy", Unit::Angle)]
+    {
+        let Some((key, item)) = of_base(other) else { continue };
+        return Err(item.error(match of_base(same) {
+            Some((first, _)) => InputErrorKind::GivenTwice { first: (*first).to_owned() },
+            None => InputErrorKind::MisplacedKey {
+                place: format!(
+                    "write either translation_m and rotation_deg or xyz_m and rpy_deg; {key} \
+                     beside them is {}",
+                    unit.alternatives(same)
+                ),
+            },
+        }));
+    }
+    Ok(())
+}
+
 fn base(section: Option<Section<'_, '_>>) -> Result<BasePose, InputError> {
     let mut base = BasePose { translation: Vector3::zeros(), rotation: Vector3::zeros() };
     let Some(mut section) = section else { return Ok(base) };
     if let Some(Placement { xyz, rpy }) = arm::placement(&mut section)? {
         base.translation = xyz;
         base.rotation = UnitQuaternion::from_euler_angles(rpy.x, rpy.y, rpy.z).scaled_axis();
+        check_one_form(&section)?;
         section.finish()?;
         return Ok(base);
     }

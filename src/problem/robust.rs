@@ -25,6 +25,12 @@ pub enum RobustLoss {
 
 /// Reads the section; returns `None` if it is absent.
 pub(super) fn read(root: &mut Section<'_, '_>) -> Result<Option<Robust>, InputError> {
+    if let Some(item) = root.peek("robust").filter(|item| item.any_text().is_ok()) {
+        let word = item.any_text()?.to_lowercase();
+        let loss = if ["huber", "l1"].contains(&word.as_str()) { word.as_str() } else { "huber" };
+        let write = format!("the line [robust] and below it loss = \"{loss}\"");
+        return Err(item.error(InputErrorKind::NotASection { write }));
+    }
     let Some(mut section) = root.section("robust")? else { return Ok(None) };
     let words = ["huber", "l1"];
     let meanings = [RobustLoss::Huber, RobustLoss::L1];

@@ -97,6 +97,19 @@ impl Problem {
         Some(self.with_chain(joints))
     }
 
+    /// Returns the problem with changed rows of the joint table as the file has them. Returns `None`
+    /// if `change` does, or if the changed rows are not those of a standard table that the problem
+    /// declares.
+    pub(crate) fn with_changed_rows(
+        &self,
+        change: impl FnOnce(&mut [Joint]) -> Option<()>,
+    ) -> Option<Self> {
+        let is_standard = self.standard_rows().is_some();
+        let mut problem = if is_standard { self.read_as_modified()? } else { self.clone() };
+        change(&mut problem.joints)?;
+        if is_standard { problem.read_as_standard() } else { Some(problem) }
+    }
+
     /// Replaces the joints of a chain; the last one carries the tool and all targets.
     fn with_chain(&self, joints: Vec<Joint>) -> Self {
         let last = joints.len() - 1;

@@ -29,6 +29,9 @@ const ROTATION_AXES: [[usize; 3]; 12] = [
     [2, 1, 2],
 ];
 
+/// Name of the convention in which the angles of the table are in another unit.
+pub(super) const IN_RADIANS: &str = "angles in radians, declared in degrees";
+
 /// Function from a rotation as read to the rotations that the table may have meant.
 type Reading = Box<dyn Fn(&UnitQuaternion<f64>) -> Vec<UnitQuaternion<f64>>>;
 
@@ -95,6 +98,11 @@ fn readings(kind: RotationKind) -> Vec<(String, Reading)> {
             Box::new(move |q| angles(kind, q).map(UnitQuaternion::from_scaled_axis).to_vec());
         readings.push(("rotation vectors".to_owned(), of_vector));
     }
+    let in_radians: Reading = Box::new(move |q| {
+        let scaled = angles(kind, q).map(|angles| angles * (180.0 / PI));
+        scaled.map(|angles| of_kind(kind, &angles)).to_vec()
+    });
+    readings.push((IN_RADIANS.to_owned(), in_radians));
     for order in ROTATION_AXES {
         let letters: Vec<char> = order.iter().map(|&axis| ['x', 'y', 'z'][axis]).collect();
         let [a, b, c] = [letters[0], letters[1], letters[2]];
@@ -130,6 +138,17 @@ fn angles(kind: RotationKind, q: &UnitQuaternion<f64>) -> [Vector3<f64>; 2] {
         RotationKind::RollPitchYaw => {
             let (x, y, z) = q.euler_angles();
             [Vector3::new(x, y, z); 2]
+        }
+    }
+}
+
+/// Returns the rotation with three numbers in the convention `kind` \[rad\].
+fn of_kind(kind: RotationKind, angles: &Vector3<f64>) -> UnitQuaternion<f64> {
+    match kind {
+        RotationKind::Vector => UnitQuaternion::from_scaled_axis(*angles),
+        RotationKind::EulerXyz => euler([0, 1, 2], angles),
+        RotationKind::RollPitchYaw => {
+            UnitQuaternion::from_euler_angles(angles.x, angles.y, angles.z)
         }
     }
 }

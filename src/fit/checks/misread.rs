@@ -15,6 +15,9 @@ const MIN_SIGMAS: f64 = 10.0;
 /// no σ is declared.
 const MIN_PART: f64 = 0.01;
 
+/// Largest error that counts as noise, as a multiple of the declared σ. Real arms leave several σ.
+const MAX_NOISE_SIGMAS: f64 = 5.0;
+
 /// Maximum number of explanations that a text names.
 const MAX_NAMED: usize = 4;
 
@@ -42,8 +45,16 @@ impl Check for ReadAsMeant {
         let more = words.len().saturating_sub(MAX_NAMED);
         let more = if more > 0 { format!(", or {more} more") } else { String::new() };
         let name = kind.observation.kind();
+        let is_noise = kind
+            .declared_sigma
+            .is_none_or(|sigma| best.rms <= MAX_NOISE_SIGMAS * kind.observation.root() * sigma);
+        let (fit_words, rest) = if is_noise {
+            ("fit", "")
+        } else {
+            ("fit better", ", still far more than the declared σ, so that another mistake remains")
+        };
         let text = format!(
-            "the measurements fit if they are read in another way: with {}{more}, the error would be {} instead of {}",
+            "the measurements {fit_words} if they are read in another way: with {}{more}, the error would be {} instead of {}{rest}",
             words[..words.len().min(MAX_NAMED)].join(", or "),
             size(name, best.rms, 3),
             size(name, explanations.as_read, 3)

@@ -55,6 +55,7 @@ const CHECKS: &[&dyn Check] = &[
     &nominal_error::NominalIsNear,
     &parameter_limits::GivesWayToLoads,
     &table_digits::CommandsHaveDigits,
+    &priors::SigmaIsNotOverstated,
     &prediction::PredictionHolds,
     &prediction::NotWorseThanNominal,
     &bounds::BoundsAreSeen,

@@ -3,7 +3,7 @@
 use serde_json::json;
 
 use super::checked_fit::{Check, CheckedFit};
-use super::convention::fitting_conventions;
+use super::convention::{IN_RADIANS, fitting_conventions};
 use super::finding::{Finding, FindingCode};
 
 /// Smallest root mean squared error of orientation at which another convention or frame is
@@ -40,6 +40,9 @@ impl Check for OrientationsFit {
         let numbers = [rms.into(), sigma.into(), json!(conventions)];
         let finding = Finding::new(FindingCode::OrientationMisfit, numbers, text);
         vec![match conventions.first() {
+            Some(convention) if convention == IN_RADIANS => finding.with_remedy(format!(
+                "the columns fit as {convention}: call them rx_rad, ry_rad and rz_rad"
+            )),
             Some(convention) => finding.with_remedy(format!(
                 "the measured orientations fit if the columns are read as {convention}: correct the order or the meaning of the columns"
             )),

@@ -4,6 +4,7 @@ use serde_json::json;
 
 use super::checked_fit::{Check, CheckedFit};
 use super::finding::{Finding, FindingCode};
+use super::row_kind::size;
 use crate::fit::uncertainty::noise::Noise;
 use crate::fit::uncertainty::refuted_priors::RefutedPrior;
 
@@ -98,5 +99,43 @@ impl Check for NoiseIsDeclared {
         } else {
             finding
         }]
+    }
+}
+
+/// Largest ratio of the declared σ to what the fit leaves. It is as far from 1 as the largest ratio
+/// in the other direction, [`MAX_NOISE_FACTOR`].
+const MAX_OVERSTATED_RATIO: f64 = 30.0;
+/// Smallest ratio of measured numbers to fitted parameters at which the residual shows the noise.
+const MIN_NUMBERS_PER_PARAMETER: usize = 2;
+
+/// Checks that the declared σ is not far above what the fit leaves.
+pub(super) struct SigmaIsNotOverstated;
+
+impl Check for SigmaIsNotOverstated {
+    fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
+        let measurements = fit.fitting.measurements;
+        let kind = fit.kind(measurements.leading());
+        let Some(sigma) = kind.declared_sigma else { return Vec::new() };
+        let errors = fit.fitting.position_errors(&kind.rows, &fit.end.x);
+        let rms = fit.rms(&kind.rows, &errors) / kind.observation.root();
+        if sigma <= MAX_OVERSTATED_RATIO * rms
+            || 3 * kind.rows.len() < MIN_NUMBERS_PER_PARAMETER * fit.whole.unknowns.len()
+        {
+            return Vec::new();
+        }
+        let name = kind.observation.kind();
+        let place = match measurements.files.first() {
+            Some(file) if measurements.sigma.is_some() => {
+                format!("column sigma_mm of {}", file.display())
+            }
+            _ => fit.problem.data.position_sigma_location.to_string(),
+        };
+        let text = format!(
+            "the declared σ of {} ({place}) is {:.0} times the {} that the fit leaves",
+            size(name, sigma, 4),
+            sigma / rms,
+            size(name, rms, 4)
+        );
+        vec![Finding::new(FindingCode::SigmaOverstated, [sigma.into(), rms.into()], text)]
     }
 }

@@ -44,6 +44,8 @@ pub(super) fn candidates(problem: &Problem, table: &Measurements) -> Vec<Misread
     units.extend(lengths(false).then_some(Misreading::Metres));
     units.extend(lengths(true).then_some(Misreading::Millimetres));
     units.extend(lengths(false).then_some(Misreading::Inches));
+    let power = if lengths(false) { 3 } else { -3 };
+    units.extend((0..3).map(|axis| Misreading::AxisUnit { axis, power }));
     units.push(Misreading::Mirrored);
     units.extend(is_far(problem).then_some(Misreading::TargetInMillimetres));
     units.extend(long.then_some(Misreading::ArmInMillimetres));
@@ -72,6 +74,8 @@ fn of_commands(problem: &Problem) -> Vec<Misreading> {
     let mut misreadings: Vec<Misreading> =
         moving.iter().map(|&joint| Misreading::reversed(&[joint])).collect();
     misreadings.extend(is_ordered.then_some(Misreading::OppositeOrder));
+    let places = if is_ordered { moving.len() } else { 1 };
+    misreadings.extend((1..places).map(|by| Misreading::Rotated { by }));
     for (k, &joint) in moving.iter().enumerate().take(MAX_PAIRED) {
         for &with in &moving[k + 1..moving.len().min(MAX_PAIRED)] {
             if kind(joint) != kind(with) {
@@ -115,6 +119,9 @@ pub(super) fn shift_step(rows: usize) -> usize {
 fn of_joint_table(problem: &Problem) -> Vec<Misreading> {
     use JointField::{A, Alpha, Beta, D, Theta};
     let mut forms = vec![Misreading::StandardForm, Misreading::ModifiedForm];
+    let rows = problem.standard_rows().map_or(problem.joints.len(), <[Joint]>::len);
+    forms.extend((1..rows).map(|row| Misreading::ExchangedRows { row }));
+    forms.extend((1..=rows).map(|row| Misreading::ExchangedLengths { row }));
     let fields = [Alpha, Theta, Beta];
     for field in fields {
         let mut counts = [0; 2];

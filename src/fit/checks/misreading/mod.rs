@@ -50,6 +50,18 @@ pub enum Misreading {
     },
     /// The columns of all joints are in the opposite order.
     OppositeOrder,
+    /// The columns of all joints are moved on by some places, the last ones to the beginning.
+    Rotated {
+        /// Number of places by which the columns are moved on.
+        by: usize,
+    },
+    /// One coordinate of the positions is in another unit than the others.
+    AxisUnit {
+        /// Coordinate, 0…2 for x, y, z.
+        axis: usize,
+        /// Exponent of the power of ten by which the coordinate must be multiplied.
+        power: i8,
+    },
     /// The angle of a joint contains the command of another joint (mechanical coupling). Joints are
     /// counted from 1.
     Coupled {
@@ -105,6 +117,16 @@ pub enum Misreading {
         joint: usize,
         /// Entry of the joint table with the wrong sign.
         field: JointField,
+    },
+    /// Two neighbouring rows of the joint table are exchanged.
+    ExchangedRows {
+        /// Number of the first row, from 1.
+        row: usize,
+    },
+    /// The lengths a and d of a row of the joint table are exchanged.
+    ExchangedLengths {
+        /// Number of the row, from 1.
+        row: usize,
     },
     /// A length of the joint table is in another unit or has a misplaced decimal point.
     Length {
@@ -184,6 +206,8 @@ impl Misreading {
             | Self::TableRadians { joint, field }
             | Self::TableDegrees { joint, field } => (joint, 0, Some(field)),
             Self::Mass { mass, .. } => (mass, 0, None),
+            Self::AxisUnit { axis, .. } => (axis, 0, None),
+            Self::ExchangedRows { row } | Self::ExchangedLengths { row } => (row, 0, None),
             Self::Reversed { joints } => (usize::try_from(joints).unwrap_or(usize::MAX), 0, None),
             _ => (0, 0, None),
         };

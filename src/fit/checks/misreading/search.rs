@@ -27,6 +27,9 @@ const MAX_REACHES: f64 = 1e4;
 /// Largest error of the nominal arm, as a multiple of the arm's reach, for which only misread loads
 /// are searched. A joint angle that is wrong by one degree causes seven times as much.
 const MAX_REACHES_OF_LOADS: f64 = 2e-3;
+/// Smallest relative error of a ratio of motion to command that is a misreading. Gears deviate by
+/// less.
+const MIN_RATIO_ERROR: f64 = 1e-3;
 /// Maximum number of rows on which misreadings are tried.
 const MAX_ROWS: usize = 120;
 /// Maximum number of moving joints for which every subset is tried as reversed.
@@ -154,13 +157,16 @@ impl Trial<'_> {
             .collect();
         let explanation = |&misreading: &Misreading| {
             let Outcome { rms, size, left_out } = self.outcome(misreading, true)?;
-            // A negative ratio means that the joint turns against its command.
-            if size.is_some_and(|size| matches!(misreading, Misreading::Ratio { .. }) && size < 0.0)
-            {
+            // A negative ratio means that the joint turns against its command, and one of 1 is no
+            // misreading.
+            let is_impossible = |size: f64| size < 0.0 || (size - 1.0).abs() < MIN_RATIO_ERROR;
+            if size.is_some_and(|size| {
+                matches!(misreading, Misreading::Ratio { .. }) && is_impossible(size)
+            }) {
                 return None;
             }
             Some(Explanation {
-                words: misreading.described(size),
+                words: misreading.described(size, self.problem),
                 rms,
                 effect: size.and_then(|size| misreading.expressed(size)),
                 left_out: left_out?,

@@ -10,7 +10,7 @@ use super::candidates::{
 use super::{Misreading, numbers_of};
 use crate::measurement::Measurements;
 use crate::model::parameter::JointField;
-use crate::problem::{Effect, Freedom, JointKind, ParameterRule, Problem, Quantities};
+use crate::problem::{Effect, Freedom, Joint, JointKind, ParameterRule, Problem, Quantities};
 
 /// Length of an inch \[mm\].
 const MM_PER_INCH: f64 = 25.4;
@@ -40,6 +40,8 @@ impl Misreading {
                 | Self::TableDegrees { .. }
                 | Self::Sign { .. }
                 | Self::Length { .. }
+                | Self::ExchangedRows { .. }
+                | Self::ExchangedLengths { .. }
         )
     }
 
@@ -83,6 +85,19 @@ impl Misreading {
             Self::Length { joint, field, power } => {
                 scale(&mut problem, joint, field, power_of_ten(power), &|_| true)?;
                 return Some(problem);
+            }
+            Self::ExchangedRows { row } => {
+                return declared.with_changed_rows(|rows| {
+                    let [first, second] = rows.get_mut(row - 1..=row)? else { return None };
+                    exchange_rows(first, second)
+                });
+            }
+            Self::ExchangedLengths { row } => {
+                return declared.with_changed_rows(|rows| {
+                    let joint = rows.get_mut(row - 1)?;
+                    let can_change = joint.a != joint.d && joint.beam.is_none();
+                    can_change.then(|| std::mem::swap(&mut joint.a, &mut joint.d))
+                });
             }
             Self::Mass { mass, power } => {
                 let masses = (1..).zip(masses_of(&mut problem));
@@ -202,6 +217,11 @@ impl Misreading {
             Self::Mirrored => {
                 rows.positions.iter_mut().for_each(|position| position.swap_rows(0, 1));
             }
+            Self::AxisUnit { axis, power } => {
+                rows.positions
+                    .iter_mut()
+                    .for_each(|position| position[axis] *= power_of_ten(power));
+            }
             Self::Payload { power } => {
                 rows.payload
                     .iter_mut()
@@ -226,12 +246,16 @@ impl Misreading {
                 let turning = (0..q.len()).filter(|&j| turns_in(problem, table, j, false));
                 turning.for_each(|joint| q[joint] *= DEGREES_PER_GRADIAN);
             }
-            Self::OppositeOrder => {
+            Self::OppositeOrder | Self::Rotated { .. } => {
                 let commanded: Vec<usize> = (0..q.len().min(problem.joints.len()))
                     .filter(|&joint| problem.joints[joint].command_kind() != JointKind::Fixed)
                     .collect();
-                let values: Vec<f64> = commanded.iter().map(|&joint| q[joint]).collect();
-                commanded.iter().rev().zip(values).for_each(|(&joint, value)| q[joint] = value);
+                let mut values: Vec<f64> = commanded.iter().map(|&joint| q[joint]).collect();
+                match self {
+                    Self::Rotated { by } => values.rotate_left(by % commanded.len().max(1)),
+                    _ => values.reverse(),
+                }
+                commanded.iter().zip(values).for_each(|(&joint, value)| q[joint] = value);
             }
             Self::Reversed { joints } => {
                 numbers_of(joints).for_each(|joint| q[joint - 1] = -q[joint - 1]);
@@ -246,6 +270,25 @@ impl Misreading {
             _ => {}
         }
     }
+}
+
+/// Exchanges two rows of the joint table; `None` if they are equal, or have no rows.
+fn exchange_rows(first: &mut Joint, second: &mut Joint) -> Option<()> {
+    let row = |joint: &Joint| [joint.alpha, joint.a, joint.theta, joint.d, joint.beta];
+    let has_row = |joint: &Joint| joint.placement.is_none() && joint.beam.is_none();
+    if row(first) == row(second) || !has_row(first) || !has_row(second) {
+        return None;
+    }
+    for (one, other) in [
+        (&mut first.alpha, &mut second.alpha),
+        (&mut first.a, &mut second.a),
+        (&mut first.theta, &mut second.theta),
+        (&mut first.d, &mut second.d),
+        (&mut first.beta, &mut second.beta),
+    ] {
+        std::mem::swap(one, other);
+    }
+    Some(())
 }
 
 /// Multiplies an entry of one joint, or of all if `joint` is 0, by `factor` if `applies` returns

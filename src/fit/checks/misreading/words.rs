@@ -1,10 +1,13 @@
 //! Misreadings in words.
 
+use std::f64::consts::PI;
 use std::fmt;
 
 use super::undo::power_of_ten;
 use super::{Misreading, numbers_of};
+use crate::error::Location;
 use crate::model::parameter::JointField;
+use crate::problem::{JointKind, Problem};
 
 /// Returns the name of an entry of the joint table, such as `alpha of joint 3`.
 fn entry_name(joint: usize, field: JointField) -> String {
@@ -16,20 +19,70 @@ fn entry_name(joint: usize, field: JointField) -> String {
 
 impl Misreading {
     /// Describes the misreading, with the size that a fit found if there is one: an angle \[rad\]
-    /// or a ratio.
-    pub(super) fn described(self, size: Option<f64>) -> String {
+    /// or a ratio. An entry of the joint table has its place in the file.
+    pub(super) fn described(self, size: Option<f64>, problem: &Problem) -> String {
+        if let Some(place) = self.place(problem) {
+            return format!("{self} ({place})");
+        }
         match (self, size) {
             (Self::Zero { joint, .. }, Some(size)) => {
                 format!("joint {joint} whose zero position is {:.2}° off", size.to_degrees())
             }
             (Self::Ratio { joint, .. }, Some(size)) => {
-                format!("joint {joint} that turns by {size:.4} times its command")
+                let kind = problem.joints.get(joint - 1).map(|joint| joint.kind);
+                let moves = if kind == Some(JointKind::Prismatic) { "moves" } else { "turns" };
+                let unit = unit_of_ratio(size, kind);
+                format!("joint {joint} that {moves} by {size:.4} times its command{unit}")
             }
             (Self::Coupled { joint, from, .. }, Some(size)) => format!(
                 "joint {joint} that also turns by {size:.3} times the command of joint {from} (declare joint-coupling)"
             ),
             _ => self.to_string(),
         }
+    }
+
+    /// Returns the place of the entry or row of the joint table that the misreading concerns. In a
+    /// standard table a and α of a parameter's joint are in the row before.
+    fn place(self, problem: &Problem) -> Option<String> {
+        use JointField::{A, Alpha};
+        let is_standard = problem.standard_rows().is_some();
+        let row = match self {
+            Self::Sign { joint, field }
+            | Self::Length { joint, field, .. }
+            | Self::TableRadians { joint, field }
+            | Self::TableDegrees { joint, field } => {
+                joint.checked_sub(usize::from(is_standard && matches!(field, A | Alpha)))?
+            }
+            Self::ExchangedRows { row } | Self::ExchangedLengths { row } => row,
+            _ => return None,
+        };
+        let location = &problem.joints.get(row.checked_sub(1)?)?.location;
+        let place = Location { key: None, excerpt: None, ..location.clone() };
+        Some(if is_standard {
+            format!("row {row} of the table, {place}")
+        } else {
+            place.to_string()
+        })
+    }
+}
+
+/// Largest relative deviation of a ratio from that of two units at which it is one.
+const UNIT_TOLERANCE: f64 = 0.02;
+
+/// Returns the units of a joint's column that a ratio of motion to command means.
+fn unit_of_ratio(ratio: f64, kind: Option<JointKind>) -> &'static str {
+    let is = |other: f64| (ratio / other - 1.0).abs() < UNIT_TOLERANCE;
+    let is_prismatic = kind == Some(JointKind::Prismatic);
+    if is_prismatic && is(1e-3) {
+        " (its column is in millimetres, declared in metres)"
+    } else if is_prismatic && is(1e3) {
+        " (its column is in metres, declared in millimetres)"
+    } else if !is_prismatic && is(180.0 / PI) {
+        " (its column is in radians, declared in degrees)"
+    } else if !is_prismatic && is(PI / 180.0) {
+        " (its column is in degrees, declared in radians)"
+    } else {
+        ""
     }
 }
 
@@ -56,6 +109,25 @@ impl fmt::Display for Misreading {
                     }
                     [] => Ok(()),
                 }
+            }
+            Self::Rotated { by } => {
+                let places = if by == 1 { "place" } else { "places" };
+                write!(f, "columns of the joints that are moved on by {by} {places}")
+            }
+            Self::AxisUnit { axis, power } => {
+                let (found, declared) = if power > 0 {
+                    ("metres", "millimetres")
+                } else {
+                    ("millimetres", "metres")
+                };
+                let name = ['x', 'y', 'z'][axis];
+                write!(f, "{name} alone that is in {found}, declared in {declared}")
+            }
+            Self::ExchangedRows { row } => {
+                write!(f, "rows {row} and {} of the joint table that are exchanged", row + 1)
+            }
+            Self::ExchangedLengths { row } => {
+                write!(f, "a and d of row {row} of the joint table that are exchanged")
             }
             Self::Exchanged { joint, with } => {
                 write!(f, "columns of joints {joint} and {with} that are exchanged")

@@ -1,0 +1,43 @@
+//! Words in cells where a number is expected, recognised for error messages.
+
+/// Units that tables of other programs write into cells.
+pub(super) const UNITS: [&str; 12] =
+    ["degrees", "degree", "deg", "°C", "°", "rad", "mm", "kg", "m", "s", "N", "C"];
+
+/// First three letters of the months in English, German and French.
+const MONTHS: [&str; 19] = [
+    "jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec", "mär",
+    "mrz", "mai", "okt", "dez", "fév", "aoû",
+];
+
+/// Returns true for a number with a decimal point whose thousands are separated by commas, such as
+/// `1,874.383`.
+pub(super) fn has_thousands(word: &str) -> bool {
+    let Some((whole, _)) = word.split_once('.') else { return false };
+    let mut groups = whole.trim_start_matches(['-', '+']).split(',');
+    let is_digits = |group: &str| group.bytes().all(|byte| byte.is_ascii_digit());
+    groups.next().is_some_and(|first| (1..=3).contains(&first.len()) && is_digits(first))
+        && groups.all(|group| group.len() == 3 && is_digits(group))
+        && word.replace(',', "").parse::<f64>().is_ok()
+}
+
+/// Returns true for a day and a month such as `18. Mrz` or `Mar-18`, into which spreadsheets turn
+/// numbers such as 18.3.
+pub(super) fn is_spreadsheet_date(word: &str) -> bool {
+    let parts: Vec<&str> =
+        word.split([' ', '-', '.', '/']).filter(|part| !part.is_empty()).collect();
+    let is_month = |part: &&str| {
+        let part: String = part.to_lowercase().chars().take(3).collect();
+        MONTHS.contains(&part.as_str())
+    };
+    let is_day = |part: &&str| part.len() <= 4 && part.bytes().all(|byte| byte.is_ascii_digit());
+    matches!(parts.as_slice(), [a, b] if is_month(a) && is_day(b) || is_day(a) && is_month(b))
+}
+
+/// Returns the unit that follows a number in the same cell, such as `°` in `118.1°`.
+pub(super) fn unit_behind(word: &str) -> Option<&'static str> {
+    UNITS.into_iter().find(|unit| {
+        let number = word.strip_suffix(unit).map(|number| number.trim_end().replace(',', "."));
+        number.is_some_and(|number| number.parse::<f64>().is_ok())
+    })
+}

@@ -1,0 +1,50 @@
+//! Errors of rows that hold no measurement: summaries, titles of pages, and missing positions.
+
+use super::table::{Table, shortened};
+use crate::error::{InputError, InputErrorKind, TableErrorKind};
+
+/// Minimum number of empty cells of a row that begins with a word and is probably a summary.
+const MIN_EMPTY_CELLS: usize = 2;
+
+impl Table {
+    /// Returns true if the current row begins with a word without a digit and has no more numbers
+    /// than words, as the title or foot of a page.
+    pub(super) fn is_line_of_words(&self) -> bool {
+        let cells = || self.cells().iter().map(|cell| String::from_utf8_lossy(cell.trim_ascii()));
+        let is_number = |cell: &str| cell.replace(',', ".").parse::<f64>().is_ok();
+        let numbers = cells().filter(|cell| is_number(cell)).count();
+        let begins_with_word =
+            cells().next().is_some_and(|cell| cell.starts_with(|c: char| c.is_alphabetic()));
+        begins_with_word && 2 * numbers <= self.cells().len()
+    }
+
+    /// Returns the error of an empty cell of the current row.
+    pub(super) fn empty_cell(&self, place: usize) -> InputError {
+        let empty = self.cells().iter().filter(|cell| cell.trim_ascii().is_empty()).count();
+        let first = std::str::from_utf8(self.cell(0)).unwrap_or_default();
+        let is_word = !first.is_empty() && first.chars().all(|c| c.is_alphabetic() || c == '.');
+        if self.is_empty_row() {
+            self.error(TableErrorKind::EmptyRow)
+        } else if is_word && empty >= MIN_EMPTY_CELLS {
+            self.error(TableErrorKind::SummaryRow { word: shortened(first), empty })
+        } else {
+            self.cell_error(place, TableErrorKind::EmptyCell)
+        }
+    }
+
+    /// Returns a coordinate of a measured position in the current row, as [`number`](Self::number)
+    /// does. Errors name the way to leave out rows in which nothing was measured.
+    pub fn measured_number(&self, place: usize) -> Result<f64, InputError> {
+        self.number(place).map_err(|error| match *error.kind {
+            InputErrorKind::Table(
+                TableErrorKind::EmptyCell | TableErrorKind::SummaryRow { .. },
+            ) => self.cell_error(place, TableErrorKind::EmptyMeasurement),
+            InputErrorKind::Table(TableErrorKind::NotANumber { value })
+                if !value.contains(|c: char| c.is_ascii_digit()) =>
+            {
+                self.cell_error(place, TableErrorKind::WordForMeasurement { value })
+            }
+            _ => error,
+        })
+    }
+}
