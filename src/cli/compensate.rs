@@ -14,6 +14,7 @@ use flexcal::results::{CompensationResult, Document as _, commands_csv};
 use super::diagnostic;
 use super::estimate::Trust;
 use super::input::Common;
+use super::misplaced;
 use super::outcome::Outcome;
 
 /// Arguments of `flexcal compensate`.
@@ -45,7 +46,7 @@ pub struct Arguments {
 
 /// Frame of the targets.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Frame {
+pub(super) enum Frame {
     /// The measuring frame, as measurements
     Measuring,
     /// The frame of the arm's base
@@ -95,8 +96,14 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     }
     let correction = remainder::of_estimate(&problem, &estimate);
     let fitted = (&estimate, correction.as_ref().ok().and_then(Option::as_ref));
-    let found =
-        Compensation::new(&problem, fitted, targets, arguments.frame.into(), arguments.level)?;
+    let solve = |targets: Measurements, frame: Frame| {
+        Compensation::new(&problem, fitted, targets, frame.into(), arguments.level)
+    };
+    let found = solve(targets.clone(), arguments.frame)?;
+    let as_given = (&targets, arguments.frame, found.commands.as_slice());
+    let meant = misplaced::meant(as_given, |targets, frame| {
+        solve(targets, frame).ok().map(|found| found.commands)
+    });
     // An error of the correction is reported only after the errors of the estimate, which explain
     // more.
     correction?;
@@ -105,6 +112,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
             "the estimate does not know where the arm's base is in the measuring frame, so targets in that frame are reached as far as it \
              happens to be assumed; --frame base takes them in the frame of the base",
         );
+    }
+    if let Some(words) = meant.as_ref().filter(|_| !common.quiet) {
+        diagnostic::warn(words);
     }
     let Compensation { targets, commands, bounds, .. } = &found;
     let bounds = bounds.as_ref();
@@ -118,7 +128,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         let written = results.path("commands.csv");
         let [problem_word, estimate] = [common.problem(), &arguments.estimate].map(shell_word);
         let reached = commands.iter().filter(|command| command.is_reached()).count();
-        let next = if reached == 0 {
+        let next = if meant.is_some() {
+            "correct the frame or the unit of the targets, as the warning says".to_owned()
+        } else if reached == 0 {
             "check the unit and the frame of the targets (--frame base takes them in the frame of the base) and the limits of the \
              joints"
                 .to_owned()

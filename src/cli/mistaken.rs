@@ -8,7 +8,11 @@ use clap::error::{ContextKind, ContextValue, ErrorKind};
 use flexcal::report::shell_word;
 
 /// Words that are often given as options or values, and where to write what they mean.
-const ELSEWHERE: [(&[&str], &str); 4] = [
+const ELSEWHERE: [(&[&str], &str); 5] = [
+    (
+        &["--output", "--ouput", "--outdir", "--out-dir", "--output-dir", "-o"],
+        "--out DIR names the folder of the results",
+    ),
     (
         &["--heldout", "--held-out", "--held_out", "--holdout", "--fraction"],
         "the problem says which poses are held out: held_out = { fraction = 0.3, seed = 1 } in [data]",
@@ -22,6 +26,19 @@ const ELSEWHERE: [(&[&str], &str); 4] = [
         &["urdf", "URDF"],
         "leave --format out to write a URDF: --urdf ARM.urdf names the one to change",
     ),
+];
+
+/// Words that are often given for the name of a command.
+const SYNONYMS: [(&str, &[&str]); 6] = [
+    (
+        "identify",
+        &["calibrate", "calibration", "fit", "estimate", "solve", "identification", "run"],
+    ),
+    ("compensate", &["correct", "apply", "inverse"]),
+    ("simulate", &["sim", "simulation", "generate"]),
+    ("loop", &["search", "select", "find", "discover"]),
+    ("accept", &["validate", "verify", "validation", "acceptance"]),
+    ("init", &["new", "create", "import"]),
 ];
 
 /// Adds a tip to the error of wrong arguments if a usual mistake is recognised. `words` are the
@@ -46,7 +63,15 @@ fn tip(error: &clap::Error, words: &[OsString], cli: &Command) -> Option<String>
             let path = Path::new(context(ContextKind::InvalidSubcommand)?);
             let is_problem = path.is_dir() || path.extension().is_some_and(|end| end == "toml");
             let named = shell_word(path);
-            is_problem.then(|| format!("write a command first, as in flexcal identify {named}"))
+            let word = path.to_str().unwrap_or_default().to_lowercase();
+            let synonym = SYNONYMS.iter().find(|(_, words)| words.contains(&word.as_str()));
+            match synonym {
+                _ if is_problem => {
+                    Some(format!("write a command first, as in flexcal identify {named}"))
+                }
+                Some((command, _)) => Some(format!("flexcal {command} may be meant")),
+                None => None,
+            }
         }
         ErrorKind::UnknownArgument if first.starts_with('-') => {
             let is_command = |word: &&str| cli.find_subcommand(word).is_some();
@@ -57,8 +82,37 @@ fn tip(error: &clap::Error, words: &[OsString], cli: &Command) -> Option<String>
         }
         _ => {
             let word = context(ContextKind::InvalidValue).or(context(ContextKind::InvalidArg))?;
-            let (_, tip) = ELSEWHERE.iter().find(|(words, _)| words.contains(&word))?;
-            Some((*tip).to_owned())
+            let elsewhere = ELSEWHERE.iter().find(|(words, _)| words.contains(&word));
+            let is_unknown = error.kind() == ErrorKind::UnknownArgument;
+            elsewhere.map(|(_, tip)| (*tip).to_owned()).or_else(|| {
+                let other = || other_command(word, first, cli);
+                negative_number(words).or_else(other).filter(|_| is_unknown)
+            })
         }
     }
+}
+
+/// Returns the tip for a negative number behind an option, which is read as another option.
+fn negative_number(words: &[OsString]) -> Option<String> {
+    let words: Vec<&str> = words.iter().filter_map(|word| word.to_str()).collect();
+    let pair = words.windows(2).find(|pair| {
+        pair[0].starts_with("--") && pair[1].starts_with('-') && pair[1].parse::<f64>().is_ok()
+    })?;
+    Some(format!(
+        "{option} is followed by {value}, which is read as an option; most options take numbers \
+         above zero, and others are written {option}={value}",
+        option = pair[0],
+        value = pair[1]
+    ))
+}
+
+/// Returns the tip for an `option` that `command` does not have and others do.
+fn other_command(option: &str, command: &str, cli: &Command) -> Option<String> {
+    let name = option.strip_prefix("--")?;
+    cli.find_subcommand(command)?;
+    let has_it =
+        |other: &&Command| other.get_arguments().any(|argument| argument.get_long() == Some(name));
+    let others: Vec<&str> = cli.get_subcommands().filter(has_it).map(Command::get_name).collect();
+    (!others.is_empty())
+        .then(|| format!("{command} takes no {option}; it is an option of {}", others.join(", ")))
 }

@@ -21,6 +21,7 @@ mod input;
 mod interrupt;
 mod loop_command;
 mod man;
+mod misplaced;
 mod mistaken;
 mod next;
 mod outcome;

@@ -24,7 +24,9 @@ pub(crate) use near::{nearest, one_typo};
 pub(crate) use no_rows::NoRows;
 pub(crate) use plain::{escape_hidden, mask_hidden, one_line};
 pub(crate) use study::StudyErrorKind;
-pub(crate) use table::{JOINED, TableErrorKind};
+pub(crate) use table::JOINED;
+#[doc(hidden)]
+pub use table::TableErrorKind;
 pub(crate) use typography::typographic;
 pub(crate) use urdf::UrdfErrorKind;
 #[doc(hidden)]

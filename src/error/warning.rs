@@ -113,7 +113,7 @@ pub enum WarningKind {
     HeavyPayload { mass: String, arm: Option<String> },
     #[error(
         "a gravity of {size} m/s² is {}; the standard value is 9.80665 m/s²",
-        if *is_unit { "a direction without a size" } else { "large; is it in mm/s²?" }
+        if *is_unit { "a direction without a size" } else { "large (is it in mm/s²?)" }
     )]
     UnusualGravity { size: String, is_unit: bool },
     #[error(
@@ -127,6 +127,11 @@ pub enum WarningKind {
          beam; if the bending stiffness is in N·mm², divide it by 1e6"
     )]
     StiffBeam { radius: String, length: String },
+    #[error(
+        "measured {distance} mm from {first}, which has the same pose and joint angles; one of the \
+         two is probably the point of another pose"
+    )]
+    SamePoseElsewhere { first: String, distance: String },
     #[error(
         "each of the {rows} rows has a session of its own, so nothing is common to two rows; a \
          session is a setting-up of the instrument or arm: leave the column out if it holds times \

@@ -5,7 +5,8 @@ use std::convert::identity;
 
 use super::mapped::{Names, no_such};
 use super::meaning::{
-    Meaning, Numbering, affects_results, lacking_neighbour, split_unit, unit_of, word_of_row,
+    Meaning, Numbering, affects_results, asked_for_readings, lacking_neighbour, split_unit,
+    unit_of, word_of_row,
 };
 use super::role::{POINT, POSITION, Role};
 use super::table::Table;
@@ -272,7 +273,8 @@ impl Columns {
                 }
                 let usable = |name: &&str| suffix.is_empty() && !name.contains(' ') && !is_shared;
                 let named = Some(joint.name.as_str()).filter(usable);
-                return missing(&[&[number.as_str()], named.as_slice()].concat(), unit);
+                return missing(&[&[number.as_str()], named.as_slice()].concat(), unit)
+                    .map_err(|error| asked_for_readings(error, suffix));
             }
         }
         for (k, covariate) in problem.data.covariates.iter().enumerate() {

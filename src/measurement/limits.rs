@@ -1,4 +1,6 @@
-//! Warnings about implausible commands and temperatures.
+//! Warnings about implausible commands, conditions and repeated poses.
+
+use std::collections::HashMap;
 
 use super::Measurements;
 use crate::error::{Warning, WarningKind};
@@ -16,6 +18,9 @@ const MAX_PAYLOAD: f64 = 3000.0;
 /// Largest plausible ratio of a payload to the declared masses of the arm. Arms carry up to about
 /// their own mass.
 const MAX_PAYLOAD_RATIO: f64 = 10.0;
+/// Largest plausible distance between repeated measurements of one pose \[m\]. Loads and backlash
+/// move an arm by less.
+const MAX_REPEAT_DISTANCE: f64 = 0.02;
 /// Minimum number of rows at which a session for each of them is implausible.
 const MIN_SESSION_ROWS: usize = 10;
 /// Largest plausible time \[s\], counted from 1970. Later times are in the year 5138, whereas
@@ -78,6 +83,30 @@ impl Measurements {
         };
         let location = self.location(row).with_key("payload_kg");
         (is_heavy_for_arm || heaviest > MAX_PAYLOAD).then_some(Warning { location, kind })
+    }
+
+    /// Returns a warning for the first row that has the pose, the configuration, the session and the
+    /// target of an earlier row, and a position far from it.
+    pub(super) fn same_pose_elsewhere(&self) -> Option<Warning> {
+        let name = |row: usize| match (&self.pose, &self.pose_names) {
+            (Some(numbers), _) => numbers.get(row).map(|number| number.to_bits()),
+            (None, Some(names)) => names.of_row.get(row).map(|name| *name as u64),
+            (None, None) => None,
+        };
+        let mut first_rows: HashMap<_, usize> = HashMap::new();
+        (0..self.len()).filter(|&row| self.observation(row).is_position()).find_map(|row| {
+            let target = self.target.as_ref().map(|target| target.of_row[row]);
+            let key = (name(row)?, self.session.of_row[row], target);
+            let first = *first_rows.entry(key).or_insert(row);
+            let distance = (self.positions[row] - self.positions[first]).norm();
+            let is_same = self.configuration(row) == self.configuration(first);
+            let kind = WarningKind::SamePoseElsewhere {
+                first: self.location(first).to_string(),
+                distance: format!("{:.0}", distance * 1e3),
+            };
+            (is_same && distance > MAX_REPEAT_DISTANCE)
+                .then(|| Warning { location: self.location(row), kind })
+        })
     }
 
     /// Returns a warning, located at the first row, if each of several rows has its own session.

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::convert::identity;
 
 use super::role::{POINT, Role, columns_with_unit, columns_without_unit};
-use crate::error::{InputErrorKind, TableErrorKind, WarningKind, nearest};
+use crate::error::{InputError, InputErrorKind, TableErrorKind, WarningKind, nearest};
 use crate::problem::{Joint, JointKind, Problem};
 use crate::quantity::Unit;
 
@@ -243,6 +243,23 @@ pub(super) fn lacking_neighbour(
     match (bases.iter().any(|known| known == base), missing.next(), missing.next()) {
         (true, Some(missing), None) => Some(format!("{missing}_{unit}")),
         _ => None,
+    }
+}
+
+/// Adds to the error of a missing column of encoder readings, whose names have a `suffix`, why it
+/// is needed.
+pub(super) fn asked_for_readings(error: InputError, suffix: &str) -> InputError {
+    match *error.kind {
+        InputErrorKind::Table(TableErrorKind::MissingColumn { write, near, unknown })
+            if !suffix.is_empty() =>
+        {
+            let write = format!(
+                "{write}, or write joints = \"commanded\" in [data], because \"read\" asks for \
+                 encoder readings"
+            );
+            error.location.error(TableErrorKind::MissingColumn { write, near, unknown })
+        }
+        kind => error.location.error(kind),
     }
 }
 

@@ -256,6 +256,7 @@ impl<'a> Tables<'a> {
                     let zeros = if is_comma { "0;0;0" } else { "0,0,0" };
                     warnings.extend(measurements.lost_targets(zeros)?);
                     warnings.extend(measurements.beyond_limits(problem, &commands));
+                    warnings.extend(measurements.same_pose_elsewhere());
                 }
                 warnings.extend(problem.plausibility_warnings());
                 measurements.warnings.clone_from(&warnings);

@@ -51,6 +51,11 @@ impl Truth {
 fn truth(document: &Document, problem: &Problem) -> Result<Truth, InputError> {
     let table = document.table()?;
     let mut root = Section::new(document, String::new(), 0..0, table.get_ref());
+    if let Some(item) = root.peek("joint") {
+        let found = "a problem, for it has joints";
+        let kind = InputErrorKind::OtherFormat { found, expected: "a TRUTH.toml" };
+        return Err(item.error(kind));
+    }
     let noise = root.section("noise")?.map_or(Ok(Noise::default()), noise)?;
     let truth = sections(&mut root, problem)?;
     root.finish()?;

@@ -77,6 +77,30 @@ fn changed(from: &str, to: &str) -> String {
 }
 
 #[test]
+fn targets_in_another_unit_are_asked_about() {
+    let folder = Folder::with_lunar_sampler();
+    folder.flexcal("identify . --out out");
+    let table = folder.table("a-none.csv");
+    let places = ["x_mm", "y_mm", "z_mm"].map(|name| table.place(name));
+    let warned = |change: &dyn Fn(usize, f64) -> f64| {
+        let rows = table.rows.iter().take(4).map(|row| {
+            let mut row = row.clone();
+            for (axis, place) in places.into_iter().enumerate() {
+                row[place] = change(axis, row[place].parse().unwrap()).to_string();
+            }
+            row.join(",") + "\n"
+        });
+        let text = table.columns.join(",") + "\n" + &rows.collect::<String>();
+        folder.write("targets.csv", text);
+        folder
+            .flexcal("compensate . --estimate out/estimate.json --data targets.csv --out c")
+            .stderr
+    };
+    assert!(warned(&|_, x| x / 1e3).contains("with metres instead of the declared millimetres"));
+    assert!(!warned(&|_, x| x).contains("where their joint columns lead"));
+}
+
+#[test]
 fn the_digest_is_of_what_predictions_depend_on() {
     let digest = |from, to| parse(&changed(from, to)).digest();
     let unchanged = digest("", "");

@@ -214,6 +214,10 @@ fn wrong_arguments_end_with_status_two_and_help_with_zero() {
         ("problem.toml", "tip: write a command first, as in flexcal identify problem.toml"),
         ("export . --estimate e.json --format URDF", "tip: leave --format out to write a URDF"),
         ("init .", "it is a folder; give a regular file"),
+        ("identify . --ouput out", "tip: --out DIR names the folder of the results"),
+        ("loop . --solver lm", "tip: loop takes no --solver; it is an option of identify"),
+        ("accept . --tolerance-mm -0.1", "--tolerance-mm is followed by -0.1"),
+        ("calibrate .", "tip: flexcal identify may be meant"),
     ] {
         assert_contains(&folder.flexcal(arguments).code(2).stderr, &[words]);
     }

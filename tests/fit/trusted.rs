@@ -224,6 +224,43 @@ fn gross_mistakes_are_fitted_and_named() {
 }
 
 #[test]
+fn exchanged_rows_and_lengths_columns_moved_on_and_one_axis_in_metres_are_named() {
+    let named = |problem: &Problem, data: &Dataset, words: &str| {
+        let found = fit(problem, data);
+        let finding = found.finding(FindingCode::Misread).unwrap().to_string();
+        assert!(!found.is_trusted() && finding.contains(words), "{finding}");
+    };
+    let (problem, data) = based();
+    let mut moved = data.clone();
+    moved.measurements.configurations.chunks_exact_mut(5).for_each(|q| q.rotate_right(1));
+    named(&problem, &moved, "columns of the joints that are moved on by 1 place");
+    let mut metres = data.clone();
+    metres.measurements.positions.iter_mut().for_each(|at| at.z *= 1e-3);
+    metres.measurements.position_unit = Some(1e-3);
+    named(&problem, &metres, "z alone that is in metres, declared in millimetres");
+    let mut rows = problem.clone();
+    let (third, fourth) = (rows.joints[2].clone(), rows.joints[3].clone());
+    for (joint, other) in [(2, &fourth), (3, &third)] {
+        let joint = &mut rows.joints[joint];
+        (joint.alpha, joint.a, joint.d) = (other.alpha, other.a, other.d);
+    }
+    named(&rows, &data, "rows 3 and 4 of the joint table that are exchanged (");
+    let mut lengths = problem.clone();
+    let fourth = &mut lengths.joints[3];
+    std::mem::swap(&mut fourth.a, &mut fourth.d);
+    named(&lengths, &data, "a and d of row 4 of the joint table that are exchanged (");
+}
+
+#[test]
+fn a_sigma_in_another_unit_is_asked_about() {
+    for (factor, is_named) in [(1.0, false), (20.0, false), (1000.0, true)] {
+        let (mut problem, data) = based();
+        problem.data.position_sigma = Some(factor * SIGMA);
+        assert_eq!(fit(&problem, &data).has(FindingCode::SigmaOverstated), is_named, "{factor}");
+    }
+}
+
+#[test]
 fn gross_mistakes_with_a_standard_table_are_fitted_and_named() {
     // Read as a modified table, the same rows have one joint fewer than the measurements.
     let problem = parse(&format!(

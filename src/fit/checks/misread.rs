@@ -51,7 +51,10 @@ impl Check for ReadAsMeant {
         let (fit_words, rest) = if is_noise {
             ("fit", "")
         } else {
-            ("fit better", ", still far more than the declared σ, so that another mistake remains")
+            (
+                "fit better",
+                ", which is more than the declared σ: the model lacks something, or another mistake remains",
+            )
         };
         let text = format!(
             "the measurements {fit_words} if they are read in another way: with {}{more}, the error would be {} instead of {}{rest}",

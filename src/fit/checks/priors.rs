@@ -105,6 +105,8 @@ impl Check for NoiseIsDeclared {
 /// Largest ratio of the declared σ to what the fit leaves. It is as far from 1 as the largest ratio
 /// in the other direction, [`MAX_NOISE_FACTOR`].
 const MAX_OVERSTATED_RATIO: f64 = 30.0;
+/// Smallest such ratio at which the positions are not measured: no unit of σ makes it as large.
+const MIN_COMPUTED_RATIO: f64 = 1e5;
 /// Smallest ratio of measured numbers to fitted parameters at which the residual shows the noise.
 const MIN_NUMBERS_PER_PARAMETER: usize = 2;
 
@@ -136,6 +138,15 @@ impl Check for SigmaIsNotOverstated {
             sigma / rms,
             size(name, rms, 4)
         );
-        vec![Finding::new(FindingCode::SigmaOverstated, [sigma.into(), rms.into()], text)]
+        let finding = Finding::new(FindingCode::SigmaOverstated, [sigma.into(), rms.into()], text);
+        vec![if sigma > MIN_COMPUTED_RATIO * rms {
+            finding.with_remedy(
+                "measured positions scatter more than that: check whether these are targets or \
+                 computed positions"
+                    .to_owned(),
+            )
+        } else {
+            finding
+        }]
     }
 }

@@ -4,3 +4,4 @@ mod files;
 mod reading;
 mod sections;
 mod tables;
+mod usual;

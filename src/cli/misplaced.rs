@@ -1,0 +1,55 @@
+//! Targets that are probably given in another frame or unit.
+
+use flexcal::fit::Command;
+use flexcal::measurement::Measurements;
+
+use super::compensate::Frame;
+
+/// Smallest mean distance between targets and the poses of their commands at which another frame
+/// or unit is tried \[m\]. Errors of arms are a few millimetres.
+const MIN_MISS: f64 = 0.05;
+/// Largest ratio of that distance in another frame or unit to that as given at which the other one
+/// is meant.
+const MAX_RATIO: f64 = 0.1;
+
+/// Returns the frame or unit in which the targets are much nearer to where their commands lead, in
+/// words. `solve` finds the commands for targets in a frame.
+pub(super) fn meant(
+    (targets, frame, commands): (&Measurements, Frame, &[Command]),
+    solve: impl Fn(Measurements, Frame) -> Option<Vec<Command>>,
+) -> Option<String> {
+    let given = mean_miss(commands);
+    if !targets.position_measured || given <= MIN_MISS {
+        return None;
+    }
+    let (other, name) = match frame {
+        Frame::Measuring => (Frame::Base, "base"),
+        Frame::Base => (Frame::Measuring, "measuring"),
+    };
+    let scaled = |factor: f64| {
+        let mut scaled = targets.clone();
+        scaled.positions.iter_mut().for_each(|position| *position *= factor);
+        scaled
+    };
+    let trials = [
+        (targets.clone(), other, format!("--frame {name}")),
+        (scaled(1e3), frame, "metres instead of the declared millimetres".to_owned()),
+        (scaled(1e-3), frame, "millimetres instead of the declared metres".to_owned()),
+    ];
+    let misses = trials.into_iter().filter_map(|(targets, frame, words)| {
+        let miss = mean_miss(&solve(targets, frame)?);
+        (miss < MAX_RATIO * given).then_some((miss, words))
+    });
+    let (miss, words) = misses.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    Some(format!(
+        "the targets are {:.0} mm from where their joint columns lead, and with {words} {:.1} mm: \
+         check frame and unit of the targets before the arm is moved",
+        given * 1e3,
+        miss * 1e3
+    ))
+}
+
+/// Returns the mean distance between the targets and the poses of their joint columns \[m\].
+fn mean_miss(commands: &[Command]) -> f64 {
+    commands.iter().map(|command| command.seed_miss).sum::<f64>() / commands.len().max(1) as f64
+}
