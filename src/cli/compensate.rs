@@ -3,18 +3,18 @@
 use std::error::Error;
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use flexcal::fit;
 use flexcal::measurement::Measurements;
 use flexcal::problem::Problem;
-use flexcal::remainder::{self, Compensation, TargetFrame};
+use flexcal::remainder::{self, Compensation};
 use flexcal::report::{self, shell_word};
 use flexcal::results::{CompensationResult, Document as _, commands_csv};
 
 use super::diagnostic;
 use super::estimate::Trust;
 use super::input::Common;
-use super::misplaced;
+use super::misplaced::{self, Frame};
 use super::outcome::Outcome;
 
 /// Arguments of `flexcal compensate`.
@@ -42,24 +42,6 @@ pub struct Arguments {
     level: f64,
     #[command(flatten)]
     trust: Trust,
-}
-
-/// Frame of the targets.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(super) enum Frame {
-    /// The measuring frame, as measurements
-    Measuring,
-    /// The frame of the arm's base
-    Base,
-}
-
-impl From<Frame> for TargetFrame {
-    fn from(frame: Frame) -> Self {
-        match frame {
-            Frame::Measuring => Self::Measuring,
-            Frame::Base => Self::Base,
-        }
-    }
 }
 
 /// Error of missing targets: no table of targets is named.

@@ -1,9 +1,9 @@
 //! Targets that are probably given in another frame or unit.
 
+use clap::ValueEnum;
 use flexcal::fit::Command;
 use flexcal::measurement::Measurements;
-
-use super::compensate::Frame;
+use flexcal::remainder::TargetFrame;
 
 /// Smallest mean distance between targets and the poses of their commands at which another frame
 /// or unit is tried \[m\]. Errors of arms are a few millimetres.
@@ -11,6 +11,24 @@ const MIN_MISS: f64 = 0.05;
 /// Largest ratio of that distance in another frame or unit to that as given at which the other one
 /// is meant.
 const MAX_RATIO: f64 = 0.1;
+
+/// Frame of the targets.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum Frame {
+    /// The measuring frame, as measurements
+    Measuring,
+    /// The frame of the arm's base
+    Base,
+}
+
+impl From<Frame> for TargetFrame {
+    fn from(frame: Frame) -> Self {
+        match frame {
+            Frame::Measuring => Self::Measuring,
+            Frame::Base => Self::Base,
+        }
+    }
+}
 
 /// Returns the frame or unit in which the targets are much nearer to where their commands lead, in
 /// words. `solve` finds the commands for targets in a frame.

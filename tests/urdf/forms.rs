@@ -86,11 +86,14 @@ fn placements_and_followers_are_the_same_in_model_and_rig() {
     assert!((at_rest - (expected * Point3::new(0.05, 0.1, 0.2)).coords).norm() < 1e-12);
 
     for (wrong, says) in [
-        ("kind = 'fixed'\nxyz_m = [0, 0, 1]\nalpha_deg = 3", "unknown key"),
+        ("kind = 'fixed'\nxyz_m = [0, 0, 1]\nalpha_deg = 3", "joint 2 is placed by xyz_m"),
         ("xyz_m = [0, 0, 1]", "unknown key"),
-        ("mimic = { joint = 2 }", "joint 2 takes no command that another joint could follow"),
+        ("mimic = { joint = 2 }", "joint 2 cannot follow itself"),
         ("mimic = { joint = 7 }", "no joint 7"),
-        ("mimic = { joint = 1 }\nmin_deg = 3", "unknown key"),
+        (
+            "mimic = { joint = 1 }\nmin_deg = 3",
+            "joint 2 follows another joint, so it has no limits",
+        ),
         ("kind = 'fixed'\nmimic = { joint = 1 }", "a fixed joint cannot follow another one"),
     ] {
         let text = format!("name = 'w'\n[[joint]]\nd_m = 1\n[[joint]]\n{wrong}\n");

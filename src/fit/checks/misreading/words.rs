@@ -123,12 +123,6 @@ impl fmt::Display for Misreading {
                 let name = ['x', 'y', 'z'][axis];
                 write!(f, "{name} alone that is in {found}, declared in {declared}")
             }
-            Self::ExchangedRows { row } => {
-                write!(f, "rows {row} and {} of the joint table that are exchanged", row + 1)
-            }
-            Self::ExchangedLengths { row } => {
-                write!(f, "a and d of row {row} of the joint table that are exchanged")
-            }
             Self::Exchanged { joint, with } => {
                 write!(f, "columns of joints {joint} and {with} that are exchanged")
             }
@@ -148,35 +142,6 @@ impl fmt::Display for Misreading {
             Self::Ratio { joint, percent } => {
                 let ratio = f64::from(percent) / 100.0;
                 write!(f, "joint {joint} that turns by {ratio} times its command")
-            }
-            Self::StandardForm => {
-                f.write_str("a joint table in standard DH form (declare dh = \"standard\")")
-            }
-            Self::ModifiedForm => {
-                f.write_str("a joint table in modified DH form, declared as standard (declare dh = \"modified\")")
-            }
-            Self::TableRadians { joint, field } => {
-                write!(f, "{} that is in radians, declared in degrees", entry_name(joint, field))
-            }
-            Self::TableDegrees { joint, field } => {
-                write!(f, "{} that is in degrees, declared in radians", entry_name(joint, field))
-            }
-            Self::Sign { joint, field } => {
-                write!(f, "{} that has the other sign", entry_name(joint, field))
-            }
-            Self::Length { joint, field, power: -3 } => {
-                write!(f, "{} that is in millimetres, declared in metres", entry_name(joint, field))
-            }
-            Self::Length { joint, field, power: 3 } => {
-                write!(f, "{} that is in metres, declared in millimetres", entry_name(joint, field))
-            }
-            Self::Length { joint, field, power } => {
-                write!(
-                    f,
-                    "{} that is to be multiplied by {}",
-                    entry_name(joint, field),
-                    power_of_ten(power)
-                )
             }
             Self::HeldBase => f.write_str(
                 "a base that stands elsewhere than declared (free it in [parameters]: \"base.*\" = { free = true })",
@@ -211,6 +176,51 @@ impl fmt::Display for Misreading {
                 let sign = if is_negative { "−" } else { "+" };
                 write!(f, "gravity that points along {sign}{}", ['x', 'y', 'z'][axis])
             }
+            _ => self.fmt_of_table(f),
+        }
+    }
+}
+
+impl Misreading {
+    /// Describes a misreading of the joint table.
+    fn fmt_of_table(self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::ExchangedRows { row } => {
+                write!(f, "rows {row} and {} of the joint table that are exchanged", row + 1)
+            }
+            Self::ExchangedLengths { row } => {
+                write!(f, "a and d of row {row} of the joint table that are exchanged")
+            }
+            Self::StandardForm => {
+                f.write_str("a joint table in standard DH form (declare dh = \"standard\")")
+            }
+            Self::ModifiedForm => {
+                f.write_str("a joint table in modified DH form, declared as standard (declare dh = \"modified\")")
+            }
+            Self::TableRadians { joint, field } => {
+                write!(f, "{} that is in radians, declared in degrees", entry_name(joint, field))
+            }
+            Self::TableDegrees { joint, field } => {
+                write!(f, "{} that is in degrees, declared in radians", entry_name(joint, field))
+            }
+            Self::Sign { joint, field } => {
+                write!(f, "{} that has the other sign", entry_name(joint, field))
+            }
+            Self::Length { joint, field, power: -3 } => {
+                write!(f, "{} that is in millimetres, declared in metres", entry_name(joint, field))
+            }
+            Self::Length { joint, field, power: 3 } => {
+                write!(f, "{} that is in metres, declared in millimetres", entry_name(joint, field))
+            }
+            Self::Length { joint, field, power } => {
+                write!(
+                    f,
+                    "{} that is to be multiplied by {}",
+                    entry_name(joint, field),
+                    power_of_ten(power)
+                )
+            }
+            _ => Ok(()),
         }
     }
 }
