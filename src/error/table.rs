@@ -18,6 +18,7 @@ pub(crate) const JOINED: &str =
 /// Kind of error in a table of measurements; [`Location`](super::Location) holds the place.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
+#[expect(missing_docs, reason = "the message of each variant says what it stands for")]
 pub enum TableErrorKind {
     #[error("no measurements; name them in `files`")]
     NoDataFiles,
