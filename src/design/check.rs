@@ -125,7 +125,8 @@ pub fn check(problem: &Problem, checked: &CheckedPoses, seed: u64) -> Result<Che
         CheckedPoses::Table { .. } => {
             let sensitivity = site.sensitivity(&series, None);
             if let Some(row) = (0..sensitivity.len()).find(|&row| !sensitivity.is_finite(row)) {
-                return Err(series.location(row).error(InputErrorKind::NoEquilibrium).into());
+                let error = series.location(row).error(InputErrorKind::NoEquilibrium);
+                return Err(problem.with_soft_joint(error).into());
             }
             (series, sensitivity)
         }

@@ -117,12 +117,6 @@ pub enum WarningKind {
     )]
     UnusualGravity { size: String, is_unit: bool },
     #[error(
-        "gravity on the masses beyond this joint has a moment of up to {moment} N·m, which would \
-         turn it by {angle} rad with this stiffness; a stiffness in N·m/arcmin times 3438, or in \
-         N·m/° times 57.3, is one in N·m/rad"
-    )]
-    SoftJoint { moment: String, angle: String },
-    #[error(
         "the radius of gyration √(EI/EA) would be {radius} m, more than the {length} m of the \
          beam; if the bending stiffness is in N·mm², divide it by 1e6"
     )]

@@ -189,6 +189,9 @@ fn fit_rows(
             .and_then(|warm_start| warm_start.linear_model.as_ref()),
         earlier: options.earlier.as_deref(),
     };
+    if let Some(error) = fitting.unpredictable() {
+        return Err(problem.with_soft_joint(error).into());
+    }
     let unknowns = fitted_parameters(&fitting)?;
     let (start, registered) =
         prepared(&mut fitting, options.warm_start.as_deref(), has_declared_noise)?;
@@ -380,11 +383,8 @@ fn prepared(
 /// Returns the parameters that the strategy varies.
 ///
 /// # Errors
-/// Returns an error if a row has no equilibrium, or the strategy varies only bases and targets.
+/// Returns an error if the strategy varies only bases and targets.
 fn fitted_parameters<'a>(fitting: &Fitting<'a>) -> Result<Vec<&'a Parameter>, IdentifyError> {
-    if let Some(error) = fitting.unpredictable() {
-        return Err(error.into());
-    }
     let unknowns: Vec<&Parameter> = fitting.whole().parameters().collect();
     if fitting.strategy != Strategy::Joint
         && unknowns.iter().all(|parameter| parameter.site.is_placement())

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use super::section::Section;
 use super::{Body, Joint, JointKind, Problem};
-use crate::error::{Location, Warning, WarningKind};
+use crate::error::{InputError, InputErrorKind, Location, Warning, WarningKind};
 use crate::quantity::rounded_right_angle;
 
 /// Largest plausible length in the joint table \[m\]. Longer ones are probably in millimetres.
@@ -108,7 +108,7 @@ impl Problem {
     pub fn plausibility_warnings(&self) -> Vec<Warning> {
         let warnings = self.warnings.iter().cloned();
         let warnings = warnings.chain(self.far_target()).chain(self.narrow_limits());
-        warnings.chain(self.bodies()).chain(self.soft_joint()).chain(self.stiff_beam()).collect()
+        warnings.chain(self.bodies()).chain(self.stiff_beam()).collect()
     }
 
     /// Returns a warning for the first mass of a joint that is too heavy for an arm, and for the
@@ -140,9 +140,21 @@ impl Problem {
         of_beams.chain(self.joints.iter().map(|joint| total(&joint.bodies))).sum()
     }
 
-    /// Returns a warning for the joint that gravity would turn furthest if that is more than
+    /// Names the joint that is probably too soft in the error of a pose without equilibrium; other
+    /// errors stay as they are.
+    pub(crate) fn with_soft_joint(&self, error: InputError) -> InputError {
+        match *error.kind {
+            InputErrorKind::NoEquilibrium => {
+                let kind = self.soft_joint().unwrap_or(InputErrorKind::NoEquilibrium);
+                error.location.error(kind)
+            }
+            kind => error.location.error(kind),
+        }
+    }
+
+    /// Returns the error of the joint that gravity would turn furthest if that is more than
     /// [`MAX_SAG`]. The moment is an upper bound, with all links stretched out.
-    fn soft_joint(&self) -> Option<Warning> {
+    fn soft_joint(&self) -> Option<InputErrorKind> {
         let gravity = self.gravity.norm();
         if !self.is_chain() || gravity > MAX_GRAVITY {
             return None;
@@ -167,14 +179,15 @@ impl Problem {
         };
         let sags = self.joints.iter().enumerate().filter_map(|(index, joint)| {
             let moment = moment(index);
-            Some((joint, moment, moment / joint.stiffness?))
+            Some((index + 1, joint, moment, moment / joint.stiffness?))
         });
-        let (joint, moment, angle) = sags.max_by(|a, b| a.2.total_cmp(&b.2))?;
-        let location = Location { excerpt: None, ..joint.location.clone() };
-        let kind =
-            WarningKind::SoftJoint { moment: format!("{moment:.1}"), angle: format!("{angle:.1}") };
-        (angle > MAX_SAG)
-            .then(|| Warning { location: location.with_key("stiffness_N_m_per_rad"), kind })
+        let (number, joint, moment, angle) = sags.max_by(|a, b| a.3.total_cmp(&b.3))?;
+        let place = Location { key: None, excerpt: None, ..joint.location.clone() };
+        (angle > MAX_SAG).then(|| InputErrorKind::SoftJoint {
+            joint: format!("joint {number} ({place})"),
+            moment: format!("{moment:.1}"),
+            angle: format!("{angle:.1}"),
+        })
     }
 
     /// Returns a warning for the first beam whose radius of gyration, by its rigidities, exceeds

@@ -180,7 +180,7 @@ fn bad_input_is_named_and_leaves_nothing_behind() {
         (
             "an arm too soft to stand",
             |b| b.edit(PROBLEM, "5.2e4", "1.0"),
-            &["a-none.csv:2", "equilibrium"],
+            &["a-none.csv:2", "equilibrium", "joint 2 (./problem.toml:13) may be too soft"],
         ),
     ];
     for (what, spoil, expected) in mistakes {

@@ -109,7 +109,10 @@ pub fn waypoints(
     targets.positions = model.predict(poses, &nominal);
     targets.position_measured = true;
     match targets.positions.iter().position(|position| !position.iter().all(|x| x.is_finite())) {
-        Some(row) => Err(rows.location(row).error(InputErrorKind::NoEquilibrium)),
+        Some(row) => {
+            let error = rows.location(row).error(InputErrorKind::NoEquilibrium);
+            Err(problem.with_soft_joint(error))
+        }
         None => Ok(targets),
     }
 }

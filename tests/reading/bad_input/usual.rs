@@ -144,8 +144,6 @@ fn conditions_and_loads_in_other_units_are_asked_about() {
         ))
     };
     assert_eq!(elastic("9e3", "2.4e3"), []);
-    let soft = elastic("2.6", "2.4e3");
-    assert!(matches!(soft.as_slice(), [(Some(3), WarningKind::SoftJoint { .. })]), "{soft:?}");
     let stiff = elastic("9e3", "2.4e9");
     assert!(matches!(stiff.as_slice(), [(Some(6), WarningKind::StiffBeam { .. })]), "{stiff:?}");
 }
