@@ -177,8 +177,7 @@ pub fn plan(
         return Err(DesignError::NothingSeen);
     }
     let unavoidable = undetermined.saturating_sub(untouched(parameters, &[Some(&sensitivity)]));
-    let (attainable_rank, least_poses) =
-        attainable_rank_and_poses(parameters, given.as_ref(), &sensitivity);
+    let (attainable_rank, least_poses) = rank_and_poses(parameters, given.as_ref(), &sensitivity);
     let goal = (*criterion == Criterion::I)
         .then(|| WorkspaceGoal::new(&site, &table, uniform.len(), seed));
     let exchange = match &goal {
@@ -275,7 +274,7 @@ fn tables(
 
 /// Returns the number of combinations that given poses and all candidates determine together, and
 /// the smallest number of planned poses that can determine them.
-fn attainable_rank_and_poses(
+fn rank_and_poses(
     parameters: &[Parameter],
     given: Option<&Sensitivity>,
     candidates: &Sensitivity,

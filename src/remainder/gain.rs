@@ -49,7 +49,7 @@ pub struct Gain {
     pub density: MeanDifference,
     /// Increase of the logarithm of the marginal likelihood, including the priors of the
     /// hyperparameters.
-    pub ln_evidence_gain: f64,
+    pub ln_evidence: f64,
     /// Number of configurations averaged over.
     pub configurations: usize,
 }
@@ -60,7 +60,7 @@ impl Gain {
     pub(super) fn of(
         configurations: &[Vec<usize>],
         (without, with): (&[LeftOutError], &[LeftOutError]),
-        ln_evidence_gain: f64,
+        ln_evidence: f64,
     ) -> Self {
         let means = |errors: &[LeftOutError], of: fn(&LeftOutError) -> f64| -> Vec<f64> {
             let mean = |rows: &Vec<usize>| {
@@ -80,7 +80,7 @@ impl Gain {
             with: average(&after),
             error: difference(&before, &after),
             density: difference(&more, &less),
-            ln_evidence_gain,
+            ln_evidence,
             configurations: configurations.len(),
         }
     }
@@ -117,6 +117,6 @@ impl Gain {
     pub fn is_significant(&self) -> bool {
         self.error.ratio() > self.threshold()
             && self.density.ratio() > self.density_threshold()
-            && self.ln_evidence_gain > Self::least_evidence()
+            && self.ln_evidence > Self::least_evidence()
     }
 }

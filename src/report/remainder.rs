@@ -40,7 +40,7 @@ pub fn remainder_text(found: &Identification, outcome: &Outcome) -> String {
             number(gain.density.mean, 2),
             number(gain.density.ratio(), 2),
             number(gain.density_threshold(), 2),
-            number(gain.ln_evidence_gain, 2),
+            number(gain.ln_evidence, 2),
             number(Gain::least_evidence(), 2),
         ),
     }
