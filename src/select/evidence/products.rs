@@ -148,13 +148,23 @@ impl<'a> Products<'a> {
     }
 
     /// Returns the converged sizes of a set and ln of its posterior; calls `settle` if they are not
-    /// cached.
+    /// cached. `settle` also returns true if the sizes stay where they are: a set that begins with
+    /// them has the same result.
     pub fn settled(
         &self,
         (members, sizes): (&[usize], &[f64]),
-        settle: impl FnOnce() -> Option<(Vec<f64>, f64)>,
+        settle: impl FnOnce() -> Option<(Vec<f64>, f64, bool)>,
     ) -> Option<(Vec<f64>, f64)> {
-        self.cache.settled.get_or_compute(&sized_set(members, sizes), settle)
+        let cache = &self.cache.settled;
+        cache.get_or_compute(&sized_set(members, sizes), || {
+            let (sizes, ln_posterior, stay) = settle()?;
+            let result = (sizes, ln_posterior);
+            if stay {
+                let converged = sized_set(members, &result.0);
+                cache.get_or_compute(&converged, || Some(result.clone()));
+            }
+            Some(result)
+        })
     }
 
     /// Returns the problem that remains once the hypotheses `members` are fitted with the prior

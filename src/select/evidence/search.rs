@@ -89,9 +89,9 @@ impl Set {
         self
     }
 
-    /// Returns the converged sizes (prior σ of the coefficients) of the members and ln of the
-    /// posterior at them; `None` if a Cholesky factorisation fails.
-    fn converged_sizes(&self, products: &Products) -> Option<(Vec<f64>, f64)> {
+    /// Returns the converged sizes (prior σ of the coefficients), ln of the posterior at them, and
+    /// whether the last pass changed no size; `None` if a Cholesky factorisation fails.
+    fn converged_sizes(&self, products: &Products) -> Option<(Vec<f64>, f64, bool)> {
         let (members, mut sizes) = (&self.members, self.sizes.clone());
         let mut all = products.reduced(members, &sizes)?;
         let mut summed = vec![0.0; members.len()];
@@ -117,7 +117,7 @@ impl Set {
         let gains: f64 = summed.iter().map(|with| with - all.ln_likelihood()).sum();
         let ln_posterior =
             all.ln_likelihood() + gains - products.over_noise(products.squares) + prior;
-        Some((sizes, ln_posterior))
+        Some((sizes, ln_posterior, !stale.contains(&true)))
     }
 }
 
