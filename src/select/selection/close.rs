@@ -1,6 +1,7 @@
 //! The loop: fits the declared problem, searches the effects that it lacks, and collects the
 //! result.
 
+use std::cell::OnceCell;
 use std::collections::BTreeSet;
 
 use super::found::{Found, found};
@@ -127,20 +128,32 @@ pub fn close_by(
     } else {
         result?
     };
-    let (fitted, evidence) = found_or_declared(&declared, (fitted, evidence), &data, &unstoppable)?;
-    let mut conclusion = concluded(&state, &declared, (fitted, evidence), interrupted);
+    // If the declared fit does not describe the arm, it needs no evidence.
+    let of_declared = state
+        .evidence_of_declared
+        .take()
+        .filter(|_| declared.found.describes_arm() && !interrupted);
+    let (fitted, evidence) = found_or_declared(
+        (&declared, of_declared.as_ref()),
+        (fitted, evidence),
+        &data,
+        &unstoppable,
+    )?;
     // If no effect has the status found, the effects are kept only if they predict left-out poses
     // better: by more than one standard error of the gain, or significantly if none is even
     // probable.
-    let best = conclusion.effects.iter().map(|found| found.status).min();
-    let gain = || LeftOutGain::new(&conclusion.fitted, &declared, &data);
-    let is_used = match best {
+    let gain = OnceCell::new();
+    let gain = || gain.get_or_init(|| LeftOutGain::new(&fitted, &declared, &data)).as_ref();
+    let is_used = |best: Option<Status>| match best {
         None | Some(Status::Found) => true,
-        Some(Status::Probable) => gain().is_some_and(|gain| gain.exceeds_standard_error()),
-        Some(_) => gain().is_some_and(|gain| gain.is_significant()),
+        Some(Status::Probable) => gain().is_some_and(LeftOutGain::exceeds_standard_error),
+        Some(_) => gain().is_some_and(LeftOutGain::is_significant),
     };
-    if !is_used {
-        conclusion = concluded(&state, &declared, (declared.clone(), None), interrupted);
+    let mut conclusion =
+        concluded(&state, &declared, (fitted.clone(), evidence), interrupted, is_used);
+    if !is_used(conclusion.effects.iter().map(|found| found.status).min()) {
+        conclusion =
+            concluded(&state, &declared, (declared.clone(), of_declared), interrupted, |_| true);
     }
     let Conclusion { fitted, evidence, residual_tests, effects, mut unexplained } = conclusion;
     if unexplained.is_empty() {
@@ -220,12 +233,14 @@ struct Conclusion {
 }
 
 /// Tests the residual of a fit and collects the claims about the effects that it contains, and
-/// about structure without a law. Evidence that is missing is evaluated first.
+/// about structure without a law. Evidence that is missing is evaluated first. `is_used` tells from
+/// the best status of an effect whether the conclusion is used.
 fn concluded(
     state: &SearchState,
     declared: &Fitted,
     (fitted, evidence): (Fitted, Option<Evidence>),
     interrupted: bool,
+    is_used: impl Fn(Option<Status>) -> bool,
 ) -> Conclusion {
     let data = state.data;
     let is_trusted = fitted.found.describes_arm();
@@ -247,6 +262,7 @@ fn concluded(
         &fitted,
         (best, of_all_rows.as_ref()),
         (is_trusted, residual_tests.is_structured()),
+        is_used,
     );
     Conclusion { fitted, evidence, residual_tests, effects, unexplained }
 }
@@ -256,9 +272,10 @@ fn concluded(
 ///
 /// A found fit with cautions is repeated from the nominal arm, because terms that were missing at
 /// first may have driven a parameter to a wrong optimum. If cautions remain, it is kept only if it
-/// predicts significantly better than the declared fit.
+/// predicts significantly better than the declared fit. `of_declared` is the evidence about the
+/// declared fit, if it was evaluated.
 fn found_or_declared(
-    declared: &Fitted,
+    (declared, of_declared): (&Fitted, Option<&Evidence>),
     (fitted, evidence): (Fitted, Option<Evidence>),
     data: &Data,
     options: &Options,
@@ -268,7 +285,7 @@ fn found_or_declared(
         LeftOutGain::new(new, old, data).is_some_and(|gain| gain.is_significant())
     };
     if is_extended && is_better(declared, &fitted) {
-        return Ok((declared.clone(), None));
+        return Ok((declared.clone(), of_declared.cloned()));
     }
     if fitted.found.describes_arm() {
         return Ok((fitted, evidence));
@@ -279,7 +296,7 @@ fn found_or_declared(
     }
     // Nothing that is fitted to a misread table says anything about the arm.
     if declared.found.has(FindingCode::Misread) {
-        return Ok((declared.clone(), None));
+        return Ok((declared.clone(), of_declared.cloned()));
     }
     let is_kept =
         |other: &Fitted| other.found.termination.converged() && is_better(other, declared);
@@ -288,7 +305,7 @@ fn found_or_declared(
     } else if is_kept(&anew) {
         Ok((anew, None))
     } else {
-        Ok((declared.clone(), None))
+        Ok((declared.clone(), of_declared.cloned()))
     }
 }
 

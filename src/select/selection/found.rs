@@ -58,18 +58,21 @@ pub struct Found {
 /// the fit has cautions (`is_trusted` is false), no effect is more than probable. If the residual
 /// of the fit is not noise (`is_structured`), its claims are means over subsets. No claim is surer
 /// than by the evidence `of_all_rows`, which includes rows that the effects make outliers.
+///
+/// `is_used` tells from the best status of an effect whether the result is used; no better status
+/// is used less. If it is not used by the evidence on all rows, random subsets, which only reduce
+/// the probabilities, are not evaluated.
 pub(super) fn found(
     state: &SearchState,
     fitted: &Fitted,
     (best, of_all_rows): (Option<(&Evidence, &HypothesisSet)>, Option<&Evidence>),
     (is_trusted, is_structured): (bool, bool),
+    is_used: impl Fn(Option<Status>) -> bool,
 ) -> Vec<Found> {
     let (data, rules) = (state.data, state.data.rules);
     let added = state.added(fitted);
     let parts: Vec<Effect> = added.iter().flat_map(Effect::parts).collect();
     let reconsidered = state.reconsidered(fitted);
-    let subsets =
-        best.map(|best| subset_evidence(fitted, data, best, &reconsidered)).unwrap_or_default();
     let p_values = p_values(state, fitted, &added);
     let plainer = plainer(state, fitted);
     let held_out_after = |effect: &Effect| {
@@ -79,7 +82,7 @@ pub(super) fn found(
             state.rounds.iter().find(|round| holds(round) && round.effects.iter().all(stays));
         round.map_or(fitted.found.fitted.held_out, |round| round.held_out)
     };
-    let found_effect = |(effect, p_value): (Effect, f64)| {
+    let found_effect = |(effect, p_value): (Effect, f64), subsets: &[SubsetEvidence]| {
         let alternatives = best.map_or_else(Vec::new, |(evidence, _)| {
             alternatives(evidence, &effect, &parts, MIN_ALTERNATIVE_ODDS)
         });
@@ -166,7 +169,18 @@ pub(super) fn found(
             effect,
         }
     };
-    added.iter().cloned().zip(p_values).map(found_effect).collect()
+    let all = |subsets: &[SubsetEvidence]| -> Vec<Found> {
+        let tested = added.iter().cloned().zip(p_values.iter().copied());
+        tested.map(|effect| found_effect(effect, subsets)).collect()
+    };
+    let on_all_rows = all(&[]);
+    match best {
+        Some(best) if is_used(on_all_rows.iter().map(|found| found.status).min()) => {
+            let subsets = subset_evidence(fitted, data, best, &reconsidered);
+            if subsets.is_empty() { on_all_rows } else { all(&subsets) }
+        }
+        _ => on_all_rows,
+    }
 }
 
 /// Returns, for each effect of a fit, the p-value of the F test of the fit against the fit without

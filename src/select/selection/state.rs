@@ -49,6 +49,8 @@ pub(super) struct SearchState<'a> {
     pub latest: Fitted,
     /// Evidence about the latest fit, if it was evaluated.
     pub evidence: Option<Evidence>,
+    /// Evidence about the fit of the declared problem, if it was evaluated.
+    pub evidence_of_declared: Option<Evidence>,
     /// Sets of effects that were fitted so far.
     fitted_sets: Vec<Vec<Effect>>,
 }
@@ -68,6 +70,7 @@ impl<'a> SearchState<'a> {
             rounds: Vec::new(),
             latest: first.clone(),
             evidence: None,
+            evidence_of_declared: None,
             fitted_sets: vec![first.effects()],
         }
     }
@@ -118,6 +121,9 @@ impl<'a> SearchState<'a> {
             return Err(IdentifyError::interrupted());
         }
         self.evidence.clone_from(&evidence);
+        if self.rounds.is_empty() && self.added(fitted).is_empty() {
+            self.evidence_of_declared.clone_from(&evidence);
+        }
         Ok(evidence)
     }
 
