@@ -1,12 +1,11 @@
 //! Columns of the hypotheses: what each would do to every measured coordinate.
 
-use crate::select::settings::{
-    PRIOR_OF_FUNCTIONS, PRIOR_OF_RIGID_LINKS, SLOW_LENGTH, SMOOTH_LENGTHS, SURFACE_LENGTH,
-};
+use crate::select::settings::{SLOW_LENGTH, SMOOTH_LENGTHS, SURFACE_LENGTH};
 use nalgebra::{DMatrix, DVector};
 
 use super::block::Design;
 use super::candidate::{Candidate, even};
+use super::families::{Families, OtherHypotheses, ln_family};
 use super::functions::{SampledCovariate, goes_with, growing, merge, products_of, times};
 use super::hypothesis::Hypothesis;
 use super::marginal::Coefficients;
@@ -44,6 +43,8 @@ pub(super) struct Columns<'a, 'l> {
     pub candidates: Vec<Candidate>,
     /// For each candidate, its family and its share of the family's prior probability.
     shares: Vec<(String, f64)>,
+    /// Effects that displace no pose.
+    unseen: Vec<Effect>,
     /// Covariates on which the functions depend.
     pub covariates: Vec<SampledCovariate>,
 }
@@ -52,16 +53,17 @@ impl<'a, 'l> Columns<'a, 'l> {
     /// Builds the candidates: effects with their columns, and functions without a law. With `only`,
     /// it builds the functions of that hypothesis alone.
     ///
-    /// Returns the candidates, the covariates of the functions, and ln of the prior probability of
-    /// one family of effects.
+    /// Returns the candidates, the covariates of the functions, ln of the prior probability of one
+    /// family of effects, and what that of a single effect needs to know of the others.
     pub fn all(
         problem: &'a Problem,
         linearised: &'a Linearised<'l>,
         (coverage, takes_gears, weighed): ((bool, bool), bool, usize),
         effects: &[(Effect, DMatrix<f64>)],
         only: Option<&'a Hypothesis>,
-    ) -> (Vec<Candidate>, Vec<SampledCovariate>, f64) {
+    ) -> (Vec<Candidate>, Vec<SampledCovariate>, f64, OtherHypotheses) {
         let (candidates, shares, covariates) = (Vec::new(), Vec::new(), Vec::new());
+        let unseen = Vec::new();
         let mut new_columns = Self {
             problem,
             linearised,
@@ -71,6 +73,7 @@ impl<'a, 'l> Columns<'a, 'l> {
             only,
             candidates,
             shares,
+            unseen,
             covariates,
         };
         new_columns.effects(effects);
@@ -151,21 +154,14 @@ impl<'a, 'l> Columns<'a, 'l> {
         let only: Vec<Effect> = effects.iter().map(|(effect, _)| effect.clone()).collect();
         let (tries, _) = tries(&only, self.problem);
         for ((effect, columns), tries) in effects.iter().zip(tries) {
-            let terms = effect.terms(self.problem);
-            let (columns, largest) = even(columns.clone(), &terms, self.weighed);
-            let hypothesis = Hypothesis::of_effect(effect, self.problem, self.coverage);
-            let coefficients = Coefficients {
-                never_negative: terms.iter().map(|term| term.never_negative).collect(),
-                alone: acts_along_axes(&terms),
-                largest,
-            };
-            self.push_candidate(
-                effect.name(),
-                1.0 / tries,
-                hypothesis,
-                Design::Dense(columns),
-                coefficients,
-            );
+            let measured = (self.coverage, self.weighed);
+            match candidate_of(effect, columns.clone(), self.problem, measured) {
+                Some(candidate) => {
+                    self.candidates.push(candidate);
+                    self.shares.push((effect.name().to_owned(), 1.0 / tries));
+                }
+                None => self.unseen.push(effect.clone()),
+            }
         }
     }
 
@@ -443,32 +439,40 @@ impl<'a, 'l> Columns<'a, 'l> {
         self.add(family, 1.0, hypothesis, || times(at, &products_of(&[one, other], length)));
     }
 
-    /// Returns the candidates with their prior probabilities. The odds of each further hypothesis
-    /// are 1 to 2. The probability is divided between families by weight, and within a family by
-    /// share.
-    fn into_candidates(self) -> (Vec<Candidate>, Vec<SampledCovariate>, f64) {
-        let mut families: Vec<(&str, f64, f64)> = Vec::new();
+    /// Returns the candidates with their prior probabilities, the covariates, ln of the prior
+    /// probability of a family of effects, and the weight of the functions without a law.
+    fn into_candidates(self) -> (Vec<Candidate>, Vec<SampledCovariate>, f64, OtherHypotheses) {
+        let mut families = Families::default();
         for ((family, share), candidate) in self.shares.iter().zip(&self.candidates) {
-            if let Some((_, _, sum)) =
-                families.iter_mut().find(|(known, ..)| *known == family.as_str())
-            {
-                *sum += share;
-            } else {
-                let weight = match candidate.hypothesis.effect() {
-                    Some(Effect::LinkBending { .. }) => PRIOR_OF_RIGID_LINKS,
-                    Some(_) => 1.0,
-                    None => PRIOR_OF_FUNCTIONS,
-                };
-                families.push((family, weight, *share));
-            }
+            families.add(family, *share, candidate.hypothesis.effect());
         }
-        let total_weight: f64 = families.iter().map(|(_, weight, _)| weight).sum();
+        let total_weight = families.weight(false);
         let mut candidates = self.candidates;
         for (candidate, (family, share)) in candidates.iter_mut().zip(&self.shares) {
-            let entry = families.iter().find(|(known, ..)| *known == family.as_str());
-            let (weight, sum) = entry.map_or((1.0, 1.0), |(_, weight, sum)| (*weight, *sum));
-            candidate.ln_prior = (share / sum * weight / total_weight / 2.0).ln();
+            candidate.ln_prior = families.ln_prior(family, *share, total_weight);
         }
-        (candidates, self.covariates, -(2.0 * total_weight.max(1.0)).ln())
+        let weight_of_functions = families.weight(true);
+        let others = OtherHypotheses { weight_of_functions, unseen: self.unseen };
+        (candidates, self.covariates, ln_family(total_weight), others)
     }
+}
+
+/// Creates the candidate for an effect from the columns of its parameters, without its prior
+/// probability; `None` if it displaces no pose.
+pub(super) fn candidate_of(
+    effect: &Effect,
+    columns: DMatrix<f64>,
+    problem: &Problem,
+    (coverage, weighed): ((bool, bool), usize),
+) -> Option<Candidate> {
+    let terms = effect.terms(problem);
+    let (columns, largest) = even(columns, &terms, weighed);
+    let coefficients = Coefficients {
+        never_negative: terms.iter().map(|term| term.never_negative).collect(),
+        alone: acts_along_axes(&terms),
+        largest,
+    };
+    let design = Design::Dense(columns).scaled(weighed)?;
+    let hypothesis = Hypothesis::of_effect(effect, problem, coverage);
+    Some(Candidate { hypothesis, variant: 0, design, ln_prior: 0.0, coefficients })
 }

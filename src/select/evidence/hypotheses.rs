@@ -4,7 +4,8 @@ use nalgebra::{DMatrix, DVector};
 
 use super::block::Design;
 use super::candidate::{Candidate, even, order_of};
-use super::columns::Columns;
+use super::columns::{Columns, candidate_of};
+use super::families::{Families, OtherHypotheses, ln_family};
 use super::functions::{SampledCovariate, Shape};
 use super::hypothesis::Hypothesis;
 use super::hypothesis_set::HypothesisSet;
@@ -18,7 +19,7 @@ use crate::select::candidates::Candidates;
 use crate::select::data::Data;
 use crate::select::fitted::Fitted;
 use crate::select::grammar;
-use crate::select::neighbourhood::Linearised;
+use crate::select::neighbourhood::{Linearised, tries};
 
 /// Fit linearised at some rows, with all hypotheses about its residual.
 pub(in crate::select) struct Hypotheses<'a> {
@@ -38,6 +39,34 @@ pub(in crate::select) struct Hypotheses<'a> {
     coverage: (bool, bool),
     /// Candidate times at which the instrument may have moved.
     pub(super) times: Vec<f64>,
+    /// What the prior probability of an effect needs to know of the other hypotheses.
+    pub(super) others: OtherHypotheses,
+}
+
+/// Effect with the columns of its parameters.
+type WithColumns = (Effect, DMatrix<f64>);
+
+/// Splits effects with their columns into those whose prior probability does not depend on the
+/// other candidates, and all others. No list can contain all waves, composed laws and moves.
+fn split_unlisted(all: impl Iterator<Item = WithColumns>) -> (Vec<WithColumns>, Vec<WithColumns>) {
+    all.partition(|(effect, _)| {
+        order_of(effect).is_some()
+            || effect.is_described()
+            || matches!(effect, Effect::StationMove { .. })
+    })
+}
+
+/// Returns the effects `added` with the columns of their parameters `unknowns` in the fit. Only the
+/// coefficients of a law are removed from the fit; inner parameters keep their values.
+fn columns_of_added<'a>(
+    linearised: &'a Linearised,
+    (added, unknowns): (&'a [Effect], &'a [Vec<usize>]),
+) -> impl Iterator<Item = WithColumns> + 'a {
+    added.iter().zip(unknowns).map(|(part, unknowns)| {
+        let inner = if let Effect::Law(law) = part { law.parameters().len() } else { 0 };
+        let count = unknowns.len().saturating_sub(inner);
+        (part.clone(), linearised.fitted().select_columns(&unknowns[..count]))
+    })
 }
 
 impl<'a> Hypotheses<'a> {
@@ -57,29 +86,13 @@ impl<'a> Hypotheses<'a> {
         let unknowns = columns_of_part.concat();
         let linearised =
             fitted.linearised_with(data, rows, &candidates, &hypothesis_sites(&fitted.problem));
-        let fit = linearised.fitted();
-        let projected_columns =
-            added.iter().zip(&columns_of_part).map(|(part, columns_of_part)| {
-                // Only the coefficients of a law are removed from the fit; inner parameters keep their
-                // values.
-                let inner = if let Effect::Law(law) = part { law.parameters().len() } else { 0 };
-                let count = columns_of_part.len().saturating_sub(inner);
-                (part.clone(), fit.select_columns(&columns_of_part[..count]))
-            });
-        // No list can contain all waves, composed laws and moves. The prior probability of each of
-        // them therefore does not depend on the other candidates.
-        let is_unlisted = |effect: &Effect| {
-            order_of(effect).is_some()
-                || effect.is_described()
-                || matches!(effect, Effect::StationMove { .. })
-        };
-        let (unlisted, known): (Vec<_>, Vec<_>) =
-            projected_columns.partition(|(effect, _)| is_unlisted(effect));
+        let (unlisted, known) =
+            split_unlisted(columns_of_added(&linearised, (&added, &columns_of_part)));
         let new =
             candidates.into_iter().map(|effect| (effect.clone(), linearised.columns(&effect)));
         let effects: Vec<(Effect, DMatrix<f64>)> = known.into_iter().chain(new).collect();
         let coverage = coverage(&linearised, data);
-        let (all, covariates, ln_family) = Columns::all(
+        let (all, covariates, ln_family, others) = Columns::all(
             &fitted.problem,
             &linearised,
             (coverage, data.takes_gears, weighed),
@@ -97,6 +110,7 @@ impl<'a> Hypotheses<'a> {
             covariates,
             coverage,
             times,
+            others,
         };
         let entered = |(effect, columns)| hypotheses.entered(&effect, columns, &fitted.problem);
         let unlisted: Vec<Candidate> = unlisted.into_iter().filter_map(entered).collect();
@@ -148,10 +162,85 @@ impl<'a> Hypotheses<'a> {
             fitted.linearised_with(data, rows, &[], &hypothesis_sites(&fitted.problem));
         let coverage = coverage(&linearised, data);
         let how = (coverage, data.takes_gears, weighed);
-        let (all, covariates, ln_family) =
+        let (all, covariates, ln_family, others) =
             Columns::all(&fitted.problem, &linearised, how, &[], Some(of));
         let (added, unknowns, times) = (Vec::new(), Vec::new(), Vec::new());
-        Self { linearised, added, unknowns, all, weighed, ln_family, covariates, coverage, times }
+        Self {
+            linearised,
+            added,
+            unknowns,
+            all,
+            weighed,
+            ln_family,
+            covariates,
+            coverage,
+            times,
+            others,
+        }
+    }
+
+    /// Creates the hypotheses of the effects `added` alone, with the prior probabilities that they
+    /// have among all hypotheses. `others` comes from the hypotheses about another fit. Returns
+    /// `None` if an effect is a wave, which needs the columns of other waves.
+    pub(super) fn of_added(
+        fitted: &'a Fitted,
+        data: &Data<'a>,
+        (added, others): (&[Effect], &OtherHypotheses),
+        rows: &[usize],
+    ) -> Option<Self> {
+        let problem = &fitted.problem;
+        let added: Vec<Effect> = added.iter().flat_map(Effect::parts).collect();
+        if added.iter().any(|effect| order_of(effect).is_some()) {
+            return None;
+        }
+        let columns_of_part: Vec<Vec<usize>> =
+            added.iter().map(|part| fitted.unknowns_of(part)).collect();
+        let linearised = fitted.linearised_at(data, rows, &[]);
+        let (unlisted, known) =
+            split_unlisted(columns_of_added(&linearised, (&added, &columns_of_part)));
+        let (coverage, weighed) = (coverage(&linearised, data), rows.len());
+        let mut listed: Vec<Effect> = known.iter().map(|(effect, _)| effect.clone()).collect();
+        listed.extend(Candidates::new(problem, data).testable);
+        let (tries, _) = tries(&listed, problem);
+        let mut families = Families::default();
+        let (mut all, mut shares) = (Vec::new(), Vec::new());
+        let mut known = known.into_iter();
+        for (effect, tries) in listed.iter().zip(tries) {
+            let is_seen = match known.next() {
+                Some((_, columns)) => {
+                    let candidate = candidate_of(effect, columns, problem, (coverage, weighed));
+                    let is_seen = candidate.is_some();
+                    shares.extend(candidate.is_some().then(|| 1.0 / tries));
+                    all.extend(candidate);
+                    is_seen
+                }
+                None => !others.unseen.contains(effect),
+            };
+            if is_seen {
+                families.add(effect.name(), 1.0 / tries, Some(effect));
+            }
+        }
+        let total_weight = families.weight(false) + others.weight_of_functions;
+        for (candidate, share) in all.iter_mut().zip(shares) {
+            let name = candidate.hypothesis.effect().map_or("", Effect::name);
+            candidate.ln_prior = families.ln_prior(name, share, total_weight);
+        }
+        let mut hypotheses = Self {
+            linearised,
+            unknowns: columns_of_part.concat(),
+            added,
+            all,
+            weighed,
+            ln_family: ln_family(total_weight),
+            covariates: Vec::new(),
+            coverage,
+            times: data.shift_times(),
+            others: others.clone(),
+        };
+        let entered = |(effect, columns)| hypotheses.entered(&effect, columns, problem);
+        let unlisted: Vec<Candidate> = unlisted.into_iter().filter_map(entered).collect();
+        hypotheses.all.extend(unlisted);
+        Some(hypotheses)
     }
 
     /// Returns the candidate for a hypothesis that is a member of a set, with the function that the

@@ -18,6 +18,7 @@ mod candidate;
 mod column_products;
 mod columns;
 mod elsewhere;
+mod families;
 mod finer;
 mod functions;
 mod hypotheses;
@@ -68,14 +69,22 @@ const MAX_REFINED_SHAPES: usize = 4;
 /// each at a fit of its own set. Each fit scales its residual by its own σ′. The density is that of
 /// the residual over the common `sigma` σ \[m\], with ν degrees of freedom: ln p(r/σ′) = ln p(r/σ)
 /// − ν ln (σ/σ′).
+///
+/// `evidence` is that about the first of the compared fits.
 pub(super) fn ln_posterior(
     fitted: &Fitted,
     data: &Data,
-    (added, left_out): (&[Effect], &[usize]),
+    (added, evidence): (&[Effect], &Evidence),
     (functions, sigma): (&[(Hypothesis, usize)], f64),
 ) -> Option<f64> {
     let rows = data.evidence_rows();
-    let hypotheses = Hypotheses::new(fitted, data, added, &rows, rows.len());
+    let of_effects = if functions.is_empty() {
+        Hypotheses::of_added(fitted, data, (added, &evidence.others), &rows)
+    } else {
+        None
+    };
+    let hypotheses =
+        of_effects.unwrap_or_else(|| Hypotheses::new(fitted, data, added, &rows, rows.len()));
     let is_own = |candidate: &&Candidate| match candidate.hypothesis.effect() {
         Some(effect) => hypotheses.added.contains(effect),
         None => functions.iter().any(|(function, variant)| {
@@ -83,7 +92,7 @@ pub(super) fn ln_posterior(
         }),
     };
     let members: Vec<&Candidate> = hypotheses.all.iter().filter(is_own).collect();
-    let (blocks, target) = blocks(fitted, data, &hypotheses, &members, left_out)?;
+    let (blocks, target) = blocks(fitted, data, &hypotheses, &members, &evidence.left_out)?;
     Some(
         search::ln_posterior(&Products::new(&blocks, &target))?
             - target.noise.freedom * (fitted.sigma / sigma).ln(),
@@ -241,8 +250,12 @@ fn evaluated_without<'a>(
         }
     }
     explanations.sort_by(|a, b| b.probability.total_cmp(&a.probability));
-    let mut evidence =
-        Evidence { sets: explanations, stand_ins: Vec::new(), left_out: left_out.to_vec() };
+    let mut evidence = Evidence {
+        sets: explanations,
+        stand_ins: Vec::new(),
+        left_out: left_out.to_vec(),
+        others: hypotheses.others.clone(),
+    };
     if let Some(best) = evidence.certain_set(data.rules.inclusion_threshold)
         && best.gears().is_empty()
     {

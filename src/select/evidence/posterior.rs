@@ -1,5 +1,6 @@
 //! Probabilities of all sets of hypotheses, and the claims that follow.
 
+use super::families::OtherHypotheses;
 use super::hypothesis::{Hypothesis, HypothesisKind, Site};
 use super::hypothesis_set::HypothesisSet;
 use crate::problem::Effect;
@@ -17,6 +18,8 @@ pub struct Evidence {
     pub(super) stand_ins: Vec<(Hypothesis, Hypothesis)>,
     /// Poses that were left out of the evidence, because each alone supported an effect.
     pub(in crate::select) left_out: Vec<usize>,
+    /// What the prior probability of an effect needs to know of the other hypotheses.
+    pub(super) others: OtherHypotheses,
 }
 
 /// Claims about a hypothesis with their probabilities, from the weakest to the strongest.
@@ -288,7 +291,12 @@ mod tests {
             of(&[settling(), shift(10.0)], 0.1),
         ];
         let held = explanations[0].effects();
-        let evidence = Evidence { sets: explanations, stand_ins: Vec::new(), left_out: Vec::new() };
+        let evidence = Evidence {
+            sets: explanations,
+            stand_ins: Vec::new(),
+            left_out: Vec::new(),
+            others: OtherHypotheses::default(),
+        };
         // The two later shifts together are twice as probable as settling.
         let alternatives = evidence.alternatives(&drift(), &held, 0.1);
         assert_eq!(alternatives, [(shift(30.0), 0.2), (settling(), 0.1)]);
@@ -314,7 +322,12 @@ mod tests {
             of(&[6.41, 1.5], 0.125),
             of(&[1.6, 6.4], 0.125),
         ];
-        let evidence = Evidence { sets: explanations, stand_ins: Vec::new(), left_out: Vec::new() };
+        let evidence = Evidence {
+            sets: explanations,
+            stand_ins: Vec::new(),
+            left_out: Vec::new(),
+            others: OtherHypotheses::default(),
+        };
         let law = |order: f64| evidence.claims(&wave(order)).law.1;
         // Order 6.41 counts as 6.4 and 1.6 as 1.5, but 6.4 and 1.5 do not count as each other.
         assert!((law(6.4) - 1.0).abs() < 1e-12, "{}", law(6.4));

@@ -93,7 +93,12 @@ impl<'a> Reevaluation<'a> {
             functions: members.iter().map(|&k| candidates[k].variant).zip(sizes).collect(),
         };
         let sets = search(&Products::new(&blocks, &target), &present).into_iter().map(set);
-        Some(Evidence { sets: sets.collect(), stand_ins: Vec::new(), left_out: left_out.to_vec() })
+        Some(Evidence {
+            sets: sets.collect(),
+            stand_ins: Vec::new(),
+            left_out: left_out.to_vec(),
+            others: self.hypotheses.others.clone(),
+        })
     }
 
     /// Returns the index of the pose whose squared residual decreases most when `effect` is added

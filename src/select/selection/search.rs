@@ -143,10 +143,9 @@ fn refitted(
         .certain_set(rules.inclusion_threshold)
         .filter(|best| !best.hypotheses.is_empty() && is_held(best, &open, Effect::eq));
     let Some(best) = held.cloned() else { return Ok((evidence, None)) };
-    let left_out = evidence.left_out.clone();
     let ln_posterior_of = |fitted: &Fitted, functions: &[(Hypothesis, usize)], sigma: f64| {
         unless_stopped(data, || {
-            ln_posterior(fitted, data, (&state.reconsidered(fitted), &left_out), (functions, sigma))
+            ln_posterior(fitted, data, (&state.reconsidered(fitted), &evidence), (functions, sigma))
         })
     };
     let functions = best.without_law();

@@ -1,0 +1,61 @@
+//! Prior probabilities of hypotheses. The odds of each further hypothesis are 1 to 2. The
+//! probability is divided between families by weight, and within a family by share.
+
+use crate::problem::Effect;
+use crate::select::settings::{PRIOR_OF_FUNCTIONS, PRIOR_OF_RIGID_LINKS};
+
+/// Families of the hypotheses about a residual.
+#[derive(Default)]
+pub(super) struct Families(Vec<Family>);
+
+struct Family {
+    name: String,
+    weight: f64,
+    /// Sum of the shares of its members.
+    shares: f64,
+    is_of_functions: bool,
+}
+
+/// What the prior probability of an effect needs to know of the other hypotheses about a residual.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(super) struct OtherHypotheses {
+    /// Sum of the weights of the families of functions without a law.
+    pub weight_of_functions: f64,
+    /// Effects that displace no pose, and are no hypotheses.
+    pub unseen: Vec<Effect>,
+}
+
+impl Families {
+    /// Adds a hypothesis to its family; `effect` is `None` for a function without a law.
+    pub fn add(&mut self, name: &str, share: f64, effect: Option<&Effect>) {
+        if let Some(known) = self.0.iter_mut().find(|known| known.name == name) {
+            known.shares += share;
+            return;
+        }
+        let weight = match effect {
+            Some(Effect::LinkBending { .. }) => PRIOR_OF_RIGID_LINKS,
+            Some(_) => 1.0,
+            None => PRIOR_OF_FUNCTIONS,
+        };
+        let is_of_functions = effect.is_none();
+        self.0.push(Family { name: name.to_owned(), weight, shares: share, is_of_functions });
+    }
+
+    /// Returns the sum of the weights of all families, or of those of functions without a law.
+    pub fn weight(&self, of_functions_only: bool) -> f64 {
+        let counts = |family: &&Family| family.is_of_functions || !of_functions_only;
+        self.0.iter().filter(counts).map(|family| family.weight).sum()
+    }
+
+    /// Returns ln of the prior probability of a hypothesis, given the weight of all families.
+    pub fn ln_prior(&self, name: &str, share: f64, total_weight: f64) -> f64 {
+        let family = self.0.iter().find(|family| family.name == name);
+        let (weight, shares) = family.map_or((1.0, 1.0), |family| (family.weight, family.shares));
+        (share / shares * weight / total_weight / 2.0).ln()
+    }
+}
+
+/// Returns ln of the prior probability of a family of effects, given the weight of all families.
+pub(super) fn ln_family(total_weight: f64) -> f64 {
+    -(2.0 * total_weight.max(1.0)).ln()
+}
