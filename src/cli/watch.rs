@@ -68,7 +68,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         let first = watch.causes.first().map(|cause| cause.kind);
         let next = if watch.is_changed() && first == Some(CauseKind::Other) {
             format!(
-                "flexcal identify {} names units, signs, columns and orders of joints that are read wrongly",
+                "flexcal identify {} says whether units, signs, columns or the order of joints are read wrongly",
                 common.named()
             )
         } else if watch.is_changed() && first == Some(CauseKind::Noise) {

@@ -7,7 +7,8 @@
 //!
 //! ln LR = −½ ln det(I + D A D) + ½ bᵀ D (I + D A D)⁻¹ D b            [Bishop 2006, §2.3]
 //!
-//! Larger noise, and something else: their part of Σ becomes κ² I. One gross row i: S + λ² on the coordinates of row i.
+//! Larger noise, and something else: their part of Σ becomes κ² I. One gross row i: S + λ² on the
+//! coordinates of row i.
 //!
 //! Each ratio is a density of all rows so far over that of "unchanged", so it is a martingale while
 //! the arm is unchanged, and so is a mixture of them. It exceeds 1/α at any time with a probability

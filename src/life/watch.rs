@@ -1,6 +1,6 @@
 //! Watch: has an arm changed since its estimate, and what?
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, Vector3};
 use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 
 use super::assessment::{AssessedCause, assess};
@@ -17,8 +17,9 @@ use crate::measurement::Measurements;
 use crate::model::parameter::ParameterSite;
 use crate::model::{Model, Pose};
 use crate::observation::kind_named;
-use crate::problem::Problem;
+use crate::problem::{JointKind, Problem};
 use crate::quantity::Unit;
+use crate::spatial::Frame;
 
 /// Largest number of causes that are reported.
 const MAX_CAUSES: usize = 6;
@@ -28,8 +29,18 @@ const LEAST_PROBABILITY: f64 = 0.005;
 const NAMED: f64 = 0.9;
 /// Largest number of groups of rows that are left out in turn.
 const MAX_GROUPS: usize = 60;
-/// Prior probability that something else changed together with the base, relative to the base alone.
+/// Prior odds that something else changed together with the base, against the base alone: two
+/// changes at once are rare.
 const SECOND_CHANGE: f64 = 0.05;
+/// Smallest number of measured positions that determine a moved base; three leave nothing to judge
+/// it by.
+const MIN_BASE_ROWS: usize = 4;
+/// Smallest ratio of the second to the first squared spread of points that are not on a line.
+const MIN_SQUARED_SPREAD: f64 = 1e-6;
+/// Largest tilt of the axis of joint 1 by a turn about it \[rad\].
+const MAX_TILT: f64 = 1e-3;
+/// Largest displacement of a point on the axis of joint 1 by a turn about it \[m\].
+const MAX_SHIFT: f64 = 2e-3;
 /// Smallest evidence of a pose for one cause against another, in nats, that tells them apart.
 const LEAST_DIFFERENCE: f64 = 1e-3;
 
@@ -189,7 +200,7 @@ pub fn watch(
     let is_unexplained = watched.first().is_some_and(|cause| cause.kind == CauseKind::Other);
     if changed_at.is_some() && is_unexplained {
         let moved = tested.moved_base(&poses, &x, (&earlier, &leads), threshold);
-        watched = moved.map_or(watched, |base| vec![base]);
+        watched = moved.unwrap_or(watched);
     }
     Ok(Watch {
         false_alarm_rate,
@@ -256,7 +267,9 @@ impl Tested<'_> {
     }
 
     /// Returns a move of the only base as the cause, if the rows are unchanged once the base is
-    /// registered to them: ln of the evidence for a further change is below `threshold`.
+    /// registered to them: ln of the evidence for a further change is below `threshold`. A turn
+    /// about the axis of joint 1 may as well be a changed zero of that joint, which is then returned
+    /// beside it. Returns nothing if the base does not explain the rows.
     ///
     /// The causes are linear in their changes; a base that turns by degrees is not.
     fn moved_base(
@@ -265,8 +278,8 @@ impl Tested<'_> {
         x: &DVector<f64>,
         (earlier, leads): (&Earlier, &[bool]),
         threshold: f64,
-    ) -> Option<WatchedCause> {
-        if self.placement.bases.len() != 1 {
+    ) -> Option<Vec<WatchedCause>> {
+        if self.placement.bases.len() != 1 || !determine_base(poses) {
             return None;
         }
         // Without priors and bounds, because the base was moved.
@@ -292,8 +305,54 @@ impl Tested<'_> {
             change.change += at_base.extended.x[k] - x.get(k).copied().unwrap_or(0.0);
         }
         watched.probability = 1.0 / (1.0 + SECOND_CHANGE * evidence.exp());
-        Some(watched)
+        let frame = |x: &DVector<f64>| model.base_frames(x.as_slice()).into_iter().next();
+        let angle = turn_about_first_joint(self.problem, &frame(x)?, &frame(&registered)?);
+        let Some(angle) = angle else { return Some(vec![watched]) };
+        // Neither rows nor their errors tell the two apart.
+        watched.probability *= 0.5;
+        let zero = WatchedCause {
+            kind: CauseKind::Zero,
+            label: "zero of joint 1".to_owned(),
+            changes: vec![Change {
+                parameter: "joint1.theta".to_owned(),
+                unit: Unit::Angle,
+                change: angle,
+                std_error: f64::NAN,
+            }],
+            ..watched.clone()
+        };
+        Some(vec![watched, zero])
     }
+}
+
+/// Returns true if the positions of the poses determine the pose of a base with numbers to spare:
+/// [`MIN_BASE_ROWS`] positions that do not lie on a line.
+fn determine_base(poses: &[Pose]) -> bool {
+    let points: Vec<&Vector3<f64>> = poses
+        .iter()
+        .filter(|pose| pose.observation.is_position())
+        .map(|pose| pose.measured)
+        .collect();
+    let mean = points.iter().copied().sum::<Vector3<f64>>() / points.len().max(1) as f64;
+    let spread: Matrix3<f64> =
+        points.iter().map(|point| (*point - mean) * (*point - mean).transpose()).sum();
+    let mut squares = spread.symmetric_eigenvalues();
+    squares.as_mut_slice().sort_by(f64::total_cmp);
+    points.len() >= MIN_BASE_ROWS && squares[1] > MIN_SQUARED_SPREAD * squares[2]
+}
+
+/// Returns the angle about the axis of joint 1 by which a base turned from one frame to another;
+/// `None` if it moved otherwise, or joint 1 does not turn on the base.
+fn turn_about_first_joint(problem: &Problem, old: &Frame<f64>, new: &Frame<f64>) -> Option<f64> {
+    let first = problem.joints.first().filter(|joint| joint.kind == JointKind::Revolute)?;
+    let (sin, cos) = first.alpha.sin_cos();
+    let (axis, centre) = (Vector3::new(0.0, -sin, cos), Vector3::new(first.a, 0.0, 0.0));
+    let move_in_base = old.inverse().compose(new);
+    let turn = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&move_in_base.axes));
+    let shift = move_in_base.point(&centre) - centre;
+    let is_about_it = (turn * axis - axis).norm() < MAX_TILT && shift.norm() < MAX_SHIFT;
+    let vector = turn.scaled_axis();
+    is_about_it.then_some(vector.dot(&axis))
 }
 
 /// Returns true if a row measures a position.

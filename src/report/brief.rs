@@ -1,17 +1,18 @@
 //! Result of the command `identify` on one screen.
 
 use super::document::Block;
-use super::errors::{judging, noun, with_unit};
+use super::errors::noun;
 use super::identify::{errors_by_axis, headline};
 use super::noise::{influential_rows, noise};
 use super::parameters::correlated;
 use super::prior::summary;
 use super::render::text;
 use super::row_kinds::unsteady;
+use super::trust::outcome;
 use crate::fit::{Estimate, Finding, FindingCode, Identification, size_of_kind};
 use crate::problem::Problem;
 use crate::quantity::format::{counted, number};
-use crate::results::{Knowledge, ResidualSize};
+use crate::results::Knowledge;
 
 /// Returns a summary of a fit for one screen, ending in a line break: errors, size of the residual,
 /// parameters and remarks. `bound` is a sentence on the error bound of predictions.
@@ -28,40 +29,6 @@ pub fn estimate_brief(problem: &Problem, found: &Identification, bound: Option<S
     blocks.extend(found.prior.as_ref().map(|comparison| Block::Text(summary(comparison))));
     blocks.push(Block::Lines(parameters(&found.estimates), remarks(found)));
     text(&blocks)
-}
-
-/// States whether the fit is to be trusted, the held-out error before and after it, and how much
-/// its residual exceeds the declared noise. `has_bound` is true if the text states an error bound.
-pub(super) fn outcome(found: &Identification, has_bound: bool) -> String {
-    if let Some(reason) = found.first_error() {
-        return format!("Not to be trusted: {reason}.");
-    }
-    let [before, after] = [&found.registered, &found.fitted].map(|errors| &errors.held_out);
-    let falls = if after.mean.norm < before.mean.norm { "falls" } else { "does not fall: it goes" };
-    let is_larger = match ResidualSize::of(found) {
-        ResidualSize::Contradicted(chi2) | ResidualSize::Unclear(chi2) => chi2 > 1.0,
-        _ => false,
-    };
-    if !(before.mean.norm.is_finite() && after.mean.norm.is_finite()) {
-        return "The fit is to be trusted.".to_owned();
-    }
-    let scope = if is_larger && has_bound { " within the error bound below" } else { "" };
-    let size = if found.noise_factor > 1.0 {
-        format!("{} × the declared σ", number(found.noise_factor.sqrt(), 1))
-    } else {
-        "larger than the declared σ explains".to_owned()
-    };
-    format!(
-        "Trusted{scope}: the mean {} error {falls} from {} to {}.{}",
-        judging(&found.fitted).replace(' ', "-"),
-        with_unit(before, before.mean.norm),
-        with_unit(after, after.mean.norm),
-        if is_larger {
-            format!(" Not fully explained: the residual is {size}.")
-        } else {
-            String::new()
-        }
-    )
 }
 
 /// Returns true if the data determine no parameter of the fit.

@@ -10,6 +10,8 @@ use crate::results::{MAX_COEFFICIENTS, MAX_SHOWN_HARMONICS, ParameterValue, join
 const MAX_DECIMALS: usize = 6;
 /// Smallest standard error that has two digits within [`MAX_DECIMALS`].
 const MIN_PLAIN_ERROR: f64 = 1e-5;
+/// Value below which a power of ten shows more digits than decimals do.
+const MAX_SMALL_VALUE: f64 = 1e-3;
 
 /// Lists the parameters of an effect with their values. For many harmonics, it lists the amplitudes
 /// of the largest.
@@ -33,16 +35,16 @@ pub(super) fn values(effect: &Effect, parameters: &[ParameterValue]) -> Vec<Stri
     highest.chain((lower > 0).then(|| format!("{lower} smaller ones in loop.json"))).collect()
 }
 
-/// Returns a value with its standard error in a convenient unit: `4.12 ± 0.05 µrad/(m·K)`. If the
-/// error has no digit within [`MAX_DECIMALS`], both are multiples of a power of ten:
-/// `(9.82 ± 0.31)·10⁻⁶ °`.
+/// Returns a value with its standard error in a convenient unit: `4.12 ± 0.05 µrad/(m·K)`. Small
+/// values whose error has less than two digits within [`MAX_DECIMALS`] are written with a power of
+/// ten: `(9.82 ± 0.31)·10⁻⁶ °`.
 fn value(parameter: &ParameterValue) -> String {
     let unit = parameter.unit.display(parameter.estimate);
     let scaled = parameter.estimate * unit.factor;
     let Some(error) = parameter.std_error.map(|error| error * unit.factor) else {
         return format!("{} {}, no standard error", number(scaled, MAX_DECIMALS), unit.symbol);
     };
-    if error > 0.0 && error < MIN_PLAIN_ERROR {
+    if error > 0.0 && error < MIN_PLAIN_ERROR && scaled.abs() < MAX_SMALL_VALUE {
         let power = scaled.abs().max(error).log10().floor();
         let digits = decimals(error / 10.0_f64.powf(power), MAX_DECIMALS);
         let shown = |value: f64| number(value / 10.0_f64.powf(power), digits);
@@ -185,6 +187,7 @@ mod tests {
         };
         assert_eq!(shown(0.0123, 0.0004), "0.01230 ± 0.00040 °");
         assert_eq!(shown(-9.82e-6, 3.1e-7), "(-9.82 ± 0.31)·10⁻⁶ °");
+        assert_eq!(shown(12.0, 3e-6), "12.000000 ± 0.000003 °");
     }
 
     #[test]

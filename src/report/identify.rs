@@ -1,6 +1,5 @@
 //! Texts of the command `identify`: full text for the terminal, and report on one fit.
 
-use super::brief::outcome;
 use super::document::{Block, Headline, Table};
 use super::errors::{
     axes, brief, held_out_rows, judging, measure, rows_of, shown, unit, unpredicted,
@@ -16,6 +15,7 @@ use super::prior::prior;
 use super::render::{Report, report, text};
 use super::residual_tests;
 use super::row_kinds::row_kind_tables;
+use super::trust::outcome;
 use crate::fit::{ErrorSummary, Errors, Identification, JointSources, OrientationErrors};
 use crate::problem::Problem;
 use crate::quantity::format::{counted, mm, number};

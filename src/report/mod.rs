@@ -40,6 +40,7 @@ mod separation;
 mod shell;
 mod study;
 mod trace;
+mod trust;
 mod unexplained;
 mod verdict;
 mod watch;

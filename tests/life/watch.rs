@@ -126,6 +126,27 @@ fn a_base_that_was_turned_far_is_named_with_its_move() {
 }
 
 #[test]
+fn a_zero_of_joint_1_that_moved_far_is_not_named_a_moved_base() {
+    let bench = Bench::new();
+    let (arm, estimate) = calibrated(&bench, 8);
+    let rows = bench.measure(&with_zero(&arm, 1, 20.0), 12, 4014, 1.0);
+    let verdict = judged(&bench, &estimate, &rows);
+    assert!(verdict.is_changed() && verdict.named().is_none(), "{verdict:?}");
+    let zero = verdict.causes.iter().find(|cause| cause.kind == CauseKind::Zero).unwrap();
+    assert!((zero.changes[0].change - 20.0_f64.to_radians()).abs() < 1e-3, "{zero:?}");
+}
+
+#[test]
+fn too_few_rows_name_no_moved_base() {
+    let bench = Bench::new();
+    let (arm, estimate) = calibrated(&bench, 9);
+    let mut rows = bench.measure(&arm, 2, 4015, 1.0);
+    rows.positions.iter_mut().for_each(|position| *position *= 1e-3);
+    let verdict = judged(&bench, &estimate, &rows);
+    assert_eq!(verdict.causes[0].kind, CauseKind::Other, "{verdict:?}");
+}
+
+#[test]
 fn rows_that_no_cause_explains_are_called_so() {
     let bench = Bench::new();
     let (arm, estimate) = calibrated(&bench, 7);

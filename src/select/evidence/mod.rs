@@ -34,6 +34,7 @@ mod products;
 mod reevaluation;
 mod sag;
 mod search;
+mod settling;
 mod sites;
 mod waves;
 

@@ -7,9 +7,8 @@ use rayon::prelude::*;
 
 use super::block::Block;
 use super::products::{Products, ReducedProblem};
+use super::settling::converged_sizes;
 
-/// Maximum number of coordinate-ascent passes over the sizes of the members of a set.
-const MAX_SETTLING_PASSES: usize = 4;
 /// Number of most probable sets whose sizes are made to converge at the end.
 const MAX_SETTLED_SETS: usize = 32;
 /// Number of most probable sets in which a function of several covariates is replaced by two
@@ -81,43 +80,13 @@ impl Set {
         if self.members.len() < 2 {
             return self;
         }
-        let settled =
-            products.settled((&self.members, &self.sizes), || self.converged_sizes(products));
+        let settled = products.settled((&self.members, &self.sizes), || {
+            converged_sizes(products, &self.members, &self.sizes)
+        });
         if let Some((sizes, ln_posterior)) = settled {
             (self.sizes, self.ln_posterior) = (sizes, ln_posterior);
         }
         self
-    }
-
-    /// Returns the converged sizes (prior σ of the coefficients), ln of the posterior at them, and
-    /// whether the last pass changed no size; `None` if a Cholesky factorisation fails.
-    fn converged_sizes(&self, products: &Products) -> Option<(Vec<f64>, f64, bool)> {
-        let (members, mut sizes) = (&self.members, self.sizes.clone());
-        let mut all = products.reduced(members, &sizes)?;
-        let mut summed = vec![0.0; members.len()];
-        // A size stays converged while the sizes of the other members do not change.
-        let mut stale = vec![true; members.len()];
-        for _ in 0..MAX_SETTLING_PASSES {
-            for k in 0..members.len() {
-                if !std::mem::take(&mut stale[k]) {
-                    continue;
-                }
-                let (ln_summed, size) = all.of_member(k)?;
-                summed[k] = ln_summed;
-                if size.to_bits() != sizes[k].to_bits() {
-                    stale.fill(true);
-                    stale[k] = false;
-                    sizes[k] = size;
-                    all = products.reduced(members, &sizes)?;
-                }
-            }
-        }
-        let further = |(k, &member)| products.ln_prior(&products.blocks[member], &members[..k]);
-        let prior: f64 = members.iter().enumerate().map(further).sum();
-        let gains: f64 = summed.iter().map(|with| with - all.ln_likelihood()).sum();
-        let ln_posterior =
-            all.ln_likelihood() + gains - products.over_noise(products.squares) + prior;
-        Some((sizes, ln_posterior, !stale.contains(&true)))
     }
 }
 

@@ -96,8 +96,8 @@ pub fn proposals(
     let factors = match place {
         FormulaSite::Joint(joint) => factors(quantities, joint),
         FormulaSite::Elsewhere => factors_at_other_sites(quantities),
-        // A link that follows a lagged temperature is an effect of the catalogue, whose time constant
-        // is searched. Products with a lag of fixed time constant only imitate another constant.
+        // The catalogue searches the time constant of a link that follows a lagged temperature.
+        // Products with a lag of one time constant would imitate another one.
         FormulaSite::Link => {
             let mut factors = factors_at_other_sites(quantities);
             factors.retain(|factor| factor.form != Form::Lag);
