@@ -113,7 +113,7 @@ fn poses_for_causes_tell_open_effects_apart() {
     let found = effect("found", "gear-ratio = { joint = 2 }", &[]);
     folder.write("loop.json", document(vec![found.clone()]).to_string());
     let none = next(&folder, "--for causes --explanations loop.json");
-    assert_contains(&none.stderr, &["no explanation is left"]);
+    assert_contains(&none.stderr, &["there is nothing to tell apart"]);
     let harmonic = "joint-harmonic = { joint = 3, orders = [1] }";
     let open = effect("probable", "gear-ratio = { joint = 3 }", &[harmonic]);
     folder.write("loop.json", document(vec![found, open]).to_string());
