@@ -49,11 +49,14 @@ pub(super) fn meant(
         scaled.positions.iter_mut().for_each(|position| *position *= factor);
         scaled
     };
-    let trials = [
-        (targets.clone(), other, format!("--frame {name}")),
-        (scaled(1e3), frame, "metres instead of the declared millimetres".to_owned()),
-        (scaled(1e-3), frame, "millimetres instead of the declared metres".to_owned()),
-    ];
+    let is_in =
+        |unit: f64| targets.position_unit.is_some_and(|own| (own / unit - 1.0).abs() < 1e-9);
+    let mut trials = vec![(targets.clone(), other, format!("--frame {name}"))];
+    if is_in(1e-3) {
+        trials.push((scaled(1e3), frame, "metres instead of the declared millimetres".to_owned()));
+    } else if is_in(1.0) {
+        trials.push((scaled(1e-3), frame, "millimetres instead of the declared metres".to_owned()));
+    }
     let misses = trials.into_iter().filter_map(|(targets, frame, words)| {
         let miss = mean_miss(&solve(targets, frame)?);
         (miss < MAX_RATIO * given).then_some((miss, words))

@@ -390,7 +390,7 @@ pub enum InputErrorKind {
     NoEquilibrium,
     #[error(
         "the nominal arm has no equilibrium under its loads here; {joint} may be too soft: gravity \
-         on the masses beyond it has a moment of up to {moment} N·m, which would turn it by {angle} \
+         on the masses beyond it has a moment of up to {moment} N·m, which could turn it by up to {angle} \
          rad; a stiffness in N·m/arcmin times 3438, or in N·m/° times 57.3, is one in N·m/rad"
     )]
     SoftJoint { joint: String, moment: String, angle: String },

@@ -18,8 +18,8 @@ const MAX_PAYLOAD: f64 = 3000.0;
 /// Largest plausible ratio of a payload to the declared masses of the arm. Arms carry up to about
 /// their own mass.
 const MAX_PAYLOAD_RATIO: f64 = 10.0;
-/// Largest plausible distance between repeated measurements of one pose \[m\]. Loads and backlash
-/// move an arm by less.
+/// Largest plausible distance between repeated measurements of one pose \[m\]. Repetition and
+/// backlash move an arm by less.
 const MAX_REPEAT_DISTANCE: f64 = 0.02;
 /// Minimum number of rows at which a session for each of them is implausible.
 const MIN_SESSION_ROWS: usize = 10;
@@ -85,8 +85,8 @@ impl Measurements {
         (is_heavy_for_arm || heaviest > MAX_PAYLOAD).then_some(Warning { location, kind })
     }
 
-    /// Returns a warning for the first row that has the pose, the configuration, the session and the
-    /// target of an earlier row, and a position far from it.
+    /// Returns a warning for the first row that has the pose, the configuration, the session, the
+    /// target and the loads of an earlier row, and a position far from it.
     pub(super) fn same_pose_elsewhere(&self) -> Option<Warning> {
         let name = |row: usize| match (&self.pose, &self.pose_names) {
             (Some(numbers), _) => numbers.get(row).map(|number| number.to_bits()),
@@ -96,7 +96,9 @@ impl Measurements {
         let mut first_rows: HashMap<_, usize> = HashMap::new();
         (0..self.len()).filter(|&row| self.observation(row).is_position()).find_map(|row| {
             let target = self.target.as_ref().map(|target| target.of_row[row]);
-            let key = (name(row)?, self.session.of_row[row], target);
+            let load = |values: &Option<Vec<f64>>| values.as_ref().map(|of| of[row].to_bits());
+            let loads = (load(&self.payload), load(&self.hoist));
+            let key = (name(row)?, self.session.of_row[row], target, loads);
             let first = *first_rows.entry(key).or_insert(row);
             let distance = (self.positions[row] - self.positions[first]).norm();
             let is_same = self.configuration(row) == self.configuration(first);

@@ -336,10 +336,8 @@ impl Table {
         let word = self.word(place)?;
         let value = || shortened(word);
         let CellStyle { delimiter, decimal_comma } = self.style_of(place);
-        if is_spreadsheet_date(word) {
-            return Err(self.cell_error(place, TableErrorKind::SpreadsheetDate { value: value() }));
-        }
-        if decimal_comma && delimiter != ',' && word.contains('.') {
+        let has_point = decimal_comma && delimiter != ',' && word.contains('.');
+        if has_point && !is_spreadsheet_date(word) {
             return Err(self.cell_error(place, TableErrorKind::DecimalPoint { value: value() }));
         }
         let with_point = (decimal_comma && word.contains(',')).then(|| word.replace(',', "."));
@@ -349,6 +347,9 @@ impl Table {
                 Err(self.cell_error(place, InputErrorKind::MagnitudeTooLarge { value: value() }))
             }
             Ok(_) => Err(self.cell_error(place, InputErrorKind::NotFinite { value: value() })),
+            Err(_) if is_spreadsheet_date(word) => {
+                Err(self.cell_error(place, TableErrorKind::SpreadsheetDate { value: value() }))
+            }
             Err(_) if word == self.name_of(place) => {
                 Err(self.error(TableErrorKind::HeaderRepeated))
             }

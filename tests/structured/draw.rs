@@ -14,6 +14,14 @@ impl Draw {
         Self(ChaCha8Rng::seed_from_u64(k))
     }
 
+    /// Returns random numbers for a change of case `k`, independent of those that made it; each
+    /// kind of change has its own `stream` from 1 on.
+    pub fn of_change(k: u64, stream: u64) -> Self {
+        let mut numbers = ChaCha8Rng::seed_from_u64(k);
+        numbers.set_stream(stream);
+        Self(numbers)
+    }
+
     /// Draws evenly from `low` to `high`, rounded to a ten-thousandth as people write numbers.
     pub fn number(&mut self, low: f64, high: f64) -> f64 {
         (self.0.random_range(low..=high) * 1e4).round() / 1e4

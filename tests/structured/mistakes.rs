@@ -100,7 +100,7 @@ fn mistaken(draw: &mut Draw, case: &Case) -> Mistaken {
 /// Makes a mistake in a case, and checks that `identify` names a place that exists, ends with
 /// status 2 and writes nothing.
 pub fn mistakes_are_told(k: u64, case: &Case, folder: &Path) -> Verdict {
-    let draw = &mut Draw::new(k);
+    let draw = &mut Draw::of_change(k, 1);
     let Mistaken { what, problem, table } = mistaken(draw, case);
     ensure!(problem != case.problem || table != case.table, "{what}: nothing is changed");
     write(folder, &problem, &table);

@@ -33,7 +33,7 @@ pub fn order_changes_nothing(k: u64, case: &Case, fit: &Fitted, folder: &Path) -
     let lines: Vec<&str> = case.table.lines().collect();
     let first = case.rows[0].line - 1;
     let mut shuffled: Vec<usize> = (first..lines.len()).collect();
-    Draw::new(k).shuffle(&mut shuffled);
+    Draw::of_change(k, 2).shuffle(&mut shuffled);
     let order: Vec<usize> = (0..first).chain(shuffled).collect();
     let text = order.iter().map(|&line| lines[line]).collect::<Vec<_>>().join("\n") + "\n";
     let path = write(folder, &case.problem, &text);

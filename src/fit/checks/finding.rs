@@ -228,7 +228,7 @@ impl Finding {
             FindingCode::RowsSetAside => "check these rows",
             _ => return,
         };
-        self.remedy = format!("the effects that the loop tried do not remove this, so {remedy}");
+        self.remedy = format!("flexcal loop does not remove this, so {remedy}");
     }
 
     /// Returns the severity of the finding, which its code determines.

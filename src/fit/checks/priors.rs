@@ -102,11 +102,12 @@ impl Check for NoiseIsDeclared {
     }
 }
 
-/// Largest ratio of the declared σ to what the fit leaves. It is as far from 1 as the largest ratio
-/// in the other direction, [`MAX_NOISE_FACTOR`].
+/// Largest ratio of the declared σ to what the fit leaves. In the other direction, the variance of
+/// [`MAX_NOISE_FACTOR`] allows a ratio of √1000 ≈ 32.
 const MAX_OVERSTATED_RATIO: f64 = 30.0;
-/// Smallest such ratio at which the positions are not measured: no unit of σ makes it as large.
-const MIN_COMPUTED_RATIO: f64 = 1e5;
+/// Smallest such ratio at which the positions are not measured: micrometres taken for metres, the
+/// largest exchange of units of σ, give 1e6.
+const MIN_COMPUTED_RATIO: f64 = 1e7;
 /// Smallest ratio of measured numbers to fitted parameters at which the residual shows the noise.
 const MIN_NUMBERS_PER_PARAMETER: usize = 2;
 
@@ -121,7 +122,8 @@ impl Check for SigmaIsNotOverstated {
         let errors = fit.fitting.position_errors(&kind.rows, &fit.end.x);
         let rms = fit.rms(&kind.rows, &errors) / kind.observation.root();
         if sigma <= MAX_OVERSTATED_RATIO * rms
-            || 3 * kind.rows.len() < MIN_NUMBERS_PER_PARAMETER * fit.whole.unknowns.len()
+            || kind.observation.coordinates() * kind.rows.len()
+                < MIN_NUMBERS_PER_PARAMETER * fit.whole.unknowns.len()
         {
             return Vec::new();
         }
