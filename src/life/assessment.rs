@@ -9,6 +9,9 @@ use super::rows::{SensitiveRows, Sums};
 /// Rows at which the sequential test looks; more rows are looked at in equal steps.
 const MAX_LOOKS: usize = 400;
 
+/// Sums of rows for several ratios of the noise to the assumed one, each with its ratio.
+type SumsByRatio = Vec<(f64, Sums)>;
+
 /// Result of the test after all rows.
 pub(super) struct Assessment {
     /// ln of the mixture's likelihood ratio after each look, and the number of rows then.
@@ -109,7 +112,7 @@ pub(super) fn assess(
 ) -> Option<Assessment> {
     let columns = rows.sensitivity.ncols();
     let mut sums = Sums::new(columns, 1.0);
-    let of_ratios = |ratios: &[f64]| -> Vec<(f64, Sums)> {
+    let of_ratios = |ratios: &[f64]| -> SumsByRatio {
         ratios.iter().map(|&ratio| (ratio, Sums::new(columns, ratio))).collect()
     };
     let mut noisier = [of_ratios(&NOISE_RATIOS), of_ratios(&OTHER_RATIOS)];
@@ -164,7 +167,7 @@ fn ln_size_priors(cause: &Cause) -> impl Iterator<Item = f64> {
 fn ratios(
     rows: &SensitiveRows,
     count: usize,
-    (sums, noisier, factor): (&Sums, &[Vec<(f64, Sums)>; 2], &DMatrix<f64>),
+    (sums, noisier, factor): (&Sums, &[SumsByRatio; 2], &DMatrix<f64>),
     unchanged: &Unchanged,
     causes: &[Cause],
 ) -> Vec<(usize, Option<usize>, Weighted)> {
