@@ -95,14 +95,13 @@ fn tip(error: &clap::Error, words: &[OsString], cli: &Command) -> Option<String>
 /// Returns the tip for a negative number behind an option, which is read as another option.
 fn negative_number(words: &[OsString]) -> Option<String> {
     let words: Vec<&str> = words.iter().filter_map(|word| word.to_str()).collect();
-    let pair = words.windows(2).find(|pair| {
-        pair[0].starts_with("--") && pair[1].starts_with('-') && pair[1].parse::<f64>().is_ok()
+    let mut pairs = words.iter().zip(words.iter().skip(1));
+    let (option, value) = pairs.find(|(option, value)| {
+        option.starts_with("--") && value.starts_with('-') && value.parse::<f64>().is_ok()
     })?;
     Some(format!(
         "{option} is followed by {value}, which is read as an option; most options take numbers \
-         above zero, and others are written {option}={value}",
-        option = pair[0],
-        value = pair[1]
+         above zero, and others are written {option}={value}"
     ))
 }
 

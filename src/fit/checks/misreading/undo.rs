@@ -95,7 +95,7 @@ impl Misreading {
             Self::ExchangedLengths { row } => {
                 return declared.with_changed_rows(|rows| {
                     let joint = rows.get_mut(row - 1)?;
-                    let can_change = joint.a != joint.d && joint.beam.is_none();
+                    let can_change = joint.a.total_cmp(&joint.d).is_ne() && joint.beam.is_none();
                     can_change.then(|| std::mem::swap(&mut joint.a, &mut joint.d))
                 });
             }
@@ -274,7 +274,8 @@ impl Misreading {
 
 /// Exchanges two rows of the joint table; `None` if they are equal, or have no rows.
 fn exchange_rows(first: &mut Joint, second: &mut Joint) -> Option<()> {
-    let row = |joint: &Joint| [joint.alpha, joint.a, joint.theta, joint.d, joint.beta];
+    let row =
+        |joint: &Joint| [joint.alpha, joint.a, joint.theta, joint.d, joint.beta].map(f64::to_bits);
     let has_row = |joint: &Joint| joint.placement.is_none() && joint.beam.is_none();
     if row(first) == row(second) || !has_row(first) || !has_row(second) {
         return None;
