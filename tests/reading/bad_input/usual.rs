@@ -9,11 +9,8 @@ use crate::common::reading::{problem_error, table_error, try_poses, try_table};
 /// Returns the kind and the line of the error of a table of the arm.
 fn kind(problem: &str, table: &str) -> (TableErrorKind, Option<usize>) {
     let error = table_error(&parse(problem), table);
-    let line = error.location.line;
-    match *error.kind {
-        InputErrorKind::Table(kind) => (kind, line),
-        other => panic!("{other}"),
-    }
+    let InputErrorKind::Table(kind) = *error.kind else { unreachable!("{}", error.kind) };
+    (kind, error.location.line)
 }
 
 const ROWS: &str = "q1_deg,x_mm,y_mm,z_mm\n1,1,2,3\n";
