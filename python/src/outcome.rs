@@ -121,6 +121,13 @@ impl Identification {
         }
         Ok(())
     }
+
+    /// Data of the figures, with the uncertainty of predictions.
+    fn plots(&self) -> Result<PlotData, IdentifyError> {
+        let shown = PlotData::of_identification(&self.problem, &self.data, &self.found)?;
+        let Some(fitted) = self.fitted()? else { return Ok(shown) };
+        shown.with_uncertainty((&self.found, &self.problem), &self.data, fitted)
+    }
 }
 
 #[pymethods]
@@ -140,7 +147,8 @@ impl Identification {
     /// What the command line prints.
     fn summary(&self, py: Python<'_>) -> PyResult<String> {
         detached(py, || {
-            let mut text = report::estimate_text(&self.problem, &self.found);
+            let bound = report::bound_text(&self.plots()?);
+            let mut text = report::estimate_text(&self.problem, &self.found, bound);
             if let Some(fitted) = self.fitted()?.filter(|_| self.is_corrected) {
                 text.push('\n');
                 text += &report::remainder_text(&self.found, &fitted.outcome());
@@ -198,11 +206,7 @@ impl Identification {
     /// Pages and figures.
     fn report(&self, py: Python<'_>) -> PyResult<Pages> {
         detached(py, || {
-            let mut shown = PlotData::of_identification(&self.problem, &self.data, &self.found)?;
-            if let Some(fitted) = self.fitted()? {
-                let found = (&*self.found, &*self.problem);
-                shown = shown.with_uncertainty(found, &self.data, fitted)?;
-            }
+            let shown = self.plots()?;
             Ok(pages(report::identification_report(&self.problem, &self.found, &shown)))
         })?
         .map_err(|error: IdentifyError| raised(&error))

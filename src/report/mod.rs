@@ -58,7 +58,8 @@ pub(crate) use next::next_page;
 pub(crate) use noise::show_influential_rows;
 pub(crate) use plan::plan_page;
 pub(crate) use predict::{prediction_page, prediction_text};
-pub(crate) use remainder::bound_text;
+#[doc(hidden)]
+pub use remainder::bound_text;
 pub use render::Report;
 #[doc(hidden)]
 pub use render::{limit_text_width, text_width};

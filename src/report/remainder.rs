@@ -80,7 +80,7 @@ pub(super) fn uncertainty<'a>(found: &Identification, plots: &'a PlotData) -> Ve
 }
 
 /// States the mean bound of prediction errors over the workspace, if it is known.
-pub(crate) fn bound_text(plots: &PlotData) -> Option<String> {
+pub fn bound_text(plots: &PlotData) -> Option<String> {
     let uncertainty = plots.uncertainty.as_ref()?;
     let (level, bounds) = (uncertainty.level, &uncertainty.bounds);
     let mean = bounds.iter().map(|at| at.bound).sum::<f64>() / bounds.len() as f64;
