@@ -16,7 +16,8 @@ struct Family {
     is_of_functions: bool,
 }
 
-/// What the prior probability of an effect needs to know of the other hypotheses about a residual.
+/// Summary of the hypotheses about a residual, from which the prior probability of an effect among
+/// them follows without their columns.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct OtherHypotheses {
     /// Sum of the weights of the families of functions without a law.

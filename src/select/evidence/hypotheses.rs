@@ -180,8 +180,9 @@ impl<'a> Hypotheses<'a> {
     }
 
     /// Creates the hypotheses of the effects `added` alone, with the prior probabilities that they
-    /// have among all hypotheses. `others` comes from the hypotheses about another fit. Returns
-    /// `None` if an effect is a wave, which needs the columns of other waves.
+    /// have among all hypotheses. The functions without a law, and the effects that displace no
+    /// pose, are taken to be those about another fit, `others`. Returns `None` if an effect is a
+    /// wave, which needs the columns of other waves.
     pub(super) fn of_added(
         fitted: &'a Fitted,
         data: &Data<'a>,
