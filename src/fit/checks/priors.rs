@@ -108,6 +108,9 @@ const MAX_OVERSTATED_RATIO: f64 = 30.0;
 /// Smallest such ratio at which the positions are not measured: micrometres taken for metres, the
 /// largest exchange of units of σ, give 1e6.
 const MIN_COMPUTED_RATIO: f64 = 1e7;
+/// Residual below which the data are exact to the rounding of doubles \[m\] or \[rad\]: a simulation
+/// without noise, of which σ says nothing.
+const MIN_MEASURED_RMS: f64 = 1e-12;
 /// Smallest ratio of measured numbers to fitted parameters at which the residual shows the noise.
 const MIN_NUMBERS_PER_PARAMETER: usize = 2;
 
@@ -121,7 +124,8 @@ impl Check for SigmaIsNotOverstated {
         let Some(sigma) = kind.declared_sigma else { return Vec::new() };
         let errors = fit.fitting.position_errors(&kind.rows, &fit.end.x);
         let rms = fit.rms(&kind.rows, &errors) / kind.observation.root();
-        if sigma <= MAX_OVERSTATED_RATIO * rms
+        if rms < MIN_MEASURED_RMS
+            || sigma <= MAX_OVERSTATED_RATIO * rms
             || kind.observation.coordinates() * kind.rows.len()
                 < MIN_NUMBERS_PER_PARAMETER * fit.whole.unknowns.len()
         {
