@@ -49,8 +49,9 @@ pub(super) fn meant(
         scaled.positions.iter_mut().for_each(|position| *position *= factor);
         scaled
     };
-    let is_in =
-        |unit: f64| targets.position_unit.is_some_and(|own| (own / unit - 1.0).abs() < 1e-9);
+    let is_in = |unit: f64| {
+        targets.position_unit.is_some_and(|declared| (declared / unit - 1.0).abs() < 1e-9)
+    };
     let mut trials = vec![(targets.clone(), other, format!("--frame {name}"))];
     if is_in(1e-3) {
         trials.push((scaled(1e3), frame, "metres instead of the declared millimetres".to_owned()));

@@ -5,60 +5,10 @@ pub(super) const UNITS: [&str; 12] =
     ["degrees", "degree", "deg", "°C", "°", "rad", "mm", "kg", "m", "s", "N", "C"];
 
 /// Months and their abbreviations in English, German and French, as spreadsheets write them.
-const MONTHS: &[&str] = &[
-    "jan",
-    "feb",
-    "mar",
-    "apr",
-    "may",
-    "jun",
-    "jul",
-    "aug",
-    "sep",
-    "sept",
-    "oct",
-    "nov",
-    "dec",
-    "january",
-    "february",
-    "march",
-    "april",
-    "june",
-    "july",
-    "august",
-    "september",
-    "october",
-    "november",
-    "december",
-    "mär",
-    "mrz",
-    "mai",
-    "okt",
-    "dez",
-    "januar",
-    "februar",
-    "märz",
-    "juni",
-    "juli",
-    "oktober",
-    "dezember",
-    "janv",
-    "févr",
-    "mars",
-    "avr",
-    "juin",
-    "juil",
-    "août",
-    "déc",
-    "janvier",
-    "février",
-    "avril",
-    "juillet",
-    "septembre",
-    "octobre",
-    "novembre",
-    "décembre",
-];
+const MONTHS: &str = "jan feb mar apr may jun jul aug sep sept oct nov dec january february march april \
+    june july august september october november december mär mrz mai okt dez januar \
+    februar märz juni juli oktober dezember janv févr mars avr juin juil août déc \
+    janvier février avril juillet septembre octobre novembre décembre";
 
 /// Returns true for a number with a decimal point whose thousands are separated by commas, such as
 /// `1,874.383`.
@@ -76,7 +26,7 @@ pub(super) fn has_thousands(word: &str) -> bool {
 pub(super) fn is_spreadsheet_date(word: &str) -> bool {
     let parts: Vec<&str> =
         word.split([' ', '-', '.', '/']).filter(|part| !part.is_empty()).collect();
-    let is_month = |part: &&str| MONTHS.contains(&part.to_lowercase().as_str());
+    let is_month = |part: &&str| MONTHS.split(' ').any(|month| month == part.to_lowercase());
     let is_day = |part: &&str| part.len() <= 4 && part.bytes().all(|byte| byte.is_ascii_digit());
     matches!(parts.as_slice(), [a, b] if is_month(a) && is_day(b) || is_day(a) && is_month(b))
 }

@@ -7,8 +7,8 @@ use crate::error::{InputError, InputErrorKind, TableErrorKind};
 const MIN_EMPTY_CELLS: usize = 2;
 
 impl Table {
-    /// Returns true if the current row begins with a word without a digit and has no more numbers
-    /// than words, as the title or foot of a page.
+    /// Returns true if the first cell of the current row begins with a letter and at most half of the
+    /// cells are numbers, as in the title or foot of a page.
     pub(super) fn is_line_of_words(&self) -> bool {
         let cells = || self.cells().iter().map(|cell| String::from_utf8_lossy(cell.trim_ascii()));
         let is_number = |cell: &str| cell.replace(',', ".").parse::<f64>().is_ok();
