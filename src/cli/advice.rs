@@ -46,8 +46,11 @@ pub fn after_fit(
         None if found.has(FindingCode::PositionsComputed) => {
             "measure the poses with an instrument".to_owned()
         }
-        // If the priors contradict the fit, neither a cause nor a correction follows from it.
-        None if found.has(FindingCode::PriorContradicted) => {
+        // If the priors contradict the fit, neither a cause nor a correction follows from it. Where
+        // the nominal arm is far off, the declared numbers are wrong and not the priors.
+        None if found.has(FindingCode::PriorContradicted)
+            && !found.has(FindingCode::NominalFarOff) =>
+        {
             let rule = found
                 .finding(FindingCode::PriorContradicted)
                 .and_then(|finding| finding.word("rule"));

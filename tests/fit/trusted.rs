@@ -252,6 +252,49 @@ fn exchanged_rows_and_lengths_columns_moved_on_and_one_axis_in_metres_are_named(
 }
 
 #[test]
+fn a_held_target_a_turned_row_and_a_ball_screw_are_named() {
+    let named = |problem: &Problem, data: &Dataset| {
+        let found = fit(problem, data);
+        assert!(!found.is_trusted());
+        found.finding(FindingCode::Misread).map(ToString::to_string).unwrap_or_default()
+    };
+    let held = "'joint*' = { sigma_deg = 0.3, sigma_mm = 2 }\n'base.*' = { free = true }";
+    let mut problem = parse(&text(held));
+    let data = measured(&problem, 8);
+    problem.tool.target += Vector3::new(-0.05, 0.06, 0.0);
+    let target = named(&problem, &data);
+    assert!(target.contains("a target that lies elsewhere than [tool] declares"), "{target}");
+    assert!(!target.contains("times its command"), "{target}");
+    let (mut problem, data) = based();
+    problem.joints[2].alpha += std::f64::consts::FRAC_PI_2;
+    let twist = named(&problem, &data);
+    assert!(twist.contains("alpha of joint 3 that is 90° off ("), "{twist}");
+    let scara = parse(&format!(
+        "name = 'arm'\n[[joint]]\nd_m = 0.35\n[[joint]]\na_m = 0.325\n[[joint]]\nkind = 'prismatic'\na_m = 0.275\n\
+         alpha_deg = 180\n[[joint]]\n[tool]\ntarget_m = [0.08, 0, 0.02]\n[parameters]\n{held}\n[data]\n\
+         position_sigma_mm = 0.05\n"
+    ));
+    let mut data = measured(&scara, 8);
+    let lead = std::f64::consts::TAU / 0.02;
+    data.measurements.configurations.chunks_exact_mut(4).for_each(|q| q[3] -= lead * q[2]);
+    let screw = named(&scara, &data);
+    assert!(screw.contains("joint 4 that also turns by 18.0"), "{screw}");
+    assert!(screw.contains("°/mm of joint 3"), "{screw}");
+}
+
+#[test]
+fn no_cause_is_named_if_the_table_is_one_of_another_arm() {
+    let (problem, _) = based();
+    let mut other = problem.clone();
+    let lengths = [(0.0, 0.2), (0.3, 0.1), (0.35, -0.2), (-0.2, 0.4), (0.1, 0.15)];
+    for (joint, (a, d)) in other.joints.iter_mut().zip(lengths) {
+        (joint.a, joint.d) = (a, d);
+    }
+    let found = fit(&problem, &measured(&other, 8));
+    assert!(!found.is_trusted() && !found.has(FindingCode::Misread), "{:?}", found.findings);
+}
+
+#[test]
 fn a_sigma_in_another_unit_is_asked_about() {
     for (factor, is_named) in [(1.0, false), (20.0, false), (1000.0, true)] {
         let (mut problem, data) = based();

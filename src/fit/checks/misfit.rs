@@ -16,6 +16,9 @@ const MIN_UNIMPROVED_RATIO: f64 = 0.9;
 /// Smallest error, as a multiple of the declared σ, at which a fit that is no better than the
 /// nominal arm is reported.
 const MIN_REPORTED_ERROR: f64 = 1000.0;
+/// Smallest residual of a fit, relative to the spread of the measurements, at which the table may
+/// be that of another arm.
+const MIN_OTHER_ARM_MISS: f64 = 0.5;
 /// Largest ratio between the spreads of measured and predicted points that is not reported.
 const MAX_SIZE_RATIO: f64 = 2.0;
 /// Smallest spread of points from which the size of an arm is judged \[m\], or of tilts from which
@@ -80,7 +83,14 @@ fn misfit_finding(kind: &RowKind, rms: f64) -> Option<Finding> {
         let (what, by, part) = (measured(kind), size(kind, rms, 1), 100.0 * rms / spread);
         (
             format!("the fitted arm misses the {what} by {by}, {part:.0} % of their spread"),
-            format!("check units, signs of joints, and {}", named(kind)),
+            if rms > MIN_OTHER_ARM_MISS * spread {
+                format!(
+                    "check units, signs of joints, {}, and whether the table is one of this arm",
+                    named(kind)
+                )
+            } else {
+                format!("check units, signs of joints, and {}", named(kind))
+            },
         )
     } else {
         let text = "the fitted arm misses the measurements by more than can be computed";

@@ -16,7 +16,7 @@ const MIN_SIGMAS: f64 = 10.0;
 const MIN_PART: f64 = 0.01;
 
 /// Largest error that counts as noise, as a multiple of the declared σ. Real arms leave several σ.
-const MAX_NOISE_SIGMAS: f64 = 5.0;
+pub(super) const MAX_NOISE_SIGMAS: f64 = 5.0;
 
 /// Maximum number of explanations that a text names.
 const MAX_NAMED: usize = 4;

@@ -36,6 +36,13 @@ impl CheckedFit<'_> {
             |parameter: &Parameter| matches!(parameter.site, ParameterSite::Base { .. });
         self.fitting.model.parameters.iter().any(is_of_base)
     }
+
+    /// Returns true if no coordinate of a target is a free parameter.
+    pub fn is_target_held(&self) -> bool {
+        let is_of_target =
+            |parameter: &Parameter| matches!(parameter.site, ParameterSite::Target { .. });
+        !self.fitting.model.parameters.iter().any(is_of_target)
+    }
 }
 
 impl Check for NominalIsNear {

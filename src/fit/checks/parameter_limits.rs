@@ -9,7 +9,7 @@ use crate::quantity::Unit;
 
 /// Largest deviation of an arm parameter, in σ of its prior, that is not reported. Chance exceeds 5
 /// σ once in two million.
-const MAX_PRIOR_SIGMAS: f64 = 5.0;
+pub(super) const MAX_PRIOR_SIGMAS: f64 = 5.0;
 
 /// Returns true if the parameter is a declared quantity of the arm, a base or a target, not of an
 /// effect.
@@ -23,16 +23,19 @@ pub(super) fn is_of_arm(parameter: &Parameter) -> bool {
     is_declared && parameter.regressor.is_constant()
 }
 
+/// Returns the size of a deviation `x` in σ of the parameter's prior; `None` without a prior, or if
+/// the parameter is not one of the arm.
+pub(super) fn prior_sigmas(parameter: &Parameter, x: f64) -> Option<f64> {
+    Some(x.abs() / parameter.sigma.filter(|_| is_of_arm(parameter))?)
+}
+
 /// Checks that no parameter of the arm deviates by more than [`MAX_PRIOR_SIGMAS`] σ of its prior.
 pub(super) struct WithinPriors;
 
 impl Check for WithinPriors {
     fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
-        let ratio = |parameter: &Parameter, x: f64| {
-            Some(x.abs() / parameter.sigma.filter(|_| is_of_arm(parameter))?)
-        };
         let is_far = |parameter: &Parameter, x: f64| {
-            ratio(parameter, x).is_some_and(|sigmas| sigmas > MAX_PRIOR_SIGMAS)
+            prior_sigmas(parameter, x).is_some_and(|sigmas| sigmas > MAX_PRIOR_SIGMAS)
         };
         let finding = |(parameter, sigmas): (&Parameter, f64)| {
             let name = &parameter.name;
@@ -51,7 +54,8 @@ impl Check for WithinPriors {
                 None => Finding::new(FindingCode::BeyondPrior, numbers, text),
             }
         };
-        let largest = largest_ratio(fit, ratio).filter(|(_, sigmas)| *sigmas > MAX_PRIOR_SIGMAS);
+        let largest =
+            largest_ratio(fit, prior_sigmas).filter(|(_, sigmas)| *sigmas > MAX_PRIOR_SIGMAS);
         largest.map(finding).into_iter().collect()
     }
 }

@@ -21,6 +21,11 @@ const ZERO_POSITION_STEP: i16 = 15;
 /// them.
 const TRIAL_RATIOS: [i16; 18] =
     [1, 5, 10, 20, 25, 33, 50, 67, 80, 90, 110, 125, 150, 200, 300, 400, 500, 1000];
+/// Usual leads of ball screws \[mm\]. A fit in full finds the values near them.
+const SCREW_LEADS: [i16; 12] = [4, 5, 6, 8, 10, 12, 16, 20, 25, 32, 40, 50];
+/// Angles by which α of a row may be wrong \[°\]. A turn by 180° of a right angle is its other
+/// sign.
+const TWISTS: [i16; 3] = [-90, 90, 180];
 /// Maximum number of rows by which positions may be shifted.
 const MAX_SHIFT: i8 = 3;
 /// Number of rows, evenly spaced, from which a shift of positions may begin.
@@ -79,6 +84,10 @@ fn of_commands(problem: &Problem) -> Vec<Misreading> {
     for (k, &joint) in moving.iter().enumerate().take(MAX_PAIRED) {
         for &with in &moving[k + 1..moving.len().min(MAX_PAIRED)] {
             if kind(joint) != kind(with) {
+                let is_sliding = kind(joint) == JointKind::Prismatic;
+                let (joint, from) = if is_sliding { (with, joint) } else { (joint, with) };
+                let screw = |lead| Misreading::Screw { joint, from, lead };
+                misreadings.extend(SCREW_LEADS.iter().flat_map(|&lead| [lead, -lead].map(screw)));
                 continue;
             }
             misreadings.push(Misreading::Exchanged { joint, with });
@@ -142,6 +151,14 @@ fn of_joint_table(problem: &Problem) -> Vec<Misreading> {
         }
         forms.extend((counts[0] > 1).then_some(Misreading::TableRadians { joint: 0, field }));
         forms.extend((counts[1] > 1).then_some(Misreading::TableDegrees { joint: 0, field }));
+    }
+    for (joint, declared) in (2..).zip(problem.joints.iter().skip(1)) {
+        let is_right = |&degrees: &i16| {
+            let other_sign = degrees == 180 && (declared.alpha.abs() - PI / 2.0).abs() < 1e-9;
+            !other_sign && declared.placement.is_none() && declared.kind != JointKind::Fixed
+        };
+        let twist = |degrees| Misreading::Twist { joint, degrees };
+        forms.extend(TWISTS.into_iter().filter(is_right).map(twist));
     }
     let count_long = |joint: &Joint| {
         lengths_of(&mut joint.clone())

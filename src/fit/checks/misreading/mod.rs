@@ -72,6 +72,16 @@ pub enum Misreading {
         /// True if the command is subtracted.
         is_opposite: bool,
     },
+    /// A turning joint also turns with a sliding one, as the nut of a ball screw does. Joints are
+    /// counted from 1.
+    Screw {
+        /// Number of the turning joint.
+        joint: usize,
+        /// Number of the sliding joint.
+        from: usize,
+        /// Lead of the screw \[mm\]; negative for a left-handed screw.
+        lead: i16,
+    },
     /// Positions belong to the configuration of another row.
     Shifted {
         /// Number of rows by which a position comes too late.
@@ -128,6 +138,13 @@ pub enum Misreading {
         /// Number of the row, from 1.
         row: usize,
     },
+    /// The angle α of the joint table is wrong by a multiple of 90°.
+    Twist {
+        /// Number of the joint, from 1.
+        joint: usize,
+        /// Angle that must be added to α \[°\].
+        degrees: i16,
+    },
     /// A length of the joint table is in another unit or has a misplaced decimal point.
     Length {
         /// Number of the joint, from 1.
@@ -139,6 +156,8 @@ pub enum Misreading {
     },
     /// The base stands elsewhere than declared, and the problem holds it there.
     HeldBase,
+    /// The target lies elsewhere than declared, and the problem holds it there.
+    HeldTarget,
     /// The target of `[tool]` is in millimetres, declared as metres.
     TargetInMillimetres,
     /// Lengths of joints are in millimetres, declared as metres; likewise a target longer than 1 m.
@@ -200,11 +219,14 @@ impl Misreading {
         let (first, second, field) = match self {
             Self::Zero { joint, .. } | Self::Ratio { joint, .. } => (joint, 0, None),
             Self::Exchanged { joint, with } => (joint, with, None),
-            Self::Coupled { joint, from, .. } => (joint, from, None),
+            Self::Coupled { joint, from, .. } | Self::Screw { joint, from, .. } => {
+                (joint, from, None)
+            }
             Self::Length { joint, field, .. }
             | Self::Sign { joint, field }
             | Self::TableRadians { joint, field }
             | Self::TableDegrees { joint, field } => (joint, 0, Some(field)),
+            Self::Twist { joint, .. } => (joint, 0, Some(JointField::Alpha)),
             Self::Mass { mass, .. } => (mass, 0, None),
             Self::AxisUnit { axis, .. } => (axis, 0, None),
             Self::ExchangedRows { row } | Self::ExchangedLengths { row } => (row, 0, None),

@@ -4,11 +4,13 @@ use nalgebra::{DVector, Vector3};
 use rayon::prelude::*;
 
 use super::Misreading;
-use super::candidates::{candidates, of_loads, of_order, shift_step};
+use super::candidates::{candidates, is_far, of_loads, of_order, shift_step};
 use super::explanation::{Explanation, Explanations, LeftOutMisfit};
+use super::undo::is_unit_ratio;
 use crate::fit::checks::checked_fit::CheckedFit;
+use crate::fit::checks::misread::MAX_NOISE_SIGMAS;
 use crate::fit::checks::nominal_error::is_nominal_far_off;
-use crate::fit::checks::parameter_limits::is_of_arm;
+use crate::fit::checks::parameter_limits::{MAX_PRIOR_SIGMAS, is_of_arm, prior_sigmas};
 use crate::fit::stages::fitting::{FitEnd, Fitting};
 use crate::fit::{Placement, SolverChoice};
 use crate::least_squares::{LinearisationCache, Loss};
@@ -27,6 +29,9 @@ const MAX_REACHES: f64 = 1e4;
 /// Largest error of the nominal arm, as a multiple of the arm's reach, for which only misread loads
 /// are searched. A joint angle that is wrong by one degree causes seven times as much.
 const MAX_REACHES_OF_LOADS: f64 = 2e-3;
+/// Smallest ratio of motion to command that is a misreading, unless it is that of two units. A
+/// smaller one means that the data contradict any motion of the joint.
+const MIN_RATIO: f64 = 0.02;
 /// Smallest relative error of a ratio of motion to command that is a misreading. Gears deviate by
 /// less.
 const MIN_RATIO_ERROR: f64 = 1e-3;
@@ -54,6 +59,8 @@ struct Outcome {
     size: Option<f64>,
     /// Misfit of configurations that are left out of a full fit.
     left_out: Option<LeftOutMisfit>,
+    /// True if no parameter of the arm deviates far beyond its prior.
+    is_within_priors: bool,
 }
 
 /// Rows and problem with which misreadings are tried.
@@ -96,9 +103,19 @@ fn explanations(fit: &CheckedFit) -> Explanations {
     // A base that is only a little off is no misreading.
     let is_base_held = is_position && !fit.is_base_free() && is_nominal_far_off(fit);
     tested.extend(is_base_held.then_some(Misreading::HeldBase));
+    // A target that is far away is in millimetres.
+    let is_target_held = is_position && fit.is_target_held() && !is_far(fit.problem);
+    tested.extend(is_target_held.then_some(Misreading::HeldTarget));
     let mut errors = trial.registered_errors(&tested);
     errors.sort_by(|a, b| a.1.total_cmp(&b.1));
-    let near_alone = near_misreadings(&errors, nominal);
+    // Two reversed joints look like α between them that is turned by 180°.
+    let alone: Vec<(Misreading, f64)> = errors
+        .iter()
+        .copied()
+        .filter(|(misreading, _)| !matches!(misreading, Misreading::Twist { .. }))
+        .collect();
+    let is_near_alone = !near_misreadings(&alone, nominal).is_empty();
+    let near_alone = if is_near_alone { near_misreadings(&errors, nominal) } else { Vec::new() };
     errors.extend(trial.several_reversed(&tested));
     errors.sort_by(|a, b| a.1.total_cmp(&b.1));
     if let Some(shift) = errors.iter_mut().find(|(found, _)| found.shifted_from().is_some()) {
@@ -156,13 +173,23 @@ impl Trial<'_> {
             .take(MAX_FITTED_MISREADINGS)
             .collect();
         let explanation = |&misreading: &Misreading| {
-            let Outcome { rms, size, left_out } = self.outcome(misreading, true)?;
+            let Outcome { rms, size, left_out, is_within_priors } =
+                self.outcome(misreading, true)?;
             // A negative ratio means that the joint turns against its command, and one of 1 is no
             // misreading.
-            let is_impossible = |size: f64| size < 0.0 || (size - 1.0).abs() < MIN_RATIO_ERROR;
+            let is_impossible = |size: f64| {
+                let is_still = size < MIN_RATIO && !is_unit_ratio(size);
+                is_still || (size - 1.0).abs() < MIN_RATIO_ERROR
+            };
             if size.is_some_and(|size| {
                 matches!(misreading, Misreading::Ratio { .. }) && is_impossible(size)
             }) {
+                return None;
+            }
+            // An arm that must be bent far beyond its priors is not the one that was measured. A
+            // shift of rows leaves one of them without its configuration.
+            let is_shift = misreading.shifted_from().is_some();
+            if !is_within_priors && !is_shift && rms > self.noise_limit() {
                 return None;
             }
             Some(Explanation {
@@ -230,7 +257,8 @@ impl Trial<'_> {
         let registered = registered.ok()?;
         if !is_fitted {
             let rms = self.error(&fitting, &split.identification, &registered);
-            return rms.is_finite().then_some(Outcome { rms, size: None, left_out: None });
+            let outcome = Outcome { rms, size: None, left_out: None, is_within_priors: true };
+            return rms.is_finite().then_some(outcome);
         }
         let end = fitting.run(&registered).ok()?;
         let x = &end.x;
@@ -243,7 +271,17 @@ impl Trial<'_> {
         let size = name.and_then(|name| Some(misreading.size(value(&name)?)?.1));
         let corrected = rewritten.as_ref().unwrap_or(self.problem);
         let left_out = Some(self.left_out(&fitting, &end, corrected));
-        rms.is_finite().then_some(Outcome { rms, size, left_out })
+        let mut fitted = model.parameters.iter().zip(x);
+        let is_within_priors = !fitted.any(|(parameter, x)| {
+            prior_sigmas(parameter, *x).is_some_and(|sigmas| sigmas > MAX_PRIOR_SIGMAS)
+        });
+        rms.is_finite().then_some(Outcome { rms, size, left_out, is_within_priors })
+    }
+
+    /// Returns the largest error that counts as noise \[m\].
+    fn noise_limit(&self) -> f64 {
+        let observation = self.fitting.measurements.leading();
+        MAX_NOISE_SIGMAS * observation.root() * self.fitting.sigma
     }
 
     /// Returns the misfit of a fit with each configuration left out. `problem` is that of the fit,

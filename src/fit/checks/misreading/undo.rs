@@ -24,6 +24,11 @@ const UNIT_RATIO_TOLERANCE: f64 = 0.05;
 /// Size of a gradian \[°\].
 const DEGREES_PER_GRADIAN: f64 = 0.9;
 
+/// Returns true if a ratio of motion to command is that of two units.
+pub(super) fn is_unit_ratio(size: f64) -> bool {
+    UNIT_RATIOS.iter().any(|ratio| (size / ratio - 1.0).abs() < UNIT_RATIO_TOLERANCE)
+}
+
 /// Returns 10 to the power `power`, the factor between two units of a length or a mass.
 pub(super) fn power_of_ten(power: i8) -> f64 {
     10.0_f64.powi(power.into())
@@ -40,6 +45,7 @@ impl Misreading {
                 | Self::TableDegrees { .. }
                 | Self::Sign { .. }
                 | Self::Length { .. }
+                | Self::Twist { .. }
                 | Self::ExchangedRows { .. }
                 | Self::ExchangedLengths { .. }
         )
@@ -51,12 +57,16 @@ impl Misreading {
         let mut problem = declared.clone();
         match self {
             Self::HeldBase => {
-                let none = Quantities::default();
-                problem.parameters.push(ParameterRule {
-                    pattern: "base*".to_owned(),
-                    freedom: Freedom::Free { sigma: none, min: none, max: none },
-                    location: declared.data.location.clone(),
-                });
+                problem.parameters.push(without_prior("base*".to_owned(), declared));
+                return Some(problem);
+            }
+            Self::HeldTarget => {
+                let rule = |axis| without_prior(format!("tool*.{axis}"), declared);
+                problem.parameters.extend(["x", "y", "z"].map(rule));
+                return Some(problem);
+            }
+            Self::Twist { joint, degrees } => {
+                problem.joints.get_mut(joint - 1)?.alpha += f64::from(degrees).to_radians();
                 return Some(problem);
             }
             Self::TargetInMillimetres => {}
@@ -132,12 +142,8 @@ impl Misreading {
         let (pattern, _) = self.size(0.0)?;
         let mut problem =
             self.effect().map_or_else(|| problem.clone(), |effect| problem.with_effect(effect));
-        let none = Quantities::default();
-        problem.parameters.push(ParameterRule {
-            pattern,
-            freedom: Freedom::Free { sigma: none, min: none, max: none },
-            location: problem.data.location.clone(),
-        });
+        let rule = without_prior(pattern, &problem);
+        problem.parameters.push(rule);
         Some(problem)
     }
 
@@ -145,7 +151,9 @@ impl Misreading {
     fn effect(self) -> Option<Effect> {
         match self {
             Self::Ratio { joint, .. } => Some(Effect::GearRatio { joint }),
-            Self::Coupled { joint, from, .. } => Some(Effect::JointCoupling { joint, from }),
+            Self::Coupled { joint, from, .. } | Self::Screw { joint, from, .. } => {
+                Some(Effect::JointCoupling { joint, from })
+            }
             _ => None,
         }
     }
@@ -156,10 +164,7 @@ impl Misreading {
     pub(super) fn expressed(self, size: f64) -> Option<(Effect, f64)> {
         let effect = self.effect()?;
         match effect {
-            Effect::GearRatio { .. } => {
-                let is_unit = |ratio: &f64| (size / ratio - 1.0).abs() < UNIT_RATIO_TOLERANCE;
-                (!UNIT_RATIOS.iter().any(is_unit)).then_some((effect, size - 1.0))
-            }
+            Effect::GearRatio { .. } => (!is_unit_ratio(size)).then_some((effect, size - 1.0)),
             _ => Some((effect, size)),
         }
     }
@@ -175,6 +180,10 @@ impl Misreading {
             Self::Coupled { joint, from, is_opposite } => {
                 let name = format!("joint-coupling[{joint},{from}].factor");
                 Some((name, if is_opposite { -1.0 } else { 1.0 } + x))
+            }
+            Self::Screw { joint, from, lead } => {
+                let name = format!("joint-coupling[{joint},{from}].factor");
+                Some((name, radians_per_metre(lead) + x))
             }
             Self::Zero { joint, degrees } => {
                 Some((format!("joint{joint}.theta"), f64::from(degrees).to_radians() + x))
@@ -265,10 +274,28 @@ impl Misreading {
                 let sign = if is_opposite { -1.0 } else { 1.0 };
                 q[joint - 1] += sign * q[from - 1];
             }
+            Self::Screw { joint, from, lead } => {
+                q[joint - 1] += radians_per_metre(lead) * q[from - 1];
+            }
             Self::Zero { joint, degrees } => q[joint - 1] += f64::from(degrees).to_radians(),
             Self::Ratio { joint, percent } => q[joint - 1] *= f64::from(percent) / 100.0,
             _ => {}
         }
+    }
+}
+
+/// Returns the turn of a screw per travel \[rad/m\], given its lead \[mm\].
+fn radians_per_metre(lead: i16) -> f64 {
+    2.0 * PI * 1e3 / f64::from(lead)
+}
+
+/// Returns the rule that frees the parameters of a pattern without a prior.
+fn without_prior(pattern: String, problem: &Problem) -> ParameterRule {
+    let none = Quantities::default();
+    ParameterRule {
+        pattern,
+        freedom: Freedom::Free { sigma: none, min: none, max: none },
+        location: problem.data.location.clone(),
     }
 }
 

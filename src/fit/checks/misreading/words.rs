@@ -34,6 +34,10 @@ impl Misreading {
                 let unit = unit_of_ratio(size, kind);
                 format!("joint {joint} that {moves} by {size:.4} times its command{unit}")
             }
+            (Self::Screw { joint, from, .. }, Some(size)) => format!(
+                "joint {joint} that also turns by {:.3}°/mm of joint {from} (a ball screw: declare joint-coupling)",
+                size.to_degrees() * 1e-3
+            ),
             (Self::Coupled { joint, from, .. }, Some(size)) => format!(
                 "joint {joint} that also turns by {size:.3} times the command of joint {from} (declare joint-coupling)"
             ),
@@ -53,6 +57,7 @@ impl Misreading {
             | Self::TableDegrees { joint, field } => {
                 joint.checked_sub(usize::from(is_standard && matches!(field, A | Alpha)))?
             }
+            Self::Twist { joint, .. } => joint.checked_sub(usize::from(is_standard))?,
             Self::ExchangedRows { row } | Self::ExchangedLengths { row } => row,
             _ => return None,
         };
@@ -130,6 +135,9 @@ impl fmt::Display for Misreading {
                 let sign = if is_opposite { "minus " } else { "" };
                 write!(f, "joint {joint} that also turns by {sign}the command of joint {from}")
             }
+            Self::Screw { joint, from, lead } => {
+                write!(f, "joint {joint} that also turns once per {lead} mm of joint {from}")
+            }
             Self::Shifted { by, from } => {
                 let rows = if by.abs() == 1 { "row" } else { "rows" };
                 let side = if by > 0 { "before" } else { "after" };
@@ -143,6 +151,9 @@ impl fmt::Display for Misreading {
                 let ratio = f64::from(percent) / 100.0;
                 write!(f, "joint {joint} that turns by {ratio} times its command")
             }
+            Self::HeldTarget => f.write_str(
+                "a target that lies elsewhere than [tool] declares (correct it there, or free it in [parameters]: \"tool.*\" = { free = true })",
+            ),
             Self::HeldBase => f.write_str(
                 "a base that stands elsewhere than declared (free it in [parameters]: \"base.*\" = { free = true })",
             ),
@@ -205,6 +216,11 @@ impl Misreading {
             }
             Self::Sign { joint, field } => {
                 write!(f, "{} that has the other sign", entry_name(joint, field))
+            }
+            Self::Twist { joint, degrees } => {
+                let entry = entry_name(joint, JointField::Alpha);
+                let error = if degrees == 180 { 180 } else { -degrees };
+                write!(f, "{entry} that is {error}° off")
             }
             Self::Length { joint, field, power: -3 } => {
                 write!(f, "{} that is in millimetres, declared in metres", entry_name(joint, field))
