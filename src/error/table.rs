@@ -44,6 +44,12 @@ pub enum TableErrorKind {
     )]
     NothingJoined { gap: Option<String>, keys: Option<[String; 2]>, offset: Option<String> },
     #[error(
+        "the times of the {table} are whole minutes, those of the other table are not: a \
+         spreadsheet drops seconds; export the times with their seconds, or write by = \"order\" \
+         if row by row both tables belong together"
+    )]
+    SecondsLost { table: &'static str },
+    #[error(
         "{left} of {rows} measured rows have no partner in the joint table{}{}",
         nearest_in_time(gap.as_deref()),
         clock_offset_remedy(Some(offset.as_str()))

@@ -97,6 +97,32 @@ pub enum WarningKind {
     LooksLikeMilliseconds { value: String },
     #[error("all temperatures are {least} °C or more; if these are kelvins, subtract 273.15")]
     Kelvins { least: String },
+    #[error(
+        "all temperatures are {least} °C or more, which is hot for an arm; if these are degrees \
+         Fahrenheit, convert them: °C = (°F − 32) / 1.8"
+    )]
+    Fahrenheit { least: String },
+    #[error(
+        "the hoist forces are usually {usual} N, and [joint.beam.hoist] declares {declared} N; if \
+         the column holds kilograms, multiply it by 9.80665"
+    )]
+    HoistInKilograms { usual: String, declared: String },
+    #[error(
+        "the hoist pulls downwards, along gravity, but a hoist relieves an arm; if its direction \
+         has the wrong sign, write [0, 0, 1] or leave it out"
+    )]
+    HoistPullsDown,
+    #[error(
+        "no joint turns by more than {widest}° from zero; if the columns are in radians, their \
+         names end in _rad"
+    )]
+    FewDegrees { widest: String },
+    #[error(
+        "{rows} rows are paired by order with rows of other times, the first here: {partner} was \
+         {gap} s off, and another row is nearer; write by = \"time\", or check whether a row is \
+         missing or the tables are sorted differently"
+    )]
+    OrderContradictedByTimes { rows: usize, partner: String, gap: String },
     #[error("{value} °C is hot for a reference temperature; if it is in kelvins, subtract 273.15")]
     HotReference { value: String },
     #[error(

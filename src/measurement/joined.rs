@@ -9,6 +9,7 @@ use super::cell_style::CellStyle;
 use super::clocks::{best_shift, nearest};
 use super::mapped::Names;
 use super::meaning::is_numbered_or_position;
+use super::paired_times::{TimedPair, are_whole_minutes, order_contradicted};
 use super::table::{Table, shortened};
 use super::time::shown;
 use crate::error::{InputError, InputErrorKind, Location, TableErrorKind, Warning, WarningKind};
@@ -56,6 +57,10 @@ pub(super) struct JoinedLog {
     unlike_pairs: Vec<[String; 2]>,
     /// Times of the measured rows \[s\], for a join by time.
     times: Vec<f64>,
+    /// Column of the times in the current table, for a join by order.
+    clock: Option<Key>,
+    /// Times of rows that are joined by order.
+    timed_pairs: Vec<TimedPair>,
 }
 
 /// Column that pairs rows, and its conversion to seconds if it holds times.
@@ -78,6 +83,16 @@ struct LogRow {
 fn name_column(names: &[String]) -> Option<usize> {
     let place = |wanted: &str| names.iter().position(|name| name == wanted);
     place("pose").or_else(|| place("name"))
+}
+
+/// Returns the column with times.
+fn time_key(names: &[String]) -> Option<Key> {
+    let place = |wanted: &str| names.iter().position(|name| name == wanted);
+    let with_unit = Unit::Time.suffixes().iter().find_map(|suffix| {
+        let place = place(&format!("time_{}", suffix.name))?;
+        Some(Key { place, to_si: suffix.to_si })
+    });
+    with_unit.or_else(|| place("time").map(|place| Key { place, to_si: |_| f64::NAN }))
 }
 
 /// Returns a name in lower case, without spaces, marks and the zeros before a number.
@@ -117,6 +132,8 @@ impl JoinedLog {
             name_columns: None,
             unlike_pairs: Vec::new(),
             times: Vec::new(),
+            clock: None,
+            timed_pairs: Vec::new(),
         };
         for file in &log.files {
             let kind = InputErrorKind::DataFileMissing { path: file.clone() };
@@ -149,6 +166,7 @@ impl JoinedLog {
             return Err(table.column(name.map_or("", String::as_str)).error(kind));
         }
         let key = self.find_key(&table, &self.names)?;
+        let clock = time_key(&self.names).filter(|_| self.rule == JoinRule::Order);
         while table.next_row()? {
             let mut time = f64::NAN;
             match (self.rule, key) {
@@ -164,7 +182,10 @@ impl JoinedLog {
                     }
                     self.of_name.insert(name, self.rows.len());
                 }
-                _ => {}
+                _ => {
+                    let of_row = clock.and_then(|key| table.time(key.place, key.to_si).ok());
+                    time = of_row.unwrap_or(f64::NAN);
+                }
             }
             let (file, line, cells) = (table.file.clone(), table.line(), table.cells().clone());
             self.rows.push(LogRow { file, line, cells, time, uses: 0 });
@@ -175,21 +196,13 @@ impl JoinedLog {
 
     /// Returns the column by which rows are paired; `None` for a join by order.
     fn find_key(&self, table: &Table, names: &[String]) -> Result<Option<Key>, InputError> {
-        let place = |wanted: &str| names.iter().position(|name| name == wanted);
         let (key, write) = match self.rule {
             JoinRule::Order => return Ok(None),
             JoinRule::Name => (
                 name_column(names).map(|place| Key { place, to_si: std::convert::identity }),
                 "pose or name",
             ),
-            JoinRule::Time { .. } => {
-                let with_unit = Unit::Time.suffixes().iter().find_map(|suffix| {
-                    let place = place(&format!("time_{}", suffix.name))?;
-                    Some(Key { place, to_si: suffix.to_si })
-                });
-                let date = || place("time").map(|place| Key { place, to_si: |_| f64::NAN });
-                (with_unit.or_else(date), "time_s or time")
-            }
+            JoinRule::Time { .. } => (time_key(names), "time_s or time"),
         };
         let is_unknown = |(ours, theirs): &(&String, &String)| {
             ours == theirs && !ours.is_empty() && !is_numbered_or_position(ours)
@@ -210,6 +223,7 @@ impl JoinedLog {
         self.key = self.find_key(table, &names)?;
         if self.rule == JoinRule::Order {
             self.name_columns = name_column(&names).zip(name_column(&self.names));
+            self.clock = time_key(&names);
         }
         let is_new = |place: &usize| {
             let (name, header) = (self.names.get(*place), self.header.get(*place));
@@ -260,6 +274,13 @@ impl JoinedLog {
             if !name.is_empty() && name != other.trim() {
                 self.unlike_pairs.push([name.to_owned(), other.trim().to_owned()]);
             }
+        }
+        if let Some(clock) = self.clock
+            && let Ok(measured) = table.time(clock.place, clock.to_si)
+        {
+            let place = Location::file(&table.file).at_line(table.line());
+            let log_place = Location::file(&row.file).at_line(row.line);
+            self.timed_pairs.push(TimedPair { measured, logged: row.time, place, log_place });
         }
         let cells = self.appended.iter().map(|&place| row.cells.get(place).unwrap_or_default());
         table.append_cells(cells, (&row.file, row.line));
@@ -318,6 +339,11 @@ impl JoinedLog {
         {
             return error(TableErrorKind::NamesWrittenOtherwise { left, rows, pair: quoted(pair) });
         }
+        if 2 * left > rows
+            && let Some(table) = self.table_without_seconds()
+        {
+            return error(TableErrorKind::SecondsLost { table });
+        }
         if self.paired == 0 && self.requested > 0 {
             let (gap, keys, offset) = (self.gap(), self.keys(), self.offset());
             return error(TableErrorKind::NothingJoined { gap, keys, offset });
@@ -354,6 +380,22 @@ impl JoinedLog {
                 error(TableErrorKind::ClocksDiffer { gap, offset })
             }
             None => Ok(()),
+        }
+    }
+
+    /// Returns the table whose times are whole minutes while those of the other are not; `None`
+    /// unless the tables are joined by time.
+    fn table_without_seconds(&self) -> Option<&'static str> {
+        let JoinRule::Time { offset, .. } = self.rule else { return None };
+        if self.times.len().min(self.log_times.len()) < MIN_CHECKED_ROWS {
+            return None;
+        }
+        let measured = are_whole_minutes(self.times.iter().copied());
+        let logged = are_whole_minutes(self.log_times.iter().map(|time| time - offset));
+        match (measured, logged) {
+            (true, false) => Some("measurements"),
+            (false, true) => Some("joint table"),
+            _ => None,
         }
     }
 
@@ -442,6 +484,7 @@ impl JoinedLog {
         let unpaired =
             [warning(&self.unpaired, self.gap(), MAX_LISTED_ROWS), warning(&unused, None, 0)];
         let unpaired = unpaired.into_iter().flatten();
-        Ok(self.decoding_warnings.iter().cloned().chain(unpaired).collect())
+        let order = order_contradicted(&self.timed_pairs);
+        Ok(self.decoding_warnings.iter().cloned().chain(unpaired).chain(order).collect())
     }
 }

@@ -38,7 +38,8 @@ pub(super) struct Commands<'a> {
 }
 
 impl Commands<'_> {
-    fn unit(&self) -> &str {
+    /// Returns the unit in the column's name.
+    pub(super) fn unit(&self) -> &str {
         self.name.rsplit_once('_').map_or("", |(_, unit)| unit)
     }
 

@@ -39,6 +39,8 @@ mod observed;
 mod order;
 #[deny(clippy::indexing_slicing)]
 mod orientation;
+mod other_units;
+mod paired_times;
 #[deny(clippy::indexing_slicing)]
 mod read;
 mod repeats;

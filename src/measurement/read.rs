@@ -248,6 +248,9 @@ impl<'a> Tables<'a> {
                 let commands = commands(&columns);
                 warnings.extend(measurements.many_turns(problem, &commands));
                 warnings.extend(measurements.kelvins());
+                warnings.extend(measurements.fahrenheit(problem));
+                warnings.extend(measurements.hoist_in_kilograms(problem));
+                warnings.extend(measurements.few_degrees(problem, &commands));
                 warnings.extend(measurements.milliseconds());
                 warnings.extend(measurements.heavy_payload(problem));
                 warnings.extend(measurements.session_per_row());

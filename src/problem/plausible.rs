@@ -99,6 +99,8 @@ const MAX_SAG: f64 = 1.0;
 const MAX_REFERENCE_TEMPERATURE: f64 = 200.0;
 /// Largest difference from 1 at which the size of gravity counts as that of a unit vector.
 const UNIT_TOLERANCE: f64 = 1e-6;
+/// Smallest cosine between a hoist's direction and gravity at which the hoist pulls downwards.
+const MIN_DOWNWARDS: f64 = 0.7;
 /// Largest plausible distance of a centre of mass from the frame of its joint \[m\].
 const MAX_BODY_DISTANCE: f64 = 10.0;
 
@@ -108,7 +110,11 @@ impl Problem {
     pub fn plausibility_warnings(&self) -> Vec<Warning> {
         let warnings = self.warnings.iter().cloned();
         let warnings = warnings.chain(self.far_target()).chain(self.narrow_limits());
-        warnings.chain(self.bodies()).chain(self.stiff_beam()).collect()
+        warnings
+            .chain(self.bodies())
+            .chain(self.stiff_beam())
+            .chain(self.hoist_downwards())
+            .collect()
     }
 
     /// Returns a warning for the first mass of a joint that is too heavy for an arm, and for the
@@ -204,6 +210,22 @@ impl Problem {
                 length: format!("{length:.3}"),
             };
             (radius > length).then(|| Warning { location: location.with_key(key), kind })
+        })
+    }
+
+    /// Returns a warning for the first hoist that pulls along gravity.
+    fn hoist_downwards(&self) -> Option<Warning> {
+        let down = self.gravity.try_normalize(0.0)?;
+        self.joints.iter().find_map(|joint| {
+            let beam = joint.beam.as_ref()?;
+            let hoist = beam.hoist.as_ref()?;
+            let location = Location { excerpt: None, ..joint.location.clone() };
+            let key = format!("beam {}.hoist.direction", beam.name);
+            let pulls_down = hoist.direction.dot(&down) > MIN_DOWNWARDS;
+            pulls_down.then(|| Warning {
+                location: location.with_key(key),
+                kind: WarningKind::HoistPullsDown,
+            })
         })
     }
 

@@ -117,6 +117,54 @@ fn sizes_that_no_arm_has_are_said() {
 }
 
 #[test]
+fn conditions_and_angles_in_another_unit_are_asked_about() {
+    let said = |problem: &str, column: &str, value: f64| {
+        let row = |k: u32| format!("{},{},1,2,3,{}\n", k % 7, k % 5, value + f64::from(k) / 8.0);
+        let rows: String = (0..12).map(row).collect();
+        let table = format!("q1_rad,q2_rad,x_m,y_m,z_m,{column}\n{rows}");
+        words(&try_table(&parse(&format!("{ARM}{problem}")), &table).unwrap().1)
+    };
+    let cold = "[data]\nreference_temperature_C = 20\n";
+    let hot = "[data]\nreference_temperature_C = 45\n";
+    let hoist = |force: f64, direction: &str| {
+        format!(
+            "beam.name = 'A'\nbeam.EA_N = 1e7\nbeam.EIy_N_m2 = 1e4\nbeam.EIz_N_m2 = 1e4\n\
+             beam.GJ_N_m2 = 1e4\n[joint.beam.hoist]\nat_m = [0.2, 0, 0]\nforce_N = {force}\n{direction}"
+        )
+    };
+    let fahrenheit = "rows.csv:2: temperature_C: all temperatures are 65 °C or more";
+    let kilograms = "rows.csv:2: hoist_N: the hoist forces are usually 6.75 N, and";
+    let down = "problem.toml:3: beam A.hoist.direction: the hoist pulls downwards";
+    for (problem, column, value, expected) in [
+        (cold.to_owned(), "temperature_C", 65.0, fahrenheit),
+        (cold.to_owned(), "temperature_C", 19.0, ""),
+        (cold.to_owned(), "temperature_C", 49.5, ""),
+        (hot.to_owned(), "temperature_C", 65.0, ""),
+        (hoist(62.0, ""), "hoist_N", 6.0, kilograms),
+        (hoist(62.0, ""), "hoist_N", 60.0, ""),
+        (hoist(0.0, ""), "hoist_N", 6.0, ""),
+        (hoist(62.0, "direction = [0, 0.1, -1]"), "hoist_N", 60.0, down),
+    ] {
+        let said = said(&problem, column, value);
+        assert!(said.contains(expected), "{said}");
+        assert_eq!(said.is_empty(), expected.is_empty(), "{column} {value}: {said}");
+    }
+    let angles = |widest: f64, rows: u32| {
+        let row = |k: u32| format!("{},{},1,2,{k}\n", f64::from(k % 7) * widest / 6.0, k % 3);
+        let table =
+            format!("q1_deg,q2_deg,x_m,y_m,z_m\n{}", (0..rows).map(row).collect::<String>());
+        words(&try_table(&parse(ARM), &table).unwrap().1)
+    };
+    assert_contains(
+        &angles(3.0, 12),
+        &[
+            "rows.csv:8: joint 1: no joint turns by more than 3.0° from zero; if the columns are in radians",
+        ],
+    );
+    assert_eq!((angles(3.0, 8), angles(30.0, 12)), (String::new(), String::new()));
+}
+
+#[test]
 fn the_name_of_a_file_may_be_a_session() {
     let table = "q1_deg,q2_deg,x_m,y_m,z_m\n1,2,3,4,5\n";
     let problem = problem("'#file' = 'session'\n");

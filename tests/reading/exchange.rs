@@ -210,6 +210,31 @@ fn clocks_that_differ_are_refused_with_the_offset() {
 }
 
 #[test]
+fn times_that_contradict_the_order_or_have_no_seconds_are_named() {
+    let logged = |k: usize| format!("{},{k},0\n", 60 * k + k % 3);
+    let log = format!("time_s,A1,A2\n{}", (0..20).map(logged).collect::<String>());
+    let tracker = |time: &dyn Fn(usize) -> usize| {
+        let row = |k: usize| format!("P{k};1;2;{k};{}\n", time(k));
+        format!("Point;X;y_mm;z_mm;time_s\n{}", (0..20).map(row).collect::<String>())
+    };
+    let warned = |time: &dyn Fn(usize) -> usize| {
+        let (rows, warnings) = joined("by = 'order'", &tracker(time), &log).unwrap();
+        assert_eq!(rows.len(), 20);
+        words(&warnings)
+    };
+    assert_eq!(warned(&|k| 7200 + 60 * k + k % 4), "");
+    assert_contains(
+        &warned(&|k| 7200 + 60 * (k + k / 15) + 5),
+        &[
+            "tracker.csv:17: 4 rows are paired by order with rows of other times",
+            "controller.csv:17",
+        ],
+    );
+    let lost = joined("by = 'time', tolerance_s = 0.5", &tracker(&|k| 60 * k + 600), &log);
+    assert_says(&lost.unwrap_err(), &["problem.toml", "the times of the measurements are whole"]);
+}
+
+#[test]
 fn tables_that_are_paired_wrongly_are_refused_with_the_names() {
     let row = |k: usize, name: &str| format!("{name};{k};2;3\n");
     let tracker: String = (1..=9).map(|k| row(k, &format!("CAL_{k}"))).collect();

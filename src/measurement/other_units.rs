@@ -1,0 +1,88 @@
+//! Warnings about columns that are probably in another unit than their names say.
+
+use std::f64::consts::TAU;
+
+use super::Measurements;
+use super::limits::Commands;
+use crate::error::{Warning, WarningKind};
+use crate::problem::{JointKind, Problem};
+
+/// Temperatures \[°C\] that are hot for the place of an arm, but usual as degrees Fahrenheit.
+const FAHRENHEIT: std::ops::RangeInclusive<f64> = 50.0..=110.0;
+/// Highest reference temperature of an arm at room temperature \[°C\].
+const MAX_ROOM_TEMPERATURE: f64 = 30.0;
+/// Standard acceleration of gravity \[m/s²\].
+const GRAVITY: f64 = 9.80665;
+/// Largest relative difference between the usual hoist force and that of the declared mass at which
+/// the column probably holds the mass.
+const MAX_HOIST_DIFFERENCE: f64 = 0.2;
+/// Minimum number of rows from which the range of the joints is judged.
+const MIN_ROWS: usize = 10;
+/// Smallest declared range of a joint with which motions of a few degrees are suspect \[rad\].
+const MIN_WIDE_RANGE: f64 = 1.0;
+
+impl Measurements {
+    /// Returns a warning, located at the lowest temperature, if all temperatures are hot for a
+    /// reference temperature of a room.
+    pub(super) fn fahrenheit(&self, problem: &Problem) -> Option<Warning> {
+        let reference = problem.data.reference_temperature?;
+        let temperatures = || self.temperature.iter().flatten().copied();
+        let (row, least) = temperatures().enumerate().min_by(|(_, a), (_, b)| a.total_cmp(b))?;
+        let is_usual = temperatures().all(|value| FAHRENHEIT.contains(&value));
+        let kind = WarningKind::Fahrenheit { least: format!("{least}") };
+        let location = self.location(row).with_key("temperature_C");
+        (is_usual && reference <= MAX_ROOM_TEMPERATURE).then_some(Warning { location, kind })
+    }
+
+    /// Returns a warning, located at the first row, if the hoist forces are those of the declared
+    /// force in kilograms.
+    pub(super) fn hoist_in_kilograms(&self, problem: &Problem) -> Option<Warning> {
+        let hoists = problem.joints.iter().filter_map(|joint| joint.beam.as_ref()?.hoist.as_ref());
+        let declared = hoists.map(|hoist| hoist.force).find(|force| *force > 0.0)?;
+        let mut forces: Vec<f64> =
+            self.hoist.iter().flatten().copied().filter(|force| *force > 0.0).collect();
+        forces.sort_by(f64::total_cmp);
+        let usual = *forces.get(forces.len() / 2)?;
+        let ratio = usual * GRAVITY / declared;
+        let kind = WarningKind::HoistInKilograms {
+            usual: format!("{usual}"),
+            declared: format!("{declared}"),
+        };
+        let location = self.location(0).with_key("hoist_N");
+        ((ratio - 1.0).abs() < MAX_HOIST_DIFFERENCE).then_some(Warning { location, kind })
+    }
+
+    /// Returns a warning, located at the largest angle, if no column in degrees leaves the range
+    /// that is usual for radians, although the joints turn further.
+    pub(super) fn few_degrees(&self, problem: &Problem, columns: &[Commands]) -> Option<Warning> {
+        let is_angle = |column: &&Commands| {
+            column.unit() == "deg"
+                && problem
+                    .joints
+                    .get(column.joint)
+                    .is_some_and(|joint| joint.command_kind() == JointKind::Revolute)
+        };
+        let is_wide = |column: &Commands| {
+            let range = problem.joints.get(column.joint).map(|joint| joint.limits);
+            range.is_none_or(|(min, max)| max - min > MIN_WIDE_RANGE)
+        };
+        let angles: Vec<&Commands> = columns.iter().filter(is_angle).collect();
+        if self.len() < MIN_ROWS || angles.len() < 2 || !angles.iter().all(|angle| is_wide(angle)) {
+            return None;
+        }
+        let value = |row: usize, joint: usize| {
+            self.configuration(row).get(joint).copied().unwrap_or(0.0).abs().to_degrees()
+        };
+        let cells =
+            (0..self.len()).flat_map(|row| angles.iter().map(move |angle| (row, angle.joint)));
+        let (row, joint) = cells.max_by(|a, b| value(a.0, a.1).total_cmp(&value(b.0, b.1)))?;
+        let widest = value(row, joint);
+        let least = angles.iter().filter(|angle| {
+            let mut rows = (0..self.len()).map(|row| value(row, angle.joint));
+            rows.any(|value| value > 0.0)
+        });
+        let kind = WarningKind::FewDegrees { widest: format!("{widest:.1}") };
+        let location = self.location(row).with_key(format!("joint {}", joint + 1));
+        (widest <= TAU && least.count() > 1).then_some(Warning { location, kind })
+    }
+}

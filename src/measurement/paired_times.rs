@@ -1,0 +1,96 @@
+//! Times of rows that two tables pair by their order.
+
+use crate::error::{Location, Warning, WarningKind};
+
+/// Minimum number of timed pairs whose times are compared.
+const MIN_PAIRS: usize = 4;
+/// Minimum number of pairs that have to contradict the order. A single one may be a pause between
+/// arrival and measurement.
+const MIN_CONTRADICTED: usize = 2;
+/// Smallest time between the rows of a pair, after the offset of the clocks, at which the pair
+/// contradicts the order, as a fraction of the usual time between rows of the joint table.
+const MIN_GAP: f64 = 0.75;
+/// Largest time to the nearest row of the joint table at which a pair contradicts the order, as a
+/// fraction of the time to the row of the pair.
+const MAX_NEAREST: f64 = 0.5;
+
+/// Times of the rows of a pair \[s\], each on the clock of its table, and their places.
+pub(super) struct TimedPair {
+    pub measured: f64,
+    pub logged: f64,
+    pub place: Location,
+    pub log_place: Location,
+}
+
+/// Returns the middle one of some values; `None` without values.
+fn median(mut values: Vec<f64>) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied()
+}
+
+/// Returns a warning, located at the first such row, if rows of the joint table are paired by order
+/// with rows that were measured at other times.
+pub(super) fn order_contradicted(pairs: &[TimedPair]) -> Option<Warning> {
+    let timed = || pairs.iter().filter(|pair| (pair.measured - pair.logged).is_finite());
+    if timed().count() < MIN_PAIRS {
+        return None;
+    }
+    let offset = median(timed().map(|pair| pair.measured - pair.logged).collect())?;
+    let mut logged: Vec<f64> = timed().map(|pair| pair.logged).collect();
+    logged.sort_by(f64::total_cmp);
+    let spacing = median(logged.windows(2).map(|times| times[1] - times[0]).collect())?;
+    let gap = |pair: &TimedPair, logged: f64| (pair.measured - logged - offset).abs();
+    let is_contradicted = |pair: &&TimedPair| {
+        let of_pair = gap(pair, pair.logged);
+        let nearest = logged.iter().map(|&time| gap(pair, time)).fold(f64::INFINITY, f64::min);
+        spacing > 0.0 && of_pair > MIN_GAP * spacing && nearest < MAX_NEAREST * of_pair
+    };
+    let contradicted: Vec<&TimedPair> = timed().filter(is_contradicted).collect();
+    let first = contradicted.first()?;
+    let kind = WarningKind::OrderContradictedByTimes {
+        rows: contradicted.len(),
+        partner: first.log_place.to_string(),
+        gap: format!("{:.0}", gap(first, first.logged)),
+    };
+    (contradicted.len() >= MIN_CONTRADICTED)
+        .then(|| Warning { location: first.place.clone(), kind })
+}
+
+/// Returns true if all times \[s\] are whole minutes.
+pub(super) fn are_whole_minutes(mut times: impl Iterator<Item = f64>) -> bool {
+    const MAX_ROUNDING: f64 = 1e-3;
+    times.all(|time| (time / 60.0 - (time / 60.0).round()).abs() * 60.0 < MAX_ROUNDING)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+
+    fn pair(measured: f64, logged: f64) -> TimedPair {
+        let place = || Location::file(Path::new("rows.csv")).at_line(2);
+        TimedPair { measured, logged, place: place(), log_place: place() }
+    }
+
+    #[test]
+    fn only_several_rows_of_other_times_contradict_the_order() {
+        let rows = |measured: &dyn Fn(usize) -> f64| {
+            let pairs: Vec<TimedPair> =
+                (0..20).map(|row| pair(measured(row), 60.0 * row as f64)).collect();
+            order_contradicted(&pairs).map(|warning| warning.kind)
+        };
+        let minute = |row: usize| 60.0 * row as f64;
+        assert_eq!(rows(&|row| 7.0e8 + minute(row) + (row % 7) as f64 * 5.0), None);
+        assert_eq!(rows(&|row| minute(row) + if row == 5 { 50.0 } else { 9.0 }), None);
+        assert_eq!(rows(&|_| f64::NAN), None);
+        let lost = rows(&|row| minute(if row < 15 { row } else { row + 1 }) + 9.0);
+        assert!(
+            matches!(lost, Some(WarningKind::OrderContradictedByTimes { rows: 4, .. })),
+            "{lost:?}"
+        );
+        assert!(rows(&|row| minute(row * 7 % 20)).is_some());
+        assert!(are_whole_minutes([0.0, 120.0, 1.7e9 - 20.0].into_iter()));
+        assert!(!are_whole_minutes([0.0, 61.0].into_iter()));
+    }
+}
