@@ -12,6 +12,8 @@ pub enum UrdfErrorKind {
     Missing,
     #[error("not valid XML: {message}")]
     Syntax { message: String },
+    #[error("<{element}> is not closed; write </{name}> before </{before}> on line {line}")]
+    NotClosed { element: String, name: String, before: String, line: usize },
     #[error(
         "contains a document type declaration, which is refused because it may expand without \
          limit; remove it"

@@ -146,6 +146,15 @@ fn rows(chain: &Chain, notes: &mut Vec<String>) -> Vec<Row> {
             limits: Some(joint.limits).filter(|_| stage.mimic.is_none()),
             bodies: Vec::new(),
         });
+        if joint.lacks_axis {
+            let start = joint.span.start;
+            notes.push(format!(
+                "{} has no <axis> ({}), so its axis is x of its frame; write <axis xyz=\"…\"/> if \
+                 it is another one",
+                joint.name,
+                chain.robot.source.locate(start..start + 1)
+            ));
+        }
         if let Some((lower, upper)) = joint.reversed_limits {
             notes.push(format!(
                 "{}: the limits {lower} to {upper} exclude each other (the lower one is above \

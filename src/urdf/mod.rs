@@ -12,6 +12,7 @@ mod export;
 mod free;
 mod lines;
 mod mounted;
+mod not_closed;
 mod notes;
 mod number;
 mod patches;

@@ -7,6 +7,7 @@ use std::path::Path;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use roxmltree::{Document as Xml, Node};
 
+use super::not_closed::not_closed;
 use super::number::numbers;
 use crate::error::{
     InputError, InputErrorKind, Location, UrdfErrorKind, XML, is_hidden, shortened, text_format,
@@ -66,6 +67,8 @@ pub(super) struct Joint {
     pub origin: Origin,
     /// Unit axis of the motion, joint frame.
     pub axis: Vector3<f64>,
+    /// True if the joint moves and has no `<axis>`; the format then takes x.
+    pub lacks_axis: bool,
     /// Range of q \[rad\] or \[m\], infinite without limits.
     pub limits: (f64, f64),
     /// Limits \[rad\] or \[m\] as (lower, upper) that are ignored because the lower one is above
@@ -132,6 +135,9 @@ impl Robot {
                 .error(InputErrorKind::OtherFormat { found, expected }));
         }
         let xml = Xml::parse(&text).map_err(|error| {
+            if let Some(error) = not_closed(&source, &error) {
+                return error;
+            }
             let location = Location::file(&source.file).at_line(error.pos().row as usize);
             location.error(match error {
                 roxmltree::Error::DtdDetected => UrdfErrorKind::DocumentType,
@@ -378,6 +384,7 @@ impl Reader<'_> {
             child: child_link,
             origin,
             axis,
+            lacks_axis: moves && child("axis").is_none(),
             limits,
             reversed_limits,
             limits_in_degrees: in_degrees,

@@ -31,6 +31,11 @@ fn mistakes_are_named_with_their_place() {
             "<robot name=\"r\">\n<link name=\"a\">".to_owned(),
             "not valid XML: the root node was opened but never closed",
         ),
+        (
+            "not closed",
+            "<robot name=\"r\">\n<!-- <joint> -->\n<joint name=\"a>\">\n<parent/>\n<joint name=\"b\"><child/></joint>\n</robot>".to_owned(),
+            ":3: <joint name=\"a>\"> is not closed; write </joint> before </robot> on line 6",
+        ),
         ("other", "<sdf/>".to_owned(), ":1: not a URDF: its outermost element is <sdf>"),
         ("mjcf", "<mujoco/>".to_owned(), "mjcf-urdf-simple-converter"),
         ("sdf", "<sdf/>".to_owned(), "sdf2urdf"),

@@ -177,6 +177,23 @@ fn a_problem_frees_what_positions_tell_apart_and_says_what_was_rounded() {
 }
 
 #[test]
+fn a_joint_without_an_axis_is_said_to_turn_about_x() {
+    for (kind, axis, is_said) in
+        [("revolute", "", true), ("revolute", "<axis xyz=\"1 0 0\"/>", false), ("fixed", "", false)]
+    {
+        let text = format!(
+            "<robot name=\"r\">\n<link name=\"a\"/><link name=\"b\"/><link name=\"c\"/>\n\
+             <joint name=\"i\" type=\"revolute\"><parent link=\"a\"/><child link=\"b\"/><axis xyz=\"0 0 1\"/></joint>\n\
+             <joint name=\"j\" type=\"{kind}\"><parent link=\"b\"/><child link=\"c\"/>{axis}</joint></robot>"
+        );
+        let robot = Robot::parse(&text, Path::new("r.urdf")).unwrap();
+        let notes = describe(&Chain::new(&robot, None, None).unwrap()).unwrap().notes;
+        let said = notes.iter().any(|note| note.starts_with("j has no <axis> (r.urdf:4"));
+        assert_eq!(said, is_said, "{kind} {axis}: {notes:?}");
+    }
+}
+
+#[test]
 fn limits_that_exclude_each_other_are_said_to_be_none() {
     for (limits, is_said) in
         [("lower=\"1\" upper=\"-1\"", true), ("lower=\"-1\" upper=\"1\"", false), ("", false)]
@@ -204,8 +221,9 @@ fn other_units_and_broken_followers_are_noted() {
     let arm = |origin: &str, beside: &str| {
         format!(
             "<robot name=\"r\"><link name=\"a\"/><link name=\"b\"/><link name=\"c\"/><link name=\"f\"/>\
-             <joint name=\"j1\" type=\"continuous\"><parent link=\"a\"/><child link=\"b\"/></joint>\
-             <joint name=\"j2\" type=\"revolute\"><parent link=\"b\"/><child link=\"c\"/><origin {origin}/>\
+             <joint name=\"j1\" type=\"continuous\"><parent link=\"a\"/><child link=\"b\"/>\
+             <axis xyz=\"1 0 0\"/></joint>\
+             <joint name=\"j2\" type=\"revolute\"><parent link=\"b\"/><child link=\"c\"/><origin {origin}/><axis xyz=\"1 0 0\"/>\
              <limit lower=\"-1\" upper=\"1\"/></joint>\
              <joint name=\"g\" type=\"prismatic\"><parent link=\"a\"/><child link=\"f\"/>{beside}</joint></robot>"
         )

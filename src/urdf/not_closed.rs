@@ -1,0 +1,74 @@
+//! Element of a URDF whose closing tag is missing.
+
+use roxmltree::Error;
+
+use crate::error::{InputError, UrdfErrorKind, shortened};
+use crate::problem::item::Document;
+
+/// Maximum number of characters of a tag that an error shows.
+const MAX_SHOWN: usize = 60;
+
+/// Returns the error of the element that is not closed before the closing tag of another one;
+/// `None` for other errors.
+pub(super) fn not_closed(source: &Document, error: &Error) -> Option<InputError> {
+    let Error::UnexpectedCloseTag(name, before, position) = error else { return None };
+    let line = position.row as usize;
+    let starts = source.text.split_inclusive('\n').scan(0, |start, line| {
+        let this = *start;
+        *start += line.len();
+        Some(this)
+    });
+    let line_start = starts.take(line).last()?;
+    let rest = source.text.get(line_start..)?;
+    let column = rest.char_indices().nth(position.col as usize - 1).map_or(rest.len(), |at| at.0);
+    let (start, tag) = *open_tags(source.text.get(..line_start + column)?).last()?;
+    let kind = UrdfErrorKind::NotClosed {
+        element: shortened(tag, MAX_SHOWN),
+        name: shortened(name, MAX_SHOWN),
+        before: shortened(before, MAX_SHOWN),
+        line,
+    };
+    tag.starts_with(name.as_str()).then(|| source.locate(start..start + 1).error(kind))
+}
+
+/// Returns the tags that are open at the end of a text, outermost first, with the places of their
+/// `<`. Tags are shown without brackets.
+fn open_tags(text: &str) -> Vec<(usize, &str)> {
+    let mut open = Vec::new();
+    let mut at = 0;
+    while let Some(found) = text.get(at..).and_then(|rest| rest.find('<')) {
+        let start = at + found;
+        let rest = text.get(start..).unwrap_or_default();
+        let end = if rest.starts_with("<!--") {
+            rest.find("-->").map(|end| end + 2)
+        } else {
+            tag_end(rest)
+        };
+        let Some(end) = end else { break };
+        let tag = rest.get(1..end).unwrap_or_default();
+        if tag.starts_with('/') {
+            open.pop();
+        } else if !tag.starts_with(['!', '?']) && !tag.ends_with('/') {
+            open.push((start, tag));
+        }
+        at = start + end + 1;
+    }
+    open
+}
+
+/// Returns the place of the `>` that ends a tag; brackets in quotes do not.
+fn tag_end(tag: &str) -> Option<usize> {
+    let mut quote = None;
+    tag.char_indices().find_map(|(at, character)| match (quote, character) {
+        (None, '>') => Some(at),
+        (None, '"' | '\'') => {
+            quote = Some(character);
+            None
+        }
+        (Some(open), _) if open == character => {
+            quote = None;
+            None
+        }
+        _ => None,
+    })
+}
