@@ -1,5 +1,8 @@
 //! Errors that prevent a design.
 
+use nalgebra::Vector3;
+
+use super::workspace::Workspace;
 use crate::error::{InputError, InputErrorKind, Location};
 use crate::problem::{Joint, JointKind, Problem};
 
@@ -51,6 +54,12 @@ pub enum DesignError {
         "the nominal arm has no equilibrium under its loads in any pose; check stiffnesses and masses"
     )]
     NoEquilibrium,
+    /// The target of the nominal arm is in no candidate inside the region.
+    #[error("in no pose is the target inside the region{}", of_size(*.millimetres))]
+    NothingInRegion {
+        /// Largest side of the box \[mm\]; `None` without a box.
+        millimetres: Option<f64>,
+    },
     /// No candidate shows a point of a marker to a camera.
     #[error(
         "no candidate shows a point of a marker to a camera; widen the ranges of the joints, or check where cameras and markers are"
@@ -66,7 +75,28 @@ pub enum DesignError {
     NothingSeen,
 }
 
+/// Largest side of a box that is probably in metres \[mm\].
+const MAX_METRES: f64 = 10.0;
+
+/// Returns the remedy for a region without poses, given the largest side of its box \[mm\].
+fn of_size(millimetres: Option<f64>) -> String {
+    match millimetres {
+        Some(side) if side < MAX_METRES => format!(
+            ", whose longest side is {side:.3} mm: if its numbers are metres, multiply them by 1000"
+        ),
+        _ => "; check --workspace-mm, --plane and the ranges of the joints (coordinates are those \
+             of the arm's base, in millimetres)"
+            .to_owned(),
+    }
+}
+
 impl DesignError {
+    /// Returns the error of a region that the target reaches in no pose.
+    pub(super) fn nothing_in(region: &Workspace) -> Self {
+        let side = |[from, to]: [Vector3<f64>; 2]| (to - from).amax() * 1e3;
+        Self::NothingInRegion { millimetres: region.corners.map(side) }
+    }
+
     /// Returns the error of a joint without a limit at `end`, which is `min` or `max`.
     pub(super) fn no_range(joint: &Joint, end: &str) -> Self {
         let unit = if joint.kind == JointKind::Prismatic { "mm" } else { "deg" };

@@ -213,6 +213,9 @@ pub fn next(
     let mut site = Site::with_cameras(&designed, &[&measured], pairs)?;
     site.at(&found);
     let (pool, reference) = pool_and_workspace(&designed, candidates, &site, &measured, options);
+    if let Some(region) = options.workspace.filter(|_| pool.is_empty()) {
+        return Err(DesignError::nothing_in(region).into());
+    }
     let (pool, sensitivity) = site.in_equilibrium(&pool);
     let reference = if is_of_cameras { site.in_equilibrium(&reference).0 } else { reference };
     if pool.is_empty() || reference.is_empty() {

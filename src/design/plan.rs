@@ -116,6 +116,11 @@ pub struct Plan {
     pub is_of_cameras: bool,
 }
 
+/// Returns the error of a plan without candidates, with or without cameras.
+const fn nothing_admitted(has_no_cameras: bool) -> DesignError {
+    if has_no_cameras { DesignError::NoEquilibrium } else { DesignError::NothingInView }
+}
+
 /// Chooses poses by exchange from several starts. The result depends on the seed, not on the number
 /// of threads.
 ///
@@ -138,14 +143,12 @@ pub fn plan(
     let with_distances = with_known_distances(given, candidates);
     let given = with_distances.as_ref();
     let (uniform, extremes) = tables(problem, candidates, (poses, seed));
-    let mut tables = vec![&uniform];
-    tables.extend(given);
+    let tables: Vec<&Measurements> = std::iter::once(&uniform).chain(given).collect();
     let pairs = views::pairs(problem, &uniform);
     if !pairs.is_empty() && *criterion == Criterion::I {
         return Err(DesignError::NoPositions);
     }
-    let nothing =
-        if pairs.is_empty() { DesignError::NoEquilibrium } else { DesignError::NothingInView };
+    let nothing = nothing_admitted(pairs.is_empty());
     let site = Site::with_cameras(problem, &tables, pairs)?;
     let admitted = |(table, sensitivity): (Measurements, Sensitivity)| match options.workspace {
         Some(workspace) => {
@@ -158,7 +161,9 @@ pub fn plan(
     let given_arm_rows = given.map(|given| given.clone().arm_rows());
     let (given_table, given): (Option<Measurements>, Option<Sensitivity>) =
         given.map(|given| site.in_equilibrium(given)).unzip();
-    let (mut table, uniform) = admitted(site.in_equilibrium(&uniform));
+    let (table, uniform) = site.in_equilibrium(&uniform);
+    let region = options.workspace.filter(|_| !table.is_empty());
+    let (mut table, uniform) = admitted((table, uniform));
     let mut sensitivity = uniform.clone();
     if let Some(extremes) = extremes {
         let (extremes, extreme_sensitivity) = admitted(site.in_equilibrium(&extremes));
@@ -167,7 +172,7 @@ pub fn plan(
     }
     let tried = sensitivity.len();
     if sensitivity.is_empty() {
-        return Err(nothing);
+        return Err(region.map_or(nothing, DesignError::nothing_in));
     }
     if tried < poses {
         return Err(DesignError::TooFewCandidates { poses, candidates: tried });

@@ -42,7 +42,10 @@ impl Document {
 fn expected_instead_of(format: &str) -> &'static str {
     match format {
         XML => "TOML; flexcal init FILE makes a problem.toml of a URDF",
-        TABLE => "TOML; PROBLEM is a problem.toml or its folder, and --data names tables",
+        TABLE => {
+            "TOML; PROBLEM is a problem.toml or its folder, --truth a TRUTH.toml, and tables of \
+             rows or poses follow --data or --candidates"
+        }
         JSON => {
             "TOML; PROBLEM is a problem.toml or its folder, and --estimate names an estimate.json"
         }

@@ -27,8 +27,21 @@ fn the_problem_may_stand_behind_the_data_or_in_the_current_folder() {
         measured.numbers("y_mm").iter().all(|y| *y > -100.0)
             && measured.numbers("x_mm").iter().all(|x| *x > -600.0)
     );
-    let run = run("plan --truth truth.toml --poses 12 --workspace-mm 1,0,0,1,0,1").code(2);
-    assert_contains(&run.stderr, &["the box is empty"]);
+    for (arguments, words) in [
+        ("--truth truth.toml --workspace-mm 1,0,0,1,0,1", "the box is empty"),
+        (
+            "--truth truth.toml --workspace-mm=4,4.7,0,0.5,0,0.5",
+            "whose longest side is 0.700 mm: if its numbers are metres, multiply them by 1000",
+        ),
+        (
+            "--truth truth.toml --workspace-mm=90000,91000,0,500,0,500",
+            "in no pose is the target inside the region; check --workspace-mm",
+        ),
+        ("--truth a-none.csv", "--truth a TRUTH.toml, and tables of rows or poses follow --data"),
+    ] {
+        let run = run(&format!("plan --poses 12 {arguments}")).code(2);
+        assert_contains(&run.stderr, &[words]);
+    }
 }
 
 /// Replaces everything from the section `[parameters]` on.
