@@ -301,7 +301,7 @@ catalogue! {
     /// Error m of the payload's mass, in all poses with a payload.
     PayloadMass "payload-mass" => Family {
         terms: &[TermEntry::at(At::Arm(ArmField::Payload), "mass", 2.0)],
-        says: "payloads are heavier than declared",
+        says: "payloads weigh more or less than declared",
         needs: &[Need::Payload],
         ..Family::PLAIN
     };
