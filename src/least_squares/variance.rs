@@ -108,6 +108,13 @@ impl VarianceLikelihood {
             + self.residual_squares / variance
     }
 
+    /// Returns the degrees of freedom that tell s²: one for each row outside the range of A, and
+    /// (1 / (1 + a²))² for each direction with a prior, which is its share of the information on s²
+    /// at s² = 1.
+    pub fn freedom(&self) -> f64 {
+        self.free_rows + self.directions.iter().map(|(a, _)| (1.0 + a).powi(-2)).sum::<f64>()
+    }
+
     /// Returns the s² of the largest likelihood and the excess of its 2 ln L over that of s² = 1.
     pub fn maximum(&self) -> (f64, f64) {
         let step = (LOG_VARIANCE_RANGE.1 - LOG_VARIANCE_RANGE.0) / f64::from(GRID_STEPS);

@@ -119,7 +119,8 @@ fn orientations(draw: &mut Draw, rows: &[Row], format: &mut String) -> Vec<Colum
             let (x, y, z) = turn.inverse().euler_angles();
             [-x, -y, -z]
         }
-        _ => turn.scaled_axis().into(),
+        // The rotation vector of a matrix is lost at half a turn, that of a quaternion is not.
+        _ => UnitQuaternion::from_rotation_matrix(turn).scaled_axis().into(),
     };
     *format += ["", "rotation = \"rpy\"\n", "rotation = \"euler-xyz\"\n", ""][choice];
     for (k, axis) in ["rx", "ry", "rz"].into_iter().enumerate() {

@@ -78,7 +78,7 @@ impl PoseSufficiency {
             is_held_out,
         )
         .or_else(|| undetermined_base_finding(fitting, &numbers, later, at, is_held_out))
-        .map(|finding| held_out_finding(&finding));
+        .map(|finding| held_out_finding(&finding, count_distinct(&numbers, later.iter().copied())));
         let several_targets =
             poses < count_distinct(&numbers, split.identification.iter().copied());
         Self { finding, held_out, coordinates, poses, several_targets }
@@ -93,11 +93,10 @@ impl PoseSufficiency {
 }
 
 /// Returns the finding about a base or tool that only held-out rows use, made from one about
-/// identification rows.
-fn held_out_finding(finding: &Finding) -> Finding {
-    let number = |name| finding.value(name).cloned().unwrap_or_default();
+/// identification rows. `poses` is the number of different poses of these held-out rows.
+fn held_out_finding(finding: &Finding, poses: usize) -> Finding {
     let text = format!("held-out rows of {}; their errors say little", finding.text);
-    let numbers = [number("of"), number("poses")];
+    let numbers = [finding.value("of").cloned().unwrap_or_default(), poses.into()];
     Finding::new(FindingCode::HeldOutBaseNotDetermined, numbers, text)
 }
 

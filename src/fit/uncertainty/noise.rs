@@ -25,6 +25,13 @@ const SCALE_TOLERANCE: f64 = 0.01;
 const STEPS_BEFORE_NOISE_TEST: u64 = 30;
 /// Maximum number of fits in the search for σ.
 const MAX_NOISE_FITS: usize = 20;
+/// Least number of degrees of freedom that lower a declared σ at the usual critical value. With
+/// fewer, a residual that is small by chance (probability 0.0005) would make standard errors more
+/// than 2.5 times too small.
+const MIN_FREEDOM_TO_LOWER: f64 = 12.0;
+/// Multiple of the critical value that lowers a declared σ with fewer degrees of freedom. Noise
+/// exceeds it with a probability below 1e-10; computed positions without noise always do.
+const LOWERING_FACTOR: f64 = 5.0;
 /// Noise models of positions and of orientations that take the declared σ.
 const DECLARED_NOISE: (NoiseModel, NoiseModel) = (NoiseModel::DECLARED, NoiseModel::DECLARED);
 /// Multiple of the critical value [`by_chance`] of the likelihood-ratio statistic, above which a
@@ -151,7 +158,8 @@ fn is_beyond_doubt(stage: &Stage) -> bool {
 /// kept. Poses that a robust loss treats as outliers do not count.
 ///
 /// The declared σ is contradicted if 2 ln of the likelihood ratio exceeds its critical value (χ²₁)
-/// at probability 0.001.
+/// at probability 0.001. A few degrees of freedom lower it only with
+/// far more evidence.
 fn next_noise_models(
     stage: &Stage,
     end: &FitEnd,
@@ -182,7 +190,8 @@ fn next_noise_models(
     let whitened = residual_vector(&residuals, &x);
     let unmoved_squares = unmoved.squares(whitened.as_slice(), stage.coordinates());
     let rows = (count, (2.0 * data.cost - unmoved_squares).max(0.0));
-    let (ratio, gain) = VarianceLikelihood::new(&data, rows, &x, &priors, &held, &closed).maximum();
+    let likelihood = VarianceLikelihood::new(&data, rows, &x, &priors, &held, &closed);
+    let (ratio, gain) = likelihood.maximum();
     if !ratio.is_finite() {
         return Ok(None);
     }
@@ -190,7 +199,8 @@ fn next_noise_models(
     let shares = mean_square_ratios(&whitened, stage.coordinates(), [count - turned, turned]);
     // The σ of positions and that of orientations must both have converged.
     let settled = shares.iter().all(|share| ((ratio * share).sqrt() - 1.0).abs() < SCALE_TOLERANCE);
-    let chance = by_chance();
+    let is_lowered_by_few = ratio < 1.0 && likelihood.freedom() < MIN_FREEDOM_TO_LOWER;
+    let chance = by_chance() * if is_lowered_by_few { LOWERING_FACTOR } else { 1.0 };
     if (first && gain <= chance) || (!first && settled) {
         return Ok(None);
     }
