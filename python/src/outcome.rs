@@ -12,7 +12,7 @@ use flexcal::model::parameter::Parameter;
 use flexcal::nalgebra::{DMatrix, Vector3};
 use flexcal::problem::Problem;
 use flexcal::remainder::{self, Bounds, Correction, Fitted};
-use flexcal::report::{self, Report};
+use flexcal::report::{self, PredictionAccuracy, Report};
 use flexcal::results::{Document as _, IdentificationResult, LoopResult, PlotData, TraceResult};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -147,8 +147,8 @@ impl Identification {
     /// What the command line prints.
     fn summary(&self, py: Python<'_>) -> PyResult<String> {
         detached(py, || {
-            let bound = report::bound_text(&self.plots()?);
-            let mut text = report::estimate_text(&self.problem, &self.found, bound);
+            let accuracy = PredictionAccuracy::new(&self.found, &self.plots()?);
+            let mut text = report::estimate_text(&self.problem, &self.found, accuracy);
             if let Some(fitted) = self.fitted()?.filter(|_| self.is_corrected) {
                 text.push('\n');
                 text += &report::remainder_text(&self.found, &fitted.outcome());

@@ -8,7 +8,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use flexcal::fit::{self, Options, SolverChoice, Strategy};
 use flexcal::life::{FleetPrior, PriorError, PriorSource, identify_with_prior};
 use flexcal::remainder::{self, Correction, Fitted};
-use flexcal::report;
+use flexcal::report::{self, PredictionAccuracy};
 use flexcal::results::{
     Document as _, IdentificationResult, PlotData, REMAINDER_FILE, residuals_csv,
 };
@@ -173,11 +173,11 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     results.write_report(&texts, &told)?;
     let sources = sources.as_ref().map(report::joint_sources_text);
     common.print_result(&json, || {
-        let bound = report::bound_text(&shown);
+        let accuracy = PredictionAccuracy::new(&identification, &shown);
         let told = if arguments.verbose {
-            report::estimate_text(&problem, &identification, bound)
+            report::estimate_text(&problem, &identification, accuracy)
         } else {
-            report::estimate_brief(&problem, &identification, bound)
+            report::estimate_brief(&problem, &identification, accuracy)
         };
         let sources = sources.as_ref().map_or_else(String::new, |words| format!("\n{words}\n"));
         let is_structured = shown.residual_tests.is_structured();

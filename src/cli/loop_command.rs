@@ -8,7 +8,7 @@ use flexcal::fit::{FindingCode, Options, ProgressSink};
 use flexcal::measurement::Dataset;
 use flexcal::problem::{self, Problem};
 use flexcal::remainder::{self, Correction, Fitted};
-use flexcal::report;
+use flexcal::report::{self, PredictionAccuracy};
 use flexcal::results::{Document as _, LoopResult, PlotData, REMAINDER_FILE, residuals_csv};
 use flexcal::select::{self, ClosedLoop};
 
@@ -103,7 +103,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         let told = if arguments.verbose {
             report::loop_text(&problem, &closure)
         } else {
-            report::loop_brief(&problem, &closure, report::bound_text(&shown))
+            let accuracy = PredictionAccuracy::new(&closure.after, &shown);
+            report::loop_brief(&problem, &closure, accuracy)
         };
         let next = advice::after_loop(common, &problem, &closure.before.fit, &result, &results);
         format!("{told}{words}{}Next: {next}\n", results.written())

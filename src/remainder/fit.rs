@@ -9,7 +9,7 @@ use super::judge::judge;
 use super::linearise::{Linearisation, prior, timed_poses};
 use super::residuals::{CorrectedResiduals, residuals};
 use super::training_rows::TrainingRows;
-use crate::fit::{Identification, IdentifyError, Placement};
+use crate::fit::{ErrorSummary, Identification, IdentifyError, Placement};
 use crate::measurement::Dataset;
 use crate::model::Model;
 use crate::problem::{Observation, Problem};
@@ -45,8 +45,9 @@ pub struct Outcome {
     pub(crate) is_declared: bool,
     /// Number of joints whose errors the remainder corrects.
     pub(crate) joints: usize,
-    /// Mean held-out error with the remainder \[m\]; `None` if none is kept.
-    pub(crate) held_out: Option<f64>,
+    /// Held-out errors with the remainder; `None` if none is kept. If no rows are held out, these
+    /// are the errors of configurations left out, without it.
+    pub(crate) held_out: Option<ErrorSummary>,
 }
 
 impl Fitted {
@@ -58,7 +59,7 @@ impl Fitted {
             gain: self.gain,
             is_declared: self.is_declared,
             joints: self.remainder.as_ref().map_or(0, |remainder| remainder.joints().len()),
-            held_out: residuals.map(|corrected| corrected.errors.held_out.mean.norm),
+            held_out: residuals.map(|corrected| corrected.errors.held_out),
         }
     }
 

@@ -6,6 +6,7 @@ use super::identify::{errors_by_axis, headline};
 use super::noise::{influential_rows, noise};
 use super::parameters::correlated;
 use super::prior::summary;
+use super::remainder::PredictionAccuracy;
 use super::render::text;
 use super::row_kinds::unsteady;
 use super::trust::outcome;
@@ -15,9 +16,14 @@ use crate::quantity::format::{counted, number};
 use crate::results::Knowledge;
 
 /// Returns a summary of a fit for one screen, ending in a line break: errors, size of the residual,
-/// parameters and remarks. `bound` is a sentence on the error bound of predictions.
-pub fn estimate_brief(problem: &Problem, found: &Identification, bound: Option<String>) -> String {
-    let outcome = outcome(found, bound.is_some());
+/// parameters and remarks.
+pub fn estimate_brief(
+    problem: &Problem,
+    found: &Identification,
+    accuracy: Option<PredictionAccuracy>,
+) -> String {
+    let outcome = outcome(found, accuracy.as_ref());
+    let bound = accuracy.and_then(|accuracy| accuracy.bound);
     let mut blocks = vec![Block::lines(headline(problem, found, &outcome))];
     blocks.extend([
         Block::Table(errors_by_axis(found)),

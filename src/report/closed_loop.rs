@@ -11,8 +11,9 @@ use super::identify::{
 use super::noise::{expected, influential_rows, short, size};
 use super::parameters::{against_priors, parameters};
 use super::probability::percent;
+use super::remainder::PredictionAccuracy;
 use super::render::{Report, report, text};
-use super::unexplained::{correction, places, to_declare, unexplained};
+use super::unexplained::{places, to_declare, unexplained};
 use super::verdict::{alternative, causes, counts, has_place, stand_in, title, verdict};
 use super::{effect, residual_tests, trace};
 use crate::problem::Problem;
@@ -35,7 +36,11 @@ const EXTENDED: &str = "with what was found";
 
 /// Returns a summary of the outcome for one screen, ending in a line break. `bound` is a sentence on
 /// the error bound of predictions.
-pub fn loop_brief(problem: &Problem, closure: &ClosedLoop, bound: Option<String>) -> String {
+pub fn loop_brief(
+    problem: &Problem,
+    closure: &ClosedLoop,
+    accuracy: Option<PredictionAccuracy>,
+) -> String {
     let result = &LoopResult::new(problem, closure);
     let mut blocks = head(problem, closure, result);
     // The summary shows the held-out rows without their column of χ², which is empty.
@@ -43,9 +48,14 @@ pub fn loop_brief(problem: &Problem, closure: &ClosedLoop, bound: Option<String>
     table.rows.truncate(table.rows.len() / 2);
     table.header.pop();
     table.rows.iter_mut().for_each(|row| _ = row.pop());
+    if let Some(errors) = accuracy.as_ref().and_then(|accuracy| accuracy.corrected) {
+        let norms = Summary::of(&errors).norms().0.map(|value| number(value, 4));
+        let names = ["".to_owned(), "with the remainder too".to_owned()];
+        table.rows.push([names.as_slice(), &norms].concat());
+    }
     blocks.push(Block::Table(table));
-    let size = gain_sentence(closure, result).into_iter().chain(bound);
-    let size: Vec<String> = size.collect();
+    let bound = accuracy.and_then(|accuracy| accuracy.bound);
+    let size: Vec<String> = gain_sentence(closure, result).into_iter().chain(bound).collect();
     blocks.extend((!size.is_empty()).then(|| Block::Text(size.join(" "))));
     let end = remaining_structure(closure, result)
         .map_or_else(String::new, |words| format!("\n{}", text(&[Block::Text(words)])));
@@ -204,8 +214,9 @@ fn blocks<'a>(
     };
     let counts =
         format!("{unknowns} from {}; {held_out}.", rows_of(fit, |errors| errors.identification));
+    let accuracy = PredictionAccuracy::new(after, plots);
     let mut blocks = vec![
-        Block::Headline(headline(problem, closure, result)),
+        Block::Headline(headline(problem, closure, result, accuracy.as_ref())),
         Block::Text(verdict(result, after.sigma_scale < 1.0)),
         Block::Text(counts),
     ];
@@ -266,15 +277,18 @@ fn blocks<'a>(
     blocks
 }
 
-/// Returns the outcome at a glance, with the smooth correction if there is one.
-fn headline(problem: &Problem, closure: &ClosedLoop, result: &LoopResult) -> Headline {
+/// Returns the outcome at a glance, with the remainder if there is one.
+fn headline(
+    problem: &Problem,
+    closure: &ClosedLoop,
+    result: &LoopResult,
+    accuracy: Option<&PredictionAccuracy>,
+) -> Headline {
     let (fit, after) = (&closure.before.fit, &closure.after);
     let (first, last) = (fit.fitted.held_out, after.fitted.held_out);
-    let correction = correction(closure);
-    let (best, with) = match correction {
-        Some(correction) => (correction.held_out, ", smooth correction included"),
-        None => (last, ""),
-    };
+    let corrected = accuracy.and_then(|accuracy| accuracy.corrected);
+    let with = if corrected.is_some() { ", remainder included" } else { "" };
+    let best = corrected.unwrap_or(last);
     let (_, unit) = result.after.errors.judged().norms();
     let mut facts = vec![
         (
@@ -290,9 +304,9 @@ fn headline(problem: &Problem, closure: &ClosedLoop, result: &LoopResult) -> Hea
         fitted_parameters(after),
         size("Residual before", fit),
         size("Residual after", after),
-        ("Held out, after", spread(&last)),
+        ("Held out, after", spread(&best)),
     ];
-    facts.extend(correction.map(|_| ("Without the correction", format!("{} {unit}", mean(&last)))));
+    facts.extend(corrected.map(|_| ("Without the remainder", format!("{} {unit}", mean(&last)))));
     facts.retain(|(name, _)| result.trusted || *name != "Effects found");
     facts.extend(known_gain(result).map(|Gain { mean, interval_95: [low, high] }| {
         let digits = decimals(high - low, 4).max(2);
@@ -306,7 +320,7 @@ fn headline(problem: &Problem, closure: &ClosedLoop, result: &LoopResult) -> Hea
     let of = format!("{}{with}", held_out_rows(after));
     let mut states =
         vec![(BEFORE, mean(&fit.registered.held_out)), ("as declared, fitted", mean(&first))];
-    if !result.effects.is_empty() || correction.is_some() {
+    if !result.effects.is_empty() || corrected.is_some() {
         states.push((EXTENDED, mean(&best)));
     }
     Headline { states, unit, of, facts, is_doubtful: !result.trusted }

@@ -12,6 +12,7 @@ use super::parameters::{
     weak,
 };
 use super::prior::prior;
+use super::remainder::PredictionAccuracy;
 use super::render::{Report, report, text};
 use super::residual_tests;
 use super::row_kinds::row_kind_tables;
@@ -24,11 +25,16 @@ use crate::results::{PlotData, nominal_arm, rows_in};
 /// Name of the file with the complete result.
 const FILE: &str = "estimate.json";
 
-/// Returns the full result as text, ending in a line break. `bound` is a sentence on the error bound
-/// of predictions.
-pub fn estimate_text(problem: &Problem, found: &Identification, bound: Option<String>) -> String {
+/// Returns the full result as text, ending in a line break.
+pub fn estimate_text(
+    problem: &Problem,
+    found: &Identification,
+    accuracy: Option<PredictionAccuracy>,
+) -> String {
+    let outcome = outcome(found, accuracy.as_ref());
+    let bound = accuracy.and_then(|accuracy| accuracy.bound);
     let mut blocks = vec![
-        Block::lines(headline(problem, found, &outcome(found, bound.is_some()))),
+        Block::lines(headline(problem, found, &outcome)),
         Block::Table(errors_by_axis(found)),
         Block::lines(
             [noise(problem, found)].into_iter().chain(bound).collect::<Vec<_>>().join("\n"),
@@ -56,8 +62,12 @@ pub fn identification_report(
 
 fn blocks<'a>(problem: &Problem, found: &'a Identification, plots: &'a PlotData) -> Vec<Block<'a>> {
     let held_out = found.fitted.held_out;
+    let mut states =
+        vec![(BEFORE, mean(&found.registered.held_out)), ("identified", mean(&held_out))];
+    let corrected = PredictionAccuracy::new(found, plots).and_then(|accuracy| accuracy.corrected);
+    states.extend(corrected.map(|errors| ("with the remainder", mean(&errors))));
     let head = Headline {
-        states: vec![(BEFORE, mean(&found.registered.held_out)), ("identified", mean(&held_out))],
+        states,
         unit: unit(&held_out),
         of: held_out_rows(found),
         facts: vec![

@@ -59,7 +59,7 @@ pub(crate) use noise::show_influential_rows;
 pub(crate) use plan::plan_page;
 pub(crate) use predict::{prediction_page, prediction_text};
 #[doc(hidden)]
-pub use remainder::bound_text;
+pub use remainder::PredictionAccuracy;
 pub use render::Report;
 #[doc(hidden)]
 pub use render::{limit_text_width, text_width};

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use super::document::{Block, Column, Table, code};
 use super::figures;
-use crate::fit::{Identification, Residual};
+use crate::fit::{ErrorSummary, Identification, Residual};
 use crate::quantity::format::{counted, mm, number, two_digits};
 use crate::remainder::{Bounds, Gain, JointError, Outcome};
 use crate::results::PlotData;
@@ -13,7 +13,7 @@ use crate::results::PlotData;
 /// without it.
 pub fn remainder_text(found: &Identification, outcome: &Outcome) -> String {
     let before = number(found.fitted.held_out.mean.norm * 1e3, 4);
-    let after = outcome.held_out.map(|error| number(error * 1e3, 4));
+    let after = outcome.held_out.map(|errors| number(errors.mean.norm * 1e3, 4));
     let Some(gain) = outcome.gain.filter(|_| !outcome.is_declared) else {
         return match after {
             Some(after) => format!(
@@ -79,18 +79,33 @@ pub(super) fn uncertainty<'a>(found: &Identification, plots: &'a PlotData) -> Ve
     blocks
 }
 
-/// States the mean bound of prediction errors over the workspace, if it is known.
-pub fn bound_text(plots: &PlotData) -> Option<String> {
-    let uncertainty = plots.uncertainty.as_ref()?;
-    let (level, bounds) = (uncertainty.level, &uncertainty.bounds);
-    let mean = bounds.iter().map(|at| at.bound).sum::<f64>() / bounds.len() as f64;
-    let percent = (level * 1e6).round() / 1e4;
-    mean.is_finite().then(|| {
-        format!(
-            "Error bound of a prediction ({percent} %, measurement noise included): {} mm, mean over the workspace.",
-            two_digits(mean * 1e3, 4)
-        )
-    })
+/// Accuracy of predictions, as the summaries of `identify` and `loop` state it.
+#[derive(Debug, Clone)]
+pub struct PredictionAccuracy {
+    /// Sentence on the mean error bound over the workspace; `None` if the bound is not known.
+    pub bound: Option<String>,
+    /// Errors of held-out rows with the remainder; `None` if there is none, or no row is held out.
+    pub corrected: Option<ErrorSummary>,
+}
+
+impl PredictionAccuracy {
+    /// Takes the bounds and the remainder of a fit; `found` contains its errors without remainder.
+    /// Returns `None` if the uncertainty of predictions was not estimated.
+    pub fn new(found: &Identification, plots: &PlotData) -> Option<Self> {
+        let uncertainty = plots.uncertainty.as_ref()?;
+        let held_out = uncertainty.outcome.held_out;
+        let with = if held_out.is_some() { " with the remainder" } else { "" };
+        let bounds = &uncertainty.bounds;
+        let mean = bounds.iter().map(|at| at.bound).sum::<f64>() / bounds.len() as f64;
+        let percent = (uncertainty.level * 1e6).round() / 1e4;
+        let bound = mean.is_finite().then(|| {
+            format!(
+                "Error bound of a prediction{with} ({percent} %, measurement noise included): {} mm, mean over the workspace.",
+                two_digits(mean * 1e3, 4)
+            )
+        });
+        Some(Self { bound, corrected: held_out.filter(|_| !found.fitted.is_left_out) })
+    }
 }
 
 /// Largest error of positions that were computed by the model, relative to the expected error. Tables

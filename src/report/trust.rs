@@ -1,17 +1,20 @@
 //! Sentence that says whether a fit is to be trusted.
 
 use super::errors::{judging, with_unit};
+use super::remainder::PredictionAccuracy;
 use crate::fit::Identification;
 use crate::quantity::format::number;
 use crate::results::ResidualSize;
 
 /// States whether the fit is to be trusted, the held-out error before and after it, and how much
-/// its residual exceeds the declared noise. `has_bound` is true if the text states an error bound.
-pub(super) fn outcome(found: &Identification, has_bound: bool) -> String {
+/// its residual exceeds the declared noise.
+pub(super) fn outcome(found: &Identification, accuracy: Option<&PredictionAccuracy>) -> String {
     if let Some(reason) = found.first_error() {
         return format!("Not to be trusted: {reason}.");
     }
-    let [before, after] = [&found.registered, &found.fitted].map(|errors| &errors.held_out);
+    let [before, fitted] = [&found.registered, &found.fitted].map(|errors| &errors.held_out);
+    let corrected = accuracy.and_then(|accuracy| accuracy.corrected.as_ref());
+    let after = corrected.unwrap_or(fitted);
     let falls = if after.mean.norm < before.mean.norm { "falls" } else { "does not fall: it goes" };
     let is_larger = match ResidualSize::of(found) {
         ResidualSize::Contradicted(chi2) | ResidualSize::Unclear(chi2) => chi2 > 1.0,
@@ -20,14 +23,20 @@ pub(super) fn outcome(found: &Identification, has_bound: bool) -> String {
     if !(before.mean.norm.is_finite() && after.mean.norm.is_finite()) {
         return "The fit is to be trusted.".to_owned();
     }
+    let has_bound = accuracy.is_some_and(|accuracy| accuracy.bound.is_some());
     let scope = if is_larger && has_bound { " within the error bound below" } else { "" };
     let size = if found.noise_factor > 1.0 {
         format!("{} × the declared σ", number(found.noise_factor.sqrt(), 1))
     } else {
         "larger than the declared σ explains".to_owned()
     };
+    let without = if corrected.is_some() {
+        format!(" ({} without the remainder)", with_unit(fitted, fitted.mean.norm))
+    } else {
+        String::new()
+    };
     format!(
-        "Trusted{scope}: the mean {} error {falls} from {} to {}.{}",
+        "Trusted{scope}: the mean {} error {falls} from {} to {}{without}.{}",
         judging(&found.fitted).replace(' ', "-"),
         with_unit(before, before.mean.norm),
         with_unit(after, after.mean.norm),

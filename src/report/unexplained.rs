@@ -14,7 +14,7 @@ use crate::results::{LoopResult, Structure, Summary, at_place};
 use crate::select::{ClosedLoop, Correction, HELD_FIXED, REFUSED};
 
 /// Returns the empirical correction of structure without a law, if there is one.
-pub(super) fn correction(closure: &ClosedLoop) -> Option<&Correction> {
+fn correction(closure: &ClosedLoop) -> Option<&Correction> {
     closure.unexplained.iter().find_map(|left| left.correction.as_ref())
 }
 
@@ -217,16 +217,15 @@ fn corrected(problem: &Problem, closure: &ClosedLoop, correction: &Correction) -
     let [without, with] = [*without, *with].map(|error| held_out.in_unit(error));
     let show = |value: f64| number(value, 4);
     let mut sentences = vec![format!(
-        "A smooth correction at this place {improves} the prediction of held-out poses: mean {} to {} {unit}, rms {} to {} {unit}. For \
-         identification poses left out in turn the rms changes from {} to {} {unit}. The correction names no cause and is not part \
-         of {}.",
+        "A smooth function fitted at this place alone {improves} the prediction of held-out poses: mean {} to {} {unit}, rms {} to {} \
+         {unit}. For identification poses left out in turn the rms changes from {} to {} {unit}. The function shows how much of the \
+         error lies there; it names no cause, and no file contains it.",
         show(mean_before),
         show(mean),
         show(rms_before),
         show(rms),
         show(without),
         show(with),
-        code("problem.closed.toml"),
     )];
     let range = |(covariate, range): &(Covariate, (f64, f64))| {
         let (factor, unit) = unit_of(problem, covariate);
@@ -237,7 +236,7 @@ fn corrected(problem: &Problem, closure: &ClosedLoop, correction: &Correction) -
         ranges.iter().filter(|(of, _)| *of != Covariate::Position).map(range).collect();
     if !ranges.is_empty() {
         sentences.push(format!(
-            "The correction is valid for {}, the range of the identification poses; outside, it keeps its last value ({beyond} of {} \
+            "It is valid for {}, the range of the identification poses; outside, it keeps its last value ({beyond} of {} \
              held-out poses).",
             ranges.join(", "),
             held_out.n

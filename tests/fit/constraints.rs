@@ -14,7 +14,7 @@ use flexcal::least_squares::solver::{
 };
 use flexcal::measurement::{Dataset, Measurements};
 use flexcal::problem::Problem;
-use flexcal::report::estimate_text;
+use flexcal::report::{PredictionAccuracy, estimate_text};
 use flexcal::results::{Document as _, IdentificationResult};
 use flexcal::select::trace;
 
@@ -307,7 +307,8 @@ fn the_service_arm_shows_which_limit_is_wrong() {
     let (_, block) = page.split_once("```text\n").unwrap();
     // The bound comes from predictions in the workspace, of which the fit alone knows nothing.
     let bound = block.lines().find(|line| line.starts_with("Error bound of a prediction"));
-    let printed = estimate_text(&problem, &found, bound.map(str::to_owned));
+    let accuracy = PredictionAccuracy { bound: bound.map(str::to_owned), corrected: None };
+    let printed = estimate_text(&problem, &found, Some(accuracy));
     for line in block.split("```").next().unwrap().lines() {
         assert!(printed.contains(line), "{line}");
     }
