@@ -115,7 +115,7 @@ fn judged(arguments: &Arguments, problem: &Problem) -> Result<CheckedPoses, Box<
             if files.is_empty() {
                 return Err(PosesError::None.into());
             }
-            let (measured, warnings) = Measurements::read_poses(files, problem)?;
+            let (measured, warnings) = Measurements::read_to_predict(files, problem)?;
             common.warn(&warnings);
             let data = Dataset::from_measurements(problem, measured)?;
             let held_out = design::predictable_rows(&data);

@@ -60,9 +60,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     }
     results.write(&[(PAGE, &report::difference_page(&sides))])?;
     if !quiet {
-        let first = shell_word(first);
+        let better = shell_word(if report::predicts_better(&sides) { second } else { first });
         output::print(&format!(
-            "{}{}Next: flexcal watch PROBLEM --estimate {first} --data FILE says whether new rows contradict an estimate\n",
+            "{}{}Next: flexcal watch PROBLEM --estimate {better} --data FILE says whether new rows contradict an estimate\n",
             report::difference_text(&sides),
             results.written()
         ))?;
@@ -92,8 +92,8 @@ fn side(file: &Path, trust: Trust) -> Result<Side, Box<dyn Error>> {
     Ok(Side { estimate, errors, held_out: held_out_errors(file) })
 }
 
-/// Returns the size of each held-out position error \[mm\] with its configuration, by file and line,
-/// from the residuals.csv that `flexcal identify` writes beside an estimate.json; empty if there is
+/// Returns the size of each held-out position error \[mm\] with its configuration, by file name and
+/// line, from the residuals.csv that `flexcal identify` writes beside an estimate.json; empty if there is
 /// none.
 fn held_out_errors(estimate: &Path) -> BTreeMap<(String, String), (f64, String)> {
     let is_identified = estimate.file_name().is_some_and(|name| name == "estimate.json");
@@ -111,7 +111,9 @@ fn held_out_errors(estimate: &Path) -> BTreeMap<(String, String), (f64, String)>
         let [x, y, z] = ["residual_x_mm", "residual_y_mm", "residual_z_mm"].map(number);
         let joints = header.iter().zip(row).filter(|(name, _)| is_joint(name));
         let configuration = joints.map(|(_, cell)| cell).collect::<Vec<_>>().join(",");
-        let row = (cell("file")?.to_owned(), cell("line")?.to_owned());
+        // Problems in other folders name the same file by another path.
+        let name = Path::new(cell("file")?).file_name()?.to_string_lossy().into_owned();
+        let row = (name, cell("line")?.to_owned());
         let length = x?.hypot(y?).hypot(z?);
         (cell("held_out")? == "true").then_some((row, (length, configuration)))
     };

@@ -150,6 +150,12 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         let (file, named) = (results.path("next.csv"), shell_word(common.problem()));
         let files: Vec<String> =
             common.files(&problem).iter().map(|file| shell_word(file)).collect();
+        if problem.data.joint_log.is_some() {
+            return format!(
+                "{text}{written}Next: {lacks}measure these poses, append them to the measurements and to the joint table of \
+                 {named}, then\nflexcal next {named}\n"
+            );
+        }
         let measure = if next.is_of_cameras {
             "take an image in each of these poses, write a row for each point that is found, then"
         } else {

@@ -31,7 +31,7 @@ pub(crate) struct Side {
     pub estimate: SavedEstimate,
     /// Names of errors with their values, for example `held out, mean_mm`.
     pub errors: Vec<(String, f64)>,
-    /// Size of each held-out position error \[mm\] with its configuration in words, by file and
+    /// Size of each held-out position error \[mm\] with its configuration in words, by file name and
     /// line; empty if it is not known.
     pub held_out: BTreeMap<(String, String), (f64, String)>,
 }
@@ -150,12 +150,20 @@ fn verdict(differences: &[Difference], tested: usize, limit: f64) -> String {
     }
 }
 
-/// States the mean difference of the held-out errors of rows that both results predict, with its
-/// interval over configurations; `None` if there are fewer than [`MIN_PAIRS`].
-fn paired([a, b]: &[Side; 2]) -> Option<String> {
+/// Returns true if B predicts the rows that neither fitted better than A, beyond chance.
+pub fn predicts_better(sides: &[Side; 2]) -> bool {
+    paired_change(sides).is_some_and(|(_, change)| change.high < 0.0)
+}
+
+/// Returns the number of held-out rows that both results predict, and the mean of error B − A
+/// \[mm\] with its interval over configurations; `None` if fewer than [`MIN_PAIRS`] configurations
+/// are common.
+fn paired_change([a, b]: &[Side; 2]) -> Option<(f64, Interval)> {
     let mut of_configurations: BTreeMap<&str, (f64, f64)> = BTreeMap::new();
     for (row, (of_b, configuration)) in &b.held_out {
-        let Some((of_a, _)) = a.held_out.get(row) else { continue };
+        let Some((of_a, _)) = a.held_out.get(row).filter(|of_a| of_a.1 == *configuration) else {
+            continue;
+        };
         let sum = of_configurations.entry(configuration).or_default();
         *sum = (sum.0 + of_b - of_a, sum.1 + 1.0);
     }
@@ -164,7 +172,12 @@ fn paired([a, b]: &[Side; 2]) -> Option<String> {
         return None;
     }
     let rows = changes.iter().map(|(_, count)| count).sum::<f64>();
-    let Interval { value, low, high } = mean_interval(&changes, RESAMPLES, INTERVAL_LEVEL, SEED);
+    Some((rows, mean_interval(&changes, RESAMPLES, INTERVAL_LEVEL, SEED)))
+}
+
+/// States the mean difference of the held-out errors of rows that both results predict.
+fn paired(sides: &[Side; 2]) -> Option<String> {
+    let (rows, Interval { value, low, high }) = paired_change(sides)?;
     let verdict = match (low > 0.0, high < 0.0) {
         (true, _) => "B predicts them worse",
         (_, true) => "B predicts them better",

@@ -308,6 +308,32 @@ fn an_acceptance_lists_the_joint_table_too() {
 }
 
 #[test]
+fn check_and_next_know_the_joint_table() {
+    let bench = bench();
+    let problem = crate::common::arms::path("problems/bench-arm/two-tables");
+    bench.flexcal(&format!("check {} --out checked", problem.display())).success();
+    assert!(bench.json("checked/check.json")["poses"].as_u64() > Some(20));
+    let run = bench.flexcal(&format!("next {} --poses 2 --out next", problem.display())).success();
+    assert_contains(&run.stdout, &["append them to the measurements and to the joint table"]);
+}
+
+#[test]
+fn results_of_one_table_are_paired_whatever_the_path() {
+    let bench = bench();
+    bench.flexcal("identify arm --out here").success();
+    // The same table, named by another path.
+    bench.map("arm/problem.toml", |text| {
+        text.replace("'measurements.csv'", "'../arm/measurements.csv'")
+    });
+    bench.flexcal("identify arm --out there").success();
+    let run = bench.flexcal("compare-results here/estimate.json there/estimate.json").success();
+    assert_contains(
+        &run.stdout,
+        &["rows that both predict and neither fitted: neither predicts them better"],
+    );
+}
+
+#[test]
 fn an_acceptance_is_of_the_files_that_were_read() {
     let bench = bench();
     // Three of the held-out rows in one configuration, 0.3 mm apart along x.
