@@ -28,11 +28,24 @@ const CONTRADICTIONS: [FindingCode; 5] = [
 /// `estimate` is the file written.
 pub fn after_fit(
     common: &Common,
-    found: &Identification,
+    (problem, found): (&Problem, &Identification),
     is_structured: bool,
     estimate: &Path,
 ) -> String {
     let named = common.named();
+    let to_apply = |what: &str| {
+        let [problem, estimate] = [common.problem(), estimate].map(shell_word);
+        format!("flexcal compensate {problem} --estimate {estimate} --data TARGETS.csv {what}")
+    };
+    // A loop that wrote a remainder into the problem has searched for causes already.
+    let search = if problem.remainder.is_some() {
+        format!(
+            "flexcal trace {named} ranks candidates for what is left; {}",
+            to_apply("applies the estimate with its remainder")
+        )
+    } else {
+        format!("flexcal loop {named} looks for what the model lacks")
+    };
     match report::show_influential_rows(found, &common.problem_file()) {
         Some(look) => {
             format!(
@@ -64,9 +77,7 @@ pub fn after_fit(
             "correct the table or {} as the warning says, then flexcal identify {named}; if the input is right, flexcal loop {named} looks for what the model lacks",
             common.problem_file().display()
         ),
-        None if found.has(FindingCode::NoiseBeyondDeclared) => {
-            format!("flexcal loop {named} looks for what the model lacks")
-        }
+        None if found.has(FindingCode::NoiseBeyondDeclared) => search,
         None if !found.is_trusted() || report::determines_nothing(found) => {
             format!("flexcal check {named} says what the poses can tell")
         }
@@ -78,17 +89,12 @@ pub fn after_fit(
             || found.has(FindingCode::HeldOutBeyondPrediction)
             || found.has(FindingCode::RowsSetAside) =>
         {
-            format!("flexcal loop {named} looks for what the model lacks")
+            search
         }
         None if found.has(FindingCode::HeldOutNotBetter) => {
             format!("flexcal check {named} says what the poses can tell")
         }
-        None => {
-            let [problem, estimate] = [common.problem(), estimate].map(shell_word);
-            format!(
-                "flexcal compensate {problem} --estimate {estimate} --data TARGETS.csv corrects commands"
-            )
-        }
+        None => to_apply("corrects commands"),
     }
 }
 

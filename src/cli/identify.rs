@@ -182,7 +182,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         let sources = sources.as_ref().map_or_else(String::new, |words| format!("\n{words}\n"));
         let is_structured = shown.residual_tests.is_structured();
         let estimate = results.path("estimate.json");
-        let next = advice::after_fit(common, &identification, is_structured, &estimate);
+        let next = advice::after_fit(common, (&problem, &identification), is_structured, &estimate);
         format!("{told}{words}{sources}{}Next: {next}\n", results.written())
     })?;
     if let (Some(words), true, false) = (&sources, common.json, common.quiet) {

@@ -81,9 +81,9 @@ pub struct Check {
     /// Number of measured coordinates.
     pub coordinates: usize,
     /// Number of measured coordinates, counting each distinct pose once.
-    pub distinct: usize,
+    pub distinct_coordinates: usize,
     /// Number of distinct poses.
-    pub different: usize,
+    pub distinct_poses: usize,
     /// Number of free parameters without a prior.
     pub without_prior: usize,
 }
@@ -164,12 +164,12 @@ pub fn check(problem: &Problem, checked: &CheckedPoses, seed: u64) -> Result<Che
             (noise.unwrap_or(0.0), count),
         ),
         coordinates: coordinates(&poses, sensitivity.coordinates, 0..count),
-        distinct: coordinates(
+        distinct_coordinates: coordinates(
             &poses,
             sensitivity.coordinates,
             first_rows(&poses.pose_numbers(problem)),
         ),
-        different: count_distinct(&poses.pose_numbers(problem), 0..count),
+        distinct_poses: count_distinct(&poses.pose_numbers(problem), 0..count),
         without_prior: parameters.iter().filter(|parameter| parameter.sigma.is_none()).count(),
     })
 }
@@ -193,7 +193,7 @@ impl Check {
     /// measure at least as many coordinates as there are parameters without a prior.
     pub fn suffices(&self) -> bool {
         self.forecast.undetermined <= self.growth.undetermined
-            && self.distinct >= self.without_prior
+            && self.distinct_coordinates >= self.without_prior
     }
 }
 

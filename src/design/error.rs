@@ -106,7 +106,7 @@ impl DesignError {
         Self::NoRange(location.error(InputErrorKind::MissingKey { write, near: None }))
     }
 
-    /// Returns the error of an unknown position σ.
+    /// Returns the error of a problem that does not declare the noise σ of a measured position.
     pub(super) fn no_sigma(problem: &Problem) -> Self {
         let sigma = "the expected 1 σ of a coordinate (or give the poses a column sigma_mm)";
         let write = if problem.fixtures.is_empty() {

@@ -32,8 +32,9 @@ pub(super) struct Misfit {
     /// joints).
     frequencies: DMatrix<f64>,
     phases: Vec<f64>,
-    /// Amplitude aⱼ of each joint \[rad\] or \[m\]; 0 for a joint that does not move the target.
-    amplitudes: Vec<f64>,
+    /// Standard deviation aⱼ of each joint's smooth error \[rad\] or \[m\]; 0 for a joint that does
+    /// not move the target.
+    joint_sigmas: Vec<f64>,
     /// Offset and inverse length of each joint's range; `None` for angles.
     ranges: Vec<Option<(f64, f64)>>,
 }
@@ -64,7 +65,7 @@ impl Misfit {
         let levers: Vec<f64> = (0..joints).map(lever).collect();
         let moving = levers.iter().filter(|lever| **lever > 0.0).count().max(1) as f64;
         let of_joint = size * (3.0 / moving).sqrt();
-        let amplitudes =
+        let joint_sigmas =
             levers.iter().map(|lever| if *lever > 0.0 { of_joint / lever } else { 0.0 }).collect();
         let range = |joint: usize| {
             (!site.is_angle(joint)).then(|| {
@@ -73,12 +74,12 @@ impl Misfit {
                 (low, (high - low).max(f64::MIN_POSITIVE).recip())
             })
         };
-        Self { frequencies, phases, amplitudes, ranges: (0..joints).map(range).collect() }
+        Self { frequencies, phases, joint_sigmas, ranges: (0..joints).map(range).collect() }
     }
 
     /// Returns the number of weights.
     pub fn weights(&self) -> usize {
-        self.phases.len() * self.amplitudes.len()
+        self.phases.len() * self.joint_sigmas.len()
     }
 
     /// Returns `sensitivity` of the poses of `table` with a row for every weight below those of the
@@ -95,9 +96,9 @@ impl Misfit {
         let sigmas = site.sigmas(table, unit);
         for (pose, slope) in site.command_slopes(table).iter().enumerate() {
             let features = self.features(table.configuration(pose));
-            for (joint, amplitude) in self.amplitudes.iter().enumerate() {
+            for (joint, sigma) in self.joint_sigmas.iter().enumerate() {
                 for axis in 0..3 {
-                    let slope = slope[(axis, joint)] * amplitude / sigmas[pose];
+                    let slope = slope[(axis, joint)] * sigma / sigmas[pose];
                     let column = coordinates * pose + axis;
                     for (k, feature) in features.iter().enumerate() {
                         rows[(parameters + features.len() * joint + k, column)] = slope * feature;
@@ -108,7 +109,7 @@ impl Misfit {
         Sensitivity { rows, coordinates }
     }
 
-    /// Returns φ at a configuration; their squares add up to 1 in the mean.
+    /// Returns the random features φ at a configuration. The sum of their squares is 1 on average.
     fn features(&self, configuration: &[f64]) -> Vec<f64> {
         let embedded = configuration.iter().zip(&self.ranges).flat_map(|(q, range)| match range {
             Some((offset, scale)) => [(q - offset) * scale, 0.0],

@@ -111,7 +111,7 @@ pub struct Plan {
     /// True if the plan determines all combinations that all candidates can, and measures at least
     /// as many coordinates as there are parameters without a prior.
     pub suffices: bool,
-    /// True if cameras measure the poses: every point of a marker in view counts.
+    /// True if cameras measure the poses. Each marker point in view is then one measurement.
     #[doc(hidden)]
     pub is_of_cameras: bool,
 }

@@ -439,7 +439,8 @@ pub enum InputErrorKind {
     #[error(
         "no held-out row measures a position, and pose accuracy is of positions: hold out rows \
          with x_mm, y_mm and z_mm, measured by \
-         whatever is to judge the arm; identify tells the errors of contacts, distances and tilts"
+         whatever is to judge the arm; identify reports the errors of \
+         points in images, contacts, distances and tilts"
     )]
     NoPositionsHeldOut,
     #[error(

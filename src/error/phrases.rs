@@ -51,7 +51,7 @@ const MAX_LISTED_COLUMNS: usize = 12;
 
 /// Returns the remedy of a missing column: the similar column `near`, or else the `unknown` columns,
 /// and the section that maps such names.
-pub(super) fn named_otherwise(write: &str, near: Option<&str>, unknown: &[String]) -> String {
+pub(super) fn missing_column_remedy(write: &str, near: Option<&str>, unknown: &[String]) -> String {
     let is_usual = |name: &&str| name.ends_with("_deg") || name.ends_with("_mm");
     let mut names = write.split(" or ");
     let ours = names.clone().find(is_usual).or(names.next()).unwrap_or_default();

@@ -6,8 +6,8 @@ use thiserror::Error;
 
 use super::near::{instead, meant, question};
 use super::phrases::{
-    clock_offset_remedy, compared, decimal_comma_remedy, difference, in_quotes, named_otherwise,
-    plural, then,
+    clock_offset_remedy, compared, decimal_comma_remedy, difference, in_quotes,
+    missing_column_remedy, plural, then,
 };
 use super::warning::{listed, nearest_in_time};
 
@@ -174,7 +174,7 @@ pub enum TableErrorKind {
          thousands separators, or correct decimal"
     )]
     DecimalPoint { value: String },
-    #[error("missing; add {write}{}", named_otherwise(write, near.as_deref(), unknown))]
+    #[error("missing; add {write}{}", missing_column_remedy(write, near.as_deref(), unknown))]
     MissingColumn { write: String, near: Option<String>, unknown: Vec<String> },
     #[error("unknown column, one letter away from {meant}; write {meant}, or a less similar name")]
     MistypedColumn { meant: String },

@@ -108,7 +108,7 @@ impl<'a, P: LeastSquares> Fit<'a, P> {
     }
 
     /// Returns the number of chunks that one thread absorbs in sequence.
-    fn run_length(&self) -> usize {
+    fn chunks_per_thread(&self) -> usize {
         let rows = CHUNK_ITEMS * self.problem.rows_per_item().max(1);
         (ROWS_PER_UNKNOWN * self.problem.parameters()).div_ceil(rows).max(1)
     }
@@ -150,7 +150,7 @@ impl<'a, P: LeastSquares> Fit<'a, P> {
     /// With few unknowns, merging is cheap and chunks are merged one by one in order; otherwise
     /// [`Fit::reduce_halves`] merges them pairwise.
     fn reduce_by(&self, fill: &(impl Fn(usize, &mut Block) + Sync)) -> Triangle {
-        if self.run_length() > 1 {
+        if self.chunks_per_thread() > 1 {
             return self.reduce_halves(fill, 0..self.chunks(), &Mutex::default());
         }
         let mut total: Option<Triangle> = None;
@@ -171,7 +171,7 @@ impl<'a, P: LeastSquares> Fit<'a, P> {
         chunks: Range<usize>,
         spare: &Mutex<Vec<Block>>,
     ) -> Triangle {
-        if chunks.len() <= self.run_length() {
+        if chunks.len() <= self.chunks_per_thread() {
             let spare = || spare.lock().unwrap_or_else(PoisonError::into_inner);
             let reused = spare().pop();
             let mut block = reused.unwrap_or_else(|| self.empty_block());

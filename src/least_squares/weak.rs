@@ -20,8 +20,9 @@ const MAX_ROUNDING_WEIGHT: f64 = 1e-6;
 /// Combinations of unknowns that the data determine too weakly for a reliable estimate.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Weak {
-    /// Rows that span the combinations, scaled to the strongest column, shape = (combinations, n)
-    /// [1 / unit of x].
+    /// Constraint rows W, which keep the combinations fixed by W p = 0 for a step p. They are as
+    /// long as the longest column of the triangle in units of the plausible sizes, shape =
+    /// (combinations, n) [1 / unit of x].
     pub rows: DMatrix<f64>,
     /// Each combination with its weights in units of the plausible sizes, and the data change it
     /// causes \[σ\].

@@ -88,7 +88,7 @@ pub(super) fn weighted_cause(
 ) -> Option<Weighted> {
     let columns: Vec<usize> = cause.columns.iter().map(|&k| columns[k]).collect();
     let tried: Vec<_> = cause
-        .sizes
+        .trial_sigmas
         .iter()
         .zip(ln_size_priors(cause))
         .filter_map(|(sizes, ln_prior)| Some((unchanged.cause(&columns, sizes)?, sizes, ln_prior)))
@@ -157,8 +157,8 @@ pub(super) fn assess(
 /// first; the probabilities sum to 1. Large rates per kelvin are as probable as small ones.
 fn ln_size_priors(cause: &Cause) -> impl Iterator<Item = f64> {
     let larger = if cause.kind == CauseKind::Temperature { 1.0 } else { LARGER_SIZE };
-    let sum: f64 = (0..cause.sizes.len()).map(|size| larger.powf(size as f64)).sum();
-    (0..cause.sizes.len()).map(move |size| size as f64 * larger.ln() - sum.ln())
+    let sum: f64 = (0..cause.trial_sigmas.len()).map(|size| larger.powf(size as f64)).sum();
+    (0..cause.trial_sigmas.len()).map(move |size| size as f64 * larger.ln() - sum.ln())
 }
 
 /// Computes the weighted likelihood ratio of each cause, and of each of the first `count` rows as a

@@ -89,8 +89,8 @@ pub(super) struct Cause {
     pub columns: Vec<usize>,
     /// Name and unit of each amplitude.
     pub amplitudes: Vec<(String, Unit)>,
-    /// Sizes (1 σ) of the amplitudes that are tried.
-    pub sizes: Vec<Vec<f64>>,
+    /// Standard deviations of the amplitudes in each trial, one vector for each size of a change.
+    pub trial_sigmas: Vec<Vec<f64>>,
     /// Logarithm of the prior probability.
     pub ln_weight: f64,
 }
@@ -182,10 +182,11 @@ impl Extended {
             let all = self.model.parameters.iter().enumerate();
             all.filter(|(_, parameter)| choose(parameter.site, parameter)).map(|(k, _)| k).collect()
         };
-        let mut push = |kind, label: String, columns: Vec<usize>, sizes: Vec<Vec<f64>>| {
+        let mut push = |kind, label: String, columns: Vec<usize>, trial_sigmas: Vec<Vec<f64>>| {
             if !columns.is_empty() {
                 let amplitudes = columns.iter().map(|&k| (self.name(k), self.unit(k))).collect();
-                causes.push(Cause { kind, label, columns, amplitudes, sizes, ln_weight: 0.0 });
+                let ln_weight = 0.0;
+                causes.push(Cause { kind, label, columns, amplitudes, trial_sigmas, ln_weight });
             }
         };
         let mixed = |columns: &[usize], length_mm: f64, angle_deg: f64| -> Vec<f64> {
@@ -284,7 +285,7 @@ impl Extended {
             label: label.to_owned(),
             columns: Vec::new(),
             amplitudes: Vec::new(),
-            sizes: Vec::new(),
+            trial_sigmas: Vec::new(),
             ln_weight: 0.0,
         };
         causes.push(none(CauseKind::Noise, "noise of the measurement"));
@@ -331,7 +332,7 @@ impl Extended {
             label,
             columns: vec![column],
             amplitudes: vec![amplitude],
-            sizes: sizes.iter().map(|&size| vec![size]).collect(),
+            trial_sigmas: sizes.iter().map(|&size| vec![size]).collect(),
             ln_weight: 0.0,
         };
         let all = rows.add_column(&lengths, of_row);

@@ -145,7 +145,8 @@ pub fn fleet(estimates: &[SavedEstimate]) -> Result<Fleet, PriorError> {
     for (number, estimate) in estimates.iter().enumerate() {
         let file = || estimate.file.clone();
         if let Some(part) = first.differing_part(estimate) {
-            return Err(PriorError::OtherType { file: file(), other: first.file.clone(), part });
+            let (other, part) = (first.file.clone(), part.name);
+            return Err(PriorError::OtherType { file: file(), other, part });
         }
         if estimate.posterior().includes_fleet {
             return Err(PriorError::HasFleetPrior { file: file() });

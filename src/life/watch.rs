@@ -47,7 +47,7 @@ const LEAST_DIFFERENCE: f64 = 1e-3;
 /// Verdict on an arm since its estimate.
 #[derive(Debug, Clone)]
 pub struct Watch {
-    /// Probability of a false alarm at any look.
+    /// Largest probability of any false alarm over all rows of one test.
     pub false_alarm_rate: f64,
     /// True if the fit of the estimate was trusted.
     pub estimate_trusted: bool,
@@ -126,10 +126,12 @@ impl Watch {
 
 /// Tests measured rows, in their order, against an estimate that is `days` days old.
 ///
-/// The residuals of an unchanged arm are normal with the covariance of noise, known misfit and
-/// estimate. The misfit is the same in all rows of one configuration. Their density is compared with
-/// a mixture of densities, one for each cause and size of a change. The ratio exceeds 1 / `false_alarm_rate` at any look with at most that probability if
-/// nothing changed. Rows that the estimate was fitted to are left out.
+/// The residuals of an unchanged arm are normal, with the covariance of noise, known misfit and
+/// estimate. If the rows state temperatures, the covariance also contains effects of temperature as
+/// large as the misfit. The misfit is the same in all rows of one configuration. The density of the
+/// residuals is compared with a mixture of densities, one for each cause and size of a change. If
+/// nothing changed, the ratio ever exceeds 1 / `false_alarm_rate` with at most that probability.
+/// Rows that the estimate was fitted to are left out.
 ///
 /// # Errors
 /// Returns an error if the estimate is of another arm or has other laws, if no row is new, or if

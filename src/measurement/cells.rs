@@ -39,7 +39,7 @@ pub(super) fn direction(table: &Table, column: &Column) -> Result<f64, InputErro
 /// Returns true if the current row's cell in column `place` is the word `validation`, and false if
 /// it is `identification`.
 pub(super) fn is_validation(table: &Table, place: usize) -> Result<bool, InputError> {
-    match table.word(place)? {
+    match table.non_empty_text(place)? {
         "validation" => Ok(true),
         "identification" => Ok(false),
         word => {

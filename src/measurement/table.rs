@@ -314,15 +314,15 @@ impl Table {
         self.record.iter().all(|cell| cell.trim_ascii().is_empty())
     }
 
-    /// Returns a cell of the current row as a word that is not empty.
-    pub fn word(&self, place: usize) -> Result<&str, InputError> {
+    /// Returns a cell of the current row as text that is not empty.
+    pub fn non_empty_text(&self, place: usize) -> Result<&str, InputError> {
         let word = self.text(place)?;
         if word.is_empty() { Err(self.empty_cell(place)) } else { Ok(word) }
     }
 
     /// Returns a cell of the current row as a word without invisible characters.
     pub fn name(&self, place: usize) -> Result<&str, InputError> {
-        let word = self.word(place)?;
+        let word = self.non_empty_text(place)?;
         match word.chars().find(|&character| is_hidden(character)) {
             Some(hidden) => {
                 Err(self.cell_error(place, InputErrorKind::Hidden { code: hidden.into() }))
@@ -333,7 +333,7 @@ impl Table {
 
     /// Returns a cell of the current row as a finite number.
     pub fn number(&self, place: usize) -> Result<f64, InputError> {
-        let word = self.word(place)?;
+        let word = self.non_empty_text(place)?;
         let value = || shortened(word);
         let CellStyle { delimiter, decimal_comma } = self.style_of(place);
         let has_point = decimal_comma && delimiter != ',' && word.contains('.');
@@ -386,7 +386,7 @@ impl Table {
     /// Returns a cell of the current row as a time: a number with a unit \[s\], or a date and time
     /// \[s since 1970\].
     pub fn time(&self, place: usize, to_si: fn(f64) -> f64) -> Result<f64, InputError> {
-        let word = self.word(place)?;
+        let word = self.non_empty_text(place)?;
         match date_time(word, self.date_order) {
             Some(seconds) => Ok(seconds),
             None if is_ambiguous(word, self.date_order) => {

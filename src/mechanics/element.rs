@@ -153,7 +153,7 @@ impl<S: Scalar> Element<'_, S> {
 
 impl<S: Scalar> BentElement<'_, S> {
     /// Returns the position of a load, arm base frame \[m\].
-    pub fn point(&self, load: &LinkLoad<S>) -> Vector3<S> {
+    pub fn load_position(&self, load: &LinkLoad<S>) -> Vector3<S> {
         let (station, offset) = self.element.station_and_offset(load);
         let Deflection { displacement, rotation } = self.cantilever.at(station);
         let along = Vector3::new(station, S::from(0.0), S::from(0.0));

@@ -378,7 +378,7 @@ impl<S: Scalar> Arm<S> {
                     let bent = element.bend(&root, points);
                     events.push(Event::Load { at: bent.centre_of_mass(), force: weight });
                     for load in element.own_loads() {
-                        let at = bent.point(load);
+                        let at = bent.load_position(load);
                         if load.rope && self.rope.is_some() {
                             hooks.push([at.x, at.y]);
                         }

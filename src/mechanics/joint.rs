@@ -102,12 +102,13 @@ pub struct Joint<S> {
     pub bodies: Vec<PointMass>,
 }
 
-/// Coordinates of a joint in a pose.
+/// Angle and offset of a joint in a pose: its constants θ and d with the command q added to one of
+/// them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Coordinates<S> {
-    /// Sine and cosine of θ + q.
+    /// Sine and cosine of the angle: θ + q for a revolute joint, θ for a prismatic one.
     pub angle: (S, S),
-    /// Displacement d + q along the axis \[m\].
+    /// Displacement along the axis: d + q for a prismatic joint, d for a revolute one \[m\].
     pub offset: S,
 }
 

@@ -297,7 +297,7 @@ impl Model {
     }
 
     /// Returns true if the problem declares number `axis` of a fixture.
-    pub(crate) fn is_declared(&self, fixture: usize, axis: usize) -> bool {
+    pub(crate) fn declares_fixture_coordinate(&self, fixture: usize, axis: usize) -> bool {
         self.declared
             .get(fixture)
             .and_then(|fixture| fixture.known.get(axis))

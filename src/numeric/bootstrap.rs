@@ -41,7 +41,7 @@ pub(crate) fn mean_interval(
     // z₀ corrects the bias of the bootstrap median; the acceleration is a sixth of the skewness of
     // the
     // jackknife means.
-    let z0 = quantile(means.partition_point(|drawn| *drawn < value) as f64 / draws as f64);
+    let z0 = normal_quantile(means.partition_point(|drawn| *drawn < value) as f64 / draws as f64);
     let without = |left_out: usize| {
         mean(&mut sums.iter().enumerate().filter(|(k, _)| *k != left_out).map(|(_, sum)| *sum))
     };
@@ -51,7 +51,7 @@ pub(crate) fn mean_interval(
     let scale = moment(2).powf(1.5);
     let acceleration = if scale > 0.0 { moment(3) / (6.0 * scale) } else { 0.0 };
     let quantile_of_means = |level: f64| {
-        let z = z0 + quantile(level);
+        let z = z0 + normal_quantile(level);
         let shifted = z0 + z / (1.0 - acceleration * z).max(0.1);
         let corrected = 0.5 * erfc(-shifted / std::f64::consts::SQRT_2);
         #[expect(
@@ -67,7 +67,7 @@ pub(crate) fn mean_interval(
 }
 
 /// Returns z with Φ(z) = `probability` for the normal distribution Φ, limited to ±4.
-fn quantile(probability: f64) -> f64 {
+fn normal_quantile(probability: f64) -> f64 {
     const MAX_SCORE: f64 = 4.0;
     if probability > 0.0 && probability < 1.0 {
         (-std::f64::consts::SQRT_2 * erfc_inv(2.0 * probability)).clamp(-MAX_SCORE, MAX_SCORE)
@@ -80,7 +80,7 @@ fn quantile(probability: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::quantile;
+    use super::normal_quantile;
 
     #[test]
     fn quantiles_are_those_of_the_normal_distribution() {
@@ -88,9 +88,9 @@ mod tests {
             [(0.025, -1.959_963_984_5), (0.5, 0.0), (0.841_344_746_1, 1.0), (0.0, -4.0), (1.0, 4.0)]
         {
             assert!(
-                (quantile(probability) - z).abs() < 1e-6,
+                (normal_quantile(probability) - z).abs() < 1e-6,
                 "{probability} {}",
-                quantile(probability)
+                normal_quantile(probability)
             );
         }
     }

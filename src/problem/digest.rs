@@ -75,21 +75,21 @@ impl Problem {
             Equilibrium::Deflected => "deflected".to_owned(),
         };
         let _ = write!(text, " {beam_elements}");
-        vectors(&mut text, &[gravity, target, payload_at, translation, rotation]);
+        push_vectors(&mut text, &[gravity, target, payload_at, translation, rotation]);
         number(&mut text, *payload_mass);
         if tool.payload_follows {
             text.push_str(" payload at the identified target");
         }
         if *turned != Vector3::zeros() {
             text.push_str(" turned");
-            vectors(&mut text, &[turned]);
+            push_vectors(&mut text, &[turned]);
         }
         if carrier + 1 != joints.len() {
             let _ = write!(text, " on {}", carrier + 1);
         }
         for Target { name, joint, at, rotation, .. } in targets {
             let _ = write!(text, "\ntarget {} {}", quoted(name), joint + 1);
-            vectors(&mut text, &[at, rotation]);
+            push_vectors(&mut text, &[at, rotation]);
         }
         for (index, declared) in joints.iter().enumerate() {
             joint(&mut text, index, declared);
@@ -144,7 +144,7 @@ fn joint(text: &mut String, index: usize, joint: &Joint) {
     }
     if let Some(Placement { xyz, rpy }) = placement {
         text.push_str(" placed");
-        vectors(text, &[xyz, rpy]);
+        push_vectors(text, &[xyz, rpy]);
     }
     if let Some(Mimic { joint, ratio }) = mimic {
         let _ = write!(text, " mimic {}", joint + 1);
@@ -172,7 +172,7 @@ fn beam(text: &mut String, beam: &Beam) {
     if let Some(Hoist { at, force, direction }) = hoist {
         text.push_str(" hoist");
         number(text, *force);
-        vectors(text, &[at, direction]);
+        push_vectors(text, &[at, direction]);
     }
 }
 
@@ -180,11 +180,11 @@ fn masses(text: &mut String, bodies: &[Body]) {
     for Body { name: _, mass, position } in bodies {
         text.push_str(" mass");
         number(text, *mass);
-        vectors(text, &[position]);
+        push_vectors(text, &[position]);
     }
 }
 
-fn vectors(text: &mut String, vectors: &[&Vector3<f64>]) {
+fn push_vectors(text: &mut String, vectors: &[&Vector3<f64>]) {
     for value in vectors.iter().flat_map(|vector| vector.iter()) {
         number(text, *value);
     }

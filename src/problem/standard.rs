@@ -100,7 +100,7 @@ impl Problem {
     /// Returns the problem with changed rows of the joint table as the file has them. Returns `None`
     /// if `change` does, or if the changed rows are not those of a standard table that the problem
     /// declares.
-    pub(crate) fn with_changed_rows(
+    pub(crate) fn with_changed_joint_rows(
         &self,
         change: impl FnOnce(&mut [Joint]) -> Option<()>,
     ) -> Option<Self> {

@@ -156,7 +156,8 @@ pub fn compensate(
         }
         let before = first.get_or_insert_with(|| commands.clone());
         for (command, before) in commands.iter_mut().zip(before.iter()) {
-            (command.seed_miss, command.seed_turn) = (before.seed_miss, before.seed_turn);
+            (command.seed_miss, command.seed_orientation_error) =
+                (before.seed_miss, before.seed_orientation_error);
         }
         if change <= MAX_CONVERGED_CHANGE || pass >= MAX_PASSES || !correction.has_remainder() {
             return Ok(commands.into_iter().zip(poses).collect());

@@ -24,7 +24,7 @@ pub(super) struct Hyperparameters {
     /// for others.
     pub single_lengths: Vec<f64>,
     /// Length ℓᵥ of each input: \[rad\] for angles, in standard deviations of the input for others.
-    pub joint_lengths: Vec<f64>,
+    pub input_lengths: Vec<f64>,
     /// 1 σ of the independent noise of each coordinate \[m\].
     pub noise: f64,
     /// 1 σ of the noise σ_c that rows of one configuration share \[m\]; 0 if no configuration is
@@ -40,7 +40,7 @@ impl Hyperparameters {
             joint: Vec::new(),
             constant: Vec::new(),
             single_lengths: Vec::new(),
-            joint_lengths: Vec::new(),
+            input_lengths: Vec::new(),
             noise,
             shared_noise,
         }
@@ -124,7 +124,7 @@ impl<'a> SiteCovariance<'a> {
             inputs,
             single: single.map(|(size, length)| (size * size, length.powi(-2))).collect(),
             joint: joint.map(|(size, constant)| (size * size, constant * constant)).collect(),
-            joint_scales: hyper.joint_lengths.iter().map(|length| length.powi(-2)).collect(),
+            joint_scales: hyper.input_lengths.iter().map(|length| length.powi(-2)).collect(),
         }
     }
 

@@ -119,7 +119,7 @@ impl<'a> MarginalLikelihood<'a> {
     /// Returns the number of hyperparameters: the amplitudes, the lengths ℓᵤ and ℓᵥ, σ and, if
     /// noise is shared, σ_c.
     pub fn len(&self) -> usize {
-        self.joint_lengths().end + 1 + usize::from(self.shares_noise)
+        self.input_lengths().end + 1 + usize::from(self.shares_noise)
     }
 
     /// Returns the indices of the lengths ℓᵤ among the hyperparameters.
@@ -128,7 +128,7 @@ impl<'a> MarginalLikelihood<'a> {
     }
 
     /// Returns the indices of the lengths ℓᵥ among the hyperparameters.
-    fn joint_lengths(&self) -> Range<usize> {
+    fn input_lengths(&self) -> Range<usize> {
         let first = self.single_lengths().end;
         first..first + self.inputs.angles.len()
     }
@@ -136,7 +136,7 @@ impl<'a> MarginalLikelihood<'a> {
     /// Returns families of hyperparameter indices whose lengths are expected to be similar. All ℓᵤ
     /// form one family, all ℓᵥ of commands another, and each ℓᵥ of a condition one of its own.
     fn length_families(&self) -> Vec<Range<usize>> {
-        let Range { start, end } = self.joint_lengths();
+        let Range { start, end } = self.input_lengths();
         let is_command = |source: &&Source| matches!(source, Source::Command(_));
         let conditions = start + self.inputs.sources.iter().filter(is_command).count();
         let commands = [self.single_lengths(), start..conditions].into_iter();
@@ -149,8 +149,8 @@ impl<'a> MarginalLikelihood<'a> {
         DVector::from_fn(self.len(), |k, _| match k {
             k if k < self.amplitudes.len() => amplitude,
             k if self.single_lengths().contains(&k) => lengths[0].ln(),
-            k if self.joint_lengths().contains(&k) => lengths[1].ln(),
-            k => self.size + NOISE_STARTS[k - self.joint_lengths().end].ln(),
+            k if self.input_lengths().contains(&k) => lengths[1].ln(),
+            k => self.size + NOISE_STARTS[k - self.input_lengths().end].ln(),
         })
     }
 
@@ -159,7 +159,7 @@ impl<'a> MarginalLikelihood<'a> {
         let about = |(low, high)| (self.size + low, self.size + high);
         let bound = |k| match k {
             k if k < self.amplitudes.len() => about(AMPLITUDE_BOUNDS),
-            k if k < self.joint_lengths().end => LENGTH_BOUNDS,
+            k if k < self.input_lengths().end => LENGTH_BOUNDS,
             _ => about(NOISE_BOUNDS),
         };
         (0..self.len()).map(bound).collect()
@@ -167,13 +167,13 @@ impl<'a> MarginalLikelihood<'a> {
 
     /// Converts the logarithms that the search varies to hyperparameters.
     pub fn hyperparameters(&self, logarithms: &DVector<f64>) -> Hyperparameters {
-        let (sites, noise) = (self.inputs.sites.len(), self.joint_lengths().end);
+        let (sites, noise) = (self.inputs.sites.len(), self.input_lengths().end);
         let mut hyper = Hyperparameters {
             single: vec![0.0; sites],
             joint: vec![0.0; sites],
             constant: vec![0.0; sites],
             single_lengths: vec![1.0; sites],
-            joint_lengths: self.joint_lengths().map(|k| logarithms[k].exp()).collect(),
+            input_lengths: self.input_lengths().map(|k| logarithms[k].exp()).collect(),
             noise: logarithms[noise].exp(),
             shared_noise: if self.shares_noise { logarithms[noise + 1].exp() } else { 0.0 },
         };
@@ -242,7 +242,7 @@ impl<'a> MarginalLikelihood<'a> {
         let (n, width) = (self.rows.len(), self.inputs.angles.len());
         let sites = self.inputs.sites.len();
         let scales = |lengths: &[f64]| lengths.iter().map(|l| l.powi(-2)).collect::<Vec<f64>>();
-        let [single, joint] = [&hyper.single_lengths, &hyper.joint_lengths].map(|l| scales(l));
+        let [single, joint] = [&hyper.single_lengths, &hyper.input_lengths].map(|l| scales(l));
         let mut matrix = DMatrix::zeros(AXES * n, AXES * n);
         let column = |(first, out): (usize, &mut [f64])| {
             let count = n - first;
@@ -317,7 +317,7 @@ impl<'a> MarginalLikelihood<'a> {
         let (n, width) = (self.rows.len(), self.inputs.angles.len());
         let sites = self.inputs.sites.len();
         let mut gradient = DVector::zeros(self.len());
-        let noise = self.joint_lengths().end;
+        let noise = self.input_lengths().end;
         for row in 0..n {
             let ratio = (hyper.noise * self.rows.relative_sigma[row]).powi(2);
             for k in AXES * row..AXES * (row + 1) {
@@ -383,8 +383,8 @@ impl<'a> MarginalLikelihood<'a> {
         for (k, &site) in self.single_lengths().zip(&self.singles) {
             gradient[k] = hyper.single[site].powi(2) * sums[3 * sites + site];
         }
-        for (input, k) in self.joint_lengths().enumerate() {
-            gradient[k] = hyper.joint_lengths[input].powi(-2) * sums[4 * sites + input];
+        for (input, k) in self.input_lengths().enumerate() {
+            gradient[k] = hyper.input_lengths[input].powi(-2) * sums[4 * sites + input];
         }
         gradient
     }

@@ -179,7 +179,7 @@ impl Correction {
             unit: inputs.standard[k].1,
             min: inputs.ranges[k].0,
             max: inputs.ranges[k].1,
-            joint_length: hyper.joint_lengths.get(k).copied().unwrap_or(1.0),
+            joint_length: hyper.input_lengths.get(k).copied().unwrap_or(1.0),
         };
         let parameter = |(k, parameter): (usize, &Linearised)| Parameter {
             name: parameter.name.clone(),
@@ -292,7 +292,7 @@ impl Correction {
             joint: document.sites.iter().map(|site| site.joint_amplitude_m).collect(),
             constant: document.sites.iter().map(|site| site.constant_amplitude_m).collect(),
             single_lengths: document.sites.iter().map(|site| site.single_length).collect(),
-            joint_lengths: document.inputs.iter().map(|input| input.joint_length).collect(),
+            input_lengths: document.inputs.iter().map(|input| input.joint_length).collect(),
             noise: document.noise_m,
             shared_noise: document.configuration_noise_m,
         };

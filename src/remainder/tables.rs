@@ -96,7 +96,7 @@ impl Correction {
             joint,
             constant,
             single_lengths,
-            joint_lengths,
+            input_lengths,
             noise: _,
             shared_noise: _,
         } = &self.posterior.hyper;
@@ -134,7 +134,7 @@ impl Correction {
             },
             is_angle: angles[k],
             standard: standard[k],
-            scale: inverse_square(joint_lengths[k]),
+            scale: inverse_square(input_lengths[k]),
         };
         let rows = |numbers: &[f64], width: usize| {
             numbers.chunks(width.max(1)).map(<[f64]>::to_vec).collect::<Vec<_>>()

@@ -58,7 +58,7 @@ fn hyper() -> Hyperparameters {
         joint: vec![4e-5, 9e-5],
         constant: vec![0.0, 5e-5],
         single_lengths: vec![0.3, 0.5],
-        joint_lengths: vec![1.2, 0.9, 2.0],
+        input_lengths: vec![1.2, 0.9, 2.0],
         noise: 2e-5,
         shared_noise: 1.5e-5,
     }
@@ -138,7 +138,7 @@ fn far_from_all_rows_only_the_parameters_are_corrected() {
     let (rows, inputs, prior) = (rows(), inputs(), prior());
     let hyper = Hyperparameters {
         single_lengths: vec![0.05; 2],
-        joint_lengths: vec![0.05; 3],
+        input_lengths: vec![0.05; 3],
         constant: vec![0.0; 2],
         ..hyper()
     };

@@ -56,8 +56,8 @@ pub fn acceptance_page(problem: &Problem, result: &AcceptanceResult) -> String {
         Table::new(&["held-out poses", "from", "to", "unit"], conditions.collect(), &[0, 3]);
     let commit = result.commit.as_ref().map(|commit| {
         Block::Text(format!(
-            "HEAD of the repository around the problem: {commit}. Only the digests show whether \
-             files differ from it."
+            "Git commit of the folder that holds the problem: {commit}. Files may differ from that \
+             commit; the digests below identify them."
         ))
     });
     let mut blocks = vec![Block::Headline(head)];
@@ -80,8 +80,8 @@ pub fn acceptance_page(problem: &Problem, result: &AcceptanceResult) -> String {
     blocks.extend(commit);
     blocks.extend([
         Block::Table(Table::new(&["input", "SHA-256"], inputs.collect(), &[0, 1])),
-        Block::heading("Accepted"),
-        Block::Blanks(vec!["arm, serial number", "place, date", "measured by", "accepted by"]),
+        Block::heading("Signatures"),
+        Block::Blanks(vec!["arm, serial number", "place, date", "measured by", "signed by"]),
     ]);
     report(problem, "acceptance", &blocks).html
 }

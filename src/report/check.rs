@@ -119,7 +119,7 @@ fn share(expected: &ExpectedParameter) -> String {
 
 /// States in one line why the checked poses do not suffice.
 pub fn why_not_sufficient(check: &Check) -> String {
-    let (forecast, different) = (&check.forecast, check.different);
+    let (forecast, different) = (&check.forecast, check.distinct_poses);
     let (of, parameters) = (forecast.poses, check.without_prior);
     let open = forecast.undetermined.saturating_sub(check.growth.undetermined);
     if open > 0 {
@@ -132,7 +132,7 @@ pub fn why_not_sufficient(check: &Check) -> String {
     format!(
         "{different} of the {of} poses differ and measure {} coordinates, fewer than the {parameters} parameters without \
          a prior: more poses are needed",
-        check.distinct
+        check.distinct_coordinates
     )
 }
 

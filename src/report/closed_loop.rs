@@ -19,7 +19,7 @@ use super::{effect, residual_tests, trace};
 use crate::problem::Problem;
 use crate::quantity::format::{counted, decimals, number};
 use crate::results::{FoundEffect, Gain, LoopResult, PlotData, Summary, TraceResult, nominal_arm};
-use crate::select::ClosedLoop;
+use crate::select::{ClosedLoop, Trace};
 
 /// Maximum number of alternatives that a text names; the page names twice as many.
 const MAX_SHOWN_ALTERNATIVES: usize = 4;
@@ -84,7 +84,7 @@ pub fn loop_brief(
 }
 
 /// Returns a found effect as a list item: value ± 1 σ, probability of its law, and effects that the
-/// data cannot distinguish from it.
+/// data do not exclude in its place.
 fn cause(found: &FoundEffect) -> Point {
     let values = effect::values(&found.effect.effect, &found.parameters);
     // Values of a law that only stands for an unknown one inform nobody.
@@ -94,7 +94,7 @@ fn cause(found: &FoundEffect) -> Point {
     let law = found.claims.as_ref().map(|claims| claims.law.probability);
     let law = law.filter(|_| !is_stand_in);
     facts.extend(law.map(|law| format!("probability of the law {}", percent(law))));
-    let label = if has_place(found) { "not distinguishable from" } else { "candidates" };
+    let label = if has_place(found) { "not excluded" } else { "candidates" };
     let others = match found.alternatives.as_slice() {
         [] => String::new(),
         [first] => format!("; {label}: {}", alternative(first)),
@@ -169,6 +169,7 @@ pub fn loop_text(problem: &Problem, closure: &ClosedLoop) -> String {
     if !failed.is_empty() {
         blocks.push(Block::heading("Residual tests that the declared problem fails"));
         blocks.push(Block::list(failed));
+        blocks.extend(other_chi2_before(closure));
     }
     blocks.extend(found(result, MAX_SHOWN_ALTERNATIVES));
     let failed = residual_tests::failed(&closure.residual_tests);
@@ -176,8 +177,11 @@ pub fn loop_text(problem: &Problem, closure: &ClosedLoop) -> String {
         blocks.push(Block::heading("Remaining residual"));
         let unexplained = unexplained(problem, closure, result).into_iter();
         // Without found effects, the failed tests are already listed above.
+        let has_failed = !failed.is_empty();
         let failed = failed.into_iter().filter(|_| !result.effects.is_empty());
         blocks.push(Block::list(unexplained.chain(failed)));
+        let is_listed = has_failed && !result.effects.is_empty();
+        blocks.extend(other_chi2_after(closure).filter(|_| is_listed));
     }
     text(&blocks)
 }
@@ -243,6 +247,7 @@ fn blocks<'a>(
         Block::heading("Residual of the declared problem"),
     ]);
     blocks.extend(residual_tests::blocks(&closure.before.residual_tests));
+    blocks.extend(other_chi2_before(closure));
     let traced = TraceResult::new(problem, &closure.before);
     let every = format!("{} writes them all", code("flexcal trace"));
     let mut ranking = trace::ranking(problem, &traced, MAX_SHOWN_CANDIDATES, &every);
@@ -266,6 +271,7 @@ fn blocks<'a>(
             figures::joint_map(plots),
         ]),
     ]);
+    blocks.extend(other_chi2_after(closure));
     blocks.extend(super::remainder::uncertainty(after, plots));
     blocks.push(Block::heading("Parameters of the final fit"));
     blocks.extend(parameters(&closure.closed, after, &file));
@@ -382,6 +388,18 @@ fn known_gain(result: &LoopResult) -> Option<Gain> {
     result.gain().filter(is_known)
 }
 
+/// States why the tests of the declared problem's residual have another χ²/ν than its fit.
+fn other_chi2_before(closure: &ClosedLoop) -> Option<Block<'static>> {
+    let Trace { residual_tests: tests, fit, .. } = &closure.before;
+    residual_tests::other_reduced_chi2(tests, fit.reduced_chi2).map(Block::Text)
+}
+
+/// States why the tests of the remaining residual have another χ²/ν than the final fit.
+fn other_chi2_after(closure: &ClosedLoop) -> Option<Block<'static>> {
+    let tests = &closure.residual_tests;
+    residual_tests::other_reduced_chi2(tests, closure.after.reduced_chi2).map(Block::Text)
+}
+
 /// States the gain on the held-out rows with its interval, and the size of the residual.
 fn gain_sentence(closure: &ClosedLoop, result: &LoopResult) -> Option<String> {
     let after = &closure.after;
@@ -422,19 +440,14 @@ fn remaining_structure(closure: &ClosedLoop, result: &LoopResult) -> Option<Stri
         .then(|| format!("What remains: {}; -v lists it, report.html shows it.", parts.join(", ")))
 }
 
-/// States the gain and explains how to read the figures.
+/// States the gain, and names the arms that have poses without an equilibrium.
 fn gain(closure: &ClosedLoop, result: &LoopResult) -> Block<'static> {
     let (before, after) = (&closure.before, &closure.after);
-    let another =
-        residual_tests::other_reduced_chi2(&before.residual_tests, before.fit.reduced_chi2)
-            .or_else(|| {
-                residual_tests::other_reduced_chi2(&closure.residual_tests, after.reduced_chi2)
-            });
     let mut arms = vec![
         ("the nominal arm", &before.fit.registered),
         ("the arm as declared, fitted", &before.fit.fitted),
     ];
     arms.extend((!result.effects.is_empty()).then_some(("what was found", &after.fitted)));
-    let words = [gain_sentence(closure, result), another, unpredicted(&arms)];
+    let words = [gain_sentence(closure, result), unpredicted(&arms)];
     Block::Text(words.into_iter().flatten().collect::<Vec<_>>().join(" "))
 }

@@ -9,6 +9,7 @@ use super::figures::{ACCENT, Drawing, Forest};
 use super::render::{page, text};
 use crate::fit::SavedEstimate;
 use crate::numeric::{Interval, mean_interval};
+use crate::quantity::Unit;
 use crate::quantity::format::{counted, decimals, number, or_dash};
 
 /// Probability that any parameter of two estimates of an unchanged arm is said to differ.
@@ -85,12 +86,19 @@ fn blocks<'a>(sides: &[Side; 2]) -> Vec<Block<'a>> {
     blocks.push(Block::Words(vec![Block::Table(table(listed))]));
     if listed.len() < differences.len() {
         let more = differences.len() - listed.len();
-        let words = format!("{more} parameters with smaller differences are on the page.");
+        let words = format!(
+            "compare-results.html lists {} with smaller differences.",
+            counted(more, "more parameter")
+        );
         blocks.push(Block::Words(vec![Block::Text(words)]));
     }
     blocks.push(Block::Page(vec![Block::Table(table(&differences))]));
     blocks
 }
+
+/// Units that are shown with the prefix that suits the value.
+const STIFFNESSES: [Unit; 3] =
+    [Unit::TorsionalStiffness, Unit::AxialRigidity, Unit::FlexuralRigidity];
 
 /// Returns the parameters that both estimates have, the largest difference first.
 fn differences([a, b]: &[Side; 2]) -> Vec<Difference> {
@@ -103,6 +111,12 @@ fn differences([a, b]: &[Side; 2]) -> Vec<Difference> {
             "m" => (1e3, "mm"),
             symbol => (1.0, symbol),
         };
+        let magnitude = value.abs().max(others[place].1.abs());
+        let prefixed = STIFFNESSES.into_iter().find(|unit| unit.symbol() == symbol);
+        let (factor, symbol) = prefixed.map_or((factor, symbol.to_owned()), |unit| {
+            let display = unit.display(magnitude);
+            (display.factor, display.symbol)
+        });
         let values = [value, others[place].1].map(|value| value * factor);
         let sigma = (variance(a, k) + variance(b, place)).sqrt() * factor;
         let sigma = Some(sigma).filter(|sigma| sigma.is_finite());
@@ -194,7 +208,12 @@ fn paired(sides: &[Side; 2]) -> Option<String> {
 fn notes([a, b]: [&SavedEstimate; 2]) -> Vec<String> {
     let mut notes = Vec::new();
     if let Some(part) = a.differing_part(b) {
-        notes.push(format!("The arms are declared differently: {part}."));
+        let name = part.name;
+        notes.push(match part.is_declared {
+            [true, false] => format!("Only A declares {name}."),
+            [false, true] => format!("Only B declares {name}."),
+            _ => format!("The arms are declared differently: {name}."),
+        });
     }
     let shared = a.posterior().fitted_rows.intersection(&b.posterior().fitted_rows).count();
     if shared > 0 {

@@ -91,7 +91,7 @@ fn counted_rows(found: &Identification, of: &ErrorSummary, adjective: &str) -> S
     let (one, many) = match kind_named(of.kind).row {
         words if words.0 != "pose" => words,
         _ if !found.kinds.is_empty() => ("position", "positions"),
-        _ if found.several_targets && adjective.is_empty() => ("point", "points"),
+        _ if found.several_targets => ("point", "points"),
         _ => ("pose", "poses"),
     };
     format!("{} {adjective}{}", of.n, if of.n == 1 { one } else { many })

@@ -317,7 +317,11 @@ pub(super) fn mean(of: &ErrorSummary) -> String {
 pub(super) fn poses(found: &Identification) -> (&'static str, String) {
     let (fitted, held_out) =
         (rows_in(found, |errors| errors.identification), rows_in(found, |errors| errors.held_out));
-    let what = if found.fitted.identification.kind == "position" { "Poses" } else { "Rows" };
+    let what = match found.fitted.identification.kind {
+        "position" if found.several_targets && found.kinds.is_empty() => "Points",
+        "position" => "Poses",
+        _ => "Rows",
+    };
     let held_out = if found.fitted.is_left_out { "none".to_owned() } else { held_out.to_string() };
     (what, format!("{fitted} fitted, {held_out} held out"))
 }

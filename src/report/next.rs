@@ -181,13 +181,15 @@ fn steps(options: &NextOptions, next: &NextPoses, percent: &str) -> Table {
     });
     let header = ["pose", "travel", "gain", "rms, mm", "bound, mm"];
     let goal = match options.purpose {
-        Purpose::Accuracy => "mean variance of predictions",
+        Purpose::Accuracy => {
+            "mean variance of predictions that parameters and assumed misfit cause"
+        }
         Purpose::Causes => "mean variance of the effects",
         Purpose::Both => "sum of the variances of predictions and effects",
     };
     let note = format!(
         "travel: largest move of a joint from the pose before, share of its range; gain: by how much the pose lowers the {goal}, in % of the present one; rms, bound ({percent} %): \
-         expected in the workspace after the pose"
+         expected error in the workspace after the pose, with noise and the misfit that no pose lowers"
     );
     Table::new(&header, rows.collect(), &[]).noted(&[&note])
 }

@@ -67,14 +67,19 @@ pub(super) fn table_3(comparison: &Comparison, procedure: &Procedure) -> Table {
         (ErrorSummary::of(&procedure.after), procedure.ignoring.as_deref().map(ErrorSummary::of));
     let elastic = ignoring.is_some();
     let mut header = vec!["held out, mm", "axis", "before"];
-    header.extend(if elastic { ["with elasticity", "− %"] } else { ["identified", "− %"] });
-    header.extend(elastic.then_some(["ignoring it", "− %"]).into_iter().flatten());
+    header.extend(if elastic {
+        ["with elasticity", "reduction, %"]
+    } else {
+        ["identified", "reduction, %"]
+    });
+    header.extend(elastic.then_some(["ignoring it", "reduction, %"]).into_iter().flatten());
     let beside = comparison.is_papers_arm && elastic;
-    let published = ["paper: before", "with elasticity", "− %", "ignoring it", "− %"];
+    let published =
+        ["paper: before", "with elasticity", "reduction, %", "ignoring it", "reduction, %"];
     header.extend(beside.then_some(published).into_iter().flatten());
     let mut rows = Vec::new();
     for (kind, of, printed) in KINDS {
-        for (axis, name) in ["x", "y", "z", "sum"].into_iter().enumerate() {
+        for (axis, name) in ["x", "y", "z", "norm"].into_iter().enumerate() {
             let value = |summary: &ErrorSummary| on(of(summary), axis) * 1e3;
             let mut row =
                 vec![if axis == 0 { kind.to_owned() } else { String::new() }, name.to_owned()];

@@ -193,7 +193,8 @@ pub(super) fn unidentifiable<'a>(
     let is = if unidentifiable.len() == 1 { "is" } else { "are" };
     let words = format!(
         "{} of {} combinations of parameters {is} not identifiable at the nominal arm. Changed together, these\n\
-         parameters move no predicted position (numbers: shares of the displacement that each change alone would cause):",
+         parameters move no predicted position (numbers: in proportion to the displacement that each change alone\n\
+         would cause; their squares add up to 1):",
         unidentifiable.len(),
         unknowns.len()
     );
@@ -280,6 +281,9 @@ pub(super) fn correlations<'a>(found: &Identification, file: &str) -> Block<'a> 
     });
     let points = first_of(pairs, MAX_LISTED, file);
     let words = match points.as_slice() {
+        [] if found.identifiability().unidentifiable.is_empty() => {
+            "No two parameters are correlated by more than 0.9."
+        }
         [] => "No two other parameters are correlated by more than 0.9.",
         _ => {
             "Correlated by more than 0.9 (the data determine their sum or difference better than each):"

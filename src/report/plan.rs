@@ -97,7 +97,7 @@ fn blocks<'a>(
         "{}{besides}, from {}; criterion {}, best of {}",
         counted(poses, "pose"),
         counted(plan.candidates, "candidate"),
-        criterion.as_str(),
+        criterion_words(criterion),
         counted(plan.starts.len(), "start"),
     );
     let mut blocks = opening(&problem.title, counts).to_vec();
@@ -120,6 +120,21 @@ fn blocks<'a>(
         Block::Table(commands(problem, &plan.poses)),
     ]));
     blocks
+}
+
+/// Returns the letter of a criterion with the quantity that it minimises.
+fn criterion_words(criterion: &Criterion) -> &'static str {
+    match criterion {
+        Criterion::D => "D (volume of the confidence ellipsoid)",
+        Criterion::S => "S (geometric mean of the standard errors)",
+        Criterion::A => "A (mean relative variance)",
+        Criterion::E => "E (largest relative variance of a combination)",
+        Criterion::I => "I (mean variance of predictions)",
+        Criterion::Each(_) => {
+            "S (geometric mean of the standard errors) of the parameters of both effects"
+        }
+        Criterion::Subset(_) => "D of chosen parameters",
+    }
 }
 
 /// States how many poses command a joint to its limit, where controllers may refuse them; `None` if

@@ -54,7 +54,7 @@ pub(super) fn uncertainty<'a>(found: &Identification, plots: &'a PlotData) -> Ve
         remainder_text(found, outcome)
     } else {
         format!(
-            "Predictions are not corrected. {} fits a remainder if at least 20 configurations are \
+            "Predictions are not corrected. {} fits a remainder (a smooth correction of each joint) if at least 20 configurations are \
              measured, and keeps it if it predicts left-out configurations better.",
             code("flexcal identify --remainder")
         )
@@ -137,12 +137,17 @@ pub(super) fn bounded(bounds: &Bounds, residuals: Option<&[Residual]>) -> String
                   nothing";
     } else if let Some(residuals) = residuals {
         let share = bounds.coverage(residuals.iter().map(|pose| pose.position.norm()));
-        let _ = write!(words, "; {} % of these rows lie within theirs", number(share * 100.0, 1));
+        let _ =
+            write!(words, "; {} % of these rows lie within their bounds", number(share * 100.0, 1));
     }
     let beyond = bounds.poses.iter().filter(|pose| pose.is_extrapolated).count();
     if beyond > 0 {
         let poses = counted(beyond, "pose");
-        let _ = write!(words, "; {poses} outside of what was measured, with wider bounds");
+        let lie = if beyond == 1 { "lies" } else { "lie" };
+        let _ = write!(
+            words,
+            "; {poses} {lie} outside the range of the fitted poses, with wider bounds"
+        );
     }
     words
 }

@@ -40,12 +40,12 @@ pub(super) fn verdict(result: &LoopResult, takes_less: bool) -> String {
     end + first + &outcome(result, takes_less)
 }
 
-/// States how many effects were found, and how many causes are probable.
+/// States how many effects were found, and how many other causes are not sure.
 pub(super) fn counts(result: &LoopResult) -> String {
     let found = result.with_status(Status::Found).count();
     match causes(result).filter(|cause| cause.is_doubted()).count() {
         0 => found.to_string(),
-        doubted => format!("{found}, and {doubted} probable"),
+        doubted => format!("{found}; {doubted} not sure"),
     }
 }
 
@@ -142,7 +142,9 @@ fn found(result: &LoopResult) -> String {
         [] => String::new(),
         [cause] => {
             let rival = cause.alternatives.first();
-            let link = if has_place(cause) { "or else" } else { "one candidate:" };
+            // Without a place and a candidate law, the effects in doubt are examples of what may act.
+            let is_unknown = !has_place(cause) && stand_in(cause).is_some();
+            let link = if is_unknown { "for example" } else { "or else" };
             let or_else = rival
                 .map_or_else(String::new, |rival| format!(", {link} {}", rival.effect.description));
             format!("; {}{or_else}", claim(cause, &cause.effect.description))
@@ -185,10 +187,13 @@ pub(super) fn alternative(other: &AlternativeEffect) -> String {
     format!("{} ({})", other.effect.description, percent(other.probability))
 }
 
-/// Returns the title of a cause: its status, what may be claimed about it, and the line that
-/// declares it.
+/// Returns the title of a cause: its status unless it is found, what may be claimed about it, and
+/// the line that declares it.
 pub(super) fn title(found: &FoundEffect) -> String {
-    claim(found, &declared(&found.effect))
+    match found.status {
+        Status::Found => declared(&found.effect),
+        _ => claim(found, &declared(&found.effect)),
+    }
 }
 
 /// States the status of an effect and what may be claimed about it; `words` describe the effect.

@@ -32,7 +32,7 @@ fn blocks<'a>(problem: &Problem, watch: &Watch, drawn: Option<Drawing>) -> Vec<B
     let in_unit = |error: f64| format!("{} {}", two_digits(error * unit.factor, 4), unit.symbol);
     let (chi2, coordinates, p) = watch.chi2;
     let mut head = format!(
-        "{} against the estimate; probability of a false alarm at any look: at most {} %\n\n{}",
+        "{} against the estimate; probability of any false alarm over all rows: at most {} %\n\n{}",
         counted(watch.rows, "row"),
         two_digits(100.0 * watch.false_alarm_rate, 3),
         verdict(watch)
@@ -53,7 +53,8 @@ fn blocks<'a>(problem: &Problem, watch: &Watch, drawn: Option<Drawing>) -> Vec<B
     }
     let mut blocks = opening(&problem.title, head).to_vec();
     blocks.push(Block::Page(vec![Block::Text(format!(
-        "σ of a coordinate, known misfit included: {}; χ² {} of {coordinates:.0}, p {}.",
+        "σ of a coordinate, known misfit included: {}; χ² {} of {coordinates:.0}, p {}. The covariance also contains the uncertainty of \
+         the estimate and, if the rows state temperatures, effects of temperature as large as the misfit, so a small χ² is usual.",
         in_unit(watch.sigma),
         number(chi2, 1),
         p_value(p)
@@ -81,8 +82,8 @@ fn control_chart(watch: &Watch, rows: &Measurements) -> Option<Drawing> {
         names: ("watch-evidence", "Evidence for a change after each row"),
         caption: format!(
             "Common logarithm of the evidence for a change: how many times as probable the rows are with a change as without one. \
-             An arm that has not changed reaches the orange line at any row with a probability of at most {} %. Vertical lines: \
-             the first row of each session or file.",
+             The curve of an arm that has not changed ever reaches the orange line with a probability of at most {} %. Vertical \
+             lines: the first row of each session or file.",
             two_digits(100.0 * watch.false_alarm_rate, 3)
         ),
         labels: ("row", "log₁₀ of the evidence"),

@@ -138,7 +138,7 @@ impl ResidualTest {
 
     /// Returns true if a failure of the test indicates structure that an effect could explain.
     /// Outlier and normality tests are no tests of structure.
-    pub fn is_structure(&self) -> bool {
+    pub fn tests_structure(&self) -> bool {
         !matches!(self.test, Test::Outliers { .. } | Test::Normality)
     }
 
@@ -168,14 +168,14 @@ impl ResidualTests {
         let p_value = |test: &ResidualTest| {
             test.outcome.as_ref().map_or(f64::INFINITY, |outcome| outcome.p_value)
         };
-        let failed = self.tests.iter().filter(|test| test.is_structure() && test.failed());
+        let failed = self.tests.iter().filter(|test| test.tests_structure() && test.failed());
         failed.min_by(|a, b| p_value(a).total_cmp(&p_value(b)))
     }
 
     /// Returns the ratio of the residual to the declared σ if the size of the residual is the only
     /// significant finding; `None` otherwise.
     pub fn size_alone(&self) -> Option<f64> {
-        let mut failed = self.tests.iter().filter(|test| test.is_structure() && test.failed());
+        let mut failed = self.tests.iter().filter(|test| test.tests_structure() && test.failed());
         let (Some(only), None) = (failed.next(), failed.next()) else { return None };
         match (&only.test, &only.outcome) {
             (Test::ReducedChiSquared, Ok(outcome)) if outcome.statistic > 1.0 => {
@@ -197,7 +197,7 @@ impl ResidualTests {
 
     /// Returns true if at least one test of structure could be made.
     pub fn is_testable(&self) -> bool {
-        self.tests.iter().any(|test| test.is_structure() && test.outcome.is_ok())
+        self.tests.iter().any(|test| test.tests_structure() && test.outcome.is_ok())
     }
 }
 
@@ -221,7 +221,7 @@ fn tested(
         Test::ReducedChiSquared => {
             let size = match (failed, statistic < from) {
                 (true, _) => "residuals are larger than σ explains",
-                (false, true) => "residuals are smaller than σ, which is overstated",
+                (false, true) => "residuals are not larger than σ; σ is overstated",
                 (false, false) => "residuals are as large as σ",
             };
             write!(

@@ -131,7 +131,7 @@ impl CompensationResult {
             reached: reached.len(),
             mean_miss_before_mm: mean(|command| Some(command.seed_miss), mm),
             mean_miss_mm: mean(|command| Some(command.miss.norm()), mm),
-            mean_turn_before_deg: mean(|command| command.seed_turn, f64::to_degrees),
+            mean_turn_before_deg: mean(|command| command.seed_orientation_error, f64::to_degrees),
             mean_turn_deg: mean(|command| Some(command.turn?.norm()), f64::to_degrees),
             unreached: missed.iter().map(|command| command.row + 1).collect(),
             bounds: None,

@@ -35,7 +35,7 @@ impl ResidualTest {
             Self {
                 check: test.name(),
                 about: test.about().map(about),
-                structure: test.is_structure(),
+                structure: test.tests_structure(),
                 failed: test.failed(),
                 statistic: outcome.map(|outcome| outcome.statistic),
                 bounds: outcome.map(|outcome| outcome.bounds),

@@ -16,7 +16,7 @@ pub struct WatchResult {
     /// True if the fit of the estimate was trusted.
     pub estimate_trusted: bool,
     pub changed: bool,
-    /// Probability of an alarm at any look if nothing has changed.
+    /// Largest probability of any alarm over all rows if nothing has changed.
     pub false_alarm_rate: f64,
     /// Days of drift that "unchanged" allows for.
     pub drift_days: f64,

@@ -31,9 +31,10 @@ const MIN_TWICE_LN_ODDS: f64 = 9.21;
 /// Outcome of a reference check.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ReferenceVerdict {
-    /// The readings show the motion that the effect describes.
+    /// The readings are at least 100 times as probable with the motion that the effect describes as
+    /// without it.
     Corroborated,
-    /// The readings do not show that motion.
+    /// The readings are at least 100 times as probable without that motion as with it.
     Contradicted,
 }
 

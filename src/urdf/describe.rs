@@ -11,7 +11,7 @@ use super::free::distinguishable_parameters;
 use super::lines::Step;
 use super::notes;
 use super::read::Kind;
-use super::weights::weights;
+use super::weights::carried_masses;
 use crate::error::InputError;
 use crate::problem::Problem;
 use crate::problem::quoted;
@@ -183,12 +183,12 @@ fn rows(chain: &Chain, notes: &mut Vec<String>) -> Vec<Row> {
             frame
         })
         .collect();
-    let (weights, beside) = weights(chain);
-    for weight in weights {
-        let place = weight.stage + lead;
+    let (masses, beside) = carried_masses(chain);
+    for link in masses {
+        let place = link.stage + lead;
         if let (Some(row), Some(frame)) = (rows.get_mut(place), frames.get(place)) {
-            let at = frame.resolve(&(weight.at - frame.origin));
-            row.bodies.push((weight.name, weight.mass, at));
+            let at = frame.resolve(&(link.at - frame.origin));
+            row.bodies.push((link.name, link.mass, at));
         }
     }
     if !beside.is_empty() {

@@ -92,25 +92,34 @@ fn unlimited_slide(joint: &Joint) -> Option<String> {
 
 /// Returns a note if angles were read as multiples of 45° from their rounded decimals.
 fn right_angles(origins: &[&Joint]) -> Option<String> {
-    let mut values: Vec<String> = Vec::new();
+    let (mut values, mut degrees): (Vec<String>, Vec<String>) = Default::default();
     let mut joints = Vec::new();
     for joint in origins {
         let pairs = joint.origin.written.iter().zip(joint.origin.meant.iter());
-        let rounded: Vec<f64> = pairs
+        let rounded: Vec<(f64, f64)> = pairs
             .filter(|(written, meant)| written.to_bits() != meant.to_bits())
-            .map(|(written, _)| written.abs())
+            .map(|(written, meant)| (written.abs(), meant.abs()))
             .collect();
         if !rounded.is_empty() {
             joints.push(joint.name.as_str());
         }
-        for value in rounded.into_iter().map(|value| value.to_string()) {
+        for (written, meant) in rounded {
+            let value = written.to_string();
             if !values.contains(&value) {
                 values.push(value);
+                degrees.push(format!("{}°", meant.to_degrees().round()));
             }
         }
     }
     (!values.is_empty()).then(|| {
-        let (values, joints) = (values.join(", "), joints.join(", "));
-        format!("{values} [rad] taken as the multiple of 45° that was rounded, at {joints}; more decimals are taken as they are")
+        let [verb, subject] = if values.len() == 1 {
+            ["is", "it is a rounded value"]
+        } else {
+            ["are", "they are rounded values"]
+        };
+        let (values, joints, degrees) = (values.join(", "), joints.join(", "), degrees.join(", "));
+        format!(
+            "{values} rad at {joints} {verb} read as exactly {degrees}, of which {subject}; values with more decimals are used as written"
+        )
     })
 }

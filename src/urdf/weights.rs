@@ -7,8 +7,8 @@ use super::read::Kind;
 use crate::spatial::Frame;
 
 /// Mass of a link in the chain or attached to it, with the stage that carries it.
-pub(super) struct Weight {
-    /// Index of the stage after which the link follows.
+pub(super) struct CarriedMass {
+    /// Index of the stage that carries the link.
     pub stage: usize,
     pub name: String,
     /// Mass of the link \[kg\].
@@ -19,16 +19,16 @@ pub(super) struct Weight {
 
 /// Returns all links with a mass after the chain's first moving joint, and the names of the moving
 /// joints that branch off after it.
-pub(super) fn weights(chain: &Chain) -> (Vec<Weight>, Vec<String>) {
+pub(super) fn carried_masses(chain: &Chain) -> (Vec<CarriedMass>, Vec<String>) {
     let robot = chain.robot;
-    let (mut weights, mut beside) = (Vec::new(), Vec::new());
+    let (mut masses, mut beside) = (Vec::new(), Vec::new());
     // Each entry is a link with its frame and carrying stage, from the base outwards.
     let mut open = vec![(chain.base, Frame::identity(), None)];
     while let Some((link, frame, carrier)) = open.pop() {
         if let (Some(stage), Some(body)) = (carrier, robot.links.get(link))
             && body.mass > 0.0
         {
-            weights.push(Weight {
+            masses.push(CarriedMass {
                 stage,
                 name: body.name.clone(),
                 mass: body.mass,
@@ -50,6 +50,6 @@ pub(super) fn weights(chain: &Chain) -> (Vec<Weight>, Vec<String>) {
             open.push((joint.child, next, stage.or(carrier)));
         }
     }
-    weights.sort_by_key(|weight| weight.stage);
-    (weights, beside)
+    masses.sort_by_key(|link| link.stage);
+    (masses, beside)
 }

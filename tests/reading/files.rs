@@ -367,7 +367,7 @@ fn an_acceptance_is_of_the_files_that_were_read() {
     let digest = record["inputs"][0]["sha256"].as_str().unwrap();
     assert_contains(
         &bench.read("signed/acceptance.html"),
-        &["measured by", "accepted by", "Instrument: tracker", "SHA-256", digest],
+        &["measured by", "signed by", "Instrument: tracker", "SHA-256", digest],
     );
     // A repository around the problem is identified by its commit.
     bench.write(".git/HEAD", "ref: refs/heads/main\n");

@@ -73,6 +73,7 @@ fn claim(found: &FoundEffect) -> String {
         (Status::Located, None) => {
             "located: only together with the others, not significant by itself".to_owned()
         }
+        (Status::Found, _) => words,
         (status, _) => format!("{}: {words}", status.as_str()),
     }
 }

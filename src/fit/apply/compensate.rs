@@ -48,7 +48,7 @@ pub struct Command {
     pub turn: Option<Vector3<f64>>,
     /// Angle to the desired orientation if the seed were commanded \[rad\]; `None` if none is
     /// desired.
-    pub seed_turn: Option<f64>,
+    pub seed_orientation_error: Option<f64>,
 }
 
 impl Command {
@@ -231,8 +231,16 @@ pub fn compensate(
             configuration = damped_search(problem, (&arm, &led), &serving, pose)?;
         }
         let ((miss, turn), (before, turn_before)) = (at(&configuration), at(seed));
-        let (seed_miss, seed_turn) = (before.norm(), turn_before.map(|turn| turn.norm()));
-        commands.push(Command { row, configuration, miss, seed_miss, turn, seed_turn });
+        let (seed_miss, seed_orientation_error) =
+            (before.norm(), turn_before.map(|turn| turn.norm()));
+        commands.push(Command {
+            row,
+            configuration,
+            miss,
+            seed_miss,
+            turn,
+            seed_orientation_error,
+        });
     }
     Ok(commands)
 }

@@ -376,14 +376,20 @@ impl SavedEstimate {
         &self.arm_parts
     }
 
-    /// Returns the name of the first part of the declared arm in which two estimates differ; `None`
+    /// Returns the first part of the declared arm in which two estimates differ; `None`
     /// if both are of the same declared arm.
-    pub(crate) fn differing_part(&self, other: &Self) -> Option<String> {
+    pub(crate) fn differing_part(&self, other: &Self) -> Option<DifferingPart> {
         let (parts, others) = (&self.arm_parts, &other.arm_parts);
         let differs = |name: &&String| parts.get(*name) != others.get(*name);
-        let part = parts.keys().chain(others.keys()).find(differs).map(|part| shown_part(part));
+        let part = parts.keys().chain(others.keys()).find(differs).map(|part| DifferingPart {
+            name: shown_part(part),
+            is_declared: [parts, others].map(|of| of.is_empty() || of.contains_key(part)),
+        });
         part.or_else(|| {
-            (self.arm_digest != other.arm_digest).then(|| "the declared arm".to_owned())
+            (self.arm_digest != other.arm_digest).then(|| DifferingPart {
+                name: "the declared arm".to_owned(),
+                is_declared: [true; 2],
+            })
         })
     }
 
@@ -451,6 +457,14 @@ fn is_other_placement(name: &str, model: &Model) -> bool {
             || model.parameters.iter().any(|parameter| parameter.name.starts_with(&bracketed));
         name.starts_with(&bracketed) || name.starts_with(&single) && has_names()
     })
+}
+
+/// Part of the declared arm in which two estimates differ.
+pub(crate) struct DifferingPart {
+    /// Name of the part for display.
+    pub name: String,
+    /// True for each of the two estimates whose arm declares the part.
+    pub is_declared: [bool; 2],
 }
 
 /// Returns the name of a part of an arm for display. The names of effects are their declarations

@@ -8,14 +8,15 @@ use super::nominal_error::is_nominal_far_off;
 use super::parameter_limits::WithinPriors;
 use super::row_kind::size;
 
-/// Largest residual, as a multiple of the declared σ, for which misreadings of the table are not
+/// Largest rms residual, as a multiple of the declared σ, for which misreadings of the table are not
 /// searched.
 const MIN_SIGMAS: f64 = 10.0;
-/// Smallest residual, relative to the spread of the points, for which misreadings are searched if
-/// no σ is declared.
+/// Largest rms residual, relative to the spread of the points, for which misreadings are not
+/// searched if no σ is declared.
 const MIN_PART: f64 = 0.01;
 
-/// Largest error that counts as noise, as a multiple of the declared σ. Real arms leave several σ.
+/// Largest rms residual of a fit with a misreading undone that counts as noise, as a multiple of
+/// the declared σ. Residuals of real arms reach several σ.
 pub(super) const MAX_NOISE_SIGMAS: f64 = 5.0;
 
 /// Maximum number of explanations that a text names.

@@ -52,8 +52,9 @@ pub(in crate::fit) fn payload_finding(
     })
 }
 
-/// Returns the sum of squared residuals and deviations from the priors, in units of the σ taken by
-/// a fit with this noise factor. `None` unless every identification row measures a position.
+/// Returns χ² of the residuals for the declared variance times this noise factor, plus the squared
+/// deviations from the priors in units of the prior σ. Returns `None` unless every identification
+/// row measures a position.
 fn deviance(
     problem: &Problem,
     data: &Dataset,

@@ -50,7 +50,7 @@ pub(crate) fn locate(
         let base = poses.iter().find(|pose| pose.observation.fixture() == Some(fixture));
         let base = base.map_or(Vector3::zeros(), |pose| bases[pose.base].origin);
         let Some(mut found) = fixture_of_contacts(kind, &contacts, &base) else { continue };
-        if kind == FixtureKind::Plane && model.is_declared(fixture, 0) {
+        if kind == FixtureKind::Plane && model.declares_fixture_coordinate(fixture, 0) {
             // The normal is declared, so that only the distance is free.
             let [rx, ry, ..] = model.fixtures(x.as_slice())[fixture].numbers;
             found[2] = plane_distance(&contacts, &plane_normal(rx, ry));
@@ -71,7 +71,7 @@ fn free_numbers(
         ParameterSite::Fixture { fixture, kind, axis }
             if parameter.sigma.is_none()
                 && !parameter.is_bounded()
-                && !model.is_declared(fixture, axis)
+                && !model.declares_fixture_coordinate(fixture, axis)
                 && chosen(k) =>
         {
             Some((fixture, kind, axis, k))

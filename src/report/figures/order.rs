@@ -12,12 +12,12 @@ const MIN_MINUTES_SPAN: f64 = 180.0;
 /// Draws the residual coordinates of positions in order of time, with a band of ±2 σ.
 pub fn order(data: &PlotData) -> Option<Drawing> {
     let is_fitted = |row: &usize| data.is_position(*row) && !data.residuals[*row].held_out;
-    let is_finite = |row: &usize| data.size(*row).is_finite();
+    let is_finite = |row: &usize| data.residual_length(*row).is_finite();
     let fitted: Vec<usize> = (0..data.residuals.len()).filter(is_fitted).collect();
     let finite = fitted.iter().filter(|row| is_finite(row)).count();
     let candidates: Vec<usize> =
         data.shown.iter().copied().filter(|row| is_fitted(row) && is_finite(row)).collect();
-    let rows = sample(&candidates, MAX_POSES, |row| data.size(row));
+    let rows = sample(&candidates, MAX_POSES, |row| data.residual_length(row));
     let shown: Vec<&PoseError> = rows.iter().map(|&row| &data.residuals[row]).collect();
     if shown.len() < 2 {
         return None;

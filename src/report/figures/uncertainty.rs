@@ -64,7 +64,7 @@ pub fn bounds_over_workspace(data: &PlotData) -> Option<Drawing> {
     let caption = format!(
         "Mean bound of measured − predicted that holds with a probability of {level} %, over the \
          workspace in the frame of the arm's base: pale {} mm, deep {} mm or more. Of {} random \
-         configurations, each joint within its measured values, {beyond} are far from all measured \
+         configurations within the measured range of each joint, {beyond} are far from all measured \
          poses; a ring marks cells where most are.",
         two_digits(least * 1e3, 4),
         two_digits(most * 1e3, 4),

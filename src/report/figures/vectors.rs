@@ -17,10 +17,10 @@ pub fn vectors(data: &PlotData) -> Option<Drawing> {
         return None;
     }
     let positions = || (0..data.residuals.len()).filter(|&row| data.is_position(row));
-    let is_finite = |row: &usize| data.is_position(*row) && data.size(*row).is_finite();
+    let is_finite = |row: &usize| data.is_position(*row) && data.residual_length(*row).is_finite();
     let count = positions().filter(is_finite).count();
     let finite: Vec<usize> = data.shown.iter().copied().filter(is_finite).collect();
-    let rows = sample(&finite, MAX_POSES, |row| data.size(row));
+    let rows = sample(&finite, MAX_POSES, |row| data.residual_length(row));
     let shown: Vec<&PoseError> = rows.iter().map(|&row| &data.residuals[row]).collect();
     let extent =
         |axis: usize| with_margin(range(shown.iter().map(|pose| pose.position[axis])), 0.12);

@@ -24,9 +24,9 @@ const MANY_COLUMNS: usize = 9;
 const SCRIPTS: [&str; 2] = [include_str!("page.js"), include_str!("view.js")];
 
 /// Sentences at the end of a report that explain its errors.
-const ERRORS: &str = " Errors are distances between measured and predicted positions. Before: the nominal arm, with base and tool \
-                      fitted if they are free, unless stated otherwise. Held-out poses influence nothing: no parameter is fitted to \
-                      them and no effect chosen by them.";
+const ERRORS: &str = " Errors are distances between measured and predicted positions. Before: the nominal arm; its free base and \
+                      tool parameters are fitted first. A note under a table names any other arm. Held-out poses influence nothing: \
+                      no parameter is fitted to them and no effect chosen by them.";
 
 /// Report in two formats, with its figures.
 #[derive(Debug, Clone, PartialEq, Eq)]

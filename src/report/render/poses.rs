@@ -93,8 +93,8 @@ fn view(data: &PlotData) -> Markup {
             p.under { output {} }
         }
         @if coverage.tried > 0 {
-            p { (number(share, 0)) " % of " (coverage.tried) " end-point positions, of configurations spread evenly over the joint limits (or measured \
-                ranges, if no limit is declared), lie within " (mm(coverage.near, 0)) " mm of a fitted pose (a tenth of the diagonal of all positions)." }
+            p { "Joint limits (measured ranges of joints without declared limits): " (number(share, 0)) " % of the end-point positions of "
+                (coverage.tried) " configurations spread evenly over them lie within " (mm(coverage.near, 0)) " mm of a fitted pose (a tenth of the diagonal of all positions)." }
         }
     }
 }
@@ -119,8 +119,8 @@ fn ranges(data: &PlotData) -> Markup {
 /// Renders the table of the largest residuals.
 fn largest(data: &PlotData) -> Markup {
     let mut rows: Vec<usize> =
-        data.shown.iter().copied().filter(|&row| data.size(row).is_finite()).collect();
-    rows.sort_by(|&a, &b| data.size(b).total_cmp(&data.size(a)));
+        data.shown.iter().copied().filter(|&row| data.residual_length(row).is_finite()).collect();
+    rows.sort_by(|&a, &b| data.residual_length(b).total_cmp(&data.residual_length(a)));
     rows.truncate(LISTED_POSES);
     html! {
         @let all_positions = data.residuals.iter().all(|residual| residual.observation.is_position());

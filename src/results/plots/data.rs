@@ -302,7 +302,7 @@ impl PlotData {
     }
 
     /// Returns the length of the residual of the best arm in a row \[m\].
-    pub(crate) fn size(&self, row: usize) -> f64 {
+    pub(crate) fn residual_length(&self, row: usize) -> f64 {
         self.residuals[row].error.norm()
     }
 }

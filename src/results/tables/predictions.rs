@@ -153,7 +153,7 @@ pub fn commands_csv(
     add("miss_before_mm", &|command| fixed(command.seed_miss * 1e3, 4));
     if turned {
         add("turn_deg", &|command| degrees(command.turn.map(|turn| turn.norm())));
-        add("turn_before_deg", &|command| degrees(command.seed_turn));
+        add("turn_before_deg", &|command| degrees(command.seed_orientation_error));
     }
     add("reached", &|command| command.is_reached().to_string());
     for (name, column) in bounds.into_iter().flat_map(uncertainty) {

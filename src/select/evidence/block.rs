@@ -125,7 +125,7 @@ pub(super) struct Block {
     /// True if the hypothesis is a function of several covariates.
     pub is_surface: bool,
     /// True if the hypothesis is a periodic error with many orders under one prior.
-    pub is_gear: bool,
+    pub is_periodic_of_many_orders: bool,
     /// Name of the family of the hypothesis' effect; `None` for a function without a law.
     pub family: Option<String>,
     /// Joint, from 0, whose command error the effect describes; `None` for other hypotheses.
@@ -192,7 +192,7 @@ impl Block {
                 ln_prior,
                 coefficients,
                 is_surface: false,
-                is_gear: false,
+                is_periodic_of_many_orders: false,
                 family: None,
                 joint: None,
                 is_whole_law: false,
@@ -216,7 +216,7 @@ impl Block {
     /// Returns true if a set with this block is not extended: it is a periodic error, or has more
     /// than `MAX_WIDE_COLUMNS` columns that belong to single poses.
     pub fn is_wide(&self) -> bool {
-        self.is_gear
+        self.is_periodic_of_many_orders
             || matches!(&self.columns, Columns::Grouped { levers, groups } if levers.ncols() * count(groups) > MAX_WIDE_COLUMNS)
     }
 

@@ -9,7 +9,7 @@ use super::block::Block;
 use super::candidate::{Candidate, HYPOTHESES_PER_PROJECTION};
 use super::hypotheses::Hypotheses;
 use super::marginal;
-use super::products::{Products, Target};
+use super::products::{Products, ResidualModel};
 use super::waves::Waves;
 use crate::fit::Noise;
 use crate::problem::Effect;
@@ -25,7 +25,7 @@ pub(super) fn blocks(
     hypotheses: &Hypotheses,
     candidates: &[&Candidate],
     left_out: &[usize],
-) -> Option<(Vec<Block>, Target)> {
+) -> Option<(Vec<Block>, ResidualModel)> {
     let linearised = hypotheses.linearised.without(left_out);
     let neighbourhood = fitted.neighbourhood_without(&linearised, &hypotheses.unknowns);
     if !neighbourhood.residual().iter().all(|value| value.is_finite()) {
@@ -56,7 +56,7 @@ pub(super) fn blocks(
         least: if holds { 0.0 } else { f64::NEG_INFINITY },
     };
     let alike = (PRIOR_OF_SAME_FAMILY.ln() - hypotheses.ln_family - 2.0_f64.ln()).max(0.0);
-    let target = Target { fit: neighbourhood, noise, alike, stop: data.stop.clone() };
+    let target = ResidualModel { fit: neighbourhood, noise, alike, stop: data.stop.clone() };
     let is_added = |&k: &usize| {
         candidates[k].hypothesis.effect().is_some_and(|effect| hypotheses.added.contains(effect))
     };

@@ -55,7 +55,8 @@ impl Candidate {
             let effect = candidate.hypothesis.effect();
             block.joint = effect.filter(|effect| effect.acts_at_joint()).and_then(Effect::joint);
             block.is_whole_law = effect.is_some_and(Effect::is_described);
-            block.is_gear = matches!(candidate.hypothesis.kind, HypothesisKind::Gear(_));
+            block.is_periodic_of_many_orders =
+                matches!(candidate.hypothesis.kind, HypothesisKind::Gear(_));
             block.is_surface = !block.is_law() && candidate.hypothesis.depends_on.len() > 1;
         }
         blocks

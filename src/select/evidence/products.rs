@@ -23,9 +23,10 @@ const HYPOTHESES_PER_PRODUCT: usize = 16;
 /// are factored instead.
 const MIN_SIZE_OF_MEMBER: f64 = 1e-3;
 
-/// Residual that the hypotheses are to explain, with its degrees of freedom and the prior on its σ.
+/// Linearised fit whose residual the hypotheses are to explain, with the noise model and the
+/// request to stop the search.
 #[derive(Debug, Clone)]
-pub(super) struct Target {
+pub(super) struct ResidualModel {
     pub fit: LinearNeighbourhood,
     pub noise: Noise,
     /// Log factor on the prior of a hypothesis if the set already contains one of its family.
@@ -37,7 +38,7 @@ pub(super) struct Target {
 /// Columns of hypotheses, the residual, and their products.
 pub(super) struct Products<'a> {
     pub blocks: &'a [Block],
-    pub target: &'a Target,
+    pub target: &'a ResidualModel,
     /// Sum of squares rᵀr, with the fitted parameters projected out.
     pub squares: f64,
     /// Grid of noise factors.
@@ -68,12 +69,16 @@ fn sized_set(members: &[usize], sizes: &[f64]) -> SizedSet {
 }
 
 impl<'a> Products<'a> {
-    pub fn new(blocks: &'a [Block], target: &'a Target) -> Self {
+    pub fn new(blocks: &'a [Block], target: &'a ResidualModel) -> Self {
         Self::with_cache(CachedProducts::default(), blocks, target)
     }
 
     /// Creates the products for `blocks`, reusing cached results about the first of them.
-    pub fn with_cache(mut cache: CachedProducts, blocks: &'a [Block], target: &'a Target) -> Self {
+    pub fn with_cache(
+        mut cache: CachedProducts,
+        blocks: &'a [Block],
+        target: &'a ResidualModel,
+    ) -> Self {
         let squares = target.fit.residual().norm_squared();
         cache.columns.extend_to(blocks.len());
         Self { blocks, target, squares, grid: target.noise.grid(), cache }
@@ -91,7 +96,7 @@ impl<'a> Products<'a> {
 
     /// Returns true if at least one of these hypotheses is a periodic error with many orders.
     pub fn has_gear(&self, members: &[usize]) -> bool {
-        members.iter().any(|&member| self.blocks[member].is_gear)
+        members.iter().any(|&member| self.blocks[member].is_periodic_of_many_orders)
     }
 
     /// Returns ln of the prior probability of a hypothesis in a set that contains the `others`.
@@ -421,7 +426,7 @@ mod tests {
             designs.map(|effect| (effect.scaled(40).unwrap(), 0.0, Coefficients::default()));
         let blocks = Block::all(designs.to_vec(), &fit);
         let noise = Noise { freedom: 116.0, trust: 0.1, least: 0.0 };
-        let target = Target { fit, noise, alike: 0.0, stop: Stop::default() };
+        let target = ResidualModel { fit, noise, alike: 0.0, stop: Stop::default() };
         let products = Products::new(&blocks, &target);
         let (members, sizes) = ([0, 1, 2], [3.0, 0.3, 1.0]);
         let reduced = products.reduced(&members, &sizes).unwrap();
@@ -480,7 +485,7 @@ mod tests {
         };
         let blocks: Vec<Block> = families.map(block).to_vec();
         let noise = Noise { freedom: 29.0, trust: 0.1, least: 0.0 };
-        let target = Target { fit: fit.clone(), noise, alike: 1.5, stop: Stop::default() };
+        let target = ResidualModel { fit: fit.clone(), noise, alike: 1.5, stop: Stop::default() };
         let products = Products::new(&blocks, &target);
         let of = |block: usize, others: &[usize]| products.ln_prior(&blocks[block], others);
         let is = |value: f64, expected: f64| assert!((value - expected).abs() < 1e-12, "{value}");

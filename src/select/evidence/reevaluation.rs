@@ -15,7 +15,7 @@ use super::hypotheses::Hypotheses;
 use super::hypothesis::Hypothesis;
 use super::hypothesis_set::HypothesisSet;
 use super::posterior::Evidence;
-use super::products::{Products, Target};
+use super::products::{Products, ResidualModel};
 use super::search::{Weighted, reduced_by, search};
 use crate::problem::Effect;
 
@@ -77,7 +77,7 @@ impl<'a> Reevaluation<'a> {
         (0..candidates.len()).filter(is_held).collect()
     }
 
-    fn blocks(&self, left_out: &[usize]) -> Option<(Vec<Block>, Target)> {
+    fn blocks(&self, left_out: &[usize]) -> Option<(Vec<Block>, ResidualModel)> {
         blocks(self.fitted, self.data, self.hypotheses, &self.probable_candidates(), left_out)
     }
 

@@ -189,7 +189,8 @@ pub(super) fn search(products: &Products, present: &[usize]) -> Vec<Weighted> {
 /// lower and a higher highest order, together describe coefficients that decrease with the order.
 fn add_gears(evaluated: &mut BTreeMap<Vec<usize>, Set>, products: &Products) {
     let blocks = products.blocks;
-    let gears: Vec<usize> = (0..blocks.len()).filter(|&block| blocks[block].is_gear).collect();
+    let gears: Vec<usize> =
+        (0..blocks.len()).filter(|&block| blocks[block].is_periodic_of_many_orders).collect();
     let by_posterior = |a: &Set, b: &Set| a.ln_posterior.total_cmp(&b.ln_posterior);
     let with_gear = evaluated.values().filter(|set| products.has_gear(&set.members));
     let best = with_gear.max_by(|a, b| by_posterior(a, b)).cloned();
@@ -379,7 +380,7 @@ mod tests {
     use crate::fit::Stop;
     use crate::select::evidence::block::Design;
     use crate::select::evidence::marginal::{Coefficients, Noise};
-    use crate::select::evidence::products::Target;
+    use crate::select::evidence::products::ResidualModel;
     use crate::select::neighbourhood::{LinearNeighbourhood, Unknowns};
 
     /// Returns a matrix of deterministic numbers without pattern, with root mean square about 1.
@@ -393,7 +394,7 @@ mod tests {
 
     /// Returns blocks and residual with two strong effects and a third, each of two columns, and
     /// noise.
-    fn three(names: [usize; 3]) -> (Vec<Block>, Target) {
+    fn three(names: [usize; 3]) -> (Vec<Block>, ResidualModel) {
         let columns: Vec<DMatrix<f64>> =
             (0..3).map(|k| matrix(90, 2, 7.0 * f64::from(k))).collect();
         let residual = columns[0].column(0) * 60.0
@@ -407,7 +408,7 @@ mod tests {
         };
         let blocks = names.iter().map(block).collect();
         let noise = Noise { freedom: 89.0, trust: 0.1, least: 0.0 };
-        (blocks, Target { fit, noise, alike: 0.0, stop: Stop::default() })
+        (blocks, ResidualModel { fit, noise, alike: 0.0, stop: Stop::default() })
     }
 
     #[test]
@@ -442,7 +443,7 @@ mod tests {
             block
         };
         let blocks = [&third, &one, &other].map(block);
-        let target = Target {
+        let target = ResidualModel {
             fit: fit.clone(),
             noise: Noise { freedom: 89.0, trust: 0.1, least: 0.0 },
             alike: 0.0,

@@ -43,8 +43,8 @@ use crate::select::harmonic_prior::is_gear_of;
 const PHASE_STEPS: [f64; 2] = [1.0, 0.02];
 /// Number of best orders of the first scan that a finer scan refines.
 const MAX_REFINED_ORDERS: usize = 3;
-/// Maximum number of orders in a scan. If a joint turns more than four times, the highest orders
-/// are not scanned.
+/// Maximum number of orders in a scan. The step between orders is inverse to the joint's range;
+/// over more than four turns, the scan therefore ends below the highest order.
 const MAX_SCANNED_ORDERS: usize = 8000;
 /// Shortest lead of a screw that is searched for \[m\].
 const MIN_LEAD: f64 = 0.002;

@@ -50,9 +50,9 @@ pub enum Misreading {
     },
     /// The columns of all joints are in the opposite order.
     OppositeOrder,
-    /// The columns of all joints are moved on by some places, the last ones to the beginning.
+    /// The columns of all joints are shifted to the right; the last ones come first.
     Rotated {
-        /// Number of places by which the columns are moved on.
+        /// Number of places by which the columns are shifted to the right.
         by: usize,
     },
     /// One coordinate of the positions is in another unit than the others.

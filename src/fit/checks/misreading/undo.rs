@@ -97,13 +97,13 @@ impl Misreading {
                 return Some(problem);
             }
             Self::ExchangedRows { row } => {
-                return declared.with_changed_rows(|rows| {
+                return declared.with_changed_joint_rows(|rows| {
                     let [first, second] = rows.get_mut(row - 1..=row)? else { return None };
-                    exchange_rows(first, second)
+                    exchange_joint_rows(first, second)
                 });
             }
             Self::ExchangedLengths { row } => {
-                return declared.with_changed_rows(|rows| {
+                return declared.with_changed_joint_rows(|rows| {
                     let joint = rows.get_mut(row - 1)?;
                     let can_change = joint.a.total_cmp(&joint.d).is_ne() && joint.beam.is_none();
                     can_change.then(|| std::mem::swap(&mut joint.a, &mut joint.d))
@@ -300,7 +300,7 @@ fn without_prior(pattern: String, problem: &Problem) -> ParameterRule {
 }
 
 /// Exchanges two rows of the joint table; `None` if they are equal, or have no rows.
-fn exchange_rows(first: &mut Joint, second: &mut Joint) -> Option<()> {
+fn exchange_joint_rows(first: &mut Joint, second: &mut Joint) -> Option<()> {
     let row =
         |joint: &Joint| [joint.alpha, joint.a, joint.theta, joint.d, joint.beta].map(f64::to_bits);
     let has_row = |joint: &Joint| joint.placement.is_none() && joint.beam.is_none();
