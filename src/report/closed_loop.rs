@@ -50,7 +50,7 @@ pub fn loop_brief(
     table.rows.iter_mut().for_each(|row| _ = row.pop());
     if let Some(errors) = accuracy.as_ref().and_then(|accuracy| accuracy.corrected) {
         let norms = Summary::of(&errors).norms().0.map(|value| number(value, 4));
-        let names = ["".to_owned(), "with the remainder too".to_owned()];
+        let names = [String::new(), "with the remainder too".to_owned()];
         table.rows.push([names.as_slice(), &norms].concat());
     }
     blocks.push(Block::Table(table));
