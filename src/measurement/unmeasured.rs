@@ -7,15 +7,16 @@ use crate::error::{InputError, InputErrorKind, TableErrorKind};
 const MIN_EMPTY_CELLS: usize = 2;
 
 impl Table {
-    /// Returns true if the first cell of the current row begins with a letter and at most half of the
-    /// cells are numbers, as in the title or foot of a page.
+    /// Returns true if the first cell of the current row begins with a letter and the row has more
+    /// words than numbers, as in the title or foot of a page.
     pub(super) fn is_line_of_words(&self) -> bool {
         let cells = || self.cells().iter().map(|cell| String::from_utf8_lossy(cell.trim_ascii()));
+        let filled = || cells().filter(|cell| !cell.is_empty());
         let is_number = |cell: &str| cell.replace(',', ".").parse::<f64>().is_ok();
-        let numbers = cells().filter(|cell| is_number(cell)).count();
+        let numbers = filled().filter(|cell| is_number(cell)).count();
         let begins_with_word =
             cells().next().is_some_and(|cell| cell.starts_with(|c: char| c.is_alphabetic()));
-        begins_with_word && 2 * numbers <= self.cells().len()
+        begins_with_word && filled().count() > 2 * numbers
     }
 
     /// Returns the error of an empty cell of the current row.

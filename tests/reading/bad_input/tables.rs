@@ -134,6 +134,9 @@ fn rows() {
         ("1,1,2,-1e999,", &["rows.csv:3: column z_mm: -1e999 is not a finite number"]),
         ("1,,2,3,", &["rows.csv:3: column x_mm: the cell is empty"]),
         ("1,2,3", &["rows.csv:3: the row has 3 fields, the header 5"]),
+        // A title has more words than numbers, a row that was cut off has not.
+        ("Page 2 of 3", &["rows.csv:3: the line begins with a word and has 1 cell, the header 5"]),
+        ("P12,30.1", &["rows.csv:3: the row has 2 fields, the header 5"]),
         ("1,2,3,4,5,6", &["rows.csv:3: the row has 6 fields, the header 5; if its numbers have a"]),
         (",,,,", &["rows.csv:3: the row is empty; delete it"]),
         ("  ", &["rows.csv:3: the row is empty; delete it"]),
