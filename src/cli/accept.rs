@@ -110,6 +110,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     }
     let (json, page) = (result.to_json(), report::acceptance_page(&problem, &result));
     results.write(&[("acceptance.json", &json), ("acceptance.html", &page)])?;
+    let outcome = diagnostic::judged(&found, common.quiet);
     common.print_result(&json, || {
         let text = report::acceptance_text(&problem, &result);
         let page = results.path("acceptance.html");
@@ -129,7 +130,6 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         };
         format!("{text}{}Next: {next}\n", results.written())
     })?;
-    let outcome = diagnostic::judged(&found, common.quiet);
     match &result.tolerance {
         Some(tested) if tested.verdict != Verdict::Pass.as_str() => {
             if common.quiet {

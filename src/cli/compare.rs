@@ -39,6 +39,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let shown = PlotData::of_comparison(&problem, &data, &comparison)?;
     let told = report::comparison_report(&problem, &comparison, &shown);
     results.write_report(&[("compare.json", &json)], &told)?;
+    let outcome = diagnostic::judged(&comparison.joint, common.quiet);
     common.print_result(&json, || {
         let text = report::compare_text(&problem, &comparison);
         let lacks = exceeds_noise(&comparison.joint);
@@ -49,5 +50,5 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         };
         format!("{text}{}Next: flexcal {command} {} {what}\n", results.written(), common.named())
     })?;
-    Ok(diagnostic::judged(&comparison.joint, common.quiet))
+    Ok(outcome)
 }

@@ -172,6 +172,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     interrupt::begin_writing();
     results.write_report(&texts, &told)?;
     let sources = sources.as_ref().map(report::joint_sources_text);
+    let outcome = diagnostic::judged(&identification, common.quiet);
     common.print_result(&json, || {
         let accuracy = PredictionAccuracy::new(&identification, &shown);
         let told = if arguments.verbose {
@@ -188,5 +189,5 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     if let (Some(words), true, false) = (&sources, common.json, common.quiet) {
         diagnostic::warn(words);
     }
-    Ok(diagnostic::judged(&identification, common.quiet))
+    Ok(outcome)
 }

@@ -99,6 +99,10 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let told = report::loop_report(&problem, &closure, &shown);
     interrupt::begin_writing();
     results.write_report(&texts, &told)?;
+    let outcome = diagnostic::judged(&closure.after, common.quiet);
+    if closure.interrupted {
+        diagnostic::warn(&report::interrupted(closure.rounds.len()));
+    }
     common.print_result(&json, || {
         let told = if arguments.verbose {
             report::loop_text(&problem, &closure)
@@ -109,10 +113,6 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         let next = advice::after_loop(common, &problem, &closure.before.fit, &result, &results);
         format!("{told}{words}{}Next: {next}\n", results.written())
     })?;
-    let outcome = diagnostic::judged(&closure.after, common.quiet);
-    if closure.interrupted {
-        diagnostic::warn(&report::interrupted(closure.rounds.len()));
-    }
     Ok(if closure.interrupted { Outcome::Interrupted } else { outcome })
 }
 

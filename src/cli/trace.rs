@@ -39,10 +39,11 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let plots = PlotData::of_identification(&problem, &data, &trace.fit)?;
     let page = report::trace_page(&problem, &trace, &plots);
     results.write(&[("trace.json", &json), ("trace.html", &page)])?;
+    let outcome = diagnostic::judged(&trace.fit, common.quiet);
     common.print_result(&json, || {
         let (text, next) =
             (report::trace_text(&problem, &trace), advice::after_trace(common, &result));
         format!("{text}{}Next: {next}\n", results.written())
     })?;
-    Ok(diagnostic::judged(&trace.fit, common.quiet))
+    Ok(outcome)
 }
