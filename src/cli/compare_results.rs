@@ -1,12 +1,12 @@
 //! Arguments and work of `flexcal compare-results`.
 
-use std::collections::BTreeMap;
 use std::error::Error;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 use flexcal::fit::SavedEstimateError;
-use flexcal::report::{self, Side, shell_word};
+use flexcal::report::{self, HeldOutRow, Side, shell_word};
+use nalgebra::Vector3;
 
 use super::diagnostic;
 use super::estimate::Trust;
@@ -89,13 +89,12 @@ fn side(file: &Path, trust: Trust) -> Result<Side, Box<dyn Error>> {
             errors.extend(norm.map(|norm| (format!("{name}, {size}, {symbol}"), norm)));
         }
     }
-    Ok(Side { estimate, errors, held_out: held_out_errors(file) })
+    Ok(Side { estimate, errors, held_out: held_out_rows(file) })
 }
 
-/// Returns the size of each held-out position error \[mm\] with its configuration, by file name and
-/// line, from the residuals.csv that `flexcal identify` writes beside an estimate.json; empty if there is
-/// none.
-fn held_out_errors(estimate: &Path) -> BTreeMap<(String, String), (f64, String)> {
+/// Returns the held-out rows of positions in the residuals.csv that `flexcal identify` writes
+/// beside an estimate.json; empty if there is none.
+fn held_out_rows(estimate: &Path) -> Vec<HeldOutRow> {
     let is_identified = estimate.file_name().is_some_and(|name| name == "estimate.json");
     let file = estimate.with_file_name("residuals.csv");
     let text = is_identified.then(|| flexcal::files::read_text(&file).ok()).flatten();
@@ -108,14 +107,20 @@ fn held_out_errors(estimate: &Path) -> BTreeMap<(String, String), (f64, String)>
     let error = |row: &csv::StringRecord| {
         let cell = |name: &str| row.get(header.iter().position(|column| column == name)?);
         let number = |name: &str| cell(name)?.parse::<f64>().ok();
-        let [x, y, z] = ["residual_x_mm", "residual_y_mm", "residual_z_mm"].map(number);
+        let vector = |part: &str| {
+            let [x, y, z] = ["x", "y", "z"].map(|axis| number(&format!("{part}_{axis}_mm")));
+            Some(Vector3::new(x?, y?, z?))
+        };
+        let residual = vector("residual")?;
         let joints = header.iter().zip(row).filter(|(name, _)| is_joint(name));
         let configuration = joints.map(|(_, cell)| cell).collect::<Vec<_>>().join(",");
-        // Problems in other folders name the same file by another path.
-        let name = Path::new(cell("file")?).file_name()?.to_string_lossy().into_owned();
-        let row = (name, cell("line")?.to_owned());
-        let length = x?.hypot(y?).hypot(z?);
-        (cell("held_out")? == "true").then_some((row, (length, configuration)))
+        let row = HeldOutRow {
+            line: cell("line")?.to_owned(),
+            configuration,
+            measured: vector("predicted")? + residual,
+            error: residual.norm(),
+        };
+        (cell("held_out")? == "true").then_some(row)
     };
     table.records().flatten().filter_map(|row| error(&row)).collect()
 }

@@ -104,7 +104,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let given = if common.data().is_empty() {
         None
     } else {
-        let (given, warnings) = Measurements::read_poses(common.data(), &problem)?;
+        let (given, warnings) = Measurements::read_to_predict(common.data(), &problem)?;
         common.warn(&warnings);
         Some(given)
     };

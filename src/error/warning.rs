@@ -108,8 +108,8 @@ pub enum WarningKind {
     )]
     HoistInKilograms { usual: String, declared: String },
     #[error(
-        "the hoist pulls downwards, along gravity, but a hoist relieves an arm; if its direction \
-         has the wrong sign, write [0, 0, 1] or leave it out"
+        "the hoist pulls downwards, along gravity, but a hoist relieves an arm; check the signs of \
+         its direction and of the gravity, both in the base frame"
     )]
     HoistPullsDown,
     #[error(

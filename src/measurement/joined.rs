@@ -340,6 +340,7 @@ impl JoinedLog {
             return error(TableErrorKind::NamesWrittenOtherwise { left, rows, pair: quoted(pair) });
         }
         if 2 * left > rows
+            && self.offset().is_none()
             && let Some(table) = self.table_without_seconds()
         {
             return error(TableErrorKind::SecondsLost { table });

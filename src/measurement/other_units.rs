@@ -7,8 +7,8 @@ use super::limits::Commands;
 use crate::error::{Warning, WarningKind};
 use crate::problem::{JointKind, Problem};
 
-/// Temperatures \[°C\] that are hot for the place of an arm, but usual as degrees Fahrenheit.
-const FAHRENHEIT: std::ops::RangeInclusive<f64> = 50.0..=110.0;
+/// Temperatures of rooms, 15 °C to 35 °C, in degrees Fahrenheit.
+const FAHRENHEIT: std::ops::RangeInclusive<f64> = 59.0..=95.0;
 /// Highest reference temperature of an arm at room temperature \[°C\].
 const MAX_ROOM_TEMPERATURE: f64 = 30.0;
 /// Standard acceleration of gravity \[m/s²\].

@@ -36,21 +36,30 @@ pub(super) fn order_contradicted(pairs: &[TimedPair]) -> Option<Warning> {
         return None;
     }
     let offset = median(timed().map(|pair| pair.measured - pair.logged).collect())?;
-    let mut logged: Vec<f64> = timed().map(|pair| pair.logged).collect();
-    logged.sort_by(f64::total_cmp);
-    let spacing = median(logged.windows(2).map(|times| times[1] - times[0]).collect())?;
+    let mut by_log_time: Vec<&TimedPair> = timed().collect();
+    by_log_time.sort_by(|a, b| a.logged.total_cmp(&b.logged));
+    let steps = by_log_time.iter().zip(by_log_time.iter().skip(1));
+    let spacing = median(steps.map(|(a, b)| b.logged - a.logged).collect())?;
     let gap = |pair: &TimedPair, logged: f64| (pair.measured - logged - offset).abs();
+    let is_apart = |pair: &TimedPair| spacing > 0.0 && gap(pair, pair.logged) > MIN_GAP * spacing;
+    // A row that is measured after a pause is near a row of the joint table whose pair is right.
     let is_contradicted = |pair: &&TimedPair| {
-        let of_pair = gap(pair, pair.logged);
-        let nearest = logged.iter().map(|&time| gap(pair, time)).fold(f64::INFINITY, f64::min);
-        spacing > 0.0 && of_pair > MIN_GAP * spacing && nearest < MAX_NEAREST * of_pair
+        if !is_apart(pair) {
+            return false;
+        }
+        let after = by_log_time.partition_point(|other| other.logged < pair.measured - offset);
+        let beside = by_log_time.iter().skip(after.saturating_sub(1)).take(2);
+        let nearest = beside.min_by(|a, b| gap(pair, a.logged).total_cmp(&gap(pair, b.logged)));
+        nearest.is_some_and(|nearest| {
+            is_apart(nearest) && gap(pair, nearest.logged) < MAX_NEAREST * gap(pair, pair.logged)
+        })
     };
     let contradicted: Vec<&TimedPair> = timed().filter(is_contradicted).collect();
     let first = contradicted.first()?;
     let kind = WarningKind::OrderContradictedByTimes {
         rows: contradicted.len(),
         partner: first.log_place.to_string(),
-        gap: format!("{:.0}", gap(first, first.logged)),
+        gap: format!("{:.1}", gap(first, first.logged)),
     };
     (contradicted.len() >= MIN_CONTRADICTED)
         .then(|| Warning { location: first.place.clone(), kind })
@@ -83,6 +92,9 @@ mod tests {
         let minute = |row: usize| 60.0 * row as f64;
         assert_eq!(rows(&|row| 7.0e8 + minute(row) + (row % 7) as f64 * 5.0), None);
         assert_eq!(rows(&|row| minute(row) + if row == 5 { 50.0 } else { 9.0 }), None);
+        // Pauses between arrival and measurement, at two and at five rows.
+        assert_eq!(rows(&|row| minute(row) + if row % 9 == 5 { 55.0 } else { 5.0 }), None);
+        assert_eq!(rows(&|row| minute(row) + if row % 4 == 1 { 55.0 } else { 5.0 }), None);
         assert_eq!(rows(&|_| f64::NAN), None);
         let lost = rows(&|row| minute(if row < 15 { row } else { row + 1 }) + 9.0);
         assert!(

@@ -34,8 +34,7 @@ const SCREEN_LINES: usize = 22;
 /// Name of the arm with the effects of the extended problem.
 const EXTENDED: &str = "with what was found";
 
-/// Returns a summary of the outcome for one screen, ending in a line break. `bound` is a sentence on
-/// the error bound of predictions.
+/// Returns a summary of the outcome for one screen, ending in a line break.
 pub fn loop_brief(
     problem: &Problem,
     closure: &ClosedLoop,

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use nalgebra::Vector3;
 use statrs::distribution::{ContinuousCDF as _, Normal};
 
 use super::document::{Block, Column, Table};
@@ -24,6 +25,8 @@ const RESAMPLES: usize = 5000;
 const INTERVAL_LEVEL: f64 = 0.95;
 /// Seed of the bootstrap.
 const SEED: u64 = 1;
+/// Largest difference between two measured positions of one row \[mm\]: tables state 1e-6 mm.
+const SAME_POSITION: f64 = 1e-5;
 /// Maximum number of decimals of a value.
 const MAX_DECIMALS: usize = 6;
 
@@ -32,9 +35,30 @@ pub(crate) struct Side {
     pub estimate: SavedEstimate,
     /// Names of errors with their values, for example `held out, mean_mm`.
     pub errors: Vec<(String, f64)>,
-    /// Size of each held-out position error \[mm\] with its configuration in words, by file name and
-    /// line; empty if it is not known.
-    pub held_out: BTreeMap<(String, String), (f64, String)>,
+    /// Held-out rows of positions; empty if they are not known.
+    pub held_out: Vec<HeldOutRow>,
+}
+
+/// Held-out row of a measured position. Its file is not named, because problems in other folders
+/// name the same file by another path.
+pub(crate) struct HeldOutRow {
+    /// Line of the row in its table.
+    pub line: String,
+    /// Configuration in words.
+    pub configuration: String,
+    /// Measured position \[mm\].
+    pub measured: Vector3<f64>,
+    /// Length of the position error \[mm\].
+    pub error: f64,
+}
+
+impl HeldOutRow {
+    /// Returns true if both are the same row of one table, read for two results.
+    fn is_same(&self, other: &Self) -> bool {
+        self.line == other.line
+            && self.configuration == other.configuration
+            && (self.measured - other.measured).norm() < SAME_POSITION
+    }
 }
 
 /// Parameter that both estimates have, in the unit of tables.
@@ -173,13 +197,16 @@ pub fn predicts_better(sides: &[Side; 2]) -> bool {
 /// \[mm\] with its interval over configurations; `None` if fewer than [`MIN_PAIRS`] configurations
 /// are common.
 fn paired_change([a, b]: &[Side; 2]) -> Option<(f64, Interval)> {
+    let mut of_lines: BTreeMap<&str, Vec<&HeldOutRow>> = BTreeMap::new();
+    for row in &a.held_out {
+        of_lines.entry(&row.line).or_default().push(row);
+    }
     let mut of_configurations: BTreeMap<&str, (f64, f64)> = BTreeMap::new();
-    for (row, (of_b, configuration)) in &b.held_out {
-        let Some((of_a, _)) = a.held_out.get(row).filter(|of_a| of_a.1 == *configuration) else {
-            continue;
-        };
-        let sum = of_configurations.entry(configuration).or_default();
-        *sum = (sum.0 + of_b - of_a, sum.1 + 1.0);
+    for row in &b.held_out {
+        let same = of_lines.get(row.line.as_str()).into_iter().flatten();
+        let Some(of_a) = same.copied().find(|of_a| of_a.is_same(row)) else { continue };
+        let sum = of_configurations.entry(&row.configuration).or_default();
+        *sum = (sum.0 + row.error - of_a.error, sum.1 + 1.0);
     }
     let changes: Vec<(f64, f64)> = of_configurations.into_values().collect();
     if changes.len() < MIN_PAIRS || a.estimate.file == b.estimate.file {

@@ -75,7 +75,7 @@ fn blocks<'a>(problem: &Problem, found: &'a Identification, plots: &'a PlotData)
             fitted_parameters(found),
             (
                 if found.fitted.is_left_out { "Left out, after" } else { "Held out, after" },
-                spread(&held_out),
+                spread(&corrected.unwrap_or(held_out)),
             ),
             size("Residual against σ", found),
             ("Strategy", found.strategy.as_str().to_owned()),

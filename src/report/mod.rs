@@ -49,7 +49,7 @@ pub(crate) use acceptance::{acceptance_page, acceptance_text, tolerance_text};
 pub(crate) use brief::{determines_nothing, estimate_brief};
 pub(crate) use check::check_page;
 pub use closed_loop::{loop_report, loop_text};
-pub(crate) use difference::{Side, difference_page, difference_text, predicts_better};
+pub(crate) use difference::{HeldOutRow, Side, difference_page, difference_text, predicts_better};
 pub(crate) use fleet::{fleet_page, fleet_text};
 pub(crate) use identify::joint_sources_text;
 pub use identify::{estimate_text, identification_report};

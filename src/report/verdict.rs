@@ -142,7 +142,7 @@ fn found(result: &LoopResult) -> String {
         [] => String::new(),
         [cause] => {
             let rival = cause.alternatives.first();
-            // Without a place and a candidate law, the effects in doubt are examples of what may act.
+            // Without a place and a law, the effects in doubt are examples of what may act.
             let is_unknown = !has_place(cause) && stand_in(cause).is_some();
             let link = if is_unknown { "for example" } else { "or else" };
             let or_else = rival

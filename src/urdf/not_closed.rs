@@ -21,14 +21,17 @@ pub(super) fn not_closed(source: &Document, error: &Error) -> Option<InputError>
     let line_start = starts.take(line).last()?;
     let rest = source.text.get(line_start..)?;
     let column = rest.char_indices().nth(position.col as usize - 1).map_or(rest.len(), |at| at.0);
-    let (start, tag) = *open_tags(source.text.get(..line_start + column)?).last()?;
+    let open = open_tags(source.text.get(..line_start + column)?);
+    let (start, tag) = *open.last()?;
+    // A tag that closes no open element is itself the mistake.
+    let closes = open.iter().any(|(_, tag)| tag.split_whitespace().next() == Some(before));
     let kind = UrdfErrorKind::NotClosed {
         element: shortened(tag, MAX_SHOWN),
         name: shortened(name, MAX_SHOWN),
         before: shortened(before, MAX_SHOWN),
         line,
     };
-    tag.starts_with(name.as_str()).then(|| source.locate(start..start + 1).error(kind))
+    (closes && tag.starts_with(name.as_str())).then(|| source.locate(start..start + 1).error(kind))
 }
 
 /// Returns the tags that are open at the end of a text, outermost first, with the places of their

@@ -8,8 +8,8 @@ use super::nominal_error::is_nominal_far_off;
 use super::parameter_limits::WithinPriors;
 use super::row_kind::size;
 
-/// Largest rms residual, as a multiple of the declared σ, for which misreadings of the table are not
-/// searched.
+/// Largest rms residual, as a multiple of the declared σ, for which misreadings of the table are
+/// not searched.
 const MIN_SIGMAS: f64 = 10.0;
 /// Largest rms residual, relative to the spread of the points, for which misreadings are not
 /// searched if no σ is declared.

@@ -26,11 +26,11 @@ const STEPS_BEFORE_NOISE_TEST: u64 = 30;
 /// Maximum number of fits in the search for σ.
 const MAX_NOISE_FITS: usize = 20;
 /// Least number of degrees of freedom that lower a declared σ at the usual critical value. With
-/// fewer, a residual that is small by chance (probability 0.0005) would make standard errors more
-/// than 2.5 times too small.
+/// fewer, a residual that is small by chance (probability near 0.001) would make standard errors
+/// more than 2.5 times too small.
 const MIN_FREEDOM_TO_LOWER: f64 = 12.0;
 /// Multiple of the critical value that lowers a declared σ with fewer degrees of freedom. Noise
-/// exceeds it with a probability below 1e-10; computed positions without noise always do.
+/// exceeds it with a probability below 1e-10; positions that were computed to all digits do.
 const LOWERING_FACTOR: f64 = 5.0;
 /// Noise models of positions and of orientations that take the declared σ.
 const DECLARED_NOISE: (NoiseModel, NoiseModel) = (NoiseModel::DECLARED, NoiseModel::DECLARED);
@@ -158,8 +158,7 @@ fn is_beyond_doubt(stage: &Stage) -> bool {
 /// kept. Poses that a robust loss treats as outliers do not count.
 ///
 /// The declared σ is contradicted if 2 ln of the likelihood ratio exceeds its critical value (χ²₁)
-/// at probability 0.001. A few degrees of freedom lower it only with
-/// far more evidence.
+/// at probability 0.001. A few degrees of freedom lower it only with far more evidence.
 fn next_noise_models(
     stage: &Stage,
     end: &FitEnd,

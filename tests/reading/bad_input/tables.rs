@@ -116,7 +116,7 @@ fn a_name_that_joints_share_is_no_column() {
 
 #[test]
 fn rows() {
-    let rows: [(&str, &[&str]); 29] = [
+    let rows: [(&str, &[&str]); 31] = [
         ("abc,1,2,3,", &["rows.csv:3: column q1_deg: \"abc\" is not a number"]),
         ("1,\"1,5\",2,3,", &["rows.csv:3: column x_mm: \"1,5\" is not a number"]),
         ("1,\"1,874.5\",2,3,", &["column x_mm: \"1,874.5\" has separators of thousands"]),

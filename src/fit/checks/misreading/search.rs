@@ -1,5 +1,8 @@
 //! Search for the misreadings that explain why an arm does not fit its measurements.
 
+use std::f64::consts::TAU;
+use std::ops::RangeInclusive;
+
 use nalgebra::{DVector, Vector3};
 use rayon::prelude::*;
 
@@ -29,9 +32,14 @@ const MAX_REACHES: f64 = 1e4;
 /// Largest error of the nominal arm, as a multiple of the arm's reach, for which only misread loads
 /// are searched. A joint angle that is wrong by one degree causes seven times as much.
 const MAX_REACHES_OF_LOADS: f64 = 2e-3;
-/// Smallest ratio of motion to command that is a misreading, unless it is that of two units. A
-/// smaller one means that the data contradict any motion of the joint.
-const MIN_RATIO: f64 = 0.02;
+/// Smallest motion of a joint over all rows with which a ratio of motion to command is a misreading
+/// \[rad\] or \[m\]. A smaller one means that the data contradict any motion of the joint.
+const MIN_MOTION: f64 = 0.01;
+/// Range of the lead of a screw that is a misreading \[m\]: that of ball screws, with room.
+const SCREW_LEADS: RangeInclusive<f64> = 1e-3..=0.2;
+/// Error, as a multiple of the arm's reach, up to which an explanation far beyond the priors is
+/// named: nominal arms are wrong by about as much, and their priors may be too narrow.
+const MAX_REACHES_BEYOND_PRIORS: f64 = 5e-4;
 /// Smallest relative error of a ratio of motion to command that is a misreading. Gears deviate by
 /// less.
 const MIN_RATIO_ERROR: f64 = 1e-3;
@@ -177,19 +185,21 @@ impl Trial<'_> {
                 self.outcome(misreading, true)?;
             // A negative ratio means that the joint turns against its command, and one of 1 is no
             // misreading.
-            let is_impossible = |size: f64| {
-                let is_still = size < MIN_RATIO && !is_unit_ratio(size);
-                is_still || (size - 1.0).abs() < MIN_RATIO_ERROR
+            let is_impossible = |size: f64| match misreading {
+                Misreading::Ratio { joint, .. } => {
+                    let is_still = size * self.commanded_range(joint - 1) < MIN_MOTION;
+                    is_still && !is_unit_ratio(size) || (size - 1.0).abs() < MIN_RATIO_ERROR
+                }
+                Misreading::Screw { .. } => !SCREW_LEADS.contains(&(TAU / size.abs())),
+                _ => false,
             };
-            if size.is_some_and(|size| {
-                matches!(misreading, Misreading::Ratio { .. }) && is_impossible(size)
-            }) {
+            if size.is_some_and(is_impossible) {
                 return None;
             }
             // An arm that must be bent far beyond its priors is not the one that was measured. A
             // shift of rows leaves one of them without its configuration.
             let is_shift = misreading.shifted_from().is_some();
-            if !is_within_priors && !is_shift && rms > self.noise_limit() {
+            if !is_within_priors && !is_shift && rms > self.largest_usual_error() {
                 return None;
             }
             Some(Explanation {
@@ -278,10 +288,22 @@ impl Trial<'_> {
         rms.is_finite().then_some(Outcome { rms, size, left_out, is_within_priors })
     }
 
-    /// Returns the largest error that counts as noise \[m\].
-    fn noise_limit(&self) -> f64 {
-        let observation = self.fitting.measurements.leading();
-        MAX_NOISE_SIGMAS * observation.root() * self.fitting.sigma
+    /// Returns the largest error that noise, or priors that are too narrow, leave \[m\].
+    fn largest_usual_error(&self) -> f64 {
+        let Fitting { measurements, model, sigma, .. } = self.fitting;
+        let noise = MAX_NOISE_SIGMAS * measurements.leading().root() * sigma;
+        noise.max(MAX_REACHES_BEYOND_PRIORS * model.reach())
+    }
+
+    /// Returns the difference between the largest and the smallest command of the joint at index
+    /// `joint` \[rad\] or \[m\].
+    fn commanded_range(&self, joint: usize) -> f64 {
+        let commands = || {
+            let measurements = self.fitting.measurements;
+            let rows = self.fitting.split.identification.iter();
+            rows.filter_map(move |&row| measurements.configuration(row).get(joint).copied())
+        };
+        commands().fold(f64::NEG_INFINITY, f64::max) - commands().fold(f64::INFINITY, f64::min)
     }
 
     /// Returns the misfit of a fit with each configuration left out. `problem` is that of the fit,

@@ -35,7 +35,7 @@ impl Misreading {
                 format!("joint {joint} that {moves} by {size:.4} times its command{unit}")
             }
             (Self::Screw { joint, from, .. }, Some(size)) => format!(
-                "joint {joint} that also turns by {:.3}°/mm of joint {from} (a ball screw: declare joint-coupling)",
+                "joint {joint} that also turns by {:.3}°/mm of joint {from} (as a ball screw does; declare joint-coupling)",
                 size.to_degrees() * 1e-3
             ),
             (Self::Coupled { joint, from, .. }, Some(size)) => format!(
