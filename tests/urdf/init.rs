@@ -144,7 +144,7 @@ fn a_problem_frees_what_positions_tell_apart_and_says_what_was_rounded() {
     let robot = robot("odd.urdf");
     let description = describe(&Chain::new(&robot, Some("base"), Some("tool")).unwrap()).unwrap();
     assert!(
-        description.notes.iter().any(|note| note.starts_with("1.5708 [rad] taken")),
+        description.notes.iter().any(|note| note.starts_with("1.5708 rad at ")),
         "{:?}",
         description.notes
     );
