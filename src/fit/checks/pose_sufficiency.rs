@@ -78,7 +78,7 @@ impl PoseSufficiency {
             is_held_out,
         )
         .or_else(|| undetermined_base_finding(fitting, &numbers, later, at, is_held_out))
-        .map(|finding| held_out_finding(&finding, count_distinct(&numbers, later.iter().copied())));
+        .map(|finding| held_out_finding(&finding, placement, (later, &numbers)));
         let several_targets =
             poses < count_distinct(&numbers, split.identification.iter().copied());
         Self { finding, held_out, coordinates, poses, several_targets }
@@ -93,10 +93,21 @@ impl PoseSufficiency {
 }
 
 /// Returns the finding about a base or tool that only held-out rows use, made from one about
-/// identification rows. `poses` is the number of different poses of these held-out rows.
-fn held_out_finding(finding: &Finding, poses: usize) -> Finding {
+/// identification rows. `rows` are such held-out rows, `numbers` the pose numbers of all rows.
+fn held_out_finding(
+    finding: &Finding,
+    placement: &Placement,
+    (rows, numbers): (&[usize], &[usize]),
+) -> Finding {
     let text = format!("held-out rows of {}; their errors say little", finding.text);
-    let numbers = [finding.value("of").cloned().unwrap_or_default(), poses.into()];
+    let of = finding.value("of").cloned().unwrap_or_default();
+    let is_of = |row: &usize| {
+        let base = label("base", &placement.bases[placement.base_of(*row)]);
+        let tool = label("tool", &placement.targets[placement.target_of(*row)]);
+        of == base.as_str() || of == tool.as_str()
+    };
+    let poses = count_distinct(numbers, rows.iter().copied().filter(is_of));
+    let numbers = [of, poses.into()];
     Finding::new(FindingCode::HeldOutBaseNotDetermined, numbers, text)
 }
 
