@@ -4,11 +4,11 @@ use std::fmt::Write as _;
 
 use super::document::{Block, Column, Point, Table, some_of};
 use super::errors::header;
-use super::verdict::{alternative, has_place, stand_in, title};
+use super::verdict::{alternative, stand_in, title};
 use super::{effect, figures, trace};
 use crate::quantity::format::{number, or_dash, p_value};
 use crate::results::{FoundEffect, LoopResult, Step, Witness};
-use crate::select::{ClosedLoop, Status};
+use crate::select::ClosedLoop;
 
 /// Returns the heading of the list of effects: nothing is claimed after a fit that is not trusted.
 pub(super) fn found_heading(result: &LoopResult) -> &'static str {
@@ -120,14 +120,6 @@ pub(super) fn rounds<'a>(closure: &'a ClosedLoop, result: &LoopResult) -> Vec<Bl
     ]
 }
 
-/// Returns the status of an effect, or that neither place nor law of the cause is known.
-fn status(found: &FoundEffect) -> &'static str {
-    match found.status {
-        Status::Located if !has_place(found) => "unknown place and law",
-        status => status.as_str(),
-    }
-}
-
 /// Returns the status of each effect with the evidence for it.
 pub(super) fn status_table<'a>(closure: &ClosedLoop, result: &LoopResult) -> Option<Block<'a>> {
     let share = |part: f64| format!("{} %", number(part * 100.0, 0));
@@ -138,7 +130,7 @@ pub(super) fn status_table<'a>(closure: &ClosedLoop, result: &LoopResult) -> Opt
     let mean = header(&closure.after.fitted.held_out, mean);
     let columns = [
         Column::words("effect", |found: &FoundEffect| found.effect.description.clone()),
-        Column::words("status", |found: &FoundEffect| status(found).to_owned()),
+        Column::words("status", |found: &FoundEffect| found.status.as_str().to_owned()),
         Column::number("p", |found: &FoundEffect| p_value(found.p_value)),
         Column::number("law", law),
         Column::number("refits", |found: &FoundEffect| or_dash(found.stability, share)),
