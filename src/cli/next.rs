@@ -153,7 +153,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         if problem.data.joint_log.is_some() {
             return format!(
                 "{text}{written}Next: {lacks}measure these poses, append them to the measurements and to the joint table of \
-                 {named}, then\nflexcal next {named}\n"
+                 {named}, then\nflexcal next {}\n",
+                common.named()
             );
         }
         let measure = if next.is_of_cameras {

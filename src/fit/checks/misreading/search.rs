@@ -36,7 +36,7 @@ const MAX_REACHES_OF_LOADS: f64 = 2e-3;
 /// \[rad\] or \[m\]. A smaller one means that the data contradict any motion of the joint.
 const MIN_MOTION: f64 = 0.01;
 /// Range of the lead of a screw that is a misreading \[m\]: that of ball screws, with room.
-const SCREW_LEADS: RangeInclusive<f64> = 1e-3..=0.2;
+const SCREW_LEAD_RANGE: RangeInclusive<f64> = 1e-3..=0.2;
 /// Error, as a multiple of the arm's reach, up to which an explanation far beyond the priors is
 /// named: nominal arms are wrong by about as much, and their priors may be too narrow.
 const MAX_REACHES_BEYOND_PRIORS: f64 = 5e-4;
@@ -190,7 +190,7 @@ impl Trial<'_> {
                     let is_still = size * self.commanded_range(joint - 1) < MIN_MOTION;
                     is_still && !is_unit_ratio(size) || (size - 1.0).abs() < MIN_RATIO_ERROR
                 }
-                Misreading::Screw { .. } => !SCREW_LEADS.contains(&(TAU / size.abs())),
+                Misreading::Screw { .. } => !SCREW_LEAD_RANGE.contains(&(TAU / size.abs())),
                 _ => false,
             };
             if size.is_some_and(is_impossible) {
