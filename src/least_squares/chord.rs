@@ -10,11 +10,11 @@ use super::{Block, LeastSquares, Linearisation, Triangle};
 use crate::numeric::kernel::sum_of_squares;
 use crate::numeric::{gram, inverse_factor};
 
-/// Largest relative linearisation error ‖ρ‖ / ‖J₀ δ‖ at which the derivatives of the base point are
-/// reused.
+/// Largest ‖ρ‖ / ‖J₀ δ‖ at which the derivatives J₀ of the base point are reused after a step δ,
+/// where ρ is the change of the residuals that J₀ δ does not predict.
 const MAX_LINEARISATION_ERROR: f64 = 0.01;
-/// Ridge added to the scaled normal matrix R₀ᵀR₀, whose diagonal is 1, so that its Cholesky factor
-/// exists.
+/// Ridge added to the diagonal of the scaled normal matrix S⁻¹R₀ᵀR₀S⁻¹, whose entries are 1, so
+/// that its Cholesky factor exists.
 const NORMAL_RIDGE: f64 = 1e-10;
 
 /// Residuals and derivatives at a base point x₀, reused for linearisations at points nearby.
@@ -28,12 +28,13 @@ const NORMAL_RIDGE: f64 = 1e-10;
 pub(super) struct Base {
     /// Identifier of the data set.
     pub data: u64,
-    /// Unit of the residuals: they are multiples of this many assumed σ.
+    /// Unit by which the stored residuals were divided, such as 1 σ of a position \[m\].
     unit: f64,
     x: DVector<f64>,
     chunks: Vec<Chunk>,
     triangle: Triangle,
-    /// Map for reuse, formed at the first use; contains `None` if reuse is impossible.
+    /// Map from J₀ᵀ ρ to Q₀ᵀ ρ, formed at the first use. Contains `None` if an unknown has no
+    /// effect or a number is not finite.
     projector: OnceLock<Option<Projector>>,
 }
 
@@ -57,7 +58,8 @@ struct Projector {
 }
 
 impl Projector {
-    /// Forms the map, or returns `None` if an unknown has no effect or a number is not finite.
+    /// Forms the map from the factor at the base point, or returns `None` if an unknown has no
+    /// effect or a number is not finite.
     fn new(triangle: &Triangle) -> Option<Self> {
         let Linearisation { triangle: mut scaled, projected: constant, .. } =
             triangle.clone().into_linearisation();
@@ -89,7 +91,8 @@ struct ChunkError {
 }
 
 impl Base {
-    /// Stores the chunks of all items, linearised at `x`, with their triangular factor.
+    /// Stores the chunks of all items, linearised at `x`, with their triangular factor. `data`
+    /// identifies the data set; residuals were divided by `unit`.
     pub fn new(
         x: &DVector<f64>,
         (data, unit): (u64, f64),
@@ -99,14 +102,19 @@ impl Base {
         Self { data, unit, x: x.clone(), chunks, triangle, projector: OnceLock::new() }
     }
 
-    /// Returns the triangular factor at the base point.
+    /// Returns the triangular factor of all items at the base point.
     pub fn triangle(&self) -> Triangle {
         self.triangle.clone()
     }
 
-    /// Returns the triangular factor at `x`, with residuals counted in `unit`, from the derivatives
-    /// of the base point; `None` if the linearisation error at `x` is too large.
-    pub fn at(&self, problem: &impl LeastSquares, x: &DVector<f64>, unit: f64) -> Option<Triangle> {
+    /// Returns the triangular factor at `x`, computed with the derivatives of the base point, for
+    /// residuals divided by `unit`. Returns `None` if the linearisation error at `x` is too large.
+    pub fn triangle_at(
+        &self,
+        problem: &impl LeastSquares,
+        x: &DVector<f64>,
+        unit: f64,
+    ) -> Option<Triangle> {
         let (step, scale) = (x - &self.x, self.unit / unit);
         let n = step.len();
         let error = |Chunk { items, block }: &Chunk| {

@@ -2,7 +2,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
-/// Difference step of an unknown: the step that changes the residual vector by this part of ‖r‖.
+/// Difference step of an unknown: the step that changes the residual vector by this fraction of
+/// ‖r‖.
 const DIFFERENCE_STEP: f64 = 1e-4;
 
 /// Cost, gradient and Gauss–Newton matrix of an objective at one point.
@@ -17,9 +18,9 @@ pub(super) struct Slopes {
 
 /// Returns S = Σ rᵢ ∇²rᵢ = ∂(Jᵀr)/∂x − JᵀJ from differences of the gradient Jᵀr.
 ///
-/// Calls `slopes` once for each unknown. An unknown is moved up, or down where `within` forbids the
-/// upper point. If `within` forbids both, its row and column come from the differences of the other
-/// unknowns. Returns `None` if an entry is not finite.
+/// Calls `slopes` at x and once for each unknown that has an effect. An unknown is moved up, or
+/// down where `within` is false at the upper point. If both points are outside, its row and column
+/// come from the differences of the other unknowns. Returns `None` if an entry is not finite.
 pub(super) fn by_differences(
     slopes: impl Fn(&DVector<f64>) -> Slopes,
     x: &DVector<f64>,

@@ -76,8 +76,8 @@ pub fn check_jacobian(
     JacobianCheck { columns }
 }
 
-/// Returns the extrapolated difference of column `j` with the smallest estimated error over several
-/// first steps, and that error. `size` is the unknown's typical size.
+/// Returns ∂r/∂xⱼ by extrapolated differences, and its estimated error: the best of several first
+/// steps. `size` is the typical size of unknown `j`.
 fn extrapolate<P: LeastSquares>(
     problem: &P,
     x: &DVector<f64>,
@@ -111,8 +111,9 @@ fn central_difference<P: LeastSquares>(
     (residual_at(above) - residual_at(below)) / (above - below)
 }
 
-/// Extrapolates differences to step zero by Ridders' tableau; stops once higher orders no longer
-/// reduce the estimated error.
+/// Extrapolates the central differences `difference(h)` to h = 0 by Ridders' tableau, from the step
+/// `first` downwards. Returns the limit and its estimated error. Stops once higher orders no longer
+/// reduce that error.
 fn ridders(difference: impl Fn(f64) -> DVector<f64>, first: f64) -> (DVector<f64>, f64) {
     let mut h = first;
     let mut previous = vec![difference(h)];

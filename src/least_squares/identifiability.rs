@@ -15,14 +15,16 @@ use super::singular::SingularValues;
 pub const UNIDENTIFIABLE_BELOW: f64 = 1e-9;
 /// Largest norm of a column, relative to the largest column, that counts as zero.
 const MAX_ZERO_COLUMN_NORM: f64 = 1e-14;
-/// Smallest share of a combination that makes an unknown a preferred pivot of its description.
+/// Smallest coefficient of an unknown, relative to the norm of its combination, that makes it a
+/// preferred pivot of the echelon form.
 const MIN_PIVOT_SHARE: f64 = 0.1;
-/// Smallest entry of a combination that is not a rounding error.
+/// Largest coefficient of a combination of unit norm that counts as a rounding error.
 const MAX_ROUNDING_ENTRY: f64 = 1e-6;
 /// Smallest relative singular value that certifies full rank without an SVD: twice
 /// [`UNIDENTIFIABLE_BELOW`], to allow for rounding.
 const MIN_CERTAIN_FULL_RANK: f64 = 2.0 * UNIDENTIFIABLE_BELOW;
-/// Relative size of a trailing pivot below which a direction is certainly unidentifiable.
+/// Largest trailing pivot of the pivoted QR, relative to the first pivot, whose direction is
+/// certainly unidentifiable.
 const MAX_CERTAIN_NULL_PIVOT: f64 = 1e-12;
 
 /// Identifiability of the unknowns, from the triangular factor R of the Jacobian.
@@ -34,25 +36,27 @@ pub struct Identifiability {
     pub rank: usize,
     /// Combinations of unknowns that change no residual.
     pub unidentifiable: Vec<UnidentifiableCombination>,
-    /// Basis of the unidentifiable combinations, orthonormal in the scaled unknowns, shape =
-    /// (n − rank, n) [1 / unit of x].
+    /// Rows G, one for each unidentifiable combination, shape = (n − rank, n) \[1 / unit of x\]. G
+    /// p is the part of a step p along these combinations. The rows are orthonormal in unknowns
+    /// that are scaled by their column norms.
     pub gauge: DMatrix<f64>,
-    /// Share of each unknown outside the unidentifiable combinations, 0 (none) to 1 (identified).
+    /// Share of each unknown outside the unidentifiable combinations: 1 − squared length of its
+    /// projection onto them, from 0 (not identifiable) to 1 (identifiable).
     pub visible: Vec<f64>,
 }
 
 /// Parameters that can change together without changing any measurement.
 #[derive(Debug, Clone, PartialEq)]
 pub struct UnidentifiableCombination {
-    /// Index and weight of each unknown in scaled unknowns (unit norm, first weight positive),
-    /// sorted by index.
+    /// Index and coefficient of each unknown, sorted by index. Unknowns are multiplied by the norm
+    /// of their Jacobian column; the coefficients then have unit norm.
     pub weights: Vec<(usize, f64)>,
     /// Norm of the scaled Jacobian times the combination.
     pub singular_value: f64,
 }
 
 impl Identifiability {
-    /// Analyses the least-squares problem with triangular factor `triangle` (n × n).
+    /// Analyses the Jacobian with triangular factor `triangle` (n × n).
     #[doc(hidden)]
     pub fn of(triangle: &DMatrix<f64>) -> Self {
         let Scaled { matrix: scaled, scale } = Scaled::of(triangle);
@@ -110,9 +114,10 @@ pub(crate) struct Blind {
 }
 
 impl Blind {
-    /// Analyses the least-squares problem with triangular factor `triangle` (n × n).
+    /// Finds the unidentifiable combinations of the Jacobian with triangular factor `triangle` (n ×
+    /// n).
     ///
-    /// Forms singular values only where cheaper tests do not decide. If ‖R⁻¹‖ of R with unit
+    /// Computes singular values only if cheaper tests do not decide. If ‖R⁻¹‖ of R with unit
     /// columns bounds every singular value away from zero, the rank is full. If pivoted QR gives R
     /// P = Q [R₁ R₂; 0 ε] with R₁ of certainly full rank and ε at rounding level, the null space is
     /// spanned by P [−R₁⁻¹R₂; 1].
@@ -129,8 +134,9 @@ impl Blind {
         Self { gauge, visible }
     }
 
-    /// Converts orthonormal rows that span the null space in scaled unknowns into the gauge and
-    /// visible shares. `scale` holds the column norms.
+    /// Returns the gauge and the visible shares. The rows of `null` are an orthonormal basis of the
+    /// null space in scaled unknowns; `scale` holds the column norms by which the unknowns are
+    /// scaled.
     fn of(null: &DMatrix<f64>, scale: &[f64]) -> Self {
         let visible = (0..null.ncols())
             .map(|j| (1.0 - null.column(j).norm_squared()).clamp(0.0, 1.0))
@@ -142,8 +148,8 @@ impl Blind {
     }
 }
 
-/// Triangle with columns scaled to unit norm (columns that count as zero are set to zero), and the
-/// norms.
+/// Triangle whose columns are scaled to unit norm, and the norms. Columns that count as zero are
+/// set to zero and have scale 1.
 struct Scaled {
     matrix: DMatrix<f64>,
     scale: Vec<f64>,
@@ -219,11 +225,11 @@ pub(super) fn complement(basis: &DMatrix<f64>) -> DMatrix<f64> {
     rows.transpose()
 }
 
-/// Returns the unidentifiable combinations as the reduced row echelon form of the null space
-/// `null`.
+/// Returns the unidentifiable combinations as the reduced row echelon form of `null`, whose rows
+/// span the null space of `scaled`.
 ///
-/// This basis depends on the space alone and has few unknowns in each combination. Pivots are the
-/// first unknowns with a share of at least [`MIN_PIVOT_SHARE`], then those above
+/// This basis depends only on the space and has few unknowns in each combination. Pivots are the
+/// first unknowns with a relative coefficient of at least [`MIN_PIVOT_SHARE`], then those above
 /// [`MAX_ROUNDING_ENTRY`].
 fn echelon_combinations(
     mut null: DMatrix<f64>,

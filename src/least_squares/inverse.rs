@@ -1,5 +1,4 @@
-//! Inverses of upper triangles: certify a good condition at a small part of the cost of singular
-//! values.
+//! Inverses of upper triangles, which show at little cost that a matrix is well conditioned.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -28,9 +27,9 @@ pub(super) fn regular_inverse(triangle: &DMatrix<f64>, least: f64) -> Option<DMa
     certain.then_some(inverse)
 }
 
-/// Returns Σ weight² ‖eⱼᵀ R⁻¹‖² over the pairs (j, weight) of `weighted`; `None` if R is not upper
-/// triangular.
-pub(super) fn inverse_rows(
+/// Returns Σ wⱼ² ‖eⱼᵀ R⁻¹‖², the weighted squared norms of rows of R⁻¹, over the pairs (j, wⱼ) of
+/// `weighted`. Returns `None` if R is not upper triangular.
+pub(super) fn sum_of_inverse_row_squares(
     triangle: &DMatrix<f64>,
     weighted: impl Iterator<Item = (usize, f64)>,
 ) -> Option<f64> {
@@ -73,7 +72,8 @@ mod tests {
         let inverse = regular_inverse(&triangle, 1e-12).unwrap();
         assert!((&triangle * &inverse - DMatrix::identity(9, 9)).amax() < 1e-12 * inverse.amax());
         let expected = 4.0 * inverse.row(3).norm_squared() + 0.25 * inverse.row(8).norm_squared();
-        let found = inverse_rows(&triangle, [(3, 2.0), (8, 0.5)].into_iter()).unwrap();
+        let found =
+            sum_of_inverse_row_squares(&triangle, [(3, 2.0), (8, 0.5)].into_iter()).unwrap();
         assert!((found / expected - 1.0).abs() < 1e-12);
         let (condition, smallest) = (1.0 / inverse.norm(), 1e-5 * triangle[(8, 8)]);
         assert!(
@@ -84,7 +84,9 @@ mod tests {
         assert!(regular_inverse(&triangle, 1e-4).is_none());
         triangle[(8, 8)] = 0.0;
         assert!(regular_inverse(&triangle, 1e-12).is_none());
-        assert!(!inverse_rows(&triangle, [(3, 1.0)].into_iter()).unwrap().is_finite());
+        assert!(
+            !sum_of_inverse_row_squares(&triangle, [(3, 1.0)].into_iter()).unwrap().is_finite()
+        );
         assert!(regular_inverse(&triangle.transpose(), 1e-12).is_none());
         assert_eq!(regular_inverse(&DMatrix::zeros(0, 0), 1.0), Some(DMatrix::zeros(0, 0)));
     }

@@ -12,19 +12,20 @@ use super::{Loss, Triangle};
 /// the first point of the same data, which is needed again at the end.
 const MAX_CACHED: usize = 3;
 
-/// Most recent linearisations of some data. Reducing many rows takes far longer than any use of the
-/// triangular factor.
+/// Most recent linearisations of a few data sets. Reducing many rows takes far longer than any use
+/// of the triangular factor.
 #[derive(Debug, Default)]
 pub struct LinearisationCache {
     cached: Mutex<VecDeque<(Key, f64, Triangle)>>,
-    /// Linearisation of all data that later points reuse; `None` unless the fit is provisional.
+    /// Linearisation of all data whose derivatives are reused at later points; `None` unless the
+    /// fit is provisional.
     base: Option<Mutex<Option<Arc<Base>>>>,
 }
 
 /// Identifier of a linearisation: the data set and the point.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Key {
-    /// Identifier of the data set, without the unit of its residuals.
+    /// Identifier of the data set, whatever the unit by which residuals are divided.
     pub data: u64,
     pub loss: Loss,
     pub x: DVector<f64>,
@@ -44,8 +45,9 @@ impl LinearisationCache {
         self.base.is_some()
     }
 
-    /// Returns the linearisation cached under `key`, or calls `reduce` and caches its result, for
-    /// residuals in this `unit`. With squared loss, a change of unit only scales the factor.
+    /// Returns the linearisation cached under `key`, or calls `reduce` and caches its result.
+    /// `unit` is the one by which residuals are divided: with squared loss, another unit only
+    /// scales the cached factor.
     pub(super) fn get_or_reduce(
         &self,
         key: &Key,
@@ -72,8 +74,8 @@ impl LinearisationCache {
         })
     }
 
-    /// Returns the stored linearisation of a data set, which steps of a provisional fit reuse;
-    /// `None` if there is none.
+    /// Returns the linearisation of data set `data` whose derivatives a provisional fit reuses;
+    /// `None` if none is stored.
     pub(super) fn base(&self, data: u64) -> Option<Arc<Base>> {
         let base = self.base.as_ref()?;
         locked(base).as_ref().filter(|base| base.data == data).map(Arc::clone)

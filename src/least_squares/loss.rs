@@ -3,9 +3,10 @@
 use super::Block;
 use crate::numeric::kernel::{norm, sum_of_squares};
 
-/// Number of lengths at which the moments of a loss are summed.
+/// Number of steps of the quadrature over residual lengths that gives the moments of a loss.
 const MOMENT_STEPS: u32 = 2000;
-/// Largest length of a normal residual of a few numbers that counts in such sums \[σ\].
+/// Upper limit of that quadrature \[σ\]: longer normal residuals of a few coordinates have a
+/// negligible probability.
 const MAX_LENGTH: f64 = 10.0;
 
 /// Loss function of an item (a pose). Its cost is ½ρ(s²), where s = ‖r‖ is the whitened residual
@@ -73,7 +74,7 @@ impl Loss {
         }
     }
 
-    /// Returns the curvature of ½ρ along the residual, d(ρ′ s)/ds.
+    /// Returns the second derivative of ½ρ with respect to the residual length s, d(ρ′ s)/ds.
     pub fn curvature(self, s: f64) -> f64 {
         match self {
             Self::Squares => 1.0,
@@ -85,7 +86,7 @@ impl Loss {
         }
     }
 
-    /// Returns Σ ρ over the items of `residuals`, with `rows` values per item.
+    /// Returns Σ ρ over the items of `residuals`, which have `rows` values each.
     pub(super) fn sum(self, residuals: &[f64], rows: usize) -> f64 {
         if self == Self::Squares {
             return sum_of_squares(residuals);
@@ -93,14 +94,15 @@ impl Loss {
         residuals.chunks_exact(rows.max(1)).map(|item| self.rho(norm(item))).sum()
     }
 
-    /// Returns for each row of `residuals` the weight ρ′ of its item, with `rows` values per item.
+    /// Returns the weight ρ′ of each row of `residuals`. The rows of an item, `rows` in number,
+    /// have the same weight.
     pub(super) fn weights(self, residuals: &[f64], rows: usize) -> Vec<f64> {
         let items = residuals.chunks_exact(rows.max(1));
         items.flat_map(|item| std::iter::repeat_n(self.weight(norm(item)), item.len())).collect()
     }
 
-    /// Scales the rows of each item in `block` by √ρ′ and returns Σ ρ, with `rows` rows per item.
-    /// For [`Loss::Squares`] does nothing and returns `None`.
+    /// Scales the rows of each item in `block` by √ρ′ and returns Σ ρ over the items, which have
+    /// `rows` rows each. For [`Loss::Squares`] does nothing and returns `None`.
     pub(super) fn weigh(self, block: &mut Block, rows: usize) -> Option<f64> {
         if self == Self::Squares {
             return None;
@@ -121,8 +123,9 @@ impl Loss {
         Some(sum)
     }
 
-    /// Returns the mean curvature of the loss and the mean square of its slope, each over all
-    /// directions. The residuals are normal with `coordinates` numbers and 1 σ = `scale`.
+    /// Returns the expected second derivative of ½ρ, averaged over the directions of a residual,
+    /// and the expected square of its slope per coordinate. Residuals are normal with `coordinates`
+    /// coordinates of standard deviation `scale` \[σ\].
     ///
     /// E[(k − 1) ρ′(s) + ∂(ρ′ s)/∂s] / k and E[(ρ′ s)²] / k with s² / scale² ~ χ²ₖ [Huber &
     /// Ronchetti 2009, sec. 7.6].

@@ -1,7 +1,7 @@
 //! Nonlinear least squares over many small items, independent of robots.
 //!
 //! A problem is a sum over items (poses, data points) of whitened residuals r(x). Solvers never see
-//! the m × n Jacobian: it is reduced, block by block, to the triangular factor of its QR
+//! the m × n Jacobian: the rows are reduced, block by block, to the triangular factor of its QR
 //! decomposition.
 
 mod chord;
@@ -124,7 +124,7 @@ impl Block {
     }
 }
 
-/// Function that solvers minimise, ½‖r(x)‖², given by its value and its triangular linearisation.
+/// Function ½‖r(x)‖² that solvers minimise, given by its value and its triangular linearisation.
 pub trait Objective {
     /// Returns the number of unknowns n.
     fn parameters(&self) -> usize;
@@ -137,8 +137,8 @@ pub trait Objective {
 
     /// Returns S = ∂(Jᵀr)/∂x − JᵀJ at x, the part of the Hessian that Gauss–Newton neglects.
     ///
-    /// The default implementation differences the gradient at points that `within` accepts. Returns
-    /// `None` if a derivative is not finite.
+    /// The default implementation differences the gradient, at points for which `within` returns
+    /// true. Returns `None` if a derivative is not finite.
     fn curvature(
         &self,
         x: &DVector<f64>,

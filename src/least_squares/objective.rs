@@ -15,25 +15,25 @@ use super::{
 };
 use crate::numeric::kernel::{dot, sum_of_squares};
 
-/// Number of items reduced together. Larger problems keep only n × n factors, never the m × n
-/// matrix.
+/// Number of items (poses) that are reduced to one triangular factor at a time. Larger problems
+/// keep only n × n factors, never the m × n matrix.
 pub const CHUNK_ITEMS: usize = 256;
 
-/// Fraction of a step over which the second derivative along the step is differenced.
+/// Fraction of a step at which residuals are evaluated for the second derivative along the step.
 const ACCELERATION_STEP: f64 = 0.1;
 
-/// Rows per unknown that are absorbed one chunk after the other before factors are merged. Merging
+/// Rows per unknown that one thread absorbs chunk after chunk before factors are merged. Merging
 /// two factors costs as much as absorbing n/2 rows.
 const ROWS_PER_UNKNOWN: usize = 4;
 
-/// Maximum number of chunks whose results are in memory at the same time.
+/// Maximum number of chunks whose results are in memory at a time.
 const GROUP_CHUNKS: usize = 64;
 
-/// Maximum number of derivatives (8 bytes each) that a provisional fit stores for later points: 128
-/// MB.
+/// Maximum number of derivatives that a provisional fit stores for later points: 128 MB of 8-byte
+/// numbers.
 const MAX_KEPT_DERIVATIVES: usize = 1 << 24;
 
-/// Data problem with optional linear rows, ready for a solver.
+/// Objective of a least-squares problem with optional linear rows (priors, gauge conditions).
 ///
 /// Items are processed in chunks of [`CHUNK_ITEMS`]. Each chunk, or each run of chunks if there are
 /// many unknowns, is reduced to a [`Triangle`]. The triangles are merged in an order that does not
@@ -54,7 +54,7 @@ impl<'a, P: LeastSquares> Fit<'a, P> {
     }
 
     /// Sets the loss of each item's residual (an item is a pose). Linear rows, such as priors,
-    /// always count by their squares.
+    /// always enter with their squares.
     #[must_use]
     pub fn with_loss(mut self, loss: Loss) -> Self {
         self.loss = loss;
@@ -62,7 +62,7 @@ impl<'a, P: LeastSquares> Fit<'a, P> {
     }
 
     /// Stores linearisations in `cache` and reuses those stored there. `data` identifies the data
-    /// of the problem, apart from the `unit` of its residuals.
+    /// set; `unit` is what its residuals are divided by, such as 1 σ of a position \[m\].
     #[must_use]
     pub fn with_cache(mut self, cache: &'a LinearisationCache, data: u64, unit: f64) -> Self {
         self.cache = Some((cache, data, unit));
@@ -194,7 +194,7 @@ impl<'a, P: LeastSquares> Fit<'a, P> {
             if !(cache.is_provisional() && self.keeps_derivatives()) {
                 return self.reduce(x);
             }
-            let earlier = cache.base(data).and_then(|base| base.at(self.problem, x, unit));
+            let earlier = cache.base(data).and_then(|base| base.triangle_at(self.problem, x, unit));
             earlier.unwrap_or_else(|| {
                 let base = self.base(x, (data, unit));
                 let triangle = base.triangle();
@@ -250,8 +250,8 @@ impl<'a, P: LeastSquares> Fit<'a, P> {
     }
 }
 
-/// Applies `map` to each of `count` chunks, in parallel if there are several, and passes the
-/// results to `take` in order.
+/// Applies `map` to the index of each of `count` chunks and a `buffer`, in parallel if there are
+/// several chunks. Passes the results to `take` in the order of the chunks.
 fn in_order<B, T: Send>(
     count: usize,
     buffer: impl Fn() -> B + Sync + Send,
@@ -297,7 +297,8 @@ impl<P: LeastSquares> Objective for Fit<'_, P> {
         linearisation
     }
 
-    /// Differences gradients at exact linearisations, without the cache of earlier points.
+    /// Differences the gradients of exact linearisations; derivatives cached at other points are
+    /// not used.
     fn curvature(
         &self,
         x: &DVector<f64>,
@@ -467,7 +468,7 @@ mod tests {
         for (unit, step) in [(0.1, 0.0), (0.1, 0.02), (0.5, 0.02)] {
             let curve = Curve { unit };
             let x = &start + DVector::from_vec(vec![step, -2.0 * step, step, 0.5 * step]);
-            let predicted = base.at(&curve, &x, unit).unwrap().into_linearisation();
+            let predicted = base.triangle_at(&curve, &x, unit).unwrap().into_linearisation();
             let residual = residual_vector(&curve, &x);
             let gradient = columns.tr_mul(&residual) * (0.1 / unit);
             assert!(
@@ -478,6 +479,6 @@ mod tests {
             // The two exchangeable unknowns do not grow with opposite signs.
             assert!(predicted.projected.norm_squared() < residual.norm_squared());
         }
-        assert!(base.at(&curve, &(&start * 3.0), 0.1).is_none());
+        assert!(base.triangle_at(&curve, &(&start * 3.0), 0.1).is_none());
     }
 }

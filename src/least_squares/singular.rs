@@ -15,19 +15,20 @@ const GROUP_COLUMNS: usize = 32;
 /// thread.
 const MIN_PARALLEL_COLUMNS: usize = 4 * GROUP_COLUMNS;
 
-/// Singular value decomposition B = U Σ Vᵀ with the projection Uᵀc of a constant c; in no order.
+/// Singular value decomposition B = U Σ Vᵀ, in no particular order, with the projection Uᵀc of a
+/// vector c.
 #[derive(Debug, Clone)]
 pub(super) struct Decomposition {
     /// Scaled right singular vectors σᵢ vᵢ as columns.
     pub columns: DMatrix<f64>,
     /// Singular values σᵢ, in the order of the columns.
     pub singular: Vec<f64>,
-    /// Projections `uᵢᵀc` of the constant.
+    /// Projections `uᵢᵀc` of the vector c, in the order of the columns.
     pub projected: DVector<f64>,
 }
 
 impl Decomposition {
-    /// Decomposes B and projects c; without `constant` nothing is projected.
+    /// Decomposes B and projects c; if `constant` is `None`, the projections are zero.
     ///
     /// B P = Q R by column-pivoted QR. The columns of Rᵀ are rotated until they are orthogonal:
     /// they become σᵢ Pᵀvᵢ, and the same rotations turn Qᵀc into Uᵀc. [Hestenes 1958; Drmač &
@@ -81,7 +82,8 @@ impl SingularValues {
     }
 }
 
-/// Rotates pairs of columns until all are orthogonal, together with the entries of `projected`.
+/// Rotates pairs of columns until all are orthogonal; the entries of `projected` are rotated with
+/// them.
 fn orthogonalise(columns: &mut DMatrix<f64>, projected: &mut DVector<f64>) {
     let (rows, n) = columns.shape();
     if rows == 0 {
@@ -137,7 +139,7 @@ struct ColumnGroup {
     projected: Vec<f64>,
 }
 
-/// One column, its squared norm and its entry of the projected constant.
+/// Column with its squared norm and its entry of the projected vector.
 type Column<'a> = (&'a mut [f64], &'a mut f64, &'a mut f64);
 
 impl ColumnGroup {
@@ -195,8 +197,8 @@ impl ColumnGroup {
     }
 }
 
-/// Rotates two columns (entries, squared norm, projected constant) so that they become orthogonal.
-/// Returns false if they already are, within rounding.
+/// Rotates two columns (entries, squared norm, entry of the projected vector) so that they become
+/// orthogonal. Returns false if they already are, within rounding.
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
 fn rotate((a, aa, ca): &mut Column, (b, bb, cb): &mut Column) -> bool {
     let product = dot(a, b);

@@ -135,7 +135,7 @@ impl Triangle {
         self.squares += other.squares;
     }
 
-    /// Returns the problem \[R c\] with added rows diag(d) p = 0, whose cost is not counted.
+    /// Returns \[R c\] = (`triangle`, `projected`) with added rows diag(d) p = 0; its cost is zero.
     pub(crate) fn damped(
         triangle: &DMatrix<f64>,
         projected: &DVector<f64>,
@@ -348,7 +348,7 @@ fn coupling(vectors: &[&[f64]; PANEL], width: usize) -> [[f64; PANEL]; PANEL] {
 }
 
 impl Linearisation {
-    /// Adds rows W p = 0 for the step p, shape of `rows` = (k, n); the cost stays unchanged.
+    /// Adds rows W p = 0 for the step p, with W = `rows`, shape = (k, n). The cost stays unchanged.
     #[must_use]
     pub(crate) fn with_rows(self, rows: &DMatrix<f64>) -> Self {
         let n = self.projected.len();

@@ -10,26 +10,25 @@ const MAX_QL_STEPS: usize = 60;
 /// Returns each eigenvalue λᵢ of the symmetric matrix M = V diag(λ) Vᵀ with the component vᵢᵀc of
 /// the vector c; `None` if the steps do not converge, or an entry is not finite.
 ///
-/// Reflections make the matrix tridiagonal, implicit QL steps make it diagonal, and both turn the
-/// vector along, so that no eigenvector is formed [Golub & Van Loan 2013, sec. 8.3]. Each eigenvalue
-/// is exact to rounding of the largest one.
+/// Reflections make the matrix tridiagonal and implicit QL steps make it diagonal. Both are applied
+/// to the vector, so that no eigenvector is formed [Golub & Van Loan 2013, sec. 8.3]. Each
+/// eigenvalue is exact to rounding of the largest one.
 pub(super) fn eigenvalues_along(
     mut matrix: DMatrix<f64>,
     vector: &DVector<f64>,
 ) -> Option<Vec<(f64, f64)>> {
     let (mut along, n) = (vector.as_slice().to_vec(), matrix.ncols());
-    let mut beside = vec![0.0; n];
-    for (j, entry) in beside.iter_mut().enumerate().take(n.saturating_sub(1)) {
+    let mut off_diagonal = vec![0.0; n];
+    for (j, entry) in off_diagonal.iter_mut().enumerate().take(n.saturating_sub(1)) {
         *entry = reflect(&mut matrix, j, &mut along);
     }
     let mut diagonal = matrix.diagonal().as_slice().to_vec();
-    diagonalise(&mut diagonal, &mut beside, &mut along)?;
+    diagonalise(&mut diagonal, &mut off_diagonal, &mut along)?;
     Some(diagonal.into_iter().zip(along).collect())
 }
 
-/// Sets column j of a symmetric matrix to zero below its first entry under the diagonal, by a
-/// reflection of the rows and columns behind j and of the vector. Returns that entry; the column
-/// itself is left as it was.
+/// Reflects the rows and columns behind j of a symmetric matrix, and the vector `along`, so that
+/// column j has one entry below its diagonal. Returns that entry; column j itself is not written.
 fn reflect(matrix: &mut DMatrix<f64>, j: usize, along: &mut [f64]) -> f64 {
     let (n, first) = (matrix.nrows(), j + 1);
     let mut axis = matrix.as_slice()[j * n + first..first * n].to_vec();
@@ -55,20 +54,21 @@ fn reflect(matrix: &mut DMatrix<f64>, j: usize, along: &mut [f64]) -> f64 {
     entry
 }
 
-/// Replaces the `diagonal` of a symmetric tridiagonal matrix by its eigenvalues, given the entries
-/// `beside` it, and turns the vector `along` into their eigenvectors.
-fn diagonalise(diagonal: &mut [f64], beside: &mut [f64], along: &mut [f64]) -> Option<()> {
+/// Replaces the `diagonal` of a symmetric tridiagonal matrix, with the entries `off_diagonal`, by
+/// its eigenvalues. Replaces `along` by the components of that vector along the eigenvectors.
+/// Returns `None` if the QL steps do not converge or a result is not finite.
+fn diagonalise(diagonal: &mut [f64], off_diagonal: &mut [f64], along: &mut [f64]) -> Option<()> {
     let n = diagonal.len();
     for low in 0..n {
-        let is_zero = |k: &usize, diagonal: &[f64], beside: &[f64]| {
-            beside[*k].abs() <= f64::EPSILON * (diagonal[*k].abs() + diagonal[k + 1].abs())
+        let is_zero = |k: &usize, diagonal: &[f64], off_diagonal: &[f64]| {
+            off_diagonal[*k].abs() <= f64::EPSILON * (diagonal[*k].abs() + diagonal[k + 1].abs())
         };
-        let end = |diagonal: &[f64], beside: &[f64]| {
-            (low..n - 1).find(|k| is_zero(k, diagonal, beside)).unwrap_or(n - 1)
+        let end = |diagonal: &[f64], off_diagonal: &[f64]| {
+            (low..n - 1).find(|k| is_zero(k, diagonal, off_diagonal)).unwrap_or(n - 1)
         };
         let mut steps = 0;
         loop {
-            let high = end(diagonal, beside);
+            let high = end(diagonal, off_diagonal);
             if high == low {
                 break;
             }
@@ -77,18 +77,18 @@ fn diagonalise(diagonal: &mut [f64], beside: &mut [f64], along: &mut [f64]) -> O
                 return None;
             }
             // Wilkinson's shift.
-            let ratio = (diagonal[low + 1] - diagonal[low]) / (2.0 * beside[low]);
+            let ratio = (diagonal[low + 1] - diagonal[low]) / (2.0 * off_diagonal[low]);
             let root = (ratio * ratio + 1.0).sqrt().copysign(ratio);
-            let mut bulge = diagonal[high] - diagonal[low] + beside[low] / (ratio + root);
+            let mut bulge = diagonal[high] - diagonal[low] + off_diagonal[low] / (ratio + root);
             let (mut sine, mut cosine, mut change) = (1.0, 1.0, 0.0);
             let mut is_split = false;
             for k in (low..high).rev() {
-                let (f, b) = (sine * beside[k], cosine * beside[k]);
+                let (f, b) = (sine * off_diagonal[k], cosine * off_diagonal[k]);
                 let length = (f * f + bulge * bulge).sqrt();
-                beside[k + 1] = length;
+                off_diagonal[k + 1] = length;
                 if length == 0.0 {
                     diagonal[k + 1] -= change;
-                    beside[high] = 0.0;
+                    off_diagonal[high] = 0.0;
                     is_split = true;
                     break;
                 }
@@ -104,8 +104,8 @@ fn diagonalise(diagonal: &mut [f64], beside: &mut [f64], along: &mut [f64]) -> O
             }
             if !is_split {
                 diagonal[low] -= change;
-                beside[low] = bulge;
-                beside[high] = 0.0;
+                off_diagonal[low] = bulge;
+                off_diagonal[high] = 0.0;
             }
         }
     }

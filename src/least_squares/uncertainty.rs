@@ -6,32 +6,34 @@ use super::Triangle;
 use super::inverse::regular_inverse;
 use super::singular::SingularValues;
 
-/// Weight by which gauge rows become constraints: the variance along them falls below rounding.
+/// Factor by which gauge rows are multiplied so that they act as constraints: the variance along
+/// them falls below rounding.
 pub(super) const CONSTRAINT_WEIGHT: f64 = 1e5;
-/// Largest scaled singular value, relative to the largest of all, whose direction counts as
-/// undetermined.
+/// Largest singular value of the column-scaled matrix, relative to its first one, whose direction
+/// counts as undetermined.
 const MAX_UNDETERMINED_SINGULAR_VALUE: f64 = 1e-13;
-/// Smallest ratio of singular values at which the explicit inverse is used, with an error of at
-/// most 1e-7.
+/// Smallest ratio of the last to the first singular value at which the explicit inverse is used;
+/// its relative error is then at most 1e-7.
 const MIN_WELL_CONDITIONED_RATIO: f64 = 1e-9;
 
-/// Covariance of the unknowns of a fit with the number of unknowns that the data determine.
+/// Covariance of the unknowns of a fit and the effective number of parameters.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Uncertainty {
     /// Covariance, shape = (n, n); rows and columns of unknowns that are not estimated are zero.
     pub covariance: DMatrix<f64>,
-    /// Effective number of parameters: free unknowns less the share that priors determine.
+    /// Effective number of parameters: estimated unknowns, less the unidentifiable combinations,
+    /// less the part Σ posterior/prior variance that priors determine.
     pub effective_parameters: f64,
 }
 
 impl Uncertainty {
-    /// Returns (`RᵀR` / s² + `PᵀP`)⁻¹ on the free unknowns, with the unidentifiable combinations
-    /// fixed.
+    /// Returns the covariance (`RᵀR` / s² + P²)⁻¹ of the free unknowns, P = diag(1 /
+    /// `prior_sigma`), with the unidentifiable combinations fixed.
     ///
     /// `data` is the triangular factor R of the whitened data and `prior_sigma` the 1 σ of each
-    /// unknown's prior. The rows of `gauge` span the unidentifiable combinations. `held` marks
-    /// unknowns that are not estimated (at a bound). s² = `noise_factor` multiplies the assumed
-    /// variance of the data.
+    /// unknown's prior. The rows of `gauge` span the unidentifiable combinations. `held` is true
+    /// for unknowns that are not estimated (at a bound); their rows and columns are zero. s² =
+    /// `noise_factor` multiplies the assumed variance of the data.
     pub fn of(
         data: &DMatrix<f64>,
         prior_sigma: &[Option<f64>],

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::inverse::inverse_rows;
+use super::inverse::sum_of_inverse_row_squares;
 use super::tridiagonal::eigenvalues_along;
 use super::uncertainty::CONSTRAINT_WEIGHT;
 use super::{Linearisation, Triangle};
@@ -15,7 +15,7 @@ const GRID_STEPS: u32 = 480;
 /// Largest ratio a² of prior variance to assumed data variance in a direction that informs on the
 /// noise. Directions above it are projected out.
 const MAX_PRIOR_RATIO: f64 = 0.1;
-/// Number of golden sections within the best grid step; they locate ln s² to 1e-8.
+/// Number of golden sections around the best point of the grid; they locate ln s² to 1e-8.
 const GOLDEN_SECTIONS: u32 = 40;
 /// Golden ratio less one, (√5 − 1)/2.
 const GOLDEN: f64 = 0.618_033_988_749_894_8;
@@ -45,8 +45,8 @@ impl VarianceLikelihood {
     /// Builds the likelihood from the linearisation `data` at the unknowns `x`.
     ///
     /// `rows` is the number of data rows and `squares` their ‖r‖². `priors` holds 1 σ of each
-    /// unknown's prior, `held` marks unknowns that are not estimated, and the rows of `closed` are
-    /// combinations that are fixed.
+    /// unknown's prior, `held` is true for unknowns that are not estimated. The rows of `closed`
+    /// are combinations of unknowns that are fixed.
     pub fn new(
         data: &Linearisation,
         (rows, squares): (usize, f64),
@@ -68,11 +68,11 @@ impl VarianceLikelihood {
         let at_priors = &data.projected - &data.triangle * &moved;
         let height = n + closed.nrows();
         let mut stack = DMatrix::zeros(height.max(width + 1), width + 1);
-        for (place, &j) in free.iter().chain(&with_prior).enumerate() {
+        for (column, &j) in free.iter().chain(&with_prior).enumerate() {
             let scale = priors[j].unwrap_or(1.0);
-            stack.view_mut((0, place), (n, 1)).copy_from(&(data.triangle.column(j) * scale));
+            stack.view_mut((0, column), (n, 1)).copy_from(&(data.triangle.column(j) * scale));
             stack
-                .view_mut((n, place), (closed.nrows(), 1))
+                .view_mut((n, column), (closed.nrows(), 1))
                 .copy_from(&(closed.column(j) * (CONSTRAINT_WEIGHT * scale)));
         }
         stack.view_mut((0, width), (n, 1)).copy_from(&at_priors);
@@ -87,9 +87,8 @@ impl VarianceLikelihood {
             (squares - data.projected.norm_squared()).max(0.0) + reduced[(width, width)].powi(2);
         let free_rows = (rows + closed.nrows()) as f64 - first as f64;
         // The norm of the inverse bounds every a² from below. If all directions are projected out,
-        // the
-        // singular values are not needed.
-        let inverse = inverse_rows(&prior_block, (0..k).map(|j| (j, 1.0)));
+        // the singular values are not needed.
+        let inverse = sum_of_inverse_row_squares(&prior_block, (0..k).map(|j| (j, 1.0)));
         if inverse.is_some_and(|squares| squares * MAX_PRIOR_RATIO < 1.0) {
             let free_rows = free_rows - k as f64;
             return Self { directions: Vec::new(), residual_squares, free_rows };
@@ -99,8 +98,8 @@ impl VarianceLikelihood {
         Self { directions, residual_squares, free_rows }
     }
 
-    /// Returns −2 ln L at ln s² = `log`.
-    fn at(&self, log: f64) -> f64 {
+    /// Returns −2 ln L(s²) at ln s² = `log`.
+    fn deviance(&self, log: f64) -> f64 {
         let variance = log.exp();
         let term = |&(a, c): &(f64, f64)| (variance + a).ln() + c / (variance + a);
         self.directions.iter().map(term).sum::<f64>()
@@ -108,9 +107,9 @@ impl VarianceLikelihood {
             + self.residual_squares / variance
     }
 
-    /// Returns the degrees of freedom that tell s²: one for each row outside the range of A, and
-    /// (1 / (1 + a²))² for each direction with a prior, which is its share of the information on s²
-    /// at s² = 1.
+    /// Returns the effective degrees of freedom of the estimate of s². Each row outside the range
+    /// of A adds one. Each direction with a prior adds (1 / (1 + a²))², its share of the
+    /// information on s² at s² = 1.
     pub fn freedom(&self) -> f64 {
         self.free_rows + self.directions.iter().map(|(a, _)| (1.0 + a).powi(-2)).sum::<f64>()
     }
@@ -121,24 +120,24 @@ impl VarianceLikelihood {
         let grid = |k: u32| LOG_VARIANCE_RANGE.0 + f64::from(k) * step;
         let best = (0..=GRID_STEPS)
             .map(grid)
-            .min_by(|a, b| self.at(*a).total_cmp(&self.at(*b)))
+            .min_by(|a, b| self.deviance(*a).total_cmp(&self.deviance(*b)))
             .unwrap_or(0.0);
         let (mut low, mut high) = (best - step, best + step);
         for _ in 0..GOLDEN_SECTIONS {
             let (a, b) = (high - GOLDEN * (high - low), low + GOLDEN * (high - low));
-            if self.at(a) < self.at(b) { high = b } else { low = a }
+            if self.deviance(a) < self.deviance(b) { high = b } else { low = a }
         }
         let log = 0.5 * (low + high);
-        (log.exp(), self.at(0.0) - self.at(log))
+        (log.exp(), self.deviance(0.0) - self.deviance(log))
     }
 }
 
 /// Returns a² and c² of the directions of A with a² up to [`MAX_PRIOR_RATIO`], for y = A z + e and
-/// c = Uᵀy.
+/// c = Uᵀy. The result is empty if the eigenvalues do not converge.
 ///
-/// They are eigenvalues of (1 + A Aᵀ)⁻¹, which are exact to rounding where a² is small; the factor
-/// of 1 + A Aᵀ is that of the rows of Aᵀ and 1. Directions with a = 0 count, although only noise
-/// is in them.
+/// They follow from the eigenvalues 1/(1 + a²) of (1 + A Aᵀ)⁻¹, which are exact to rounding where
+/// a² is small. The triangular factor of Aᵀ stacked on the identity is that of 1 + A Aᵀ. Directions
+/// with a = 0 are included; they contain noise alone.
 fn spectrum(a: &DMatrix<f64>, y: &DVector<f64>) -> Vec<(f64, f64)> {
     let k = a.ncols();
     let mut stack = DMatrix::zeros(2 * k, k);

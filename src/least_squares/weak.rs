@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::identifiability::UnidentifiableCombination;
-use super::inverse::inverse_rows;
+use super::inverse::sum_of_inverse_row_squares;
 use super::singular::SingularValues;
 use super::{Block, Linearisation, Objective, Triangle};
 
@@ -14,20 +14,21 @@ use super::{Block, Linearisation, Objective, Triangle};
 /// deviations of an arm, at most a hundredth of that size, then move no position by more than 0.05
 /// σ.
 pub const WEAK_THRESHOLD: f64 = 5.0;
-/// Largest weight in a combination that counts as rounding.
+/// Largest coefficient of a combination that counts as rounding.
 const MAX_ROUNDING_WEIGHT: f64 = 1e-6;
 
 /// Combinations of unknowns that the data determine too weakly for a reliable estimate.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Weak {
-    /// Constraint rows W, which keep the combinations fixed by W p = 0 for a step p. They are as
-    /// long as the longest column of the triangle in units of the plausible sizes, shape =
+    /// Constraint rows W, which keep the combinations fixed by W p = 0 for a step p. Each row is as
+    /// long as the longest column of the triangle in units of the plausible sizes. Shape =
     /// (combinations, n) [1 / unit of x].
     pub rows: DMatrix<f64>,
-    /// Each combination with its weights in units of the plausible sizes, and the data change it
-    /// causes \[σ\].
+    /// Each combination, with coefficients in units of the plausible sizes, and the change of the
+    /// data that it causes \[σ\].
     pub combinations: Vec<UnidentifiableCombination>,
-    /// Fraction of each unknown that lies outside the weak combinations, 0…1.
+    /// Share of each unknown outside the weak combinations: 1 − squared length of its projection
+    /// onto them, 0…1. It is 1 for unknowns without a plausible size.
     pub visible: Vec<f64>,
 }
 
@@ -46,19 +47,20 @@ impl Weak {
             return None;
         }
         // The norm ‖R₃⁻¹‖ in scaled unknowns follows from the rows of R⁻¹.
-        let inverse = inverse_rows(triangle, sized.iter().map(|&(j, size)| (j, size.recip())));
+        let inverse =
+            sum_of_inverse_row_squares(triangle, sized.iter().map(|&(j, size)| (j, size.recip())));
         if inverse.is_some_and(|squares| squares.sqrt() * WEAK_THRESHOLD < 1.0) {
             return None;
         }
         let unsized_unknowns: Vec<usize> = (0..n).filter(|&j| sizes[j].is_none()).collect();
         let first = unsized_unknowns.len();
         let mut block = Block::zeros(triangle.nrows(), n);
-        for (place, &j) in unsized_unknowns.iter().enumerate() {
-            block.column_mut(place).copy_from_slice(triangle.column(j).as_slice());
+        for (column, &j) in unsized_unknowns.iter().enumerate() {
+            block.column_mut(column).copy_from_slice(triangle.column(j).as_slice());
         }
-        for (place, &(j, size)) in sized.iter().enumerate() {
+        for (column, &(j, size)) in sized.iter().enumerate() {
             let scaled = triangle.column(j) * size;
-            block.column_mut(first + place).copy_from_slice(scaled.as_slice());
+            block.column_mut(first + column).copy_from_slice(scaled.as_slice());
         }
         let mut reduced = Triangle::new(n);
         reduced.absorb(&mut block);
@@ -71,7 +73,7 @@ impl Weak {
         {
             return None;
         }
-        let strongest = sized
+        let longest = sized
             .iter()
             .map(|&(j, size)| triangle.column(j).norm() * size)
             .fold(WEAK_THRESHOLD, f64::max);
@@ -80,9 +82,9 @@ impl Weak {
         let spanned = super::identifiability::complement(&right.columns(0, strong).into_owned());
         let mut rows = DMatrix::zeros(spanned.nrows(), n);
         let mut visible = vec![1.0; n];
-        for (place, &(j, size)) in sized.iter().enumerate() {
-            visible[j] = (1.0 - spanned.column(place).norm_squared()).clamp(0.0, 1.0);
-            rows.set_column(j, &(spanned.column(place) * (strongest / size)));
+        for (column, &(j, size)) in sized.iter().enumerate() {
+            visible[j] = (1.0 - spanned.column(column).norm_squared()).clamp(0.0, 1.0);
+            rows.set_column(j, &(spanned.column(column) * (longest / size)));
         }
         let combination = |row: nalgebra::RowDVector<f64>| {
             let sign = row
@@ -91,7 +93,7 @@ impl Weak {
                 .map_or(1.0, |weight| weight.signum());
             let weights =
                 row.iter().enumerate().filter(|(_, weight)| weight.abs() > MAX_ROUNDING_WEIGHT);
-            let weights = weights.map(|(place, weight)| (sized[place].0, sign * weight)).collect();
+            let weights = weights.map(|(k, weight)| (sized[k].0, sign * weight)).collect();
             UnidentifiableCombination {
                 weights,
                 singular_value: (&conditional * row.transpose()).norm(),

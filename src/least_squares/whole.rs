@@ -31,7 +31,7 @@ pub fn jacobian_and_residual<P: LeastSquares>(
     let (column_rows, chunk_rows) = ((rows * items).max(1), (rows * CHUNK_ITEMS).max(1));
     let mut jacobian = zeros(rows * items, n);
     let mut residual = DVector::zeros(rows * items);
-    // Each part holds, for one chunk, the slices of all columns that belong to it.
+    // Each part holds the slices of all columns that belong to one chunk.
     let mut parts: Vec<Vec<&mut [f64]>> = Vec::new();
     parts.resize_with(items.div_ceil(CHUNK_ITEMS), || Vec::with_capacity(n + 1));
     for column in jacobian.as_mut_slice().chunks_mut(column_rows).chain([residual.as_mut_slice()]) {

@@ -66,16 +66,17 @@ pub struct Constrained {
     bounds: Bounds,
     rows: Inequalities,
     model: Option<Model>,
-    /// Active faces of the last problem from the same x.
+    /// Active faces of the last solution from the same x, guessed to be active in the next.
     guess: Option<Faces>,
-    /// Undamped constrained step from x, once computed.
+    /// Constrained step from x without damping, once it was computed.
     undamped: Option<PolyhedronSolution>,
     /// True if constraints changed the last step.
     is_limited: bool,
 }
 
 impl Constrained {
-    /// Returns the undamped constrained step if constraints limit it and the radius does not.
+    /// Returns the constrained step without damping; `None` if no constraint or the radius limits
+    /// it.
     fn undamped_step(&mut self, x: &DVector<f64>, radius: f64) -> Option<Step> {
         let model = self.model.as_ref()?;
         let undamped = self.undamped.get_or_insert_with(|| {
@@ -106,7 +107,7 @@ impl Constrained {
         Step { point, length: q.norm(), slope, predicted, damping }
     }
 
-    /// Creates the subproblem of a method within bounds and inequalities.
+    /// Creates the subproblem of a method with bounds and linear inequalities `rows`.
     pub fn new(method: StepMethod, bounds: Bounds, rows: Inequalities) -> Self {
         Self { method, bounds, rows, model: None, guess: None, undamped: None, is_limited: false }
     }
@@ -222,12 +223,12 @@ impl Subproblem for Constrained {
                     self.undamped.as_ref().map_or(&polyhedron.touched, |undamped| &undamped.faces);
                 let mut problem = PolyhedronProblem::new(&model.factor, &polyhedron, faces.clone());
                 problem.guess_faces(&(&step.point - x).component_mul(&model.scale));
-                let (size, undamped) = (problem.gradient_norm(), &mut self.undamped);
+                let (gradient_norm, undamped) = (problem.gradient_norm(), &mut self.undamped);
                 let solve = |lambda| match lambda {
                     0.0 => undamped.get_or_insert_with(|| problem.solve(0.0)).clone(),
                     _ => problem.solve(lambda),
                 };
-                step_within_radius(solve, step.damping, size, radius)
+                step_within_radius(solve, step.damping, gradient_norm, radius)
             }
             StepMethod::InteriorPoint => {
                 let solution =
@@ -246,14 +247,14 @@ impl Subproblem for Constrained {
 
 /// Returns the constrained step with ‖q‖ ≤ Δ to within 10 %, and its damping λ.
 ///
-/// `solve` returns the constrained step for any λ, `size` is ‖Bᵀc‖ and `first` the λ > 0 of the
-/// unconstrained step. ‖q(λ)‖ falls with λ and is at most ‖Bᵀc‖/λ (compare q with 0), which
-/// brackets λ. Within the bracket, Hebden's model ‖q(λ)‖ ≈ a/(b + λ) is fitted to the last two
-/// values.
+/// `solve` returns the constrained step for any λ, `gradient_norm` is ‖Bᵀc‖ and `first` the λ of
+/// the unconstrained step, 0 if it was not damped. ‖q(λ)‖ falls with λ and is at most ‖Bᵀc‖/λ
+/// (compare q with 0), which brackets λ. Within the bracket, Hebden's model ‖q(λ)‖ ≈ a/(b + λ) is
+/// fitted to the last two values.
 fn step_within_radius(
     mut solve: impl FnMut(f64) -> PolyhedronSolution,
     first: f64,
-    size: f64,
+    gradient_norm: f64,
     radius: f64,
 ) -> (PolyhedronSolution, f64) {
     let is_short = |length: f64| length <= (1.0 + RADIUS_SLACK) * radius;
@@ -267,7 +268,7 @@ fn step_within_radius(
     if is_short(length) {
         return (undamped, 0.0);
     }
-    let (mut low, mut high) = (0.0, size / radius);
+    let (mut low, mut high) = (0.0, gradient_norm / radius);
     let mut last = (0.0, length);
     let mut lambda = if first_solution.is_some() { first } else { 1e-3 * high };
     let mut best = None;

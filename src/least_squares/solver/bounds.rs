@@ -79,7 +79,7 @@ impl Bounds {
         &self.upper
     }
 
-    /// Returns the bound that `x[j]` equals or exceeds, if any.
+    /// Returns the bound that `x[j]` lies on or beyond, or `None` between the bounds.
     pub(super) fn at(&self, x: &DVector<f64>, j: usize) -> Option<AtBound> {
         if x[j] <= self.lower[j] {
             Some(AtBound::Lower)
@@ -97,7 +97,8 @@ impl Bounds {
         }
     }
 
-    /// Places the unknowns with an active bound exactly on it and clamps all others into the box.
+    /// Places each unknown with an active bound exactly on that bound and clamps all others into
+    /// the box.
     pub(super) fn hold(&self, x: &mut DVector<f64>, active: &[Option<AtBound>]) {
         for (j, active) in active.iter().enumerate() {
             match active {

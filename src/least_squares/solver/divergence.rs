@@ -18,7 +18,7 @@ impl Default for Divergence {
     }
 }
 
-/// Running divergence test over the costs of one run.
+/// Divergence test over the successive costs of one run.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct DivergenceMonitor {
     divergence: Divergence,

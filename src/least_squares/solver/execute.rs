@@ -7,7 +7,7 @@ use nalgebra::DVector;
 use super::{Solution, Termination};
 use crate::least_squares::Objective;
 
-/// State of argmin's executor, of which x and ½‖r‖² are used.
+/// State of argmin's executor; only x and the cost ½‖r‖² are used.
 pub type State = IterState<DVector<f64>, (), (), (), (), f64>;
 
 /// Observer that ignores every iteration.
@@ -41,8 +41,8 @@ pub(super) fn run<O: Objective, S: Solver<O, State> + ReportsTermination>(
     // The executor fails only when an observer does.
     let Ok(mut result) = executor.run() else { return solution };
     let count = |what: &str| result.problem.counts.get(what).copied().unwrap_or(0);
-    // An acceleration takes one residual and one linearisation; differencing the gradient takes one
-    // linearisation more than there are unknowns.
+    // An acceleration takes one evaluation of residuals and one linearisation; differencing the
+    // gradient takes one linearisation more than there are unknowns.
     let accelerations = count("acceleration_count");
     solution.cost_evaluations = count("cost_count") + accelerations;
     solution.linearisations = count("linearise_count")

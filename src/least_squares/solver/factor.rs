@@ -51,7 +51,7 @@ impl Factor {
         &self.matrix * q
     }
 
-    /// Returns Bᵀc, the gradient at q = 0.
+    /// Returns Bᵀc, the gradient of ½‖B q + c‖² at q = 0.
     pub fn gradient(&self) -> DVector<f64> {
         self.matrix.tr_mul(&self.constant)
     }
@@ -72,13 +72,14 @@ impl Factor {
         self.spectrum().solution(lambda, n)
     }
 
-    /// Returns the change of the minimiser of ‖B q + c‖² + λ‖q‖² when `gradient` is added to its
-    /// gradient. Returns `None` if B lacks rank.
+    /// Returns the change of the minimiser of ½‖B q + c‖² + ½λ‖q‖² when `gradient` is added to the
+    /// gradient of this function. Returns `None` if B lacks rank.
     pub fn response(&self, gradient: &DVector<f64>, lambda: f64) -> Option<DVector<f64>> {
         self.pivoted()?.response(gradient, lambda)
     }
 
-    /// Returns the minimiser of ‖B q + c‖ with ‖q‖ ≤ `radius` to within 10 %, and its damping λ.
+    /// Returns the minimiser of ‖B q + c‖ subject to ‖q‖ ≤ `radius`, and its damping λ. The radius
+    /// is met to within 10 %.
     pub fn limited(&mut self, radius: f64) -> (DVector<f64>, f64) {
         if let Some(step) = self.pivoted().and_then(|pivoted| pivoted.limited(radius)) {
             return step;
@@ -110,11 +111,11 @@ impl Factor {
     }
 }
 
-/// Returns the fraction of σ₁ that counts as zero, lowered (down to rounding) so that short columns
-/// are kept.
+/// Returns the fraction of σ₁ up to which singular values count as zero: `tolerance`, lowered (down
+/// to rounding) so that short columns are kept.
 fn spectral_cut(matrix: &DMatrix<f64>, tolerance: f64) -> f64 {
-    let sizes = || matrix.column_iter().map(|c| c.norm()).filter(|&size| size > 0.0);
-    let spread = sizes().fold(f64::INFINITY, f64::min) / sizes().fold(0.0, f64::max);
+    let norms = || matrix.column_iter().map(|c| c.norm()).filter(|&norm| norm > 0.0);
+    let spread = norms().fold(f64::INFINITY, f64::min) / norms().fold(0.0, f64::max);
     let rounding = 8.0 * matrix.ncols() as f64 * f64::EPSILON;
     (tolerance * spread.min(1.0)).max(rounding.min(tolerance))
 }

@@ -119,8 +119,13 @@ struct RunRecord {
 struct Stopped(Termination);
 
 impl<O: Objective> Adapter<O> {
-    /// Applies `extract` to the linearisation at x, which is formed unless x is the last point.
-    fn at<T>(&self, x: &DVector<f64>, extract: impl Fn(&Linearisation) -> T) -> Result<T, Error> {
+    /// Calls `extract` with the linearisation at x, which is computed unless x is the last point.
+    /// Returns an error if the run ends there.
+    fn with_linearisation<T>(
+        &self,
+        x: &DVector<f64>,
+        extract: impl Fn(&Linearisation) -> T,
+    ) -> Result<T, Error> {
         let record = &mut *self.record.borrow_mut();
         if let Some((_, linearisation)) = record.last.as_ref().filter(|(point, _)| point == x) {
             return Ok(extract(linearisation));
@@ -158,7 +163,7 @@ impl<O: Objective> Operator for &Adapter<O> {
     type Output = DVector<f64>;
 
     fn apply(&self, x: &DVector<f64>) -> Result<DVector<f64>, Error> {
-        self.at(x, |linearisation| linearisation.projected.clone())
+        self.with_linearisation(x, |linearisation| linearisation.projected.clone())
     }
 }
 
@@ -167,6 +172,6 @@ impl<O: Objective> Jacobian for &Adapter<O> {
     type Jacobian = DMatrix<f64>;
 
     fn jacobian(&self, x: &DVector<f64>) -> Result<DMatrix<f64>, Error> {
-        self.at(x, |linearisation| linearisation.triangle.clone())
+        self.with_linearisation(x, |linearisation| linearisation.triangle.clone())
     }
 }

@@ -20,7 +20,8 @@ pub(super) struct HalfSpace {
 }
 
 /// Minimises ½‖B q + c‖² + ½λ‖q‖² within all half-spaces and, if there is a `radius`, within ‖q‖ ≤
-/// Δ. Returns q and the damping equivalent to the radius.
+/// `radius`. Returns q and the damping that has the effect of the radius, 0 if the radius does not
+/// limit q.
 ///
 /// The solver works with z = S q (unit columns) and y = B q + c, so that `BᵀB` is never formed;
 /// normals are scaled to unit length. Returns `None` if q is not finite.
@@ -32,7 +33,7 @@ pub(super) fn interior_point(
 ) -> Option<(DVector<f64>, f64)> {
     let matrix = factor.matrix();
     let (rows, n) = matrix.shape();
-    let sizes: Vec<f64> = matrix
+    let column_norms: Vec<f64> = matrix
         .column_iter()
         .map(|c| (c.norm_squared() + lambda).sqrt())
         .map(|s| if s > 0.0 { s } else { 1.0 })
@@ -52,25 +53,32 @@ pub(super) fn interior_point(
     let mut right = Vec::with_capacity(rows + spaces.len());
     for i in 0..rows {
         push_entry(i, n + i, 1.0);
-        (0..n).for_each(|j| push_entry(i, j, -matrix[(i, j)] / sizes[j]));
+        (0..n).for_each(|j| push_entry(i, j, -matrix[(i, j)] / column_norms[j]));
         right.push(factor.constant()[i] / scale);
     }
     for space in spaces {
-        let length = space.normal.iter().map(|&(j, g)| (g / sizes[j]).powi(2)).sum::<f64>().sqrt();
-        space.normal.iter().for_each(|&(j, g)| push_entry(right.len(), j, -g / sizes[j] / length));
+        let length =
+            space.normal.iter().map(|&(j, g)| (g / column_norms[j]).powi(2)).sum::<f64>().sqrt();
+        space
+            .normal
+            .iter()
+            .for_each(|&(j, g)| push_entry(right.len(), j, -g / column_norms[j] / length));
         right.push(-space.offset / scale / length);
     }
     if let Some(radius) = radius {
         right.push(radius / scale);
-        for (j, size) in sizes.iter().enumerate() {
+        for (j, size) in column_norms.iter().enumerate() {
             push_entry(right.len(), j, -size.recip());
             right.push(0.0);
         }
     }
     let constraints =
         CscMatrix::new_from_triplets(right.len(), n + rows, row_indices, column_indices, values);
-    let diagonal: Vec<f64> =
-        sizes.iter().map(|s| lambda / (s * s)).chain(std::iter::repeat_n(1.0, rows)).collect();
+    let diagonal: Vec<f64> = column_norms
+        .iter()
+        .map(|s| lambda / (s * s))
+        .chain(std::iter::repeat_n(1.0, rows))
+        .collect();
     let indices: Vec<usize> = (0..n + rows).collect();
     let quadratic =
         CscMatrix::new_from_triplets(n + rows, n + rows, indices.clone(), indices, diagonal);
@@ -89,7 +97,8 @@ pub(super) fn interior_point(
         DefaultSolver::new(&quadratic, &linear, &constraints, &right, &cones, settings).ok()?;
     solver.solve();
     let z = solver.solution.x.get(..n)?;
-    let q = DVector::from_iterator(n, z.iter().zip(&sizes).map(|(z, size)| z * scale / size));
+    let q =
+        DVector::from_iterator(n, z.iter().zip(&column_norms).map(|(z, size)| z * scale / size));
     // The multiplier of the cone is λ q, of length λ Δ.
     let damping = radius
         .and_then(|radius| Some(solver.solution.z.get(rows + spaces.len())? * scale / radius));

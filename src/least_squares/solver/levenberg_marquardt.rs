@@ -16,7 +16,7 @@ use crate::least_squares::{Linearisation, MANY_UNKNOWNS};
 #[derive(Debug, Clone, Default)]
 pub struct Unconstrained {
     model: Option<Model>,
-    /// Last step without geodesic acceleration.
+    /// Last step p without geodesic acceleration.
     unaccelerated: DVector<f64>,
 }
 
@@ -39,8 +39,8 @@ impl Model {
         Self { factor, scale: scale.clone() }
     }
 
-    /// Returns the problem with ½ `acceleration` (Jᵀ r″) added to its gradient; `None` if B lacks
-    /// rank.
+    /// Returns the problem with ½ D⁻¹ `acceleration` added to its gradient Bᵀc, where
+    /// `acceleration` is Jᵀ r″. Returns `None` if B lacks rank.
     pub(super) fn with_acceleration(&self, acceleration: &DVector<f64>) -> Option<Factor> {
         let gradient = 0.5 * acceleration.component_div(&self.scale);
         let shift = self.factor.matrix().tr_solve_upper_triangular(&gradient)?;

@@ -9,7 +9,8 @@ use crate::least_squares::inverse::regular_inverse;
 /// Maximum number of Newton steps on the secular equation ‖q(λ)‖ = Δ. If they do not suffice,
 /// singular values are used.
 const MAX_SECULAR_STEPS: usize = 20;
-/// Smallest ratio of singular values at which an upper triangle is used without pivoting.
+/// Smallest ratio of the last to the first singular value at which an upper triangle is used
+/// without pivoting.
 const MIN_UNPIVOTED_RATIO: f64 = 1e-8;
 
 /// Least-squares problem min ‖B q + c‖ of full rank with B S⁻¹ P = Q R; S holds the column norms of
@@ -23,7 +24,7 @@ pub(super) struct Pivoted {
     /// Projection `Qᵀc` of the constant.
     projected: DVector<f64>,
     /// Inverse column norms 1/S in pivot order.
-    inverse_sizes: DVector<f64>,
+    inverse_norms: DVector<f64>,
     permutation: PermutationSequence<Dyn>,
     /// Solution q at λ = 0, in pivot order.
     solution: DVector<f64>,
@@ -42,16 +43,16 @@ impl Pivoted {
         if n == 0 || matrix.nrows() < n {
             return None;
         }
-        let (unit, mut inverse_sizes) = with_unit_columns(matrix);
+        let (unit, mut inverse_norms) = with_unit_columns(matrix);
         if tolerance <= MIN_UNPIVOTED_RATIO && regular_inverse(&unit, MIN_UNPIVOTED_RATIO).is_some()
         {
             let (projected, permutation) =
                 (constant.clone(), PermutationSequence::<Dyn>::identity_generic(Dyn(n)));
-            let solution = solve(&unit, &projected, &inverse_sizes)?;
+            let solution = solve(&unit, &projected, &inverse_norms)?;
             return Some(Self {
                 triangle: unit,
                 projected,
-                inverse_sizes,
+                inverse_norms,
                 permutation,
                 solution,
                 is_unpivoted: true,
@@ -67,12 +68,12 @@ impl Pivoted {
         qr.q_tr_mul(&mut projected);
         let projected = projected.rows(0, n).into_owned();
         let permutation = qr.p().clone();
-        permutation.permute_rows(&mut inverse_sizes);
-        let solution = solve(&triangle, &projected, &inverse_sizes)?;
+        permutation.permute_rows(&mut inverse_norms);
+        let solution = solve(&triangle, &projected, &inverse_norms)?;
         Some(Self {
             triangle,
             projected,
-            inverse_sizes,
+            inverse_norms,
             permutation,
             solution,
             is_unpivoted: false,
@@ -84,8 +85,8 @@ impl Pivoted {
         self.unpermuted(self.solution.clone())
     }
 
-    /// Returns the minimiser with ‖q‖ ≤ Δ to within the slack and its λ ≥ 0, or `None` if Newton's
-    /// method does not converge in [`MAX_SECULAR_STEPS`].
+    /// Returns the minimiser with ‖q‖ ≤ Δ, to within 10 %, and its damping λ ≥ 0, or `None` if
+    /// Newton's method does not converge in [`MAX_SECULAR_STEPS`].
     ///
     /// λ ← λ + (‖q‖ − Δ) / (Δ ‖w‖²), `Rᵀw` = S⁻¹ q/‖q‖, with R of the damped problem          [Moré
     /// 1978, eqs. 5.8 and 5.9]
@@ -98,7 +99,7 @@ impl Pivoted {
             if length <= (1.0 + RADIUS_SLACK) * radius {
                 return Some((self.unpermuted(q), lambda));
             }
-            let mut w = q.component_mul(&self.inverse_sizes) / length;
+            let mut w = q.component_mul(&self.inverse_norms) / length;
             if !triangle.tr_solve_upper_triangular_mut(&mut w) {
                 return None;
             }
@@ -106,31 +107,31 @@ impl Pivoted {
             let damped = Triangle::damped(
                 &self.triangle,
                 &self.projected,
-                &(&self.inverse_sizes * lambda.sqrt()),
+                &(&self.inverse_norms * lambda.sqrt()),
             );
-            q = solve(&damped.triangle, &damped.projected, &self.inverse_sizes)?;
+            q = solve(&damped.triangle, &damped.projected, &self.inverse_norms)?;
             triangle = damped.triangle;
         }
         None
     }
 
-    /// Returns −(`BᵀB` + λ)⁻¹ g, or `None` if it is not finite.
+    /// Returns −(`BᵀB` + λ)⁻¹ g for the vector g = `gradient`, or `None` if it is not finite.
     pub(super) fn response(&self, gradient: &DVector<f64>, lambda: f64) -> Option<DVector<f64>> {
         let mut q = gradient.clone();
         self.permutation.permute_rows(&mut q);
-        q.component_mul_assign(&self.inverse_sizes);
+        q.component_mul_assign(&self.inverse_norms);
         let damped = (lambda > 0.0).then(|| {
             Triangle::damped(
                 &self.triangle,
                 &self.projected,
-                &(&self.inverse_sizes * lambda.sqrt()),
+                &(&self.inverse_norms * lambda.sqrt()),
             )
             .triangle
         });
         let triangle = damped.as_ref().unwrap_or(&self.triangle);
         let is_solved = triangle.tr_solve_upper_triangular_mut(&mut q)
             && triangle.solve_upper_triangular_mut(&mut q);
-        q.component_mul_assign(&self.inverse_sizes);
+        q.component_mul_assign(&self.inverse_norms);
         let response = self.unpermuted(-q);
         (is_solved && response.iter().all(|value| value.is_finite())).then_some(response)
     }
@@ -142,8 +143,9 @@ impl Pivoted {
     }
 }
 
-/// Returns true if B is a well-conditioned upper triangle after scaling to unit columns. The factor
-/// of any subset of its columns then is, too, with or without damping.
+/// Returns true if B is a well-conditioned upper triangle after scaling to unit columns. The
+/// triangular factor of any subset of its columns is then well conditioned, too, with or without
+/// damping.
 pub(super) fn is_well_conditioned(matrix: &DMatrix<f64>, tolerance: f64) -> bool {
     tolerance <= MIN_UNPIVOTED_RATIO
         && regular_inverse(&with_unit_columns(matrix).0, MIN_UNPIVOTED_RATIO).is_some()
@@ -152,25 +154,25 @@ pub(super) fn is_well_conditioned(matrix: &DMatrix<f64>, tolerance: f64) -> bool
 /// Returns B S⁻¹ and 1/S, with S the column norms of B.
 fn with_unit_columns(matrix: &DMatrix<f64>) -> (DMatrix<f64>, DVector<f64>) {
     let mut unit = matrix.clone();
-    let mut inverse_sizes = DVector::from_element(matrix.ncols(), 1.0);
-    for (mut column, inverse) in unit.column_iter_mut().zip(inverse_sizes.iter_mut()) {
-        let size = column.norm();
-        if size > 0.0 {
-            column /= size;
-            *inverse = size.recip();
+    let mut inverse_norms = DVector::from_element(matrix.ncols(), 1.0);
+    for (mut column, inverse) in unit.column_iter_mut().zip(inverse_norms.iter_mut()) {
+        let norm = column.norm();
+        if norm > 0.0 {
+            column /= norm;
+            *inverse = norm.recip();
         }
     }
-    (unit, inverse_sizes)
+    (unit, inverse_norms)
 }
 
-/// Returns −S⁻¹ R⁻¹ c, or `None` if it is not finite.
+/// Returns −S⁻¹ R⁻¹ c, where `inverse_norms` holds 1/S; `None` if it is not finite.
 fn solve(
     triangle: &DMatrix<f64>,
     projected: &DVector<f64>,
-    inverse_sizes: &DVector<f64>,
+    inverse_norms: &DVector<f64>,
 ) -> Option<DVector<f64>> {
     let mut q = triangle.solve_upper_triangular(projected)?;
-    for (q, inverse) in q.iter_mut().zip(inverse_sizes) {
+    for (q, inverse) in q.iter_mut().zip(inverse_norms) {
         *q *= -inverse;
     }
     q.iter().all(|v| v.is_finite()).then_some(q)

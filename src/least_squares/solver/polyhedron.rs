@@ -51,13 +51,15 @@ impl Faces {
         self.bounds.iter().all(Option::is_none) && !self.rows.contains(&true)
     }
 
-    /// Returns the number of faces in which the two sets differ.
+    /// Returns the number of unknowns and half-spaces whose active faces differ between the two
+    /// sets.
     pub(super) fn differences(&self, other: &Self) -> usize {
         let rows = self.rows.iter().zip(&other.rows).filter(|(a, b)| a != b).count();
         rows + self.bounds.iter().zip(&other.bounds).filter(|(a, b)| a != b).count()
     }
 
-    /// Copies the state of the last face in which `other` differs into this set.
+    /// Makes the last face in which the two sets differ as it is in `other`; half-spaces come after
+    /// bounds.
     pub(super) fn adopt_last_difference(&mut self, other: &Self) {
         if let Some(i) = (0..self.rows.len()).rfind(|&i| self.rows[i] != other.rows[i]) {
             self.rows[i] = other.rows[i];
@@ -134,7 +136,8 @@ impl Polyhedron {
         }
     }
 
-    /// Returns the normals of the given faces, shape = (faces, n).
+    /// Returns the normals of the active bounds, then of the active half-spaces, shape = (faces,
+    /// n).
     pub(super) fn normals_of(&self, faces: &Faces) -> DMatrix<f64> {
         let n = faces.bounds.len();
         let (active, bounded) = (
@@ -148,11 +151,11 @@ impl Polyhedron {
         rows
     }
 
-    /// Returns `force` − Gᵀμ and the multipliers μ of the half-spaces among `faces`, of minimum
-    /// norm if they are not unique.
+    /// Returns the remainder `force` − Gᵀμ and the multipliers μ of the half-spaces among `faces`,
+    /// of minimum norm if they are not unique.
     ///
-    /// The remainder holds the multipliers of the bounds; its free entries vanish if the faces
-    /// carry all of `force`.
+    /// The remainder holds the multipliers of the active bounds. Its entries of free unknowns
+    /// vanish if `force` is a combination of the normals of the faces.
     pub(super) fn multipliers(
         &self,
         faces: &Faces,
@@ -175,8 +178,9 @@ impl Polyhedron {
         )
     }
 
-    /// Returns the faces whose multiplier does not point inwards by more than `slack`; a fixed
-    /// unknown keeps its bound.
+    /// Returns the faces whose multiplier has the right sign, or the wrong one by at most `slack`.
+    /// `bounds` and `rows` hold the multipliers of bounds and half-spaces. A fixed unknown keeps
+    /// its bound.
     pub(super) fn retained_faces(
         &self,
         faces: &Faces,
@@ -199,8 +203,8 @@ impl Polyhedron {
         retained
     }
 
-    /// Returns the shortest q on the given faces, and an orthonormal basis of the directions of the
-    /// free unknowns along the active half-spaces.
+    /// Returns a point q on the given faces, the shortest in the free unknowns. Also returns an
+    /// orthonormal basis of the directions of the free unknowns along the active half-spaces.
     ///
     /// The basis is `None` if no half-space is active.
     pub(super) fn affine_subspace(&self, faces: &Faces) -> (DVector<f64>, Option<DMatrix<f64>>) {

@@ -16,9 +16,10 @@ pub(super) const FACE_DISTANCE: f64 = 1e-6;
 /// Maximum number of corrections of all wrong faces at once without progress; each costs one
 /// factorisation, the interior-point method more than twenty.
 const MAX_JOINT_CORRECTIONS: usize = 10;
-/// Maximum number of further corrections of a single face at a time.
+/// Maximum number of corrections of one face at a time, after the corrections of all wrong faces at
+/// once.
 const MAX_SINGLE_CORRECTIONS: usize = 40;
-/// Maximum number of corrections of the faces near the interior point.
+/// Maximum number of corrections that start from the faces near the interior-point solution.
 const MAX_INTERIOR_CORRECTIONS: usize = 30;
 /// Relative rounding allowed in the optimality conditions.
 const OPTIMALITY_ROUNDING: f64 = 1e-12;
@@ -37,8 +38,8 @@ impl<'a> PolyhedronProblem<'a> {
         Self { factor, gradient: factor.gradient(), polyhedron, guess }
     }
 
-    /// Guesses the active faces, if there is no guess yet: those that the unconstrained step
-    /// `unbounded` violates.
+    /// If there is no guess yet, guesses that the active faces are those that the unconstrained
+    /// step `unbounded` violates.
     pub(super) fn guess_faces(&mut self, unbounded: &DVector<f64>) {
         if self.guess.is_empty() {
             self.guess = self.corrected_faces(&self.guess, unbounded, 0.0);
@@ -159,7 +160,7 @@ impl<'a> PolyhedronProblem<'a> {
         q
     }
 
-    /// Returns the minimiser of ‖A y + c‖² + λ‖y‖².
+    /// Returns the minimiser of ‖A y + c‖² + λ‖y‖² for A = `matrix` and c = `constant`.
     fn minimiser(&self, matrix: DMatrix<f64>, constant: DVector<f64>, lambda: f64) -> DVector<f64> {
         // Damping enters as rows √λ y = 0: the corner is orthogonal to every direction along the
         // faces.

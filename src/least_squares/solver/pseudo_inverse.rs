@@ -64,7 +64,7 @@ impl PseudoInverse {
         }
     }
 
-    /// Stores the linearisation at a new point and returns the reason to stop there, if any.
+    /// Stores the linearisation at a new point. Returns the reason to stop there, or `None`.
     fn accept_linearisation(&mut self, linearisation: Linearisation) -> Option<Termination> {
         let Linearisation { cost, triangle, projected } = &linearisation;
         let termination = if self.monitor.diverges(*cost) {

@@ -5,12 +5,12 @@ use nalgebra::{DMatrix, DVector};
 use crate::least_squares::triangle::reflector;
 use crate::numeric::kernel::dot;
 
-/// Returns R and c′ with Rᵀ R = `Bᵀ B` and Rᵀ c′ = `Bᵀ c`, for B with at least as many rows as
-/// columns.
+/// Returns R and c′ with Rᵀ R = `Bᵀ B` and Rᵀ c′ = `Bᵀ c` for B = `matrix`, with at least as many
+/// rows as columns, and c = `constant`.
 ///
-/// A reflector reaches only to the last non-zero row of its column and those before it. Without d
-/// of the columns of an n × n triangle that is at most d + 1 rows, and the cost is 2 (d + 1) n²,
-/// compared with 4/3 n³ for a full factorisation.
+/// A reflector reaches only to the last row that is not zero in its column or in those before. If d
+/// columns of an n × n triangle were removed, it reaches at most d + 1 rows, and the cost is 2 (d +
+/// 1) n², compared with 4/3 n³ for a full factorisation.
 pub(super) fn retriangularise(
     mut matrix: DMatrix<f64>,
     mut constant: DVector<f64>,

@@ -8,7 +8,7 @@ use crate::least_squares::Linearisation;
 
 /// Fraction of the distance to a bound that a step may take.
 const BOUND_FRACTION: f64 = 0.995;
-/// Distance that a start must keep from its bounds, relative to the bound's magnitude or 1,
+/// Smallest distance of a start from its bounds, relative to the magnitude of the bound or 1,
 /// whichever is larger.
 const START_MARGIN: f64 = 1e-10;
 
@@ -53,7 +53,8 @@ impl ScaledModel {
         scaled.component_mul(&self.size)
     }
 
-    /// Returns the best candidate `from` + t `along` with low ≤ t ≤ high.
+    /// Returns the candidate of the lowest model value among `from` + t `along` with low ≤ t ≤
+    /// high.
     fn best_along(
         &self,
         from: &DVector<f64>,
@@ -136,7 +137,7 @@ impl Reflective {
     }
 }
 
-/// Returns t ≥ 0 with ‖from + t along‖ = radius, or 0 if there is none.
+/// Returns t ≥ 0 with ‖`from` + t `along`‖ = `radius`, or 0 if there is none.
 fn fraction_to_radius(from: &DVector<f64>, along: &DVector<f64>, radius: f64) -> f64 {
     let (a, b, c) = (along.norm_squared(), from.dot(along), from.norm_squared() - radius * radius);
     let root = (b * b - a * c).max(0.0).sqrt();

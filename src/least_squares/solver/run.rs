@@ -157,7 +157,7 @@ pub fn minimise_constrained_by<O: Objective>(
     solution
 }
 
-/// Moves each unknown onto a bound it is near, one at a time, if that does not raise the cost.
+/// Moves each unknown onto a bound that is near, one at a time, if that does not raise the cost.
 fn move_onto_bounds<O: Objective>(
     objective: &O,
     bounds: &Bounds,

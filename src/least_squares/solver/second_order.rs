@@ -10,7 +10,8 @@ const GOOD_RATIO: std::ops::RangeInclusive<f64> = 0.5..=1.5;
 /// Narrower range of the gain ratio for undamped steps of the model with the second-order term S,
 /// which is exact near an optimum.
 const GOOD_RATIO_WITH_S: std::ops::RangeInclusive<f64> = 0.9..=1.1;
-/// Number of poorly predicted steps in a run from which further steps get geodesic acceleration.
+/// Number of poorly predicted steps in a run from which the steps that follow get geodesic
+/// acceleration.
 const MIN_MISSES_FOR_ACCELERATION: usize = 2;
 /// Largest ratio of acceleration to length of an undamped step after which acceleration pauses
 /// until the next poorly predicted step.
@@ -89,7 +90,8 @@ impl SecondOrder {
         self.misses >= MIN_MISSES_FOR_ACCELERATION && !self.is_straight && !self.is_retired
     }
 
-    /// Records the ratio of acceleration to length of an accelerated step, and its damping.
+    /// Records the ratio of acceleration to length of an accelerated step, and the damping of that
+    /// step.
     pub fn record_acceleration(&mut self, ratio: f64, damping: f64) {
         self.is_straight = damping == 0.0 && ratio <= MAX_STRAIGHT_ACCELERATION;
     }
@@ -115,8 +117,9 @@ impl SecondOrder {
 
     /// Records a step and returns true if S should be formed at the present point.
     ///
-    /// `length` is ‖D p‖, `remaining` the number of steps left, and `worth` the predicted reduction
-    /// over the smallest one that is worth a step.
+    /// `ratio` is the gain ratio of the step, `taken` true if it was accepted, `length` its ‖D p‖
+    /// and `damping` its λ. `worth` is its predicted reduction over the smallest one that is worth
+    /// a step, `remaining` the number of steps that the iteration limit leaves.
     pub fn should_form(
         &mut self,
         (ratio, taken): (f64, bool),

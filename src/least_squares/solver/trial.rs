@@ -2,8 +2,8 @@
 
 use super::Step;
 
-/// Ratio of geodesic acceleration to step length at which the radius neither grows nor shrinks for
-/// its sake.
+/// Ratio of geodesic acceleration to step length at which the radius aims: after an accelerated
+/// step it grows by this ratio over the actual one, at least 1.5 and at most 8 times.
 const TARGET_ACCELERATION: f64 = 0.03;
 /// Smallest gain ratio ρ at which the radius grows.
 pub(super) const GOOD_RATIO: f64 = 0.75;
@@ -22,7 +22,8 @@ pub(super) struct Trial {
 }
 
 impl Trial {
-    /// Compares a step, and its acceleration ratio, with the costs before and after it.
+    /// Compares the predictions of `step` with the costs `before` and `after` it. `acceleration` is
+    /// the ratio of geodesic acceleration to step length, `None` for a step without acceleration.
     pub fn new((step, acceleration): (&Step, Option<f64>), before: f64, after: f64) -> Self {
         // If the cost grew a hundredfold, it says nothing about the curvature.
         let actual = if after < 100.0 * before { 1.0 - after / before } else { -1.0 };
@@ -40,8 +41,8 @@ impl Trial {
         }
     }
 
-    /// Returns the gain ratio ρ, or 1 if actual and predicted reduction differ by no more than
-    /// `tolerance`, which is rounding of the cost.
+    /// Returns the gain ratio ρ, or 1 if actual and predicted relative reduction differ by no more
+    /// than `tolerance`, which is rounding of the cost.
     pub fn significant_ratio(&self, tolerance: f64) -> f64 {
         if (self.actual - self.predicted).abs() <= tolerance { 1.0 } else { self.ratio }
     }

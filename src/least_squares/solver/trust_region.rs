@@ -195,8 +195,8 @@ impl<S: Subproblem> TrustRegion<S> {
         self.subproblem.prepare(x, model, &self.scale, &self.settings);
     }
 
-    /// Returns the step from x, accelerated if called for, and its ratio of acceleration to length.
-    /// Sets `radius` to the one that was used.
+    /// Returns the step from x, and its ratio of acceleration to length if it is accelerated. Sets
+    /// `radius` to the radius of that step.
     fn step<O: Objective>(
         &mut self,
         problem: &mut Problem<O>,
@@ -235,8 +235,8 @@ impl<S: Subproblem> TrustRegion<S> {
         }
     }
 
-    /// Sets D to the inverse plausible sizes of the unknowns. An unknown without a size gets the
-    /// inverse of the change that would remove the whole residual.
+    /// Sets D to the inverse plausible sizes of the unknowns. For an unknown without a plausible
+    /// size, D is the inverse of the change that would remove the whole residual.
     ///
     /// Returns false, with D unchanged, if no size is known.
     fn rescale_by_sizes<O: Objective>(
@@ -305,7 +305,7 @@ impl<S: Subproblem> ReportsTermination for TrustRegion<S> {
     }
 }
 
-/// Returns the state after an iteration that ends at x, and stops there if a reason is given.
+/// Returns the state at x after an iteration, marked as terminated if there is a `termination`.
 pub(super) fn ended(
     state: State,
     x: DVector<f64>,
