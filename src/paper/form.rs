@@ -1,6 +1,6 @@
 //! Printed and corrected forms of the misprinted formulas.
 
-/// Form in which a formula is evaluated.
+/// Form in which a misprinted formula is evaluated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[non_exhaustive]
 pub enum Form {
@@ -12,7 +12,8 @@ pub enum Form {
 }
 
 worded! {
-    /// Misprint that changes a formula; each is documented at its formula.
+    /// Misprint of the paper that changes a formula. The function that evaluates the formula
+    /// describes it.
     ///
     /// `docs/paper.md` lists the displacement of the end point by each misprint and its effect on a
     /// calibration.
@@ -55,8 +56,8 @@ worded! {
 }
 
 impl Misprint {
-    /// Misprints that the paper contradicts elsewhere, so that its authors cannot have executed
-    /// them.
+    /// Misprints that the paper contradicts elsewhere, so that its authors cannot have computed
+    /// with them.
     ///
     /// Eq. 17 and 18 correct eq. 16. Eq. 21 with 22 is dT = (V Δ V⁻¹) T, which eq. 24 states in the
     /// inertial frame, as the text to eq. 26 says; in eq. 23 and 25 only T or the frame is on the
@@ -71,24 +72,24 @@ impl Misprint {
     ];
 }
 
-/// Choice of the form of every misprinted formula.
+/// Choice between the printed and the corrected form of each misprinted formula.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub struct Reading {
     forms: [Form; Misprint::EACH.len()],
 }
 
 impl Reading {
-    /// Returns the form of one misprint.
+    /// Returns the form in which the formula with this misprint is evaluated.
     pub fn form(&self, misprint: Misprint) -> Form {
         self.forms[misprint as usize]
     }
 
-    /// Returns true if a misprint is kept, so that its formula has the printed form.
+    /// Returns true if the formula with this misprint is evaluated as printed.
     pub fn keeps(&self, misprint: Misprint) -> bool {
         self.form(misprint) == Form::Printed
     }
 
-    /// Returns the reading with the given form for one misprint.
+    /// Returns the reading with the formula of one misprint evaluated in the given form.
     #[must_use]
     pub fn with(mut self, misprint: Misprint, form: Form) -> Self {
         self.forms[misprint as usize] = form;
@@ -96,8 +97,8 @@ impl Reading {
     }
 }
 
-/// All formulas corrected, or all misprints kept that the authors can have executed. `Printed`
-/// keeps every misprint except [`Misprint::CONTRADICTED`], which apply only if chosen by name.
+/// [`Form::Corrected`] corrects all formulas. [`Form::Printed`] keeps every misprint except
+/// [`Misprint::CONTRADICTED`], with which the authors cannot have computed.
 impl From<Form> for Reading {
     fn from(form: Form) -> Self {
         let uniform = Self { forms: [form; Misprint::EACH.len()] };
@@ -107,7 +108,7 @@ impl From<Form> for Reading {
     }
 }
 
-/// One misprint kept, all other formulas corrected.
+/// The formula of this one misprint is evaluated as printed, all others are corrected.
 impl From<Misprint> for Reading {
     fn from(misprint: Misprint) -> Self {
         Self::default().with(misprint, Form::Printed)

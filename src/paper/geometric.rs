@@ -1,4 +1,4 @@
-//! Motion of the end frame by errors of the geometric parameters, eq. 28-38.
+//! Motion of the end frame by errors of the geometric parameters, eq. 28-38 of the paper.
 
 use nalgebra::{DMatrix, Matrix6, SMatrix};
 

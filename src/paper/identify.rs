@@ -16,14 +16,15 @@ use crate::problem::Problem;
 pub struct Options {
     /// Form of each formula.
     pub reading: Reading,
-    /// Source of the stiffness (first stage).
+    /// Source of the stiffness, which the first stage determines.
     pub stiffness: StiffnessStage,
-    /// Settings of the iteration of eq. 45; by default truncated at 1e-6.
+    /// Settings of the iteration of eq. 45; by default, singular values up to 1e-6 of the largest
+    /// are dropped.
     pub iteration: PseudoInverseSettings,
 }
 
 impl Options {
-    /// Creates options with the default iteration.
+    /// Creates options with the default settings of the iteration.
     pub fn new(reading: impl Into<Reading>, stiffness: StiffnessStage) -> Self {
         let iteration =
             PseudoInverseSettings { tolerance: 1e-6, ..PseudoInverseSettings::default() };
@@ -34,21 +35,21 @@ impl Options {
 /// Result of the identification procedure.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Identified {
-    /// Geometry E and flexibilities S; flexibilities may be negative.
+    /// Identified geometry E and flexibilities S; estimated flexibilities may be negative.
     pub parameters: Parameters,
-    /// Iteration of eq. 45 with its termination; its x holds the errors e relative to nominal.
+    /// End of the iteration of eq. 45; its x holds the deviations e of the unknowns from nominal.
     pub iteration: Solution,
-    /// Identified share of each entry of e = [e₁ … e_n] at nominal geometry, 0…1, shape = (5n). The
-    /// other share is chosen with minimum norm among combinations that move no position. 0 for
-    /// entries that are not identified.
+    /// Part of each entry of e = [e₁ … e_n] that the positions determine at nominal geometry, 0…1,
+    /// shape = (5n). The rest lies in combinations that move no position, for which the minimum
+    /// norm decides. 0 for entries that are not unknowns.
     pub identified_share: Vec<f64>,
 }
 
-/// Error of poses that the procedure cannot use.
+/// Error of poses from which the procedure cannot identify the arm.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum IdentifyError {
-    /// The poses have fewer equations, three each, than the 5n unknowns of eq. 42.
+    /// The poses have fewer equations, three each, than eq. 42 has unknowns: 5n, or 4n without β.
     #[error(
         "identifying {unknowns} geometric parameters takes at least {needed} poses, there are {poses}"
     )]
@@ -70,30 +71,31 @@ pub enum IdentifyError {
         /// Number of joints of the arm.
         expected: usize,
     },
-    /// Residuals of the stiffness stage are not finite.
+    /// The stiffness stage met a number that is not finite.
     #[error("a measured position or a deflection at nominal geometry is not finite")]
     NotFinite,
-    /// Load differences need configurations that were measured under several loads.
+    /// Load differences were requested, but no configuration was measured under several loads.
     #[error("no configuration was measured under several loads")]
     NoLoadDifferences,
 }
 
-/// Identifies stiffness, then geometry, from measured positions, each once.
+/// Identifies stiffness, then geometry, from measured positions; the stiffness is not identified
+/// again with the new geometry.
 ///
 /// 1. Stiffness by the [`StiffnessStage`] (§3.3 puts it first; the paper does not print its
 ///    equations).
 /// 2. With fixed stiffness, e_{j+1} = `J_g(E_j)`⁺ [`PE_meas` − `PE_nom(E_j)` − `D_f(E_j)`],
 ///    E_{j+1} = E_j + e_{j+1}, until e is negligible [Chen2021, eq. 45].
 ///
-/// Geometric errors that resemble deflections bias stage 1 if it uses positions. It explains them
-/// by flexibilities many times the true ones, or negative, and stage 2 cannot correct that. Load
-/// differences are not biased. Eq. 41, which neglects the coupling, matters less; `docs/paper.md`
-/// has figures.
+/// Geometric errors that resemble deflections bias stage 1 if it uses positions. Stage 1 explains
+/// them by flexibilities many times the true ones, or negative, and stage 2 cannot correct that.
+/// Load differences are not biased. That eq. 41 neglects the effect of e on the deflections matters
+/// less; `docs/paper.md` has figures.
 ///
-/// All flexibilities of the problem and all 5n geometric parameters are unknown, independently of
-/// `[parameters]`; base and target are known. Printed differently (`BetaLeftOut`): the text to eq.
-/// 45 has E_j = [α a θ d]ᵀ, so that β stays nominal, although e contains it and table 2 identifies
-/// it.
+/// All flexibilities of the problem and all 5n geometric parameters are unknown, whatever
+/// `[parameters]` declares; base and target are known. Printed differently (`BetaLeftOut`): the
+/// text to eq. 45 has E_j = [α a θ d]ᵀ, so that β stays nominal, although e contains it and table 2
+/// identifies it.
 ///
 /// # Errors
 /// Returns an error if the poses do not match the arm, are too few for eq. 42, or are not finite. A
@@ -141,7 +143,8 @@ pub fn identify(
     Ok(Identified { parameters, iteration, identified_share })
 }
 
-/// Returns the geometric parameters that eq. 45 corrects, as indices into e = [e₁ … e_n].
+/// Returns the indices into e = [e₁ … e_n] of the geometric parameters that eq. 45 corrects, for an
+/// arm of `joints` joints.
 fn geometric_unknowns(joints: usize, reading: &Reading) -> Vec<usize> {
     let beta = 4;
     (0..5 * joints).filter(|k| k % 5 != beta || !reading.keeps(Misprint::BetaLeftOut)).collect()

@@ -1,4 +1,4 @@
-//! Torsion of the joints, eq. 8-11.
+//! Torsion of the joints by the moments about their axes, eq. 8-11 of the paper.
 
 use nalgebra::Vector6;
 
@@ -11,8 +11,8 @@ use super::loads::JointLoads;
 ///
 /// Δφ = `M_V` l/(`GI_p`) − `M_F` l/(`GI_p`)          [Chen2021, eq. 8-10]
 ///
-/// The moments about the joint axis come from weights and hoists; here the latter carry their sign.
-/// Joint 1 rotates about the vertical, so that Δφ = 0 (eq. 11) follows from the moments.
+/// The moments `M_V` and `M_F` about the joint axis come from weights and hoists; `loads.hoists`
+/// is −`M_F`. Joint 1 rotates about the vertical, so that its moments and Δφ are 0 (eq. 11).
 ///
 /// Printed differently (`JointTwoLength`): l₃ instead of the length of joint 2. The paper does not
 /// define that length. With |d|, along which its joints are built, the printed form multiplies by
@@ -36,8 +36,8 @@ pub fn torsion(
     angle
 }
 
-/// Returns the differential motion `d_Ji` of frame i by a torsion Δφ \[rad\] of its joint, in frame
-/// i.
+/// Returns the differential motion `d_Ji` of frame i by a torsion `angle` Δφ \[rad\] of its joint,
+/// in the axes of frame i: translation \[m\], then rotation \[rad\].
 ///
 /// `d_Ji` = Δφ [0 0 0 −sβ 0 cβ]ᵀ, the motion by Δθ, third column of eq. 31; for β = 0 it is [0 0 0
 /// 0 0 Δφ]ᵀ [Chen2021, eq. 8-11].

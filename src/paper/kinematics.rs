@@ -1,4 +1,4 @@
-//! Frames of the rigid arm, eq. 1-2.
+//! Frames of the rigid arm, eq. 1-2 of the paper.
 
 use nalgebra::{Matrix3, Matrix4, Rotation3, Vector3};
 
@@ -21,7 +21,7 @@ pub struct Mdh {
 }
 
 impl Mdh {
-    /// Returns the declared parameters of a joint.
+    /// Returns the parameters of a joint that the problem declares.
     pub fn nominal(joint: &Joint) -> Self {
         Self { alpha: joint.alpha, a: joint.a, theta: joint.theta, d: joint.d, beta: joint.beta }
     }
@@ -31,7 +31,8 @@ impl Mdh {
         [&mut self.alpha, &mut self.a, &mut self.theta, &mut self.d, &mut self.beta]
     }
 
-    /// Adds the configuration coordinate q \[rad\] or \[m\] to θ or d.
+    /// Returns the parameters with the configuration coordinate q added to θ of a revolute joint
+    /// \[rad\] or to d of a prismatic one \[m\]; a fixed joint stays as it is.
     #[must_use]
     pub fn at(mut self, kind: JointKind, q: f64) -> Self {
         match kind {
@@ -42,7 +43,8 @@ impl Mdh {
         self
     }
 
-    /// Returns `T_i1` = Rx(α) Tx(a), the transform to the tip of the link [Chen2021, eq. 20].
+    /// Returns `T_i1` = Rx(α) Tx(a), the transform from frame i − 1 to the tip of the link before
+    /// joint i [Chen2021, eq. 20].
     pub fn to_tip(&self) -> Matrix4<f64> {
         rotation(Vector3::x() * self.alpha) * translation(Vector3::x() * self.a)
     }
@@ -55,23 +57,24 @@ impl Mdh {
             * rotation(Vector3::y() * self.beta)
     }
 
-    /// Returns `T_i` = Rx(α) Tx(a) Rz(θ) Tz(d) Ry(β) [Chen2021, eq. 1].
+    /// Returns `T_i` = Rx(α) Tx(a) Rz(θ) Tz(d) Ry(β), the transform from frame i − 1 to frame i
+    /// [Chen2021, eq. 1].
     pub fn transform(&self) -> Matrix4<f64> {
         self.to_tip() * self.from_tip()
     }
 }
 
-/// Returns the homogeneous transform of a rotation vector.
+/// Returns the homogeneous transform that rotates by a rotation vector \[rad\].
 fn rotation(rotation_vector: Vector3<f64>) -> Matrix4<f64> {
     Rotation3::new(rotation_vector).to_homogeneous()
 }
 
-/// Returns the homogeneous transform of a translation.
+/// Returns the homogeneous transform that translates by a vector \[m\].
 fn translation(vector: Vector3<f64>) -> Matrix4<f64> {
     Matrix4::new_translation(&vector)
 }
 
-/// Returns the rotation matrix of a transform and its origin \[m\].
+/// Returns the rotation matrix and the origin \[m\] of a homogeneous transform.
 pub(super) fn split(transform: &Matrix4<f64>) -> (Matrix3<f64>, Vector3<f64>) {
     (
         transform.fixed_view::<3, 3>(0, 0).into_owned(),
@@ -81,20 +84,20 @@ pub(super) fn split(transform: &Matrix4<f64>) -> (Matrix3<f64>, Vector3<f64>) {
 
 /// Frames of the rigid arm in one configuration.
 ///
-/// The paper ends in frame n, `U_{n+1}` = I. Here `U_{n+1}` = Trans(target), since on axis n
-/// neither Δθ nor Δβ of the last joint moves the end point. The inertial frame of the paper is the
-/// base frame of the arm. Measured positions are in the measuring frame, in which the problem's
-/// `base` locates the arm.
+/// The end point of the paper is the origin of frame n, `U_{n+1}` = I. Here `U_{n+1}` =
+/// Trans(target), since a point on axis n is moved neither by Δθ nor by Δβ of the last joint. The
+/// inertial frame of the paper is the base frame of the arm. Measured positions are in the
+/// measuring frame, in which the problem's `base` locates the arm.
 #[derive(Debug, Clone)]
 pub struct Chain {
     /// Parameters of the joints, with the configuration added.
     pub links: Vec<Mdh>,
-    /// Transform from the measuring frame to the base.
+    /// Transform from the measuring frame to the base: the base's pose in the measuring frame.
     pub base: Matrix4<f64>,
-    /// Products `before[k]` = T₁ … T_k, one more than joints.
+    /// Products `before[k]` = T₁ … T_k, k = 0 … n: the pose of frame k in the base frame.
     pub before: Vec<Matrix4<f64>>,
-    /// Products `after[k]` = T_{k+1} … T_n Trans(target), the paper's `U_{k+1}`, one more than
-    /// joints.
+    /// Products `after[k]` = T_{k+1} … T_n Trans(target), k = 0 … n, the paper's `U_{k+1}`: the
+    /// pose of the end frame in frame k.
     pub after: Vec<Matrix4<f64>>,
 }
 
@@ -126,12 +129,13 @@ impl Chain {
         Self { links, base, before, after }
     }
 
-    /// Returns T = T₁ … T_n with base and target, measuring frame [Chen2021, eq. 2].
+    /// Returns T = T₁ … T_n multiplied by base and target: the pose of the end frame in the
+    /// measuring frame [Chen2021, eq. 2].
     pub fn end(&self) -> Matrix4<f64> {
         self.base * self.after[0]
     }
 
-    /// Returns the nominal position `PE_nom` of the end point, measuring frame \[m\].
+    /// Returns the position `PE_nom` of the end point of the rigid arm, measuring frame \[m\].
     pub fn position(&self) -> Vector3<f64> {
         split(&self.end()).1
     }

@@ -1,24 +1,24 @@
-//! Deflection of a link's tip, eq. 3-7.
+//! Deflection of a link's tip, eq. 3-7 of the paper.
 
 use nalgebra::Vector6;
 
 use super::form::{Misprint, Reading};
 use super::loads::{LinkLoads, PointLoad, Wrench};
 
-/// Flexibilities of a link; 0 is rigid. The paper has one EI for both planes.
+/// Flexibilities of a link; 0 is rigid. In the paper EI is equal in both planes.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct LinkFlexibility {
     /// Axial flexibility 1/EA [1/N].
     pub axial: f64,
-    /// Flexibility `1/EI_y` [1/(N·m²)], bending in z.
+    /// Flexibility `1/EI_y` [1/(N·m²)] of bending about y, which deflects the link along z.
     pub about_y: f64,
-    /// Flexibility `1/EI_z` [1/(N·m²)], bending in y.
+    /// Flexibility `1/EI_z` [1/(N·m²)] of bending about z, which deflects the link along y.
     pub about_z: f64,
     /// Torsional flexibility 1/`GI_p` [1/(N·m²)].
     pub twist: f64,
 }
 
-/// Numerators of eq. 4 and 6: tip deflections times rigidity, link frame.
+/// Tip deflections of a link times their rigidities, link frame: the numerators of eq. 4 and 6.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LinkTerms {
     /// Elongation EA Δx [N·m].
@@ -34,7 +34,8 @@ pub struct LinkTerms {
     pub carries: bool,
 }
 
-/// Loads in one bending plane: lateral forces and the moments that bend in the same sense.
+/// Loads in one bending plane. Pairs hold the force along y or z and the moment that bends the link
+/// towards positive y or z.
 struct Plane {
     spread: f64,
     tip: (f64, f64),
@@ -133,8 +134,9 @@ impl LinkTerms {
 }
 
 impl Plane {
-    /// Returns EI times deflection and EI times slope of the tip in one plane. `l` is the length
-    /// \[m\], `lever` the factor of the tip force.
+    /// Returns EI times the deflection \[N·m³\] and EI times the slope \[N·m²\] of the tip in the
+    /// plane. `l` is the length of the link \[m\], and `lever` is l³, by which the tip force is
+    /// multiplied, or l² as printed.
     fn tip_deflection(&self, l: f64, lever: f64, points: &[PointLoad]) -> (f64, f64) {
         let (force, moment) = self.tip;
         let mut deflection =

@@ -1,9 +1,9 @@
 //! Loads of a pose, resolved in the frames of the rigid arm.
 //!
-//! The paper resolves them by hand for its arm (`G_4r`, `G_4n`, `M_4P`, `M_4V`, …, §2.1 and §2.2).
-//! Here they follow from the frames, with signs, for any arm. Component x of a link frame is the
-//! index r of the paper, components y and z its index n in the two planes. Moment components z and
-//! y are its `M_V` and (with opposite sign) `M_Pn`, component x its `M_Pr`.
+//! The paper resolves the loads by hand for its arm (`G_4r`, `G_4n`, `M_4P`, `M_4V`, …, §2.1 and
+//! §2.2). Here they follow from the frames, with signs, for any arm. Component x of a link frame is
+//! the index r of the paper, components y and z its index n in the two planes. Moment components z
+//! and y are its `M_V` and (with opposite sign) `M_Pn`, component x its `M_Pr`.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -19,12 +19,12 @@ pub struct Wrench {
     pub moment: Vector3<f64>,
 }
 
-/// Load between root and tip of a link.
+/// Weight or hoist that acts on a link between its root and its tip.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PointLoad {
-    /// Distance s from the root along the link \[m\]; `r_cx` and `l_F1` of the paper.
+    /// Coordinate s along the link from its root \[m\]; `r_cx` and `l_F1` of the paper.
     pub station: f64,
-    /// Force and moment at s, link frame.
+    /// Force, and moment about the point at s on the link's axis, link frame.
     pub wrench: Wrench,
     /// True for the force of the hoist, false for a weight.
     pub hoist: bool,
@@ -35,36 +35,37 @@ pub struct PointLoad {
 pub struct LinkLoads {
     /// Length l \[m\], negative for a link along −x.
     pub length: f64,
-    /// Distributed weight q, the link's weight over l [N/m].
+    /// Distributed weight q, the link's weight over l [N/m]; opposite to gravity for a negative l.
     pub spread: Vector3<f64>,
-    /// Carried masses and the hoist.
+    /// Weights of the masses on the link, and the hoist if it holds this link.
     pub points: Vec<PointLoad>,
-    /// Weights beyond the tip, reduced to the tip: `G_4`, `M_4` or `G_34`, `M_34` [Chen2021, eq.
-    /// 3].
+    /// Sum of the weights beyond the tip, with moments about the tip: `G_4`, `M_4` or `G_34`,
+    /// `M_34` [Chen2021, eq. 3].
     pub tip: Wrench,
-    /// Hoists on links further out, reduced to the tip.
+    /// Sum of the hoists on links beyond the tip, with moments about the tip.
     pub tip_hoist: Wrench,
 }
 
 /// Moments about a joint's axis [N·m].
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct JointLoads {
-    /// Moment of the weights beyond the joint: `M_4V`, `M_34V`, `M_234V`.
+    /// Moment of the weights beyond the joint, positive along the axis: `M_4V`, `M_34V`, `M_234V`.
     pub weights: f64,
-    /// Moment of the hoists beyond the joint: −`M_1F`, −`M_2F`.
+    /// Moment of the hoists beyond the joint, positive along the axis: −`M_1F`, −`M_2F`.
     pub hoists: f64,
 }
 
 /// Loads of a pose, with an entry for each joint.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Loads {
-    /// Loads on each link that is a beam.
+    /// Loads on the link before each joint; `None` if that link is not a beam.
     pub links: Vec<Option<LinkLoads>>,
     /// Moments about each joint axis.
     pub joints: Vec<JointLoads>,
 }
 
-/// Force \[N\] at a point \[m\] of the arm, base frame, marked as weight or hoist.
+/// Force \[N\] at a point \[m\] of the arm, base frame. `hoist` is true for a hoist, false for a
+/// weight.
 struct Load {
     at: Vector3<f64>,
     force: Vector3<f64>,
@@ -72,7 +73,8 @@ struct Load {
 }
 
 impl Loads {
-    /// Computes the loads from the end point to the base: a section carries all loads beyond it.
+    /// Computes the loads joint by joint from the end point to the base. Each joint and link
+    /// carries the loads between it and the end point.
     pub fn new(problem: &Problem, chain: &Chain, setup: &PoseView) -> Self {
         let gravity = problem.gravity;
         let n = problem.joints.len();
@@ -115,8 +117,8 @@ impl Loads {
     }
 }
 
-/// Returns the loads that a beam carries: positions in the link frame \[m\], forces in the base
-/// frame \[N\], and true for the hoist.
+/// Returns the loads that act on a beam: positions in the link frame \[m\], forces in the base
+/// frame \[N\], and true for a hoist, false for a weight.
 fn carried(
     beam: &Beam,
     gravity: Vector3<f64>,
@@ -131,15 +133,16 @@ fn carried(
         .collect()
 }
 
-/// Returns a force at a point `at` of the link frame as a load on the link's axis. A load beyond an
-/// end acts at that end, with its moment.
+/// Returns a force at a point `at` as a load on the axis of a link with this `length`, all in the
+/// link frame. A force beyond an end acts at that end, with its moment about the end.
 fn point_load(at: Vector3<f64>, length: f64, force: Vector3<f64>, hoist: bool) -> PointLoad {
     let station = at.x.clamp(length.min(0.0), length.max(0.0));
     let offset = at - Vector3::x() * station;
     PointLoad { station, wrench: Wrench { force, moment: offset.cross(&force) }, hoist }
 }
 
-/// Returns the sum of the weights or of the hoists, with moments about a point, base frame.
+/// Returns the sum of the hoists among `forces` if `hoist` is true, else of the weights, with
+/// moments about `point`, base frame.
 fn sum_about(forces: &[Load], point: Vector3<f64>, hoist: bool) -> Wrench {
     forces.iter().filter(|load| load.hoist == hoist).fold(Wrench::default(), |sum, load| Wrench {
         force: sum.force + load.force,
@@ -147,7 +150,7 @@ fn sum_about(forces: &[Load], point: Vector3<f64>, hoist: bool) -> Wrench {
     })
 }
 
-/// Resolves a wrench in the given axes.
+/// Returns the components of a wrench along `axes`, given in the frame in which these are.
 fn resolved(axes: &Matrix3<f64>, wrench: &Wrench) -> Wrench {
     Wrench { force: axes.tr_mul(&wrench.force), moment: axes.tr_mul(&wrench.moment) }
 }

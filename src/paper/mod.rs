@@ -15,8 +15,8 @@
 //! | 42-45 least squares, iteration | [`least_squares`], [`stiffness`], [`identify`](fn@identify), `PseudoInverse` |
 //! | tables 1-3 | [`published`] |
 //!
-//! The module shares no physics with the model: forces are resolved in the frames of the rigid arm,
-//! and every effect is of first order.
+//! The module shares no physics with [`model`](crate::model): forces are resolved in the frames of
+//! the rigid arm, and every effect is of first order.
 //!
 //! # Misprints
 //! Each misprinted formula takes a [`Reading`], which selects for each [`Misprint`] the printed or

@@ -1,4 +1,4 @@
-//! Parameters of the paper: geometry E and flexibilities S.
+//! Parameters of the arm in the paper: geometry E and flexibilities S.
 
 use super::kinematics::Mdh;
 use super::link::LinkFlexibility;
@@ -7,15 +7,15 @@ use crate::problem::Problem;
 /// Geometric parameters E and flexibilities S, with an entry for each joint.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Parameters {
-    /// Geometry E of the joints.
+    /// Modified Denavit–Hartenberg parameters of each joint, the geometry E.
     pub geometry: Vec<Mdh>,
     /// Flexibility l/(`GI_p`) of each joint [rad/(N·m)]; 0 is rigid.
     pub joints: Vec<f64>,
-    /// Flexibilities of the link before each joint; all 0 if it is rigid.
+    /// Flexibilities of the link before each joint; all 0 if the link is rigid.
     pub links: Vec<LinkFlexibility>,
 }
 
-/// Identifier of one flexibility; joints are counted from 0.
+/// Identifier of one flexibility, with the index of its joint, from 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Flexibility {
@@ -23,18 +23,18 @@ pub enum Flexibility {
     Joint(usize),
     /// Axial flexibility 1/EA of the link before a joint [1/N].
     Axial(usize),
-    /// Bending flexibility 1/EI for both planes [1/(N·m²)].
+    /// Bending flexibility 1/EI, equal in both planes, of the link before a joint [1/(N·m²)].
     Bending(usize),
-    /// Bending flexibility `1/EI_y` [1/(N·m²)].
+    /// Bending flexibility `1/EI_y` about y of the link before a joint [1/(N·m²)].
     BendingY(usize),
-    /// Bending flexibility `1/EI_z` [1/(N·m²)].
+    /// Bending flexibility `1/EI_z` about z of the link before a joint [1/(N·m²)].
     BendingZ(usize),
     /// Torsional flexibility 1/GJ of the link before a joint [1/(N·m²)].
     Twist(usize),
 }
 
 impl Parameters {
-    /// Returns the parameters that the problem declares.
+    /// Returns the geometry and the flexibilities that the problem declares.
     pub fn nominal(problem: &Problem) -> Self {
         let reciprocal = |rigidity: Option<f64>| rigidity.map_or(0.0, f64::recip);
         Self {
@@ -57,7 +57,7 @@ impl Parameters {
         }
     }
 
-    /// Returns the declared geometry with a rigid arm.
+    /// Returns the geometry that the problem declares, with all flexibilities 0.
     pub fn rigid(problem: &Problem) -> Self {
         let n = problem.joints.len();
         let geometry = problem.joints.iter().map(Mdh::nominal).collect();
@@ -76,8 +76,8 @@ impl Parameters {
         out
     }
 
-    /// Returns the flexibilities that are not 0. A link with one EI for both planes has one bending
-    /// flexibility, as in the paper.
+    /// Returns the identifiers of the flexibilities that are not 0. A link with equal EI in both
+    /// planes has one bending flexibility, as in the paper.
     pub fn flexibilities(&self) -> Vec<Flexibility> {
         let joints = self.joints.iter().enumerate().map(|(k, _)| Flexibility::Joint(k));
         let links = self.links.iter().enumerate().flat_map(|(k, link)| {
@@ -91,7 +91,7 @@ impl Parameters {
         joints.chain(links).filter(|&which| self.get(which) != 0.0).collect()
     }
 
-    /// Returns the value of a flexibility.
+    /// Returns the value of the flexibility `which`, in the unit that [`Flexibility`] states.
     pub fn get(&self, which: Flexibility) -> f64 {
         match which {
             Flexibility::Joint(k) => self.joints[k],
@@ -102,7 +102,7 @@ impl Parameters {
         }
     }
 
-    /// Sets the value of a flexibility.
+    /// Sets the flexibility `which` to `value`, in the unit that [`Flexibility`] states.
     pub fn set(&mut self, which: Flexibility, value: f64) {
         match which {
             Flexibility::Joint(k) => self.joints[k] = value,

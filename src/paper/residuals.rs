@@ -1,4 +1,4 @@
-//! Least-squares problem of the iteration of eq. 45.
+//! Least-squares problem that the iteration of the paper's eq. 45 solves.
 
 use std::ops::Range;
 
@@ -12,13 +12,14 @@ use crate::problem::{PoseView, Problem};
 /// Pose with its measured position.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Measured<'a> {
-    /// Commanded conditions of the pose.
+    /// Configuration and loads of the pose.
     pub setup: PoseView<'a>,
     /// Measured position `PE_meas`, measuring frame \[m\].
     pub position: Vector3<f64>,
 }
 
-/// Residuals `PE_meas` − `PE_nom(E)` − `D_f(E)` \[m\] with the derivative −`J_g(E)` of the paper.
+/// Residuals `PE_meas` − `PE_nom(E)` − `D_f(E)` \[m\] as a function of the geometry E, with the
+/// derivative −`J_g(E)` of the paper.
 ///
 /// The derivative neglects ∂`D_f`/∂E (eq. 41). The iteration therefore stops at `J_g`ᵀ r = 0, near
 /// the minimum of ‖r‖ but not at it.
@@ -31,8 +32,9 @@ pub struct GeometryResiduals<'a> {
 }
 
 impl<'a> GeometryResiduals<'a> {
-    /// Creates the residuals of `poses` with the flexibilities of `parameters`. `unknowns` are
-    /// indices into e = [e₁ … e_n]; every pose has as many joints as the arm.
+    /// Creates the residuals of `poses` about the geometry and with the flexibilities of
+    /// `parameters`. `unknowns` are the indices into e = [e₁ … e_n] of the geometric errors to
+    /// find. Every pose must have as many joints as the arm.
     pub fn new(
         problem: &'a Problem,
         poses: &'a [Measured<'a>],
@@ -43,7 +45,8 @@ impl<'a> GeometryResiduals<'a> {
         Self { problem, poses, parameters, unknowns, reading }
     }
 
-    /// Returns the parameters with the unknowns changed by the errors `x`.
+    /// Returns the parameters with the deviations `x` added to those geometric parameters that are
+    /// unknowns.
     pub fn at(&self, x: &DVector<f64>) -> Parameters {
         let mut parameters = self.parameters.clone();
         for (&index, x) in self.unknowns.iter().zip(x) {

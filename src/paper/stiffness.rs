@@ -1,4 +1,4 @@
-//! First stage: source of the stiffness before the geometry is identified (§3.3).
+//! First stage of the paper's identification: stiffness, before the geometry is identified (§3.3).
 
 use nalgebra::{DMatrix, DVector, Matrix3xX, Vector3};
 
@@ -10,12 +10,12 @@ use crate::least_squares::{Block, Triangle};
 use crate::problem::Problem;
 
 worded! {
-    /// Source of the stiffness. The paper says that elastic parameters are calibrated first, but
-    /// not how.
+    /// Source of the stiffness that is fixed while the geometry is identified. The paper says that
+    /// elastic parameters are calibrated first, but not how.
     #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
     #[non_exhaustive]
     pub enum StiffnessStage: as_str {
-        /// Rigid arm, which the paper calls ignoring elasticity.
+        /// No elasticity: a rigid arm, which the paper calls ignoring elasticity.
         Rigid = "rigid";
         /// Stiffness that the problem declares.
         Nominal = "nominal-stiffness";
@@ -28,12 +28,14 @@ worded! {
 }
 
 impl StiffnessStage {
-    /// Fraction of the largest singular value up to which combinations of flexibilities keep their
-    /// nominal value. The columns of the elastic Jacobian are scaled by the nominal flexibilities.
+    /// Largest singular value of the elastic Jacobian, relative to its largest one, at which a
+    /// combination of flexibilities keeps its nominal value. Columns of the Jacobian are
+    /// derivatives with respect to the logarithms of the flexibilities.
     pub const TOLERANCE: f64 = 1e-2;
 }
 
-/// Returns x = A⁺ b with singular values up to `tolerance`·σ₁ dropped [Chen2021, eq. 43, 44].
+/// Returns x = A⁺ b, with singular values of A up to `tolerance` times the largest one dropped
+/// [Chen2021, eq. 43, 44].
 ///
 /// Returns `None` if A or b is not finite, or if their numbers of rows differ.
 pub fn least_squares(a: &DMatrix<f64>, b: &DVector<f64>, tolerance: f64) -> Option<DVector<f64>> {
@@ -50,12 +52,15 @@ pub fn least_squares(a: &DMatrix<f64>, b: &DVector<f64>, tolerance: f64) -> Opti
     Some(minimum_norm_step(&triangle.into_linearisation(), tolerance))
 }
 
-/// Equations of one pose: ∂`D_f`/∂ln c, shape = (3, flexibilities), and the residual `PE_meas` −
-/// `PE_nom` − `D_f` \[m\].
+/// Equations of one pose, measuring frame: derivatives ∂`D_f`/∂ln c with respect to the
+/// flexibilities c, shape = (3, flexibilities) \[m\], and the residual `PE_meas` − `PE_nom` − `D_f`
+/// \[m\].
 type Equations = (Matrix3xX<f64>, Vector3<f64>);
 
-/// Estimates flexibilities by linear least squares at nominal geometry, where `D_f` is linear in
-/// them: c = c₀ + C⁺ [`PE_meas` − `PE_nom` − C c₀].
+/// Returns parameters with nominal geometry and the flexibilities of the given `stage`.
+///
+/// Linear least squares estimates the flexibilities c from their nominal values c₀ at nominal
+/// geometry, where `D_f` = C c: c = c₀ + C⁺ [`PE_meas` − `PE_nom` − C c₀].
 ///
 /// With load differences, the mean over each configuration is subtracted from its poses. This
 /// cancels all quantities that do not depend on the load: the geometric errors, except their part
@@ -111,8 +116,8 @@ fn equations_of(
     (Matrix3xX::from_columns(&columns), pose.position - end.position(parameters))
 }
 
-/// Subtracts from each pose the mean of its configuration, for configurations measured under
-/// several loads; returns `None` if there are none.
+/// Returns the equations of the poses with the mean over their configuration subtracted. Poses of
+/// configurations with a single load are left out. Returns `None` if no configuration has several.
 fn differences(poses: &[Measured], equations: &[Equations]) -> Option<Vec<Equations>> {
     let load = |pose: &Measured| (pose.setup.payload.copied(), pose.setup.hoist.copied());
     let mut groups: Vec<Vec<usize>> = Vec::new();

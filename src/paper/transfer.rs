@@ -1,4 +1,5 @@
-//! Transfer of the deflections of joints and links to the motion of the end frame, eq. 12-27.
+//! Transfer of the deflections of joints and links to the motion of the end frame, eq. 12-27 of the
+//! paper.
 
 use nalgebra::{Matrix4, Matrix6, Vector6};
 
@@ -78,19 +79,20 @@ pub fn inertial_link_transfer(chain: &Chain, k: usize) -> Matrix6<f64> {
     transfer(&inverse)
 }
 
-/// Deflections of a pose, `d_f` = [`D_A` `D_B` … `d_J1` … `d_Jn`], with their transfers to the end
-/// point.
+/// Deflections `d_f` = [`D_A` `D_B` … `d_J1` … `d_Jn`] of an arm in one pose, with the matrices
+/// that transfer them to the end frame.
 #[derive(Debug, Clone)]
 pub struct Elastic {
-    /// Joint, `J_Li` and terms of eq. 4 or 6 of each link that is a beam.
+    /// For each link that is a beam: index of the joint after it, `J_Li`, and its terms of eq. 4 or
+    /// 6.
     links: Vec<(usize, Matrix6<f64>, LinkTerms)>,
-    /// Motion `J_Ji` `d_Ji` by each joint for unit flexibility.
+    /// Motion `J_Ji` `d_Ji` of the end frame by each joint, divided by the joint's flexibility.
     joints: Vec<Vector6<f64>>,
     reading: Reading,
 }
 
 impl Elastic {
-    /// Computes the deflections of a configuration under its loads.
+    /// Computes the deflections of the arm with frames `chain` under `loads`.
     pub fn new(chain: &Chain, loads: &Loads, reading: &Reading) -> Self {
         let links = loads.links.iter().enumerate().filter_map(|(k, link)| {
             Some((k, link_transfer(chain, k, reading), LinkTerms::new(link.as_ref()?, reading)))
@@ -130,7 +132,8 @@ impl Elastic {
         self.of_joints(parameters) + links.sum::<Vector6<f64>>()
     }
 
-    /// Returns ∂`D_f`/∂c for the flexibility c = `which`; `D_f` is linear in all of them.
+    /// Returns the derivative ∂`D_f`/∂c with respect to the flexibility c = `which`, end frame.
+    /// `D_f` is linear in all flexibilities.
     pub fn derivative(&self, which: Flexibility) -> Vector6<f64> {
         self.motion(&Parameters::unit(self.joints.len(), which))
     }
