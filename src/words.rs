@@ -1,9 +1,9 @@
-//! Declaration of enums whose variants have words.
+//! Macro that declares an enum together with the text of each variant.
 
-/// Declares an enum without data, whose variants are followed by their words. Each word has a
-/// method that returns it, named after the enum.
+/// Declares an enum without data. `pub enum Name: first, second { Variant = "a", "b"; }` also
+/// declares one method per text: `first()` returns "a", and `second()` returns "b".
 ///
-/// Adds `EACH`, every variant in order, and `WORDS`, the first word of each.
+/// Adds the constants `EACH`, every variant in order, and `WORDS`, the first text of each.
 macro_rules! worded {
     (
         $(#[$meta:meta])*
@@ -17,11 +17,11 @@ macro_rules! worded {
         }
 
         impl $name {
-            /// Every variant, in order.
+            /// Every variant, in the order of their declaration.
             #[doc(hidden)]
             pub const EACH: [Self; [$($word),*].len()] = [$(Self::$variant),*];
 
-            /// First word of every variant, in order.
+            /// Text of every variant, in the order of `EACH`; the first one if there are several.
             #[doc(hidden)]
             pub const WORDS: [&'static str; Self::EACH.len()] = [$($word),*];
         }

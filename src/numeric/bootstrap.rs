@@ -4,7 +4,7 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use statrs::function::erf::{erfc, erfc_inv};
 
-/// Estimate with its confidence interval.
+/// Estimate with its confidence interval, at the level that the function returning it states.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Interval {
     /// Estimate of the quantity, in its unit.
@@ -15,10 +15,11 @@ pub struct Interval {
     pub high: f64,
 }
 
-/// Returns the mean over all groups with its confidence interval at level `covered`.
+/// Returns the mean of the values of all groups with its bootstrap confidence interval at level
+/// `covered`, 0…1; NaN if there are no groups.
 ///
-/// Each group is given by the sum and the number of its values. The bootstrap draws groups and
-/// corrects for bias and acceleration (BCa) [Efron 1987].
+/// `sums` holds for each group the sum and the number of its values. Each of the `draws` bootstrap
+/// samples draws whole groups; the interval is BCa (bias-corrected and accelerated) [Efron 1987].
 pub(crate) fn mean_interval(
     sums: &[(f64, f64)],
     draws: usize,
@@ -38,8 +39,7 @@ pub(crate) fn mean_interval(
         .map(|_| mean(&mut (0..sums.len()).map(|_| sums[rng.random_range(0..sums.len())])))
         .collect();
     means.sort_by(f64::total_cmp);
-    // z₀ corrects the bias of the bootstrap median; the acceleration is a sixth of the skewness of
-    // the
+    // z₀ corrects the bias of the bootstrap median. The acceleration comes from the skewness of the
     // jackknife means.
     let z0 = normal_quantile(means.partition_point(|drawn| *drawn < value) as f64 / draws as f64);
     let without = |left_out: usize| {
@@ -66,7 +66,8 @@ pub(crate) fn mean_interval(
     Interval { value, low: quantile_of_means(tail), high: quantile_of_means(1.0 - tail) }
 }
 
-/// Returns z with Φ(z) = `probability` for the normal distribution Φ, limited to ±4.
+/// Returns the quantile z of the standard normal distribution with Φ(z) = `probability`, limited to
+/// ±4.
 fn normal_quantile(probability: f64) -> f64 {
     const MAX_SCORE: f64 = 4.0;
     if probability > 0.0 && probability < 1.0 {

@@ -1,4 +1,4 @@
-//! Cholesky factors and triangular inverses by blocked matrix products.
+//! Cholesky factors and inverses of triangles by blocked matrix products.
 
 use nalgebra::{DMatrix, DMatrixViewMut, DVector};
 
@@ -6,31 +6,31 @@ use super::kernel::{add_product, factor_in_place};
 
 /// Largest number of rows for which a triangular solve or inverse proceeds column by column.
 const MAX_UNBLOCKED_ROWS: usize = 24;
-/// Number of columns that are factored together.
-const PANEL: usize = 64;
+/// Number of columns that the Cholesky factorisation treats as one block (panel).
+const PANEL_COLUMNS: usize = 64;
 
 /// Returns the Cholesky factor L of M = L Lᵀ, or `None` if M is not positive definite. Only the
 /// lower half of M is read.
 ///
-/// Panel by panel: with M = (A · ; B C) and A = L Lᵀ, the rows below are P = B L⁻ᵀ and the
-/// remaining block is C − P Pᵀ.
+/// Panel by panel: with M = (A · ; B C) and A = L₁ L₁ᵀ, the factor has the rows P = B L₁⁻ᵀ below
+/// L₁, and C − P Pᵀ remains to be factored.
 pub(crate) fn lower_factor(mut matrix: DMatrix<f64>) -> Option<DMatrix<f64>> {
     let n = matrix.nrows();
-    if n <= PANEL {
+    if n <= PANEL_COLUMNS {
         let is_factored = factor_in_place(n, matrix.as_mut_slice());
         matrix.fill_upper_triangle(0.0, 1);
         return is_factored.then_some(matrix);
     }
-    for first in (0..n).step_by(PANEL) {
-        let wide = PANEL.min(n - first);
+    for first in (0..n).step_by(PANEL_COLUMNS) {
+        let wide = PANEL_COLUMNS.min(n - first);
         let behind = first + wide;
         let diagonal = lower_factor(matrix.view((first, first), (wide, wide)).into_owned())?;
         matrix.view_mut((first, first), (wide, wide)).copy_from(&diagonal);
         let (mut left, mut right) = matrix.columns_range_pair_mut(first..behind, behind..);
         let mut panel = left.rows_mut(behind, n - behind);
         solve_right(&diagonal, &mut panel);
-        for next in (0..n - behind).step_by(PANEL) {
-            let count = PANEL.min(n - behind - next);
+        for next in (0..n - behind).step_by(PANEL_COLUMNS) {
+            let count = PANEL_COLUMNS.min(n - behind - next);
             let across = panel.rows(next, count).transpose();
             right.view_mut((behind + next, next), (n - behind - next, count)).gemm(
                 -1.0,
@@ -44,7 +44,8 @@ pub(crate) fn lower_factor(mut matrix: DMatrix<f64>) -> Option<DMatrix<f64>> {
     Some(matrix)
 }
 
-/// Replaces B by B L⁻ᵀ, block by block of columns, with matrix products for the earlier blocks.
+/// Replaces B = `right` by B L⁻ᵀ with L = `lower`, one block of columns after the other. Products
+/// with the columns that are already solved are subtracted from each block by matrix products.
 fn solve_right(lower: &DMatrix<f64>, right: &mut DMatrixViewMut<f64>) {
     let n = lower.nrows();
     for first in (0..n).step_by(MAX_UNBLOCKED_ROWS) {
@@ -63,7 +64,7 @@ fn solve_right(lower: &DMatrix<f64>, right: &mut DMatrixViewMut<f64>) {
     }
 }
 
-/// Returns L⁻¹ of a lower triangle without zeros on its diagonal.
+/// Returns the inverse L⁻¹ of a lower triangle L without zeros on its diagonal.
 ///
 /// With L = (F 0 ; B G), W = F⁻¹ and X = G⁻¹: L⁻¹ = (W 0 ; −X B W, X).
 pub(crate) fn inverse_lower(lower: &DMatrix<f64>) -> DMatrix<f64> {
@@ -88,14 +89,14 @@ pub(crate) fn inverse_lower(lower: &DMatrix<f64>) -> DMatrix<f64> {
     inverse
 }
 
-/// Returns L⁻¹ of M = L Lᵀ, or `None` if M is not positive definite. Only the lower half of M is
-/// read.
+/// Returns the inverse L⁻¹ of the Cholesky factor of M = L Lᵀ, or `None` if M is not positive
+/// definite. Only the lower half of M is read.
 pub(crate) fn inverse_factor(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     lower_factor(matrix.clone()).map(|lower| inverse_lower(&lower))
 }
 
-/// Solves M x = b and returns x, or `None` if M is not positive definite. Only the lower half of M
-/// is read.
+/// Solves M x = b for a symmetric `matrix` M and `right` b and returns x, or `None` if M is not
+/// positive definite. Only the lower half of M is read.
 pub(crate) fn solve_positive(
     matrix: DMatrix<f64>,
     mut right: DVector<f64>,

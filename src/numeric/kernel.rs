@@ -1,4 +1,4 @@
-//! Dot products and updates of columns in vector registers.
+//! Dot products, updates of columns and Cholesky factors, written for vector registers.
 //!
 //! Every loop keeps independent partial sums, so that the compiler can use wide registers where the
 //! processor has them. The order of each sum is fixed and products are never fused, so that results
@@ -7,16 +7,17 @@
 use multiversion::multiversion;
 use nalgebra::{DMatrix, RealField};
 
-/// Number of Householder reflectors applied together to one trailing column.
+/// Number of vectors that are combined in one pass over another vector: Householder reflectors that
+/// are applied together to a column, or columns that are added to one.
 pub(crate) const PANEL: usize = 4;
-/// Number of independent partial sums of a dot product.
+/// Number of independent partial sums of each dot product in [`dots`]; [`dot`] has twice as many.
 const LANES: usize = 4;
-/// Number of independent partial sums of a dot product of long vectors.
+/// Number of independent partial sums of a dot product in [`long_dot`].
 const LONG_LANES: usize = 32;
-/// Sums of squares inside this range have neither overflowed nor underflowed.
+/// Range of sums of squares that have neither overflowed nor lost digits by underflow.
 const SAFE_SQUARES: std::ops::Range<f64> = 1e-280..1e280;
 
-/// Returns the Euclidean norm without overflow or underflow.
+/// Returns the Euclidean norm, also where the squares of the entries would overflow or underflow.
 pub(crate) fn norm(vector: &[f64]) -> f64 {
     let squares = sum_of_squares(vector);
     if SAFE_SQUARES.contains(&squares) || squares.is_nan() {
@@ -50,7 +51,7 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     sums.iter().sum::<f64>() + a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum::<f64>()
 }
 
-/// Returns the four products vᵢᵀb from one pass over b.
+/// Returns the four dot products vᵢᵀb, computed in one pass over b.
 #[multiversion(targets("x86_64+avx2"))]
 pub(crate) fn dots(vectors: &[&[f64]; PANEL], b: &[f64]) -> [f64; PANEL] {
     let ([v0, v1, v2, v3], [r0, r1, r2, r3]) = split(vectors);
@@ -69,7 +70,7 @@ pub(crate) fn dots(vectors: &[&[f64]; PANEL], b: &[f64]) -> [f64; PANEL] {
     std::array::from_fn(|i| (sums[i][0] + sums[i][1]) + (sums[i][2] + sums[i][3]) + tails[i])
 }
 
-/// Subtracts Σ sᵢ vᵢ from b in one pass over b.
+/// Replaces b by b − Σ sᵢ vᵢ for four vectors vᵢ, in one pass over b.
 #[multiversion(targets("x86_64+avx2"))]
 pub(crate) fn subtract(b: &mut [f64], s: &[f64; PANEL], vectors: &[&[f64]; PANEL]) {
     let ([v0, v1, v2, v3], [r0, r1, r2, r3]) = split(vectors);
@@ -112,7 +113,7 @@ pub(crate) fn few_transposed_times<T: RealField + Copy>(
     out
 }
 
-/// Returns aᵀb of long vectors.
+/// Returns the dot product aᵀb with [`LONG_LANES`] partial sums, for long vectors.
 #[inline(always)]
 #[expect(clippy::inline_always, reason = "for every kind of processor")]
 fn long_dot<T: RealField + Copy>(a: &[T], b: &[T]) -> T {
@@ -134,7 +135,8 @@ fn long_dot<T: RealField + Copy>(a: &[T], b: &[T]) -> T {
     a_rest.iter().zip(b_rest).fold(sums[0], |sum, (a, b)| sum + *a * *b)
 }
 
-/// Replaces y by y + A x. The columns of A begin `stride` apart in `columns`, each as long as y.
+/// Replaces y by y + A x. The columns of A begin `stride` entries apart in `columns`; each is as
+/// long as y.
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
 pub(crate) fn add_product(y: &mut [f64], (columns, stride): (&[f64], usize), x: &[f64]) {
     let rows = y.len();
@@ -165,10 +167,10 @@ pub(crate) fn subtract_two(y: &mut [f64], (a, s): (&[f64], f64), (b, t): (&[f64]
     }
 }
 
-/// Replaces the lower half of a symmetric matrix, stored column by column, by its Cholesky factor L;
-/// false if the matrix is not positive definite. The upper half is not read.
+/// Replaces the lower half of a symmetric n × n matrix, stored column by column, by its Cholesky
+/// factor L. Returns false if the matrix is not positive definite. The upper half is not read.
 ///
-/// Each column is reduced by four earlier ones at a time.
+/// Multiples of four earlier columns at a time are subtracted from each column.
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
 pub(crate) fn factor_in_place(n: usize, entries: &mut [f64]) -> bool {
     for j in 0..n {

@@ -1,4 +1,4 @@
-//! Small numerical methods that several modules share.
+//! Numerical methods that several modules share: matrix products, factors, bootstrap, bisection.
 
 mod bootstrap;
 mod factor;
@@ -14,8 +14,8 @@ pub(crate) use product::{
     transposed_product, zeros,
 };
 
-/// Returns the median of some values, or `None` if there are none. For an even number of values it
-/// is the mean of the two middle ones.
+/// Returns the median of some values, or `None` if there are none. The median of an even number of
+/// values is the mean of the two middle ones.
 pub(crate) fn median(values: impl IntoIterator<Item = f64>) -> Option<f64> {
     let mut sorted: Vec<f64> = values.into_iter().collect();
     sorted.sort_by(f64::total_cmp);
@@ -31,8 +31,8 @@ pub(crate) fn range(values: impl IntoIterator<Item = f64>) -> (f64, f64) {
     })
 }
 
-/// Halves the interval `halvings` times and returns the part in which `is_below` changes from true
-/// to false.
+/// Halves the interval `(low, high)` `halvings` times and returns the part in which `is_below`
+/// changes from true to false. It is assumed to be true at `low` and false at `high`.
 pub(crate) fn bisect(
     is_below: impl Fn(f64) -> bool,
     (mut low, mut high): (f64, f64),

@@ -1,26 +1,26 @@
-//! Parallel products of tall matrices. The partition depends only on the sizes, so results are the
-//! same to the bit for any number of threads.
+//! Parallel products of tall matrices. How the work is divided depends only on the sizes, so
+//! results are the same to the bit for any number of threads.
 
 use std::ops::Range;
 
 use nalgebra::{DMatrix, DMatrixView, DMatrixViewMut, Dyn, MatrixView};
 use rayon::prelude::*;
 
-/// Number of result columns that one thread computes at a time. For each block, the matrix product
-/// repacks the left factor.
+/// Number of result columns that one thread computes at a time. Smaller blocks are slower, because
+/// the matrix product repacks the left factor for each block.
 const BLOCK_COLUMNS: usize = 96;
 /// Number of columns of a narrow result that one thread computes at a time, without packing.
 const NARROW_BLOCK_COLUMNS: usize = 8;
-/// Largest number of columns for which a product is computed by axpy and dot operations; packing
-/// the factors would take longer.
+/// Largest number of rows or columns of a factor for which a product is computed by axpy and dot
+/// operations; packing the factors would take longer.
 const MAX_NARROW_COLUMNS: usize = 5;
 /// Number of rows that one thread processes at a time if the result has few columns.
 const BLOCK_ROWS: usize = 1024;
-/// Smallest number of entries for which a product overwrites its factor instead of allocating
-/// memory.
-const MIN_IN_PLACE: usize = 1 << 20;
-/// Number of columns of a tall matrix that one thread transposes at a time.
-const TRANSPOSED_COLUMNS: usize = 24;
+/// Smallest number of entries of the left factor for which a product overwrites it instead of
+/// allocating memory.
+const MIN_IN_PLACE_ENTRIES: usize = 1 << 20;
+/// Largest number of columns of A whose rows of the product AᵀB one thread computes at a time.
+const MAX_TRANSPOSED_COLUMNS: usize = 24;
 /// Smallest number of multiplications for which a product is computed in parallel.
 const MIN_PARALLEL_WORK: usize = 1 << 20;
 
@@ -46,7 +46,7 @@ pub(crate) fn product_with_upper(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<
     product_with_upper_padded(a, b, 0)
 }
 
-/// Returns A B for a square upper triangle B, followed by `extra` rows of zeros.
+/// Returns A B for a square upper triangle B, with `extra` rows of zeros appended.
 pub(crate) fn product_with_upper_padded(
     a: &DMatrix<f64>,
     b: &DMatrix<f64>,
@@ -60,7 +60,7 @@ pub(crate) fn product_with_upper_padded(
 /// Replaces A by A B for a square upper triangle B. A large A is overwritten in place, since new
 /// memory takes much of the time of the product.
 pub(crate) fn multiply_by_upper(a: &mut DMatrix<f64>, b: &DMatrix<f64>) {
-    if a.len() < MIN_IN_PLACE {
+    if a.len() < MIN_IN_PLACE_ENTRIES {
         *a = product_with_upper(a, b);
         return;
     }
@@ -84,8 +84,8 @@ pub(crate) fn subtract_product(c: DMatrixViewMut<f64>, a: &DMatrix<f64>, b: &DMa
     by_rows(c, 0, &form);
 }
 
-/// Applies `form` in parallel to blocks of rows of a tall matrix, each with the index of its first
-/// row.
+/// Applies `form` in parallel to blocks of consecutive rows of a tall matrix. `form` receives the
+/// index of the first row of its block; the rows of `matrix` are counted from `first`.
 fn by_rows(
     mut matrix: DMatrixViewMut<f64>,
     first: usize,
@@ -99,8 +99,8 @@ fn by_rows(
     rayon::join(|| by_rows(upper, first, form), || by_rows(lower, first + half, form));
 }
 
-/// Writes A B into the first rows of `out`. `filled` returns the rows of B outside which a range of
-/// its columns is zero.
+/// Writes A B into the first rows of `out`. For a range of columns of B, `filled` returns the range
+/// of rows outside which these columns are zero.
 fn product_to(
     a: &DMatrix<f64>,
     b: &DMatrix<f64>,
@@ -123,7 +123,7 @@ fn product_to(
             0.0,
         );
     };
-    // The longest columns of a triangle come first.
+    // The last columns of an upper triangle are the longest, so they are computed first.
     out.as_mut_slice().par_chunks_mut(height * BLOCK_COLUMNS).enumerate().rev().for_each(form);
 }
 
@@ -142,8 +142,8 @@ pub(crate) fn lower_product(lower: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f
     out
 }
 
-/// Returns A B for a narrow B, by blocks of rows that stay in the processor's cache from column to
-/// column.
+/// Returns A B for a B with few columns, by blocks of rows of A that stay in the processor's cache
+/// from one column of B to the next.
 fn narrow_product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
     let rows = a.nrows();
     let of_rows =
@@ -183,7 +183,7 @@ pub(crate) fn transposed_narrow_product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> D
     out.transpose()
 }
 
-/// Returns AᵀA; only the upper triangle is computed, then mirrored.
+/// Returns AᵀA. Only its upper triangle is computed and then mirrored.
 pub(crate) fn gram(a: &DMatrix<f64>) -> DMatrix<f64> {
     let (rows, n) = a.shape();
     if rows * n * n < MIN_PARALLEL_WORK || rows <= MAX_NARROW_COLUMNS {
@@ -206,13 +206,14 @@ pub(crate) fn gram(a: &DMatrix<f64>) -> DMatrix<f64> {
             );
         }
     };
-    // The longest columns come first.
+    // The last columns of the upper triangle are the longest, so they are computed first.
     out.as_mut_slice().par_chunks_mut(n * BLOCK_COLUMNS).enumerate().rev().for_each(form);
     out.fill_lower_triangle_with_upper_triangle();
     out
 }
 
-/// Returns LᵀL for a square lower triangle L; only the upper half is computed, then mirrored.
+/// Returns LᵀL for a square lower triangle L. Only its upper triangle is computed and then
+/// mirrored.
 pub(crate) fn gram_of_lower(lower: &DMatrix<f64>) -> DMatrix<f64> {
     let n = lower.nrows();
     if n * n * n < MIN_PARALLEL_WORK {
@@ -243,7 +244,7 @@ pub(crate) fn gram_of_lower(lower: &DMatrix<f64>) -> DMatrix<f64> {
     out
 }
 
-/// Returns a view of Aᵀ without copying. It is not for products with a size up to
+/// Returns a view of Aᵀ without copying. It must not enter products with a dimension of at most
 /// [`MAX_NARROW_COLUMNS`]: nalgebra forms these by axpy operations that access strided columns out
 /// of bounds.
 fn transposed_view(a: &DMatrix<f64>) -> MatrixView<'_, f64, Dyn, Dyn, Dyn, Dyn> {
@@ -251,8 +252,8 @@ fn transposed_view(a: &DMatrix<f64>) -> MatrixView<'_, f64, Dyn, Dyn, Dyn, Dyn> 
     DMatrixView::from_slice_with_strides_generic(a.as_slice(), Dyn(n), Dyn(rows), Dyn(rows), Dyn(1))
 }
 
-/// Returns AᵀB for a tall A and an equally tall B, by groups of columns of A, so that one thread
-/// forms each sum.
+/// Returns AᵀB for a tall A and an equally tall B, by groups of columns of A. One thread forms each
+/// sum over the rows, so that its order does not depend on the number of threads.
 pub(crate) fn transposed_product(a: &DMatrix<f64>, b: DMatrixView<f64>) -> DMatrix<f64> {
     let (rows, n) = a.shape();
     // See `transposed_view`.
@@ -260,7 +261,7 @@ pub(crate) fn transposed_product(a: &DMatrix<f64>, b: DMatrixView<f64>) -> DMatr
         return a.transpose() * b;
     }
     let transposed = transposed_view(a);
-    let parts = n.div_ceil(TRANSPOSED_COLUMNS);
+    let parts = n.div_ceil(MAX_TRANSPOSED_COLUMNS);
     let of_columns = |part: usize| {
         let (first, end) = (part * n / parts, (part + 1) * n / parts);
         transposed.rows(first, end - first) * b
@@ -273,7 +274,8 @@ pub(crate) fn transposed_product(a: &DMatrix<f64>, b: DMatrixView<f64>) -> DMatr
     out
 }
 
-/// Returns a matrix of zeros whose memory is not touched before it is written to.
+/// Returns a matrix of zeros. A large one is requested from the system as zeroed memory, which is
+/// not touched before it is written to.
 pub(crate) fn zeros(rows: usize, columns: usize) -> DMatrix<f64> {
     DMatrix::from_vec(rows, columns, vec![0.0; rows * columns])
 }

@@ -1,4 +1,4 @@
-//! Frames and rotations in three dimensions, generic over the scalar and differentiable.
+//! Frames and rotations in three dimensions; most functions also accept dual numbers.
 
 mod frame;
 mod placement;

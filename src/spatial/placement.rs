@@ -1,12 +1,12 @@
-//! Frames given by xyz and roll, pitch, yaw, as in URDF.
+//! Conversion of frames from and to xyz and roll, pitch, yaw, as in URDF.
 
 use nalgebra::Vector3;
 
 use super::Frame;
 
 impl Frame<f64> {
-    /// Creates the frame Txyz Rz(yaw) Ry(pitch) Rx(roll) from `xyz` \[m\] and `rpy` \[rad\] in the
-    /// order roll, pitch, yaw.
+    /// Creates the frame T(xyz) Rz(yaw) Ry(pitch) Rx(roll) from `xyz` \[m\] and `rpy` \[rad\], in
+    /// which roll comes first.
     pub fn from_xyz_rpy(xyz: &Vector3<f64>, rpy: &Vector3<f64>) -> Self {
         let mut frame = Self { origin: *xyz, ..Self::identity() };
         frame.rotate_z(rpy.z.sin_cos());
@@ -15,17 +15,17 @@ impl Frame<f64> {
         frame
     }
 
-    /// Returns roll, pitch and yaw \[rad\]; yaw is 0 if pitch is a right angle.
+    /// Returns roll, pitch and yaw \[rad\] of the frame's axes; yaw is 0 if pitch is ±90°.
     ///
     /// Yaw follows from the x axis and roll from the remaining rotation, which is exact to rounding
     /// at every pitch.
     pub fn roll_pitch_yaw(&self) -> Vector3<f64> {
         let [x, y, z] = &self.axes;
-        let level = x.x.hypot(x.y);
-        let yaw = if level > 1e-12 { x.y.atan2(x.x) } else { 0.0 };
+        let horizontal = x.x.hypot(x.y);
+        let yaw = if horizontal > 1e-12 { x.y.atan2(x.x) } else { 0.0 };
         let (sin, cos) = yaw.sin_cos();
         let roll = (sin * z.x - cos * z.y).atan2(cos * y.y - sin * y.x);
-        Vector3::new(roll, (-x.z).atan2(level), yaw)
+        Vector3::new(roll, (-x.z).atan2(horizontal), yaw)
     }
 
     /// Returns the inverse transform: the reference frame relative to this frame.

@@ -1,14 +1,14 @@
-//! Exponential and logarithm of rotations.
+//! Rotation vectors: exponential map, logarithm and its derivative, rotations about one axis.
 
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
 use crate::scalar::Scalar;
 
-/// Squared angle below which the exponential map uses its power series \[rad²\], which is exact to
-/// rounding there.
+/// Squared angle \[rad²\] below which the coefficients of a rotation are computed by power series,
+/// which are exact to rounding there; the closed forms divide by the angle.
 const MAX_SERIES_ANGLE_SQUARED: f64 = 0.01;
 
-/// Rotates `vector` by the rotation vector `w` \[rad\]: exp(`[w]×`) v.
+/// Returns `vector` v rotated by the rotation vector `w` \[rad\]: exp(`[w]×`) v.
 ///
 /// exp(`[w]×`) v = v + A w×v + B w×(w×v), A = sin φ / φ, B = (1 − cos φ) / φ², φ = ‖w‖
 /// (Rodrigues). Smooth at w = 0, with its derivative.
@@ -36,17 +36,17 @@ pub fn rotation_axes<S: Scalar>(w: &Vector3<S>) -> [Vector3<S>; 3] {
     ]
 }
 
-/// Returns the rotation vector \[rad\], in the reference frame, that rotates the axes `from` into
-/// `to`: log(R₂ R₁ᵀ), at most half a turn.
+/// Returns the rotation vector \[rad\], reference frame, that rotates the axes `from` into the axes
+/// `to`: log(R₂ R₁ᵀ) with R₁ = `from` and R₂ = `to`. Its length is at most π.
 pub fn rotation_between(from: &[Vector3<f64>; 3], to: &[Vector3<f64>; 3]) -> Vector3<f64> {
-    let turn = Matrix3::from_columns(to) * Matrix3::from_columns(from).transpose();
-    UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(turn)).scaled_axis()
+    let rotation = Matrix3::from_columns(to) * Matrix3::from_columns(from).transpose();
+    UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rotation)).scaled_axis()
 }
 
-/// Returns the inverse right Jacobian of SO(3), the derivative of log(exp(`[w]×`) exp(`[δ]×`)) at δ
-/// = 0: J⁻¹ = I + ½ `[w]×` + C `[w]×`², C = (1 − φ/2 cot φ/2) / φ².
+/// Returns the inverse right Jacobian of SO(3), the derivative of log(exp(`[w]×`) exp(`[δ]×`)) with
+/// respect to δ at δ = 0: J⁻¹ = I + ½ `[w]×` + C `[w]×`², C = (1 − φ/2 cot φ/2) / φ², φ = ‖w‖.
 ///
-/// The rotation vector w \[rad\] is shorter than a turn. [Chirikjian 2012, ch. 10]
+/// The rotation vector w \[rad\] is shorter than 2π. [Chirikjian 2012, ch. 10]
 pub fn inverse_right_jacobian(w: &Vector3<f64>) -> Matrix3<f64> {
     let squared = w.norm_squared();
     let c = if squared < MAX_SERIES_ANGLE_SQUARED {
@@ -59,34 +59,35 @@ pub fn inverse_right_jacobian(w: &Vector3<f64>) -> Matrix3<f64> {
     Matrix3::identity() + cross * 0.5 + cross * cross * c
 }
 
-/// Rotates a real vector about the x axis, given (sin, cos).
+/// Returns a real vector rotated about the x axis by the angle with this (sin, cos).
 #[inline]
 pub fn rotated_about_x<S: Scalar>(sin_cos: (S, S), vector: &Vector3<f64>) -> Vector3<S> {
-    let (y, z) = turn(sin_cos, vector.y, vector.z);
+    let (y, z) = rotate_in_plane(sin_cos, vector.y, vector.z);
     Vector3::new(S::from(vector.x), y, z)
 }
 
-/// Rotates a real vector about the y axis, given (sin, cos).
+/// Returns a real vector rotated about the y axis by the angle with this (sin, cos).
 #[inline]
 pub fn rotated_about_y<S: Scalar>(sin_cos: (S, S), vector: &Vector3<f64>) -> Vector3<S> {
-    let (z, x) = turn(sin_cos, vector.z, vector.x);
+    let (z, x) = rotate_in_plane(sin_cos, vector.z, vector.x);
     Vector3::new(x, S::from(vector.y), z)
 }
 
-/// Rotates a real vector about the z axis, given (sin, cos).
+/// Returns a real vector rotated about the z axis by the angle with this (sin, cos).
 #[inline]
 pub fn rotated_about_z<S: Scalar>(sin_cos: (S, S), vector: &Vector3<f64>) -> Vector3<S> {
-    let (x, y) = turn(sin_cos, vector.x, vector.y);
+    let (x, y) = rotate_in_plane(sin_cos, vector.x, vector.y);
     Vector3::new(x, y, S::from(vector.z))
 }
 
-/// Rotates coordinates in a plane by an angle, given (sin, cos).
+/// Returns the plane coordinates (u, v) rotated from u towards v by the angle with this (sin, cos).
 #[inline]
-fn turn<S: Scalar>((sin, cos): (S, S), u: f64, v: f64) -> (S, S) {
+fn rotate_in_plane<S: Scalar>((sin, cos): (S, S), u: f64, v: f64) -> (S, S) {
     (cos * u - sin * v, sin * u + cos * v)
 }
 
-/// Returns (sin φ / φ, (1 − cos φ) / φ²) from φ² \[rad²\].
+/// Returns the coefficients (sin φ / φ, (1 − cos φ) / φ²) of [`rotate`] from `squared` = φ²
+/// \[rad²\].
 fn coefficients<S: Scalar>(squared: S) -> (S, S) {
     if squared.re() < MAX_SERIES_ANGLE_SQUARED {
         let horner = |c: [f64; 5]| {
