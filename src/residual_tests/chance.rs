@@ -14,7 +14,7 @@ const MIN_SKEWNESS: f64 = 0.02;
 /// curve of [Stephens 1986] ends there.
 const MAX_STATISTIC: f64 = 150.0;
 
-/// Null distribution of a test statistic. Large values of the statistic are improbable.
+/// Null distribution of a test statistic. The tests are one-sided: large values are significant.
 #[derive(Debug, Clone)]
 pub(super) enum Chance {
     /// Null distribution of `scale` times a χ² variable.
@@ -43,7 +43,8 @@ impl Chance {
         p.clamp(f64::MIN_POSITIVE, 1.0)
     }
 
-    /// Returns the critical value that the statistic reaches with probability `level`.
+    /// Returns the critical value that the statistic reaches with probability `level` under the
+    /// null hypothesis.
     pub fn upper(&self, level: f64) -> f64 {
         match self {
             Self::ChiSquared { distribution, scale } => {
@@ -55,8 +56,8 @@ impl Chance {
         }
     }
 
-    /// Returns the value below which a χ² statistic falls with probability `level`. It is 0 for
-    /// other statistics, because only their large values are significant.
+    /// Returns the value below which a χ² statistic falls with probability `level` under the null
+    /// hypothesis. It is 0 for other statistics, because only their large values are significant.
     pub fn lower(&self, level: f64) -> f64 {
         match self {
             Self::ChiSquared { distribution, scale } => scale * distribution.inverse_cdf(level),
@@ -68,16 +69,16 @@ impl Chance {
 /// Values of a statistic drawn under the null hypothesis.
 ///
 /// The p-value is (1 + number of draws that reach the statistic) / (1 + draws), which is valid for
-/// any number of draws. If fewer than ten reach it, the p-value is that of a gamma distribution
-/// with the draws' mean, variance and skewness (Pearson's type III), which extends far beyond 1 /
-/// draws [Winkler et al. 2016, NeuroImage 141, 502-516].
+/// any number of draws. If fewer than ten draws reach it, the p-value is that of a gamma
+/// distribution with the draws' mean, variance and skewness (Pearson's type III), which extends far
+/// beyond 1 / draws [Winkler et al. 2016, NeuroImage 141, 502-516].
 #[derive(Debug, Clone)]
 pub(super) struct Drawn {
     /// Drawn values, ascending.
     values: Vec<f64>,
     /// Gamma distribution of shape k and scale 1 fitted to the draws, used for the upper tail.
     tail: Gamma,
-    /// Offset of the statistic: statistic = origin + unit × value of the gamma distribution.
+    /// Origin and unit of the fitted tail: statistic = origin + unit × variable of `tail`.
     origin: f64,
     unit: f64,
 }
@@ -117,7 +118,7 @@ impl Drawn {
     fn upper(&self, level: f64) -> f64 {
         if level > self.share(MIN_EXCEEDING_DRAWS) {
             let reached = level * (1 + self.values.len()) as f64 - 1.0;
-            // The statistic is the value that a whole number of draws reaches.
+            // The bound is a drawn value, which a whole number of draws reaches.
             #[expect(
                 clippy::cast_possible_truncation,
                 clippy::cast_sign_loss,

@@ -36,7 +36,7 @@ pub enum Covariate {
 impl Covariate {
     /// Returns the covariates through which `quantity` varies. `is_recorded` states whether
     /// directions of approach are recorded, and whether times are. Without times, the row number
-    /// replaces the time; without directions, the commands replace them.
+    /// replaces the time. Without directions of approach, friction varies with the command alone.
     pub fn of(quantity: Quantity, problem: &Problem, is_recorded: (bool, bool)) -> Vec<Self> {
         let (approach_known, time_measured) = is_recorded;
         match quantity {
@@ -62,7 +62,7 @@ impl Covariate {
         if measured { Self::Time } else { Self::Row }
     }
 
-    /// Returns the covariate that the problem declares with index `which`.
+    /// Returns the covariate that the problem declares with index `which`, counted from 0.
     pub fn declared(which: usize, problem: &Problem) -> Self {
         Self::Declared(
             problem.data.covariates.get(which).map_or("", |covariate| &covariate.name).into(),

@@ -5,8 +5,8 @@ use nalgebra::{DMatrix, DVector};
 use super::covariate::Covariate;
 use super::outcome::Untestable;
 
-/// Root mean square residual, in units of the declared σ, below which it counts as rounding error
-/// and is not tested.
+/// Smallest root mean square residual, in units of the declared σ, that is tested. A smaller one is
+/// rounding error.
 pub(crate) const MIN_RESIDUAL_SIGMAS: f64 = 1e-3;
 
 /// Values of a covariate, one for each pose.
@@ -22,7 +22,7 @@ pub struct CovariateValues {
 #[derive(Debug, Clone, Copy)]
 pub struct FitResidual<'a> {
     /// Whitened residuals (measured − predicted) / σ, measuring frame, pose after pose, shape = (3
-    /// N). Entries beyond the numbers that a pose measures are 0.
+    /// N). A pose has three entries; those beyond its measured coordinates are 0.
     pub residual: &'a DVector<f64>,
     /// Matrix Q, shape = (3 N, p): H = Q Qᵀ maps data to fitted values.
     ///
@@ -36,7 +36,7 @@ pub struct FitResidual<'a> {
     pub sigma_is_declared: bool,
     /// Time of each pose, in any unit and from any origin.
     pub time: &'a [f64],
-    /// Session of each pose, as a number.
+    /// Identifier of each pose's session. Tests of order compare poses of one session only.
     pub session: &'a [usize],
     /// Identifier of each pose's setup. Poses with equal setup are repeats, for which the model
     /// predicts the same position.
@@ -51,8 +51,8 @@ impl FitResidual<'_> {
         self.coordinates.get(pose).copied().unwrap_or(3)
     }
 
-    /// Returns an error if sizes do not agree or a value is not finite.
-    pub(super) fn testable(&self) -> Result<(), Untestable> {
+    /// Returns an error if the numbers of poses disagree, or if Q or a residual is not finite.
+    pub(super) fn check_input(&self) -> Result<(), Untestable> {
         let rows = self.residual.len();
         let poses = rows / 3;
         let shapes = rows == 3 * poses
@@ -72,7 +72,7 @@ impl FitResidual<'_> {
 
     /// Returns an error if the residual is so much smaller than the declared σ that it is rounding
     /// error.
-    pub(super) fn above_rounding(&self) -> Result<(), Untestable> {
+    pub(super) fn check_above_rounding(&self) -> Result<(), Untestable> {
         let size = self.residual.norm_squared() / self.residual.len().max(1) as f64;
         let is_rounding = self.sigma_is_declared && size < MIN_RESIDUAL_SIGMAS.powi(2);
         if is_rounding { Err(Untestable::Rounding) } else { Ok(()) }

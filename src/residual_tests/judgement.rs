@@ -21,9 +21,9 @@ pub(super) struct Trial {
     pub shown: fn(f64) -> f64,
 }
 
-/// Judges the tests by Holm's procedure: the smallest of m p-values fails below α / m, the next one
-/// below α / (m − 1), until one does not [Holm 1979]. α is `family_level`; `outliers` are stored in
-/// the result.
+/// Judges the tests by Holm's procedure: the smallest of m p-values fails up to α / m, the next one
+/// up to α / (m − 1), until one does not fail [Holm 1979]. α is `family_level`. `outliers`, the
+/// indices of the poses left out, are stored in the result.
 pub(super) fn judge(tried: Vec<Tried>, family_level: f64, outliers: Vec<usize>) -> ResidualTests {
     let p_value = |tried: &Tried| {
         tried.trial.as_ref().ok().map(|trial| trial.chance.p_value(trial.statistic))

@@ -11,21 +11,21 @@ use crate::numeric::{gram, lower_factor, multiply_by_upper};
 
 /// Minimum number of residual degrees of freedom for any test.
 const MIN_DEGREES_OF_FREEDOM: f64 = 4.0;
-/// Smallest share of a direction's squared length that must lie in the kept poses for the fit to
-/// them to be defined.
+/// Smallest fraction of the squared length of a fitted direction that must lie in the kept poses.
+/// With less, these poses do not determine the direction.
 const MIN_KEPT_SHARE: f64 = 1e-6;
-/// Smallest share of its noise variance that the residual must keep along a direction of a pose for
-/// studentisation. With less, the pose alone determines that direction.
+/// Smallest fraction of the noise variance that a residual must keep along a direction of a pose
+/// for studentisation. With less, the pose alone determines that direction.
 const MIN_RESIDUAL_SHARE: f64 = 1e-4;
-/// Smallest share of a fitted direction determined by priors, at which the priors' contribution to
-/// the residuals is counted.
+/// Smallest eigenvalue of I − QᵀQ that is not neglected: the part of a fitted direction that priors
+/// determine instead of data.
 const MIN_PRIOR_SHARE: f64 = 1e-6;
-/// Value added to a diagonal so that a Cholesky factor exists in spite of rounding.
+/// Value added to the diagonal of I − QᵀQ so that a Cholesky factor exists in spite of rounding.
 const CHOLESKY_JITTER: f64 = 1e-10;
 /// Number of poses whose rows of Q are transposed together, chosen for the processor cache.
 const POSES_PER_BLOCK: usize = 32;
-/// Largest number of directions for which eigenvectors are computed; a Cholesky factor of more
-/// takes less time.
+/// Number of fitted directions p from which I − QᵀQ is factored by Cholesky, because eigenvectors
+/// take more time.
 const MAX_EIGENVECTOR_DIRECTIONS: usize = 100;
 
 /// Projection I − H with H = Q Qᵀ, and the matrices that studentise each pose.
@@ -65,8 +65,8 @@ impl<'a> Leverage<'a> {
         Ok(Self { fitted, gram, freedom, squared_freedom, whiteners, coordinates })
     }
 
-    /// Returns a matrix S with S Sᵀ = I − QᵀQ, shape = (p, k), for the k directions along which
-    /// priors contribute to the residuals.
+    /// Returns a matrix R with R Rᵀ = I − QᵀQ, shape = (p, k). k is the number of directions that
+    /// priors help to determine, or p.
     pub fn prior_root(&self) -> DMatrix<f64> {
         let p = self.gram.nrows();
         let mut prior_part = DMatrix::identity(p, p) - &self.gram;
@@ -89,7 +89,8 @@ impl<'a> Leverage<'a> {
         poses.into_iter().map(Vector3::from).collect()
     }
 
-    /// Replaces the residuals by the studentised ones.
+    /// Replaces the residual r_b of each pose by the studentised one, as [`Self::studentise`]
+    /// returns it.
     pub fn studentise_in_place(&self, poses: &mut [[f64; 3]]) {
         for (pose, whitener) in poses.iter_mut().zip(&self.whiteners) {
             *pose = (whitener * Vector3::from(*pose)).into();
@@ -97,8 +98,9 @@ impl<'a> Leverage<'a> {
     }
 }
 
-/// Applies a function to chunks of poses in parallel and concatenates the results. The function
-/// receives the index of the first pose and the rows of Q as columns, three a pose.
+/// Applies a function to blocks of poses in parallel and concatenates the results. The function
+/// receives the index of the first pose of a block and the block's rows of Q as columns, three a
+/// pose.
 fn by_poses<T: Send>(
     fitted: &DMatrix<f64>,
     of: impl Fn(usize, &DMatrix<f64>) -> Vec<T> + Sync,
@@ -119,7 +121,7 @@ fn products(a: &DMatrix<f64>, b: &DMatrix<f64>, pose: usize) -> Matrix3<f64> {
     Matrix3::from_fn(|i, j| a.column(3 * pose + i).dot(&b.column(3 * pose + j)))
 }
 
-/// Returns S with S Sᵀ = `prior_part` = I − QᵀQ, with one column for each direction that priors
+/// Returns R with R Rᵀ = `prior_part` = I − QᵀQ, with one column for each direction that priors
 /// help to determine.
 fn root_of_priors(prior_part: DMatrix<f64>) -> DMatrix<f64> {
     let p = prior_part.nrows();
@@ -135,7 +137,7 @@ fn root_of_priors(prior_part: DMatrix<f64>) -> DMatrix<f64> {
     DMatrix::from_fn(p, by_priors.len(), entry)
 }
 
-/// Returns A^(−½) of a symmetric matrix, zero along directions in which A vanishes.
+/// Returns A^(−½) of a symmetric matrix A; eigenvalues up to [`MIN_RESIDUAL_SHARE`] become 0.
 fn inverse_root(matrix: Matrix3<f64>) -> Matrix3<f64> {
     let eigen = matrix.symmetric_eigen();
     let roots = eigen
@@ -162,7 +164,8 @@ impl<'a> Kept<'a> {
         Self { poses: (0..residual.len() / 3).collect(), residual, leverage }
     }
 
-    /// Refits without the poses marked `out`; `None` if the others do not determine the fit.
+    /// Refits without the poses whose entry of `out` is true; `None` if the others do not determine
+    /// the fit.
     ///
     /// With Q_A and Q_B the rows of the kept and of the other poses, and M = I − Q_BᵀQ_B = L Lᵀ,
     /// the residual is r_A + Q_A M⁻¹ Q_Bᵀ r_B, and Q_A L⁻ᵀ replaces Q [Cook and Weisberg 1982,
@@ -202,29 +205,30 @@ pub(super) struct Others {
     pub freedom: f64,
 }
 
-/// For each pose b, returns the sum of squares of the other poses in the fit without b.
+/// For each pose b, returns the sum of squares of the other poses in the fit without b, and its
+/// degrees of freedom.
 ///
 /// The rows of pose b are Q_b; with D = (I − H_bb)⁻¹, a = D r_b and W = Q_b QᵀQ Q_bᵀ, as in
 /// [`Kept::without`],
 ///
-/// ‖r‖² becomes ‖r‖² − |r_b|² + 2 a·(Q_b Qᵀr − H_bb r_b) + a·(W − H_bb²) a,  tr H becomes tr H − tr
-/// H_bb + tr D (W − H_bb²)
+/// ‖r‖² becomes ‖r‖² − |r_b|² + 2 a·(Q_b Qᵀr − H_bb r_b) + a·(W − H_bb²) a, and tr H becomes tr H −
+/// tr H_bb + tr D (W − H_bb²).
 pub(super) fn each_left_out(leverage: &Leverage, residual: &DVector<f64>) -> Vec<Others> {
     let fitted = leverage.fitted.as_ref();
-    let again = fitted * transposed_product(fitted, residual);
+    let hat_residual = fitted * transposed_product(fitted, residual);
     let total = residual.norm_squared();
     by_poses(fitted, |first, rows| {
         let gram_rows = &leverage.gram * rows;
         let others = |number: usize| {
             let pose = first + number;
             let of_pose = |values: &DVector<f64>| values.fixed_rows::<3>(3 * pose).into_owned();
-            let (residual_of_pose, again) = (of_pose(residual), of_pose(&again));
+            let (residual_of_pose, hat_residual) = (of_pose(residual), of_pose(&hat_residual));
             let hat_block = products(rows, rows, number);
             let more = products(rows, &gram_rows, number) - hat_block * hat_block;
             let inverse = leverage.whiteners[pose] * leverage.whiteners[pose];
             let pull = inverse * residual_of_pose;
-            let change =
-                2.0 * pull.dot(&(again - hat_block * residual_of_pose)) + pull.dot(&(more * pull));
+            let change = 2.0 * pull.dot(&(hat_residual - hat_block * residual_of_pose))
+                + pull.dot(&(more * pull));
             Others {
                 squares: total - residual_of_pose.norm_squared() + change,
                 freedom: leverage.freedom - leverage.coordinates[pose] as f64 + hat_block.trace()
@@ -249,7 +253,8 @@ fn transposed_product(fitted: &DMatrix<f64>, residual: &DVector<f64>) -> DVector
 mod tests {
     use super::*;
 
-    /// Returns the leverage of 60 poses and p unknowns, with or without a prior on each second one.
+    /// Returns the leverage of 60 poses and p unknowns; if `has_priors`, each second unknown has
+    /// one.
     fn leverage(p: usize, has_priors: bool) -> Leverage<'static> {
         let entry =
             |i: usize, j: usize| ((12.9898 * i as f64 + 78.233 * j as f64).sin() * 43.7) % 1.0;

@@ -9,7 +9,7 @@
 //! - `size`, `outliers`, `statistic`: size and distribution of the residuals, order, and dependence
 //!   on covariates.
 //! - `chance`, `permutation`: null distributions.
-//! - `judgement`, `outcome`: decision over all tests, and its wording.
+//! - `judgement`, `outcome`: decision over all tests, its results and their sentences.
 
 mod chance;
 mod covariate;

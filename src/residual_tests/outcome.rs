@@ -23,8 +23,8 @@ pub enum Test {
     ReducedChiSquared,
     /// Size against the scatter of repeated poses; statistic: ratio F of both variances.
     LackOfFit,
-    /// Runs of equal sign in an order of the poses; statistic: share of steps from pose to pose at
-    /// which a coordinate keeps its sign.
+    /// Runs of equal sign in an order of the poses; statistic: fraction of the steps from pose to
+    /// pose at which a coordinate keeps its sign.
     Runs {
         /// Order of the poses.
         sequence: Sequence,
@@ -39,10 +39,10 @@ pub enum Test {
         /// Covariate whose influence is tested.
         covariate: Covariate,
     },
-    /// Poses whose residual is too large to be noise; statistic: the largest distance in units of
-    /// the other poses' scatter.
+    /// Poses whose residual is too large to be noise; statistic: length of the largest studentised
+    /// residual of a pose, in units of the scatter of the other poses.
     Outliers {
-        /// Pose with the largest distance; `None` if there is none.
+        /// Index of the pose with the largest statistic, from 0; `None` if no pose can be tested.
         worst: Option<usize>,
     },
     /// Normality of the residual coordinates; statistic: Anderson and Darling's A².
@@ -56,10 +56,11 @@ pub enum Untestable {
     /// The fit leaves too few degrees of freedom.
     #[error("the fit leaves too few degrees of freedom")]
     NoFreedom,
-    /// No session has enough poses.
+    /// Too few poses: a test of order needs five in one session, a test of dependence five in all, a
+    /// test of normality eight coordinates.
     #[error("too few poses")]
     TooFewPoses,
-    /// The covariate has the same value in all poses.
+    /// The covariate (in the test of normality: the residual) has the same value in all poses.
     #[error("it is the same at every pose")]
     Constant,
     /// The problem declares no σ.
@@ -71,7 +72,7 @@ pub enum Untestable {
     /// No pose was measured twice under the same conditions.
     #[error("no pose was measured twice under the same conditions")]
     NoRepeats,
-    /// A value is not a finite number.
+    /// A residual, a time, a covariate or an entry of Q is not a finite number.
     #[error("a value is not a finite number")]
     NotFinite,
     /// Residuals, fitted directions, labels or covariates differ in their number of poses.
@@ -122,7 +123,7 @@ impl ResidualTest {
     }
 
     /// Returns the covariate whose influence is tested; for a test of order it is time or row
-    /// number.
+    /// number. Returns `None` for the other tests.
     pub fn about(&self) -> Option<Covariate> {
         match &self.test {
             Test::Dependence { covariate } => Some(covariate.clone()),
@@ -153,7 +154,8 @@ impl ResidualTest {
 pub struct ResidualTests {
     /// All tests, including those that cannot be made.
     pub tests: Vec<ResidualTest>,
-    /// Poses that were left out as outliers, counted from 0.
+    /// Indices of the poses that were left out of the tests as outliers, counted from 0. The tests
+    /// of outliers and of normality include them.
     pub outliers: Vec<usize>,
 }
 
@@ -172,8 +174,8 @@ impl ResidualTests {
         failed.min_by(|a, b| p_value(a).total_cmp(&p_value(b)))
     }
 
-    /// Returns the ratio of the residual to the declared σ if the size of the residual is the only
-    /// significant finding; `None` otherwise.
+    /// Returns √(χ²/ν), the ratio of the residual to the declared σ, if the χ² test is the only
+    /// test of structure that failed; `None` otherwise.
     pub fn size_alone(&self) -> Option<f64> {
         let mut failed = self.tests.iter().filter(|test| test.tests_structure() && test.failed());
         let (Some(only), None) = (failed.next(), failed.next()) else { return None };
@@ -185,8 +187,8 @@ impl ResidualTests {
         }
     }
 
-    /// Returns the ratio of the residual to the declared σ if it is significantly less than 1;
-    /// `None` otherwise.
+    /// Returns √(χ²/ν), the ratio of the residual to the declared σ, if it is significantly less
+    /// than 1; `None` otherwise.
     pub fn overstated_sigma(&self) -> Option<f64> {
         let size = self.tests.iter().filter(|test| test.test == Test::ReducedChiSquared);
         let mut sizes = size.filter_map(|test| test.outcome.as_ref().ok());
@@ -204,13 +206,13 @@ impl ResidualTests {
 impl fmt::Display for ResidualTest {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match &self.outcome {
-            Ok(outcome) => tested(self, outcome, f),
-            Err(why) => write!(f, "{} not tested: {why}", untested(&self.test)),
+            Ok(outcome) => write_tested(self, outcome, f),
+            Err(why) => write!(f, "{} not tested: {why}", untested_phrase(&self.test)),
         }
     }
 }
 
-fn tested(
+fn write_tested(
     ResidualTest { test, row, .. }: &ResidualTest,
     outcome: &Outcome,
     f: &mut fmt::Formatter<'_>,
@@ -242,7 +244,7 @@ fn tested(
             write!(
                 f,
                 "residuals {sign} {} (the sign stays at {:.0} % of the steps, expected up to {:.0} %)",
-                order(*sequence),
+                order_phrase(*sequence),
                 percent.0,
                 percent.1
             )
@@ -253,7 +255,7 @@ fn tested(
             write!(
                 f,
                 "residuals {follow} {} (Ljung–Box {statistic:.1}, expected up to {to:.1})",
-                order(*sequence)
+                order_phrase(*sequence)
             )
         }
         Test::Dependence { covariate } => {
@@ -282,19 +284,19 @@ fn tested(
     }
 }
 
-fn order(sequence: Sequence) -> &'static str {
+fn order_phrase(sequence: Sequence) -> &'static str {
     match sequence {
         Sequence::Time => "in the order of time",
         Sequence::Rows => "in the order of the rows",
     }
 }
 
-fn untested(test: &Test) -> String {
+fn untested_phrase(test: &Test) -> String {
     match test {
         Test::ReducedChiSquared => "size against σ".to_owned(),
         Test::LackOfFit => "size against repeated poses".to_owned(),
-        Test::Runs { sequence } => format!("signs {}", order(*sequence)),
-        Test::LjungBox { sequence } => format!("autocorrelation {}", order(*sequence)),
+        Test::Runs { sequence } => format!("signs {}", order_phrase(*sequence)),
+        Test::LjungBox { sequence } => format!("autocorrelation {}", order_phrase(*sequence)),
         Test::Dependence { covariate } => format!("dependence on {covariate}"),
         Test::Outliers { .. } => "outliers".to_owned(),
         Test::Normality => "normal distribution".to_owned(),

@@ -12,22 +12,26 @@ use super::leverage::Leverage;
 use super::statistic::{Sample, Statistic};
 use crate::numeric::{subtract_product, transposed_product};
 
-/// Maximum number of permutation draws. Fewer are made if their product with Q takes more than
-/// `MAX_MULTIPLICATIONS` multiplications; p-values below 1 % then come from the fitted tail.
+/// Largest and smallest number of permutation draws. Fewer than the largest are made if their
+/// product with Q takes more than `MAX_MULTIPLICATIONS` multiplications; p-values below 1 % then
+/// come from the fitted tail.
 const MAX_DRAWS: usize = 1999;
 const MIN_DRAWS: usize = 999;
 const MAX_MULTIPLICATIONS: u64 = 1 << 32;
-/// Maximum number of draws that are fitted together, so that Q is read once for all of them. Fewer
-/// are fitted together if they contain more than `MAX_BATCH_NUMBERS` numbers.
+/// Largest and smallest number of draws that are fitted together, so that Q is read once for all
+/// of them. Fewer than the largest are fitted together if they contain more than
+/// `MAX_BATCH_NUMBERS` numbers.
 const MAX_BATCH_DRAWS: usize = 96;
 const MIN_BATCH_DRAWS: usize = 16;
 const MAX_BATCH_NUMBERS: usize = 1 << 21;
 /// Number of draws whose statistics are computed side by side, in vector registers.
 const DRAWS_SIDE_BY_SIDE: usize = 8;
-/// Largest number of rows of a draw at which draws are copied side by side: a bound of memory.
+/// Largest number of residuals of a draw (three a pose) at which draws are evaluated side by side.
+/// The limit bounds the memory of the copies.
 const MAX_ROWS_SIDE_BY_SIDE: usize = 1 << 18;
 
-/// Returns the null distribution of each statistic; `None` if the statistic is constant.
+/// Returns the null distribution of each statistic; `None` if the statistic is the same in all
+/// draws.
 ///
 /// A draw permutes the studentised residuals e of the poses, removes their fit and studentises
 /// again:
@@ -41,7 +45,7 @@ const MAX_ROWS_SIDE_BY_SIDE: usize = 1 << 18;
 /// no σ. Without priors, the p-values do not depend on the unit of the residuals. All statistics
 /// share the draws. Each draw has a separate random stream, so that results do not depend on the
 /// number of threads.
-pub(super) fn p_values(
+pub(super) fn null_distributions(
     leverage: &Leverage,
     studentised: &[Vector3<f64>],
     statistics: &[&Statistic],
@@ -58,7 +62,7 @@ pub(super) fn p_values(
     let starts: Vec<usize> = (0..draws).step_by(together).collect();
     let values = |space: &mut DMatrix<f64>, start: usize| {
         draw((leverage, &prior), studentised, start..(start + together).min(draws), seed, space);
-        values(leverage, statistics, space)
+        evaluate_draws(leverage, statistics, space)
     };
     let drawn: Vec<Vec<Vec<f64>>> = if together > MIN_BATCH_DRAWS {
         starts.into_par_iter().map_init(DMatrix::default, values).collect()
@@ -73,7 +77,8 @@ pub(super) fn p_values(
     (0..statistics.len()).map(of).collect()
 }
 
-/// Writes residuals r* of some draws into the columns of `residuals`, shape = (3 N, draws).
+/// Writes the residuals r* of [`null_distributions`] for the draws with these numbers into the
+/// columns of `residuals`, shape = (3 N, draws). `prior` is R with R Rᵀ = I − QᵀQ.
 fn draw(
     (leverage, prior): (&Leverage, &DMatrix<f64>),
     studentised: &[Vector3<f64>],
@@ -109,8 +114,9 @@ fn draw(
     subtract_product(residuals.as_view_mut(), &leverage.fitted, &components);
 }
 
-/// Returns the statistics of each draw from its residuals, which are studentised in place.
-fn values(
+/// Returns the statistics, one list a draw, from the residuals r* of the draws. Studentises these
+/// residuals in place.
+fn evaluate_draws(
     leverage: &Leverage,
     statistics: &[&Statistic],
     residuals: &mut DMatrix<f64>,
@@ -124,18 +130,16 @@ fn values(
         }
         let draws: Vec<&[[f64; 3]]> = draws.into_iter().map(|poses| &*poses).collect();
         match <[&[[f64; 3]]; DRAWS_SIDE_BY_SIDE]>::try_from(draws) {
-            Ok(draws) => evaluated(draws, statistics),
-            Err(draws) => {
-                draws.into_iter().flat_map(|draw| evaluated([draw], statistics)).collect()
-            }
+            Ok(draws) => evaluate(draws, statistics),
+            Err(draws) => draws.into_iter().flat_map(|draw| evaluate([draw], statistics)).collect(),
         }
     };
     let count = if rows > MAX_ROWS_SIDE_BY_SIDE { 1 } else { DRAWS_SIDE_BY_SIDE };
     residuals.as_mut_slice().par_chunks_mut(count * rows).flat_map_iter(of_draws).collect()
 }
 
-/// Returns the statistics of each draw from its studentised residuals.
-fn evaluated<const L: usize>(draws: [&[[f64; 3]]; L], statistics: &[&Statistic]) -> Vec<Vec<f64>> {
+/// Returns the statistics, one list a draw, from the studentised residuals of L draws.
+fn evaluate<const L: usize>(draws: [&[[f64; 3]]; L], statistics: &[&Statistic]) -> Vec<Vec<f64>> {
     let sample = Sample::of(draws);
     let values: Vec<[f64; L]> =
         statistics.iter().map(|statistic| statistic.evaluate(&sample)).collect();

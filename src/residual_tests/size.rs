@@ -13,7 +13,8 @@ use super::outcome::{Test, Untestable};
 
 /// Minimum number of residual coordinates for the test of normality.
 const MIN_COORDINATES: usize = 8;
-/// Smallest distance of a probability from 0 and 1, so that its logarithm is finite.
+/// Lower bound of the probabilities Φ(z) in Anderson and Darling's A², so that their logarithms are
+/// finite.
 const MIN_TAIL_PROBABILITY: f64 = 1e-300;
 
 /// Tests χ² / ν of the residuals against the declared σ, with ν = 3 N − tr H.
@@ -41,13 +42,13 @@ pub(super) fn reduced_chi_squared(fit: &FitResidual, kept: &Kept) -> Tried {
 /// Tests the variance of the residuals against that of repeated measurements about their mean,
 /// which no model explains [Draper and Smith 1998, ch. 2].
 ///
-/// F = ((‖r‖² − P) / (ν − νₚ)) / (P / νₚ),  P = Σ |r − r̄ of the same setup|²,  νₚ = 3 Σ (repeats −
-/// 1)
+/// F = ((‖r‖² − P) / (ν − νₚ)) / (P / νₚ), P = Σ |r − r̄|², νₚ = Σ k (n − 1). r̄ is the mean
+/// residual of the n poses of the same setup, each with k measured coordinates.
 pub(super) fn lack_of_fit(fit: &FitResidual, kept: &Kept) -> Tried {
-    Tried { test: Test::LackOfFit, trial: ratio(fit, kept) }
+    Tried { test: Test::LackOfFit, trial: lack_of_fit_trial(fit, kept) }
 }
 
-fn ratio(fit: &FitResidual, kept: &Kept) -> Result<Trial, Untestable> {
+fn lack_of_fit_trial(fit: &FitResidual, kept: &Kept) -> Result<Trial, Untestable> {
     let mut setups = BTreeMap::<usize, (usize, Vec<Vector3<f64>>)>::new();
     for (&pose, residual) in kept.poses.iter().zip(kept.residual.as_slice().chunks_exact(3)) {
         let (_, repeats) =
@@ -74,7 +75,7 @@ fn ratio(fit: &FitResidual, kept: &Kept) -> Result<Trial, Untestable> {
 }
 
 /// Tests all studentised coordinates for normality by Anderson and Darling's test, with estimated
-/// mean and variance.
+/// mean and variance. Coordinates that are exactly 0, such as those not measured, are left out.
 ///
 /// A² = −n − (1/n) Σᵢ (2i − 1) [ln Φ(z₍ᵢ₎) + ln Φ(−z₍ₙ₊₁₋ᵢ₎)], times 1 + 0.75/n + 2.25/n² [Stephens
 /// 1986, in D'Agostino and Stephens, Goodness-of-Fit Techniques, section 4.8.5]
@@ -85,7 +86,7 @@ fn ratio(fit: &FitResidual, kept: &Kept) -> Result<Trial, Untestable> {
 pub(super) fn anderson_darling(studentised: &[Vector3<f64>]) -> Tried {
     let mut values: Vec<f64> =
         studentised.iter().flatten().copied().filter(|value| *value != 0.0).collect();
-    let trial = squared_distance(&mut values).map(|statistic| Trial {
+    let trial = a_squared(&mut values).map(|statistic| Trial {
         statistic,
         chance: Chance::AndersonDarling,
         shown: |value| value,
@@ -93,7 +94,7 @@ pub(super) fn anderson_darling(studentised: &[Vector3<f64>]) -> Tried {
     Tried { test: Test::Normality, trial }
 }
 
-fn squared_distance(values: &mut [f64]) -> Result<f64, Untestable> {
+fn a_squared(values: &mut [f64]) -> Result<f64, Untestable> {
     if values.len() < MIN_COORDINATES {
         return Err(Untestable::TooFewPoses);
     }

@@ -9,11 +9,11 @@ use super::outcome::{Sequence, Untestable};
 
 /// Minimum number of poses for tests of order and of dependence.
 const MIN_POSES: usize = 5;
-/// Maximum number of lags of the autocorrelation; a session needs this many poses for each lag
-/// [Hyndman and Athanasopoulos 2018, section 5.4].
+/// Maximum number of lags of the autocorrelation [Hyndman and Athanasopoulos 2018, section 5.4].
 const MAX_LAGS: usize = 10;
+/// Number of poses that the longest session needs for each lag of the autocorrelation [ibid.].
 const POSES_PER_LAG: usize = 5;
-/// Range of a covariate, relative to its values, up to which it counts as constant.
+/// Largest range of a constant covariate, relative to its largest absolute value: rounding errors.
 const MAX_CONSTANT_RANGE: f64 = 1e-12;
 
 /// Studentised residuals of L draws side by side, each with its mean subtracted.
@@ -45,7 +45,7 @@ impl<const L: usize> Sample<L> {
     }
 }
 
-/// Returns the scalar product of two residuals of each draw.
+/// Returns the scalar product of the residuals of two poses, for each draw.
 #[inline]
 fn dot<const L: usize>(a: &[[f64; L]; 3], b: &[[f64; L]; 3]) -> [f64; L] {
     std::array::from_fn(|l| a[0][l] * b[0][l] + a[1][l] * b[1][l] + a[2][l] * b[2][l])
@@ -55,7 +55,7 @@ fn dot<const L: usize>(a: &[[f64; L]; 3], b: &[[f64; L]; 3]) -> [f64; L] {
 /// unit.
 #[derive(Debug)]
 pub(super) enum Statistic {
-    /// Share of steps from pose to pose at which a coordinate keeps its sign.
+    /// Fraction of the steps from pose to pose at which a coordinate keeps its sign.
     Runs(Arc<Order>),
     /// Ljung and Box's Q of the autocorrelation.
     LjungBox(Arc<Order>),
@@ -79,11 +79,12 @@ impl Statistic {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Order {
     sessions: Vec<Vec<usize>>,
+    /// Number of lags of the autocorrelation, 1…10.
     lags: usize,
 }
 
-/// Returns the poses `kept`, renumbered from 0, in the order of time, and in the order of the rows
-/// if that differs.
+/// Returns the orders of the poses `kept` for the tests: by time, and by rows if that differs. The
+/// indices in an order count the kept poses from 0.
 pub(super) fn sequences(
     fit: &FitResidual,
     kept: &[usize],
@@ -127,8 +128,8 @@ impl Order {
             .flat_map(move |session| session.iter().copied().zip(session.iter().skip(lag).copied()))
     }
 
-    /// Returns the share of steps at which a coordinate keeps its sign. Many kept signs mean few
-    /// runs [Wald and Wolfowitz 1940].
+    /// Returns the fraction of the steps from pose to pose at which a coordinate keeps its sign.
+    /// Many kept signs mean few runs [Wald and Wolfowitz 1940].
     pub fn kept_signs<const L: usize>(&self, sample: &Sample<L>) -> [f64; L] {
         let (mut steps, mut kept) = (0_u32, [0_u32; L]);
         for (a, b) in self.pairs(1) {
@@ -190,11 +191,12 @@ pub(super) struct Cumulative {
 }
 
 impl Cumulative {
-    /// Creates the statistic from the covariate's values in the poses `kept`, which are renumbered
-    /// from 0.
+    /// Creates the statistic from the covariate's values in all poses, of which those in `kept` are
+    /// used.
     ///
     /// # Errors
-    /// Returns an error if `values` does not have `count` entries, or if the covariate is constant.
+    /// Returns an error if `values` does not have `count` entries or one is not finite, if `kept`
+    /// has fewer than five poses, or if the covariate is constant in them.
     pub fn new(values: &[f64], count: usize, kept: &[usize]) -> Result<Self, Untestable> {
         if values.len() != count {
             return Err(Untestable::SizeMismatch);
@@ -244,7 +246,7 @@ fn centred_norm(sorted: &[f64]) -> f64 {
     let squares: f64 = sorted.iter().map(|x| (x - sum / n).powi(2)).sum();
     let (mut below, mut means_sum, mut means_squares) = (0.0, 0.0, 0.0);
     for (i, x) in sorted.iter().enumerate() {
-        // The sum has two parts: the i values below x, and the values from x on.
+        // Mean distance from x: of the i values below x, and of the values from x on.
         let mean = (x * i as f64 - below + (sum - below) - x * (n - i as f64)) / n;
         means_sum += mean;
         means_squares += mean * mean;

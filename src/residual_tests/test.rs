@@ -22,23 +22,23 @@ use super::statistic::{Cumulative, Sample, Statistic, sequences};
 pub fn test_residual(fit: &FitResidual, level: f64, seed: u64) -> ResidualTests {
     let poses = fit.residual.len() / 3;
     let leverage = match fit
-        .testable()
+        .check_input()
         .and_then(|()| {
             Leverage::new(
                 Cow::Borrowed(fit.fitted),
                 (0..poses).map(|pose| fit.coordinates_of(pose)).collect(),
             )
         })
-        .and_then(|all| fit.above_rounding().map(|()| all))
+        .and_then(|leverage| fit.check_above_rounding().map(|()| leverage))
     {
         Ok(leverage) => leverage,
         Err(why) => return judge(all_untestable(fit, &why), level, Vec::new()),
     };
     let studentised = leverage.studentise(fit.residual.as_slice());
-    // This is the largest possible number of tests. A pose that is an outlier at this level also
-    // fails in the judgement.
-    let most = fit.covariates.len() + 8;
-    let found = outliers::find(fit, &leverage, level / most as f64);
+    // A pose that is removed at the level of one test of the largest possible number also fails in
+    // Holm's procedure.
+    let max_tests = fit.covariates.len() + 8;
+    let found = outliers::find(fit, &leverage, level / max_tests as f64);
     let kept = found.kept.unwrap_or_else(|| Kept::all(fit, leverage));
     let mut tried = vec![size::reduced_chi_squared(fit, &kept), size::lack_of_fit(fit, &kept)];
     tried.extend(order_and_dependence_tests(fit, &kept, seed));
@@ -47,19 +47,20 @@ pub fn test_residual(fit: &FitResidual, level: f64, seed: u64) -> ResidualTests 
     judge(tried, level, (0..poses).filter(|pose| kept.poses.binary_search(pose).is_err()).collect())
 }
 
-/// Returns the tests of order and dependence.
+/// Returns the tests of order (runs and Ljung–Box) and of dependence on each covariate, for the
+/// kept poses.
 fn order_and_dependence_tests(fit: &FitResidual, kept: &Kept, seed: u64) -> Vec<Tried> {
     let statistics = statistics(fit, &kept.poses);
     let working: Vec<&Statistic> =
         statistics.iter().filter_map(|(_, statistic)| statistic.as_ref().ok()).collect();
     let studentised = kept.leverage.studentise(kept.residual.as_slice());
-    let mut p_values =
-        permutation::p_values(&kept.leverage, &studentised, &working, seed).into_iter();
+    let mut null_distributions =
+        permutation::null_distributions(&kept.leverage, &studentised, &working, seed).into_iter();
     let coordinates: Vec<[f64; 3]> = studentised.into_iter().map(Into::into).collect();
     let sample = Sample::of([&coordinates]);
     let tried = statistics.iter().map(|(test, statistic)| {
         let trial = statistic.as_ref().map_err(Clone::clone).and_then(|statistic| {
-            let chance = p_values.next().flatten().ok_or(Untestable::NoFreedom)?;
+            let chance = null_distributions.next().flatten().ok_or(Untestable::NoFreedom)?;
             let shown =
                 if matches!(test, Test::Dependence { .. }) { f64::sqrt } else { |value| value };
             let [statistic] = statistic.evaluate(&sample);
@@ -70,8 +71,8 @@ fn order_and_dependence_tests(fit: &FitResidual, kept: &Kept, seed: u64) -> Vec<
     tried.collect()
 }
 
-/// Returns the statistics of order and dependence on some of the poses, or the reasons why they
-/// cannot be computed.
+/// Returns the tests of order and of dependence with their statistics for some poses. `Err` is the
+/// reason why a statistic cannot be computed.
 fn statistics(fit: &FitResidual, poses: &[usize]) -> Vec<(Test, Result<Statistic, Untestable>)> {
     let mut statistics = Vec::new();
     for (sequence, order) in sequences(fit, poses) {
@@ -89,7 +90,7 @@ fn statistics(fit: &FitResidual, poses: &[usize]) -> Vec<(Test, Result<Statistic
     statistics
 }
 
-/// Returns all tests as impossible for the reason `why`.
+/// Returns every test with `why` as the reason why it cannot be made.
 fn all_untestable(fit: &FitResidual, why: &Untestable) -> Vec<Tried> {
     let sequence = Sequence::Time;
     let mut tests = vec![
