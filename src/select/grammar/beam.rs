@@ -13,26 +13,29 @@ use crate::numeric::kernel::few_transposed_times;
 
 /// Maximum number of terms of a sum.
 const MAX_TERMS: usize = 3;
-/// Number of best sums of each length that are extended by a further term.
+/// Number of best sums of each length that are extended by one more term.
 const EXTENDED_SUMS: usize = 8;
-/// Number of best sums in which each term is exchanged in turn, and multiplied by each factor.
+/// Number of best sums of each length in which each term is exchanged in turn, and multiplied by
+/// each factor.
 const EXCHANGED_SUMS: usize = 4;
-/// Number of best sums of each length beside which all products of two factors are tried again.
+/// Number of best sums of each length to which every product of two factors is tried as the next
+/// term, not only those that are best alone.
 const SCREENED_SUMS: usize = 4;
-/// Number of best terms alone that are tried as one of two terms.
+/// Number of terms, the best ones alone, that are tried as the first of two terms.
 const FIRST_TERMS: usize = 400;
 /// Number of sums above which only the best are kept: a bound of memory.
 const MAX_UNSORTED_SUMS: usize = 4_000;
-/// Number of best sums of each length whose inner parameters are refined before further terms are
-/// added. Otherwise further terms would make up for a wrong value.
+/// Number of best sums of each length whose inner parameters are refined before terms are added.
+/// Otherwise additional terms would compensate a wrong value.
 const REFINED_SUMS: usize = 24;
-/// Maximum number of extensions of a sum that are kept: by posterior, and by the guide
-/// [`Scored::guide`].
+/// Maximum numbers of extensions of a sum that are kept: the best by posterior, and the best of the
+/// others by [`Scored::guide`].
 const KEPT_EXTENSIONS: [usize; 2] = [120, 60];
-/// Loss of ln posterior by the best further term above which no further terms are added.
+/// Loss of ln posterior from the best sum to the best one with one more term, above which the
+/// search ends.
 const MAX_LN_LOSS_OF_TERM: f64 = 1.0;
-/// Smallest difference between the predictions of two sums that are both kept, in units of the
-/// noise.
+/// Smallest difference between the predictions of two sums that are both extended: root of the sum
+/// of squares over all measurements, in units of the noise.
 const MIN_BEAM_DIFFERENCE: f64 = 0.7;
 
 /// Scores of a sum.
@@ -40,33 +43,33 @@ const MIN_BEAM_DIFFERENCE: f64 = 0.7;
 pub struct Scored {
     /// ln of the posterior: evidence times prior.
     pub ln_posterior: f64,
-    /// ln of the posterior if all that the sum leaves unexplained counts as noise. It prefers
-    /// simple terms first.
+    /// ln of the posterior if what the sum leaves of the explainable residual were noise of unknown
+    /// scale. By this score, simple terms are added first.
     guide: f64,
 }
 
 /// Sum that is extended, with the span of its columns.
-struct State {
+struct SpannedSum {
     sum: Sum,
     ln_prior: f64,
     span: Span,
-    /// Columns of the sum times the weights W, shape = (poses, k).
+    /// Weight matrix W times the orthonormal functions of the span, shape = (poses, k).
     weighted: DMatrix<f32>,
 }
 
 /// Term that extends a sum, with its scores.
 struct Extension {
-    /// Indices of the extended sum, of the chunk of the term, and of the term in it.
-    place: (usize, usize, usize),
+    /// Indices of the extended sum, of the chunk of the term, and of the term in its chunk.
+    indices: (usize, usize, usize),
     scored: Scored,
 }
 
-/// Beam search for the formula of an error at one joint.
+/// Beam search for the formula of an error at one site.
 pub struct Beam<'a> {
     /// Terms from which sums are built.
     terms: Terms,
     quantities: &'a Quantities,
-    /// Products of columns at the joint's coordinate, with the fit projected out.
+    /// Products of columns at the site's coordinate, with the fit projected out.
     site: &'a WhitenedSite,
     /// Likelihood of a residual, integrated over the noise scale.
     noise: &'a Noise,
@@ -75,13 +78,13 @@ pub struct Beam<'a> {
 }
 
 impl<'a> Beam<'a> {
-    /// Creates the search at one joint.
+    /// Creates the search at one site.
     pub fn new(
         terms: Terms,
-        known: &'a Quantities,
+        quantities: &'a Quantities,
         (site, noise): (&'a WhitenedSite, &'a Noise),
     ) -> Self {
-        Self { terms, quantities: known, site, noise, explainable: site.explainable() }
+        Self { terms, quantities, site, noise, explainable: site.explainable() }
     }
 
     /// Returns all sums that were evaluated, with their scores, and the terms with the factors that
@@ -127,7 +130,7 @@ impl<'a> Beam<'a> {
     }
 
     /// Extends each of `sums` by every term, and adds the new sums to `next` with their scores.
-    /// `extended` holds the sums extended before.
+    /// `extended` holds all sums that have been extended; `sums` are added to it.
     fn extend(&self, sums: &[Sum], extended: &mut BTreeSet<Sum>, next: &mut BTreeMap<Sum, Scored>) {
         for sum in sums {
             extended.insert(sum.clone());
@@ -135,18 +138,18 @@ impl<'a> Beam<'a> {
         }
     }
 
-    /// Extends the first of `sums` by the terms that explain most in addition to each, and adds the
-    /// new sums to `next` with their scores.
+    /// Extends each of the first [`SCREENED_SUMS`] of `sums` by the products of two and three
+    /// factors that explain most in addition to it. Adds the new sums to `next` with their scores.
     fn extend_by_pairs(&self, sums: &[Sum], next: &mut BTreeMap<Sum, Scored>) {
         let sums = &sums[..sums.len().min(SCREENED_SUMS)];
-        let spans: Vec<Span> = sums.iter().map(|sum| self.state(sum).span).collect();
+        let spans: Vec<Span> = sums.iter().map(|sum| self.spanned(sum).span).collect();
         for (sum, terms) in sums.iter().zip(self.terms.beside(&spans, self.site)) {
             self.extend_by(&self.terms.chunks_of(&terms, self.site), sum, next);
         }
     }
 
-    /// Adds the best sums of two terms with one column each. The first is one of the best terms
-    /// alone, of which many more are tried than of longer sums.
+    /// Adds the best sums of two terms with one column each to `next`. The first is one of the
+    /// [`FIRST_TERMS`] best terms alone, many more than [`EXTENDED_SUMS`].
     fn add_two_terms(&self, next: &mut BTreeMap<Sum, Scored>) {
         let chunks: Vec<&Chunk> =
             self.terms.chunks.iter().filter(|chunk| chunk.width == 1).collect();
@@ -154,7 +157,7 @@ impl<'a> Beam<'a> {
             let gains = chunk.single_term_gains().zip(&chunk.ln_prior).enumerate();
             let extension = |(term, (gain, ln_prior)): (usize, (f64, &f64))| {
                 let scored = self.scored(gain, 1, *ln_prior);
-                (gain > 0.0).then_some(Extension { place: (0, number, term), scored })
+                (gain > 0.0).then_some(Extension { indices: (0, number, term), scored })
             };
             gains.filter_map(extension).collect::<Vec<Extension>>()
         };
@@ -163,7 +166,7 @@ impl<'a> Beam<'a> {
         let n = self.site.diagonal.len();
         let mut weighted = DMatrix::<f32>::zeros(first.len(), n);
         let mut along = Vec::with_capacity(first.len());
-        for (mut row, Extension { place: (_, chunk, term), .. }) in
+        for (mut row, Extension { indices: (_, chunk, term), .. }) in
             weighted.row_iter_mut().zip(&first)
         {
             let chunk = chunks[*chunk];
@@ -174,7 +177,7 @@ impl<'a> Beam<'a> {
             row.iter_mut().zip(unit.iter()).for_each(|(to, value)| *to = *value as f32);
             along.push(chunk.along[*term] * scale);
         }
-        // A sum explains more than the best term alone, or it is not worth its second term.
+        // A sum that does not explain more than the best term alone is not worth its second term.
         let least = along.iter().fold(0.0_f64, |most, along| most.max(along * along));
         let of_chunk = |(number, chunk): (usize, &&Chunk)| {
             let products = &weighted * &chunk.columns;
@@ -189,11 +192,11 @@ impl<'a> Beam<'a> {
                     if new == 0 || explained <= least {
                         continue;
                     }
-                    let (_, first_chunk, first_term) = first[k].place;
-                    // Each further term halves the prior, and two terms have two orders.
+                    let (_, first_chunk, first_term) = first[k].indices;
+                    // A second term halves the prior, and two terms have two orders.
                     let ln_prior = chunks[first_chunk].ln_prior[first_term] + chunk.ln_prior[term];
                     let scored = self.scored(explained, 2, ln_prior);
-                    sums.push(Extension { place: (k, number, term), scored });
+                    sums.push(Extension { indices: (k, number, term), scored });
                 }
                 if sums.len() > MAX_UNSORTED_SUMS {
                     sums = best_of(sums);
@@ -202,8 +205,8 @@ impl<'a> Beam<'a> {
             best_of(sums)
         };
         let sums: Vec<Extension> = chunks.par_iter().enumerate().flat_map_iter(of_chunk).collect();
-        for Extension { place: (k, chunk, term), scored } in best_of(sums) {
-            let (_, first_chunk, first_term) = first[k].place;
+        for Extension { indices: (k, chunk, term), scored } in best_of(sums) {
+            let (_, first_chunk, first_term) = first[k].indices;
             let mut sum = vec![
                 chunks[first_chunk].terms[first_term].clone(),
                 chunks[chunk].terms[term].clone(),
@@ -217,13 +220,13 @@ impl<'a> Beam<'a> {
 
     /// Extends a sum by each term of `chunks`, and adds the new sums to `next` with their scores.
     fn extend_by(&self, chunks: &[Chunk], sum: &Sum, next: &mut BTreeMap<Sum, Scored>) {
-        let state = self.state(sum);
-        for Extension { place: (_, chunk, term), scored } in self.extensions(&state, chunks) {
+        let spanned = self.spanned(sum);
+        for Extension { indices: (_, chunk, term), scored } in self.extensions(&spanned, chunks) {
             let term = &chunks[chunk].terms[term];
-            if state.sum.contains(term) {
+            if spanned.sum.contains(term) {
                 continue;
             }
-            let mut longer = [state.sum.as_slice(), std::slice::from_ref(term)].concat();
+            let mut longer = [spanned.sum.as_slice(), std::slice::from_ref(term)].concat();
             longer.sort();
             if !self.is_separated(&longer) {
                 continue;
@@ -235,15 +238,16 @@ impl<'a> Beam<'a> {
         }
     }
 
-    /// Returns true if no two terms are nearly the same.
+    /// Returns true if no two terms of a sum are nearly the same function.
     fn is_separated(&self, sum: &Sum) -> bool {
-        let Self { terms, quantities: known, site, noise, .. } = self;
+        let Self { terms, quantities, site, noise, .. } = self;
         sum.len() < 2
-            || is_separated(terms, sum, &Refiner { terms, known, site, noise }.starts(sum))
+            || is_separated(terms, sum, &Refiner { terms, quantities, site, noise }.starts(sum))
     }
 
-    /// Multiplies each term of some sums by every factor. A term that alone explains little gets
-    /// its factors only in a sum with the other terms.
+    /// Replaces each term of `sums` by its products with every factor, and adds the new sums to
+    /// `next` with their scores. A term may explain little alone, but much in a sum with the other
+    /// terms.
     fn multiply(&self, sums: &[Sum], next: &mut BTreeMap<Sum, Scored>) {
         for sum in sums {
             for k in 0..sum.len() {
@@ -254,12 +258,12 @@ impl<'a> Beam<'a> {
         }
     }
 
-    /// Adds the best sums with refined values of their inner parameters.
+    /// Adds the best sums of `next` to it once more, with refined values of their inner parameters.
     fn refine(&mut self, next: &mut BTreeMap<Sum, Scored>) {
         for sum in self.best(next, REFINED_SUMS) {
-            let Self { terms, quantities: known, site, noise, .. } = &*self;
-            let refiner = Refiner { terms, known, site, noise };
-            let Some(values) = refiner.values(&sum) else { continue };
+            let Self { terms, quantities, site, noise, .. } = &*self;
+            let refiner = Refiner { terms, quantities, site, noise };
+            let Some(values) = refiner.best_values(&sum) else { continue };
             let with_values = |(term, values): (&Product, Vec<f64>)| {
                 let pairs = term.iter().zip(values);
                 let mut term: Product = pairs
@@ -273,20 +277,20 @@ impl<'a> Beam<'a> {
             if !self.is_separated(&refined) {
                 continue;
             }
-            let span = self.state(&refined).span;
+            let span = self.spanned(&refined).span;
             let prior = ln_prior(&self.terms, &refined);
             let scored = self.scored(span.explained_squares(), span.along.len(), prior);
             next.entry(refined).or_insert(scored);
         }
     }
 
-    /// Returns the columns of a term, each of length 1, with W times them.
+    /// Returns the columns of a term, scaled to length 1, and W times each of them.
     fn weighted(&self, term: &Product) -> Vec<Weighted> {
         self.site
             .weighted(self.terms.columns(term).into_iter().map(scaled_to_unit_length).collect())
     }
 
-    fn state(&self, sum: &Sum) -> State {
+    fn spanned(&self, sum: &Sum) -> SpannedSum {
         let mut span = self.site.empty_span();
         for term in sum {
             span.extend(&self.weighted(term), &self.site.product);
@@ -294,22 +298,23 @@ impl<'a> Beam<'a> {
         #[expect(clippy::cast_possible_truncation, reason = "half the width is twice as fast")]
         let weighted = span.weighted.map(|value| value as f32);
         let ln_prior = if sum.is_empty() { 0.0 } else { ln_prior(&self.terms, sum) };
-        State { sum: sum.clone(), ln_prior, span, weighted }
+        SpannedSum { sum: sum.clone(), ln_prior, span, weighted }
     }
 
     /// Returns the extensions of a sum by terms of `chunks` with the best scores.
-    fn extensions(&self, state: &State, chunks: &[Chunk]) -> Vec<Extension> {
-        let count = state.sum.len() as f64;
-        let further = if state.sum.is_empty() { 0.0 } else { 0.5_f64.ln() + (count + 1.0).ln() };
-        let (before, rank) = (state.span.explained_squares(), state.span.along.len());
+    fn extensions(&self, spanned: &SpannedSum, chunks: &[Chunk]) -> Vec<Extension> {
+        let count = spanned.sum.len() as f64;
+        let ln_prior_of_count =
+            if spanned.sum.is_empty() { 0.0 } else { 0.5_f64.ln() + (count + 1.0).ln() };
+        let (before, rank) = (spanned.span.explained_squares(), spanned.span.along.len());
         let of_chunk = |(number, chunk): (usize, &Chunk)| {
-            let along = few_transposed_times(&state.weighted, &chunk.columns);
+            let along = few_transposed_times(&spanned.weighted, &chunk.columns);
             let product = |a: usize, b: usize| {
                 let pairs = along.column(a).into_iter().zip(along.column(b));
                 pairs.map(|(x, y)| f64::from(*x) * f64::from(*y)).sum::<f64>()
             };
             let explained = |a: usize| {
-                let pairs = along.column(a).into_iter().zip(state.span.along.iter());
+                let pairs = along.column(a).into_iter().zip(spanned.span.along.iter());
                 pairs.map(|(x, y)| f64::from(*x) * y).sum::<f64>()
             };
             let mut extensions: Vec<Extension> = Vec::new();
@@ -318,9 +323,9 @@ impl<'a> Beam<'a> {
                 if new == 0 {
                     continue;
                 }
-                let prior = state.ln_prior + chunk.ln_prior[term] + further;
+                let prior = spanned.ln_prior + chunk.ln_prior[term] + ln_prior_of_count;
                 let scored = self.scored(before + gain, rank + new, prior);
-                extensions.push(Extension { place: (0, number, term), scored });
+                extensions.push(Extension { indices: (0, number, term), scored });
             }
             best_of(extensions)
         };
@@ -329,6 +334,8 @@ impl<'a> Beam<'a> {
         best_of(extensions)
     }
 
+    /// Returns the scores of a sum that explains the sum of squares `explained` with `rank`
+    /// independent columns.
     fn scored(&self, explained: f64, rank: usize, ln_prior: f64) -> Scored {
         let shrunk = explained * BEAM_VARIANCE / (1.0 + BEAM_VARIANCE);
         let occam = 0.5 * rank as f64 * (1.0 + BEAM_VARIANCE).ln();
@@ -340,8 +347,8 @@ impl<'a> Beam<'a> {
         }
     }
 
-    /// Returns the best `most` sums, alternately by posterior and by guide. Their predictions
-    /// differ by at least `MIN_BEAM_DIFFERENCE`.
+    /// Returns at most `most` of the best sums, alternately by posterior and by guide, whose
+    /// predictions differ by at least [`MIN_BEAM_DIFFERENCE`].
     fn best(&self, sums: &BTreeMap<Sum, Scored>, most: usize) -> Vec<Sum> {
         const MAX_COMPARED_SUMS: usize = 200;
         let by = |of: fn(&Scored) -> f64| {
@@ -360,7 +367,7 @@ impl<'a> Beam<'a> {
             if found.len() >= most {
                 break;
             }
-            if found.iter().any(|(known, _)| known == sum) {
+            if found.iter().any(|(other, _)| other == sum) {
                 continue;
             }
             let mut span = self.site.empty_span();
@@ -390,25 +397,25 @@ fn scaled_to_unit_length(column: DVector<f64>) -> DVector<f64> {
 }
 
 /// Returns the best extensions by posterior and by guide, at most [`KEPT_EXTENSIONS`] of each.
-fn best_of(mut all: Vec<Extension>) -> Vec<Extension> {
-    if all.len() <= KEPT_EXTENSIONS[0] {
-        return all;
+fn best_of(mut extensions: Vec<Extension>) -> Vec<Extension> {
+    if extensions.len() <= KEPT_EXTENSIONS[0] {
+        return extensions;
     }
-    let mut others = split_best(&mut all, KEPT_EXTENSIONS[0], |scored| scored.ln_posterior);
+    let mut others = split_best(&mut extensions, KEPT_EXTENSIONS[0], |scored| scored.ln_posterior);
     split_best(&mut others, KEPT_EXTENSIONS[1], |scored| scored.guide);
-    all.extend(others);
-    all
+    extensions.extend(others);
+    extensions
 }
 
 /// Keeps the `most` extensions with the highest value of `of`, sorted, and returns the others. Of
-/// equal values the earlier place comes first.
+/// equal values the one with smaller indices comes first.
 fn split_best(
     extensions: &mut Vec<Extension>,
     most: usize,
     of: impl Fn(&Scored) -> f64,
 ) -> Vec<Extension> {
     let order = |a: &Extension, b: &Extension| {
-        of(&b.scored).total_cmp(&of(&a.scored)).then_with(|| a.place.cmp(&b.place))
+        of(&b.scored).total_cmp(&of(&a.scored)).then_with(|| a.indices.cmp(&b.indices))
     };
     if extensions.len() > most {
         extensions.select_nth_unstable_by(most, order);

@@ -1,4 +1,4 @@
-//! Classes of sums whose predictions noise does not tell apart.
+//! Classes of sums whose predictions differ by less than the noise allows to distinguish.
 
 use nalgebra::DVector;
 
@@ -9,9 +9,9 @@ use super::quantities::Quantities;
 use super::refinement::{Refined, Refiner};
 use super::site::{Noise, Weighted, WhitenedSite};
 use super::terms::{Sum, Terms, is_separated};
-use super::written::{Written, written};
+use super::written::{Written, write_law};
 
-/// Log odds to the best sum beyond which sums are dropped.
+/// Largest ln odds of the best sum over another sum that is kept.
 const MAX_LN_ODDS: f64 = 12.0;
 /// Maximum number of sums that are grouped into classes.
 const MAX_SUMS: usize = 400;
@@ -19,16 +19,17 @@ const MAX_SUMS: usize = 400;
 const MAX_REFINED: usize = 40;
 /// Maximum number of classes that are proposed as laws.
 const MAX_CLASSES: usize = 8;
-/// Largest difference between the values of an inner parameter, in grid cells, at which two sums
-/// are the same.
+/// Largest difference between the values of each inner parameter, in grid cells, at which two sums
+/// of the same factors are one.
 const MAX_CELL_DIFFERENCE: f64 = 0.5;
-/// Largest difference between the predictions of two sums of one class, in units of the noise.
+/// Largest difference between the predictions of two sums of one class: root of the sum of squares
+/// over all measurements, in units of the noise.
 const MAX_CLASS_DIFFERENCE: f64 = 2.0;
-/// Largest difference between the predictions of two sums that count as one form, in units of the
-/// noise.
+/// Largest difference between the predictions of two sums of one form, as for
+/// [`MAX_CLASS_DIFFERENCE`].
 const MAX_FORM_DIFFERENCE: f64 = 1.0;
-/// Smallest share of the probability of a class at which another form is listed.
-const MIN_SHARE: f64 = 0.02;
+/// Smallest fraction of the probability of a class at which another form is listed.
+const MIN_FORM_PROBABILITY: f64 = 0.02;
 /// Maximum number of other forms of a class that are listed.
 const MAX_RIVAL_FORMS: usize = 4;
 
@@ -37,19 +38,23 @@ const MAX_RIVAL_FORMS: usize = 4;
 pub struct Proposal {
     /// Formulas and parameters of the simplest sum of the class.
     pub law: Written,
-    /// Sums of the class that are another form, each with its share of the probability of the class.
+    /// Sums of the class that are of another form than `law`, each with its fraction of the
+    /// probability of the class, the most probable first.
     pub rivals: Vec<(Written, f64)>,
-    /// ln of the prior probability of the class if its likelihood is that of the proposed formula.
+    /// ln of the prior probability that gives the class its posterior if its likelihood is that of
+    /// `law`.
     pub ln_prior: f64,
-    /// ln of the posterior probability of the class, up to a constant of the residual.
+    /// ln of the posterior probability of the class, up to a constant that depends on the residual
+    /// alone.
     pub ln_posterior: f64,
-    /// True if a law that the fit contains belongs to the class.
+    /// True if the fit already contains a law whose prediction belongs to the class.
     pub is_present: bool,
 }
 
 struct Class {
     /// Sum that represents the class.
     first: Refined,
+    /// Other sums of the class.
     others: Vec<Refined>,
     /// ln of the summed posteriors of the class.
     ln_posterior: f64,
@@ -57,15 +62,15 @@ struct Class {
 
 impl Class {
     /// Returns the sums of the class that are of another form than the first one, each with its
-    /// share of the probability of the class, the most probable first.
+    /// fraction of the probability of the class, the most probable first.
     ///
-    /// Two sums are of one form if their predictions differ by less than the squared distance
-    /// `largest`, or if the second one adds terms to the first.
-    fn rivals(&self, terms: &Terms, largest: f64) -> Vec<(&Refined, f64)> {
+    /// Two sums are of one form if the squared distance of their predictions is less than
+    /// `max_squared_distance`, or if the second one has all terms of the first.
+    fn rivals(&self, terms: &Terms, max_squared_distance: f64) -> Vec<(&Refined, f64)> {
         let forms = |sum: &Sum| forms(terms, sum);
         let is_one_form = |one: &Refined, other: &Refined| {
             let of_other = forms(&other.sum);
-            one.prediction.squared_distance(&other.prediction) < largest
+            one.prediction.squared_distance(&other.prediction) < max_squared_distance
                 || forms(&one.sum).iter().all(|term| of_other.contains(term))
         };
         let mut others: Vec<&Refined> = self.others.iter().collect();
@@ -78,15 +83,16 @@ impl Class {
                 None => rivals.push((other, share)),
             }
         }
-        rivals.retain(|(_, share)| *share >= MIN_SHARE);
+        rivals.retain(|(_, share)| *share >= MIN_FORM_PROBABILITY);
         rivals.sort_by(|a, b| b.1.total_cmp(&a.1));
         rivals.truncate(MAX_RIVAL_FORMS);
         rivals
     }
 }
 
-/// Returns the most probable formulas of the error at a site, given as in files, that is part of
-/// `place`. `present` holds the columns of laws that the fit contains.
+/// Returns the most probable formulas of the error at a site, the most probable first, without
+/// those that the catalogue contains. `at` is the site in the words of files, `place` the part of
+/// the arm to which it belongs. `present` holds the columns of each law that the fit contains.
 pub fn proposals(
     quantities: &Quantities,
     (at, place): (&str, FormulaSite),
@@ -112,7 +118,7 @@ pub fn proposals(
     let Some(best) = sums.first().map(|sum| sum.1) else { return Vec::new() };
     sums.retain(|(_, ln)| *ln > best - MAX_LN_ODDS);
     sums.truncate(MAX_SUMS);
-    let refiner = Refiner { terms: &terms, known: quantities, site, noise };
+    let refiner = Refiner { terms: &terms, quantities, site, noise };
     let mut refined_sums: Vec<Refined> = sums
         .into_iter()
         .enumerate()
@@ -161,7 +167,7 @@ pub fn proposals(
         }
         let is_near = |other: &Weighted| other.squared_distance(&first.prediction) < largest;
         let is_present = predictions.iter().any(is_near);
-        let as_written = |sum: &Refined| written((&terms, quantities), at, &sum.sum, &sum.inner);
+        let as_written = |sum: &Refined| write_law((&terms, quantities), at, &sum.sum, &sum.inner);
         let rivals = class.rivals(&terms, MAX_FORM_DIFFERENCE.powi(2) * factor);
         Some(Proposal {
             law: as_written(first),
@@ -174,14 +180,16 @@ pub fn proposals(
     classes.into_iter().filter_map(proposal).take(MAX_CLASSES).collect()
 }
 
-/// Returns the forms of the factors of each term.
+/// Returns the forms of the factors of each term, gas springs without their ratio.
 fn forms(terms: &Terms, sum: &Sum) -> Vec<Vec<Form>> {
-    let of_term =
-        |term: &Vec<u16>| term.iter().map(|&k| terms.factors[usize::from(k)].form.kind()).collect();
+    let of_term = |term: &Vec<u16>| {
+        term.iter().map(|&k| terms.factors[usize::from(k)].form.with_first_ratio()).collect()
+    };
     sum.iter().map(of_term).collect()
 }
 
-/// Returns true if two sums have the same terms, up to their order and inner parameters.
+/// Returns true if two sums have the same terms, apart from the order of terms and factors and from
+/// the values of inner parameters.
 fn is_one_law(terms: &Terms, one: &Sum, other: &Sum) -> bool {
     let sorted = |sum: &Sum| {
         let word = |forms: Vec<Form>| {
@@ -196,8 +204,8 @@ fn is_one_law(terms: &Terms, one: &Sum, other: &Sum) -> bool {
     one.len() == other.len() && sorted(one) == sorted(other)
 }
 
-/// Returns the sums without those that an earlier one equals but for a fraction of a grid cell in
-/// the values of inner parameters.
+/// Returns the sums without those that differ from an earlier one only by a fraction of a grid cell
+/// in the values of inner parameters.
 fn distinct(refined_sums: Vec<Refined>, terms: &Terms) -> Vec<Refined> {
     let parts = |refined: &Refined| {
         let part = |(term, inner): (&Vec<u16>, &Vec<f64>)| {
@@ -236,6 +244,7 @@ fn distinct(refined_sums: Vec<Refined>, terms: &Terms) -> Vec<Refined> {
     refined_sums.into_iter().filter(|refined| is_new(refined)).collect()
 }
 
+/// Returns ln(eᵃ + eᵇ).
 fn ln_add(a: f64, b: f64) -> f64 {
     let most = a.max(b);
     most + ((a - most).exp() + (b - most).exp()).ln()

@@ -1,4 +1,4 @@
-//! All factors at one joint, each with its prior probability.
+//! Factors of formulas at a site, each with its prior probability.
 
 use std::collections::BTreeSet;
 use std::f64::consts::PI;
@@ -22,16 +22,18 @@ const SETTLING_TIMES: (f64, f64, u32) = (0.08, 0.8, 4);
 const ANGLE_FACTORS: [[i32; 2]; 6] = [[1, 1], [1, -1], [2, 1], [2, -1], [1, 2], [1, -2]];
 /// Number of trial angles of a gas spring over a revolution.
 const STRUT_ANGLES: u32 = 16;
-/// Prior weight of a gas spring relative to another kind of factor: an arm that has one is mostly
-/// declared with it.
+/// Prior probability of a gas spring relative to a family of factors. It is low, because most arms
+/// that have a gas spring are declared with it.
 const STRUT_WEIGHT: f64 = 0.25;
-/// Smallest share of the poses that must have a moment of either sign for the sign to be a factor.
+/// Smallest fraction of the poses with a positive moment, and of those without, at which the sign
+/// of the moment is a factor.
 const MIN_SIGN_SHARE: f64 = 0.1;
 
 /// Returns the factors of formulas at other sites than joint coordinates, such as at the tool. They
-/// are conditions of a pose, and the commands with their sines and cosines.
+/// are the conditions of a pose (temperature, time, payload, covariates), and the commands with
+/// their sines and cosines.
 ///
-/// All kinds of factors have the same prior probability, and so have the joints.
+/// All families of factors have the same prior probability, and so have the joints.
 pub fn factors_at_other_sites(quantities: &Quantities) -> Vec<Factor> {
     let is_listed = |factor: &Factor| match factor.form {
         Form::Command(_) => true,
@@ -60,8 +62,8 @@ pub fn factors_at_other_sites(quantities: &Quantities) -> Vec<Factor> {
 
 /// Returns all factors of formulas at the coordinate of the joint `joint_of_site`, counted from 0.
 ///
-/// All kinds of factors have the same prior probability. Half of it belongs to the joint itself,
-/// the other half to the other joints. Order k has 1/k² of the probability of order 1. The
+/// All families of factors have the same prior probability. Half of it belongs to the joint of the
+/// site, the other half to the other joints. Order k has 1/k² of the probability of order 1. The
 /// probability is divided by the number of trial values of an inner parameter.
 pub fn factors(quantities: &Quantities, joint_of_site: usize) -> Vec<Factor> {
     let mut listed_factors: Vec<Factor> = Vec::new();

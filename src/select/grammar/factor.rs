@@ -1,4 +1,4 @@
-//! Factors of terms: functions of one or two quantities, with the parameter inside of some.
+//! Factors of terms: functions of one or two quantities of a pose, some with an inner parameter.
 
 use super::quantities::{Quantities, quoted};
 
@@ -17,7 +17,8 @@ pub enum FormulaSite {
     Elsewhere,
 }
 
-/// Function of one quantity of a pose, from which formulas are built; joints are counted from 0.
+/// Function of one or two quantities of a pose, from which formulas are built; joints are counted
+/// from 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Form {
     /// Command q of a joint.
@@ -60,13 +61,13 @@ pub enum Form {
         /// True for a cosine.
         cosine: bool,
     },
-    /// Side from which a joint approached the pose, −1 or 1.
+    /// Side from which a joint approached the pose, −1 to 1.
     Side(usize),
     /// Moment of the loads about a joint's axis \[N·m\].
     Moment(usize),
     /// Cube of the moment of the loads about a joint's axis.
     CubicMoment(usize),
-    /// Sign of the moment of the loads about a joint's axis, −1 or 1.
+    /// Sign of the moment of the loads about a joint's axis: −1, 0 or 1.
     MomentSign(usize),
     /// Temperature above the reference \[K\].
     Warming,
@@ -76,9 +77,11 @@ pub enum Form {
     Lag,
     /// Time since the first pose, as a fraction of the measured duration.
     Elapsed,
-    /// Settling 1 − exp(−t/τ) with an inner parameter τ.
+    /// Settling 1 − exp(−t/τ) with an inner parameter τ, a fraction of the measured duration as t
+    /// is.
     Settling,
-    /// Step in time: 0 before and 1 after an inner parameter.
+    /// Step in time: 0 before and 1 from the inner parameter on, a fraction of the measured
+    /// duration.
     Step,
     /// Mass of the payload \[kg\].
     Payload,
@@ -96,21 +99,21 @@ pub struct Factor {
     /// Value of the inner parameter and distance to the next trial value; `None` if the form has
     /// none.
     pub inner: Option<(f64, f64)>,
-    /// Log prior probability of the factor among all factors.
+    /// ln of the prior probability of the factor among all factors.
     pub ln_prior: f64,
 }
 
 impl Form {
-    /// Returns the form with the first trial ratio of a gas spring: the ratio is fitted, so that
-    /// forms which differ in it alone are the same.
-    pub fn kind(self) -> Self {
+    /// Returns the form, for a gas spring with the first trial ratio. The ratio is fitted, so
+    /// springs that differ in their trial ratios alone are the same.
+    pub fn with_first_ratio(self) -> Self {
         match self {
             Self::Strut { joint, .. } => Self::Strut { joint, ratio: 0 },
             other => other,
         }
     }
 
-    /// Returns the index of the form's kind, by which prior probabilities are shared.
+    /// Returns the index of the form's family. All families have the same prior probability.
     pub fn family(self) -> usize {
         match self {
             Self::Command(_) => 0,
@@ -183,7 +186,7 @@ impl Form {
     /// inner parameter.
     pub fn columns(self, quantities: &Quantities, inner: f64) -> Vec<Vec<f64>> {
         let of = |values_of_joints: &[(usize, Vec<f64>)], joint: usize, f: &dyn Fn(f64) -> f64| {
-            let values = values_of_joints.iter().find(|(known, _)| *known == joint);
+            let values = values_of_joints.iter().find(|(other, _)| *other == joint);
             values.map_or_else(Vec::new, |(_, values)| values.iter().map(|x| f(*x)).collect())
         };
         let plain = |values: &Option<Vec<f64>>, f: &dyn Fn(f64) -> f64| {

@@ -10,7 +10,7 @@ const PRIOR_OF_GRAMMAR: f64 = 8.0;
 /// Prior weight of all laws of the grammar at each of the other sites: tool, measurement, base,
 /// small motions of all joints, and links. Fewer formulas are searched there.
 const PRIOR_ELSEWHERE: f64 = 2.0;
-/// Number of sites of laws at the tool, at the measurement, at the base and in a link.
+/// Number of sites of laws (axes or components) at each of tool, measurement, base and link.
 const AXES: f64 = 3.0;
 /// Number of small motions of a joint at which laws are searched.
 const MOTIONS: f64 = 4.0;
@@ -22,10 +22,11 @@ pub fn ln_prior(effect: &Effect, problem: &Problem) -> Option<f64> {
     Some(ln_weight(law, problem) + law.description()?)
 }
 
-/// Returns ln of the prior weight of all laws at the site of a law.
+/// Returns ln of the prior weight of all laws at the site of a law, relative to a family of
+/// effects.
 fn ln_weight(law: &Law, problem: &Problem) -> f64 {
-    let takes = |joint: &&Joint| joint.command_kind() != JointKind::Fixed;
-    let joints = problem.joints.iter().filter(takes).count().max(1) as f64;
+    let takes_command = |joint: &&Joint| joint.command_kind() != JointKind::Fixed;
+    let joints = problem.joints.iter().filter(takes_command).count().max(1) as f64;
     match law.at() {
         At::Coordinate => (PRIOR_OF_GRAMMAR / joints).ln(),
         At::Before(_) | At::After(_) => (PRIOR_ELSEWHERE / MOTIONS / joints).ln(),

@@ -13,7 +13,7 @@ const LAG_FRACTION: f64 = 0.1;
 pub struct Quantities {
     /// Joints that move, with their commands \[rad\] or \[m\].
     pub commands: Vec<(usize, Vec<f64>)>,
-    /// True for each joint that is revolute.
+    /// True for each joint of the arm that is revolute.
     pub turns: Vec<bool>,
     /// Joints with the side from which they approached each pose, −1 to 1.
     pub sides: Vec<(usize, Vec<f64>)>,
@@ -22,7 +22,8 @@ pub struct Quantities {
     /// Temperature above the reference temperature in each pose \[K\]; `None` if no temperature or
     /// no reference is known.
     pub warming: Option<Vec<f64>>,
-    /// Time constant \[s\] and lagged temperature above the reference \[K\].
+    /// Time constant \[s\] and lagged temperature above the reference \[K\]; `None` if temperature
+    /// or time is unknown.
     pub lag: Option<(f64, Vec<f64>)>,
     /// Time since the first pose, as a fraction of the measured duration, and that duration \[s\].
     pub elapsed: Option<(Vec<f64>, f64)>,
@@ -35,14 +36,16 @@ pub struct Quantities {
 }
 
 impl Quantities {
-    /// Evaluates the quantities of a problem in some poses.
+    /// Evaluates the quantities of a problem in some poses. `time_measured` is true if times are
+    /// recorded.
     pub fn new(problem: &Problem, poses: &[&Pose], time_measured: bool) -> Self {
         let values = |formula: &str| {
             let regressor = Regressor::parse(formula, problem).ok()?;
             varying(regressor.values(poses.iter().map(|pose| &pose.setup)))
         };
         let joints = || 0..problem.joints.len();
-        let takes = |joint: &usize| problem.joints[*joint].command_kind() != JointKind::Fixed;
+        let takes_command =
+            |joint: &usize| problem.joints[*joint].command_kind() != JointKind::Fixed;
         let turns: Vec<bool> =
             problem.joints.iter().map(|joint| joint.kind == JointKind::Revolute).collect();
         let of_joints = |name: &str, is_of: &dyn Fn(&usize) -> bool| {
@@ -60,14 +63,14 @@ impl Quantities {
         let names = problem.covariate_names();
         let covariate = |(k, name): (usize, &String)| Some((k, values(&quoted(name))?));
         Self {
-            commands: of_joints("q", &takes),
+            commands: of_joints("q", &takes_command),
             sides: if is_given_everywhere(|pose| pose.setup.approach.is_some()) {
-                of_joints("approach", &takes)
+                of_joints("approach", &takes_command)
             } else {
                 Vec::new()
             },
             moments: if problem.gravity.norm() > 0.0 {
-                of_joints("M", &|joint| turns[*joint] && takes(joint))
+                of_joints("M", &|joint| turns[*joint] && takes_command(joint))
             } else {
                 Vec::new()
             },
@@ -84,7 +87,7 @@ impl Quantities {
     }
 }
 
-/// Returns the name of a covariate as formulas write it, quoted if necessary.
+/// Returns the name of a covariate in back quotes, as formulas write it.
 pub(super) fn quoted(name: &str) -> String {
     format!("`{name}`")
 }

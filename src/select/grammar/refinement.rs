@@ -10,8 +10,8 @@ use super::terms::{Sum, Terms, ln_prior, product};
 const TRIAL_VALUES: i32 = 8;
 /// Maximum number of passes over the inner parameters of a sum in the beam search.
 const MAX_PASSES: usize = 2;
-/// Loss of ln evidence at a trial value next to the best one, above which values between them are
-/// tried.
+/// If ln evidence is lower by more than this at both trial values next to the best one, values
+/// between them are tried.
 const MAX_LN_LOSS: f64 = 0.5;
 
 /// Sum with refined values of its inner parameters.
@@ -19,23 +19,27 @@ pub(super) struct Refined {
     pub sum: Sum,
     /// Values of the inner parameters: one list for each term, with one value for each factor.
     pub inner: Vec<Vec<f64>>,
+    /// ln of the evidence, averaged over the grid cells of the inner parameters, plus `ln_prior`.
     pub ln_posterior: f64,
+    /// ln of the evidence at the values `inner`.
     pub ln_evidence: f64,
     pub ln_prior: f64,
+    /// Function of the pose that the sum fits to the residual.
     pub prediction: Weighted,
 }
 
 /// Search for the values of the inner parameters of sums.
 pub(super) struct Refiner<'a> {
     pub terms: &'a Terms,
-    pub known: &'a Quantities,
+    pub quantities: &'a Quantities,
     pub site: &'a WhitenedSite,
     pub noise: &'a Noise,
 }
 
 impl Refiner<'_> {
-    /// Returns a sum with the best values of its inner parameters. Its evidence is averaged over
-    /// the grid cell of each parameter.
+    /// Returns a sum with the best values of its inner parameters, and its posterior averaged over
+    /// the grid cell of each of them. If `is_refined` is false, the sum keeps the values that the
+    /// dictionary lists.
     pub fn refined(&self, sum: Sum, is_refined: bool) -> Refined {
         let mut inner = self.starts(&sum);
         let averaged = if is_refined { self.refine(&sum, &mut inner) } else { 0.0 };
@@ -54,7 +58,7 @@ impl Refiner<'_> {
 
     /// Returns the best values of the inner parameters (such as time constants) of a sum of terms;
     /// `None` if the sum has no inner parameter.
-    pub fn values(&self, sum: &Sum) -> Option<Vec<Vec<f64>>> {
+    pub fn best_values(&self, sum: &Sum) -> Option<Vec<Vec<f64>>> {
         let has_inner = |&k: &u16| self.terms.factors[usize::from(k)].inner.is_some();
         if !sum.iter().flatten().any(has_inner) {
             return None;
@@ -68,14 +72,15 @@ impl Refiner<'_> {
         Some(inner)
     }
 
-    /// Returns the listed values of the inner parameters of a sum; 0 for factors without one.
+    /// Returns the values of the inner parameters of a sum that its factors list; 0 for factors
+    /// without an inner parameter.
     pub fn starts(&self, sum: &Sum) -> Vec<Vec<f64>> {
         let start = |&k: &u16| self.terms.factors[usize::from(k)].inner.map_or(0.0, |at| at.0);
         sum.iter().map(|term| term.iter().map(start).collect()).collect()
     }
 
     /// Sets each inner parameter in turn to its best value, with the others fixed. Returns ln of
-    /// the mean likelihood over the grid cells, relative to the best values.
+    /// the mean likelihood over the parameters' grid cells, relative to that at the best values.
     fn refine(&self, sum: &Sum, inner: &mut [Vec<f64>]) -> f64 {
         let mut averaged = 0.0;
         for (t, term) in sum.iter().enumerate() {
@@ -97,7 +102,7 @@ impl Refiner<'_> {
                 let fixed = product(fixed.iter().map(Vec::as_slice));
                 let form = self.terms.factors[usize::from(factor)].form;
                 let mut evidence = |value: f64| {
-                    let moved = form.columns(self.known, value).into_iter();
+                    let moved = form.columns(self.quantities, value).into_iter();
                     let moved: Vec<DVector<f64>> = moved.map(DVector::from_vec).collect();
                     let both = fixed.iter().map(Vec::as_slice).chain([moved.as_slice()]);
                     let mut span = others.clone();
@@ -113,7 +118,7 @@ impl Refiner<'_> {
         averaged
     }
 
-    /// Returns the span of a sum with these values of its inner parameters.
+    /// Returns the span of a sum's columns with these values of its inner parameters.
     fn span_of(&self, sum: &Sum, inner: &[Vec<f64>]) -> Span {
         let mut span = self.site.empty_span();
         for (term, inner) in sum.iter().zip(inner) {
@@ -132,7 +137,7 @@ impl Refiner<'_> {
     fn factors(&self, term: &[u16], inner: &[f64]) -> Vec<Vec<DVector<f64>>> {
         let of_factor = |(&k, &x): (&u16, &f64)| {
             let form = self.terms.factors[usize::from(k)].form;
-            form.columns(self.known, x).into_iter().map(DVector::from_vec).collect()
+            form.columns(self.quantities, x).into_iter().map(DVector::from_vec).collect()
         };
         term.iter().zip(inner).map(of_factor).collect()
     }

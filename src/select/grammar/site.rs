@@ -1,11 +1,11 @@
-//! Gram matrix of the lever of one coordinate in all poses, everything else projected out.
+//! Gram matrix of the lever of one coordinate in all poses, with the parameters of the fit projected out.
 
 use nalgebra::{DMatrix, DVector};
 
 use crate::least_squares::Triangle;
 use crate::numeric::kernel::{add_product, few_transposed_times};
 
-/// Number of points of the table of the likelihood, which is integrated over the noise.
+/// Number of intervals of the table of ln p(residual).
 const NOISE_TABLE_POINTS: usize = 400;
 /// Trial prior variances of the coefficients, relative to the variance of their estimates; equally
 /// probable a priori.
@@ -13,17 +13,21 @@ const COEFFICIENT_VARIANCES: [f64; 3] = [300.0, 5000.0, 80_000.0];
 /// Prior variance of the coefficients in the beam search, relative to the variance of their
 /// estimates.
 pub const BEAM_VARIANCE: f64 = 3000.0;
-/// Smallest share of a column's squared length, outside the span of other columns, at which the
-/// column counts as independent.
+/// Smallest fraction of a column's squared length that lies outside the span of earlier columns for
+/// the column to be added to the span.
 const MIN_LEFT: f64 = 1e-4;
 
 /// Number of rows of the triangular factor R that are multiplied together.
 const ROWS_PER_PRODUCT: usize = 40;
 
-/// Table of ln p(residual) by its sum of squares, integrated over the noise.
+/// Table of ln p(residual), integrated over the unknown noise factor, by the sum of squares of the
+/// residual.
 pub struct Noise {
+    /// Sum of squares of the residual without additional columns.
     squares: f64,
+    /// Degrees of freedom of the residual.
     freedom: f64,
+    /// Values of ln p for sums of squares of `squares` · (k / [`NOISE_TABLE_POINTS`])².
     table: Vec<f64>,
 }
 
@@ -42,19 +46,20 @@ impl Noise {
         ((self.squares - reduction) / self.freedom).max(1e-12)
     }
 
-    /// Returns the gain in ln p(residual) if columns reduce the sum of squares by `reduction`.
+    /// Returns the gain in ln p(residual) if columns reduce the sum of squares by `reduction`, 0
+    /// for none.
     pub fn gain(&self, reduction: f64) -> f64 {
         let relative_residual =
             ((self.squares - reduction).max(0.0) / self.squares.max(f64::MIN_POSITIVE)).sqrt();
-        let place = relative_residual * NOISE_TABLE_POINTS as f64;
+        let position = relative_residual * NOISE_TABLE_POINTS as f64;
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "an index")]
-        let low = (place as usize).min(NOISE_TABLE_POINTS - 1);
-        let part = place - low as f64;
+        let low = (position as usize).min(NOISE_TABLE_POINTS - 1);
+        let part = position - low as f64;
         self.table[low] * (1.0 - part) + self.table[low + 1] * part - self.table[NOISE_TABLE_POINTS]
     }
 
-    /// Returns the log evidence of columns with `rank` independent directions that reduce the sum
-    /// of squares by `squares`.
+    /// Returns ln of the evidence of `rank` independent columns that reduce the sum of squares by
+    /// `squares`, relative to no column: the mean over [`COEFFICIENT_VARIANCES`].
     pub fn evidence(&self, squares: f64, rank: usize) -> f64 {
         let at = |variance: f64| {
             self.gain(squares * variance / (1.0 + variance))
@@ -68,18 +73,19 @@ impl Noise {
     }
 }
 
-/// Products of columns at one coordinate, with the fit projected out. The column of a function f of
-/// the pose has the squared length fᵀWf and the product fᵀp with the residual, W = diag(d) − BᵀB.
+/// Products of columns at one coordinate of the model, with the fit projected out. An error f of
+/// this coordinate, a function of the pose, has a column of squared length fᵀWf and of product fᵀp
+/// with the residual. W = diag(d) − BᵀB; BᵀB is the part that the fitted parameters explain.
 pub struct WhitenedSite {
     /// Vector d: squared length of the lever in each pose, shape = (poses).
     pub diagonal: DVector<f64>,
     /// Upper triangular factor R with RᵀR = BᵀB, shape = (poses, poses).
     less: DMatrix<f64>,
-    /// Vector p, shape = (poses).
+    /// Vector p: product of each pose's column with the residual, shape = (poses).
     pub product: DVector<f64>,
 }
 
-/// Function of the pose with the weight matrix W times it.
+/// Values of a function in all poses, and the weight matrix W times these values.
 #[derive(Clone)]
 pub struct Weighted {
     /// Values of the function, shape = (poses).
@@ -107,7 +113,7 @@ impl WhitenedSite {
         Self { diagonal, less: Triangle::factor(b), product }
     }
 
-    /// Returns R times functions of the pose, one in each column.
+    /// Returns R times functions of the pose, one in each column of `functions`.
     pub fn within(&self, functions: &DMatrix<f64>) -> DMatrix<f64> {
         let poses = self.less.nrows();
         let mut out = DMatrix::zeros(poses, functions.ncols());
@@ -130,7 +136,7 @@ impl WhitenedSite {
         DVector::from_iterator(function.len(), values)
     }
 
-    /// Returns the largest sum of squares that functions of the pose can explain: that of one free
+    /// Returns the largest sum of squares that a function of the pose can explain: that of one free
     /// value per pose.
     pub fn explainable(&self) -> f64 {
         let n = self.diagonal.len();
@@ -168,13 +174,13 @@ impl WhitenedSite {
 }
 
 impl Weighted {
-    /// Returns the squared length fᵀWf, in units of the noise.
+    /// Returns the squared length fᵀWf, in units of the noise variance.
     pub fn squared_length(&self) -> f64 {
         self.values.dot(&self.times)
     }
 
-    /// Returns the squared length (f − g)ᵀW(f − g) of the difference to another function g, in
-    /// units of the noise.
+    /// Returns the squared length (f − g)ᵀW(f − g) of the difference from another function g, in
+    /// units of the noise variance.
     pub fn squared_distance(&self, other: &Self) -> f64 {
         let pairs = self.values.iter().zip(&other.values);
         let weighted = self.times.iter().zip(&other.times);
@@ -216,7 +222,7 @@ impl Span {
         self.along.norm_squared()
     }
 
-    /// Returns the function of the pose that fits the residual best.
+    /// Returns the function of the span that fits the residual best (least squares).
     pub fn prediction(&self) -> Weighted {
         Weighted { values: &self.functions * &self.along, times: &self.weighted * &self.along }
     }

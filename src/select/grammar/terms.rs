@@ -1,4 +1,4 @@
-//! Terms: products of up to three factors, with their columns and products.
+//! Terms: products of up to three factors, with their columns and inner products.
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -14,31 +14,30 @@ const FACTOR_COUNT_PROBABILITIES: [f64; 3] = [0.6, 0.3, 0.1];
 /// one that is. An error by one joint's command has any phase, which their pair fits; in products of
 /// several joints, as rotations give them, the zero positions of the arm determine the phases.
 pub const LONE_WAVE: f64 = 1.0 / 3.0;
-/// Smallest share of a term's squared length that the fitted parameters must leave.
+/// Smallest fraction of a column's length that the fitted parameters must leave unexplained.
 const MIN_LEFT: f64 = 2e-3;
-/// Smallest difference between the inner parameters of two terms of a sum that are otherwise the
-/// same, in grid steps.
+/// Smallest difference between the inner parameters of two terms of a sum with the same factors, in
+/// grid steps.
 const MIN_STEPS_APART: f64 = 1.9;
 /// Number of terms whose columns are multiplied together in one matrix product.
 const TERMS_PER_PRODUCT: usize = 1024;
-/// Number of such products that are formed at a time: a bound of memory.
+/// Number of chunks of terms that are formed at a time: a bound of memory.
 const CHUNKS_AT_ONCE: usize = 8;
 /// Maximum number of terms with two factors that are kept, the best ones.
 const MAX_PAIRS: usize = 8_000;
 /// Maximum number of terms with two factors to which a third factor is added.
 const MAX_EXTENDED: usize = 40;
-/// Maximum number of terms with two factors that are kept because they explain most in addition to
-/// a sum.
+/// Maximum number of terms with two factors tried in a sum because they explain most besides it.
 const MAX_PAIRS_BESIDE: usize = 300;
 
-/// Product of factors, given by their indices in ascending order.
+/// Product of factors, given by their indices in [`Terms::factors`], ascending.
 pub type Product = Vec<u16>;
 
 /// Sum of products of factors: the terms of a formula.
 pub type Sum = Vec<Product>;
 
-/// Returns ln of the prior probability of a sum. Each further term halves it; the order of terms
-/// does not count.
+/// Returns ln of the prior probability of a sum. Each term after the first halves it; the orders of
+/// the terms add up.
 pub fn ln_prior(terms: &Terms, sum: &Sum) -> f64 {
     let count = sum.len().max(1);
     let orderings: f64 = (1..=count).map(|k| k as f64).product();
@@ -46,9 +45,9 @@ pub fn ln_prior(terms: &Terms, sum: &Sum) -> f64 {
     of_terms + (count - 1) as f64 * 0.5_f64.ln() + orderings.ln()
 }
 
-/// Returns true if no two terms of a sum differ only in the place of a kink, or in inner parameters
-/// with nearly the same values `inner`. Such a sum approximates another function, such as a ramp or
-/// a pulse, and is no law.
+/// Returns false if two terms of a sum differ only in the position of a kink, or only in inner
+/// parameters with nearly the same values `inner`. Such a sum approximates another function, such
+/// as a ramp or a pulse, and is no law.
 pub fn is_separated(terms: &Terms, sum: &Sum, inner: &[Vec<f64>]) -> bool {
     let is_apart = |a: usize, b: usize| {
         let factors = |k: usize| sum[k].iter().map(|&k| &terms.factors[usize::from(k)]);
@@ -65,7 +64,7 @@ pub fn is_separated(terms: &Terms, sum: &Sum, inner: &[Vec<f64>]) -> bool {
     (0..sum.len()).all(|a| (a + 1..sum.len()).all(|b| is_apart(a, b)))
 }
 
-/// Group of terms that have the same number of columns, with the columns.
+/// Group of terms with the same number of columns, and the inner products of these columns in W.
 pub struct Chunk {
     /// Number of columns of each term.
     pub width: usize,
@@ -73,9 +72,9 @@ pub struct Chunk {
     pub terms: Vec<Product>,
     /// ln of the prior probability of each term.
     pub ln_prior: Vec<f64>,
-    /// Columns, shape = (poses, terms × width).
+    /// Columns, each scaled to length 1, shape = (poses, terms × width).
     pub columns: DMatrix<f32>,
-    /// Squared length of each column, in units of the noise.
+    /// Squared length of each column in W; 0 if the fitted parameters explain the column.
     pub squares: Vec<f64>,
     /// Inner product of the two columns of each term of width 2.
     pub mixed: Vec<f64>,
@@ -83,12 +82,13 @@ pub struct Chunk {
     pub along: Vec<f64>,
 }
 
-/// Terms that the search for formulas at one joint combines.
+/// Terms that the search for formulas at one site combines.
 pub struct Terms {
-    /// Factors with their columns.
+    /// Factors of the dictionary, and after them those with refined inner parameters.
     pub factors: Vec<Factor>,
+    /// Columns of each factor.
     values: Vec<Vec<DVector<f64>>>,
-    /// Number of factors with listed values of their inner parameters, the first ones.
+    /// Number of factors of the dictionary.
     listed: usize,
     /// Terms in groups of equal width.
     pub chunks: Vec<Chunk>,
@@ -113,7 +113,7 @@ impl Terms {
         let single: Vec<Product> = (0..count).map(|k| vec![number(k)]).collect();
         let pairs: Vec<Product> = (0..count)
             .flat_map(|a| (a..count).map(move |b| vec![number(a), number(b)]))
-            .filter(|pair| new_terms.is_new(pair))
+            .filter(|pair| new_terms.is_allowed(pair))
             .collect();
         let mut chunks = new_terms.chunks_of(&single, site);
         let (best_pairs, all_pairs) = new_terms.best_of(&pairs, MAX_PAIRS, site);
@@ -124,7 +124,7 @@ impl Terms {
         new_terms
     }
 
-    /// Returns the products of `terms` with every listed factor.
+    /// Returns the products of `terms` with every factor of the dictionary.
     fn multiplied(&self, terms: &[Product]) -> Vec<Product> {
         let number = |k: usize| u16::try_from(k).unwrap_or(u16::MAX);
         let multiple = |term: &Product, factor: usize| {
@@ -136,14 +136,14 @@ impl Terms {
             .iter()
             .filter(|term| term.len() < FACTOR_COUNT_PROBABILITIES.len())
             .flat_map(|term| (0..self.listed).map(move |factor| multiple(term, factor)));
-        let mut multiples: Vec<Product> = multiples.filter(|term| self.is_new(term)).collect();
+        let mut multiples: Vec<Product> = multiples.filter(|term| self.is_allowed(term)).collect();
         multiples.sort_unstable();
         multiples.dedup();
         multiples
     }
 
     /// Returns, for each span, the terms with two factors that explain most of the residual in
-    /// addition to it, and products of the best of them with every listed factor.
+    /// addition to it, and products of the best of them with every factor of the dictionary.
     ///
     /// A term that alone explains little may explain most of what other terms leave.
     pub fn beside(&self, spans: &[Span], site: &WhitenedSite) -> Vec<Vec<Product>> {
@@ -165,8 +165,9 @@ impl Terms {
         (0..spans.len()).map(of_span).collect()
     }
 
-    /// Returns the terms with the largest gains, each given with the indices of its chunk and of
-    /// the term in it, and products of the best of them with every listed factor.
+    /// Returns the terms with the largest gains, and products of the best of them with every factor
+    /// of the dictionary. `gains` holds each gain with the indices of the chunk and of the term in
+    /// it.
     fn best_beside(&self, gains: impl Iterator<Item = (f64, usize, usize)>) -> Vec<Product> {
         let order = |a: &(f64, usize, usize), b: &(f64, usize, usize)| {
             b.0.total_cmp(&a.0).then_with(|| (a.1, a.2).cmp(&(b.1, b.2)))
@@ -183,14 +184,14 @@ impl Terms {
         terms
     }
 
-    /// Returns the products of a term with every listed factor, in chunks; none for a term with the
-    /// largest number of factors.
+    /// Returns the products of a term with every factor of the dictionary, in chunks; none for a
+    /// term of three factors.
     pub fn multiples(&self, term: &Product, site: &WhitenedSite) -> Vec<Chunk> {
         self.chunks_of(&self.multiplied(std::slice::from_ref(term)), site)
     }
 
-    /// Returns the index of a factor with another value of its inner parameter, which is added if
-    /// it is not known.
+    /// Returns the index of a factor with another value of its inner parameter. Adds the factor if
+    /// it is not in the list.
     pub fn with_inner(&mut self, factor: u16, value: f64, quantities: &Quantities) -> u16 {
         let Factor { form, inner, ln_prior } = self.factors[usize::from(factor)].clone();
         let Some((old, step)) = inner else { return factor };
@@ -201,17 +202,18 @@ impl Terms {
         if old.to_bits() == value.to_bits() {
             return factor;
         }
-        let place = self.factors.iter().position(is_same).unwrap_or_else(|| {
+        let index = self.factors.iter().position(is_same).unwrap_or_else(|| {
             self.factors.push(Factor { form, inner: Some((value, step)), ln_prior });
             let columns = form.columns(quantities, value);
             self.values.push(columns.into_iter().map(DVector::from_vec).collect());
             self.factors.len() - 1
         });
-        u16::try_from(place).unwrap_or(factor)
+        u16::try_from(index).unwrap_or(factor)
     }
 
-    /// Returns true if no product of fewer or other factors is the same function.
-    fn is_new(&self, term: &Product) -> bool {
+    /// Returns true if a product of factors may be a term: no product of fewer factors is the same
+    /// function, and it has at most one harmonic.
+    fn is_allowed(&self, term: &Product) -> bool {
         let of = |k: u16| &self.factors[usize::from(k)];
         let wide = term.iter().filter(|k| of(**k).form.width() > 1).count();
         // A gas spring stands alone.
@@ -271,15 +273,14 @@ impl Terms {
         term.iter().map(|&k| self.factors[usize::from(k)].form.width()).product()
     }
 
-    /// Returns all of `terms` with their columns, in chunks.
+    /// Returns all of `terms` with their columns, in chunks of equal width.
     pub fn chunks_of(&self, terms: &[Product], site: &WhitenedSite) -> Vec<Chunk> {
         let chunk = |(width, terms): &(usize, Vec<&Product>)| self.chunk(*width, terms, site);
         self.groups(terms).par_iter().map(chunk).collect()
     }
 
-    /// Returns the `most` of `terms` that alone reduce the residual most, in chunks, and all terms
-    /// without their columns. A few chunks are formed at a time, so that memory hardly grows with
-    /// the number of terms.
+    /// Returns the `most` of `terms` that alone explain most of the residual, and all terms without
+    /// their columns, both in chunks. Few chunks are formed at a time to save memory.
     fn best_of(
         &self,
         terms: &[Product],
@@ -297,7 +298,7 @@ impl Terms {
         (best_chunks, all_chunks)
     }
 
-    /// Returns terms in groups of one width.
+    /// Returns the terms in groups for chunks, each with its number of columns a term (1 or 2).
     fn groups<'t>(&self, terms: &'t [Product]) -> Vec<(usize, Vec<&'t Product>)> {
         let (narrow, wide): (Vec<&Product>, Vec<&Product>) =
             terms.iter().partition(|term| self.width(term) == 1);
@@ -365,7 +366,7 @@ impl Terms {
         }
     }
 
-    /// Returns the `most` terms that alone reduce the residual most, in chunks.
+    /// Keeps the `most` terms that alone explain most of the residual.
     fn best(chunks: Vec<Chunk>, most: usize) -> Vec<Chunk> {
         let mut gains: Vec<f64> = chunks.iter().flat_map(Chunk::single_term_gains).collect();
         if gains.len() <= most {
@@ -375,7 +376,7 @@ impl Terms {
         chunks.into_iter().map(|chunk| chunk.explaining_more_than(least)).collect()
     }
 
-    /// Returns the `most` terms that alone reduce the residual most.
+    /// Returns the `most` terms that alone explain most of the residual, the best one first.
     fn best_terms(chunks: &[Chunk], most: usize) -> Vec<Product> {
         let mut gains_and_terms: Vec<(f64, &Product)> =
             chunks.iter().flat_map(|chunk| chunk.single_term_gains().zip(&chunk.terms)).collect();
@@ -398,8 +399,8 @@ impl Chunk {
     }
 
     /// Returns the sum of squares that a term explains in addition to a span, and its number of
-    /// independent directions. `less` returns the products of the term's columns within the span,
-    /// `explained` those with the residual.
+    /// columns independent of the span. For column indices, `less` returns the inner product of two
+    /// columns' parts within the span, `explained` that of a column's part with the residual.
     pub fn gain(
         &self,
         term: usize,
@@ -432,9 +433,9 @@ impl Chunk {
         ((b.1 * p * p - 2.0 * mixed * p * q + a.1 * q * q) / determinant, 2)
     }
 
-    /// Returns the sum of squares that a term explains in addition to a span, and its number of
-    /// independent directions. `products` holds the products of the terms' columns with the
-    /// orthonormal functions of the span, `along` those of the functions with the residual.
+    /// Returns the result of [`Self::gain`]. `products` holds the inner products of the chunk's
+    /// columns with the orthonormal functions of the span, `along` those of the functions with the
+    /// residual.
     fn gain_beside(
         &self,
         term: usize,
@@ -444,7 +445,7 @@ impl Chunk {
         self.gain(term, |a, b| dot(column(a), column(b)), |a| dot(column(a), along.as_slice()))
     }
 
-    /// Returns the terms with their products, without their columns.
+    /// Returns the chunk without the columns, but with their inner products.
     fn without_columns(&self) -> Self {
         Self {
             width: self.width,

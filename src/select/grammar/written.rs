@@ -1,4 +1,4 @@
-//! Sums as formulas of a law.
+//! Conversion of the sums of the search to laws with formulas as text.
 
 use super::factor::{Form, STRUT_RATIOS};
 use super::quantities::Quantities;
@@ -9,9 +9,9 @@ use crate::laws::LawParameter;
 /// Formulas of a law with its inner parameters.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Written {
-    /// Name of the law: site and quantities, without numbers.
+    /// Name of the law: its site and formulas, without the values of inner parameters.
     pub name: String,
-    /// Formulas as text, one for each coefficient.
+    /// Formulas as text; each has one coefficient.
     pub formulas: Vec<String>,
     /// Inner parameters of the formulas.
     pub parameters: Vec<LawParameter>,
@@ -24,15 +24,15 @@ const STRUT_RATIO_SIGMA: f64 = 0.2;
 /// Largest ratio k of a gas spring; at 1 it would have no length in its dead point.
 const MAX_STRUT_RATIO: f64 = 0.99;
 
-/// Writes a sum as a law at a site, which is given as in files, with the values `inner` of its
-/// inner parameters.
-pub fn written(
-    (terms, known): (&Terms, &Quantities),
+/// Writes a sum of terms as a law. `site` is the law's site in the words of files. `inner` holds
+/// the values of the inner parameters: one list for each term, with one value for each factor.
+pub fn write_law(
+    (terms, quantities): (&Terms, &Quantities),
     site: &str,
     sum: &Sum,
     inner: &[Vec<f64>],
 ) -> Written {
-    let span = known.elapsed.as_ref().map_or(1.0, |elapsed| elapsed.1);
+    let span = quantities.elapsed.as_ref().map_or(1.0, |elapsed| elapsed.1);
     let mut parameters: Vec<LawParameter> = Vec::new();
     let mut formulas = Vec::new();
     let mut order: Vec<usize> = (0..sum.len()).collect();
@@ -43,17 +43,17 @@ pub fn written(
         for (&k, &x) in sum[t].iter().zip(&inner[t]) {
             let factor = &terms.factors[usize::from(k)];
             let word = match (factor.form, factor.inner) {
-                (Form::Step, _) => digits(x * span).to_string(),
+                (Form::Step, _) => rounded(x * span).to_string(),
                 (form, Some((_, step))) => {
                     let (letter, unit) =
                         if form == Form::Settling { ("tau", span) } else { ("c", 1.0) };
                     let name = numbered(letter, &parameters);
                     parameters.push(LawParameter {
                         name: name.clone(),
-                        start: digits(x * unit),
+                        start: rounded(x * unit),
                         min: None,
                         max: None,
-                        sigma: Some(digits(step * unit)),
+                        sigma: Some(rounded(step * unit)),
                     });
                     name
                 }
@@ -69,7 +69,7 @@ pub fn written(
                     sigma: Some(STRUT_RATIO_SIGMA),
                 });
             }
-            let texts = factor.form.texts(known, &word, &ratio);
+            let texts = factor.form.texts(quantities, &word, &ratio);
             products = products
                 .iter()
                 .flat_map(|left| {
@@ -84,9 +84,10 @@ pub fn written(
     Written { name: name(site, &formulas), formulas, parameters }
 }
 
-/// Returns a letter as the name of a further parameter, with a number if the letter is taken.
+/// Returns the name of an additional inner parameter: the letter, with a number from 2 if names in
+/// `parameters` already begin with it.
 fn numbered(letter: &str, parameters: &[LawParameter]) -> String {
-    match parameters.iter().filter(|known| known.name.starts_with(letter)).count() {
+    match parameters.iter().filter(|quantities| quantities.name.starts_with(letter)).count() {
         0 => letter.to_owned(),
         count => format!("{letter}{}", count + 1),
     }
@@ -101,7 +102,7 @@ fn joined(factors: &[String]) -> String {
             Some((base, Ok(power))) => (base, power),
             _ => (factor.as_str(), 1),
         };
-        match powers.iter_mut().find(|(known, _)| *known == base) {
+        match powers.iter_mut().find(|(quantities, _)| *quantities == base) {
             Some((_, sum)) => *sum += power,
             None => powers.push((base, power)),
         }
@@ -124,7 +125,7 @@ fn name(site: &str, formulas: &[String]) -> String {
             }
         });
         let text = searched.collect::<String>();
-        // The law of a gas spring, by what it is.
+        // The formula of a gas spring is named in words.
         let strut = text.split_once(")/sqrt(1 + ").and_then(|(sine, _)| sine.strip_prefix("sin("));
         let text = strut.map_or(text.clone(), |angle| {
             format!("gas spring {}", angle.split(' ').next().unwrap_or_default())
@@ -141,6 +142,6 @@ fn name(site: &str, formulas: &[String]) -> String {
 }
 
 /// Rounds a value to [`PARAMETER_DIGITS`] significant digits.
-fn digits(value: f64) -> f64 {
+fn rounded(value: f64) -> f64 {
     format!("{value:.*e}", usize::try_from(PARAMETER_DIGITS).unwrap_or(3)).parse().unwrap_or(value)
 }
