@@ -11,12 +11,13 @@ use crate::model::parameter::{BeamField, JointField, ParameterSite, Regressor};
 use crate::problem::Problem;
 
 impl Model {
-    /// Returns ∂p/∂q of predicted positions at the full parameter vector `x`, shape = (3, joints)
-    /// for each pose, measuring frame \[m/rad\], for prismatic joints \[m/m\]. It is 0 at fixed
-    /// joints and NaN without equilibrium.
+    /// Returns ∂p/∂q of the predicted positions at the full parameter vector `x`, shape = (3,
+    /// joints) for each pose, measuring frame \[m/rad\], for prismatic joints \[m/m\]. Columns of
+    /// joints without a command (fixed and mimic joints) are 0; all are NaN without equilibrium.
     ///
     /// A command moves its joint, and every coordinate, strain, small motion, base and reading with
-    /// a term that depends on it: ∂p/∂q = ∂p/∂θ (1 + ∂Δθ/∂q) + Σ ∂p/∂s ∂s/∂q. Directions of
+    /// a term that depends on it. With Δθ the terms at the joint and s these other quantities,
+    /// ∂p/∂q = ∂p/∂θ (1 + ∂Δθ/∂q) + Σ ∂p/∂s ∂s/∂q. Directions of
     /// approach are kept constant.
     pub(crate) fn command_jacobian(
         &self,
@@ -29,9 +30,10 @@ impl Model {
         let commanded = arm.moving_joints().len();
         let arm = arm.with_mimic_joints(problem);
         let moving = arm.moving_joints();
-        // Besides joint coordinates, terms that depend on commands add to these sites.
-        let beyond = arm.sites_that_follow_commands();
-        let probes: Vec<(ParameterSite, f64)> = beyond.iter().map(|of| (of.site, 0.0)).collect();
+        // Terms that depend on commands also add to sites that are not joint coordinates.
+        let other_terms = arm.non_joint_terms_that_follow_commands();
+        let probes: Vec<(ParameterSite, f64)> =
+            other_terms.iter().map(|term| (term.site, 0.0)).collect();
         let arm = arm.with_probes(&probes);
         let columns = moving.len() + probes.len();
         let poses: Vec<Pose> = poses.into_iter().map(|pose| Pose { sigma: 1.0, ..pose }).collect();
@@ -68,10 +70,10 @@ impl Model {
                         );
                     }
                 }
-                for (of, place) in beyond.iter().zip(moving.len()..) {
-                    let by_site = &block.column(place)[rows.clone()];
+                for (term, column) in other_terms.iter().zip(moving.len()..) {
+                    let by_site = &block.column(column)[rows.clone()];
                     for &joint in &moving {
-                        let slope = of.size * of.regressor.slope(&pose.setup, joint);
+                        let slope = term.size * term.regressor.slope(&pose.setup, joint);
                         // The block contains derivatives of measured − predicted.
                         for (entry, by_site) in jacobian.column_mut(joint).iter_mut().zip(by_site) {
                             *entry -= slope * by_site;
@@ -91,8 +93,9 @@ impl Model {
     }
 }
 
-/// Term beyond the coordinates of joints: what it adds to, size × regressor.
-struct TermBeyond {
+/// Term size × regressor that adds to a strain, a small motion, a base or a reading, not to a
+/// joint's coordinate.
+struct NonJointTerm {
     site: ParameterSite,
     regressor: Regressor,
     size: f64,
@@ -100,7 +103,7 @@ struct TermBeyond {
 
 impl Model {
     /// Returns the terms of strains, small motions, bases and readings that depend on commands.
-    fn sites_that_follow_commands(&self) -> Vec<TermBeyond> {
+    fn non_joint_terms_that_follow_commands(&self) -> Vec<NonJointTerm> {
         let of_arm = self.fixed_terms.iter().filter_map(|term| {
             let site = match term.site {
                 TermSite::Joint(_) => return None,
@@ -113,15 +116,15 @@ impl Model {
                     ParameterSite::Joint { joint, field }
                 }
             };
-            Some(TermBeyond { site, regressor: term.regressor.clone(), size: term.value })
+            Some(NonJointTerm { site, regressor: term.regressor.clone(), size: term.value })
         });
         let [shifts, turns] = self.instrument.terms();
-        let of_shift = |&(axis, ref regressor, size): &(usize, Regressor, f64)| TermBeyond {
+        let of_shift = |&(axis, ref regressor, size): &(usize, Regressor, f64)| NonJointTerm {
             site: ParameterSite::Shift { axis },
             regressor: regressor.clone(),
             size,
         };
-        let of_turn = |&(axis, ref regressor, size): &(usize, Regressor, f64)| TermBeyond {
+        let of_turn = |&(axis, ref regressor, size): &(usize, Regressor, f64)| NonJointTerm {
             site: ParameterSite::Turn { axis },
             regressor: regressor.clone(),
             size,

@@ -16,8 +16,8 @@ pub struct CommandResiduals<'a> {
     /// the mimic joints.
     joints: PoseResiduals<'a>,
     commands: usize,
-    /// For each mimic joint, the column of its leader's correction and the ratio of its motion to
-    /// the leader's.
+    /// For each mimic joint, the index of its leader's command and the ratio of its motion to the
+    /// leader's.
     followers: Vec<(usize, f64)>,
 }
 

@@ -5,7 +5,7 @@ use crate::model::parameter::{
 };
 use crate::problem::{Mimic, Problem};
 
-/// Quantity that a term adds to: a joint coordinate or a beam's strain.
+/// Quantity that a term adds to: a joint coordinate, a beam's strain or a small motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum TermSite {
     /// Coordinate of a joint.
@@ -27,7 +27,7 @@ pub(super) enum TermSite {
     },
 }
 
-/// Term with a known coefficient: value × regressor.
+/// Term with a given coefficient: value × regressor.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct CommandTerm {
     pub site: TermSite,
@@ -64,7 +64,7 @@ impl CommandTerm {
 }
 
 impl TermSite {
-    /// Returns the coordinate, strain or motion to which a parameter at `site` adds; `None` for
+    /// Returns the coordinate, strain or motion to which a parameter at `site` adds its term; `None` for
     /// every other site.
     fn of(site: ParameterSite) -> Option<Self> {
         match site {

@@ -1,11 +1,13 @@
-//! Poses with all terms that add to their commands.
+//! Sum of the terms that add to joint coordinates, strains and small motions, and its application
+//! to poses.
 
 use super::command_term::{CommandTerm, TermSite};
 use super::harmonic_sum::HarmonicSum;
 use crate::model::parameter::{Parameter, Waves};
 use crate::problem::{JointOffsets, PoseView};
 
-/// Sum of the terms that add to commands and strains, evaluated for one pose at a time.
+/// Sum of the terms that add to joint coordinates, strains and small motions, evaluated for one
+/// pose at a time.
 #[derive(Debug, Clone, Default)]
 pub(super) struct CommandTerms {
     series: Vec<HarmonicSum>,
@@ -20,7 +22,7 @@ impl CommandTerms {
     /// `x`.
     pub fn new(fixed: &[CommandTerm], parameters: &[Parameter], x: &[f64]) -> Self {
         let mut others = CommandTerm::all(fixed, parameters, x);
-        let series = HarmonicSum::take(&mut others);
+        let series = HarmonicSum::take_from(&mut others);
         Self { series, others, ..Self::default() }
     }
 

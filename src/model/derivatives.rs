@@ -20,8 +20,9 @@ pub(super) struct Base {
     pub directions: [Vector3<f64>; 3],
     /// Derivatives of the base's axes with respect to its rotation vector.
     rotation_slopes: [Frame<f64>; 3],
-    /// Jacobian columns of effects that rotate the base about the measuring frame's origin, each
-    /// with the derivative of the base frame.
+    /// Jacobian column of each parameter that rotates the base about the measuring frame's origin.
+    /// The frame contains the derivative ∂R/∂x R⁻¹ of that rotation R: it maps a point to its
+    /// derivative, measuring frame.
     effect_slopes: Vec<(usize, Frame<f64>)>,
     /// Jacobian columns of the base's translation and rotation vector; `None` for fixed
     /// coordinates.
@@ -141,10 +142,11 @@ impl Target {
 }
 
 impl ArmDerivatives {
-    /// Writes the derivatives of a point \[m\] in the frame of a joint with respect to the arm's
-    /// parameters. Returns that frame, measuring frame, or `None` if the pose has no equilibrium.
+    /// Writes the derivatives of a point \[m\], given in the frame of a joint, with respect to the
+    /// arm's parameters into `rows`. Returns the frame of the joint, measuring frame, or `None` if
+    /// the pose has no equilibrium.
     ///
-    /// `commanded` is the pose as commanded, `setup` with the corrections of its commands.
+    /// `commanded` is the pose as commanded; `setup` includes the terms that add to its commands.
     #[inline]
     pub(super) fn write(
         &mut self,

@@ -23,12 +23,13 @@ pub(super) struct Elastic {
     whole: Vec<WholeArmInput>,
     arm: Arm<f64>,
     state: StaticState,
-    /// Memory for forward passes in real numbers.
+    /// Memory for forward passes in real and in dual numbers, reused from pose to pose.
     real: Workspace<f64>,
-    ws: Workspace<Dual64>,
+    dual: Workspace<Dual64>,
 }
 
-/// Parameters that act on a single segment, with the segment and the index of the derivative in it.
+/// Inputs that act on a single segment, each with the segment and the index of its derivative
+/// direction there.
 struct SegmentInputs {
     sensitivity: Sensitivity,
     inputs: Vec<(Input, Segment, usize)>,
@@ -79,12 +80,13 @@ impl Elastic {
             arm,
             state,
             real: Workspace::default(),
-            ws: Workspace::default(),
+            dual: Workspace::default(),
         }
     }
 
-    /// Writes the derivatives of a target, given by its position \[m\] in the frame of the joint
-    /// `tip`. Returns the frame of `tip`, measuring frame, or `None` without equilibrium.
+    /// Writes the derivatives of a target with respect to all inputs into `rows`. The target is
+    /// given by its position \[m\] in the frame of the joint `tip`. Returns the frame of `tip`,
+    /// measuring frame, or `None` without equilibrium.
     pub fn write(
         &mut self,
         (commanded, setup): (&PoseView, &PoseView),
@@ -92,7 +94,7 @@ impl Elastic {
         (tip, target): (usize, &Vector3<f64>),
         rows: &mut Rows,
     ) -> Option<Frame<f64>> {
-        let Self { segments, adjoint, whole, arm, state, real, ws } = self;
+        let Self { segments, adjoint, whole, arm, state, real, dual } = self;
         arm.equilibrate_at(setup, tip, real, state).ok()?;
         match segments {
             Some(SegmentInputs { sensitivity, inputs }) => {
@@ -113,7 +115,7 @@ impl Elastic {
             if matches!(input.site, ParameterSite::Target { .. }) && !carries_payload {
                 continue;
             }
-            let position = arm.target_position(setup, target, state, ws);
+            let position = arm.target_position(setup, target, state, dual);
             rows.put_input(
                 input,
                 commanded,
@@ -124,7 +126,7 @@ impl Elastic {
     }
 }
 
-/// Returns the only segment on which an input acts; `None` if the input changes loads.
+/// Returns the segment on which an input acts alone; `None` if the input changes loads.
 fn segment_of(arm: &Arm<f64>, site: ParameterSite) -> Option<Segment> {
     match site {
         ParameterSite::Joint { joint, field: JointField::A }

@@ -45,7 +45,8 @@ impl Model {
         Self { instrument: self.instrument.without_errors(), ..self }
     }
 
-    /// Adds corrections to the mimic joints as free parameters to a model with free commands.
+    /// Adds corrections to the coordinates of mimic joints, as free parameters, to a model with
+    /// free commands.
     #[must_use]
     pub(crate) fn with_mimic_joints(mut self, problem: &Problem) -> Self {
         let kind =
@@ -54,7 +55,8 @@ impl Model {
         self
     }
 
-    /// Returns the full parameter vector of values by name \[SI\].
+    /// Returns the full parameter vector (deviations from nominal) at which the parameters have the
+    /// values that `value` returns for their names \[SI\].
     ///
     /// # Errors
     /// Returns the name of a free parameter that has no value.
@@ -70,7 +72,7 @@ impl Model {
         entries.collect::<Result<Vec<f64>, String>>().map(DVector::from_vec)
     }
 
-    /// Returns true if a term that is not free depends on the joints' commands.
+    /// Returns true if a term with a fixed coefficient depends on the joints' commands.
     pub(crate) fn follows_commands(&self) -> bool {
         let [shifts, turns] = self.instrument.terms();
         let of_instrument = shifts.iter().chain(turns).map(|(_, regressor, _)| regressor);
@@ -79,7 +81,8 @@ impl Model {
         regressors.any(Regressor::follows_commands)
     }
 
-    /// Returns the joints that the parameters of a model with free commands move, in their order.
+    /// Returns the index of the joint that each parameter moves, in the order of the parameters,
+    /// for a model with free commands.
     pub(crate) fn moving_joints(&self) -> Vec<usize> {
         let joint = |parameter: &Parameter| match parameter.site {
             ParameterSite::Joint { joint, .. } => Some(joint),
@@ -89,8 +92,8 @@ impl Model {
     }
 }
 
-/// Creates the corrections to the coordinates of joints, according to the joint kind that `kind`
-/// returns.
+/// Creates a parameter q1, q2, … for each joint, without prior: the correction to its θ or d.
+/// Joints for which `kind` returns `Fixed` have none.
 fn commands(problem: &Problem, arm: &Arm<f64>, kind: fn(&Joint) -> JointKind) -> Vec<Parameter> {
     let joints = problem.joints.iter().zip(&arm.joints).enumerate();
     let corrected = joints.filter_map(|(joint, (declared, nominal_joint))| {

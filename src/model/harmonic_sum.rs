@@ -5,7 +5,7 @@ use multiversion::multiversion;
 use super::command_term::{CommandTerm, TermSite};
 use crate::model::parameter::Regressor;
 
-/// Number of consecutive orders that one vector operation evaluates.
+/// Number of consecutive orders that are evaluated together by one vector operation.
 const LANES: usize = 4;
 /// Minimum number of harmonics from which a sum by recurrence is faster than separate evaluation
 /// (timed).
@@ -21,14 +21,14 @@ const MAX_ORDER: u32 = 1024;
 pub(super) struct HarmonicSum {
     pub site: TermSite,
     joint: usize,
-    /// Coefficients aₖ and bₖ in groups of consecutive orders.
+    /// Coefficients aₖ, then bₖ, in groups of [`LANES`] consecutive orders.
     terms: Vec<[[f64; LANES]; 2]>,
 }
 
 impl HarmonicSum {
     /// Removes from `terms` the harmonics of a joint that add to the same quantity, if they are
     /// many and dense, and returns their sums.
-    pub fn take(terms: &mut Vec<CommandTerm>) -> Vec<Self> {
+    pub fn take_from(terms: &mut Vec<CommandTerm>) -> Vec<Self> {
         let mut found: Vec<(Self, usize)> = Vec::new();
         for CommandTerm { site, regressor, value } in &*terms {
             let (site, value) = (*site, *value);
@@ -126,7 +126,7 @@ mod tests {
         });
         let mut remaining: Vec<CommandTerm> = terms.iter().chain(&few).cloned().collect();
         remaining.push(CommandTerm { site, regressor: Regressor::Unit, value: 1.0 });
-        let series = HarmonicSum::take(&mut remaining);
+        let series = HarmonicSum::take_from(&mut remaining);
         assert!(series.len() == 1 && remaining.len() == 4 && remaining[..3] == few);
         for k in -30..30 {
             let configuration = [0.4, 0.21 * f64::from(k), 1.0];

@@ -9,9 +9,9 @@ use crate::model::parameter::{ParameterSite, Regressor};
 #[derive(Debug, Clone)]
 pub(super) struct Input {
     pub site: ParameterSite,
-    /// Index of the unknown parameter that equals this scalar; `None` if there is none.
+    /// Index of the unknown parameter whose value this scalar takes; `None` if there is none.
     pub parameter: Option<usize>,
-    /// Jacobian column of the parameter that equals this scalar; `None` if there is none.
+    /// Jacobian column of that parameter; `None` if there is none.
     pub column: Option<usize>,
     /// Jacobian columns of the parameters that add to the scalar, each with the regressor that
     /// multiplies it.

@@ -9,15 +9,16 @@ use crate::spatial::Frame;
 
 /// Error model of the measuring instrument.
 ///
-/// A position p reads as p (1 + s) + E p + Σ dᵢ·regressorᵢ. All bases rotate about the measuring
-/// frame's origin by the rotation vector Σ ωᵢ·regressorᵢ.
+/// A position p reads as p (1 + s) + E p + Σ dᵢ·regressorᵢ with displacements dᵢ. All bases rotate
+/// about the measuring frame's origin by the rotation vector Σ ωᵢ·regressorᵢ.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct Instrument {
     /// Relative scale error s of the instrument: measured lengths are 1 + s times the true ones.
     pub scale: f64,
     /// Strain E of the measuring frame; `None` counts as zero.
     strain: Option<Matrix3<f64>>,
-    /// Axis, regressor and size [m per unit of the regressor] of each displacement d.
+    /// Axis, regressor and size [m per unit of the regressor] of each displacement d of the
+    /// readings. Axis [`RANGE_AXIS`] is the line of sight.
     shifts: Vec<(usize, Regressor, f64)>,
     /// Axis, regressor and size [rad per unit of the regressor] of each rotation ω.
     rotations: Vec<(usize, Regressor, f64)>,
@@ -61,8 +62,8 @@ impl Instrument {
         self.strain.map_or([0.0; 6], |strain| STRAIN_PLACES.map(|place| strain[place]))
     }
 
-    /// Returns only the motions of the bases, which displace the arm itself, without errors of the
-    /// instrument's readings.
+    /// Returns the part of the instrument that displaces the arm itself, the motions of the bases,
+    /// without errors of the readings.
     pub fn without_errors(&self) -> Self {
         let of_bases = |terms: &[(usize, Regressor, f64)]| {
             terms.iter().filter(|(_, regressor, _)| regressor.moves_base()).cloned().collect()
@@ -144,8 +145,8 @@ impl Instrument {
     }
 }
 
-/// Returns the direction of a displacement of readings: an axis of the measuring frame, or the line
-/// of sight from the station, its origin.
+/// Returns the unit vector along which a displacement of readings acts: an axis of the measuring
+/// frame, or the line of sight from the station at its origin.
 fn direction(axis: usize, position: &Vector3<f64>) -> Vector3<f64> {
     if axis == RANGE_AXIS {
         position.try_normalize(0.0).unwrap_or_default()
@@ -154,7 +155,8 @@ fn direction(axis: usize, position: &Vector3<f64>) -> Vector3<f64> {
     }
 }
 
-/// Returns Σ size × value(regressor) of the terms of each axis.
+/// Returns the vector whose entry for each axis is Σ size × value(regressor) over the terms of this
+/// axis.
 fn sum(terms: &[(usize, Regressor, f64)], value: impl Fn(&Regressor) -> f64) -> Vector3<f64> {
     let mut sum = Vector3::zeros();
     for (axis, regressor, size) in terms {

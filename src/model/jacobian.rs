@@ -45,8 +45,8 @@ pub(super) struct JacobianWriter<'m> {
 }
 
 impl<'m> JacobianWriter<'m> {
-    /// Creates a writer of these `columns` at the full parameter vector `x`. `oriented` is required
-    /// for rows with orientations, `tilted` for rows with tilts.
+    /// Creates a writer of these `columns` at the full parameter vector `x`. `oriented` must be
+    /// true if a row has an orientation, `tilted` if a row measures tilts.
     pub fn new(
         model: &'m Model,
         x: &[f64],
@@ -55,11 +55,11 @@ impl<'m> JacobianWriter<'m> {
     ) -> Self {
         let arm = model.arm(|k| x[k]);
         let mut bases: Vec<Base> = model.base_poses(x).iter().map(Base::new).collect();
-        let places = model.target_positions(x).into_iter().zip(model.target_rotations(x));
+        let placements = model.target_positions(x).into_iter().zip(model.target_rotations(x));
         let target = |(index, (position, rotation))| {
             Target::new(model.target_joint(index), position, &rotation)
         };
-        let mut targets: Vec<Target> = places.enumerate().map(target).collect();
+        let mut targets: Vec<Target> = placements.enumerate().map(target).collect();
         let fixtures = model.fixtures(x);
         let mut fixture_columns = vec![[None; MAX_NUMBERS]; fixtures.len()];
         let (mut instrument_columns, mut base_rotations) = (Vec::new(), Vec::new());
@@ -113,7 +113,7 @@ impl<'m> JacobianWriter<'m> {
     }
 
     /// Writes the whitened residual of a row and its derivatives into a block of zeros, from row
-    /// `row` on. There are three rows, or six if the row has an orientation.
+    /// `row` on: three rows, or six if the pose has an orientation.
     #[inline]
     pub fn write(&mut self, pose: &Pose, block: &mut Block, row: usize) {
         if pose.observation.is_position() {
@@ -128,7 +128,7 @@ impl<'m> JacobianWriter<'m> {
     fn write_other(&mut self, pose: &Pose, block: &mut Block, row: usize) {
         let (observation, last_column) = (pose.observation, block.parameters());
         let mut rows = Rows { block, row, scale: -1.0 / pose.sigma };
-        let lost = Vector3::from_element(f64::NAN);
+        let no_equilibrium = Vector3::from_element(f64::NAN);
         let fixtures = fixtures_of(observation, |fixture| self.fixtures[fixture]);
         let mut scene = Scene { fixtures, ..Scene::default() };
         let mut slopes = None;
@@ -138,12 +138,12 @@ impl<'m> JacobianWriter<'m> {
                 let Some(tilts) = &mut self.tilts else { return };
                 let setup = self.commands.apply(&pose.setup);
                 let tilts = tilts.write((&pose.setup, &setup), observation, &mut rows);
-                rows.put(last_column, &tilts.map_or(lost, |tilts| tilts - pose.measured));
+                rows.put(last_column, &tilts.map_or(no_equilibrium, |tilts| tilts - pose.measured));
                 return;
             }
             Needs::Carriers => match self.write_carriers(pose, &mut scene, &mut rows) {
                 Some(by) => slopes = Some(by),
-                None => return rows.put(last_column, &lost),
+                None => return rows.put(last_column, &no_equilibrium),
             },
             Needs::Target => {
                 let (base, target) = (&self.bases[pose.base], &self.targets[pose.target]);
@@ -156,7 +156,7 @@ impl<'m> JacobianWriter<'m> {
                 let point = (target.joint, &target.position);
                 let Some(frame) = self.arm.write((&pose.setup, &setup), base, point, &mut moves)
                 else {
-                    rows.put(last_column, &lost);
+                    rows.put(last_column, &no_equilibrium);
                     return;
                 };
                 scene.target = write_placement(&frame, base, target, &mut moves);
@@ -215,16 +215,16 @@ impl<'m> JacobianWriter<'m> {
             }
         }
         let by = pose.observation.slopes(scene);
-        let place = scene.carriers[1].point(&scene.fixtures[1].frame().point(&scene.point));
+        let position = scene.carriers[1].point(&scene.fixtures[1].frame().point(&scene.point));
         for ((frame, carrier), sign) in scene.carriers.iter().zip(carriers).zip([-1.0, 1.0]) {
             let Some(carrier) = carrier else { continue };
-            let point = frame.resolve(&(place - frame.origin));
+            let point = frame.resolve(&(position - frame.origin));
             write(carrier.checked_sub(1), &point, points)?;
             let mut moves = Rows { block: points, row: 0, scale: 1.0 };
             for (axis, &column) in base.columns.iter().take(3).enumerate() {
                 moves.put_if(column, || base.directions[axis]);
             }
-            for (column, slope) in base.point_slopes(&place) {
+            for (column, slope) in base.point_slopes(&position) {
                 moves.put(column, &slope);
             }
             for column in 0..points.parameters() {

@@ -50,11 +50,12 @@ impl LinearModel {
         Self { parameters, sigma, jacobian, residual }
     }
 
-    /// Fills the block with the residuals and derivatives of some rows at the full parameter vector
-    /// `x`. Stored columns are copied; `write` computes the residual and the columns of the
-    /// unknowns that it is given.
+    /// Fills the block with the residuals and derivatives of the rows `items` at the full parameter
+    /// vector `x`. Derivatives that are stored are copied. `write` computes the residuals and the
+    /// columns of the unknowns in its first argument.
     ///
-    /// Returns false, with the block unchanged, if `x` is another point or the rows are others.
+    /// Returns false, with the block unchanged, if `x` is another point or the residuals there
+    /// differ.
     pub fn fill(
         &self,
         (poses, items): (&[Pose], Range<usize>),
@@ -97,13 +98,14 @@ impl LinearModel {
         true
     }
 
-    /// Returns true if `x` is the point of the linear model, to rounding.
+    /// Returns true if `x` is the point of the linear model to within rounding; parameters that it
+    /// does not contain must be 0.
     fn is_at(&self, parameters: &[Parameter], x: &[f64]) -> bool {
         parameters.iter().zip(x).all(|(parameter, x)| {
             let entry = self.parameters.get(&parameter.name);
-            let known_x = entry.map_or(0.0, |(x, _)| *x);
-            let size = parameter.nominal.abs() + known_x.abs();
-            (x - known_x).abs() <= MAX_RELATIVE_DIFFERENCE * size
+            let stored_x = entry.map_or(0.0, |(x, _)| *x);
+            let size = parameter.nominal.abs() + stored_x.abs();
+            (x - stored_x).abs() <= MAX_RELATIVE_DIFFERENCE * size
         })
     }
 }

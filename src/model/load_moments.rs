@@ -1,4 +1,5 @@
-//! Moments of the loads as fitted, which formulas of laws take, and their part of the derivatives.
+//! Moments of the fitted loads about the joint axes, which formulas of laws may contain, and the
+//! derivatives through these moments.
 
 use std::borrow::Cow;
 use std::sync::Arc;
@@ -15,17 +16,17 @@ use crate::model::parameter::{
 
 /// Column of a Jacobian: a site of the model and the regressor that multiplies its derivative.
 pub(super) struct Column {
-    /// Index of the parameter; `None` for the part of a load that acts through moments.
+    /// Index of the parameter; `None` for the effect of a load through the moments in formulas.
     pub parameter: Option<usize>,
     pub site: ParameterSite,
     pub regressor: Regressor,
 }
 
-/// Columns of the unknown parameters, followed by those of loads that act through the moments in
+/// Columns of the unknown parameters, followed by the effects of loads through the moments in
 /// formulas. The latter are added to the columns of the loads.
 pub(super) struct Columns {
     columns: Vec<Column>,
-    /// Column of the load to which each column beyond those of the unknowns is added.
+    /// Index of the load's column to which each column after those of the unknowns is added.
     added_to: Vec<usize>,
 }
 
@@ -50,7 +51,7 @@ impl Columns {
         }
         let is_load = |&(_, k): &(usize, usize)| model.is_load(&parameters[k]);
         let loads = unknowns.iter().copied().enumerate().filter(is_load);
-        for (place, load) in loads.filter(|_| !terms.is_empty()) {
+        for (column, load) in loads.filter(|_| !terms.is_empty()) {
             let seeded = |k: usize| Dual64::new(x[k], f64::from(u8::from(k == load)));
             let arm = model.arm_with(seeded, |parameter| model.is_load(parameter));
             let moments = Arc::new(AxisMoments::new(arm));
@@ -59,19 +60,20 @@ impl Columns {
                     terms.iter().copied().filter(|&k| parameters[k].site == site).collect();
                 let regressor = load_regressor(parameters, x, &at_site, &moments);
                 columns.push(Column { parameter: None, site, regressor });
-                added_to.push(place);
+                added_to.push(column);
             }
         }
         Self { columns, added_to }
     }
 
-    /// Returns all columns, in the order of the block that [`Columns::write`] passes on.
+    /// Returns all columns, in the order of the block that the function passed to
+    /// [`Columns::write`] fills.
     pub fn all(&self) -> &[Column] {
         &self.columns
     }
 
-    /// Fills a block of the unknowns' columns and the residual with what `write` writes into a
-    /// block of all columns.
+    /// Fills a block that contains the columns of the unknowns and the residual. `write` fills a
+    /// block of all columns, from which it is computed.
     pub fn write(&self, block: &mut Block, write: impl FnOnce(&mut Block)) {
         if self.added_to.is_empty() {
             return write(block);
@@ -91,8 +93,8 @@ impl Columns {
 }
 
 impl Model {
-    /// Returns the free parameters, with the moments of the loads at the full parameter vector `x`
-    /// in formulas.
+    /// Returns the free parameters. Formulas that contain moments use those of the loads at the
+    /// full parameter vector `x`.
     pub(crate) fn parameters_at(&self, x: &[f64]) -> Cow<'_, [Parameter]> {
         if !self.parameters.iter().any(uses_moments) {
             return Cow::Borrowed(&self.parameters);
@@ -103,7 +105,7 @@ impl Model {
         Cow::Owned(self.parameters.iter().map(parameter).collect())
     }
 
-    /// Returns true if a parameter changes the loads, not the geometry or what deflects.
+    /// Returns true if a parameter changes the loads, but neither geometry nor compliance.
     fn is_load(&self, parameter: &Parameter) -> bool {
         parameter.site.is_load() || self.payload_axis(parameter.site).is_some()
     }

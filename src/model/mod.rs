@@ -206,7 +206,8 @@ impl Model {
         self.arm_with(x, |_| true)
     }
 
-    /// Returns the arm whose parameter k deviates by `x(k)` from nominal if it is `selected`.
+    /// Returns the arm whose parameter k deviates by `x(k)` from nominal if `selected` is true for
+    /// it, and otherwise keeps its nominal value.
     fn arm_with<S: Scalar>(
         &self,
         x: impl Fn(usize) -> S,
@@ -244,12 +245,14 @@ impl Model {
         .filter(|_| self.payload_follows)
     }
 
-    /// Returns the terms that add to the joints' commands at the full parameter vector `x`.
+    /// Returns the terms that add to the joints' commands, strains and small motions at the full
+    /// parameter vector `x`.
     fn commands(&self, x: &[f64]) -> CommandTerms {
         CommandTerms::new(&self.fixed_terms, &self.parameters_at(x), x)
     }
 
-    /// Returns the instrument at the full parameter vector `x`.
+    /// Returns the errors of the instrument and the rotations of the bases at the full parameter
+    /// vector `x`.
     fn instrument_at(&self, x: &[f64]) -> Instrument {
         self.instrument.with(&self.parameters_at(x), x)
     }
@@ -279,7 +282,7 @@ impl Model {
             .collect()
     }
 
-    /// Returns the index of the joint whose frame carries a target.
+    /// Returns the index of the joint whose frame carries a target, from 0.
     pub(crate) fn target_joint(&self, target: usize) -> usize {
         self.target_joints.get(target).copied().unwrap_or_else(|| self.nominal.last())
     }
@@ -296,7 +299,7 @@ impl Model {
         targets
     }
 
-    /// Returns true if the problem declares number `axis` of a fixture.
+    /// Returns true if the problem declares the number with index `axis` of a fixture.
     pub(crate) fn declares_fixture_coordinate(&self, fixture: usize, axis: usize) -> bool {
         self.declared
             .get(fixture)
@@ -326,7 +329,7 @@ impl Model {
         point().unwrap_or_default()
     }
 
-    /// Returns the values of points, anchors, surfaces, cameras and markers at `x`.
+    /// Returns the numbers of all points, anchors, surfaces, cameras and markers at `x`.
     pub(crate) fn fixtures(&self, x: &[f64]) -> Vec<FixtureValues<f64>> {
         let mut fixtures = self.fixtures.clone();
         for (parameter, x) in self.parameters.iter().zip(x) {

@@ -1,5 +1,5 @@
-//! Derivatives of an orientation, from those of points: the ends of the target's axes show how the
-//! target rotates.
+//! Derivatives of an orientation, computed from those of points: the motions of the ends of the
+//! target's axes give its rotation.
 
 use nalgebra::Vector3;
 
@@ -10,7 +10,8 @@ use crate::least_squares::Block;
 use crate::problem::PoseView;
 use crate::spatial::{Frame, inverse_right_jacobian, rotation_between};
 
-/// Number of derivative rows of four points: the target and the ends of its three axes, 1 m long.
+/// Number of rows for the derivatives of four points: the target and the ends of its three axes, 1
+/// m long.
 pub(super) const POINT_ROWS: usize = 12;
 
 /// Pose, base and target at which an orientation is differentiated.

@@ -44,7 +44,7 @@ pub enum PartSite {
 /// Term of a prediction: value × regressor adds to the quantity of a site.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PartTerm {
-    /// Place whose quantity the term adds to.
+    /// Quantity that the term adds to.
     pub site: PartSite,
     /// Function of the pose.
     pub regressor: Regressor,
@@ -52,10 +52,10 @@ pub struct PartTerm {
     pub value: f64,
 }
 
-/// Everything that a prediction of a position or orientation needs.
+/// Numbers from which the position and orientation of a target are predicted.
 #[derive(Debug, Clone)]
 pub struct ModelParts {
-    /// Arm with its parameters.
+    /// Arm with the values of its parameters.
     pub arm: Arm<f64>,
     /// Terms of joints, beams, bases and instrument.
     pub terms: Vec<PartTerm>,

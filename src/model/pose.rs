@@ -1,4 +1,4 @@
-//! Measured rows as the model takes them.
+//! Measured rows in the form that the model predicts.
 
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -15,10 +15,10 @@ pub struct Pose<'a> {
     pub target: usize,
     /// Quantity that is measured.
     pub observation: Observation,
-    /// Measured numbers, followed by zeros \[m\] or \[rad\]: a position in the measuring frame, a
-    /// distance, tilts, 0 for a contact.
+    /// Measured numbers, followed by zeros \[m\], \[rad\] or \[px\]: a position in the measuring
+    /// frame, a distance, tilts, a pixel, 0 for a contact.
     pub measured: &'a Vector3<f64>,
-    /// 1 σ of each number \[m\] or \[rad\].
+    /// 1 σ of each measured number \[m\], \[rad\] or \[px\].
     pub sigma: f64,
     /// Orientation of the target, if it is fitted.
     pub orientation: Option<MeasuredOrientation<'a>>,

@@ -15,7 +15,7 @@ use super::predictor::{Prediction, Predictor};
 use crate::least_squares::{Block, CHUNK_ITEMS, LeastSquares};
 use crate::observation::Needs;
 
-/// Number of residuals of a row without an orientation; with one, a row has twice as many.
+/// Number of residuals of a row if no row has an orientation.
 const POSITION_RESIDUALS: usize = 3;
 const POSE_RESIDUALS: usize = 6;
 
@@ -34,7 +34,7 @@ pub struct PoseResiduals<'a> {
     fixed: DVector<f64>,
     residuals_per_row: usize,
     measures_tilts: bool,
-    /// Jacobian at a point, which is reused if the residuals are linearised there.
+    /// Linear model whose derivatives are reused if the residuals are linearised at its point.
     linear_model: Option<&'a LinearModel>,
 }
 
@@ -93,7 +93,7 @@ impl<'a> PoseResiduals<'a> {
         &self.unknowns
     }
 
-    /// Returns measured − predicted of each row \[m\] or \[rad\]; NaN without equilibrium.
+    /// Returns measured − predicted of each row \[m\], \[rad\] or \[px\]; NaN without equilibrium.
     pub fn position_errors(&self, x: &DVector<f64>) -> Vec<Vector3<f64>> {
         self.errors(x, |pose, predicted| pose.measured - predicted.numbers)
     }

@@ -13,15 +13,15 @@ use crate::observation::{FixtureValues, Needs, Observation};
 use crate::spatial::{Frame, rotation_between};
 
 impl Model {
-    /// Returns measured − predicted of each row at the full parameter vector `x` \[m\] or \[rad\];
-    /// NaN without equilibrium.
+    /// Returns measured − predicted of each row at the full parameter vector `x` \[m\], \[rad\] or
+    /// \[px\]; NaN without equilibrium.
     #[doc(hidden)]
     pub fn residuals(&self, poses: Vec<Pose>, x: &DVector<f64>) -> Vec<Vector3<f64>> {
         PoseResiduals::new(self, poses, Vec::new(), x.clone()).position_errors(&DVector::zeros(0))
     }
 
-    /// Returns the predicted numbers of each row at the full parameter vector `x` \[m\] or
-    /// \[rad\]; NaN without equilibrium.
+    /// Returns the predicted numbers of each row at the full parameter vector `x` \[m\], \[rad\] or
+    /// \[px\]; NaN without equilibrium.
     #[doc(hidden)]
     pub fn predict(&self, poses: Vec<Pose>, x: &DVector<f64>) -> Vec<Vector3<f64>> {
         let measured: Vec<Vector3<f64>> = poses.iter().map(|pose| *pose.measured).collect();
@@ -44,8 +44,8 @@ impl Model {
             .orientation_errors(&DVector::zeros(0))
     }
 
-    /// Returns measured − predicted of each row at the full parameter vector `x` \[m\] or \[rad\],
-    /// with rigid links and joints and without effects on the arm.
+    /// Returns measured − predicted of each row at the full parameter vector `x` \[m\], \[rad\] or
+    /// \[px\], with rigid links and joints and without effects on the arm.
     pub(crate) fn geometric_residuals(&self, poses: &[Pose], x: &[f64]) -> Vec<Vector3<f64>> {
         let mut predictor = Predictor::rigid(self, x);
         poses.iter().map(|pose| pose.measured - predictor.predict(pose).numbers).collect()
@@ -133,8 +133,8 @@ impl Model {
         self.map(poses, x, |predictor, pose| predictor.carriers(pose))
     }
 
-    /// Converts image errors to lengths at the observed points, at the full parameter vector `x`
-    /// \[m\]: along u and v, error / focal length × depth. Rows of other kinds are left out.
+    /// Converts image errors \[px\] to lengths at the observed points \[m\], at the full parameter
+    /// vector `x`: along u and v, error / focal length × depth. Rows of other kinds are left out.
     pub(crate) fn lengths_at_points(
         &self,
         poses: &[Pose],

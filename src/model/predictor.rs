@@ -27,6 +27,7 @@ pub(super) struct Predictor<'m> {
     fixtures: Vec<FixtureValues<f64>>,
     instrument: Instrument,
     commands: CommandTerms,
+    /// Frames of the arm for tilts, created by the first row that measures one.
     tilts: Option<TiltDerivatives>,
     state: StaticState,
     workspace: Workspace<f64>,
@@ -34,7 +35,7 @@ pub(super) struct Predictor<'m> {
 
 /// Predicted numbers and orientation of a row.
 pub(super) struct Prediction {
-    /// Predicted numbers \[m\] or \[rad\], followed by zeros.
+    /// Predicted numbers \[m\], \[rad\] or \[px\], followed by zeros.
     pub numbers: Vector3<f64>,
     /// Rotation vector from the predicted to the measured orientation, measuring frame \[rad\]. It
     /// is 0 for a planned orientation without a measured value; `None` if the row has no
@@ -113,9 +114,9 @@ impl<'m> Predictor<'m> {
     /// Returns the predicted numbers and orientation of a row; NaN if the pose has no equilibrium.
     #[inline]
     pub fn predict(&mut self, pose: &Pose) -> Prediction {
-        let lost = Vector3::from_element(f64::NAN);
+        let undefined = Vector3::from_element(f64::NAN);
         self.try_predict(pose)
-            .unwrap_or(Prediction { numbers: lost, turn: pose.orientation.map(|_| lost) })
+            .unwrap_or(Prediction { numbers: undefined, turn: pose.orientation.map(|_| undefined) })
     }
 
     fn try_predict(&mut self, pose: &Pose) -> Option<Prediction> {

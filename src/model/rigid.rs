@@ -1,9 +1,9 @@
 //! Derivatives of a rigid arm with respect to its parameters.
 //!
-//! Every parameter belongs to one motion. An inward pass carries the target through each motion in
-//! dual numbers and gives its derivative in the frame before that motion. An outward pass computes
-//! these frames in real numbers. In a tree of joints, both follow the path from base to target;
-//! parameters elsewhere have no effect.
+//! Every parameter belongs to one elementary motion of a link. An inward pass transforms the target
+//! through each motion in dual numbers, from tip to base, and gives its derivative in the frame
+//! before that motion. An outward pass computes these frames in real numbers. In a tree of joints,
+//! both follow the path from base to target; parameters elsewhere have no effect.
 
 use nalgebra::Vector3;
 use num_dual::Dual64;
@@ -40,12 +40,12 @@ struct Link {
     moving: [Option<usize>; 2 * MOTION],
 }
 
-/// Derivatives of the target with respect to the five motions of a link, each in the frame before
-/// its motion, and the joint's coordinates.
+/// Derivatives of the target with respect to α, a, θ, d, β of a link, each in the frame before its
+/// motion, and the joint's coordinates.
 struct Carried {
     derivatives: [Vector3<f64>; 5],
     coordinates: Coordinates<Dual64>,
-    /// Derivatives with respect to the small motions, if the link has some.
+    /// Derivatives with respect to the small motions; `None` if the link has none.
     motions: Option<MotionLevers>,
 }
 
@@ -71,8 +71,9 @@ impl Rigid {
         Self { links, tree: arm.tree.clone(), inputs, carried: Vec::new(), placed: Vec::new() }
     }
 
-    /// Writes the derivatives of a target, given by its position \[m\] in the frame of the joint
-    /// `tip`. Returns the frame of `tip`, measuring frame.
+    /// Writes the derivatives of a target with respect to all inputs into `rows`. The target is
+    /// given by its position \[m\] in the frame of the joint `tip`. Returns the frame of `tip`,
+    /// measuring frame.
     #[inline]
     pub fn write(
         &mut self,
@@ -85,11 +86,11 @@ impl Rigid {
         carried.clear();
         placed.clear();
         let mut point = *target;
-        let way = || {
+        let links_on_path = || {
             let path = links.iter().zip(setup.configuration).enumerate();
             path.filter(|(joint, _)| tree.path_contains(*joint, tip))
         };
-        for (joint, (link, &q)) in way().rev() {
+        for (joint, (link, &q)) in links_on_path().rev() {
             let coordinates = link.joint.coordinates(q);
             let motion = link.motion(setup.motion(joint));
             let (derivatives, motions);
@@ -103,12 +104,12 @@ impl Rigid {
         }
         let mut frame = *base;
         for ((joint, (link, _)), Carried { derivatives, coordinates, motions }) in
-            way().zip(carried.iter().rev())
+            links_on_path().zip(carried.iter().rev())
         {
             if let Some((placement, derivatives)) =
                 link.joint.placement.as_ref().and_then(|placement| Some((placement, placed.pop()?)))
             {
-                place(placement, &mut frame, |place, frame| {
+                advance_through(placement, &mut frame, |place, frame| {
                     if let Some(input) = link.placing[place] {
                         rows.put_input(
                             &inputs[input],
@@ -129,13 +130,13 @@ impl Rigid {
                 }
             };
             link.advance(coordinates, &mut frame, motion.as_ref(), |place, frame| match place {
-                Place::Geometry(place) => {
+                LinkMotion::Geometry(place) => {
                     if let Some(input) = link.inputs[place] {
                         let column = frame.vector(&derivatives[place]);
                         rows.put_input(&inputs[input], commanded, &column);
                     }
                 }
-                Place::Motion(side) => write_motion(side, frame, rows),
+                LinkMotion::Motion(side) => write_motion(side, frame, rows),
             });
         }
         frame
@@ -166,8 +167,9 @@ impl Link {
         Some(of_pose.copied().unwrap_or_default())
     }
 
-    /// Transforms a point \[m\] from the frame behind the link to the frame before it. Returns
-    /// first its derivatives with respect to α, a, θ, d, β, then the point.
+    /// Transforms a point \[m\] from the frame behind the link to the frame before it. Returns its
+    /// derivatives with respect to α, a, θ, d, β, those with respect to small motions, if any, and
+    /// the point.
     #[inline]
     fn carry(
         &self,
@@ -192,36 +194,37 @@ impl Link {
         ([by_alpha, by_a, by_theta, by_d, by_beta], motions, point)
     }
 
-    /// Moves `frame` through the link. Calls `before` with the index of each motion and the frame
-    /// before it.
+    /// Moves `frame` from before the link to behind it. Calls `before` with each elementary motion
+    /// and the frame before it.
     #[inline]
     fn advance(
         &self,
         at: &Coordinates<Dual64>,
         frame: &mut Frame<f64>,
         motion: Option<&[f64; 2 * MOTION]>,
-        mut before: impl FnMut(Place, &Frame<f64>),
+        mut before: impl FnMut(LinkMotion, &Frame<f64>),
     ) {
         let Joint { alpha, a, beta, .. } = &self.joint;
-        let displaced =
-            |side: usize, frame: &mut Frame<f64>, before: &mut dyn FnMut(Place, &Frame<f64>)| {
-                if let Some(motion) = motion {
-                    before(Place::Motion(side), frame);
-                    let [translation, rotation] = vectors(motion, SIDES[side]);
-                    frame.translate(&translation);
-                    frame.rotate(&rotation);
-                }
-            };
-        before(Place::Geometry(0), frame);
+        let displaced = |side: usize,
+                         frame: &mut Frame<f64>,
+                         before: &mut dyn FnMut(LinkMotion, &Frame<f64>)| {
+            if let Some(motion) = motion {
+                before(LinkMotion::Motion(side), frame);
+                let [translation, rotation] = vectors(motion, SIDES[side]);
+                frame.translate(&translation);
+                frame.rotate(&rotation);
+            }
+        };
+        before(LinkMotion::Geometry(0), frame);
         frame.rotate_x(real(alpha.sin_cos));
-        before(Place::Geometry(1), frame);
+        before(LinkMotion::Geometry(1), frame);
         frame.translate_x(a.re);
         displaced(0, frame, &mut before);
-        before(Place::Geometry(2), frame);
+        before(LinkMotion::Geometry(2), frame);
         frame.rotate_z(real(at.angle));
-        before(Place::Geometry(3), frame);
+        before(LinkMotion::Geometry(3), frame);
         frame.translate_z(at.offset.re);
-        before(Place::Geometry(4), frame);
+        before(LinkMotion::Geometry(4), frame);
         frame.rotate_y(real(beta.sin_cos));
         displaced(1, frame, &mut before);
     }
@@ -229,18 +232,19 @@ impl Link {
 
 /// Elementary motion of a link: one of its geometry, or a small motion on one side of the joint.
 #[derive(Clone, Copy)]
-enum Place {
+enum LinkMotion {
     Geometry(usize),
     Motion(usize),
 }
 
-/// Returns translation and rotation vector of a small motion.
+/// Returns the translation \[m\] and the rotation vector \[rad\] of the small motion whose six
+/// numbers start at `first`.
 fn vectors(motion: &[f64; 2 * MOTION], first: usize) -> [Vector3<f64>; 2] {
     [first, first + 3].map(|first| Vector3::from_column_slice(&motion[first..first + 3]))
 }
 
-/// Carries a point \[m\] from behind a small motion to before it, and writes its derivatives in the
-/// frame before it.
+/// Transforms a point \[m\] from the frame behind a small motion to the frame before it. Writes its
+/// derivatives, in the frame before the motion, into `motions`.
 fn displace(
     motion: &[f64; 2 * MOTION],
     motions: &mut [Vector3<f64>; 2 * MOTION],
@@ -273,9 +277,9 @@ fn carry_through(
     ([x, y, z, by_roll, by_pitch, by_yaw], point + placement.xyz.map(|coordinate| coordinate.re))
 }
 
-/// Moves `frame` through a placement. Calls `before` with the index of each motion and the frame
-/// before it.
-fn place(
+/// Moves `frame` from before a placement to behind it. Calls `before` with the index of each number
+/// (x, y, z, roll, pitch, yaw) and the frame before its motion.
+fn advance_through(
     placement: &Placement<Dual64>,
     frame: &mut Frame<f64>,
     mut before: impl FnMut(usize, &Frame<f64>),

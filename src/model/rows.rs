@@ -1,4 +1,4 @@
-//! Rows of a block that hold the derivatives of one pose.
+//! Rows of a block that contain the derivatives of one predicted vector.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -62,8 +62,8 @@ impl Rows<'_> {
     }
 }
 
-/// Sets all entries of the reused block `points` to zero, because the last row may have used
-/// columns of another base.
+/// Sets all entries of the reused block `points` to zero, because the previous pose may have
+/// written columns that this one does not.
 pub(super) fn clear(points: &mut Block) {
     for column in 0..points.parameters() {
         points.column_mut(column).fill(0.0);

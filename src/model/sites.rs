@@ -9,8 +9,8 @@ use crate::scalar::Scalar;
 use crate::spatial::rotate;
 use nalgebra::Vector3;
 
-/// Creates the part of the arm that a parameter at `site` needs, if it is absent. The part starts
-/// at `nominal`, where the arm behaves as without it.
+/// Creates the part of the arm that a parameter at `site` needs, if it is absent. With the
+/// parameter at `nominal`, the arm behaves as without this part.
 pub(super) fn prepare_site(arm: &mut Arm<f64>, site: ParameterSite, nominal: f64) {
     match site {
         ParameterSite::Joint { joint, field } => {
@@ -101,8 +101,8 @@ pub(super) fn rotate_gravity<S: Scalar>(arm: &mut Arm<S>, [x, y]: [S; 2]) {
     arm.gravity = rotate(&Vector3::new(x, y, S::from(0.0)), &arm.gravity);
 }
 
-/// Sets a site of the arm to its nominal value plus a deviation x. Effects add to the declared
-/// value.
+/// Sets the quantity at a site of the arm to `nominal` plus a deviation `x`. Parameters of effects
+/// add to the declared value.
 ///
 /// The angles that rotate gravity are collected in `tilt`, because both belong to one rotation
 /// vector.

@@ -40,7 +40,8 @@ impl TiltDerivatives {
         }
     }
 
-    /// Returns the axes of a frame, arm base frame; `None` if the pose has no equilibrium.
+    /// Returns the axes of frame `frame` (0 is the base, i that of joint i), arm base frame; `None`
+    /// if the pose has no equilibrium.
     pub fn axes(&mut self, setup: &PoseView, frame: usize) -> Option<[Vector3<f64>; 3]> {
         let Self { arm, unseeded, state, real, dual, .. } = self;
         arm.equilibrate(setup, real, state).ok()?;
@@ -57,7 +58,7 @@ impl TiltDerivatives {
         rows: &mut Rows,
     ) -> Option<Vector3<f64>> {
         let frame = observation.frame();
-        let axes_at_rest = self.axes(setup, frame)?;
+        let real_axes = self.axes(setup, frame)?;
         let Self { arm, inputs, state, dual, .. } = self;
         for (input, seeded) in inputs {
             let axes = axes(seeded, setup, frame, state, dual);
@@ -68,12 +69,13 @@ impl TiltDerivatives {
             });
             rows.put_input(input, commanded, &tilts.map(|tilt| tilt.eps));
         }
-        let scene = Scene { frame: axes_at_rest, gravity: arm.gravity, ..Scene::default() };
+        let scene = Scene { frame: real_axes, gravity: arm.gravity, ..Scene::default() };
         Some(observation.predict(&scene))
     }
 }
 
-/// Returns the axes of a frame of the arm that does not deflect, arm base frame.
+/// Returns the axes of frame `frame` (0 is the base, i that of joint i) of the undeflected arm, arm
+/// base frame.
 pub(super) fn rigid_frame_axes(
     arm: &Arm<f64>,
     setup: &PoseView,

@@ -1,4 +1,4 @@
-//! Points, anchors and surfaces around the arm; cameras and markers, which the arm may carry.
+//! Points, anchors and surfaces around the arm; cameras and markers, which may move with the arm.
 
 use nalgebra::Vector3;
 

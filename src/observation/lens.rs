@@ -35,7 +35,8 @@ pub(super) fn distorted<S: Scalar>(camera: &FixtureValues<S>, x: S, y: S) -> [S;
     [x * radial + p1 * twice_xy + p2 * (r2 + xx), y * radial + p1 * (r2 + yy) + p2 * twice_xy]
 }
 
-/// Returns the slopes X/Z and Y/Z of the ray through a pixel.
+/// Returns the slopes X/Z and Y/Z of the ray through a pixel \[px\]; without distortion if the
+/// inverse of the distortion is not finite.
 pub(crate) fn slopes_of_pixel(camera: &FixtureValues<f64>, [u, v]: [f64; 2]) -> [f64; 2] {
     let [_, _, _, _, _, _, fx, fy, cx, cy, ..] = camera.numbers;
     let measured = Vector2::new((u - cx) / fx, (v - cy) / fy);

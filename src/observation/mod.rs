@@ -34,7 +34,8 @@ use crate::spatial::{Frame, rotate};
 pub struct Slopes {
     /// Predicted numbers, padded with zeros, in the units of the observation.
     pub value: Vector3<f64>,
-    /// Derivative with respect to the position of the target, or of the point of the second fixture.
+    /// Derivative with respect to the position of the target, or of the point of the second
+    /// fixture.
     pub by_target: Matrix3<f64>,
     /// Derivative with respect to a small rotation of the base's axes, measuring frame [1/rad].
     pub by_base: Matrix3<f64>,
@@ -42,8 +43,8 @@ pub struct Slopes {
     pub by_fixtures: [SMatrix<f64, 3, MAX_NUMBERS>; 2],
 }
 
-/// Number of scalars before those of the fixtures: position of the target 3, rotation of the base
-/// 3.
+/// Number of input scalars before those of the fixtures: 3 for the position of the target, 3 for
+/// the rotation of the base.
 const INPUTS_BEFORE_FIXTURES: usize = 6;
 /// Number of input scalars of a prediction with two fixtures of at most four numbers.
 const INPUTS: usize = INPUTS_BEFORE_FIXTURES + 8;
@@ -53,7 +54,7 @@ const ALL_INPUTS: usize = INPUTS_BEFORE_FIXTURES + 2 * MAX_NUMBERS;
 /// Declares [`Observation`] and forwards each variant to the file of its kind.
 macro_rules! observations {
     ($($(#[$doc:meta])* $variant:ident $(($($index:ident: $type:ty),+))? => $kind:ident,)+) => {
-        /// Quantity measured by a row. Fixtures are counted in the order of
+        /// Quantity measured by a row. Fixtures are counted from 0, in the order of
         /// `Problem::fixtures`.
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
         pub enum Observation {
@@ -69,7 +70,8 @@ macro_rules! observations {
                 match self { $(Self::$variant { .. } => &$kind::KIND,)+ }
             }
 
-            /// Returns the predicted numbers of a row \[m\] or \[rad\], followed by zeros.
+            /// Returns the predicted numbers of a row \[m\], \[rad\] or \[px\], followed by
+            /// zeros.
             #[inline]
             pub fn predict<S: Scalar>(self, scene: &Scene<S>) -> Vector3<S> {
                 match self { $(Self::$variant { .. } => $kind::predict(scene),)+ }
@@ -158,36 +160,37 @@ impl Observation {
         self.description().name
     }
 
-    /// Returns the fixture that the target is measured against, if there is one.
+    /// Returns the index of the fixture against which the row measures the arm: a point, an anchor,
+    /// a surface or a camera. Returns `None` for positions, tilts and known distances.
     pub fn fixture(self) -> Option<usize> {
         self.fixtures()[0].filter(|_| self.is_of_arm())
     }
 
-    /// Returns the fixtures that the row refers to.
+    /// Returns the indices of the fixtures that the row refers to; `None` for missing ones.
     pub fn fixtures(self) -> [Option<usize>; 2] {
         let [first, second, _] = self.indices();
         if self.description().needs == Needs::Frame { [None; 2] } else { [first, second] }
     }
 
-    /// Returns the number of the point of the second fixture, if the row names one.
+    /// Returns the index of the point of the second fixture, from 0, if the row names one.
     pub(crate) fn point(self) -> Option<usize> {
         self.indices()[2]
     }
 
-    /// Returns a sort key: numbers that are equal for equal observations only.
+    /// Returns a sort key of four numbers, which two observations share only if they are equal.
     pub(crate) fn key(self) -> [usize; 4] {
         let kind = kinds().take_while(|kind| kind.name != self.kind()).count();
         let [first, second, third] = self.indices().map(|index| index.map_or(0, |index| index + 1));
         [kind, first, second, third]
     }
 
-    /// Returns true if the row measures a length on the arm.
+    /// Returns true if the row measures a position, a distance or a contact of the arm's target.
     pub(crate) fn measures_length(self) -> bool {
         self.is_of_arm() && self.description().unit == Unit::Length
     }
 
-    /// Returns true if the spread of the measured numbers shows how far the arm moves. This holds
-    /// for positions and tilts, but not for distances to fixtures.
+    /// Returns true if the spread of the measured numbers shows how far the arm moves. It is false
+    /// for contacts and for distances to fixtures.
     pub(crate) fn is_measured_directly(self) -> bool {
         self.is_position() || self.description().needs != Needs::Target
     }
@@ -208,7 +211,8 @@ impl Observation {
         self.description().needs != Needs::Fixtures
     }
 
-    /// Returns the frame whose tilt is measured; 0 for other rows.
+    /// Returns the frame whose tilt is measured: 0 is the base, i that of joint i. Returns 0 for
+    /// other rows.
     pub(crate) fn frame(self) -> usize {
         self.indices()[0].filter(|_| self.description().needs == Needs::Frame).unwrap_or(0)
     }

@@ -1,4 +1,4 @@
-//! Quantities that predictions start from.
+//! Quantities from which rows are predicted.
 
 use nalgebra::Vector3;
 

@@ -32,9 +32,12 @@ const MIN_SQUARED_COSINE: f64 = 1e-18;
 /// an axis a and the direction u against gravity.
 pub(super) fn predict<S: Scalar>(scene: &Scene<S>) -> Vector3<S> {
     let (zero, gravity) = (S::from(0.0), scene.gravity);
-    let weight = gravity.dot(&gravity).sqrt();
-    let up =
-        if weight.re() > 0.0 { -gravity / weight } else { Vector3::new(zero, zero, S::from(1.0)) };
+    let magnitude = gravity.dot(&gravity).sqrt();
+    let up = if magnitude.re() > 0.0 {
+        -gravity / magnitude
+    } else {
+        Vector3::new(zero, zero, S::from(1.0))
+    };
     let tilt = |axis: &Vector3<S>| {
         let sine = axis.dot(&up);
         let level = axis.cross(&up);

@@ -44,7 +44,7 @@ pub fn candidates(problem: &Problem, data: &DataCoverage) -> Vec<Candidate> {
         let found = found.flat_map(move |place| with_searched_values(family, place, data));
         found.filter_map(move |arguments| {
             let argument = |key: &str| {
-                arguments.iter().find(|(known, _)| *known == key).map(|(_, value)| value.clone())
+                arguments.iter().find(|(name, _)| *name == key).map(|(_, value)| value.clone())
             };
             let effect = Effect::build(family.name, argument)?;
             let conceivable = family.only.iter().all(|only| effect.meets(*only, problem));
@@ -110,7 +110,7 @@ fn places(family: &Family, problem: &Problem) -> Vec<Arguments> {
             .flat_map(|place| {
                 let others = values.iter().filter(|value| {
                     kind != ArgumentKind::OtherJoint
-                        || place.iter().all(|(_, known)| known != *value)
+                        || place.iter().all(|(_, other)| other != *value)
                 });
                 others.map(|value| [place.as_slice(), &[(key, value.clone())]].concat())
             })
@@ -157,8 +157,9 @@ fn with_searched_values(family: &Family, place: Arguments, data: &DataCoverage) 
 }
 
 impl Effect {
-    /// Returns the reason why these data cannot show this declared law; `None` if they can, or if
-    /// this is an effect of the catalogue, whose candidates carry their reason.
+    /// Returns the reason why these data cannot show this declared law; `None` if they can. Also
+    /// returns `None` for effects of the catalogue, whose reason [`Candidate::untestable`]
+    /// contains.
     pub(crate) fn untestable(
         &self,
         problem: &Problem,

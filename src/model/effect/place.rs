@@ -22,12 +22,12 @@ impl ParameterSite {
     }
 }
 
-/// Smallest moment from which the prior size of a compliance is derived [N·m]. Joints with little
-/// load thereby keep a wide prior.
+/// Smallest moment from which a prior size is derived [N·m]; smaller moments are raised to it.
+/// Otherwise a joint without load would get an infinite compliance and a spring without force.
 pub(super) const MIN_MOMENT: f64 = 10.0;
 
 /// Returns an upper estimate of the moment on a joint, counted from 1 [N·m]: weight of everything
-/// declared beyond it times the length of its longest branch.
+/// declared beyond it, payload included, times the length of its longest branch.
 pub(super) fn greatest_moment(problem: &Problem, joint: usize) -> f64 {
     let total_mass = |bodies: &[Body]| bodies.iter().map(|body| body.mass).sum::<f64>();
     let beam = |joint: &Joint| {
@@ -58,8 +58,8 @@ pub(super) fn greatest_moment(problem: &Problem, joint: usize) -> f64 {
         points_at_joint.map(|(_, at)| at.norm()).fold(0.0, f64::max)
     };
     let reach = |tip: usize| {
-        let way = beyond().filter(|(k, _)| tree.path_contains(*k, tip));
-        way.map(|(_, joint)| joint.a.hypot(joint.d)).sum::<f64>() + carried(tip)
+        let path = beyond().filter(|(k, _)| tree.path_contains(*k, tip));
+        path.map(|(_, joint)| joint.a.hypot(joint.d)).sum::<f64>() + carried(tip)
     };
     let tips = beyond().map(|(k, _)| k).chain([joint - 1]);
     problem.gravity.norm() * (mass + payload) * tips.map(reach).fold(0.0, f64::max)

@@ -108,8 +108,8 @@ impl Effect {
         })
     }
 
-    /// Returns the index of the joint that carries the link (beam) on which the effect acts; `None`
-    /// if there is none.
+    /// Returns the index of the joint, from 0, whose declaration contains the link (beam) on which
+    /// the effect acts; `None` if there is none.
     pub(super) fn beam(&self, problem: &Problem) -> Option<usize> {
         let Some(link) = self.link() else { return self.joint()?.checked_sub(1) };
         problem

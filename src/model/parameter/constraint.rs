@@ -28,11 +28,12 @@ pub struct LinearConstraint {
 }
 
 impl LinearConstraint {
-    /// Returns the constraint with indices into `kept`, a list of parameters; `None` if the
-    /// constraint contains a parameter that is not listed.
+    /// Returns the constraint on the parameters listed in `kept`, with positions in this list as
+    /// indices; `None` if it contains a parameter that is not listed.
     pub fn on(&self, kept: &[usize]) -> Option<Self> {
-        let place = |&(k, c): &(usize, f64)| Some((kept.iter().position(|&kept| kept == k)?, c));
-        let terms = self.terms.iter().map(place).collect::<Option<Vec<_>>>()?;
+        let renumbered =
+            |&(k, c): &(usize, f64)| Some((kept.iter().position(|&kept| kept == k)?, c));
+        let terms = self.terms.iter().map(renumbered).collect::<Option<Vec<_>>>()?;
         Some(Self { terms, ..self.clone() })
     }
 }

@@ -76,8 +76,8 @@ pub(crate) fn with_moments(parameter: &Parameter, moments: &Arc<AxisMoments<f64>
 /// parameters that are not free keep their start value.
 fn with_values_at(formula: &Formula, parameters: &[Parameter], x: &[f64]) -> Formula {
     let value = |(name, start): &(String, f64)| {
-        let place = parameters.iter().position(|parameter| parameter.name == *name);
-        let value = place.map_or(*start, |k| parameters[k].value(x[k]));
+        let index = parameters.iter().position(|parameter| parameter.name == *name);
+        let value = index.map_or(*start, |k| parameters[k].value(x[k]));
         (name.clone(), value)
     };
     formula.with_parameters(formula.parameters().iter().map(value).collect())

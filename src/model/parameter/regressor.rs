@@ -11,7 +11,7 @@ use crate::problem::{PoseView, Problem, ThermalLag};
 
 /// Function of a pose that multiplies a parameter at its site.
 ///
-/// Joints are counted from 0. Harmonics of integer order are variants of their own, because sums of
+/// Joints are counted from 0. Harmonics of integer order are separate variants, because sums of
 /// many of them are evaluated in one pass.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
@@ -24,7 +24,7 @@ pub enum Regressor {
     Sine(usize, u32),
     /// Function cos kq of a joint's command q and an order k.
     Cosine(usize, u32),
-    /// Formula other than a harmonic of integer order.
+    /// Formula that is no harmonic of integer order.
     Formula(Arc<Formula>),
     /// Marker of a parameter inside formulas: it multiplies nothing (value 0).
     Inner,
@@ -133,7 +133,8 @@ impl Formula {
         }
     }
 
-    /// Returns the derivative of a quantity with respect to the command of a joint, counted from 0.
+    /// Returns the derivative of a quantity in a pose with respect to the command of a joint,
+    /// counted from 0.
     fn quantity_slope(&self, quantity: Quantity, setup: &PoseView, joint: usize) -> f64 {
         match quantity {
             Quantity::Moment(about) => {
@@ -170,7 +171,7 @@ impl Formula {
         self.moments.is_some()
     }
 
-    /// Returns the formula with its axis moments replaced by `moments`, those of other loads.
+    /// Returns the formula with its moments about the joint axes replaced by `moments`.
     pub(super) fn with_moments(&self, moments: Arc<AxisMoments<f64>>) -> Self {
         Self { moments: Some(moments), ..self.clone() }
     }
@@ -334,7 +335,8 @@ impl Regressor {
         }
     }
 
-    /// Returns the regressor's value in each pose. Consecutive harmonics are evaluated faster.
+    /// Returns the regressor's value in each pose. A lagged temperature is continued from pose to
+    /// pose, which is faster than computing it anew for each.
     pub(crate) fn values<'p>(&self, poses: impl Iterator<Item = &'p PoseView<'p>>) -> Vec<f64> {
         let (Self::Formula(formula), Some(Quantity::Lagging { time_constant })) =
             (self, self.as_quantity())

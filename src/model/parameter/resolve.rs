@@ -22,7 +22,8 @@ pub(super) struct Candidate {
     effect_sigma: Option<f64>,
     /// Bounds of a parameter of an effect, SI.
     limits: (f64, f64),
-    /// True for a number that the problem does not declare, which is free unless a rule holds it.
+    /// True for a number of a fixture that the problem does not declare: it is free, and no rule
+    /// may fix it.
     unknown: bool,
 }
 
@@ -125,7 +126,7 @@ pub fn resolve(
     for (candidate, rule) in candidates.into_iter().zip(decided) {
         if let (true, Some(rule), ParameterSite::Fixture { kind, axis, .. }) =
             (candidate.unknown, rule, candidate.site)
-            && !matches!(&rule.freedom, Freedom::Free { sigma, .. } if of_kind(sigma, candidate.unit()).is_none())
+            && !matches!(&rule.freedom, Freedom::Free { sigma, .. } if quantity_in(sigma, candidate.unit()).is_none())
         {
             let kind = InputErrorKind::UnknownPlaceHeld {
                 parameter: candidate.name,
@@ -136,9 +137,9 @@ pub fn resolve(
         let none = Quantities::default();
         let (sigma, min, max) = match (rule.map(|rule| &rule.freedom), candidate.effect_sigma) {
             (Some(Freedom::Free { sigma, min, max }), _) => {
-                (of_kind(sigma, candidate.unit()), min, max)
+                (quantity_in(sigma, candidate.unit()), min, max)
             }
-            // Without a known unit, the size of σ cannot be judged.
+            // A σ that is not finite belongs to a parameter of unknown unit, which gets no prior.
             (None, Some(sigma)) => (Some(sigma).filter(|sigma| sigma.is_finite()), &none, &none),
             (None, None) if candidate.unknown => (None, &none, &none),
             (Some(Freedom::Fixed), _) | (None, None) => continue,
@@ -147,8 +148,9 @@ pub fn resolve(
             continue;
         }
         let unit = candidate.unit();
-        let bound =
-            |q: &Quantities| of_kind(q, unit).map(|v| if unit.is_relative() { v.ln() } else { v });
+        let bound = |q: &Quantities| {
+            quantity_in(q, unit).map(|v| if unit.is_relative() { v.ln() } else { v })
+        };
         parameters.push(Parameter {
             name: candidate.name,
             site: candidate.site,
@@ -194,8 +196,8 @@ pub fn holds_all(problem: &Problem, parameters: &[EffectParameter]) -> bool {
     !parameters.is_empty() && parameters.iter().all(held)
 }
 
-/// Returns true if a rule of `problem` that matches only effects would be an error for these
-/// parameters, because it gives no quantity in their unit.
+/// Returns true if a rule of `problem` would be an error once an effect with these parameters is
+/// declared: it matches only effects and gives no quantity in their unit.
 pub fn refuses(problem: &Problem, parameters: &[EffectParameter]) -> bool {
     let none = [String::new()];
     let is_for_arm = |rule| {
@@ -320,7 +322,7 @@ pub(super) fn candidates(
 fn check_kinds(rule: &ParameterRule, candidates: &[Candidate]) -> Result<(), InputError> {
     let Freedom::Free { sigma, min, max } = &rule.freedom else { return Ok(()) };
     let fail = |kind| Err(rule.location.clone().error(kind));
-    let given = |unit| [sigma, min, max].iter().any(|q| of_kind(q, unit).is_some());
+    let given = |unit| [sigma, min, max].iter().any(|q| quantity_in(q, unit).is_some());
     let kinds = [Unit::Angle, Unit::Length, Unit::Pixel, Unit::TorsionalStiffness];
     if !kinds.iter().any(|&unit| given(unit)) {
         return Ok(());
@@ -356,7 +358,7 @@ fn applies_to_unit(rule: &ParameterRule, unit: Unit) -> bool {
     let Freedom::Free { sigma, min, max } = &rule.freedom else { return true };
     let quantities = [sigma, min, max];
     quantities.iter().all(|q| **q == Quantities::default())
-        || quantities.iter().any(|q| of_kind(q, unit).is_some())
+        || quantities.iter().any(|q| quantity_in(q, unit).is_some())
 }
 
 fn suffixes(unit: Unit) -> &'static str {
@@ -369,7 +371,7 @@ fn suffixes(unit: Unit) -> &'static str {
     }
 }
 
-fn of_kind(quantities: &Quantities, unit: Unit) -> Option<f64> {
+fn quantity_in(quantities: &Quantities, unit: Unit) -> Option<f64> {
     match unit {
         Unit::Angle => quantities.angle,
         Unit::Length => quantities.length,

@@ -61,7 +61,7 @@ pub enum ParameterSite {
         /// Axis 0, 1 or 2.
         axis: usize,
     },
-    /// Relative error of every measured coordinate.
+    /// Relative scale error s of the instrument: a position p reads as p (1 + s).
     Scale,
     /// Entry of the strain E of the measuring frame: p reads as p + E p. E is triangular, in the
     /// order xx, yy, zz, xy, xz, yz.
@@ -137,7 +137,8 @@ impl ParameterSite {
         }
     }
 
-    /// Returns true for elastic and load parameters (stiffness, mass, force), false for geometry.
+    /// Returns true for stiffnesses, compliances and loads (mass, force, gravity), false for
+    /// geometry and errors of the instrument.
     pub fn is_elastic(self) -> bool {
         match self {
             Self::Joint { field, .. } => {
@@ -156,7 +157,7 @@ impl ParameterSite {
         }
     }
 
-    /// Returns true for errors of masses, payload, hoists and gravity.
+    /// Returns true for errors of loads: masses, payload, hoists and gravity.
     pub(crate) fn is_load(self) -> bool {
         match self {
             Self::Beam { field, .. } => matches!(field, BeamField::AddedMass | BeamField::AddedAt),

@@ -1,10 +1,10 @@
-//! Values of many regressors in one pose, with waves taken from each other.
+//! Values of many regressors in one pose, with harmonics computed from one another.
 
 use super::regressor::Regressor;
 use crate::problem::PoseView;
 
-/// Largest order difference to the last harmonic that recurrence bridges. For a larger one, a sine
-/// and a cosine are cheaper.
+/// Largest difference in order between two harmonics of a joint that recurrence bridges. For a
+/// larger one, computing sine and cosine is cheaper.
 const MAX_ORDER_STEPS: u32 = 4;
 
 /// Evaluates many regressors in one pose. A harmonic is computed by recurrence from the last one if
