@@ -15,7 +15,7 @@ use crate::fit::stages::fixture_location::locate;
 use crate::fit::stages::placement::ASSUMED_SIGMA;
 use crate::fit::stages::registration::register;
 use crate::fit::stages::stage::{Stage, StageError};
-use crate::fit::uncertainty::residual_lengths::outlying;
+use crate::fit::uncertainty::residual_lengths::are_outliers;
 use crate::fit::{ErrorSummary, Placement, SolverChoice};
 use crate::least_squares::LinearisationCache;
 use crate::measurement::{Measurements, Split};
@@ -338,7 +338,7 @@ fn residuals(
     let whitened: Vec<Vector3<f64>> =
         errors.iter().zip(sigmas).map(|(error, sigma)| error / sigma.unwrap_or(f64::NAN)).collect();
     let lengths: Vec<f64> = whitened.iter().map(Vector3::norm).collect();
-    let outliers = outlying(&lengths, coordinates);
+    let outliers = are_outliers(&lengths, coordinates);
     let held_out =
         |row: usize| split.is_some_and(|split| split.held_out.binary_search(&row).is_ok());
     let residual =

@@ -11,7 +11,7 @@ use super::misfit::{MAX_MISS, MAX_UNREPORTED_RESIDUAL, MIN_SPREAD};
 use super::outliers::{Outlier, places};
 use super::row_kind::{RowKind, rows as noun, size};
 use crate::fit::stages::fitting::Fitting;
-use crate::fit::uncertainty::residual_lengths::{chances, scatter};
+use crate::fit::uncertainty::residual_lengths::{noise_lengths_of_all, scatter};
 use crate::least_squares::{Block, CHUNK_ITEMS, LeastSquares as _};
 use crate::measurement::Measurements;
 use crate::numeric::median;
@@ -69,13 +69,13 @@ pub(in crate::fit) fn outliers(
         (0..rows.len().div_ceil(CHUNK_ITEMS)).into_par_iter().flat_map_iter(of_chunk).collect();
     let numbers: Vec<usize> =
         stage.poses.iter().map(|pose| pose.observation.coordinates()).collect();
-    let chances = chances(&numbers);
-    let scatter = scatter(&lengths, &chances).max(1.0);
+    let noise_lengths = noise_lengths_of_all(&numbers);
+    let scatter = scatter(&lengths, &noise_lengths).max(1.0);
     let errors = fitting.position_errors(rows, x);
     let outlier = |place: usize| {
         let (row, distance) = (rows[place], lengths[place] / scatter);
         let outlier_of_row = || Outlier::new(fitting.measurements, row, distance, errors[place]);
-        (distance > chances[place].1).then(outlier_of_row)
+        (distance > noise_lengths[place].1).then(outlier_of_row)
     };
     (0..rows.len()).filter_map(outlier).collect()
 }

@@ -1,4 +1,4 @@
-//! Constraints on whose limits a fit rests.
+//! Constraints that are active in a fit, because the fit rests on one of their limits.
 
 use crate::error::Location;
 use crate::fit::stages::active_limits::Held;
@@ -11,23 +11,23 @@ use crate::quantity::Unit;
 #[doc(hidden)]
 #[derive(Debug, Clone, PartialEq)]
 pub struct ActiveConstraint {
-    /// Index of the constraint in the model.
+    /// Index of the constraint among those of the model, in the order of the file.
     pub constraint: usize,
-    /// Limit in words, such as `ln A.EI − ln B.EI ≥ 0`.
+    /// Text of the constraint with its active limit, such as `ln A.EI − ln B.EI ≥ 0`.
     pub words: String,
     /// Limit (lower or upper) that is active.
     pub side: AtBound,
     /// Shadow price of moving the limit outwards, per unit of the limit.
     pub shadow_price: ShadowPrice,
-    /// Unit of the terms; stiffnesses and rigidities enter by their logarithms.
+    /// Unit of the terms of the constraint; stiffnesses and rigidities enter by their logarithms.
     pub unit: Unit,
     /// Location in the problem file.
     pub location: Location,
 }
 
 impl ActiveConstraint {
-    /// Describes the active constraints `held` of a stage, with their shadow prices, in words of
-    /// the problem file.
+    /// Describes the active constraints `held` of a stage with their shadow `prices`, in the
+    /// notation of the problem file.
     pub(in crate::fit) fn all(held: &[Held], prices: &[ShadowPrice], model: &Model) -> Vec<Self> {
         let of = |(held, shadow_price): (&Held, &ShadowPrice)| {
             let constraint = &model.constraints[held.constraint];

@@ -4,8 +4,8 @@ use nalgebra::DMatrix;
 
 use crate::model::Model;
 
-/// Covariance of the estimates, consistent with their standard errors. It includes priors, active
-/// constraints, the weights of a robust loss and the noise that the fit assumed.
+/// Covariance of the estimates, consistent with their standard errors. It accounts for priors,
+/// active constraints, the weights of a robust loss and the noise that the fit assumed.
 ///
 /// Unidentifiable combinations keep their start values: their parameters have a variance here, but
 /// no standard error. Parameters of sessions or targets that only held-out rows use are fitted with
@@ -14,8 +14,8 @@ use crate::model::Model;
 /// that bound.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Covariance {
-    /// Indices of the parameters among the estimates, ascending: those that were fitted and have a
-    /// variance.
+    /// Indices, among the estimates, of the parameters that were fitted and have a variance, in
+    /// ascending order.
     pub parameters: Vec<usize>,
     /// Covariance of the values, shape = (parameters, parameters); entry (i, j) is in the product
     /// of both SI units.
@@ -25,13 +25,14 @@ pub struct Covariance {
 /// Correlations of the parameters that were fitted together and have a variance.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Correlations {
-    /// Names of the parameters.
+    /// Names of the parameters, in the order of the rows and columns of `matrix`.
     pub names: Vec<String>,
     /// Correlations, −1…1, shape = (names, names).
     pub matrix: DMatrix<f64>,
 }
 
-/// Covariance of the values of all parameters, collected from the stages of an identification.
+/// Covariance of the values of all parameters of the model, collected from the stages of an
+/// identification; 0 for parameters without a variance.
 pub(in crate::fit) struct Collected(DMatrix<f64>);
 
 impl Collected {
@@ -40,9 +41,9 @@ impl Collected {
         Self(DMatrix::zeros(parameters, parameters))
     }
 
-    /// Writes the covariance C of the unknowns of one stage, which are given by their indices in
-    /// the model. At the full parameter vector `x`, the covariance of the values is S C S with S =
-    /// diag(∂value/∂x).
+    /// Writes the covariance C of the `unknowns` of one stage, which are indices into the
+    /// parameters of the model. The covariance of their values is S C S with S = diag(∂value/∂x) at
+    /// the full parameter vector `x`.
     pub fn enter(
         &mut self,
         model: &Model,

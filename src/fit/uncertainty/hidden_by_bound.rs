@@ -1,14 +1,15 @@
-//! Uncertainty that a bound hides: partners of an unknown that rests on a bound.
+//! Uncertainty that a bound hides: unknowns that follow another one, which rests on a bound.
 //!
-//! If the data hardly determine a combination of unknowns, a bound on one of them seems to decide
-//! the others. They have small standard errors if the unknown is held at its bound, but the bound
-//! only restricts the side on which the unknown lies. Along the valley of the cost, x + s u, the
-//! unknown is inside its bound by u ≥ 0, and the posterior of u is
+//! If the data hardly determine a combination of unknowns, a bound on one of them seems to
+//! determine the others. These have small standard errors if that unknown is held at its bound, but
+//! the bound only limits it to one side. Along the valley of the cost, x + s u, the unknown lies
+//! inside its bound by u ≥ 0, and the posterior of u is
 //!
 //! p(u) ∝ exp(−μ u − ½ h u²) on 0 ≤ u ≤ w
 //!
 //! with the multiplier μ of the bound, the curvature h of the cost along the valley, and the width
-//! w after which the valley meets another bound. Its E u² adds E u² s sᵀ to the covariance.
+//! w after which the valley meets another bound. E u² s sᵀ is added to the covariance of the
+//! unknowns.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -16,40 +17,43 @@ use crate::fit::stages::stage::Stage;
 use crate::least_squares::Triangle;
 use crate::least_squares::solver::AtBound;
 
-/// Smallest ratio of two deviations of an unknown at which the bound of another unknown hides its
-/// uncertainty: along the valley, and its standard error with the other unknown held at its bound.
-/// At 3, the valley has nine tenths of the variance.
+/// Smallest ratio at which the bound of one unknown hides the uncertainty of another: that of its
+/// deviation along the valley to its standard error with the first unknown held at the bound. At 3,
+/// the valley has nine tenths of the variance.
 const MIN_HIDDEN_RATIO: f64 = 3.0;
-/// Weight of the rows that hold combinations constant in a least-squares problem.
+/// Factor on the rows that hold combinations constant, so large that data and priors hardly change
+/// these combinations.
 const CONSTRAINT_WEIGHT: f64 = 1e5;
-/// Largest exponent of the posterior of u that counts; beyond it the posterior is zero.
+/// Largest value of μ u + ½ h u² up to which the posterior of u is integrated; beyond it, the
+/// density is negligible.
 const MAX_EXPONENT: f64 = 40.0;
 /// Number of intervals of the quadrature over u; even, for Simpson's rule.
 const QUADRATURE_INTERVALS: u32 = 400;
 
-/// Direction in which the cost hardly rises if an unknown moves away from its bound.
+/// Direction in which the cost hardly rises if an unknown moves away from the bound at which it is,
+/// with the other unknowns that move along.
 #[derive(Debug, Clone, PartialEq)]
 pub(in crate::fit) struct HiddenByBound {
     /// Index of the unknown that is at its bound.
     pub unknown: usize,
     /// Bound (lower or upper) at which the unknown is.
     pub side: AtBound,
-    /// Deviation √(E u²) of the unknown from its bound \[unit of x\]; infinite if neither data nor
-    /// other bounds limit it.
+    /// Root mean square distance √(E u²) of the unknown from its bound in the posterior \[unit of
+    /// x\]; infinite if neither data nor other bounds limit it.
     pub deviation: f64,
     /// Direction s of the valley in all unknowns. Its component of the unknown itself is 1 at a
     /// lower bound, −1 at an upper one.
     pub direction: DVector<f64>,
-    /// Indices of the partners: unknowns whose uncertainty the bound hides.
+    /// Indices of the partners: the other unknowns whose uncertainty the bound hides.
     pub partners: Vec<usize>,
 }
 
-/// Finds the bounds of a stage that hide the uncertainty of partners.
+/// Finds the bounds of a stage that hide the uncertainty of other unknowns.
 ///
 /// `triangle` is the factor R of the weighted data at the full parameter vector `at`, and the rows
-/// of `closed` are combinations that are held. `held` marks unknowns that are not estimated.
-/// `multipliers` are those of the bounds on which unknowns rest. `errors` are the standard errors
-/// with all bounds holding.
+/// of `closed` are combinations that are held constant. `held` marks unknowns that are not
+/// estimated, `at_bound` those at a bound, whose Lagrange multipliers are `multipliers`. `errors`
+/// are the standard errors with every unknown at a bound held there.
 pub(in crate::fit) fn hidden_by_bounds(
     stage: &Stage,
     at: &DVector<f64>,
@@ -58,13 +62,13 @@ pub(in crate::fit) fn hidden_by_bounds(
     multipliers: &[Option<f64>],
     errors: &[f64],
 ) -> Vec<HiddenByBound> {
-    let valley = |j: usize| -> Option<HiddenByBound> {
+    let hidden_by_bound_of = |j: usize| -> Option<HiddenByBound> {
         let (side, multiplier) = (at_bound[j]?, multipliers[j]?);
         let parameters: Vec<_> = stage.parameters().collect();
         if parameters[j].lower >= parameters[j].upper {
             return None;
         }
-        let (mut direction, curvature) = valley(stage, (triangle, closed), held, j)?;
+        let (mut direction, curvature) = valley_direction(stage, (triangle, closed), held, j)?;
         if side == AtBound::Upper {
             direction.neg_mut();
         }
@@ -91,15 +95,16 @@ pub(in crate::fit) fn hidden_by_bounds(
             partners,
         })
     };
-    (0..held.len()).filter_map(valley).collect()
+    (0..held.len()).filter_map(hidden_by_bound_of).collect()
 }
 
-/// Returns the direction in which the free unknowns follow the unknown `j`, 1 for `j` itself, and
-/// the curvature of the cost along it \[1 / unit of x²\].
+/// Returns the direction s in which the free unknowns follow the unknown `j`, with component 1 for
+/// `j` itself, and the curvature h of the cost along it \[1 / unit of x²\]. `None` if the free
+/// unknowns are not determined.
 ///
 /// With the columns of the free unknowns first and that of `j` last, \[R r; 0 ρ\] is the factor of
 /// data, priors and held combinations: s = −R⁻¹ r and h = ρ².
-fn valley(
+fn valley_direction(
     stage: &Stage,
     (triangle, closed): (&DMatrix<f64>, &DMatrix<f64>),
     held: &[bool],

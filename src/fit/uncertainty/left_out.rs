@@ -1,4 +1,4 @@
-//! Errors of configurations that are left out, where no rows are held out.
+//! Cross-validation: errors of configurations that are left out of the fit one at a time.
 
 use nalgebra::{DMatrix, DVector, Vector3};
 use rayon::prelude::*;
@@ -6,20 +6,20 @@ use rayon::prelude::*;
 use crate::fit::stages::fitting::Fitting;
 use crate::least_squares::jacobian_and_residual;
 
-/// Ridge on the normal matrix, as a fraction of the squared length of each column. It keeps
-/// directions that only one configuration determines at their fitted values.
+/// Ridge on the diagonal of the normal matrix, as a fraction of the entry there. Combinations that
+/// only one configuration determines then keep their fitted values if that one is left out.
 const RIDGE: f64 = 1e-9;
 
 impl Fitting<'_> {
-    /// Returns the error measured − predicted of each identification row, measuring frame \[m\],
-    /// shape = (identification rows). Each row is predicted by a fit without its configuration,
-    /// linearised at the full parameter vector `x`.
+    /// Returns the error measured − predicted of each identification row, in the order of these
+    /// rows, measuring frame \[m\]. Each row is predicted by a fit without its configuration, which
+    /// is linearised at the full parameter vector `x`.
     ///
     /// r₋ = (I − H)⁻¹ r with the block H of J (JᵀJ + Λ)⁻¹ Jᵀ of the configuration [Cook and
-    /// Weisberg 1982]. Λ holds priors and earlier data; rows are weighted by the robust loss. If (I
-    /// − H) or JᵀJ + Λ is singular, r₋ = r. `configurations` holds the number of the configuration
-    /// of every row of the table. `unknowns` are the parameters that were fitted and rest on no
-    /// bound.
+    /// Weisberg 1982]. Λ is the information of priors and earlier data; rows are weighted by the
+    /// robust loss. If I − H or JᵀJ + Λ is singular, r₋ = r. `configurations` holds the number of
+    /// the configuration of every row of the table. `unknowns` are the indices of the parameters
+    /// that were fitted and rest on no bound.
     pub fn left_out_errors(
         &self,
         x: &DVector<f64>,
@@ -30,7 +30,7 @@ impl Fitting<'_> {
         let stage = self.stage(rows, unknowns.to_vec());
         let (residuals, per_pose) = (stage.residuals(x), stage.coordinates());
         let (mut jacobian, mut residual) = jacobian_and_residual(&residuals, &residuals.reduced(x));
-        // At the optimum of a robust loss the rows with these weights have no gradient.
+        // At the optimum of a robust loss, the gradient of the rows with these weights is zero.
         let weight = |place: usize| {
             self.loss.weight(residual.rows(per_pose * place, per_pose).norm_squared()).sqrt()
         };

@@ -1,4 +1,5 @@
-//! Uncertainty of a fit: noise model, covariance, estimated prior sizes, shadow prices.
+//! Uncertainty of a fit: noise, covariance, prior widths that the data contradict, shadow prices,
+//! and errors of configurations that are left out.
 
 pub(super) mod active_constraint;
 pub(super) mod covariance;

@@ -1,4 +1,4 @@
-//! Search for the σ that a fit assumed: the declared one, or the restricted maximum likelihood
+//! Search for the noise σ of a fit: the declared one, or its restricted maximum likelihood (REML)
 //! estimate if residuals and priors contradict the declared one.
 
 use nalgebra::DVector;
@@ -20,19 +20,20 @@ const NOISE_TOLERANCE: f64 = 1e-3;
 /// Relative change of an estimated σ at which its search has converged, if the declared one is
 /// contradicted. Standard errors need no more accuracy.
 const SCALE_TOLERANCE: f64 = 0.01;
-/// Number of steps after which a declared σ is tested first in a joint fit. If it is contradicted,
-/// the optimum under it is not needed.
+/// Number of steps after which a joint fit tests its declared σ for the first time. If the σ is
+/// contradicted, the optimum with that σ is not needed.
 const STEPS_BEFORE_NOISE_TEST: u64 = 30;
 /// Maximum number of fits in the search for σ.
 const MAX_NOISE_FITS: usize = 20;
-/// Least number of degrees of freedom that lower a declared σ at the usual critical value. With
-/// fewer, a residual that is small by chance (probability near 0.001) would make standard errors
-/// more than 2.5 times too small.
+/// Minimum number of degrees of freedom with which a declared σ is lowered at the usual critical
+/// value. With fewer, a residual that is small by chance (probability near 0.001) would make
+/// standard errors more than 2.5 times too small.
 const MIN_FREEDOM_TO_LOWER: f64 = 12.0;
-/// Multiple of the critical value that lowers a declared σ with fewer degrees of freedom. Noise
-/// exceeds it with a probability below 1e-10; positions that were computed to all digits do.
+/// Multiple of the critical value above which a declared σ is lowered with fewer degrees of
+/// freedom. Noise exceeds it with a probability below 1e-10; computed positions, which have all
+/// digits, do.
 const LOWERING_FACTOR: f64 = 5.0;
-/// Noise models of positions and of orientations that take the declared σ.
+/// Noise models of positions and of orientations with which a fit assumes the declared σ.
 const DECLARED_NOISE: (NoiseModel, NoiseModel) = (NoiseModel::DECLARED, NoiseModel::DECLARED);
 /// Multiple of the critical value [`by_chance`] of the likelihood-ratio statistic, above which a
 /// declared σ is certainly wrong.
@@ -45,15 +46,16 @@ const REJECTION_FACTOR: f64 = 10.0;
 pub enum Noise {
     /// Declared by `position_sigma` or the column `sigma`.
     Declared,
-    /// Estimated from the scatter about the fit: 1 σ per coordinate \[m\].
+    /// Not declared, but estimated from the scatter of the residuals: 1 σ of a coordinate \[m\].
     Estimated(f64),
     /// Neither declared nor estimated, because the fit has no degrees of freedom.
     Unknown,
 }
 
-/// Runs the strategy until its σ has converged. The σ is the declared one, or the restricted
-/// maximum likelihood estimate if residuals and priors contradict it. If none is declared, it is
-/// the scatter about the fit. `judged` is true if the poses suffice to contradict a σ.
+/// Runs the strategy until the noise σ has converged. The σ is the declared one, or its restricted
+/// maximum likelihood estimate if residuals and priors contradict it. If none is declared, σ is
+/// estimated from the scatter of the residuals. `judged` is true if the poses suffice to contradict
+/// a declared σ.
 ///
 /// A fit may start with the noise models that an earlier fit assumed. It keeps them as long as the
 /// declared σ is certainly contradicted.
@@ -94,7 +96,7 @@ pub(in crate::fit) fn fitted(
                 Some(next) => {
                     (fitting.noise_model, fitting.turn_noise_model) = next;
                     if judged_early {
-                        // The fit has not converged. Its σ is tested again, like one that an
+                        // The fit has not converged. Its σ is tested again, like a σ that an
                         // earlier fit assumed.
                         taken_over = is_beyond_doubt(&fitting.whole());
                         if !taken_over {
@@ -141,8 +143,9 @@ pub(in crate::fit) fn fitted(
     }
 }
 
-/// Returns true if the noise variance of a stage, r times the declared one, certainly contradicts
-/// the declared one. With ν degrees of freedom, 2 ln of the likelihood ratio is ν (r − 1 − ln r).
+/// Returns true if the noise variance that a stage assumes, r times the declared one, certainly
+/// contradicts the declared one: 2 ln of the likelihood ratio, ν (r − 1 − ln r) with ν degrees of
+/// freedom, exceeds [`REJECTION_FACTOR`] times its critical value.
 fn is_beyond_doubt(stage: &Stage) -> bool {
     let ratios = stage
         .poses
@@ -154,11 +157,12 @@ fn is_beyond_doubt(stage: &Stage) -> bool {
     freedom * (ratio - 1.0 - ratio.ln()) > REJECTION_FACTOR * by_chance()
 }
 
-/// Returns the next noise models of positions and orientations, or `None` if the `assumed` ones are
-/// kept. Poses that a robust loss treats as outliers do not count.
+/// Returns the noise models of positions and orientations for the next fit, or `None` if the
+/// `assumed` ones are kept. Poses that a robust loss treats as outliers are left out.
 ///
 /// The declared σ is contradicted if 2 ln of the likelihood ratio exceeds its critical value (χ²₁)
-/// at probability 0.001. A few degrees of freedom lower it only with far more evidence.
+/// at probability 0.001. With few degrees of freedom, a declared σ is lowered only on far more
+/// evidence.
 fn next_noise_models(
     stage: &Stage,
     end: &FitEnd,
@@ -225,7 +229,9 @@ fn next_noise_models(
 }
 
 /// Returns the mean squares of the whitened residuals of positions and of orientations, each
-/// divided by that of all. Both are 1 if only positions are fitted.
+/// divided by the mean square of all. Both are 1 if only positions are fitted. `coordinates` is the
+/// number of residuals per pose, `counts` those of measured coordinates of positions and
+/// orientations.
 fn mean_square_ratios(whitened: &DVector<f64>, coordinates: usize, counts: [usize; 2]) -> [f64; 2] {
     if coordinates == 3 {
         return [1.0; 2];
@@ -240,9 +246,9 @@ fn mean_square_ratios(whitened: &DVector<f64>, coordinates: usize, counts: [usiz
     if mean_of_both > 0.0 { [position / mean_of_both, turn / mean_of_both] } else { [1.0; 2] }
 }
 
-/// Returns the noise variance that a stage assumed, relative to the declared one, and the σ that it
-/// assumed for the rows of `kind` (root mean square). Known distances between points keep their
-/// declared σ and do not count.
+/// Returns the mean noise variance that a stage assumed, relative to the declared one, and the root
+/// mean square of the σ that it assumed for the rows of `kind`. Known distances between points are
+/// left out, because they keep their declared σ.
 pub(in crate::fit) fn assumed_noise(stage: &Stage, kind: Observation) -> (f64, f64) {
     let rows =
         stage.poses.iter().zip(&stage.declared).filter(|(pose, _)| pose.observation.is_of_arm());

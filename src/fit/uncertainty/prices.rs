@@ -9,8 +9,8 @@ use crate::least_squares::solver::{AtBound, Factor};
 use crate::least_squares::{Fit, LinearRows, Objective as _};
 use crate::model::parameter::Parameter;
 
-/// Smallest length of the independent part of a constraint normal, relative to its length, at which
-/// it counts as linearly independent.
+/// Smallest length of the part of a constraint normal that is orthogonal to the others, relative to
+/// the length of the normal, at which the constraint counts as linearly independent.
 const MIN_INDEPENDENT_LENGTH: f64 = 1e-10;
 
 /// Shadow prices of bounds (`None` for an unknown inside its bounds) and of active constraints.
@@ -21,12 +21,12 @@ pub(in crate::fit) struct Prices {
 }
 
 impl Stage<'_> {
-    /// Computes the prices of bounds and active constraints at the full parameter vector `at`. A
-    /// price is the multiplier of a limit.
+    /// Computes the shadow prices of bounds and active constraints at the full parameter vector
+    /// `at`, from their Lagrange multipliers.
     ///
-    /// At a minimum g = Aᵀμ + w. Here g is the gradient, A holds the active constraints as rows, μ
-    /// are their multipliers, and w those of the bounds. A multiplier is ≥ 0 at a lower limit and ≤
-    /// 0 at an upper one.
+    /// At a minimum, the gradient of the cost is g = Aᵀμ + w with the active constraints as rows of
+    /// A, their multipliers μ, and the multipliers w of the bounds. A multiplier is ≥ 0 at a lower
+    /// limit and ≤ 0 at an upper one.
     ///
     /// # Errors
     /// Returns an error if the rows of the priors do not match the unknowns.
@@ -67,7 +67,8 @@ impl Stage<'_> {
                 .enumerate()
                 .for_each(|(j, coefficient)| gradient[j] -= coefficient * force);
         }
-        // Only rows of the first kind count, because millimetres and degrees have no common mean.
+        // The rms is that of the rows of the first kind, because mm and degrees have no common
+        // mean.
         let leading = self.poses.first().map(|pose| pose.observation.kind());
         let is_leading = |place: &usize| Some(self.poses[*place].observation.kind()) == leading;
         let places: Vec<usize> = (0..self.poses.len()).filter(is_leading).collect();

@@ -1,9 +1,10 @@
 //! Prior widths (σ) of the geometry, estimated from the deviations that a fit found.
 //!
-//! Linearised about the fit, the likelihood of the geometry x is a Gaussian with information A and
-//! vector b = A x̂. With prior σ multiplied by r, one factor for all parameters of a kind, the
-//! posterior is N(C b, C) with C = (A + Λ/r²)⁻¹. The logarithm of the evidence is ½ bᵀC b + ½ ln|C|
-//! − Σ ln r + constant; it is largest where r² is the mean of E x² / σ² of the kind.
+//! Linearised about the fit, the likelihood of the geometric deviations x is a Gaussian with
+//! information A and vector b = A x̂. The prior σ of each kind of parameter are multiplied by a
+//! factor r, so that the posterior is N(C b, C) with C = (A + Λ/r²)⁻¹. The logarithm of the
+//! evidence is ½ bᵀC b + ½ ln|C| − Σ ln r + constant. It is largest where r² is the posterior mean
+//! of x² / σ² over the parameters of the kind.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -16,8 +17,8 @@ const MIN_COUNT: usize = 4;
 /// Minimum sum of identified shares of the parameters of a kind from which their width is
 /// estimated.
 const MIN_DETERMINED: f64 = 3.0;
-/// Smallest ratio of the estimated to the declared σ, or of the declared to the estimated one, that
-/// is reported.
+/// Smallest ratio of the larger to the smaller one of the estimated and the declared σ at which a
+/// width is reported.
 const MIN_RATIO: f64 = 2.0;
 /// Maximum number of steps of the search for the widths.
 const MAX_STEPS: usize = 500;
@@ -42,24 +43,26 @@ pub struct PriorSize {
     pub found: f64,
 }
 
-/// Likelihood of the geometry with priors, in units of the declared σ.
+/// Likelihood of the geometric parameters with priors, which are in units of their declared σ:
+/// information matrix A and vector b = A x̂.
 struct GeometryLikelihood {
     information: DMatrix<f64>,
     vector: DVector<f64>,
 }
 
-/// Parameters of one kind, with their indices in the [`GeometryLikelihood`].
+/// Parameters of one kind with one declared σ, by their indices in the [`GeometryLikelihood`].
 struct Group {
     field: JointField,
     sigma: f64,
     places: Vec<usize>,
 }
 
-/// Returns the prior widths that the data contradict: the estimate raises the evidence
-/// significantly and differs at least by a factor of [`MIN_RATIO`].
+/// Returns the prior widths that the data contradict: the estimated width raises the evidence
+/// significantly and differs from the declared one by more than a factor of [`MIN_RATIO`].
 ///
-/// `unknowns` have the values `x` and the `covariance`, which is 0 for held ones. Angles and
-/// lengths of joints with one declared σ count, if there are enough of a kind.
+/// `unknowns` have the values `x` and the `covariance`, which is 0 for unknowns that are held.
+/// Widths are estimated for each kind of angle or length of the joints, such as α, with enough
+/// members that all have the same declared σ.
 pub(in crate::fit) fn prior_sizes(
     unknowns: &[&Parameter],
     x: &[f64],
@@ -80,14 +83,14 @@ pub(in crate::fit) fn prior_sizes(
         .collect();
     let Some(likelihood) = GeometryLikelihood::of(&seen, x, covariance) else { return Vec::new() };
     let groups = groups(&seen);
-    let (factors, decided) = likelihood.widths(&groups, None);
+    let (factors, determined) = likelihood.widths(&groups, None);
     let best = likelihood.evidence(&groups, &factors);
     let contradicted = |g: &usize| {
-        if factors[*g].max(1.0 / factors[*g]) <= MIN_RATIO || decided[*g] < MIN_DETERMINED {
+        if factors[*g].max(1.0 / factors[*g]) <= MIN_RATIO || determined[*g] < MIN_DETERMINED {
             return false;
         }
-        // For the declared width of this kind, the other kinds have the widths that fit best with
-        // it.
+        // The evidence of the declared width of this kind is that with the best widths of the other
+        // kinds.
         let declared = likelihood.evidence(&groups, &likelihood.widths(&groups, Some(*g)).0);
         best.zip(declared).is_some_and(|(best, declared)| 2.0 * (best - declared) > by_chance())
     };
@@ -104,7 +107,8 @@ pub(in crate::fit) fn prior_sizes(
     (0..groups.len()).filter(contradicted).map(size).collect()
 }
 
-/// Returns the kinds of parameters with enough members whose declared σ are all equal.
+/// Returns the groups of parameters of a kind with at least [`MIN_COUNT`] members whose declared σ
+/// are all equal. `seen` holds index, kind and σ of each parameter.
 fn groups(seen: &[(usize, JointField, f64)]) -> Vec<Group> {
     let fields = JointField::GEOMETRY.into_iter().chain(JointField::PLACEMENT);
     let group = |field: JointField| {
@@ -117,8 +121,8 @@ fn groups(seen: &[(usize, JointField, f64)]) -> Vec<Group> {
 }
 
 impl GeometryLikelihood {
-    /// Creates the likelihood of some unknowns with all others integrated out; `None` if their
-    /// covariance is singular.
+    /// Creates the likelihood of the unknowns `seen` (index, kind, σ) with all other unknowns
+    /// integrated out; `None` if the covariance of those `seen` is singular.
     fn of(seen: &[(usize, JointField, f64)], x: &[f64], covariance: &DMatrix<f64>) -> Option<Self> {
         let n = seen.len();
         let of = |i: usize, j: usize| covariance[(seen[i].0, seen[j].0)] / (seen[i].2 * seen[j].2);
@@ -128,8 +132,8 @@ impl GeometryLikelihood {
         Some(Self { information, vector })
     }
 
-    /// Returns covariance and mean of the posterior, and half the logarithm of the determinant of
-    /// its covariance.
+    /// Returns covariance and mean of the posterior with the σ of each group multiplied by its
+    /// factor, and ½ ln|covariance|; `None` if the precision is not positive definite.
     fn posterior(
         &self,
         groups: &[Group],
@@ -148,9 +152,8 @@ impl GeometryLikelihood {
         Some((covariance, mean, -half))
     }
 
-    /// Returns the logarithm of the evidence for priors whose σ are multiplied by `factors`, one
-    /// for each of the groups, up to a constant; `None` if the normal matrix is not positive
-    /// definite.
+    /// Returns the logarithm of the evidence, up to a constant, for priors whose σ are multiplied
+    /// by `factors`, one for each group; `None` if the precision is not positive definite.
     fn evidence(&self, groups: &[Group], factors: &[f64]) -> Option<f64> {
         let (_, mean, half) = self.posterior(groups, factors)?;
         let priors: f64 = groups
@@ -161,11 +164,11 @@ impl GeometryLikelihood {
         Some(0.5 * mean.dot(&self.vector) + half - priors)
     }
 
-    /// Returns the factors r that maximise the evidence, with r = 1 for the group `held`, and for
-    /// each group the sum of identified shares.
+    /// Returns for each group the factor r on its σ with which the evidence is largest, and the sum
+    /// of the identified shares of its parameters. The group `held` keeps r = 1.
     fn widths(&self, groups: &[Group], held: Option<usize>) -> (Vec<f64>, Vec<f64>) {
         let mut factors = vec![1.0; groups.len()];
-        let mut decided = vec![0.0; groups.len()];
+        let mut determined = vec![0.0; groups.len()];
         for _ in 0..MAX_STEPS {
             let Some((covariance, mean, _)) = self.posterior(groups, &factors) else { break };
             let mut change: f64 = 0.0;
@@ -175,7 +178,7 @@ impl GeometryLikelihood {
                 let spread: f64 = places.iter().map(|&i| covariance[(i, i)]).sum();
                 let next =
                     if held == Some(g) { 1.0 } else { (square / places.len() as f64).sqrt() };
-                decided[g] = places.len() as f64 - spread / factors[g].powi(2);
+                determined[g] = places.len() as f64 - spread / factors[g].powi(2);
                 change = change.max((next / factors[g]).ln().abs());
                 factors[g] = next;
             }
@@ -183,7 +186,7 @@ impl GeometryLikelihood {
                 break;
             }
         }
-        (factors, decided)
+        (factors, determined)
     }
 }
 

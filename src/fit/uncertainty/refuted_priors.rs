@@ -1,13 +1,15 @@
 //! Rules of `[parameters]` whose σ the data refute.
 //!
 //! A prior that is far too narrow keeps its parameters near nominal, and the misfit is attributed
-//! to the noise. The fit then assumes a σ far above the declared one. For each rule the evidence of
-//! wider σ is computed, linearised about the fit. With the deviations z, r = R z + c in declared σ,
-//! priors z ∼ N(0, K⁻¹) and noise variance s²,
+//! to the noise. The fit then assumes a noise σ far above the declared one. For each rule the
+//! evidence of wider prior σ is computed, linearised about the fit. With the deviations z of the
+//! unknowns from nominal, whitened residuals r = R z + c, priors z ∼ N(0, K⁻¹), and the noise
+//! variance s² relative to the declared one,
 //!
 //! −2 ln L(s², K) = m ln s² + ln|A| − ln|K| + (‖r₀‖² − bᵀA⁻¹b / s²) / s²,  A = RᵀR / s² + K
 //!
-//! with b = Rᵀc, ‖r₀‖² the squares at nominal, and m measured coordinates  [Bishop 2006, §3.5].
+//! with b = Rᵀc, the squared whitened residual ‖r₀‖² of the nominal arm, and m measured coordinates
+//! [Bishop 2006, §3.5].
 
 use nalgebra::{DMatrix, DVector};
 
@@ -15,7 +17,7 @@ use crate::fit::stages::noise_model::by_chance;
 use crate::fit::stages::stage::Stage;
 use crate::least_squares::Loss;
 
-/// Factors by which the σ of a rule is widened in turn.
+/// Trial factors by which the σ of a rule is multiplied.
 const TRIAL_FACTORS: [f64; 8] = [3.0, 10.0, 30.0, 100.0, 300.0, 1e3, 3e3, 1e4];
 /// Largest ratio of the noise variance with a wider prior to that with the declared one, at which
 /// the prior explains the misfit.
@@ -23,7 +25,8 @@ const MAX_VARIANCE_RATIO: f64 = 0.25;
 /// Largest noise variance with wider priors, relative to the declared one, at which priors explain
 /// the misfit.
 const MAX_VARIANCE: f64 = 1000.0;
-/// Multiple of the critical gain in 2 ln L (probability 0.001) above which a prior is refuted.
+/// Multiple of the critical value of 2 ln of the likelihood ratio (probability 0.001) above which a
+/// prior is refuted.
 const REJECTION_FACTOR: f64 = 10.0;
 /// Smallest ratio of the noise variance that the fit assumed to the declared one, at which priors
 /// are tested.
@@ -32,7 +35,8 @@ const MIN_NOISE_FACTOR: f64 = 4.0;
 const TRIAL_VARIANCES: u32 = 24;
 /// Largest number of unknowns for which priors are tested, because the work grows with its cube.
 const MAX_UNKNOWNS: usize = 150;
-/// Precision of unknowns without a prior, relative to that of the data.
+/// Prior precision given to unknowns without a prior, relative to the information of the data about
+/// them.
 const FLAT_PRIOR_PRECISION: f64 = 1e-12;
 
 /// Rule of `[parameters]` whose declared σ the data refute.
@@ -40,18 +44,18 @@ const FLAT_PRIOR_PRECISION: f64 = 1e-12;
 pub(in crate::fit) struct RefutedPrior {
     /// Pattern of the rule, as in the problem file.
     pub rule: String,
-    /// Factor by which the declared σ of the rule is too small.
+    /// Trial factor on the declared σ of the rule with the largest evidence.
     pub factor: f64,
-    /// Ratio of the σ of the residual with wider priors to that with the declared ones.
+    /// Ratio of the noise σ with all refuted priors widened to that with the declared priors.
     pub sigma_ratio: f64,
 }
 
-/// Finds the rules whose σ the data refute, the most improbable first.
+/// Finds the rules whose σ the data refute, the one whose widening raises the evidence most first.
 ///
-/// `stage` has all unknowns and identification rows with declared σ, and `at` is the full parameter
-/// vector of the fit. `held` marks unknowns that rest on bounds. `rules` names the rule of each
-/// unknown with a prior. `noise_factor` is the ratio of the noise variance that the fit assumed to
-/// the declared one.
+/// `stage` has all unknowns and identification rows with their declared noise σ, and `at` is the
+/// full parameter vector of the fit. `held` marks unknowns that rest on bounds. `rules` holds the
+/// pattern of the rule of each unknown with a prior. `noise_factor` is the ratio of the noise
+/// variance that the fit assumed to the declared one.
 pub(in crate::fit) fn refuted_priors(
     stage: &Stage,
     at: &DVector<f64>,
@@ -76,8 +80,8 @@ pub(in crate::fit) fn refuted_priors(
     };
     let mut factors = vec![1.0; names.len()];
     let Some(declared) = evidence.best(&widened(&factors)) else { return Vec::new() };
-    // Widening all rules together leaves the smallest variance. If that explains too little, no
-    // choice of rules does.
+    // Widening all rules together gives the smallest noise variance. If even that is too large, no
+    // selection of rules explains the misfit.
     let widest =
         evidence.best(&widened(&vec![TRIAL_FACTORS[TRIAL_FACTORS.len() - 1]; names.len()]));
     if widest.is_none_or(|best| best.variance > MAX_VARIANCE_RATIO * declared.variance) {
@@ -115,14 +119,15 @@ pub(in crate::fit) fn refuted_priors(
     order.into_iter().map(refuted).collect()
 }
 
-/// Noise variance of largest evidence under given priors, and −2 ln L there.
+/// Noise variance, relative to the declared one, with the largest evidence under given priors, and
+/// the deviance −2 ln L there.
 #[derive(Debug, Clone, Copy)]
 struct Best {
     variance: f64,
     deviance: f64,
 }
 
-/// Linearised data from which the evidence of priors is computed.
+/// Linearised data from which the evidence of priors and noise variances is computed.
 struct Evidence {
     /// Information RᵀR of the free unknowns.
     information: DMatrix<f64>,
@@ -168,8 +173,8 @@ impl Evidence {
         variances.filter_map(of).min_by(|a, b| a.deviance.total_cmp(&b.deviance))
     }
 
-    /// Returns −2 ln L for priors of these σ and a noise variance; `None` if the matrix is
-    /// singular.
+    /// Returns −2 ln L for priors with these σ and a noise variance relative to the declared one;
+    /// `None` if the matrix A is singular.
     fn deviance(&self, sigmas: &[Option<f64>], variance: f64) -> Option<f64> {
         let n = self.free.len();
         let precision = |i: usize| match sigmas[self.free[i]] {

@@ -1,4 +1,4 @@
-//! Shadow price of a bound or constraint.
+//! Shadow price of a bound or constraint: what moving it outwards would gain.
 
 use crate::quantity::Unit;
 
@@ -6,17 +6,17 @@ use crate::quantity::Unit;
 #[doc(hidden)]
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ShadowPrice {
-    /// Lagrange multiplier −∂(½χ²)/∂limit, with priors counted in χ² \[1 / SI unit of the limit\];
-    /// limits of logarithms have no unit.
+    /// Lagrange multiplier: decrease of ½χ² per unit by which the limit is moved outwards, with the
+    /// priors included in χ² \[1 / SI unit of the limit\]. Limits of logarithms have no unit.
     pub multiplier: f64,
-    /// Decrease of the root mean squared position residual per unit, if the whole gain in χ² came
-    /// from positions \[m / SI unit\].
+    /// Decrease of the rms residual of the rows of the leading kind per unit of the limit, if the
+    /// whole decrease of χ² came from these rows \[m / SI unit of the limit\].
     pub rms: f64,
 }
 
 impl ShadowPrice {
-    /// Returns the decrease of the root mean square \[mm\] for a limit moved outwards by one step,
-    /// and the name of that step. The step is 1 mm, 1°, 1 % (for logarithms) or one SI unit.
+    /// Returns the decrease of the rms residual \[mm\] for a limit moved outwards by one step, and
+    /// the name of that step. The step is 1 mm, 1°, 1 % (for logarithms) or one SI unit.
     #[doc(hidden)]
     pub fn in_mm(self, unit: Unit) -> (f64, &'static str) {
         let (step, name) = match unit {

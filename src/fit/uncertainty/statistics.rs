@@ -1,4 +1,4 @@
-//! Statistics of a fit: standard errors, identified parts, χ² and outliers.
+//! Statistics of a fit: standard errors, identified shares, χ² and residual lengths.
 
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF as _};
@@ -13,44 +13,47 @@ use crate::fit::uncertainty::residual_lengths::Lengths;
 use crate::least_squares::{Blind, Loss, Uncertainty};
 use crate::model::Pose;
 
-/// Largest share of an unknown in unidentifiable combinations, 0…1, at which it still has a
+/// Largest part of an unknown in unidentifiable combinations, 0…1, at which the unknown still has a
 /// standard error.
 const MAX_UNIDENTIFIABLE_SHARE: f64 = 1e-3;
 
 /// Statistics of the unknowns of a fit.
 #[derive(Debug, Clone)]
 pub(in crate::fit) struct Statistics {
-    /// Standard error of each unknown, in its SI unit.
+    /// Standard error of each unknown: of its deviation in SI units, or of the logarithm of a
+    /// stiffness or rigidity.
     pub errors: Vec<f64>,
-    /// True if data and priors determine each unknown: it rests on no bound and takes part in no
-    /// unidentifiable combination.
+    /// For each unknown, true if data and priors determine it: it rests on no bound and has no part
+    /// in an unidentifiable combination.
     pub known: Vec<bool>,
     /// Identified share of each unknown, 0…1; 1 for unknowns without a prior in a provisional fit.
     pub identified: Vec<f64>,
-    /// Covariance of the unknowns, shape = (unknowns, unknowns); 0 for unknowns that are held.
+    /// Covariance of the unknowns, in the units of `errors`, shape = (unknowns, unknowns); 0 for
+    /// unknowns that are held at a bound.
     pub covariance: DMatrix<f64>,
-    /// Reduced χ² against the declared σ; `None` without degrees of freedom. A robust loss excludes
-    /// outliers.
+    /// Reduced χ² of the residuals in units of the declared σ; `None` without degrees of freedom.
+    /// A robust loss excludes outliers.
     pub reduced_chi2: Option<f64>,
-    /// Interval in which `reduced_chi2` lies with probability 0.999 if the residual is only noise.
+    /// Interval in which `reduced_chi2` lies with probability 0.999 if the residual is only noise;
+    /// `None` without degrees of freedom.
     pub chance: Option<(f64, f64)>,
-    /// Constraints that are active at the end of the fit.
+    /// Constraints that are active (at a limit) at the end of the fit.
     pub constraints: Vec<Held>,
-    /// Prices of bounds and constraints.
+    /// Shadow prices of the bounds and constraints on which the fit rests.
     pub prices: Prices,
     /// Bounds that hide the uncertainty of other unknowns.
     pub hidden: Vec<HiddenByBound>,
-    /// Lengths of the whitened residuals of the poses.
+    /// Lengths of the whitened residuals of the poses, with their scatter.
     pub lengths: Lengths,
 }
 
 impl Statistics {
-    /// Computes the statistics of a stage that ended at `end`; `noise_model` converts the declared
-    /// σ to the one that the fit assumed; `None` if none is declared.
+    /// Computes the statistics of a stage that ended at `end`. `noise_model` is the one with which
+    /// the fit converted the declared σ of positions; `None` if none is declared.
     ///
     /// With Huber's loss the covariance is that of the weighted Jacobian, times
     /// [`Loss::variance_factor`]; with absolute lengths it is that of [`sandwich`]. Active
-    /// constraints confine it to the directions that they leave open.
+    /// constraints confine the covariance to the directions that they leave free.
     ///
     /// # Errors
     /// Returns an error if a constraint is not finite, or the priors do not match the unknowns.
@@ -99,7 +102,7 @@ impl Statistics {
                 let scale = if lengths.scatter > 0.0 { lengths.scatter / declared } else { 1.0 };
                 sandwich(stage, &end.x, (&each, scale, kept), (&closed, &held))
             } else {
-                // The factor is of the new data alone, not of the earlier ones.
+                // The factor applies to the new data alone, not to the earlier ones.
                 let factor = stage.loss.variance_factor(&lengths.weighed, &each, freedom);
                 let data = stage.linearised(&end.x, stage.loss).triangle / factor.sqrt();
                 let data = stage.with_earlier(data, &end.x);
@@ -138,7 +141,7 @@ impl Statistics {
         } else {
             Blind::in_triangle(&stage.data_triangle(&end.x)).visible
         };
-        // A variance that only a bound limits contains no information of the data.
+        // The part of a variance that a bound hides is not determined by the data.
         let from_data = |j: usize| match errors[j] {
             error if error > bounded_errors[j] => (bounded_errors[j] / error).powi(2),
             _ => 1.0,
@@ -175,16 +178,17 @@ impl Statistics {
     }
 }
 
-/// Lower limit of the share of residual coordinates that are not outliers, in the covariance of a
-/// fit of absolute lengths. It keeps the covariance finite if nearly all rows are outliers.
+/// Smallest share of residual coordinates that are not outliers which the covariance of a fit of
+/// absolute lengths assumes. It keeps the covariance finite if nearly all rows are outliers.
 const MIN_SHARE_KEPT: f64 = 0.1;
 
 /// Returns the covariance of a fit of absolute lengths, A⁻¹ B A⁻¹ with A = a JᵀJ + Λ and B = b JᵀJ
 /// + Λ [Huber & Ronchetti 2009, sec. 7.6]. Λ holds the precision of priors and earlier data.
 ///
-/// Such a fit meets some rows exactly, whose weights say nothing about the uncertainty. The mean
-/// curvature a and the mean square b of the slope are therefore those of normal residuals with 1 σ
-/// = `scale`, for the share `kept` of the rows. `each` are the coordinates of the poses.
+/// Such a fit has zero residuals in some rows, whose weights do not show the uncertainty. The mean
+/// curvature a and the mean square b of the slope of the loss are therefore those of normal
+/// residuals with 1 σ = `scale`. Only the share `kept` of the rows contributes to a. `each` holds
+/// the numbers of coordinates of the poses.
 fn sandwich(
     stage: &Stage,
     at: &DVector<f64>,
@@ -220,8 +224,8 @@ fn sandwich(
     uncertainty
 }
 
-/// Returns the interval in which χ²/ν of pure noise lies with probability 0.999, with ν =
-/// `freedom`; `None` if ν is at most 0.5.
+/// Returns the interval in which χ²/ν of pure noise with ν = `freedom` degrees of freedom lies with
+/// probability 0.999; `None` if ν is at most 0.5.
 fn noise_interval(freedom: f64) -> Option<(f64, f64)> {
     let distribution = ChiSquared::new(freedom).ok().filter(|_| freedom > 0.5)?;
     let bound = |p: f64| distribution.inverse_cdf(p) / freedom;
