@@ -1,4 +1,4 @@
-//! Summaries of errors over the rows of a table.
+//! Summaries of the residuals measured − predicted over the rows of a table.
 
 use nalgebra::Vector3;
 
@@ -6,10 +6,12 @@ use crate::measurement::Measurements;
 use crate::observation::{Observation, kind_named};
 use crate::quantity::Unit;
 
-/// Values per axis of the measuring frame and for the Euclidean norm \[m\].
+/// Statistic of error vectors: its values for each axis of the measuring frame and for the
+/// Euclidean norm \[m\]. Errors of other kinds of rows are in the unit of their kind.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct AxisValues {
-    /// Value along the x axis \[m\].
+    /// Value along the x axis \[m\]; for rows that measure a single number, the value of that
+    /// number.
     pub x: f64,
     /// Value along the y axis \[m\].
     pub y: f64,
@@ -19,42 +21,44 @@ pub struct AxisValues {
     pub norm: f64,
 }
 
-/// Summary of the position errors of some poses \[m\].
+/// Summary of the errors measured − predicted of some rows of one kind, in the unit of the kind:
+/// positions, distances and contacts \[m\], tilts \[rad\], images \[px\].
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct ErrorSummary {
-    /// Kind of the rows ([`Observation::kind`](crate::problem::Observation::kind)). Errors of other
-    /// kinds than positions are residuals of the measured quantity; a single number counts along x.
+    /// Kind of the rows ([`Observation::kind`](crate::problem::Observation::kind)). The error of a
+    /// row that measures a single number is along x.
     pub kind: &'static str,
     /// Number of rows whose errors are summarised.
     pub n: usize,
-    /// Number of poses without an equilibrium; their errors, and so mean, max and rms, are NaN.
+    /// Number of rows that the arm cannot predict, because their pose has no equilibrium. If there
+    /// are any, `mean`, `max` and `rms` are NaN.
     pub unpredicted: usize,
-    /// Mean absolute value per axis, and mean norm.
+    /// Mean of the absolute error along each axis, and mean norm of the error.
     pub mean: AxisValues,
-    /// Largest absolute value per axis, and largest norm.
+    /// Largest absolute error along each axis, and largest norm of the error.
     pub max: AxisValues,
-    /// Root mean square per axis, and root of the mean squared norm.
+    /// Root mean square error along each axis, and root of the mean squared norm.
     pub rms: AxisValues,
     /// Image errors converted to lengths at the observed points \[m\]: mean, largest and root mean
     /// square; `None` for other kinds of rows.
     pub at_point: Option<[AxisValues; 3]>,
 }
 
-/// Errors on identification rows and on held-out rows.
+/// Errors of one arm on identification rows and on held-out rows, for one kind of rows.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Errors {
     /// Errors on the identification rows, which are fitted.
     pub identification: ErrorSummary,
-    /// Errors on the held-out rows, which were not fitted. If no row is held out: errors of all
-    /// rows in fits without their configuration.
+    /// Errors on the held-out rows, which were not fitted. If `is_left_out` is true: errors on the
+    /// identification rows, each predicted by a fit without its configuration.
     pub held_out: ErrorSummary,
-    /// True if no row is held out: `held_out` then summarises all rows, each configuration
-    /// predicted by a fit without it.
+    /// True if the problem holds out no row, so that `held_out` summarises a cross-validation that
+    /// leaves out one configuration at a time.
     pub is_left_out: bool,
 }
 
-/// Errors of orientation \[rad\]: lengths and components of the rotation vectors from predicted to
-/// measured, measuring frame.
+/// Errors of orientation \[rad\]: statistics of the rotation vectors from the predicted to the
+/// measured orientation, measuring frame.
 #[doc(hidden)]
 #[derive(Debug, Clone, PartialEq)]
 pub struct OrientationErrors {
@@ -62,11 +66,12 @@ pub struct OrientationErrors {
     pub registered: Errors,
     /// Errors of the arm with all parameters fitted.
     pub fitted: Errors,
-    /// Standard deviation (1 σ) of orientations about each axis that the fit assumed \[rad\].
+    /// Standard deviation (1 σ) of measured orientations about each axis that the fit assumed
+    /// \[rad\].
     pub sigma_taken: f64,
 }
 
-/// Summarises the errors of the rows that measure the same kind of quantity as `observation`.
+/// Summarises the `errors` of those `rows` that measure the same kind of quantity as `observation`.
 pub(super) fn of_kind(
     measurements: &Measurements,
     rows: impl IntoIterator<Item = usize>,
@@ -84,25 +89,26 @@ pub(super) fn of_kind(
 }
 
 impl ErrorSummary {
-    /// Returns the unit of the errors: length for positions, angle for tilts, pixels for images.
+    /// Returns the kind of unit of the errors: length for positions, angle for tilts, pixel for
+    /// images.
     pub(crate) fn unit(&self) -> Unit {
         kind_named(self.kind).unit
     }
 
-    /// Converts an error from \[m\], \[rad\] or \[px\] to the unit in which errors of this kind are
-    /// shown: mm, ° or px.
+    /// Converts an error of this kind of rows from m, rad or px to the unit in which it is shown:
+    /// mm, ° or px.
     pub(crate) fn in_unit(&self, value: f64) -> f64 {
         value * self.unit().in_tables().factor
     }
 
-    /// Summarises errors measured − predicted of positions \[m\].
+    /// Summarises position errors measured − predicted \[m\].
     #[doc(hidden)]
     pub fn of(errors: &[Vector3<f64>]) -> Self {
         Self::of_kind(Observation::Position, errors)
     }
 
-    /// Summarises the residuals measured − predicted of the rows that are of the leading kind of
-    /// the table.
+    /// Summarises the `errors` measured − predicted of those `rows` that are of the leading kind of
+    /// `table`.
     pub(crate) fn of_rows(
         table: &Measurements,
         rows: impl IntoIterator<Item = usize>,
@@ -111,13 +117,15 @@ impl ErrorSummary {
         of_kind(table, rows, errors, table.leading())
     }
 
-    /// Adds the image errors converted to `lengths` at the observed points \[m\].
+    /// Returns the summary with statistics of `lengths`, the image errors converted to lengths at
+    /// the observed points \[m\].
     pub(in crate::fit) fn with_lengths(self, lengths: &[Vector3<f64>]) -> Self {
         let Self { mean, max, rms, .. } = Self::of(lengths);
         Self { at_point: Some([mean, max, rms]), ..self }
     }
 
-    /// Summarises the residuals of rows of one kind \[m\] or \[rad\].
+    /// Summarises the errors measured − predicted of rows that are all of the kind of
+    /// `observation`, in the unit of the kind.
     pub(crate) fn of_kind(observation: Observation, errors: &[Vector3<f64>]) -> Self {
         let values: Vec<[f64; 4]> =
             errors.iter().map(|e| [e.x.abs(), e.y.abs(), e.z.abs(), e.norm()]).collect();

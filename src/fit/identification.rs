@@ -80,8 +80,8 @@ fn check_data(
     if split.identification.is_empty() { Err(IdentifyError::NoPoses) } else { Ok(()) }
 }
 
-/// Identifies as [`identify`] does, with a model that the caller has derived from the problem, as
-/// [`Strategy::model`] does.
+/// Identifies as [`identify`] does, but with a model that the caller has derived from the problem,
+/// for example by [`Strategy::model`].
 ///
 /// # Errors
 /// Returns an error if problem, data, strategy and solver do not fit each other, or if the fit was
@@ -94,7 +94,7 @@ pub fn identify_model(
 ) -> Result<Identification, IdentifyError> {
     let Dataset { measurements, split } = data;
     let mut found = fit_rows(model, problem, (measurements, split), options)?;
-    // A robust loss already limits the influence of such rows.
+    // A robust loss already limits the influence of single rows.
     if options.influential_rows && !options.provisional && problem.robust.is_none() {
         let values =
             found.estimates.iter().map(|estimate| (estimate.name.clone(), estimate.estimate));
@@ -345,7 +345,8 @@ fn fit_rows(
     })
 }
 
-/// Returns the parts that registration fits, because some of their parameters are free.
+/// Returns the names of the parts that registration fits, because some of their parameters are
+/// free.
 fn registered_parts(model: &Model) -> Vec<&'static str> {
     let placed = || model.parameters.iter().map(|parameter| parameter.site);
     let has = |is_part: fn(ParameterSite) -> bool| {
@@ -360,7 +361,8 @@ fn registered_parts(model: &Model) -> Vec<&'static str> {
 }
 
 /// Returns the full parameter vector of the registered nominal arm and its errors. Also sets the σ
-/// with which the fit starts: from the warm start, or from these errors if none is declared.
+/// and the noise models with which the fit starts. Without a declared σ, it is the scatter of these
+/// errors; the noise models are those of the warm start, if it contains any.
 fn prepared(
     fitting: &mut Fitting,
     warm_start: Option<&WarmStart>,
@@ -394,9 +396,9 @@ fn fitted_parameters<'a>(fitting: &Fitting<'a>) -> Result<Vec<&'a Parameter>, Id
     Ok(unknowns)
 }
 
-/// Returns the estimates of all parameters, their covariance, and the finding if the fit did not
-/// converge. Bases and targets of held-out sessions are fitted to their rows with the arm's
-/// parameters fixed.
+/// Returns the estimates of all parameters, their covariance, and a finding if the fit did not
+/// converge. Bases and targets that only held-out rows use are first fitted to those rows with the
+/// arm's parameters fixed, and `end` is updated.
 fn estimated(
     fitting: &Fitting,
     end: &mut FitEnd,
@@ -436,8 +438,8 @@ fn estimated(
     Ok((estimates, covariance, not_converged))
 }
 
-/// Returns, for each unknown, the pattern of the rule of `[parameters]` that gives its prior;
-/// `None` without a prior.
+/// Returns, for each unknown, the pattern of the rule of `[parameters]` that declares its prior;
+/// `None` if the unknown has no prior.
 fn rules(problem: &Problem, unknowns: &[&Parameter]) -> Vec<Option<String>> {
     let rule = |parameter: &&Parameter| {
         parameter.sigma?;
@@ -465,8 +467,8 @@ fn not_converged_finding(reason: Termination) -> Finding {
     })
 }
 
-/// Returns the loss that the section `[robust]` declares, scaled for the three coordinates of a
-/// position.
+/// Returns the loss that the section `[robust]` declares. Defaults of its threshold and slope are
+/// those for the three coordinates of a position.
 fn loss(robust: Robust) -> Loss {
     match robust.loss {
         RobustLoss::Huber => {

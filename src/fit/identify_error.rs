@@ -3,7 +3,7 @@
 use super::StageError;
 use crate::error::InputError;
 
-/// Error of an identification that could not be made, or could not be applied.
+/// Error of an identification that could not be computed, or whose result could not be applied.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum IdentifyError {

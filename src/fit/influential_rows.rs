@@ -4,28 +4,30 @@ use crate::fit::checks::outliers::{InfluentialRows, Outlier};
 use crate::fit::outcome::Identification;
 use crate::fit::uncertainty::noise::Noise;
 
-/// Ratio of the residual variances without and with some rows, below which the rows are influential
-/// even if a misfit remains. Rows that a single effect concerns, such as two with a payload, may be
-/// among them.
+/// Ratio of the residual variance without some rows to that with them, below which the rows are
+/// influential even if a misfit remains. Such rows may also be the only ones that an effect
+/// concerns, for example two rows with a payload.
 const MAX_DECISIVE_RATIO: f64 = 0.01;
-/// Ratio of the residual variances without and with some rows, below which the rows are influential
-/// if the declared σ then explains the remaining residual.
+/// Ratio of the residual variance without some rows to that with them, below which the rows are
+/// influential if the declared σ explains the residual of the other rows.
 const MAX_INFLUENTIAL_RATIO: f64 = 0.5;
-/// Smallest number of rows per influential row. If more rows seem influential, the model does not
-/// fit any of them.
+/// Minimum number of fitted rows for each influential row. If more rows seem influential, the model
+/// is wrong, not these rows.
 const MIN_ROWS_PER_INFLUENTIAL: usize = 5;
-/// Number of rows per row removed in one round (at least one is removed). A gross error makes good
-/// rows look like outliers, so few are removed at a time.
+/// Number of fitted rows for each row that is removed in one round (at least one is removed). A
+/// gross error makes good rows look like outliers, so few are removed at a time.
 const ROWS_PER_REMOVAL: usize = 100;
-/// Ratio of the residual variances after and before a round, above which the removed rows are not
-/// gross errors and the search ends.
+/// Ratio of the residual variance after a round to that before, above which the removed rows are
+/// not gross errors and the search ends.
 const MAX_GAINFUL_RATIO: f64 = 0.95;
 
-/// Finds the influential rows of the fit `found`; `without` fits the identification rows except the
-/// given ones.
+/// Finds the influential rows of the fit `found`; `without` fits the identification rows except
+/// those with the given indices.
 ///
-/// Rows with the largest residuals are removed and the others fitted again, until the declared σ
-/// explains the residual or no outlier remains. The search ends at a fit that does not converge.
+/// Outliers with the largest residuals are removed and the other rows fitted again, until the
+/// declared σ explains the residual or no outlier remains. The search ends at a fit that does not
+/// converge. Returns `None` if the declared σ explains the residual of `found`, or if no few rows
+/// cause most of the misfit.
 pub(super) fn influential_rows(
     found: &Identification,
     without: impl Fn(&[usize]) -> Option<Identification>,
@@ -34,7 +36,7 @@ pub(super) fn influential_rows(
         return None;
     }
     let count = found.fitted.identification.n;
-    let (most, a_round) =
+    let (max_rows, rows_per_round) =
         ((count / MIN_ROWS_PER_INFLUENTIAL).max(1), (count / ROWS_PER_REMOVAL).max(1));
     let mut rows: Vec<Outlier> = Vec::new();
     let mut reduced_fit: Option<Identification> = None;
@@ -44,9 +46,12 @@ pub(super) fn influential_rows(
         let mut largest: Vec<&Outlier> =
             last.outliers.iter().filter(|row| row.kind != "known distance").collect();
         largest.sort_by(|a, b| b.distance.total_cmp(&a.distance));
-        largest.truncate(a_round);
+        largest.truncate(rows_per_round);
         let largest: Vec<Outlier> = largest.into_iter().cloned().collect();
-        if is_explained_by_sigma(last) || largest.is_empty() || rows.len() + largest.len() > most {
+        if is_explained_by_sigma(last)
+            || largest.is_empty()
+            || rows.len() + largest.len() > max_rows
+        {
             break;
         }
         let numbers: Vec<usize> = rows.iter().chain(&largest).map(|outlier| outlier.row).collect();
@@ -66,7 +71,7 @@ pub(super) fn influential_rows(
     is_better.then_some(InfluentialRows { rows, reduced_chi2, sigma_taken })
 }
 
-/// Returns true if the declared σ explains the residual of a fit.
+/// Returns true if σ is declared and explains the residual: the fit did not assume a larger σ.
 fn is_explained_by_sigma(fit: &Identification) -> bool {
     fit.noise == Noise::Declared && fit.noise_factor <= 1.0 + 1e-9
 }

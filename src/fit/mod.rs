@@ -1,12 +1,13 @@
 //! Identification of an arm: fits, their uncertainty, checks of their results, and their
 //! application.
 //!
-//! [`identify`] fits the free parameters of a problem with [`Options`], which may name a strategy,
-//! a solver or a [`CustomSolver`]. The [`Identification`] holds estimates with standard errors,
-//! their covariance, errors of identification and held-out rows, and what the checks found
-//! ([`Finding`]). [`Identification::predict`] and [`Identification::predict_with_covariance`]
-//! apply it to other poses; [`compensate`] finds the commands that bring the identified arm to
-//! given positions. A [`SavedEstimate`] is an identification read back from `estimate.json`.
+//! [`identify`] fits the free parameters of a problem. Its [`Options`] select a strategy and a
+//! solver, which may be a [`CustomSolver`]. The returned [`Identification`] contains estimates with
+//! standard errors, their covariance, errors of identification and held-out rows, and the
+//! [`Finding`]s of the checks. [`Identification::predict`] and
+//! [`Identification::predict_with_covariance`] apply it to other poses. [`compensate`] finds the
+//! commands that bring the identified arm to given positions. A [`SavedEstimate`] is an
+//! identification read back from `estimate.json`.
 
 mod apply;
 mod checks;

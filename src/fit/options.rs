@@ -23,12 +23,12 @@ pub struct Options {
     pub custom_solver: Option<Arc<dyn CustomSolver>>,
     /// Receiver of progress reports; `None` to report nothing.
     pub progress: Option<ProgressSink>,
-    /// Request to stop early. A fit then returns
-    /// [`StageError::Interrupted`](super::StageError::Interrupted); a loop returns its results up
-    /// to then.
+    /// Request by which the caller can stop the work early. A stopped fit returns
+    /// [`StageError::Interrupted`](super::StageError::Interrupted); a stopped loop returns its
+    /// results up to then.
     pub stop: Option<Stop>,
-    /// Names and values \[SI\] from which the fit starts; other parameters start at the registered
-    /// nominal arm.
+    /// Names and values \[SI\] of parameters that start the fit at these values; all others start
+    /// at the registered nominal arm.
     pub start: Vec<(String, f64)>,
     /// Maximum number of steps of a fit; `None` for the solver's default.
     pub max_steps: Option<u64>,
@@ -38,9 +38,10 @@ pub struct Options {
     /// State of an earlier fit of the same data with other effects, from which the fit starts;
     /// `None` for a cold start.
     pub(crate) warm_start: Option<Arc<WarmStart>>,
-    /// Earlier data that join the fit.
+    /// Earlier data that are fitted together with the new rows; `None` for none.
     pub(crate) earlier: Option<Arc<EarlierData>>,
-    /// True if the fit is provisional: another fit follows, so the result is not checked.
+    /// True if the fit is provisional: another fit follows, so the fit stops at a larger tolerance
+    /// and its result is only checked for convergence.
     pub(crate) provisional: bool,
     /// True to search for influential rows by further fits.
     pub(crate) influential_rows: bool,
@@ -86,7 +87,7 @@ impl Options {
         Self { stop: stop.into(), ..self }
     }
 
-    /// Sets earlier data that join the fit.
+    /// Sets earlier data that are fitted together with the new rows.
     #[must_use]
     pub(crate) fn with_earlier(self, earlier: Arc<EarlierData>) -> Self {
         Self { earlier: Some(earlier), ..self }
@@ -99,7 +100,7 @@ impl Options {
         }
     }
 
-    /// Sets the values \[SI\] by name from which the fit starts.
+    /// Sets names and values \[SI\] of parameters that start the fit at these values.
     #[must_use]
     pub fn with_start(self, start: Vec<(String, f64)>) -> Self {
         Self { start, ..self }
@@ -117,7 +118,8 @@ impl Options {
         Self { max_steps: max_steps.into(), ..self }
     }
 
-    /// Returns the full parameter vector from which the fit starts: `x` with the values of `start`.
+    /// Returns the full parameter vector from which the fit starts: the deviations `x`, with those
+    /// of the parameters in `start` replaced.
     pub(super) fn begin(&self, model: &Model, x: &DVector<f64>) -> DVector<f64> {
         let given =
             |parameter: &Parameter| self.start.iter().find(|(name, _)| *name == parameter.name);

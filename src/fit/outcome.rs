@@ -1,4 +1,4 @@
-//! Result of an identification.
+//! Result of an identification: estimates with their uncertainty, errors, and findings.
 
 use std::sync::OnceLock;
 
@@ -25,11 +25,11 @@ use crate::quantity::Unit;
 /// Smallest absolute correlation at which a pair of parameters is reported. In units of σ, the
 /// variances of sum and difference then differ at least by a factor of 19.
 pub const STRONG_CORRELATION: f64 = 0.9;
-/// Largest identified share at which a parameter has no standard error, because the data do not
-/// determine it.
+/// Largest identified share, 0…1, at which the data do not determine a parameter, so that it has no
+/// standard error.
 const MAX_UNIDENTIFIED_SHARE: f64 = 1e-6;
 
-/// Free parameter after the fit; SI units.
+/// Free parameter of the problem after a fit; SI units.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Estimate {
     /// Name of the parameter as in the problem file, such as `joint2.stiffness`.
@@ -65,26 +65,27 @@ pub struct Estimate {
 pub struct Identification {
     /// Strategy of the fit: which parameters are fitted together, in which order.
     pub strategy: Strategy,
-    /// Solver that was used.
+    /// Solver that was used; never `Auto`.
     pub solver: SolverChoice,
-    /// Reason for the choice of the solver, if `auto` chose it.
+    /// Reason for the choice of the solver; `None` if the caller chose it.
     pub solver_reason: Option<&'static str>,
     /// Reason why the last least-squares fit stopped.
     pub termination: Termination,
-    /// Effect that expresses the misreading of the table that the checks found.
+    /// Effect with which the model fits the table as it was read, if the checks found that the
+    /// table was misread and an effect expresses the mistake; else `None`.
     pub(crate) misread: Option<MisreadEffect>,
     /// Findings of the checks, errors first; a provisional fit is only checked for convergence.
     pub findings: Vec<Finding>,
     /// Number of different poses of the arm that were fitted; several targets in one pose count
     /// once.
     pub poses: usize,
-    /// True if some pose of the arm shows several targets.
+    /// True if several targets were measured in one pose of the arm.
     pub several_targets: bool,
     /// Number of steps that were tried, over all stages.
     pub iterations: u64,
     /// Number of evaluations of the residual, with or without derivatives, over all stages.
     pub evaluations: u64,
-    /// Convergence of the alternating stages of a sequential strategy.
+    /// Convergence of the alternating stages of [`Strategy::Sequential`]; `None` for others.
     #[doc(hidden)]
     pub alternation: Option<Alternation>,
     /// Duration of the identification \[s\].
@@ -96,24 +97,24 @@ pub struct Identification {
     pub registered: Errors,
     /// Errors of the identified arm.
     pub fitted: Errors,
-    /// Errors of the identification rows, each configuration predicted by a fit without it \[m\];
-    /// empty where rows are held out.
+    /// Errors measured − predicted of the identification rows \[m\], each predicted by a fit
+    /// without its configuration; empty unless the problem holds out no row.
     pub(crate) left_out: Vec<Vector3<f64>>,
-    /// Errors of each kind of rows: with the registered nominal arm and with the identified arm.
-    /// Empty if there is only one kind.
+    /// Errors of the registered nominal arm and of the identified arm, for each kind of rows. Empty
+    /// if there is only one kind.
     pub kinds: Vec<(Errors, Errors)>,
-    /// Scatter of the predicted target at each touched point, with the registered nominal and with
-    /// the identified arm. The flag is true if all rows of the point are held out.
+    /// Scatter of the predicted target at each touched point: that of the registered nominal arm,
+    /// that of the identified arm, and true if all rows of the point are held out.
     #[doc(hidden)]
     pub spreads: Vec<(PointSpread, PointSpread, bool)>,
-    /// Errors of orientation, where it is fitted.
+    /// Errors of orientation; `None` if orientation is not fitted.
     #[doc(hidden)]
     pub orientation: Option<OrientationErrors>,
     /// Reduced χ² (χ² over its degrees of freedom) of the identification data; `None` without
     /// degrees of freedom or with estimated noise. A robust loss excludes outliers.
     pub reduced_chi2: Option<f64>,
     /// Interval in which `reduced_chi2` lies with probability 0.999 if the residual is only noise;
-    /// `None` if `reduced_chi2` is.
+    /// `None` if `reduced_chi2` is `None`.
     pub chance: Option<(f64, f64)>,
     /// Noise variance that the fit assumed, relative to the declared one; 1 unless residuals and
     /// priors contradict the declared σ.
@@ -121,7 +122,8 @@ pub struct Identification {
     /// Standard deviation (1 σ) of a measured coordinate that the fit assumed \[m\] (of a tilt
     /// \[rad\]): root mean square over the identification rows of the leading kind.
     pub sigma_taken: f64,
-    /// Factor on the declared σ that the fit assumed: 1, or less if the declared σ are too large.
+    /// Factor below 1 by which the fit multiplied declared σ that are too large; 1 if it did not
+    /// reduce them.
     pub sigma_scale: f64,
     /// Combinations of `unknowns` that the data determine too weakly, which keep their start
     /// values. Weights are in units of the arm's reach for lengths, 1 rad for angles and a factor
@@ -160,18 +162,18 @@ pub struct Identification {
     /// but not with a robust loss.
     #[doc(hidden)]
     pub influential_rows: Option<InfluentialRows>,
-    /// Full parameter vector of the identified arm.
+    /// Full parameter vector of the identified arm: the deviation of each parameter from nominal.
     pub x: DVector<f64>,
     /// Full parameter vector of the registered nominal arm, whose errors are `registered`.
     pub registered_x: DVector<f64>,
-    /// Parts that were fitted in the registered nominal arm: "base", "tool", "fixtures"; those that
-    /// are not free are left out.
+    /// Parts that are free and were therefore fitted in the registered nominal arm: "base", "tool",
+    /// "fixtures".
     pub(crate) registered_parts: Vec<&'static str>,
     /// Comparison with the earlier estimate that was the prior; `None` without one.
     pub(crate) prior: Option<PriorComparison>,
     /// Digests of the identification rows; empty for a provisional fit.
     pub(crate) fitted_rows: Vec<String>,
-    /// Start of each session, from which time-dependent terms count.
+    /// Start time of each session, relative to which time-dependent terms are evaluated.
     pub(crate) start_times: StartTimes,
     /// Standard deviation (1 σ) of a coordinate in rows that state none, declared or estimated
     /// \[m\].
@@ -184,8 +186,8 @@ impl Identification {
         self.first_error().is_none()
     }
 
-    /// Returns true if the fit describes the measured arm well enough to look for effects. No
-    /// finding may be an error, except about a residual beyond the declared noise.
+    /// Returns true if the fit describes the measured arm well enough to search for effects: no
+    /// finding is an error, except one about a residual beyond the declared noise.
     pub(crate) fn describes_arm(&self) -> bool {
         let is_noise = |finding: &Finding| finding.code == FindingCode::NoiseBeyondDeclared;
         let mut findings = self.findings.iter();
@@ -209,7 +211,7 @@ impl Identification {
         self.finding(code).is_some()
     }
 
-    /// Returns the findings that are warnings, except those that have their own section in reports.
+    /// Returns the findings that are warnings, except those for which reports have a section.
     pub fn cautions(&self) -> impl Iterator<Item = &Finding> {
         let has_section =
             |code| matches!(code, FindingCode::InfluentialRows | FindingCode::UnsteadyPoint);
@@ -225,7 +227,7 @@ impl Identification {
         found.get_or_init(|| Identifiability::of(triangle))
     }
 
-    /// Returns the texts of the warnings, [`cautions`](Self::cautions), with their remedies.
+    /// Returns the texts of the findings in [`cautions`](Self::cautions), with their remedies.
     #[doc(hidden)]
     pub fn reasons_to_ask(&self) -> Vec<String> {
         self.cautions().map(ToString::to_string).collect()
@@ -249,7 +251,8 @@ impl Identification {
             .collect()
     }
 
-    /// Returns the correlations of the parameters that were fitted together.
+    /// Returns the correlations of the parameters that were fitted together to the identification
+    /// rows and have a variance.
     pub fn correlations(&self) -> Correlations {
         let name = |k: usize| &self.estimates[k].name;
         let Covariance { parameters, .. } = &self.covariance;
@@ -264,7 +267,8 @@ impl Identification {
 }
 
 impl Estimate {
-    /// Creates the estimate of a parameter that no stage varied, at its nominal value.
+    /// Creates the estimate of a parameter that no stage varied, at its nominal value. If
+    /// `time_measured` is false, speeds are per row instead of per second.
     pub(super) fn unfitted(parameter: &Parameter, time_measured: bool) -> Self {
         let unit = match parameter.unit() {
             Unit::Speed if !time_measured => Unit::LengthPerRow,
@@ -286,7 +290,8 @@ impl Estimate {
     }
 }
 
-/// Writes the result of a stage into the estimates and the covariance of its unknowns.
+/// Writes the values of a stage's unknowns at its `end` into `estimates`, with their standard
+/// errors, bounds and identified shares, and their covariance into `covariance`.
 pub(super) fn enter(
     (estimates, covariance): (&mut [Estimate], &mut Collected),
     stage: &Stage,

@@ -1,4 +1,4 @@
-//! Comparison of the posterior of a fit with an earlier estimate that was its prior.
+//! Comparison of a fit with the earlier estimate that was its prior.
 
 use std::path::PathBuf;
 
@@ -9,9 +9,10 @@ use crate::quantity::Unit;
 pub(crate) struct PriorComparison {
     /// Path of the earlier estimate.
     pub file: PathBuf,
-    /// Days of drift by which the prior was widened.
+    /// Time over which drift widened the prior \[days\].
     pub days: f64,
-    /// Number of rows that were left out, because the earlier estimate was fitted to them.
+    /// Number of rows that were left out of the fit, because the earlier estimate was fitted to
+    /// them.
     pub left_out: usize,
     /// Standard deviation (1 σ) of a coordinate \[m\] taken from the earlier fit; `None` if that
     /// is the declared one.
@@ -22,17 +23,19 @@ pub(crate) struct PriorComparison {
     /// Standard deviation (1 σ) of a coordinate \[m\] that the earlier fit estimated; `None` if
     /// the problem declares σ.
     pub estimated_sigma: Option<f64>,
-    /// True if the prior contains that of a fleet.
+    /// True if the prior of a fleet is part of the earlier estimate.
     pub includes_fleet: bool,
-    /// χ² of the new rows under the prior, its degrees of freedom, and its p-value.
+    /// χ² of the new rows as predicted by the prior, its degrees of freedom, and its p-value;
+    /// `None` if it was not computed.
     pub chi2: Option<(f64, f64, f64)>,
-    /// Causes for which the new rows contradict the prior, in the order in which they were found.
+    /// Texts of the causes of change that explain why the new rows contradict the prior, in the
+    /// order in which they were found; empty if the rows agree with it.
     pub causes: Vec<String>,
-    /// Parameters that the prior informs on.
+    /// Comparison of each parameter of which the prior contains information.
     pub parameters: Vec<ComparedParameter>,
 }
 
-/// Parameter with its prior, what the new rows say of it, and its posterior; SI units.
+/// Parameter with its prior, the estimate from the new rows alone, and its posterior; SI units.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct ComparedParameter {
     pub name: String,
@@ -40,10 +43,10 @@ pub(crate) struct ComparedParameter {
     /// Value and standard error of the earlier estimate, widened by drift.
     pub prior: (f64, f64),
     /// Value and standard error by the new rows, with the prior of the other parameters; `None` if
-    /// they say nothing, or if the parameter is at a bound.
+    /// the new rows contain no information on the parameter, or if it is at a bound.
     pub data: Option<(f64, f64)>,
-    /// Value and standard error of the fit; no standard error at a bound.
+    /// Value and standard error of the fit; the standard error is `None` at a bound.
     pub posterior: (f64, Option<f64>),
-    /// Difference of data and prior, in units of its standard deviation.
+    /// Difference `data` − `prior`, divided by its standard deviation; `None` if `data` is.
     pub difference: Option<f64>,
 }

@@ -1,4 +1,5 @@
-//! Residuals of the fitted rows as a function of the unknowns, for solvers outside of flexcal.
+//! Residuals of the identification rows and the priors as a function of the unknowns, for solvers
+//! outside of flexcal.
 
 use std::sync::Arc;
 
@@ -14,7 +15,8 @@ use crate::model::{Model, PoseResiduals};
 use crate::observation::Observation;
 use crate::problem::Problem;
 
-/// Number of residuals that [`PoseResiduals`] reserves for the numbers of a row.
+/// Number of residuals that [`PoseResiduals`] reserves for the measured numbers of each row; three
+/// more follow if orientations are fitted.
 const NUMBERS: usize = 3;
 
 /// Whitened residuals of the identification rows and of the priors as a function of the unknowns.
@@ -30,20 +32,21 @@ pub struct ResidualFunction {
     unknowns: Vec<usize>,
     /// Full parameter vector of the registered nominal arm.
     start: DVector<f64>,
-    /// 1 σ of a coordinate in rows that state none \[m\].
+    /// 1 σ of a coordinate \[m\] in rows that state none: declared, or else assumed.
     sigma: f64,
-    /// 1 σ of an orientation about each axis, if orientations are fitted \[rad\].
+    /// Declared 1 σ of an orientation about each axis \[rad\]; `None` if orientations are not
+    /// fitted.
     turn_sigma: Option<f64>,
 }
 
-/// Origin of one residual.
+/// Measured number or prior from which one residual comes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ResidualOrigin {
     /// Number `coordinate` that a row of the table measures; 3 to 5 are the axes of an orientation.
     Measured {
         /// Index of the row in the table, from 0.
         row: usize,
-        /// Index of the number.
+        /// Index of the number among those of the row.
         coordinate: usize,
     },
     /// Prior of the unknown with this index.
@@ -84,7 +87,8 @@ impl ResidualFunction {
         self.unknowns.iter().map(|&k| &self.model.parameters[k])
     }
 
-    /// Returns the deviations x of the registered nominal arm, at which a fit starts.
+    /// Returns the unknowns x of the registered nominal arm, at which a fit starts: deviations from
+    /// nominal.
     pub fn start(&self) -> DVector<f64> {
         DVector::from_iterator(self.unknowns.len(), self.unknowns.iter().map(|&k| self.start[k]))
     }
@@ -142,7 +146,8 @@ impl ResidualFunction {
         PoseResiduals::new(&self.model, poses, self.unknowns.clone(), self.start.clone())
     }
 
-    /// Returns the values of measured numbers, without those that fill up the rows of a table.
+    /// Returns `values` without the zeros that pad every identification row to the same number of
+    /// residuals.
     fn without_padding(&self, values: &[f64]) -> Vec<f64> {
         let rows = &self.data.split.identification;
         let size = if rows.is_empty() { NUMBERS } else { values.len() / rows.len() };

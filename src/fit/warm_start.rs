@@ -6,30 +6,30 @@ use crate::fit::stages::noise_model::NoiseModel;
 use crate::fit::{Errors, Identification};
 use crate::model::{LinearModel, Model};
 
-/// State reused to start the next fit of the same data, or of most of their rows, with other
-/// effects. It contains registered parameters, noise model, and the linear model at the optimum.
+/// State of a fit from which a fit of the same data, or of most of their rows, with other effects
+/// starts: registered parameters, noise models, and the linear model at the optimum.
 #[derive(Debug, Clone)]
 pub(crate) struct WarmStart {
-    /// Deviations of the registered nominal arm by parameter name; parameters without an entry do
-    /// not deviate.
+    /// Names and deviations from nominal of the parameters that registration changed, mostly those
+    /// of bases and targets; all other deviations are 0.
     registered: Vec<(String, f64)>,
     /// Errors of the registered nominal arm.
     pub(super) errors: Errors,
-    /// Noise models of positions and orientations; `None` if the next fit starts with the declared
-    /// σ.
+    /// Noise models of positions and of orientations with which the next fit starts; `None` if it
+    /// starts with the declared σ.
     pub(super) noise: Option<(NoiseModel, NoiseModel)>,
-    /// Jacobian at the optimum, if it was computed.
+    /// Jacobian and residual at the optimum of the fit; `None` if they were not computed.
     pub(super) linear_model: Option<LinearModel>,
 }
 
 impl WarmStart {
-    /// Sets the linear model (Jacobian) at the optimum.
+    /// Returns the state with this linear model (Jacobian and residual at the optimum).
     pub(crate) fn with_linear_model(self, linear_model: Option<LinearModel>) -> Self {
         Self { linear_model, ..self }
     }
 
-    /// Returns the full parameter vector of the registered nominal arm in the model of the next
-    /// fit.
+    /// Returns the full parameter vector of the registered nominal arm in `model`, the model of the
+    /// next fit.
     pub(super) fn registered(&self, model: &Model) -> DVector<f64> {
         let deviation = |name: &String| {
             self.registered.iter().find(|(other, _)| other == name).map_or(0.0, |entry| entry.1)
@@ -40,8 +40,8 @@ impl WarmStart {
 }
 
 impl Identification {
-    /// Returns the state from which the next fit starts. It contains the noise model only if
-    /// `keep_noise` is true.
+    /// Returns the state from which the next fit starts, without a linear model. It contains the
+    /// noise models that this fit assumed only if `keep_noise` is true.
     pub(crate) fn warm_start(&self, keep_noise: bool) -> WarmStart {
         let names = self.estimates.iter().map(|estimate| estimate.name.clone());
         let deviations = names.zip(self.registered_x.iter().copied());

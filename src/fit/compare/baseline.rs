@@ -1,4 +1,4 @@
-//! Identification procedure of the paper on the same problem, as a row of the comparison.
+//! Identification by the procedure of \[Chen2021\], one row of the comparison of strategies.
 
 use std::time::Instant;
 
@@ -11,12 +11,13 @@ use crate::measurement::{Dataset, Measurements};
 use crate::paper::{self, EndPoint, Form, Mdh, Measured, StiffnessStage};
 use crate::problem::{Joint, Problem};
 
-/// Result of the paper's closed forms and iteration on the identification rows.
+/// Result of an identification by the paper's closed forms and iteration from the identification
+/// rows.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Baseline {
-    /// Form of the equations: as printed, or with the misprints corrected.
+    /// Form of the paper's misprinted equations: as printed, or corrected.
     pub form: Form,
-    /// Stage of the procedure that supplies the stiffness.
+    /// Source of the stiffness in the procedure.
     pub stage: StiffnessStage,
     /// Table 2 of the paper: α, a, θ, d, β of each joint.
     pub geometry: Vec<[TableEntry; 5]>,
@@ -24,11 +25,11 @@ pub struct Baseline {
     pub errors: Errors,
     /// Errors measured − predicted of the held-out poses, measuring frame \[m\].
     pub held_out: Vec<Vector3<f64>>,
-    /// Number of steps of the iteration [Chen2021, eq. 45].
+    /// Number of steps of the iteration of the geometry [Chen2021, eq. 45].
     pub iterations: u64,
-    /// Number of evaluations of the residual.
+    /// Number of evaluations of the residual in the iteration.
     pub evaluations: u64,
-    /// Duration of the iteration \[s\].
+    /// Duration of the whole procedure and of its predictions \[s\].
     pub seconds: f64,
     /// Reason why the iteration stopped.
     pub termination: Termination,
@@ -40,8 +41,8 @@ impl Baseline {
         paper_name(self.form, self.stage)
     }
 
-    /// Returns the result in the form of the paper's tables; `rigid` is the result with elasticity
-    /// ignored.
+    /// Returns the result in the form of the paper's tables; `rigid` is the result of the procedure
+    /// that ignores elasticity, or `None` if the arm is rigid.
     pub(in crate::fit) fn procedure(&self, rigid: Option<&Self>) -> Procedure {
         let ignoring = rigid.map(|rigid| rigid.held_out.clone());
         let paper = Some((self.form, self.stage));
@@ -51,18 +52,18 @@ impl Baseline {
 }
 
 /// Runs every form of the paper's procedure [Chen2021, eq. 1-45] that the identification rows
-/// allow: first with elasticity ignored, then corrected and as printed, with stiffness known, from
-/// positions, or from load differences.
+/// allow: first with elasticity ignored, then with corrected and with printed equations, each with
+/// declared stiffness, with stiffness from positions, and with stiffness from load differences.
 ///
-/// Returns an empty list if the procedure does not apply. It needs one session and target, and one
-/// chain of joints in DH form without mimic joints. It also needs at least as many equations as
-/// geometric parameters. Without elasticity it returns the rigid form alone.
+/// Returns an empty list if the procedure does not apply. The procedure needs one session and
+/// target, one chain of joints in DH form without mimic joints, and at least as many equations as
+/// geometric parameters. For an arm without elasticity, the list has the rigid form alone.
 pub(in crate::fit) fn baselines(problem: &Problem, data: &Dataset) -> Vec<Baseline> {
     let Dataset { measurements, .. } = data;
-    let beyond = |joint: &Joint| joint.placement.is_some() || joint.mimic.is_some();
+    let is_unsupported = |joint: &Joint| joint.placement.is_some() || joint.mimic.is_some();
     let is_one =
         measurements.session.names.len() < 2 && measurements.target.is_none() && problem.is_chain();
-    if !is_one || problem.joints.iter().any(beyond) {
+    if !is_one || problem.joints.iter().any(is_unsupported) {
         return Vec::new();
     }
     let rigid = (Form::Corrected, StiffnessStage::Rigid);
@@ -86,6 +87,7 @@ fn poses<'a>(data: &'a Measurements, rows: &[usize]) -> Vec<Measured<'a>> {
         .collect()
 }
 
+/// Runs one form of the paper's procedure; `None` if the identification rows do not allow it.
 fn baseline(
     problem: &Problem,
     data: &Dataset,

@@ -1,4 +1,4 @@
-//! Comparison of strategies and solvers, and of models without parts of the elasticity.
+//! Comparison of identifications of one problem by different strategies, solvers and models.
 
 use nalgebra::{DVector, Vector3};
 
@@ -15,42 +15,44 @@ use crate::paper::StiffnessStage;
 use crate::paper::published::is_published_arm;
 use crate::problem::Problem;
 
-/// Results of all strategies and solvers for one problem.
+/// Results of all strategies, solvers and ablations for one problem.
 #[derive(Debug, Clone)]
 pub struct Comparison {
     /// Joint fit of the declared model by the solver that `auto` chooses.
     pub joint: Identification,
     /// Joint fit of the rigid arm, with elasticity ignored.
     pub rigid: Identification,
-    /// One identification per strategy and solver, without strategies that have nothing to vary.
+    /// One identification for each strategy and solver, except strategies without a parameter to
+    /// vary.
     pub strategies: Vec<Identification>,
     /// Results of the paper's procedure in every form that the data allow, the rigid one first;
     /// empty if it was not requested, or if no row is held out.
     pub paper: Vec<Baseline>,
-    /// Ablation and joint fit of the model without the ablated elasticity.
+    /// Each ablation with the joint fit of the model without the elasticity that it removes.
     pub ablations: Vec<(Ablation, Identification)>,
     /// Results of the joint fit and of every elastic form of the paper's procedure, as in the
     /// paper's tables. Empty if some rows measure no position, or none is held out.
     pub procedures: Vec<Procedure>,
-    /// Errors before calibration as the paper defines them: those of the rigid nominal arm.
+    /// Errors before identification as the paper defines them: those of the rigid nominal arm.
     pub before: Before,
     /// True if the problem declares the arm of the paper, so that the published figures apply.
     pub is_papers_arm: bool,
 }
 
-/// Errors of the rigid nominal arm.
+/// Errors of the rigid nominal arm, before identification.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Before {
     /// Errors measured − predicted of the held-out poses, measuring frame \[m\].
     pub errors: Vec<Vector3<f64>>,
-    /// True if base or tool were fitted before, because they are free without a prior.
+    /// True if base and tool were fitted first, because some of their parameters are free without
+    /// prior and bounds.
     pub registered: bool,
 }
 
 /// Settings of a comparison of strategies and solvers on one problem.
 #[derive(Clone, Default)]
 pub struct CompareOptions {
-    /// True to run the paper's procedure. It always runs if the problem declares the paper's arm.
+    /// True to run the paper's procedure for any arm. It always runs for the paper's arm.
     pub paper: bool,
     /// Receiver of progress reports; `None` to report nothing.
     pub progress: Option<ProgressSink>,
@@ -58,8 +60,8 @@ pub struct CompareOptions {
 
 /// Runs every strategy with every solver, and every ablation, on the identification rows.
 ///
-/// It leaves out strategies that have nothing to vary, solvers that cannot keep the declared bounds
-/// or constraints, and ablations of an arm without elasticity.
+/// Leaves out strategies without a parameter to vary and solvers that cannot keep the declared
+/// bounds or constraints. Without free elastic parameters, [`Ablation::All`] alone runs.
 ///
 /// # Errors
 /// Returns an error if problem and data do not fit each other.
@@ -77,13 +79,13 @@ pub fn compare(
     };
     let elastic = problem.is_elastic();
     // Without bounds, all solvers that keep bounds take the same steps: one of them is enough.
-    let tells = |solver: &SolverChoice| {
+    let is_distinct = |solver: &SolverChoice| {
         model.is_bounded() || matches!(solver.within(), None | Some(BoundMethod::ActiveSet))
     };
     let solvers = SolverChoice::SOLVERS
         .iter()
         .copied()
-        .filter(|solver| solver.keeps(&model) && tells(solver));
+        .filter(|solver| solver.keeps(&model) && is_distinct(solver));
     let mut strategies = Vec::new();
     for strategy in
         Strategy::EACH.into_iter().filter(|&strategy| elastic || strategy != Strategy::Rigid)

@@ -1,4 +1,4 @@
-//! Results in the form of the paper: its tables 2 and 3 and its figure 13.
+//! Results of an identification in the form of the paper's tables 2 and 3 and its figure 13.
 
 use nalgebra::Vector3;
 
@@ -6,34 +6,37 @@ use crate::fit::{Identification, Strategy};
 use crate::paper::{Form, StiffnessStage};
 use crate::problem::{Joint, Problem};
 
-/// Geometric parameter of a joint, as in table 2 of the paper \[m\] or \[rad\].
+/// Geometric parameter of a joint before and after identification, as in table 2 of the paper.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TableEntry {
     /// Value that the problem declares \[m\] or \[rad\].
     pub nominal: f64,
     /// Value that the procedure identified \[m\] or \[rad\].
     pub identified: f64,
-    /// Share of the value that the data determine, 0…1; `None` if it was not identified.
+    /// Identified share: the part of the value that the data determine, 0…1; `None` if the
+    /// parameter was not identified.
     pub seen: Option<f64>,
 }
 
-/// Result of one procedure, in the form of the paper's tables 2 and 3 and figure 13.
+/// Result of one identification procedure, in the form of the paper's tables 2 and 3 and figure 13.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Procedure {
-    /// Form of the paper's procedure; `None` for the joint fit of the declared model.
+    /// Form of the equations and source of the stiffness of the paper's procedure; `None` for the
+    /// joint fit of the declared model.
     pub paper: Option<(Form, StiffnessStage)>,
-    /// Table 2: number and α, a, θ, d, β of each joint in DH form.
+    /// Table 2: number (from 1) and α, a, θ, d, β of each joint in DH form.
     pub geometry: Vec<(usize, [TableEntry; 5])>,
     /// Errors measured − predicted of the held-out poses after identification, measuring frame
     /// \[m\].
     pub after: Vec<Vector3<f64>>,
-    /// Errors of the held-out poses with elasticity ignored \[m\]; `None` if the arm is rigid.
+    /// Errors measured − predicted of the held-out poses after an identification that ignores
+    /// elasticity, measuring frame \[m\]; `None` if the arm is rigid.
     pub ignoring: Option<Vec<Vector3<f64>>>,
 }
 
 impl Procedure {
-    /// Creates the result of a fit with its held-out errors and those of the fit that ignores
-    /// elasticity.
+    /// Creates the result of the joint fit `found`, with its held-out errors `after` and those of
+    /// the fit that ignores elasticity.
     pub(in crate::fit) fn of_fit(
         problem: &Problem,
         found: &Identification,
