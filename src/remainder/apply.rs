@@ -14,14 +14,15 @@ use crate::measurement::{Measurements, Split};
 use crate::model::Model;
 use crate::problem::Problem;
 
-/// Largest change of the corrections \[m\] in one pass at which the commands have converged; far
-/// below the accuracy of any arm.
+/// Largest change of a target's correction \[m\] from one pass to the next at which the commands
+/// have converged; far below the accuracy of any arm.
 const MAX_CONVERGED_CHANGE: f64 = 1e-11;
-/// Maximum number of passes. A command that has not converged by then is returned with its
-/// remaining distance `miss` to the target.
+/// Maximum number of passes, each of which corrects the targets and computes all commands again. A
+/// command that has not converged by then is returned with its remaining distance `miss` to the
+/// target.
 const MAX_PASSES: usize = 12;
 
-/// Prediction of rows by an arm with its correction.
+/// Positions that the identified arm with its correction predicts for rows of a table.
 #[derive(Debug, Clone)]
 pub struct CorrectedPrediction {
     /// Corrected positions, with residuals and errors if the rows were measured.
@@ -48,12 +49,12 @@ pub fn predict(
     let model = estimate.model(Model::new(problem, &placement.bases, &placement.targets)?);
     let unseen = correction.unseen_placements(&model);
     let seen = estimate.without_fitted(|name| unseen.contains(name));
-    let is_placed_again = rows.position_measured && correction.has_remainder();
-    let again = (is_placed_again && !unseen.is_empty())
+    let is_refitted = rows.position_measured && correction.has_remainder();
+    let refitted = (is_refitted && !unseen.is_empty())
         .then(|| fit::predict(problem, Some(&seen), rows, split).ok())
         .flatten();
-    let estimate = if again.is_some() { &seen } else { estimate };
-    let prediction = match again {
+    let estimate = if refitted.is_some() { &seen } else { estimate };
+    let prediction = match refitted {
         Some(prediction) => prediction,
         None => fit::predict(problem, Some(estimate), rows, split)?,
     };
@@ -100,12 +101,11 @@ pub fn predict_identified(
     Ok((positions, corrected))
 }
 
-/// Returns the rows with `shifts` \[m\] subtracted from their measured positions, as an arm without
-/// these errors would have been measured. A NaN shift (no equilibrium) is skipped.
+/// Returns the rows with `shifts` \[m\] subtracted from their positions, as if the arm had no such
+/// errors. A NaN shift (no equilibrium) is skipped.
 fn shifted(rows: &Measurements, shifts: &[Vector3<f64>]) -> Measurements {
     let mut rows = rows.clone();
     let of_rows = rows.positions.iter_mut().zip(shifts);
-    // A row whose arm has no equilibrium is not corrected.
     for (position, shift) in
         of_rows.filter(|(_, shift)| shift.iter().all(|value| value.is_finite()))
     {
@@ -149,9 +149,9 @@ pub fn compensate(
         let poses = corrected(&reached);
         let mut change = 0.0_f64;
         for ((command, pose), shift) in commands.iter_mut().zip(&poses).zip(&mut shifts) {
-            let turn = pose.shift - *shift;
-            command.miss -= turn;
-            change = change.max(turn.norm());
+            let difference = pose.shift - *shift;
+            command.miss -= difference;
+            change = change.max(difference.norm());
             *shift = pose.shift;
         }
         let before = first.get_or_insert_with(|| commands.clone());

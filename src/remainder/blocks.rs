@@ -13,7 +13,8 @@ const SEED: u64 = 0x0062_6c6f_636b;
 const MAX_PASSES: usize = 30;
 
 /// Returns the index of each row's block. Blocks are at most `count` clusters by k-means, in (sin
-/// q, cos q) of angles and standardised values of other inputs. [Lloyd 1982]
+/// q, cos q) of angles and standardised values of other inputs. [Lloyd 1982] The rows of one
+/// configuration share a block.
 pub(super) fn blocks(rows: &Rows, inputs: &Inputs, count: usize) -> Vec<usize> {
     let points: Vec<Vec<f64>> =
         (0..rows.len()).map(|row| point(rows.inputs_of(row), inputs)).collect();
@@ -46,8 +47,10 @@ pub(super) fn blocks(rows: &Rows, inputs: &Inputs, count: usize) -> Vec<usize> {
     block
 }
 
-fn point(inputs: &[f64], kinds: &Inputs) -> Vec<f64> {
-    let each = inputs.iter().zip(&kinds.angles);
+/// Returns the coordinates in which the distances of rows are measured: sine and cosine of each
+/// angle, and the standardised value of each other input.
+fn point(values: &[f64], inputs: &Inputs) -> Vec<f64> {
+    let each = values.iter().zip(&inputs.angles);
     each.flat_map(
         |(&value, &is_angle)| {
             if is_angle { vec![value.sin(), value.cos()] } else { vec![value] }
@@ -62,5 +65,5 @@ fn nearest(point: &[f64], centres: &[Vec<f64>]) -> usize {
         centre.iter().zip(point).map(|(a, b)| (a - b) * (a - b)).sum()
     };
     let each = centres.iter().map(distance).enumerate();
-    each.min_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(place, _)| place)
+    each.min_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(index, _)| index)
 }

@@ -9,10 +9,10 @@ use crate::measurement::Measurements;
 use crate::model::Model;
 use crate::problem::Problem;
 
-/// Frame of the targets.
+/// Frame in which the positions of targets are given.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TargetFrame {
-    /// Measuring frame, as measurements.
+    /// Measuring frame, in which measured positions are given, too.
     Measuring,
     /// Frame of the arm's base.
     Base,
@@ -25,7 +25,8 @@ pub struct Compensation {
     pub targets: Measurements,
     /// Command for each target.
     pub commands: Vec<Command>,
-    /// Bounds of the errors that remain, if the estimate holds the uncertainty of predictions.
+    /// Bounds of the errors with which the commands reach the targets; `None` if the estimate does
+    /// not hold the uncertainty of predictions.
     pub bounds: Option<Bounds>,
     /// True if the targets depend on the pose of the base, which the estimate does not determine.
     pub is_base_open: bool,
@@ -47,9 +48,9 @@ pub enum CompensationError {
 }
 
 impl Compensation {
-    /// Finds the commands for `targets`. Targets without positions are waypoints: the arm is
-    /// brought to where the nominal arm would have been. `correction` corrects predictions and
-    /// bounds errors with probability `level`.
+    /// Finds the commands for `targets`. Targets without positions are waypoints: the identified
+    /// arm is brought to where the nominal arm would be with the same commands. `correction`
+    /// corrects predictions and bounds errors with probability `level`.
     ///
     /// # Errors
     /// Returns an error if a row is no position, the estimate is of another problem, or the nominal

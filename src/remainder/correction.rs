@@ -9,14 +9,14 @@ use super::linearise::Linearisation;
 use super::placement_fit::PlacementFit;
 use super::posterior::{Posterior, RowFactors, RowPosterior};
 use super::rows::{AXES, Layout, Rows, SiteKind};
-use super::scores::{Scores, expected_size, fade};
+use super::scores::{Scores, applied_share, expected_size};
 use crate::fit::Identification;
 use crate::model::parameter::Parameter;
 use crate::model::{Model, Pose};
 use crate::problem::{PoseView, Problem};
 
-/// Smallest applied share of the correction, 0 to 1, at which a pose does not count as
-/// extrapolated.
+/// Smallest part of the correction that is applied at a pose, 0 to 1, at which the pose does not
+/// count as extrapolated.
 const MIN_SHARE: f64 = 0.5;
 /// Margin on either side of an input's measured range, as a fraction of the range, within which a
 /// pose is not extrapolated.
@@ -39,15 +39,15 @@ pub struct Correction {
     pub(super) sigma: f64,
     pub(super) layout: Layout,
     /// Free parameters, in the order of the posterior's parameter columns.
-    pub(super) parameters: Vec<Linearised>,
+    pub(super) parameters: Vec<LinearisedParameter>,
     pub(super) posterior: Posterior,
     /// Ratios of error to expected error of training rows that were left out.
     pub(crate) scores: Scores,
 }
 
-/// Free parameter, with its value in the linearisation of the arm.
+/// Free parameter, with its value at the point where the arm was linearised: the identified one.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Linearised {
+pub(super) struct LinearisedParameter {
     pub name: String,
     /// Deviation of the estimate from the nominal value, SI.
     pub deviation: f64,
@@ -55,12 +55,12 @@ pub(super) struct Linearised {
     pub estimate: f64,
 }
 
-/// Parameters of a correction that a model contains.
-struct Columns {
-    /// For each parameter in both, its column in the posterior and its index in the model.
-    found: Vec<(usize, usize)>,
-    /// Difference, for every column, between the deviation in the model and the one in the
-    /// linearisation of the correction.
+/// Parameters of a correction that a model contains, too.
+struct SharedParameters {
+    /// For each shared parameter, its column in the posterior and its index in the model.
+    indices: Vec<(usize, usize)>,
+    /// Deviation of each parameter of the correction in the model, minus the one at which the
+    /// correction was linearised; 0 for a parameter that the model lacks.
     moved: DVector<f64>,
 }
 
@@ -102,7 +102,7 @@ impl Correction {
             layout.sites.clear();
             layout.inputs.sites.clear();
         }
-        let parameter = |&k: &usize| Linearised {
+        let parameter = |&k: &usize| LinearisedParameter {
             name: found.estimates[k].name.clone(),
             deviation: found.x[k],
             estimate: found.estimates[k].estimate,
@@ -135,8 +135,9 @@ impl Correction {
         (AXES as f64 * self.posterior.hyper.noise_variance_of(1.0)).sqrt()
     }
 
-    /// Returns the error bound over poses with the expected error lengths `sizes` \[m\], as
-    /// [`Scores::pooled_bound`] does.
+    /// Returns the length \[m\] that errors do not exceed with probability `level`, over all poses
+    /// with the expected error lengths `sizes` \[m\] together. `certainty` holds the confidence in
+    /// the bound and the degrees of freedom of the scores, as for [`Scores::pooled_bound`].
     pub(crate) fn pooled_bound(
         &self,
         sizes: &[f64],
@@ -146,14 +147,14 @@ impl Correction {
         self.scores.pooled_bound(sizes, level, certainty)
     }
 
-    /// Returns the names of the free parameters of bases and tools of `model` on which no fitted
-    /// row depends. Their sessions or targets were not fitted.
+    /// Returns the names of the free parameters of those bases and tools of `model` that the
+    /// correction lacks: no row of their session or target was fitted.
     pub(super) fn unseen_placements<'a>(&self, model: &'a Model) -> HashSet<&'a str> {
-        let whole = |name: &str| name.split('.').next().unwrap_or_default().to_owned();
+        let owner = |name: &str| name.split('.').next().unwrap_or_default().to_owned();
         let seen: HashSet<String> =
-            self.parameters.iter().map(|parameter| whole(&parameter.name)).collect();
+            self.parameters.iter().map(|parameter| owner(&parameter.name)).collect();
         let is_unseen = |parameter: &&Parameter| {
-            parameter.site.is_placement() && !seen.contains(&whole(&parameter.name))
+            parameter.site.is_placement() && !seen.contains(&owner(&parameter.name))
         };
         let unseen = model.parameters.iter().filter(is_unseen);
         unseen.map(|parameter| parameter.name.as_str()).collect()
@@ -190,9 +191,9 @@ impl Correction {
         placed: &[usize],
         poses: &[Pose],
     ) -> Vec<CorrectedPose> {
-        let columns = self.columns(model, x);
+        let shared = self.shared_parameters(model, x);
         let placed = PlacementFit::new((problem, model, x), placed, poses);
-        let of_chunk = |poses: &[Pose]| self.factors(&columns, (problem, model, x), poses);
+        let of_chunk = |poses: &[Pose]| self.factors(&shared, (problem, model, x), poses);
         let chunks = || {
             poses.chunks(POSES_PER_CHUNK).enumerate().map(|(k, poses)| (POSES_PER_CHUNK * k, poses))
         };
@@ -206,7 +207,7 @@ impl Correction {
             if let Some(taken) = &sums {
                 placed.subtract(taken, first, &mut factors);
                 for (k, share) in noise_shares.iter_mut().enumerate() {
-                    *share = placed.shares_left(first + k);
+                    *share = placed.remaining_noise_shares(first + k);
                 }
             }
             self.corrected(&rows, (&factors, &noise_shares), poses)
@@ -214,40 +215,40 @@ impl Correction {
         chunks().flat_map(corrected).collect()
     }
 
-    /// Finds the parameters of the correction in `model`, and how far they moved from the values of
-    /// the linearisation.
-    fn columns(&self, model: &Model, x: &DVector<f64>) -> Columns {
-        let places: HashMap<&str, usize> = model
+    /// Finds the parameters of the correction in `model`, and how far `x` moved them from the point
+    /// where the correction was linearised.
+    fn shared_parameters(&self, model: &Model, x: &DVector<f64>) -> SharedParameters {
+        let indices: HashMap<&str, usize> = model
             .parameters
             .iter()
             .enumerate()
             .map(|(k, parameter)| (parameter.name.as_str(), k))
             .collect();
-        let place = |parameter: &Linearised| places.get(parameter.name.as_str()).copied();
-        let found = self.parameters.iter().enumerate();
-        let found = found.filter_map(|(column, parameter)| Some((column, place(parameter)?)));
-        let found: Vec<(usize, usize)> = found.collect();
+        let index = |parameter: &LinearisedParameter| indices.get(parameter.name.as_str()).copied();
+        let shared = self.parameters.iter().enumerate();
+        let shared = shared.filter_map(|(column, parameter)| Some((column, index(parameter)?)));
+        let indices: Vec<(usize, usize)> = shared.collect();
         let mut moved = DVector::zeros(self.parameters.len());
-        for &(column, k) in &found {
+        for &(column, k) in &indices {
             moved[column] = x[k] - self.parameters[column].deviation;
         }
-        Columns { found, moved }
+        SharedParameters { indices, moved }
     }
 
-    /// Returns the linearised rows of some poses and the posterior of their corrections, without
-    /// the part that `x` already contains. For poses without equilibrium, the residual is NaN and
-    /// all else is 0.
+    /// Returns the linearised rows of some poses and the posterior of their corrections. The change
+    /// of the parameters that `x` already contains is subtracted. For poses without equilibrium,
+    /// the residual is NaN and all else is 0.
     fn factors(
         &self,
-        Columns { found, moved }: &Columns,
+        SharedParameters { indices, moved }: &SharedParameters,
         (problem, model, x): (&Problem, &Model, &DVector<f64>),
         poses: &[Pose],
     ) -> (Rows, RowFactors) {
-        let unknowns = found.iter().map(|&(_, k)| k).collect();
+        let unknowns = indices.iter().map(|&(_, k)| k).collect();
         let linearisation = Linearisation { problem, model, x, unknowns, sigma: self.sigma };
         let mut rows = linearisation.rows(&self.layout, poses.to_vec());
         let mut jacobian = DMatrix::zeros(AXES * poses.len(), self.parameters.len());
-        for (from, &(column, _)) in found.iter().enumerate() {
+        for (from, &(column, _)) in indices.iter().enumerate() {
             jacobian.set_column(column, &rows.jacobian.column(from));
         }
         rows.jacobian = jacobian;
@@ -260,9 +261,9 @@ impl Correction {
         (rows, factors)
     }
 
-    /// Returns the applied share of each correction, with its uncertainty. `noise_shares` are the
-    /// fractions of the noise variance that remain in the coordinates after bases and tools are
-    /// fitted.
+    /// Returns the part of each correction that is applied, with its uncertainty. `noise_shares`
+    /// are the fractions of the noise variance that remain in the coordinates after bases and tools
+    /// are fitted.
     fn corrected(
         &self,
         rows: &Rows,
@@ -272,7 +273,7 @@ impl Correction {
         let hyper = &self.posterior.hyper;
         let of_row = |(row, RowPosterior { mean, covariance, prior }): (usize, RowPosterior)| {
             let lost = rows.residual[AXES * row].is_nan();
-            let share = fade(covariance.trace(), prior);
+            let share = applied_share(covariance.trace(), prior);
             let has_remainder = self.has_remainder();
             let missed = if has_remainder { (1.0 - share) * mean.norm() } else { 0.0 };
             let noise = noise_shares[row] * hyper.noise_variance_of(rows.relative_sigma[row]);

@@ -7,15 +7,17 @@ use super::scores::{LeftOutError, left_out_errors};
 use super::search::Minimum;
 use super::training_rows::TrainingRows;
 
-/// Largest number of configurations for which hyperparameters are fitted anew without each fold.
-/// With more configurations, no single one has much influence on the about 25 hyperparameters.
+/// Largest number of configurations at which the hyperparameters are fitted again for each fold
+/// that is left out. With more configurations, no single one has much influence on the about 25
+/// hyperparameters.
 pub(super) const MAX_CONFIGURATIONS: usize = 100;
 /// Maximum number of folds of the cross-validation.
 const FOLDS: usize = 10;
 
 /// Returns the prediction error of each row by a fit to the other folds: first with the parameters
-/// alone, then with a remainder. `near` is the optimum of the hyperparameters on all rows. `None`
-/// if a matrix is not positive definite because of rounding.
+/// alone, then with a remainder. The search of each fold starts at `near`, the optimum of the
+/// hyperparameters that was found without leaving rows out. `None` if a matrix is not positive
+/// definite because of rounding.
 pub(super) fn cross_validated(
     training: &TrainingRows,
     near: &Minimum,

@@ -17,8 +17,9 @@ pub fn declared(problem: &Problem) -> Result<Option<Correction>, SavedRemainderE
     of_problem(problem, Changes::Refused)
 }
 
-/// Reads the remainder that a problem declares and uses; `changes` states whether a changed file is
-/// accepted.
+/// Reads the remainder that a problem declares and uses; `changes` states whether a file is
+/// accepted that was edited after flexcal wrote it. Returns `None` if the problem uses no
+/// remainder.
 fn of_problem(
     problem: &Problem,
     changes: Changes,
@@ -59,6 +60,7 @@ pub fn of_estimate(
     Ok(correction.filter(|declared| declared.check(problem, &estimate.file).is_ok()))
 }
 
+/// Reads a correction, and checks that it belongs to the problem.
 fn read(
     problem: &Problem,
     file: &Path,

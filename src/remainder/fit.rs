@@ -18,6 +18,7 @@ use crate::problem::{Observation, Problem};
 const MIN_CONFIGURATIONS: usize = 10;
 /// Maximum number of rows to which a correction is fitted.
 const MAX_ROWS: usize = 10_000;
+
 /// Uncertainty of an identified arm's predictions, with and without a remainder, from
 /// configurations that were left out.
 #[derive(Debug, Clone)]
@@ -115,6 +116,8 @@ pub fn uncertainty(
     fitted((found, problem), data, false)
 }
 
+/// Conditions the parameters on the training rows, with a remainder in addition if one is wanted
+/// and predicts better. Returns `None` if the rows do not suffice.
 fn fitted(
     (found, problem): (&Identification, &Problem),
     data: &Dataset,
@@ -158,7 +161,7 @@ fn training_rows(
     let is_usable = finite(rows.residual.as_slice())
         && finite(rows.jacobian.as_slice())
         && finite(rows.sites.as_slice());
-    // Bases and tools of sessions that are held out have no column here.
+    // Parameters that move none of these rows, such as bases of held-out sessions, are left out.
     let seen: Vec<usize> =
         (0..rows.jacobian.ncols()).filter(|&j| rows.jacobian.column(j).amax() > 0.0).collect();
     rows.jacobian = rows.jacobian.select_columns(&seen);
@@ -166,8 +169,8 @@ fn training_rows(
     let prior = prior(model, &found.x, &linearisation.unknowns, &rows);
     let unknowns = (layout, linearisation.unknowns);
     let training = TrainingRows::new(unknowns, rows, prior);
-    let enough = training.configurations.len() >= MIN_CONFIGURATIONS && training.size > 0.0;
-    (is_usable && enough).then_some(training)
+    let suffices = training.configurations.len() >= MIN_CONFIGURATIONS && training.size > 0.0;
+    (is_usable && suffices).then_some(training)
 }
 
 /// Returns the identification rows that are no outliers; above [`MAX_ROWS`], every n-th of them.

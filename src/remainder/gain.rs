@@ -4,16 +4,16 @@ use statrs::distribution::{ContinuousCDF as _, StudentsT};
 
 use super::scores::LeftOutError;
 
-/// Probability with which the tests of error and likelihood each find a gain although there is no
-/// model error. In 200 simulated data sets without model error (28 poses), no remainder passed all
-/// tests.
+/// Probability with which the test of the error length, and the test of the marginal likelihood,
+/// find a gain although there is no model error. In 200 simulated data sets without model error (28
+/// poses), no remainder passed all tests.
 const FALSE_GAIN_PROBABILITY: f64 = 0.02;
 /// Probability with which the test of the predictive density finds a gain although there is no
 /// model error. It is larger than [`FALSE_GAIN_PROBABILITY`] because the test of the error must
 /// pass, too. Without model error, the density decreases in 94 % of data sets.
 const FALSE_DENSITY_GAIN_PROBABILITY: f64 = 0.1;
 
-/// Mean difference over the configurations, with its standard error.
+/// Mean of one difference per left-out configuration, with its standard error.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MeanDifference {
     /// Mean of the differences over the left-out configurations.
@@ -47,8 +47,8 @@ pub struct Gain {
     pub error: MeanDifference,
     /// Increase of the logarithm of the predictive density of a left-out row.
     pub density: MeanDifference,
-    /// Increase of the logarithm of the marginal likelihood, including the priors of the
-    /// hyperparameters.
+    /// Increase of the logarithm of the marginal likelihood over that of noise alone, including the
+    /// priors of the hyperparameters.
     pub ln_evidence: f64,
     /// Number of configurations averaged over.
     pub configurations: usize,
@@ -85,18 +85,20 @@ impl Gain {
         }
     }
 
-    /// Returns the ratio of mean gain to standard error that noise alone exceeds with a probability
-    /// of 2 %. It is a quantile of Student's t distribution.
+    /// Returns the ratio of the mean decrease of the error length to its standard error that noise
+    /// alone exceeds with a probability of 2 %. It is a quantile of Student's t distribution.
     pub fn threshold(&self) -> f64 {
         self.quantile(1.0 - FALSE_GAIN_PROBABILITY)
     }
 
-    /// Returns the ratio of the mean density gain to its standard error that noise alone exceeds
-    /// with a probability of 10 %.
+    /// Returns the ratio of the mean increase of the log density to its standard error that noise
+    /// alone exceeds with a probability of 10 %.
     pub fn density_threshold(&self) -> f64 {
         self.quantile(1.0 - FALSE_DENSITY_GAIN_PROBABILITY)
     }
 
+    /// Returns the quantile `level` of Student's t distribution with one degree of freedom less
+    /// than there are configurations.
     fn quantile(&self, level: f64) -> f64 {
         StudentsT::new(0.0, 1.0, self.configurations as f64 - 1.0)
             .map_or(f64::INFINITY, |distribution| distribution.inverse_cdf(level))

@@ -11,8 +11,8 @@ use super::training_rows::TrainingRows;
 /// Maximum number of rows in the search of the hyperparameters, and in the refinement after it. The
 /// time grows with the cube of this number.
 const MAX_SEARCH_ROWS: [usize; 2] = [120, 400];
-/// Initial lengths ℓᵤ and ℓᵥ, in rad or standard deviations, of the searches. For each start there
-/// is a measured arm on which it reaches the best optimum.
+/// Initial lengths ℓᵤ and ℓᵥ of the searches, \[rad\] for angles and in standard deviations for
+/// other inputs. For each start there is a measured arm on which it reaches the best optimum.
 const STARTS: [[f64; 2]; 3] = [[1.0, 1.0], [0.15, 0.15], [0.1, 3.0]];
 /// Maximum number of steps of the search from each start, and of the refinement.
 const MAX_STEPS: [usize; 2] = [60, 20];
@@ -20,11 +20,13 @@ const MAX_STEPS: [usize; 2] = [60, 20];
 /// Hyperparameters at a local maximum of the marginal likelihood.
 pub(super) struct Searched {
     pub hyper: Hyperparameters,
+    /// Minimum of the negative log marginal likelihood, in the logarithms of the hyperparameters.
     pub minimum: Minimum,
     /// Increase of the log marginal likelihood over that of a model with noise alone.
     pub evidence: f64,
 }
 
+/// Returns the marginal likelihood of `rows`, which are a part of the training rows.
 fn likelihood<'a>(training: &'a TrainingRows, rows: &'a Rows) -> MarginalLikelihood<'a> {
     let shares_noise = training.shares_noise();
     let rows = (rows, &training.layout.inputs);
@@ -55,8 +57,9 @@ pub(super) fn search(training: &TrainingRows) -> Option<Searched> {
     Some(Searched { hyper, minimum, evidence })
 }
 
-/// Returns the optimum of the marginal likelihood of `rows`, searched from the optimum `near` that
-/// was found on `count` other rows; `None` if the likelihood cannot be evaluated.
+/// Returns the optimum of the marginal likelihood of `rows`. The search starts at the optimum
+/// `near` of another selection of `count` training rows. `None` if the likelihood cannot be
+/// evaluated there.
 fn refine(training: &TrainingRows, rows: &Rows, near: &Minimum, count: usize) -> Option<Minimum> {
     let refined = likelihood(training, rows);
     let inverse = &near.inverse * (count as f64 / rows.len() as f64);
@@ -64,7 +67,8 @@ fn refine(training: &TrainingRows, rows: &Rows, near: &Minimum, count: usize) ->
     minimise(value, (near.at.clone(), Some(inverse)), &refined.bounds(), MAX_STEPS[1])
 }
 
-/// Returns the hyperparameters fitted to a part of the rows, starting near the optimum of all rows.
+/// Returns the hyperparameters fitted to `rows`, a part of the training rows. The search starts at
+/// the optimum `near` of the search over all of them. `None` if the likelihood cannot be evaluated.
 pub(super) fn search_near(
     training: &TrainingRows,
     rows: &Rows,
@@ -74,7 +78,8 @@ pub(super) fn search_near(
     Some(likelihood(training, rows).hyperparameters(&minimum.at))
 }
 
-/// Returns the mean error length of rows that are predicted without their configuration \[m\].
+/// Returns the mean error length \[m\] of rows that are predicted without their configuration;
+/// `None` if a matrix is not positive definite because of rounding.
 fn left_out_error(training: &TrainingRows, rows: &Rows, hyper: &Hyperparameters) -> Option<f64> {
     let centres: Vec<usize> = (0..rows.len()).collect();
     let inputs = &training.layout.inputs;

@@ -6,7 +6,7 @@ use nalgebra::DMatrix;
 use super::kernel::{Hyperparameters, covariance, matern, squared_distance};
 use super::rows::{AXES, Inputs, Rows};
 
-/// Number of knots of a joint's function uⱼ per length ℓᵤ.
+/// Number of knots of a joint's function uⱼ per correlation length ℓᵤ.
 const KNOTS_PER_LENGTH: f64 = 2.0;
 /// Maximum number of knots of one site's function uⱼ.
 const MAX_KNOTS: usize = 90;
@@ -31,8 +31,8 @@ pub(super) struct Knot {
 }
 
 impl Inducing {
-    /// Creates the inducing variables at the rows with the indices `centres`. Unless these are all
-    /// rows, functions of single joints also get knots over the range of the rows.
+    /// Creates the inducing variables at the rows with the indices `centres`. Unless the centres
+    /// are all rows, the functions uⱼ also get knots over the range of their commands in the rows.
     pub fn new(rows: &Rows, centres: &[usize], hyper: &Hyperparameters, inputs: &Inputs) -> Self {
         let is_exact = hyper.sites() == 0 || centres.len() == rows.len();
         let centres = rows.select(if hyper.sites() == 0 { &[] } else { centres });
@@ -61,8 +61,8 @@ impl Inducing {
         AXES * self.centres.len() + self.knots.len()
     }
 
-    /// Returns the covariance of the remainder at `rows` with the inducing variables, shape = (3
-    /// rows, len).
+    /// Returns the covariance of the remainder's shift at `rows` \[m\] with the inducing variables,
+    /// shape = (3 rows, len).
     pub fn cross(&self, hyper: &Hyperparameters, inputs: &Inputs, rows: &Rows) -> DMatrix<f64> {
         let width = AXES * self.centres.len();
         let cross = covariance(hyper, inputs, rows, &self.centres);
@@ -102,7 +102,7 @@ impl Inducing {
 }
 
 /// Returns the index of the input that is the command of the site's joint; `None` if the site has
-/// no function of its own command.
+/// no function uⱼ of that command alone.
 fn input_of(inputs: &Inputs, site: usize) -> Option<usize> {
     inputs.sites[site].single
 }

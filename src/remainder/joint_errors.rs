@@ -6,14 +6,14 @@ use super::correction::Correction;
 use super::kernel::Hyperparameters;
 use super::rows::{AXES, Rows, Site, SiteKind};
 
-/// Error of a joint's coordinate as a function of its own command, and the motions of the target's
-/// position that all modelled errors of the joint cause.
+/// Error of a joint's coordinate as a function of the joint's own command, and the motions of the
+/// target that all modelled errors of the joint cause.
 #[derive(Debug, Clone, PartialEq)]
 pub struct JointError {
     /// Index of the joint, from 0.
     pub joint: usize,
-    /// Length ℓᵤ of the function of the joint's own command: \[rad\], or \[m\] for a prismatic
-    /// joint.
+    /// Correlation length ℓᵤ of the error as a function of the joint's own command: \[rad\], or
+    /// \[m\] for a prismatic joint.
     pub length: f64,
     /// Error over the measured range of the command. The mean over the range is subtracted, because
     /// it only changes the joint's offset.
@@ -29,15 +29,16 @@ pub struct JointError {
 pub struct JointErrorPoint {
     /// Command of the joint \[rad\], or \[m\] for a prismatic joint.
     pub command: f64,
-    /// Mean error as a motion of the position: error times the joint's lever \[m\].
+    /// Posterior mean of the error times the joint's lever \[m\], minus its mean over the range of
+    /// commands. The lever is the root mean square derivative of the position.
     pub mean: f64,
-    /// 1 σ of the error, as motion of the position \[m\].
+    /// Posterior 1 σ of the error times the lever \[m\].
     pub sigma: f64,
 }
 
 impl Correction {
-    /// Returns the errors of each joint whose coordinate errs, at `count` commands over its
-    /// measured range. The list is empty without a remainder.
+    /// Returns the errors of each joint whose coordinate error the remainder models, at `count`
+    /// commands over its measured range. The list is empty without a remainder.
     #[doc(hidden)]
     pub fn joint_errors(&self, count: usize) -> Vec<JointError> {
         let sites = self.layout.sites.iter().enumerate();
@@ -45,6 +46,8 @@ impl Correction {
         coordinates.filter_map(|(place, site)| self.joint_error(place, site, count)).collect()
     }
 
+    /// Returns the error of the joint of a coordinate site, which has the index `place` among all
+    /// sites; `None` if the site has no function of the joint's own command.
     fn joint_error(&self, place: usize, site: &Site, count: usize) -> Option<JointError> {
         let inputs = &self.layout.inputs;
         let input = inputs.sites[place].single?;
@@ -110,8 +113,8 @@ impl Correction {
         })
     }
 
-    /// Returns the root mean square motion of the position at the centres \[m\] by those processes
-    /// whose amplitude in `part` is not 0.
+    /// Returns the root mean square motion of the position at the centres \[m\] that those Gaussian
+    /// processes cause whose amplitude in `part` is not 0.
     fn motion(&self, part: &Hyperparameters) -> f64 {
         let inducing = &self.posterior.inducing;
         let cross = inducing.cross(part, &self.layout.inputs, &inducing.centres);

@@ -15,9 +15,9 @@ use super::training_rows::TrainingRows;
 const MIN_CONFIGURATIONS_FOR_REMAINDER: usize = 20;
 /// Number of blocks of neighbouring configurations, each of which is left out once.
 const BLOCKS: usize = 10;
-/// Minimum mean number of configurations in a block; with few configurations there are fewer
-/// blocks.
-const MIN_BLOCK: usize = 3;
+/// Minimum mean number of configurations in a block. With few configurations there are therefore
+/// fewer blocks than [`BLOCKS`], but at least two.
+const MIN_BLOCK_CONFIGURATIONS: usize = 3;
 
 /// Posterior distribution, with the scores of training rows that were left out.
 pub(super) struct Conditioned {
@@ -27,19 +27,21 @@ pub(super) struct Conditioned {
 
 /// Posterior with the parameters alone, and with a remainder in addition.
 pub(super) struct Judged {
+    /// Posterior of the parameters without a remainder.
     pub alone: Conditioned,
     /// Posterior with a remainder; `None` if the remainder is not kept.
     pub remainder: Option<Conditioned>,
+    /// Gain in accuracy by the remainder, whether it is kept or not; `None` if none was fitted.
     pub gain: Option<Gain>,
 }
 
 /// Conditions on the training rows with the parameters alone and, if wanted, with a remainder.
 /// Returns `None` if a matrix is not positive definite because of rounding.
 pub(super) fn judge(training: &TrainingRows, is_remainder_wanted: bool) -> Option<Judged> {
-    let count = BLOCKS.min(training.configurations.len() / MIN_BLOCK).max(2);
+    let count = BLOCKS.min(training.configurations.len() / MIN_BLOCK_CONFIGURATIONS).max(2);
     let block = blocks(&training.rows, &training.layout.inputs, count);
     let conditioned = |hyper: &Hyperparameters| {
-        let centres = training.some_rows(training.centres(), 1);
+        let centres = training.some_rows(training.max_centres(), 1);
         let rows = (&training.rows, &training.layout.inputs);
         Training::new(rows, &training.prior, hyper, &centres)
     };
@@ -64,10 +66,10 @@ pub(super) fn judge(training: &TrainingRows, is_remainder_wanted: bool) -> Optio
     let errors_alone = errors(&noise, &single_alone, &single_alone);
     let plain = with_scores(alone, &errors_alone, &errors(&noise, &blocks_alone, &blocks_alone));
     let without = Judged { alone: plain, remainder: None, gain: None };
-    let enough = is_remainder_wanted
+    let is_fitted = is_remainder_wanted
         && !training.layout.sites.is_empty()
         && training.configurations.len() >= MIN_CONFIGURATIONS_FOR_REMAINDER;
-    let searched = enough.then(|| search(training)).flatten();
+    let searched = is_fitted.then(|| search(training)).flatten();
     let Some(Searched { hyper, minimum, evidence }) = searched else { return Some(without) };
     let beside = conditioned(&hyper).and_then(|with| Some((left_out(&with)?, with)));
     let Some(((single_with, blocks_with), with)) = beside else { return Some(without) };
@@ -89,7 +91,8 @@ pub(super) fn judge(training: &TrainingRows, is_remainder_wanted: bool) -> Optio
 }
 
 /// Returns the factor by which error bounds grow because hyperparameters were fitted to the same
-/// rows. It is √(m / (m − k)), with m coordinates and k hyperparameters.
+/// rows. It is √(m / (m − k)), with m three times the number of configurations and k
+/// hyperparameters.
 fn inflation(configurations: usize, hyperparameters: usize) -> f64 {
     let coordinates = (AXES * configurations) as f64;
     (coordinates / (coordinates - hyperparameters as f64).max(1.0)).sqrt()

@@ -14,11 +14,11 @@ use super::rows::{AXES, Inputs, Rows};
 /// variance σ² to each coordinate, and noise of variance σ_c² that rows of one configuration share.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Hyperparameters {
-    /// Amplitude aᵤⱼ of each site: 1 σ of uⱼ's effect on the position \[m\].
+    /// Amplitude aᵤⱼ of each site: prior 1 σ of uⱼ times the lever of the site \[m\].
     pub single: Vec<f64>,
-    /// Amplitude aᵥⱼ of each site: 1 σ of vⱼ's effect on the position \[m\].
+    /// Amplitude aᵥⱼ of each site: prior 1 σ of vⱼ times the lever of the site \[m\].
     pub joint: Vec<f64>,
-    /// 1 σ of the effect of each site's constant error on the position \[m\].
+    /// Prior 1 σ of each site's constant error times the lever of the site \[m\].
     pub constant: Vec<f64>,
     /// Length ℓᵤⱼ of each site: \[rad\] for revolute joints, in standard deviations of the input
     /// for others.
@@ -51,7 +51,7 @@ impl Hyperparameters {
         self.single.len()
     }
 
-    /// Returns the prior variance of the error at a site, as motion of the position \[m²\].
+    /// Returns the prior variance of the error at a site times the lever of the site \[m²\].
     pub fn site_variance(&self, site: usize) -> f64 {
         [self.single[site], self.joint[site], self.constant[site]].iter().map(|a| a * a).sum()
     }
@@ -104,7 +104,8 @@ pub(super) fn squared_distances<'a>(
     pairs.map(|(a, b)| (a[0] - b[0]).powi(2) + (a[1] - b[1]).powi(2))
 }
 
-/// Covariances of the site errors between two poses \[m²\].
+/// Prior covariances of the errors at each site between two poses \[m²\]; errors are multiplied by
+/// the levers of their sites.
 pub(super) struct SiteCovariance<'a> {
     inputs: &'a Inputs,
     /// Variance a²ᵤⱼ and inverse squared length ℓᵤⱼ⁻² of each site.
@@ -179,7 +180,7 @@ pub(super) fn covariance(
                 &mut squares,
                 &mut sites,
             );
-            carry(&sites, (left, row), (right, pose), |a, b, value| {
+            position_covariances(&sites, (left, row), (right, pose), |a, b, value| {
                 out[b * height + AXES * row + a] = value;
             });
         }
@@ -188,11 +189,11 @@ pub(super) fn covariance(
     out
 }
 
-/// Adds up the covariances of the site errors as motions of the position. For each pair of axes a
-/// and b, it calls `enter` with Σ A₁ₐ c A₂ᵦ, summed over the sites with covariance c. A₁ and A₂ are
-/// the site columns of the two rows.
+/// Computes the covariance of the positions of two rows from the covariances `sites` of the errors
+/// at each site. For each pair of axes a and b, it calls `enter` with Σ A₁ₐ c A₂ᵦ. The sum is over
+/// the sites with covariance c; A₁ and A₂ are the site derivatives of the two rows.
 #[inline]
-pub(super) fn carry(
+pub(super) fn position_covariances(
     sites: &[f64],
     (left, first): (&Rows, usize),
     (right, second): (&Rows, usize),

@@ -5,28 +5,28 @@ use std::ops::Range;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::kernel::{Hyperparameters, carry, embedded, matern, squared_distances};
+use super::kernel::{Hyperparameters, embedded, matern, position_covariances, squared_distances};
 use super::prior::ParameterPrior;
 use super::rows::{AXES, Inputs, Rows, SiteFunctions, Source};
 use crate::numeric::{
     gram, gram_of_lower, inverse_lower, lower_factor, product_with_lower, product_with_upper,
 };
 
-/// 1 σ of the prior of the mean of ln ℓ, about 0, in each family of lengths. Two σ span lengths
-/// from 0.05 to 20 rad or standard deviations.
+/// 1 σ of the prior of the mean of ln ℓ, about 0, in each family of correlation lengths. Two σ span
+/// lengths from 0.05 to 20 rad or standard deviations of the input.
 const LENGTH_SPREAD: f64 = 1.5;
 /// 1 σ of the prior of each ln ℓ about the mean of its family.
 const LENGTH_DIFFERENCE: f64 = 0.15;
-/// 1 σ of the prior of ln a, about ln(root mean square residual).
+/// 1 σ of the prior of ln a of each amplitude, about ln(root mean square length of a residual).
 const AMPLITUDE_SPREAD: f64 = 3.0;
-/// Bounds of ln ℓ: ln 0.02 and ln 8.
+/// Bounds of ln ℓ: ln 0.02 and ln 8 rad or standard deviations of the input.
 const LENGTH_BOUNDS: (f64, f64) = (-3.912_023, 2.079_441_5);
-/// Bounds of ln a relative to ln(root mean square residual).
+/// Bounds of ln a of each amplitude, relative to ln(root mean square length of a residual).
 const AMPLITUDE_BOUNDS: (f64, f64) = (-7.0, 2.0);
-/// Bounds of ln σ and ln σ_c relative to ln(root mean square residual).
+/// Bounds of ln σ and ln σ_c, relative to ln(root mean square length of a residual).
 pub(super) const NOISE_BOUNDS: (f64, f64) = (-4.0, 2.0);
 /// Initial values of σ (noise of a coordinate) and σ_c (noise that the rows of one configuration
-/// share) in the search, as fractions of the root mean square residual.
+/// share) in the search, as fractions of the root mean square length of a residual.
 pub(super) const NOISE_STARTS: [f64; 2] = [0.7, 0.3];
 
 /// Negative logarithm of marginal likelihood times hyperparameter priors, as a function of the
@@ -53,7 +53,8 @@ pub(super) struct MarginalLikelihood<'a> {
     shares_noise: bool,
     /// Logarithm of the root mean square length of a residual in m.
     size: f64,
-    /// Squared distances in each input from a row (first index) to itself and to all later rows.
+    /// For each row, its squared distances to itself and to all later rows: one number per input
+    /// for the first pair, then for the next one.
     distances: Vec<Vec<f64>>,
 }
 
@@ -65,8 +66,8 @@ enum Function {
     Constant,
 }
 
-/// Correlations of the error functions between one row and each row from it on. A pair is that row
-/// with itself or with a later row.
+/// Correlations of the error functions between one row and itself, and between it and each later
+/// row; each of these is a pair.
 struct PairColumn {
     /// For each pair and site j, the correlation of the function uⱼ of the site's own command, and
     /// its derivative with respect to ln ℓᵤⱼ.
@@ -116,8 +117,8 @@ impl<'a> MarginalLikelihood<'a> {
         }
     }
 
-    /// Returns the number of hyperparameters: the amplitudes, the lengths ℓᵤ and ℓᵥ, σ and, if
-    /// noise is shared, σ_c.
+    /// Returns the number of hyperparameters: the amplitudes, the lengths ℓᵤ and ℓᵥ, σ and, if rows
+    /// of a configuration share noise, σ_c.
     pub fn len(&self) -> usize {
         self.input_lengths().end + 1 + usize::from(self.shares_noise)
     }
@@ -208,19 +209,19 @@ impl<'a> MarginalLikelihood<'a> {
         let n = whitened.ncols();
         let outer = lower_factor(DMatrix::identity(n, n) + gram(&whitened))?;
         let log_det_h = 2.0 * outer.diagonal().iter().map(|value| value.ln()).sum::<f64>();
-        let reach = product_with_upper(&whitened, &inverse_lower(&outer).transpose());
-        let reach = product_with_lower(&reach.transpose(), &inverse);
+        let z = product_with_upper(&whitened, &inverse_lower(&outer).transpose());
+        let z = product_with_lower(&z.transpose(), &inverse);
         let mut inverse = gram_of_lower(&inverse);
-        inverse -= gram(&reach);
+        inverse -= gram(&z);
         let weights = &inverse * &self.target;
         let mut value = 0.5 * (self.target.dot(&weights) + log_det_c + log_det_h);
-        // Half the trace is ½ tr((K⁻¹ − α αᵀ) ∂C).
+        // The gradient is ½ tr((K⁻¹ − α αᵀ) ∂C), with α = K⁻¹ y.
         inverse.ger(-1.0, &weights, &weights, 1.0);
         let mut gradient = self.gradient(&hyper, &inverse, &pairs);
         for k in 0..self.amplitudes.len() {
-            let away = (logarithms[k] - self.size) / AMPLITUDE_SPREAD;
-            value += 0.5 * away * away;
-            gradient[k] += away / AMPLITUDE_SPREAD;
+            let deviation = (logarithms[k] - self.size) / AMPLITUDE_SPREAD;
+            value += 0.5 * deviation * deviation;
+            gradient[k] += deviation / AMPLITUDE_SPREAD;
         }
         // ln ℓ ~ N(0, τ² I + s² 1 1ᵀ) within a family, by the Sherman–Morrison formula.
         for family in self.length_families() {
@@ -266,9 +267,14 @@ impl<'a> MarginalLikelihood<'a> {
                         *covariance += hyper.single[site].powi(2) * correlation;
                     }
                 }
-                carry(&covariances, (self.rows, second), (self.rows, first), |a, b, value| {
-                    out[b * AXES * n + AXES * second + a] = value;
-                });
+                position_covariances(
+                    &covariances,
+                    (self.rows, second),
+                    (self.rows, first),
+                    |a, b, value| {
+                        out[b * AXES * n + AXES * second + a] = value;
+                    },
+                );
             }
             pairs
         };

@@ -14,15 +14,18 @@ use crate::model::parameter::{JointField, ParameterSite};
 use crate::model::{Model, Pose, PoseResiduals};
 use crate::problem::{Joint, JointKind, Problem};
 
-/// Smallest root mean square derivative of the position with respect to a joint, as a fraction of
-/// the largest, at which the joint is a site.
+/// Smallest root mean square derivative of the position with respect to a joint's coordinate or
+/// compliance at which the remainder models its error, as a fraction of the largest over the
+/// joints.
 const MIN_LEVER: f64 = 1e-3;
-/// Smallest ratio of a condition's standard deviation to its mean at which it counts as varying.
+/// Largest ratio of standard deviation to mean at which a temperature, payload or hoist force
+/// counts as constant, so that errors do not depend on it.
 const MIN_SPREAD: f64 = 1e-6;
-/// 1 σ of the motion of the position that a parameter without a declared prior may cause \[m\]. It
-/// exceeds any plausible error, so that data decide.
+/// 1 σ of the motion of the position \[m\] that the prior assumed for a parameter without a
+/// declared one allows. It exceeds any plausible error, so that the data decide.
 const WIDE_MOTION_SIGMA: f64 = 0.3;
-/// Largest prior 1 σ of a parameter without a declared prior, in the SI unit of the parameter.
+/// Largest prior 1 σ assumed for a parameter without a declared prior, in the SI unit of the
+/// parameter.
 const MAX_SPREAD: f64 = 1e3;
 
 /// Model of a problem, to be linearised about a full parameter vector.
@@ -67,8 +70,8 @@ impl Linearisation<'_> {
         -jacobian_and_residual(&residuals, &residuals.reduced(self.x)).0
     }
 
-    /// Returns the derivatives of the position with respect to each site's error, divided by the
-    /// site's lever, shape = (sites, 3 poses).
+    /// Returns the derivatives of the positions of `poses` with respect to each site's joint
+    /// coordinate or compliance, divided by the site's lever, shape = (sites, 3 poses).
     fn site_columns(&self, sites: &[Site], poses: &[Pose]) -> DMatrix<f64> {
         let mut out = DMatrix::zeros(sites.len(), AXES * poses.len());
         let of_kind = |kind| -> Vec<(usize, usize)> {
@@ -113,8 +116,8 @@ impl Linearisation<'_> {
         -slopes
     }
 
-    /// Determines the sites at which the arm may err in these poses, and the inputs on which the
-    /// errors may depend.
+    /// Determines the joint coordinates and compliances at which errors move the arm in these
+    /// poses, and the inputs on which the errors may depend.
     pub fn layout(&self, poses: &[Pose]) -> Layout {
         let joints = commanded(self.problem);
         let sites = |kind| joints.iter().map(move |&joint| Site { joint, kind, lever: 1.0 });
@@ -162,7 +165,7 @@ impl Linearisation<'_> {
     }
 
     /// Sets the lever of each site, the root mean square derivative of the position over `poses`.
-    /// Sites that hardly move the position are left out.
+    /// Sites with a lever below [`MIN_LEVER`] times the largest are left out.
     fn with_levers(&self, sites: Vec<Site>, poses: &[Pose]) -> Vec<Site> {
         let columns = self.site_columns(&sites, poses);
         let count = poses.len().max(1) as f64;

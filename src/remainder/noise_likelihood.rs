@@ -9,9 +9,9 @@ use super::rows::{AXES, Rows};
 use super::search::minimise;
 use crate::numeric::{gram, lower_factor};
 
-/// Step of ln σ and ln σ_c in central differences.
+/// Step of ln σ and ln σ_c in the central differences of the likelihood.
 const DIFFERENCE_STEP: f64 = 1e-4;
-/// Maximum number of steps of the search.
+/// Maximum number of steps of the search for the largest likelihood.
 const MAX_STEPS: usize = 60;
 
 /// Sums over the rows from which the likelihood is computed at any σ and σ_c.
@@ -92,7 +92,8 @@ impl NoiseLikelihood {
 }
 
 /// Returns the largest logarithm of the marginal likelihood of `rows` over σ and σ_c, without a
-/// remainder. `size` is the root mean square residual \[m\].
+/// remainder. `size` is the root mean square length of a residual \[m\]. `None` if the likelihood
+/// is not finite at the start.
 pub(super) fn evidence_of_noise(
     rows: &Rows,
     prior: &ParameterPrior,

@@ -9,7 +9,7 @@ use crate::model::{Model, Pose};
 use crate::problem::Problem;
 
 /// Smallest eigenvalue of CᵀC, relative to the largest, whose direction is fitted. C holds the
-/// derivatives with respect to bases and tools, scaled to unit columns.
+/// derivatives of the positions with respect to bases and tools, scaled to unit columns.
 const RANK_TOLERANCE: f64 = 1e-9;
 
 /// Linear least-squares fit of those bases, tools and points that are no parameters of the
@@ -22,8 +22,8 @@ pub(super) struct PlacementFit {
     basis: DMatrix<f64>,
 }
 
-/// Products of Qᵀ with the corrections of all rows: with their mean and with their covariance
-/// factor.
+/// Products of Qᵀ with the corrections of all rows: with their posterior mean, and with the factor
+/// of their posterior covariance.
 pub(super) struct CorrectionProducts {
     mean: DVector<f64>,
     spread: DMatrix<f64>,
@@ -77,8 +77,8 @@ impl PlacementFit {
     }
 
     /// Returns the fraction of the variance of independent noise that remains in each coordinate of
-    /// a row after the fit.
-    pub fn shares_left(&self, row: usize) -> Vector3<f64> {
+    /// a row after the fit, 0 to 1.
+    pub fn remaining_noise_shares(&self, row: usize) -> Vector3<f64> {
         Vector3::from_fn(|axis, _| {
             (1.0 - self.basis.row(AXES * row + axis).norm_squared()).max(0.0)
         })
@@ -142,6 +142,9 @@ mod tests {
         // (1, 3, 4) · (1, 1, 2) / 6 = 2 times (1, 1, 2).
         assert!((shifts[0] - Vector3::new(2.0, 2.0, 0.0)).norm() < 1e-12, "{shifts:?}");
         assert!((shifts[1] - Vector3::new(4.0, 0.0, 0.0)).norm() < 1e-12, "{shifts:?}");
-        assert!((fit.shares_left(1) - Vector3::new(1.0 - 4.0 / 6.0, 1.0, 1.0)).norm() < 1e-12);
+        assert!(
+            (fit.remaining_noise_shares(1) - Vector3::new(1.0 - 4.0 / 6.0, 1.0, 1.0)).norm()
+                < 1e-12
+        );
     }
 }

@@ -1,4 +1,5 @@
-//! Posterior of parameters and remainder, computed as a linear model with Gaussian weights.
+//! Posterior of parameters and remainder, computed as a linear model of features with Gaussian
+//! weights.
 
 use std::collections::HashMap;
 
@@ -29,18 +30,19 @@ pub(super) struct Posterior {
     pub hyper: Hyperparameters,
     pub inputs: Inputs,
     pub prior: ParameterPrior,
-    /// Inducing variables z that stand for the error functions.
+    /// Inducing variables z, which represent the error functions.
     pub inducing: Inducing,
-    /// Inverse L⁻¹ of the factor of K_z.
+    /// Inverse L⁻¹ of the lower triangular factor of K_z.
     inverse: DMatrix<f64>,
     /// Lower triangular factor of A, and its inverse.
     pub factor: DMatrix<f64>,
     inverse_factor: DMatrix<f64>,
-    /// Posterior mean ŵ of the weights of the inducing variables.
+    /// Posterior mean ŵ of the weights of all features: those of the inducing variables, then those
+    /// of the parameters.
     pub weights: DVector<f64>,
 }
 
-/// Posterior distribution of one row's correction.
+/// Posterior distribution of the correction of one row's position, in its three coordinates.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct RowPosterior {
     /// Mean of measured − predicted position, with the parameters at their fitted values in the
@@ -57,7 +59,7 @@ pub(super) struct RowPosterior {
 pub(super) struct RowFactors {
     /// Mean of measured − predicted position, three coordinates for each row \[m\].
     pub mean: DVector<f64>,
-    /// Factor S of the part S Sᵀ of the covariance that weights and parameters cause, shape = (3
+    /// Factor F of the part F Fᵀ of the covariance that the uncertain weights cause, shape = (3
     /// rows, features) \[m\].
     pub spread: DMatrix<f64>,
     /// For each row, the trace of the remainder's prior covariance \[m²\], and the part of that
@@ -85,7 +87,7 @@ fn outer_block(of: &DMatrix<f64>, row: usize, columns: usize) -> Matrix3<f64> {
     Matrix3::from_fn(|a, b| product[(a, b)])
 }
 
-/// Prediction of a row from the other rows.
+/// Error of a row's prediction by a posterior that was conditioned without the row.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct LeftOut {
     /// Measured − predicted position \[m\], measuring frame.
@@ -99,12 +101,14 @@ pub(super) struct Training {
     pub posterior: Posterior,
     /// Features of the training rows, whitened by their noise: N^(−½) Φ.
     whitened: DMatrix<f64>,
-    /// Residuals of the training rows, whitened by their noise: N^(−½) y.
+    /// Residuals of the training rows at the mean of the parameters' prior, whitened by their
+    /// noise: N^(−½) y.
     target: DVector<f64>,
     /// Rows of each configuration, with the lower factor of their noise covariance.
     groups: Vec<(Vec<usize>, DMatrix<f64>)>,
 }
 
+/// Returns the indices 3 · row + axis of the coordinates of some rows.
 fn coordinates(rows: &[usize]) -> Vec<usize> {
     rows.iter().flat_map(|&row| (0..AXES).map(move |axis| AXES * row + axis)).collect()
 }
@@ -147,7 +151,7 @@ impl Posterior {
         gram(&scaled)
     }
 
-    /// Returns the matrix E with tr(F E Fᵀ) = prior − posterior variance of a row's correction. F
+    /// Returns the matrix E with tr(Φ E Φᵀ) = prior − posterior variance of a row's correction. Φ
     /// is (k(x, z), J S½) at the row, and the prior variance is that of the remainder alone.
     pub fn explained(&self) -> DMatrix<f64> {
         let kernel = self.inducing.len();
@@ -171,8 +175,8 @@ impl Posterior {
         self.factors_of(&self.hyper, rows)
     }
 
-    /// Returns mean and covariance factor of the correction by some of the processes. `part` holds
-    /// the hyperparameters with the amplitudes of all other processes set to 0.
+    /// Returns mean and covariance factor of the correction by some of the Gaussian processes.
+    /// `part` holds the hyperparameters with the amplitudes of all other processes set to 0.
     pub fn factors_of(&self, part: &Hyperparameters, rows: &Rows) -> RowFactors {
         let inducing = (&self.inducing, &self.inverse);
         let features = features(part, &self.inputs, inducing, &self.prior, rows);
@@ -188,7 +192,7 @@ impl Posterior {
         }
     }
 
-    /// Predicts rows that were not used for training.
+    /// Returns the prediction errors of measured rows that were not used for training.
     pub fn left_out(&self, rows: &Rows) -> Vec<LeftOut> {
         let left_out = |(row, predicted): (usize, RowPosterior)| {
             let noise = self.hyper.noise_variance_of(rows.relative_sigma[row]);
@@ -202,7 +206,8 @@ impl Posterior {
     }
 }
 
-/// Returns the lower factor L of the covariance of the inducing variables.
+/// Returns the lower factor L of the covariance of the inducing variables; `None` if the covariance
+/// is not positive definite.
 fn inducing_factor(
     hyper: &Hyperparameters,
     inputs: &Inputs,
@@ -213,6 +218,8 @@ fn inducing_factor(
     lower_factor(matrix)
 }
 
+/// Returns the features φ = (k(x, z) L⁻ᵀ, J S½) of `rows`, shape = (3 rows, features); `inverse` is
+/// L⁻¹.
 fn features(
     hyper: &Hyperparameters,
     inputs: &Inputs,
@@ -279,9 +286,9 @@ impl Training {
         Some(Self { posterior, whitened, target, groups })
     }
 
-    /// Predicts each row of `judged` without the rows of its part, in closed form. `part` is the
-    /// index of every row's part; rows of one configuration must share it. Returns `None` if a
-    /// matrix is not positive definite because of rounding.
+    /// Predicts each row of `judged` without the rows of its part, in closed form. `part` holds the
+    /// index of the part to which each row belongs; rows of one configuration must share it.
+    /// Returns `None` if a matrix is not positive definite because of rounding.
     pub fn without_each(&self, part: &[usize], judged: &[usize]) -> Option<Vec<LeftOut>> {
         let mut parts = vec![Vec::new(); part.iter().max().map_or(0, |last| last + 1)];
         for group in &self.groups {
@@ -297,7 +304,7 @@ impl Training {
         let of_groups = |groups: &[&Group]| -> Vec<usize> {
             groups.iter().flat_map(|(group, _)| coordinates(group)).collect()
         };
-        // S is computed for all small parts at once, A for the large parts.
+        // S = Φ L⁻ᵀ is computed for all small parts at once, and A once for all large parts.
         let width = self.whitened.ncols();
         let places: Vec<Vec<usize>> = parts.iter().map(|groups| of_groups(groups)).collect();
         let small: Vec<usize> =
@@ -355,7 +362,7 @@ impl Training {
         left_out: &[usize],
         judged: &[usize],
         spread: &DMatrix<f64>,
-    ) -> Option<Deleted> {
+    ) -> Option<WhitenedErrors> {
         let n = left_out.len();
         let features = self.whitened.select_rows(left_out);
         let error = self.target.select_rows(left_out) - features * &self.posterior.weights;
@@ -365,9 +372,9 @@ impl Training {
         let place: HashMap<usize, usize> =
             left_out.iter().enumerate().map(|(place, &of)| (of, place)).collect();
         let of_judged: Vec<usize> = judged.iter().map(|of| place[of]).collect();
-        Some(Deleted {
+        Some(WhitenedErrors {
             error: error.select_rows(&of_judged),
-            identity: 0.0,
+            identity_factor: 0.0,
             root: root.select_columns(&of_judged),
         })
     }
@@ -379,36 +386,37 @@ impl Training {
         left_out: &[usize],
         judged: &[usize],
         whole: &DMatrix<f64>,
-    ) -> Option<Deleted> {
+    ) -> Option<WhitenedErrors> {
         let Posterior { factor, weights, .. } = &self.posterior;
         let features = self.whitened.select_rows(left_out);
         let lower = lower_factor(whole - gram(&features))?;
-        // This is Φᵀy of the other rows.
+        // Φᵀy of the rows that are not left out.
         let target = self.target.select_rows(left_out);
         let projected = factor * factor.tr_mul(weights) - features.tr_mul(&target);
         let of_judged = self.whitened.select_rows(judged);
         let error = self.target.select_rows(judged) - &of_judged * solved(&lower, &projected);
         let root = product_with_upper(&of_judged, &inverse_lower(&lower).transpose()).transpose();
-        Some(Deleted { error, identity: 1.0, root })
+        Some(WhitenedErrors { error, identity_factor: 1.0, root })
     }
 }
 
 /// Rows of one configuration, and the lower factor of their noise covariance.
 type Group = (Vec<usize>, DMatrix<f64>);
 
-/// Errors of whitened coordinates that were predicted without themselves, and their covariance.
-struct Deleted {
+/// Errors of whitened coordinates that were predicted without these coordinates, and the covariance
+/// of the errors.
+struct WhitenedErrors {
     error: DVector<f64>,
     /// Number c and matrix R that give the covariance c I + RᵀR of the errors.
-    identity: f64,
+    identity_factor: f64,
     root: DMatrix<f64>,
 }
 
-impl Deleted {
+impl WhitenedErrors {
     /// Returns the covariance of `count` errors from index `first` on.
     fn covariance(&self, first: usize, count: usize) -> DMatrix<f64> {
         let root = self.root.columns(first, count);
-        DMatrix::identity(count, count) * self.identity + root.tr_mul(&root)
+        DMatrix::identity(count, count) * self.identity_factor + root.tr_mul(&root)
     }
 }
 

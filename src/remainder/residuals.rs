@@ -15,7 +15,7 @@ use crate::model::Model;
 use crate::problem::Problem;
 use crate::spatial::Frame;
 
-/// Residuals of a corrected arm.
+/// Residuals of the identified arm with its correction.
 #[derive(Debug, Clone)]
 pub struct CorrectedResiduals {
     /// Residual of each row, in the order of the rows.
@@ -29,7 +29,8 @@ pub struct CorrectedResiduals {
 
 /// Returns the residuals of all rows of `data` with the arm of `found` and its correction.
 ///
-/// Bases, tools and points of held-out rows alone are refitted to these rows, to first order.
+/// Bases, tools and points that only held-out rows use are refitted to the corrected rows, to first
+/// order.
 ///
 /// # Errors
 /// Returns an error if `problem` and `data` are not those that were identified.
@@ -64,7 +65,7 @@ pub fn residuals(
         let errors: Vec<Vector3<f64>> = part.iter().map(|&row| rows[row].position).collect();
         ErrorSummary::of_rows(table, part.iter().copied(), &errors)
     };
-    // Configurations that are left out are predicted without the remainder.
+    // Without held-out rows, the errors of configurations left out are those without the remainder.
     let Errors { held_out: left_out, is_left_out, .. } = found.fitted;
     let errors = Errors {
         identification: of(&data.split.identification),
@@ -88,8 +89,8 @@ pub(super) fn in_measuring_frame(
     }
 }
 
-/// Returns the parameters of fitted bases, tools and points that are not among the parameters of
-/// the correction, because only held-out rows use them.
+/// Returns the indices of the parameters of fitted bases, tools and points that are not among the
+/// parameters of the correction, because only held-out rows use them.
 fn placed(found: &Identification, model: &Model, correction: &Correction) -> Vec<usize> {
     let in_correction: HashSet<&str> =
         correction.parameters.iter().map(|parameter| parameter.name.as_str()).collect();

@@ -16,6 +16,7 @@ pub(super) const AXES: usize = 3;
 /// functions.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Layout {
+    /// Joint coordinates and compliances at which errors are modelled.
     pub sites: Vec<Site>,
     /// Inputs of the error functions, such as commands and loads.
     pub inputs: Inputs,
@@ -27,8 +28,9 @@ pub(super) struct Site {
     /// Joint, counted from 0.
     pub joint: usize,
     pub kind: SiteKind,
-    /// Lever: root mean square over the fitted rows of the position's derivative with respect to
-    /// the site's quantity. Errors times the lever are motions in m.
+    /// Lever: root mean square, over the fitted rows, of the derivative of the position with
+    /// respect to the coordinate or compliance. An error times the lever is a motion of the
+    /// position in m.
     ///
     /// The unit is \[m/rad\] for a revolute joint, \[1\] for a prismatic one and \[N·m²/rad\] for
     /// compliances, which share the largest of their levers.
@@ -108,14 +110,15 @@ pub(super) struct SiteFunctions {
 /// Inputs of the remainder: the commands of the moving joints, and conditions that vary.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Inputs {
-    /// Error functions at each site (joint) of the remainder.
+    /// Error functions at each site of the remainder.
     pub sites: Vec<SiteFunctions>,
+    /// Quantity of a pose that each input is.
     pub sources: Vec<Source>,
     /// For each input, true if it is an angle. Distances between angles are chords, so that q and q
     /// + 2π coincide.
     pub angles: Vec<bool>,
-    /// Offset and unit that standardise each input: 0 and 1 for angles, mean and standard deviation
-    /// for others.
+    /// Offset and unit that standardise each input as (value − offset) / unit. They are 0 and 1 for
+    /// angles, mean and standard deviation for others.
     pub standard: Vec<(f64, f64)>,
     /// Smallest and largest value of each input in the fitted rows, before standardisation.
     pub ranges: Vec<(f64, f64)>,
@@ -146,8 +149,8 @@ pub(super) struct Rows {
     /// Derivatives ∂p/∂x of the position with respect to the free parameters, shape = (3 rows,
     /// parameters).
     pub jacobian: DMatrix<f64>,
-    /// Derivatives of the position with respect to each site's quantity, divided by the site's
-    /// lever, shape = (sites, 3 rows).
+    /// Derivatives of the position with respect to each site's joint coordinate or compliance,
+    /// divided by the site's lever, shape = (sites, 3 rows).
     pub sites: DMatrix<f64>,
     /// Standardised inputs, shape = (inputs, rows).
     pub inputs: DMatrix<f64>,
@@ -170,14 +173,14 @@ impl Rows {
         &self.inputs.as_slice()[n * row..n * (row + 1)]
     }
 
-    /// Returns the derivatives of a row's position along one axis with respect to all sites, shape
-    /// = (sites). `coordinate` is 3 · row + axis.
+    /// Returns the derivatives of a row's position along one axis with respect to all sites,
+    /// divided by their levers, shape = (sites). `coordinate` is 3 · row + axis.
     pub fn sites_of(&self, coordinate: usize) -> &[f64] {
         let n = self.sites.nrows();
         &self.sites.as_slice()[n * coordinate..n * (coordinate + 1)]
     }
 
-    /// Returns the rows with the given indices.
+    /// Returns the rows with the given indices, in this order.
     pub fn select(&self, rows: &[usize]) -> Self {
         let coordinates: Vec<usize> =
             rows.iter().flat_map(|&row| (0..AXES).map(move |axis| AXES * row + axis)).collect();

@@ -8,7 +8,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::value::{RawValue, to_raw_value};
 
-use super::correction::{Correction, Linearised};
+use super::correction::{Correction, LinearisedParameter};
 use super::inducing::{Inducing, Knot};
 use super::kernel::Hyperparameters;
 use super::posterior::Posterior;
@@ -143,20 +143,20 @@ fn line(numbers: &[f64]) -> Option<Box<RawValue>> {
     to_raw_value(numbers).ok()
 }
 
-/// Rounds a number to seven significant digits, which the variances computed from the factor do not
-/// need to exceed.
+/// Rounds a number to seven significant digits; variances computed from the factor need no more.
 fn shortened(number: f64) -> f64 {
     format!("{number:.6e}").parse().unwrap_or(number)
 }
 
 impl Correction {
-    /// Returns the correction as JSON text that ends in a line break.
+    /// Returns the correction as JSON text with the digests that show later changes, ending in a
+    /// line break.
     #[doc(hidden)]
     pub fn to_json(&self) -> String {
         sealed(&self.to_text())
     }
 
-    /// Returns the correction as JSON text that ends in a line break.
+    /// Returns the correction as JSON text without digests, ending in a line break.
     pub(crate) fn to_text(&self) -> String {
         let Posterior { hyper, prior, inducing: Inducing { centres, knots }, factor, .. } =
             &self.posterior;
@@ -181,7 +181,7 @@ impl Correction {
             max: inputs.ranges[k].1,
             joint_length: hyper.input_lengths.get(k).copied().unwrap_or(1.0),
         };
-        let parameter = |(k, parameter): (usize, &Linearised)| Parameter {
+        let parameter = |(k, parameter): (usize, &LinearisedParameter)| Parameter {
             name: parameter.name.clone(),
             estimate: parameter.estimate,
             deviation: parameter.deviation,
@@ -343,7 +343,7 @@ impl Correction {
             (factor, DVector::from_vec(weights), change),
         )
         .ok_or_else(|| wrong("the covariance of the centres is not positive definite"))?;
-        let linearised = |parameter: Parameter| Linearised {
+        let linearised = |parameter: Parameter| LinearisedParameter {
             name: parameter.name,
             deviation: parameter.deviation,
             estimate: parameter.estimate,

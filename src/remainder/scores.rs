@@ -10,20 +10,20 @@ use super::posterior::LeftOut;
 use super::rows::{AXES, Rows};
 use crate::numeric::bisect;
 
-/// Maximum number of scores kept; quantiles up to 1 − 1/1000 remain exact.
+/// Maximum number of scores that are kept, as evenly spaced quantiles. Quantiles up to 0.999 can
+/// still be taken from them.
 const MAX_SCORES: usize = 1000;
-
-/// Minimum number of configurations from which the tail of the scores is judged.
+/// Minimum number of configurations from which the tail of the scores is estimated.
 const MIN_FOR_TAIL: usize = 20;
-/// Number of halvings of the interval in which a bound is searched.
+/// Number of bisections of the interval in which an error bound is searched.
 const HALVINGS: usize = 50;
 
-/// Returns the share of a correction that is applied: 1 if the data determine the remainder, 0 if
-/// they do not.
+/// Returns the part of a correction that is applied, 1 − `posterior` / `prior`: 1 if the data
+/// determine the remainder, 0 if they do not, or without a remainder.
 ///
 /// `posterior` is the posterior variance of the correction and `prior` the prior variance of the
 /// remainder, both as traces \[m²\].
-pub(super) fn fade(posterior: f64, prior: f64) -> f64 {
+pub(super) fn applied_share(posterior: f64, prior: f64) -> f64 {
     if prior > 0.0 { 1.0 - (posterior / prior).clamp(0.0, 1.0) } else { 0.0 }
 }
 
@@ -38,8 +38,8 @@ pub(super) struct LeftOutError {
     pub density: f64,
 }
 
-/// Computes the errors of left-out rows if only the applied share of each correction is added.
-/// `alone` are predictions with the parameters alone, `with` those with the remainder of these
+/// Computes the errors of left-out rows if only the [`applied_share`] of each correction is added.
+/// `alone` are the errors with the parameters alone, `with` those with the remainder of these
 /// hyperparameters.
 pub(super) fn left_out_errors(
     hyper: &Hyperparameters,
@@ -51,7 +51,7 @@ pub(super) fn left_out_errors(
         let noise = AXES as f64 * hyper.noise_variance_of(rows.relative_sigma[row]);
         let prior = variance(hyper, rows, row).trace();
         let whole = with.covariance.trace();
-        let share = fade(whole - noise, prior);
+        let share = applied_share(whole - noise, prior);
         let correction = alone.error - with.error;
         let error = alone.error - correction * share;
         let missed = if prior > 0.0 { (1.0 - share) * correction.norm() } else { 0.0 };
@@ -73,8 +73,9 @@ fn log_density(error: &Vector3<f64>, covariance: &Matrix3<f64>) -> f64 {
     -0.5 * (square + covariance.determinant().ln() + AXES as f64 * TAU.ln())
 }
 
-/// Returns the expected error length \[m\], from the trace of the error covariance \[m²\] and the
-/// length of the part of the correction that is not applied \[m\].
+/// Returns the expected root mean square error length \[m\]. `variance` is the trace of the error
+/// covariance \[m²\], and `missed` the length of the part of the correction that is not applied
+/// \[m\].
 pub(super) fn expected_size(variance: f64, missed: f64) -> f64 {
     (variance + missed * missed).sqrt()
 }
@@ -85,9 +86,9 @@ pub(super) fn expected_size(variance: f64, missed: f64) -> f64 {
 pub struct Scores {
     /// Number of configurations that were left out.
     pub(super) configurations: usize,
-    /// Scores of rows whose configuration was left out.
+    /// Scores of rows that were predicted without their configuration.
     pub(super) single: Vec<f64>,
-    /// Scores of rows whose block of neighbouring configurations was left out.
+    /// Scores of rows that were predicted without their block of neighbouring configurations.
     pub(super) blocks: Vec<f64>,
 }
 
@@ -105,10 +106,10 @@ impl Scores {
     /// Returns the ratio of error bound to expected error length at which the bound holds with
     /// probability `level`.
     ///
-    /// With G configurations it is the quantile of rank level (G + 1), interpolated. The larger one
-    /// of single configurations and blocks is taken. [Lei, G'Sell, Rinaldo, Tibshirani & Wasserman
-    /// 2018] For ranks beyond G, the largest score is extrapolated with the distribution of the
-    /// length of a normal vector in three dimensions.
+    /// With G configurations it is the score of rank level (G + 1), interpolated. The larger one of
+    /// both lists, single configurations and blocks, is taken. [Lei, G'Sell, Rinaldo, Tibshirani &
+    /// Wasserman 2018] For ranks beyond G, the largest score is extrapolated with the distribution
+    /// of the length of a normal vector in three dimensions.
     pub fn quantile(&self, level: f64) -> f64 {
         let count = self.configurations.max(1) as f64;
         let part = level * (count + 1.0) / count;
@@ -133,25 +134,27 @@ impl Scores {
         beyond * of(&self.single).max(of(&self.blocks))
     }
 
-    /// Returns the root mean square of the scores of single configurations; 1 if expected errors
-    /// are right. `None` without scores.
+    /// Returns the root mean square of the scores of single configurations; 1 if the expected error
+    /// lengths are right. `None` without scores.
     pub(super) fn scale(&self) -> Option<f64> {
         let count = self.single.len() as f64;
         let squares: f64 = self.single.iter().map(|score| score * score).sum();
         (count > 0.0 && squares > 0.0).then(|| (squares / count).sqrt())
     }
 
-    /// Returns the relative standard error of the quantile `level` of the lengths of normal vectors
-    /// in three dimensions, as many as configurations. [David & Nagaraja 2003, eq. 10.2.1]
+    /// Returns the relative standard error of the quantile `level` of a sample of lengths of normal
+    /// vectors in three dimensions. The sample has as many lengths as there are configurations.
+    /// [David & Nagaraja 2003, eq. 10.2.1]
     fn quantile_error(&self, level: f64) -> f64 {
         let quantile = length_quantile(level);
         let density = FRAC_2_PI.sqrt() * quantile.powi(2) * (-0.5 * quantile.powi(2)).exp();
         (level * (1.0 - level) / self.configurations as f64).sqrt() / (density * quantile)
     }
 
-    /// Returns the length that the errors of poses with the expected lengths `sizes` do not exceed
-    /// with probability `level`, over all poses together. The length is too small with at most the
-    /// probability 1 − `confidence`, if the scores have `freedom` degrees of freedom.
+    /// Returns the length \[m\] that errors do not exceed with probability `level`, over all poses
+    /// with the expected error lengths `sizes` \[m\] together. The length is too small with at most
+    /// the probability 1 − `confidence`, if the scores have `freedom` degrees of freedom. `None`
+    /// without scores.
     ///
     /// Errors are normal vectors whose scale the scores give, stretched if the scores have a longer
     /// tail than such vectors by more than the standard error of their quantile.
@@ -216,9 +219,14 @@ mod tests {
     #[test]
     fn a_correction_fades_where_nothing_was_learned() {
         assert_eq!(
-            (fade(0.0, 2.0), fade(2.0, 2.0), fade(3.0, 2.0), fade(1.0, 2.0)),
+            (
+                applied_share(0.0, 2.0),
+                applied_share(2.0, 2.0),
+                applied_share(3.0, 2.0),
+                applied_share(1.0, 2.0)
+            ),
             (1.0, 0.0, 0.0, 0.5)
         );
-        assert!(fade(0.0, 0.0).abs() < 1e-15);
+        assert!(applied_share(0.0, 0.0).abs() < 1e-15);
     }
 }

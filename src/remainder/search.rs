@@ -14,7 +14,7 @@ const ARMIJO_FRACTION: f64 = 1e-4;
 /// Maximum number of times that a step is halved before the search stops.
 const MAX_HALVINGS: usize = 12;
 
-/// Minimum that a search has found.
+/// Minimum of a function that a search has found.
 #[derive(Debug, Clone)]
 pub(super) struct Minimum {
     pub at: DVector<f64>,

@@ -8,7 +8,7 @@ use super::kernel::Hyperparameters;
 use super::rows::{AXES, Inputs, Layout, Site, SiteKind, Source};
 use crate::model::Model;
 
-/// Site at which an arm errs: the coordinate or the compliance of a joint.
+/// Site at which the remainder models an error: the coordinate or the compliance of a joint.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SiteTable {
     /// Index of the joint, counted from 0.
@@ -16,12 +16,14 @@ pub struct SiteTable {
     /// True if the error is in the compliance of the joint, false if it is in the joint's
     /// coordinate.
     pub is_compliance: bool,
-    /// Lever that divides the derivative of the position: \[m/rad\], \[1\] or \[N·m²/rad\].
+    /// Lever by which the derivative of the position is divided: \[m/rad\] for a revolute joint,
+    /// \[1\] for a prismatic one, \[N·m²/rad\] for a compliance.
     pub lever: f64,
     /// Prior variances \[m²\] of the error times `lever`. There are three parts: as a function of
     /// the joint's command alone, as a function of all inputs, and constant.
     pub variances: [f64; 3],
-    /// Index of the input that is the joint's own command, and 1/ℓᵤ² of the function of it.
+    /// Index of the input that is the joint's own command, and 1/ℓᵤ² of the function of that
+    /// command alone; `None` without such a function.
     pub single: Option<(usize, f64)>,
 }
 
@@ -38,16 +40,16 @@ pub enum InputSource {
     Hoist,
 }
 
-/// Input of the error functions.
+/// Input of the error functions, with its standardisation and its correlation length.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct InputTable {
     /// Quantity of a pose that is the input.
     pub source: InputSource,
     /// True if the input is an angle, so that distances are chords.
     pub is_angle: bool,
-    /// Offset and unit that standardise the input.
+    /// Offset and unit that standardise the input as (value − offset) / unit.
     pub standard: (f64, f64),
-    /// Inverse squared length 1/ℓᵥ² along this input of the functions of all inputs.
+    /// Inverse squared correlation length 1/ℓᵥ² along this input of the functions of all inputs.
     pub scale: f64,
 }
 
@@ -55,14 +57,14 @@ pub struct InputTable {
 /// variance, with prior − posterior = tr(Φ E Φᵀ) and Φ = (k(x, centres), J S½).
 #[derive(Debug, Clone, PartialEq)]
 pub struct CorrectionTables {
-    /// Sites at which the arm errs.
+    /// Joint coordinates and compliances at which errors are modelled.
     pub sites: Vec<SiteTable>,
     /// Inputs on which the errors depend.
     pub inputs: Vec<InputTable>,
     /// Standardised inputs of each centre.
     pub centres: Vec<Vec<f64>>,
-    /// Derivatives with respect to the sites at each centre: for each of three coordinates, one
-    /// number per site.
+    /// Derivatives of the position with respect to the sites at each centre, divided by the levers:
+    /// for each of three coordinates, one number per site.
     pub slopes: Vec<Vec<f64>>,
     /// Knots of the functions of a joint's own command: index of the site, and standardised input.
     pub knots: Vec<(usize, f64)>,
@@ -75,7 +77,8 @@ pub struct CorrectionTables {
 }
 
 impl Correction {
-    /// Returns the indices of the joints whose compliances err, counted from 0.
+    /// Returns the indices of the joints whose compliance errors the remainder models, counted from
+    /// 0.
     pub fn compliant_joints(&self) -> Vec<usize> {
         let sites = self.layout.sites.iter().filter(|site| site.kind == SiteKind::Compliance);
         sites.map(|site| site.joint).collect()

@@ -152,7 +152,9 @@ fn far_from_all_rows_only_the_parameters_are_corrected() {
     );
     let parameters = &distant_pose.jacobian * posterior.parameters();
     assert!((predicted.mean - Vector3::from_column_slice(parameters.as_slice())).norm() < 1e-9);
-    assert!(super::scores::fade(predicted.covariance.trace(), predicted.prior).abs() < 1e-15);
+    assert!(
+        super::scores::applied_share(predicted.covariance.trace(), predicted.prior).abs() < 1e-15
+    );
 }
 
 #[test]

@@ -28,6 +28,7 @@ pub(super) struct TrainingRows {
     pub prior: ParameterPrior,
     /// Root mean square length of a residual \[m\].
     pub size: f64,
+    /// Row indices of each configuration.
     pub configurations: Vec<Vec<usize>>,
     /// Indices of the rows that are left out to test predictions: all, or those of some
     /// configurations.
@@ -84,8 +85,8 @@ impl TrainingRows {
         (0..count).map(divided).collect()
     }
 
-    /// Returns the maximum number of rows that are centres of the processes.
-    pub fn centres(&self) -> usize {
+    /// Returns the maximum number of rows that are centres of the Gaussian processes.
+    pub fn max_centres(&self) -> usize {
         if self.rows.len() <= MAX_EXACT_ROWS { MAX_EXACT_ROWS } else { MAX_CENTRES }
     }
 
@@ -95,8 +96,8 @@ impl TrainingRows {
         10 * self.configurations.len() < 9 * self.rows.len()
     }
 
-    /// Estimates the noise of predictions without a remainder. σ² is the variance within
-    /// configurations, and σ_c² the variance of all residuals minus σ².
+    /// Estimates the noise of a model without a remainder. σ² is the variance of the residuals
+    /// within configurations, and σ_c² the variance of all residuals minus σ².
     pub fn noise(&self) -> Hyperparameters {
         let coordinate = |row: usize, axis: usize| self.rows.residual[AXES * row + axis];
         let coordinates = (AXES * self.rows.len()) as f64;
