@@ -22,7 +22,7 @@ const SETTINGS_STREAM: u64 = 1 << 32;
 /// Resolution to which commanded forces \[N\] and temperatures [°C] are rounded.
 const SETTING_STEP: f64 = 0.1;
 
-/// Frequency of poses at the limits of the ranges.
+/// Frequency with which drawn quantities lie at a limit of their range.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Extremes {
@@ -33,7 +33,8 @@ pub enum Extremes {
 }
 
 impl PoseRanges {
-    /// Returns the joint limits that the problem declares.
+    /// Returns the joint limits that the problem declares, as ranges of poses without payloads and
+    /// other conditions.
     ///
     /// # Errors
     /// Returns an error if a moving joint lacks a limit.
@@ -50,8 +51,8 @@ impl PoseRanges {
         Ok(Self { joints, ..Self::default() })
     }
 
-    /// Returns the joint limits that the problem declares, and the measured ranges of joints that
-    /// lack one; payloads are those of the measured rows.
+    /// Returns the joint limits that the problem declares, and the range of the commands in `rows`
+    /// for joints that lack one. The payloads are those of the rows.
     #[doc(hidden)]
     pub fn measured(problem: &Problem, rows: &Measurements) -> Self {
         let of_joint = |(k, joint): (usize, &Joint)| {
@@ -67,8 +68,9 @@ impl PoseRanges {
         Self { joints, payloads, ..Self::default() }
     }
 
-    /// Draws `count` poses from the ranges; positions are zero. A larger count leaves the first
-    /// poses unchanged. Quantities are independent, and targets alternate from row to row.
+    /// Draws `count` poses from the ranges; measured positions are set to 0. A larger count leaves
+    /// the first poses unchanged. Quantities are independent, and targets alternate from row to
+    /// row.
     #[doc(hidden)]
     pub fn draw(
         &self,
@@ -164,17 +166,20 @@ struct Draft {
     joints: Vec<f64>,
     /// Position in the list of payloads, from 0 (first payload) to 1 (last payload).
     choice: f64,
+    /// Hoist force \[N\]; `None` without a range of it.
     hoist: Option<f64>,
+    /// Temperature [°C]; `None` without a range of it.
     temperature: Option<f64>,
+    /// Values of the covariates of the problem, in their units.
     covariates: Vec<f64>,
-    /// True for each joint that approaches its command from above.
+    /// For each joint, true if its column `approach` is 1, false if it is −1.
     sides: Vec<bool>,
     /// Index of the measured target.
     target: usize,
 }
 
 impl Draft {
-    /// Recovers the unrounded draft of a row that was drawn from these ranges.
+    /// Returns a row that was drawn from these ranges as a draft, with the rounded values.
     fn of(ranges: &PoseRanges, poses: &Measurements, row: usize) -> Self {
         let in_row = |column: &Option<Vec<f64>>| column.as_ref().map(|values| values[row]);
         let index = in_row(&poses.payload).and_then(|mass| {
@@ -220,6 +225,7 @@ impl<'a> PoseTable<'a> {
         Self { ranges, rows }
     }
 
+    /// Rounds a drawn pose and appends it.
     fn push(&mut self, problem: &Problem, draft: &Draft) {
         let Self { ranges, rows } = self;
         for (k, joint) in problem.joints.iter().enumerate() {
@@ -267,6 +273,7 @@ impl<'a> PoseTable<'a> {
         rows.positions.push(Vector3::zeros());
     }
 
+    /// Returns the table, with the row index as time \[s\].
     fn finish(self) -> Measurements {
         let count = self.rows.len();
         Measurements {

@@ -12,22 +12,22 @@ use crate::measurement::{Dataset, Labels, Measurements, RowOrder, count_distinct
 use crate::problem::{Observation, PoseRanges, Problem};
 use crate::select::{Detection, detectable};
 
-/// Number of poses at which predictions are evaluated.
+/// Number of poses drawn from ranges at which predictions are evaluated.
 const PREDICTION_POSES: usize = 500;
-/// Number of poses in the series that shows the benefit of additional poses.
+/// Number of poses in the series that shows the benefit of additional poses, if they are drawn.
 const SERIES_LENGTH: usize = 384;
-/// Smallest and largest number of arms drawn from the priors.
+/// Smallest and largest number of arms that are drawn from the priors of the parameters.
 const ARMS: (usize, usize) = (16, 200);
-/// Target for arms × poses, from which the number of arms follows within [`ARMS`].
+/// Wanted number of arms × poses, from which the number of arms follows within [`ARMS`].
 const ARM_POSES: usize = 20_000;
 /// Random stream of the drawn poses.
-const POSES: u64 = 0;
-/// Random stream of the poses of predictions.
-const PREDICTIONS: u64 = 10;
-/// Random stream of the order of rows.
-const ORDER: u64 = 11;
+const POSE_STREAM: u64 = 0;
+/// Random stream of the poses at which predictions are evaluated.
+const PREDICTION_STREAM: u64 = 10;
+/// Random stream of the order in which rows of a table form a series.
+const ORDER_STREAM: u64 = 11;
 /// Random stream of the drawn arms.
-const ARM: u64 = 12;
+const ARM_STREAM: u64 = 12;
 
 /// Poses whose results are forecast.
 #[derive(Debug, Clone)]
@@ -62,9 +62,10 @@ pub enum PredictionPoses {
 /// Forecast of the results of measurements in some poses.
 #[derive(Debug, Clone)]
 pub struct Check {
-    /// Expected errors and identifiability of the parameters.
+    /// Expected errors and identifiability of the parameters, averaged over arms drawn from the
+    /// priors.
     pub forecast: Forecast,
-    /// Expected error of positions that the identified arm predicts.
+    /// Expected error of positions that the identified arm predicts, linear about the nominal arm.
     pub prediction: Prediction,
     /// Poses at which the prediction is evaluated.
     pub(crate) predicted_at: PredictionPoses,
@@ -74,13 +75,14 @@ pub struct Check {
     /// Kind of measurement that has this noise: the first kind in the table that is a length
     /// ([`Observation::kind`]).
     pub noise_of: &'static str,
-    /// Forecasts for the first n poses of a longer series that continues the checked poses.
+    /// Forecasts for the first n poses of a series: of the checked poses and more of the same
+    /// ranges, or of the table's rows in random order.
     pub(crate) growth: Growth,
     /// Effects of the catalogue that the poses would show, with their smallest detectable sizes.
     pub(crate) detection: Detection,
-    /// Number of measured coordinates.
+    /// Number of coordinates that the checked poses measure.
     pub coordinates: usize,
-    /// Number of measured coordinates, counting each distinct pose once.
+    /// Number of coordinates that the checked poses measure, counting each distinct pose once.
     pub distinct_coordinates: usize,
     /// Number of distinct poses.
     pub distinct_poses: usize,
@@ -88,7 +90,7 @@ pub struct Check {
     pub without_prior: usize,
 }
 
-/// Forecasts the results of measurements in some poses.
+/// Forecasts the results of measurements in the poses `checked`; `seed` determines all draws.
 ///
 /// # Errors
 /// Returns an error if the problem lacks a declaration, or if the nominal arm has no equilibrium in
@@ -99,15 +101,15 @@ pub fn check(problem: &Problem, checked: &CheckedPoses, seed: u64) -> Result<Che
     };
     let (series, count, prediction_table, predicted_at) = match checked {
         CheckedPoses::Drawn(ranges, count) => {
-            let series = draw(ranges, SERIES_LENGTH.max(2 * count), POSES);
-            let predictions = draw(ranges, PREDICTION_POSES, PREDICTIONS);
+            let series = draw(ranges, SERIES_LENGTH.max(2 * count), POSE_STREAM);
+            let predictions = draw(ranges, PREDICTION_POSES, PREDICTION_STREAM);
             (series, *count, predictions, PredictionPoses::Ranges)
         }
         CheckedPoses::Table { poses, within, held_out } => {
-            let series = poses.select(&choose(poses.len(), poses.len(), seed, ORDER));
+            let series = poses.select(&choose(poses.len(), poses.len(), seed, ORDER_STREAM));
             let (predictions, predicted_at) = match (within, held_out) {
                 (Some(ranges), _) => {
-                    (draw(ranges, PREDICTION_POSES, PREDICTIONS), PredictionPoses::Ranges)
+                    (draw(ranges, PREDICTION_POSES, PREDICTION_STREAM), PredictionPoses::Ranges)
                 }
                 (None, Some(rows)) => (rows.as_ref().clone(), PredictionPoses::HeldOut),
                 (None, None) => (poses.as_ref().clone(), PredictionPoses::Same),
@@ -136,7 +138,7 @@ pub fn check(problem: &Problem, checked: &CheckedPoses, seed: u64) -> Result<Che
     }
     let attainable = match checked {
         CheckedPoses::Table { poses, within: Some(ranges), .. } => {
-            let drawn = measured_as(poses, draw(ranges, SERIES_LENGTH, POSES));
+            let drawn = measured_as(poses, draw(ranges, SERIES_LENGTH, POSE_STREAM));
             Some(site.in_equilibrium(&drawn).1)
         }
         _ => None,
@@ -148,7 +150,7 @@ pub fn check(problem: &Problem, checked: &CheckedPoses, seed: u64) -> Result<Che
     let lengths = series.kinds().into_iter().find(|kind| kind.measures_length());
     let noise = lengths.map(|kind| noise(problem, &series, kind));
     let forecast = Forecast::new(parameters, &sensitivity.select(&(0..count).collect::<Vec<_>>()));
-    let arms = site.arms(&poses, (ARM_POSES / count).clamp(ARMS.0, ARMS.1), (seed, ARM));
+    let arms = site.arms(&poses, (ARM_POSES / count).clamp(ARMS.0, ARMS.1), (seed, ARM_STREAM));
     Ok(Check {
         prediction: forecast.prediction(&workspace),
         forecast: forecast.over(parameters, &arms),
@@ -189,17 +191,18 @@ fn measured_as(table: &Measurements, drawn: Measurements) -> Measurements {
 }
 
 impl Check {
-    /// Returns true if the poses determine all combinations that such poses can determine, and
-    /// measure at least as many coordinates as there are parameters without a prior.
+    /// Returns true if the poses determine all combinations of parameters that more poses of the
+    /// same kind would determine. They must also measure at least as many coordinates as there are
+    /// parameters without a prior.
     pub fn suffices(&self) -> bool {
         self.forecast.undetermined <= self.growth.undetermined
             && self.distinct_coordinates >= self.without_prior
     }
 }
 
-/// Returns `count` random rows of a table; the seed determines the choice.
+/// Returns `count` random rows of a table, all if it has fewer; the seed determines the choice.
 pub fn random_rows(table: &Measurements, count: usize, seed: u64) -> Measurements {
-    table.select(&choose(table.len(), count, seed, ORDER))
+    table.select(&choose(table.len(), count, seed, ORDER_STREAM))
 }
 
 /// Returns the held-out rows whose session and target also occur in identification rows, so that
@@ -221,8 +224,8 @@ fn finite(sensitivity: &Sensitivity) -> Sensitivity {
     sensitivity.select(&rows.collect::<Vec<_>>())
 }
 
-/// Returns √3 σ \[m\], the root mean square length of a position error, with the mean σ² of the
-/// rows of one kind.
+/// Returns √3 σ \[m\], the root mean square length of a position error. σ² is the mean over the
+/// rows of the kind of `kind`, or the declared value if the table has no column of σ.
 fn noise(problem: &Problem, table: &Measurements, kind: Observation) -> f64 {
     let declared = problem.sigma_of(kind).unwrap_or(1.0);
     let is_of_kind = |row: &usize| table.observation(*row).kind() == kind.kind();

@@ -2,15 +2,15 @@
 
 use nalgebra::{DMatrix, DVector};
 
-/// Smallest share of the prior in the information on a combination at which the prior, not the
-/// data, determines it.
+/// Smallest share of the prior in the information on a combination of unknowns at which the prior,
+/// not the data, determines the combination.
 const PRIOR_DOMINATED: f64 = 0.5;
 
 /// Optimality criterion: a size, to be minimised, of the covariance C of the parameters (priors
 /// included).
 ///
-/// D, S, A and E concern the parameters of the arm. Bases and targets are estimated together with
-/// them and enter C, but their errors do not count.
+/// D, S, A and E measure the errors of the parameters of the arm. Bases and targets are estimated
+/// together with them, but their errors are not measured.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Criterion {
@@ -18,14 +18,13 @@ pub enum Criterion {
     /// their confidence ellipsoid. Units do not change the choice of poses.
     D,
     /// Product Π C_kk of the n variances; its 2n-th root is the geometric mean of the standard
-    /// errors.
-    /// Independent of units.
+    /// errors. Units do not change the choice of poses.
     S,
-    /// Sum Σ C_kk / C̄_kk, the mean variance relative to the covariance C̄ of as many average
-    /// candidates.
+    /// Sum Σ C_kk / C̄_kk of the variances relative to those of C̄, the covariance after as many
+    /// average candidates.
     A,
-    /// Largest variance of a combination relative to C̄, among the combinations that average
-    /// candidates determine more than the priors do.
+    /// Largest variance of a combination of parameters relative to its variance after as many
+    /// average candidates. Only combinations count that these determine more than the priors do.
     E,
     /// Mean variance of predicted positions in the workspace, with a smooth misfit of the joints
     /// among the unknowns (I-optimality). [Atkinson, Donev & Tobias 2007, ch. 10]
@@ -40,9 +39,9 @@ pub enum Criterion {
 /// Criterion for one problem, in scaled unknowns.
 #[derive(Debug, Clone)]
 pub(super) struct ScaledCriterion {
-    /// Unknowns whose errors count, in ascending order.
+    /// Indices of the unknowns whose errors are measured, in ascending order.
     pub wanted: Vec<usize>,
-    /// Other unknowns, whose errors do not count.
+    /// Indices of the other unknowns.
     pub nuisance: Vec<usize>,
     pub measure: Measure,
 }
@@ -56,7 +55,7 @@ pub(super) enum Measure {
     Product,
     /// Weighted sum Σ w_k C_kk over all unknowns; w_k = 0 for nuisance unknowns.
     Trace(DVector<f64>),
-    /// Trace tr(C M) with the weights M of all unknowns.
+    /// Trace tr(C M) with the weight matrix M of all unknowns.
     Mean(DMatrix<f64>),
     /// Largest eigenvalue of F C Fᵀ; F has shape = (combinations, unknowns).
     Eigenvalue(DMatrix<f64>),
@@ -79,7 +78,8 @@ impl Criterion {
 
     /// Prepares the criterion for information matrices in scaled unknowns. `average` is the
     /// information of average poses, `prior` that of the priors alone. `placements` is true for
-    /// unknowns of bases and targets. `goal` is the matrix M of the criterion I.
+    /// unknowns of bases and targets. `goal` is the matrix M of the criterion I. Returns `None` if
+    /// `average` is singular for A or E, or if I lacks its goal.
     pub(super) fn scaled(
         &self,
         placements: &[bool],
@@ -89,7 +89,7 @@ impl Criterion {
         let n = placements.len();
         let is_wanted = |k: usize| match self {
             Self::Subset(columns) | Self::Each(columns) => columns.contains(&k),
-            // If only bases or targets are free, their errors count.
+            // If only bases or targets are free, their errors are measured.
             _ => !placements[k] || placements.iter().all(|placement| *placement),
         };
         let (wanted, nuisance): (Vec<usize>, Vec<usize>) = (0..n).partition(|&k| is_wanted(k));
@@ -112,8 +112,9 @@ impl Criterion {
 }
 
 impl ScaledCriterion {
-    /// Returns the logarithm of the measure for information M, divided by the number of parameters
-    /// for a determinant or product; infinite if M is singular.
+    /// Returns the logarithm of the measure for an information matrix; infinite if the matrix is
+    /// singular. The logarithm of a determinant or product is divided by the number of wanted
+    /// unknowns.
     pub fn value(&self, information: &DMatrix<f64>) -> f64 {
         let Some(cholesky) = information.clone().cholesky() else { return f64::INFINITY };
         match &self.measure {
@@ -144,9 +145,9 @@ pub(super) fn block(matrix: &DMatrix<f64>, keep: &[usize]) -> DMatrix<f64> {
     matrix.select_rows(keep).select_columns(keep)
 }
 
-/// Returns the combinations F of the unknowns that average poses determine more than the priors do;
-/// all combinations if there are none. They are uncorrelated with unit variance after average
-/// poses.
+/// Returns the combinations F of the unknowns that average poses determine more than the priors do,
+/// shape = (combinations, unknowns); all combinations if there are none. After average poses they
+/// are uncorrelated with unit variance. `None` if the information of average poses is singular.
 ///
 /// (C̄_ss)⁻¹ = L Lᵀ and L⁻¹ P_ss L⁻ᵀ = Q diag(share of the prior) Qᵀ; F consists of the rows of Qᵀ
 /// Lᵀ with a share below one half.

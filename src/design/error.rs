@@ -6,7 +6,7 @@ use super::workspace::Workspace;
 use crate::error::{InputError, InputErrorKind, Location};
 use crate::problem::{Joint, JointKind, Problem};
 
-/// Instruction for freeing the geometry of an arm.
+/// Lines of a problem file that make the geometry of an arm and its base free parameters.
 const FREE: &str = "write [parameters] with lines such as \"joint*.alpha\" = { sigma_deg = 1.0 }, \"joint*.a\" = { sigma_mm = 5.0 }, \
                     \"joint*.theta\" = { sigma_deg = 1.0 }, \"joint*.d\" = { sigma_mm = 5.0 }, \"base.*\" = { free = true }";
 
@@ -75,13 +75,13 @@ pub enum DesignError {
     NothingSeen,
 }
 
-/// Largest side of a box that is probably in metres \[mm\].
-const MAX_METRES: f64 = 10.0;
+/// Length \[mm\] below which the largest side of a box was probably given in metres by mistake.
+const MIN_PLAUSIBLE_SIDE_MM: f64 = 10.0;
 
 /// Returns the remedy for a region without poses, given the largest side of its box \[mm\].
 fn of_size(millimetres: Option<f64>) -> String {
     match millimetres {
-        Some(side) if side < MAX_METRES => format!(
+        Some(side) if side < MIN_PLAUSIBLE_SIDE_MM => format!(
             ", whose longest side is {side:.3} mm: if its numbers are metres, multiply them by 1000"
         ),
         _ => "; check --workspace-mm, --plane and the ranges of the joints (coordinates are those \

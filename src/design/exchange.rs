@@ -9,39 +9,43 @@ use super::sensitivity::Sensitivity;
 use crate::least_squares::Identifiability;
 use crate::model::parameter::Parameter;
 
-/// Information of average poses that is added to every plan, as a fraction. It keeps plans with too
-/// few poses regular, so that they can be compared.
+/// Fraction of the information of as many average candidates that is added to every set of poses.
+/// It keeps the information of too few poses regular, so that sets can be compared.
 const RIDGE: f64 = 1e-6;
-/// Information added along combinations that neither candidates nor priors determine, so that they
-/// count as fixed; scaled unknowns.
+/// Information added along each combination that neither candidates nor priors determine, which
+/// holds the combination fixed; in scaled unknowns.
 const FIXING_INFORMATION: f64 = 1e4;
-/// Smallest decrease of the logarithm of the criterion after which another sweep follows.
+/// Smallest decrease of the logarithm of the criterion in one sweep after which another one
+/// follows.
 const MIN_GAIN: f64 = 1e-6;
-/// Maximum number of sweeps.
+/// Maximum number of sweeps, each of which tries to exchange every pose once.
 const MAX_SWEEPS: usize = 50;
 
 /// Candidates and criterion of an exchange of poses.
 ///
-/// Unknowns are scaled by the information of average candidates and priors.
+/// Unknowns are scaled so that average candidates and priors give each of them unit information.
 #[derive(Debug, Clone)]
 pub struct Exchange {
-    /// Jᵀ of the candidates, scaled.
+    /// Jᵀ of the candidates with respect to the scaled unknowns, shape = (unknowns, coordinates ·
+    /// candidates).
     candidates: DMatrix<f64>,
     /// Number of measured coordinates of each candidate.
     coordinates: usize,
     /// Scale by which each unknown is multiplied.
     scale: DVector<f64>,
-    /// Information without any candidate, scaled: priors, given poses, ridge.
+    /// Information on the scaled unknowns without any candidate: priors, given poses, ridge.
     base_information: DMatrix<f64>,
     criterion: ScaledCriterion,
 }
 
-/// Properties of the unknowns of a design: the free parameters, and further ones that only predict.
+/// Properties of the unknowns of a design: the free parameters, followed by the weights of an
+/// assumed misfit if there is one.
 #[derive(Debug, Clone)]
 pub(super) struct Unknowns {
     /// Standard deviation of the prior of each unknown; `None` without a prior.
     pub sigmas: Vec<Option<f64>>,
-    /// True for parameters of bases and targets, whose errors do not count unless all are such.
+    /// True for parameters of bases and targets. A criterion measures their errors only if there
+    /// are no other unknowns.
     pub placements: Vec<bool>,
 }
 
@@ -66,7 +70,7 @@ impl Unknowns {
 /// Set of poses that exchanging any single pose does not improve.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ExchangeResult {
-    /// Indices of the candidates, in ascending order.
+    /// Indices of the chosen candidates, in ascending order.
     pub chosen: Vec<usize>,
     /// Logarithm of the criterion at the start and after each sweep; never increases.
     pub values: Vec<f64>,
@@ -83,7 +87,8 @@ impl Exchange {
     /// Prepares the exchange of `poses` poses, in addition to the poses `given`, which are measured
     /// in any case.
     ///
-    /// Returns `None` if the information is not finite, because a candidate has no equilibrium.
+    /// Returns `None` if the information is not finite, because a candidate has no equilibrium, or
+    /// if it is singular.
     pub fn new(
         parameters: &[Parameter],
         candidates: &Sensitivity,
@@ -94,8 +99,9 @@ impl Exchange {
         Self::of(&Unknowns::of(parameters), candidates, given, poses, (criterion, None))
     }
 
-    /// Prepares the exchange as [`new`](Self::new) does, for parameters and further unknowns. The
-    /// criterion I minimises tr(C M) with the matrix M `goal`, in the units of the unknowns.
+    /// Prepares the exchange as [`new`](Self::new) does, for parameters and the weights of a
+    /// misfit. The criterion I minimises tr(C M) with the matrix M `goal`, in the units of the
+    /// unknowns.
     pub(super) fn of(
         unknowns: &Unknowns,
         candidates: &Sensitivity,
@@ -170,13 +176,13 @@ impl Exchange {
     }
 
     /// Starts a choice of poses one after the other, by the criterion I. Returns `None` for another
-    /// criterion, or if the information is singular.
+    /// criterion, or if the information without candidates is singular.
     pub(super) fn greedy(&self) -> Option<Greedy<'_>> {
         let Measure::Mean(goal) = &self.criterion.measure else { return None };
         Greedy::new((&self.candidates, self.coordinates), goal, &self.base_information)
     }
 
-    /// Returns the matrix M of a goal tr(C M) in scaled unknowns.
+    /// Converts the matrix M of a goal tr(C M) to scaled unknowns.
     pub(super) fn scaled(&self, goal: &DMatrix<f64>) -> DMatrix<f64> {
         DMatrix::from_fn(goal.nrows(), goal.ncols(), |i, j| {
             goal[(i, j)] / (self.scale[i] * self.scale[j])
@@ -188,7 +194,7 @@ impl Exchange {
         self.candidates.ncols() / self.coordinates
     }
 
-    /// Returns the logarithm of the criterion for a set of candidates.
+    /// Returns the logarithm of the criterion for a set of candidates, given by their indices.
     pub fn value(&self, chosen: &[usize]) -> f64 {
         self.criterion.value(&self.information(chosen.iter().copied()))
     }
@@ -213,7 +219,7 @@ impl Exchange {
                 else {
                     continue;
                 };
-                // Rounding does not count as a gain.
+                // A decrease within rounding is no gain.
                 let limit = value - 1e-10 * value.abs().max(1.0);
                 if let Some((better, gained)) =
                     scan.best((&self.candidates, self.coordinates), |k| !chosen.contains(&k), limit)
@@ -232,8 +238,8 @@ impl Exchange {
         ExchangeResult { chosen, values }
     }
 
-    /// Returns the information matrix of the given rows and a set of candidates, in scaled
-    /// unknowns.
+    /// Returns the information on the scaled unknowns from priors, given poses and a set of
+    /// candidates.
     fn information(&self, poses: impl Iterator<Item = usize>) -> DMatrix<f64> {
         let mut information = self.base_information.clone();
         for pose in poses {

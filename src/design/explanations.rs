@@ -10,16 +10,17 @@ use crate::files::read_limited;
 use crate::problem::{Effect, EffectDeclaration, Problem};
 
 /// Maximum size of a loop.json \[MiB\].
-const LARGEST_MIB: u64 = 256;
+const MAX_FILE_MIB: u64 = 256;
 /// Maximum number of alternatives of one effect that are considered, the most probable first.
 const MAX_ALTERNATIVES: usize = 3;
 
 /// Effects of a loop.json, with those among which the data do not decide.
 #[derive(Debug, Clone, Default)]
 pub struct Explanations {
-    /// Effects that the extended problem declares and that stand without doubt.
+    /// Effects with the status `found` and without alternatives, which the problem lacks.
     settled: Vec<EffectDeclaration>,
-    /// Effects that are still to be told apart: doubted ones and their alternatives.
+    /// Effects among which poses are to decide: those with an alternative or a lower status, and
+    /// their alternatives.
     open: Vec<EffectDeclaration>,
 }
 
@@ -63,7 +64,7 @@ impl Explanations {
     pub fn read(file: &Path, problem: &Problem) -> Result<Self, ExplanationsError> {
         let named = || file.to_owned();
         let unreadable = |source| ExplanationsError::Unreadable { file: named(), source };
-        let bytes = read_limited(file, LARGEST_MIB << 20).map_err(unreadable)?;
+        let bytes = read_limited(file, MAX_FILE_MIB << 20).map_err(unreadable)?;
         let document: Document = serde_json::from_slice(&bytes)
             .map_err(|source| ExplanationsError::Syntax { file: named(), source })?;
         if document.problem != problem.name {
@@ -103,20 +104,20 @@ impl Explanations {
         Ok(explanations)
     }
 
-    /// Returns the effects that are still to be told apart.
+    /// Returns the effects among which the data do not decide yet.
     pub fn open(&self) -> impl Iterator<Item = &Effect> {
         self.open.iter().map(|declared| &declared.effect)
     }
 
-    /// Returns the problem with all effects declared.
+    /// Returns the problem with all effects of the loop.json declared, settled and open.
     pub(super) fn declared(&self, problem: &Problem) -> Problem {
         let mut declared = problem.clone();
         declared.effects.extend(self.settled.iter().chain(&self.open).cloned());
         declared
     }
 
-    /// Returns the names of the parameters whose errors decide among the effects: those that are 0
-    /// without the effect.
+    /// Returns the names of the open effects' parameters that are 0 without the effect, such as a
+    /// compliance. The smaller their errors, the better the data decide among the effects.
     pub(super) fn parameters(&self, declared: &Problem) -> Vec<String> {
         let parameters = self.open().flat_map(|effect| effect.parameters(declared));
         let sized = parameters.filter(|parameter| parameter.nominal == 0.0);

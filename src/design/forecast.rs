@@ -8,12 +8,13 @@ use crate::least_squares::{Identifiability, Uncertainty};
 use crate::model::parameter::Parameter;
 use crate::quantity::Unit;
 
-/// Share of a parameter in undetermined combinations above which it has no standard error.
+/// Part of a parameter, 0 to 1, that lies in undetermined combinations, from which on the forecast
+/// gives no standard error for it.
 const UNDETERMINED_SHARE: f64 = 1e-3;
-/// Identified share below which a parameter has no standard error.
+/// Identified share up to which the forecast gives no standard error for a parameter.
 const MIN_IDENTIFIED: f64 = 1e-6;
 
-/// Expected result for one parameter.
+/// Expected result of the identification for one parameter.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExpectedParameter {
     /// Name as in the problem file.
@@ -22,14 +23,15 @@ pub struct ExpectedParameter {
     pub unit: Unit,
     /// Nominal value of the parameter, SI.
     pub nominal: f64,
-    /// Standard deviation of the prior at the nominal value, SI.
+    /// Standard deviation of the prior at the nominal value, SI; `None` without a prior.
     pub prior: Option<f64>,
-    /// Standard error of the estimate, SI (for a logarithm times the nominal value); `None` if the
-    /// data will not inform on the parameter.
+    /// Expected standard error of the estimate, SI (for a logarithm times the nominal value);
+    /// `None` if the data will not inform on the parameter.
     pub std_error: Option<f64>,
-    /// Share of the value that the data will determine, 0…1.
+    /// Expected identified share: part of the value that the data will determine, 0…1.
     pub identified: f64,
-    /// Share at the nominal arm, where parameters may be confounded that other arms separate, 0…1.
+    /// Identified share at the nominal arm, 0…1. Other arms may separate parameters that are
+    /// confounded there.
     pub identified_at_nominal: f64,
     /// True for a parameter of a base or target, false for one of the arm.
     pub is_placement: bool,
@@ -44,8 +46,8 @@ pub struct Forecast {
     pub identifiability: Identifiability,
     /// Forecast for every free parameter.
     pub expected: Vec<ExpectedParameter>,
-    /// Covariance of the deviations x, with unidentifiable combinations held fixed, shape =
-    /// (parameters, parameters).
+    /// Expected covariance of the deviations x from nominal at the nominal arm, with undetermined
+    /// combinations held fixed, shape = (parameters, parameters).
     pub covariance: DMatrix<f64>,
     /// Number of combinations that neither measurements nor priors determine.
     pub undetermined: usize,
@@ -104,8 +106,8 @@ impl Forecast {
         }
     }
 
-    /// Replaces the standard errors by their root mean squares over the arms with sensitivities
-    /// `arms`, which differ from the nominal one.
+    /// Replaces the standard errors by their root mean squares over other arms than the nominal
+    /// one; `arms` holds the sensitivity of each.
     ///
     /// If a combination is unidentifiable at the nominal arm and has a wide prior, it is confounded
     /// with other parameters at other arms. Errors are then larger than the linearisation at the
@@ -129,8 +131,8 @@ impl Forecast {
         self
     }
 
-    /// Returns the expected error of positions that the identified arm predicts at `poses`, whose
-    /// sensitivity is in metres (σ = 1 m).
+    /// Returns the expected error of positions that the identified arm predicts. `poses` is the
+    /// sensitivity of the predicted poses for σ = 1 m, so that it is in metres.
     ///
     /// The error of a prediction J x has the covariance J C Jᵀ. Measurement noise is not included.
     pub(crate) fn prediction(&self, poses: &Sensitivity) -> Prediction {
@@ -161,7 +163,8 @@ impl Forecast {
 }
 
 impl ExpectedParameter {
-    /// Sets the standard error and the identified share for a variance of x.
+    /// Sets the standard error and the identified share for a variance of the parameter's deviation
+    /// x.
     fn set_variance(&mut self, parameter: &Parameter, variance: f64) {
         if let Some(sigma) = parameter.sigma {
             self.identified = (1.0 - variance / (sigma * sigma)).clamp(0.0, 1.0);
@@ -201,7 +204,8 @@ impl Posterior {
     }
 }
 
-/// Returns the triangular factor of data and priors together.
+/// Returns the triangular factor R of data and priors together; `triangle` is that of the data, and
+/// `sigmas` are those of the priors.
 fn with_priors(triangle: &DMatrix<f64>, sigmas: &[Option<f64>]) -> DMatrix<f64> {
     let n = triangle.ncols();
     let mut stacked = DMatrix::zeros(2 * n, n);

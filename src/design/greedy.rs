@@ -25,13 +25,14 @@ pub(super) struct Greedy<'a> {
     goal: &'a DMatrix<f64>,
     /// Covariance C of the unknowns, shape = (unknowns, unknowns).
     pub covariance: DMatrix<f64>,
+    /// Products V = C Jᵀ of all candidates.
     v: DMatrix<f64>,
+    /// Products T = M V of all candidates.
     t: DMatrix<f64>,
 }
 
 impl<'a> Greedy<'a> {
-    /// Starts from the information that is known before any candidate is measured; `None` if it is
-    /// singular.
+    /// Starts from the information before any candidate is measured; `None` if it is singular.
     pub fn new(
         (candidates, coordinates): (&'a DMatrix<f64>, usize),
         goal: &'a DMatrix<f64>,
@@ -48,7 +49,7 @@ impl<'a> Greedy<'a> {
         self.covariance.dot(self.goal)
     }
 
-    /// Returns the decrease of the goal by each candidate.
+    /// Returns the decrease of the goal tr(C M) by each candidate.
     pub fn gains(&self) -> Vec<f64> {
         let count = self.candidates.ncols() / self.coordinates;
         let blocks: Vec<Range<usize>> = (0..count)
@@ -67,6 +68,7 @@ impl<'a> Greedy<'a> {
             .collect()
     }
 
+    /// Returns the decrease of the goal by one candidate with R coordinates.
     fn gain<const R: usize>(&self, candidate: usize) -> f64 {
         let columns = R * candidate;
         let dot = |a: &DMatrix<f64>, i: usize, b: &DMatrix<f64>, j: usize| {
@@ -85,7 +87,7 @@ impl<'a> Greedy<'a> {
         s.cholesky().map_or(0.0, |factor| factor.solve(&lowered).trace())
     }
 
-    /// Adds a candidate to the measured poses.
+    /// Adds a candidate to the measured poses: updates C, V and T.
     pub fn take(&mut self, candidate: usize) {
         let columns = self.coordinates * candidate;
         let [j, w, m] = [self.candidates, &self.v, &self.t]

@@ -13,12 +13,12 @@ const POSE_COUNTS: [usize; 14] = [4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192,
 pub struct Growth {
     /// Forecasts in ascending order of the number of poses.
     pub steps: Vec<GrowthStep>,
-    /// Number of combinations that can be determined without priors.
+    /// Number of combinations of parameters that more poses can determine without priors.
     pub attainable_rank: usize,
-    /// Number of combinations that stay undetermined with all poses.
+    /// Number of combinations that even all these poses and the priors leave undetermined.
     pub undetermined: usize,
-    /// Smallest number of poses that determine all attainable combinations, and for which
-    /// predictions are as accurate as one measurement (rms). `None` if the series is too short.
+    /// Smallest number of poses that determine all attainable combinations, and for which the rms
+    /// error of predictions is at most that of one measurement. `None` if the series is too short.
     pub enough: Option<usize>,
 }
 
@@ -40,10 +40,10 @@ pub struct GrowthStep {
 impl Growth {
     /// Forecasts the first n poses of `series`, for increasing n.
     ///
-    /// Predictions are evaluated at the poses `workspace` (in metres). `noise` is the root mean
-    /// square length of the error of one measured position \[m\], `extra` an additional number of
-    /// poses to evaluate. The attainable combinations are those that the series and the poses
-    /// `elsewhere` determine together.
+    /// Predictions are evaluated at the poses whose sensitivity for σ = 1 m is `workspace`. `noise`
+    /// is the root mean square length of the error of one measured position \[m\], `extra` an
+    /// additional number of poses to evaluate. The attainable combinations are those that the
+    /// series and the poses `elsewhere` determine together.
     pub fn new(
         parameters: &[Parameter],
         series: &Sensitivity,

@@ -11,14 +11,15 @@ use crate::random;
 
 /// Number of random features of the error of one joint.
 const FEATURES: usize = 24;
-/// Correlation length of the joint errors \[rad\]; for prismatic joints a share of the range. It is
-/// the middle of 0.3 to 1.2 rad, between which plans on two measured arms differ little.
-const LENGTH: f64 = 0.6;
+/// Correlation length of the joint errors: \[rad\] for revolute joints, a fraction of the range for
+/// prismatic ones. It is the middle of 0.3 to 1.2 rad, between which plans on two measured arms
+/// differ little.
+const CORRELATION_LENGTH: f64 = 0.6;
 /// Degrees of freedom of the spectral density of the Matérn 5/2 correlation. [Rasmussen & Williams
 /// 2006, eq. 4.15]
 const SPECTRAL_FREEDOM: usize = 5;
-/// Random stream of the features.
-const STREAM: u64 = 300;
+/// Random stream of the frequencies and phases of the features.
+const FEATURE_STREAM: u64 = 300;
 
 /// Smooth error eⱼ(q) of every joint coordinate that no declared law describes.
 ///
@@ -31,26 +32,29 @@ pub(super) struct Misfit {
     /// Frequency of each feature in each coordinate (cos q, sin q or x, 0), shape = (features, 2
     /// joints).
     frequencies: DMatrix<f64>,
+    /// Phase of each feature \[rad\].
     phases: Vec<f64>,
     /// Standard deviation aⱼ of each joint's smooth error \[rad\] or \[m\]; 0 for a joint that does
     /// not move the target.
     joint_sigmas: Vec<f64>,
-    /// Offset and inverse length of each joint's range; `None` for angles.
+    /// Smallest command and inverse width of each prismatic joint's range \[m\], \[1/m\]; `None`
+    /// for angles.
     ranges: Vec<Option<(f64, f64)>>,
 }
 
 impl Misfit {
-    /// Creates a misfit that moves the position by `size` \[m\] along each axis, root mean square
-    /// over the poses of `table`. All joints contribute equally.
+    /// Creates a misfit that moves the position along each axis by `size` \[m\], root mean square
+    /// over the axes and the poses of `table`. All joints contribute equally.
     pub fn new(site: &Site, table: &Measurements, size: f64, seed: u64) -> Self {
         let joints = table.joints;
-        let mut random = random::stream(seed, STREAM);
+        let mut random = random::stream(seed, FEATURE_STREAM);
         let mut frequencies = DMatrix::zeros(FEATURES, 2 * joints);
         let mut phases = Vec::with_capacity(FEATURES);
         for feature in 0..FEATURES {
             let mut normal = || random::normal(&mut random);
             let squares: f64 = (0..SPECTRAL_FREEDOM).map(|_| normal().powi(2)).sum();
-            let scale = (SPECTRAL_FREEDOM as f64 / squares.max(f64::MIN_POSITIVE)).sqrt() / LENGTH;
+            let scale = (SPECTRAL_FREEDOM as f64 / squares.max(f64::MIN_POSITIVE)).sqrt()
+                / CORRELATION_LENGTH;
             for coordinate in 0..2 * joints {
                 frequencies[(feature, coordinate)] = scale * random::normal(&mut random);
             }
@@ -77,13 +81,13 @@ impl Misfit {
         Self { frequencies, phases, joint_sigmas, ranges: (0..joints).map(range).collect() }
     }
 
-    /// Returns the number of weights.
+    /// Returns the number of weights w of all joints together.
     pub fn weights(&self) -> usize {
         self.phases.len() * self.joint_sigmas.len()
     }
 
     /// Returns `sensitivity` of the poses of `table` with a row for every weight below those of the
-    /// parameters. `unit` \[m\] replaces σ, if given.
+    /// parameters. The new rows are in units of σ, or of `unit` \[m\] if given.
     pub fn extend(
         &self,
         site: &Site,

@@ -1,4 +1,4 @@
-//! Choice of the next poses to measure, given all poses that are measured.
+//! Choice of the next poses to measure, given the poses that have been measured.
 
 use nalgebra::DMatrix;
 
@@ -20,15 +20,18 @@ use crate::remainder::{self, Correction, SavedRemainderError};
 const DRAWN_CANDIDATES: [usize; 2] = [500, 1500];
 /// Maximum number of poses over which the variance of predictions is averaged.
 const WORKSPACE_POSES: usize = 500;
-/// Random stream of the uniform candidates, of those at the limits, and of the workspace.
+/// Random streams of the uniform candidates, of those with emphasis on the limits, and of the poses
+/// of the workspace.
 const STREAMS: [u64; 3] = [400, 401, 402];
-/// Share of the largest gain above which candidates count as equal; the least travel then decides.
+/// Fraction of the largest gain from which on candidates count as equally good; the least travel of
+/// the joints then decides.
 const EQUAL_GAIN: f64 = 0.98;
-/// Multiplications for one unknown of one candidate when a pose is chosen.
+/// Number of multiplications for one unknown of one candidate with three coordinates each time that
+/// a pose is chosen.
 const MULTIPLICATIONS_PER_UNKNOWN: f64 = 90.0;
 /// Maximum number of multiplications of a request; some ten minutes on one core.
 const MAX_OPERATIONS: f64 = 2e12;
-/// Maximum number of entries of the matrices of all candidates, 3 GB.
+/// Maximum number of entries of the matrices Jᵀ, V and T of all candidates together; 3 GB.
 const MAX_ENTRIES: f64 = 4e8;
 
 /// Aim of the next poses.
@@ -43,12 +46,12 @@ pub enum Purpose {
     Both,
 }
 
-/// Reason for which no or no further poses are chosen.
+/// Reason to choose fewer poses than requested, or none.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum StopReason {
-    /// The bound over the workspace is below the tolerance.
+    /// The error bound over the workspace is not above the tolerance.
     Enough,
-    /// All that further poses can gain is less than the uncertainty of the error itself.
+    /// The most by which more poses can lower the expected error is less than 1 σ of that error.
     GainBelowNoise,
     /// All candidates are measured or chosen.
     NoCandidates,
@@ -67,9 +70,10 @@ pub struct NextOptions<'a> {
     pub level: f64,
     /// Seed of all random numbers.
     pub seed: u64,
-    /// Region for the target; `None` is unlimited.
+    /// Region in which the target must stay; `None` without a limit.
     pub workspace: Option<&'a Workspace>,
-    /// Effects that poses for causes tell apart.
+    /// Effects of a loop among which poses for causes are to decide; needed for [`Purpose::Causes`]
+    /// and [`Purpose::Both`].
     pub explanations: Option<&'a Explanations>,
     /// True if predictions use a remainder that is fitted to the measured poses.
     pub remainder: bool,
@@ -77,14 +81,16 @@ pub struct NextOptions<'a> {
     pub fit: Options,
 }
 
-/// Chosen pose with the expectation after its measurement.
+/// Travel to a chosen pose, and the expected benefit of measuring it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NextStep {
-    /// Largest move of a joint from the pose before, as a share of the joint's range, 0 to 1.
+    /// Largest move of a joint from the pose before, as a fraction of the joint's range over the
+    /// candidates.
     pub travel: f64,
-    /// Decrease of the goal by the pose, as a share of its present value.
+    /// Decrease of the goal tr(C M) by the pose, as a fraction of its value before all chosen
+    /// poses.
     pub gain: f64,
-    /// Expected error over the workspace after this pose; `None` if it is unknown now.
+    /// Expected error over the workspace after this pose; `None` if [`NextPoses::error`] is `None`.
     pub error: Option<WorkspaceError>,
 }
 
@@ -93,7 +99,7 @@ pub struct NextStep {
 pub struct NextPoses {
     /// Chosen poses in the order of measurement.
     pub poses: Measurements,
-    /// Expectation after each pose.
+    /// Travel and expected benefit of each chosen pose.
     pub steps: Vec<NextStep>,
     /// Number of rows that are measured and fitted.
     pub measured: usize,
@@ -101,18 +107,20 @@ pub struct NextPoses {
     pub candidates: usize,
     /// Number of poses over which predictions are judged.
     pub workspace_poses: usize,
-    /// Size of the misfit along each axis, root mean square \[m\]; NaN if cameras measure.
+    /// Assumed root mean square misfit of the position along each axis \[m\]; NaN if cameras
+    /// measure.
     pub misfit: f64,
     /// 1 σ of the noise of one coordinate \[m\]; NaN if cameras measure.
     pub noise: f64,
     /// Error over the workspace now; `None` with fewer than ten configurations, or with fewer
     /// measured coordinates than fitted parameters.
     pub error: Option<WorkspaceError>,
-    /// Expected error over the workspace after any number of poses \[m\]; `None` if it is unknown.
+    /// Expected error over the workspace that no number of poses lowers further \[m\]; `None` if
+    /// `error` is `None`.
     pub attainable: Option<f64>,
-    /// Reason for which fewer poses were chosen than requested.
+    /// Reason for which fewer poses were chosen than requested; `None` if all were.
     pub stop: Option<StopReason>,
-    /// Effects that the poses tell apart.
+    /// Effects among which the poses are to decide; empty for accuracy.
     pub effects: Vec<Effect>,
     /// True if cameras measure the poses: predictions are pixels of the points in view, and their
     /// error is not judged.
@@ -123,7 +131,8 @@ pub struct NextPoses {
 }
 
 impl NextPoses {
-    /// Returns the number of poses after which the bound is expected to be below `tolerance` \[m\].
+    /// Returns the number of chosen poses after which the error bound is expected to be at most
+    /// `tolerance` \[m\]; `None` without a tolerance, or if no number suffices.
     pub(crate) fn enough_after(&self, tolerance: Option<f64>) -> Option<usize> {
         let is_below =
             |step: &NextStep| step.error.zip(tolerance).is_some_and(|(of, most)| of.bound <= most);
@@ -146,7 +155,7 @@ pub enum NextError {
     /// The declared remainder cannot be read.
     #[error(transparent)]
     Remainder(#[from] SavedRemainderError),
-    /// No effects are to be told apart.
+    /// The loop.json has no effects among which poses could decide.
     #[error(
         "there is nothing to tell apart: in loop.json every effect that was found is certain and has no alternative; use --for accuracy"
     )]
@@ -175,8 +184,8 @@ pub enum NextError {
 /// the number of threads.
 ///
 /// # Errors
-/// Returns an error if the measured poses cannot be fitted, no candidate remains, no effect is to be
-/// told apart, or the request is too large.
+/// Returns an error if the measured poses cannot be fitted, no candidate remains, poses for causes
+/// have no effects to decide among, or the request is too large.
 pub fn next(
     problem: &Problem,
     data: &Dataset,
@@ -211,7 +220,7 @@ pub fn next(
     let rows: Vec<usize> = data.split.identification.clone();
     let measured = data.measurements.select(&rows);
     let mut site = Site::with_cameras(&designed, &[&measured], pairs)?;
-    site.at(&found);
+    site.linearise_at(&found);
     let (pool, reference) = pool_and_workspace(&designed, candidates, &site, &measured, options);
     if let Some(region) = options.workspace.filter(|_| pool.is_empty()) {
         return Err(DesignError::nothing_in(region).into());
@@ -242,7 +251,7 @@ pub fn next(
     let predicted = extended(&reference, site.sensitivity(&reference, unit), unit);
     let prediction = mean_square(&predicted);
     let cause = explanations.map(|of| cause_goal(&site, &of.parameters(&designed), &prediction));
-    // Bounds from left-out configurations need parameters that the data decide.
+    // Errors of left-out configurations give no bounds if the priors determine the parameters.
     let correction = if is_of_cameras || found.has(FindingCode::PriorsDecide) {
         None
     } else {
@@ -251,7 +260,7 @@ pub fn next(
     let error = match &correction {
         Some(correction) => {
             let mut site = Site::new(&plain, &[&measured])?;
-            site.at(&found);
+            site.linearise_at(&found);
             WorkspaceError::of(correction, &site, &reference, (options.level, size.freedom))
         }
         None => None,
@@ -260,7 +269,7 @@ pub fn next(
         Exchange::of(&unknowns, &sensitivity, Some(&given), poses, (&Criterion::I, Some(goal)))
             .ok_or(NextError::Design(DesignError::NoEquilibrium))
     };
-    // With equal weight, each goal counts in units of its present value.
+    // For equal weights, each goal is divided by its value before any new pose.
     let goal = match (&cause, options.purpose) {
         (Some(cause), Purpose::Causes) => cause.clone(),
         (Some(cause), Purpose::Both) => {
@@ -275,11 +284,11 @@ pub fn next(
     let mut greedy = exchange.greedy().ok_or(DesignError::NoEquilibrium)?;
     let scaled = exchange.scaled(&prediction);
     let parameters = site.model.parameters.len();
-    let left = |greedy: &Greedy| {
+    let remaining_error = |greedy: &Greedy| {
         let view = |of: &DMatrix<f64>| of.view((0, 0), (parameters, parameters)).into_owned();
         view(&greedy.covariance).dot(&view(&scaled)).max(0.0)
     };
-    let before = left(&greedy);
+    let before = remaining_error(&greedy);
     let is_trusted = found.is_trusted();
     let stop = error.filter(|_| is_trusted).and_then(|error| stop_reason(&error, options));
     let mut result = NextPoses {
@@ -301,15 +310,16 @@ pub fn next(
         return Ok(result);
     }
     let last = measured.configuration(measured.len() - 1);
-    let share = |greedy: &Greedy| if before > 0.0 { left(greedy) / before } else { 1.0 };
+    let share = |greedy: &Greedy| if before > 0.0 { remaining_error(greedy) / before } else { 1.0 };
     let chosen = take_poses((&mut result, &mut greedy), (&pool, last), poses, share);
     result.poses = pool.select(&chosen);
     Ok(result)
 }
 
-/// Takes up to `count` poses of the `pool` one after the other, each with the largest gain; of equal
-/// ones the nearest to the `last` configuration. Enters them as steps of `result`, and returns their
-/// rows. `share` is the part of the present mean square error that remains.
+/// Takes up to `count` poses of the `pool` one after the other, each with the largest gain; of
+/// equal ones the nearest to the configuration before, which is `last` at first. Enters them as
+/// steps of `result`, and returns their rows. `share` returns the fraction of the mean square error
+/// by the parameters that remains.
 fn take_poses(
     (result, greedy): (&mut NextPoses, &mut Greedy),
     (pool, last): (&Measurements, &[f64]),
@@ -346,7 +356,8 @@ fn take_poses(
     chosen
 }
 
-/// Returns the candidates that are not measured yet, and the poses of the workspace.
+/// Returns the candidates that have not been measured yet, and the poses of the workspace, over
+/// which predictions are averaged.
 fn pool_and_workspace(
     problem: &Problem,
     candidates: &Candidates,
@@ -377,9 +388,9 @@ fn pool_and_workspace(
     }
 }
 
-/// Returns the uncertainty of predictions by the fit `found`, with a remainder that is fitted to the
-/// rows at hand if the problem declares one or the options ask for it. `None` if the data are too
-/// few to estimate it.
+/// Returns the uncertainty of predictions by the fit `found`, with a remainder that is fitted to
+/// the rows at hand if the problem declares one or the options ask for it. `None` if the data are
+/// too few to estimate it.
 fn correction(
     problem: &Problem,
     data: &Dataset,
@@ -394,9 +405,9 @@ fn correction(
     })
 }
 
-/// Returns the reason to measure no further poses: the bound is within the tolerance, or all that
-/// they can gain is less than the uncertainty of the error. Poses that tell causes apart have no such
-/// limit.
+/// Returns the reason to measure no more poses: the error bound is within the tolerance, or the
+/// most that poses can lower the expected error is less than 1 σ of it. Returns `None` if there is
+/// no such reason, or if the poses are for causes alone.
 fn stop_reason(error: &WorkspaceError, options: &NextOptions) -> Option<StopReason> {
     if options.purpose == Purpose::Causes {
         return None;
@@ -409,14 +420,16 @@ fn stop_reason(error: &WorkspaceError, options: &NextOptions) -> Option<StopReas
     is_below_noise.then_some(StopReason::GainBelowNoise)
 }
 
-/// Returns M with tr(C M) = mean over the poses of tr(J C Jᵀ).
+/// Returns M with tr(C M) = mean over the poses of tr(J C Jᵀ), without poses that have no
+/// equilibrium.
 pub(super) fn mean_square(sensitivity: &Sensitivity) -> DMatrix<f64> {
     let finite: Vec<usize> =
         (0..sensitivity.len()).filter(|&pose| sensitivity.is_finite(pose)).collect();
     sensitivity.select(&finite).information() / finite.len().max(1) as f64
 }
 
-/// Returns M with tr(C M) = Σ C_kk / σ_k² over the parameters `names`, σ_k their priors.
+/// Returns M with tr(C M) = Σ C_kk / σ_k² over the parameters `names`. σ_k is that of the
+/// parameter's prior, 1 without a prior. M has the shape of `like`.
 fn cause_goal(site: &Site, names: &[String], like: &DMatrix<f64>) -> DMatrix<f64> {
     let mut goal = DMatrix::zeros(like.nrows(), like.ncols());
     for (k, parameter) in site.model.parameters.iter().enumerate() {
@@ -433,9 +446,9 @@ fn unmeasured(table: &Measurements, measured: &Measurements) -> Vec<usize> {
         let payload = of.payload.as_ref().map(|payload| payload[row]);
         of.configuration(row).iter().copied().chain(payload).map(f64::to_bits).collect()
     };
-    let known: std::collections::HashSet<Vec<u64>> =
+    let measured_keys: std::collections::HashSet<Vec<u64>> =
         (0..measured.len()).map(|row| key(measured, row)).collect();
-    (0..table.len()).filter(|&row| !known.contains(&key(table, row))).collect()
+    (0..table.len()).filter(|&row| !measured_keys.contains(&key(table, row))).collect()
 }
 
 /// Checks that the request takes neither too long nor too much memory.

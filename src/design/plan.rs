@@ -19,20 +19,20 @@ use crate::numeric::median;
 use crate::problem::{PoseRanges, Problem};
 use crate::random;
 
-/// Number of candidates drawn from ranges: uniformly, and with emphasis on the limits.
+/// Minimum number of candidates drawn from ranges: uniformly, and with emphasis on the limits.
 pub(super) const DRAWN_CANDIDATES: [usize; 2] = [500, 2000];
 /// Number of exchanges, each started from random poses.
 const STARTS: usize = 8;
-/// Number of best exchanges that are refined.
+/// Number of exchanges whose poses are refined: those with the best criterion.
 const REFINED_STARTS: usize = 4;
-/// Rounds of refinement, each with the reach of its variations as a fraction of the ranges.
+/// Largest change of a quantity in the variations of each refinement round, as a fraction of its
+/// range.
 const REFINEMENT_REACHES: [f64; 8] = [0.3, 0.2, 0.2, 0.1, 0.1, 0.05, 0.05, 0.02];
 /// Number of candidates in a refinement round.
 const ROUND_CANDIDATES: usize = 2500;
-/// Number of candidates in a refinement round if cameras measure them: each stands for many rows.
+/// Number of candidates in a refinement round if cameras measure many points of each candidate.
 const CAMERA_ROUND_CANDIDATES: usize = 640;
-/// Number of random sets of poses that a plan is compared with; odd, so that the median is one of
-/// them.
+/// Number of random sets of poses that a plan is compared with; odd, so that one is the median.
 pub(super) const RANDOM_SETS: usize = 75;
 /// Random stream of the uniform candidates.
 pub(super) const UNIFORM_STREAM: u64 = 0;
@@ -42,9 +42,9 @@ const EXTREMES_STREAM: u64 = 1;
 const REFINEMENT_STREAM: u64 = 2;
 /// Maximum number of poses over which the criterion I averages the variance of predictions.
 const MAX_WORKSPACE_POSES: usize = 500;
-/// First random stream of the starts.
+/// First random stream of the poses from which exchanges start.
 const START_STREAM: u64 = 100;
-/// First random stream of the random sets.
+/// First random stream of the random sets of poses that a plan is compared with.
 pub(super) const RANDOM_SET_STREAM: u64 = 200;
 
 /// Source of the poses of a plan.
@@ -66,10 +66,10 @@ pub struct PlanOptions<'a> {
     pub criterion: &'a Criterion,
     /// Seed of all random numbers.
     pub seed: u64,
-    /// Region for the target; `None` is unlimited.
+    /// Region in which the target must stay; `None` without a limit.
     #[doc(hidden)]
     pub workspace: Option<&'a Workspace>,
-    /// Callback after every sweep; several threads call it.
+    /// Function that is called after every sweep, by several threads.
     #[doc(hidden)]
     pub progress: Option<&'a (dyn Fn(PlanProgress) + Sync)>,
 }
@@ -77,9 +77,9 @@ pub struct PlanOptions<'a> {
 /// Progress of a plan.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlanProgress {
-    /// Number of the start, from 1; `None` during refinement.
+    /// Number of the exchange from random poses, from 1; `None` during refinement.
     pub start: Option<usize>,
-    /// Number of sweeps of the present exchange.
+    /// Number of finished sweeps of the present exchange.
     pub sweep: usize,
     /// Logarithm of the criterion.
     pub value: f64,
@@ -94,7 +94,7 @@ pub struct Plan {
     pub given: usize,
     /// Number of candidates that were tried.
     pub candidates: usize,
-    /// Logarithm of the criterion at the end of each start, before refinement.
+    /// Logarithm of the criterion at the end of each exchange, before refinement.
     pub starts: Vec<f64>,
     /// Logarithm of the criterion of the plan.
     pub value: f64,
@@ -116,8 +116,8 @@ pub struct Plan {
     pub is_of_cameras: bool,
 }
 
-/// Returns the error of a plan without candidates, with or without cameras.
-const fn nothing_admitted(has_no_cameras: bool) -> DesignError {
+/// Returns the error of a plan without candidates. `has_no_cameras` is true if no cameras measure.
+const fn no_candidates(has_no_cameras: bool) -> DesignError {
     if has_no_cameras { DesignError::NoEquilibrium } else { DesignError::NothingInView }
 }
 
@@ -148,7 +148,7 @@ pub fn plan(
     if !pairs.is_empty() && *criterion == Criterion::I {
         return Err(DesignError::NoPositions);
     }
-    let nothing = nothing_admitted(pairs.is_empty());
+    let nothing = no_candidates(pairs.is_empty());
     let site = Site::with_cameras(problem, &tables, pairs)?;
     let admitted = |(table, sensitivity): (Measurements, Sensitivity)| match options.workspace {
         Some(workspace) => {
@@ -258,8 +258,8 @@ pub fn plan(
     })
 }
 
-/// Returns the candidates: the rows given, or poses drawn within ranges, and poses at the ends of
-/// the ranges.
+/// Returns the candidates as two tables. The first holds the rows given, or poses drawn uniformly
+/// from the ranges; the second holds poses often at the limits of the ranges, if there are ranges.
 fn tables(
     problem: &Problem,
     candidates: &Candidates,
@@ -290,8 +290,8 @@ fn rank_and_poses(
     (total, total.saturating_sub(before).div_ceil(candidates.coordinates))
 }
 
-/// Returns the given rows with those known distances of the candidates that they lack; `None` if
-/// there are neither.
+/// Returns the given rows with those rows of the candidates added that measure a distance between
+/// fixtures and are not given yet. Returns `None` if there are neither.
 fn with_known_distances(
     given: Option<&Measurements>,
     candidates: &Candidates,
@@ -310,8 +310,8 @@ fn with_known_distances(
     }
 }
 
-/// Returns the number of fixture unknowns without a prior on which none of these rows depends. A
-/// fixture that is not used need not be located.
+/// Returns the number of fixture unknowns without a prior on which none of `rows` depends. A plan
+/// need not determine them, because no row uses the fixture.
 fn untouched(parameters: &[Parameter], rows: &[Option<&Sensitivity>]) -> usize {
     let is_informed =
         |k: usize| rows.iter().flatten().any(|of| of.rows.row(k).iter().any(|slope| *slope != 0.0));
@@ -323,14 +323,15 @@ fn untouched(parameters: &[Parameter], rows: &[Option<&Sensitivity>]) -> usize {
 
 /// Goal of the criterion I: the mean variance of predictions over the workspace.
 struct WorkspaceGoal {
-    /// Misfit of the size of the noise, which no measurement shows before it is made.
+    /// Assumed misfit, as large as the noise; its real size is not known before the measurement.
     misfit: Misfit,
-    /// Matrix M with tr(C M) = mean variance.
+    /// Matrix M with tr(C M) = mean variance of predictions.
     mean_square: DMatrix<f64>,
 }
 
 impl WorkspaceGoal {
-    /// Takes the first `count` poses of a table as the workspace.
+    /// Takes at most [`MAX_WORKSPACE_POSES`] of the first `count` poses of a table as the
+    /// workspace.
     fn new(site: &Site, table: &Measurements, count: usize, seed: u64) -> Self {
         let step = count.div_ceil(MAX_WORKSPACE_POSES).max(1);
         let workspace = table.select(&(0..count).step_by(step).collect::<Vec<_>>());
@@ -342,8 +343,8 @@ impl WorkspaceGoal {
         Self { misfit, mean_square: mean_square(&sensitivity) }
     }
 
-    /// Creates the exchange of `poses` candidates, with the misfit among the unknowns. Candidates and
-    /// given poses come with their sensitivities.
+    /// Creates the exchange of `poses` candidates, with the misfit among the unknowns. Candidates
+    /// and given poses come with their sensitivities.
     fn exchange(
         &self,
         site: &Site,
@@ -363,6 +364,7 @@ impl WorkspaceGoal {
 }
 
 impl PlanOptions<'_> {
+    /// Calls the progress function, if there is one.
     fn report(&self, start: Option<usize>, sweep: usize, value: f64) {
         if let Some(progress) = self.progress {
             progress(PlanProgress { start, sweep, value });
@@ -370,7 +372,8 @@ impl PlanOptions<'_> {
     }
 }
 
-/// Returns the results of all starts, the best first, and their values in the order of the starts.
+/// Runs an exchange from each start. Returns the results, the best first, and the logarithms of the
+/// criterion in the order of the starts.
 fn starts(exchange: &Exchange, options: &PlanOptions) -> (Vec<ExchangeResult>, Vec<f64>) {
     let mut results: Vec<ExchangeResult> = (0..STARTS)
         .into_par_iter()
@@ -407,7 +410,8 @@ impl Selection {
             .reduce(|best, next| if next.value < best.value { next } else { best })
     }
 
-    /// Refines the poses in rounds of exchanges with candidates ever closer to them.
+    /// Refines the poses in rounds of exchanges. The candidates of a round are variations of the
+    /// present poses, ever closer to them. `number` selects the random streams.
     fn refined(
         mut self,
         site: &Site,
@@ -449,8 +453,8 @@ impl Selection {
 }
 
 impl Plan {
-    /// Returns the median standard error of parameter k over the random sets, SI; `None` if most of
-    /// them do not inform on it.
+    /// Returns the median standard error of parameter k over the random sets, SI; `None` if more
+    /// than half of the sets do not inform on it.
     pub(crate) fn random_error(&self, k: usize) -> Option<f64> {
         let errors = self.random.iter().map(|forecast| forecast.expected[k].std_error);
         median(errors.map(|error| error.unwrap_or(f64::INFINITY))).filter(|error| error.is_finite())
@@ -469,8 +473,9 @@ impl Plan {
             .collect()
     }
 
-    /// Returns the ratio of the standard errors of random poses to those of the plan, as the
-    /// geometric mean over these parameters. `None` if no parameter has both.
+    /// Returns the ratio of the standard errors of random poses to those of the plan, above 1 if
+    /// the plan is better. It is the geometric mean over these parameters; `None` if no parameter
+    /// has both errors.
     #[doc(hidden)]
     pub fn gain(&self, parameters: &[usize]) -> Option<f64> {
         let ratios: Vec<f64> = parameters
@@ -483,8 +488,8 @@ impl Plan {
     }
 }
 
-/// Returns `count` random numbers from 0..`available` (all of them if there are fewer), in random
-/// order.
+/// Returns `count` distinct random numbers from 0..`available` (all of them if there are fewer), in
+/// random order.
 pub(super) fn choose(available: usize, count: usize, seed: u64, stream: u64) -> Vec<usize> {
     shuffled(available, count, &mut random::stream(seed, stream))
 }

@@ -20,13 +20,14 @@ const EIGENVALUE_BISECTIONS: usize = 50;
 /// I + J C Jᵀ [Fedorov 1972, ch. 3].
 pub(super) struct CandidateScan<'a> {
     criterion: &'a ScaledCriterion,
+    /// Covariance C of the unknowns without the replaced pose.
     covariance: DMatrix<f64>,
-    /// Logarithm of the criterion before the candidate.
+    /// Logarithm of the criterion without the replaced pose.
     value: f64,
     state: State<'a>,
 }
 
-/// Quantities that the measure needs for all candidates.
+/// Quantities that the measure of the criterion needs for all candidates.
 enum State<'a> {
     /// Inverse of the information block of the nuisance unknowns.
     Determinant(DMatrix<f64>),
@@ -69,20 +70,20 @@ impl<'a> CandidateScan<'a> {
         Some(Self { criterion, covariance, value: criterion.value(information), state })
     }
 
-    /// Returns the index and value of the candidate with the lowest criterion value below `limit`,
-    /// out of those for which `may` is true; the first if several are equal.
+    /// Returns the index and the logarithm of the criterion of the best candidate for which
+    /// `is_allowed` is true; the first if several are equal. `None` if none is below `limit`.
     ///
     /// `candidates` holds Jᵀ of all candidates, shape = (unknowns, coordinates · candidates).
     pub fn best(
         &self,
         (candidates, coordinates): (&DMatrix<f64>, usize),
-        may: impl Fn(usize) -> bool + Sync,
+        is_allowed: impl Fn(usize) -> bool + Sync,
         limit: f64,
     ) -> Option<(usize, f64)> {
         match coordinates {
-            6 => self.best_of_all::<6>(candidates, may, limit),
-            COMPRESSED_ROWS => self.best_of_all::<COMPRESSED_ROWS>(candidates, may, limit),
-            _ => self.best_of_all::<3>(candidates, may, limit),
+            6 => self.best_of_all::<6>(candidates, is_allowed, limit),
+            COMPRESSED_ROWS => self.best_of_all::<COMPRESSED_ROWS>(candidates, is_allowed, limit),
+            _ => self.best_of_all::<3>(candidates, is_allowed, limit),
         }
     }
 
@@ -90,7 +91,7 @@ impl<'a> CandidateScan<'a> {
     fn best_of_all<const R: usize>(
         &self,
         candidates: &DMatrix<f64>,
-        may: impl Fn(usize) -> bool + Sync,
+        is_allowed: impl Fn(usize) -> bool + Sync,
         limit: f64,
     ) -> Option<(usize, f64)>
     where
@@ -104,7 +105,7 @@ impl<'a> CandidateScan<'a> {
                 self.best_of::<R>(
                     candidates,
                     start..(start + BLOCK_CANDIDATES).min(count),
-                    &may,
+                    &is_allowed,
                     limit,
                 )
             })
@@ -112,12 +113,12 @@ impl<'a> CandidateScan<'a> {
         best.into_iter().flatten().reduce(|best, next| if next.1 < best.1 { next } else { best })
     }
 
-    /// Evaluates a range of the candidates.
+    /// Evaluates a range of the candidates; `None` if no value is below `limit`.
     fn best_of<const R: usize>(
         &self,
         candidates: &DMatrix<f64>,
         range: Range<usize>,
-        may: impl Fn(usize) -> bool,
+        is_allowed: impl Fn(usize) -> bool,
         mut limit: f64,
     ) -> Option<(usize, f64)>
     where
@@ -126,7 +127,7 @@ impl<'a> CandidateScan<'a> {
         let mut best = None;
         let rows = candidates.columns(R * range.start, R * range.len());
         let w_all = &self.covariance * rows;
-        // Further products that the measure needs for each candidate.
+        // Products that the measure needs for each candidate in addition to W.
         let products = match &self.state {
             State::Determinant(inverse) => inverse * rows.select_rows(&self.criterion.nuisance),
             State::Product => DMatrix::zeros(0, w_all.ncols()),
@@ -136,7 +137,7 @@ impl<'a> CandidateScan<'a> {
             State::Mean { goal, .. } => *goal * &w_all,
             State::Eigenvalue { rotated, .. } => rotated * &w_all,
         };
-        for k in (0..range.len()).filter(|&k| may(range.start + k)) {
+        for k in (0..range.len()).filter(|&k| is_allowed(range.start + k)) {
             let (j, w, products) =
                 (rows.columns(R * k, R), w_all.columns(R * k, R), products.columns(R * k, R));
             let s: Square<R> = identity_plus_product(&j, &w);
@@ -145,11 +146,13 @@ impl<'a> CandidateScan<'a> {
                     let ratio = s.volume() / self.nuisance_s::<R>(&j, &products).volume();
                     self.value - ratio.ln() / self.criterion.wanted.len() as f64
                 }
-                State::Product => self.product(&w, &s),
+                State::Product => self.mean_log_variance(&w, &s),
                 State::Trace { before, .. } | State::Mean { before, .. } => {
                     (before - trace(&w, &s, &products)).ln()
                 }
-                State::Eigenvalue { values, .. } => largest(values, &products, &s, limit),
+                State::Eigenvalue { values, .. } => {
+                    log_largest_eigenvalue(values, &products, &s, limit)
+                }
             };
             if value < limit {
                 limit = value;
@@ -161,7 +164,7 @@ impl<'a> CandidateScan<'a> {
 
     /// Returns the mean logarithm of the variances of the wanted unknowns after the candidate is
     /// added.
-    fn product<const R: usize>(&self, w: &DMatrixView<f64>, s: &Square<R>) -> f64 {
+    fn mean_log_variance<const R: usize>(&self, w: &DMatrixView<f64>, s: &Square<R>) -> f64 {
         let Some(inverse) = s.try_inverse() else { return f64::INFINITY };
         let (mut logarithm, mut product) = (0.0, 1.0);
         for &k in &self.criterion.wanted {
@@ -192,9 +195,11 @@ impl<'a> CandidateScan<'a> {
 /// Symmetric matrix with a row for every coordinate of a pose.
 type Square<const R: usize> = SMatrix<f64, R, R>;
 
-/// Operations on small matrices that depend on their size.
+/// Operations on small matrices that nalgebra implements for each size separately.
 trait Small {
+    /// Returns the determinant.
     fn volume(&self) -> f64;
+    /// Returns the number of positive eigenvalues.
     fn positive_eigenvalues(&self) -> usize;
 }
 
@@ -231,9 +236,9 @@ fn trace<const R: usize>(w: &DMatrixView<f64>, s: &Square<R>, weighted: &DMatrix
 /// Returns the logarithm of the largest eigenvalue of Λ − Z Zᵀ, or infinity if it is not below
 /// `limit`. Z Zᵀ = Y S⁻¹ Yᵀ with Y = Qᵀ F W.
 ///
-/// Λ − Z Zᵀ − t has as many positive eigenvalues as Λ − t and S − Yᵀ(Λ − t)⁻¹Y together, less the
-/// number of rows of S [Haynsworth 1968].
-fn largest<const R: usize>(
+/// Λ − Z Zᵀ − t has as many positive eigenvalues as Λ − t and S − Yᵀ(Λ − t)⁻¹Y together, minus the
+/// number of rows of S [Haynsworth 1968]. `values` are the diagonal of Λ, `w` is Y.
+fn log_largest_eigenvalue<const R: usize>(
     values: &DVector<f64>,
     w: &DMatrixView<f64>,
     s: &Square<R>,

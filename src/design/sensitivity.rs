@@ -16,7 +16,8 @@ pub struct Sensitivity {
     /// Matrix Jᵀ, shape = (parameters, coordinates · poses) [1 / unit of x]; not finite for a pose
     /// without equilibrium.
     pub rows: DMatrix<f64>,
-    /// Number of measured coordinates of a pose: three, or six with its orientation.
+    /// Number of measured coordinates of a pose: three, six with its orientation, or twelve for
+    /// compressed views of cameras.
     pub coordinates: usize,
 }
 

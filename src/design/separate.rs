@@ -1,4 +1,4 @@
-//! Plan of poses that separate two effects.
+//! Plan of poses whose measurements distinguish two effects.
 
 use rayon::prelude::*;
 
@@ -14,14 +14,15 @@ use crate::select::{Separation, separation};
 pub struct EffectPair {
     /// Both effects of the pair.
     pub effects: [Effect; 2],
-    /// Problem without the effects.
+    /// Problem without the two effects.
     pub plain: Problem,
     /// Problem with both effects.
     pub declared: Problem,
 }
 
 impl EffectPair {
-    /// Creates a pair of effects that `problem` does not declare; only positions separate them.
+    /// Creates a pair of effects that `problem` does not declare. Both problems of the pair contain
+    /// only measured positions.
     ///
     /// # Errors
     /// Returns an error if the effects are equal, if one is already declared, or if one depends on
@@ -71,6 +72,7 @@ impl EffectPair {
         Ok(Criterion::Each(columns))
     }
 
+    /// Returns how well the measurement of these poses distinguishes the effects.
     fn separation(&self, poses: &Measurements) -> Result<Separation, DesignError> {
         let [first, second] = &self.effects;
         Ok(separation(&self.plain, poses, [first, second])?)
@@ -90,8 +92,8 @@ pub struct PairSeparation {
     pub random: Vec<Separation>,
 }
 
-/// Chooses the poses that separate two effects best, with both effects declared;
-/// `options.criterion` is not used.
+/// Chooses the poses that distinguish two effects best. The plan is for the problem with both
+/// effects declared, and `options.criterion` is not used.
 ///
 /// # Errors
 /// Returns the errors of [`plan()`].
@@ -133,8 +135,8 @@ pub fn separate(
 }
 
 impl PairSeparation {
-    /// Returns the median over the random sets of the quantity that `of` returns; infinite if most
-    /// of them lack it.
+    /// Returns the median over the random sets of the quantity that `of` returns; infinite if more
+    /// than half of the sets lack it.
     pub fn random(&self, of: impl Fn(&Separation) -> Option<f64>) -> f64 {
         let values = self.random.iter().map(|separation| of(separation).unwrap_or(f64::INFINITY));
         median(values).unwrap_or(f64::NAN)

@@ -15,12 +15,12 @@ use crate::problem::{JointKind, Observation, Problem};
 use crate::random;
 use crate::remainder::Correction;
 
-/// Mass assumed for a declared `unmodelled-mass` \[kg\]. With a mass of 0, its position would have
-/// no influence.
+/// Mass \[kg\] assumed for a declared `unmodelled-mass` when derivatives are taken. With a mass of
+/// 0, its position would have no influence.
 const PROBE_MASS: f64 = 1.0;
 
-/// Returns true if a row of a table helps to locate its fixture. A planned row does so only by
-/// contact, which requires no measured number.
+/// Returns true if a row of a table helps to locate its fixture. A planned row, which has no
+/// measured numbers yet, does so only if it is a contact.
 fn locates(observation: Observation, table: &Measurements) -> bool {
     let mut fields = observation.description().measured_fields();
     table.position_measured || observation.is_position() || fields.all(|field| !field.required)
@@ -37,7 +37,8 @@ pub struct Site<'a> {
     /// Full parameter vector of the nominal arm, with unknown fixtures at the points where that arm
     /// touches them.
     nominal: DVector<f64>,
-    /// Cameras and markers that measure rows without another measured quantity.
+    /// Fixture indices of each camera and marker that measure together. They measure the rows that
+    /// state no other measured quantity; empty if positions are measured instead.
     pairs: Vec<(usize, usize)>,
 }
 
@@ -51,8 +52,9 @@ impl<'a> Site<'a> {
         Self::with_cameras(problem, tables, Vec::new())
     }
 
-    /// Creates the site for all poses of `tables`, whose rows without another measured quantity the
-    /// `pairs` of a camera and a marker measure; positions if there are none.
+    /// Creates the site for all poses of `tables`. Rows that state no other measured quantity are
+    /// measured by the `pairs` of a camera and a marker (fixture indices), or as positions if there
+    /// are no pairs.
     ///
     /// # Errors
     /// Returns the errors of [`new`](Self::new), or an error if the pose of one of the pairs is
@@ -179,8 +181,8 @@ impl<'a> Site<'a> {
         !self.pairs.is_empty() && (0..table.len()).all(is_plain)
     }
 
-    /// Returns the sensitivity of all points that cameras see in the poses of a table at the nominal
-    /// arm; `None` if no camera measures them.
+    /// Returns the sensitivity of the marker points that cameras see in the poses of a table, at
+    /// the nominal arm; `None` if cameras do not measure the table.
     pub(super) fn all_points(&self, table: &Measurements) -> Option<Sensitivity> {
         let poses = self.poses(table, &Placement::of(table));
         let of_site = (self.problem, &self.model);
@@ -193,9 +195,9 @@ impl<'a> Site<'a> {
         self.problem
     }
 
-    /// Moves the point of linearisation to the values of an identification. Parameters that it
-    /// lacks stay at their values.
-    pub(super) fn at(&mut self, found: &Identification) {
+    /// Moves the point of linearisation to the values of an identification. Parameters that the
+    /// identification lacks keep their values.
+    pub(super) fn linearise_at(&mut self, found: &Identification) {
         for (value, parameter) in self.nominal.iter_mut().zip(&self.model.parameters) {
             let place = found.estimates.iter().position(|of| of.name == parameter.name);
             if let Some(estimated) = place.and_then(|place| found.x.get(place)) {
@@ -204,8 +206,8 @@ impl<'a> Site<'a> {
         }
     }
 
-    /// Returns ∂p/∂q of the predicted positions, shape = (3, joints) for each pose; 0 where the arm
-    /// has no equilibrium.
+    /// Returns the derivatives ∂p/∂q of the predicted positions with respect to the commands, shape
+    /// = (3, joints) for each pose; 0 where the arm has no equilibrium.
     pub(super) fn command_slopes(&self, table: &Measurements) -> Vec<DMatrix<f64>> {
         let poses = self.poses(table, &Placement::of(table));
         let mut slopes = self.model.command_jacobian(self.problem, poses, &self.nominal);
@@ -217,8 +219,8 @@ impl<'a> Site<'a> {
         slopes
     }
 
-    /// Returns the expected length of measured − predicted at the poses of a table \[m\], without
-    /// poses in which the arm has no equilibrium.
+    /// Returns the expected root mean square length of measured − predicted at each pose of a table
+    /// \[m\], without poses in which the arm has no equilibrium.
     pub(super) fn expected_sizes(&self, correction: &Correction, table: &Measurements) -> Vec<f64> {
         let poses = self.poses(table, &Placement::of(table));
         let corrected = correction.at((self.problem, &self.model, &self.nominal), &[], &poses);
@@ -251,7 +253,8 @@ impl<'a> Site<'a> {
         poses
     }
 
-    /// Returns the rows of a table at which the nominal target is inside a workspace.
+    /// Returns the indices of the rows of a table in which the nominal target is inside a
+    /// workspace.
     pub(super) fn inside(&self, table: &Measurements, workspace: &Workspace) -> Vec<usize> {
         let nominal = vec![0.0; self.model.parameters.len()];
         let points = self

@@ -3,9 +3,10 @@
 use crate::measurement::Measurements;
 use crate::numeric::range;
 
-/// Inverse widths of the joints' ranges over some poses.
+/// Measure of the travel between configurations, relative to the joints' ranges over some poses.
 #[derive(Debug, Clone)]
 pub(super) struct Travel {
+    /// Inverse width of each joint's range [1/rad] or [1/m]; 0 for a joint that does not move.
     scales: Vec<f64>,
 }
 
@@ -19,7 +20,7 @@ impl Travel {
         Self { scales: (0..table.joints).map(scale).collect() }
     }
 
-    /// Returns the largest move of a joint between two configurations, as a share of its range.
+    /// Returns the largest move of a joint between two configurations, as a fraction of its range.
     pub fn between(&self, from: &[f64], to: &[f64]) -> f64 {
         let moves = from.iter().zip(to).zip(&self.scales);
         moves.map(|((from, to), scale)| (to - from).abs() * scale).fold(0.0, f64::max)

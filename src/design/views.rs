@@ -14,21 +14,23 @@ use crate::spatial::Frame;
 /// Smallest cosine of the angle between the line of sight and the normal of a flat marker at which
 /// detectors find its points: 60°.
 const MIN_COS_INCIDENCE: f64 = 0.5;
-/// Largest ratio of the smallest to the largest spread of points at which a marker counts as flat.
+/// Largest ratio of the smallest to the largest spread of a marker's points at which the marker
+/// counts as flat. The second largest spread must exceed this ratio.
 const MAX_FLAT_RATIO: f64 = 0.05;
-/// Maximum number of points of a view whose derivatives represent all of them in the search.
+/// Maximum number of points of a view whose derivatives represent all its points in the search for
+/// poses.
 const SEARCH_POINTS: usize = 8;
-/// Maximum number of points of a view whose derivatives represent all of them in forecasts.
+/// Maximum number of points of a view whose derivatives represent all its points in forecasts.
 const FORECAST_POINTS: usize = 60;
-/// Number of rows to which the views of a configuration are compressed in the search: six of a pose
-/// and six of a lens or of a second view.
+/// Number of rows to which the views of a configuration are compressed in the search. Six suffice
+/// for a pose; six more are for a lens or a second view.
 pub(super) const COMPRESSED_ROWS: usize = 12;
-/// Deviations by which unknowns are compared when views are compressed: lengths \[m\], angles
-/// \[rad\], pixels, and coefficients of distortion.
-const SIZES: [f64; 4] = [1e-3, 1e-3, 1.0, 1e-2];
+/// Deviations that make unknowns of different units comparable when views are compressed: of
+/// lengths \[m\], angles \[rad\], pixels, and distortion coefficients.
+const UNKNOWN_SCALES: [f64; 4] = [1e-3, 1e-3, 1.0, 1e-2];
 
-/// Returns the pairs of a camera and a marker that measure configurations of `table`: those of the
-/// problem, where the rows name nothing that is measured and no σ of positions is declared.
+/// Returns the pairs of a camera and a marker on different carriers, as fixture indices. The list
+/// is empty if σ of positions is declared or if rows of `table` state what they measure.
 pub(super) fn pairs(problem: &Problem, table: &Measurements) -> Vec<(usize, usize)> {
     let are_plain = (0..table.len()).all(|row| table.observation(row).is_position());
     if problem.data.position_sigma.is_some() || !are_plain {
@@ -46,8 +48,9 @@ pub(super) fn pairs(problem: &Problem, table: &Measurements) -> Vec<(usize, usiz
         .collect()
 }
 
-/// Points of markers in view in each of `poses` at the full parameter vector `at`, as poses that
-/// measure their pixels: at most `most` of each view, with a σ that makes them count as all.
+/// Returns the points of markers in view in each of `poses` at the full parameter vector `at`, as
+/// poses that measure pixels. Of each view at most `most` points are returned, whose σ is reduced
+/// so that they inform as much as all points in view.
 fn in_view<'a>(
     (problem, model): (&Problem, &Model),
     pairs: &[(usize, usize)],
@@ -102,15 +105,17 @@ fn in_view<'a>(
 struct View {
     lens: FixtureValues<f64>,
     marker: FixtureValues<f64>,
+    /// Frames that camera and marker move with.
     carriers: [Frame<f64>; 2],
     /// Normal of a flat marker, marker frame; `None` for points in space.
     normal: Option<Vector3<f64>>,
+    /// Width and height of the image [px].
     image: [f64; 2],
 }
 
 impl View {
-    /// Returns true if a point is in front of the camera and in its image, and the line of sight
-    /// makes at most 60° with the marker's normal.
+    /// Returns true if a point (marker frame) is in front of the camera and in its image, and the
+    /// line of sight makes at most 60° with the marker's normal.
     fn shows(&self, pixel: Observation, point: Vector3<f64>) -> bool {
         let Self { lens, marker, carriers, .. } = self;
         let fixtures = [*lens, *marker];
@@ -128,7 +133,8 @@ impl View {
     }
 }
 
-/// Returns the unit normal of points in a plane; `None` for fewer than three or points in space.
+/// Returns the unit normal of points in a plane; `None` for points on a line, and for points in
+/// space.
 fn normal(points: &[Vector3<f64>]) -> Option<Vector3<f64>> {
     let middle = points.iter().sum::<Vector3<f64>>() / points.len().max(1) as f64;
     let spread: Matrix3<f64> =
@@ -160,10 +166,10 @@ pub(super) fn compressed(
 ) -> Sensitivity {
     let n = model.parameters.len();
     let size = |unit: Unit| match unit {
-        Unit::Length => SIZES[0],
-        Unit::Angle => SIZES[1],
-        Unit::Pixel => SIZES[2],
-        _ => SIZES[3],
+        Unit::Length => UNKNOWN_SCALES[0],
+        Unit::Angle => UNKNOWN_SCALES[1],
+        Unit::Pixel => UNKNOWN_SCALES[2],
+        _ => UNKNOWN_SCALES[3],
     };
     let sizes = DVector::from_iterator(n, model.parameters.iter().map(|p| size(p.unit())));
     let views = in_view((problem, model), pairs, (poses, at), SEARCH_POINTS);

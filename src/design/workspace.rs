@@ -1,4 +1,4 @@
-//! Region that the target must stay in.
+//! Region in which the target must stay.
 
 use nalgebra::Vector3;
 
@@ -25,8 +25,8 @@ pub enum RegionError {
 }
 
 impl Workspace {
-    /// Creates the region of a box x0, x1, y0, y1, z0, z1 \[mm\] and of planes nx, ny, nz, d \[mm\];
-    /// `None` without either.
+    /// Creates the region of a box x0, x1, y0, y1, z0, z1 \[mm\] and of planes nx, ny, nz, d
+    /// \[mm\]; `None` without either.
     ///
     /// # Errors
     /// Returns an error if the box is empty or a plane has no normal.

@@ -1,32 +1,33 @@
-//! Error of predictions over the workspace, now and after further poses.
+//! Error of predictions over the workspace, now and after more poses.
 
 use super::Site;
 use crate::fit::Identification;
 use crate::measurement::Measurements;
 use crate::remainder::Correction;
 
-/// Smallest misfit that is assumed, as a share of the noise. No real arm is free of misfit.
-const LEAST_MISFIT: f64 = 0.5;
-/// Degrees of freedom of the assumption that misfit and noise are equal. It decides while the
-/// measured poses are few.
+/// Smallest misfit that is assumed, as a fraction of the noise; no real arm is free of misfit.
+const MIN_MISFIT_RATIO: f64 = 0.5;
+/// Degrees of freedom of the prior assumption that misfit and noise are equally large. The
+/// assumption dominates while there are few measured poses.
 const PRIOR_FREEDOM: f64 = 10.0;
 /// Probability with which the bound over the workspace is not too low.
 const CONFIDENCE: f64 = 0.9;
 
-/// Sizes of noise and misfit, from the scatter of a fit.
+/// Sizes of noise and misfit, estimated from the residuals of a fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct MisfitSize {
     /// 1 σ of the noise of one coordinate \[m\].
     pub noise: f64,
-    /// Size of the misfit along each axis, root mean square \[m\].
+    /// Root mean square misfit of the position along each axis \[m\].
     pub misfit: f64,
-    /// Degrees of freedom of the scatter: coordinates without the identified parameters.
+    /// Residual degrees of freedom: number of measured coordinates minus the sum of the identified
+    /// shares of the fitted parameters.
     pub freedom: f64,
 }
 
 impl MisfitSize {
-    /// Splits the scatter of a fit. The misfit is what exceeds a declared noise. Without one, noise
-    /// and misfit count as equal.
+    /// Splits the variance of the residuals of a fit. The misfit is the part beyond the declared
+    /// noise; without declared noise, half of the variance is taken as noise.
     pub fn of(found: &Identification, has_declared_noise: bool) -> Self {
         let identified: f64 = found
             .estimates
@@ -40,7 +41,7 @@ impl MisfitSize {
         let noise = if has_declared_noise { found.sigma } else { found.sigma / 2_f64.sqrt() };
         let variance = noise * noise;
         let scatter = (sum + PRIOR_FREEDOM * 2.0 * variance) / (freedom + PRIOR_FREEDOM);
-        let misfit = (scatter - variance).max((LEAST_MISFIT * noise).powi(2)).sqrt();
+        let misfit = (scatter - variance).max((MIN_MISFIT_RATIO * noise).powi(2)).sqrt();
         Self { noise, misfit, freedom }
     }
 }
@@ -48,7 +49,7 @@ impl MisfitSize {
 /// Error measured − predicted over the workspace.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WorkspaceError {
-    /// Expected error, root mean square of the length, measurement noise included \[m\].
+    /// Expected root mean square error length, measurement noise included \[m\].
     pub expected: f64,
     /// 1 σ of the expected error \[m\].
     pub expected_sigma: f64,
@@ -60,8 +61,9 @@ pub struct WorkspaceError {
 }
 
 impl WorkspaceError {
-    /// Judges predictions at the poses of `table` by the errors of configurations that were left
-    /// out of the fit. `freedom` is the number of degrees of freedom of the scatter.
+    /// Estimates the error of predictions at the poses of `table` from the errors of configurations
+    /// that were left out of the fit. `freedom` is the number of residual degrees of freedom.
+    /// `None` if no configuration was left out.
     pub(super) fn of(
         correction: &Correction,
         site: &Site,
@@ -78,8 +80,8 @@ impl WorkspaceError {
         Some(Self { expected, expected_sigma: expected / (2.0 * freedom).sqrt(), bound, least })
     }
 
-    /// Returns the error after the variance that the parameters cause has fallen to a `share` of its
-    /// present value.
+    /// Returns the error after the variance that the parameters cause has fallen to a `share` of
+    /// its present value.
     pub(super) fn with_parameters(self, share: f64) -> Self {
         let (square, least) = (self.expected * self.expected, self.least * self.least);
         let ratio = ((least + (square - least) * share) / square).sqrt();
