@@ -1,12 +1,12 @@
-//! Formats of files, recognised by their beginning, to name what a wrong file is.
+//! Formats of files, recognised by their beginning, for messages about a file of the wrong format.
 
-/// Format whose files an error may take for another input.
+/// Name of the JSON format in messages.
 pub(crate) const JSON: &str = "a JSON file";
-/// Format of tables.
+/// Name of the format of tables in messages.
 pub(crate) const TABLE: &str = "a table in text (CSV)";
-/// Format of problems, truths and studies.
+/// Name of the format of problems, truths and studies in messages.
 pub(crate) const TOML: &str = "a TOML file";
-/// Format of URDFs.
+/// Name of the format of URDFs in messages.
 pub(crate) const XML: &str = "an XML file";
 
 /// Formats of binary files by their first bytes.
@@ -31,7 +31,7 @@ const SIGNATURES: [(&[u8], &str); 18] = [
     (b"PXR-USDC", "a USD scene"),
 ];
 
-/// Formats of text by their first characters, in lower case.
+/// Formats of text files by their first characters, in lower case.
 const MARKS: [(&str, &str); 9] = [
     ("<!doctype html", "an HTML page"),
     ("<html", "an HTML page"),
@@ -50,7 +50,7 @@ pub(crate) fn binary_format(bytes: &[u8]) -> Option<&'static str> {
     SIGNATURES.iter().find(|(signature, _)| bytes.starts_with(signature)).map(|(_, format)| *format)
 }
 
-/// Returns the format that the first line with content of a text has; `None` if it is unknown.
+/// Returns the format of a text by its first line with content; `None` if the format is unknown.
 ///
 /// Lines that begin with `#` are skipped as comments.
 pub(crate) fn text_format(text: &str) -> Option<&'static str> {
@@ -81,7 +81,7 @@ pub(crate) fn text_format(text: &str) -> Option<&'static str> {
     }
 }
 
-/// Returns true if a line of the text has three numbers between delimiters.
+/// Returns true if a line of the text has at least three numbers between delimiters.
 fn has_rows(text: &str) -> bool {
     let is_number = |cell: &&str| cell.trim().replace(',', ".").parse::<f64>().is_ok();
     let counts = |line: &str| {

@@ -6,8 +6,8 @@ use std::path::PathBuf;
 use thiserror::Error;
 
 use super::NoRows;
-use super::near::{instead, meant};
-use super::phrases::{commas, list, near, plural, then};
+use super::near::{is_it_rather, suggestion};
+use super::phrases::{decimal_comma_hint, list, near_quote, plural, with_remedy};
 use super::study::StudyErrorKind;
 use super::table::TableErrorKind;
 use super::urdf::UrdfErrorKind;
@@ -51,15 +51,15 @@ pub enum InputErrorKind {
     Utf16,
     #[error("{found}, not {expected}")]
     OtherFormat { found: &'static str, expected: &'static str },
-    #[error("not valid TOML: {message}{}{}", near(near_text), then(*remedy))]
+    #[error("not valid TOML: {message}{}{}", near_quote(near_text), with_remedy(*remedy))]
     Syntax { message: String, near_text: String, remedy: Option<&'static str> },
 
     // The following errors concern keys.
-    #[error("unknown key{}; known here: {}", meant(key, known), known.join(", "))]
+    #[error("unknown key{}; known here: {}", suggestion(key, known), known.join(", "))]
     UnknownKey { key: String, known: Vec<String> },
     #[error("does not belong here: {place}")]
     MisplacedKey { place: String },
-    #[error("missing; write {write}{}", instead("", near.as_deref()))]
+    #[error("missing; write {write}{}", is_it_rather("", near.as_deref()))]
     MissingKey { write: String, near: Option<String> },
     #[error("a section is expected here; write {write}")]
     NotASection { write: String },
@@ -93,9 +93,9 @@ pub enum InputErrorKind {
     NotWhole { value: String, least: u64 },
     #[error("{value} is too large; at most {most}")]
     TooLarge { value: u64, most: u64 },
-    #[error("a vector has 3 numbers, found {found}{}", commas(*has_close_commas))]
+    #[error("a vector has 3 numbers, found {found}{}", decimal_comma_hint(*has_close_commas))]
     NotAVector { found: usize, has_close_commas: bool },
-    #[error("expected 2 numbers, found {found}{}", commas(*has_close_commas))]
+    #[error("expected 2 numbers, found {found}{}", decimal_comma_hint(*has_close_commas))]
     NotAPair { found: usize, has_close_commas: bool },
     #[error(
         "expected {expected} numbers ({names}), found {found}; write 0 for a coefficient that the \
@@ -186,7 +186,7 @@ pub enum InputErrorKind {
     RepeatedFixture { what: &'static str, name: String, line: usize },
     #[error(
         "no {what} is called \"{name}\"{}; {}",
-        meant(name, known),
+        suggestion(name, known),
         list("there are", known, "none is declared")
     )]
     UnknownFixture { what: &'static str, name: String, known: Vec<String> },
@@ -233,7 +233,7 @@ pub enum InputErrorKind {
     NotOneEffect { found: usize },
     #[error("needs arguments; write {write}")]
     NeedsArguments { write: String },
-    #[error("unknown effect{}; known: {}", meant(name, *known), known.join(", "))]
+    #[error("unknown effect{}; known: {}", suggestion(name, *known), known.join(", "))]
     UnknownEffect { name: String, known: &'static [&'static str] },
     #[error("no joint {joint}; the arm has {joints}, counted from 1")]
     UnknownJoint { joint: u64, joints: usize },
@@ -337,7 +337,7 @@ pub enum InputErrorKind {
 
     #[error(
         "the pattern matches no parameter of this arm{}; {}",
-        meant(pattern, known),
+        suggestion(pattern, known),
         list("they are", known, "it has none")
     )]
     MatchesNothing { pattern: String, known: Vec<String> },
@@ -366,7 +366,7 @@ pub enum InputErrorKind {
     NoLimit,
     #[error(
         "no such parameter{}; {}",
-        meant(name, known),
+        suggestion(name, known),
         list("there are", known, "the arm has none")
     )]
     UnknownParameter { name: String, known: Vec<String> },

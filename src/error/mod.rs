@@ -77,34 +77,34 @@ impl fmt::Debug for Excerpt {
 }
 
 impl Location {
-    /// Returns a place that means a whole file.
+    /// Returns the location of a whole file.
     #[doc(hidden)]
     pub fn file(file: impl Into<PathBuf>) -> Self {
         Self { file: file.into(), line: None, key: None, excerpt: None }
     }
 
-    /// Returns the place of a span of a text file that is held in memory.
+    /// Returns the location of a span of a text file that is in memory.
     pub(crate) fn in_text(file: &Path, text: &Arc<str>, span: Range<usize>) -> Self {
         let line = lines(text.as_bytes().get(..span.start).unwrap_or(text.as_bytes()));
         let excerpt = Excerpt { text: Arc::clone(text), first_line: 1, span };
         Self { file: file.to_owned(), line: Some(line), key: None, excerpt: Some(excerpt) }
     }
 
-    /// Returns this place with a line number.
+    /// Returns this location with a line number, counted from 1.
     #[must_use]
     pub(crate) fn at_line(mut self, line: usize) -> Self {
         self.line = Some(line);
         self
     }
 
-    /// Returns this place with a key or column.
+    /// Returns this location with a key or column.
     #[must_use]
     pub(crate) fn with_key(mut self, key: impl Into<String>) -> Self {
         self.key = Some(key.into());
         self
     }
 
-    /// Returns an error at this place.
+    /// Returns an error at this location.
     pub(crate) fn error(self, kind: impl Into<InputErrorKind>) -> InputError {
         InputError { location: Box::new(self), kind: Box::new(kind.into()) }
     }
@@ -174,7 +174,7 @@ pub(crate) fn shortened(text: &str, max_chars: usize) -> String {
     }
 }
 
-/// Returns the number of lines that have begun in a text.
+/// Returns the number of lines of a text, the last one included even if it is empty.
 pub(crate) fn lines(text: &[u8]) -> usize {
     text.split(|&byte| byte == b'\n').count()
 }

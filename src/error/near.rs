@@ -34,16 +34,16 @@ pub(crate) fn one_typo(word: &str, known: &str) -> bool {
 }
 
 /// Returns ` (did you mean …?)` if a known word is similar, otherwise an empty text.
-pub(super) fn meant<T: AsRef<str>>(word: &str, known: impl IntoIterator<Item = T>) -> String {
-    question(nearest(word, known).as_ref().map(AsRef::as_ref))
+pub(super) fn suggestion<T: AsRef<str>>(word: &str, known: impl IntoIterator<Item = T>) -> String {
+    did_you_mean(nearest(word, known).as_ref().map(AsRef::as_ref))
 }
 
 /// Returns ` (is it …?)` with a similar word and its noun; an empty text for `None`.
-pub(super) fn instead(noun: &str, near: Option<&str>) -> String {
+pub(super) fn is_it_rather(noun: &str, near: Option<&str>) -> String {
     near.map_or_else(String::new, |near| format!(" (is it {noun}{near}?)"))
 }
 
 /// Returns ` (did you mean …?)` for a suggested word; an empty text for `None`.
-pub(super) fn question(meant: Option<&str>) -> String {
+pub(super) fn did_you_mean(meant: Option<&str>) -> String {
     meant.map_or_else(String::new, |meant| format!(" (did you mean {meant}?)"))
 }

@@ -10,17 +10,18 @@ pub(super) fn plural(count: usize) -> &'static str {
 }
 
 /// Returns a quotation of the text near an error.
-pub(super) fn near(text: &str) -> String {
+pub(super) fn near_quote(text: &str) -> String {
     if text.is_empty() { String::new() } else { format!(", near `{text}`") }
 }
 
 /// Returns `; ` and a remedy, or an empty text.
-pub(super) fn then(remedy: Option<&str>) -> String {
+pub(super) fn with_remedy(remedy: Option<&str>) -> String {
     remedy.map_or_else(String::new, |remedy| format!("; {remedy}"))
 }
 
-/// Returns the remedy of a list with too many numbers if some follow a comma without a space.
-pub(super) fn commas(has_close_commas: bool) -> &'static str {
+/// Returns the remedy for a list with too many numbers; empty unless some of them follow a comma
+/// without a space.
+pub(super) fn decimal_comma_hint(has_close_commas: bool) -> &'static str {
     if has_close_commas {
         "; if a comma is a decimal one, write a point: 0.18 for 0,18"
     } else {
@@ -28,8 +29,9 @@ pub(super) fn commas(has_close_commas: bool) -> &'static str {
     }
 }
 
-/// States which of two files has a column: the present one if `has`, else `other`.
-pub(super) fn difference(other: &Path, has: bool) -> String {
+/// Returns a clause that says which of two files has a column: the present one if `has`, else
+/// `other`.
+pub(super) fn column_difference(other: &Path, has: bool) -> String {
     let says = if has { "has this column, this file does not" } else { "does not have it" };
     format!("{} {says}", other.display())
 }
@@ -73,7 +75,7 @@ pub(super) fn missing_column_remedy(write: &str, near: Option<&str>, unknown: &[
     }
 }
 
-/// Returns the remedy of a row with more fields than the header.
+/// Returns the remedy for a row with more fields than the header; empty if it has fewer.
 pub(super) fn decimal_comma_remedy(found: usize, expected: usize) -> &'static str {
     if found > expected {
         "; if its numbers have a decimal comma, separate the columns by ; or tab"
@@ -82,15 +84,16 @@ pub(super) fn decimal_comma_remedy(found: usize, expected: usize) -> &'static st
     }
 }
 
-/// Shows the keys of two tables that no row shares: of the measurements, and of the joint table.
-pub(super) fn compared(keys: Option<&[String; 2]>) -> String {
+/// Returns one key of each table, in parentheses, if no row shares a key: of the measurements, and
+/// of the joint table. Returns an empty text for `None`.
+pub(super) fn compared_keys(keys: Option<&[String; 2]>) -> String {
     keys.map_or_else(String::new, |[measured, joints]| {
         format!(" (the measurements have {measured}, the joint table {joints})")
     })
 }
 
-/// Returns the remedy of clocks that differ; `offset` is the value of `offset_s` that pairs the
-/// rows best.
+/// Returns the remedy for clocks that differ. `offset` is the value of `offset_s` [s] that pairs
+/// most rows; the text is empty for `None`.
 pub(super) fn clock_offset_remedy(offset: Option<&str>) -> String {
     offset.map_or_else(String::new, |offset| {
         format!(

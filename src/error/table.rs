@@ -4,14 +4,14 @@ use std::path::PathBuf;
 
 use thiserror::Error;
 
-use super::near::{instead, meant, question};
+use super::near::{did_you_mean, is_it_rather, suggestion};
 use super::phrases::{
-    clock_offset_remedy, compared, decimal_comma_remedy, difference, in_quotes,
-    missing_column_remedy, plural, then,
+    clock_offset_remedy, column_difference, compared_keys, decimal_comma_remedy, in_quotes,
+    missing_column_remedy, plural, with_remedy,
 };
-use super::warning::{listed, nearest_in_time};
+use super::warning::{listed, nearest_in_time_hint};
 
-/// Declaration that joins two tables.
+/// Declaration in `[data]` that joins a joint table to the measurements, for messages.
 pub(crate) const JOINED: &str =
     "joints = { files = [\"…\"], by = \"name\" } (or \"order\" or \"time\")";
 
@@ -38,8 +38,8 @@ pub enum TableErrorKind {
         "no row of the measurements has a partner in the joint table; check the column of the \
          join (pose or time) and \
          tolerance_s{}{}{}",
-        nearest_in_time(gap.as_deref()),
-        compared(keys.as_ref()),
+        nearest_in_time_hint(gap.as_deref()),
+        compared_keys(keys.as_ref()),
         clock_offset_remedy(offset.as_deref())
     )]
     NothingJoined { gap: Option<String>, keys: Option<[String; 2]>, offset: Option<String> },
@@ -51,14 +51,14 @@ pub enum TableErrorKind {
     SecondsLost { table: &'static str },
     #[error(
         "{left} of {rows} measured rows have no partner in the joint table{}{}",
-        nearest_in_time(gap.as_deref()),
+        nearest_in_time_hint(gap.as_deref()),
         clock_offset_remedy(Some(offset.as_str()))
     )]
     MostUnpaired { left: usize, rows: usize, gap: Option<String>, offset: String },
     #[error(
         "{same} of {rows} measured rows have the same partner, {partner}, an end of the joint \
          table; check whether both clocks agree, and tolerance_s{}{}",
-        compared(keys.as_ref()),
+        compared_keys(keys.as_ref()),
         clock_offset_remedy(offset.as_deref())
     )]
     CommonPartner {
@@ -112,9 +112,9 @@ pub enum TableErrorKind {
     #[error(
         "{} has no such column{}; {}{}",
         file.display(),
-        meant(name, known),
+        suggestion(name, known),
         in_quotes(known),
-        then(remedy.as_deref())
+        with_remedy(remedy.as_deref())
     )]
     NoSuchColumn { file: PathBuf, name: String, known: Vec<String>, remedy: Option<String> },
     #[error(
@@ -129,7 +129,7 @@ pub enum TableErrorKind {
          \"{theirs}\" = \"{ours}\""
     )]
     MapReversed { theirs: String, ours: String },
-    #[error("not a column of flexcal{}", question(meant.as_deref()))]
+    #[error("not a column of flexcal{}", did_you_mean(meant.as_deref()))]
     UnknownMeaning { meant: Option<String> },
     #[error(
         "every row has the position that marks missing measurements; check missing in [data.format]"
@@ -182,7 +182,7 @@ pub enum TableErrorKind {
     RepeatedColumn { first: String },
     #[error(
         "{}; give every file the same columns (a column without values may be left out of all)",
-        difference(other, *has)
+        column_difference(other, *has)
     )]
     ColumnsDiffer { other: PathBuf, has: bool },
     #[error(
@@ -271,7 +271,7 @@ pub enum TableErrorKind {
     NotADirection { value: f64 },
     #[error(
         "\"{word}\" is neither identification nor validation, the two words of this column{}",
-        instead("", *meant)
+        is_it_rather("", *meant)
     )]
     UnknownSplit { word: String, meant: Option<&'static str> },
 }

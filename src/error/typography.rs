@@ -20,7 +20,8 @@ const CHARACTERS: [(&str, &str, &str); 4] = [
     ("°", "a degree sign", "write the number alone, because its name ends in the unit"),
 ];
 
-/// Returns what the first typographic character of a text is, with its code, and the remedy.
+/// Returns the description, with its code, of the first typographic character of a text, and the
+/// remedy. Returns `None` if the text has none.
 pub(crate) fn typographic(text: &str) -> Option<(String, &'static str)> {
     text.chars().find_map(|character| {
         let (_, what, remedy) =

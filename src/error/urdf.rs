@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-use super::near::meant;
+use super::near::suggestion;
 
 /// Kind of error in a URDF; [`Location`](super::Location) holds the place.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
@@ -46,9 +46,13 @@ pub enum UrdfErrorKind {
          prismatic, fixed; choose a chain without it with --base and --tip"
     )]
     Kind { kind: String },
-    #[error("no link is called \"{name}\"{}; the links are {}", meant(name, known), listed(known))]
+    #[error(
+        "no link is called \"{name}\"{}; the links are {}",
+        suggestion(name, known),
+        listed(known)
+    )]
     NoLink { name: String, known: Vec<String> },
-    #[error("no joint is called \"{name}\"{}", meant(name, known))]
+    #[error("no joint is called \"{name}\"{}", suggestion(name, known))]
     NoJoint { name: String, known: Vec<String> },
     #[error("the joints follow each other in a cycle of <mimic>")]
     MimicCircle,
@@ -113,7 +117,8 @@ fn conversion(found: &str) -> &'static str {
 /// Maximum number of names in a list.
 const MAX_LISTED_NAMES: usize = 30;
 
-/// Returns names separated by commas, and the number of names left out.
+/// Returns names separated by commas, and the number of further names if there are more than
+/// [`MAX_LISTED_NAMES`].
 fn listed(names: &[String]) -> String {
     let more = names.len().saturating_sub(MAX_LISTED_NAMES);
     let more = if more > 0 { format!(" and {more} more") } else { String::new() };

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use thiserror::Error;
 
-use super::near::question;
+use super::near::did_you_mean;
 use super::phrases::plural;
 
 /// Kind of a warning, with its cause and remedy as message.
@@ -12,7 +12,7 @@ use super::phrases::plural;
 #[non_exhaustive]
 #[expect(missing_docs, reason = "the message of each variant says what it stands for")]
 pub enum WarningKind {
-    #[error("unknown column{}; ignored{}", question(meant.as_deref()), covariate(meant.as_deref()))]
+    #[error("unknown column{}; ignored{}", did_you_mean(meant.as_deref()), covariate_hint(meant.as_deref()))]
     ColumnIgnored { meant: Option<String> },
     #[error(
         "no column of {} has a name of [data.columns]; the table is read by flexcal's names",
@@ -23,7 +23,7 @@ pub enum WarningKind {
     Unmapped { names: Vec<String> },
     #[error(
         "{rows} row{} without a partner in the other table, the first here{}; left out{}",
-        plural(*rows), listed(*rows, others), nearest_in_time(gap.as_deref())
+        plural(*rows), listed(*rows, others), nearest_in_time_hint(gap.as_deref())
     )]
     WithoutPartner { rows: usize, others: Vec<String>, gap: Option<String> },
     #[error("not UTF-8 text; read as Windows-1252 (Latin-1), so check accented letters and signs")]
@@ -134,7 +134,7 @@ pub enum WarningKind {
     LooksLikeGrams { mass: String },
     #[error(
         "{mass} kg is a heavy payload for this arm{}; if these are grams, divide by 1000",
-        carrying(arm.as_deref())
+        declared_mass_hint(arm.as_deref())
     )]
     HeavyPayload { mass: String, arm: Option<String> },
     #[error(
@@ -176,7 +176,7 @@ pub enum WarningKind {
     FarTarget { distance: String, links: String },
 }
 
-fn carrying(arm: Option<&str>) -> String {
+fn declared_mass_hint(arm: Option<&str>) -> String {
     arm.map_or_else(String::new, |arm| format!(", whose declared masses add up to {arm} kg"))
 }
 
@@ -200,13 +200,13 @@ fn additional_rows(rows: usize) -> String {
 }
 
 /// Returns the hint for a column that does not resemble a known one.
-fn covariate(meant: Option<&str>) -> &'static str {
+fn covariate_hint(meant: Option<&str>) -> &'static str {
     if meant.is_none() { " (name it in [data.covariates] if the arm may depend on it)" } else { "" }
 }
 
-/// Returns the hint for a join by time in which rows have no partner within the tolerance; `gap` is
-/// their usual distance in words.
-pub(super) fn nearest_in_time(gap: Option<&str>) -> String {
+/// Returns a hint for rows without a partner within the tolerance of a join by time. `gap` is their
+/// usual distance in words; the hint is empty for `None`.
+pub(super) fn nearest_in_time_hint(gap: Option<&str>) -> String {
     gap.map_or_else(String::new, |gap| {
         format!(
             " (the nearest row of the joint table is typically {gap} away; check whether both \
@@ -215,7 +215,8 @@ pub(super) fn nearest_in_time(gap: Option<&str>) -> String {
     })
 }
 
-/// Names the other rows that a warning concerns; `rows` is their number.
+/// Returns the names of rows after the first one, to which a warning points. `rows` counts all
+/// rows, the first included.
 pub(super) fn listed(rows: usize, others: &[String]) -> String {
     let left = rows.saturating_sub(1 + others.len());
     let left = if left > 0 { format!(" and {left} more") } else { String::new() };

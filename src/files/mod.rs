@@ -66,7 +66,7 @@ pub fn read_text(path: &Path) -> io::Result<String> {
     io::read_to_string(open(path)?)
 }
 
-/// Returns true if two paths lead to the same existing file, also through links.
+/// Returns true if two paths lead to the same existing file, if necessary through links.
 pub fn same_file(first: &Path, second: &Path) -> bool {
     #[cfg(unix)]
     if let (Ok(first), Ok(second)) = (first.metadata(), second.metadata()) {
@@ -94,7 +94,7 @@ fn is_formula(word: &str) -> bool {
     start.starts_with(['=', '+', '-', '@', '\t', '\r']) && start.parse::<f64>().is_err()
 }
 
-/// Escapes a word that a spreadsheet would run, by an apostrophe in front.
+/// Escapes a word that a spreadsheet would run as a formula, by an apostrophe in front.
 fn escape_cell(word: String) -> String {
     if is_formula(&word) { format!("'{word}") } else { word }
 }

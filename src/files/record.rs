@@ -64,7 +64,8 @@ impl FolderRecord {
         Ok(Self { lines: String::from_utf8_lossy(&text).lines().filter_map(line).collect() })
     }
 
-    /// Returns the command that wrote a file, if flexcal wrote it and it is unchanged.
+    /// Returns the command that wrote the file `name`; `None` if the record does not list it or the
+    /// file has changed since.
     pub fn writer(&self, folder: &Path, name: &str) -> Option<&str> {
         let mut lines = self.lines.iter().filter(|line| line.name == name).peekable();
         lines.peek()?;
@@ -109,7 +110,7 @@ impl FolderRecord {
         StagedFile::new(&Self::file(folder), &lines)?.commit()
     }
 
-    /// Returns the path of the file `.flexcal` in a folder, which lists what flexcal wrote there.
+    /// Returns the path of the record, the file `.flexcal` in a folder.
     pub fn file(folder: &Path) -> PathBuf {
         folder.join(RECORD_NAME)
     }

@@ -44,8 +44,8 @@ pub(crate) fn sealed(text: &str) -> String {
 }
 
 /// Returns the first key of a JSON object whose value differs from the one that [`sealed`] wrote,
-/// or that was added or removed; the key of the digests themselves if they were removed from a file
-/// of a format that has them. Returns `None` if nothing changed.
+/// or that was added or removed. If the digests were removed from a file of a format that has them,
+/// returns their key. Returns `None` if nothing changed.
 ///
 /// # Errors
 /// Returns an error if the text is no JSON object.

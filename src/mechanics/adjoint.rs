@@ -23,8 +23,8 @@ use super::statics::{
 };
 use crate::spatial::Frame;
 
-/// Wrenches at the arm's base origin, one for each coordinate of the target's position. Their
-/// virtual work on a motion is the change of that coordinate.
+/// Wrenches about the origin of the arm's base frame, one for each coordinate of the target's
+/// position. Their virtual work on a motion is the change of that coordinate.
 #[derive(Debug, Clone, Copy, Default)]
 struct VirtualWrench {
     force: PerCoordinate,
@@ -105,8 +105,8 @@ impl LinearisedArm {
         }
     }
 
-    /// Sweeps from all tips to the base and writes `result`: either the image of Λ under the sweep
-    /// or the derivatives of the target's position `at` \[m\].
+    /// Sweeps from all tips to the base and writes `result`: the image of Λ under the sweep, or the
+    /// derivatives of the target's position at `at` \[m\] with respect to all parameters.
     fn adjoint_sweep(&mut self, at: &Vector3<f64>, result: SweepResult) {
         let Self {
             steps,

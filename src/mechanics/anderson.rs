@@ -6,8 +6,8 @@ const MAX_PAIRS: usize = 4;
 /// Smallest squared length of the part of a difference that is orthogonal to earlier ones, relative
 /// to its squared length, at which the difference is used. A smaller part is a rounding error.
 const MIN_INDEPENDENT_PART: f64 = 1e-20;
-/// Largest ratio of residuals of two passes that counts as a contraction. Slower passes are not
-/// accelerated.
+/// Largest ratio of the residual lengths of two successive passes that counts as a contraction.
+/// Slower passes are not accelerated.
 const MAX_CONTRACTION: f64 = 0.5;
 
 /// Difference of two residuals g(x) − x, orthogonal to the other pairs, with the difference of the
@@ -33,12 +33,12 @@ pub(super) struct Anderson {
 }
 
 impl Anderson {
-    /// Discards all earlier passes, because the fixed-point problem changes.
+    /// Discards all earlier passes, because another fixed-point problem follows.
     pub fn restart(&mut self) {
         (self.used, self.passes) = (0, 0);
     }
 
-    /// Replaces x by the next iterate, given `image` g(x).
+    /// Replaces x by the next iterate, given g(x) as `image`.
     pub fn advance(&mut self, x: &mut [f64], image: &[f64]) {
         let Self { pairs, used, passes, last } = self;
         let residual = |k: usize| image[k] - x[k];

@@ -28,11 +28,11 @@ pub struct Arm<S> {
     pub payload_at: Vector3<S>,
     /// Payload mass of poses that give none \[kg\].
     pub payload_mass: f64,
-    /// Excess of the payload mass over the declared one, in poses with a payload \[kg\].
+    /// Difference of the true payload mass from the declared one, in poses with a payload \[kg\].
     pub payload_error: S,
-    /// Errors of the hoists' force and direction.
+    /// Errors of the hoists' force and direction; `None` if they have none.
     pub rope: Option<HoistError<S>>,
-    /// Flexibility of the base about its x and y [rad/(N·m)].
+    /// Flexibility of the base about its x and y axes [rad/(N·m)]; rigid if `None`.
     pub mounting: Option<[S; 2]>,
     /// Mixing factor λ from loads on the rigid arm (0) to loads on the deflected arm (1); used with
     /// undeflected statics only.

@@ -7,7 +7,7 @@ use super::{Cantilever, Deflection, Flexibility, Wrench};
 use crate::scalar::Scalar;
 use crate::spatial::{Frame, rotate};
 
-/// Force on a beam.
+/// Force on a beam at a point, such as the weight of a point mass or the pull of a rope.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct LinkLoad<S> {
     /// Index of the element that carries the load.
@@ -16,14 +16,14 @@ pub(super) struct LinkLoad<S> {
     pub at: Vector3<S>,
     /// Force, arm base frame \[N\].
     pub force: Vector3<S>,
-    /// True for the force of a rope, which may depend on the position.
+    /// True for the force of a hoist's rope, which may depend on the position.
     pub rope: bool,
 }
 
-/// Part of a beam with all its loads; forces in the arm base frame.
+/// Element of a beam with all its loads; forces in the arm base frame.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Element<'a, S> {
-    /// Number of the element along the beam.
+    /// Index of the element along the beam, from 0.
     pub number: usize,
     /// Signed length of the element \[m\].
     pub length: S,
@@ -55,13 +55,14 @@ pub(super) struct BentElement<'a, S> {
     tip: Deflection<S>,
     /// Frame at the root, x along the chord, rotated about it by half the twist.
     chord: Frame<S>,
-    /// Rotation vector from the undeflected section at the root to the chord's frame \[rad\].
+    /// Rotation vector from the undeflected section at the root to the chord's frame \[rad\], root
+    /// frame.
     lean: Vector3<S>,
 }
 
 impl<S: Scalar> Element<'_, S> {
-    /// Returns the loads on this element.
-    pub fn own_loads(&self) -> impl Iterator<Item = &LinkLoad<S>> {
+    /// Returns the loads that act on this element, of those of the whole beam.
+    pub fn loads_on_element(&self) -> impl Iterator<Item = &LinkLoad<S>> {
         self.loads.iter().filter(|load| load.element == self.number)
     }
 
@@ -73,7 +74,7 @@ impl<S: Scalar> Element<'_, S> {
         points: &'p mut Vec<(S, Wrench<S>)>,
     ) -> Cantilever<'p, S> {
         points.clear();
-        for load in self.own_loads() {
+        for load in self.loads_on_element() {
             let (station, offset) = self.station_and_offset(load);
             let force = axes.resolve(&load.force);
             points.push((station, Wrench { force, moment: offset.cross(&force) }));

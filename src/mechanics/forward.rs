@@ -40,7 +40,7 @@ struct Walk<'a, S> {
     frame: Frame<S>,
     /// Index of the next unknown moment.
     next: usize,
-    /// Joint whose frame is returned.
+    /// Joint whose frame is redeflecting_moments.
     tip: usize,
 }
 
@@ -155,13 +155,13 @@ impl<S: Scalar> Arm<S> {
         }));
         ws.beyond.clear();
         ws.beyond.resize(self.joints.len(), zero);
-        ws.weights.clear();
+        ws.branch_sums.clear();
         let (mut mass, mut hoisted) = (S::from(0.0), zero);
         for (index, ((joint, beyond), rope)) in
             self.joints.iter().zip(&mut ws.beyond).zip(&ws.ropes).enumerate().rev()
         {
             for (more, pull) in
-                (0..self.tree.extra_branches_on(index)).filter_map(|_| ws.weights.pop())
+                (0..self.tree.extra_branches_on(index)).filter_map(|_| ws.branch_sums.pop())
             {
                 mass += more;
                 hoisted += pull;
@@ -179,7 +179,7 @@ impl<S: Scalar> Arm<S> {
                 hoisted += rope;
             }
             if self.tree.begins_branch(index) {
-                ws.weights.push((mass, hoisted));
+                ws.branch_sums.push((mass, hoisted));
                 (mass, hoisted) = (S::from(0.0), zero);
             }
         }
@@ -277,11 +277,11 @@ impl<S: Scalar> Arm<S> {
                 });
             }
             walk.frame.rotate_z(angle);
-            let mut turned = usize::from(joint.has_twist());
+            let mut deflecting_moments = usize::from(joint.has_twist());
             if let Some(flexibility) = joint.slide {
-                walk.cut(Segment::Joint(i), turned, &mut ws.events, &mut ws.cuts);
+                walk.cut(Segment::Joint(i), deflecting_moments, &mut ws.events, &mut ws.cuts);
                 walk.slide(flexibility, offset, Segment::Joint(i), ws);
-                turned = 0;
+                deflecting_moments = 0;
             } else {
                 walk.frame.translate_z(offset);
             }
@@ -291,7 +291,7 @@ impl<S: Scalar> Arm<S> {
                 ws.trail.push(walk.frame.origin);
             }
             ws.keep(&walk.frame);
-            walk.cut(Segment::Joint(i), turned, &mut ws.events, &mut ws.cuts);
+            walk.cut(Segment::Joint(i), deflecting_moments, &mut ws.events, &mut ws.cuts);
             if walk.records_events() {
                 for body in &joint.bodies {
                     let force = self.gravity * S::from(body.mass);
@@ -315,7 +315,7 @@ impl<S: Scalar> Arm<S> {
         found
     }
 
-    /// Passes along the beam of joint `link`, element by element.
+    /// Passes along the beam of the joint with index `link`, element by element.
     fn walk_beam(&self, beam: &Beam<S>, link: usize, walk: &mut Walk<S>, ws: &mut Workspace<S>) {
         let Workspace {
             events,
@@ -336,10 +336,10 @@ impl<S: Scalar> Arm<S> {
         let strain = beam.strain.as_ref().map(|strain| strain.plus(of_pose.unwrap_or_default()));
         let weight = self.gravity * S::from(beam.mass / elements as f64);
         for number in 0..elements {
-            let branches =
+            let outboard =
                 link_loads.iter().filter(|load| load.element > number).map(|load| load.force);
-            let branches =
-                weight * S::from((elements - 1 - number) as f64) + branches.sum::<Vector3<S>>();
+            let outboard =
+                weight * S::from((elements - 1 - number) as f64) + outboard.sum::<Vector3<S>>();
             let moment =
                 walk.moments().map_or_else(|| Vector3::from_element(S::from(0.0)), Vector3::from);
             let element = Element {
@@ -350,11 +350,11 @@ impl<S: Scalar> Arm<S> {
                 strain,
                 weight,
                 loads: link_loads,
-                tip: Wrench { force: beyond[link] + branches, moment },
+                tip: Wrench { force: beyond[link] + outboard, moment },
             };
             let mut root = walk.frame;
-            if let Bend::BySegment(_, Some(turn)) = walk.bend {
-                root.rotate(turn);
+            if let Bend::BySegment(_, Some(rotation)) = walk.bend {
+                root.rotate(rotation);
             }
             match walk.bend {
                 Bend::FirstOrder(_) => {
@@ -363,7 +363,7 @@ impl<S: Scalar> Arm<S> {
                 Bend::Rigid => {
                     let middle = root.origin + root.axes[0] * (length * 0.5);
                     events.push(Event::Load { at: middle, force: weight });
-                    for load in element.own_loads() {
+                    for load in element.loads_on_element() {
                         let (at, mut force) = (element.straight_point(&root, load), load.force);
                         if let (true, Some(hoist), Some(_)) = (load.rope, &beam.hoist, &self.rope) {
                             hooks.push([at.x, at.y]);
@@ -377,7 +377,7 @@ impl<S: Scalar> Arm<S> {
                 Bend::Bent(_) | Bend::BySegment(..) => {
                     let bent = element.bend(&root, points);
                     events.push(Event::Load { at: bent.centre_of_mass(), force: weight });
-                    for load in element.own_loads() {
+                    for load in element.loads_on_element() {
                         let at = bent.load_position(load);
                         if load.rope && self.rope.is_some() {
                             hooks.push([at.x, at.y]);
@@ -395,8 +395,8 @@ impl<S: Scalar> Arm<S> {
         }
     }
 
-    /// Lists the loads of a beam with elements of `length` \[m\]; `rope` is the force of its rope
-    /// \[N\].
+    /// Writes the loads of a beam with elements of `length` \[m\] into `loads`; `rope` is the force
+    /// of its rope \[N\].
     fn load_beam(&self, beam: &Beam<S>, rope: Vector3<S>, length: S, loads: &mut Vec<LinkLoad<S>>) {
         let last = (self.beam_elements - 1) as f64;
         #[expect(

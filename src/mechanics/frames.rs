@@ -13,8 +13,8 @@ impl Arm<Dual64> {
     /// Returns the frame behind the mounting and the frames behind all joints, arm base frame.
     /// `state` is the equilibrium of the same arm without derivatives.
     ///
-    /// The derivatives of the moments follow from the fixed point x = G(x) of [`super::statics`],
-    /// iterated until they settle.
+    /// The derivatives of the moments are those from the fixed point x = G(x) of
+    /// [`super::statics`], iterated until they settle.
     pub(crate) fn frames(
         &self,
         setup: &PoseView,

@@ -33,15 +33,15 @@ pub struct AddedMass<S> {
 pub struct HoistError<S> {
     /// Relative error of the force.
     pub force: S,
-    /// Lean of the direction, x and y of the base frame.
+    /// Error added to the x and y components of the unit direction, arm base frame.
     pub lean: [S; 2],
-    /// Derivative of the lean with respect to the hook's x and y [1/m].
+    /// Derivative of that error with respect to the hook's x and y [1/m].
     pub trolley: S,
 }
 
 impl<S: Scalar> Nonlinear<S> {
-    /// Returns the angle \[rad\] under a moment [N·m]. The play is included only if the moment
-    /// `takes_up_play`, because the direction of approach is unknown.
+    /// Returns the angle \[rad\] under a moment [N·m]. `takes_up_play` is true if the moment takes
+    /// up the play, because the direction of approach is unknown; otherwise play is left out.
     pub(super) fn twist(&self, moment: S, takes_up_play: bool) -> S {
         let cubic = self.cubic * moment * moment * moment;
         if takes_up_play { cubic + self.play * tanh(moment / PLAY_MOMENT) * 0.5 } else { cubic }

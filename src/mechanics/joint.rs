@@ -81,7 +81,7 @@ pub struct Joint<S> {
     pub theta: S,
     /// Offset d along the joint axis \[m\].
     pub d: S,
-    /// Tilt β behind the joint.
+    /// Rotation angle β about y behind the joint.
     pub beta: Angle<S>,
     /// Torsional flexibility 1/k about `z_i` [rad/(N·m)]; rigid if `None`.
     pub flexibility: Option<S>,
@@ -89,16 +89,17 @@ pub struct Joint<S> {
     pub nonlinear: Option<Nonlinear<S>>,
     /// Flexibility about x and y before the joint's rotation [rad/(N·m)].
     pub lateral: Option<[S; 2]>,
-    /// Bending flexibility 1/EI of the slide, a cantilever of length d + q [1/(N·m²)].
+    /// Bending flexibility 1/EI of the slide, a cantilever of length d + q [1/(N·m²)]; rigid if
+    /// `None`.
     pub slide: Option<S>,
     /// Spring that takes up part of the moment about `z_i`.
     pub compensator: Option<Compensator<S>>,
     /// Small motion before the joint turns, and behind it: translation \[m\] and rotation vector
-    /// \[rad\] each; `None` if no parameter is one.
+    /// \[rad\] each; `None` if the arm has no such parameter.
     pub motion: Option<Box<[S; 2 * MOTION]>>,
-    /// Elastic link along the length a.
+    /// Elastic link along the length a; rigid and without mass if `None`.
     pub beam: Option<Beam<S>>,
-    /// Masses carried by frame i.
+    /// Point masses that move with frame i, behind the joint.
     pub bodies: Vec<PointMass>,
 }
 
@@ -250,8 +251,8 @@ impl<S: Scalar> Joint<S> {
         self.displace(frame, motion, SIDES[1]);
     }
 
-    /// Moves a frame by the motion that begins at the number `first`: the parameters of the arm and
-    /// those of the pose together.
+    /// Moves a frame by the small motion whose six numbers start at `first`: the sum of the arm's
+    /// constants and the numbers of the pose.
     pub(super) fn displace(
         &self,
         frame: &mut Frame<S>,

@@ -10,15 +10,15 @@ use crate::spatial::Frame;
 /// One vector for each of the three coordinates of the target's position.
 pub(super) type PerCoordinate = [Vector3<f64>; 3];
 
-/// Motion of a segment's end per unit of one parameter: a point r beyond the end moves by rotation
-/// × r + translation.
+/// Motion of a segment's end per unit of one parameter: a point r fixed to the end moves by
+/// rotation × r + translation, arm base frame.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct EndTwist {
     /// Rotation vector per unit of the parameter \[rad\].
     pub rotation: Vector3<f64>,
     /// Displacement of the point at the base origin per unit \[m\].
     pub translation: Vector3<f64>,
-    /// Change of the spring's moment about a joint's axis per unit [N·m].
+    /// Change of the moment of the spring about a joint's axis, per unit [N·m].
     pub pull: f64,
 }
 
@@ -34,13 +34,13 @@ pub(super) enum MomentAxes {
 pub(super) enum Step {
     /// Force on a rigid part, by its index.
     Load(usize),
-    /// Place where the moments are unknowns.
+    /// Point of the arm where moments are unknown.
     Section(Section),
     /// Segment of the arm.
     Segment(LinearisedSegment),
-    /// Start of this many branches besides the next one.
+    /// Fork at which `branches` branches start besides the one that follows.
     Fork { branches: usize },
-    /// End of a branch; the next one starts at the last fork that has one left.
+    /// End of a branch; the next one starts at the last fork with a branch left.
     Branch,
 }
 
@@ -83,7 +83,8 @@ impl LinearisedSegment {
     }
 }
 
-/// Place where moments are unknowns of the equilibrium.
+/// Point of the arm where moments are unknowns of the equilibrium: position, axes of the moments,
+/// indices of the unknowns.
 #[derive(Debug, Clone)]
 pub(super) struct Section {
     pub at: Vector3<f64>,
@@ -95,8 +96,8 @@ pub(super) struct Section {
     pub moment: Vector3<f64>,
 }
 
-/// Force at a point, arm base frame, with its virtual force: for each coordinate of the target, its
-/// change when the point moves.
+/// Force at a point, arm base frame. Its virtual force is the change of each coordinate of the
+/// target per displacement of the point.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Load {
     pub at: Vector3<f64>,
@@ -123,7 +124,7 @@ impl Wrench {
 #[derive(Debug, Clone, Default)]
 pub(super) struct LinearisedArm {
     pub steps: Vec<Step>,
-    /// Number of steps between the base and the target's frame.
+    /// Number of steps between the base and the frame that carries the target.
     pub target: usize,
     pub loads: Vec<Load>,
     pub columns: Vec<EndTwist>,
@@ -140,8 +141,8 @@ pub(super) struct LinearisedArm {
 }
 
 impl LinearisedArm {
-    /// Creates an empty linearisation of `parts` segments with at most `directions` directions
-    /// each.
+    /// Creates an empty linearisation of `parts` segments, each with at most `directions`
+    /// directions of differentiation.
     pub fn new(parts: usize, directions: usize) -> Self {
         Self {
             derivatives: vec![Vector3::zeros(); parts * directions],
@@ -193,7 +194,7 @@ impl LinearisedArm {
         }));
     }
 
-    /// Appends a segment. Its loads are the last of the loads that were added.
+    /// Appends a segment. Its loads are those that were added last, as many as it has events.
     pub fn push_segment(&mut self, mut segment: LinearisedSegment) {
         segment.loads = self.loads.len() - segment.events.len()..self.loads.len();
         (segment.first_column, segment.first_move) = (self.columns.len(), self.moves.len());

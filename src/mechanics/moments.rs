@@ -1,4 +1,4 @@
-//! Moments of the loads about the axes of the joints, as formulas of laws take them.
+//! Moments of the loads about the axes of the joints, which formulas of laws may contain.
 
 use super::arm::Arm;
 use super::forward::Bend;
@@ -16,7 +16,8 @@ pub struct AxisMoments<S> {
 }
 
 impl AxisMoments<f64> {
-    /// Converts the arm to another scalar, the coordinate of one joint being `seeded`.
+    /// Returns the moments in another scalar type, with `seed` added to the coordinate of the joint
+    /// with index `joint`.
     pub fn seeded<S: Scalar>(&self, joint: usize, seed: S) -> AxisMoments<S> {
         let mut arm: Arm<S> = self.arm.lift();
         if let Some(joint) = arm.joints.get_mut(joint) {
@@ -30,8 +31,8 @@ impl AxisMoments<f64> {
 }
 
 impl<S: Scalar> AxisMoments<S> {
-    /// Creates the moments of an arm's loads: masses, payload and hoists. What deflects is left
-    /// out, and so are gravity compensators.
+    /// Creates the moments of an arm's loads: masses, payload and hoists. Deflections and gravity
+    /// compensators are left out.
     pub fn new(mut arm: Arm<S>) -> Self {
         (arm.mounting, arm.mixing) = (None, None);
         for joint in &mut arm.joints {

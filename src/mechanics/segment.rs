@@ -25,8 +25,9 @@ pub enum Segment {
 }
 
 impl Segment {
-    /// Returns the first direction of parameters. Before it lie three rotations of a beam's root
-    /// and three moments of an element, or two tilts and one rotation of a joint.
+    /// Returns the index of the first direction that belongs to a parameter. Before it are three
+    /// rotations of a beam's root and three moments of an element, or two tilts and one rotation of
+    /// a joint.
     pub fn first_parameter_direction(self) -> usize {
         if self.is_beam() { 6 } else { 3 }
     }

@@ -11,8 +11,9 @@ use super::statics::{StaticState, StaticsError};
 use super::workspace::Workspace;
 use crate::problem::{Equilibrium, PoseView};
 
-/// Derivatives of poses at equilibrium with respect to the parameters of segments. Direction k
-/// carries the k-th variable of every segment, so that a few passes in dual numbers suffice.
+/// Derivatives of poses at equilibrium with respect to the parameters of segments. In direction k,
+/// the k-th variable of every segment is differentiated at once, so that a few passes in dual
+/// numbers suffice.
 pub struct Sensitivity {
     /// One arm for each direction, with that direction's parameter of every segment as dual-number
     /// variable.
@@ -76,14 +77,14 @@ impl Sensitivity {
             let seeded =
                 |(&x, &of): (&f64, &usize)| Dual64::new(x, f64::from(u8::from(of == direction)));
             moments.extend(pose.moments.iter().zip(&*directions).map(seeded));
-            let turning = (direction < 3).then(|| {
+            let root_rotation = (direction < 3).then(|| {
                 Vector3::from_fn(|i, _| Dual64::new(0.0, f64::from(u8::from(i == direction))))
             });
             if direction == 0 {
                 // The parameters of segments do not change the forces.
                 arm.gather_forces(setup, &[], ws);
             }
-            arm.walk(setup, Bend::BySegment(&moments, turning.as_ref()), pose.tip, ws);
+            arm.walk(setup, Bend::BySegment(&moments, root_rotation.as_ref()), pose.tip, ws);
             if direction == 0 {
                 linearised.linearise(ws, parameters);
             }
@@ -98,8 +99,8 @@ impl Sensitivity {
         Ok(())
     }
 
-    /// Returns the derivative of the position \[m\], arm base frame, with respect to the parameter
-    /// in a direction of a segment.
+    /// Returns the derivative of the target's position, arm base frame \[m\], with respect to the
+    /// parameter of a segment that has this direction.
     pub fn derivative(&self, segment: Segment, direction: usize) -> Vector3<f64> {
         self.linearised.derivative(segment.index(), direction)
     }

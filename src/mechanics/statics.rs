@@ -29,10 +29,11 @@ pub(super) const MAX_EQUILIBRIUM_PASSES: usize = 200;
 /// Largest change per pass at convergence: of the moments relative to the sum of their magnitudes,
 /// and of Λ relative to its size.
 pub(super) const MAX_RELATIVE_CHANGE: f64 = 1e-13;
-/// Largest relative change of Λ in its last pass that is still accepted: rounding may keep Λ from
-/// settling further, and the derivatives do not change.
+/// Largest change of Λ in its last pass, relative to its size, that is still accepted. Rounding may
+/// prevent a smaller one, and the derivatives do not change.
 pub(super) const MAX_ACCEPTED_CHANGE: f64 = 1e-9;
-/// Rounding of a moment relative to the sum of its terms, which cancel if a hoist balances the arm.
+/// Rounding of a moment relative to the sum of the magnitudes of its terms, which cancel if a hoist
+/// balances the arm.
 const MOMENT_ROUNDING: f64 = 1e-15;
 /// Reason why a pose has no static equilibrium.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -261,10 +262,12 @@ impl<S: Scalar> Arm<S> {
         });
         let position = match (first_order, self.mixing) {
             (Some(first_order), None) => first_order,
-            (None, _) => self.at_rest(setup, &target, pose, &mut moments, ws),
+            (None, _) => self.deflected_position(setup, &target, pose, &mut moments, ws),
             (Some(first_order), Some(mixing)) => {
                 first_order
-                    + (self.at_rest(setup, &target, pose, &mut moments, ws) - first_order) * mixing
+                    + (self.deflected_position(setup, &target, pose, &mut moments, ws)
+                        - first_order)
+                        * mixing
             }
         };
         ws.moments = moments;
@@ -273,7 +276,7 @@ impl<S: Scalar> Arm<S> {
 
     /// Returns the target's position on the deflected arm with its exact first derivatives, arm
     /// base frame \[m\]; `moments` is reused memory.
-    fn at_rest(
+    fn deflected_position(
         &self,
         setup: &PoseView,
         target: &Vector3<S>,

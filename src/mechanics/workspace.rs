@@ -46,7 +46,7 @@ pub struct Workspace<S> {
     pub(super) forks: Vec<Frame<S>>,
     /// Mass \[kg\] and hoist force \[N\] of branches that have been summed but not yet added to
     /// their trunk.
-    pub(super) weights: Vec<(S, Vector3<S>)>,
+    pub(super) branch_sums: Vec<(S, Vector3<S>)>,
     pub(super) wrenches: Vec<(Vector3<S>, Vector3<S>)>,
     /// Frames behind the mounting and behind each joint in the last pass, if they are kept.
     pub(super) frames: Vec<Frame<S>>,
@@ -76,7 +76,7 @@ impl<S> Default for Workspace<S> {
             cuts: Vec::new(),
             passed: 0,
             forks: Vec::new(),
-            weights: Vec::new(),
+            branch_sums: Vec::new(),
             wrenches: Vec::new(),
             frames: Vec::new(),
             keeps_frames: false,

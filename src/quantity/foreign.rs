@@ -40,13 +40,13 @@ const FOREIGN: [(&str, Unit, f64); 31] = [
 ];
 
 impl Unit {
-    /// Returns the suffixes of this quantity that files do not use.
+    /// Returns the suffixes of units of this quantity that files do not use.
     pub(crate) fn foreign_suffixes(self) -> impl Iterator<Item = &'static str> {
         FOREIGN.iter().filter(move |(_, unit, _)| *unit == self).map(|(suffix, ..)| *suffix)
     }
 
     /// Converts a value in a unit that files do not use to the unit of tables, rounded to twelve
-    /// digits. Returns `None` for an unknown suffix.
+    /// digits. Returns `None` if `suffix` is not such a unit of this quantity.
     pub(crate) fn convert_foreign(self, suffix: &str, value: f64) -> Option<f64> {
         let known = FOREIGN.iter().find(|(known, unit, _)| *unit == self && *known == suffix);
         let converted = value * known?.2 * self.in_tables().factor;

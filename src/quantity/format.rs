@@ -7,6 +7,7 @@ const MIN_SCIENTIFIC_SIZE: f64 = 1e12;
 const MIN_WRITTEN_P: f64 = 1e-16;
 
 /// Returns the number of decimals that shows `error` with two significant digits, at most `most`.
+/// Returns `most` if `error` is not above 0 or not finite.
 pub(crate) fn decimals(error: f64, most: usize) -> usize {
     if error <= 0.0 || !error.is_finite() {
         return most;
@@ -21,7 +22,7 @@ pub(crate) fn decimals(error: f64, most: usize) -> usize {
     wanted
 }
 
-/// Formats `value` with two significant digits and at most `most` decimals.
+/// Formats `value` with two significant digits, but with at most `most` decimals.
 pub(crate) fn two_digits(value: f64, most: usize) -> String {
     number(value, decimals(value, most))
 }
@@ -74,7 +75,7 @@ pub(crate) fn mm(length: f64, decimals: usize) -> String {
     number(length * 1e3, decimals)
 }
 
-/// Formats a value by `words`; returns "–" for `None`.
+/// Formats a value by the function `words`; returns "–" for `None`.
 pub(crate) fn or_dash<T>(value: Option<T>, words: impl FnOnce(T) -> String) -> String {
     value.map_or_else(|| "–".to_owned(), words)
 }

@@ -108,10 +108,10 @@ pub struct Display {
     pub symbol: String,
 }
 
-/// Unit of measured numbers in tables and messages.
+/// Unit in which tables and messages give measured numbers.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct TableUnit {
-    /// Factor that converts an SI value to the displayed unit.
+    /// Factor that converts an SI value to this unit.
     pub factor: f64,
     /// Suffix in names of columns and keys: `mm`, `deg`.
     pub suffix: &'static str,
@@ -119,7 +119,7 @@ pub(crate) struct TableUnit {
     pub symbol: &'static str,
 }
 
-/// Properties of one unit: a row of the table.
+/// Row of the unit table: properties of one unit.
 struct Row {
     /// Name of the quantity with its article, for messages.
     noun: &'static str,
@@ -297,7 +297,8 @@ impl Unit {
         }
     }
 
-    /// Returns the unit in which files state a deviation from a nominal value with this unit.
+    /// Returns the unit in which files state a deviation from a nominal value in this unit: a ratio
+    /// for stiffnesses and rigidities, else the same unit.
     pub(crate) fn deviation_unit(self) -> Self {
         if self.is_relative() { Self::Ratio } else { self }
     }
