@@ -8,15 +8,15 @@ use crate::quantity::Unit;
 
 /// Maximum number of harmonic orders of one effect.
 const MAX_ORDERS: usize = 100;
-/// Highest order of a wave. At higher orders, commands known to a hundredth of a degree determine
-/// no phase.
+/// Highest order of a wave [cycles per revolution]. At higher orders, an error of a hundredth of a
+/// degree in the command changes the phase by more than 100°.
 pub(crate) const HIGHEST_ORDER: f64 = 1e4;
 
 /// Reader of the arguments of one effect, one after the other.
 pub(crate) struct Reader<'s, 'a, 'i> {
     pub section: Section<'a, 'i>,
     joints: &'s [Joint],
-    /// Number of the joint that was read last.
+    /// Number of the joint that was read last, counted from 1.
     last: Option<usize>,
 }
 
@@ -25,7 +25,7 @@ impl<'s, 'a, 'i> Reader<'s, 'a, 'i> {
         Self { section, joints, last: None }
     }
 
-    /// Reads the argument with a `key`, which ends in the suffix of its unit if it has one.
+    /// Reads the argument called `key`, which ends in the suffix of its SI unit if it has one.
     ///
     /// # Errors
     /// Returns an error if the argument is missing, or if the arm lacks the joint, beam or
@@ -78,7 +78,8 @@ impl<'s, 'a, 'i> Reader<'s, 'a, 'i> {
         Ok(joint)
     }
 
-    /// Reads the number of a joint that takes a command and whose kind satisfies `is_it`.
+    /// Reads the number of a joint that takes a command and whose kind satisfies `is_it`; for
+    /// another kind returns the error that `mistake` makes of the number.
     fn joint_of(
         &mut self,
         key: &str,

@@ -119,7 +119,7 @@ fn joint(
     if placement.is_none() && form == Form::Modified {
         beta = section.number("beta", Unit::Angle)?.unwrap_or(0.0);
     }
-    check_company(&section, number, (follows, placement.is_some()))?;
+    check_compatible_keys(&section, number, (follows, placement.is_some()))?;
     let limits = limits(&mut section, if follows { JointKind::Fixed } else { kind })?;
     let stiffness = stiff(&mut section, "stiffness", Unit::TorsionalStiffness)?;
     let beam = match section.section("beam")? {
@@ -153,13 +153,14 @@ fn joint(
     })
 }
 
-/// Keys of the row of a joint table, and of the limits of a joint, without their units.
+/// Keys of a row of the joint table, without the suffixes of their units.
 const ROW_KEYS: [&str; 5] = ["alpha", "a", "theta", "d", "beta"];
+/// Keys of the limits of a joint, without the suffixes of their units.
 const LIMIT_KEYS: [&str; 2] = ["min", "max"];
 
 /// Checks that a joint has no key that another of its keys makes meaningless: limits if it follows
 /// another joint, and a row of the joint table if it is placed by `xyz_m` and `rpy_deg`.
-fn check_company(
+fn check_compatible_keys(
     section: &Section<'_, '_>,
     number: usize,
     (follows, is_placed): (bool, bool),
@@ -199,7 +200,7 @@ fn limits(section: &mut Section<'_, '_>, kind: JointKind) -> Result<(f64, f64), 
         JointKind::Fixed => return Ok((f64::NEG_INFINITY, f64::INFINITY)),
     };
     let mut limit = |base| -> Result<_, InputError> {
-        let found = section.quantity(base, unit).map_err(|error| of_other_kind(error, kind))?;
+        let found = section.quantity(base, unit).map_err(|error| with_kind_hint(error, kind))?;
         let Some((item, suffix)) = found else { return Ok(None) };
         Ok(Some(((suffix.to_si)(item.number()?), item)))
     };
@@ -212,8 +213,9 @@ fn limits(section: &mut Section<'_, '_>, kind: JointKind) -> Result<(f64, f64), 
     }
 }
 
-/// Adds to the error of a limit in the unit of another kind of joint that the kind may be wrong.
-fn of_other_kind(error: InputError, kind: JointKind) -> InputError {
+/// Adds a hint to the error of a limit whose unit fits another kind of joint: the kind may be
+/// wrong.
+fn with_kind_hint(error: InputError, kind: JointKind) -> InputError {
     match *error.kind {
         InputErrorKind::WrongUnit { noun, suffix, write } => {
             let is_of = |unit: Unit| unit.suffix(&suffix).is_some();

@@ -14,7 +14,8 @@ use crate::quantity::Unit;
 /// Maximum number of points of a marker.
 const MAX_POINTS: usize = 10_000;
 
-/// Arm whose frames may carry a camera or a marker: its joints, and the joint of the tool.
+/// Arm whose frames may carry a camera or a marker: its joints, and the index of the joint that
+/// carries the tool.
 #[derive(Clone, Copy)]
 pub(super) struct Carriers<'a> {
     pub joints: &'a [Joint],
@@ -32,13 +33,13 @@ pub(super) struct Declared {
 }
 
 impl Declared {
-    /// Creates the properties of a fixture that stands in the measuring frame.
+    /// Creates the properties of a fixture that is at rest in the measuring frame.
     pub fn new(kind: FixtureKind, known: Vec<Option<f64>>) -> Self {
         Self { kind, known, carrier: None, points: Vec::new(), sigma: None, image: None }
     }
 }
 
-/// Reads the remaining keys of a camera.
+/// Reads the keys of a camera other than its name.
 pub(super) fn camera(
     section: &mut Section<'_, '_>,
     carriers: Carriers,
@@ -95,7 +96,7 @@ fn positive_pair(item: &Item<'_, '_>) -> Result<[f64; 2], InputError> {
     }
 }
 
-/// Reads the remaining keys of a marker.
+/// Reads the keys of a marker other than its name.
 pub(super) fn marker(
     section: &mut Section<'_, '_>,
     carriers: Carriers,
@@ -115,7 +116,8 @@ pub(super) fn marker(
     Ok(Declared { carrier, points, ..Declared::new(FixtureKind::Marker, known) })
 }
 
-/// Reads the frame that carries an object; `None` for the measuring frame.
+/// Reads the frame that carries an object: 0 is the base, i that of joint i, `None` the measuring
+/// frame.
 fn carrier(on: &Item<'_, '_>, carriers: Carriers) -> Result<Option<usize>, InputError> {
     let word = on.text()?;
     if word == "world" {
@@ -124,7 +126,8 @@ fn carrier(on: &Item<'_, '_>, carriers: Carriers) -> Result<Option<usize>, Input
     frame(word, carriers.joints, carriers.tool).map(Some).map_err(|kind| on.error(kind))
 }
 
-/// Reads a pose: the position, then the rotation vector; unknown without `at` and `rotation`.
+/// Reads the numbers of a pose: position \[m\], then rotation vector \[rad\]. Numbers without the
+/// keys `at` or `rotation` are `None`.
 fn pose(section: &mut Section<'_, '_>) -> Result<Vec<Option<f64>>, InputError> {
     let at = section.vector("at", Unit::Length)?;
     let rotation = section.vector("rotation", Unit::Angle)?;

@@ -75,7 +75,8 @@ impl<'a> PoseView<'a> {
 }
 
 impl PoseView<'_> {
-    /// Returns the small motions of a joint, if any joint has some.
+    /// Returns the small motions of a joint with index `joint`; `None` if effects add no offsets in
+    /// this pose.
     #[inline]
     pub(crate) fn motion(&self, joint: usize) -> Option<&[f64; 12]> {
         Some(&self.offsets?.get(joint)?.motion)
@@ -98,8 +99,8 @@ impl PoseView<'_> {
 }
 
 impl PoseConditions {
-    /// Appends this pose to the past of the next one. Either all poses of a past have a temperature
-    /// or none has; the same holds for approach directions.
+    /// Appends this pose to `past`, the earlier poses of the next one. Either all poses of a past
+    /// have a temperature or none has; the same holds for approach directions.
     pub(crate) fn append_to(&self, past: &mut Past) {
         past.times.push(self.time);
         past.temperatures.extend(self.temperature);
@@ -143,7 +144,7 @@ pub struct PoseRanges {
 
 impl PoseRanges {
     /// Returns these ranges without the temperatures, approach directions and covariates on which
-    /// no declared effect depends, because they need not be set.
+    /// no declared effect depends, because these conditions need not be varied.
     #[must_use]
     #[doc(hidden)]
     pub fn relevant_to(self, problem: &Problem) -> Self {

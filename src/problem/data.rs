@@ -83,12 +83,14 @@ pub enum HeldOut {
     },
     /// Holds out all rows of one session.
     Session(String),
-    /// Holds out no row: errors are those of configurations that are left out.
+    /// Holds out no row. Prediction errors are those of each configuration, left out of the fit in
+    /// turn.
     Nothing,
 }
 
 impl Data {
-    /// Returns the standard deviation that `[data]` declares for an observation \[m\] or \[rad\].
+    /// Returns the standard deviation that `[data]` declares for each number of an observation
+    /// \[m\] or \[rad\].
     fn sigma_of(&self, observation: Observation) -> Option<f64> {
         if observation.is_position() {
             return self.position_sigma;
@@ -98,8 +100,8 @@ impl Data {
 }
 
 impl Problem {
-    /// Returns the declared standard deviation of a number that a row measures \[m\], \[rad\] or
-    /// \[px\], also if a camera declares it.
+    /// Returns the declared standard deviation of each number that a row measures \[m\], \[rad\] or
+    /// \[px\]. For pixels it is the one that the camera declares.
     pub(crate) fn sigma_of(&self, observation: Observation) -> Option<f64> {
         let mut fixtures = observation.fixtures().into_iter().flatten();
         let of_fixture = fixtures.find_map(|fixture| self.fixtures.get(fixture)?.sigma);
@@ -147,7 +149,7 @@ pub(super) fn read(root: &mut Section<'_, '_>) -> Result<Data, InputError> {
     let position_sigma_location =
         position_sigma_location.map_or_else(|| location.clone(), |item| item.location());
     let mut kind_sigmas = BTreeMap::new();
-    // The σ of a known distance is declared with the distance, that of a pixel with the camera.
+    // The σ of a known distance is declared in `[[distance]]`, that of a pixel in `[[camera]]`.
     let beside = [Needs::Fixtures, Needs::Carriers];
     for kind in kinds().filter(|kind| !beside.contains(&kind.needs)) {
         let not_positive = |value| InputErrorKind::NotPositive { value };

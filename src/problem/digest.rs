@@ -22,12 +22,11 @@ impl Problem {
     /// It is the SHA-256 of a text of words and numbers, each after a space. Numbers are in SI with
     /// twelve digits (`5.00000000000e-1`):
     /// - `undeflected` or `deflected` without a space; beam elements; gravity; target; payload
-    ///   position; translation and rotation of the base; payload mass; if the tool has an
-    ///   orientation, `turned` and its rotation vector; if another joint than the last carries it,
-    ///   `on` and its number;
+    ///   position; translation and rotation of the base; payload mass; `payload at the identified
+    ///   target` if it follows the target; if the tool has an orientation, `turned` and its rotation
+    ///   vector; if another joint than the last carries it, `on` and its number;
     /// - for each target a new line with `target`, its quoted name, the number of its joint, its
     ///   position and rotation vector;
-    /// - `payload fixed` if the payload is declared at the target but does not follow it;
     /// - for each joint a new line with `revolute`, `prismatic` or `fixed`; if its parent is not
     ///   the joint before it, `on` and the parent's number (0 for the base); if it has xyz and rpy,
     ///   `placed` and these; if it follows another joint, `mimic`, that joint's number and the
@@ -56,8 +55,7 @@ impl Problem {
                 joints += 1;
                 format!("joint {joints}")
             }
-            // The last line is that of the reference temperature; in this text it follows the last
-            // effect.
+            // The reference temperature, if any, follows the last effect on the same line.
             _ => line.rsplit_once('}').map_or(line, |(declared, _)| declared).to_owned(),
         };
         let short = |line: &str| hexadecimal(line).chars().take(16).collect::<String>();
@@ -76,7 +74,7 @@ impl Problem {
         };
         let _ = write!(text, " {beam_elements}");
         push_vectors(&mut text, &[gravity, target, payload_at, translation, rotation]);
-        number(&mut text, *payload_mass);
+        push_number(&mut text, *payload_mass);
         if tool.payload_follows {
             text.push_str(" payload at the identified target");
         }
@@ -92,7 +90,7 @@ impl Problem {
             push_vectors(&mut text, &[at, rotation]);
         }
         for (index, declared) in joints.iter().enumerate() {
-            joint(&mut text, index, declared);
+            push_joint(&mut text, index, declared);
         }
         // The order of the declarations has no effect on predictions.
         let mut declared: Vec<String> =
@@ -103,7 +101,7 @@ impl Problem {
             effects.iter().any(|declared| Effect::is_thermal(&declared.effect)),
             data.reference_temperature,
         ) {
-            number(&mut text, reference);
+            push_number(&mut text, reference);
         }
         text
     }
@@ -118,7 +116,7 @@ pub(crate) fn hexadecimal(text: &str) -> String {
     })
 }
 
-fn joint(text: &mut String, index: usize, joint: &Joint) {
+fn push_joint(text: &mut String, index: usize, joint: &Joint) {
     let Joint {
         kind,
         parent,
@@ -148,58 +146,57 @@ fn joint(text: &mut String, index: usize, joint: &Joint) {
     }
     if let Some(Mimic { joint, ratio }) = mimic {
         let _ = write!(text, " mimic {}", joint + 1);
-        number(text, *ratio);
+        push_number(text, *ratio);
     }
     for value in [alpha, a, theta, d, beta] {
-        number(text, *value);
+        push_number(text, *value);
     }
-    optional(text, *stiffness);
-    masses(text, bodies);
+    push_rigidity(text, *stiffness);
+    push_masses(text, bodies);
     if let Some(elastic) = elastic {
-        beam(text, elastic);
+        push_beam(text, elastic);
     }
 }
 
-fn beam(text: &mut String, beam: &Beam) {
+fn push_beam(text: &mut String, beam: &Beam) {
     // The name enters because parameters and effects use it.
     let Beam { name, mass, ea, ei_y, ei_z, gj, masses: carried, hoist } = beam;
     let _ = write!(text, " beam {}", quoted(name));
-    number(text, *mass);
+    push_number(text, *mass);
     for rigidity in [ea, ei_y, ei_z, gj] {
-        optional(text, *rigidity);
+        push_rigidity(text, *rigidity);
     }
-    masses(text, carried);
+    push_masses(text, carried);
     if let Some(Hoist { at, force, direction }) = hoist {
         text.push_str(" hoist");
-        number(text, *force);
+        push_number(text, *force);
         push_vectors(text, &[at, direction]);
     }
 }
 
-fn masses(text: &mut String, bodies: &[Body]) {
+fn push_masses(text: &mut String, bodies: &[Body]) {
     for Body { name: _, mass, position } in bodies {
         text.push_str(" mass");
-        number(text, *mass);
+        push_number(text, *mass);
         push_vectors(text, &[position]);
     }
 }
 
 fn push_vectors(text: &mut String, vectors: &[&Vector3<f64>]) {
     for value in vectors.iter().flat_map(|vector| vector.iter()) {
-        number(text, *value);
+        push_number(text, *value);
     }
 }
 
-fn optional(text: &mut String, value: Option<f64>) {
+fn push_rigidity(text: &mut String, value: Option<f64>) {
     match value {
-        Some(value) => number(text, value),
+        Some(value) => push_number(text, value),
         None => text.push_str(" rigid"),
     }
 }
 
-/// Appends a number with twelve digits, fewer than a change of unit preserves. Adding 0 turns −0
-/// into 0.
-fn number(text: &mut String, value: f64) {
+/// Appends a number with twelve digits, which a change of unit preserves. Adding 0 turns −0 into 0.
+fn push_number(text: &mut String, value: f64) {
     let _ = write!(text, " {:.11e}", value + 0.0);
 }
 

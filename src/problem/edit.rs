@@ -8,11 +8,11 @@ use toml_edit::{
 
 use super::{Argument, Effect};
 
-/// Replaces the `declared` effects of the text by the `closed` ones (declared and found), each with
-/// comments.
+/// Replaces the `declared` effects of the text by the `closed` ones (declared and found). Found
+/// effects come with lines of comment.
 ///
 /// The `closed` effects begin with the declared ones in their order, possibly with more harmonics.
-/// `files` are the new names of measurements and joint tables.
+/// `files` are the new lists of files of measurements and of joint tables.
 ///
 /// # Errors
 /// Returns an error if the text is not TOML.
@@ -24,23 +24,23 @@ pub(crate) fn with_effects(
 ) -> Result<String, TomlError> {
     let mut document: DocumentMut = text.parse()?;
     if let Some(data) = document.get_mut("data").and_then(Item::as_table_like_mut) {
-        name_files(data, files[0]);
+        set_files(data, files[0]);
         if let Some(joints) = data.get_mut("joints").and_then(Item::as_table_like_mut) {
-            name_files(joints, files[1]);
+            set_files(joints, files[1]);
         }
     }
     for (k, (effect, comments)) in closed.iter().enumerate() {
         match declared.get(k) {
             Some(known) if known == effect => {}
-            Some(_) => replace(&mut document, k, effect),
-            None => add(&mut document, effect, comments),
+            Some(_) => replace_arguments(&mut document, k, effect),
+            None => append_effect(&mut document, effect, comments),
         }
     }
     Ok(document.to_string())
 }
 
-/// Replaces the list of data files in a table.
-fn name_files(data: &mut dyn TableLike, files: &[PathBuf]) {
+/// Replaces the list of files in a table, `[data]` or its `joints`.
+fn set_files(data: &mut dyn TableLike, files: &[PathBuf]) {
     let slashes = |file: &PathBuf| file.to_string_lossy().replace(std::path::MAIN_SEPARATOR, "/");
     let mut names = Value::Array(files.iter().map(slashes).collect());
     match data.get_mut("files") {
@@ -53,7 +53,7 @@ fn name_files(data: &mut dyn TableLike, files: &[PathBuf]) {
 }
 
 /// Appends an effect to the document, below its comments.
-fn add(document: &mut DocumentMut, effect: &Effect, comments: &[String]) {
+fn append_effect(document: &mut DocumentMut, effect: &Effect, comments: &[String]) {
     let lines: String = comments.iter().flat_map(|line| ["# ", line, "\n"]).collect();
     if let Some(Item::Value(Value::Array(known))) = document.get_mut("effect") {
         let mut value =
@@ -77,7 +77,7 @@ fn add(document: &mut DocumentMut, effect: &Effect, comments: &[String]) {
     }
 }
 
-/// Returns the last position in the document of the tables of an item.
+/// Returns the position in the document of the last table of an item, 0 without a table.
 fn last_position(item: &Item) -> isize {
     let of_table = |table: &Table| {
         let below = table.iter().map(|(_, item)| last_position(item)).max();
@@ -91,7 +91,7 @@ fn last_position(item: &Item) -> isize {
 }
 
 /// Replaces the arguments of the declared effect with index `k` by those of `effect`.
-fn replace(document: &mut DocumentMut, k: usize, effect: &Effect) {
+fn replace_arguments(document: &mut DocumentMut, k: usize, effect: &Effect) {
     let declared: Option<&mut dyn TableLike> = match document.get_mut("effect") {
         Some(Item::ArrayOfTables(tables)) => {
             tables.get_mut(k).map(|table| table as &mut dyn TableLike)

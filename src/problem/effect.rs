@@ -1,4 +1,4 @@
-//! Effects that a problem declares, and whether they can act on its arm.
+//! Effects that a problem declares, and the reasons why they cannot act on its arm.
 
 use super::{Data, Equilibrium, Joint, JointKind, Problem, Statics};
 use crate::error::{InputErrorKind, Location};
@@ -54,8 +54,8 @@ impl Effect {
         })
     }
 
-    /// Returns the error of a condition on the arm that the effect requires; `None` if the arm
-    /// meets it.
+    /// Returns the error if the arm does not meet the condition `only`, which the effect requires;
+    /// `None` if it does.
     fn unmet(&self, only: Only, statics: Statics, joints: &[Joint]) -> Option<InputErrorKind> {
         match only {
             Only::Link => {
@@ -74,7 +74,7 @@ impl Effect {
         }
     }
 
-    /// Returns true if the effect lets a joint, counted from 1, rotate under a moment about its
+    /// Returns true if the effect makes a joint, counted from 1, rotate under a moment about its
     /// axis.
     pub(super) fn gives_way(&self, joint: usize) -> bool {
         self.joint() == Some(joint) && self.acts_at(At::Joint(JointField::Compliance))

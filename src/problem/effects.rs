@@ -91,8 +91,8 @@ pub(crate) fn gives_way<'e>(
     stiff || effects.any(|effect| effect.gives_way(joint))
 }
 
-/// Parses one effect as in a problem file, without its `[[effect]]`: `gear-ratio = { joint = 3 }`.
-/// A name alone, such as `hoist-force`, is short for `hoist-force = true`.
+/// Parses one effect, written as in a problem file, without its `[[effect]]`: `gear-ratio = { joint
+/// = 3 }`. A name alone, such as `hoist-force`, is short for `hoist-force = true`.
 pub(super) fn parse(
     text: &str,
     named: &Path,

@@ -20,17 +20,19 @@ use crate::spatial::MAX_NORMAL_TILT;
 /// Standard deviation of a known distance if the file states none: one micrometre \[m\].
 const DEFAULT_DISTANCE_SIGMA: f64 = 1e-6;
 
-/// Object in the surroundings whose position may be known or unknown.
+/// Object around the arm or on it, against which rows are measured. Its position may be declared or
+/// unknown.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fixture {
     /// Name of the fixture, as used in columns.
     pub name: String,
     /// Kind of the fixture.
     pub kind: FixtureKind,
-    /// Coordinates in the order of [`FixtureKind::fields`], SI; `None` for an unknown coordinate.
+    /// Declared numbers in the order of [`FixtureKind::fields`], SI; `None` for a number that is
+    /// not declared.
     pub known: Vec<Option<f64>>,
-    /// Frame of the arm that carries it: 0 is the base, i that of joint i; `None` if it stands in
-    /// the measuring frame.
+    /// Frame of the arm that carries the fixture: 0 is the base, i that of joint i; `None` if it is
+    /// at rest in the measuring frame.
     pub carrier: Option<usize>,
     /// Points of a marker in its frame \[m\]; empty for others.
     pub points: Vec<Vector3<f64>>,
@@ -55,7 +57,8 @@ pub struct KnownDistance {
     pub location: Location,
 }
 
-/// Returns the columns that name what a row is measured against, each with its cell.
+/// Returns the columns that name the fixtures or the frame of a row, each with the content of its
+/// cell.
 pub(crate) fn reference_cells(
     problem: &Problem,
     observation: Observation,
@@ -210,7 +213,8 @@ fn distance(
     })
 }
 
-/// Returns the error for a word that names no fixture.
+/// Returns the error for a name that is none of the `names`; `what` is the noun for a fixture in
+/// the message.
 pub fn unknown(what: &'static str, name: &str, names: &[&str]) -> InputErrorKind {
     let known = names.iter().map(|&name| name.to_owned()).collect();
     InputErrorKind::UnknownFixture { what, name: name.to_owned(), known }

@@ -3,8 +3,8 @@
 use super::joint::Joint;
 use crate::error::InputErrorKind;
 
-/// Returns the frame that a word names: `base`, a joint by its name, or `joint3`. The word `tool`
-/// means the frame of joint `tool` (counted from 0).
+/// Returns the frame that a word names: 0 for `base`, i for joint i by its name or as `joint3`. The
+/// word `tool` names the frame of the joint with index `tool`.
 ///
 /// # Errors
 /// Returns an error if the word names no frame.
@@ -30,11 +30,12 @@ pub(crate) fn frame(word: &str, joints: &[Joint], tool: usize) -> Result<usize, 
     }
 }
 
-/// Returns a word that names a frame: the joint's name if it is unambiguous, otherwise `joint3`.
-pub(crate) fn frame_word(place: usize, joints: &[Joint], tool: usize) -> String {
-    let Some(joint) = place.checked_sub(1).and_then(|joint| joints.get(joint)) else {
+/// Returns a word that names the frame with this index: the joint's name if it is unambiguous,
+/// otherwise `joint3`.
+pub(crate) fn frame_word(index: usize, joints: &[Joint], tool: usize) -> String {
+    let Some(joint) = index.checked_sub(1).and_then(|joint| joints.get(joint)) else {
         return "base".to_owned();
     };
-    let is_it = frame(&joint.name, joints, tool).is_ok_and(|named| named == place);
-    if is_it { joint.name.clone() } else { format!("joint{place}") }
+    let is_it = frame(&joint.name, joints, tool).is_ok_and(|named| named == index);
+    if is_it { joint.name.clone() } else { format!("joint{index}") }
 }

@@ -27,7 +27,7 @@ pub(crate) struct Document {
 }
 
 impl Document {
-    /// Reads a text file; `missing` is the error if the file does not exist.
+    /// Reads a text file; `missing` is the error that is returned if the file does not exist.
     pub fn read(file: &Path, missing: InputErrorKind) -> Result<Self, InputError> {
         let expected = missing.expected_file();
         let bytes = read_limited(file, MAX_TEXT_MIB << 20).map_err(|source| {

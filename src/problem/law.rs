@@ -67,8 +67,8 @@ fn check(law: &Law, at: &Item, joints: &[Joint]) -> Result<(), InputError> {
     }
 }
 
-/// Returns a name that consists of word characters, so that it cannot be confused with a pattern or
-/// bracket. `noun` describes it in the error.
+/// Returns the text as a name if it consists of letters, digits, _ and -, so that it cannot be
+/// confused with a pattern or bracket. `noun` describes it in the error.
 fn word(item: &Item, text: &str, noun: &'static str) -> Result<String, InputError> {
     let is_word = text.chars().all(|c| c.is_alphanumeric() || c == '_' || c == '-');
     if is_word {
@@ -78,7 +78,7 @@ fn word(item: &Item, text: &str, noun: &'static str) -> Result<String, InputErro
     }
 }
 
-/// Returns the unit of the quantity that a law adds to at a site; `joint` counts from 1.
+/// Returns the unit of the quantity to which a law adds at the site `at`; `joint` counts from 1.
 pub(crate) fn law_unit(at: At, joint: Option<usize>, joints: &[Joint]) -> Unit {
     let slides = |number: usize| {
         joints.get(number.wrapping_sub(1)).is_some_and(|joint| joint.kind == JointKind::Prismatic)

@@ -107,7 +107,7 @@ pub struct Problem {
     /// Names of the URDF links at both ends of the arm, if the problem was made from a URDF.
     #[doc(hidden)]
     pub urdf: Option<UrdfEnds>,
-    /// Effects declared by the model.
+    /// Declared effects `[[effect]]`, in the order of the file.
     #[doc(hidden)]
     pub effects: Vec<EffectDeclaration>,
     /// Points, anchors, surfaces, cameras and markers that rows are measured against.
@@ -163,7 +163,8 @@ impl Problem {
         self.tree().is_chain() && carrier_joints.all(|joint| joint == last)
     }
 
-    /// Returns an error if the joints form a tree; `what` names the operation that needs a chain.
+    /// Returns an error if the joints do not form a chain; `what` names the operation that needs
+    /// one.
     ///
     /// # Errors
     /// Returns an error if the parent of a joint is not the joint before it.

@@ -23,9 +23,9 @@ pub struct ParameterRule {
 pub enum Freedom {
     /// The parameter is held at its nominal value.
     Fixed,
-    /// Free, with optional prior and bounds.
+    /// The parameter is free, with optional prior and bounds.
     Free {
-        /// Standard deviation of a Gaussian prior about the nominal value.
+        /// Standard deviation (1 σ) of a Gaussian prior about the nominal value.
         sigma: Quantities,
         /// Lower bound of the deviation from nominal; for relative quantities a multiple of
         /// nominal.
@@ -61,7 +61,7 @@ pub struct Quantities {
 }
 
 impl Quantities {
-    /// Returns the value for parameters with this unit; `None` if there is none.
+    /// Returns the value for parameters with this unit; `None` if the rule has none for it.
     pub(crate) fn of_kind(&self, unit: Unit) -> Option<f64> {
         match unit {
             Unit::Angle => self.angle,
@@ -79,8 +79,10 @@ const MAX_RULES: usize = 2000;
 /// Maximum length of a pattern \[bytes\], which bounds the work of matching all parameters.
 const MAX_PATTERN_BYTES: usize = 500;
 
+/// Units of the values that a rule may give, in the order of [`Quantities`].
 const KINDS: [Unit; 4] = [Unit::Angle, Unit::Length, Unit::Pixel, Unit::Ratio];
-/// Nominal value on the scale of each kind: deviation 0 or ratio 1.
+/// Nominal value for each unit in [`KINDS`], on the scale of bounds: deviation 0, or ratio 1 to the
+/// nominal value.
 const NOMINAL_VALUES: [f64; 4] = [0.0, 0.0, 0.0, 1.0];
 
 /// Reads all rules in the order of the file.
@@ -97,7 +99,7 @@ pub(super) fn drift(root: &mut Section<'_, '_>) -> Result<Vec<DriftRule>, InputE
     let Some(section) = root.section("drift")? else { return Ok(Vec::new()) };
     let rule = |(pattern, item): (&str, Item<'_, '_>)| {
         let mut section = item.section()?;
-        let sigma = Spread::read(&mut section, "sigma")?;
+        let sigma = ValuesByUnit::read(&mut section, "sigma")?;
         section.finish()?;
         if section.len() == 0 {
             return Err(item.error(InputErrorKind::EmptyRule));
@@ -129,9 +131,9 @@ fn rule(pattern: &str, item: &Item<'_, '_>) -> Result<ParameterRule, InputError>
     }
     let fixed = flag(&mut section, "fixed")?;
     let free = flag(&mut section, "free")?;
-    let sigma = Spread::read(&mut section, "sigma")?;
-    let min = Spread::read(&mut section, "min")?;
-    let max = Spread::read(&mut section, "max")?;
+    let sigma = ValuesByUnit::read(&mut section, "sigma")?;
+    let min = ValuesByUnit::read(&mut section, "min")?;
+    let max = ValuesByUnit::read(&mut section, "max")?;
     section.finish()?;
 
     let held_by = match (fixed, free) {
@@ -160,13 +162,13 @@ fn flag(section: &mut Section<'_, '_>, key: &str) -> Result<Option<bool>, InputE
     section.get(key).map(|item| item.boolean()).transpose()
 }
 
-/// Prior width or bound in SI with its place.
+/// Prior width or bound in SI, with its entry in the file.
 type Value<'a, 'i> = (f64, Item<'a, 'i>);
 
 /// Prior widths or bounds, one for each unit in [`KINDS`].
-struct Spread<'a, 'i>([Option<Value<'a, 'i>>; KINDS.len()]);
+struct ValuesByUnit<'a, 'i>([Option<Value<'a, 'i>>; KINDS.len()]);
 
-impl<'a, 'i> Spread<'a, 'i> {
+impl<'a, 'i> ValuesByUnit<'a, 'i> {
     fn read(section: &mut Section<'a, 'i>, base: &str) -> Result<Self, InputError> {
         if let Some(bare) = section.peek(base) {
             let write = KINDS.map(|unit| unit.alternatives(base)).join(" or ");
@@ -188,7 +190,8 @@ impl<'a, 'i> Spread<'a, 'i> {
     }
 }
 
-/// Returns an error if prior width and bounds of one kind contradict each other.
+/// Returns an error if prior width and bounds for one unit contradict each other. `nominal` is the
+/// nominal value on the scale of the bounds.
 fn check(
     nominal: f64,
     sigma: Option<&Value<'_, '_>>,

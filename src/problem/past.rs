@@ -68,7 +68,8 @@ impl<'a> LazyPast<'a> {
         Self { table: Some(table), row }
     }
 
-    /// Returns the row in the table (0 for a single pose), or `None` without a past.
+    /// Returns the index of the pose's row in its table (0 for a single pose), or `None` without a
+    /// table.
     pub(crate) fn place(self) -> Option<u32> {
         self.table.map(|_| self.row)
     }
@@ -120,8 +121,8 @@ impl Past<&[f64]> {
     /// a travel Δq towards the side g = ±1, z = g + (z' − g) exp(−|Δq|/s). \[Dahl 1968\]
     ///
     /// `q` and `side` are coordinate and approach direction of the pose; `distance` is s \[rad\] or
-    /// \[m\]. If the side is unknown (0), the sign of Δq replaces it. At the first pose z equals
-    /// its side.
+    /// \[m\]. If the side is unknown (0), the sign of Δq replaces it. At the first pose of the
+    /// session, z equals the side of approach.
     pub fn friction_state(&self, joint: usize, (q, side): (f64, f64), distance: f64) -> f64 {
         let joints = self.configurations.len().checked_div(self.times.len()).unwrap_or(0);
         let value_at =
@@ -130,10 +131,10 @@ impl Past<&[f64]> {
         let (mut travelled, mut state) = (0.0, 0.0);
         for pose in (0..self.times.len()).rev() {
             let before = value_at(self.configurations, pose);
-            let way = (q - before).abs() / distance;
+            let travel = (q - before).abs() / distance;
             let towards = if side == 0.0 { (q - before).signum() } else { side };
-            state += towards * f64::exp(-travelled) * -(-way).exp_m1();
-            travelled += way;
+            state += towards * f64::exp(-travelled) * -(-travel).exp_m1();
+            travelled += travel;
             (q, side) = (before, value_at(self.approaches, pose));
             if travelled > MAX_MEMORY {
                 return state;
@@ -151,12 +152,12 @@ impl Past<&[f64]> {
             .len()
             .checked_sub(1)
             .and_then(|pose| self.configurations.get(pose * joints + joint));
-        let way = last.map_or(0.0, |before| q - before);
-        if way == 0.0 {
+        let travel = last.map_or(0.0, |before| q - before);
+        if travel == 0.0 {
             return 0.0;
         }
-        let towards = if side == 0.0 { way.signum() } else { side };
-        (towards - self.friction_state(joint, (q, side), distance)) * way.signum() / distance
+        let towards = if side == 0.0 { travel.signum() } else { side };
+        (towards - self.friction_state(joint, (q, side), distance)) * travel.signum() / distance
     }
 }
 
@@ -176,8 +177,8 @@ impl ThermalLag {
         Self { time_constant, progress: None }
     }
 
-    /// Advances to the time and temperature `now` (\[s\], [°C]) and returns the lagged temperature
-    /// T̃ [°C] there. `past` holds the earlier poses of the session.
+    /// Advances to `now`, a time \[s\] and the temperature then [°C], and returns the lagged
+    /// temperature T̃ [°C] there. `past` holds the earlier poses of the session.
     pub fn advance(&mut self, past: &Past<&[f64]>, now: (f64, f64)) -> f64 {
         self.advance_from(0, past, now)
     }
@@ -201,7 +202,8 @@ impl ThermalLag {
         reading(processed - 1).map_or(now.1, |before| self.after(lagged, before, now))
     }
 
-    /// Returns T̃ after a linear change of T between two readings: T̃ = T − (1 − e) τ ΔT/Δt + (T̃'
+    /// Returns T̃ at the reading `next` after a linear change of T from the reading `before`, each
+    /// a time \[s\] and a temperature [°C]. There T̃' is `lagged`: T̃ = T − (1 − e) τ ΔT/Δt + (T̃'
     /// − T') e with e = exp(−Δt/τ).
     fn after(&self, lagged: f64, before: (f64, f64), next: (f64, f64)) -> f64 {
         let passed = (next.0 - before.0) / self.time_constant;
@@ -255,8 +257,8 @@ mod tests {
         let mut z: f64 = -1.0;
         for k in 0..4 {
             if k > 0 {
-                let way: f64 = commands[k] - commands[k - 1];
-                z = way.signum() + (z - way.signum()) * (-way.abs() / 0.3).exp();
+                let travel: f64 = commands[k] - commands[k - 1];
+                z = travel.signum() + (z - travel.signum()) * (-travel.abs() / 0.3).exp();
             }
             let configurations: Vec<f64> = commands[..k].iter().flat_map(|q| [9.0, *q]).collect();
             let approaches: Vec<f64> =

@@ -1,9 +1,9 @@
-//! Places of keys that stand in the wrong section.
+//! Sections to which misplaced keys belong.
 
 use crate::error::one_typo;
 use crate::laws::NAMES;
 
-/// Sections and some of their keys that are often written elsewhere.
+/// Sections with some of their keys that are often written in another section.
 const PLACES: [(&str, &[&str]); 4] = [
     ("", &["gravity_m_s2", "dh", "title"]),
     (

@@ -9,9 +9,10 @@ use crate::quantity::rounded_right_angle;
 
 /// Largest plausible length in the joint table \[m\]. Longer ones are probably in millimetres.
 const MAX_PLAUSIBLE_LENGTH: f64 = 20.0;
-/// Largest usual limit of a joint, as a number of radians. Limits of that many degrees are suspect.
+/// Largest usual limit of a joint \[rad\]. If no limit in degrees is larger than this number, the
+/// limits are suspected to be in radians.
 const MAX_RADIANS: f64 = TAU + 0.02;
-/// Minimum number of rows in which the form of a table can be recognised.
+/// Minimum number of rows or turning joints from which the convention of a table is judged.
 const MIN_ROWS: usize = 3;
 
 /// Returns warnings about a `[[joint]]`: angles that look like radians, lengths that look like
@@ -93,7 +94,7 @@ pub(super) fn form(joints: &[Joint]) -> Option<Warning> {
 const MAX_BODY_MASS: f64 = 1000.0;
 /// Largest plausible size of gravity \[m/s²\]; that of Jupiter is 25.
 const MAX_GRAVITY: f64 = 30.0;
-/// Largest plausible angle by which gravity turns an elastic joint \[rad\].
+/// Largest plausible rotation of an elastic joint by gravity \[rad\].
 const MAX_SAG: f64 = 1.0;
 /// Highest plausible reference temperature \[°C\]. A cold room in kelvins exceeds it.
 const MAX_REFERENCE_TEMPERATURE: f64 = 200.0;
@@ -146,8 +147,8 @@ impl Problem {
         of_beams.chain(self.joints.iter().map(|joint| total(&joint.bodies))).sum()
     }
 
-    /// Names the joint that is probably too soft in the error of a pose without equilibrium; other
-    /// errors stay as they are.
+    /// Returns the error of a pose without equilibrium with the name of the joint that is probably
+    /// too soft; returns any other error as it is.
     pub(crate) fn with_soft_joint(&self, error: InputError) -> InputError {
         match *error.kind {
             InputErrorKind::NoEquilibrium => {
@@ -158,7 +159,7 @@ impl Problem {
         }
     }
 
-    /// Returns the error of the joint that gravity would turn furthest if that is more than
+    /// Returns an error that names the joint that gravity would turn furthest, if by more than
     /// [`MAX_SAG`]. The moment is an upper bound, with all links stretched out.
     fn soft_joint(&self) -> Option<InputErrorKind> {
         let gravity = self.gravity.norm();
@@ -229,7 +230,8 @@ impl Problem {
         })
     }
 
-    /// Returns a warning if all turning joints have limits that would be usual numbers of radians.
+    /// Returns a warning if the limits of all turning joints, in degrees, are so small that they
+    /// are probably in radians.
     fn narrow_limits(&self) -> Option<Warning> {
         let turning: Vec<&Joint> =
             self.joints.iter().filter(|joint| joint.kind == JointKind::Revolute).collect();

@@ -50,8 +50,8 @@ impl Problem {
         problem_of(&Document { file: file.to_owned(), text: Arc::from(text) })
     }
 
-    /// Returns this problem with one more effect declared after the others; its joints count from
-    /// 1.
+    /// Returns this problem with one more effect, declared after the others; the numbers of its
+    /// joints count from 1.
     #[must_use]
     pub fn with_effect(&self, effect: Effect) -> Self {
         let mut problem = self.clone();

@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use super::{Joint, JointKind, Placement, Problem};
 use crate::spatial::Frame;
 
-/// Name of the fixed joint that holds a and α of the last row.
+/// Name of the fixed joint that is added for a and α of the last row of a standard table.
 const FLANGE: &str = "flange";
 
 /// Converts rows of standard DH, T = Rz(θ+q) Tz(d) Tx(a) Rx(α), to joints of modified DH.
@@ -110,7 +110,8 @@ impl Problem {
         if is_standard { problem.read_as_standard() } else { Some(problem) }
     }
 
-    /// Replaces the joints of a chain; the last one carries the tool and all targets.
+    /// Returns the problem with other joints in a chain; the last joint carries the tool and all
+    /// targets.
     fn with_chain(&self, joints: Vec<Joint>) -> Self {
         let last = joints.len() - 1;
         let mut problem = Self { joints, ..self.clone() };

@@ -37,8 +37,8 @@ impl Document {
     }
 }
 
-/// Returns the input that is expected in place of a file of another format, with the place of such
-/// files.
+/// Returns the input that is expected in place of a file of another format, and where files of that
+/// format belong.
 fn expected_instead_of(format: &str) -> &'static str {
     match format {
         XML => "TOML; flexcal init FILE makes a problem.toml of a URDF",
@@ -53,8 +53,8 @@ fn expected_instead_of(format: &str) -> &'static str {
     }
 }
 
-/// Returns the usual mistake at a place of a line, split there into `before` and `after`, with its
-/// remedy.
+/// Returns the usual mistake that a line shows at the error, with its remedy; `None` if none is
+/// recognised. The line is split there into `before` and `after`.
 fn usual_mistake(before: &str, after: &str, message: &str) -> Option<(String, &'static str)> {
     let word = after.split([' ', '\t', ',', ']', '}', '#']).next().unwrap_or_default();
     let is_digit = |character: char| character.is_ascii_digit();
@@ -102,7 +102,7 @@ fn usual_mistake(before: &str, after: &str, message: &str) -> Option<(String, &'
     }
 }
 
-/// Returns true if further words and an equals sign follow the first word of a key.
+/// Returns true if the first word of a key is followed by more words, and then by an equals sign.
 fn line_has_spaced_key(after: &str) -> bool {
     after.split_once('=').is_some_and(|(words, _)| {
         !words.trim().is_empty() && words.chars().all(|c| c.is_alphanumeric() || c == ' ')

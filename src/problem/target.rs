@@ -22,9 +22,9 @@ pub struct Tool {
     pub payload_at: Vector3<f64>,
     /// True if the payload hangs at the identified target: `payload_at = "target"`.
     pub payload_follows: bool,
-    /// True if the problem declares where the payload hangs.
+    /// True if the problem declares the position of the payload.
     pub payload_is_declared: bool,
-    /// Payload without a column `payload_kg` \[kg\].
+    /// Payload mass of rows without a column `payload_kg` \[kg\].
     pub payload_mass: f64,
 }
 
