@@ -9,7 +9,7 @@ use serde_json::json;
 
 use super::checked_fit::{Check, CheckedFit};
 use super::finding::{Finding, FindingCode};
-use crate::fit::stages::parameter_size::plausible;
+use crate::fit::stages::parameter_size::plausible_size;
 use crate::least_squares::{UnidentifiableCombination, Weak};
 use crate::model::parameter::Parameter;
 use crate::quantity::Unit;
@@ -91,7 +91,7 @@ impl Check for NamedDirections {
         let model = fit.fitting.model;
         let size = |parameter: &&Parameter| {
             let without_prior = Parameter { sigma: None, ..(*parameter).clone() };
-            plausible(model, &without_prior).unwrap_or(match parameter.unit() {
+            plausible_size(model, &without_prior).unwrap_or(match parameter.unit() {
                 Unit::Length => model.reach(),
                 Unit::Pixel => PLAUSIBLE_PIXELS,
                 _ => 1.0,
@@ -232,8 +232,8 @@ struct Found<'a> {
 }
 
 impl Found<'_> {
-    /// Returns the directions of the null space that lie in the unknowns for which `is_in_set` holds
-    /// and that are not accounted for, and accounts for them.
+    /// Returns the directions of the null space that lie in the unknowns for which `is_in_set`
+    /// holds and that are not accounted for, and accounts for them.
     fn within(&mut self, is_in_set: impl Fn(usize) -> bool) -> Vec<RowDVector<f64>> {
         let outside: Vec<usize> = (0..self.names.len()).filter(|&k| !is_in_set(k)).collect();
         if outside.len() == self.names.len() {

@@ -3,7 +3,7 @@
 use super::checked_fit::{Check, CheckedFit};
 use super::contradicted_entry::contradicted_entry;
 use super::finding::{Finding, FindingCode};
-use crate::fit::stages::parameter_size::largest;
+use crate::fit::stages::parameter_size::largest_deviation;
 use crate::model::parameter::{JointField, Parameter, ParameterSite};
 use crate::quantity::Unit;
 
@@ -67,7 +67,8 @@ pub(super) struct WithinArmSize;
 impl Check for WithinArmSize {
     fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
         let model = fit.fitting.model;
-        let ratio = |parameter: &Parameter, x: f64| Some(x.abs() / largest(model, parameter)?);
+        let ratio =
+            |parameter: &Parameter, x: f64| Some(x.abs() / largest_deviation(model, parameter)?);
         let finding = |(parameter, sizes): (&Parameter, f64)| {
             let unit = match parameter.unit() {
                 Unit::Length => "the arm's own size",

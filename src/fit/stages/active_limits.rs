@@ -1,4 +1,4 @@
-//! Active constraints of a stage, and the directions that they leave free.
+//! Active constraints of a stage, and the rows that confine the unknowns to the free directions.
 
 use nalgebra::DMatrix;
 
@@ -6,7 +6,7 @@ use crate::least_squares::solver::AtBound;
 
 /// Active constraint of a stage, as a row of coefficients of its unknowns.
 #[derive(Debug, Clone)]
-pub(in crate::fit) struct Held {
+pub(in crate::fit) struct ActiveLimit {
     /// Index of the constraint in the model.
     pub constraint: usize,
     /// Limit (lower or upper) that is active.
@@ -15,21 +15,22 @@ pub(in crate::fit) struct Held {
     pub row: Vec<f64>,
 }
 
-/// Returns the rows of `gauge` and of active `constraints`, shape = (rows, unknowns). They have
-/// unit length in unknowns that are scaled by the column norms of `triangle`.
+/// Returns the rows of `gauge` and of active `constraints`, along which the unknowns cannot move,
+/// shape = (rows, unknowns). Rows of constraints have unit length in unknowns that are scaled by
+/// the column norms of `triangle`.
 ///
-/// A constraint on a single unknown that is not yet held acts as a bound: the unknown is marked in
-/// `held`.
+/// A constraint with only one unknown that is not yet held acts as a bound: it gets no row, and the
+/// unknown is marked in `held`.
 pub(in crate::fit) fn confine(
     triangle: &DMatrix<f64>,
     gauge: &DMatrix<f64>,
-    constraints: &[Held],
+    constraints: &[ActiveLimit],
     held: &mut [bool],
 ) -> DMatrix<f64> {
     let n = held.len();
     let scale: Vec<f64> =
         triangle.column_iter().map(|c| c.norm()).map(|s| if s > 0.0 { s } else { 1.0 }).collect();
-    let mut remaining: Vec<&Held> = constraints.iter().collect();
+    let mut remaining: Vec<&ActiveLimit> = constraints.iter().collect();
     loop {
         let open = |row: &[f64]| (0..n).filter(|&j| row[j] != 0.0 && !held[j]).collect::<Vec<_>>();
         let Some(alone) = remaining.iter().position(|found| open(&found.row).len() <= 1) else {

@@ -1,4 +1,4 @@
-//! Alternating fits: their rate of convergence, and Anderson acceleration.
+//! Alternating fits (block coordinate descent): rate of convergence, and Anderson acceleration.
 
 use std::collections::VecDeque;
 
@@ -6,30 +6,33 @@ use nalgebra::{DMatrix, DVector};
 
 /// Maximum number of earlier sweeps that the acceleration combines.
 const MAX_COMBINED_SWEEPS: usize = 10;
-/// Relative singular value below which a difference of sweeps counts as rounding and is not used.
+/// Smallest singular value of the differences of sweeps, relative to the largest one, that is used;
+/// smaller ones are rounding.
 const RANK_TOLERANCE: f64 = 1e-8;
-/// Maximum number of power iterations that estimate the contraction.
+/// Maximum number of power iterations that estimate the contraction factor.
 const MAX_POWER_ITERATIONS: usize = 2000;
-/// Relative change of the contraction at which the power iteration counts as converged.
+/// Change of the contraction factor, relative to 1 minus the factor, at which the power iteration
+/// has converged.
 const CONTRACTION_TOLERANCE: f64 = 1e-6;
 
-/// Convergence of an alternating fit.
+/// Convergence of a fit that alternates between several stages.
 #[doc(hidden)]
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Alternation {
     /// Number of sweeps over all stages.
     pub sweeps: usize,
-    /// Factor by which one sweep without acceleration multiplies the error near the optimum,
-    /// measured by the change of the predictions. `None` if data and priors leave a combination
-    /// undetermined.
+    /// Factor by which one sweep without acceleration multiplies the error near the optimum. The
+    /// error is measured by the change of the predictions that it causes. `None` if it was not
+    /// computed, or if data and priors leave a combination undetermined.
     pub contraction: Option<f64>,
 }
 
 /// Anderson acceleration of the fixed-point iteration x ← g(x) of a sweep  [Anderson 1965; Walker &
 /// Ni 2011].
 ///
-/// The next point is x + f − (ΔX + ΔF) γ with f = g(x) − x and γ = argmin ‖f − ΔF γ‖ over
-/// differences of earlier sweeps; unknowns are scaled by their effect.
+/// The next point is x + f − (ΔX + ΔF) γ with f = g(x) − x and γ = argmin ‖f − ΔF γ‖. The columns
+/// of ΔX and ΔF are differences of x and f between successive sweeps. In the norm, unknowns are
+/// scaled by their effect on the residual.
 #[derive(Debug, Clone, Default)]
 pub(in crate::fit) struct Anderson {
     /// Pairs of g(x) and scaled f of earlier sweeps, oldest first.
@@ -42,7 +45,9 @@ impl Anderson {
         self.sweeps.clear();
     }
 
-    /// Returns the next x to try after a sweep from `x` to `image`; `None` after the first sweep.
+    /// Returns the next x to try after a sweep from `x` to `image` = g(x). `scale` holds the
+    /// factors by which unknowns are scaled. Returns `None` after the first sweep, or if the next x
+    /// is not finite.
     pub fn next(
         &mut self,
         x: &DVector<f64>,
@@ -69,10 +74,11 @@ impl Anderson {
     }
 }
 
-/// Returns the asymptotic factor by which one sweep multiplies ‖R e‖ of an error e, by power
-/// iteration. Each of `stages` minimises ‖R e‖ over its unknowns in turn.
+/// Returns the asymptotic factor by which one sweep multiplies ‖R e‖ of an error e of the unknowns,
+/// by power iteration. Each of `stages` in turn minimises ‖R e‖ over the unknowns that it lists.
 ///
-/// `triangle` is the factor R of data and priors.
+/// `triangle` is the factor R of data and priors. Returns `None` if a stage leaves a combination of
+/// its unknowns undetermined.
 pub(in crate::fit) fn contraction(triangle: &DMatrix<f64>, stages: &[Vec<usize>]) -> Option<f64> {
     let hessian = triangle.tr_mul(triangle);
     let roots: Option<Vec<_>> = stages

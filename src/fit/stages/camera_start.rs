@@ -1,4 +1,5 @@
-//! Start poses of cameras and markers without a guess, by linear solutions from the views.
+//! Start values of the poses of cameras and markers, from linear equations of the views; no guess
+//! of the caller is needed.
 
 use std::collections::BTreeMap;
 
@@ -11,27 +12,28 @@ use crate::spatial::Frame;
 
 /// Smallest ratio of the second smallest to the largest singular value of the rotation equations at
 /// which the views determine the rotations of camera and marker.
-const MIN_RATIO: f64 = 1e-4;
+const MIN_SINGULAR_VALUE_RATIO: f64 = 1e-4;
 /// Minimum number of views, each with a marker pose, from which camera and marker are solved
 /// together.
 const MIN_VIEWS: usize = 3;
 
-/// View of a marker by a camera in one configuration.
+/// View of one marker by one camera in one configuration.
 struct View {
     camera: usize,
     marker: usize,
-    /// Frame of the camera's carrier in the frame of the marker's carrier.
+    /// Pose of the frame that carries the camera in the frame that carries the marker.
     carrier: Isometry3<f64>,
     /// Pose of the marker in the camera's frame, translation \[m\].
     marker_in_camera: Isometry3<f64>,
 }
 
 /// Returns the poses of the `wanted` cameras and markers in the frames that carry them, as far as
-/// the `poses` at the full parameter vector `x` determine them.
+/// the views in `poses` determine them at the full parameter vector `x`.
 ///
 /// In each view, the marker's pose V in the camera's frame follows from its points. With the pose A
-/// of the camera's carrier in the marker's, A C V = M for the poses C of the camera and M of the
-/// marker; if both are unknown, all views of the pair give them together [Shah 2013].
+/// of the frame that carries the camera in the one that carries the marker, A C V = M. C is the
+/// pose of the camera and M that of the marker in the frame that carries it. If both are unknown,
+/// all views of the pair determine them together [Shah 2013].
 pub(super) fn poses_from_views(
     model: &Model,
     poses: &[Pose],
@@ -52,14 +54,14 @@ pub(super) fn poses_from_views(
                 let marker = |view: &View| view.carrier * camera * view.marker_in_camera;
                 let of_pair =
                     |other: &&View| (other.camera, other.marker) == (view.camera, view.marker);
-                (view.marker, mean(views.iter().filter(of_pair).map(marker)))
+                (view.marker, mean_pose(views.iter().filter(of_pair).map(marker)))
             } else {
                 let marker = known.get(&view.marker).copied().unwrap_or_default();
                 let camera =
                     |view: &View| view.carrier.inverse() * marker * view.marker_in_camera.inverse();
                 let of_pair =
                     |other: &&View| (other.camera, other.marker) == (view.camera, view.marker);
-                (view.camera, mean(views.iter().filter(of_pair).map(camera)))
+                (view.camera, mean_pose(views.iter().filter(of_pair).map(camera)))
             };
             known.insert(fixture, pose);
             continue;
@@ -72,7 +74,7 @@ pub(super) fn poses_from_views(
         by_count.sort_by_key(|(_, views)| std::cmp::Reverse(views.len()));
         let solved = by_count
             .iter()
-            .find_map(|((camera, marker), views)| Some((*camera, *marker, both(views)?)));
+            .find_map(|((camera, marker), views)| Some((*camera, *marker, solve_pair(views)?)));
         let Some((camera, marker, [of_camera, of_marker])) = solved else { break };
         known.insert(camera, of_camera);
         known.insert(marker, of_marker);
@@ -81,9 +83,9 @@ pub(super) fn poses_from_views(
     known
 }
 
-/// Returns a camera and a marker whose poses the views do not determine, with the reason; `None` if
-/// they determine the poses of all `wanted` cameras and markers, or no view gives a marker's pose.
-pub(super) fn undecided(
+/// Returns a `wanted` camera and a `wanted` marker whose poses the views do not determine, with the
+/// reason; `None` if no view shows such a pair.
+pub(super) fn undetermined_pair(
     model: &Model,
     poses: &[Pose],
     wanted: &[usize],
@@ -103,7 +105,8 @@ pub(super) fn undecided(
     Some((pair, why))
 }
 
-/// Returns the views in which the marker has enough visible points to determine its pose.
+/// Returns the views in which the marker has enough measured points to determine its pose in the
+/// camera's frame.
 fn views(
     model: &Model,
     poses: &[Pose],
@@ -144,12 +147,12 @@ fn views(
     points.into_iter().filter_map(view).collect()
 }
 
-/// Returns the poses of camera and marker from all views of the pair, A C V = M; `None` if the
-/// views do not determine them.
+/// Returns the poses C of the camera and M of the marker from all views of the pair, A C V = M;
+/// `None` if the views do not determine them. A is `carrier` and V `marker_in_camera` of a view.
 ///
 /// For the rotations, (Vᵀ ⊗ A) vec C − vec M = 0 is linear; for the translations,
 /// A t_C − t_M = −t_A − A C t_V.
-fn both(views: &[&View]) -> Option<[Isometry3<f64>; 2]> {
+fn solve_pair(views: &[&View]) -> Option<[Isometry3<f64>; 2]> {
     if views.len() < MIN_VIEWS {
         return None;
     }
@@ -167,7 +170,7 @@ fn both(views: &[&View]) -> Option<[Isometry3<f64>; 2]> {
     let mut order: Vec<usize> = (0..18).collect();
     order.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
     let largest = eigen.eigenvalues[order[17]];
-    if eigen.eigenvalues[order[1]] < MIN_RATIO * MIN_RATIO * largest {
+    if eigen.eigenvalues[order[1]] < MIN_SINGULAR_VALUE_RATIO.powi(2) * largest {
         return None;
     }
     let solution = eigen.eigenvectors.column(order[0]);
@@ -195,8 +198,9 @@ fn both(views: &[&View]) -> Option<[Isometry3<f64>; 2]> {
     found.iter().all(|pose| pose.translation.vector.iter().all(|x| x.is_finite())).then_some(found)
 }
 
-/// Returns the mean of poses: that of the positions, and the rotation nearest to the mean matrix.
-fn mean(poses: impl Iterator<Item = Isometry3<f64>>) -> Isometry3<f64> {
+/// Returns the mean of poses: the mean position, and the rotation nearest to the mean of the
+/// rotation matrices.
+fn mean_pose(poses: impl Iterator<Item = Isometry3<f64>>) -> Isometry3<f64> {
     let (mut turn, mut shift, mut count) = (Matrix3::zeros(), Vector3::zeros(), 0.0);
     for pose in poses {
         turn += pose.rotation.to_rotation_matrix().matrix();
@@ -207,7 +211,7 @@ fn mean(poses: impl Iterator<Item = Isometry3<f64>>) -> Isometry3<f64> {
     Isometry3::from_parts(Translation3::from(shift / count), rotation.into())
 }
 
-/// Returns a frame as a rigid motion.
+/// Returns a frame as the rigid motion from its coordinates to those of the reference frame.
 fn isometry(frame: &Frame<f64>) -> Isometry3<f64> {
     let rotation = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&frame.axes));
     Isometry3::from_parts(Translation3::from(frame.origin), rotation.into())

@@ -1,14 +1,14 @@
-//! Constraints on the unknowns of a stage.
+//! Constraints of the model as inequalities in the unknowns of a stage.
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::fit::stages::active_limits::Held;
+use crate::fit::stages::active_limits::ActiveLimit;
 use crate::fit::stages::stage::{Stage, StageError};
 use crate::least_squares::solver::{Inequalities, InequalitiesError};
 
 impl Stage<'_> {
-    /// Returns the indices of the model's constraints on the unknowns, and the constraints as
-    /// inequalities in the unknowns. All other parameters have their values in `at`.
+    /// Returns the indices of the model's constraints that involve the unknowns, and these
+    /// constraints as inequalities in the unknowns. All other parameters are as in `at`.
     ///
     /// # Errors
     /// Returns an error if a row or limit is not finite.
@@ -42,16 +42,16 @@ impl Stage<'_> {
         Ok((which, Inequalities::new(matrix, DVector::from_vec(lower), DVector::from_vec(upper))?))
     }
 
-    /// Returns the constraints that are active at the full parameter vector `at`.
+    /// Returns the constraints that are active (at a limit) at the full parameter vector `at`.
     ///
     /// # Errors
     /// Returns an error if a row or limit is not finite.
-    pub fn held(&self, at: &DVector<f64>) -> Result<Vec<Held>, StageError> {
+    pub fn held(&self, at: &DVector<f64>) -> Result<Vec<ActiveLimit>, StageError> {
         let (which, rows) = self.constraints(at)?;
         let x = DVector::from_iterator(self.unknowns.len(), self.unknowns.iter().map(|&k| at[k]));
         let held = |(i, constraint)| {
             let row = rows.matrix().row(i).iter().copied().collect();
-            Some(Held { constraint, side: rows.at(&x, i)?, row })
+            Some(ActiveLimit { constraint, side: rows.at(&x, i)?, row })
         };
         Ok(which.into_iter().enumerate().filter_map(held).collect())
     }

@@ -1,22 +1,22 @@
-//! Earlier data as linear rows that join a fit of new data.
+//! Earlier data as linear residual rows that are fitted together with new data.
 
 use nalgebra::{DMatrix, DVector};
 
 use crate::least_squares::LinearRows;
 use crate::model::Model;
 
-/// Smallest eigenvalue of the earlier correlation matrix, relative to the largest, that is more
-/// than rounding. Combinations below it are those that the earlier fit held.
+/// Largest eigenvalue of the correlation matrix of the earlier estimate, relative to the largest
+/// one, that is only rounding: the earlier fit held this combination constant.
 const MAX_HELD_EIGENVALUE: f64 = 1e-13;
-/// Eigenvalue of that matrix, relative to the largest, below which the declared prior of a
-/// combination is negligible.
+/// Largest eigenvalue of the correlation matrix of the earlier estimate, relative to the largest
+/// one, at which the data determine the combination so well that its declared prior is negligible.
 const MAX_WELL_KNOWN_EIGENVALUE: f64 = 1e-6;
-/// Smallest eigenvalue of the information beyond the declared priors, relative to the largest, that
-/// counts.
+/// Smallest eigenvalue of the information beyond the declared priors, relative to the largest one,
+/// for which a row is made.
 const MIN_INFORMATIVE_EIGENVALUE: f64 = 1e-10;
 
-/// Linear residual rows A x + b that stand for earlier data on some parameters, given by their
-/// names. x are deviations from nominal.
+/// Linear residual rows A x + b that contain the information of earlier data about the deviations x
+/// of some parameters from nominal. The parameters are given by their names.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct EarlierData {
     names: Vec<String>,
@@ -27,12 +27,12 @@ pub(crate) struct EarlierData {
 }
 
 impl EarlierData {
-    /// Creates the rows whose information AᵀA, together with declared priors about 0, is that of a
-    /// Gaussian with this `mean` and `covariance`.
+    /// Creates the rows whose information AᵀA, together with the declared priors about 0, is that
+    /// of a Gaussian of the deviations with this `mean` and `covariance`.
     ///
     /// `precision` holds the declared prior precision 1/σ² of each parameter, 0 without a prior.
     /// Directions in which the Gaussian is wider than the declared prior get no rows. Returns
-    /// `None` if the covariance is not positive.
+    /// `None` if a variance is not positive and finite.
     pub fn new(
         names: Vec<String>,
         mean: &DVector<f64>,
@@ -86,13 +86,13 @@ impl EarlierData {
         Some(Self { names, matrix, constant })
     }
 
-    /// Returns true if the earlier data inform on the parameter `name`.
+    /// Returns true if the earlier data contain information about the parameter `name`.
     pub fn covers(&self, name: &str) -> bool {
         self.names.iter().any(|covered| covered == name)
     }
 
-    /// Returns the rows as functions of the `unknowns` of a model; other parameters have their
-    /// values in `at`.
+    /// Returns the rows as linear functions of the `unknowns`, which are indices into the
+    /// parameters of `model`. All other parameters are as in the full parameter vector `at`.
     pub(in crate::fit) fn on(
         &self,
         model: &Model,

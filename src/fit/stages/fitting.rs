@@ -1,4 +1,5 @@
-//! Fits of an identification: bases and targets, the stages of the strategy, held-out sessions.
+//! Fits of an identification: registration of bases and targets, the stages of the strategy, and
+//! the set-up that only held-out rows use.
 
 use nalgebra::DVector;
 
@@ -25,7 +26,7 @@ use crate::observation::Needs;
 use crate::problem::Observation;
 use crate::quantity::Unit;
 
-/// Maximum number of sweeps (one pass over all stages) of a sequential strategy.
+/// Maximum number of sweeps of a sequential strategy; one sweep runs each of its stages once.
 const MAX_SWEEPS: usize = 500;
 /// Relative reduction of the cost in one sweep at which a sequential strategy counts as converged.
 const SWEEP_TOLERANCE: f64 = 1e-7;
@@ -33,20 +34,20 @@ const SWEEP_TOLERANCE: f64 = 1e-7;
 /// the next stage moves the optimum.
 const MAX_SWEEP_STEPS: u64 = 2;
 
-/// Change of ν ln ‖r‖² (ν measured coordinates) per step at which a provisional fit counts as
-/// converged. It is a thousandth of the change that decides on an effect.
+/// Change of ν ln ‖r‖² (ν measured coordinates) by one step below which a provisional fit has
+/// converged. It is a thousandth of the change that decides whether an effect is added.
 const PROVISIONAL_TOLERANCE: f64 = 0.01;
-/// Relative reduction of the cost per step at which a fit stops if its declared σ is tested next.
-/// The σ is then known to half of this.
+/// Relative reduction of the cost by one step below which a fit stops if its declared σ is tested
+/// next. The relative error of an estimated σ is then about half of this.
 const TESTED_NOISE_TOLERANCE: f64 = 1e-3;
 
-/// Input that all fits of an identification share.
+/// Input that all fits of one identification share.
 pub(in crate::fit) struct Fitting<'a> {
     pub model: &'a Model,
     pub measurements: &'a Measurements,
     pub split: &'a Split,
     pub placement: &'a Placement,
-    /// Bases and targets that only held-out rows use.
+    /// Bases, targets and fixtures that only held-out rows use.
     pub held_out_only: HeldOutOnly,
     pub strategy: Strategy,
     pub solver: SolverChoice,
@@ -56,29 +57,30 @@ pub(in crate::fit) struct Fitting<'a> {
     pub loss: Loss,
     pub progress: Option<&'a ProgressSink>,
     pub stop: Option<&'a Stop>,
-    /// Maximum number of steps of a stage of the strategy.
+    /// Maximum number of solver steps of a stage of the strategy; `None` for the solver's default.
     pub max_steps: Option<u64>,
-    /// True if the fit may stop early because its declared σ is tested next.
+    /// True if the fit may stop before it has converged, because its declared σ is tested next.
     pub to_be_judged: bool,
     /// Standard deviation (1 σ) of a coordinate in rows that state none, declared or assumed \[m\].
     pub sigma: f64,
-    /// 1 σ of an orientation about each axis, where orientations are fitted \[rad\].
+    /// Declared 1 σ of an orientation about each axis \[rad\]; `None` if orientations are not
+    /// fitted.
     pub turn_sigma: Option<f64>,
-    /// Noise model of positions.
+    /// Noise model that converts the declared σ of positions to the one that the fit assumes.
     pub noise_model: NoiseModel,
-    /// Noise model of orientations.
+    /// Noise model that converts the declared σ of orientations to the one that the fit assumes.
     pub turn_noise_model: NoiseModel,
     /// Cache of linearisations, shared by the fits of one problem.
     pub cache: &'a LinearisationCache,
     /// Jacobian at the optimum of an earlier fit, reused if this fit starts there.
     pub linear_model: Option<&'a LinearModel>,
-    /// Earlier data that join the stages of the strategy.
+    /// Earlier data that are fitted together with the identification rows; `None` without any.
     pub earlier: Option<&'a EarlierData>,
 }
 
-/// Result of a fit of the strategy.
+/// Result of a fit by all stages of the strategy.
 pub(in crate::fit) struct FitEnd {
-    /// Full parameter vector at the end.
+    /// Full parameter vector at the end of the fit.
     pub x: DVector<f64>,
     pub termination: Termination,
     pub iterations: u64,
@@ -86,7 +88,7 @@ pub(in crate::fit) struct FitEnd {
     /// Active bound of each unknown; `None` if it is inside its bounds.
     pub at_bound: Vec<Option<AtBound>>,
     pub gauge: Gauge,
-    /// Convergence of alternating stages.
+    /// Convergence of alternating stages; `None` if the strategy has one stage or runs them once.
     pub alternation: Option<Alternation>,
 }
 
@@ -123,8 +125,8 @@ impl From<StageEnd> for FitEnd {
 }
 
 impl<'a> Fitting<'a> {
-    /// Returns the indices of the parameters for which `choose` is true, except bases and targets
-    /// that only held-out rows use.
+    /// Returns the indices of the parameters for which `choose` returns true, except those of
+    /// bases, targets and fixtures that only held-out rows use.
     fn choose(&self, choose: impl Fn(&Parameter) -> bool) -> Vec<usize> {
         let numbered = self.model.parameters.iter().enumerate();
         numbered
@@ -133,12 +135,13 @@ impl<'a> Fitting<'a> {
             .collect()
     }
 
-    /// Returns the indices of the parameters of bases and targets.
+    /// Returns the indices of the parameters of the set-up that the identification rows use: bases,
+    /// targets and positions of fixtures.
     pub fn placements(&self) -> Vec<usize> {
         self.choose(|parameter| parameter.site.is_placement())
     }
 
-    /// Returns true if earlier data inform on parameter `k`.
+    /// Returns true if earlier data contain information about the parameter with index `k`.
     pub fn is_covered(&self, k: usize) -> bool {
         self.earlier.is_some_and(|earlier| earlier.covers(&self.model.parameters[k].name))
     }
@@ -158,12 +161,13 @@ impl<'a> Fitting<'a> {
         }
     }
 
-    /// Creates a stage on `rows` with the σ of the noise models.
+    /// Creates a stage that fits `unknowns` to `rows`, with the σ that the noise models assume.
     pub fn stage(&self, rows: &[usize], unknowns: Vec<usize>) -> Stage<'a> {
         let mut poses = self.poses(rows);
         let declared = poses.iter().map(|pose| pose.sigma).collect();
         for pose in &mut poses {
-            // Known distances keep their σ, however much the contacts scatter.
+            // Known distances between fixtures keep their declared σ, however much contacts
+            // scatter.
             if pose.observation.is_of_arm() {
                 pose.sigma = self.noise_model.assumed_sigma(pose.sigma);
             }
@@ -182,14 +186,16 @@ impl<'a> Fitting<'a> {
         }
     }
 
-    /// Creates a stage that fits bases and targets, always by the solver that `auto` chooses.
+    /// Creates a stage that fits `unknowns` of the set-up to `rows`, always by the solver that
+    /// `auto` chooses.
     fn placement_stage(&self, rows: &[usize], unknowns: Vec<usize>) -> Stage<'a> {
         let mut stage = self.stage(rows, unknowns);
         stage.solver = SolverChoice::Auto.decide(self.model);
         stage
     }
 
-    /// Creates a stage of the strategy: on the identification rows, with the loss of the problem.
+    /// Creates a stage of the strategy, which fits `unknowns` to the identification rows with the
+    /// loss of the problem.
     fn strategy_stage(&self, unknowns: Vec<usize>) -> Stage<'a> {
         let stage = self.stage(&self.split.identification, unknowns);
         let max_steps = self.max_steps.unwrap_or(stage.max_steps);
@@ -204,16 +210,16 @@ impl<'a> Fitting<'a> {
         Stage { loss: self.loss, max_steps, cost_tolerance, earlier, ..stage }
     }
 
-    /// Creates the stage of all parameters that the strategy varies together, on the identification
-    /// rows.
+    /// Creates the stage that fits all parameters which any stage of the strategy varies to the
+    /// identification rows.
     pub fn whole(&self) -> Stage<'a> {
         let varied =
             |parameter: &Parameter| self.strategy.stages().iter().any(|chosen| chosen(parameter));
         self.strategy_stage(self.choose(varied))
     }
 
-    /// Creates the stage of bases and targets of held-out sessions, on their rows; `None` without
-    /// any.
+    /// Creates the stage that fits the bases, targets and fixtures which only held-out rows use to
+    /// those rows; `None` if there are none.
     pub fn held_out_stage(&self) -> Option<Stage<'a>> {
         let HeldOutOnly { parameters, rows } = &self.held_out_only;
         let unknowns: Vec<usize> = (0..parameters.len()).filter(|&k| parameters[k]).collect();
@@ -251,7 +257,8 @@ impl<'a> Fitting<'a> {
             .or_else(|| if of_cameras.is_empty() { None } else { behind() })
     }
 
-    /// Returns an error at the first row of a camera and a marker whose poses the views leave open.
+    /// Returns an error at the first row of a camera and a marker whose poses the views in `rows`
+    /// do not determine; `None` if they determine all of them.
     fn undecided(&self, rows: &[usize]) -> Option<InputError> {
         let x = DVector::zeros(self.model.parameters.len());
         let ([camera, marker], why) = undecided_views(self.model, &self.poses(rows), &x)?;
@@ -293,8 +300,8 @@ impl<'a> Fitting<'a> {
         self.registered_to(COST_TOLERANCE)
     }
 
-    /// Registers the nominal arm as [`Self::registered`] does, until a step reduces the cost by
-    /// less than `cost_tolerance`, relative to the cost.
+    /// Returns what [`Self::registered`] returns, but stops when a step reduces the cost by less
+    /// than `cost_tolerance`, relative to the cost.
     pub fn registered_to(&self, cost_tolerance: f64) -> Result<DVector<f64>, StageError> {
         let mut x = self.located();
         let placements = self.placements();
@@ -350,8 +357,8 @@ impl<'a> Fitting<'a> {
         let scale = DVector::from_vec(scale);
         let mut anderson = Anderson::default();
         let mut cost = f64::INFINITY;
-        // All short stages may fail where a longer one succeeds. The search therefore ends only
-        // after a sweep without a limit of steps.
+        // Short stages may all fail where a longer one succeeds. The alternation therefore only
+        // ends after a sweep of stages without a small limit of steps.
         let mut long = false;
         for sweep in 1..=MAX_SWEEPS {
             let begin = whole.reduced(&end.x);
@@ -378,8 +385,9 @@ impl<'a> Fitting<'a> {
         Ok(end)
     }
 
-    /// Runs one sweep over the stages of the strategy, each with at most `steps` steps. Returns the
-    /// reason why it ended.
+    /// Runs each stage of the strategy once from the point in `end`, with at most `steps` solver
+    /// steps or the default limit, and updates `end`. Returns the termination of the first stage
+    /// that did not converge, else that of the last stage.
     fn sweep(
         &self,
         whole: &Stage,
@@ -406,8 +414,8 @@ impl<'a> Fitting<'a> {
         Ok(termination)
     }
 
-    /// Completes `end` with the combinations of unknowns that data and priors do not determine
-    /// there.
+    /// Completes `end` with the combinations of unknowns that data and priors do not determine at
+    /// its point.
     fn with_gauge(whole: &Stage, mut end: FitEnd) -> Result<FitEnd, StageError> {
         let held: Vec<bool> = end.at_bound.iter().map(Option::is_some).collect();
         end.gauge = whole.gauge(&end.x, &held, &whole.held(&end.x)?);
@@ -420,6 +428,8 @@ impl<'a> Fitting<'a> {
         self.errors_of(self.measurements.leading(), x)
     }
 
+    /// Returns the errors of identification and held-out rows of the kind of the observation `kind`
+    /// at the full parameter vector `x`.
     fn errors_of(&self, kind: Observation, x: &DVector<f64>) -> Errors {
         let of = |rows: &[usize]| {
             let errors = self.position_errors(rows, x);
@@ -477,7 +487,8 @@ impl<'a> Fitting<'a> {
         })
     }
 
-    /// Returns the residuals measured − predicted of `rows`, measuring frame \[m\].
+    /// Returns the residuals measured − predicted of `rows` at the full parameter vector `x`:
+    /// positions in the measuring frame \[m\], other rows in the unit of their kind.
     pub fn position_errors(&self, rows: &[usize], x: &DVector<f64>) -> Vec<nalgebra::Vector3<f64>> {
         self.placement.position_errors(self.model, x, self.measurements, rows)
     }

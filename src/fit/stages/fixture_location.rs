@@ -1,29 +1,30 @@
-//! Locations of points, anchors and surfaces in closed form, from the positions that the arm
-//! predicts.
+//! Start values of fixtures (points, anchors, surfaces, cameras, markers) in closed form, from the
+//! target positions that the arm predicts.
 
 use nalgebra::{DMatrix, DVector, Matrix3, SymmetricEigen, Vector3};
 
-use super::camera_start::{poses_from_views, undecided};
+use super::camera_start::{poses_from_views, undetermined_pair};
 use crate::model::parameter::{Parameter, ParameterSite};
 use crate::model::{Model, Pose};
 use crate::problem::FixtureKind;
 use crate::problem::fixture::lean;
 use crate::spatial::plane_normal;
 
-/// Largest ratio of the spread of points normal to a plane to their spread within it at which they
-/// count as coplanar.
+/// Largest ratio of the rms distance of points from their best plane to their spread within it, at
+/// which the points count as coplanar.
 const MAX_COPLANAR_RATIO: f64 = 1e-3;
-/// Smallest difference of measured offsets at which they determine the side of a plane \[m\].
+/// Smallest difference of a measured offset from the mean at which offsets decide to which side the
+/// normal of a plane points \[m\].
 const MIN_OFFSET_DIFFERENCE: f64 = 1e-4;
 /// Smallest distance of the arm's base from a plane at which the base decides to which side the
-/// normal points, if the offsets do not \[m\].
+/// normal points, if the measured offsets do not decide it \[m\].
 const MIN_BASE_DISTANCE: f64 = 0.05;
 
 /// Locates fixtures in closed form from the `poses` that measure against them and writes their
 /// parameters into the full parameter vector `x`.
 ///
-/// It sets the `chosen` parameters of fixtures that are free without prior and bounds and have no
-/// declared value. Fixtures that no pose touches keep their values.
+/// It sets parameters that are free without prior and bounds, have no declared value, and for whose
+/// index `chosen` returns true. Fixtures that no pose measures keep their values.
 pub(crate) fn locate(
     model: &Model,
     poses: &[Pose],
@@ -61,8 +62,8 @@ pub(crate) fn locate(
     }
 }
 
-/// Returns fixture, kind, axis and parameter of each number of a fixture that is located: free
-/// without prior and bounds, without a declared value, and chosen.
+/// Returns the coordinates of fixtures that [`locate`] sets, as (fixture, kind, axis, index of the
+/// parameter): free without prior and bounds, without a declared value, and chosen.
 fn free_numbers(
     model: &Model,
     chosen: impl Fn(usize) -> bool,
@@ -81,7 +82,7 @@ fn free_numbers(
     model.parameters.iter().enumerate().filter_map(free).collect()
 }
 
-/// Returns the cameras and markers whose pose is free in all six coordinates.
+/// Returns the indices of the cameras and markers whose pose is free in all six coordinates.
 fn wanted_poses(free: &[(usize, FixtureKind, usize, usize)]) -> Vec<usize> {
     let is_of_pose =
         |(_, kind, axis, _): &&(usize, FixtureKind, usize, usize)| kind.has_pose() && *axis < 6;
@@ -94,17 +95,18 @@ fn wanted_poses(free: &[(usize, FixtureKind, usize, usize)]) -> Vec<usize> {
 }
 
 /// Returns a camera and a marker whose free poses the views in `poses` do not determine at the full
-/// parameter vector `x`, with the reason.
+/// parameter vector `x`, with the reason; `None` if the views determine all of them.
 pub(crate) fn undecided_views(
     model: &Model,
     poses: &[Pose],
     x: &DVector<f64>,
 ) -> Option<([usize; 2], &'static str)> {
     let wanted = wanted_poses(&free_numbers(model, |_| true));
-    if wanted.is_empty() { None } else { undecided(model, poses, &wanted, x) }
+    if wanted.is_empty() { None } else { undetermined_pair(model, poses, &wanted, x) }
 }
 
-/// Sets the poses of cameras and markers that are free in all six coordinates.
+/// Sets in `x` the poses of the cameras and markers that are free in all six coordinates, as far as
+/// the views in `poses` determine them.
 fn locate_cameras(
     model: &Model,
     poses: &[Pose],
@@ -127,9 +129,10 @@ fn locate_cameras(
     }
 }
 
-/// Returns the parameters of a fixture that fit its contacts best. A contact is a predicted point
-/// and the measured distance or offset \[m\]. Points and `base`, the arm's base, are in the
-/// measuring frame. `None` if there are no contacts, or for cameras and markers.
+/// Returns the parameters of a fixture that fit its contacts best, in the order of its axes. A
+/// contact is a predicted target and the measured distance or offset \[m\]. Targets and `base`, the
+/// origin of the arm's base, are in the measuring frame. `None` if there are no contacts, or for
+/// cameras and markers.
 fn fixture_of_contacts(
     kind: FixtureKind,
     contacts: &[(Vector3<f64>, f64)],
@@ -157,8 +160,8 @@ fn centre(contacts: &[(Vector3<f64>, f64)]) -> Vector3<f64> {
     contacts.iter().map(|(point, _)| point).sum::<Vector3<f64>>() / contacts.len() as f64
 }
 
-/// Returns the principal directions of points about their centre with the sums of squares along
-/// them, widest spread first.
+/// Returns the principal directions of the points of contacts about their `centre`, with the sums
+/// of squares along them, largest first.
 fn principal(contacts: &[(Vector3<f64>, f64)], centre: &Vector3<f64>) -> [(Vector3<f64>, f64); 3] {
     let spread: Matrix3<f64> =
         contacts.iter().map(|(point, _)| (point - centre) * (point - centre).transpose()).sum();
@@ -168,7 +171,8 @@ fn principal(contacts: &[(Vector3<f64>, f64)], centre: &Vector3<f64>) -> [(Vecto
     order.map(|k| (eigen.eigenvectors.column(k).into_owned(), eigen.eigenvalues[k]))
 }
 
-/// Returns the least-squares solution u of rows (a, b) of a·u = b; `None` if there are no rows.
+/// Returns the least-squares solution u of the equations a·u = b given by rows (a, b); `None` if
+/// there are no rows.
 fn least_squares(rows: &[(Vec<f64>, f64)]) -> Option<DVector<f64>> {
     let n = rows.first()?.0.len();
     let matrix = DMatrix::from_fn(rows.len(), n, |i, j| rows[i].0[j]);
@@ -177,11 +181,11 @@ fn least_squares(rows: &[(Vec<f64>, f64)]) -> Option<DVector<f64>> {
     matrix.svd(true, true).solve(&right, 1e-12 * size).ok()
 }
 
-/// Returns the anchor A of distances ℓ to points p: ‖p‖² − ℓ² = 2 p·A − ‖A‖² is linear in A and
-/// ‖A‖².
+/// Returns the position of the anchor A that has the measured distances ℓ from the points p:
+/// ‖p‖² − ℓ² = 2 p·A − ‖A‖² is linear in A and ‖A‖².
 ///
-/// If the points lie in a plane, the distance of the anchor from the plane follows from the
-/// lengths. Of the two sides, the one that fits better is taken, or else the upper one.
+/// If the points lie in a plane, the distance of the anchor from the plane follows from ‖A‖². Of
+/// the two sides, the one that fits better is taken, or the upper one if both fit equally.
 fn anchor(contacts: &[(Vector3<f64>, f64)]) -> Vector3<f64> {
     let centre = centre(contacts);
     let axes = principal(contacts, &centre);
@@ -209,8 +213,9 @@ fn anchor(contacts: &[(Vector3<f64>, f64)]) -> Vector3<f64> {
     if misfit(&sides[1]) < misfit(&sides[0]) { sides[1] } else { sides[0] }
 }
 
-/// Returns centre C and radius ρ of the sphere through points p: ‖p‖² = 2 p·C + (ρ² − ‖C‖²) is
-/// linear in C and the bracket. Offsets point outwards.
+/// Returns the centre C and the radius ρ of the sphere that the points p touch, ‖p‖² = 2 p·C +
+/// (ρ² − ‖C‖²), which is linear in C and the bracket. Measured offsets of points from the surface,
+/// positive outwards, only correct the radius.
 fn sphere(contacts: &[(Vector3<f64>, f64)]) -> (Vector3<f64>, f64) {
     let middle = centre(contacts);
     let row = |(point, _): &(Vector3<f64>, f64)| {
@@ -226,8 +231,9 @@ fn sphere(contacts: &[(Vector3<f64>, f64)]) -> (Vector3<f64>, f64) {
     (place, radius / contacts.len() as f64)
 }
 
-/// Returns the plane of least spread as (normal, distance). Its normal points to the side of larger
-/// offsets. If these do not differ, it points to the arm's base, or else up.
+/// Returns the parameters (rx, ry, d, 0) of the plane from which the points have the smallest
+/// spread. Its normal points to the side of larger offsets. If these do not differ, the normal
+/// points to the arm's base, or up if the base is near the plane.
 fn plane(contacts: &[(Vector3<f64>, f64)], base: &Vector3<f64>) -> [f64; 4] {
     let n = contacts.len() as f64;
     let middle = centre(contacts);
@@ -251,7 +257,8 @@ fn plane(contacts: &[(Vector3<f64>, f64)], base: &Vector3<f64>) -> [f64; 4] {
     [rx, ry, plane_distance(contacts, &normal), 0.0]
 }
 
-/// Returns the distance d of the plane with this normal from the origin \[m\].
+/// Returns the signed distance d of the plane with this unit normal from the origin \[m\], positive
+/// along the normal: the mean of n·p − offset over the contacts.
 fn plane_distance(contacts: &[(Vector3<f64>, f64)], normal: &Vector3<f64>) -> f64 {
     contacts.iter().map(|(point, offset)| normal.dot(point) - offset).sum::<f64>()
         / contacts.len() as f64

@@ -1,8 +1,9 @@
-//! Combinations of the unknowns of a stage that stay where they start.
+//! Combinations of the unknowns of a stage that keep their start values, because data and priors do
+//! not determine them.
 
 use nalgebra::DMatrix;
 
-use super::active_limits::Held;
+use super::active_limits::ActiveLimit;
 use crate::least_squares::{Blind, Triangle, UnidentifiableCombination, Weak};
 
 /// Combinations of the unknowns of a stage that data and priors leave undetermined or determine too
@@ -11,22 +12,25 @@ use crate::least_squares::{Blind, Triangle, UnidentifiableCombination, Weak};
 pub(in crate::fit) struct Gauge {
     /// Rows that span the combinations, shape = (combinations, unknowns).
     pub rows: DMatrix<f64>,
-    /// Part of each unknown outside the combinations, 0…1.
+    /// Part of each unknown outside the combinations, 0…1; 0 for unknowns at a bound.
     pub visible: Vec<f64>,
-    /// Weak combinations, one by one.
+    /// Combinations that data and priors determine too weakly; those that they leave undetermined
+    /// are not in this list.
     pub weak: Vec<UnidentifiableCombination>,
 }
 
 impl Gauge {
-    /// Finds the combinations of the unknowns not `held` that data, priors and `active` constraints
-    /// do not determine. `data` is the triangular factor of the data, `sizes` are the plausible
-    /// deviations of the unknowns.
+    /// Finds the combinations that data, priors and `active` constraints do not determine, among
+    /// the unknowns that are not marked in `held`.
+    ///
+    /// `data` is the triangular factor of the whitened Jacobian, and `priors` holds the rows of the
+    /// priors. `sizes` are the plausible sizes of the unknowns; `None` for unknowns without one.
     pub fn new(
         data: &DMatrix<f64>,
         priors: &DMatrix<f64>,
         sizes: &[Option<f64>],
         held: &[bool],
-        active: &[Held],
+        active: &[ActiveLimit],
     ) -> Self {
         let n = data.ncols();
         let seen = n + priors.nrows();

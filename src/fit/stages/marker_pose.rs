@@ -9,13 +9,14 @@ use crate::observation::{FixtureValues, slopes_of_pixel};
 
 /// Largest ratio of the smallest to the largest spread of points at which they count as coplanar.
 const MAX_COPLANAR_RATIO: f64 = 1e-6;
-/// Minimum number of points that determine a pose: coplanar points, and points in space.
+/// Minimum number of points from which a pose is computed: coplanar points, and points in space.
 const MIN_POINTS: [usize; 2] = [4, 6];
 /// Number of Gauss–Newton steps that refine the linear pose.
 const REFINEMENT_STEPS: usize = 10;
 
-/// Returns the pose of a marker in the camera's frame from its points and their pixels, by the
-/// direct linear transform and a refinement; `None` if the points do not determine it.
+/// Returns the pose of a marker in the camera's frame, by the direct linear transform and a
+/// refinement. `points` holds the points of the marker \[m\], marker frame, with their pixels.
+/// `None` if they do not determine the pose.
 pub(super) fn marker_in_camera(
     camera: &FixtureValues<f64>,
     points: &[(Vector3<f64>, [f64; 2])],
@@ -28,9 +29,11 @@ pub(super) fn marker_in_camera(
 }
 
 /// Returns the pose of a marker in the camera's frame by the direct linear transform, from its
-/// points `places` \[m\], marker frame, and their image slopes. In the principal axes of the
-/// points, it solves for the columns of (r₁ r₂ t), or (r₁ r₂ r₃ t) for points in space, up to
-/// scale. `None` if the points are too few or lie on a line.
+/// points `places` \[m\], marker frame, and their undistorted image coordinates `slopes` (x/z,
+/// y/z).
+///
+/// In the principal axes of the points, it solves for the columns of (r₁ r₂ t), or (r₁ r₂ r₃ t) for
+/// points in space, up to scale. `None` if the points are too few or lie on a line.
 fn linear_pose(places: &[Vector3<f64>], slopes: &[[f64; 2]]) -> Option<Isometry3<f64>> {
     let middle = places.iter().sum::<Vector3<f64>>() / places.len() as f64;
     let spread: Matrix3<f64> =
@@ -83,8 +86,9 @@ fn linear_pose(places: &[Vector3<f64>], slopes: &[[f64; 2]]) -> Option<Isometry3
         .then(|| Isometry3::from_parts(Translation3::from(shift), rotation.into()))
 }
 
-/// Returns the pose with the smallest squared error of the image coordinates (`slopes`: x/z, y/z),
-/// by Gauss–Newton steps from `pose`; `None` if a point is behind the camera.
+/// Returns the pose of a marker with the smallest squared error of the image coordinates `slopes`
+/// (x/z, y/z) of its points `places`, by Gauss–Newton steps from `pose`. `None` if a point is
+/// behind the camera, or the points do not determine the pose.
 fn refined(
     mut pose: Isometry3<f64>,
     places: &[Vector3<f64>],
@@ -117,7 +121,8 @@ fn refined(
     in_front.then_some(pose)
 }
 
-/// Returns the rotation matrix nearest to `matrix` in the Frobenius norm.
+/// Returns the rotation matrix nearest to `matrix` in the Frobenius norm; the identity if `matrix`
+/// has no singular value decomposition.
 pub(super) fn nearest_rotation(matrix: &Matrix3<f64>) -> Matrix3<f64> {
     let svd = matrix.svd(true, true);
     let (Some(u), Some(v_t)) = (svd.u, svd.v_t) else { return Matrix3::identity() };

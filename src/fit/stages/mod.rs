@@ -1,4 +1,5 @@
-//! Least-squares fits of an identification: strategies, solvers, registration, staged fits.
+//! Least-squares fits of an identification: strategies and their stages, solvers, registration of
+//! bases and targets, start values of fixtures, and noise models.
 
 pub(super) mod active_limits;
 pub(super) mod alternation;

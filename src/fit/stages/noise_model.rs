@@ -1,35 +1,37 @@
-//! Noise model: from the declared σ of each row to the one that a fit assumed.
+//! Noise model: conversion of the declared σ of each row to the σ that a fit assumes.
 
 use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 
-/// Probability of a residual under the declared σ below which the declared σ counts as
-/// contradicted.
+/// Probability of so large or so small a residual under the declared σ, below which the declared σ
+/// is contradicted.
 pub(in crate::fit) const MAX_CHANCE_PROBABILITY: f64 = 1e-3;
 /// Smallest σ that a fit assumes \[m\]: predicted positions have rounding errors of this size.
 pub(in crate::fit) const MIN_SIGMA: f64 = 1e-9;
 
-/// Noise model √((scale σ)² + e²) of a row with declared σ.
+/// Noise model: a fit assumes √((scale σ)² + e²) for a row with the declared σ.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::fit) struct NoiseModel {
-    /// Factor on the declared σ: usually 1; less if σ is too large, more if rows of several kinds
-    /// scatter more than declared.
+    /// Factor on the declared σ: usually 1; less if the declared σ are too large, more if rows of
+    /// several kinds scatter more than declared.
     pub scale: f64,
-    /// Standard deviation (1 σ) e of the model's error, which is added to the noise in quadrature
-    /// \[m\].
+    /// Standard deviation (1 σ) e of the error of the arm model, which is added to the noise in
+    /// quadrature \[m\], for orientations \[rad\].
     pub model_error: f64,
 }
 
 impl NoiseModel {
-    /// Noise model that takes every σ as declared.
+    /// Noise model with which a fit assumes every σ as declared.
     pub const DECLARED: Self = Self { scale: 1.0, model_error: 0.0 };
 
-    /// Returns the σ \[m\] that the fit assumed for a declared one.
+    /// Returns the σ that the fit assumes for a declared `sigma`, in the same unit.
     pub fn assumed_sigma(self, sigma: f64) -> f64 {
         if self == Self::DECLARED { sigma } else { (self.scale * sigma).hypot(self.model_error) }
     }
 
-    /// Creates the model that scales all `declared` σ by one factor. The mean variance of rows,
-    /// weighted by the σ `assumed` in the last fit, grows by the factor `ratio`.
+    /// Creates the model that scales all `declared` σ by one factor, so that the mean variance of
+    /// the rows is `ratio` times that of the last fit.
+    ///
+    /// Solves Σ (scale σ)² / assumed² = N ratio, with the σ `assumed` in the last fit.
     pub fn scaled(declared: &[f64], assumed: &[f64], ratio: f64) -> Self {
         let sum: f64 =
             declared.iter().zip(assumed).map(|(sigma, assumed)| (sigma / assumed).powi(2)).sum();
@@ -38,11 +40,11 @@ impl NoiseModel {
         Self { scale: (declared.len() as f64 * ratio / sum).sqrt().max(least), model_error: 0.0 }
     }
 
-    /// Creates the model that adds a model error e to all `declared` σ. The mean variance of poses,
-    /// weighted by the σ `assumed` in the last fit, grows by the factor `ratio`.
+    /// Creates the model that adds one model error e to all `declared` σ, so that the mean variance
+    /// of the rows is `ratio` times that of the last fit.
     ///
-    /// Solves Σ (σ² + e²) / assumed² = N ratio for e; if no e ≥ 0 does, all σ are scaled by one
-    /// factor.
+    /// Solves Σ (σ² + e²) / assumed² = N ratio for e, with the σ `assumed` in the last fit. If no e
+    /// ≥ 0 is a solution, all σ are scaled down by one factor instead.
     pub fn raised(declared: &[f64], assumed: &[f64], ratio: f64) -> Self {
         let n = declared.len() as f64;
         let sum: f64 =

@@ -1,4 +1,4 @@
-//! Base and target of each row, and those that only held-out rows use.
+//! Base and target of each row, and the bases, targets and fixtures that only held-out rows use.
 
 use std::collections::BTreeSet;
 
@@ -9,23 +9,25 @@ use crate::model::parameter::ParameterSite;
 use crate::model::{MeasuredOrientation, Model, Pose};
 use crate::problem::Problem;
 
-/// Standard deviation (1 σ) of a coordinate \[m\] that is assumed at first if none is declared.
+/// Standard deviation (1 σ) of a measured coordinate \[m\] with which a fit starts if none is
+/// declared.
 pub(in crate::fit) const ASSUMED_SIGMA: f64 = 1e-3;
 
-/// Assignment of the rows of a table to bases and targets.
+/// Assignment of the rows of a table to bases (poses of the arm's base, one per session) and
+/// targets (measured points on the arm).
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Placement {
-    /// Names of the bases, one per session.
+    /// Names of the bases: those of the sessions.
     pub bases: Vec<String>,
-    /// Names of the targets, one per word of the column `target`, or per session without that
-    /// column.
+    /// Names of the targets: the words of the column `target`, or those of the sessions without
+    /// that column.
     pub targets: Vec<String>,
     base_of_row: Vec<usize>,
     target_of_row: Vec<usize>,
 }
 
 impl Placement {
-    /// Creates the assignment from the columns `session` and `target`.
+    /// Creates the assignment from the columns `session` and `target` of a table.
     pub fn of(measurements: &Measurements) -> Self {
         let session = &measurements.session;
         let target = measurements.target.as_ref().unwrap_or(session);
@@ -37,24 +39,26 @@ impl Placement {
         }
     }
 
-    /// Returns the index of the base of a row.
+    /// Returns the index of the base of a row in `bases`.
     pub fn base_of(&self, row: usize) -> usize {
         self.base_of_row[row]
     }
 
-    /// Returns the index of the target of a row.
+    /// Returns the index of the target of a row in `targets`.
     pub fn target_of(&self, row: usize) -> usize {
         self.target_of_row[row]
     }
 
-    /// Returns the root mean square of the declared σ of one coordinate over `rows` \[m\].
+    /// Returns the root mean square over `rows` of the declared σ of a coordinate \[m\], or of
+    /// [`ASSUMED_SIGMA`] in rows without one.
     pub fn sigma(&self, measurements: &Measurements, rows: &[usize], problem: &Problem) -> f64 {
         let whole = problem.data.position_sigma.unwrap_or(ASSUMED_SIGMA);
         let squares = rows.iter().map(|&row| measurements.sigma_of(row).unwrap_or(whole).powi(2));
         if rows.is_empty() { whole } else { (squares.sum::<f64>() / rows.len() as f64).sqrt() }
     }
 
-    /// Returns `rows` as poses; `sigma` \[m\] is the σ of rows that state none.
+    /// Returns `rows` as poses without orientations; `sigma` \[m\] is the σ of a coordinate in rows
+    /// that state none.
     pub fn poses<'a>(
         &self,
         measurements: &'a Measurements,
@@ -75,8 +79,9 @@ impl Placement {
             .collect()
     }
 
-    /// Sets the elapsed times of poses relative to the starts of their sessions in an earlier
-    /// table. Poses of other sessions keep the time since the first pose of theirs.
+    /// Sets the elapsed times of `poses` to those since the start of their session in an earlier
+    /// table. Poses of sessions without an earlier start keep the time since the first pose of
+    /// their session.
     pub(crate) fn count_time_from(&self, starts: &StartTimes, poses: &mut [Pose]) {
         let starts: Vec<Option<f64>> =
             self.bases.iter().map(|session| starts.of_session(session)).collect();
@@ -87,8 +92,8 @@ impl Placement {
         }
     }
 
-    /// Returns `rows` as poses with their measured orientations, if the σ `turn` of these is given
-    /// \[rad\].
+    /// Returns `rows` as poses, with their measured orientations if the σ `turn` of an orientation
+    /// \[rad\] is given. `sigma` \[m\] is the σ of a coordinate in rows that state none.
     pub fn oriented_poses<'a>(
         &self,
         measurements: &'a Measurements,
@@ -107,8 +112,9 @@ impl Placement {
         poses
     }
 
-    /// Returns the residuals measured − predicted of `rows` at the full parameter vector `x`,
-    /// measuring frame \[m\]; NaN where the arm has no equilibrium.
+    /// Returns the residuals measured − predicted of `rows` at the full parameter vector `x`:
+    /// positions in the measuring frame \[m\], other rows in the unit of their kind. NaN where the
+    /// arm has no equilibrium.
     pub fn position_errors(
         &self,
         model: &Model,
@@ -122,8 +128,8 @@ impl Placement {
     /// Finds the parameters of bases, targets and fixtures that only held-out rows use, and those
     /// rows.
     ///
-    /// They do not depend on the arm's parameters, so they are fitted to their held-out rows, with
-    /// the arm's parameters fixed.
+    /// These parameters have no effect on the fitted rows, so they are fitted to their held-out
+    /// rows, with the arm's parameters fixed.
     pub(in crate::fit) fn held_out_only(
         &self,
         model: &Model,
@@ -170,7 +176,7 @@ impl Placement {
 /// Bases, targets and fixtures that only held-out rows use.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(in crate::fit) struct HeldOutOnly {
-    /// True for each parameter of the model that belongs to such a base, target or fixture.
+    /// For each parameter of the model, true if it belongs to such a base, target or fixture.
     pub parameters: Vec<bool>,
     /// Held-out rows that use such a base, target or fixture.
     pub rows: Vec<usize>,

@@ -9,11 +9,11 @@ use argmin::core::{Error, KV, State as _};
 use crate::least_squares::solver::State;
 use crate::problem::Effect;
 
-/// Progress of a fit or a loop.
+/// Report on the progress of a fit or a loop.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum Progress {
-    /// A fit tried a step.
+    /// The solver of a fit tried a step.
     Step {
         /// Number of steps tried in the current fit.
         iteration: u64,
@@ -21,30 +21,32 @@ pub enum Progress {
         unknowns: usize,
         /// Number of poses of the current fit.
         poses: usize,
-        /// Cost ½‖r‖² after the step.
+        /// Cost after the step: ½‖r‖² of whitened residuals and priors, or with a robust loss ρ
+        /// ½Σρ.
         cost: f64,
     },
-    /// A round of a loop evaluates candidates, or starts another of its fits.
+    /// A round of a loop evaluates candidate effects, or starts another fit.
     Round {
         /// Number of the round, from 1.
         round: usize,
-        /// Effects that earlier rounds added.
+        /// Effects that earlier rounds added to the model.
         effects: Vec<Effect>,
         /// Number of the fit that starts, from 1; 0 while candidates are evaluated.
         fit: usize,
         /// Number of fits of the round that are planned so far.
         fits: usize,
     },
-    /// The loop adds no more effects and computes the claims about those that it has.
+    /// The loop adds no more effects and computes the claims about those that it has added.
     Finishing,
 }
 
-/// Receiver of progress; the library itself prints nothing.
+/// Function that receives progress reports; the library itself prints nothing.
 pub type ProgressSink = Arc<dyn Fn(Progress) + Send + Sync>;
 
-/// Request from another thread or a signal handler to stop early. Clones share the request.
+/// Request from another thread or a signal handler to stop the work early. Clones share the
+/// request.
 ///
-/// A fit checks it between the steps of its solver.
+/// A fit checks for a request between the steps of its solver.
 #[derive(Debug, Clone, Default)]
 pub struct Stop(Arc<AtomicBool>);
 
@@ -61,12 +63,12 @@ impl Stop {
     }
 }
 
-/// Error of a solver that was stopped.
+/// Error by which [`Reporter`] ends a solver on request.
 #[derive(Debug, thiserror::Error)]
 #[error("stopped")]
 struct Stopped;
 
-/// Observer of a solver: reports every step, and stops it on request.
+/// Observer of a solver that reports every step and stops the solver on request.
 pub(in crate::fit) struct Reporter {
     pub sink: Option<ProgressSink>,
     pub stop: Option<Stop>,

@@ -1,4 +1,4 @@
-//! Registration: base pose and target orientation from measured poses in closed form.
+//! Registration: poses of bases and orientations of targets from measured poses, in closed form.
 
 use nalgebra::{DVector, Matrix3, Matrix4, Quaternion, Rotation3, UnitQuaternion, Vector3};
 
@@ -6,16 +6,17 @@ use crate::model::parameter::{Parameter, ParameterSite};
 use crate::model::{Model, Pose};
 use crate::spatial::{Frame, rotate};
 
-/// Largest ratio of the second to the first squared spread of points at which they count as
-/// collinear.
+/// Largest ratio of the middle to the largest eigenvalue of SᵀS at which points count as collinear.
+/// S is the cross-covariance of predicted and measured points.
 const MAX_COLLINEAR_RATIO: f64 = 1e-12;
 
-/// Registers bases and targets that are free in all components, without priors and bounds, in the
-/// full parameter vector `x`.
+/// Sets the poses of bases and the orientations of targets in the full parameter vector `x` to
+/// those that fit the `poses` best. It sets those that are free in all components, without priors
+/// and bounds.
 ///
-/// A base becomes the best rigid motion from the arm's base frame to the measured positions of
-/// `poses`. Then the best orientation of each target is found. Bases and targets that no pose uses
-/// keep their values.
+/// The pose of a base is the best rigid motion from predicted positions in the arm's base frame to
+/// measured positions. Then the best orientation of each target is found. Bases and targets that no
+/// pose uses keep their values.
 ///
 /// min over R, t of Σ ‖y − R p − t‖²: the unit quaternion of R is the eigenvector of a symmetric 4
 /// × 4 matrix  [Horn 1987].
@@ -28,12 +29,12 @@ pub fn register(model: &Model, poses: &[Pose], x: &mut DVector<f64>) {
     let frames = if has_orientation { model.frames(poses, x.as_slice()) } else { Vec::new() };
     let oriented: Vec<(&Pose, Frame<f64>)> =
         poses.iter().zip(frames).filter_map(|(pose, last)| Some((pose, last?))).collect();
-    let turned: Vec<Frame<f64>> = model
+    let target_frames: Vec<Frame<f64>> = model
         .target_rotations(x.as_slice())
         .iter()
         .map(|rotation| Frame::from_rotation_vector(Vector3::zeros(), rotation))
         .collect();
-    let turns = |target: usize| {
+    let is_orientation_free = |target: usize| {
         let is_of_target = |parameter: &&Parameter| matches!(parameter.site, ParameterSite::Target { target: of, axis: 3.. } if of == target);
         let free = |parameter: &&Parameter| parameter.sigma.is_none() && !parameter.is_bounded();
         model.parameters.iter().filter(is_of_target).filter(free).count() == 3
@@ -57,11 +58,12 @@ pub fn register(model: &Model, poses: &[Pose], x: &mut DVector<f64>) {
         if columns.len() < 6 || points.is_empty() {
             continue;
         }
-        let seen = oriented.iter().filter(|(pose, _)| of_base(pose) && !turns(pose.target));
-        let seen = seen.filter_map(|(pose, last)| {
-            Some((last.compose(&turned[pose.target]).axes, axes(pose)?))
+        let known =
+            oriented.iter().filter(|(pose, _)| of_base(pose) && !is_orientation_free(pose.target));
+        let pairs = known.filter_map(|(pose, last)| {
+            Some((last.compose(&target_frames[pose.target]).axes, axes(pose)?))
         });
-        let nominal_rotation = mean_turn(seen).unwrap_or(nominal.rotation);
+        let nominal_rotation = best_rotation(pairs).unwrap_or(nominal.rotation);
         let (rotation, translation) = rigid_motion(&points, &nominal_rotation);
         let rotation = rotation - nominal.rotation;
         let translation = translation - nominal.translation;
@@ -69,7 +71,7 @@ pub fn register(model: &Model, poses: &[Pose], x: &mut DVector<f64>) {
             x[k] = if axis < 3 { translation[axis] } else { rotation[axis - 3] };
         }
     }
-    turn_targets(model, &oriented, x, turns);
+    register_target_orientations(model, &oriented, x, is_orientation_free);
 }
 
 /// Returns the three axes of the measured orientation of a pose, measuring frame; `None` if the row
@@ -78,19 +80,19 @@ fn axes(pose: &Pose) -> Option<[Vector3<f64>; 3]> {
     pose.orientation?.axes()
 }
 
-/// Registers in `x` the orientations of the targets for which `turns` returns true. Each pose is
-/// paired with the frame that carries its target, arm base frame.
-fn turn_targets(
+/// Sets in `x` the best orientations of the targets for which `is_chosen` returns true. Each pose
+/// is paired with the frame of the arm that carries its target, given in the arm's base frame.
+fn register_target_orientations(
     model: &Model,
     poses: &[(&Pose, Frame<f64>)],
     x: &mut DVector<f64>,
-    turns: impl Fn(usize) -> bool,
+    is_chosen: impl Fn(usize) -> bool,
 ) {
     let bases = model.base_frames(x.as_slice());
     let nominal = model.target_rotations(DVector::zeros(x.len()).as_slice());
-    for (target, nominal) in nominal.iter().enumerate().filter(|(target, _)| turns(*target)) {
-        // R of the target turns the axes of the last frame into the measured ones, both seen from
-        // the last frame.
+    for (target, nominal) in nominal.iter().enumerate().filter(|(target, _)| is_chosen(*target)) {
+        // The target's rotation R rotates the axes of the frame that carries it into the measured
+        // axes, all given in that frame.
         let seen =
             poses.iter().filter(|(pose, _)| pose.target == target).filter_map(|(pose, last)| {
                 let last = bases[pose.base].compose(last);
@@ -99,7 +101,7 @@ fn turn_targets(
                     axes(pose)?.map(|axis| last.resolve(&axis)),
                 ))
             });
-        let Some(rotation) = mean_turn(seen) else { continue };
+        let Some(rotation) = best_rotation(seen) else { continue };
         for (k, parameter) in model.parameters.iter().enumerate() {
             if let ParameterSite::Target { target: of, axis: axis @ 3.. } = parameter.site
                 && of == target
@@ -110,12 +112,12 @@ fn turn_targets(
     }
 }
 
-/// Returns the rotation vector \[rad\] that best turns the first axes of the pairs into the second
-/// ones; `None` without pairs.
+/// Returns the rotation vector \[rad\] that best rotates the first axes A of each pair into the
+/// second axes B; `None` without pairs.
 ///
-/// min over R of Σ ‖R A − B‖²: R = U diag(1, 1, ±1) Vᵀ of Σ B Aᵀ = U Σ Vᵀ  [Arun, Huang & Blostein
-/// 1987].
-fn mean_turn(
+/// min over R of Σ ‖R A − B‖²: R = U diag(1, 1, ±1) Vᵀ with the singular value decomposition U D Vᵀ
+/// of Σ B Aᵀ  [Arun, Huang & Blostein 1987].
+fn best_rotation(
     pairs: impl Iterator<Item = ([Vector3<f64>; 3], [Vector3<f64>; 3])>,
 ) -> Option<Vector3<f64>> {
     let product = |(from, to): ([Vector3<f64>; 3], [Vector3<f64>; 3])| {
@@ -131,9 +133,9 @@ fn mean_turn(
     )
 }
 
-/// Returns the rotation vector \[rad\] and translation \[m\] that best move the first points of the
-/// pairs to the second ones. If the points are collinear, which leaves the rotation about their
-/// line undetermined, the rotation is `nominal`.
+/// Returns the rotation vector \[rad\] and translation \[m\] of the rigid motion that best moves
+/// the first points of the pairs to the second ones. If the points are collinear, so that the
+/// rotation about their line is undetermined, the rotation is `nominal`.
 fn rigid_motion(
     pairs: &[(Vector3<f64>, Vector3<f64>)],
     nominal: &Vector3<f64>,

@@ -1,4 +1,4 @@
-//! Choice of the solver.
+//! Solvers of the fits, by name.
 
 use crate::least_squares::solver::BoundMethod;
 use crate::model::Model;
@@ -39,14 +39,14 @@ worded! {
 }
 
 impl SolverChoice {
-    /// Every choice by name, `auto` first.
+    /// Every choice that has a name on the command line, `auto` first: all but `Custom`.
     #[doc(hidden)]
     pub const CHOICES: &[Self] = Self::EACH.split_at(Self::EACH.len() - 1).0;
-    /// Every solver, without `auto`.
+    /// Every solver of flexcal: all choices but `Auto` and `Custom`.
     #[doc(hidden)]
     pub const SOLVERS: &[Self] = Self::CHOICES.split_at(1).1;
 
-    /// Names of the choices.
+    /// Names of [`CHOICES`](Self::CHOICES), in the same order.
     pub(crate) const NAMES: &[&'static str] = Self::WORDS.split_at(Self::CHOICES.len()).0;
 
     /// Returns the method by which the solver keeps bounds; `None` if the solver cannot keep

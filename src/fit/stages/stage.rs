@@ -8,9 +8,9 @@ use nalgebra::{DMatrix, DVector};
 use super::custom_solver::CustomSolver;
 use super::gauge::{Gauge, below};
 use crate::fit::SolverChoice;
-use crate::fit::stages::active_limits::Held;
+use crate::fit::stages::active_limits::ActiveLimit;
 use crate::fit::stages::earlier_data::EarlierData;
-use crate::fit::stages::parameter_size::plausible;
+use crate::fit::stages::parameter_size::plausible_size;
 use crate::fit::stages::progress::{ProgressSink, Reporter, Stop};
 use crate::least_squares::solver::{
     self, Bounds, BoundsError, GaussNewtonSettings, Inequalities, InequalitiesError,
@@ -24,8 +24,8 @@ use crate::model::parameter::Parameter;
 use crate::model::{LinearModel, Model, Pose, PoseResiduals};
 use crate::problem::PoseView;
 
-/// Relative reduction of the cost at which a stage has converged. It is above the rounding of
-/// predicted positions in units of their noise, and far below a noticeable change of an estimate.
+/// Relative reduction of the cost by a step below which a stage has converged. It is above the
+/// rounding errors of the cost, and far below a noticeable change of an estimate.
 pub const COST_TOLERANCE: f64 = 1e-11;
 
 /// Error of a stage that cannot be set up, or was stopped.
@@ -51,16 +51,17 @@ pub enum StageError {
     Interrupted,
 }
 
-/// Input of one least-squares fit.
+/// Input of one least-squares fit: some parameters of a model are fitted to some poses.
 pub(in crate::fit) struct Stage<'a> {
     pub model: &'a Model,
     /// Poses with the σ that the fit assumes.
     pub poses: Arc<Vec<Pose<'a>>>,
-    /// Declared 1 σ of a coordinate of each pose \[m\].
+    /// Declared 1 σ of a coordinate of each pose, in the unit of its kind.
     pub declared: Vec<f64>,
-    /// Declared 1 σ of the orientations, where these are fitted \[rad\].
+    /// Declared 1 σ of an orientation about each axis \[rad\]; `None` if orientations are not
+    /// fitted.
     pub declared_turn: Option<f64>,
-    /// Indices, among all parameters of the model, of those that the stage varies.
+    /// Indices, among all parameters of the model, of the unknowns: those that the stage varies.
     pub unknowns: Vec<usize>,
     pub solver: SolverChoice,
     /// Solver of the caller, required by [`SolverChoice::Custom`].
@@ -71,14 +72,15 @@ pub(in crate::fit) struct Stage<'a> {
     pub cost_tolerance: f64,
     /// Loss of the residual of a pose.
     pub loss: Loss,
-    /// True if constraints apply that also involve free parameters which do not vary in this stage.
+    /// True if a constraint also applies when it involves parameters that this stage does not vary;
+    /// these then have the values at which the stage starts.
     pub counts_fixed: bool,
     /// Linearisations shared by fits of the same data.
     pub cache: &'a LinearisationCache,
     /// Jacobian at the optimum of an earlier fit of the identification rows, reused if this stage
     /// starts there.
     pub linear_model: Option<&'a LinearModel>,
-    /// Earlier data that join the rows of the fit; `None` without an earlier estimate.
+    /// Earlier data that are fitted together with the poses; `None` without an earlier estimate.
     pub earlier: Option<&'a EarlierData>,
     pub progress: Option<&'a ProgressSink>,
     pub stop: Option<&'a Stop>,
@@ -93,7 +95,8 @@ pub(in crate::fit) struct StageEnd {
 }
 
 impl<'a> Stage<'a> {
-    /// Creates a stage with squared loss, the σ of the poses and the default limits of the solver.
+    /// Creates a stage with squared loss and the default limits of the solver. The σ of the poses
+    /// count as declared.
     pub fn new(
         model: &'a Model,
         poses: Vec<Pose<'a>>,
@@ -131,18 +134,20 @@ impl<'a> Stage<'a> {
         self.poses.iter().map(Pose::coordinates).sum()
     }
 
-    /// Returns the number of residual rows of each pose: three, or six with its orientation; unused
-    /// rows are 0.
+    /// Returns the number of residual rows that each pose has: three, or six if orientations are
+    /// fitted. Rows that a pose does not need are 0.
     pub fn coordinates(&self) -> usize {
         if self.declared_turn.is_some() { 6 } else { 3 }
     }
 
-    /// Returns the residuals of the stage; parameters that do not vary are as in `at`.
+    /// Returns the whitened residuals of the stage as a function of the unknowns; all other
+    /// parameters are as in `at`.
     pub fn residuals(&self, at: &DVector<f64>) -> PoseResiduals<'a> {
         self.residuals_of(Arc::clone(&self.poses), at)
     }
 
-    /// Returns the residuals of other poses; parameters that do not vary are as in `at`.
+    /// Returns the whitened residuals of `poses` as a function of the unknowns; all other
+    /// parameters are as in `at`.
     pub fn residuals_of(
         &self,
         poses: impl Into<Arc<Vec<Pose<'a>>>>,
@@ -158,7 +163,8 @@ impl<'a> Stage<'a> {
         self.cached(&residuals, at, loss).linearise(&residuals.reduced(at))
     }
 
-    /// Creates the objective of these poses. Stages with equal data share its linearisations.
+    /// Creates the objective of `residuals` with this loss. Fits with the same cache and equal data
+    /// share its linearisations.
     fn cached<'b>(
         &'b self,
         residuals: &'b PoseResiduals<'a>,
@@ -168,13 +174,14 @@ impl<'a> Stage<'a> {
         Fit::new(residuals).with_loss(loss).with_cache(self.cache, self.digest(at), self.unit())
     }
 
-    /// Returns 1 σ of the first pose \[m\]: the unit in which cached linearisations are stored.
+    /// Returns 1 σ of a coordinate of the first pose \[m\]: the unit in which cached linearisations
+    /// are stored.
     fn unit(&self) -> f64 {
         self.poses.first().map_or(1.0, |pose| pose.sigma)
     }
 
-    /// Returns a hash of the data, the unknowns, and the values in `at` of parameters that do not
-    /// vary. It does not depend on the unit of the residuals.
+    /// Returns a hash of the data, the unknowns, and the values in `at` of all other parameters. It
+    /// does not change if the σ of all poses are multiplied by one factor.
     fn digest(&self, at: &DVector<f64>) -> u64 {
         let (mut digest, unit) = (DefaultHasher::new(), self.unit());
         let mut others = at.clone();
@@ -206,21 +213,21 @@ impl<'a> Stage<'a> {
             put(pose.orientation.map_or(0.0, |orientation| orientation.sigma / unit));
             put(pose.base as f64);
             put(pose.target as f64);
-            // Earlier poses are in the table, which all fits with the same cache share: the row
-            // identifies them.
+            // All fits with the same cache share the table, so the row identifies the earlier poses
+            // of the session.
             put(past.place().map_or(f64::NAN, f64::from));
         }
         self.poses.iter().for_each(|pose| pose.observation.hash(&mut digest));
         digest.finish()
     }
 
-    /// Returns the triangular factor R of the whitened data at `at`, earlier data included, without
-    /// priors.
+    /// Returns the triangular factor R of the whitened Jacobian at `at`, with the rows of earlier
+    /// data, without priors.
     pub fn data_triangle(&self, at: &DVector<f64>) -> DMatrix<f64> {
         self.with_earlier(self.linearised(at, Loss::Squares).triangle, at)
     }
 
-    /// Returns the triangular factor of `triangle` stacked on the rows of earlier data.
+    /// Returns the triangular factor of `triangle` with the rows of earlier data appended below.
     pub fn with_earlier(&self, triangle: DMatrix<f64>, at: &DVector<f64>) -> DMatrix<f64> {
         match self.earlier {
             Some(_) => below(&triangle, &self.earlier_rows(at).matrix),
@@ -228,24 +235,25 @@ impl<'a> Stage<'a> {
         }
     }
 
-    /// Returns, for each unknown without a prior, its plausible deviation in SI; `None` for
-    /// unknowns with a prior.
+    /// Returns the plausible size of each unknown \[SI\]; `None` for unknowns that have a prior or
+    /// no plausible size.
     fn sizes(&self) -> Vec<Option<f64>> {
-        self.parameters().map(|parameter| plausible(self.model, parameter)).collect()
+        self.parameters().map(|parameter| plausible_size(self.model, parameter)).collect()
     }
 
-    /// Returns the factor R of the data at `at` with each pose weighted by the loss, earlier data
-    /// included.
+    /// Returns the triangular factor R of the whitened Jacobian at `at` with each pose weighted by
+    /// the loss, with the rows of earlier data, without priors.
     pub fn weighted_triangle(&self, at: &DVector<f64>) -> DMatrix<f64> {
         self.with_earlier(self.linearised(at, self.loss).triangle, at)
     }
 
-    /// Returns the factor R of weighted data and priors at `at`.
+    /// Returns the triangular factor R of [`weighted_triangle`](Self::weighted_triangle) and the
+    /// priors.
     pub fn triangle_with_priors(&self, at: &DVector<f64>) -> DMatrix<f64> {
         below(&self.weighted_triangle(at), &self.priors())
     }
 
-    /// Returns the entries of the unknowns in the full parameter vector `at`.
+    /// Returns the values of the unknowns in the full parameter vector `at`.
     pub fn reduced(&self, at: &DVector<f64>) -> DVector<f64> {
         DVector::from_iterator(self.unknowns.len(), self.unknowns.iter().map(|&k| at[k]))
     }
@@ -272,7 +280,7 @@ impl<'a> Stage<'a> {
 
     /// Finds the combinations of the unknowns that data, priors and `active` constraints do not
     /// determine at `at`; unknowns marked in `held` are left out.
-    pub fn gauge(&self, at: &DVector<f64>, held: &[bool], active: &[Held]) -> Gauge {
+    pub fn gauge(&self, at: &DVector<f64>, held: &[bool], active: &[ActiveLimit]) -> Gauge {
         let n = self.unknowns.len();
         if self.parameters().all(|parameter| parameter.sigma.is_some()) {
             return Gauge { rows: DMatrix::zeros(0, n), visible: vec![1.0; n], weak: Vec::new() };
@@ -280,7 +288,7 @@ impl<'a> Stage<'a> {
         Gauge::new(&self.data_triangle(at), &self.priors(), &self.sizes(), held, active)
     }
 
-    /// Minimises the cost from the full parameter vector `start`.
+    /// Minimises the cost over the unknowns, starting from the full parameter vector `start`.
     ///
     /// Combinations that are unidentifiable or weak at the start keep their start values; one that
     /// becomes weak later keeps the value that it has then. If a combination that is unidentifiable
@@ -396,7 +404,8 @@ impl<'a> Stage<'a> {
         self.custom_solver.filter(|_| self.solver == SolverChoice::Custom)
     }
 
-    /// Returns the cost at the full parameter vector `at`: ½Σρ of the data and ½‖r‖² of the priors.
+    /// Returns the cost at the full parameter vector `at`: ½Σρ of the data, and ½‖r‖² of priors and
+    /// earlier data.
     pub fn cost(&self, at: &DVector<f64>) -> f64 {
         let residuals = self.residuals(at);
         let x = residuals.reduced(at);
@@ -405,8 +414,8 @@ impl<'a> Stage<'a> {
             + 0.5 * self.earlier_squares(at, &x)
     }
 
-    /// Returns the rows of earlier data on the unknowns, with all other parameters at their values
-    /// in `at`; no rows without earlier data.
+    /// Returns the rows of earlier data as linear functions of the unknowns, with all other
+    /// parameters as in `at`; no rows without earlier data.
     pub fn earlier_rows(&self, at: &DVector<f64>) -> LinearRows {
         let n = self.unknowns.len();
         match self.earlier {
@@ -421,7 +430,7 @@ impl<'a> Stage<'a> {
         (rows.matrix * x + rows.constant).norm_squared()
     }
 
-    /// Returns the rows x / σ of the priors, shape = (priors, unknowns).
+    /// Returns the matrix of the rows x / σ of the priors, shape = (priors, unknowns).
     pub fn priors(&self) -> DMatrix<f64> {
         let sigmas: Vec<(usize, f64)> = self
             .parameters()

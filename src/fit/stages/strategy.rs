@@ -1,14 +1,14 @@
-//! Strategies: which parameters are fitted together.
+//! Strategies of a fit: which parameters are fitted together, and in which order.
 
 use crate::model::parameter::Parameter;
 use crate::model::{Ablation, Model};
 
 worded! {
-    /// Strategy of a fit: which parameters are fitted together.
+    /// Strategy of a fit: which parameters are fitted together, and in which order.
     #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
     #[non_exhaustive]
     pub enum Strategy: as_str, summary {
-        /// Fits everything at once.
+        /// Fits all free parameters at once.
         #[default]
         Joint = "joint", "Everything at once";
         /// Fits stiffness, then geometry [Chen2021, sec. 3.3], and repeats both until the cost
@@ -34,8 +34,8 @@ impl Strategy {
         if self == Self::Rigid { declared.ablated(Ablation::Rigid) } else { declared }
     }
 
-    /// Returns the stages of one sweep. Each is a predicate that selects the parameters to vary;
-    /// bases and targets vary in every stage.
+    /// Returns the stages of one sweep. Each stage is a predicate that returns true for the
+    /// parameters that it varies; bases and targets vary in every stage.
     pub(crate) fn stages(self) -> &'static [fn(&Parameter) -> bool] {
         const ALL: fn(&Parameter) -> bool = |_| true;
         const STIFFNESS: fn(&Parameter) -> bool = |p| p.site.is_elastic() || p.site.is_placement();

@@ -1,7 +1,7 @@
 //! Constraints that are active in a fit, because the fit rests on one of their limits.
 
 use crate::error::Location;
-use crate::fit::stages::active_limits::Held;
+use crate::fit::stages::active_limits::ActiveLimit;
 use crate::fit::uncertainty::shadow_price::ShadowPrice;
 use crate::least_squares::solver::AtBound;
 use crate::model::Model;
@@ -28,8 +28,12 @@ pub struct ActiveConstraint {
 impl ActiveConstraint {
     /// Describes the active constraints `held` of a stage with their shadow `prices`, in the
     /// notation of the problem file.
-    pub(in crate::fit) fn all(held: &[Held], prices: &[ShadowPrice], model: &Model) -> Vec<Self> {
-        let of = |(held, shadow_price): (&Held, &ShadowPrice)| {
+    pub(in crate::fit) fn all(
+        held: &[ActiveLimit],
+        prices: &[ShadowPrice],
+        model: &Model,
+    ) -> Vec<Self> {
+        let of = |(held, shadow_price): (&ActiveLimit, &ShadowPrice)| {
             let constraint = &model.constraints[held.constraint];
             let [lower, upper] = &constraint.limits;
             let limit = if held.side == AtBound::Lower { lower } else { upper };

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::fit::stages::active_limits::Held;
+use crate::fit::stages::active_limits::ActiveLimit;
 use crate::fit::stages::stage::{Stage, StageError};
 use crate::fit::uncertainty::shadow_price::ShadowPrice;
 use crate::least_squares::solver::{AtBound, Factor};
@@ -34,7 +34,7 @@ impl Stage<'_> {
         &self,
         at: &DVector<f64>,
         at_bound: &[Option<AtBound>],
-        active: &[Held],
+        active: &[ActiveLimit],
     ) -> Result<Prices, StageError> {
         let n = self.unknowns.len();
         if active.is_empty() && at_bound.iter().all(Option::is_none) {
@@ -80,7 +80,7 @@ impl Stage<'_> {
             places.iter().map(|&place| self.poses[place].sigma.powi(2)).sum::<f64>() / count;
         // If both limits of a constraint are equal, either side may be active.
         let parameters: Vec<&Parameter> = self.parameters().collect();
-        let is_equality = |held: &Held| {
+        let is_equality = |held: &ActiveLimit| {
             let limits = &self.model.constraints[held.constraint];
             limits.lower >= limits.upper
         };

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 
-use crate::fit::stages::active_limits::{Held, confine};
+use crate::fit::stages::active_limits::{ActiveLimit, confine};
 use crate::fit::stages::fitting::FitEnd;
 use crate::fit::stages::noise_model::{MAX_CHANCE_PROBABILITY, NoiseModel};
 use crate::fit::stages::stage::{Stage, StageError};
@@ -38,7 +38,7 @@ pub(in crate::fit) struct Statistics {
     /// `None` without degrees of freedom.
     pub chance: Option<(f64, f64)>,
     /// Constraints that are active (at a limit) at the end of the fit.
-    pub constraints: Vec<Held>,
+    pub constraints: Vec<ActiveLimit>,
     /// Shadow prices of the bounds and constraints on which the fit rests.
     pub prices: Prices,
     /// Bounds that hide the uncertainty of other unknowns.
