@@ -9,7 +9,7 @@ pub(super) fn plural(count: usize) -> &'static str {
     if count == 1 { "" } else { "s" }
 }
 
-/// Returns a quotation of the text near an error.
+/// Returns `, near` and a quotation of the text near an error; empty for an empty text.
 pub(super) fn near_quote(text: &str) -> String {
     if text.is_empty() { String::new() } else { format!(", near `{text}`") }
 }
@@ -36,7 +36,8 @@ pub(super) fn column_difference(other: &Path, has: bool) -> String {
     format!("{} {says}", other.display())
 }
 
-/// Returns names in quotes, as in `there are "a", "b"`.
+/// Returns the column names of a header in quotes, as in `there are "a", "b"`, or a clause that
+/// there are none.
 pub(super) fn in_quotes(names: &[String]) -> String {
     let names: Vec<String> =
         names.iter().map(|name| format!("\"{}\"", shortened(name, 40))).collect();
@@ -92,7 +93,7 @@ pub(super) fn compared_keys(keys: Option<&[String; 2]>) -> String {
     })
 }
 
-/// Returns the remedy for clocks that differ. `offset` is the value of `offset_s` [s] that pairs
+/// Returns the remedy for clocks that differ. `offset` is the value of `offset_s` \[s\] that pairs
 /// most rows; the text is empty for `None`.
 pub(super) fn clock_offset_remedy(offset: Option<&str>) -> String {
     offset.map_or_else(String::new, |offset| {

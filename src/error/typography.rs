@@ -1,6 +1,6 @@
 //! Characters of word processors and spreadsheets that look like those of the keyboard.
 
-/// Characters with what they are, and the remedy.
+/// Groups of typographic characters, each with its description and the remedy, for messages.
 const CHARACTERS: [(&str, &str, &str); 4] = [
     (
         "\u{2212}\u{2010}\u{2011}\u{2012}\u{2013}\u{2014}",

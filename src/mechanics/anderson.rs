@@ -26,8 +26,10 @@ struct Pair {
 #[derive(Debug, Clone, Default)]
 pub(super) struct Anderson {
     pairs: [Pair; MAX_PAIRS],
-    /// Number of pairs in use, and number of passes made.
+    /// Number of pairs formed since the last pass that was no contraction; the last [`MAX_PAIRS`]
+    /// are kept.
     used: usize,
+    /// Number of passes since the last restart.
     passes: usize,
     last: Pair,
 }

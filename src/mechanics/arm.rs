@@ -20,7 +20,7 @@ pub struct Arm<S> {
     pub beam_elements: usize,
     /// Joints from the base outwards, branch by branch.
     pub joints: Vec<Joint<S>>,
-    /// Order in which the joints follow each other.
+    /// Parent relations of the joints.
     pub tree: Tree,
     /// Index of the joint whose frame carries the payload; the last joint if `None`.
     pub payload_on: Option<usize>,

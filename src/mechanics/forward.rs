@@ -40,7 +40,7 @@ struct Walk<'a, S> {
     frame: Frame<S>,
     /// Index of the next unknown moment.
     next: usize,
-    /// Joint whose frame is redeflecting_moments.
+    /// Index of the joint whose frame is returned.
     tip: usize,
 }
 

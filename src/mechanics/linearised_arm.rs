@@ -32,7 +32,7 @@ pub(super) enum MomentAxes {
 /// Element of the linearised forward pass, in order from the base outwards.
 #[derive(Debug, Clone)]
 pub(super) enum Step {
-    /// Force on a rigid part, by its index.
+    /// Load on a rigid part, by its index in [`LinearisedArm::loads`].
     Load(usize),
     /// Point of the arm where moments are unknown.
     Section(Section),
@@ -59,16 +59,19 @@ pub(super) struct LinearisedSegment {
     /// Indices of the unknown moments that deflect the segment.
     pub unknowns: Range<usize>,
     pub moment_direction: usize,
-    /// First direction that belongs to a parameter, and number of all directions.
+    /// First direction that belongs to a parameter.
     pub parameter_direction: usize,
+    /// Number of all directions.
     pub directions: usize,
     /// Events of the forward pass that are the segment's loads.
     pub events: Range<usize>,
     /// Event of the joint's axis; `None` if the segment is no joint that deflects about it.
     pub axis: Option<usize>,
-    /// Indices of the segment's loads, twists and moves, set by [`LinearisedArm::push_segment`].
+    /// Indices of the segment's loads, set by [`LinearisedArm::push_segment`].
     pub loads: Range<usize>,
+    /// Index of its first twist in [`LinearisedArm::columns`].
     pub first_column: usize,
+    /// Index of its first load motion in [`LinearisedArm::moves`].
     pub first_move: usize,
 }
 
@@ -129,9 +132,9 @@ pub(super) struct LinearisedArm {
     pub loads: Vec<Load>,
     pub columns: Vec<EndTwist>,
     pub moves: Vec<Vector3<f64>>,
-    /// Influence Λ, for each moment the three coordinates of the target [m/(N·m)], and its image in
-    /// the last sweep.
+    /// Influence Λ: for each moment the three coordinates of the target [m/(N·m)].
     pub influence: Vec<f64>,
+    /// Image of Λ in the last sweep.
     pub image: Vec<f64>,
     pub anderson: Anderson,
     /// Derivatives of the position with respect to the parameters, by segment and direction.

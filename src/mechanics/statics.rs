@@ -54,8 +54,9 @@ pub struct StaticState {
     pub(super) moments: Vec<f64>,
     /// Influence Λ, shape = (3, moments), row-major [m/(N·m)]; empty until it is computed.
     pub(super) adjoint: Vec<f64>,
-    /// Matrices `P_x`, shape = (3, moments), row-major, and `G_x`, column-major.
+    /// Matrix `P_x`, shape = (3, moments), row-major.
     position_response: Vec<f64>,
+    /// Matrix `G_x`, shape = (moments, moments), column-major.
     moment_response: Vec<f64>,
 }
 

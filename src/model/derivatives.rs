@@ -163,8 +163,8 @@ impl ArmDerivatives {
     }
 }
 
-/// Returns the rotation vector per unit of a parameter of axes eₖ with derivatives (`slopes`) deₖ:
-/// ω = ½ Σ eₖ × deₖ.
+/// Returns the rotation vector per unit of a parameter, ω = ½ Σ eₖ × deₖ, for `axes` eₖ whose
+/// derivatives with respect to the parameter are the `slopes` deₖ.
 pub(super) fn angular_velocity(
     axes: &[Vector3<f64>; 3],
     slopes: &[Vector3<f64>; 3],

@@ -105,9 +105,9 @@ impl Instrument {
         }
     }
 
-    /// Returns I + (E + ∂d/∂p) / (1 + s): the factor from derivatives that contain the scale to
-    /// those of the reading of a position; `None` without a strain and without a displacement d
-    /// along the line of sight.
+    /// Returns the factor I + (E + ∂d/∂p) / (1 + s) that turns derivatives of (1 + s) times a
+    /// position into those of its reading. Returns `None` if the factor is 1: without a strain and
+    /// without a displacement d along the line of sight.
     pub fn relative_strain(
         &self,
         position: &Vector3<f64>,

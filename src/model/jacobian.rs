@@ -280,7 +280,7 @@ impl<'m> JacobianWriter<'m> {
 }
 
 /// Writes the derivatives of the target's position with respect to base and target. Returns that
-/// position, measuring frame \[m\]. `frame` carries the target, arm base frame.
+/// position, measuring frame \[m\]. `frame` carries the target, measuring frame.
 #[inline]
 fn write_placement(
     frame: &Frame<f64>,

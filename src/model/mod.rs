@@ -58,7 +58,7 @@ pub use self::{ablation::Ablation, pose::Pose, pose_residuals::PoseResiduals};
 #[derive(Debug, Clone)]
 pub struct Model {
     nominal: Arm<f64>,
-    /// Terms with fixed coefficients that add to the joints' commands.
+    /// Terms with fixed coefficients that add to joint coordinates, strains and small motions.
     fixed_terms: Vec<CommandTerm>,
     instrument: Instrument,
     bases: Vec<BasePose>,

@@ -16,7 +16,7 @@ pub(super) const POINT_ROWS: usize = 12;
 
 /// Pose, base and target at which an orientation is differentiated.
 pub(super) struct Place<'a> {
-    /// Pose with the commands as given, and with the corrections that terms add to them.
+    /// Pose as commanded, and pose with the terms that add to its commands.
     pub setups: (&'a PoseView<'a>, &'a PoseView<'a>),
     /// Base of the arm.
     pub base: &'a Base,

@@ -27,7 +27,7 @@ pub enum PartSite {
     },
     /// Displacement of the position along an axis of the measuring frame.
     Shift {
-        /// Axis 0, 1 or 2.
+        /// Axis 0, 1 or 2, or 3 for the line of sight from the origin.
         axis: usize,
         /// True for an error of the instrument, false for a motion of the base.
         is_error: bool,

@@ -74,9 +74,9 @@ impl Model {
         })
     }
 
-    /// Returns the true position of the target in each pose at the full parameter vector `x`,
-    /// measuring frame \[m\], for every kind of row; NaN without equilibrium. Errors of the
-    /// instrument are left out.
+    /// Returns the predicted position of the target itself in each pose at the full parameter
+    /// vector `x`, measuring frame \[m\], for every kind of row; NaN without equilibrium. Errors of
+    /// the instrument are left out.
     pub(crate) fn predicted_targets(&self, poses: &[Pose], x: &[f64]) -> Vec<Vector3<f64>> {
         let (bases, points) = (self.base_frames(x), self.predicted_targets_in_base(poses, x));
         let position = |(pose, point): (&Pose, Option<Vector3<f64>>)| {

@@ -30,13 +30,15 @@ pub(super) struct Rigid {
     placed: Vec<[Vector3<f64>; 6]>,
 }
 
-/// Link whose parameters are dual-number variables, with the index of the input for each motion:
-/// five of the geometry, and six of the placement.
+/// Link whose parameters are dual-number variables, with the index of the input for each of its
+/// elementary motions; `None` for motions without an input.
 struct Link {
     joint: Joint<Dual64>,
+    /// Inputs of α, a, θ, d, β.
     inputs: [Option<usize>; 5],
+    /// Inputs of x, y, z, roll, pitch, yaw of the placement.
     placing: [Option<usize>; 6],
-    /// Index of the input for each small motion on either side of the joint; `None` for fixed ones.
+    /// Inputs of the small motions on either side of the joint.
     moving: [Option<usize>; 2 * MOTION],
 }
 

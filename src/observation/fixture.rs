@@ -91,8 +91,9 @@ impl FixtureKind {
     }
 }
 
-/// Numbers of a fixture in the order of [`FixtureKind::fields`], SI, measuring frame, followed by
-/// zeros.
+/// Numbers of a fixture in the order of [`FixtureKind::fields`], in SI units or px, followed by
+/// zeros. Those of cameras and markers are in the frame that carries them, others in the measuring
+/// frame.
 #[derive(Debug, Clone, Copy)]
 pub struct FixtureValues<S> {
     /// Kind of the fixture.

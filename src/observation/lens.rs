@@ -6,8 +6,8 @@ use num_dual::DualSVec64;
 use super::{FixtureKind, FixtureValues};
 use crate::scalar::{Scalar, gradient, seeded};
 
-/// Smallest squared slope (tangent squared) of a ray relative to the optical axis for which its
-/// angle is computed. Below it, angle and tangent are equal to rounding.
+/// Squared slope (tangent squared) that is added to that of a ray, so that its angle has a
+/// derivative on the optical axis. There, angle and tangent are equal to rounding.
 const MIN_SQUARED_SLOPE: f64 = 1e-20;
 
 /// Number of Newton steps that invert the distortion.

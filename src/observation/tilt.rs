@@ -25,7 +25,7 @@ pub(super) const KIND: Kind = Kind {
     suspects: "the names in the column frame",
 };
 
-/// Smallest squared cosine of a tilt in the derivative, so that a tilt of 90° has one.
+/// Squared cosine that is added to that of a tilt, so that the tilt has a derivative at 90°.
 const MIN_SQUARED_COSINE: f64 = 1e-18;
 
 /// Predicts the angles τ of the frame's x and y axes above the horizontal \[rad\]: sin τ = a·u for

@@ -155,7 +155,7 @@ const fn mm(name: &'static str) -> Suffix {
     Suffix { name, to_si: |x| x / 1000.0 }
 }
 
-/// Returns a row of the table.
+/// Expands to a [`Row`] of the unit table.
 macro_rules! row {
     ($noun:literal, $symbol:literal, [$($suffix:expr),*], $shown:expr) => {
         Row { noun: $noun, symbol: $symbol, suffixes: const { &[$($suffix),*] }, shown: $shown }

@@ -7,7 +7,7 @@ use super::AtBound;
 /// Distance from its limit, relative to the size of its terms and of x, up to which a row counts as
 /// active (on the limit).
 const MAX_ACTIVE_DISTANCE: f64 = 1e-12;
-/// Violation up to which a row counts as satisfied, relative to the size of its terms.
+/// Largest violation at which a row counts as satisfied, relative to the size of its terms.
 const MAX_ROUNDING_VIOLATION: f64 = 1e-14;
 
 /// Linear inequalities lo ≤ A x ≤ hi, infinite where a side has no limit.

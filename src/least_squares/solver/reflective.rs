@@ -31,7 +31,7 @@ pub struct Reflective {
 #[derive(Debug, Clone)]
 struct ScaledModel {
     factor: Factor,
-    /// Scale d = √v / D, or 1/D if there is no bound in the direction of descent; 0 for a fixed
+    /// Scale d = √(v / D), or 1/D if there is no bound in the direction of descent; 0 for a fixed
     /// unknown.
     size: DVector<f64>,
     gradient: DVector<f64>,

@@ -15,7 +15,7 @@ use crate::least_squares::Objective;
 /// Distance to a bound, as a fraction of the width between the bounds, up to which a solution is
 /// moved onto the bound.
 const MAX_DISTANCE_TO_BOUND: f64 = 1e-3;
-/// Relative increase of the cost that counts as rounding.
+/// Largest relative increase of the cost that counts as rounding.
 const COST_ROUNDING: f64 = 1e-12;
 
 /// Minimises ½‖r(x)‖² from `start` by Levenberg–Marquardt.

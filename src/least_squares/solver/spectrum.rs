@@ -58,7 +58,7 @@ impl Spectrum {
         q
     }
 
-    /// Returns λ ≥ 0 with ‖q(λ)‖ = Δ to within the slack, or zero if ‖q(0)‖ is not longer.
+    /// Returns λ ≥ 0 with ‖q(λ)‖ = Δ to within 10 %, or zero if ‖q(0)‖ is not longer.
     ///
     /// Newton's method on 1/‖q(λ)‖ = 1/Δ from λ = 0 converges monotonically [Hebden 1973; Moré
     /// 1978].

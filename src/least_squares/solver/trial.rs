@@ -2,8 +2,9 @@
 
 use super::Step;
 
-/// Ratio of geodesic acceleration to step length at which the radius aims: after an accelerated
-/// step it grows by this ratio over the actual one, at least 1.5 and at most 8 times.
+/// Ratio of geodesic acceleration to step length that the next radius aims at. After an accelerated
+/// step, the radius is multiplied by this ratio over the actual one, at least by 1.5 and at most by
+/// 8.
 const TARGET_ACCELERATION: f64 = 0.03;
 /// Smallest gain ratio ρ at which the radius grows.
 pub(super) const GOOD_RATIO: f64 = 0.75;

@@ -18,7 +18,7 @@ const MIN_ACCEPTED_RATIO: f64 = 1e-4;
 const MAX_ACCELERATION: f64 = 0.75;
 /// Maximum number of accelerated steps tried from one point, with decreasing radius.
 const MAX_ACCELERATION_TRIES: usize = 6;
-/// Relative change of the cost that counts as rounding.
+/// Largest relative change of the cost that counts as rounding.
 const MAX_COST_ROUNDING: f64 = 1e3 * f64::EPSILON;
 
 /// Method by which a solver chooses its step from a linearisation.

@@ -37,7 +37,7 @@ impl Candidate {
     }
 }
 
-/// Parameter of a declared effect.
+/// Parameter of an effect, declared or not.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EffectParameter {
     /// Name such as `gear-ratio[3].error`.
