@@ -13,7 +13,7 @@ use crate::spatial::rotate;
 pub(super) type EffectValues<'a> = (&'a Effect, &'a [f64]);
 
 impl Rig {
-    /// Returns the chain of one pose in the base frame, and the frame of each joint on it.
+    /// Returns the undeformed chain of one pose, and the frame of each joint on it.
     pub(super) fn chain(&self, conditions: &PoseConditions) -> (Chain, Vec<PieceFrame>) {
         let gravity = self.gravity();
         let weight = |mass: f64| Force::Constant(gravity * mass);
@@ -30,9 +30,9 @@ impl Rig {
                 chain.end().rotate_x(rpy.x.sin_cos());
             }
             chain.end().rotate_x(joint.alpha.sin_cos());
-            self.link(joint, number, &gravity, conditions, &mut chain);
+            self.add_link(joint, number, &gravity, conditions, &mut chain);
             let (lateral, about_axis) = self.joint_hinges(joint, number, conditions);
-            chain.hinge(lateral);
+            chain.add_hinge(lateral);
             let before = self.moved_by_laws(conditions, At::Before, Some(number));
             *chain.end() = chain.end().compose(&before);
             let (mut turn, mut slide) = (joint.theta, joint.d);
@@ -47,12 +47,12 @@ impl Rig {
                 JointKind::Prismatic => slide += q + error,
                 JointKind::Fixed => turn += error,
             }
-            chain.hinge(about_axis);
+            chain.add_hinge(about_axis);
             if !about_axis.is_rigid() {
-                chain.spring(self.springs(number, turn));
+                chain.add_springs(self.springs(number, turn));
             }
             chain.end().rotate_z(turn.sin_cos());
-            self.slide(number, slide, &mut chain);
+            self.add_slide(number, slide, &mut chain);
             chain.end().rotate_y(joint.beta.sin_cos());
             let behind = self.moved_by_laws(conditions, At::After, Some(number));
             *chain.end() = chain.end().compose(&behind);
@@ -61,14 +61,14 @@ impl Rig {
                 *chain.end() = chain.end().compose(&tool);
             }
             for body in &joint.bodies {
-                chain.load(&body.position, weight(body.mass));
+                chain.add_load(&body.position, weight(body.mass));
             }
             frames.push(chain.end_frame());
         }
         let payload = self.payload(conditions);
         if let Some(tool) = frames.get(self.arm.tool.joint).filter(|_| payload != 0.0) {
             chain.continue_from(tool);
-            chain.load(&self.arm.tool.payload_at, weight(payload));
+            chain.add_load(&self.arm.tool.payload_at, weight(payload));
         }
         (chain, frames)
     }
@@ -78,7 +78,7 @@ impl Rig {
         self.effects.iter().filter_map(TrueEffect::catalogued)
     }
 
-    /// Returns the gravity vector, base frame [m/s²].
+    /// Returns the true gravity vector, base frame [m/s²].
     pub(super) fn gravity(&self) -> Vector3<f64> {
         let turn = |gravity, effect: EffectValues<'_>| match effect {
             (Effect::GravityDirection, &[x, y]) => rotate(&Vector3::new(x, y, 0.0), &gravity),
@@ -98,8 +98,8 @@ impl Rig {
         hinge
     }
 
-    /// Returns two hinges of a joint: the lateral one before its rotation, and the one about its z
-    /// axis. `number` counts from 1.
+    /// Returns two hinges of a joint: the one that tilts across the axis before the joint's
+    /// rotation, and the one about the joint's z axis. `number` counts joints from 1.
     fn joint_hinges(
         &self,
         joint: &Joint,
@@ -134,8 +134,8 @@ impl Rig {
         (lateral, about_axis)
     }
 
-    /// Returns the springs of gravity compensators at a joint whose undeformed angle is `angle`
-    /// \[rad\].
+    /// Returns the springs of gravity compensators at a joint whose angle without deformation is
+    /// `angle` \[rad\]; `number` counts joints from 1.
     fn springs(&self, number: usize, angle: f64) -> impl Iterator<Item = Spring> {
         self.effect_values().filter_map(move |effect| match effect {
             (
@@ -150,7 +150,7 @@ impl Rig {
         })
     }
 
-    /// Returns the true payload of a pose: the commanded one with its error \[kg\].
+    /// Returns the true payload of a pose \[kg\]: the stated one with its error.
     fn payload(&self, conditions: &PoseConditions) -> f64 {
         let declared = conditions.payload.unwrap_or(self.arm.tool.payload_mass);
         let add = |payload: f64, effect: EffectValues<'_>| match effect {
@@ -161,7 +161,7 @@ impl Rig {
     }
 }
 
-/// Returns the compliance 1/k, or 0 for a rigid part.
+/// Returns the compliance 1 / `stiffness`, or 0 for a rigid part (`None`).
 pub(super) fn compliance(stiffness: Option<f64>) -> f64 {
     stiffness.map_or(0.0, f64::recip)
 }

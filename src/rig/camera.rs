@@ -17,13 +17,14 @@ const MAX_DRAWS: usize = 3000;
 /// Smallest cosine of the angle between the line of sight and the normal of a flat marker at which
 /// its points are found: 60°.
 const MIN_COS_INCIDENCE: f64 = 0.5;
-/// Largest distance of a point from the plane of the others at which a marker counts as flat, as a
-/// share of its size.
+/// Largest distance of a marker's point from the plane of the others at which the marker counts as
+/// flat, as a fraction of the largest distance of a point from the first.
 const MAX_FLAT_RATIO: f64 = 0.05;
 
 impl Rig {
-    /// Takes images of a pose with all cameras. Returns a row for each point in view, with noise;
-    /// `None` if there is none. If `may_move`, configurations are drawn until one shows a point.
+    /// Takes images of a pose with all cameras. Returns a row for each marker point in view, with
+    /// noise; `None` if there is none. If `may_move` is true, configurations are drawn until one
+    /// shows a point, at most [`MAX_DRAWS`] times.
     pub(super) fn take_images(
         &self,
         row: &mut Row,
@@ -48,8 +49,8 @@ impl Rig {
         Ok(None)
     }
 
-    /// Returns a row for each seen point, with the conditions of the pose `row`. The σ of a pixel is
-    /// that of the truth or of the camera.
+    /// Returns a row for each seen point, with noise on its pixel and the conditions of the pose
+    /// `row`. The σ of the noise is that of the truth, or else of the camera.
     fn rows_of_points(
         &self,
         row: &mut Row,
@@ -74,7 +75,8 @@ impl Rig {
         rows
     }
 
-    /// Returns the points of markers that cameras see in equilibrium, with their pixels.
+    /// Returns the points of markers that cameras see in static equilibrium, with their pixels
+    /// without noise.
     fn points_in_view(
         &self,
         conditions: &PoseConditions,
@@ -82,7 +84,7 @@ impl Rig {
         let (chain, frames) = self.chain(conditions);
         let equilibrium = Equilibrium::find(&chain).ok_or(NoEquilibrium)?;
         let base = Frame::from_rotation_vector(self.arm.base.translation, &self.arm.base.rotation);
-        let base = isometry(&self.mounted(conditions).compose(&base));
+        let base = isometry(&self.mounting_frame(conditions).compose(&base));
         let foot = PieceFrame { piece: Some(0), frame: Frame::identity() };
         let of_fixture = |fixture: &Fixture| {
             let number = |k: usize| fixture.known.get(k).copied().flatten().unwrap_or(0.0);
@@ -114,7 +116,7 @@ impl Rig {
     }
 }
 
-/// Returns the fixtures whose kind has a word, with their numbers.
+/// Returns the fixtures whose kind has the name `word`, with their indices among all fixtures.
 fn numbered<'a>(
     fixtures: &'a [Fixture],
     word: &'static str,
@@ -122,8 +124,8 @@ fn numbered<'a>(
     (0..).zip(fixtures).filter(move |(_, fixture)| fixture.kind.word() == word)
 }
 
-/// Returns the pixel of a point, camera frame \[m\]; `None` if it is behind the camera, outside the
-/// image, or seen at more than 60° from the `normal` of its marker.
+/// Returns the pixel of a point, which is given in the camera frame \[m\]; `None` if it is behind
+/// the camera, outside the image, or seen at more than 60° from the `normal` of its marker.
 fn pixel(lens: &Fixture, point: &Point3<f64>, normal: Option<&Vector3<f64>>) -> Option<[f64; 2]> {
     let number = |k: usize| lens.known.get(k).copied().flatten().unwrap_or(0.0);
     let is_flat_on = normal.is_none_or(|normal| {
@@ -158,7 +160,8 @@ fn pixel(lens: &Fixture, point: &Point3<f64>, normal: Option<&Vector3<f64>>) -> 
     ((0.0..width).contains(&u) && (0.0..height).contains(&v)).then_some([u, v])
 }
 
-/// Returns the unit normal of points in a plane; `None` for points in space or on a line.
+/// Returns the unit normal of points in a plane; `None` for points in space or on a line, and
+/// without points.
 fn normal_of(points: &[Vector3<f64>]) -> Option<Vector3<f64>> {
     let first = points.first()?;
     let from_first = || points.iter().map(|point| point - first);

@@ -4,16 +4,18 @@ use nalgebra::{Rotation2, Vector2, Vector3};
 
 use crate::spatial::Frame;
 
-/// Lumped spring between two rigid pieces, with compliance, play and deformation without load.
+/// Lumped spring between two rigid pieces of the arm, with compliance, play and deformation without
+/// load.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Hinge {
-    /// Compliance about each axis [rad/(N·m)].
+    /// Rotation about each axis per moment about the same axis [rad/(N·m)].
     pub compliance: Vector3<f64>,
-    /// Coupling compliances [rad/(N·m)]: between the x and y axes, then between the x and z axes.
+    /// Rotation about one axis per moment about another [rad/(N·m)]: first for the pair x and y,
+    /// then for the pair x and z.
     pub coupling: Vector2<f64>,
-    /// Angle about z per cube of the moment [rad/(N·m)³].
+    /// Angle about z per cube of the moment about z [rad/(N·m)³].
     pub cubic: f64,
-    /// Play b about z, taken up by the moment \[rad\].
+    /// Play b about z \[rad\]. The moment about z rotates the hinge by up to b/2 to its side.
     pub play: f64,
     /// Elongation along x per force [m/N].
     pub stretch: f64,
@@ -23,7 +25,7 @@ pub(super) struct Hinge {
     pub free_stretch: f64,
 }
 
-/// Moment at which 76 % (tanh 1) of the play is taken up [N·m].
+/// Moment at which the hinge has rotated by 76 % (tanh 1) of half its play [N·m].
 const PLAY_MOMENT: f64 = 1.0;
 
 impl Hinge {
@@ -56,8 +58,8 @@ pub(super) struct Motion {
     pub stretch: f64,
 }
 
-/// Spring across a hinge. It pulls a point of the piece behind the hinge towards a point before it;
-/// coordinates are x and y of the hinge.
+/// Spring of a gravity compensator across a hinge. It pulls a point of the piece behind the hinge
+/// towards an anchor before the hinge; points are given by x and y in the frame of the hinge.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Spring {
     /// Index of the piece behind the hinge.
@@ -85,7 +87,7 @@ impl Spring {
     }
 }
 
-/// Rigid piece with the hinge before it.
+/// Rigid piece of the arm with the hinge before it.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Piece {
     pub hinge: Hinge,
@@ -99,7 +101,7 @@ pub(super) struct PieceFrame {
     /// Index of the piece, which is lower than that of any piece mounted on this frame; `None` is
     /// the base.
     pub piece: Option<usize>,
-    /// Frame relative to the hinge of the piece, or to the base.
+    /// Frame relative to the deformed end of the piece's hinge, or to the base.
     pub frame: Frame<f64>,
 }
 
@@ -108,7 +110,7 @@ pub(super) struct PieceFrame {
 pub(super) struct Load {
     /// Index of the piece that carries the load.
     pub piece: usize,
-    /// Point of action, relative to the hinge of the piece \[m\].
+    /// Point of action, relative to the deformed end of the piece's hinge \[m\].
     pub at: Vector3<f64>,
     pub force: Force,
 }
@@ -150,7 +152,7 @@ pub(super) struct Chain {
     pub springs: Vec<Spring>,
     /// Index of the piece to which the next elements are added.
     last: usize,
-    /// Current end of that piece, relative to its hinge.
+    /// Current end of that piece, relative to the piece's hinge.
     end: Frame<f64>,
 }
 
@@ -178,7 +180,7 @@ impl Chain {
     }
 
     /// Adds a hinge and a new piece behind it; a rigid hinge adds nothing.
-    pub fn hinge(&mut self, hinge: Hinge) {
+    pub fn add_hinge(&mut self, hinge: Hinge) {
         if !hinge.is_rigid() {
             self.pieces.push(Piece { hinge, root: self.end_frame() });
             (self.last, self.end) = (self.pieces.len() - 1, Frame::identity());
@@ -186,13 +188,14 @@ impl Chain {
     }
 
     /// Adds springs across the last hinge.
-    pub fn spring(&mut self, springs: impl Iterator<Item = Spring>) {
+    pub fn add_springs(&mut self, springs: impl Iterator<Item = Spring>) {
         let piece = self.last;
         self.springs.extend(springs.map(|spring| Spring { piece, ..spring }));
     }
 
-    /// Returns the sum, over all loads, of the force here times the point of action in the `moved`
-    /// chain, with every hinge undeformed [N·m]. Its differences are the work of the loads.
+    /// Returns Σ F · p over all loads [N·m], with every hinge undeformed. F is the force in this
+    /// chain, and p its point of action in the `moved` chain. Differences of the sum between moved
+    /// chains are the work of the loads.
     pub fn work(&self, moved: &Self) -> f64 {
         let forces = self.loads.iter().zip(self.points());
         let forces = forces.map(|(load, point)| load.force.at(&point));
@@ -211,7 +214,7 @@ impl Chain {
     }
 
     /// Adds a load at a point \[m\] relative to the current end of the chain.
-    pub fn load(&mut self, point: &Vector3<f64>, force: Force) {
+    pub fn add_load(&mut self, point: &Vector3<f64>, force: Force) {
         self.loads.push(Load { piece: self.last, at: self.end.point(point), force });
     }
 }

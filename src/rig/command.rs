@@ -6,10 +6,8 @@ use crate::laws::At;
 use crate::problem::{Effect, Mount, PoseConditions};
 
 impl Rig {
-    /// Returns the deviation of the joint with this number (from 1) from its command, without load
-    /// \[rad\] or \[m\].
-    ///
-    /// Deviations of a prismatic joint add to its d.
+    /// Returns by how much the coordinate of the joint with this number (from 1) exceeds its
+    /// command, without deformation under load \[rad\], or \[m\] for a prismatic joint.
     pub(super) fn command_error(&self, number: usize, conditions: &PoseConditions) -> f64 {
         let command =
             |joint: usize| conditions.configuration.get(joint - 1).copied().unwrap_or(0.0);
@@ -80,14 +78,16 @@ impl Rig {
         self.effects.iter().map(deviation).sum::<f64>() + by_laws
     }
 
-    /// Returns the value of a covariate declared by the problem, in its unit; 0 if it is unknown.
+    /// Returns the value of the covariate `name` of the problem in a pose, in its unit; 0 if the
+    /// pose has none.
     pub(super) fn covariate(&self, name: &str, conditions: &PoseConditions) -> f64 {
         let covariates = self.arm.data.covariates.iter().zip(&conditions.covariates);
         let matching = covariates.filter(|(covariate, _)| covariate.name == name);
         matching.map(|(_, value)| *value).sum()
     }
 
-    /// Returns the temperature difference T − T₀ [°C].
+    /// Returns the difference T − T₀ from the reference temperature [°C]; 0 if either is not
+    /// stated.
     pub(super) fn warming(&self, conditions: &PoseConditions) -> f64 {
         match (conditions.temperature, self.arm.data.reference_temperature) {
             (Some(temperature), Some(reference)) => temperature - reference,
@@ -96,7 +96,7 @@ impl Rig {
     }
 
     /// Returns the lagged temperature difference T̃ − T₀ [°C] of a body that follows the
-    /// temperature with a time constant \[s\].
+    /// temperature with a time constant \[s\]; 0 if the pose states no temperature.
     ///
     /// The temperature is linear between the readings of successive poses.
     pub(super) fn lagged_warming(&self, conditions: &PoseConditions, time_constant: f64) -> f64 {
@@ -119,8 +119,9 @@ impl Rig {
     }
 }
 
-/// Returns the friction state z ∈ [−1, 1] of a joint (index from 0) after the earlier poses of the
-/// session. `distance` is the friction path \[rad\] or \[m\] [Dahl 1968].
+/// Returns the friction state z ∈ [−1, 1] of a joint (index from 0) in a pose, after the earlier
+/// poses of the session. `distance` is the path over which the friction reverses \[rad\] or \[m\].
+/// [Dahl 1968]
 pub(super) fn friction(conditions: &PoseConditions, joint: usize, distance: f64) -> f64 {
     let past = &conditions.past;
     let joints = conditions.configuration.len();

@@ -1,4 +1,5 @@
-//! Rows that measure against fixtures: search of a configuration in contact, and the reading.
+//! Simulated rows that measure against fixtures: search of a configuration in contact, and the
+//! measured values.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -23,13 +24,13 @@ const CONTACT_TOLERANCE: f64 = 1e-9;
 const DIFFERENCE_STEP: f64 = 1e-6;
 /// Largest change of a joint coordinate in one Newton step \[rad\] or \[m\].
 const MAX_STEP: f64 = 0.3;
-/// Smallest ratio of singular values at which a direction of joint space is moved; the others keep
-/// their values.
+/// Smallest singular value of the gap's Jacobian, relative to the largest, whose direction in joint
+/// space a Newton step moves along.
 const RANK_TOLERANCE: f64 = 1e-3;
 
 impl Rig {
-    /// Returns the offset of a target from a fixture \[m\]: the vector from a point, the distance
-    /// from an anchor, or the height above a surface.
+    /// Returns the offset of a target position from a fixture \[m\]: the vector from a point, or,
+    /// as first component, the distance from an anchor or the height above a surface.
     fn fixture_offset(&self, fixture: usize, target: &Vector3<f64>) -> Vector3<f64> {
         let Some(fixture) = self.arm.fixtures.get(fixture) else { return Vector3::zeros() };
         let number = |k: usize| fixture.known.get(k).copied().flatten().unwrap_or(0.0);
@@ -42,15 +43,13 @@ impl Rig {
             FixtureKind::Plane => {
                 scalar(plane_normal(position.x, position.y).dot(target) - position.z)
             }
-            // The rig takes no images.
+            // Cameras and markers are not touched; images measure them.
             _ => Vector3::zeros(),
         }
     }
 
-    /// Returns the angles of the x and y axes of a frame above the horizontal \[rad\], in
-    /// equilibrium.
-    ///
-    /// A plumb line shows them: an axis is at the angle ½π − τ from the line.
+    /// Returns the angles of the x and y axes of a frame above the horizontal \[rad\], in static
+    /// equilibrium; the third component is 0. `frame` 0 is the base, i the frame of joint i.
     fn tilts(
         &self,
         conditions: &PoseConditions,
@@ -68,8 +67,9 @@ impl Rig {
         Ok(Vector3::new(above(&frame.axes[0]), above(&frame.axes[1]), 0.0))
     }
 
-    /// Measures a row. For a contact, it first moves the joints until the target touches the
-    /// fixture, with the row's noise as remaining offset.
+    /// Measures a row, whose position and orientation hold the noise before. For a contact, the
+    /// joints are first moved until the target touches the fixture, with the noise as remaining
+    /// offset.
     ///
     /// Returns `None` if no configuration in contact was found within the joint ranges.
     pub(super) fn measure(
@@ -89,7 +89,7 @@ impl Rig {
             Observation::Point(fixture) => (fixture, noise),
             Observation::Surface(fixture) => (fixture, Vector3::new(noise.x, 0.0, 0.0)),
             Observation::Distance(anchor) => {
-                let (target, _) = self.placed(&row.target, &row.conditions)?;
+                let (target, _) = self.true_pose_of(&row.target, &row.conditions)?;
                 row.position =
                     self.fixture_offset(anchor, &target) + Vector3::new(noise.x, 0.0, 0.0);
                 row.orientation = None;
@@ -105,7 +105,7 @@ impl Rig {
         (row.position, row.orientation) = (Vector3::zeros(), None);
         let (count, measured) = (row.observation.coordinates(), row.target.clone());
         let gap = |conditions: &PoseConditions| -> Result<DVector<f64>, NoEquilibrium> {
-            let (position, _) = self.placed(&measured, conditions)?;
+            let (position, _) = self.true_pose_of(&measured, conditions)?;
             let gap = self.fixture_offset(fixture, &position) - target;
             Ok(DVector::from_column_slice(&gap.as_slice()[..count]))
         };
@@ -124,8 +124,8 @@ impl Rig {
         Ok(None)
     }
 
-    /// Moves the joints by Newton's method until `gap` \[m\] is zero. Returns true if that
-    /// succeeded within the joint ranges.
+    /// Moves the joints by Newton's method until `gap` \[m\] is zero. Returns true if a
+    /// configuration within the joint ranges of the truth was found.
     fn move_to_contact(
         &self,
         conditions: &mut PoseConditions,

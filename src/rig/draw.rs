@@ -26,21 +26,22 @@ const SPLIT_STREAM: u64 = 3;
 const EFFECT_STREAM: u64 = 4;
 /// Random stream of the orientation noise.
 const ORIENTATION_NOISE_STREAM: u64 = 5;
-/// First random stream of contact searches; each pose has one stream.
+/// First random stream of contact searches and images; each pose has one stream.
 const FIRST_CONTACT_STREAM: u64 = 1000;
 
 /// Simulated measurement of one pose.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Row {
-    /// Commanded conditions of the pose.
+    /// Commands, payload, temperature and other conditions of the pose.
     pub conditions: PoseConditions,
     /// Name of the measured target; empty if the problem declares none.
     pub target: String,
     /// Kind of measurement of the row.
     pub observation: Observation,
-    /// Measured position, measuring frame, or a distance; 0 for a contact \[m\].
+    /// Measured position, measuring frame \[m\]; 0 for a contact. Other kinds of rows use the first
+    /// components: a distance \[m\], two tilts \[rad\], or two pixels.
     pub position: Vector3<f64>,
-    /// Measured orientation, measuring frame, if orientations are measured.
+    /// Measured orientation, measuring frame; `None` if it is not measured.
     pub orientation: Option<UnitQuaternion<f64>>,
     /// True if the row is held out.
     pub held_out: bool,
@@ -55,12 +56,12 @@ pub struct Simulation {
     pub(crate) joints: Vec<Joint>,
     /// Seed of all random numbers.
     pub seed: u64,
-    /// Truth from which the arm was drawn.
+    /// Description of the true arm from which it was drawn.
     pub truth: Truth,
     /// All parameters with their true values.
     #[doc(hidden)]
     pub parameters: Vec<TrueParameter>,
-    /// Rig with the true arm.
+    /// Test rig with the true arm.
     #[doc(hidden)]
     pub rig: Rig,
     /// Measurements in order of time.
@@ -68,7 +69,7 @@ pub struct Simulation {
     pub rows: Vec<Row>,
     /// Name of the column that marks held-out rows.
     pub split_column: String,
-    /// Names of the columns of the problem's covariates, if the poses have them.
+    /// Names of the problem's covariates, which are columns; empty if the poses have none.
     pub(super) covariates: Vec<String>,
 }
 
@@ -103,15 +104,14 @@ pub enum SimulationError {
     },
 }
 
-/// Random arm, poses and noise, before any measurement.
+/// Drawn true arm, poses and noise, before any measurement.
 #[derive(Debug, Clone)]
 pub struct Draw {
     /// Problem with true values in place of nominal ones.
     pub arm: Problem,
     /// All parameters with their true values.
     pub parameters: Vec<TrueParameter>,
-    /// Poses in order of time, none held out; `position` and `orientation` hold the noise alone
-    /// \[m\].
+    /// Poses in order of time, none held out; `position` and `orientation` hold the noise alone.
     pub rows: Vec<Row>,
 }
 
@@ -160,14 +160,14 @@ pub fn simulate(
 /// Poses of a simulation.
 #[derive(Debug, Clone)]
 pub enum SimulatedPoses {
-    /// This many random poses.
+    /// Number of poses, which are drawn at random.
     Random(usize),
     /// Given poses, each with the name of its target.
     Given(Vec<(PoseConditions, String)>),
 }
 
 /// Measures the true arm as [`simulate`] and [`simulate_poses`] do, and calls `measured` after each
-/// pose.
+/// pose, possibly from several threads.
 ///
 /// # Errors
 /// Returns an error if a pose has no equilibrium, or if the arm does not reach a fixture.
@@ -211,7 +211,8 @@ pub fn simulate_poses(
     simulate_counted(problem, truth, SimulatedPoses::Given(poses), seed, &|| ())
 }
 
-/// Returns given poses as rows, with drawn temperatures and approach sides where they lack them.
+/// Returns given poses as rows. Times are drawn; temperatures, approach sides and covariates are
+/// drawn if a pose lacks them.
 fn given_rows(
     problem: &Problem,
     truth: &Truth,
@@ -238,8 +239,8 @@ fn given_rows(
     rows
 }
 
-/// Measures a drawn arm in the drawn poses; calls `measured` after each pose. If `may_move`, other
-/// configurations are drawn for images that show nothing; otherwise they have no rows.
+/// Measures a drawn arm in the drawn poses; calls `measured` after each pose. If `may_move` is
+/// true, other configurations are drawn for images that show nothing; otherwise they have no rows.
 fn measure(
     problem: &Problem,
     truth: &Truth,
@@ -310,7 +311,8 @@ fn measure(
     })
 }
 
-/// Returns standard normal numbers for effect values, from a separate stream.
+/// Returns `count` standard normal numbers for drawing effect values, from a stream that nothing
+/// else uses.
 pub(crate) fn standard_normals(count: usize, seed: u64) -> Vec<f64> {
     let mut random = stream(seed, EFFECT_STREAM);
     (0..count).map(|_| normal(&mut random)).collect()
@@ -329,8 +331,8 @@ pub(super) fn between(random: &mut ChaCha8Rng, (from, to): (f64, f64)) -> f64 {
     from + (to - from) * random.random::<f64>()
 }
 
-/// Returns the arm with its true parameters. A value given in the truth precedes a drawn one, and a
-/// drawn one the nominal value.
+/// Returns the arm with its true parameters. A value given in the truth takes precedence over a
+/// drawn one, and a drawn one over the nominal value.
 fn true_arm(
     problem: &Problem,
     truth: &Truth,
@@ -344,7 +346,7 @@ fn true_arm(
         // the others.
         let drawn = normal(&mut random);
         if let Some(given) = truth.parameters.iter().rev().find(|given| given.name == name) {
-            *value = parameters::deviated(unit, nominal, given.value);
+            *value = parameters::true_value(unit, nominal, given.value);
         } else if let Some(sigma) = truth
             .random
             .iter()
@@ -352,7 +354,7 @@ fn true_arm(
             .find(|rule| matches(&rule.pattern, &name))
             .and_then(|rule| rule.sigma(unit))
         {
-            *value = parameters::spread(unit, nominal, sigma, drawn);
+            *value = parameters::random_value(unit, nominal, sigma, drawn);
         }
         parameters.push(TrueParameter { name, unit, nominal, value: *value });
     });

@@ -1,4 +1,5 @@
-//! Effects that the rig applies: those of the catalogue and one outside it, with their true values.
+//! Effects that the rig applies, with their true values: those of the catalogue, and smooth joint
+//! errors that it does not contain.
 
 use crate::problem::{Effect, Joint, JointKind, Mount, law_unit};
 use crate::quantity::Unit;
@@ -18,7 +19,7 @@ pub enum Cause {
     },
 }
 
-/// Shape of an error over q, with u = (q − centre)/width.
+/// Shape of a joint error as a function of the command q, with u = (q − centre)/width.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Shape {
@@ -67,7 +68,8 @@ impl TrueEffect {
         &self.values
     }
 
-    /// Returns the names of the values, in the order of the law, with the suffix of their SI unit.
+    /// Returns the names of the values of a cause, with the suffix of their SI unit, in the order
+    /// in which docs/truth.md lists them.
     pub fn keys(cause: &Cause, joints: &[Joint]) -> Vec<String> {
         keys(cause, joints)
             .into_iter()
@@ -85,7 +87,8 @@ impl TrueEffect {
     }
 }
 
-/// Returns names and units of the values of a cause, in the order that docs/truth.md states.
+/// Returns names and units of the values of a cause, in the order in which docs/truth.md lists
+/// them.
 pub(super) fn keys(cause: &Cause, joints: &[Joint]) -> Vec<(String, Unit)> {
     let slides = |joint: &usize| {
         joints.get(joint - 1).is_some_and(|joint| joint.kind == JointKind::Prismatic)

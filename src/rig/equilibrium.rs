@@ -1,15 +1,18 @@
-//! Static equilibrium of a chain: the deformation of every hinge matches the load that it carries.
+//! Static equilibrium of a chain: the deformation of every hinge matches the force and the moment
+//! that act on it.
 
 use nalgebra::Vector3;
 
 use super::chain::{Chain, Load, Motion, PieceFrame};
 use crate::spatial::Frame;
 
-/// Largest sum of the changes of all hinges in a pass at which the equilibrium is reached [rad, m].
+/// Largest sum of the changes of all hinges in one pass at which the equilibrium is reached,
+/// rotations in rad and elongations in m.
 const EQUILIBRIUM_TOLERANCE: f64 = 1e-12;
-/// Maximum number of passes. If they do not suffice, the arm counts as too flexible for its loads.
+/// Maximum number of passes over all hinges. If they do not suffice, the arm counts as too flexible
+/// for its loads.
 const MAX_PASSES: usize = 2000;
-/// Smallest fraction of a pass that is applied after an overshoot.
+/// Smallest fraction of the changes of a pass that is applied after overshoots.
 const MIN_STEP: f64 = 1.0 / 64.0;
 
 /// Chain in static equilibrium, base frame.
@@ -18,9 +21,10 @@ pub(super) struct Equilibrium {
     hinges: Vec<Frame<f64>>,
     /// Frames of the pieces, base frame.
     pieces: Vec<Frame<f64>>,
+    /// Deformation of the hinge before each piece.
     motions: Vec<Motion>,
-    /// Total force \[N\] that each piece carries, and its moment about the origin of the base frame
-    /// [N·m].
+    /// Force \[N\] that all pieces beyond a piece exert on it, and the moment of that force about
+    /// the origin of the base frame [N·m].
     carried: Vec<(Vector3<f64>, Vector3<f64>)>,
 }
 
@@ -47,7 +51,7 @@ impl Equilibrium {
         let (mut step, mut least) = (1.0, f64::INFINITY);
         for _ in 0..MAX_PASSES {
             equilibrium.place(chain);
-            let change = equilibrium.load(chain, &loads, &mut next_missing);
+            let change = equilibrium.sum_loads(chain, &loads, &mut next_missing);
             if change <= EQUILIBRIUM_TOLERANCE {
                 return Some(equilibrium);
             }
@@ -94,10 +98,10 @@ impl Equilibrium {
         }
     }
 
-    /// Sums the loads from the tips inwards. Writes the change that each hinge needs to match its
-    /// load into `missing`, and returns the sum of the changes. `loads` must be in the order of the
-    /// pieces.
-    fn load(&mut self, chain: &Chain, loads: &[Load], missing: &mut [Motion]) -> f64 {
+    /// Sums the loads from the tips inwards. Writes into `missing` the change of deformation that
+    /// each hinge needs to match its load, and returns the sum of the changes. `loads` must be in
+    /// the order of the pieces.
+    fn sum_loads(&mut self, chain: &Chain, loads: &[Load], missing: &mut [Motion]) -> f64 {
         let mut sum = 0.0;
         let mut loads = loads.iter().rev().peekable();
         self.carried.clear();

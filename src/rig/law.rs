@@ -9,19 +9,20 @@ use crate::laws::{At, BeamField, Law, Quantity};
 use crate::problem::{Effect, JointKind, PoseConditions};
 use crate::spatial::Frame;
 
-/// Turn \[rad\] or displacement \[m\] of a joint to each side, over which the work of the loads is
-/// differentiated.
+/// Rotation \[rad\] or displacement \[m\] of a joint to each side, over which the work of the loads
+/// is differentiated numerically.
 const MOMENT_STEP: f64 = 1e-4;
 
 impl Rig {
-    /// Returns what those laws that `acts` accepts add to the quantity at their site, SI units.
+    /// Returns the sum that the laws for which `is_selected` is true add to the quantity at their
+    /// site, SI units.
     pub(super) fn added_by_laws(
         &self,
         conditions: &PoseConditions,
-        acts: impl Fn(&Law) -> bool,
+        is_selected: impl Fn(&Law) -> bool,
     ) -> f64 {
         let added = |effect: EffectValues<'_>| match effect {
-            (Effect::Law(law), coefficients) if acts(law) => {
+            (Effect::Law(law), coefficients) if is_selected(law) => {
                 self.sum_of_terms(law, coefficients, conditions)
             }
             _ => 0.0,
@@ -29,8 +30,9 @@ impl Rig {
         self.effect_values().map(added).sum()
     }
 
-    /// Returns the small motion that laws add at the six sites `at(0)` … `at(5)`; the identity
-    /// without such a law. `joint` counts from 1; `None` accepts laws of any place.
+    /// Returns the small motion that laws add: translations at the sites `at(0)` to `at(2)`, and
+    /// the rotation vector at `at(3)` to `at(5)`; the identity without such a law. `joint` counts
+    /// from 1; `None` accepts laws of any place.
     pub(super) fn moved_by_laws(
         &self,
         conditions: &PoseConditions,
@@ -46,7 +48,8 @@ impl Rig {
         Frame::from_rotation_vector(Vector3::from_fn(|axis, _| number(axis)), &turn)
     }
 
-    /// Returns the strain that laws add along a beam, and the curvatures about its y and z [1/m].
+    /// Returns the strain that laws add along the beam of a link, and the curvatures about the
+    /// beam's y and z axes [1/m].
     pub(super) fn strained_by_laws(&self, link: &str, conditions: &PoseConditions) -> [f64; 3] {
         BeamField::STRAINS.map(|field| {
             self.added_by_laws(conditions, |law| {
@@ -82,8 +85,9 @@ impl Rig {
         terms.map(|(formula, size)| size * formula.evaluate(&of, &inner)).sum()
     }
 
-    /// Returns the moment of the loads about the axis of a joint, counted from 0, on the
-    /// undeflected arm [N·m]. It is the work of the loads, with their errors, per turn of the joint.
+    /// Returns the moment of the loads about the axis of a joint on the undeflected arm [N·m]; for
+    /// a prismatic joint, their force along the axis \[N\]. It is the work of the loads, errors of
+    /// the loads included, per motion of the joint. `joint` counts from 0.
     fn moment(&self, joint: usize, conditions: &PoseConditions) -> f64 {
         let errors_of_loads = self.effects.iter().filter(|effect| {
             matches!(

@@ -15,11 +15,12 @@ type LinkLoad = (Vector3<f64>, Force);
 const OUTER_FRACTION: f64 = 0.211_324_865_405_187_1;
 
 impl Rig {
-    /// Adds the link along a joint's a: segments with two hinges each, or one rigid piece.
+    /// Adds to `chain` the link along the length a of a joint: segments with two hinges each, or
+    /// one rigid piece. `number` counts joints from 1.
     ///
     /// The link is divided where it carries a load, so that its bending moment is smooth along
     /// every segment.
-    pub(super) fn link(
+    pub(super) fn add_link(
         &self,
         joint: &Joint,
         number: usize,
@@ -33,22 +34,24 @@ impl Rig {
         }
         let mut loads =
             beam.map_or_else(Vec::new, |beam| self.link_loads(beam, joint.a, gravity, conditions));
-        // Loads beyond either end of the link act at that end.
+        // The link is divided at the load's distance from its root; a load beyond either end of the
+        // link acts at that end.
         let station = |at: &Vector3<f64>| (at.x * joint.a.signum()).clamp(0.0, joint.a.abs());
         loads.sort_by(|(a, _), (b, _)| station(a).total_cmp(&station(b)));
         let weight = gravity * beam.map_or(0.0, |beam| beam.mass);
         let mut from = 0.0;
         for (at, force) in loads {
             let to = station(&at);
-            self.span(&weight, joint, number, to - from, conditions, chain);
-            chain.load(&Vector3::new(at.x - to * joint.a.signum(), at.y, at.z), force);
+            self.add_span(&weight, joint, number, to - from, conditions, chain);
+            chain.add_load(&Vector3::new(at.x - to * joint.a.signum(), at.y, at.z), force);
             from = to;
         }
-        self.span(&weight, joint, number, joint.a.abs() - from, conditions, chain);
+        self.add_span(&weight, joint, number, joint.a.abs() - from, conditions, chain);
     }
 
-    /// Adds a part of a link, `reach` \[m\] long, divided into its share of the link's segments.
-    fn span(
+    /// Adds to `chain` a part of a link, `reach` \[m\] long, divided into its share of the link's
+    /// segments. `weight` is the weight of the whole link \[N\].
+    fn add_span(
         &self,
         weight: &Vector3<f64>,
         joint: &Joint,
@@ -68,21 +71,21 @@ impl Rig {
         let hinge = self.hinge(joint.beam.as_ref(), number, length / 2.0, conditions);
         let rigid = |part: f64, chain: &mut Chain| {
             let weight = Force::Constant(weight * (part * length / joint.a));
-            chain.load(&Vector3::new(part * length / 2.0, 0.0, 0.0), weight);
+            chain.add_load(&Vector3::new(part * length / 2.0, 0.0, 0.0), weight);
             chain.end().translate_x(part * length);
         };
         for _ in 0..segments {
             rigid(OUTER_FRACTION, chain);
-            chain.hinge(hinge);
+            chain.add_hinge(hinge);
             rigid(1.0 - 2.0 * OUTER_FRACTION, chain);
-            chain.hinge(hinge);
+            chain.add_hinge(hinge);
             rigid(OUTER_FRACTION, chain);
         }
     }
 
-    /// Adds the slide of a joint, `length` \[m\] along z (negative along −z): segments with two
-    /// hinges each, or one rigid piece.
-    pub(super) fn slide(&self, number: usize, length: f64, chain: &mut Chain) {
+    /// Adds to `chain` the slide of a joint, `length` \[m\] along z (negative along −z): segments
+    /// with two hinges each, or one rigid piece. `number` counts joints from 1.
+    pub(super) fn add_slide(&self, number: usize, length: f64, chain: &mut Chain) {
         let flexibility = |effect: EffectValues<'_>| match effect {
             (Effect::SlideBending { joint }, &[flexibility]) if *joint == number => flexibility,
             _ => 0.0,
@@ -96,14 +99,15 @@ impl Rig {
         let hinge = Hinge { compliance: Vector3::new(lateral, lateral, 0.0), ..Hinge::default() };
         for _ in 0..self.segments {
             chain.end().translate_z(OUTER_FRACTION * segment);
-            chain.hinge(hinge);
+            chain.add_hinge(hinge);
             chain.end().translate_z((1.0 - 2.0 * OUTER_FRACTION) * segment);
-            chain.hinge(hinge);
+            chain.add_hinge(hinge);
             chain.end().translate_z(OUTER_FRACTION * segment);
         }
     }
 
-    /// Returns the hinge that represents `length` \[m\] of a link (negative along −x).
+    /// Returns the hinge that represents `length` \[m\] of the link before the joint with this
+    /// number, from 1; `length` is negative for a link along −x.
     fn hinge(
         &self,
         beam: Option<&Beam>,
@@ -156,7 +160,7 @@ impl Rig {
         hinge
     }
 
-    /// Returns the loads on a beam of signed length `a` \[m\], except its weight.
+    /// Returns the loads on a beam of signed length `a` \[m\], except the beam's weight.
     fn link_loads(
         &self,
         beam: &Beam,

@@ -1,4 +1,5 @@
-//! Virtual test rig: positions of an arm made of many short rigid segments and lumped springs.
+//! Virtual test rig: simulates measurements of an arm made of many short rigid segments and lumped
+//! springs.
 //!
 //! The rig shares frames (`spatial`) and the declared arm (`problem`) with the rest of the program,
 //! but no physics: the model is tested against it. Every beam is divided into segments of three
@@ -57,7 +58,7 @@ pub use self::{
 #[doc(hidden)]
 pub const SEGMENTS: usize = 16;
 
-/// True arm on a simulated test bench.
+/// True arm on the simulated test rig, with the effects that act on it.
 #[doc(hidden)]
 #[derive(Debug, Clone)]
 pub struct Rig {
@@ -116,12 +117,13 @@ impl Rig {
         target: &str,
         conditions: &PoseConditions,
     ) -> Result<(Vector3<f64>, UnitQuaternion<f64>), NoEquilibrium> {
-        let (position, orientation) = self.placed(target, conditions)?;
+        let (position, orientation) = self.true_pose_of(target, conditions)?;
         Ok((self.track(position, conditions), orientation))
     }
 
-    /// Returns true position \[m\] and orientation of the target with this name, measuring frame.
-    fn placed(
+    /// Returns true position \[m\] and orientation of the target with this name, measuring frame;
+    /// of the tool if no target has the name.
+    fn true_pose_of(
         &self,
         target: &str,
         conditions: &PoseConditions,
@@ -136,7 +138,7 @@ impl Rig {
         };
         let carrier = equilibrium.frame(frames.get(joint).ok_or(NoEquilibrium)?);
         let base = Frame::from_rotation_vector(self.arm.base.translation, &self.arm.base.rotation);
-        let base = self.mounted(conditions).compose(&base);
+        let base = self.mounting_frame(conditions).compose(&base);
         let position = base.point(&carrier.point(&offset));
         let axes = base.compose(&carrier).axes;
         let last = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&axes));
@@ -145,9 +147,9 @@ impl Rig {
         if is_finite { Ok((position, orientation)) } else { Err(NoEquilibrium) }
     }
 
-    /// Returns the frame on which the base is mounted, measuring frame, moved by effects of
-    /// covariates and station moves.
-    fn mounted(&self, conditions: &PoseConditions) -> Frame<f64> {
+    /// Returns the frame on which the base is mounted, measuring frame. It is the measuring frame
+    /// itself unless covariates, moves of the station or laws displace the base.
+    fn mounting_frame(&self, conditions: &PoseConditions) -> Frame<f64> {
         let (mut turn, mut moved) = (Vector3::zeros(), Vector3::zeros());
         for effect in self.effect_values() {
             if let (Effect::Covariate { joint: Mount::Base, of }, [rx, ry, rz, x, y, z]) = effect {

@@ -47,7 +47,8 @@ impl Simulation {
         csv(self.header(), rows.map(|(pose, row)| self.cells(pose, row)))
     }
 
-    /// Returns the number of the pose of each row, from 1: points of one image have one pose.
+    /// Returns the number of the pose of each row, from 1. The rows of all points of one image have
+    /// the same number.
     fn pose_numbers(&self) -> Vec<usize> {
         let is_point = |row: &Row| matches!(row.observation, Observation::Pixel(..));
         let mut before: Option<&Row> = None;
@@ -83,6 +84,7 @@ impl Simulation {
         self.rows.iter().any(|row| !row.target.is_empty())
     }
 
+    /// Returns the column names of `measurements.csv`.
     fn header(&self) -> Vec<String> {
         let first = self.rows.first().map(|row| row.conditions.clone()).unwrap_or_default();
         let mut names = vec!["pose".to_owned(), self.split_column.clone()];
@@ -113,6 +115,7 @@ impl Simulation {
         names
     }
 
+    /// Returns the cells of a row in the order of the header; `pose` is the number of its pose.
     fn cells(&self, pose: usize, row: &Row) -> Vec<String> {
         let conditions = &row.conditions;
         let split = if row.held_out { "validation" } else { "identification" };
@@ -124,7 +127,7 @@ impl Simulation {
             }
         }));
         cells.extend(self.names_targets().then(|| row.target.clone()));
-        self.observed(row, &mut cells);
+        self.push_measured_cells(row, &mut cells);
         let turn =
             row.orientation.map(|orientation| orientation.scaled_axis().map(f64::to_degrees));
         let has_orientations = self.truth.orientation_sigma.is_some();
@@ -150,14 +153,15 @@ impl Simulation {
         kinds().filter(|kind| self.rows.iter().any(|row| row.observation.kind() == kind.name))
     }
 
-    /// Appends the measured values to `cells`, in the columns of all kinds of rows in the table.
-    fn observed(&self, row: &Row, cells: &mut Vec<String>) {
+    /// Appends the measured values of a row to `cells`. The columns of other kinds of rows in the
+    /// table get empty cells.
+    fn push_measured_cells(&self, row: &Row, cells: &mut Vec<String>) {
         for kind in self.kinds() {
             let is_of_kind = row.observation.kind() == kind.name;
             let cell = |text: String| if is_of_kind { text } else { String::new() };
             for field in kind.references() {
                 let mut words = reference_cells(&self.rig.arm, row.observation);
-                let word = words.find(|(known, _)| known.name == field.name);
+                let word = words.find(|(reference, _)| reference.name == field.name);
                 cells.push(cell(word.map(|(_, word)| word).unwrap_or_default()));
             }
             let decimals = if kind.unit == Unit::Length { 6 } else { 7 };
@@ -183,7 +187,7 @@ impl Simulation {
                 .truth
                 .effects
                 .iter()
-                .map(|effect| described(effect, &self.joints))
+                .map(|effect| effect_json(effect, &self.joints))
                 .collect(),
             parameters: self.parameters.iter().map(parameter).collect(),
         };
@@ -191,10 +195,11 @@ impl Simulation {
         serde_json::to_string_pretty(&document).unwrap_or_default() + "\n"
     }
 
-    /// Returns the names of the true effects.
+    /// Returns the names of the true effects as in files; `outside-catalogue` for one that is not
+    /// in the catalogue.
     pub(crate) fn effect_names(&self) -> Vec<String> {
         let name = |effect| {
-            described(effect, &self.joints)
+            effect_json(effect, &self.joints)
                 .get("effect")
                 .and_then(Value::as_str)
                 .unwrap_or_default()
@@ -223,7 +228,7 @@ fn parameter(parameter: &TrueParameter) -> Parameter<'_> {
 }
 
 /// Returns an effect as JSON: its name, arguments and values.
-fn described(effect: &TrueEffect, joints: &[Joint]) -> Value {
+fn effect_json(effect: &TrueEffect, joints: &[Joint]) -> Value {
     let mut entry = match effect.cause() {
         Cause::Outside { joint, shape } => json!({
             "effect": "outside-catalogue",

@@ -16,20 +16,20 @@ pub struct TrueParameter {
     pub value: f64,
 }
 
-/// Returns the true value for a given deviation: a factor if the unit is relative, else a
-/// difference.
-pub(super) fn deviated(unit: Unit, nominal: f64, deviation: f64) -> f64 {
+/// Returns the true value for a given deviation from `nominal`: a factor if the unit is relative
+/// (of stiffnesses and rigidities), else a difference.
+pub(super) fn true_value(unit: Unit, nominal: f64, deviation: f64) -> f64 {
     if unit.is_relative() { nominal * deviation } else { nominal + deviation }
 }
 
 /// Returns a random true value from 1 σ and a standard normal number; for a relative unit σ is that
 /// of ln(value / nominal).
-pub(super) fn spread(unit: Unit, nominal: f64, sigma: f64, normal: f64) -> f64 {
+pub(super) fn random_value(unit: Unit, nominal: f64, sigma: f64, normal: f64) -> f64 {
     if unit.is_relative() { nominal * (sigma * normal).exp() } else { nominal + sigma * normal }
 }
 
-/// Calls `set` for every parameter, in a fixed order, with its name, its unit and its value, which
-/// may be changed.
+/// Calls `set` for every parameter of an arm, in a fixed order, with name, unit and value; `set`
+/// may change the value.
 pub(super) fn visit(problem: &mut Problem, mut set: impl FnMut(String, Unit, &mut f64)) {
     use Unit::{Angle, AxialRigidity, FlexuralRigidity, Length, TorsionalStiffness};
     for (index, joint) in problem.joints.iter_mut().enumerate() {
@@ -105,7 +105,7 @@ pub(super) fn visit(problem: &mut Problem, mut set: impl FnMut(String, Unit, &mu
     }
 }
 
-/// Calls `set` for every unknown number of the fixtures, like [`visit`], which calls it last.
+/// Calls `set` for every number of the fixtures; one without a declared value starts at 0.
 fn visit_fixtures(fixtures: &mut [Fixture], mut set: impl FnMut(String, Unit, &mut f64)) {
     for Fixture { name, kind, known, .. } in fixtures {
         for (axis, (field, number)) in kind.fields().iter().zip(known).enumerate() {

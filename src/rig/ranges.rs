@@ -13,7 +13,7 @@ const DEFAULT_HELD_OUT: f64 = 0.3;
 /// Time between poses if the file gives none \[s\].
 const DEFAULT_TIME_STEP: f64 = 60.0;
 
-/// Names of other quantities in the section, which no joint name may equal.
+/// Keys of other quantities in the section. A joint with one of these names is given by its number.
 const RESERVED: [&str; 4] = ["payload", "hoist", "temperature", "time_step"];
 
 /// Contents of the section `[poses]`: ranges of the poses and choice of the rows.
@@ -21,11 +21,12 @@ pub(super) struct Poses {
     pub ranges: PoseRanges,
     /// Range of the time between poses \[s\].
     pub time_step: (f64, f64),
+    /// Rule for the number of held-out rows.
     pub held_out: HeldOutRows,
     /// Number of rows at the start of the table that measure positions; the rows after them
     /// measure the fixtures and the tilts in turn.
     pub positions: usize,
-    /// Frames whose tilts are measured.
+    /// Frames whose tilts are measured: 0 is the base of the arm, i the frame of joint i.
     pub tilts: Vec<usize>,
 }
 
@@ -50,8 +51,8 @@ pub(super) fn read(mut section: Section<'_, '_>, problem: &Problem) -> Result<Po
     Ok(Poses { ranges, time_step, held_out, positions, tilts })
 }
 
-/// Reads `q1_deg = [from, to]`, or a key with the joint's name in place of `q1` if the name is
-/// unique.
+/// Reads `q1_deg = [from, to]`, or a key with the joint's name in place of `q1` if no other joint
+/// has the name. Returns the range in \[rad\] or \[m\]; 0, 0 for a joint that takes no command.
 fn joint_range(
     section: &mut Section<'_, '_>,
     number: usize,
@@ -102,7 +103,7 @@ fn covariates(
     Ok(ranges)
 }
 
-/// Reads `base_unit = [from, to]`, if given \[SI\].
+/// Reads the range `base_unit = [from, to]`, for example `hoist_N`; `None` if it is not given. SI.
 fn range(
     section: &mut Section<'_, '_>,
     base: &str,
@@ -113,6 +114,7 @@ fn range(
     Ok(Some(((suffix.to_si)(from), (suffix.to_si)(to))))
 }
 
+/// Reads a list of two numbers, of which the first must not exceed the second.
 fn pair(item: &Item<'_, '_>) -> Result<(f64, f64), InputError> {
     if let Ok(value) = item.number() {
         return Err(item.error(InputErrorKind::OneNumber { value }));
@@ -127,6 +129,7 @@ fn pair(item: &Item<'_, '_>) -> Result<(f64, f64), InputError> {
     }
 }
 
+/// Reads the list of payloads \[kg\]; empty if there is none.
 fn payloads(section: &mut Section<'_, '_>) -> Result<Vec<f64>, InputError> {
     let Some((item, _)) = section.quantity("payload", Unit::Mass)? else { return Ok(Vec::new()) };
     let choices = item.list("a list of masses to choose from")?;
@@ -140,7 +143,7 @@ fn payloads(section: &mut Section<'_, '_>) -> Result<Vec<f64>, InputError> {
     choices.iter().map(mass).collect()
 }
 
-/// Reads the time step, a number or a range; it must not be negative.
+/// Reads the time between poses \[s\], a number or a range; it must not be negative.
 fn time_step(section: &mut Section<'_, '_>) -> Result<(f64, f64), InputError> {
     let Some((item, _)) = section.quantity("time_step", Unit::Time)? else {
         return Ok((DEFAULT_TIME_STEP, DEFAULT_TIME_STEP));
@@ -170,6 +173,7 @@ fn tilts(section: &mut Section<'_, '_>, problem: &Problem) -> Result<Vec<usize>,
     item.list("a list of frames")?.iter().map(named).collect()
 }
 
+/// Reads the share of held-out rows, or the number of identification rows; only one may be given.
 fn held_out(section: &mut Section<'_, '_>) -> Result<HeldOutRows, InputError> {
     let (share, kept) = (section.get("held_out"), section.get("identification"));
     match (share, kept) {

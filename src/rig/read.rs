@@ -106,7 +106,7 @@ fn sections(root: &mut Section<'_, '_>, problem: &Problem) -> Result<Truth, Inpu
             .collect(),
         None => Ok(Vec::new()),
     }?;
-    check_places(root, problem, &parameters, &random)?;
+    check_fixtures(root, problem, &parameters, &random)?;
     let segments = root.section("rig")?.map_or(Ok(SEGMENTS), segments)?;
     let section =
         root.section("poses")?.ok_or_else(|| root.missing("poses", example(&problem.joints)))?;
@@ -129,8 +129,9 @@ fn sections(root: &mut Section<'_, '_>, problem: &Problem) -> Result<Truth, Inpu
     })
 }
 
-/// Checks that every unknown of the fixtures has a true value.
-fn check_places(
+/// Checks that every number of a fixture that the problem leaves open has a true value, given or
+/// drawn.
+fn check_fixtures(
     root: &Section<'_, '_>,
     problem: &Problem,
     parameters: &[Deviation],
@@ -170,13 +171,14 @@ const POSITION: &str = "position";
 struct Noise {
     /// Standard deviations that the section states, by kind of rows \[m\] or \[rad\].
     given: BTreeMap<&'static str, f64>,
-    /// Standard deviation of an orientation \[rad\], if given.
+    /// Standard deviation of a measured orientation about each axis \[rad\], if given.
     turn: Option<f64>,
-    /// Error to report if the truth measures positions, or contacts without a stated σ.
+    /// Error to report if rows need the σ of positions; `None` if the section states it. Positions
+    /// need it, and so do other lengths whose σ is not stated.
     missing: Option<InputError>,
 }
 
-/// Reads the section. The default σ of contacts is that of positions.
+/// Reads the section `[noise]`. The default σ of contacts is that of positions.
 fn noise(mut section: Section<'_, '_>) -> Result<Noise, InputError> {
     let mut given = BTreeMap::new();
     for kind in kinds().filter(|kind| kind.needs != Needs::Fixtures) {
@@ -198,7 +200,7 @@ fn segments(mut section: Section<'_, '_>) -> Result<usize, InputError> {
     Ok(segments)
 }
 
-/// Reads a deviation, for example `"joint2.stiffness" = { relative = 0.83 }`.
+/// Reads the deviation of a true value, for example `"joint2.stiffness" = { relative = 0.83 }`.
 fn deviation(
     name: &str,
     item: &Item<'_, '_>,
@@ -264,8 +266,8 @@ fn random(
     Ok(rule)
 }
 
-/// Returns the table of a name. An unquoted `tool.x = { … }` is a table `tool` with a table `x`,
-/// which is an error.
+/// Returns the table that is the value of a parameter name or pattern. A name without quotes is an
+/// error: TOML reads `tool.x = { … }` as a table `tool` that holds a table `x`.
 fn named<'a, 'i>(name: &str, item: &Item<'a, 'i>) -> Result<Section<'a, 'i>, InputError> {
     let section = item.section()?;
     match section.entries().into_iter().find(|(_, inner)| inner.holds_tables()) {

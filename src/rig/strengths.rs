@@ -9,7 +9,7 @@ use crate::problem::item::Item;
 use crate::problem::section::Section;
 use crate::problem::{Effect, PoseRanges, Problem};
 
-/// Key of an effect that is not in the catalogue.
+/// Key that declares an effect outside the catalogue.
 const OUTSIDE: &str = "outside";
 
 /// Reads every table `[[effect]]` of a truth.
@@ -130,7 +130,8 @@ fn outside(item: &Item<'_, '_>, problem: &Problem) -> Result<Cause, InputError> 
     Ok(Cause::Outside { joint: number, shape })
 }
 
-/// Checks that thermal effects have temperatures and a reference temperature.
+/// Checks, for a thermal effect, that the poses have temperatures and the problem a reference
+/// temperature.
 fn check_temperature(
     cause: &Cause,
     item: &Item<'_, '_>,

@@ -11,22 +11,23 @@ use crate::quantity::Unit;
 /// which it is measured.
 #[derive(Debug, Clone)]
 pub struct Truth {
-    /// Given true values, `[parameters]`.
+    /// True values that the file states, `[parameters]`.
     #[doc(hidden)]
     pub parameters: Vec<Deviation>,
-    /// Rules for random true values, `[random]`; a given value precedes them, and a later rule an
-    /// earlier one.
+    /// Rules for random true values, `[random]`. A stated value takes precedence over them, and a
+    /// later rule over an earlier one.
     #[doc(hidden)]
     pub random: Vec<RandomRule>,
     /// Effects on the true arm, `[[effect]]`.
     #[doc(hidden)]
     pub effects: Vec<TrueEffect>,
-    /// Standard deviation of a measured coordinate \[m\].
+    /// Standard deviation of the noise of a measured coordinate \[m\].
     pub noise_sigma: f64,
-    /// Standard deviations of rows of other kinds by the name of the kind \[m\] or \[rad\].
+    /// Standard deviations of the noise of other kinds of rows, by the name of the kind: \[m\],
+    /// \[rad\] or pixels.
     pub kind_sigmas: BTreeMap<&'static str, f64>,
-    /// Number of first rows that measure positions if there are fixtures; rows that measure against
-    /// the fixtures follow.
+    /// Number of rows at the start that measure positions; the rows after them measure fixtures,
+    /// tilts and images in turn, if there are any.
     pub positions: usize,
     /// Frames whose tilts are measured in turn, after the fixtures: 0 is the base of the arm, i the
     /// frame of joint i.
@@ -69,7 +70,7 @@ pub struct RandomRule {
     pub relative: Option<f64>,
 }
 
-/// Number of held-out rows, which are chosen at random.
+/// Rule for the number of held-out rows, which are chosen at random.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum HeldOutRows {
@@ -91,17 +92,18 @@ impl Truth {
     /// Returns the quantity that each of `rows` rows measures: positions first, then fixtures,
     /// tilted frames and images in turn. Without them, all rows measure positions.
     pub(super) fn observations(&self, fixtures: &[Fixture], rows: usize) -> Vec<Observation> {
-        let kinds = self.kinds(fixtures);
+        let round = self.measured_in_turn(fixtures);
         let of_row = |row: usize| match row.checked_sub(self.positions) {
-            Some(turn) if !kinds.is_empty() => kinds[turn % kinds.len()],
+            Some(number) if !round.is_empty() => round[number % round.len()],
             _ => Observation::Position,
         };
         (0..rows).map(of_row).collect()
     }
 
-    /// Returns what is measured in turn: fixtures, tilted frames, and images of all cameras
-    /// together, which the first point of the first pair of a camera and a marker stands for.
-    fn kinds(&self, fixtures: &[Fixture]) -> Vec<Observation> {
+    /// Returns what the rows after the positions measure in turn: fixtures, tilted frames and
+    /// images. One entry, the first point of the first camera and marker, represents all images of
+    /// a pose.
+    fn measured_in_turn(&self, fixtures: &[Fixture]) -> Vec<Observation> {
         let observation = |(index, fixture): (usize, &Fixture)| {
             let mut kinds = kinds().filter(|kind| kind.references().count() == 1);
             let kind = kinds.find(|kind| kind.field(fixture.kind.word()).is_some())?;
@@ -124,16 +126,16 @@ impl Truth {
     /// each fixture and tilted frame, so that each target is measured against all of them.
     /// Otherwise there is one row.
     pub(super) fn rows_per_target(&self, fixtures: &[Fixture]) -> usize {
-        if fixtures.is_empty() { 1 } else { self.kinds(fixtures).len().max(1) }
+        if fixtures.is_empty() { 1 } else { self.measured_in_turn(fixtures).len().max(1) }
     }
 
-    /// Returns the standard deviation of a measurement \[m\], or of a tilt \[rad\].
+    /// Returns the standard deviation of the noise of a measurement \[m\]; \[rad\] for a tilt.
     pub(super) fn sigma_of(&self, observation: Observation) -> f64 {
         self.kind_sigmas.get(observation.kind()).copied().unwrap_or(self.noise_sigma)
     }
 
-    /// Returns the truth with another standard deviation of positions, contacts and distances
-    /// \[m\].
+    /// Returns the truth with `sigma` \[m\] as standard deviation of the noise of all positions,
+    /// contacts and distances.
     pub(crate) fn with_noise(&self, sigma: f64) -> Self {
         let mut truth = Self { noise_sigma: sigma, ..self.clone() };
         for kind in kinds().filter(|kind| kind.unit == Unit::Length) {
@@ -144,7 +146,8 @@ impl Truth {
 }
 
 impl RandomRule {
-    /// Returns the standard deviation of a parameter with this unit.
+    /// Returns the standard deviation that the rule gives a parameter with this unit; `None` if it
+    /// gives none.
     pub(super) fn sigma(&self, unit: Unit) -> Option<f64> {
         match unit {
             Unit::Angle => self.angle,
