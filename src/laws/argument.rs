@@ -1,4 +1,4 @@
-//! Arguments of effects, in the syntax of files.
+//! Arguments of effects: their kinds, their values, and their syntax in files.
 
 use serde::Serialize;
 
@@ -15,7 +15,7 @@ pub enum Mount {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FreeLength(pub f64);
 
-/// Kind of an argument, which determines its valid values on an arm.
+/// Kind of an argument of an effect, which determines its valid values on an arm.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ArgumentKind {
@@ -27,9 +27,10 @@ pub enum ArgumentKind {
     TurningJoint,
     /// Number of a prismatic joint that takes a command.
     SlidingJoint,
-    /// Number of a joint that has a link before it.
+    /// Number of a joint that has a link before it, from 1.
     LinkedJoint,
-    /// Number of a revolute joint that is compliant about its axis.
+    /// Number of a revolute joint that is compliant about its axis, so that a gravity compensator
+    /// relieves it.
     RelievedJoint,
     /// Number of a joint that takes a command and differs from the joint of the preceding argument.
     OtherJoint,
@@ -43,9 +44,9 @@ pub enum ArgumentKind {
     Orders,
     /// Order of a wave \[cycles per revolution\].
     Order,
-    /// Time \[s\].
+    /// Time of an event, as in the table \[s\].
     Time,
-    /// Duration, above zero \[s\].
+    /// Duration, such as a time constant; above zero \[s\].
     Duration,
     /// Length of a joint's path, above zero \[rad\].
     Distance,
@@ -56,19 +57,20 @@ pub enum ArgumentKind {
 }
 
 impl ArgumentKind {
-    /// Returns true if the search determines the value of the argument. Effects that differ only in
-    /// it count as one effect with an undetermined value.
+    /// Returns true if the search for effects determines the value of the argument. Effects that
+    /// differ only in this value count as one effect with an undetermined value.
     pub fn is_searched(self) -> bool {
         matches!(self, Self::Order | Self::Time | Self::Duration | Self::Distance)
     }
 
-    /// Returns true if the search may refine the value between those of the listed candidates.
+    /// Returns true if the search may refine the value by scaling it, between those of the listed
+    /// candidates.
     pub fn is_scalable(self) -> bool {
         matches!(self, Self::Duration | Self::Distance)
     }
 }
 
-/// Value of an argument.
+/// Value of an argument of an effect.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(untagged)]
 #[non_exhaustive]
@@ -77,25 +79,27 @@ pub enum Argument {
     Joint(usize),
     /// Orders of harmonics.
     Orders(Vec<u32>),
-    /// Name of a beam or of a declared law.
+    /// Name of a beam or of a covariate.
     Name(String),
     /// Time \[s\], path \[rad\], or order of a wave.
     Number(f64),
-    /// Point in a plane \[m\].
+    /// Point in the plane normal to a joint's axis \[m\].
     Point([f64; 2]),
-    /// Length that does not identify the effect \[m\].
+    /// Number that does not distinguish the effect from others: the free length of a spring \[m\],
+    /// or the prior σ of a law's coefficients in the unit of its key.
     Length(f64),
     /// The base, written as `true`.
     Base(bool),
-    /// Text that does not identify the effect.
+    /// Name or site of a law.
     Text(String),
-    /// List of formulas.
+    /// Formulas of a law.
     Texts(Vec<String>),
-    /// Numbers with names.
+    /// Start, limits and prior σ of a parameter inside the formulas of a law, each with its key.
     #[serde(serialize_with = "as_map")]
     Numbers(Vec<(&'static str, f64)>),
 }
 
+/// Serialises numbers with names as a map.
 fn as_map<S: serde::Serializer>(
     numbers: &[(&'static str, f64)],
     serializer: S,
@@ -125,8 +129,8 @@ impl Argument {
         }
     }
 
-    /// Returns the text by which the argument identifies the effect in the brackets of parameter
-    /// names; `None` if it does not.
+    /// Returns the text of the argument in the brackets of parameter names, which distinguishes
+    /// effects of one family; `None` if the names do not contain the argument.
     pub(crate) fn place(&self) -> Option<String> {
         match self {
             Self::Joint(joint) => Some(joint.to_string()),

@@ -1,9 +1,11 @@
-//! Catalogue of effects. It has one entry for each family, from which everything else follows.
+//! Catalogue of effects. It has one entry for each family, from which parameters, search and texts
+//! of the effects follow.
 //!
 //! An entry reads `Variant "name-in-files" { field: Type = Kind as "key" } => Family { … }`.
 //! Formulas are those of [`expression`](super::expression); `{joint}` stands for the argument
-//! `joint`. θ is the joint's command, M the moment that the outboard loads exert at the place, T
-//! the temperature above the reference. Every effect vanishes if its parameters are zero.
+//! `joint`, and `T` for T − T₀. In the comments, θ is the joint's command, M the moment that the
+//! loads beyond the joint, link or base exert on it, T the temperature and T₀ its reference. Every
+//! effect vanishes if its parameters are zero.
 
 use super::argument::{Argument, ArgumentKind, Field, FreeLength, Mount};
 use super::family::{At, Chance, Family, Need, Only, Prior, Search, TermEntry};
@@ -27,8 +29,8 @@ macro_rules! catalogue {
         $variant:ident $name:literal $({ $($field:ident: $type:ty = $kind:ident $(as $key:literal)?),+ })?
         => $family:expr;
     )+) => {
-        /// Effect with its arguments. Joints are numbered from 1 as in files, links are identified
-        /// by the name of their beam.
+        /// Effect of the catalogue with its arguments, or a law. Joints are numbered from 1 as in
+        /// files, links are identified by the name of their beam.
         #[derive(Debug, Clone, PartialEq)]
         #[non_exhaustive]
         #[expect(missing_docs, reason = "arguments carry the names of the file format")]
@@ -76,8 +78,8 @@ macro_rules! catalogue {
                 }
             }
 
-            /// Creates the effect of the family `name` from its arguments by key; `None` if one is
-            /// missing or of another kind.
+            /// Creates the effect of the family `name` from its arguments by key; `None` if there
+            /// is no such family, or if an argument is missing or of another kind.
             pub(crate) fn build(name: &str, argument: impl Fn(&str) -> Option<Argument>) -> Option<Self> {
                 match name {
                     $($name => Some(Self::$variant $({
@@ -90,19 +92,20 @@ macro_rules! catalogue {
     };
 }
 
-/// Prior σ of the amplitude or drift of a joint's coordinate or a beam's strain \[rad\] or \[m\]
-/// per unit of the regressor.
+/// Prior σ of a coefficient that adds to a joint's coordinate \[rad\] or \[m\], or to a beam's
+/// strain or curvature [1/m], per unit of the formula that it multiplies.
 const DRIFT_SIGMA: f64 = 1e-3;
-/// Prior σ of a relative error, such as a ratio or scale.
+/// Prior σ of a relative error, such as that of a transmission ratio or of a scale.
 const RELATIVE_SIGMA: f64 = 0.01;
 /// Prior σ of a displacement of the instrument's readings \[m\].
 const READING_SHIFT_SIGMA: f64 = 5e-3;
-/// Prior σ of the displacement \[m\] and rotation \[rad\] of an instrument that was knocked or set
-/// up again.
+/// Prior σ of the displacement \[m\] and of the rotation \[rad\] of an instrument that was knocked
+/// or set up again.
 const SETUP_SHIFT_SIGMA: f64 = 1e-2;
 /// Prior σ of a bending flexibility 1/EI [1/(N·m²)].
 const FLEXIBILITY_SIGMA: f64 = 1e-2;
-/// Largest plausible rotation of a joint under the largest plausible moment \[rad\].
+/// Largest plausible rotation of a joint by the cubic term of its torsion, under the largest
+/// plausible moment \[rad\].
 const MAX_TURN: f64 = 0.1;
 
 catalogue! {
@@ -146,7 +149,7 @@ catalogue! {
         ..Family::PLAIN
     };
     /// Play b of a joint: Δθ = (b/2)·approach. Without recorded directions of approach, the moment
-    /// takes it up.
+    /// at the joint decides on which side of the play the joint rests.
     Backlash "backlash" { joint: usize = MovingJoint } => Family {
         terms: &[TermEntry::at(At::JointOrSlide(JointField::Play, JointField::SlidingPlay), "width", 0.01)],
         says: "play in joint {joint}",
@@ -176,7 +179,8 @@ catalogue! {
         needs: &[Need::Loads],
         ..Family::PLAIN
     };
-    /// Tilt of a joint's bearings, (`c_x` `M_x`, `c_y` `M_y`, 0), before the joint's rotation.
+    /// Compliance of a joint's bearings: before the joint's rotation, they tilt by (`c_x` `M_x`,
+    /// `c_y` `M_y`, 0).
     JointLateralCompliance "joint-lateral-compliance" { joint: usize = AnyJoint } => Family {
         terms: &[
             TermEntry::at(At::Joint(JointField::LateralX), "about_x", 1e-3).never_negative(),

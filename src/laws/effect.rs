@@ -18,7 +18,7 @@ impl Effect {
         self.family().map_or(LAW, |family| family.name)
     }
 
-    /// Returns true if both are the same effect, or laws of the same name.
+    /// Returns true if both are the same effect with the same arguments, or laws of the same name.
     pub(crate) fn is_same_as(&self, other: &Self) -> bool {
         match (self, other) {
             (Self::Law(law), Self::Law(other)) => law.name() == other.name(),
@@ -45,12 +45,13 @@ impl Effect {
         declaration(self.name(), &arguments)
     }
 
-    /// Returns the value of an argument by its key.
+    /// Returns the value of the argument with this key; `None` if the effect has no such argument.
     pub(crate) fn argument(&self, key: &str) -> Option<Argument> {
         self.arguments().into_iter().find(|(known, _)| *known == key).map(|(_, argument)| argument)
     }
 
-    /// Returns the number, from 1, of the joint at which the effect acts.
+    /// Returns the number, from 1, of the joint at which the effect acts; `None` if it acts at
+    /// none.
     pub(crate) fn joint(&self) -> Option<usize> {
         if let Self::Law(law) = self {
             return law.joint();
@@ -61,7 +62,7 @@ impl Effect {
         })
     }
 
-    /// Returns the name of the link on which the effect acts.
+    /// Returns the name of the link on which the effect acts; `None` if it acts on none.
     pub(crate) fn link(&self) -> Option<String> {
         match self {
             Self::Law(law) => law.link().map(str::to_owned),
@@ -81,9 +82,13 @@ impl Effect {
         }
     }
 
-    /// Returns key and kind of the first argument whose kind satisfies `is_it`.
-    fn key_of(&self, is_it: impl Fn(ArgumentKind) -> bool) -> Option<(&'static str, ArgumentKind)> {
-        self.family()?.arguments.iter().find(|(_, kind)| is_it(*kind)).copied()
+    /// Returns key and kind of the first argument for whose kind `is_wanted` is true; `None` if
+    /// there is none.
+    fn key_of(
+        &self,
+        is_wanted: impl Fn(ArgumentKind) -> bool,
+    ) -> Option<(&'static str, ArgumentKind)> {
+        self.family()?.arguments.iter().find(|(_, kind)| is_wanted(*kind)).copied()
     }
 
     /// Returns the parameters with their formulas, parsed with the words of `vocabulary`.
@@ -94,7 +99,7 @@ impl Effect {
             _ => self.family().unwrap_or(&Family::PLAIN),
         };
         let arguments = self.arguments();
-        let acts = |entry: &&TermEntry| match entry.at {
+        let is_at_mount = |entry: &&TermEntry| match entry.at {
             At::Coordinate => self.joint().is_some(),
             At::BaseShift(_) | At::BaseTurn(_) => self.joint().is_none(),
             _ => true,
@@ -114,7 +119,7 @@ impl Effect {
                 inner: None,
             })
         };
-        let entries = || family.terms.iter().filter(acts);
+        let entries = || family.terms.iter().filter(is_at_mount);
         match arguments.iter().find(|(_, argument)| matches!(argument, Argument::Orders(_))) {
             Some((key, Argument::Orders(orders))) => orders
                 .iter()
@@ -143,7 +148,8 @@ impl Effect {
         })
     }
 
-    /// Returns the quantities that multiply its parameters, without duplicates.
+    /// Returns the quantities of a pose that occur in the formulas of the effect, without
+    /// duplicates.
     pub(crate) fn quantities(&self) -> Vec<Quantity> {
         let mut found = Vec::new();
         for formula in self.entries_without_arm().into_iter().filter_map(|entry| entry.formula) {
@@ -156,8 +162,9 @@ impl Effect {
         found
     }
 
-    fn follows(&self, is_it: fn(Quantity) -> bool) -> bool {
-        self.quantities().into_iter().any(is_it)
+    /// Returns true if a quantity for which `is_wanted` is true occurs in the effect's formulas.
+    fn depends_on(&self, is_wanted: fn(Quantity) -> bool) -> bool {
+        self.quantities().into_iter().any(is_wanted)
     }
 
     /// Returns true if a parameter of the effect acts at the site `at`.
@@ -172,24 +179,24 @@ impl Effect {
 
     /// Returns true if the effect depends on the temperature.
     pub(crate) fn is_thermal(&self) -> bool {
-        self.follows(Quantity::is_thermal)
+        self.depends_on(Quantity::is_thermal)
     }
 
     /// Returns true if the effect depends on directions of approach.
     pub(crate) fn has_sides(&self) -> bool {
         self.acts_at(At::JointOrSlide(JointField::Play, JointField::SlidingPlay))
-            || self.follows(Quantity::has_sides)
+            || self.depends_on(Quantity::has_sides)
     }
 
     /// Returns true if the effect depends on time or the order of the poses, rather than on
     /// quantities that a choice of poses can vary.
     pub(crate) fn follows_time(&self) -> bool {
-        self.follows(Quantity::follows_time)
+        self.depends_on(Quantity::follows_time)
     }
 
     /// Returns true if the effect depends on earlier poses.
     pub(crate) fn has_memory(&self) -> bool {
-        self.follows(Quantity::has_memory)
+        self.depends_on(Quantity::has_memory)
     }
 
     /// Returns the joint, counted from 1, that a gravity compensator supports; `None` for other
@@ -198,8 +205,8 @@ impl Effect {
         self.acts_at(At::Joint(JointField::SpringRate)).then(|| self.joint()).flatten()
     }
 
-    /// Returns (joint, commanded joint), both counted from 1, if the effect changes a joint as a
-    /// function of one command alone.
+    /// Returns (joint, commanded joint), both counted from 1, if the effect adds to the coordinate
+    /// of a joint a function of one command alone; else `None`.
     pub(crate) fn function_of(&self) -> Option<(usize, usize)> {
         let joint = self.joint()?;
         let entries = self.entries_without_arm();
@@ -225,7 +232,8 @@ impl Effect {
         orders.into_iter().map(|order| (joint, order)).collect()
     }
 
-    /// Returns an integer order that both effects have at the same joint, if there is one.
+    /// Returns an integer order of a wave that both effects have at the same joint; `None` if the
+    /// first order that they share is no integer, or if they share none.
     pub(crate) fn shared_order(&self, other: &Self) -> Option<u32> {
         let waves = other.waves();
         let shared = self.waves().into_iter().find(|wave| waves.contains(wave))?.1;
@@ -260,7 +268,8 @@ impl Effect {
         }
     }
 
-    /// Returns the description of family and place, without the argument that is searched.
+    /// Returns the name of the family and the place as in parameter names, without the argument
+    /// that the search determines.
     #[doc(hidden)]
     pub fn name_and_place(&self) -> String {
         if let Self::Law(law) = self {
@@ -301,8 +310,8 @@ impl Effect {
         }
     }
 
-    /// Returns true if the search determines an argument, such as a time. Effects with equal
-    /// [`Self::name_and_place`] then count as one.
+    /// Returns true if the search determines an argument, such as a time, or composed the formula.
+    /// Effects with equal [`Self::name_and_place`] then count as one.
     pub(crate) fn is_searched(&self) -> bool {
         self.searched().is_some() || self.is_described()
     }
@@ -331,8 +340,8 @@ impl Effect {
         }
     }
 
-    /// Returns true if both effects are equal except for the value of the argument that the search
-    /// determines.
+    /// Returns true if both effects are equal, except perhaps for the value of the argument that
+    /// the search determines.
     pub(crate) fn is_but_for_search(&self, other: &Self) -> bool {
         let is_alike = || {
             std::mem::discriminant(self) == std::mem::discriminant(other)
@@ -341,17 +350,17 @@ impl Effect {
         self == other || (self.is_searched() && is_alike())
     }
 
-    /// Returns the effect with its time constant or distance multiplied by `factor`, rounded to
-    /// three digits. `None` if the effect has no such argument, or if the product is zero or not
-    /// finite.
+    /// Returns the effect with its time constant or friction distance multiplied by `factor`,
+    /// rounded to three digits. `None` if the effect has no such argument, or if the product is
+    /// zero or not finite.
     pub(crate) fn scaled(&self, factor: f64) -> Option<Self> {
         let (key, _) = self.key_of(ArgumentKind::is_scalable)?;
         let Some(Argument::Number(number)) = self.argument(key) else { return None };
         self.with(key, &Argument::Number(to_three_digits(factor * number)?))
     }
 
-    /// Returns the effect with another value of the argument `key`; `None` if it has no such
-    /// argument.
+    /// Returns the effect with `value` for the argument `key`; `None` if the value is of another
+    /// kind, and for laws.
     fn with(&self, key: &str, value: &Argument) -> Option<Self> {
         let arguments = self.arguments();
         Self::build(self.name(), |wanted| {
@@ -386,15 +395,16 @@ impl Effect {
         orders.into_iter().filter_map(with_order).collect()
     }
 
-    /// Returns the orders of both effects, with their key, if the effects differ only in them.
+    /// Returns the key of the orders, the orders of this effect and those of the other one, if the
+    /// effects differ in nothing else; else `None`.
     fn orders_of_both(&self, other: &Self) -> Option<(&'static str, Vec<u32>, Vec<u32>)> {
         let ((key, orders), (_, more)) = (self.orders()?, other.orders()?);
         let same = self.with(key, &Argument::Orders(more.clone()))? == *other;
         same.then_some((key, orders, more))
     }
 
-    /// Returns one effect that contains both: the harmonics of one joint. `None` if they are
-    /// different effects.
+    /// Returns one effect with the orders of both, if both are harmonics of the same joint; else
+    /// `None`.
     pub(crate) fn joined(&self, other: &Self) -> Option<Self> {
         let (key, mut orders, more) = self.orders_of_both(other)?;
         let added: Vec<u32> = more.into_iter().filter(|order| !orders.contains(order)).collect();
@@ -403,7 +413,8 @@ impl Effect {
         self.with(key, &Argument::Orders(orders))
     }
 
-    /// Returns true if the effect contains the other one, as a harmonic with more orders does.
+    /// Returns true if both effects are equal, or if they are harmonics of the same joint and this
+    /// one has all orders of the other.
     #[doc(hidden)]
     pub fn covers(&self, other: &Self) -> bool {
         match self.orders_of_both(other) {
@@ -413,8 +424,8 @@ impl Effect {
     }
 }
 
-/// Number of joints assumed when properties of effects are derived without an arm; more than any
-/// arm has.
+/// Number of joints that formulas may name when properties of effects are derived without an arm;
+/// more than any arm has.
 const MAX_JOINTS: usize = 1000;
 
 /// Returns `name = { key = value }`, or `name = true` without arguments.
@@ -427,7 +438,8 @@ pub(crate) fn declaration(name: &str, arguments: &[(&str, String)]) -> String {
     }
 }
 
-/// Returns a searched number rounded to three digits; `None` if the result is zero or not finite.
+/// Returns a positive number rounded to three digits, at most to a whole number; `None` if the
+/// result is zero or not finite.
 pub(crate) fn to_three_digits(number: f64) -> Option<f64> {
     let step = 10_f64.powf(number.log10().floor() - 2.0);
     let rounded = (number / step).round() * step;

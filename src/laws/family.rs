@@ -3,7 +3,7 @@
 use super::argument::ArgumentKind;
 use super::site::{ArmField, BeamField, JointField};
 
-/// Family of effects: a law whose place and numbers are arguments.
+/// Family of effects: formulas whose place and numbers are arguments.
 ///
 /// Texts contain keys of arguments in braces, which are replaced by their values:
 /// `"sin({orders}*q{joint})"`.
@@ -17,7 +17,7 @@ pub struct Family {
     /// Parameters. If a formula or name contains a list argument, there is one parameter for each
     /// element.
     pub terms: &'static [TermEntry],
-    /// Statement about the effect in words: "transmission ratio of joint {joint} is off".
+    /// Statement of the effect in words: "transmission ratio of joint {joint} is off".
     pub says: &'static str,
     /// Statement for data without times, with row numbers (from 1) instead of times; empty if it is
     /// the same.
@@ -31,7 +31,7 @@ pub struct Family {
     pub needs: &'static [Need],
     /// Values of arguments that are candidates of the search for effects.
     pub search: Search,
-    /// Rule by which the family's prior probability is shared among its members.
+    /// Rule by which the family's prior probability is divided among its candidates.
     pub chance: Chance,
 }
 
@@ -51,7 +51,7 @@ impl Family {
     };
 }
 
-/// Parameter of a family.
+/// Parameter of every effect of a family.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct TermEntry {
@@ -62,7 +62,8 @@ pub struct TermEntry {
     /// Formula that multiplies the parameter; empty if the parameter replaces the quantity at its
     /// site.
     pub formula: &'static str,
-    /// Rule for 1 σ of the parameter's prior, a size that realistic effects hardly exceed.
+    /// Rule for 1 σ of the parameter's prior about its nominal value. Realistic effects are hardly
+    /// larger.
     pub prior: Prior,
     /// Rule for the nominal value of the parameter, at which the effect vanishes; `None` for 0.
     pub nominal: Option<Prior>,
@@ -107,7 +108,8 @@ impl TermEntry {
 /// frame.
 pub(crate) const RANGE_AXIS: usize = 3;
 
-/// Site of a parameter, relative to the place that the effect names.
+/// Site of a parameter: the quantity that it changes, at the joint, link or arm that the effect
+/// names.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum At {
@@ -138,15 +140,15 @@ pub enum At {
     Tool(usize),
     /// Relative error of every measured coordinate.
     Scale,
-    /// Entry of the strain of the measuring frame: xx, yy, zz, xy, xz, yz.
+    /// Entry of the strain of the measuring frame, by its index: xx, yy, zz, xy, xz, yz.
     Strain(usize),
 }
 
-/// Rule for the prior size (1 σ) of a parameter on an arm, SI.
+/// Rule for the prior size (1 σ) of a parameter, or for its nominal value, on an arm; SI.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum Prior {
-    /// Size that is the same on every arm; infinite for a flat prior.
+    /// Value that is the same on every arm; infinite for a flat prior.
     Size(f64),
     /// Size of a coefficient c₃ in θ = c₃ M³ at which the largest plausible moment M rotates the
     /// joint by this angle \[rad\].
@@ -161,7 +163,7 @@ pub enum Prior {
         /// True for bending about z.
         about_z: bool,
     },
-    /// Size of half the length of the link.
+    /// Half the length of the link.
     HalfLength,
 }
 
@@ -215,7 +217,7 @@ pub enum Need {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Search {
-    /// One candidate at each place; the effect has no searched argument.
+    /// One candidate at each joint, link or other place; the effect has no searched argument.
     Places,
     /// No candidates: the effect must be declared, or another search finds it.
     Declared,
@@ -232,14 +234,14 @@ pub enum Search {
     Distances,
 }
 
-/// Rule by which the prior probability of a family is shared among its members.
+/// Rule by which the prior probability of a family is divided among its candidates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Chance {
-    /// Equal share for every candidate.
+    /// Equal probability of every candidate.
     Equal,
-    /// Share that decreases with the order of a harmonic.
+    /// Probability that decreases with the order of a harmonic.
     Orders,
-    /// Share that decreases with the order of a wave.
+    /// Probability that decreases with the order of a wave.
     Waves,
 }

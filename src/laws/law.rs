@@ -1,4 +1,4 @@
-//! Declared laws: terms with formulas at one site, declared in a problem or found.
+//! Laws: terms with formulas at one site, declared in a problem or composed by a search.
 
 use super::argument::Argument;
 use super::expression::{Expression, FormulaError, Names, Parsed, Vocabulary, parse};
@@ -23,17 +23,17 @@ pub struct Law {
     terms: Vec<Parsed>,
     parameters: Vec<LawParameter>,
     covariates: Vec<String>,
-    /// What the search knows of a law that it composed; `None` for a declared one.
+    /// Prior probability and rivals of a law that a search composed; `None` for a declared one.
     description: Option<Box<Description>>,
 }
 
-/// What a search knows of a law that it composed.
+/// Prior probability and rivals of a law that a search composed.
 #[derive(Debug, Clone, PartialEq)]
 struct Description {
     /// ln of the prior probability among all laws that the search could compose at the site.
     ln_prior: f64,
-    /// Laws of other form whose predictions noise does not tell apart in the measured poses, each
-    /// with its share of the probability.
+    /// Laws of other form whose predictions in the measured poses differ by less than the noise,
+    /// each with its share of the probability.
     rivals: Vec<(Law, f64)>,
 }
 
@@ -70,7 +70,8 @@ pub struct LawSite {
 }
 
 impl LawSite {
-    /// Returns the number, counted from 1, of the joint; `None` for other places.
+    /// Returns the number, counted from 1, of the joint at which the site is; `None` for other
+    /// places.
     pub fn joint(&self) -> Option<usize> {
         if let LawPlace::Joint(joint) = self.place { Some(joint) } else { None }
     }
@@ -84,7 +85,7 @@ impl LawSite {
     /// joints are also accepted.
     ///
     /// # Errors
-    /// Returns the reason why a law cannot act there.
+    /// Returns the reason, as a sentence, why the text is no site of this arm.
     pub fn parse(
         text: &str,
         joints: usize,
@@ -156,7 +157,7 @@ impl LawSite {
 
 impl Law {
     /// Creates the law called `name` at a site. `terms` are formulas in the words of `vocabulary`,
-    /// `parameters` those inside the formulas, and `prior` that of the coefficients.
+    /// `parameters` the named parameters inside the formulas, and `prior` that of the coefficients.
     ///
     /// # Errors
     /// Returns the number of the first wrong formula, counted from 0, and the mistake in it.
@@ -193,8 +194,8 @@ impl Law {
 
     /// Returns the law marked as composed by a search, with ln of its prior probability among all
     /// laws that the search could compose at its site. `rivals` are the laws of other form whose
-    /// predictions noise does not tell apart in the measured poses, each with its share of the
-    /// probability that they and this law have together.
+    /// predictions in the measured poses differ by less than the noise. Each has its share of the
+    /// probability that the rivals and this law have together.
     #[must_use]
     pub fn described(self, ln_prior: f64, rivals: Vec<(Self, f64)>) -> Self {
         Self { description: Some(Box::new(Description { ln_prior, rivals })), ..self }
@@ -206,8 +207,9 @@ impl Law {
         self.description.as_ref().map(|description| description.ln_prior)
     }
 
-    /// Returns the laws of other form whose predictions noise does not tell apart from this one in
-    /// the measured poses, each with its share of the probability; none for a declared law.
+    /// Returns the laws of other form whose predictions in the measured poses differ from this
+    /// one's by less than the noise, each with its share of the probability; none for a declared
+    /// law.
     pub fn rivals(&self) -> &[(Self, f64)] {
         self.description.as_ref().map_or(&[], |description| &description.rivals)
     }
@@ -331,7 +333,8 @@ impl Law {
         arguments
     }
 
-    /// Returns the coefficients, named from 1, and the parameters inside the formulas.
+    /// Returns the coefficients, which are named 1, 2, …, and then the parameters inside the
+    /// formulas.
     pub(super) fn entries(&self) -> Vec<EffectTerm> {
         let plain = |name, prior| EffectTerm {
             name,

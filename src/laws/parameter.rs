@@ -11,6 +11,6 @@ pub struct LawParameter {
     pub min: Option<f64>,
     /// Largest value, SI; `None` for no limit.
     pub max: Option<f64>,
-    /// Standard deviation (1 σ) of a Gaussian prior about the start value; `None` for no prior.
+    /// Standard deviation (1 σ) of a Gaussian prior about the start value, SI; `None` for no prior.
     pub sigma: Option<f64>,
 }

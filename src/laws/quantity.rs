@@ -1,4 +1,4 @@
-//! Quantities that are recorded for every pose: the variables of formulas.
+//! Quantities of a pose: the variables of formulas.
 
 /// Variable of a formula; joints are counted from 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -35,8 +35,8 @@ pub enum Quantity {
     /// Direction from which a joint approached, −1, 0 or +1, written `approach3`; 0 if not
     /// recorded.
     Approach(usize),
-    /// Moment about the axis of a joint of everything beyond it, on the undeflected arm with the
-    /// declared loads [N·m], written `M3`.
+    /// Moment about the axis of a joint of all loads beyond it, on the undeflected arm [N·m],
+    /// written `M3`. Fitted errors of the loads are included.
     Moment(usize),
     /// Covariate of the problem, counted from 0, in its unit; written as the name of its column.
     Covariate(usize),
@@ -53,7 +53,8 @@ impl Quantity {
         matches!(self, Self::Warming | Self::Lagging { .. })
     }
 
-    /// Returns true if the value depends on the direction from which a joint approached.
+    /// Returns true if the value depends on the direction from which a joint approached its
+    /// command.
     pub fn has_sides(self) -> bool {
         matches!(self, Self::Approach(_) | Self::Friction { .. })
     }

@@ -21,9 +21,9 @@ pub enum JointField {
     Play,
     /// Play of a prismatic joint \[m\], taken up by the direction of approach only.
     SlidingPlay,
-    /// Flexibility about x before the joint's rotation [rad/(N·m)].
+    /// Compliance about x before the joint's rotation [rad/(N·m)].
     LateralX,
-    /// Flexibility about y before the joint's rotation [rad/(N·m)].
+    /// Compliance about y before the joint's rotation [rad/(N·m)].
     LateralY,
     /// Flexibility 1/EI of the slide [1/(N·m²)].
     SlideFlexibility,
@@ -39,13 +39,15 @@ pub enum JointField {
     Roll,
     Pitch,
     Yaw,
-    /// Number of the small motion before the joint turns: x, y, z \[m\], rx, ry, rz \[rad\].
+    /// Component of the small motion before the joint turns, by its index: x, y, z \[m\], rx, ry,
+    /// rz \[rad\].
     Before(usize),
-    /// Number of the small motion behind the joint: x, y, z \[m\], rx, ry, rz \[rad\].
+    /// Component of the small motion behind the joint, by its index: x, y, z \[m\], rx, ry, rz
+    /// \[rad\].
     After(usize),
 }
 
-/// Names of the numbers of a small motion.
+/// Names of the components of a small motion: translations, then rotations.
 pub(crate) const MOTION_NAMES: [&str; 6] = ["x", "y", "z", "rx", "ry", "rz"];
 
 worded! {
@@ -88,19 +90,19 @@ worded! {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum ArmField {
-    /// Mass in addition to that of every payload \[kg\].
+    /// Mass that is added to every payload \[kg\].
     Payload,
     /// Relative error of the hoist's force.
     HoistForce,
-    /// Lean of the hoist's direction along x.
+    /// Number added to the x component of the unit vector along the hoist's rope.
     HoistLeanX,
-    /// Lean of the hoist's direction along y.
+    /// Number added to the y component of the unit vector along the hoist's rope.
     HoistLeanY,
     /// Derivative of the lean of the hoist's direction with respect to the hook's position [1/m].
     HoistTrolley,
-    /// Flexibility of the base about x [rad/(N·m)].
+    /// Compliance of the base about x [rad/(N·m)].
     MountingX,
-    /// Flexibility of the base about y [rad/(N·m)].
+    /// Compliance of the base about y [rad/(N·m)].
     MountingY,
     /// Rotation of gravity about x \[rad\].
     GravityX,
@@ -131,7 +133,8 @@ impl JointField {
         Self::PLACEMENT.iter().position(|&field| field == self)
     }
 
-    /// Returns the index among the numbers of the two small motions of a joint.
+    /// Returns the index of the field among the twelve components of the two small motions of a
+    /// joint, those before it first; `None` for other fields.
     pub fn motion(self) -> Option<usize> {
         match self {
             Self::Before(axis) => Some(axis),
@@ -140,7 +143,7 @@ impl JointField {
         }
     }
 
-    /// Returns true for geometry that a problem declares.
+    /// Returns true for a geometric field that a problem declares.
     pub fn is_geometry(self) -> bool {
         Self::GEOMETRY.contains(&self) || self.placement().is_some()
     }

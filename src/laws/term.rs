@@ -16,7 +16,7 @@ pub struct EffectTerm {
     pub formula: Option<Parsed>,
     /// Rule for 1 σ of the parameter's prior.
     pub prior: Prior,
-    /// Value at which the effect vanishes; `None` for 0.
+    /// Rule for the nominal value, at which the effect vanishes; `None` for 0.
     pub nominal: Option<Prior>,
     /// True if a negative value is physically impossible.
     pub never_negative: bool,

@@ -25,6 +25,7 @@ pub(super) fn filled(text: &str, arguments: &[(&str, Argument)]) -> String {
     out
 }
 
+/// Returns an argument as text in one of the forms of [`filled`].
 fn shown(argument: &Argument, form: &str) -> String {
     match (argument, form) {
         (Argument::Orders(orders), "cycles") => {

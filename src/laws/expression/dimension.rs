@@ -2,9 +2,9 @@
 
 use super::tree::Operator;
 
-/// Number of base units: rad, m, K, kg, s, N, and the unit of a covariate.
+/// Number of base units of formulas: rad, m, K, kg, s, N, and the unit of a covariate.
 const BASES: usize = 7;
-/// Symbols of the base units.
+/// Symbols of the base units, in the order of the powers.
 const SYMBOLS: [&str; BASES] = ["rad", "m", "K", "kg", "s", "N", "units of the covariate"];
 
 /// Unit of an expression as powers of base units.
@@ -36,7 +36,7 @@ pub enum Per {
     Second,
     /// Torque [N·m].
     Torque,
-    /// Unit of a covariate.
+    /// Unit of a covariate, which the problem declares.
     Covariate,
 }
 
@@ -61,7 +61,7 @@ impl Dimension {
         Self { powers, flexible: false }
     }
 
-    /// Returns the unit by which the coefficient of a formula with this unit is divided.
+    /// Returns this unit as the one by which the unit of a coefficient is divided.
     pub fn per(self) -> Per {
         let is = |of: Self| self.powers == of.powers;
         let denominators = [
@@ -76,8 +76,8 @@ impl Dimension {
         denominators.into_iter().find(|(of, _)| is(*of)).map_or(Per::Number, |(_, per)| per)
     }
 
-    /// Returns true if a function such as `sin` accepts the expression: it has no unit, is an
-    /// angle, or its unit is undetermined.
+    /// Returns true if a function such as `sin` accepts an expression with this unit: it has no
+    /// unit, is a power of an angle, or is not determined.
     pub(super) fn is_plain(self) -> bool {
         self.flexible || self.powers[1..].iter().all(|power| *power == 0)
     }
@@ -102,7 +102,8 @@ impl Dimension {
         }
     }
 
-    /// Returns the unit of a sum, or `None` if the operands have different units.
+    /// Returns the unit of a sum, or `None` if the operands have different units. Angles and
+    /// numbers without unit may be added.
     pub(super) fn sum(self, other: Self) -> Option<Self> {
         match (self.flexible, other.flexible) {
             (false, false) => (self.powers[1..] == other.powers[1..]).then_some(self),

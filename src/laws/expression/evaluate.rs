@@ -32,6 +32,7 @@ impl Expression {
 }
 
 impl Function {
+    /// Returns the value of the function at x.
     fn apply<S: Scalar>(self, x: S) -> S {
         match self {
             Self::Sin => x.sin(),
@@ -47,19 +48,20 @@ impl Function {
             Self::Sign => S::from(sign(x.re())),
             Self::Tanh => tanh(x),
             Self::Step => S::from(f64::from(x.re() >= 0.0)),
-            Self::Spline => cubic(x),
+            Self::Spline => cubic_spline(x),
         }
     }
 }
 
 impl Operator {
+    /// Returns the value of the operator for the operands a and b.
     fn apply<S: Scalar>(self, a: S, b: S) -> S {
         match self {
             Self::Add => a + b,
             Self::Subtract => a - b,
             Self::Multiply => a * b,
             Self::Divide => a / b,
-            // a^b = exp(b ln a) has a derivative by b for positive a alone.
+            // a^b = exp(b ln a) has a derivative with respect to b only for positive a.
             Self::Power if a.re() > 0.0 => (b * a.ln()).exp(),
             Self::Power => S::from(a.re().powf(b.re())),
             Self::Atan2 if a.re() == 0.0 && b.re() == 0.0 => S::from(0.0),
@@ -83,20 +85,20 @@ fn power<S: Scalar>(x: S, exponent: f64) -> S {
     if x.re() == 0.0 { S::from(x.re().powf(exponent)) } else { x.powf(exponent) }
 }
 
-/// Returns −1, 0 or 1, NaN for NaN.
+/// Returns the sign −1, 0 or 1 of x; NaN for NaN.
 fn sign(x: f64) -> f64 {
     if x == 0.0 { 0.0 } else { x.signum() }
 }
 
-/// Returns tanh x, with a derivative of 0 if x is so large that its exponential overflows.
+/// Returns tanh x, with a derivative of 0 if |x| is so large that tanh x equals ±1 to rounding.
 fn tanh<S: Scalar>(x: S) -> S {
     /// Smallest argument at which tanh equals ±1 to rounding.
     const SATURATED_TANH: f64 = 20.0;
     if x.re().abs() > SATURATED_TANH { S::from(sign(x.re())) } else { x.tanh() }
 }
 
-/// Returns the uniform cubic B-spline over the intervals 0…4.
-fn cubic<S: Scalar>(u: S) -> S {
+/// Returns the uniform cubic B-spline with the knots 0, 1, 2, 3, 4; 0 outside 0…4.
+fn cubic_spline<S: Scalar>(u: S) -> S {
     let above = u.re() > 2.0;
     let v = if above { -u + 4.0 } else { u };
     match v.re() {

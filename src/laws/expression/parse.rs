@@ -11,15 +11,16 @@ use crate::laws::quantity::Quantity;
 
 /// Maximum length of a formula \[characters\].
 const MAX_LENGTH: usize = 2000;
-/// Maximum nesting depth of parentheses, signs and powers.
+/// Maximum nesting depth of parentheses, signs and powers, and maximum number of operators in one
+/// sum or product.
 const MAX_DEPTH: usize = 60;
 
-/// Expression with its unit.
+/// Expression parsed from a formula, with its unit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Parsed {
     /// Parsed expression.
     pub expression: Expression,
-    /// Physical dimension of the expression.
+    /// Unit of the expression.
     pub dimension: Dimension,
 }
 
@@ -49,20 +50,24 @@ pub fn parse(text: &str, vocabulary: &Vocabulary) -> Result<Parsed, FormulaError
     }
 }
 
+/// Recursive-descent parser of one formula.
 struct Parser<'a> {
     text: &'a str,
     /// Index of the next byte.
     at: usize,
+    /// Present nesting depth.
     depth: usize,
     vocabulary: &'a Vocabulary<'a>,
 }
 
 impl<'a> Parser<'a> {
+    /// Creates the error of a mistake in the byte range `span`.
     fn error(&self, span: Range<usize>, mistake: Mistake) -> FormulaError {
         let before = self.text.get(..span.start).unwrap_or(self.text);
         FormulaError { column: before.chars().count() + 1, span, mistake }
     }
 
+    /// Returns the text that has not been consumed.
     fn rest(&self) -> &'a str {
         self.text.get(self.at..).unwrap_or_default()
     }
@@ -74,6 +79,8 @@ impl<'a> Parser<'a> {
         self.rest().chars().next()
     }
 
+    /// Consumes the next character if it is `sign`, spaces before it included. Returns true if it
+    /// is.
     fn take(&mut self, sign: char) -> bool {
         let is_next = self.peek() == Some(sign);
         if is_next {
@@ -82,6 +89,7 @@ impl<'a> Parser<'a> {
         is_next
     }
 
+    /// Creates the error of a next character that is not `expected`.
     fn unexpected(&mut self, expected: &'static str) -> FormulaError {
         let next = self.peek();
         let end = self.at + next.map_or(0, char::len_utf8);
@@ -89,6 +97,7 @@ impl<'a> Parser<'a> {
         self.error(self.at..end, Mistake::Unexpected { expected, found })
     }
 
+    /// Parses a part with `read`, one nesting level deeper.
     fn deeper(
         &mut self,
         read: impl FnOnce(&mut Self) -> Result<Part, FormulaError>,
@@ -103,6 +112,7 @@ impl<'a> Parser<'a> {
         part
     }
 
+    /// Parses operands joined by + and −.
     fn sum(&mut self) -> Result<Part, FormulaError> {
         let mut left = self.product()?;
         // A chain of operators nests to the left, so it counts towards the depth of the tree.
@@ -119,6 +129,7 @@ impl<'a> Parser<'a> {
         }
     }
 
+    /// Parses operands joined by * and /.
     fn product(&mut self) -> Result<Part, FormulaError> {
         let mut left = self.signed()?;
         let mut chained = 0;
@@ -146,6 +157,7 @@ impl<'a> Parser<'a> {
         Ok(())
     }
 
+    /// Parses a power with any number of signs before it.
     fn signed(&mut self) -> Result<Part, FormulaError> {
         let start = {
             self.peek();
@@ -165,6 +177,7 @@ impl<'a> Parser<'a> {
         Ok(Part { expression, dimension: inner.dimension, span: start..inner.span.end })
     }
 
+    /// Parses an operand with an exponent, if there is one.
     fn power(&mut self) -> Result<Part, FormulaError> {
         let base = self.atom()?;
         if !self.take('^') {
@@ -178,6 +191,7 @@ impl<'a> Parser<'a> {
         self.join(Operator::Power, base, exponent)
     }
 
+    /// Joins two operands; returns an error if their units do not match.
     fn join(&self, operator: Operator, left: Part, right: Part) -> Result<Part, FormulaError> {
         let span = left.span.start..right.span.end;
         let exponent = match right.expression {
@@ -193,6 +207,7 @@ impl<'a> Parser<'a> {
         Ok(Part { expression, dimension, span })
     }
 
+    /// Parses an operand without operators: a number, a word, or a formula in parentheses.
     fn atom(&mut self) -> Result<Part, FormulaError> {
         match self.peek() {
             Some('(') => {
@@ -267,6 +282,7 @@ impl<'a> Parser<'a> {
         }
     }
 
+    /// Parses a word: a parameter, a covariate, a quantity, a constant, or the name of a function.
     fn word(&mut self) -> Result<Part, FormulaError> {
         let start = self.at;
         let rest = self.rest();
@@ -291,7 +307,7 @@ impl<'a> Parser<'a> {
             return Ok(covariate(index, span));
         }
         if let Some((_, joint)) = self.vocabulary.joints.iter().find(|(name, _)| name == word) {
-            return quantity(Quantity::Command(*joint), self.command(*joint));
+            return quantity(Quantity::Command(*joint), self.command_dimension(*joint));
         }
         match word {
             "pi" => return of(Expression::Number(std::f64::consts::PI), Dimension::FLEXIBLE),
@@ -312,13 +328,14 @@ impl<'a> Parser<'a> {
             let joint = number - 1;
             return match (prefix, of) {
                 ("M", _) => quantity(Quantity::Moment(joint), Dimension::TORQUE),
-                (_, Some(())) => quantity(Quantity::Command(joint), self.command(joint)),
+                (_, Some(())) => quantity(Quantity::Command(joint), self.command_dimension(joint)),
                 _ => quantity(Quantity::Approach(joint), Dimension::PLAIN),
             };
         }
         Err(self.error(span, self.unknown(word)))
     }
 
+    /// Returns the mistake of an unknown word, with the most similar known one.
     fn unknown(&self, word: &str) -> Mistake {
         let Vocabulary { slides, joints, covariates, parameters } = self.vocabulary;
         let commands = (1..=slides.len()).map(|number| format!("q{number}"));
@@ -338,7 +355,8 @@ impl<'a> Parser<'a> {
         Mistake::UnknownWord { word: word.to_owned(), near: nearest(word, candidates) }
     }
 
-    fn command(&self, joint: usize) -> Dimension {
+    /// Returns the unit of the command of a joint, counted from 0.
+    fn command_dimension(&self, joint: usize) -> Dimension {
         let slides = self.vocabulary.slides.get(joint).copied().unwrap_or(false);
         if slides { Dimension::LENGTH } else { Dimension::ANGLE }
     }

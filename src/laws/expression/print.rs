@@ -65,7 +65,7 @@ impl fmt::Display for Named<'_> {
             }
             Expression::Binary(operator, operands) => {
                 let [left, right] = &**operands;
-                let (sign, least) = match operator {
+                let (sign, min_strengths) = match operator {
                     Operator::Add => (" + ", (1, 2)),
                     Operator::Subtract => (" - ", (1, 2)),
                     Operator::Multiply => ("*", (2, 3)),
@@ -78,19 +78,21 @@ impl fmt::Display for Named<'_> {
                         return write!(f, "{name}({}, {})", named(left), named(right));
                     }
                 };
-                named(left).in_parentheses(left.strength() < least.0, f)?;
+                named(left).in_parentheses(left.strength() < min_strengths.0, f)?;
                 f.write_str(sign)?;
-                named(right).in_parentheses(right.strength() < least.1, f)
+                named(right).in_parentheses(right.strength() < min_strengths.1, f)
             }
         }
     }
 }
 
 impl Named<'_> {
+    /// Writes the expression, in parentheses if they are `needed`.
     fn in_parentheses(&self, needed: bool, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if needed { write!(f, "({self})") } else { write!(f, "{self}") }
     }
 
+    /// Writes a quantity as formulas name it.
     fn quantity(&self, quantity: Quantity, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match quantity {
             Quantity::Command(joint) => write!(f, "q{}", joint + 1),

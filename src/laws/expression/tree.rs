@@ -34,7 +34,7 @@ pub enum Operator {
     Divide,
     /// Power, a to the power of b.
     Power,
-    /// Angle of the point (b, a) \[rad\], −π to π.
+    /// Angle of the point with x = b and y = a from the x axis \[rad\], −π to π.
     Atan2,
     /// Minimum of a and b.
     Minimum,
@@ -68,7 +68,8 @@ pub enum Function {
     Tanh,
     /// Unit step: 1 for arguments from 0 on, else 0.
     Step,
-    /// Uniform cubic B-spline over the intervals 0…4. Its shifts by integers add up to 1.
+    /// Uniform cubic B-spline with the knots 0, 1, 2, 3, 4; 0 outside 0…4. Its shifts by integers
+    /// add up to 1.
     Spline,
 }
 
