@@ -1,28 +1,31 @@
-//! Sequential test of "unchanged" against a mixture of causes.
+//! Sequential test of an unchanged arm against a mixture of causes of a change.
 
 use nalgebra::{DMatrix, DVector};
 
-use super::causes::{Cause, CauseKind, LARGER_SIZE};
+use super::causes::{Cause, CauseKind, LARGER_SIZE_RATIO};
 use super::evidence::{NOISE_RATIOS, OTHER_RATIOS, Unchanged, ln_sum};
 use super::rows::{SensitiveRows, Sums};
 
-/// Rows at which the sequential test looks; more rows are looked at in equal steps.
+/// Maximum number of looks, which are row counts after which the evidence is computed. Tables with
+/// more rows have looks in equal steps.
 const MAX_LOOKS: usize = 400;
 
-/// Sums of rows for several ratios of the noise to the assumed one, each with its ratio.
+/// Sums over rows for several ratios of the noise to the assumed one, each with its ratio.
 type SumsByRatio = Vec<(f64, Sums)>;
 
 /// Result of the test after all rows.
 pub(super) struct Assessment {
-    /// ln of the mixture's likelihood ratio after each look, and the number of rows then.
+    /// Number of rows at each look, and ln of the likelihood ratio of the mixture of causes to
+    /// "unchanged" for these rows.
     pub looks: Vec<(usize, f64)>,
     /// Causes, the most probable first.
     pub causes: Vec<AssessedCause>,
-    /// ln of the sum of the shares of all causes.
+    /// ln Σ (prior probability × likelihood ratio) over all causes, for all rows.
     pub ln_sum: f64,
     /// Squared length rᵀ S⁻¹ r of all residuals: χ² with `coordinates` degrees of freedom if
     /// nothing changed.
     pub chi2: f64,
+    /// Number of measured coordinates.
     pub coordinates: f64,
 }
 
@@ -31,23 +34,25 @@ pub(super) struct Assessment {
 pub(super) struct AssessedCause {
     /// Index among the causes that were tried.
     pub cause: usize,
-    /// Row, if the cause is a gross row.
+    /// Index of the row, if the cause is a gross error of one row.
     pub row: Option<usize>,
-    /// First row that shows the change; 0 if it happened before the table.
+    /// Index of the first row that shows the change; 0 if it happened before the table.
     pub onset: usize,
     /// Probability among all causes, given that something changed.
     pub probability: f64,
-    /// Sizes (1 σ) of largest evidence.
+    /// Prior 1 σ of each amplitude, those of the trial with the largest evidence; empty for noise,
+    /// gross rows and something else.
     pub sizes: Vec<f64>,
-    /// Posterior mean of the amplitudes with these sizes; the ratio to the assumed noise for larger
-    /// noise and for something else.
+    /// Posterior mean of the amplitudes with these prior 1 σ; for larger noise and something else,
+    /// the ratio to the assumed noise.
     pub mean: DVector<f64>,
     /// Posterior covariance of the amplitudes.
     pub covariance: DMatrix<f64>,
 }
 
 impl AssessedCause {
-    /// Returns the name of the cause; `location` names a row by its file and line.
+    /// Returns the name of the cause, with its row or its onset; `location` names a row by its file
+    /// and line.
     pub fn label(&self, causes: &[Cause], location: impl Fn(usize) -> String) -> String {
         match (self.row, self.onset) {
             (Some(row), _) => format!("{} is off", location(row)),
@@ -57,8 +62,9 @@ impl AssessedCause {
     }
 }
 
-/// Weighted ln LR of a cause, with the amplitudes of the best size.
+/// Weighted likelihood ratio of a cause, with the amplitudes of the trial of largest evidence.
 pub(super) struct Weighted {
+    /// ln (prior probability × likelihood ratio), averaged over the trials.
     pub ln_share: f64,
     sizes: Vec<f64>,
     mean: DVector<f64>,
@@ -66,21 +72,23 @@ pub(super) struct Weighted {
 }
 
 impl Weighted {
-    /// Creates the share of a cause that moves no column.
+    /// Creates the weighted ratio of a cause that moves no column of the sensitivities.
     fn without_columns(ln_share: f64, mean: Vec<f64>) -> Self {
         let covariance = DMatrix::zeros(mean.len(), mean.len());
         Self { ln_share, sizes: Vec::new(), covariance, mean: DVector::from_vec(mean) }
     }
 
-    /// Returns the cause with its amplitudes from the row `onset` on, its probability still open.
+    /// Returns the cause with its amplitudes from the row `onset` on; its probability is NaN until
+    /// it is set.
     pub fn assessed(self, cause: usize, onset: usize) -> AssessedCause {
         let Self { sizes, mean, covariance, .. } = self;
         AssessedCause { cause, row: None, onset, probability: f64::NAN, sizes, mean, covariance }
     }
 }
 
-/// Computes the share of a cause that moves columns; `columns` maps each column of the causes to
-/// one of the sums. Returns `None` for noise and gross rows, or if a number is not finite.
+/// Computes the weighted likelihood ratio of a cause that moves columns of the sensitivities.
+/// `columns` maps each column that causes name to one of the sums. Returns `None` for noise and
+/// gross rows, or if a number is not finite.
 pub(super) fn weighted_cause(
     unchanged: &Unchanged,
     cause: &Cause,
@@ -91,7 +99,9 @@ pub(super) fn weighted_cause(
         .trial_sigmas
         .iter()
         .zip(ln_size_priors(cause))
-        .filter_map(|(sizes, ln_prior)| Some((unchanged.cause(&columns, sizes)?, sizes, ln_prior)))
+        .filter_map(|(sizes, ln_prior)| {
+            Some((unchanged.likelihood_ratio(&columns, sizes)?, sizes, ln_prior))
+        })
         .collect();
     let ratios = tried.iter().map(|((ratio, ..), _, ln_prior)| ratio + ln_prior);
     let ln_share = ln_sum(ratios) + cause.ln_weight;
@@ -129,8 +139,9 @@ pub(super) fn assess(
             continue;
         }
         let unchanged = Unchanged::new(&sums, factor)?;
-        let weighted = ratios(rows, row + 1, (&sums, &noisier, factor), &unchanged, causes);
-        // Rows to come are as likely to be gross as these; they change nothing yet.
+        let weighted =
+            weighted_ratios(rows, row + 1, (&sums, &noisier, factor), &unchanged, causes);
+        // The likelihood ratio of a gross row that is still to come is 1.
         let to_come = causes.iter().find(|cause| cause.kind == CauseKind::Row);
         let to_come = to_come.map(|cause| cause.ln_weight - (row as f64 + 2.0).ln());
         let evidence = ln_sum(weighted.iter().map(|(.., entry)| entry.ln_share).chain(to_come));
@@ -153,18 +164,18 @@ pub(super) fn assess(
     Some(Assessment { looks, causes, ln_sum: all, chi2, coordinates: sums.coordinates })
 }
 
-/// Returns the logarithms of the prior probabilities of the sizes of a cause, the smallest size
-/// first; the probabilities sum to 1. Large rates per kelvin are as probable as small ones.
+/// Returns the logarithms of the prior probabilities of the trial sizes of a cause, the smallest
+/// size first; the probabilities sum to 1. All sizes of causes by temperature are equally probable.
 fn ln_size_priors(cause: &Cause) -> impl Iterator<Item = f64> {
-    let larger = if cause.kind == CauseKind::Temperature { 1.0 } else { LARGER_SIZE };
+    let larger = if cause.kind == CauseKind::Temperature { 1.0 } else { LARGER_SIZE_RATIO };
     let sum: f64 = (0..cause.trial_sigmas.len()).map(|size| larger.powf(size as f64)).sum();
     (0..cause.trial_sigmas.len()).map(move |size| size as f64 * larger.ln() - sum.ln())
 }
 
-/// Computes the weighted likelihood ratio of each cause, and of each of the first `count` rows as a
-/// gross one, with the index of the cause and the row. `noisier` holds the sums with each of
-/// [`NOISE_RATIOS`], then those with each of [`OTHER_RATIOS`].
-fn ratios(
+/// Computes the weighted likelihood ratio of each cause, and of a gross error of each of the first
+/// `count` rows. Returns them with the index of the cause and of the gross row. `noisier` holds the
+/// sums with each of [`NOISE_RATIOS`], then those with each of [`OTHER_RATIOS`].
+fn weighted_ratios(
     rows: &SensitiveRows,
     count: usize,
     (sums, noisier, factor): (&Sums, &[SumsByRatio; 2], &DMatrix<f64>),

@@ -1,4 +1,4 @@
-//! Possible causes of a change: what may have moved, and by how much.
+//! Possible causes of a change of an arm: what may have moved, and by how much.
 
 use nalgebra::DVector;
 
@@ -8,46 +8,49 @@ use crate::model::parameter::{BeamField, JointField, Parameter, ParameterSite};
 use crate::problem::{JointKind, Problem};
 use crate::quantity::Unit;
 
-/// Prior probability of a size relative to that of the next smaller one. A change of k times the
-/// size has k² times the evidence, so large changes are seen in spite of it. Causes of temperature
-/// have equally probable sizes.
-pub(super) const LARGER_SIZE: f64 = 0.4;
-/// Sizes of a moved zero, 1 σ \[°\] or \[mm\], the smallest first.
+/// Prior probability of a trial size of a change, relative to that of the next smaller one. A
+/// change of k times the size has k² times the evidence, so large changes are found all the same.
+/// Sizes of causes by temperature are equally probable instead.
+pub(super) const LARGER_SIZE_RATIO: f64 = 0.4;
+/// Trial sizes of a moved zero of a joint, 1 σ \[°\] or \[mm\], the smallest first.
 const ZERO_SIZES: [f64; 4] = [0.01, 0.05, 0.25, 1.2];
-/// Sizes of a moved point, 1 σ on each axis \[mm\].
+/// Trial sizes of a moved target, base or fixture, 1 σ on each axis \[mm\]; rotations \[°\] are a
+/// tenth of the number.
 const LENGTH_SIZES: [f64; 4] = [0.05, 0.2, 1.0, 5.0];
-/// Sizes of a bent link: 1 σ of its lengths \[mm\] and of its angles \[°\].
+/// Trial sizes of a bent link: 1 σ of its lengths \[mm\] and of its angles \[°\].
 const LINK_SIZES: [(f64, f64); 3] = [(0.05, 0.005), (0.2, 0.02), (1.0, 0.1)];
-/// Sizes of a change of ln stiffness, 1 σ.
+/// Trial sizes of a change of ln stiffness, 1 σ.
 const STIFFNESS_SIZES: [f64; 3] = [0.05, 0.2, 0.7];
-/// Sizes of a change of a law, as parts of the σ of its prior.
+/// Trial sizes of a change of a law's parameters, 1 σ as a fraction of the σ of their priors.
 const LAW_SIZES: [f64; 3] = [0.05, 0.3, 1.0];
-/// Sizes of the strain of a warmed arm, 1 σ: steel warmer by 3, 10 and 30 K.
+/// Trial sizes of the thermal strain of an arm, 1 σ: steel that is warmer by 3, 10 and 30 K.
 const STRAIN_SIZES: [f64; 3] = [3.6e-5, 1.2e-4, 3.6e-4];
-/// Sizes of a joint's angle per kelvin, 1 σ \[rad/K\].
+/// Trial sizes of the thermal drift of a joint's zero, 1 σ \[rad/K\].
 const JOINT_THERMAL_SIZES: [f64; 3] = [1e-6, 5e-6, 3e-5];
-/// Temperature difference from the reference \[K\] above which temperature is a probable cause.
-const WARM: f64 = 3.0;
-/// Factor on the prior probability of temperature as the cause, for rows at another temperature.
-const MORE_IF_WARM: f64 = 20.0;
+/// Temperature difference from the reference \[K\] from which on temperature is a more probable
+/// cause.
+const MIN_WARMTH: f64 = 3.0;
+/// Factor on the prior probability of temperature as the cause, if a row differs from the reference
+/// by [`MIN_WARMTH`] or more.
+const WARM_FACTOR: f64 = 20.0;
 
 worded! {
-    /// Kind of a cause.
+    /// Kind of a cause of a change.
     #[derive(Debug, Clone, Copy, PartialEq, Eq)]
     pub enum CauseKind: as_str {
         /// Zero of a joint.
         Zero = "joint-zero";
         /// Geometry of a link, except the zero of its joint.
         Link = "link";
-        /// Measured point in the last frame.
+        /// Position of a target in the frame of the joint that carries it.
         Tool = "tool";
         /// Pose of the base in the measuring frame.
         Base = "base";
-        /// Point, anchor, surface, camera or marker.
+        /// Position or pose of a point, anchor, surface, camera or marker.
         Fixture = "fixture";
         /// Stiffness of a joint or rigidity of a beam.
         Stiffness = "stiffness";
-        /// Amplitude of a declared law.
+        /// Parameters of an effect or law that the problem declares.
         Law = "law";
         /// Temperature of the arm.
         Temperature = "temperature";
@@ -55,15 +58,14 @@ worded! {
         Noise = "noise";
         /// Gross error of one row.
         Row = "row";
-        /// Something else than these causes: none of them explains the rows.
+        /// Large errors without a pattern, which none of these causes explains.
         Other = "other";
     }
 }
 
 impl CauseKind {
-    /// Kinds with the prior probability of each, given a change. Collisions and exchanged motors
-    /// move zeros, so these make up half of it. Temperature is 20 times as probable if the rows are
-    /// warmer or colder than the reference.
+    /// Kinds with the prior probability of each, given that something changed. Collisions and
+    /// exchanged motors move zeros, so zeros have half of the probability.
     const WEIGHTS: [(Self, f64); 11] = [
         (Self::Zero, 0.50),
         (Self::Tool, 0.18),
@@ -85,13 +87,13 @@ pub(super) struct Cause {
     pub kind: CauseKind,
     /// Name for people, such as "zero of joint 2".
     pub label: String,
-    /// Columns of the sensitivities that it moves.
+    /// Columns of the sensitivities that the cause moves.
     pub columns: Vec<usize>,
     /// Name and unit of each amplitude.
     pub amplitudes: Vec<(String, Unit)>,
     /// Standard deviations of the amplitudes in each trial, one vector for each size of a change.
     pub trial_sigmas: Vec<Vec<f64>>,
-    /// Logarithm of the prior probability.
+    /// Logarithm of the prior probability, given that something changed.
     pub ln_weight: f64,
 }
 
@@ -107,8 +109,9 @@ pub(super) struct Extended {
 }
 
 impl Extended {
-    /// Adds a parameter at each zero, each geometry of a link, each stiffness, base and target that
-    /// is not free in `model`; `x` is its full parameter vector.
+    /// Adds a parameter for each geometric field of a moving joint, and for each coordinate of a
+    /// base or target, that is not free in `model`. `x` is the full parameter vector of `model`,
+    /// and `words` are the names of the bases, then of the targets.
     pub fn new(problem: &Problem, model: &Model, x: &DVector<f64>, words: [&[String]; 2]) -> Self {
         let mut sites: Vec<(ParameterSite, f64, String)> = Vec::new();
         let mut add = |site, nominal, name: String| {
@@ -159,7 +162,7 @@ impl Extended {
         }
     }
 
-    /// Returns the unit of a parameter's deviation at its site.
+    /// Returns the unit of a parameter's deviation.
     fn unit(&self, k: usize) -> Unit {
         if k < self.declared {
             self.model.parameters[k].unit()
@@ -168,9 +171,9 @@ impl Extended {
         }
     }
 
-    /// Lists the causes for rows of this model. `warmth` is the difference from the reference
-    /// temperature of each row \[K\], if the rows state one; columns for temperature are added to
-    /// `rows`.
+    /// Lists the causes for rows of this model, with their prior probabilities. `warmth` is the
+    /// difference of each row from the reference temperature \[K\], if the rows state temperatures.
+    /// Columns for thermal causes are added to `rows`.
     pub fn causes(
         &self,
         problem: &Problem,
@@ -291,12 +294,13 @@ impl Extended {
         causes.push(none(CauseKind::Noise, "noise of the measurement"));
         causes.push(none(CauseKind::Row, "one gross row"));
         causes.push(none(CauseKind::Other, "something else"));
-        weigh(&mut causes, warmth);
+        set_prior_probabilities(&mut causes, warmth);
         causes
     }
 
-    /// Lists the causes by temperature: all links expand, and where the rows state temperatures the
-    /// zeros move with them.
+    /// Lists the causes by temperature: all links expand and, if the rows state temperatures, the
+    /// zero of a joint moves with them. The list is empty if no row is 1 K or more from the
+    /// reference.
     fn thermal_causes(
         &self,
         problem: &Problem,
@@ -322,7 +326,8 @@ impl Extended {
         if lengths.is_empty() || !is_warm {
             return Vec::new();
         }
-        // Sizes are of strains; with temperatures the amplitude is per 10 K.
+        // The sizes are strains. If the rows state temperatures, the amplitude is a strain per
+        // kelvin, and its sizes are the strains divided by 10 K.
         let (unit, part) = match warmth {
             Some(_) => (Unit::PerDegree, 0.1),
             None => (Unit::Ratio, 1.0),
@@ -353,14 +358,14 @@ impl Extended {
 }
 
 /// Sets the prior probabilities of the causes; they sum to 1.
-fn weigh(causes: &mut [Cause], warmth: Option<&[f64]>) {
-    let is_warm = warmth.is_some_and(|warmth| warmth.iter().any(|t| t.abs() >= WARM));
+fn set_prior_probabilities(causes: &mut [Cause], warmth: Option<&[f64]>) {
+    let is_warm = warmth.is_some_and(|warmth| warmth.iter().any(|t| t.abs() >= MIN_WARMTH));
     let count = |kind| causes.iter().filter(|cause| cause.kind == kind).count() as f64;
     let weight = |kind: CauseKind| {
         let all =
             CauseKind::WEIGHTS.iter().find(|(of, _)| *of == kind).map_or(0.0, |entry| entry.1);
-        // Where the rows are warm, each zero competes with the same zero that follows temperature.
-        let factor = if kind == CauseKind::Temperature && is_warm { MORE_IF_WARM } else { 1.0 };
+        // The thermal causes of a warm arm must compete with moved zeros, which are more probable.
+        let factor = if kind == CauseKind::Temperature && is_warm { WARM_FACTOR } else { 1.0 };
         factor * all / count(kind).max(1.0)
     };
     let weights: Vec<f64> = causes.iter().map(|cause| weight(cause.kind)).collect();

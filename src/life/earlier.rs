@@ -1,4 +1,5 @@
-//! Earlier knowledge of an arm as a Gaussian on the parameters of a model.
+//! Earlier estimate of an arm, or prior from its siblings, as a Gaussian on the parameters of a
+//! model.
 
 use std::collections::HashSet;
 use std::path::PathBuf;
@@ -12,25 +13,27 @@ use crate::fit::{EarlierData, SavedEstimate, Strategy};
 use crate::model::Model;
 use crate::problem::Problem;
 
-/// Relative difference up to which two σ are equal.
+/// Relative difference up to which two σ count as equal.
 pub(super) const EQUAL_SIGMA: f64 = 1e-6;
 
-/// Gaussian on some parameters of a model, from an earlier estimate and widened by drift.
+/// Gaussian distribution of some parameters of a model, from an earlier estimate or from siblings,
+/// widened by drift.
 #[derive(Debug, Clone)]
 pub(super) struct Earlier {
+    /// File that it was read from.
     pub file: PathBuf,
     /// Names of the parameters.
     pub names: Vec<String>,
     /// Index of each parameter in the model.
-    pub places: Vec<usize>,
+    pub indices: Vec<usize>,
     /// Mean of the deviations from nominal.
     pub mean: DVector<f64>,
     /// Covariance of the deviations.
     pub covariance: DMatrix<f64>,
-    /// Digests of the rows that were fitted.
+    /// Digests of the rows to which the earlier estimate was fitted.
     pub fitted_rows: HashSet<String>,
-    /// Standard deviation (1 σ) of a coordinate to assume in new rows \[m\], where it is larger
-    /// than declared or none is declared.
+    /// Standard deviation (1 σ) of a measured coordinate to assume for new rows \[m\]; `None`
+    /// unless it is larger than the declared one or none is declared.
     pub sigma: Option<f64>,
     /// True if the Gaussian contains the prior of a fleet.
     pub includes_fleet: bool,
@@ -82,7 +85,7 @@ impl Earlier {
         Ok(Self {
             file,
             names: entries.iter().map(|&(_, k, _)| model.parameters[k].name.clone()).collect(),
-            places: entries.iter().map(|&(_, k, _)| k).collect(),
+            indices: entries.iter().map(|&(_, k, _)| k).collect(),
             mean,
             covariance,
             fitted_rows: saved.fitted_rows.clone(),
@@ -113,47 +116,50 @@ impl Earlier {
             return Err(PriorError::OtherPart { file, part: part.clone() });
         }
         let drift = drift::variances(problem, model, days)?;
-        let mut places = Vec::new();
+        let mut indices = Vec::new();
         for name in prior.parameters.keys() {
             match model.parameters.iter().position(|parameter| parameter.name == *name) {
-                Some(k) => places.push(k),
+                Some(k) => indices.push(k),
                 None => return Err(PriorError::NotFree { file, name: name.clone() }),
             }
         }
-        let count = places.len();
+        let count = indices.len();
         let entries = prior.parameters.values();
         let variance =
-            entries.clone().zip(&places).map(|((_, sigma), &k)| sigma * sigma + drift[k]);
+            entries.clone().zip(&indices).map(|((_, sigma), &k)| sigma * sigma + drift[k]);
         Ok(Self {
             file,
             names: prior.parameters.keys().cloned().collect(),
             mean: DVector::from_iterator(count, entries.map(|(mean, _)| *mean)),
             covariance: DMatrix::from_diagonal(&DVector::from_iterator(count, variance)),
-            places,
+            indices,
             fitted_rows: HashSet::new(),
             sigma: None,
             includes_fleet: true,
         })
     }
 
-    /// Returns the Gaussian as rows that join a fit, without what the declared priors state.
+    /// Returns the Gaussian as rows that are added to a fit. The declared priors, which it
+    /// contains, are divided out, so that they do not count twice.
     ///
     /// # Errors
-    /// Returns an error if the covariance is not positive.
+    /// Returns an error if the covariance is not positive definite.
     pub fn data(&self, model: &Model) -> Result<EarlierData, PriorError> {
         let precision = |k: &usize| model.parameters[*k].sigma.map_or(0.0, |sigma| sigma.powi(-2));
         let precision =
-            DVector::from_iterator(self.places.len(), self.places.iter().map(precision));
+            DVector::from_iterator(self.indices.len(), self.indices.iter().map(precision));
         EarlierData::new(self.names.clone(), &self.mean, &self.covariance, &precision)
             .ok_or_else(|| PriorError::NoCovariance { file: self.file.clone() })
     }
 
-    /// Returns the position of a model's parameter in the Gaussian; `None` if it is not part of it.
+    /// Returns the index, in the Gaussian, of the parameter with an index in the model; `None` if
+    /// the Gaussian does not contain it.
     pub fn place_of(&self, parameter: usize) -> Option<usize> {
-        self.places.iter().position(|&k| k == parameter)
+        self.indices.iter().position(|&k| k == parameter)
     }
 
-    /// Adds variance to the deviation of a model's parameter; no effect on other parameters.
+    /// Adds variance to the deviation of the parameter with an index in the model. Does nothing if
+    /// the Gaussian does not contain the parameter.
     pub fn widen(&mut self, parameter: usize, variance: f64) {
         if let Some(place) = self.place_of(parameter) {
             self.covariance[(place, place)] += variance;

@@ -1,4 +1,4 @@
-//! Errors of work with an earlier estimate.
+//! Errors of an identification with a prior, of a fleet, and of a watch.
 
 use std::path::PathBuf;
 

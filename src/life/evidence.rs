@@ -1,9 +1,9 @@
-//! Evidence for causes of a change, against "unchanged".
+//! Evidence for causes of a change of an arm, against "unchanged".
 //!
 //! Unchanged: the whitened residuals r of all rows are N(0, S) with S = Σ + K C Kᵀ. C is the
 //! covariance of the estimate. Σ is that of the noise, I, and of the misfit that the rows of one
-//! configuration share ([`Sums`]). A cause adds columns V of K with independent normal amplitudes of
-//! size D: r ~ N(0, S + V D² Vᵀ). With A = Vᵀ S⁻¹ V and b = Vᵀ S⁻¹ r its likelihood ratio is
+//! configuration share ([`Sums`]). A cause adds columns V of K with independent normal amplitudes
+//! of size D: r ~ N(0, S + V D² Vᵀ). With A = Vᵀ S⁻¹ V and b = Vᵀ S⁻¹ r its likelihood ratio is
 //!
 //! ln LR = −½ ln det(I + D A D) + ½ bᵀ D (I + D A D)⁻¹ D b            [Bishop 2006, §2.3]
 //!
@@ -18,17 +18,17 @@ use nalgebra::{DMatrix, DVector};
 
 use super::rows::{SensitiveRows, Sums};
 
-/// Ratios of the noise to the assumed one that are tried for larger noise.
+/// Ratios of the noise to the assumed one that are tried for the cause "larger noise".
 pub(super) const NOISE_RATIOS: [f64; 4] = [1.5, 2.0, 3.0, 5.0];
-/// Ratios of the errors to the assumed noise that are tried for something else than the listed
-/// causes: errors without a pattern that are too large to be noise.
+/// Ratios of the errors to the assumed noise that are tried for the cause "something else": errors
+/// without a pattern that are too large to be noise.
 pub(super) const OTHER_RATIOS: [f64; 5] = [30.0, 300.0, 3e3, 3e4, 3e5];
-/// Errors of a gross row that are tried, in units of its σ.
+/// Standard deviations λ of a gross row's error that are tried, in units of the row's σ.
 const GROSS_SIZES: [f64; 3] = [10.0, 50.0, 500.0];
-/// Smallest eigenvalue of a correlation matrix, relative to the largest, that counts.
+/// Smallest eigenvalue of a correlation matrix, relative to the largest, that does not count as 0.
 const MIN_RELATIVE_EIGENVALUE: f64 = 1e-13;
 
-/// Density of the rows if nothing changed, with everything that the ratios need.
+/// Density of the rows if nothing changed, with the quantities that the likelihood ratios need.
 pub(super) struct Unchanged {
     /// Matrix A = Kᵀ S⁻¹ K of all columns.
     pub information: DMatrix<f64>,
@@ -38,13 +38,14 @@ pub(super) struct Unchanged {
     pub squares: f64,
     /// Logarithm of the determinant of S.
     ln_det: f64,
-    /// Cholesky factor L of I + Fᵀ G F.
+    /// Cholesky factor L of I + Fᵀ G F; G and g are those of [`Sums`].
     lower: DMatrix<f64>,
     /// Vector L⁻¹ Fᵀ g.
     along: DVector<f64>,
 }
 
-/// Returns F with F Fᵀ = C for a covariance matrix C, columns of variance zero left out.
+/// Returns F with F Fᵀ = C for a covariance matrix C. F has a row for each parameter, and a column
+/// for each principal direction with a variance.
 pub(super) fn factor(covariance: &DMatrix<f64>) -> DMatrix<f64> {
     let scale = covariance.diagonal().map(|variance| variance.max(0.0).sqrt());
     let free: Vec<usize> = (0..scale.len()).filter(|&k| scale[k] > 0.0).collect();
@@ -67,8 +68,8 @@ pub(super) fn factor(covariance: &DMatrix<f64>) -> DMatrix<f64> {
 }
 
 impl Unchanged {
-    /// Computes the density of rows with these sums, for an estimate with the covariance F Fᵀ.
-    /// Returns `None` if a number is not finite.
+    /// Computes the density of rows with these sums, for an estimate with the covariance F Fᵀ, F =
+    /// `factor`. Returns `None` if a number is not finite.
     pub fn new(sums: &Sums, factor: &DMatrix<f64>) -> Option<Self> {
         let mut matrix = factor.tr_mul(&(&sums.information * factor));
         for k in 0..matrix.nrows() {
@@ -88,9 +89,10 @@ impl Unchanged {
         })
     }
 
-    /// Returns ln LR of a cause with these columns and sizes, and the posterior mean and covariance
-    /// of its amplitudes.
-    pub fn cause(
+    /// Returns ln LR of a cause that moves these columns, and the posterior mean and covariance of
+    /// its amplitudes. `sizes` are the prior 1 σ of the amplitudes. `None` if a number is not
+    /// finite.
+    pub fn likelihood_ratio(
         &self,
         columns: &[usize],
         sizes: &[f64],
@@ -115,7 +117,8 @@ impl Unchanged {
         0.5 * (self.ln_det - other.ln_det + self.squares - other.squares)
     }
 
-    /// Returns ln LR of one gross row, averaged over the sizes of its error.
+    /// Returns ln LR of a gross error in one row; LR is averaged over [`GROSS_SIZES`]. `None` if a
+    /// number is not finite.
     pub fn gross_row(
         &self,
         rows: &SensitiveRows,
@@ -136,7 +139,7 @@ impl Unchanged {
     }
 }
 
-/// Returns ln Σ exp(x) without overflow; −∞ for no numbers.
+/// Returns ln Σ exp(x) over the numbers x without overflow; −∞ without numbers.
 pub(super) fn ln_sum(numbers: impl IntoIterator<Item = f64>) -> f64 {
     let numbers: Vec<f64> = numbers.into_iter().collect();
     let largest = numbers.iter().copied().fold(f64::NEG_INFINITY, f64::max);

@@ -1,11 +1,11 @@
-//! Fleet: what estimates of several arms of one type say of the next one.
+//! Fleet: prior of an arm from the estimates of several arms of its type.
 //!
 //! Arm i has deviations θᵢ ~ N(μ, T) with T diagonal: mean μ and spread τ of each parameter. Its
-//! estimate is divided by its declared prior, so that its rows alone count: information matrix Λᵢ
-//! and vector hᵢ. μ has the declared prior N(0, s²). τ² has a scaled inverse χ² prior with half a
-//! degree of freedom. It shrinks τ towards the data sheet where few arms say little, so τ is a prior
-//! of the next arm and no measured spread. The prior of τ² is about s², or without a declared s about
-//! the mean variance of the estimates of the arms. Both are found by expectation maximisation                                   [Gelman et al. 2013, §15]
+//! estimate is divided by its declared prior, which leaves the likelihood of its rows: information
+//! matrix Λᵢ and vector hᵢ. μ has the declared prior N(0, s²). τ² has a scaled inverse χ² prior
+//! with ν = ½ degree of freedom about s², or without a declared s about the mean variance of the
+//! arms' estimates. This prior dominates if few arms inform on τ, so τ is a prior of the next arm
+//! and no measured spread. μ and τ are found by expectation maximisation [Gelman et al. 2013, §15]:
 //!
 //! mᵢ = (Λᵢ + T⁻¹)⁻¹ (hᵢ + T⁻¹ μ),   Vᵢ = (Λᵢ + T⁻¹)⁻¹,   τ² = (Σ (mᵢ − μ)² + Vᵢ + ν s²) / (n + ν)
 
@@ -19,25 +19,29 @@ use super::error::PriorError;
 use crate::fit::SavedEstimate;
 
 /// Degrees of freedom ν of the prior of each variance τ².
-const PRIOR_ARMS: f64 = 0.5;
+const PRIOR_FREEDOM: f64 = 0.5;
 /// Maximum number of steps of expectation maximisation.
 const MAX_STEPS: usize = 500;
-/// Steps of expectation maximisation without one arm, from the result with it.
+/// Maximum number of steps of expectation maximisation without one arm, from the result with it.
 const STEPS_WITHOUT_ONE: usize = 40;
-/// Relative change of every spread at which it has converged.
-const SETTLED: f64 = 1e-4;
-/// Deviation of a parameter without a declared prior, 1 σ, SI or of the logarithm.
-const WIDE: f64 = 1.0;
-/// Probability with which an arm like its siblings is called unlike them.
-const UNLIKE: f64 = 0.01;
-/// Smallest part of the fleet's variance that the rows of an arm must remove for a comparison.
-const LEAST_LEARNED: f64 = 0.05;
-/// Minimum number of arms.
+/// Largest relative change of any variance τ² in one step at which the expectation maximisation has
+/// converged.
+const CONVERGENCE_TOLERANCE: f64 = 1e-4;
+/// Prior 1 σ of the mean μ of a parameter without a declared prior, SI or of the logarithm.
+const WIDE_SIGMA: f64 = 1.0;
+/// Probability with which any arm of a fleet is called unlike the others although all are alike.
+const FALSE_UNLIKE_PROBABILITY: f64 = 0.01;
+/// Smallest information of an arm's rows on a parameter, relative to that of the fleet, at which
+/// the arm is compared in this parameter.
+const MIN_LEARNED: f64 = 0.05;
+/// Minimum number of arms of a fleet.
 const MIN_ARMS: usize = 3;
-/// Last parts of the names of parameters whose deviation is a logarithm.
-const RELATIVE: [&str; 6] = ["stiffness", "EA", "EI", "EIy", "EIz", "GJ"];
-/// First parts of the names of parameters of the set-up, which say nothing of the arm.
-const SET_UP: [&str; 7] = ["base", "tool", "point", "anchor", "surface", "camera", "marker"];
+/// Last parts of the names of parameters whose deviation is ln(value / nominal).
+const RELATIVE_FIELDS: [&str; 6] = ["stiffness", "EA", "EI", "EIy", "EIz", "GJ"];
+/// First parts of the names of parameters of the measurement setup, which are no parameters of the
+/// arm.
+const SETUP_PREFIXES: [&str; 7] =
+    ["base", "tool", "point", "anchor", "surface", "camera", "marker"];
 
 /// Mean and spread of the parameters of arms of one type.
 #[derive(Debug, Clone)]
@@ -46,9 +50,12 @@ pub struct Fleet {
     pub problem: String,
     /// Digest of each part of the declared arm.
     pub arm_parts: BTreeMap<String, String>,
+    /// Parameters that have a variance in the estimates of all arms.
     pub parameters: Vec<FleetParameter>,
-    /// Names of parameters of the arm that have no variance in some estimate, and are left out.
+    /// Names of parameters of the arm that are left out, because they have a variance in some
+    /// estimates only.
     pub left_out: Vec<String>,
+    /// Arms of the fleet, each compared with the others.
     pub arms: Vec<FleetArm>,
 }
 
@@ -60,7 +67,7 @@ pub struct FleetParameter {
     pub unit: String,
     /// Nominal value, SI.
     pub nominal: f64,
-    /// Mean of the deviations.
+    /// Mean of the deviations over the arms.
     pub mean: f64,
     /// Standard error of the mean.
     pub mean_error: f64,
@@ -74,32 +81,34 @@ pub struct FleetParameter {
 #[derive(Debug, Clone)]
 pub struct FleetArm {
     pub file: PathBuf,
-    /// Parameter that deviates most from what the other arms say, and by how many of its standard
-    /// deviations; `None` if the rows say nothing.
+    /// Name of the parameter that deviates most from the prediction by the other arms, and its
+    /// signed deviation in standard deviations; `None` if the arm's rows inform on no parameter.
     pub most: Option<(String, f64)>,
-    /// True if that is improbable for an arm like its siblings.
+    /// True if the deviation is improbable for an arm like the others.
     pub is_unlike: bool,
 }
 
-/// Information of the rows of one arm on the parameters of the fleet.
+/// Likelihood of the rows of one arm, as a function of the parameters of the fleet.
 struct Likelihood {
+    /// Information matrix Λ.
     information: DMatrix<f64>,
+    /// Vector h = Λ × (maximum-likelihood estimate).
     vector: DVector<f64>,
     /// Variance of each parameter's estimate, the declared prior included.
     variance: DVector<f64>,
 }
 
-/// Variances of the priors of mean and spread of each parameter.
+/// Priors of mean and spread of each parameter.
 struct DataSheet {
-    /// Variance of the mean.
+    /// Prior variance of the mean μ.
     mean: DVector<f64>,
-    /// Variance about which τ² has its prior.
+    /// Variance s² about which τ² has its prior.
     spread: DVector<f64>,
 }
 
 impl DataSheet {
-    /// Returns the declared variances, and for parameters without one a wide mean and the mean
-    /// variance of the estimates.
+    /// Creates the priors from the declared variances. A parameter without one gets a wide prior of
+    /// the mean, and the mean variance of the arms' estimates as s².
     fn new(declared: &[Option<f64>], likelihoods: &[Likelihood]) -> Self {
         let count = likelihoods.len().max(1) as f64;
         let of_estimates =
@@ -109,31 +118,34 @@ impl DataSheet {
                 declared[k].map_or_else(|| other(k), |sigma| sigma * sigma)
             })
         };
-        Self { mean: of(&|_| WIDE * WIDE), spread: of(&of_estimates) }
+        Self { mean: of(&|_| WIDE_SIGMA * WIDE_SIGMA), spread: of(&of_estimates) }
     }
 }
 
-/// Mean and variance of each parameter, and the variance of the mean.
-struct Model {
+/// Distribution of each parameter over the arms of a fleet.
+struct FleetDistribution {
+    /// Mean μ of each parameter.
     mean: DVector<f64>,
+    /// Variance τ² of each parameter.
     variance: DVector<f64>,
+    /// Variance of the error of each mean.
     mean_variance: DVector<f64>,
 }
 
-/// Returns true if the deviation of a parameter is a logarithm.
+/// Returns true if the deviation of the parameter with this name is a logarithm.
 fn is_relative(name: &str) -> bool {
-    RELATIVE.contains(&name.rsplit('.').next().unwrap_or_default())
+    RELATIVE_FIELDS.contains(&name.rsplit('.').next().unwrap_or_default())
 }
 
-/// Returns true for a parameter of the arm, false for one of the set-up.
+/// Returns true for a parameter of the arm, false for one of the measurement setup.
 fn is_of_arm(name: &str) -> bool {
-    !SET_UP.contains(&name.split(['.', '[']).next().unwrap_or_default())
+    !SETUP_PREFIXES.contains(&name.split(['.', '[']).next().unwrap_or_default())
 }
 
 /// Finds mean and spread of the parameters of several arms, from their estimates.
 ///
-/// Bases, tools and fixtures are left out, and so are parameters without a variance in some
-/// estimate, as at a bound.
+/// Bases, tools and fixtures are left out. So are parameters that have no variance in some
+/// estimate, for example because they rest on a bound.
 ///
 /// # Errors
 /// Returns an error if there are fewer than three arms, if they differ in their declaration, if two
@@ -187,7 +199,7 @@ pub fn fleet(estimates: &[SavedEstimate]) -> Result<Fleet, PriorError> {
     });
     let limit = {
         let tests = (names.len() * estimates.len()) as f64;
-        Normal::standard().inverse_cdf(1.0 - 0.5 * UNLIKE / tests)
+        Normal::standard().inverse_cdf(1.0 - 0.5 * FALSE_UNLIKE_PROBABILITY / tests)
     };
     let arms = estimates.iter().enumerate().map(|(arm, estimate)| {
         let others: Vec<&Likelihood> =
@@ -210,8 +222,8 @@ pub fn fleet(estimates: &[SavedEstimate]) -> Result<Fleet, PriorError> {
     })
 }
 
-/// Returns the names of the arm's parameters that have a variance in every estimate, and of those
-/// that have one in some.
+/// Returns the names of the arm's parameters that have a variance in every estimate, and the names
+/// of those that have one in some estimates only.
 fn with_variance(estimates: &[SavedEstimate]) -> (Vec<&str>, Vec<String>) {
     let has_variance = |estimate: &SavedEstimate, name: &str| {
         let place = estimate.entries().position(|(other, ..)| other == name);
@@ -230,8 +242,8 @@ fn with_variance(estimates: &[SavedEstimate]) -> (Vec<&str>, Vec<String>) {
     (kept, left_out.into_iter().map(str::to_owned).collect())
 }
 
-/// Returns what the rows of an arm say of the parameters `names`: its posterior divided by the
-/// declared prior.
+/// Returns the likelihood of the rows of an arm as a function of the parameters `names`: the
+/// posterior divided by the declared prior.
 fn likelihood(
     estimate: &SavedEstimate,
     names: &[&str],
@@ -274,7 +286,8 @@ fn likelihood(
     Ok(Likelihood { information, vector, variance: covariance.diagonal() })
 }
 
-/// Returns mean and covariance of the deviations of one arm, given mean and variance of the fleet.
+/// Returns posterior mean and covariance of the deviations of one arm, given mean and variance of
+/// the fleet; `None` if the covariance is not positive definite.
 fn conditioned(
     arm: &Likelihood,
     mean: &DVector<f64>,
@@ -294,19 +307,19 @@ fn conditioned(
     Some((mean + moved, covariance))
 }
 
-/// Finds mean and spread by expectation maximisation from a mean and a variance.
+/// Finds mean and spread by expectation maximisation, starting from a mean and a variance.
 fn maximised(
     arms: &[&Likelihood],
     sheet: &DataSheet,
     (mut mean, mut variance): (DVector<f64>, DVector<f64>),
     max_steps: usize,
-) -> Model {
+) -> FleetDistribution {
     let (n, count) = (mean.len(), arms.len() as f64);
     let mut mean_variance = DVector::zeros(n);
     for _ in 0..max_steps {
         let found: Vec<_> =
             arms.iter().filter_map(|arm| conditioned(arm, &mean, &variance)).collect();
-        // The mean, given the arms: its prior is the data sheet.
+        // Posterior mean of μ, given the deviations of the arms.
         let mut sum = DVector::zeros(n);
         let mut inside = DVector::zeros(n);
         for (arm_mean, covariance) in &found {
@@ -317,33 +330,34 @@ fn maximised(
         for k in 0..n {
             let precision = count / variance[k] + sheet.mean[k].recip();
             next[k] = sum[k] / variance[k] / precision;
-            // Arms that say little of the parameter say little of its mean.
+            // Arms whose rows hardly inform on the parameter hardly inform on its mean.
             let informed = (count - inside[k] / variance[k]).max(0.0);
             mean_variance[k] = (informed / variance[k] + sheet.mean[k].recip()).recip();
         }
         let mut change = 0.0_f64;
         for k in 0..n {
             let around: f64 = found.iter().map(|(arm, _)| (arm[k] - next[k]).powi(2)).sum();
-            let now = (around + inside[k] + PRIOR_ARMS * sheet.spread[k]) / (count + PRIOR_ARMS);
+            let now =
+                (around + inside[k] + PRIOR_FREEDOM * sheet.spread[k]) / (count + PRIOR_FREEDOM);
             change = change.max((now / variance[k] - 1.0).abs());
             variance[k] = now;
         }
         mean = next;
-        if change < SETTLED {
+        if change < CONVERGENCE_TOLERANCE {
             break;
         }
     }
-    Model { mean, variance, mean_variance }
+    FleetDistribution { mean, variance, mean_variance }
 }
 
-/// Returns the parameter in which the rows of an arm differ most from the fleet, and by how many
-/// standard deviations.
-fn most_different(arm: &Likelihood, fleet: &Model) -> Option<(usize, f64)> {
+/// Returns the index of the parameter in which the rows of an arm differ most from the fleet, and
+/// the signed difference in standard deviations; `None` if the rows inform on no parameter.
+fn most_different(arm: &Likelihood, fleet: &FleetDistribution) -> Option<(usize, f64)> {
     let prior = &fleet.variance + &fleet.mean_variance;
     let (mean, covariance) = conditioned(arm, &fleet.mean, &prior)?;
     let differences = (0..mean.len()).filter_map(|k| {
         let learned = covariance[(k, k)].recip() - prior[k].recip();
-        if learned * prior[k] < LEAST_LEARNED {
+        if learned * prior[k] < MIN_LEARNED {
             return None;
         }
         let data = (mean[k] / covariance[(k, k)] - fleet.mean[k] / prior[k]) / learned;

@@ -1,4 +1,4 @@
-//! PRIOR.toml: mean and spread of a fleet, which `identify --prior` takes.
+//! PRIOR.toml: mean and spread of the parameters of a fleet, which `identify --prior` reads.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -14,14 +14,17 @@ use crate::files::read_limited;
 const FORMAT: &str = "flexcal-prior";
 /// Newest version of the format that is read.
 const VERSION: u32 = 1;
-/// Maximum size of a file [MiB].
-const LARGEST_MIB: u64 = 16;
+/// Maximum size of a PRIOR.toml [MiB].
+const MAX_FILE_MIB: u64 = 16;
 
 /// Prior of an arm from its siblings, as read from PRIOR.toml.
 #[derive(Debug, Clone)]
 pub struct FleetPrior {
+    /// Path of the file.
     pub(super) file: PathBuf,
+    /// Name of the problem of the arms.
     pub(super) problem: String,
+    /// Digest of each part of the declared arm.
     pub(super) arm_parts: BTreeMap<String, String>,
     /// Mean and 1 σ of the deviation of each parameter, SI or of the logarithm.
     pub(super) parameters: BTreeMap<String, (f64, f64)>,
@@ -44,7 +47,7 @@ struct Entry {
 }
 
 impl Fleet {
-    /// Returns PRIOR.toml.
+    /// Returns the text of PRIOR.toml.
     pub fn to_toml(&self) -> String {
         let mut text = format!(
             "# Mean and spread (1 σ) of the deviations from nominal of {} arms: flexcal identify --prior takes this file.\n\
@@ -84,7 +87,7 @@ impl FleetPrior {
     /// Returns an error if the file cannot be read or is no PRIOR.toml.
     pub fn read(file: &Path) -> Result<Self, PriorError> {
         let syntax = |reason: String| PriorError::Syntax { file: file.to_owned(), reason };
-        let bytes = read_limited(file, LARGEST_MIB << 20)
+        let bytes = read_limited(file, MAX_FILE_MIB << 20)
             .map_err(|source| PriorError::Unreadable { file: file.to_owned(), source })?;
         let text = String::from_utf8(bytes).map_err(|error| syntax(error.to_string()))?;
         let Document { format, version, problem, arm_parts, parameters } =
@@ -108,14 +111,14 @@ impl FleetPrior {
 const MAX_MAGNITUDE: f64 = 1e100;
 
 impl Entry {
-    /// Returns true if the numbers are those of a distribution.
+    /// Returns true if the numbers are finite and give a positive 1 σ.
     fn is_usable(&self) -> bool {
         self.mean.abs() < MAX_MAGNITUDE
             && [self.mean_error, self.spread].iter().all(|size| (0.0..MAX_MAGNITUDE).contains(size))
             && self.sigma() > 0.0
     }
 
-    /// Returns 1 σ of the next arm: spread and error of the mean together.
+    /// Returns 1 σ of the deviation of the next arm: spread and error of the mean together.
     fn sigma(&self) -> f64 {
         self.spread.hypot(self.mean_error)
     }

@@ -23,21 +23,23 @@ use crate::model::Model;
 use crate::problem::Problem;
 use crate::quantity::Unit;
 
-/// Likelihood ratio at which new rows contradict the earlier estimate: a false alarm in at most
-/// one of a hundred identifications.
-const CONTRADICTION: f64 = 100.0;
+/// Likelihood ratio of a change to "unchanged" above which new rows contradict the earlier
+/// estimate: a false alarm in at most one of a hundred identifications.
+const CONTRADICTION_RATIO: f64 = 100.0;
 /// Maximum number of causes for which the prior is widened, one after the other.
 const MAX_CAUSES: usize = 4;
-/// Factor on the size of a change to which the prior of its parameters is widened.
+/// Standard deviation that is added to the prior of the parameters of a change, as a multiple of
+/// the size of the change.
 const WIDENING: f64 = 3.0;
-/// Smallest part of the prior variance that new rows must remove for their own estimate to be
-/// stated.
-const LEAST_LEARNED: f64 = 1e-3;
-/// Number of standard deviations of the prior beyond which a bound contradicts it.
+/// Smallest information of the new rows on a parameter, relative to that of the prior, at which the
+/// estimate by the new rows alone is stated.
+const MIN_LEARNED: f64 = 1e-3;
+/// Distance of a bound from the mean of the prior, in standard deviations of the prior, beyond
+/// which an estimate at the bound contradicts the prior.
 const BOUND_SIGMAS: f64 = 3.0;
-/// Standard deviation (1 σ) of the deviation of a parameter without any prior: \[m\], \[rad\], or
-/// of a logarithm.
-const WIDE: f64 = 1.0;
+/// Standard deviation (1 σ) assumed for the deviation of a parameter without any prior: \[m\],
+/// \[rad\], or of a logarithm.
+const WIDE_SIGMA: f64 = 1.0;
 
 /// Source of the prior of an identification.
 #[derive(Debug, Clone)]
@@ -49,7 +51,7 @@ pub enum PriorSource {
 }
 
 impl PriorSource {
-    /// Returns the path of the file.
+    /// Returns the path of the file from which the prior was read.
     fn file(&self) -> &Path {
         match self {
             Self::Estimate(estimate) => &estimate.file,
@@ -58,13 +60,12 @@ impl PriorSource {
     }
 }
 
-/// Fits the identification rows of `data` with the posterior of an earlier estimate, or
-/// what is known of its siblings, as prior, widened by the drift of `days` days.
+/// Fits the identification rows of `data` with a prior, the posterior of an earlier estimate or
+/// that of a fleet, widened by the drift of `days` days.
 ///
-/// Rows that the earlier estimate was fitted to are left out, held-out rows too, because the prior
-/// contains them.
-/// Where the new rows contradict the prior, the parameters that explain it best get a wide prior,
-/// and the fit is repeated.
+/// Identification and held-out rows to which the earlier estimate was fitted are left out, because
+/// the prior contains them. If the new rows contradict the prior, the prior of the most probable
+/// cause's parameters is widened, and the fit is repeated.
 ///
 /// # Errors
 /// Returns an error if the estimate is of another arm or has other laws, if no row is new, or if
@@ -152,8 +153,8 @@ pub fn identify_with_prior(
     }
 }
 
-/// Returns the mean variance of the measured positions that `problems[1]` assumes, relative to
-/// that of `problems[0]`; 1 without a declared one.
+/// Returns the mean noise variance of the measured positions that `problems[1]` assumes, divided by
+/// that of `problems[0]`; 1 if `problems[0]` declares none.
 fn variance_ratio(problems: [&Problem; 2], data: &Dataset) -> f64 {
     let rows = &data.split.identification;
     let variance = |problem: &Problem| -> Option<f64> {
@@ -164,7 +165,8 @@ fn variance_ratio(problems: [&Problem; 2], data: &Dataset) -> f64 {
     declared.zip(taken).filter(|(declared, _)| *declared > 0.0).map_or(1.0, |(a, b)| b / a)
 }
 
-/// Returns the parameter at a bound that contradicts the prior most, if one does.
+/// Returns the parameter at a bound that is furthest from the mean of the prior; `None` if none is
+/// more than [`BOUND_SIGMAS`] away.
 fn contradicting_bound(
     model: &Model,
     found: &Identification,
@@ -175,7 +177,7 @@ fn contradicting_bound(
         let sigma = prior.covariance[(place, place)].sqrt();
         Some((k, ((found.x[k] - prior.mean[place]) / sigma).abs()))
     };
-    let held = prior.places.iter().enumerate().filter_map(sigmas);
+    let held = prior.indices.iter().enumerate().filter_map(sigmas);
     let (k, sigmas) = held.max_by(|a, b| a.1.total_cmp(&b.1))?;
     (sigmas > BOUND_SIGMAS).then(|| Contradiction {
         label: format!(
@@ -190,15 +192,18 @@ fn contradicting_bound(
 
 /// Cause for which new rows contradict the earlier estimate.
 struct Contradiction {
+    /// Name of the cause for people.
     label: String,
+    /// Probability of the cause, given that something changed.
     probability: f64,
-    /// Parameters of the model whose prior is widened, with the size of their change.
+    /// Indices of the model's parameters whose prior is widened, with the size of their change.
     widened: Vec<(usize, f64)>,
-    /// Ratio of the noise to the assumed one, if it is larger.
+    /// Ratio of the noise to the assumed one, if the cause is larger noise.
     noise_ratio: Option<f64>,
 }
 
 impl Contradiction {
+    /// Returns the finding that the new rows contradict the prior in `file`.
     fn finding(&self, file: &Path) -> Finding {
         let treatment = match (self.widened.is_empty(), self.noise_ratio) {
             (false, _) => "; the prior of its parameters was widened",
@@ -217,9 +222,9 @@ impl Contradiction {
 }
 
 /// Tests whether the identification rows contradict the prior. Returns the most probable cause if
-/// they do, and χ² of the rows under the prior with its degrees of freedom and p-value.
-/// `declared_sigma` is the declared σ of a measured coordinate \[m\]; what the fit took beyond it is
-/// known misfit.
+/// they do, and χ² of the rows under the prior with its degrees of freedom and p-value; each is
+/// `None` if a number is not finite. `declared_sigma` is the declared σ of a measured coordinate
+/// \[m\]. The part of the fit's σ beyond it counts as known misfit.
 fn contradiction(
     (problem, declared_sigma): (&Problem, Option<f64>),
     model: &Model,
@@ -228,7 +233,7 @@ fn contradiction(
     prior: &Earlier,
 ) -> (Option<Contradiction>, Option<(f64, f64, f64)>) {
     let mut x = found.x.clone();
-    for (place, &k) in prior.places.iter().enumerate() {
+    for (place, &k) in prior.indices.iter().enumerate() {
         x[k] = prior.mean[place];
     }
     let extended = Extended::new(problem, model, &x, [&placement.bases, &placement.targets]);
@@ -238,7 +243,7 @@ fn contradiction(
     let mut sensitive = SensitiveRows::new(&extended.model, poses, &extended.x);
     let warmth = warmth(problem, &data.measurements, rows);
     let mut causes = extended.causes(problem, &mut sensitive, warmth.as_deref());
-    // The most probable of the listed causes is widened, however large its change is.
+    // Something else has no parameters to widen, so the most probable of the other causes is taken.
     causes.retain(|cause| cause.kind != CauseKind::Other);
     let declared = declared_sigma.unwrap_or(found.sigma).min(found.sigma);
     let misfit = 1.0 - (declared / found.sigma).powi(2);
@@ -254,14 +259,15 @@ fn contradiction(
     (most_probable(&assessed, (&causes, location), extended.declared), chi2)
 }
 
-/// Returns the most probable cause if the rows contradict the prior.
+/// Returns the most probable cause if the rows contradict the prior; else `None`. `declared` is the
+/// number of parameters of the model, to which the prior belongs.
 fn most_probable(
     assessed: &Assessment,
     (causes, location): (&[Cause], impl Fn(usize) -> String),
     declared: usize,
 ) -> Option<Contradiction> {
     let (_, evidence) = *assessed.looks.last()?;
-    let first = assessed.causes.first().filter(|_| evidence > CONTRADICTION.ln())?;
+    let first = assessed.causes.first().filter(|_| evidence > CONTRADICTION_RATIO.ln())?;
     let cause = &causes[first.cause];
     let size = |i: usize| first.sizes[i].max(first.mean[i].abs());
     let widened = cause.columns.iter().enumerate().filter(|(_, k)| **k < declared);
@@ -285,12 +291,12 @@ pub(super) fn warmth(
     Some(rows.iter().map(|&row| temperature[row] - reference).collect())
 }
 
-/// Returns the covariance of the deviations of all columns: that of the earlier estimate, declared
-/// priors where it has none, and 0 for added columns.
+/// Returns the prior covariance of the deviations of all columns: that of the earlier estimate, the
+/// declared priors of parameters that it lacks, and 0 for added columns.
 ///
-/// Columns of temperature have a variance if the earlier fit left a misfit. `warmed` holds the
+/// Columns of thermal causes have a variance if the earlier fit left a misfit. `warmed` holds the
 /// causes and the sum of the squared misfits in units of the noise, if the rows state temperatures.
-/// An effect of temperature that the fit lacks may be all of its misfit, and was there before.
+/// A thermal effect that the earlier fit lacked may have caused all its misfit, and is no change.
 pub(super) fn covariance(
     extended: &Extended,
     prior: &Earlier,
@@ -299,8 +305,8 @@ pub(super) fn covariance(
 ) -> DMatrix<f64> {
     let columns = rows.sensitivity.ncols();
     let mut covariance = DMatrix::zeros(columns, columns);
-    for (i, &k) in prior.places.iter().enumerate() {
-        for (j, &l) in prior.places.iter().enumerate() {
+    for (i, &k) in prior.indices.iter().enumerate() {
+        for (j, &l) in prior.indices.iter().enumerate() {
             covariance[(k, l)] = prior.covariance[(i, j)];
         }
     }
@@ -308,7 +314,7 @@ pub(super) fn covariance(
         let parameter = &extended.model.parameters[k];
         let is_wide = matches!(parameter.unit(), Unit::Length | Unit::Angle)
             || parameter.unit().is_relative();
-        let wide = if is_wide { WIDE } else { 0.0 };
+        let wide = if is_wide { WIDE_SIGMA } else { 0.0 };
         covariance[(k, k)] = parameter.sigma.unwrap_or(wide).powi(2);
     }
     let (causes, misfit) = warmed.unwrap_or_default();
@@ -321,8 +327,8 @@ pub(super) fn covariance(
     covariance
 }
 
-/// Compares the posterior of a fit with the prior; `prior` is that of the earlier estimate and as
-/// it was widened for the fit.
+/// Compares the posterior of a fit with the prior `original`; `widened` is the prior as it was
+/// widened for the fit. `with` sets the other entries of the comparison.
 fn compare(
     model: &Model,
     found: &Identification,
@@ -336,11 +342,11 @@ fn compare(
         let posterior = variance(k).map(|variance| variance / slope.powi(2));
         let (mean, prior) = (original.mean[place], original.covariance[(place, place)]);
         let fitted = widened.covariance[(place, place)];
-        // The information of the new rows: that of the posterior less that of the prior.
+        // The information of the new rows is that of the posterior minus that of the widened prior.
         let data = posterior.and_then(|posterior| {
             let learned = posterior.recip() - fitted.recip();
             let value = (found.x[k] / posterior - mean / fitted) / learned;
-            (learned * fitted > LEAST_LEARNED).then(|| (value, learned.recip()))
+            (learned * fitted > MIN_LEARNED).then(|| (value, learned.recip()))
         });
         let value = |x: f64, variance: f64| {
             (parameter.value(x), parameter.value_error(x, variance.sqrt()).abs())
@@ -355,7 +361,7 @@ fn compare(
         }
     };
     let file = original.file.clone();
-    let parameters = original.places.iter().enumerate().map(compared).collect();
+    let parameters = original.indices.iter().enumerate().map(compared).collect();
     let sigma = original.sigma;
     with(PriorComparison {
         file,

@@ -1,18 +1,18 @@
-//! Noise and misfit that an estimate leads one to expect in new rows.
+//! Noise and misfit that are expected in new rows because of an earlier fit.
 
 use super::earlier::EQUAL_SIGMA;
 use crate::fit::SavedEstimate;
 use crate::model::Pose;
 use crate::problem::Problem;
 
-/// Number of standard errors by which the noise of predictions exceeds the declared one for the
-/// difference to be misfit.
-const BEYOND_SCATTER: f64 = 2.0;
+/// Number of standard errors by which the variance of prediction errors must exceed the declared
+/// noise variance to count as misfit.
+const MIN_EXCESS_ERRORS: f64 = 2.0;
 
 /// Noise of new rows, and the misfit that the earlier fit found beyond it.
 pub(super) struct KnownNoise {
-    /// Standard deviation (1 σ) of a position's coordinate in rows that state none \[m\]; `None`
-    /// if nothing states it.
+    /// Standard deviation (1 σ) of the noise of a position's coordinate in rows that state none
+    /// \[m\]; `None` if neither problem nor estimate states it.
     pub sigma: Option<f64>,
     /// Standard deviation (1 σ) of the misfit of a position's coordinate \[m\].
     misfit: f64,
@@ -21,13 +21,13 @@ pub(super) struct KnownNoise {
 }
 
 impl KnownNoise {
-    /// Returns the declared noise, or else that of the earlier fit. The misfit is what exceeds it
-    /// in the larger of two: the σ that the earlier fit took, and the noise of its predictions
-    /// where that is certainly larger than declared.
+    /// Returns the declared noise, or else that of the earlier fit, and the misfit beyond it. The
+    /// misfit is the excess of the larger of two: the σ that the earlier fit took, and the noise of
+    /// its predictions if that is significantly larger than the declared one.
     pub fn of(problem: &Problem, estimate: &SavedEstimate) -> Self {
         let saved = estimate.posterior();
         let declared = problem.data.position_sigma.or(estimate.estimated_sigma);
-        // Rows that were fitted with the σ of a column: that of the fit without its misfit.
+        // For rows that state their σ, the noise is the σ that the fit took without its misfit.
         let of_rows = |taken: f64| taken / saved.noise_factor.max(1.0).sqrt();
         let sigma = declared.or(saved.sigma_taken.map(of_rows));
         let of_predictions = |sigma: f64| {
@@ -35,10 +35,10 @@ impl KnownNoise {
             let prediction: serde_json::Value = serde_json::from_str(text).ok()?;
             let number = |key: &str| prediction.get(key)?.as_f64();
             let noise = number("noise_m")?.hypot(number("configuration_noise_m")?);
-            // Known to the scatter of its own estimate, of about half the fitted coordinates.
+            // Relative standard error of the variance, estimated from about half the coordinates.
             let configurations = prediction.get("scores")?.get("configurations")?.as_f64()?;
             let scatter = (2.0 / (1.5 * configurations).max(1.0)).sqrt();
-            Some(noise).filter(|noise| (noise / sigma).powi(2) > 1.0 + BEYOND_SCATTER * scatter)
+            Some(noise).filter(|noise| (noise / sigma).powi(2) > 1.0 + MIN_EXCESS_ERRORS * scatter)
         };
         let misfit = sigma.map_or(0.0, |sigma| {
             let taken = saved.sigma_taken.filter(|taken| *taken > sigma * (1.0 + EQUAL_SIGMA));
@@ -50,8 +50,8 @@ impl KnownNoise {
         Self { sigma, misfit, other_misfit }
     }
 
-    /// Returns the misfit of each coordinate of each pose in units of its noise; `None` without a
-    /// misfit.
+    /// Returns 1 σ of the misfit of each coordinate of each pose in units of its noise; `None`
+    /// without a misfit.
     pub fn misfit_of(&self, poses: &[Pose]) -> Option<Vec<Vec<f64>>> {
         if self.misfit == 0.0 && self.other_misfit == 0.0 {
             return None;

@@ -8,18 +8,19 @@ use super::evidence::{Unchanged, ln_sum};
 use super::rows::{SensitiveRows, Sums};
 
 /// Prior probability that a change begins within the table rather than before its first row.
-const WITHIN: f64 = 0.2;
-/// Maximum number of rows that are tried as onset, evenly spaced in the table.
+const WITHIN_PROBABILITY: f64 = 0.2;
+/// Maximum number of rows that are tried as the onset of a change, evenly spaced in the table.
 const MAX_ONSETS: usize = 24;
-/// Smallest number of changed rows; a gross row at the end of the table is no change.
+/// Smallest number of rows from the onset to the end of the table. A gross row at the end of the
+/// table is thus no change.
 const MIN_CHANGED_ROWS: usize = 3;
 
-/// Adds the hypotheses that a cause acts from a later row on, and returns the causes with the most
+/// Adds the hypotheses that a cause acts only from a later row on. Returns the causes with the most
 /// probable onset of each, the most probable cause first.
 ///
-/// The probability of a cause is the sum over all its onsets. Noise and gross rows have none. The
-/// evidence for a change, and with it the rate of false alarms, does not depend on onsets. Returns
-/// `None` if a number is not finite.
+/// The probability of a cause is the sum over all its onsets. Noise and gross rows have no onsets.
+/// The evidence for a change, and with it the rate of false alarms, does not depend on onsets.
+/// Returns `None` if a number is not finite.
 pub(super) fn with_onsets(
     assessment: &Assessment,
     rows: &SensitiveRows,
@@ -37,20 +38,20 @@ pub(super) fn with_onsets(
         .causes
         .iter()
         .map(|cause| {
-            let ln_prior = if has_onset(cause) { (1.0 - WITHIN).ln() } else { 0.0 };
+            let ln_prior = if has_onset(cause) { (1.0 - WITHIN_PROBABILITY).ln() } else { 0.0 };
             vec![(cause.probability.ln() + ln_prior, cause.clone())]
         })
         .collect();
     let every_column: Vec<usize> = (0..rows.sensitivity.ncols()).collect();
-    let ln_prior = WITHIN.ln() - (onsets.len().max(1) as f64).ln();
+    let ln_prior = WITHIN_PROBABILITY.ln() - (onsets.len().max(1) as f64).ln();
     for &onset in &onsets {
         let (masked, columns) = rows.masked_before(onset, &every_column);
-        let unchanged = Unchanged::new(&sums_of(&masked), &extended(factor, columns.len()))?;
-        for (known, of_cause) in assessment.causes.iter().zip(&mut hypotheses) {
-            let found = weighted_cause(&unchanged, &causes[known.cause], &columns);
-            if let Some(found) = found.filter(|_| has_onset(known)) {
+        let unchanged = Unchanged::new(&sums_of(&masked), &padded_factor(factor, columns.len()))?;
+        for (assessed, of_cause) in assessment.causes.iter().zip(&mut hypotheses) {
+            let found = weighted_cause(&unchanged, &causes[assessed.cause], &columns);
+            if let Some(found) = found.filter(|_| has_onset(assessed)) {
                 let ln_probability = found.ln_share - assessment.ln_sum + ln_prior;
-                of_cause.push((ln_probability, found.assessed(known.cause, onset)));
+                of_cause.push((ln_probability, found.assessed(assessed.cause, onset)));
             }
         }
     }
@@ -67,14 +68,14 @@ pub(super) fn with_onsets(
     Some(found)
 }
 
-/// Returns the sums over all rows.
+/// Returns the sums over all rows, for the assumed noise.
 pub(super) fn sums_of(rows: &SensitiveRows) -> Sums {
     let mut sums = Sums::new(rows.sensitivity.ncols(), 1.0);
     (0..rows.len()).for_each(|row| sums.add(rows, row, 1.0));
     sums
 }
 
-/// Returns the factor of a covariance with `added` further columns of variance zero.
-pub(super) fn extended(factor: &DMatrix<f64>, added: usize) -> DMatrix<f64> {
+/// Returns the factor of a covariance to which `added` parameters of variance zero are appended.
+pub(super) fn padded_factor(factor: &DMatrix<f64>, added: usize) -> DMatrix<f64> {
     factor.clone().resize_vertically(factor.nrows() + added, 0.0)
 }

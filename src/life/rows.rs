@@ -1,4 +1,4 @@
-//! Measured rows, linearised about an estimate, and their sums.
+//! Measured rows, linearised about an estimate, and their sums of products.
 
 use std::collections::BTreeMap;
 
@@ -15,11 +15,11 @@ pub(super) struct SensitiveRows {
     pub sensitivity: DMatrix<f64>,
     /// Whitened residuals r.
     pub residual: DVector<f64>,
-    /// Number of residuals of a row; those that a row does not measure are 0.
+    /// Number of residuals that every row has; those that the row does not measure are 0.
     pub stride: usize,
     /// Number of coordinates that each row measures.
     pub coordinates: Vec<usize>,
-    /// Standard deviation (1 σ) of the noise of a coordinate of each row \[m\] or \[rad\].
+    /// Standard deviation (1 σ) of the noise of each row's first coordinate \[m\] or \[rad\].
     pub sigma: Vec<f64>,
     /// Misfit that rows share; `None` if all errors are independent noise.
     misfit: Option<SharedMisfit>,
@@ -28,7 +28,7 @@ pub(super) struct SensitiveRows {
 /// Misfit of the estimate that all rows of one configuration share, independent in each coordinate.
 #[derive(Debug, Clone)]
 pub(super) struct SharedMisfit {
-    /// Number of the configuration of each row.
+    /// Index of the configuration of each row.
     pub configuration: Vec<usize>,
     /// Standard deviation (1 σ) of the misfit of each residual in units of its noise,
     /// shape = (rows × stride); 0 where a row measures nothing.
@@ -49,7 +49,7 @@ pub(super) struct Sums {
     pub vector: DVector<f64>,
     /// Squared length rᵀΣ⁻¹r.
     pub squares: f64,
-    /// Number of coordinates.
+    /// Number of measured coordinates of the added rows.
     pub coordinates: f64,
     /// Logarithm of the determinant of Σ.
     pub ln_det: f64,
@@ -79,8 +79,8 @@ impl SensitiveRows {
         Self { sensitivity: -jacobian, residual, stride, coordinates, sigma, misfit: None }
     }
 
-    /// Adds a misfit that the rows of one configuration share.
-    pub fn share(&mut self, misfit: SharedMisfit) {
+    /// Sets the misfit that the rows of one configuration share.
+    pub fn set_misfit(&mut self, misfit: SharedMisfit) {
         self.misfit = Some(misfit);
     }
 
@@ -91,7 +91,8 @@ impl SensitiveRows {
         self.sigma[row] * misfit.hypot(1.0)
     }
 
-    /// Returns the configuration of a row and the misfit of one of its coordinates, if it has one.
+    /// Returns the configuration of a row and the 1 σ of the misfit of one of its coordinates, in
+    /// units of the noise; `None` without a misfit.
     fn misfit_of(&self, row: usize, coordinate: usize) -> Option<(usize, f64)> {
         let misfit = self.misfit.as_ref()?;
         let sigma = misfit.sigma[row * self.stride + coordinate];
@@ -113,7 +114,8 @@ impl SensitiveRows {
         self.residual.rows(row * self.stride, self.stride).into_owned()
     }
 
-    /// Adds a column: the sum of other columns times a factor, times a factor of each row.
+    /// Adds a column and returns its index. It is Σ factor × column over `terms`, multiplied in
+    /// each row by the number that `of_row` returns.
     pub fn add_column(&mut self, terms: &[(usize, f64)], of_row: impl Fn(usize) -> f64) -> usize {
         let column = self.sensitivity.ncols();
         let mut sum = DVector::zeros(self.sensitivity.nrows());
@@ -129,8 +131,8 @@ impl SensitiveRows {
         column
     }
 
-    /// Returns these rows with copies of some columns that are 0 before the row `first`, and the
-    /// column of the copy of each.
+    /// Returns the rows with copies of some columns appended, and the indices of the copies. A copy
+    /// is 0 in the rows before `first`, so that it represents a change from that row on.
     pub fn masked_before(&self, first: usize, columns: &[usize]) -> (Self, Vec<usize>) {
         let (before, mut masked) = (self.sensitivity.ncols(), self.clone());
         let added = columns.len();
@@ -166,7 +168,7 @@ impl Sums {
         }
     }
 
-    /// Adds one row, `weight` times; −1 removes it.
+    /// Adds one row with a weight: 1 adds it, −1 removes it again.
     pub fn add(&mut self, rows: &SensitiveRows, row: usize, weight: f64) {
         let (sensitivity, residual) = (rows.of_row(row), rows.residual_of(row));
         let coordinates = rows.coordinates[row] as f64 * weight;
@@ -194,7 +196,8 @@ impl Sums {
         }
     }
 
-    /// Adds the part of a configuration by which Σ⁻¹ differs from κ⁻² I; −1 removes it.
+    /// Adds the part of a configuration by which Σ⁻¹ differs from κ⁻² I; a weight of −1 subtracts
+    /// it.
     fn add_configuration(&mut self, sums: &ConfigurationSums, weight: f64) {
         let factor = -weight / (self.variance * (self.variance + sums.squares));
         let ConfigurationSums { sensitivity, residual, squares } = sums;
@@ -204,9 +207,8 @@ impl Sums {
         self.ln_det += weight * (squares / self.variance).ln_1p();
     }
 
-    /// Returns the lines of Σ⁻¹K and Σ⁻¹r for the measured coordinates of one row of these sums,
-    /// and the diagonal entries of Σ⁻¹ there. Shapes = (coordinates, columns), (coordinates),
-    /// (coordinates).
+    /// Returns Σ⁻¹K, Σ⁻¹r and the diagonal of Σ⁻¹, restricted to the measured coordinates of one
+    /// row that these sums contain. Shapes = (coordinates, columns), (coordinates), (coordinates).
     pub fn of_row(
         &self,
         rows: &SensitiveRows,

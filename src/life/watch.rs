@@ -1,4 +1,4 @@
-//! Watch: has an arm changed since its estimate, and what?
+//! Watch: test whether an arm has changed since its estimate, and of the causes.
 
 use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, Vector3};
 use statrs::distribution::{ChiSquared, ContinuousCDF as _};
@@ -10,7 +10,7 @@ use super::error::PriorError;
 use super::evidence::{Unchanged, factor};
 use super::identify::{covariance, warmth};
 use super::known_noise::KnownNoise;
-use super::onset::{extended as extended_factor, sums_of, with_onsets};
+use super::onset::{padded_factor, sums_of, with_onsets};
 use super::rows::{SensitiveRows, SharedMisfit};
 use crate::fit::{self, Placement, SavedEstimate, register};
 use crate::measurement::Measurements;
@@ -21,30 +21,31 @@ use crate::problem::{JointKind, Problem};
 use crate::quantity::Unit;
 use crate::spatial::Frame;
 
-/// Largest number of causes that are reported.
-const MAX_CAUSES: usize = 6;
-/// Smallest probability of a cause that is reported beside the first.
-const LEAST_PROBABILITY: f64 = 0.005;
-/// Probability from which a cause is named; below it is one of several.
-const NAMED: f64 = 0.9;
-/// Largest number of groups of rows that are left out in turn.
+/// Maximum number of causes that are reported.
+const MAX_REPORTED_CAUSES: usize = 6;
+/// Smallest probability at which a cause is reported that is not the most probable one.
+const MIN_REPORTED_PROBABILITY: f64 = 0.005;
+/// Smallest probability at which the most probable cause is named as the cause.
+const MIN_NAMED_PROBABILITY: f64 = 0.9;
+/// Maximum number of groups of rows that are left out in turn to test a cause.
 const MAX_GROUPS: usize = 60;
-/// Prior odds that something else changed together with the base, against the base alone: two
-/// changes at once are rare.
-const SECOND_CHANGE: f64 = 0.05;
-/// Smallest number of measured positions that determine a moved base; three leave nothing to judge
-/// it by.
+/// Prior odds that something else changed together with the base, against the base alone.
+const SECOND_CHANGE_ODDS: f64 = 0.05;
+/// Smallest number of measured positions that determine a moved base and test the fit.
 const MIN_BASE_ROWS: usize = 4;
-/// Smallest ratio of the second to the first squared spread of points that are not on a line.
+/// Smallest ratio of the two largest principal variances of points that are not on a line.
 const MIN_SQUARED_SPREAD: f64 = 1e-6;
-/// Largest tilt of the axis of joint 1 by a turn about it \[rad\].
+/// Largest tilt \[rad\] of the axis of joint 1 at which the move of a base counts as a rotation
+/// about that axis.
 const MAX_TILT: f64 = 1e-3;
-/// Largest displacement of a point on the axis of joint 1 by a turn about it \[m\].
+/// Largest displacement \[m\] of a point on the axis of joint 1 at which the move of a base counts
+/// as a rotation about that axis.
 const MAX_SHIFT: f64 = 2e-3;
-/// Smallest evidence of a pose for one cause against another, in nats, that tells them apart.
-const LEAST_DIFFERENCE: f64 = 1e-3;
+/// Smallest expected evidence per pose for one cause against another \[nats\] at which more poses
+/// can distinguish the causes.
+const MIN_NATS_PER_POSE: f64 = 1e-3;
 
-/// Verdict on an arm since its estimate.
+/// Result of the test whether an arm has changed since its estimate.
 #[derive(Debug, Clone)]
 pub struct Watch {
     /// Largest probability of any false alarm over all rows of one test.
@@ -55,17 +56,19 @@ pub struct Watch {
     pub rows: usize,
     /// Number of rows that were left out, because the estimate was fitted to them.
     pub left_out: usize,
-    /// ln of the evidence for a change after each look, with the number of rows then.
+    /// Number of rows at each look, and ln of the evidence for a change from these rows.
     pub looks: Vec<(usize, f64)>,
     /// Number of rows at the first look with an alarm; `None` if the arm is unchanged.
     pub changed_at: Option<usize>,
     /// χ² of all rows under "unchanged", its degrees of freedom, and its p-value.
     pub chi2: (f64, f64, f64),
-    /// Root mean square error of the rows as the estimate predicts them \[m\] or \[rad\].
+    /// Root mean square error with which the estimate predicts the rows of the leading kind \[m\]
+    /// or \[rad\].
     pub error: f64,
-    /// Unit of the errors: that of the first kind of rows.
+    /// Unit of the errors: that of the leading kind of rows.
     pub unit: Unit,
-    /// Standard deviation (1 σ) of a coordinate of these rows: noise and known misfit.
+    /// Standard deviation (1 σ) of a coordinate of the first row of the leading kind, noise and
+    /// known misfit together \[m\] or \[rad\].
     pub sigma: f64,
     /// Causes of a change, the most probable first.
     pub causes: Vec<WatchedCause>,
@@ -78,20 +81,23 @@ pub struct WatchedCause {
     pub kind: CauseKind,
     /// Name for people, such as "zero of joint 2".
     pub label: String,
-    /// Gross row, counted from 0 among all rows of the table, if that is the cause.
+    /// Index of the gross row among all rows of the table, from 0; `None` for other causes.
     pub row: Option<usize>,
-    /// First row that shows the change, counted likewise; `None` if it happened before the table.
+    /// Index of the first row that shows the change among all rows of the table, from 0; `None` if
+    /// the change happened before the table.
     pub from_row: Option<usize>,
     /// Probability among all causes, given that something changed.
     pub probability: f64,
-    /// Changes of what the cause moves; the ratio to the assumed noise for larger noise and for
-    /// something else.
+    /// Changes of the parameters that the cause moves. For larger noise and for something else,
+    /// this is the ratio of the errors to the assumed noise.
     pub changes: Vec<Change>,
-    /// Root mean square error of each row, predicted with this cause as estimated without the row
-    /// \[m\] or \[rad\]; `None` for noise and for something else.
+    /// Root mean square error of rows of the leading kind, each predicted with this cause as
+    /// estimated without the row \[m\] or \[rad\]. For a gross row it is the error of the other
+    /// rows; `None` for noise and for something else.
     pub left_out_error: Option<f64>,
-    /// Number of further poses like these after which this cause and the next one are expected to
-    /// be told apart; `None` if no number of them would, or there is no other.
+    /// Number of additional poses like the measured ones after which the data are expected to
+    /// decide between this cause and the most probable other one; `None` if no number would
+    /// suffice, or if there is no other cause.
     pub poses_to_tell_apart: Option<usize>,
 }
 
@@ -104,21 +110,22 @@ pub struct Change {
     pub unit: Unit,
     /// Change, SI; of the logarithm for stiffnesses.
     pub change: f64,
-    /// Standard error of the change.
+    /// Standard error of the change; NaN for a ratio of the noise.
     pub std_error: f64,
 }
 
 impl Watch {
-    /// Returns true if the arm, or its measurement, has changed.
+    /// Returns true if the test found that the arm or its measurement has changed.
     pub fn is_changed(&self) -> bool {
         self.changed_at.is_some()
     }
 
-    /// Returns the most probable cause if the arm has changed, no other is likely, and rows that are
-    /// left out are predicted better with the cause updated.
+    /// Returns the most probable cause if it can be named: the arm has changed, the probability is
+    /// at least 90 %, and left-out rows are predicted better with the cause than by the estimate.
     pub fn named(&self) -> Option<&WatchedCause> {
         let is_named = |cause: &&WatchedCause| {
-            cause.probability >= NAMED && cause.left_out_error.is_none_or(|left| left < self.error)
+            cause.probability >= MIN_NAMED_PROBABILITY
+                && cause.left_out_error.is_none_or(|left| left < self.error)
         };
         self.causes.first().filter(|_| self.is_changed()).filter(is_named)
     }
@@ -130,8 +137,8 @@ impl Watch {
 /// estimate. If the rows state temperatures, the covariance also contains effects of temperature as
 /// large as the misfit. The misfit is the same in all rows of one configuration. The density of the
 /// residuals is compared with a mixture of densities, one for each cause and size of a change. If
-/// nothing changed, the ratio ever exceeds 1 / `false_alarm_rate` with at most that probability.
-/// Rows that the estimate was fitted to are left out.
+/// nothing changed, the ratio exceeds 1 / `false_alarm_rate` at any look with at most the
+/// probability `false_alarm_rate`. Rows to which the estimate was fitted are left out.
 ///
 /// # Errors
 /// Returns an error if the estimate is of another arm or has other laws, if no row is new, or if
@@ -158,7 +165,7 @@ pub fn watch(
     let every_row: Vec<usize> = (0..kept.len()).collect();
     let turn = problem.data.orientation_sigma.filter(|_| problem.data.fits_orientation);
     let known = KnownNoise::of(problem, estimate);
-    if known.sigma.is_none() && !kept.has_sigma_in_every_row() && measures_positions(&kept) {
+    if known.sigma.is_none() && !kept.has_sigma_in_every_row() && has_positions(&kept) {
         return Err(PriorError::NoSigma { file: estimate.file.clone() });
     }
     let sigma = known.sigma.unwrap_or(f64::NAN);
@@ -168,7 +175,7 @@ pub fn watch(
     let leading = kept.leading();
     let leads: Vec<bool> =
         every_row.iter().map(|&row| kept.observation(row).kind() == leading.kind()).collect();
-    let tested = Tested { problem, model: &model, placement: &placement, kept: &kept, misfit };
+    let tested = TestedRows { problem, model: &model, placement: &placement, kept: &kept, misfit };
     let not_finite = || PriorError::NotFinite { file: estimate.file.clone() };
     let at_estimate = tested.linearised(&poses, &x, &earlier);
     let mut assessed = assess(&at_estimate.rows, &at_estimate.factor, &at_estimate.causes, true)
@@ -186,9 +193,9 @@ pub fn watch(
         .causes
         .iter()
         .enumerate()
-        .filter(|(k, cause)| *k == 0 || cause.probability >= LEAST_PROBABILITY)
+        .filter(|(k, cause)| *k == 0 || cause.probability >= MIN_REPORTED_PROBABILITY)
         .map(|(_, cause)| cause)
-        .take(MAX_CAUSES)
+        .take(MAX_REPORTED_CAUSES)
         .collect();
     let location = |row: usize| kept.location(row).to_string();
     let mut watched: Vec<WatchedCause> = (0..reported.len())
@@ -223,10 +230,11 @@ pub fn watch(
 }
 
 /// Rows that are tested against an estimate, with the model of the estimate.
-struct Tested<'a> {
+struct TestedRows<'a> {
     problem: &'a Problem,
     model: &'a Model,
     placement: &'a Placement,
+    /// Table of the rows.
     kept: &'a Measurements,
     /// Misfit of each coordinate of each pose in units of its noise; `None` without a misfit.
     misfit: Option<Vec<Vec<f64>>>,
@@ -242,12 +250,13 @@ struct Linearised {
 }
 
 impl Linearised {
+    /// Returns the reporter of these causes; `leads` is true for rows of the leading kind.
     fn reporter<'a>(&'a self, leads: &'a [bool]) -> Reporter<'a> {
         Reporter { rows: &self.rows, factor: &self.factor, causes: &self.causes, leads }
     }
 }
 
-impl Tested<'_> {
+impl TestedRows<'_> {
     /// Linearises the rows at the full parameter vector `x`, for an estimate with the covariance of
     /// `earlier`.
     fn linearised(&self, poses: &[Pose], x: &DVector<f64>, earlier: &Earlier) -> Linearised {
@@ -258,7 +267,7 @@ impl Tested<'_> {
             let coordinate = |place: usize| misfit[place / rows.stride].get(place % rows.stride);
             let sigma = (0..rows.residual.len()).map(|k| coordinate(k).copied().unwrap_or(0.0));
             let sigma = DVector::from_iterator(rows.residual.len(), sigma);
-            rows.share(SharedMisfit { configuration: kept.pose_numbers(problem), sigma });
+            rows.set_misfit(SharedMisfit { configuration: kept.pose_numbers(problem), sigma });
         }
         let every_row: Vec<usize> = (0..kept.len()).collect();
         let warmth = warmth(problem, kept, &every_row);
@@ -268,12 +277,13 @@ impl Tested<'_> {
         Linearised { extended, rows, causes, factor }
     }
 
-    /// Returns a move of the only base as the cause, if the rows are unchanged once the base is
-    /// registered to them: ln of the evidence for a further change is below `threshold`. A turn
-    /// about the axis of joint 1 may as well be a changed zero of that joint, which is then returned
-    /// beside it. Returns nothing if the base does not explain the rows.
+    /// Returns a move of the only base as the cause, if it explains the rows: after the base has
+    /// been registered to them, ln of the evidence for another change is below `threshold`. A
+    /// rotation about the axis of joint 1 may as well be a changed zero of that joint, which is
+    /// then returned as a second cause. Returns `None` if the base does not explain the rows.
     ///
-    /// The causes are linear in their changes; a base that turns by degrees is not.
+    /// Other tests take positions as linear in the changes, which fails for a base that is rotated
+    /// by some degrees.
     fn moved_base(
         &self,
         poses: &[Pose],
@@ -281,7 +291,7 @@ impl Tested<'_> {
         (earlier, leads): (&Earlier, &[bool]),
         threshold: f64,
     ) -> Option<Vec<WatchedCause>> {
-        if self.placement.bases.len() != 1 || !determine_base(poses) {
+        if self.placement.bases.len() != 1 || !positions_determine_base(poses) {
             return None;
         }
         // Without priors and bounds, because the base was moved.
@@ -306,11 +316,11 @@ impl Tested<'_> {
         for (change, &k) in watched.changes.iter_mut().zip(&at_base.causes[base.cause].columns) {
             change.change += at_base.extended.x[k] - x.get(k).copied().unwrap_or(0.0);
         }
-        watched.probability = 1.0 / (1.0 + SECOND_CHANGE * evidence.exp());
+        watched.probability = 1.0 / (1.0 + SECOND_CHANGE_ODDS * evidence.exp());
         let frame = |x: &DVector<f64>| model.base_frames(x.as_slice()).into_iter().next();
         let angle = turn_about_first_joint(self.problem, &frame(x)?, &frame(&registered)?);
         let Some(angle) = angle else { return Some(vec![watched]) };
-        // Neither rows nor their errors tell the two apart.
+        // The rows cannot distinguish the base and the zero, so each has half of the probability.
         watched.probability *= 0.5;
         let zero = WatchedCause {
             kind: CauseKind::Zero,
@@ -327,9 +337,9 @@ impl Tested<'_> {
     }
 }
 
-/// Returns true if the positions of the poses determine the pose of a base with numbers to spare:
-/// [`MIN_BASE_ROWS`] positions that do not lie on a line.
-fn determine_base(poses: &[Pose]) -> bool {
+/// Returns true if the measured positions determine the pose of a base and leave residual degrees
+/// of freedom: at least [`MIN_BASE_ROWS`] positions that do not lie on a line.
+fn positions_determine_base(poses: &[Pose]) -> bool {
     let points: Vec<&Vector3<f64>> = poses
         .iter()
         .filter(|pose| pose.observation.is_position())
@@ -343,8 +353,8 @@ fn determine_base(poses: &[Pose]) -> bool {
     points.len() >= MIN_BASE_ROWS && squares[1] > MIN_SQUARED_SPREAD * squares[2]
 }
 
-/// Returns the angle about the axis of joint 1 by which a base turned from one frame to another;
-/// `None` if it moved otherwise, or joint 1 does not turn on the base.
+/// Returns the angle \[rad\] about the axis of joint 1 by which a base was rotated from the frame
+/// `old` to `new`; `None` if it moved otherwise, or joint 1 is not revolute.
 fn turn_about_first_joint(problem: &Problem, old: &Frame<f64>, new: &Frame<f64>) -> Option<f64> {
     let first = problem.joints.first().filter(|joint| joint.kind == JointKind::Revolute)?;
     let (sin, cos) = first.alpha.sin_cos();
@@ -357,8 +367,8 @@ fn turn_about_first_joint(problem: &Problem, old: &Frame<f64>, new: &Frame<f64>)
     is_about_it.then_some(vector.dot(&axis))
 }
 
-/// Returns true if a row measures a position.
-fn measures_positions(measurements: &Measurements) -> bool {
+/// Returns true if at least one row measures a position.
+fn has_positions(measurements: &Measurements) -> bool {
     (0..measurements.len()).any(|row| measurements.observation(row).is_position())
 }
 
@@ -367,12 +377,12 @@ struct Reporter<'a> {
     rows: &'a SensitiveRows,
     factor: &'a DMatrix<f64>,
     causes: &'a [Cause],
-    /// True for rows of the first kind, whose errors are reported.
+    /// True for rows of the leading kind, whose errors are reported.
     leads: &'a [bool],
 }
 
 impl Reporter<'_> {
-    /// Reports a cause; `rival` is the most probable other one.
+    /// Returns the report of a cause; `rival` is the most probable other one.
     fn cause(&self, assessed: &AssessedCause, rival: Option<&AssessedCause>) -> WatchedCause {
         let cause = &self.causes[assessed.cause];
         let changes = cause.amplitudes.iter().enumerate().map(|(i, (name, unit))| Change {
@@ -405,18 +415,20 @@ impl Reporter<'_> {
         }
     }
 
-    /// Returns the root mean square length of residuals of the first kind of rows \[m\] or \[rad\].
+    /// Returns the root mean square length, over the rows of the leading kind, of the residuals
+    /// that `residual` returns in units of σ \[m\] or \[rad\].
     fn rms(&self, residual: impl Fn(usize) -> DVector<f64>) -> f64 {
         self.rms_of(|_| true, residual)
     }
 
+    /// Returns the same length over those rows for which `is_included` is true.
     fn rms_of(
         &self,
-        counts: impl Fn(usize) -> bool,
+        is_included: impl Fn(usize) -> bool,
         residual: impl Fn(usize) -> DVector<f64>,
     ) -> f64 {
         let chosen: Vec<usize> =
-            (0..self.rows.len()).filter(|&row| self.leads[row] && counts(row)).collect();
+            (0..self.rows.len()).filter(|&row| self.leads[row] && is_included(row)).collect();
         let square = |&row: &usize| {
             let numbers = residual(row);
             numbers.rows(0, numbers.len().min(3)).norm_squared() * self.rows.sigma[row].powi(2)
@@ -424,11 +436,11 @@ impl Reporter<'_> {
         (chosen.iter().map(square).sum::<f64>() / chosen.len().max(1) as f64).sqrt()
     }
 
-    /// Returns the error of each row if only the cause is updated, as estimated without the row and
-    /// its group.
+    /// Returns the root mean square error of the rows of the leading kind, each predicted with the
+    /// changes of the cause as estimated without the row's group. `None` if a number is not finite.
     fn left_out_error(&self, cause: &Cause, assessed: &AssessedCause) -> Option<f64> {
         let (rows, columns) = self.rows.masked_before(assessed.onset, &cause.columns);
-        let (rows, factor) = (&rows, extended_factor(self.factor, columns.len()));
+        let (rows, factor) = (&rows, padded_factor(self.factor, columns.len()));
         let sums = sums_of(rows);
         let groups = rows.len().min(MAX_GROUPS);
         let means: Option<Vec<DVector<f64>>> = (0..groups)
@@ -436,7 +448,7 @@ impl Reporter<'_> {
                 let mut others = sums.clone();
                 (group..rows.len()).step_by(groups).for_each(|row| others.add(rows, row, -1.0));
                 let unchanged = Unchanged::new(&others, &factor)?;
-                Some(unchanged.cause(&columns, &assessed.sizes)?.1)
+                Some(unchanged.likelihood_ratio(&columns, &assessed.sizes)?.1)
             })
             .collect();
         let means = means?;
@@ -446,15 +458,17 @@ impl Reporter<'_> {
         }))
     }
 
-    /// Returns the number of further poses like these after which a cause is expected to be nine
-    /// times as probable as its rival, if it is the true one.
+    /// Returns the number of additional poses like these after which a cause is expected to be nine
+    /// times as probable as its rival, if it is the true one. `None` if one of the two moves no
+    /// parameter, or if the poses hardly distinguish them.
     fn poses_to_tell_apart(
         &self,
         assessed: &AssessedCause,
         rival: &AssessedCause,
     ) -> Option<usize> {
         let (cause, other) = (&self.causes[assessed.cause], &self.causes[rival.cause]);
-        let wanted = (NAMED / (1.0 - NAMED)).ln() - (assessed.probability / rival.probability).ln();
+        let wanted = (MIN_NAMED_PROBABILITY / (1.0 - MIN_NAMED_PROBABILITY)).ln()
+            - (assessed.probability / rival.probability).ln();
         if wanted <= 0.0 {
             return Some(0);
         }
@@ -463,12 +477,12 @@ impl Reporter<'_> {
         }
         let (rows, columns) = self.rows.masked_before(assessed.onset, &cause.columns);
         let (rows, of_rival) = rows.masked_before(rival.onset, &other.columns);
-        let factor = extended_factor(self.factor, columns.len() + of_rival.len());
+        let factor = padded_factor(self.factor, columns.len() + of_rival.len());
         let unchanged = Unchanged::new(&sums_of(&rows), &factor)?;
         let part = |a: &[usize], b: &[usize]| {
             DMatrix::from_fn(a.len(), b.len(), |i, j| unchanged.information[(a[i], b[j])])
         };
-        // The part of the change that the rival cannot imitate.
+        // Evidence of the change for the cause, minus the part that the rival can imitate.
         let shown = part(&columns, &columns) * &assessed.mean;
         let seen = part(&of_rival, &columns) * &assessed.mean;
         let mut matrix = part(&of_rival, &of_rival);
@@ -480,6 +494,6 @@ impl Reporter<'_> {
         let of_pose = nats / (rows.len() - assessed.onset) as f64;
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "small, ≥ 0")]
         let poses = (wanted / of_pose).ceil() as usize;
-        (of_pose > LEAST_DIFFERENCE).then_some(poses)
+        (of_pose > MIN_NATS_PER_POSE).then_some(poses)
     }
 }
