@@ -9,8 +9,8 @@ use crate::model::parameter::Parameter;
 use crate::problem::Problem;
 use crate::rig::Truth;
 
-/// Number of repetitions in a part. Statistics are summed part by part, so another number would
-/// change their rounding.
+/// Maximum number of repetitions in a part. Statistics are summed part by part, so another number
+/// would change their rounding.
 const PART_REPETITIONS: usize = 50;
 
 /// Monte Carlo study as declared in `STUDY.toml`.
@@ -20,7 +20,7 @@ pub struct Study {
     pub files: Vec<PathBuf>,
     /// Short name; results are written to `out/<name>` by default.
     pub name: String,
-    /// Title for people, one line.
+    /// Title in results, one line.
     pub title: String,
     /// Problem that is fitted.
     pub problem: Problem,
@@ -28,7 +28,8 @@ pub struct Study {
     pub parameters: Vec<Parameter>,
     /// Distribution of true arms and poses, without noise.
     pub truth: Truth,
-    /// True if values of declared effects are drawn from their priors unless the truth states them.
+    /// True if the true values of declared effects are drawn from their priors unless the truth
+    /// states them.
     pub draws_effects: bool,
     /// Source of the simulated measurements.
     pub source: Source,
@@ -38,9 +39,10 @@ pub struct Study {
     pub repetitions: usize,
     /// Number of held-out poses per repetition.
     pub held_out: usize,
-    /// All combinations of noise level, number of poses, strategy and solver, in this order.
+    /// All combinations of noise level, number of poses, strategy and solver. The solver varies
+    /// fastest, the noise level slowest.
     pub cells: Vec<Cell>,
-    /// Text of the problem file, which the key of finished parts includes.
+    /// Text of the problem file, from which the key of a finished part is computed, too.
     pub(super) problem_text: String,
 }
 
@@ -59,7 +61,7 @@ worded! {
 /// Combination of noise level, number of poses, strategy and solver.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cell {
-    /// Standard deviation of a measured coordinate, in the measurements and as declared to the fit
+    /// Standard deviation of the noise of a measured coordinate, which is also declared to the fit
     /// \[m\].
     pub sigma: f64,
     /// Number of identification poses.
@@ -80,7 +82,7 @@ pub struct Part {
 }
 
 impl Study {
-    /// Returns every part, cell by cell.
+    /// Divides the study into parts, cell by cell.
     pub fn parts(&self) -> Vec<Part> {
         let of_cell = |cell| {
             let starts = (0..self.repetitions).step_by(PART_REPETITIONS);
@@ -93,10 +95,11 @@ impl Study {
     }
 }
 
-/// Share of the parts that one machine computes: every n-th part, so that each machine has parts of
-/// every cell.
+/// Subset of the parts that one of `count` machines computes: every `count`-th part, so that each
+/// machine has parts of every cell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Shard {
+    /// Number of the machine, from 1 to `count`.
     index: usize,
     count: usize,
 }
@@ -115,7 +118,7 @@ impl Shard {
         (1..=count).contains(&index).then_some(Self { index, count })
     }
 
-    /// Returns true if the part with this index belongs to the shard.
+    /// Returns true if the part with this index, from 0, belongs to the shard.
     pub fn holds(self, part: usize) -> bool {
         part % self.count == self.index - 1
     }

@@ -12,8 +12,9 @@ use crate::rig::{Cause, TrueEffect, Truth, standard_normals};
 pub(super) struct Strengths(Vec<(String, f64)>);
 
 impl Strengths {
-    /// Determines the true values of one repetition: as stated in the truth, drawn from the prior
-    /// if the study draws effects, or nominal (no effect).
+    /// Determines the true values of one repetition, whose seed is `seed`. A value is the one that
+    /// the truth states, else drawn from the prior if the study draws effects, else nominal (no
+    /// effect).
     pub fn draw(study: &Study, seed: u64) -> Self {
         let parameters: Vec<_> = study
             .problem
@@ -26,12 +27,12 @@ impl Strengths {
             let stated =
                 values.iter().find(|(name, _)| *name == parameter.name).map(|(_, value)| *value);
             // The rig always computes the loads on the deflected arm, so its mixing factor is 1.
-            let at_rest = (study.source == Source::Rig
+            let mixing_factor = (study.source == Source::Rig
                 && parameter.site == ParameterSite::Arm(ArmField::Mixing))
             .then_some(1.0);
             let free = study.parameters.iter().find(|free| free.name == parameter.name);
             let drawn = || drawn(free.filter(|_| study.draws_effects)?, normal);
-            let value = stated.or(at_rest).or_else(drawn).unwrap_or(parameter.nominal);
+            let value = stated.or(mixing_factor).or_else(drawn).unwrap_or(parameter.nominal);
             (parameter.name, value)
         };
         let normals = standard_normals(parameters.len(), seed);
@@ -44,8 +45,8 @@ impl Strengths {
         self.0.iter().find(|(parameter, _)| parameter == name).map(|(_, value)| *value)
     }
 
-    /// Returns the declared effects, with their true values, that the rig must simulate in addition
-    /// to those of the truth.
+    /// Returns the declared effects that the rig must simulate in addition to those of the truth,
+    /// with the true values that the truth does not state.
     pub fn for_rig(&self, study: &Study) -> Vec<TrueEffect> {
         let given = given(&study.truth, &study.problem);
         let effect = |effect: &Effect| {
@@ -70,12 +71,13 @@ impl Strengths {
     }
 }
 
-/// Returns the value of a parameter that lies `normal` standard deviations of its prior from the
-/// nominal value; `None` if it has no prior.
+/// Returns the value that lies `normal` standard deviations of a parameter's prior from its nominal
+/// value; `None` if the parameter has no prior.
 fn drawn(parameter: &Parameter, normal: f64) -> Option<f64> {
     Some(parameter.value(parameter.sigma? * normal))
 }
 
+/// Returns true if `given` contains a value of the parameter `name`.
 fn is_in(given: &[(String, f64)], name: &str) -> bool {
     given.iter().any(|(parameter, _)| parameter == name)
 }
@@ -85,7 +87,7 @@ fn names(effect: &Effect, problem: &Problem) -> Vec<String> {
     effect.parameters(problem).into_iter().map(|parameter| parameter.name).collect()
 }
 
-/// Returns the effect values of a truth with the names of their parameters.
+/// Returns the effect values that a truth states, with the names of their parameters.
 fn given(truth: &Truth, problem: &Problem) -> Vec<(String, f64)> {
     let of = |true_effect: &TrueEffect| match true_effect.cause() {
         Cause::Catalogued(effect) => {

@@ -26,7 +26,7 @@ pub(super) fn problem_of(
     Ok((problem, document.text.to_string(), file))
 }
 
-/// Returns the path of a file that the study names, relative to its folder.
+/// Returns the path of a file that the study names relative to `folder`, the folder of the study.
 pub(super) fn path_beside(item: &Item<'_, '_>, folder: &Path) -> Result<PathBuf, InputError> {
     let path = folder.join(item.text()?);
     if path.exists() { Ok(path) } else { Err(item.error(StudyErrorKind::FileMissing { path })) }

@@ -12,8 +12,8 @@ use crate::rig::{Cause, HeldOutRows, Shape, Truth};
 /// It is the SHA-256 of a text with numbers in SI, as short as they can be read back exactly. Its
 /// lines are: version of flexcal, source, seed and held-out poses; σ, poses, strategy, solver,
 /// first repetition and the one after the last; the truth; `effects drawn` if effect values are
-/// drawn; the text of the problem file. Inputs of other parts do not enter: a study with one more
-/// noise level keeps its finished parts.
+/// drawn; the text of the problem file. Inputs of other parts do not change the digest: a study
+/// with one more noise level keeps its finished parts.
 pub(super) fn key(study: &Study, part: &Part, cell: &Cell) -> String {
     let Study { problem_text, source, seed, held_out, .. } = study;
     let drawn = if study.draws_effects && !study.problem.effects.is_empty() {
@@ -36,7 +36,8 @@ pub(super) fn key(study: &Study, part: &Part, cell: &Cell) -> String {
 /// Its lines are: `parameter`, name, value; `random`, pattern, standard deviations of angles,
 /// lengths and relative values or `-`; `effect`, declaration (`bump` or `step` with the joint if it
 /// is outside the catalogue), values; `poses`, ranges of joints, payloads, hoist, temperature,
-/// `sides` or `-`; `rows`, time step, held-out share or number of the others, σ, segments.
+/// `sides` or `-`; `covariate`, range; `rows`, time step, held-out share or number of the others,
+/// σ, segments.
 fn canonical(truth: &Truth) -> String {
     let Truth {
         parameters,

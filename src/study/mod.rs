@@ -1,11 +1,12 @@
 //! Monte Carlo comparison of strategies: many fits to simulated measurements whose truth is known
 //! (`flexcal study`).
 //!
-//! A [`Study`] (`STUDY.toml`, see `docs/study.md`) crosses noise levels, numbers of poses,
-//! strategies and solvers into cells. Repetition r draws an arm, poses and noise from the seed and
-//! r alone. Every cell therefore fits the same arms in the same poses. Results do not depend on the
-//! order or on the number of threads or machines. The fits of a cell are grouped into [`Part`]s; a
-//! finished part is kept in a [`Store`], and results are made from finished parts only.
+//! A [`Study`] (`STUDY.toml`, see `docs/study.md`) has a cell for every combination of noise level,
+//! number of poses, strategy and solver. Repetition r draws an arm, poses and noise from the seed
+//! and r alone. Every cell therefore fits the same arms in the same poses. Results do not depend on
+//! the order or on the number of threads or machines. The fits of a cell are grouped into
+//! [`Part`]s. A finished part is kept in a [`Store`], and results are computed from finished parts
+//! only.
 //!
 //! A [`MisprintStudy`] repeats the experiment of Chen et al. (2021) with simulated arms instead.
 

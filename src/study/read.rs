@@ -63,6 +63,7 @@ impl Study {
     }
 }
 
+/// Reads the sections of a study of fits; `file` is its path.
 fn study(mut root: Section<'_, '_>, file: &Path) -> Result<Study, InputError> {
     let folder = file.parent().unwrap_or(Path::new(""));
     let name = name(&mut root)?;
@@ -130,6 +131,7 @@ fn truth_file(path: PathBuf) -> PathBuf {
     if path.is_dir() { path.join("TRUTH.toml") } else { path }
 }
 
+/// Reads the source of the measurements; the default is the model.
 fn source(root: &mut Section<'_, '_>) -> Result<Source, InputError> {
     Ok(root
         .word("data", &["model", "rig"], &[Source::Model, Source::Rig])?
@@ -137,7 +139,7 @@ fn source(root: &mut Section<'_, '_>) -> Result<Source, InputError> {
 }
 
 /// Reads the truth from the file that `truth` names, or from the sections of the study itself. In
-/// the latter case unnamed parameters are drawn from their priors.
+/// the latter case, parameters that the sections do not name are drawn from their priors.
 fn truth(
     root: &mut Section<'_, '_>,
     problem: &Problem,
@@ -191,6 +193,7 @@ fn sigmas(root: &mut Section<'_, '_>) -> Result<Vec<f64>, InputError> {
     })
 }
 
+/// Reads a strategy; one that could vary no parameter of the arm is an error.
 fn strategy(item: &Item<'_, '_>, model: &Model) -> Result<Strategy, InputError> {
     let strategy = word(item, &Strategy::WORDS, &Strategy::EACH)?;
     let varies = |choose: &fn(&_) -> bool| {
@@ -203,6 +206,7 @@ fn strategy(item: &Item<'_, '_>, model: &Model) -> Result<Strategy, InputError> 
     }
 }
 
+/// Reads a solver; one that ignores the model's bounds is an error.
 fn solver(item: &Item<'_, '_>, model: &Model) -> Result<SolverChoice, InputError> {
     let solver = word(item, SolverChoice::NAMES, SolverChoice::CHOICES)?.decide(model);
     if !solver.keeps(model) {

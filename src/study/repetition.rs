@@ -17,7 +17,7 @@ use crate::problem::Problem;
 use crate::random::stream;
 use crate::rig::{self, Draw, Rig, Row, TrueEffect, TrueParameter};
 
-/// Simulated measurements with their truth.
+/// Simulated measurements of one repetition, with their truth.
 struct Data {
     /// Measurements: held-out poses first, then identification poses.
     dataset: Dataset,
@@ -25,14 +25,16 @@ struct Data {
     truth: Vec<Option<f64>>,
 }
 
-/// Returns the problem of a study with the noise level that a cell declares.
+/// Returns the problem of a study with the noise level of a cell declared, and with measured
+/// positions only.
 pub(super) fn problem_of(study: &Study, cell: &Cell) -> Problem {
     let mut problem = study.problem.positions_alone();
     problem.data.position_sigma = Some(cell.sigma);
     problem
 }
 
-/// Fits one repetition (counted from 0); returns its score and the duration of the fit \[s\].
+/// Simulates and fits one repetition (counted from 0); returns its score and the duration of the
+/// fit \[s\].
 pub(super) fn fit(
     study: &Study,
     problem: &Problem,
@@ -56,7 +58,7 @@ pub(super) fn fit(
 /// equilibrium in some pose.
 ///
 /// Held-out poses come first, so that they are the same for every number of identification poses.
-/// Noise of another σ is the same noise, scaled.
+/// Another σ only scales the noise.
 fn data(study: &Study, cell: &Cell, repetition: usize) -> Option<Data> {
     let truth = study.truth.with_noise(cell.sigma);
     let seed = repetition_seed(study, repetition);
@@ -94,8 +96,8 @@ fn repetition_seed(study: &Study, repetition: usize) -> u64 {
     stream(study.seed, repetition as u64).next_u64()
 }
 
-/// Returns the position that the model predicts in each row for an arm with the true effect values,
-/// measuring frame \[m\]; `None` without equilibrium or if a parameter has no true value.
+/// Returns the position that the model predicts in each row for the true arm with the true effect
+/// values, measuring frame \[m\]; `None` if a row has no equilibrium or a parameter no true value.
 fn by_model(mut arm: Problem, strengths: &Strengths, rows: &[Row]) -> Option<Vec<Vector3<f64>>> {
     // Without rules, parameters of effects are free and those of the arm fixed.
     (arm.parameters, arm.constraints) = (Vec::new(), Vec::new());
@@ -110,7 +112,7 @@ fn by_model(mut arm: Problem, strengths: &Strengths, rows: &[Row]) -> Option<Vec
 }
 
 /// Returns the position that the virtual test rig measures in each row, without noise, measuring
-/// frame \[m\]; `None` without equilibrium.
+/// frame \[m\]; `None` if a row has no equilibrium.
 fn by_rig(
     arm: Problem,
     effects: Vec<TrueEffect>,
@@ -156,7 +158,7 @@ pub fn table(rows: &[Row]) -> Measurements {
     }
 }
 
-/// Scores a fit against the truth; a fit with an error among its findings counts as failed.
+/// Compares a fit with the truth. A fit with an error among its findings counts as failed.
 fn score(study: &Study, data: &Data, identification: &Identification) -> Score {
     if let Some(error) = identification.first_error() {
         return Score::Failed(match error.code {
@@ -180,7 +182,7 @@ fn score(study: &Study, data: &Data, identification: &Identification) -> Score {
     if !held_out.rms.norm.is_finite() {
         return Score::Failed("no-equilibrium");
     }
-    // Parameters that the model of the strategy lacks are nominal.
+    // Parameters that the model of the strategy lacks keep their nominal value.
     let estimate = |name: &str| {
         let estimates = identification.estimates.iter().zip(&identification.x);
         estimates.into_iter().find(|(estimate, _)| estimate.name == name)
@@ -201,7 +203,8 @@ fn score(study: &Study, data: &Data, identification: &Identification) -> Score {
     })
 }
 
-/// Returns the standard error of the deviation x, which is a logarithm for stiffnesses.
+/// Returns the standard error of the deviation x of an estimate, a logarithm for stiffnesses;
+/// `None` if the fit reports none.
 fn deviation_error(estimate: &Estimate) -> Option<f64> {
     let scale = if estimate.unit.is_relative() { estimate.estimate } else { 1.0 };
     estimate.std_error.map(|error| error / scale)

@@ -45,7 +45,8 @@ pub struct ParameterResult {
     pub with_std_error: u64,
     /// Mean of the reported standard errors, in the unit of x.
     pub std_error: Option<f64>,
-    /// Share of those fits whose estimate is within 1.96 standard errors of the truth.
+    /// Fraction of the fits with a standard error whose estimate is within 1.96 standard errors of
+    /// the truth.
     pub coverage: Option<f64>,
 }
 
@@ -61,7 +62,7 @@ pub struct Timing {
 }
 
 impl CellResult {
-    /// Returns the share of fits that failed or are not trusted.
+    /// Returns the fraction of the fits that failed or are not trusted.
     pub fn failure_rate(&self) -> f64 {
         self.tally.failed() as f64 / self.tally.fits.max(1) as f64
     }
@@ -85,15 +86,15 @@ impl CellResult {
         })
     }
 
-    /// Returns the share of all standard errors, over fits and parameters, whose 1.96-fold covers
-    /// the truth.
+    /// Returns the fraction of all estimates with a standard error, over fits and parameters, that
+    /// are within 1.96 standard errors of the truth; `None` if there are none.
     pub fn coverage(&self) -> Option<f64> {
         let sum = |of: fn(&ParameterTally) -> u64| self.tally.parameters.iter().map(of).sum();
         share(sum(|tally| tally.covered), sum(|tally| tally.std_error.count))
     }
 
-    /// Returns the name of the parameter with the largest ratio of bias to standard deviation, and
-    /// the signed ratio.
+    /// Returns the name of the parameter with the largest ratio of bias to standard deviation of
+    /// its errors, and the signed ratio; `None` if no parameter has both.
     pub fn largest_bias(&self, study: &Study) -> Option<(String, f64)> {
         let ratio = |result: ParameterResult| {
             let spread = result.spread.filter(|spread| *spread > 0.0)?;
@@ -102,7 +103,7 @@ impl CellResult {
         self.parameters(study).filter_map(ratio).max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))
     }
 
-    /// Returns the durations of the fits.
+    /// Returns statistics of the durations of the fits.
     pub fn timing(&self) -> Timing {
         let seconds = || self.seconds.iter().copied();
         let median = median(seconds()).unwrap_or(0.0);

@@ -23,7 +23,7 @@ pub enum RunError {
     Incomplete { missing: usize, parts: usize, folders: Vec<PathBuf> },
 }
 
-/// Returns the parts of a shard that are not in the store yet.
+/// Returns the parts of a shard that the store does not contain yet.
 ///
 /// # Errors
 /// Returns an error if a finished part cannot be read.
@@ -38,8 +38,8 @@ pub fn pending(study: &Study, store: &Store, shard: Shard) -> Result<Vec<Part>, 
     Ok(pending)
 }
 
-/// Runs the fits of `parts` in parallel and keeps each part as soon as it is finished; calls
-/// `fitted` after each fit.
+/// Runs the fits of `parts` in parallel, and writes each part to the store as soon as it is
+/// finished. Calls `fitted` after each fit, from several threads.
 ///
 /// # Errors
 /// Returns an error if a part cannot be written.
@@ -69,7 +69,7 @@ pub fn run(
     parts.par_iter().try_for_each(run_part)
 }
 
-/// Combines the parts of a study from several stores into its results, in the order of the parts.
+/// Combines the finished parts of a study, which may be in several stores, into its results.
 ///
 /// # Errors
 /// Returns an error if a part is missing or cannot be read.
@@ -102,6 +102,7 @@ pub fn collect(study: &Study, stores: &[Store]) -> Result<Results, RunError> {
     Ok(Results { cells })
 }
 
+/// Returns the paths of folders, separated by commas.
 fn list(folders: &[PathBuf]) -> String {
     folders.iter().map(|folder| folder.display().to_string()).collect::<Vec<_>>().join(", ")
 }

@@ -38,7 +38,7 @@ pub enum StoreError {
 }
 
 impl Study {
-    /// Returns the cell of a part.
+    /// Returns the cell to which a part belongs; an error if the study has no such cell.
     pub(super) fn cell(&self, part: &Part) -> Result<&Cell, StoreError> {
         let none = StoreError::NoSuchCell { cell: part.cell, cells: self.cells.len() };
         self.cells.get(part.cell).ok_or(none)
@@ -67,6 +67,7 @@ pub(super) struct FinishedPart {
     part: String,
     /// Digest of the inputs of the part.
     key: String,
+    /// Statistics over the fits of the part.
     pub tally: Tally,
     /// Duration of each fit \[s\]; the only field that differs from run to run.
     pub seconds: Vec<f64>,
@@ -120,7 +121,7 @@ impl Store {
         write().map_err(|source| StoreError::Unwritable { path: path.clone(), source })
     }
 
-    /// Returns the stored part; `None` if it is not finished.
+    /// Reads a finished part of the study; `None` if the store does not contain it.
     pub(super) fn find(
         &self,
         study: &Study,
@@ -144,6 +145,7 @@ impl Store {
         }
     }
 
+    /// Returns the path of the part with a key.
     fn path(&self, key: &str) -> PathBuf {
         self.folder.join(key.get(..NAME_DIGITS).unwrap_or(key)).with_extension("json")
     }

@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-/// Half-width of the interval that should cover the truth in 95 % of the fits \[σ\].
+/// Half-width, in standard errors, of the interval about an estimate that should contain the truth
+/// in 95 % of the fits.
 const COVERAGE_SIGMAS: f64 = 1.96;
 
 /// Count, mean and scatter of values, accumulated one by one.
@@ -26,7 +27,7 @@ impl Moments {
         self.merge(&Self { count: 1, mean: value, squares: 0.0, largest: value.abs() });
     }
 
-    /// Adds the values of `other` [Chan, Golub & LeVeque 1979].
+    /// Adds the values whose statistics are `other` [Chan, Golub & LeVeque 1979].
     fn merge(&mut self, other: &Self) {
         let count = self.count + other.count;
         if count == 0 {
@@ -92,23 +93,27 @@ pub struct Tally {
 
 /// Outcome of one fit: failed, or its results.
 pub(super) enum Score {
-    /// Reason for which the fit is not trusted.
+    /// Fit that is not trusted, with the reason.
     Failed(&'static str),
+    /// Trusted fit.
     Fitted(Fitted),
 }
 
 /// Results of a trusted fit, SI units.
 pub(super) struct Fitted {
+    /// Mean position error at the held-out poses \[m\].
     pub held_out_mean: f64,
+    /// Root mean square position error at the held-out poses \[m\].
     pub held_out_rms: f64,
     pub reduced_chi2: Option<f64>,
     pub iterations: u64,
-    /// Error of each free parameter; `None` if its truth is not known.
+    /// Error of each free parameter; `None` if the truth does not give its value.
     pub parameters: Vec<Option<ParameterScore>>,
 }
 
 /// Error and reported standard error of the deviation x of one parameter.
 pub(super) struct ParameterScore {
+    /// Estimate − truth.
     pub error: f64,
     pub std_error: Option<f64>,
 }

@@ -1,4 +1,5 @@
-//! Alternative models: mistaken assumptions that might explain the errors reported in \[Chen2021\].
+//! Alternative models: wrong assumptions about the arm that might explain the errors reported in
+//! \[Chen2021\].
 
 use crate::problem::{Joint, Problem};
 
@@ -40,7 +41,7 @@ impl AlternativeModel {
         arm
     }
 
-    /// Returns the factors of payload and hoist force.
+    /// Returns the factors by which the model multiplies payload and hoist force.
     pub(super) fn loads(self) -> (f64, f64) {
         match self {
             Self::HoistTooWeak => (1.0, 0.9),
@@ -51,7 +52,7 @@ impl AlternativeModel {
     }
 }
 
-/// Multiplies the stiffnesses of joints and the rigidities of links.
+/// Multiplies the stiffnesses of all joints by `joints` and the rigidities of all links by `links`.
 pub(super) fn stiffen(arm: &mut Problem, joints: f64, links: f64) {
     let each = |joint: &mut Joint| {
         joint.stiffness.iter_mut().for_each(|stiffness| *stiffness *= joints);

@@ -22,7 +22,7 @@ pub enum ReplicaError {
     Dataset(#[from] DatasetError),
 }
 
-/// Applies the procedure of \[Chen2021\] to some poses.
+/// Identifies an arm from some poses by the procedure of \[Chen2021\].
 pub(super) fn identify_as_published(
     problem: &Problem,
     poses: &[MeasuredPose],
@@ -32,7 +32,8 @@ pub(super) fn identify_as_published(
     Ok(paper::identify(problem, &poses, options)?)
 }
 
-/// Returns the position errors at some poses that the closed forms of \[Chen2021\] predict.
+/// Returns the errors (measured − predicted position) at some poses, predicted by the closed forms
+/// of \[Chen2021\].
 pub(super) fn position_errors(
     problem: &Problem,
     poses: &[MeasuredPose],

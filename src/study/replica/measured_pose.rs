@@ -10,7 +10,7 @@ use crate::problem::{PoseConditions, Problem};
 pub struct MeasuredPose {
     /// Commanded configuration, payload and hoist.
     pub conditions: PoseConditions,
-    /// Position measured by the tracker \[m\].
+    /// Measured position, measuring frame \[m\].
     pub position: Vector3<f64>,
 }
 
@@ -22,7 +22,7 @@ impl MeasuredPose {
 
     /// Returns the pose with payload and hoist force multiplied by the given factors. A load that
     /// the pose does not state is taken from `arm`.
-    pub fn under(&self, (payload, hoist): (f64, f64), arm: &Problem) -> Self {
+    pub fn with_scaled_loads(&self, (payload, hoist): (f64, f64), arm: &Problem) -> Self {
         let declared =
             arm.joints.iter().find_map(|joint| Some(joint.beam.as_ref()?.hoist.as_ref()?.force));
         let mut pose = self.clone();

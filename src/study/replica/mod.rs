@@ -2,10 +2,10 @@
 //! possible causes of the reported 2.14 mm.
 //!
 //! A [`MisprintStudy`] (`MISPRINTS.toml`, see `docs/paper.md`) draws specimens of the arm on the
-//! virtual test rig. Their flexibility is scaled until the rigid fit leaves the error that the
-//! paper reports for it. Each specimen is identified by the procedure of the paper in every reading
-//! and with every first stage, with every [`AlternativeModel`], and by the joint fit. Errors at
-//! held-out poses are compared.
+//! virtual test rig. The flexibility of a specimen is scaled until the rigid fit leaves the error
+//! that the paper reports for it. Each specimen is identified by the procedure of the paper in
+//! every reading and with every source of stiffness, with every [`AlternativeModel`], and by the
+//! joint fit. Errors at held-out poses are compared.
 
 mod alternative;
 mod fit;

@@ -88,6 +88,7 @@ impl MisprintStudy {
     }
 }
 
+/// Reads a load: a payload, a hoist force or both.
 fn load(mut section: Section<'_, '_>) -> Result<Load, InputError> {
     let payload = section.not_negative("payload", Unit::Mass)?;
     let hoist = section.not_negative("hoist", Unit::Force)?;

@@ -7,18 +7,18 @@ use crate::paper::{Form, Misprint, Reading};
 pub struct NamedReading {
     /// Name of the reading in results.
     pub name: String,
-    /// Equations that are kept as printed, or a description.
+    /// Numbers of the equations that are kept as printed; `all` if all are corrected.
     pub place: String,
     /// Description in a few words.
     pub summary: String,
     /// Form of each equation, printed or corrected.
     pub reading: Reading,
-    /// The misprint, if the reading contains only one.
+    /// Misprint of the reading, if the reading keeps only one; else `None`.
     pub misprint: Option<Misprint>,
 }
 
-/// Returns the readings: all corrected, each misprint alone, eq. 21 with each other executable
-/// misprint, and all executable misprints with and without eq. 21.
+/// Returns the readings: all equations corrected, each misprint alone, both misprinted transfers to
+/// the end point, and all misprints that can be run together with and without eq. 21.
 pub fn readings() -> Vec<NamedReading> {
     let named = |name: &str, place: &str, summary: &str, reading: Reading| NamedReading {
         name: name.to_owned(),

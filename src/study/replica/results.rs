@@ -5,7 +5,8 @@ use super::reading::NamedReading;
 use super::study::Case;
 use crate::fit::ErrorSummary;
 
-/// Position errors of a procedure at the held-out poses; `None` if its iteration did not converge.
+/// Position errors of a procedure at the held-out poses; `None` if the procedure's iteration did
+/// not converge.
 pub type HeldOutError = Option<ErrorSummary>;
 
 /// Errors at the held-out poses of one specimen, by each procedure.
@@ -13,14 +14,14 @@ pub type HeldOutError = Option<ErrorSummary>;
 pub struct Replica {
     /// Case that the specimen belongs to.
     pub case: Case,
-    /// Factor by which the specimen's declared flexibilities are multiplied.
+    /// Factor by which the flexibilities that the problem declares are multiplied for the specimen.
     pub scale: f64,
-    /// Errors of the nominal arm without elasticity.
+    /// Errors of the nominal arm without elasticity, before any identification.
     pub before: ErrorSummary,
     /// Errors after the iteration of eq. 45 with elasticity ignored.
     pub rigid: HeldOutError,
-    /// Errors of each reading with the four sources of stiffness: true, as declared, from
-    /// positions, from load differences.
+    /// Errors of each reading with the four sources of stiffness: true, as declared, identified
+    /// from positions, identified from load differences.
     pub by_reading: Vec<[HeldOutError; 4]>,
     /// Errors of each alternative model, with correct formulas, in the order of
     /// [`AlternativeModel::EACH`].
@@ -30,7 +31,7 @@ pub struct Replica {
     pub geometry_only: ErrorSummary,
     /// Errors of the fit of geometry and stiffness together, by the model of this library.
     pub joint: ErrorSummary,
-    /// Errors of the same fit with the poses under the second load in addition.
+    /// Errors of the fit of geometry and stiffness together to the poses under both loads.
     pub joint_twice: ErrorSummary,
 }
 
@@ -40,7 +41,7 @@ pub struct ReplicaResults {
     /// Largest displacement of the end point by each misprint \[m\], in the order of
     /// [`Misprint::EACH`](crate::paper::Misprint::EACH).
     pub sizes: Vec<f64>,
-    /// Interpretations of the paper's formulas (printed or corrected) that were compared.
+    /// Readings of the paper's formulas (printed or corrected) that were compared.
     pub readings: Vec<NamedReading>,
     /// Specimens, case by case.
     pub replicas: Vec<Replica>,
@@ -81,24 +82,26 @@ impl ReplicaResults {
 }
 
 impl Replica {
-    /// Returns the errors of a reading, given by its index and the index of its stiffness source in
-    /// `by_reading`.
+    /// Returns the errors of a reading, given by its index in `by_reading`, and `stage`, the index
+    /// of the source of stiffness there; `None` if the iteration did not converge.
     pub fn reading_error(&self, reading: usize, stage: usize) -> HeldOutError {
         *self.by_reading.get(reading)?.get(stage)?
     }
 
-    /// Returns the errors of an alternative model.
+    /// Returns the errors of an alternative model; `None` if the iteration did not converge.
     pub fn alternative_error(&self, alternative: AlternativeModel) -> HeldOutError {
         let index = AlternativeModel::EACH.iter().position(|model| *model == alternative)?;
         *self.by_alternative.get(index)?
     }
 
-    /// Returns the ratio of the mean error of a procedure to that of the rigid fit.
+    /// Returns the ratio of the mean error of a procedure to that of the rigid fit; `None` if one
+    /// of them did not converge.
     pub fn ratio(&self, error: HeldOutError) -> Option<f64> {
         Some(error?.mean.norm / self.rigid?.mean.norm)
     }
 
-    /// Returns the ratio of the largest error of a procedure to that of the rigid fit.
+    /// Returns the ratio of the largest error of a procedure to that of the rigid fit; `None` if
+    /// one of them did not converge.
     pub fn largest_ratio(&self, error: HeldOutError) -> Option<f64> {
         Some(error?.max.norm / self.rigid?.max.norm)
     }

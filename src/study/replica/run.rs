@@ -15,7 +15,8 @@ use crate::paper::{Form, Options, Parameters, Reading, StiffnessStage};
 use crate::problem::Problem;
 use crate::random::stream;
 
-/// Draws every specimen and identifies it by every procedure; calls `done` after each specimen.
+/// Draws every specimen and identifies it by every procedure; calls `done` after each specimen,
+/// from several threads.
 ///
 /// # Errors
 /// Returns an error if a specimen cannot be scaled or a procedure cannot be set up.
@@ -70,7 +71,7 @@ fn replica(
     let alternative = |model: AlternativeModel| -> Result<HeldOutError, ReplicaError> {
         let assumed = model.assumed(arm.true_stiffness.clone());
         let under_assumed_loads = |poses: &[MeasuredPose]| -> Vec<MeasuredPose> {
-            poses.iter().map(|pose| pose.under(model.loads(), &assumed)).collect()
+            poses.iter().map(|pose| pose.with_scaled_loads(model.loads(), &assumed)).collect()
         };
         let options = Options::new(Form::Corrected, StiffnessStage::Nominal);
         let poses = under_assumed_loads(&arm.identification);

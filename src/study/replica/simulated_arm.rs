@@ -10,8 +10,8 @@ use crate::paper::{Form, Options, StiffnessStage};
 use crate::problem::{PoseConditions, Problem};
 use crate::rig::{Draw, NoEquilibrium, Rig, Row, draw};
 
-/// Relative tolerance to which the flexibility is scaled, measured by the error that the rigid fit
-/// leaves.
+/// Relative difference of the error that the rigid fit leaves from the wanted one, below which the
+/// scale of the flexibility is found.
 const SCALE_TOLERANCE: f64 = 1e-4;
 /// Maximum number of flexibility scales tried for a specimen.
 const MAX_SCALE_TRIES: usize = 40;
@@ -23,11 +23,12 @@ pub struct SimulatedArm {
     pub declared: Problem,
     /// Declared arm with the true stiffness of this specimen.
     pub true_stiffness: Problem,
-    /// Factor of the declared flexibilities; links have `links_over_joints` times this factor.
+    /// Factor on the flexibilities that the problem declares; links have `links_over_joints` times
+    /// this factor.
     pub scale: f64,
     /// Poses at which the procedures are compared.
     pub held_out: Vec<MeasuredPose>,
-    /// Poses for identification, first load.
+    /// Poses for identification, with the loads that the case states or draws.
     pub identification: Vec<MeasuredPose>,
     /// The identification poses, measured a second time under the second load.
     pub second_load: Vec<MeasuredPose>,
@@ -35,7 +36,7 @@ pub struct SimulatedArm {
 
 impl SimulatedArm {
     /// Draws the arm of a seed and scales its flexibility until the rigid fit leaves the error that
-    /// the study states.
+    /// the study states. Returns an error if no scale is found.
     pub fn find(study: &MisprintStudy, case: &Case, seed: u64) -> Result<Self, ReplicaError> {
         let mut scale = 1.0;
         for _ in 0..MAX_SCALE_TRIES {

@@ -1,4 +1,4 @@
-//! Displacement of the end point by each misprint.
+//! Displacement of the end point that each misprint of \[Chen2021\] causes.
 
 use nalgebra::DVector;
 
@@ -6,12 +6,11 @@ use super::study::MisprintStudy;
 use crate::paper::{EndPoint, Misprint, Parameters, Reading};
 use crate::rig::{Draw, draw};
 
-/// Returns the largest change \[m\] of `D_f`, or of `D_g` = `J_g` e, by each misprint, in the order
-/// of [`Misprint::EACH`].
+/// Returns the largest displacement \[m\] by each misprint, in the order of [`Misprint::EACH`]: the
+/// change of the deflection `D_f`, or of the geometric error `D_g` = `J_g` e, whichever is larger.
 ///
-/// The maximum is over the poses of the first specimen: the declared arm with its declared
-/// elasticity and the geometric errors e of the truth. For `BetaLeftOut` it is the displacement by
-/// the β of e.
+/// The maximum is over the poses of one drawn arm with its declared elasticity and the geometric
+/// errors e. For `BetaLeftOut` it is the displacement by the errors β in e.
 pub fn sizes(study: &MisprintStudy) -> Vec<f64> {
     let (problem, poses) = (&study.problem, study.held_out + study.identification);
     let Draw { arm, rows, .. } = draw(problem, &study.truth, poses, study.seed);

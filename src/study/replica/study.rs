@@ -12,7 +12,7 @@ pub struct MisprintStudy {
     pub files: Vec<PathBuf>,
     /// Short name; results are written to `out/<name>` by default.
     pub name: String,
-    /// Title for people, one line.
+    /// Title in results, one line.
     pub title: String,
     /// Arm as the problem declares it.
     pub problem: Problem,
@@ -22,14 +22,15 @@ pub struct MisprintStudy {
     pub seed: u64,
     /// Number of specimens of each case.
     pub specimens: usize,
-    /// Number of identification poses.
+    /// Number of identification poses of each specimen.
     pub identification: usize,
-    /// Number of held-out poses.
+    /// Number of held-out poses of each specimen.
     pub held_out: usize,
-    /// Mean error of the rigid fit at the held-out poses, to which every specimen's flexibility is
-    /// scaled \[m\].
+    /// Mean position error \[m\] that the rigid fit leaves at the held-out poses. Every specimen's
+    /// flexibility is scaled to give this error.
     pub rigid_leaves: f64,
-    /// Cases of the study; the first one is identified by every procedure.
+    /// Cases of the study; the first one has the ratio of flexibilities closest to the declared
+    /// one.
     pub cases: Vec<Case>,
     /// Load under which the identification poses are measured a second time.
     pub second_load: Load,
@@ -38,7 +39,7 @@ pub struct MisprintStudy {
 /// Properties that the specimens of one case share.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Case {
-    /// Ratio of the flexibility of links to that of joints, relative to the declared ratio.
+    /// Ratio of the flexibility of links to that of joints, divided by the declared ratio.
     pub links_over_joints: f64,
     /// Load of every pose; `None` if loads are drawn for each pose.
     pub load: Option<Load>,
@@ -56,7 +57,7 @@ impl Case {
     }
 }
 
-/// Load on the arm.
+/// Payload and hoist force of a pose.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Load {
     /// Payload \[kg\]; `None` leaves it as drawn.
@@ -66,8 +67,7 @@ pub struct Load {
 }
 
 impl Load {
-    /// Returns the conditions of a pose with this load (payload and hoist force) instead of the
-    /// pose's own.
+    /// Returns the conditions of a pose with this load instead of the one that the pose states.
     pub(super) fn put_on(self, conditions: &PoseConditions) -> PoseConditions {
         let (payload, hoist) =
             (self.payload.or(conditions.payload), self.hoist.or(conditions.hoist));
