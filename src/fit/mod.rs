@@ -48,7 +48,7 @@ pub use checks::point_spread::PointSpread;
 pub(crate) use checks::required_columns::check_columns;
 #[doc(hidden)]
 pub use checks::required_columns::missing_target_columns;
-pub(crate) use checks::row_kind::{rows as rows_of_kind, size as size_of_kind};
+pub(crate) use checks::row_kind::{format_error as size_of_kind, row_noun as rows_of_kind};
 pub(crate) use checks::set_aside::selection as selection_of_outliers;
 pub(crate) use compare::baseline::Baseline;
 pub(crate) use compare::comparison::Before;

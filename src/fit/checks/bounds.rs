@@ -1,4 +1,4 @@
-//! Check of the bounds on which parameters rest.
+//! Check of the bounds at which fitted parameters are.
 
 use serde_json::json;
 
@@ -7,7 +7,8 @@ use super::finding::{Finding, FindingCode};
 use crate::fit::uncertainty::hidden_by_bound::HiddenByBound;
 use crate::least_squares::solver::AtBound;
 
-/// Maximum number of parameters hidden by a bound that the text of the finding names.
+/// Maximum number of parameters, of those whose uncertainty a bound hides, that the text of the
+/// finding names.
 const MAX_NAMED_PARTNERS: usize = 5;
 
 /// Checks that no parameter is at a bound that hides the uncertainty of other parameters.

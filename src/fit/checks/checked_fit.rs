@@ -1,4 +1,4 @@
-//! Input of the checks: a fit with everything that they look at.
+//! Input of the checks: a fit with the data that they examine.
 
 use std::cell::OnceCell;
 
@@ -40,50 +40,52 @@ pub(in crate::fit) struct CheckedFit<'a> {
     pub fitted: &'a Errors,
     /// Identification rows whose residual is too long to be noise.
     pub outliers: &'a [Outlier],
-    /// Held-out rows that are too far from the prediction.
+    /// Held-out rows whose prediction error is too large for its uncertainty.
     pub held_out_outliers: &'a [Outlier],
-    /// Stage with all unknowns and identification rows, with both the declared σ and those that the
-    /// fit assumed.
+    /// Stage that fits all unknowns to the identification rows. It holds both the declared σ and
+    /// those that the fit assumed.
     pub whole: &'a Stage<'a>,
     /// Triangular factor of the whitened Jacobian of the unknowns of `whole`, without priors, at
     /// the registered nominal arm.
     pub triangle: &'a DMatrix<f64>,
     /// True if the problem or the table declares the σ of positions.
     pub has_declared_noise: bool,
-    /// Source of the σ of positions.
+    /// Source of the σ of the measurements: declared, estimated or unknown.
     pub noise: Noise,
     /// Noise variance that the fit assumed, relative to the declared one.
     pub noise_factor: f64,
-    /// 1 σ of a coordinate that the fit assumed \[m\] or \[rad\].
+    /// 1 σ of a coordinate of the leading kind of rows that the fit assumed \[m\] or \[rad\].
     pub sigma_taken: f64,
     /// Covariance of the unknowns of `whole`, shape = (unknowns, unknowns); 0 for held unknowns.
     pub covariance: &'a DMatrix<f64>,
     /// Rules of `[parameters]` whose σ the data refute.
     pub refuted_priors: &'a [RefutedPrior],
-    /// Number of different poses, with a finding if they are too few for the unknowns.
+    /// Number of different poses and of independent coordinates, with findings if they are too few
+    /// for the unknowns.
     pub poses: &'a PoseSufficiency,
-    /// Finding that the fit did not converge; `None` if it did.
+    /// Finding that the fit did not converge; `None` if it converged.
     pub not_converged: Option<&'a Finding>,
     /// Bounds that hide the uncertainty of other unknowns.
     pub hidden: &'a [HiddenByBound],
     /// Prior widths that the fitted deviations contradict.
     pub prior_sizes: &'a [PriorSize],
-    /// Scatter of the prediction at each touched point, with the nominal and with the fitted arm.
-    /// The flag is true if all rows of the point are held out.
+    /// Scatter of the predicted target at each touched point: that of the registered nominal arm,
+    /// that of the fitted arm, and true if all rows of the point are held out.
     pub spreads: &'a [(PointSpread, PointSpread, bool)],
-    /// Misreadings of the input that would explain the misfit; they are searched at first use.
+    /// Misreadings of the input that would explain the misfit; the search for them runs at first
+    /// use.
     pub explanations: OnceCell<Explanations>,
 }
 
 impl CheckedFit<'_> {
-    /// Returns the identification rows grouped by what they measure, positions first; rows that do
-    /// not involve the arm are left out.
+    /// Returns the identification rows grouped by their kind, positions first; rows that do not
+    /// involve the arm are left out.
     pub fn kinds(&self) -> Vec<RowKind> {
         let kinds = self.fitting.measurements.kinds().into_iter().filter(|kind| kind.is_of_arm());
         kinds.map(|kind| self.kind(kind)).filter(|kind| !kind.rows.is_empty()).collect()
     }
 
-    /// Collects the identification rows that measure the same kind of thing as `observation`.
+    /// Collects the identification rows of the same kind as `observation`, with their spread and σ.
     pub fn kind(&self, observation: Observation) -> RowKind {
         let Fitting { measurements, placement, split, .. } = self.fitting;
         let is_of_kind = |row: usize| measurements.observation(row).kind() == observation.kind();
@@ -119,8 +121,8 @@ impl CheckedFit<'_> {
         }
     }
 
-    /// Returns the root mean squared length of the errors of some identification rows \[m\] or
-    /// \[rad\]. Rows that a robust loss treats as outliers do not count.
+    /// Returns the root mean squared length of the `errors` of some identification rows, in their
+    /// unit. Rows that a robust loss treats as outliers are left out.
     pub fn rms(&self, rows: &[usize], errors: &[Vector3<f64>]) -> f64 {
         let is_robust = self.fitting.loss != Loss::Squares;
         let is_set_aside =

@@ -1,39 +1,41 @@
-//! Numbers of the problem that the measurements contradict, with a remedy that names them.
+//! Declared number of the joint table or of the tool that the measurements contradict, with a
+//! remedy that names it.
 
 use nalgebra::Vector3;
 
 use super::checked_fit::CheckedFit;
-use super::row_kind::size;
+use super::row_kind::format_error;
 use crate::error::Location;
 use crate::model::parameter::{Parameter, ParameterSite};
 use crate::problem::{Joint, JointKind, Problem};
 use crate::quantity::Unit;
 
-/// Largest residual, as a fraction of the displacement that a deviation causes, at which the
-/// deviation explains the measurements.
+/// Largest rms residual of the fit, as a fraction of the displacement that the deviation of one
+/// parameter causes, at which this deviation explains the measurements.
 const MAX_REMAINING_FRACTION: f64 = 0.1;
-/// Largest distance of a number with one changed or two exchanged digits from the fitted number, as
-/// a fraction of the deviation.
+/// Largest distance of the declared number with one changed or two exchanged digits from the fitted
+/// number, as a fraction of the difference of declared and fitted number.
 const MAX_DIGIT_MISMATCH: f64 = 0.03;
-/// Largest distance of the fitted target from the one turned by 180°, as a fraction of its distance
-/// from the z axis.
+/// Largest distance of the fitted target from the declared one rotated by 180° about z, as a
+/// fraction of the target's distance from the z axis.
 const MAX_TURN_MISMATCH: f64 = 0.1;
-/// Smallest distance of a target from the z axis for which a turn is considered \[m\].
+/// Smallest distance of a declared target from the z axis for which a rotation by 180° about z is
+/// considered \[m\].
 const MIN_TURNED_RADIUS: f64 = 1e-3;
 
-/// Declared number, in words, that a single deviation of the fit contradicts.
+/// Texts about a declared number from which the fitted one deviates far.
 pub(super) struct ContradictedEntry {
-    /// Declared and fitted number, with the residual that the fitted one leaves.
+    /// Statement of the declared and the fitted number, with the rms residual of the fit.
     pub words: String,
-    /// Remedy.
+    /// Suggested remedy.
     pub remedy: String,
 }
 
 /// Returns the declared entry of the joint table, or the declared target, that the measurements
 /// contradict; `None` unless this entry alone is far off and the fit explains the measurements.
 ///
-/// `parameter` is the one with the largest deviation x, in σ of its prior; `is_far` returns true for
-/// a parameter and its deviation if the deviation is beyond the prior.
+/// `parameter` is the one with the largest deviation `x` from nominal, in σ of its prior. `is_far`
+/// returns true for a parameter and its deviation if the deviation is far beyond the prior.
 pub(super) fn contradicted_entry(
     fit: &CheckedFit,
     (parameter, x): (&Parameter, f64),
@@ -60,7 +62,7 @@ pub(super) fn contradicted_entry(
     if fitted().any(|(other, x)| !is_same(other.site) && is_far(other, *x)) {
         return None;
     }
-    let left = size(kind.observation.kind(), rms, 2);
+    let left = format_error(kind.observation.kind(), rms, 2);
     match parameter.site {
         ParameterSite::Joint { joint, .. } => {
             Some(of_joint(fit.problem.joints.get(joint)?, parameter, x, &left))
@@ -79,7 +81,8 @@ pub(super) fn contradicted_entry(
     }
 }
 
-/// Describes an entry of a joint.
+/// Describes the entry of the joint table that declares `parameter`, whose fitted deviation is `x`.
+/// `left` is the formatted rms residual of the fit.
 fn of_joint(joint: &Joint, parameter: &Parameter, x: f64, left: &str) -> ContradictedEntry {
     let display = parameter.unit().display(parameter.nominal);
     let shown = |value: f64| value * display.factor;
@@ -102,7 +105,8 @@ fn of_joint(joint: &Joint, parameter: &Parameter, x: f64, left: &str) -> Contrad
     ContradictedEntry { words, remedy }
 }
 
-/// Describes the target of `[tool]`, declared and as the fit found it \[m\].
+/// Describes the target of `[tool]` as declared and as fitted, both in the frame that carries it
+/// \[m\]. `left` is the formatted rms residual of the fit.
 fn of_tool(
     problem: &Problem,
     declared: Vector3<f64>,
@@ -141,13 +145,14 @@ fn of_tool(
     ContradictedEntry { words, remedy: remedy.to_owned() }
 }
 
-/// Returns a number without the digits that its conversion added.
+/// Formats a number with at most six decimals, without those that the conversion of units added.
 fn rounded(value: f64) -> String {
     ((value * 1e6).round() / 1e6 + 0.0).to_string()
 }
 
-/// Returns the number that the declared one becomes with two neighbouring digits exchanged or one
-/// digit changed, and the words for it; `None` unless it is near the fitted number.
+/// Returns the number that was probably meant: the declared number with two neighbouring digits
+/// exchanged or one digit changed, and the words for that. `None` unless such a number is near the
+/// fitted one.
 fn typing_error(declared: f64, fitted: f64) -> Option<(f64, &'static str)> {
     if declared == 0.0 {
         return None;
@@ -160,7 +165,7 @@ fn typing_error(declared: f64, fitted: f64) -> Option<(f64, &'static str)> {
         (is_digit(first) && is_digit(place)).then(|| changed.swap(first, place))?;
         Some((changed, "two digits exchanged"))
     });
-    // Another last digit is near many numbers.
+    // A change of the last digit comes near almost any fitted number, so it is not tried.
     let last = (0..digits.len()).rev().find(|&place| is_digit(place)).unwrap_or(0);
     let replaced = (0..last).filter(|&place| is_digit(place)).flat_map(|place| {
         let digits = &digits;

@@ -1,4 +1,4 @@
-//! Search for the orientation convention in which measured orientations would fit.
+//! Search for the convention of orientations with which the measured orientations would fit.
 
 use std::f64::consts::PI;
 
@@ -7,13 +7,15 @@ use nalgebra::{Matrix4, Quaternion, UnitQuaternion, Vector3};
 use super::checked_fit::CheckedFit;
 use crate::problem::RotationKind;
 
-/// Largest ratio of the orientation error with another convention to that as declared, at which the
-/// other convention is an explanation.
+/// Largest ratio of the rms orientation error with another convention to that with the declared
+/// one, at which the other convention explains the error.
 const MAX_EXPLAINED_RATIO: f64 = 0.2;
-/// Largest ratio to the smallest error at which a convention is named as well as the best one.
+/// Largest ratio of the error with a convention to that with the best one, at which the convention
+/// is also named.
 const MAX_RATIO_TO_BEST: f64 = 1.5;
-/// Axes of rotation of the twelve Euler conventions, R = R₁(r₁) R₂(r₂) R₃(r₃). If all three axes
-/// differ, each angle is in the column of its axis.
+/// Axes (0 to 2 for x, y, z) of the twelve Euler conventions, R = R₁(r₁) R₂(r₂) R₃(r₃). If all
+/// three axes differ, each angle is in the column of its axis, else the angles are in the order of
+/// the rotations.
 const ROTATION_AXES: [[usize; 3]; 12] = [
     [0, 1, 2],
     [0, 2, 1],
@@ -32,7 +34,8 @@ const ROTATION_AXES: [[usize; 3]; 12] = [
 /// Name of the convention in which the angles of the table are in another unit.
 pub(super) const IN_RADIANS: &str = "angles in radians, declared in degrees";
 
-/// Function from a rotation as read to the rotations that the table may have meant.
+/// Function from a rotation as it was read to the rotations that the table means in another
+/// convention. It returns several if the read rotation may come from different numbers.
 type Reading = Box<dyn Fn(&UnitQuaternion<f64>) -> Vec<UnitQuaternion<f64>>>;
 
 /// Returns the names of the conventions with which the measured orientations agree with the
@@ -72,8 +75,8 @@ pub(super) fn fitting_conventions(fit: &CheckedFit, rms: f64) -> Vec<String> {
         .collect()
 }
 
-/// Returns every alternative convention for orientations that were read with convention `kind`,
-/// with its name.
+/// Returns the name and the [`Reading`] of every alternative convention, for orientations that were
+/// read with the convention `kind`.
 fn readings(kind: RotationKind) -> Vec<(String, Reading)> {
     let inverse: Reading = Box::new(|q| vec![q.inverse()]);
     let mut readings = vec![("the inverse rotation".to_owned(), inverse)];
@@ -113,15 +116,17 @@ fn readings(kind: RotationKind) -> Vec<(String, Reading)> {
     readings
 }
 
-/// Returns every order of the components x, y, z, w of a quaternion except the declared one.
+/// Returns every order of four quaternion columns except x, y, z, w. Entry k is the component
+/// (0 to 3 for x, y, z, w) in column k.
 fn quaternion_orders() -> impl Iterator<Item = [usize; 4]> {
     let places = (0..256_usize).map(|k| [k % 4, k / 4 % 4, k / 16 % 4, k / 64]);
     let is_order = |order: &[usize; 4]| (0..4).all(|place| order.contains(&place));
     places.filter(move |order| is_order(order) && *order != [0, 1, 2, 3])
 }
 
-/// Returns the three numbers in the table from which the orientation `q` was read with convention
-/// `kind` \[rad\]. A rotation vector has two possibilities, shorter and longer than half a turn.
+/// Returns the three numbers of the table \[rad\] from which the orientation `q` was read with the
+/// convention `kind`, twice if they are unique. A rotation vector may be shorter or longer than
+/// half a turn.
 fn angles(kind: RotationKind, q: &UnitQuaternion<f64>) -> [Vector3<f64>; 2] {
     match kind {
         RotationKind::Vector => {
@@ -142,7 +147,7 @@ fn angles(kind: RotationKind, q: &UnitQuaternion<f64>) -> [Vector3<f64>; 2] {
     }
 }
 
-/// Returns the rotation with three numbers in the convention `kind` \[rad\].
+/// Returns the rotation that three numbers \[rad\] mean in the convention `kind`.
 fn of_kind(kind: RotationKind, angles: &Vector3<f64>) -> UnitQuaternion<f64> {
     match kind {
         RotationKind::Vector => UnitQuaternion::from_scaled_axis(*angles),
@@ -153,7 +158,8 @@ fn of_kind(kind: RotationKind, angles: &Vector3<f64>) -> UnitQuaternion<f64> {
     }
 }
 
-/// Returns the rotation R₁(r₁) R₂(r₂) R₃(r₃) about the axes of an Euler convention.
+/// Returns the rotation R₁(r₁) R₂(r₂) R₃(r₃) about the axes `order` of an Euler convention, with
+/// the numbers `angles` of a row \[rad\].
 fn euler(order: [usize; 3], angles: &Vector3<f64>) -> UnitQuaternion<f64> {
     let has_three_axes = order[0] != order[2];
     let turn = |place: usize| {
@@ -164,13 +170,13 @@ fn euler(order: [usize; 3], angles: &Vector3<f64>) -> UnitQuaternion<f64> {
 }
 
 /// Returns the root mean squared angle \[rad\] between predicted and measured orientations if the
-/// file's numbers follow another convention of rotations.
+/// numbers of the table follow another convention.
 ///
-/// `pairs` holds the predicted and the measured orientation of each row. `reading` returns the
-/// orientations that the numbers of a measured one may mean in the other convention. A constant
-/// rotation of the tool is fitted first: the eigenvector of Σ q qᵀ of the differences q between
-/// prediction and first reading  [Markley et al. 2007]. If a row has several readings, the nearest
-/// counts.
+/// `pairs` holds the predicted orientation of each row, and the measured one as it was read.
+/// `reading` returns the orientations that the numbers may mean in the other convention. A constant
+/// rotation of the tool is fitted first: the eigenvector of Σ q qᵀ for the largest eigenvalue, with
+/// the rotations q from the prediction to the first meaning  [Markley et al. 2007]. If a row has
+/// several meanings, the nearest one is used.
 fn misfit(pairs: &[(UnitQuaternion<f64>, UnitQuaternion<f64>)], reading: &Reading) -> f64 {
     let differences: Vec<Vec<UnitQuaternion<f64>>> = pairs
         .iter()

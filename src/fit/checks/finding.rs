@@ -1,4 +1,4 @@
-//! Findings: what the checks of a fit report, with stable codes that programs can act on.
+//! Findings: reports of the checks of a fit, with stable codes that programs can act on.
 
 use std::fmt;
 
@@ -25,9 +25,9 @@ pub struct FindingEntry {
     pub code: &'static str,
     /// Severity of every finding with this code.
     pub severity: Severity,
-    /// Names of the numbers that a finding with this code carries.
+    /// Names of the entries in [`Finding::numbers`] of a finding with this code, in their order.
     pub numbers: &'static [&'static str],
-    /// Statement that the finding makes, in one sentence.
+    /// Statement that every finding with this code makes, in one sentence.
     pub meaning: &'static str,
     /// Default remedy, used if the check suggests no specific one.
     pub remedy: &'static str,
@@ -188,11 +188,11 @@ finding_codes! {
 pub struct Finding {
     /// Code, which determines the severity.
     pub code: FindingCode,
-    /// Numbers and words of this case, by the names in [`FindingEntry::numbers`]; SI units.
+    /// Numbers and words of this case, each with its name from [`FindingEntry::numbers`]; SI units.
     pub numbers: Vec<(&'static str, Value)>,
     /// Statement about this case, without the remedy.
     pub text: String,
-    /// Suggested remedy.
+    /// Suggested remedy; empty if there is none.
     pub remedy: String,
 }
 
@@ -209,13 +209,14 @@ impl Finding {
         Self { code, numbers, text, remedy: entry.remedy.to_owned() }
     }
 
-    /// Replaces the default remedy by one specific to this case.
+    /// Returns the finding with its remedy replaced by one specific to this case.
     #[must_use]
     pub(in crate::fit) fn with_remedy(self, remedy: String) -> Self {
         Self { remedy, ..self }
     }
 
-    /// Replaces a remedy that suggests `flexcal loop` by one that applies after the loop.
+    /// Replaces a remedy that suggests `flexcal loop` by one that applies after a loop; other
+    /// remedies stay.
     pub(crate) fn set_remedy_after_loop(&mut self) {
         let remedy = match self.code {
             FindingCode::HeldOutBeyondPrediction => {

@@ -1,10 +1,11 @@
-//! Checks of single identification rows: outliers, influential rows, points that moved.
+//! Checks of single identification rows and touched points: outliers, influential rows, points that
+//! moved.
 
 use serde_json::json;
 
 use super::checked_fit::{Check, CheckedFit};
 use super::finding::{Finding, FindingCode};
-use super::outliers::{InfluentialRows, places};
+use super::outliers::{InfluentialRows, outliers_as_json};
 use super::point_spread::PointSpread;
 
 /// Checks that no identification row has a residual too large to be noise.
@@ -18,22 +19,23 @@ impl Check for NoOutliers {
         }
         let verb = if count == 1 { "is" } else { "are" };
         let text = format!("{count} of {of} identification rows {verb} too far off to be noise");
-        vec![Finding::new(FindingCode::Outliers, [places(fit.outliers), of.into()], text)]
+        let numbers = [outliers_as_json(fit.outliers), of.into()];
+        vec![Finding::new(FindingCode::Outliers, numbers, text)]
     }
 }
 
-/// Reports the few rows that cause most of the misfit of a fit.
+/// Creates the finding about few rows that cause most of the misfit of a fit.
 pub(in crate::fit) fn influential_finding(found: &InfluentialRows) -> Finding {
     let text = match found.rows.len() {
         1 => "1 row too far off to be noise causes most of the misfit".to_owned(),
         count => format!("{count} rows too far off to be noise cause most of the misfit"),
     };
-    let numbers = [places(&found.rows), json!(found.reduced_chi2)];
+    let numbers = [outliers_as_json(&found.rows), json!(found.reduced_chi2)];
     Finding::new(FindingCode::InfluentialRows, numbers, text)
 }
 
-/// Checks that no touched point scatters far more than the others along one direction, as a point
-/// that moved does.
+/// Checks that at no touched point the predicted target scatters far more than at the others and
+/// along one direction, as it does if the point moved.
 pub(super) struct SteadyPoints;
 
 impl Check for SteadyPoints {

@@ -1,4 +1,4 @@
-//! Checks of held-out rows against the fit: copies, outliers, and large errors.
+//! Checks of held-out rows: copies of identification rows, outliers, and large prediction errors.
 
 use std::collections::HashSet;
 
@@ -8,8 +8,8 @@ use rayon::prelude::*;
 use super::checked_fit::{Check, CheckedFit};
 use super::finding::{Finding, FindingCode};
 use super::misfit::{MAX_MISS, MAX_UNREPORTED_RESIDUAL, MIN_SPREAD};
-use super::outliers::{Outlier, places};
-use super::row_kind::{RowKind, rows as noun, size};
+use super::outliers::{Outlier, outliers_as_json};
+use super::row_kind::{RowKind, format_error, row_noun};
 use crate::fit::stages::fitting::Fitting;
 use crate::fit::uncertainty::residual_lengths::{noise_lengths_of_all, scatter};
 use crate::least_squares::{Block, CHUNK_ITEMS, LeastSquares as _};
@@ -17,20 +17,22 @@ use crate::measurement::Measurements;
 use crate::numeric::median;
 use crate::observation::kind_named;
 
-/// Smallest ratio of the held-out errors of fitted and nominal arm at which the fit is reported as
-/// worse than the nominal arm.
+/// Smallest ratio of the rms held-out error of the fitted arm to that of the registered nominal
+/// arm, at which the fit is reported as worse.
 const MIN_ERROR_RATIO: f64 = 1.5;
-/// Smallest held-out error, as a multiple of the noise, at which a fit is reported as worse than
-/// the nominal arm.
+/// Smallest rms held-out error, as a multiple of the noise that the fit assumed, at which the fit
+/// is reported as worse than the nominal arm.
 const MIN_NOISE_MULTIPLE: f64 = 5.0;
 
 /// Returns the held-out rows that are farther from the prediction than the σ and the covariance of
 /// the fit allow, in the order of the rows.
 ///
-/// A row is an outlier where P(χ²ₖ > s²) < 0.01 / N with s² = rᵀ (I + J C Jᵀ)⁻¹ r / scatter², r and
-/// J whitened by the σ that the fit assumed, C the covariance of its `unknowns` at `x`. The scatter
-/// is the median of s / √(median of χ²ₖ), at least 1, so that a model which misses an effect
-/// everywhere does not make every row an outlier.
+/// A row is an outlier if P(χ²ₖ > s²) < 0.01 / N with s² = rᵀ (I + J C Jᵀ)⁻¹ r / scatter², N rows
+/// and k measured numbers of the row. The residual r and the Jacobian J are whitened by the σ that
+/// the fit assumed, and C is the covariance of its `unknowns` at `x`. The scatter is the median
+/// over the rows of √(rᵀ (I + J C Jᵀ)⁻¹ r / median of χ²ₖ), or 1 if that is larger. If the model
+/// lacks an effect that acts in all rows, the scatter grows, so that not every row becomes an
+/// outlier.
 pub(in crate::fit) fn outliers(
     fitting: &Fitting,
     x: &DVector<f64>,
@@ -80,8 +82,8 @@ pub(in crate::fit) fn outliers(
     (0..rows.len()).filter_map(outlier).collect()
 }
 
-/// Returns the number of held-out rows that copy an identification row: configuration, position and
-/// session are equal to the bit.
+/// Returns the number of held-out rows that copy an identification row: configuration, measured
+/// numbers, session and kind are equal to the bit.
 fn copies(measurements: &Measurements, identification: &[usize], held_out: &[usize]) -> usize {
     let key = |row: usize| -> Vec<u64> {
         let values =
@@ -100,13 +102,13 @@ fn copies(measurements: &Measurements, identification: &[usize], held_out: &[usi
 /// Maximum number of held-out rows that the text of a finding names.
 const MAX_NAMED_ROWS: usize = 5;
 
-/// Returns the number of held-out rows that copy an identification row.
+/// Returns the number of held-out rows of a fit that copy an identification row.
 fn copies_in_fit(fit: &CheckedFit) -> usize {
     let Fitting { measurements, split, .. } = fit.fitting;
     copies(measurements, &split.identification, &split.held_out)
 }
 
-/// Checks that not every held-out row copies an identification row.
+/// Checks that at least one held-out row is no copy of an identification row.
 pub(super) struct NotAllCopied;
 
 impl Check for NotAllCopied {
@@ -121,7 +123,7 @@ impl Check for NotAllCopied {
     }
 }
 
-/// Checks that few held-out rows copy an identification row.
+/// Checks that no held-out row copies an identification row, unless all do.
 pub(super) struct NotRepeated;
 
 impl Check for NotRepeated {
@@ -138,7 +140,8 @@ impl Check for NotRepeated {
     }
 }
 
-/// Checks that the prediction error is small for most held-out rows of each kind.
+/// Checks that the median prediction error of the held-out rows of each kind is small relative to
+/// the spread of the fitted rows, or to σ.
 pub(super) struct HeldOutReached;
 
 impl Check for HeldOutReached {
@@ -156,8 +159,8 @@ impl Check for HeldOutReached {
             let noise = declared_sigma.map_or(0.0, |sigma| MAX_UNREPORTED_RESIDUAL * sigma);
             let text = format!(
                 "half of the held-out {} are missed by more than {}, {:.0} % of the spread of the fitted ones",
-                noun(kind),
-                size(kind, median, 1),
+                row_noun(kind),
+                format_error(kind, median, 1),
                 100.0 * median / spread
             );
             let numbers = [kind.into(), median.into(), spread.into()];
@@ -184,9 +187,9 @@ impl Check for BetterThanNominal {
         }
         let text = format!(
             "the fitted arm misses held-out {} by more than the nominal arm ({} rms before, {} after)",
-            noun(kind),
-            size(kind, before, 3),
-            size(kind, after, 3)
+            row_noun(kind),
+            format_error(kind, before, 3),
+            format_error(kind, after, 3)
         );
         let numbers = [kind.into(), before.into(), after.into()];
         vec![Finding::new(FindingCode::HeldOutWorse, numbers, text)]
@@ -205,7 +208,11 @@ impl Check for WithoutOutliers {
         let name = |row: &Outlier| {
             let is_vector = kind_named(row.kind).numbers == 3;
             let axis = if is_vector { " along an axis" } else { "" };
-            format!("{} (off by {}{axis})", row.location, size(row.kind, row.error.amax(), 3))
+            format!(
+                "{} (off by {}{axis})",
+                row.location,
+                format_error(row.kind, row.error.amax(), 3)
+            )
         };
         let are_positions = rows.iter().all(|row| row.kind == "position");
         let noun = if are_positions { "poses" } else { "rows" };
@@ -217,7 +224,7 @@ impl Check for WithoutOutliers {
             "{count} of {of} held-out {noun} {verb} too far off to be noise: {}{more}",
             named.join(", ")
         );
-        let numbers = [places(rows), of.into()];
+        let numbers = [outliers_as_json(rows), of.into()];
         vec![Finding::new(FindingCode::HeldOutOutliers, numbers, text).with_remedy(String::new())]
     }
 }

@@ -1,9 +1,9 @@
-//! Check of the bases and tools of held-out sessions.
+//! Check of the bases and tools that only held-out rows use.
 
 use super::checked_fit::{Check, CheckedFit};
 use super::finding::Finding;
 
-/// Checks that held-out sessions determine their bases and tools.
+/// Checks that held-out rows determine the bases and tools that only they use.
 pub(super) struct HeldOutPlaced;
 
 impl Check for HeldOutPlaced {

@@ -1,4 +1,5 @@
-//! Check of held intrinsics: an error of a lens is no error of the arm.
+//! Check of intrinsics of cameras that the fit does not vary: their errors would be attributed to
+//! the arm.
 
 use nalgebra::{Matrix6, Vector6};
 use serde_json::json;
@@ -12,31 +13,33 @@ use crate::model::Model;
 use crate::observation::Scene;
 use crate::problem::{Fixture, Freedom, ParameterRule, Problem, Quantities};
 
-/// Largest probability of the F test by chance at which freeing the intrinsics improves the fit.
+/// Largest p-value of the F test at which freeing the intrinsics improves the fit significantly.
 const MAX_CHANCE_PROBABILITY: f64 = 1e-4;
-/// Smallest probability that is stated as a number; smaller ones are rounding errors.
+/// Smallest p-value that is stated as a number; smaller ones are below the rounding errors.
 const LEAST_STATED_CHANCE: f64 = 1e-16;
-/// Smallest deviation of a coefficient from its declared value at which it is named \[σ\].
+/// Smallest deviation of an intrinsic parameter from its declared value, in standard errors, at
+/// which the finding names the parameter.
 const MIN_NAMED_SIGMAS: f64 = 3.0;
-/// Smallest ratio of the gain to the misfit that remains beyond noise at which the intrinsics are
-/// the cause: they remove three quarters of the misfit.
+/// Smallest ratio of the decrease of χ² by free intrinsics to the χ² that remains beyond noise, at
+/// which the intrinsics are the cause: they remove three quarters of the misfit.
 const MIN_GAIN_RATIO: f64 = 3.0;
-/// Multiple of the standard deviation of the remaining misfit by chance that is subtracted from it.
+/// Number of standard deviations of χ² of noise that are subtracted from the remaining misfit.
 const REMAINING_SIGMAS: f64 = 2.0;
 /// Smallest number of degrees of freedom within views that determines the noise of pixels: its
 /// relative standard error is then √(2/200) = 10 %.
 const MIN_NOISE_FREEDOM: f64 = 200.0;
 
-/// Compares the fit with one whose intrinsics are free: focal lengths, image centres and
-/// distortion. Returns a finding if these are a cause of the misfit.
+/// Compares the fit `found` with one whose intrinsics are free: focal lengths, image centres and
+/// distortion. Returns a finding if errors of the intrinsics cause most of the misfit.
 ///
-/// Two conditions hold then. An F test shows that the gain in χ² for each freed parameter is not
-/// noise of the fit with a free lens. The gain is also several times the misfit that remains beyond
-/// the noise of pixels; otherwise the arm or a marker may be the cause, of which a free lens takes
-/// up a part. The noise of pixels is that within views ([`noise_within_views`]), or the declared one.
+/// This requires two conditions. By an F test, the decrease of χ² by the freed parameters is larger
+/// than noise explains. The decrease is also several times the misfit that remains beyond the noise
+/// of pixels. Otherwise the arm or a marker may be the cause, and free intrinsics only absorb a
+/// part of their error. The noise of pixels is that within views ([`noise_within_views`]), or else
+/// the declared one.
 ///
-/// `fit` repeats the fit with another problem. There is nothing to compare without pixels, or if
-/// all intrinsics are free.
+/// `fit` repeats the fit with another problem. Returns `None` without a comparison if no row
+/// measures pixels, or if all intrinsics are free.
 pub(in crate::fit) fn lens_finding(
     problem: &Problem,
     data: &Dataset,
@@ -117,12 +120,13 @@ pub(in crate::fit) fn lens_finding(
     Some(Finding::new(FindingCode::LensContradicted, numbers, text))
 }
 
-/// Returns the variance of pixels within views, relative to the declared one, and its degrees of
-/// freedom; `None` if the views have too few points.
+/// Returns the noise variance of pixels within views, relative to the declared one, and the degrees
+/// of freedom from which it is estimated; `None` if these are too few.
 ///
-/// The arm only moves the camera relative to the marker. In each view, the residuals are therefore
-/// projected onto the complement of the six motions of the camera: what remains is noise, if lens
-/// and marker are right. With the derivatives M of a view, χ² = r·r − (Mᵀr)ᵀ (MᵀM)⁺ Mᵀr.
+/// Errors of the arm only move the camera relative to the marker. In each view, the residuals are
+/// therefore projected onto the complement of the six motions of the camera. What remains is noise
+/// if lens and marker are as modelled. With the derivatives M of the pixels of a view with respect
+/// to these motions, χ² = r·r − (Mᵀr)ᵀ (MᵀM)⁻¹ Mᵀr.
 fn noise_within_views(
     problem: &Problem,
     data: &Dataset,

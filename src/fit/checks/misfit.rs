@@ -1,23 +1,24 @@
-//! Checks of the size of the residual: a very large one means that the data are not of this arm.
+//! Checks of the size of the residual: a very large one indicates data of another arm or wrong
+//! units.
 
 use super::checked_fit::{Check, CheckedFit};
 use super::finding::{Finding, FindingCode};
-use super::row_kind::{RowKind, measured, named, size, spread};
+use super::row_kind::{RowKind, format_error, quantity_noun, spread, suspects};
 
-/// Largest residual of a fit, relative to the spread of the measurements, that is not reported as a
-/// misfit.
+/// Largest rms residual of a fit, relative to the spread of the measurements, that is not reported
+/// as a misfit.
 pub(super) const MAX_MISS: f64 = 0.02;
-/// Largest residual of a fit, as a multiple of σ, that is not reported, however small the spread of
-/// the measurements is.
+/// Largest rms residual of a fit, as a multiple of the declared σ, that is not reported, however
+/// small the spread of the measurements is.
 pub(super) const MAX_UNREPORTED_RESIDUAL: f64 = 100.0;
-/// Smallest ratio of the fitted to the nominal error at which the fit counts as no better than the
-/// nominal arm.
+/// Smallest ratio of the rms error of the fitted arm to that of the registered nominal arm, at
+/// which the fit is no better than the nominal arm.
 const MIN_UNIMPROVED_RATIO: f64 = 0.9;
-/// Smallest error, as a multiple of the declared σ, at which a fit that is no better than the
+/// Smallest rms error, as a multiple of the declared σ, at which a fit that is no better than the
 /// nominal arm is reported.
 const MIN_REPORTED_ERROR: f64 = 1000.0;
-/// Smallest residual of a fit, relative to the spread of the measurements, at which the table may
-/// be that of another arm.
+/// Smallest rms residual of a fit, relative to the spread of the measurements, at which the table
+/// may be that of another arm.
 const MIN_OTHER_ARM_MISS: f64 = 0.5;
 /// Largest ratio between the spreads of measured and predicted points that is not reported.
 const MAX_SIZE_RATIO: f64 = 2.0;
@@ -37,7 +38,8 @@ impl Check for Misfit {
         let of_kind = |kind: RowKind| {
             let error = |x| fit.rms(&kind.rows, &fit.fitting.position_errors(&kind.rows, x));
             let (nominal, fitted) = (error(fit.registered_x), error(&fit.end.x));
-            // A solver that did not converge may have driven away an arm that was near before.
+            // A solver that did not converge may have increased the error, so its misfit is only
+            // reported if the nominal arm has one as well.
             let counts = |_: &Finding| {
                 fit.end.termination.converged() || misfit_finding(&kind, nominal).is_some()
             };
@@ -70,8 +72,8 @@ impl Check for SizeOfArm {
     }
 }
 
-/// Reports a fit whose error `rms` is large relative to both the spread and the σ of rows of a
-/// kind; `None` if it is not.
+/// Returns the finding that the rms error `rms` of an arm is large relative to both the spread and
+/// the declared σ of rows of a kind; `None` if it is not.
 fn misfit_finding(kind: &RowKind, rms: f64) -> Option<Finding> {
     let RowKind { observation, spread, declared_sigma, .. } = *kind;
     let noise = declared_sigma.map_or(0.0, |sigma| MAX_UNREPORTED_RESIDUAL * sigma);
@@ -80,16 +82,17 @@ fn misfit_finding(kind: &RowKind, rms: f64) -> Option<Finding> {
     }
     let kind = observation.kind();
     let (text, remedy) = if rms.is_finite() {
-        let (what, by, part) = (measured(kind), size(kind, rms, 1), 100.0 * rms / spread);
+        let (what, by, part) =
+            (quantity_noun(kind), format_error(kind, rms, 1), 100.0 * rms / spread);
         (
             format!("the fitted arm misses the {what} by {by}, {part:.0} % of their spread"),
             if rms > MIN_OTHER_ARM_MISS * spread {
                 format!(
                     "check units, signs of joints, {}, and whether the table is one of this arm",
-                    named(kind)
+                    suspects(kind)
                 )
             } else {
-                format!("check units, signs of joints, and {}", named(kind))
+                format!("check units, signs of joints, and {}", suspects(kind))
             },
         )
     } else {
@@ -101,9 +104,9 @@ fn misfit_finding(kind: &RowKind, rms: f64) -> Option<Finding> {
 }
 
 /// Returns the finding that a fit predicts rows other than positions no better than the nominal
-/// arm; `before` and `after` are the errors of the nominal and the fitted arm. `None` for
-/// positions, or if the fit improves on the nominal arm or misses by little. The spread of such
-/// rows may carry no information.
+/// arm; `before` and `after` are the rms errors of the nominal and the fitted arm. `None` for
+/// positions, or if the fit is better than the nominal arm or its error is small. Such rows need
+/// this test, because their spread may not show the size of the workspace.
 fn no_better_finding(kind: &RowKind, before: f64, after: f64) -> Option<Finding> {
     let RowKind { observation, declared_sigma, .. } = *kind;
     let is_far = declared_sigma.is_some_and(|sigma| after > MIN_REPORTED_ERROR * sigma);
@@ -113,12 +116,12 @@ fn no_better_finding(kind: &RowKind, before: f64, after: f64) -> Option<Finding>
     let kind = observation.kind();
     let text = format!(
         "the fitted arm misses the {} by {}, the nominal one by {}, both far beyond the declared σ",
-        measured(kind),
-        size(kind, after, 1),
-        size(kind, before, 1)
+        quantity_noun(kind),
+        format_error(kind, after, 1),
+        format_error(kind, before, 1)
     );
     let numbers = [kind.into(), before.into(), after.into()];
-    let remedy = format!("check units, signs of joints, and {}", named(kind));
+    let remedy = format!("check units, signs of joints, and {}", suspects(kind));
     Some(Finding::new(FindingCode::NoBetterThanNominal, numbers, text).with_remedy(remedy))
 }
 

@@ -1,4 +1,4 @@
-//! Check whether table and problem were read as they were meant.
+//! Check whether units, signs, order and conventions of table and problem were declared rightly.
 
 use serde_json::json;
 
@@ -6,20 +6,20 @@ use super::checked_fit::{Check, CheckedFit};
 use super::finding::{Finding, FindingCode};
 use super::nominal_error::is_nominal_far_off;
 use super::parameter_limits::WithinPriors;
-use super::row_kind::size;
+use super::row_kind::format_error;
 
-/// Largest rms residual, as a multiple of the declared σ, for which misreadings of the table are
-/// not searched.
+/// Smallest rms residual of the fit, as a multiple of the declared σ, for which misreadings of
+/// table and problem are searched.
 const MIN_SIGMAS: f64 = 10.0;
-/// Largest rms residual, relative to the spread of the points, for which misreadings are not
-/// searched if no σ is declared.
+/// Smallest rms residual of the fit, relative to the spread of the points, for which misreadings
+/// are searched if no σ is declared.
 const MIN_PART: f64 = 0.01;
 
 /// Largest rms residual of a fit with a misreading undone that counts as noise, as a multiple of
 /// the declared σ. Residuals of real arms reach several σ.
 pub(super) const MAX_NOISE_SIGMAS: f64 = 5.0;
 
-/// Maximum number of explanations that a text names.
+/// Maximum number of misreadings that the text of the finding names.
 const MAX_NAMED: usize = 4;
 
 /// Checks that no misreading of table or problem (unit, sign, order, convention) explains the
@@ -60,8 +60,8 @@ impl Check for ReadAsMeant {
         let text = format!(
             "the measurements {fit_words} if they are read in another way: with {}{more}, the error would be {} instead of {}{rest}",
             words[..words.len().min(MAX_NAMED)].join(", or "),
-            size(name, best.rms, 3),
-            size(name, explanations.as_read, 3)
+            format_error(name, best.rms, 3),
+            format_error(name, explanations.as_read, 3)
         );
         let numbers = [json!(words), explanations.as_read.into(), best.rms.into()];
         vec![Finding::new(FindingCode::Misread, numbers, text)]

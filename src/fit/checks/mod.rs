@@ -34,7 +34,8 @@ mod view_order;
 use checked_fit::{Check, CheckedFit, Convergence, EnoughEquations};
 use finding::Finding;
 
-/// All checks, in the order of the findings. Commands print the first error as the reason.
+/// All checks, in the order in which their findings are listed. If a fit is not trusted, commands
+/// print the first finding that is an error as the reason.
 const CHECKS: &[&dyn Check] = &[
     &EnoughEquations,
     &misread::ReadAsMeant,

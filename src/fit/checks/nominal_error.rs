@@ -1,25 +1,28 @@
-//! Check of the nominal arm: an error as large as the measured workspace indicates a misread input.
+//! Check of the nominal arm: an error comparable to the measured workspace indicates a misread
+//! input.
 
 use serde_json::json;
 
 use super::checked_fit::{Check, CheckedFit};
 use super::finding::{Finding, FindingCode};
 use super::misreading::Misreading;
-use super::row_kind::{RowKind, measured, named, size};
+use super::row_kind::{RowKind, format_error, quantity_noun, suspects};
 use crate::model::parameter::{Parameter, ParameterSite};
 
-/// Largest error of the registered nominal arm, relative to the spread of the measurements, that is
-/// not reported.
+/// Largest rms error of the registered nominal arm, relative to the spread of the measurements,
+/// that is not reported.
 const MAX_NOMINAL_MISS: f64 = 0.1;
-/// Smallest spread of contacts, relative to the arm's reach, that is used as a scale. With a
-/// smaller one, all contacts are at one place, and their predicted spread is only the arm's error.
+/// Smallest spread of the predicted targets of contacts, relative to the arm's reach, with which
+/// the error is compared. If it is smaller, all contacts are at one place, and the spread is only
+/// the arm's error.
 const MIN_RELATIVE_SPREAD: f64 = 0.05;
 
-/// Checks that the registered nominal arm is near the measurements.
+/// Checks that the error of the registered nominal arm is small relative to the spread of the
+/// measurements.
 pub(super) struct NominalIsNear;
 
-/// Returns true if the registered nominal arm misses the leading kind of rows by more than
-/// [`MAX_NOMINAL_MISS`] of their spread.
+/// Returns true if the rms error of the registered nominal arm in rows of the leading kind exceeds
+/// [`MAX_NOMINAL_MISS`] times their spread.
 pub(super) fn is_nominal_far_off(fit: &CheckedFit) -> bool {
     let rms = fit.registered.identification.rms.norm;
     let RowKind { observation, spread, .. } = fit.kind(fit.fitting.measurements.leading());
@@ -57,8 +60,9 @@ impl Check for NominalIsNear {
     }
 }
 
-/// Reports an error `rms` of the nominal arm that is large relative to the `spread` of rows of a
-/// kind \[m\] or \[rad\]. Each of `explanations`, best first, would explain it alone.
+/// Creates the finding that the rms error `rms` of the nominal arm is large relative to the
+/// `spread` of rows of a kind \[m\] or \[rad\]. Each of `explanations`, best first, would explain
+/// the error alone.
 fn far_off_finding(
     kind: &str,
     (rms, spread): (f64, f64),
@@ -72,7 +76,7 @@ fn far_off_finding(
         return Finding::new(FindingCode::NominalFarOff, numbers, text.to_owned())
             .with_remedy("check their units".to_owned());
     }
-    let (what, by, part) = (measured(kind), size(kind, rms, 1), 100.0 * rms / spread);
+    let (what, by, part) = (quantity_noun(kind), format_error(kind, rms, 1), 100.0 * rms / spread);
     let standing = match kind {
         "position" if is_base_free => ", wherever its base stands",
         "position" => " with its base where the problem holds it",
@@ -89,6 +93,8 @@ fn far_off_finding(
                 .to_owned(),
         ),
         true if kind == "position" => finding,
-        true => finding.with_remedy(format!("check units, signs of joints, and {}", named(kind))),
+        true => {
+            finding.with_remedy(format!("check units, signs of joints, and {}", suspects(kind)))
+        }
     }
 }

@@ -1,8 +1,9 @@
-//! Directions of the unknowns that no row determines, in words: the base in the measuring frame,
-//! the scale, the last link against a camera, a focal length against the distance.
+//! Texts about the combinations of unknowns that no row determines, for example the pose of the
+//! base in the measuring frame, the scale, or a focal length and the distance together.
 //!
-//! The unknowns are grouped by what they describe. A direction of the null space that lies in the
-//! unknowns of a few groups says which of them the rows do not tell apart.
+//! The unknowns are grouped by the part that they describe: a joint, base, tool, fixture or lens. A
+//! direction of the null space of the data that lies in the unknowns of few groups shows which
+//! groups the rows do not determine separately.
 
 use nalgebra::{DMatrix, DVector, RowDVector};
 use serde_json::json;
@@ -14,30 +15,38 @@ use crate::least_squares::{UnidentifiableCombination, Weak};
 use crate::model::parameter::Parameter;
 use crate::quantity::Unit;
 
-/// Largest squared part of a unit direction outside a set of unknowns at which it lies in the set.
+/// Largest squared part of a unit direction outside a set of unknowns at which the direction lies
+/// in the set.
 const MAX_SQUARED_OUTSIDE: f64 = 1e-6;
-/// Smallest part of a unit direction outside earlier directions at which it is a further one.
-const MIN_FURTHER: f64 = 0.1;
-/// Smallest weight of an unknown in a unit direction at which it is named.
+/// Smallest part of a unit direction orthogonal to all directions found before, at which it is
+/// another direction.
+const MIN_NEW_PART: f64 = 0.1;
+/// Smallest absolute component of an unknown in a unit direction at which the unknown is named.
 const MIN_NAMED_WEIGHT: f64 = 0.02;
-/// Plausible deviation of a focal length or an image centre \[px\].
+/// Plausible size of the deviation of a focal length or an image centre \[px\].
 const PLAUSIBLE_PIXELS: f64 = 1000.0;
 /// Maximum number of unknowns and groups that a sentence names.
 const MAX_NAMED: usize = 8;
 
-/// Kind of a quantity that the rows leave open.
+/// Kind of a combination of unknowns that the rows do not determine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Open {
+    /// No row depends on the unknown.
     Unseen,
+    /// All fixtures can move together.
     Together,
+    /// The base and fixtures can move together in the measuring frame.
     Place,
+    /// Some parts can move against each other without an effect on any row.
     Apart,
+    /// A focal length and the distance from the camera can change together.
     Focal,
+    /// All lengths can change in proportion.
     Scale,
 }
 
 impl Open {
-    /// Returns the word in `numbers` of the finding.
+    /// Returns the word that identifies the kind in the `numbers` of the finding.
     const fn word(self) -> &'static str {
         match self {
             Self::Unseen => "unseen",
@@ -49,7 +58,7 @@ impl Open {
         }
     }
 
-    /// Returns a statement and a remedy; `names` are the unknowns and groups involved.
+    /// Returns a statement and a remedy; `names` lists the unknowns and groups involved.
     fn words(self, names: &str) -> [String; 2] {
         let texts = match self {
             Self::Unseen => {
@@ -79,7 +88,8 @@ impl Open {
     }
 }
 
-/// Check that names what rows other than positions leave open.
+/// Check that reports the combinations of unknowns which the rows do not determine, if some rows
+/// measure anything but positions.
 pub(super) struct NamedDirections;
 
 impl Check for NamedDirections {
@@ -111,8 +121,8 @@ impl Check for NamedDirections {
     }
 }
 
-/// Returns a sentence for each quantity that unidentifiable `combinations` of the unknowns leave
-/// open, with a remedy.
+/// Returns a sentence with a remedy for each kind of quantity that unidentifiable `combinations` of
+/// the unknowns leave undetermined; none if no fixture is unknown.
 pub(crate) fn open_quantities(
     combinations: &[UnidentifiableCombination],
     unknowns: &[String],
@@ -122,7 +132,8 @@ pub(crate) fn open_quantities(
         combination.weights.iter().for_each(|&(j, weight)| rows[(i, j)] = weight);
     }
     let names: Vec<&str> = unknowns.iter().map(String::as_str).collect();
-    // A tracker sees positions in its own frame: combinations of the arm stand in the list.
+    // Without fixtures, rows measure positions in the frame of the tracker. Combinations of the
+    // arm's parameters are then listed elsewhere.
     if !names.iter().any(|name| is_fixture(name)) {
         return Vec::new();
     }
@@ -130,7 +141,8 @@ pub(crate) fn open_quantities(
     open_directions(&rows, &names).into_iter().map(sentence).collect()
 }
 
-/// Returns what a parameter describes: the part of its name before the last point.
+/// Returns the name of the group of a parameter: the part of its name before the last point, such
+/// as `joint2` or `camera[left]`.
 fn group(name: &str) -> &str {
     name.rsplit_once('.').map_or(name, |(group, _)| group)
 }
@@ -151,7 +163,8 @@ fn is_tool(name: &str) -> bool {
     group(name) == "tool" || name.starts_with("tool[")
 }
 
-/// Returns true for the place of a point, anchor, surface, camera or marker.
+/// Returns true for a parameter of the position or pose of a point, anchor, surface, camera or
+/// marker.
 fn is_fixture(name: &str) -> bool {
     let words = ["point[", "anchor[", "surface[", "camera[", "marker["];
     words.iter().any(|word| name.starts_with(word)) && !is_lens(name) && field(name) != "radius"
@@ -171,8 +184,8 @@ fn is_length(name: &str) -> bool {
     fields.contains(&field(name)) || field(name) == "radius"
 }
 
-/// Returns what the null space `rows`, shape = (combinations, unknowns), leaves open, with the
-/// names of the unknowns or groups involved.
+/// Returns the kinds of combinations in the null space that `rows` span, shape = (combinations,
+/// unknowns), each with the names of the unknowns or groups involved.
 fn open_directions(rows: &DMatrix<f64>, names: &[&str]) -> Vec<(Open, Vec<String>)> {
     let Some(null) = orthonormal(rows) else { return Vec::new() };
     let mut found = Found { null, names, accounted: Vec::new() };
@@ -184,7 +197,7 @@ fn open_directions(rows: &DMatrix<f64>, names: &[&str]) -> Vec<(Open, Vec<String
         open.push((Open::Unseen, unseen));
     }
     let named = |k: usize, is: &dyn Fn(&str) -> bool| is(names[k]);
-    // The list of combinations names those of the arm alone.
+    // Combinations of joint parameters alone are listed elsewhere.
     found.within(|k| named(k, &is_joint));
     let mut add = |kind, directions: Vec<RowDVector<f64>>| {
         if !directions.is_empty() {
@@ -222,18 +235,18 @@ fn open_directions(rows: &DMatrix<f64>, names: &[&str]) -> Vec<(Open, Vec<String
     open
 }
 
-/// Null space with the directions that have been found in it.
+/// Null space with the directions that have already been found in it.
 struct Found<'a> {
     /// Orthonormal rows that span the null space.
     null: DMatrix<f64>,
     names: &'a [&'a str],
-    /// Orthonormal directions, in the space of the unknowns, that earlier calls have accounted for.
+    /// Orthonormal directions, in the space of the unknowns, that earlier calls of `within` found.
     accounted: Vec<RowDVector<f64>>,
 }
 
 impl Found<'_> {
-    /// Returns the directions of the null space that lie in the unknowns for which `is_in_set`
-    /// holds and that are not accounted for, and accounts for them.
+    /// Returns the directions of the null space that lie in the unknowns for whose index
+    /// `is_in_set` returns true, without those that earlier calls found. Adds them to `accounted`.
     fn within(&mut self, is_in_set: impl Fn(usize) -> bool) -> Vec<RowDVector<f64>> {
         let outside: Vec<usize> = (0..self.names.len()).filter(|&k| !is_in_set(k)).collect();
         if outside.len() == self.names.len() {
@@ -241,29 +254,30 @@ impl Found<'_> {
         }
         let outside = self.null.select_columns(&outside);
         let eigen = (&outside * outside.transpose()).symmetric_eigen();
-        let mut further = Vec::new();
+        let mut found = Vec::new();
         for (value, vector) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
             if *value > MAX_SQUARED_OUTSIDE {
                 continue;
             }
             let mut direction: RowDVector<f64> = vector.transpose() * &self.null;
             for _ in 0..2 {
-                for known in &self.accounted {
-                    direction -= known * direction.dot(known);
+                for earlier in &self.accounted {
+                    direction -= earlier * direction.dot(earlier);
                 }
             }
-            if direction.norm() > MIN_FURTHER {
+            if direction.norm() > MIN_NEW_PART {
                 direction.normalize_mut();
                 self.accounted.push(direction.clone());
                 (0..direction.len()).filter(|&k| !is_in_set(k)).for_each(|k| direction[k] = 0.0);
-                further.push(direction);
+                found.push(direction);
             }
         }
-        further
+        found
     }
 }
 
-/// Returns orthonormal rows that span the rows of a matrix; `None` if it has none.
+/// Returns orthonormal rows that span the rows of a matrix; `None` if it has no rows, or a row that
+/// is zero or not finite.
 fn orthonormal(rows: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let norms: Vec<f64> = rows.row_iter().map(|row| row.norm()).collect();
     if norms.is_empty() || norms.iter().any(|norm| !(*norm > 0.0 && norm.is_finite())) {
@@ -274,8 +288,8 @@ fn orthonormal(rows: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     Some(unit.transpose().qr().q().transpose())
 }
 
-/// Returns the unknowns with a weight in some of the `directions`; those of bases, tools and
-/// fixtures by their group.
+/// Returns the names of the unknowns with a notable component in some of the `directions`. For
+/// unknowns of bases, tools and fixtures it is the name of their group.
 fn involved(directions: &[RowDVector<f64>], names: &[&str]) -> Vec<String> {
     let mut involved: Vec<String> = Vec::new();
     for (k, name) in names.iter().enumerate() {
@@ -289,7 +303,7 @@ fn involved(directions: &[RowDVector<f64>], names: &[&str]) -> Vec<String> {
     involved
 }
 
-/// Returns names in a sentence, and the number of those left out.
+/// Joins names for a sentence; if there are many, the last ones are replaced by their number.
 fn listed(names: &[String]) -> String {
     let more = names.len().saturating_sub(MAX_NAMED);
     let shown = names[..names.len() - more].join(", ");

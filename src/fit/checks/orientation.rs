@@ -1,4 +1,4 @@
-//! Check of the orientations: a large error means that the declared convention is wrong.
+//! Check of the orientations: a large error indicates that the declared convention is wrong.
 
 use serde_json::json;
 
@@ -8,12 +8,12 @@ use super::finding::{Finding, FindingCode};
 
 /// Smallest root mean squared error of orientation at which another convention or frame is
 /// suspected \[rad\]: 2°.
-const MAX_TURN: f64 = 0.035;
+const MIN_SUSPECT_ANGLE: f64 = 0.035;
 /// Smallest root mean squared error of orientation, as a multiple of the declared σ of orientation,
 /// at which another convention or frame is suspected.
 const MIN_SIGMAS: f64 = 20.0;
 
-/// Checks that the fitted orientations are near the measured ones.
+/// Checks that the predicted orientations of the fitted arm are near the measured ones.
 pub(super) struct OrientationsFit;
 
 impl Check for OrientationsFit {
@@ -28,7 +28,7 @@ impl Check for OrientationsFit {
             .filter(|square| square.is_finite())
             .collect();
         let rms = (lengths.iter().sum::<f64>() / lengths.len().max(1) as f64).sqrt();
-        if !(rms > MAX_TURN && rms > MIN_SIGMAS * sigma) {
+        if !(rms > MIN_SUSPECT_ANGLE && rms > MIN_SIGMAS * sigma) {
             return Vec::new();
         }
         let conventions = fitting_conventions(fit, rms);

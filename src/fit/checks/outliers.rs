@@ -1,4 +1,4 @@
-//! Rows whose residual is too large to be noise.
+//! Outliers: rows whose residual is too large to be noise.
 
 use nalgebra::Vector3;
 use serde_json::{Value, json};
@@ -16,11 +16,10 @@ pub struct Outlier {
     pub location: Location,
     /// Kind of the row ([`Observation::kind`](crate::problem::Observation::kind)).
     pub kind: &'static str,
-    /// Length of the whitened residual, as a multiple of the typical scatter (1 σ) of all rows; for
-    /// a held-out row, of the σ of its prediction.
+    /// Length of the residual vector as a multiple of its scale, 1 σ of a coordinate: `scatter`, or
+    /// for a held-out row the uncertainty of its prediction.
     pub distance: f64,
-    /// Typical scatter that `distance` refers to; `None` for held-out rows, whose distance refers
-    /// to the uncertainty of their prediction.
+    /// Typical scatter (1 σ) of a coordinate to which `distance` refers; `None` for held-out rows.
     pub(crate) scatter: Option<TypicalScatter>,
     /// Residual measured − predicted, measuring frame \[m\], for tilts \[rad\]; a single number is
     /// along x.
@@ -28,6 +27,7 @@ pub struct Outlier {
 }
 
 impl Outlier {
+    /// Creates the outlier of a row with its `distance` and `error`, without a scatter.
     pub(in crate::fit) fn new(
         measurements: &Measurements,
         row: usize,
@@ -40,8 +40,7 @@ impl Outlier {
     }
 }
 
-/// Few rows that cause most of the misfit: without them, the fit explains the other rows much
-/// better.
+/// Few rows that cause most of the misfit: a fit without them explains the other rows much better.
 #[doc(hidden)]
 #[derive(Debug, Clone, PartialEq)]
 pub struct InfluentialRows {
@@ -55,8 +54,8 @@ pub struct InfluentialRows {
     pub sigma_taken: f64,
 }
 
-/// Returns the outliers among `rows`, in the order of the rows. `lengths` are their whitened
-/// residual lengths, `errors` their residuals \[m\].
+/// Returns the outliers among `rows`, in the order of the rows. `lengths` and `errors` hold the
+/// lengths of the whitened residuals and the residuals measured − predicted of all `rows`.
 pub(in crate::fit) fn outliers(
     lengths: &Lengths,
     rows: &[usize],
@@ -71,8 +70,8 @@ pub(in crate::fit) fn outliers(
     rows.iter().enumerate().zip(errors).filter_map(outlier).collect()
 }
 
-/// Returns rows as a JSON value of a finding: file, line and distance \[σ\] of each.
-pub(super) fn places(rows: &[Outlier]) -> Value {
+/// Returns outliers as the JSON list of a finding: file, line and distance \[σ\] of each row.
+pub(super) fn outliers_as_json(rows: &[Outlier]) -> Value {
     let place = |row: &Outlier| {
         let Location { file, line, .. } = &row.location;
         json!({ "file": file.display().to_string(), "line": line, "sigmas": row.distance })

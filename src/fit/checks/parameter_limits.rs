@@ -1,4 +1,5 @@
-//! Checks of the size of the fitted deviations.
+//! Checks of the fitted deviations from nominal against priors, the size of an arm, and the sign of
+//! compliances.
 
 use super::checked_fit::{Check, CheckedFit};
 use super::contradicted_entry::contradicted_entry;
@@ -7,12 +8,12 @@ use crate::fit::stages::parameter_size::largest_deviation;
 use crate::model::parameter::{JointField, Parameter, ParameterSite};
 use crate::quantity::Unit;
 
-/// Largest deviation of an arm parameter, in σ of its prior, that is not reported. Chance exceeds 5
-/// σ once in two million.
+/// Largest deviation of an arm parameter from nominal, in σ of its prior, that is not reported. A
+/// normal deviation exceeds 5 σ once in two million.
 pub(super) const MAX_PRIOR_SIGMAS: f64 = 5.0;
 
-/// Returns true if the parameter is a declared quantity of the arm, a base or a target, not of an
-/// effect.
+/// Returns true if the parameter is a declared quantity of the arm, of a base or of a target; false
+/// if it belongs to an effect or a fixture.
 pub(super) fn is_of_arm(parameter: &Parameter) -> bool {
     let is_declared = match parameter.site {
         ParameterSite::Joint { field, .. } => field.is_geometry() || field == JointField::Stiffness,
@@ -23,8 +24,8 @@ pub(super) fn is_of_arm(parameter: &Parameter) -> bool {
     is_declared && parameter.regressor.is_constant()
 }
 
-/// Returns the size of a deviation `x` in σ of the parameter's prior; `None` without a prior, or if
-/// the parameter is not one of the arm.
+/// Returns the absolute deviation `x` of a parameter in σ of its prior; `None` if it has no prior
+/// or is no quantity of the arm, of a base or of a target ([`is_of_arm`]).
 pub(super) fn prior_sigmas(parameter: &Parameter, x: f64) -> Option<f64> {
     Some(x.abs() / parameter.sigma.filter(|_| is_of_arm(parameter))?)
 }
@@ -60,8 +61,8 @@ impl Check for WithinPriors {
     }
 }
 
-/// Checks that no parameter deviates by more than is possible on an arm of this size (its reach,
-/// half a turn).
+/// Checks that no parameter deviates from nominal by more than is possible on this arm: its reach
+/// for a length, half a turn for an angle, a factor of 100 for a stiffness.
 pub(super) struct WithinArmSize;
 
 impl Check for WithinArmSize {
@@ -87,11 +88,11 @@ impl Check for WithinArmSize {
     }
 }
 
-/// Checks that joints give way along their loads: no compliance as a whole is negative by more than
-/// [`MAX_NEGATIVE_SIGMAS`] standard errors.
+/// Checks that no joint gives way against its load: no compliance, declared part included, is
+/// negative by more than [`MAX_NEGATIVE_SIGMAS`] standard errors.
 pub(super) struct GivesWayToLoads;
 
-/// Largest number of standard errors by which a compliance may be negative.
+/// Largest number of standard errors by which a compliance may be below 0 without a report.
 const MAX_NEGATIVE_SIGMAS: f64 = 5.0;
 
 impl Check for GivesWayToLoads {
@@ -128,7 +129,8 @@ impl Check for GivesWayToLoads {
     }
 }
 
-/// Returns the parameter of the fit for which `ratio`, its deviation x over a limit, is largest.
+/// Returns the parameter for which `ratio` is largest, with that ratio. `ratio` returns the
+/// absolute deviation of a parameter over its limit, or `None` if it has no limit.
 fn largest_ratio<'a>(
     fit: &CheckedFit<'a>,
     ratio: impl Fn(&Parameter, f64) -> Option<f64>,

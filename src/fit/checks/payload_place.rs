@@ -1,4 +1,4 @@
-//! Check of the place of a payload that the problem does not declare.
+//! Check of the position at which a payload acts if the problem does not declare it.
 
 use crate::fit::stages::placement::Placement;
 use crate::fit::{FindingCode, Identification, IdentifyError};
@@ -9,14 +9,16 @@ use crate::problem::Problem;
 use super::finding::Finding;
 
 /// Smallest decrease of the deviance (−2 ln of the posterior density) at which the measurements
-/// favour another place of the payload. It is a likelihood ratio of 90, or three standard errors.
+/// favour the other position of the payload. It corresponds to a likelihood ratio of 90, or three
+/// standard errors.
 const MIN_FALL_OF_DEVIANCE: f64 = 9.0;
 
 /// Compares the fit with one whose payload hangs at the identified target instead of the nominal
 /// one. Returns a finding if the measurements favour the identified target.
 ///
-/// `fit` repeats the fit with another problem. There is nothing to compare if the problem declares
-/// the place, no payload is carried, the arm is rigid, or the target is not identified.
+/// `fit` repeats the fit with another problem. Returns `None` without a comparison if the problem
+/// declares the position of the payload, there is no payload, the arm is rigid, or the target is
+/// not identified. The same holds with a robust loss, several targets, or fitted orientations.
 pub(in crate::fit) fn payload_finding(
     problem: &Problem,
     data: &Dataset,
@@ -52,9 +54,9 @@ pub(in crate::fit) fn payload_finding(
     })
 }
 
-/// Returns χ² of the residuals for the declared variance times this noise factor, plus the squared
-/// deviations from the priors in units of the prior σ. Returns `None` unless every identification
-/// row measures a position.
+/// Returns χ² of the residuals for the declared variance times `noise_factor`, plus the squared
+/// deviations from nominal in units of the prior σ. Returns `None` unless every identification row
+/// measures a position.
 fn deviance(
     problem: &Problem,
     data: &Dataset,

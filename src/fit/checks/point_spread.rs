@@ -8,8 +8,8 @@ use crate::model::{Model, Pose};
 use crate::numeric::median;
 use crate::problem::{Fixture, Observation};
 
-/// Smallest ratio of the scatter at a point to the median of all points at which the point counts
-/// as unsteady. Points that were not fitted may scatter 1.5 times as much as others.
+/// Smallest ratio of the scatter at a point to the median scatter of all points, at which the point
+/// counts as unsteady. Points that were not fitted may scatter 1.5 times as much as others.
 const MIN_UNSTEADY_RATIO: f64 = 2.5;
 /// Smallest share of the squared scatter along one direction at which a point counts as unsteady.
 /// Isotropic scatter has a third along each direction.
@@ -28,18 +28,18 @@ pub struct PointSpread {
     pub point: String,
     /// Number of rows at the point.
     pub n: usize,
-    /// Mean distance of the predicted target from its mean \[m\].
+    /// Mean distance of the predicted targets from their mean position \[m\].
     pub mean: f64,
-    /// Direction in which the scatter is largest, measuring frame.
+    /// Unit vector along which the scatter is largest, measuring frame.
     pub along: Vector3<f64>,
-    /// Share of the squared scatter along this direction, 0…1.
+    /// Share of the squared scatter that lies along `along`, 0…1.
     pub share: f64,
 }
 
 impl PointSpread {
-    /// Returns the points that scatter far more than the others and along one direction, each with
-    /// the ratio of its scatter to the median. They may have moved or yielded, which no arm
-    /// explains.
+    /// Returns the points at which the prediction scatters far more than at the others, and mainly
+    /// along one direction, each with the ratio of its scatter to the median. Such points may have
+    /// moved or yielded, which no model of the arm explains.
     #[doc(hidden)]
     pub fn unsteady<'a>(spreads: impl IntoIterator<Item = &'a Self>) -> Vec<(&'a Self, f64)> {
         let compared: Vec<&Self> = spreads
@@ -95,8 +95,9 @@ pub(in crate::fit) fn spreads(
 }
 
 impl Fitting<'_> {
-    /// Returns the scatter of the predicted target at each touched point, with the registered
-    /// nominal and with the fitted arm. The flag is true if all rows of the point are held out.
+    /// Returns the scatter of the predicted target at each touched point: that of the registered
+    /// nominal arm, that of the fitted arm, and true if all rows of the point are held out. Both
+    /// arms are given by their full parameter vectors.
     pub fn spreads(
         &self,
         fixtures: &[Fixture],
@@ -122,8 +123,9 @@ impl Fitting<'_> {
     }
 }
 
-/// Returns the direction in which the sum of squares is largest, with its largest component
-/// positive, and the share along it; NaN if `squares` is zero or not finite.
+/// Returns the unit vector along which the sum of squares is largest, with its largest component
+/// positive, and the share of the squares along it. `squares` is Σ d dᵀ of the deviations d. NaN if
+/// it is zero or not finite.
 fn main_direction(squares: Matrix3<f64>) -> (Vector3<f64>, f64) {
     let trace = squares.trace();
     if !(trace.is_finite() && trace > 0.0) {

@@ -1,4 +1,4 @@
-//! Sufficiency of the poses: do they measure enough coordinates for the fitted parameters?
+//! Sufficiency of the poses: do their measured coordinates suffice for the fitted parameters?
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -12,16 +12,18 @@ use crate::model::Model;
 use crate::model::parameter::{Parameter, ParameterSite};
 use crate::problem::{Observation, Problem};
 
-/// Number of coordinates of a rigid body: the most that targets on one body determine in one pose.
+/// Number of coordinates of a rigid body: the largest number of independent coordinates that
+/// targets on one body have in one pose.
 const BODY_COORDINATES: usize = 6;
 
-/// Number of independent coordinates of the identification poses, with a finding if they are too
-/// few.
+/// Numbers of different poses and independent coordinates of the identification rows, with findings
+/// if they are too few.
 pub(in crate::fit) struct PoseSufficiency {
-    /// Finding that the poses are too few for some unknowns, regardless of priors; `None` if they
-    /// suffice.
+    /// Finding that the identification poses are too few for the unknowns without a prior; `None`
+    /// if they suffice.
     pub finding: Option<Finding>,
-    /// Finding about a base or tool that only held-out rows use.
+    /// Finding that the held-out poses are too few for a base or tool that only they use; `None` if
+    /// they suffice.
     pub held_out: Option<Finding>,
     /// Number of measured coordinates that are independent of each other.
     pub coordinates: usize,
@@ -33,7 +35,7 @@ pub(in crate::fit) struct PoseSufficiency {
 }
 
 impl PoseSufficiency {
-    /// Examines the poses of a fit of `unknowns` that starts at the full parameter vector `at`.
+    /// Examines the poses of a fit of `unknowns`, linearised at the full parameter vector `at`.
     pub fn new(
         fitting: &Fitting,
         problem: &Problem,
@@ -84,16 +86,16 @@ impl PoseSufficiency {
         Self { finding, held_out, coordinates, poses, several_targets }
     }
 
-    /// Returns true if the independent coordinates exceed the number of `parameters` enough to
-    /// judge the declared σ.
+    /// Returns true if the residuals can contradict the declared σ: there are at least as many
+    /// independent coordinates as `parameters`, and enough for those without a prior.
     pub fn judges_noise(&self, parameters: usize) -> bool {
         let is_short = |finding: &Finding| finding.code == FindingCode::TooFewEquations;
         self.coordinates >= parameters && !self.finding.as_ref().is_some_and(is_short)
     }
 }
 
-/// Returns the finding about a base or tool that only held-out rows use, made from one about
-/// identification rows. `rows` are such held-out rows, `numbers` the pose numbers of all rows.
+/// Converts the `finding` that poses are too few into the one about a base or tool that only
+/// held-out rows use. `rows` are these held-out rows, `numbers` the pose numbers of all rows.
 fn held_out_finding(
     finding: &Finding,
     placement: &Placement,
@@ -111,8 +113,8 @@ fn held_out_finding(
     Finding::new(FindingCode::HeldOutBaseNotDetermined, numbers, text)
 }
 
-/// Reports that the fit, a base or a tool (`of`) has fewer measured coordinates than parameters
-/// without a prior.
+/// Creates the finding that the whole fit, a base or a tool (`of`) has fewer measured coordinates
+/// than parameters without a prior.
 fn too_few_finding(of: String, coordinates: usize, parameters: usize) -> Finding {
     let text = format!(
         "{of}: {coordinates} measured coordinates for {parameters} parameters without a prior (a pose measured again adds none)"
@@ -123,9 +125,13 @@ fn too_few_finding(of: String, coordinates: usize, parameters: usize) -> Finding
 
 /// Returns the number of independent measured coordinates of `rows`.
 ///
-/// Different points count, but at most six coordinates for each pose of the frame that carries the
-/// targets. Contacts and distances are added. The coordinates beyond six of a frame's targets are
-/// added once, because they determine the targets' relative positions.
+/// In each pose of a frame that carries targets, the coordinates of its targets are counted, but at
+/// most six. If targets on a frame have more than six coordinates, the excess is counted once for
+/// the frame, because it determines the relative positions of the targets. Contacts and distances
+/// in different poses are added.
+///
+/// `numbers` and `of_arm` hold the pose number of each row of the table, with and without regard to
+/// the target. `of_row` holds the number of coordinates of each row.
 fn coordinates(
     fitting: &Fitting,
     (numbers, of_arm): (&[usize], &[usize]),
@@ -165,8 +171,9 @@ fn label(what: &str, word: &str) -> String {
     if word.is_empty() { what.to_owned() } else { format!("{what}[{word}]") }
 }
 
-/// Reports the first base whose pose the points of `rows` do not determine; `None` if there is
-/// none. Only its parameters without a prior for which `varied` is true count.
+/// Returns the finding about the first base whose pose the measured positions of `rows` do not
+/// determine; `None` if there is none. Only parameters of bases are considered that have no prior
+/// and for whose index `varied` returns true.
 fn undetermined_base_finding(
     fitting: &Fitting,
     numbers: &[usize],
@@ -202,11 +209,14 @@ fn undetermined_base_finding(
     Some(Finding::new(FindingCode::BaseNotDetermined, [of.into(), poses.into()], text))
 }
 
-/// Reports a base or a target that has fewer coordinates in different poses of `rows` than `varied`
-/// parameters without a prior. Targets that only one base uses count with that base.
+/// Returns the finding about the first base or target that has fewer coordinates in different poses
+/// of `rows` than parameters without a prior; `None` if there is none. Only parameters are counted
+/// for whose index `varied` returns true. Targets that only one base uses are counted with that
+/// base.
 ///
-/// `numbers` are the pose numbers of all rows, `of_row` their numbers of coordinates. If `judged`,
-/// one more coordinate is required, so that errors of the rows can be judged.
+/// `numbers` are the pose numbers of all rows, `of_row` their numbers of coordinates. If `judged`
+/// is true, one more coordinate is required, so that the errors of the rows are not zero by the
+/// fit.
 fn too_few_poses_finding(
     (model, placement): (&Model, &Placement),
     (numbers, of_row): (&[usize], &[usize]),

@@ -1,4 +1,5 @@
-//! Checks of the fit against held-out rows, which are not fitted but may contradict the prediction.
+//! Checks of the prediction for held-out rows: are its errors as large as its uncertainty, and no
+//! larger than those of the nominal arm?
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -6,26 +7,27 @@ use statrs::distribution::{ChiSquared, ContinuousCDF as _, FisherSnedecor};
 
 use super::checked_fit::{Check, CheckedFit};
 use super::finding::{Finding, FindingCode};
-use super::row_kind::{rows as noun, size};
+use super::row_kind::{format_error, row_noun};
 use crate::fit::stages::fitting::Fitting;
 use crate::fit::uncertainty::noise::Noise;
 use crate::least_squares::{Block, CHUNK_ITEMS, LeastSquares as _};
 
-/// Largest probability of held-out residuals at which they contradict the prediction.
+/// p-value of the held-out residuals below which they contradict the prediction.
 const MAX_CHANCE_PROBABILITY: f64 = 1e-3;
-/// Maximum number of held-out rows that are tested together, to limit time.
+/// Maximum number of held-out rows that are tested together, which limits the computing time.
 const MAX_TESTED_ROWS: usize = 2048;
-/// Smallest ratio of a mean difference of held-out errors to its standard error at which it is
-/// significant.
+/// Smallest ratio of the mean increase of squared held-out errors to its standard error at which
+/// the increase is significant.
 const MIN_DIFFERENCE: f64 = 2.0;
-/// Minimum number of held-out rows from which a mean difference is judged.
+/// Minimum number of held-out rows from which the mean increase of squared errors is judged.
 const MIN_ROWS: usize = 6;
 
 /// Checks that the held-out residuals are as large as the fit predicts.
 ///
-/// r ∼ N(0, Σ + J C Jᵀ) with the Σ that the fit assumed and the covariance C of its unknowns:
-/// χ² = rᵀ(Σ + J C Jᵀ)⁻¹ r, over its number of coordinates, follows F where Σ is estimated. Rows
-/// that are reported as outliers are left out.
+/// The residuals are r ∼ N(0, Σ + J C Jᵀ) with the noise covariance Σ that the fit assumed and the
+/// covariance C of its unknowns. χ² = rᵀ(Σ + J C Jᵀ)⁻¹ r has a χ² distribution; divided by the
+/// number of coordinates, it has an F distribution if Σ is estimated. Rows that are reported as
+/// outliers are left out.
 pub(super) struct PredictionHolds;
 
 impl Check for PredictionHolds {
@@ -60,9 +62,10 @@ impl Check for PredictionHolds {
     }
 }
 
-/// Returns the probability that a valid prediction exceeds `chi2`, and the χ² that it exceeds with
-/// probability [`MAX_CHANCE_PROBABILITY`]. `noise_dof` are the degrees of freedom from which the
-/// noise was estimated; `None` if it is declared.
+/// Returns the probability that χ² of residuals as large as predicted exceeds `chi2`, and the χ²
+/// that they exceed with probability [`MAX_CHANCE_PROBABILITY`]. `noise_dof` is the number of
+/// degrees of freedom from which the noise was estimated, `None` if the noise is declared. Returns
+/// `None` if `chi2` is not finite or there are no degrees of freedom.
 fn upper_tail(chi2: f64, coordinates: usize, noise_dof: Option<f64>) -> Option<(f64, f64)> {
     let k = coordinates as f64;
     if !chi2.is_finite() || coordinates == 0 {
@@ -80,11 +83,11 @@ fn upper_tail(chi2: f64, coordinates: usize, noise_dof: Option<f64>) -> Option<(
     }
 }
 
-/// Returns χ² = rᵀ(I + J C Jᵀ)⁻¹ r of the positions of `rows`, whitened by the σ that the fit
-/// assumed, and its number of coordinates.
+/// Returns χ² = rᵀ(I + J C Jᵀ)⁻¹ r of the measured numbers of `rows` other than orientations,
+/// whitened by the σ that the fit assumed, and the number of these numbers. `None` without rows.
 ///
-/// With N = JᵀJ and v = Jᵀr it is r·r − vᵀ C (I + N C)⁻¹ v, by the Woodbury identity, with the
-/// unknowns in units of their standard errors.
+/// With N = JᵀJ and v = Jᵀr, χ² = r·r − vᵀ C (I + N C)⁻¹ v by the Woodbury identity. Unknowns are
+/// in units of their standard errors.
 fn predictive_chi2(
     fitting: &Fitting,
     rows: &[usize],
@@ -124,7 +127,8 @@ fn predictive_chi2(
     Some((products[(n, n)] - explained, coordinates))
 }
 
-/// Checks that the fitted arm predicts held-out rows no worse than the registered nominal arm.
+/// Checks that the squared held-out errors of the fitted arm are not significantly larger, in the
+/// mean, than those of the registered nominal arm.
 pub(super) struct NotWorseThanNominal;
 
 impl Check for NotWorseThanNominal {
@@ -152,9 +156,9 @@ impl Check for NotWorseThanNominal {
         let (before, after) = (fit.registered.held_out.rms.norm, fit.fitted.held_out.rms.norm);
         let text = format!(
             "the fit made the error of held-out {} worse ({} rms with the nominal arm, {} fitted), beyond chance",
-            noun(kind),
-            size(kind, before, 3),
-            size(kind, after, 3)
+            row_noun(kind),
+            format_error(kind, before, 3),
+            format_error(kind, after, 3)
         );
         let numbers = [kind.into(), before.into(), after.into()];
         vec![Finding::new(FindingCode::HeldOutNotBetter, numbers, text)]

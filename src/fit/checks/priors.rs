@@ -1,10 +1,10 @@
-//! Checks of the declared σ of priors and measurements against the data.
+//! Checks of the declared σ, those of priors and those of measurements, against the data.
 
 use serde_json::json;
 
 use super::checked_fit::{Check, CheckedFit};
 use super::finding::{Finding, FindingCode};
-use super::row_kind::size;
+use super::row_kind::format_error;
 use crate::fit::uncertainty::noise::Noise;
 use crate::fit::uncertainty::refuted_priors::RefutedPrior;
 
@@ -29,8 +29,8 @@ impl Check for DataDecide {
     }
 }
 
-/// Checks that no common prior width (σ of `[parameters]`) is contradicted by the fitted
-/// deviations.
+/// Checks that the fitted deviations contradict no prior width, the σ that `[parameters]` declares
+/// for a kind of geometric parameter of all joints.
 pub(super) struct PriorWidths;
 
 impl Check for PriorWidths {
@@ -49,7 +49,7 @@ impl Check for PriorWidths {
     }
 }
 
-/// Checks that no rule of `[parameters]` has a σ that the data refute.
+/// Checks that the data refute the prior σ of no rule of `[parameters]`.
 pub(super) struct PriorsHold;
 
 impl Check for PriorsHold {
@@ -68,15 +68,17 @@ impl Check for PriorsHold {
     }
 }
 
-/// Largest ratio of the noise variance to the declared one at which they count as equal.
+/// Largest ratio of the noise variance that the fit assumed to the declared one, at which they are
+/// equal but for rounding.
 const MAX_EQUAL_NOISE_FACTOR: f64 = 1.0 + 1e-9;
-/// Largest ratio of the noise variance to the declared one that counts as noise. Above it, σ would
-/// be 30 times too small.
+/// Largest ratio of the noise variance that the fit assumed to the declared one, at which the fit
+/// is still trusted. Above it, the declared σ would be more than 30 times too small.
 const MAX_NOISE_FACTOR: f64 = 1000.0;
-/// Ratios of estimated to declared σ that suggest a σ in metres declared as millimetres.
+/// Ratios of the σ that the fit assumed to the declared one which suggest a unit wrong by a factor
+/// of 1000, for example metres entered under a key in millimetres.
 const UNIT_RATIOS: std::ops::Range<f64> = 600.0..1600.0;
 
-/// Checks that the σ that the fit assumed is not far above the declared one.
+/// Checks that the noise σ that the fit assumed is not above the declared one.
 pub(super) struct NoiseIsDeclared;
 
 impl Check for NoiseIsDeclared {
@@ -102,19 +104,22 @@ impl Check for NoiseIsDeclared {
     }
 }
 
-/// Largest ratio of the declared σ to what the fit leaves. In the other direction, the variance of
-/// [`MAX_NOISE_FACTOR`] allows a ratio of √1000 ≈ 32.
+/// Largest ratio of the declared σ to the rms residual of a coordinate that is not reported. In the
+/// other direction, [`MAX_NOISE_FACTOR`] allows a ratio of √1000 ≈ 32.
 const MAX_OVERSTATED_RATIO: f64 = 30.0;
-/// Smallest such ratio at which the positions are not measured: micrometres taken for metres, the
-/// largest exchange of units of σ, give 1e6.
+/// Smallest ratio of the declared σ to the rms residual of a coordinate at which the positions were
+/// not measured but computed. Micrometres taken for metres, the largest mistake of the unit of σ,
+/// only give 1e6.
 const MIN_COMPUTED_RATIO: f64 = 1e7;
-/// Residual below which the data are exact to the rounding of doubles \[m\] or \[rad\]: a simulation
-/// without noise, of which σ says nothing.
+/// Rms residual of a coordinate below which the data are exact to the rounding of doubles \[m\] or
+/// \[rad\]: a simulation without noise, for which the declared σ is not checked.
 const MIN_MEASURED_RMS: f64 = 1e-12;
-/// Smallest ratio of measured numbers to fitted parameters at which the residual shows the noise.
+/// Smallest ratio of the number of measured numbers to that of fitted parameters at which the
+/// residual shows the noise.
 const MIN_NUMBERS_PER_PARAMETER: usize = 2;
 
-/// Checks that the declared σ is not far above what the fit leaves.
+/// Checks that the declared σ of the leading kind of rows is not far above the rms residual of the
+/// fit.
 pub(super) struct SigmaIsNotOverstated;
 
 impl Check for SigmaIsNotOverstated {
@@ -140,9 +145,9 @@ impl Check for SigmaIsNotOverstated {
         };
         let text = format!(
             "the declared σ of {} ({place}) is {:.0} times the {} that the fit leaves",
-            size(name, sigma, 4),
+            format_error(name, sigma, 4),
             sigma / rms,
-            size(name, rms, 4)
+            format_error(name, rms, 4)
         );
         let finding = Finding::new(FindingCode::SigmaOverstated, [sigma.into(), rms.into()], text);
         vec![if sigma > MIN_COMPUTED_RATIO * rms {

@@ -6,22 +6,24 @@ use crate::fit::stages::placement::Placement;
 use crate::observation::{Observation, kind_named};
 use crate::quantity::Unit;
 
-/// Identification rows that measure the same kind of quantity; lengths are in m, angles of tilts in
-/// rad.
+/// Identification rows that measure the same kind of quantity, such as positions or tilts. Lengths
+/// are in m, angles of tilts in rad, images in px.
 pub(in crate::fit) struct RowKind {
     pub observation: Observation,
     pub rows: Vec<usize>,
-    /// Root mean squared distance of the measured positions or tilts from their centre. For other
-    /// kinds it is that of the target's positions as the nominal arm predicts them.
+    /// Root mean squared distance of the measured positions or tilts from their mean. For other
+    /// kinds of rows it is that of the target positions which the registered nominal arm predicts
+    /// \[m\].
     pub spread: f64,
-    /// Declared standard deviation (1 σ) of a coordinate; `None` if there is none.
+    /// Declared standard deviation (1 σ) of a coordinate, rms over the rows; `None` if none is
+    /// declared.
     pub declared_sigma: Option<f64>,
-    /// 1 σ of a coordinate that the fit assumed.
+    /// 1 σ of a coordinate that the fit assumed, rms over the rows.
     pub taken_sigma: f64,
 }
 
-/// Returns the root mean squared distance \[m\] of the points of `rows` from the centre of those
-/// with the same base.
+/// Returns the root mean squared distance \[m\] of the points of `rows` from the mean of the points
+/// with the same base. `point` returns the point of the row with a given index in `rows`.
 pub(super) fn spread(
     placement: &Placement,
     rows: &[usize],
@@ -41,12 +43,12 @@ pub(super) fn spread(
     (squares / rows.len().max(1) as f64).sqrt()
 }
 
-/// Smallest length that is written with a power of ten \[m\].
+/// Smallest length that [`format_error`] writes with a power of ten \[m\].
 const MIN_SCIENTIFIC_LENGTH: f64 = 1e6;
 
 /// Formats an error of rows of a kind with its unit: tilts \[rad\] in degrees with one more
-/// decimal, others \[m\] in millimetres.
-pub(crate) fn size(kind: &str, error: f64, decimals: usize) -> String {
+/// decimal, images in px, all others \[m\] in mm.
+pub(crate) fn format_error(kind: &str, error: f64, decimals: usize) -> String {
     match kind_named(kind).unit {
         _ if !error.is_finite() => "more than can be computed".to_owned(),
         Unit::Angle => format!("{:.*}°", decimals + 1, error.to_degrees()),
@@ -56,18 +58,19 @@ pub(crate) fn size(kind: &str, error: f64, decimals: usize) -> String {
     }
 }
 
-/// Returns the word for rows of a kind.
-pub(crate) fn rows(kind: &str) -> &'static str {
+/// Returns the plural noun for rows of a kind, such as "contacts".
+pub(crate) fn row_noun(kind: &str) -> &'static str {
     kind_named(kind).row.1
 }
 
-/// Returns the word for the quantity that rows of a kind measure.
-pub(in crate::fit) fn measured(kind: &str) -> &'static str {
+/// Returns the noun for the quantity that rows of a kind measure.
+pub(in crate::fit) fn quantity_noun(kind: &str) -> &'static str {
     kind_named(kind).measured
 }
 
-/// Returns the columns and declarations to check if the arm does not fit rows of a kind.
-pub(in crate::fit) fn named(kind: &str) -> &'static str {
+/// Returns the text that lists the columns and declarations to check if the arm does not fit rows
+/// of a kind.
+pub(in crate::fit) fn suspects(kind: &str) -> &'static str {
     kind_named(kind).suspects
 }
 
@@ -78,10 +81,10 @@ mod tests {
     #[test]
     fn an_error_without_a_number_is_said_in_words() {
         for error in [f64::INFINITY, f64::NAN] {
-            assert_eq!(size("position", error, 3), "more than can be computed");
+            assert_eq!(format_error("position", error, 3), "more than can be computed");
         }
         assert_eq!(
-            (size("position", 1e-3, 2), size("tilt", 0.0, 1)),
+            (format_error("position", 1e-3, 2), format_error("tilt", 0.0, 1)),
             ("1.00 mm".to_owned(), "0.00°".to_owned())
         );
     }

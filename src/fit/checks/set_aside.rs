@@ -1,8 +1,9 @@
-//! Check of the rows that a robust loss sets aside: whether chance or a cause selects them.
+//! Check of the rows that a robust loss treats as outliers: are they a random selection of the
+//! rows?
 //!
 //! A robust loss limits the influence of gross errors. A cause that acts in some rows only, such as
-//! a station that moves, then disappears from the residual: its rows are set aside. Such rows
-//! follow time, session or a joint, which gross errors do not.
+//! a station that moves, then disappears from the residual, because its rows become outliers. Such
+//! rows depend on time, session or a joint; gross errors do not.
 
 use serde_json::json;
 use statrs::distribution::{ContinuousCDF as _, Normal};
@@ -14,32 +15,34 @@ use super::outliers::Outlier;
 use crate::least_squares::Loss;
 use crate::measurement::Measurements;
 
-/// Largest share of the rows that a robust loss may treat as outliers without a check of the cause.
-const MAX_PART: f64 = 0.05;
+/// Largest share of the rows that may be outliers of a robust loss without a test of the cause.
+const MAX_UNTESTED_SHARE: f64 = 0.05;
 /// Smallest number of outliers for which the normal approximation of a rank sum holds.
-const MIN_ROWS: usize = 10;
-/// Probability below which the outliers are not a random choice, after correction for the number of
-/// quantities tested.
+const MIN_OUTLIERS: usize = 10;
+/// Probability below which the outliers are not a random selection, after correction for the number
+/// of tests.
 const MAX_CHANCE_PROBABILITY: f64 = 1e-3;
 
-/// Quantity that decides which rows are outliers.
+/// Quantity on which it depends whether a row is an outlier.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Selection {
     /// Name of the quantity: `time`, `joint 2`, `session B`, …
     pub quantity: String,
-    /// Probability of so clear a selection by chance, times the number of tests.
+    /// Probability that a random selection of rows depends so clearly on the quantity, times the
+    /// number of tests.
     pub p_value: f64,
 }
 
-/// Returns the quantity that decides which of `rows` are outliers; `None` if there are few
-/// outliers, or if chance explains them.
+/// Returns the quantity (time, a joint, a session, payload or temperature) on which it depends
+/// which of `rows` are outliers. `None` if there are few outliers, if most rows are outliers, or if
+/// the outliers are a random selection.
 pub(crate) fn selection(
     table: &Measurements,
     rows: &[usize],
     outliers: &[Outlier],
 ) -> Option<Selection> {
     let count = outliers.len();
-    let is_many = count >= MIN_ROWS && count as f64 > MAX_PART * rows.len() as f64;
+    let is_many = count >= MIN_OUTLIERS && count as f64 > MAX_UNTESTED_SHARE * rows.len() as f64;
     if !is_many || 2 * count > rows.len() {
         return None;
     }
@@ -66,16 +69,17 @@ pub(crate) fn selection(
     let best = quantities
         .into_iter()
         .map(|(quantity, values)| {
-            let p_value = tests * by_rank(&values, &is_outlier).min(by_runs(&values, &is_outlier));
+            let p_value = tests
+                * rank_sum_p_value(&values, &is_outlier).min(runs_p_value(&values, &is_outlier));
             Selection { quantity, p_value }
         })
         .min_by(|a, b| a.p_value.total_cmp(&b.p_value))?;
     (best.p_value < MAX_CHANCE_PROBABILITY).then_some(best)
 }
 
-/// Returns the two-sided p-value of the rank sum of the marked values; ties share their rank [Mann
-/// & Whitney 1947].
-fn by_rank(values: &[f64], marked: &[bool]) -> f64 {
+/// Returns the two-sided p-value of the rank sum of the `marked` values; equal values share their
+/// mean rank [Mann & Whitney 1947].
+fn rank_sum_p_value(values: &[f64], marked: &[bool]) -> f64 {
     let mut order: Vec<usize> = (0..values.len()).collect();
     order.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
     let n = values.len() as f64;
@@ -96,9 +100,9 @@ fn by_rank(values: &[f64], marked: &[bool]) -> f64 {
     2.0 * upper_tail((sum - 0.5 * k * (n + 1.0)).abs() / variance.sqrt())
 }
 
-/// Returns the probability of so few runs of marked and other values in ascending order [Wald &
-/// Wolfowitz 1940]; 1 if values are equal.
-fn by_runs(values: &[f64], marked: &[bool]) -> f64 {
+/// Returns the probability that a random selection of as many values forms so few runs of `marked`
+/// and other values in ascending order [Wald & Wolfowitz 1940]; 1 if two values are equal.
+fn runs_p_value(values: &[f64], marked: &[bool]) -> f64 {
     let mut order: Vec<usize> = (0..values.len()).collect();
     order.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
     if order.windows(2).any(|pair| values[pair[0]].total_cmp(&values[pair[1]]).is_eq()) {
@@ -107,7 +111,7 @@ fn by_runs(values: &[f64], marked: &[bool]) -> f64 {
     let runs = 1 + order.windows(2).filter(|pair| marked[pair[0]] != marked[pair[1]]).count();
     let marked = marked.iter().filter(|marked| **marked).count() as u64;
     let count = values.len() as u64;
-    // Number of ways to divide `of` values into `parts` runs, as a logarithm.
+    // Logarithm of the number of ways to divide `of` values into `parts` runs; `None` without any.
     let ways =
         |parts: u64, of: u64| (1..=of).contains(&parts).then(|| ln_binomial(of - 1, parts - 1));
     let both = |a: Option<f64>, b: Option<f64>| {
@@ -126,8 +130,8 @@ fn upper_tail(z: f64) -> f64 {
     Normal::new(0.0, 1.0).map_or(1.0, |normal| normal.sf(z))
 }
 
-/// Checks that the rows which a robust loss treats as outliers are a random choice: that no
-/// quantity (time, session, joint command) decides which rows they are.
+/// Checks that the rows which a robust loss treats as outliers are a random selection, which does
+/// not depend on time, session, a joint or a load.
 pub(super) struct SetAsideByChance;
 
 impl Check for SetAsideByChance {
@@ -160,8 +164,10 @@ mod tests {
             |is_marked: fn(usize) -> bool| -> Vec<bool> { (0..100).map(is_marked).collect() };
         let (late, block, scattered) =
             (marked(|k| k >= 75), marked(|k| (40..60).contains(&k)), marked(|k| k * 37 % 100 < 20));
-        assert!(by_rank(&values, &late) < 1e-10 && by_runs(&values, &late) < 1e-10);
-        assert!(by_rank(&values, &block) > 0.5 && by_runs(&values, &block) < 1e-10);
-        assert!(by_rank(&values, &scattered) > 0.05 && by_runs(&values, &scattered) > 0.05);
+        let rank_sum = |marked: &[bool]| rank_sum_p_value(&values, marked);
+        let runs = |marked: &[bool]| runs_p_value(&values, marked);
+        assert!(rank_sum(&late) < 1e-10 && runs(&late) < 1e-10);
+        assert!(rank_sum(&block) > 0.5 && runs(&block) < 1e-10);
+        assert!(rank_sum(&scattered) > 0.05 && runs(&scattered) > 0.05);
     }
 }

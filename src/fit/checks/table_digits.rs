@@ -1,33 +1,38 @@
-//! Checks of the table itself: positions that a controller computed, and commands with few digits.
+//! Checks of the numbers in the table: positions that a controller computed instead of an
+//! instrument, and commands with few digits.
 
 use serde_json::json;
 
 use super::checked_fit::{Check, CheckedFit};
 use super::finding::{Finding, FindingCode};
-use super::row_kind::{RowKind, size};
+use super::row_kind::{RowKind, format_error};
 use crate::problem::JointKind;
 
-/// Largest error of the registered nominal arm, relative to its reach, at which its positions count
-/// as computed. Built arms err by a hundred times that.
+/// Largest rms error of the registered nominal arm, relative to its reach, at which the positions
+/// of the table were computed. Errors of built arms are a hundred times as large.
 const MAX_COMPUTED_ERROR: f64 = 1e-5;
-/// Largest such error relative to the declared σ of a coordinate.
+/// Largest rms error of the registered nominal arm, relative to the declared σ of a coordinate, at
+/// which the positions of the table were computed.
 const MAX_COMPUTED_SIGMAS: f64 = 0.2;
-/// Minimum number of measured coordinates for each one that base and tools place.
+/// Minimum number of measured coordinates for each free parameter of bases and tools, at which
+/// positions are examined. Fewer coordinates fit by registration alone.
 const MIN_COORDINATES: usize = 3;
 /// Trial steps of commands of revolute joints \[deg\], the largest first.
 const STEPS_DEG: [f64; 7] = [1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01];
-/// Largest distance of a command from a multiple of a step, relative to the step.
+/// Largest distance of a command from a multiple of a step, relative to the step, at which it is
+/// one.
 const MAX_OFF_STEP: f64 = 1e-5;
-/// Minimum number of different commands of a joint by which its step is known.
+/// Minimum number of different commands of a joint from which its step is determined.
 const MIN_COMMANDS: usize = 10;
-/// Smallest residual, in units of the declared σ, for which a cause in the commands is searched.
+/// Smallest rms residual of the fit, in units of the declared σ, for which rounded commands are
+/// considered as the cause.
 const MIN_SIGMAS: f64 = 3.0;
-/// Range of the ratio of the error that rounding leaves to the residual, in which it may be the
-/// cause.
+/// Range of the ratio of the rms position error by rounded commands to the rms residual, in which
+/// rounding may be the cause of the residual.
 const ROUNDING_RATIOS: std::ops::Range<f64> = 0.5..2.0;
 
-/// Checks that the positions were measured: the nominal arm does not predict them to 10 µm per metre
-/// of its reach.
+/// Checks that the positions were measured: the registered nominal arm does not predict them to
+/// 10 µm per metre of its reach and a fifth of the declared σ.
 pub(super) struct PositionsAreMeasured;
 
 impl Check for PositionsAreMeasured {
@@ -48,14 +53,14 @@ impl Check for PositionsAreMeasured {
         let text = format!(
             "the nominal arm predicts the positions to {}: they were computed from the joint angles, \
              as a controller does, not measured",
-            size("position", rms, 5)
+            format_error("position", rms, 5)
         );
         vec![Finding::new(FindingCode::PositionsComputed, [rms.into()], text)]
     }
 }
 
-/// Checks that the commands of the joints have enough digits: rounding them does not explain the
-/// size of the residual.
+/// Checks that the commands of the joints have enough digits: the error by rounding them is not of
+/// the size of the residual.
 pub(super) struct CommandsHaveDigits;
 
 impl Check for CommandsHaveDigits {
@@ -69,7 +74,7 @@ impl Check for CommandsHaveDigits {
             return Vec::new();
         }
         let steps: Vec<(usize, f64)> = revolute_joints(fit)
-            .filter_map(|joint| Some((joint, step(fit, &kind.rows, joint)?)))
+            .filter_map(|joint| Some((joint, command_step(fit, &kind.rows, joint)?)))
             .collect();
         if steps.is_empty() || steps.len() < revolute_joints(fit).count() {
             return Vec::new();
@@ -89,15 +94,15 @@ impl Check for CommandsHaveDigits {
         let text = format!(
             "the commands of each joint are multiples of a step of up to {coarsest}°; if the table \
              rounds them, that alone moves the target by {} rms, as large as the residual of {}",
-            size("position", rounding, 3),
-            size("position", rms, 3)
+            format_error("position", rounding, 3),
+            format_error("position", rms, 3)
         );
         let numbers = [json!(coarsest), rounding.into(), rms.into()];
         vec![Finding::new(FindingCode::CommandsRounded, numbers, text)]
     }
 }
 
-/// Returns the revolute joints that take a command, counted from 0.
+/// Returns the indices of the joints with a command that is an angle.
 fn revolute_joints<'f>(fit: &'f CheckedFit) -> impl Iterator<Item = usize> + 'f {
     let is_revolute =
         |joint: &usize| fit.problem.joints[*joint].command_kind() == JointKind::Revolute;
@@ -106,7 +111,7 @@ fn revolute_joints<'f>(fit: &'f CheckedFit) -> impl Iterator<Item = usize> + 'f 
 
 /// Returns the largest trial step \[rad\] of which all commands of a joint are multiples; `None` if
 /// they are multiples of no trial step, or if too few commands differ.
-fn step(fit: &CheckedFit, rows: &[usize], joint: usize) -> Option<f64> {
+fn command_step(fit: &CheckedFit, rows: &[usize], joint: usize) -> Option<f64> {
     let measurements = fit.fitting.measurements;
     let command = |&row: &usize| measurements.configurations[row * measurements.joints + joint];
     let mut degrees: Vec<f64> = rows.iter().map(|row| command(row).to_degrees()).collect();

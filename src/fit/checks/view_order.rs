@@ -12,18 +12,19 @@ use crate::model::Pose;
 use crate::observation::Needs;
 use crate::problem::{Observation, Problem};
 
-/// Largest ratio of the error with reversed numbers to the error with the numbers of the table at
-/// which a view counts as reversed. A view in the right order has a ratio above 1.
-const MAX_RATIO: f64 = 0.33;
-/// Minimum number of points of a view whose order is judged.
+/// Largest ratio of the rms error with reversed point numbers to that with the numbers of the
+/// table, at which a view is reversed. A view in the right order has a ratio above 1.
+const MAX_REVERSED_RATIO: f64 = 0.33;
+/// Minimum number of points of a view or a marker whose order is judged.
 const MIN_POINTS: usize = 4;
-/// Largest deviation of a marker from point symmetry, as a share of its size.
+/// Largest deviation of a marker from point symmetry that is rounding, relative to the largest
+/// distance of its points from its origin.
 const MAX_ASYMMETRY: f64 = 1e-6;
 /// Maximum number of views that the text of a finding lists.
 const MAX_LISTED: usize = 5;
 
-/// Groups rows that measure points of one marker in one image: places in `rows`, by camera, marker,
-/// session, time and configuration. Rows of other kinds are left out.
+/// Groups rows that measure points of one marker in one image: equal camera, marker, session, time
+/// and configuration. Each group holds indices into `rows`; rows of other kinds are left out.
 pub(super) fn views(measurements: &Measurements, rows: &[usize]) -> Vec<Vec<usize>> {
     let mut views: BTreeMap<_, Vec<usize>> = BTreeMap::new();
     for (place, &row) in rows.iter().enumerate() {
@@ -43,8 +44,9 @@ pub(super) fn views(measurements: &Measurements, rows: &[usize]) -> Vec<Vec<usiz
 
 /// Checks that no view has the points of its marker in the reverse order.
 ///
-/// A board looks the same after half a turn, so that a detector may begin at either end. The points
-/// of one view fit then as well as in the right order, but not the arm.
+/// A board looks the same after half a turn, so that a detector may begin at either end. Reversed
+/// points of one view fit some pose of the marker as well as points in the right order, but not the
+/// pose that the arm predicts.
 pub(super) struct PointsInOrder;
 
 impl Check for PointsInOrder {
@@ -62,7 +64,8 @@ impl Check for PointsInOrder {
             return Vec::new();
         }
         let views = views(fitting.measurements, &rows);
-        // Reversed views may draw the fit away: the better of it and the nominal arm decides.
+        // Reversed views may spoil the fit. The views are therefore judged by the fitted or the
+        // registered nominal arm, whichever has the smaller error.
         let errors = |poses: &[Pose], x| fitting.model.residuals(poses.to_vec(), x);
         let all: Vec<usize> = (0..rows.len()).collect();
         let at = [fit.registered_x, &fit.end.x].map(|x| (errors(&poses, x), x));
@@ -75,7 +78,7 @@ impl Check for PointsInOrder {
         };
         let is_reversed = |view: &&Vec<usize>| {
             let [square, other] = squares(view);
-            view.len() >= MIN_POINTS && other < MAX_RATIO * MAX_RATIO * square
+            view.len() >= MIN_POINTS && other < MAX_REVERSED_RATIO.powi(2) * square
         };
         let found: Vec<&Vec<usize>> = views.iter().filter(is_reversed).collect();
         let places: Vec<usize> = found.iter().copied().flatten().copied().collect();
@@ -105,8 +108,9 @@ impl Check for PointsInOrder {
     }
 }
 
-/// Returns the observation of the point that has the place of the observed one if the marker is
-/// numbered from the other end; the same observation for markers without point symmetry.
+/// Returns the observation of the point that has the same number as the observed one if the marker
+/// is numbered from the other end. Observations of markers without point symmetry, and of other
+/// kinds, stay the same.
 fn reversed(problem: &Problem, observation: Observation) -> Observation {
     let Observation::Pixel(camera, marker, point) = observation else { return observation };
     let points = problem.fixtures.get(marker as usize).map_or(&[][..], |marker| &marker.points);
@@ -123,7 +127,7 @@ fn reversed(problem: &Problem, observation: Observation) -> Observation {
     }
 }
 
-/// Returns the mean squared length of the errors at some places; 0 without a place.
+/// Returns the mean squared length of the errors with the indices `places`; 0 if there are none.
 fn mean_square(errors: &[Vector3<f64>], places: &[usize]) -> f64 {
     let sum: f64 = places.iter().map(|&place| errors[place].norm_squared()).sum();
     sum / places.len().max(1) as f64
