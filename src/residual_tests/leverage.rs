@@ -172,19 +172,21 @@ impl<'a> Kept<'a> {
     /// section 3.6].
     pub fn without(fit: &FitResidual, out: &[bool]) -> Option<Self> {
         let p = fit.fitted.ncols();
-        let (gone, poses): (Vec<usize>, Vec<usize>) = (0..out.len()).partition(|&pose| out[pose]);
+        let (removed, poses): (Vec<usize>, Vec<usize>) =
+            (0..out.len()).partition(|&pose| out[pose]);
         let rows_of = |poses: &[usize]| -> Vec<usize> {
             poses.iter().flat_map(|&b| 3 * b..3 * b + 3).collect()
         };
         let coordinates = poses.iter().map(|&pose| fit.coordinates_of(pose)).collect();
-        let (gone, kept) = (rows_of(&gone), rows_of(&poses));
-        let fitted_gone = fit.fitted.select_rows(&gone);
+        let (removed, kept) = (rows_of(&removed), rows_of(&poses));
+        let fitted_removed = fit.fitted.select_rows(&removed);
         let mut fitted = fit.fitted.select_rows(&kept);
-        let decided = Cholesky::new(DMatrix::identity(p, p) - fitted_gone.tr_mul(&fitted_gone))?;
+        let decided =
+            Cholesky::new(DMatrix::identity(p, p) - fitted_removed.tr_mul(&fitted_removed))?;
         if decided.l_dirty().diagonal().iter().any(|&pivot| pivot * pivot < MIN_KEPT_SHARE) {
             return None;
         }
-        let pull = decided.solve(&fitted_gone.tr_mul(&fit.residual.select_rows(&gone)));
+        let pull = decided.solve(&fitted_removed.tr_mul(&fit.residual.select_rows(&removed)));
         let residual = fit.residual.select_rows(&kept) + &fitted * pull;
         let inverse = decided.l().solve_lower_triangular(&DMatrix::identity(p, p))?;
         multiply_by_upper(&mut fitted, &inverse.transpose());

@@ -56,8 +56,8 @@ pub enum Untestable {
     /// The fit leaves too few degrees of freedom.
     #[error("the fit leaves too few degrees of freedom")]
     NoFreedom,
-    /// Too few poses: a test of order needs five in one session, a test of dependence five in all, a
-    /// test of normality eight coordinates.
+    /// Too few poses: a test of order needs five in one session, a test of dependence five in all,
+    /// a test of normality eight coordinates.
     #[error("too few poses")]
     TooFewPoses,
     /// The covariate (in the test of normality: the residual) has the same value in all poses.

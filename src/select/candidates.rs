@@ -8,16 +8,16 @@ use crate::problem::{Effect, Problem};
 /// Reason why an effect is not tried: the rules of the problem fix its parameters at zero.
 pub const HELD_FIXED: &str = "[parameters] holds it fixed";
 
-/// Reason why an effect is not tried: the unit in a rule of `[parameters]` that matches its
-/// parameters is not theirs.
+/// Reason why an effect is not tried: a rule of `[parameters]` that matches its parameters has
+/// another unit than they.
 pub const REFUSED: &str = "a rule of [parameters] speaks of it in another unit";
 
 /// Reason why an effect is not tried: the derivative of the residuals with respect to it is not
 /// finite in these poses.
 pub const NOT_FINITE: &str = "its derivative is not a finite number in these poses";
 
-/// Catalogue effects that the problem does not declare: those that the data can show, and the
-/// others with the reason.
+/// Effects of the catalogue that the problem does not declare: those that the data can show, and
+/// the others, each with the reason.
 pub(super) struct Candidates {
     pub testable: Vec<Effect>,
     pub untestable: Vec<(Effect, &'static str)>,
@@ -52,8 +52,8 @@ impl Candidates {
 /// merged into that one.
 pub(super) fn joined(effects: &[Effect], new: &Effect) -> Vec<Effect> {
     let mut joined_effects = effects.to_vec();
-    match joined_effects.iter_mut().find_map(|known| Some((known.joined(new)?, known))) {
-        Some((both, known)) => *known = both,
+    match joined_effects.iter_mut().find_map(|effect| Some((effect.joined(new)?, effect))) {
+        Some((both, effect)) => *effect = both,
         None => joined_effects.push(new.clone()),
     }
     joined_effects

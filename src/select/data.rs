@@ -1,4 +1,4 @@
-//! Identification poses with everything that the search asks of them.
+//! Identification rows, with the quantities that the search derives from them.
 
 use crate::select::settings::{CROSS_VALIDATION_BLOCKS, MAX_SHIFT_TIMES, MIN_POSES_BESIDE_SHIFT};
 use std::collections::BTreeMap;
@@ -8,7 +8,7 @@ use rand::SeedableRng as _;
 use rand::seq::SliceRandom as _;
 use rand_chacha::ChaCha8Rng;
 
-use super::harmonic_prior::takes_common_prior;
+use super::harmonic_prior::admits_common_prior;
 use super::rules::SelectionRules;
 use crate::fit::Stop;
 use crate::measurement::{Dataset, Measurements, Split};
@@ -26,20 +26,19 @@ pub(super) struct Data<'a> {
     pub measurements: &'a Measurements,
     pub split: &'a Split,
     pub rules: &'a SelectionRules,
-    /// Number of the measuring conditions (configuration, loads, temperature) of each
-    /// identification row. Rows with equal numbers are repeats.
+    /// Identifier of the measuring conditions (configuration, loads, temperature, session, target)
+    /// of each identification row. Rows with equal identifiers are repeats.
     pub setup: Vec<usize>,
-    /// Number of the cross-validation block to which each identification row belongs; repeats
-    /// belong to one block.
+    /// Index of the cross-validation block to which each identification row belongs. Rows of equal
+    /// configuration belong to one block.
     pub block: Vec<usize>,
     /// Effects that the search considers in addition to those of the catalogue.
     pub candidates: &'a [Effect],
-    /// True if one prior σ for each order may hold for the harmonics of all joints.
-    pub takes_gears: bool,
+    /// True if the harmonics of all joints may have a common prior: one σ for each order.
+    pub admits_common_prior: bool,
     /// Request to stop the search early.
     pub stop: Stop,
-    /// Laws that the search over formulas proposed, cached by joint and by the other hypotheses
-    /// assumed.
+    /// Laws that the search over formulas proposed.
     pub proposed: Proposed,
 }
 
@@ -65,8 +64,8 @@ impl<'a> Data<'a> {
         let mut order: Vec<usize> = (0..count).collect();
         order.shuffle(&mut ChaCha8Rng::seed_from_u64(rules.seed));
         let mut block_of = vec![0; count];
-        for (place, configuration) in order.into_iter().enumerate() {
-            block_of[configuration] = place % CROSS_VALIDATION_BLOCKS.min(count.max(1));
+        for (rank, configuration) in order.into_iter().enumerate() {
+            block_of[configuration] = rank % CROSS_VALIDATION_BLOCKS.min(count.max(1));
         }
         let block =
             configurations.into_iter().map(|configuration| block_of[configuration]).collect();
@@ -78,7 +77,7 @@ impl<'a> Data<'a> {
             setup,
             block,
             candidates: &[],
-            takes_gears: takes_common_prior(problem),
+            admits_common_prior: admits_common_prior(problem),
             stop: Stop::default(),
             proposed: Proposed::default(),
         }
@@ -262,11 +261,13 @@ fn conditions_of(measurements: &Measurements, row: usize) -> Vec<u64> {
     key
 }
 
+/// Returns the bit pattern of each value, as a key of comparisons.
 pub(super) fn bits(values: &[f64]) -> Vec<u64> {
     values.iter().map(|value| value.to_bits()).collect()
 }
 
-/// Returns an identifier for each key: equal keys have equal numbers, in order of first appearance.
+/// Returns a number for each key: equal keys have equal numbers, counted from 0 in order of first
+/// appearance.
 pub(super) fn numbered<K: Ord>(keys: impl Iterator<Item = K>) -> Vec<usize> {
     let mut number_of_key = BTreeMap::new();
     keys.map(|key| {

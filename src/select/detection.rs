@@ -51,13 +51,13 @@ pub struct Size {
     pub parameters: Vec<String>,
     /// Unit of the effect's parameters.
     pub unit: Unit,
-    /// Standard deviation (1 σ) of the catalogue's prior on the parameters, SI. Real effects are
-    /// rarely much larger.
+    /// Largest 1 σ of the catalogue's priors on the parameters, SI. Real effects are rarely much
+    /// larger.
     pub prior: f64,
     /// Size in the direction (phase, axis) that is hardest to detect, SI. `None` if the fitted
     /// parameters can reproduce it completely, or if hardly any degrees of freedom remain.
     pub worst: Option<f64>,
-    /// Size in the direction (phase, axis) that is easiest to detect, SI.
+    /// Size in the direction (phase, axis) that is easiest to detect, SI; `None` as for `worst`.
     pub best: Option<f64>,
 }
 
@@ -74,14 +74,14 @@ impl Size {
 /// The computation is linear about the nominal arm. Let C be the columns of an effect's parameters
 /// p, with the free parameters projected out as a fit with priors does. An effect of size p has the
 /// noncentrality λ = pᵀ CᵀC p. It is found if F on k and ν − k degrees of freedom is significant at
-/// level / tries. Poses without a time are assumed to be a minute apart; then only the order of
-/// rows that are already measured is known.
+/// level / tries. Planned poses without times are assumed to be a minute apart; rows already
+/// measured without times keep their row numbers as times.
 ///
 /// # Errors
 /// Returns an error if rules of `[parameters]` do not match the arm.
 pub fn detectable(problem: &Problem, poses: &Measurements) -> Result<Detection, InputError> {
-    let is_known = poses.time_measured || poses.position_measured;
-    let poses = if is_known { poses.clone() } else { timed(poses) };
+    let keeps_times = poses.time_measured || poses.position_measured;
+    let poses = if keeps_times { poses.clone() } else { with_assumed_times(poses) };
     let Candidates { testable, untestable } = candidates(problem, &poses);
     let (tries, families) = tries(&testable, problem);
     let effects = with_linear(problem, &poses, &testable, |linearised, linear| {
@@ -96,12 +96,12 @@ pub fn detectable(problem: &Problem, poses: &Measurements) -> Result<Detection, 
         level: SelectionRules::DEFAULT.level,
         effects,
         untestable,
-        times_assumed: !is_known,
+        times_assumed: !keeps_times,
     })
 }
 
-/// Returns the poses with assumed times if they have none.
-pub(super) fn timed(poses: &Measurements) -> Measurements {
+/// Returns the poses, with times a minute apart if they have none.
+pub(super) fn with_assumed_times(poses: &Measurements) -> Measurements {
     let mut poses = poses.clone();
     if !poses.time_measured {
         poses.time =
@@ -111,7 +111,7 @@ pub(super) fn timed(poses: &Measurements) -> Measurements {
     poses
 }
 
-/// Returns the effects of the catalogue that these poses can show.
+/// Returns the effects of the catalogue that these poses can show, and the others with the reason.
 pub(super) fn candidates(problem: &Problem, poses: &Measurements) -> Candidates {
     let split = Split { identification: (0..poses.len()).collect(), held_out: Vec::new() };
     Candidates::new(
@@ -120,8 +120,8 @@ pub(super) fn candidates(problem: &Problem, poses: &Measurements) -> Candidates 
     )
 }
 
-/// Calls `with` with the nominal arm linearised at these poses, and with its linear neighbourhood:
-/// all free parameters fitted, residual zero.
+/// Calls `with` with the nominal arm linearised at these poses, and with its linear neighbourhood,
+/// in which all free parameters are fitted and the residual is zero.
 pub(super) fn with_linear<T>(
     problem: &Problem,
     poses: &Measurements,

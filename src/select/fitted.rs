@@ -1,6 +1,6 @@
 //! Fit of a problem, with its linear neighbourhood.
 
-use crate::select::settings::{MAX_OUTLIER_SHARE, OUTLIER_DISTANCE};
+use crate::select::settings::{MAX_OUTLIER_SHARE, OUTLIER_SQUARED_DISTANCE};
 use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
@@ -29,15 +29,18 @@ const MAX_OUTLIER_WORK: f64 = 2e8;
 /// Largest root mean square change of the residuals between a fit that was stopped early and the
 /// converged one, in units of σ. Up to it, evidence about the former remains valid.
 const MAX_UNSETTLED: f64 = 0.05;
-/// Smallest share of its variance that the residual of a pose keeps along a direction that the pose
-/// alone determines.
+/// Fraction of the noise variance that is added to the residual's covariance 1 − H of each pose, so
+/// that it stays invertible along directions that the pose alone determines.
 const MIN_VARIANCE_OF_POSE: f64 = 1e-3;
 
 /// Problem with its effects, fitted to the identification rows.
 #[derive(Clone)]
 pub(super) struct Fitted {
+    /// Problem with its effects declared.
     pub problem: Problem,
+    /// Model of the problem.
     pub model: Model,
+    /// Result of the fit.
     pub found: Identification,
     /// Indices of the fitted parameters that are not at a bound.
     pub unknowns: Vec<usize>,
@@ -45,11 +48,12 @@ pub(super) struct Fitted {
     active: DMatrix<f64>,
     /// Standard deviation (1 σ) of a coordinate in rows without a declared σ \[m\].
     pub sigma: f64,
-    /// Rows that are excluded from the evidence: outliers.
+    /// Table indices of the outliers, which get practically no weight in the linear neighbourhood
+    /// and in the evidence.
     pub set_aside: Vec<usize>,
     /// Linear neighbourhood at the identification rows, computed on first use.
     around: OnceLock<Arc<LinearNeighbourhood>>,
-    /// Derivatives at the fit that were computed last.
+    /// Derivatives at the fit, cached if there are many unknowns.
     derivatives: Arc<Mutex<Option<Arc<Derivatives>>>>,
 }
 
@@ -60,9 +64,9 @@ impl Fitted {
         Self::of(problem, data, found)
     }
 
-    /// Fits another problem to the same rows. If a search for outliers would take too long, the
-    /// outliers of this fit are kept.
-    pub fn next(
+    /// Fits another problem, such as one with more effects, to the same rows. If a search for
+    /// outliers would take too long, the outliers of this fit are kept.
+    pub fn fit_other(
         &self,
         problem: Problem,
         data: &Data,
@@ -77,6 +81,8 @@ impl Fitted {
         Self::with_outliers_of(None, problem, data, found)
     }
 
+    /// Creates the fitted problem from a fit `found`. The outliers of `previous` are kept if a
+    /// search for outliers would take too long.
     fn with_outliers_of(
         previous: Option<&Self>,
         problem: Problem,
@@ -131,7 +137,7 @@ impl Fitted {
                 let cause = selection_of_outliers(data.measurements, data.rows(), found);
                 if cause.is_some() { Vec::new() } else { outliers_of_fit }
             }
-            _ if work <= MAX_OUTLIER_WORK => outliers(&fitted, data),
+            _ if work <= MAX_OUTLIER_WORK => find_outliers(&fitted, data),
             Some(previous) => previous.set_aside.clone(),
             None => outliers_of_fit,
         };
@@ -141,8 +147,8 @@ impl Fitted {
         Ok(fitted)
     }
 
-    /// Continues the fit until it converges, if it was stopped early or is provisional.
-    pub fn settled(self, data: &Data, options: &Options) -> Result<Self, IdentifyError> {
+    /// Returns this fit, continued until it converges if it was stopped early or is provisional.
+    pub fn converge(self, data: &Data, options: &Options) -> Result<Self, IdentifyError> {
         if self.found.termination.converged() && !self.found.provisional {
             return Ok(self);
         }
@@ -151,7 +157,7 @@ impl Fitted {
         } else {
             self.options_from_estimates(options)
         };
-        self.next(self.problem.clone(), data, &continuing)
+        self.fit_other(self.problem.clone(), data, &continuing)
     }
 
     /// Returns true if the residuals of another fit of the same effects differ by more than
@@ -171,7 +177,8 @@ impl Fitted {
     }
 
     /// Returns options for the next fit with the state that it reuses: the registered nominal arm
-    /// and the derivatives at the optimum. If the fits are `alike`, it also reuses the noise scale.
+    /// and the derivatives at the optimum. If `alike` is true, the next problem has nearly the same
+    /// effects, and the noise scale is reused, too.
     pub fn warm_started_options(&self, options: &Options, alike: bool) -> Options {
         let derivatives = self.derivatives.lock().unwrap_or_else(PoisonError::into_inner).clone();
         let at = (self.model.parameters.as_slice(), &self.found.x);
@@ -276,15 +283,15 @@ impl Fitted {
         )
     }
 
-    /// Returns the linear neighbourhood of the fit.
+    /// Returns the linear neighbourhood of the fit at the poses of `linearised`.
     pub fn neighbourhood(&self, linearised: &Linearised) -> LinearNeighbourhood {
         self.neighbourhood_without(linearised, &[])
     }
 
-    /// Returns the linear neighbourhood at the identification rows, computed once.
+    /// Returns the linear neighbourhood of the fit at the identification rows, computed once.
     pub fn around(&self, data: &Data) -> Arc<LinearNeighbourhood> {
-        if let Some(known) = self.around.get() {
-            return Arc::clone(known);
+        if let Some(cached) = self.around.get() {
+            return Arc::clone(cached);
         }
         let new = Arc::new(self.neighbourhood(&self.linearised(data, &[])));
         Arc::clone(self.around.get_or_init(|| new))
@@ -295,7 +302,8 @@ impl Fitted {
         self.with_outliers(Vec::new())
     }
 
-    /// Returns this fit with `rows` treated as outliers, in its linear neighbourhood.
+    /// Returns this fit with the table rows `rows`, and no others, treated as outliers. The
+    /// estimates stay the same; the linear neighbourhood changes.
     pub fn with_outliers(&self, rows: Vec<usize>) -> Self {
         Self {
             set_aside: rows,
@@ -305,8 +313,8 @@ impl Fitted {
         }
     }
 
-    /// Returns the linear neighbourhood with the same weight of priors as in the fit, which may
-    /// have estimated a larger σ than declared.
+    /// Returns the linear neighbourhood with the weight that priors had in the fit, relative to the
+    /// data. The fit may have estimated a larger σ than declared, which makes priors stronger.
     pub fn neighbourhood_as_fitted(&self, linearised: Linearised) -> LinearNeighbourhood {
         let unknowns =
             self.unknowns_without(&linearised, &[], self.found.noise_factor.max(1.0).sqrt());
@@ -315,7 +323,8 @@ impl Fitted {
         LinearNeighbourhood::in_place_of(columns, residual, &unknowns, empty)
     }
 
-    /// Returns the unknowns except those in `without`; 1 σ of their priors is divided by `weight`.
+    /// Returns the unknowns except those with the indices `without`, followed by the relaxed
+    /// coefficients; 1 σ of each prior is divided by `weight`.
     fn unknowns_without(
         &self,
         linearised: &Linearised,
@@ -336,7 +345,8 @@ impl Fitted {
         }
     }
 
-    /// Returns the linear neighbourhood of the fit without some unknowns.
+    /// Returns the linear neighbourhood of the fit without the unknowns with the indices `without`,
+    /// whose values become 0: the residual then contains their contribution.
     pub fn neighbourhood_without(
         &self,
         linearised: &Linearised,
@@ -344,14 +354,14 @@ impl Fitted {
     ) -> LinearNeighbourhood {
         let (columns, n) = (linearised.fitted(), self.unknowns.len());
         let mut residual = linearised.residual().clone();
-        // If two parameters are multiplied by each other, one of them at zero leaves the other
-        // without influence.
-        let is_place = |site: ParameterSite| {
+        // A parameter inside a formula, or the position of an added mass, has no influence if the
+        // coefficient by which it is multiplied is zero.
+        let is_position_of_mass = |site: ParameterSite| {
             matches!(site, ParameterSite::Beam { field: BeamField::AddedAt, .. })
         };
         let is_inside = |&&j: &&usize| {
             let parameter = &self.model.parameters[self.unknowns[j]];
-            is_place(parameter.site) || parameter.regressor == Regressor::Inner
+            is_position_of_mass(parameter.site) || parameter.regressor == Regressor::Inner
         };
         for &j in without.iter().filter(|j| !is_inside(j)) {
             residual.axpy(-self.found.x[self.unknowns[j]], &columns.column(j), 1.0);
@@ -382,20 +392,20 @@ impl Fitted {
     /// Returns the indices of an effect's parameters in the model.
     pub fn parameters_of(&self, effect: &Effect) -> Vec<usize> {
         let parameters = effect.parameters(&self.problem);
-        let is_own = |&k: &usize| {
+        let is_of_effect = |&k: &usize| {
             parameters.iter().any(|parameter| parameter.name == self.model.parameters[k].name)
         };
-        (0..self.model.parameters.len()).filter(is_own).collect()
+        (0..self.model.parameters.len()).filter(is_of_effect).collect()
     }
 }
 
-/// Returns the identification rows that are outliers, in the linear neighbourhood of the fit
-/// without them.
+/// Returns the table indices of the identification rows that are outliers, judged in the linear
+/// neighbourhood of the fit without them.
 ///
 /// The rows with the largest residuals, as many as may be outliers, are left out repeatedly until
 /// they stay the same. This is one start of least trimmed squares [Rousseeuw and Van Driessen
-/// 2006]. Then only rows beyond `OUTLIER_DISTANCE` are left out.
-fn outliers(fitted: &Fitted, data: &Data) -> Vec<usize> {
+/// 2006]. Then only rows beyond [`OUTLIER_SQUARED_DISTANCE`] are left out.
+fn find_outliers(fitted: &Fitted, data: &Data) -> Vec<usize> {
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
@@ -414,7 +424,7 @@ fn outliers(fitted: &Fitted, data: &Data) -> Vec<usize> {
     let linearised = fitted.linearised_at(data, &subset, &[]);
     let mut aside = Vec::new();
     for _ in 0..MAX_CONCENTRATION_STEPS {
-        let next = worst(&distances(fitted, &linearised, &aside), allowed(subset.len()));
+        let next = worst(&squared_distances(fitted, &linearised, &aside), allowed(subset.len()));
         if next == aside {
             break;
         }
@@ -425,8 +435,8 @@ fn outliers(fitted: &Fitted, data: &Data) -> Vec<usize> {
         (0..subset.len()).filter(|k| !aside.contains(k)).map(|k| subset[k]).collect();
     let mut aside: Vec<usize> = (0..rows.len()).filter(|&k| !kept.contains(&rows[k])).collect();
     for _ in 0..MAX_CONCENTRATION_STEPS {
-        let squares = distances(fitted, &linearised, &aside);
-        let far = squares.iter().filter(|square| **square > OUTLIER_DISTANCE).count();
+        let squares = squared_distances(fitted, &linearised, &aside);
+        let far = squares.iter().filter(|square| **square > OUTLIER_SQUARED_DISTANCE).count();
         if far > allowed(rows.len()) {
             return Vec::new();
         }
@@ -442,9 +452,10 @@ fn outliers(fitted: &Fitted, data: &Data) -> Vec<usize> {
 /// Returns the squared distance of each pose from the fit without the poses `aside`, in units of
 /// the variance of one coordinate.
 ///
-/// The distance is rᵀ C⁻¹ r over the median of all poses, with C = 1 − H for a pose in the fit and
-/// C = 1 + A (AᵀA)⁻¹ Aᵀ for one that was left out.
-fn distances(fitted: &Fitted, linearised: &Linearised, aside: &[usize]) -> Vec<f64> {
+/// The squared distance is rᵀ C⁻¹ r divided by the scatter: the median over all poses relative to
+/// that of normal residuals, at least 1 if σ is declared. C = 1 − H for a pose in the fit, C = 1 +
+/// A (AᵀA)⁻¹ Aᵀ for one that was left out, with A its rows of the Jacobian.
+fn squared_distances(fitted: &Fitted, linearised: &Linearised, aside: &[usize]) -> Vec<f64> {
     let (whole, residual) = (linearised.fitted(), linearised.residual());
     let (mut columns, mut here) = (whole.clone(), residual.clone());
     for &pose in aside {

@@ -6,7 +6,7 @@ use crate::model::parameter::{Regressor, rule_of};
 use crate::problem::{Effect, Freedom, JointKind, ParameterRule, Problem, Quantities};
 use crate::quantity::Unit;
 
-/// Smallest number of orders at which the harmonics of a joint count as one periodic error whose
+/// Smallest number of orders of a joint's harmonics that are treated as one periodic error, whose
 /// coefficients have a common prior.
 pub(super) const MIN_GEAR_ORDERS: usize = 12;
 
@@ -18,7 +18,7 @@ pub struct HarmonicPrior {
 }
 
 impl HarmonicPrior {
-    /// Returns the prior as rules of `[parameters]`: pattern and σ \[rad\].
+    /// Returns the prior as rules of `[parameters]`: pattern of parameter names and σ \[rad\].
     pub fn rules(&self) -> impl Iterator<Item = (String, f64)> {
         let of = |(order, sigma)| {
             ["sin", "cos"].map(|wave| (format!("joint-harmonic.{wave}{order}"), sigma))
@@ -40,8 +40,8 @@ impl HarmonicPrior {
 
     /// Returns σ of an order \[rad\]; `None` if the prior does not contain the order.
     pub(super) fn sigma(&self, order: u32) -> Option<f64> {
-        let place = self.by_order.binary_search_by_key(&order, |entry| entry.0).ok()?;
-        self.by_order.get(place).map(|entry| entry.1)
+        let index = self.by_order.binary_search_by_key(&order, |entry| entry.0).ok()?;
+        self.by_order.get(index).map(|entry| entry.1)
     }
 
     /// Adds the prior to the parameter rules of a problem.
@@ -60,28 +60,30 @@ impl HarmonicPrior {
     }
 }
 
-/// Returns true if an effect is a periodic error with many orders, whose coefficients have a common
-/// prior.
-pub(super) fn is_gear(effect: &Effect) -> bool {
+/// Returns true if an effect is a periodic error of a joint with at least [`MIN_GEAR_ORDERS`]
+/// orders, whose coefficients have a common prior.
+pub(super) fn is_periodic_of_many_orders(effect: &Effect) -> bool {
     matches!(effect, Effect::JointHarmonic { orders, .. } if orders.len() >= MIN_GEAR_ORDERS)
 }
 
-/// Returns true if an effect is the periodic error with many orders of a joint, counted from 1.
-pub(super) fn is_gear_of(effect: &Effect, joint: usize) -> bool {
-    is_gear(effect) && matches!(effect, Effect::JointHarmonic { joint: of, .. } if *of == joint)
+/// Returns true if an effect is the periodic error with many orders at the joint `joint`, counted
+/// from 1.
+pub(super) fn is_periodic_of_many_orders_at(effect: &Effect, joint: usize) -> bool {
+    is_periodic_of_many_orders(effect)
+        && matches!(effect, Effect::JointHarmonic { joint: of, .. } if *of == joint)
 }
 
-/// Returns the order of a regressor that is a harmonic; `None` for others.
-pub(super) fn order_of(regressor: &Regressor) -> Option<u32> {
+/// Returns the order k of a regressor sin(kq) or cos(kq); `None` for others.
+pub(super) fn harmonic_order(regressor: &Regressor) -> Option<u32> {
     match *regressor {
         Regressor::Sine(_, order) | Regressor::Cosine(_, order) => Some(order),
         _ => None,
     }
 }
 
-/// Returns true if a prior on angles can apply to all harmonics. No declared harmonic may belong to
-/// a prismatic joint, no rule may match a harmonic, and at least one joint must be revolute.
-pub(super) fn takes_common_prior(problem: &Problem) -> bool {
+/// Returns true if a common prior on angles can apply to all harmonics: no declared harmonic
+/// belongs to a prismatic joint, and no rule of `[parameters]` matches a harmonic.
+pub(super) fn admits_common_prior(problem: &Problem) -> bool {
     let joints = (1..=problem.joints.len())
         .filter(|&joint| problem.joints[joint - 1].command_kind() == JointKind::Revolute);
     let possible = joints.flat_map(|joint| {
@@ -91,7 +93,7 @@ pub(super) fn takes_common_prior(problem: &Problem) -> bool {
     declared
         .iter()
         .chain(&possible.collect::<Vec<_>>())
-        .filter(|parameter| order_of(&parameter.regressor).is_some())
+        .filter(|parameter| harmonic_order(&parameter.regressor).is_some())
         .all(|parameter| parameter.unit() == Unit::Angle && rule_of(problem, parameter).is_none())
 }
 
@@ -103,22 +105,22 @@ mod tests {
 
     #[test]
     fn a_rule_of_their_own_or_a_slide_keeps_harmonics_from_the_common_prior() {
-        let takes = |kind: &str, rule: &str| {
+        let admits = |kind: &str, rule: &str| {
             let text = format!(
                 "name = 'arm'\n[[joint]]\n[[joint]]\nkind = '{kind}'\n[[effect]]\njoint-harmonic = {{ joint = 1, orders = [1, 2] }}\n\
                  [[effect]]\njoint-harmonic = {{ joint = 2, orders = [3] }}\n[parameters]\n'joint*.theta' = {{ free = true }}\n{rule}"
             );
-            takes_common_prior(&Problem::parse(&text, Path::new("problem.toml")).unwrap())
+            admits_common_prior(&Problem::parse(&text, Path::new("problem.toml")).unwrap())
         };
-        assert!(takes("revolute", "") && takes("revolute", "'*.sin*' = { sigma_mm = 1 }"));
-        assert!(!takes("prismatic", ""));
+        assert!(admits("revolute", "") && admits("revolute", "'*.sin*' = { sigma_mm = 1 }"));
+        assert!(!admits("prismatic", ""));
         for rule in [
             "'joint-harmonic.*' = { sigma_deg = 0.01 }",
             "'joint-harmonic[2].*' = { sigma_deg = 0.01 }",
             "'joint-harmonic[1].sin2' = { fixed = true }",
             "'*.cos3' = { free = true }",
         ] {
-            assert!(!takes("revolute", rule), "{rule}");
+            assert!(!admits("revolute", rule), "{rule}");
         }
     }
 }

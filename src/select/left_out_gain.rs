@@ -5,8 +5,8 @@ use statrs::distribution::{ContinuousCDF as _, StudentsT};
 use super::data::Data;
 use super::fitted::Fitted;
 
-/// Decreases of the sum of squared errors by one fit against another \[m²\], one for each block of
-/// poses, predicted by fits without the block.
+/// Sum of squared errors of an old fit minus that of a new one \[m²\], for each block of poses,
+/// which both predict without having been fitted to it.
 pub(super) struct LeftOutGain(Vec<f64>);
 
 impl LeftOutGain {
@@ -24,14 +24,14 @@ impl LeftOutGain {
         Some(Self(before.iter().zip(&after).map(|(before, after)| before - after).collect()))
     }
 
-    /// Returns ln of the odds of the new fit to the old one by the predictive density of the poses,
-    /// for noise with standard deviation `sigma` \[m\] in each coordinate.
+    /// Returns ln of the odds of the new fit over the old one by the predictive density of the
+    /// left-out poses, for noise of standard deviation `sigma` \[m\] in each coordinate.
     pub fn ln_odds(&self, sigma: f64) -> f64 {
         self.0.iter().sum::<f64>() / (2.0 * sigma * sigma)
     }
 
-    /// Returns true if the mean decrease exceeds its standard error: the rule by which the plainer
-    /// of two models is kept. [Breiman et al. 1984, sec. 3.4.3]
+    /// Returns true if the mean decrease exceeds its standard error. Otherwise the
+    /// one-standard-error rule keeps the plainer model [Breiman et al. 1984, sec. 3.4.3].
     pub fn exceeds_standard_error(&self) -> bool {
         self.exceeds(|_| 1.0)
     }

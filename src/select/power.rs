@@ -11,15 +11,15 @@ const MAX_POISSON_DEVIATIONS: f64 = 9.0;
 /// Largest noncentrality that is considered, that of an effect 30 times its standard error.
 const MAX_NONCENTRALITY: f64 = 1024.0;
 
-/// F test of one candidate in a scan, in terms of the share of the sum of squares that it gains.
-/// Without an effect, the share follows Beta(k/2, (ν − k)/2).
+/// F test of one candidate in a scan, in terms of the fraction of the sum of squares that it
+/// explains. Without an effect, the fraction follows Beta(k/2, (ν − k)/2).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct ScanTest {
     /// Half the number of additional columns, k / 2.
     new: f64,
     /// Half the residual degrees of freedom, (ν − k) / 2.
     left: f64,
-    /// Smallest share of the sum of squares that the candidate must gain to be found.
+    /// Smallest fraction of the sum of squares that the candidate must explain to be found.
     threshold: f64,
 }
 
@@ -27,8 +27,8 @@ impl ScanTest {
     /// Creates the F test of a candidate with `k` additional columns, ν = `freedom` degrees of
     /// freedom, at `level` / `tries`. Returns `None` if no degree of freedom would remain.
     ///
-    /// The share must be significant at level / tries, and must improve the information criterion ν
-    /// ln(1 − share) + k ln ν + 2 ln(tries).
+    /// The explained fraction s must be significant at level / tries, and the information criterion
+    /// ν ln(1 − s) + k ln ν + 2 ln(tries) must be negative.
     pub fn new(k: usize, freedom: f64, level: f64, tries: f64) -> Option<Self> {
         let (new, left) = (k as f64 / 2.0, (freedom - k as f64) / 2.0);
         if k == 0 || left < 0.5 {
@@ -55,15 +55,15 @@ impl ScanTest {
         sum
     }
 
-    /// Returns the p-value, not corrected for the number of tries, of the mean gain at a
-    /// noncentrality.
+    /// Returns the p-value that belongs to the expected gain at a noncentrality λ, not corrected
+    /// for the number of tries.
     pub fn expected_p(&self, noncentrality: f64) -> f64 {
         let gained = 2.0 * self.new + noncentrality;
         beta_reg(self.left, self.new, 2.0 * self.left / (2.0 * self.left + gained))
     }
 
-    /// Returns the noncentrality at which the candidate is found with probability `power`; `None`
-    /// above [`MAX_NONCENTRALITY`].
+    /// Returns the noncentrality λ at which the candidate is found with probability `power`; `None`
+    /// if it exceeds [`MAX_NONCENTRALITY`].
     pub fn noncentrality(&self, power: f64) -> Option<f64> {
         let mut most = 32.0;
         while self.power(most) < power {

@@ -128,8 +128,8 @@ fn time_function(effect: &Effect, problem: &Problem) -> Option<Regressor> {
     (is_one && follows_time && !quantities.is_empty()).then_some(first.regressor)
 }
 
-/// Checks an effect of the instrument against readings of fixed points; `None` for other effects,
-/// and if the readings do not decide.
+/// Checks an effect of the instrument against readings of fixed points. Returns `None` for other
+/// effects, without the times needed, and if the odds are below 100 to 1 either way.
 pub(super) fn reference_check(
     fitted: &Fitted,
     data: &Data,

@@ -49,7 +49,7 @@ impl SelectionRules {
     /// Checks that every setting is in its range.
     ///
     /// # Errors
-    /// Returns an error about the first setting that is not.
+    /// Returns an error that names the first setting out of its range.
     #[doc(hidden)]
     pub fn check(&self) -> Result<(), IdentifyError> {
         let is_probability = |value: f64| value > 0.0 && value < 1.0;

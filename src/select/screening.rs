@@ -6,7 +6,7 @@ use super::evidence::{Evidence, evaluate};
 use super::fitted::Fitted;
 use super::neighbourhood::{Scan, Tried};
 use super::rules::SelectionRules;
-use super::separating_pose::{SeparatingPose, separating_pose, shuffled};
+use super::separating_pose::{SeparatingPose, random_poses, separating_pose};
 use crate::fit::{Identification, IdentifyError, Noise, Options};
 use crate::measurement::Dataset;
 use crate::problem::{Effect, Problem};
@@ -20,28 +20,29 @@ pub struct Ranked {
     pub effect: Effect,
     /// p-value of the F test, corrected for the candidates tried.
     pub p_value: f64,
-    /// F statistic and its degrees of freedom.
+    /// F statistic and the degrees of freedom of its numerator.
     pub f: (f64, usize),
     /// Expected reduction of the root mean squared error on the identification poses \[m\].
     pub gain: f64,
-    /// Reduction of the root mean squared error of identification poses, each left out of the fit
-    /// in turn \[m\]; `None` if it was not computed.
+    /// Reduction of the root mean squared error of identification poses that are left out of the
+    /// fit in ten blocks \[m\]; `None` if it was not computed.
     pub cross_validated: Option<f64>,
-    /// Effects of the ranking that are confounded with this candidate, with the largest principal
-    /// angle to each \[rad\].
+    /// Effects of the ranking that are confounded with this candidate, each with the largest
+    /// principal angle between its columns and the candidate's \[rad\].
     pub alike: Vec<(Effect, f64)>,
-    /// Pose that would distinguish this candidate from the first confounded effect.
+    /// Pose that would distinguish this candidate from the first confounded effect; `None` if there
+    /// is none, or if one of the two depends on earlier poses.
     pub separating_pose: Option<SeparatingPose>,
 }
 
-/// Result of `trace`: effects that the residual of the declared problem's fit points to.
+/// Result of `trace`: effects that may explain the residual of the declared problem's fit.
 #[derive(Debug, Clone)]
 pub struct Trace {
     /// Fit of the declared problem to the identification rows.
     pub fit: Identification,
     /// Tests of the residual of that fit.
     pub residual_tests: ResidualTests,
-    /// Candidates in order of the evidence for them, best first; only the best of each family at
+    /// Candidates in order of an information criterion, best first; only the best of each family at
     /// each place.
     pub ranking: Vec<Ranked>,
     /// Number of candidates that were tried; each order or time counts.
@@ -50,8 +51,8 @@ pub struct Trace {
     pub level: f64,
     /// Candidates that the data cannot show, with the reason.
     pub untestable: Vec<(Effect, &'static str)>,
-    /// Candidates that the fitted parameters can reproduce completely, so that they cannot be
-    /// detected.
+    /// Candidates whose displacements the fitted parameters can reproduce completely, so that they
+    /// cannot be detected.
     pub absorbed: Vec<Effect>,
     /// Evidence for sets of hypotheses; `None` if only the ranking was requested, or the residual
     /// is not finite.
@@ -63,14 +64,14 @@ pub struct Trace {
 }
 
 impl Trace {
-    /// Describes an effect in words, in terms of the quantities that these data record.
+    /// Describes an effect in words, with row numbers instead of times if these data have no times.
     pub fn describe(&self, effect: &Effect) -> String {
         effect.describe_in(self.time_measured)
     }
 }
 
-/// Ranks the effects that the residual of `problem` points to, from the identification rows alone.
-/// Changes nothing.
+/// Fits `problem` to the identification rows and ranks the effects that may explain the residual.
+/// Adds none of them.
 ///
 /// # Errors
 /// Returns an error if problem, data and options do not match.
@@ -112,19 +113,20 @@ pub(super) fn trace_fit(fitted: &Fitted, data: &Data) -> Trace {
         }
     }
     best.truncate(MAX_RANKED);
-    let looked_at =
+    let compared_count =
         best.iter().take(MAX_COMPARED).filter(|tried| tried.corrected < rules.level).count();
     let rms =
         |squares: f64| (3.0 * squares.max(0.0) / scan.linear.rows() as f64).sqrt() * fitted.sigma;
     let without = scan.linear.cross_validate(&data.block);
-    let poses = shuffled(data);
-    let looked: Vec<Effect> =
+    let poses = random_poses(data);
+    let compared_effects: Vec<Effect> =
         best.iter().take(MAX_COMPARED).map(|tried| scan.effects[tried.index].clone()).collect();
     let all_poses: Vec<usize> = (0..poses.len()).collect();
     let elsewhere = Data { measurements: &poses, ..data.clone() };
-    let there = (looked_at > 0).then(|| fitted.linearised_at(&elsewhere, &all_poses, &looked));
+    let there = (compared_count > 0)
+        .then(|| fitted.linearised_at(&elsewhere, &all_poses, &compared_effects));
     let ranked = |(place, tried): (usize, &Tried)| {
-        let close = place < looked_at;
+        let close = place < compared_count;
         let cross_validated = without.filter(|_| close).and_then(|without| {
             let with = scan.linear.with(&scan.columns(tried.index));
             Some(rms(without) - rms(with.cross_validate(&data.block)?))
@@ -141,8 +143,9 @@ pub(super) fn trace_fit(fitted: &Fitted, data: &Data) -> Trace {
         let alike: Vec<(Effect, f64)> = alike.filter_map(angle).collect();
         let candidate = &scan.effects[tried.index];
         // For effects that depend on earlier poses, no single pose distinguishes them.
-        let tells = |(other, _): &&(Effect, f64)| !candidate.has_memory() && !other.has_memory();
-        let pair = alike.first().filter(tells).zip(there.as_ref());
+        let have_no_memory =
+            |(other, _): &&(Effect, f64)| !candidate.has_memory() && !other.has_memory();
+        let pair = alike.first().filter(have_no_memory).zip(there.as_ref());
         let separating_pose = pair.and_then(|((other, _), there)| {
             separating_pose(&scan.linear, [&linearised, there], &poses, (candidate, other))
         });
@@ -173,7 +176,7 @@ pub(super) fn trace_fit(fitted: &Fitted, data: &Data) -> Trace {
     }
 }
 
-/// Tests the residual of a fit of `problem` at the identification rows.
+/// Tests the residual of a fit `found` of `problem` at the identification rows.
 ///
 /// # Errors
 /// Returns an error if problem, data and fit do not match.

@@ -14,7 +14,7 @@ use crate::problem::Effect;
 /// Pose whose measurement would distinguish two effects.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SeparatingPose {
-    /// Second of the two effects that the pose distinguishes.
+    /// Effect from which the pose distinguishes the ranked candidate.
     pub other: Effect,
     /// Configuration within the measured ranges, shape = (joints) \[rad\] or \[m\].
     pub configuration: Vec<f64>,
@@ -31,10 +31,10 @@ pub struct SeparatingPose {
     pub difference: f64,
 }
 
-/// Returns random poses within the measured ranges: each quantity of a pose has the value of a
-/// randomly chosen identification row. Joints of image rows stay together, because cameras see
-/// nothing in most other configurations.
-pub(super) fn shuffled(data: &Data) -> Measurements {
+/// Returns [`MAX_SEPARATING_POSES`] random poses within the measured ranges: each quantity of a
+/// pose has the value of a randomly chosen identification row. Joints of image rows stay together,
+/// because cameras see nothing in most other configurations.
+pub(super) fn random_poses(data: &Data) -> Measurements {
     let mut rng = ChaCha8Rng::seed_from_u64(data.rules.seed);
     let (rows, count) = (data.rows(), MAX_SEPARATING_POSES);
     let drawn: Vec<usize> = (0..count).map(|_| rows[rng.random_range(0..rows.len())]).collect();
@@ -51,18 +51,18 @@ pub(super) fn shuffled(data: &Data) -> Measurements {
             (&mut poses.hoist, &measured.hoist),
             (&mut poses.temperature, &measured.temperature),
         ];
-        for (column, known) in columns {
-            if let (Some(column), Some(known)) = (column, known) {
-                column[pose] = known[from()];
+        for (column, measured) in columns {
+            if let (Some(column), Some(measured)) = (column, measured) {
+                column[pose] = measured[from()];
             }
         }
     }
     poses
 }
 
-/// Returns the pose among `poses` at which the fits with the one and with the other effect differ
-/// most. `here` is linearised at the measured poses, `there` at `poses`. `None` if there are no
-/// poses.
+/// Returns the pose among `poses` at which the predictions of the fits with the one and with the
+/// other effect differ most. `here` is linearised at the measured poses, `there` at `poses`. `None`
+/// if there are no poses.
 pub(super) fn separating_pose(
     fit: &LinearNeighbourhood,
     [here, there]: [&Linearised; 2],

@@ -1,7 +1,7 @@
 //! Distinction of two effects by poses that are not measured yet.
 
 use super::candidates::Candidates;
-use super::detection::{Size, candidates, sizes, timed, with_linear};
+use super::detection::{Size, candidates, sizes, with_assumed_times, with_linear};
 use super::neighbourhood::tries;
 use super::power::ScanTest;
 use super::rules::SelectionRules;
@@ -24,7 +24,7 @@ pub struct Separation {
 /// Detectability of one of two effects.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Side {
-    /// Smallest size at which a scan of the whole catalogue finds the effect. It concerns the
+    /// Smallest size at which a scan of the whole catalogue finds the effect. It is the size of the
     /// parameters that have the unit of the first parameter.
     pub found: Size,
     /// Smallest size of the effect at which the other effect is ruled out as the cause, at the
@@ -53,7 +53,7 @@ pub fn separation(
     poses: &Measurements,
     [one, other]: [&Effect; 2],
 ) -> Result<Separation, InputError> {
-    let poses = timed(poses);
+    let poses = with_assumed_times(poses);
     let Candidates { mut testable, .. } = candidates(problem, &poses);
     for effect in [one, other] {
         if !testable.contains(effect) {
@@ -62,8 +62,8 @@ pub fn separation(
     }
     let (tries, families) = tries(&testable, problem);
     let tries_of = |effect: &Effect| {
-        let place = testable.iter().position(|known| known == effect);
-        place.map_or(1.0, |place| tries[place] * families as f64)
+        let index = testable.iter().position(|other| other == effect);
+        index.map_or(1.0, |index| tries[index] * families as f64)
     };
     let pair = [one.clone(), other.clone()];
     with_linear(problem, &poses, &pair, |linearised, linear| {
@@ -71,8 +71,8 @@ pub fn separation(
             let both = linear.with(&linearised.columns(beside));
             let score = both.score(&linearised.columns(effect));
             Side {
-                found: first(sizes(problem, linearised, linear, effect, tries_of(effect))),
-                told: first(sizes(problem, linearised, &both, effect, 1.0)),
+                found: first_size(sizes(problem, linearised, linear, effect, tries_of(effect))),
+                told: first_size(sizes(problem, linearised, &both, effect, 1.0)),
                 test: ScanTest::new(
                     score.rank(),
                     both.expected_freedom(),
@@ -86,8 +86,9 @@ pub fn separation(
     })
 }
 
-/// Returns the entry for the first unit of an effect's parameters.
-fn first(sizes: Vec<Size>) -> Size {
+/// Returns the first of an effect's sizes, that for the unit of its first parameter; an empty one
+/// if there is none.
+fn first_size(sizes: Vec<Size>) -> Size {
     let none = Size {
         parameters: Vec::new(),
         unit: crate::quantity::Unit::Number,

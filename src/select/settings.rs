@@ -9,11 +9,11 @@ pub(super) const PRIOR_OF_FUNCTIONS: f64 = 0.25;
 /// Prior weight of the bending of links that are declared rigid, relative to another family of
 /// effects. Most of an arm's compliance is in its joints.
 pub(super) const PRIOR_OF_RIGID_LINKS: f64 = 0.1;
-/// Prior probability that a further effect belongs to a family that the set already contains: an
-/// effect of one joint often occurs at others.
+/// Prior probability that the next effect of a set belongs to a family that the set already
+/// contains: an effect of one joint often occurs at others.
 pub(super) const PRIOR_OF_SAME_FAMILY: f64 = 0.25;
-/// Trial root mean square displacements by a hypothesis, in units of σ, equally probable a priori.
-/// They range from hardly visible to obvious, in factors of about three.
+/// Trial root mean square displacements of the target by a hypothesis, in units of σ, equally
+/// probable a priori. They range from hardly visible to obvious, in factors of about three.
 pub(super) const DISPLACEMENTS: [f64; 6] = [0.3, 1.0, 3.0, 10.0, 30.0, 100.0];
 /// Largest plausible value of an effect's parameter, as a multiple of the 1 σ of its prior.
 pub(super) const MAX_PLAUSIBLE: f64 = 3.0;
@@ -35,7 +35,8 @@ pub(super) const SURFACE_LENGTH: f64 = 0.4;
 /// Length over which amplitude and phase of a nearly periodic error change, as a fraction of the
 /// measured range.
 pub(super) const SLOW_LENGTH: f64 = 0.5;
-/// Highest order of a nearly periodic error [cycles per revolution]: that of the listed harmonics.
+/// Highest order of a nearly periodic error [cycles per revolution]: that of the harmonics in the
+/// catalogue.
 pub(super) const MAX_NEAR_ORDER: u32 = 60;
 /// Trial highest orders of periodic errors with many orders, up to the highest order of a harmonic
 /// in the catalogue.
@@ -47,8 +48,8 @@ pub(super) const GEAR_ORDERS: [u32; 4] = [12, 20, 30, 60];
 pub(super) const MIN_POSES_BESIDE_SHIFT: usize = 3;
 /// Maximum number of trial times of a station shift.
 pub(super) const MAX_SHIFT_TIMES: usize = 200;
-/// Highest order of a wave, integer or not. It is about the number of teeth of a strain-wave gear,
-/// twice its ratio.
+/// Highest order of a wave [cycles per revolution], integer or not. It is about the number of teeth
+/// of a strain-wave gear, twice its ratio.
 pub(super) const MAX_WAVE_ORDER: f64 = 320.0;
 /// Log odds of 20 to 1 at which another value of an argument (order or time) is added as a
 /// hypothesis besides a listed one.
@@ -62,17 +63,17 @@ pub(super) const MIN_REVISED_PROBABILITY: f64 = 0.01;
 pub(super) const MAX_REVISED_SETS: usize = 6;
 /// Maximum number of hypotheses by which one search extends a set.
 pub(super) const MAX_EFFECTS: usize = 4;
-/// Number of sets of equal size that are extended by a further hypothesis (beam width).
+/// Number of sets of equal size that are extended by one more hypothesis (beam width).
 pub(super) const BEAM_WIDTH: usize = 8;
-/// Maximum number of hypotheses by which a set other than the best one is extended: those with the
-/// largest gains.
+/// Maximum number of hypotheses by which the sets of one size other than the best one are extended.
 pub(super) const MAX_EXTENDING: usize = 80;
-/// Largest number of columns for single poses at which a set with such a hypothesis is extended,
-/// because the work grows with their cube.
+/// Largest number of columns of a hypothesis with free values per pose at which a set that contains
+/// it is extended, because the work grows with the cube of that number.
 pub(super) const MAX_WIDE_COLUMNS: usize = 240;
-/// Log odds to the best set beyond which larger sets are not searched.
+/// Largest ln odds of the best set over a set that is still extended or evaluated.
 pub(super) const LOG_ODDS_CUTOFF: f64 = 12.0;
-/// Largest number of added effects for which they are removed from the fit and evaluated again.
+/// Largest number of added effects at which the loop removes them from the fit and evaluates them
+/// again.
 pub(super) const MAX_RECONSIDERED: usize = 16;
 /// Maximum number of rival sets that are fitted, in addition to the best replacements of each
 /// member.
@@ -89,15 +90,16 @@ pub(super) const MAX_SINGLE_POSES: usize = 3;
 /// Smallest squared distance |r|² of an outlier, in units of the variance of the other rows'
 /// coordinates: ten standard deviations. Effects displace single poses by less, wrong readings by
 /// more.
-pub(super) const OUTLIER_DISTANCE: f64 = 100.0;
-/// Largest share of the poses that can be outliers; if more have large residuals, none is an
+pub(super) const OUTLIER_SQUARED_DISTANCE: f64 = 100.0;
+/// Largest fraction of the poses that can be outliers; if more have large residuals, none is an
 /// outlier.
 pub(super) const MAX_OUTLIER_SHARE: f64 = 0.1;
 
 // The following constants concern the ranking and the claims about effects.
 
-/// Smallest share of a candidate's column length that the fitted parameters cannot reproduce, at
-/// which it is detectable. The linear neighbourhood is not more accurate.
+/// Smallest fraction of the length of a candidate's column, outside the span of the fitted
+/// parameters' columns, at which the candidate is detectable. The linear neighbourhood is not more
+/// accurate.
 pub(super) const MIN_NEW_LENGTH: f64 = 1e-4;
 /// Number of standard errors below zero at which a parameter that cannot be negative is rejected:
 /// one in 700 for normal errors.
@@ -116,14 +118,14 @@ pub(super) const CROSS_VALIDATION_BLOCKS: usize = 10;
 /// Largest ratio of the root mean square errors of left-out poses, with and without a correction,
 /// at which the correction is reported.
 pub(super) const MAX_CORRECTED_ERROR: f64 = 0.95;
-/// Smallest odds to an effect at which another one is reported as an alternative.
+/// Smallest odds of another effect over a found one at which it is reported as an alternative.
 pub(super) const MIN_ALTERNATIVE_ODDS: f64 = 0.05;
 /// Number of random subsets of the configurations by which the stability of a finding is measured.
 pub(super) const SUBSETS: u64 = 20;
-/// Smallest share of these subsets that must contain an effect for its probability to be that on
-/// all rows. With a smaller share, the mean over the subsets is stated.
+/// Smallest fraction of these subsets in which an effect must be found for its stated probability
+/// to be that on all rows. With a smaller fraction, the mean over the subsets is stated.
 pub(super) const MIN_SHARE_OF_SUBSETS: f64 = 0.75;
-/// Reciprocal of the share of configurations that each random subset leaves out.
+/// Each random subset leaves out one in this many configurations.
 pub(super) const SUBSET_PARTS: usize = 5;
 /// Number of resamples of the bootstrap interval of the gain.
 pub(super) const RESAMPLES: usize = 2000;

@@ -27,8 +27,9 @@ pub struct Unexplained {
     pub p_value: f64,
     /// Claims with their probabilities; `None` if only the residual tests detect the structure.
     pub claims: Option<Claims>,
-    /// Empirical correction; `None` if it reduces the error of left-out poses by less than 5 %, or
-    /// if the fit has cautions.
+    /// Empirical correction, computed for the most probable structure only. `None` if it reduces
+    /// the error of left-out poses by less than 5 %, if no poses are held out, or if the fit has
+    /// cautions.
     pub correction: Option<Correction>,
 }
 
@@ -41,12 +42,12 @@ pub struct Correction {
     pub ranges: Vec<(Covariate, (f64, f64))>,
     /// Number of held-out poses at which a covariate is outside its identification range.
     pub beyond: usize,
-    /// Root mean squared error of identification poses, each left out in turn, without and with the
-    /// correction \[m\].
+    /// Root mean squared error of identification poses that are left out of the fit in ten blocks,
+    /// without and with the correction \[m\].
     pub cross_validated: (f64, f64),
     /// Error on held-out poses with the correction.
     pub held_out: ErrorSummary,
-    /// Curve of the correction, if it is a function of one covariate at one coordinate.
+    /// Curve of the correction; `None` unless it is a function of one covariate at one coordinate.
     pub curve: Option<Curve>,
 }
 
@@ -74,16 +75,16 @@ pub struct PartialResidual {
     pub correction: f64,
     /// Error of the coordinate according to this pose alone \[rad\] or \[m\].
     pub value: f64,
-    /// Length |l| of the lever \[m/rad\] or \[m/m\]. Poses with a short lever carry little
-    /// information.
+    /// Length |l| of the lever \[m/rad\] or \[m/m\]. Poses with a short lever determine the
+    /// coordinate poorly.
     pub lever: f64,
 }
 
 /// Returns the structure without a law, the most probable first; the first one has its correction.
 ///
-/// All functions of the best set are reported if at least that many hypotheses act with probability
-/// `located`. Otherwise those are reported at whose site a function acts with that probability, one
-/// for each site.
+/// All functions of the best set are reported if at least as many hypotheses as it has act with
+/// probability `located`. Otherwise those are reported at whose site a function acts with that
+/// probability, one for each site.
 pub(super) fn without_law(
     fitted: &Fitted,
     data: &Data,
@@ -93,8 +94,8 @@ pub(super) fn without_law(
     let are_all_sure = evidence.probability_of_as_many(best) >= data.rules.located;
     for hypothesis in best.hypotheses.iter().filter(|hypothesis| hypothesis.effect().is_none()) {
         let claims = evidence.claims(hypothesis);
-        let is_known = listed.iter().any(|(known, _)| known.site == hypothesis.site);
-        if !are_all_sure && (claims.law.1 < data.rules.located || is_known) {
+        let is_site_listed = listed.iter().any(|(other, _)| other.site == hypothesis.site);
+        if !are_all_sure && (claims.law.1 < data.rules.located || is_site_listed) {
             continue;
         }
         let found = Unexplained {
@@ -136,8 +137,9 @@ pub(super) fn unlocated(tests: &ResidualTests) -> Option<Unexplained> {
     })
 }
 
-/// Returns the correction by the most probable function of a hypothesis, applied to the held-out
-/// poses. `None` if it improves the prediction of left-out poses too little.
+/// Returns the correction by the most probable function of a hypothesis, and its errors on the
+/// held-out poses. `None` without such poses, or if it improves the prediction of left-out poses
+/// too little.
 fn correction(
     fitted: &Fitted,
     data: &Data,
@@ -146,15 +148,15 @@ fn correction(
 ) -> Option<Correction> {
     // The peak of a narrow function may have been mistaken for outliers. Predictions of left-out
     // poses distinguish the two.
-    let bends = fitted.problem.robust.is_none() && !fitted.set_aside.is_empty();
-    let whole = bends.then(|| fitted.with_all_rows());
-    let fitted = whole.as_ref().unwrap_or(fitted);
+    let may_hide_peak = fitted.problem.robust.is_none() && !fitted.set_aside.is_empty();
+    let with_all_rows = may_hide_peak.then(|| fitted.with_all_rows());
+    let fitted = with_all_rows.as_ref().unwrap_or(fitted);
     let (here, there) = (data.rows(), &data.split.held_out);
     if there.is_empty() {
         return None;
     }
-    let weighed = data.evidence_rows();
-    let few = Hypotheses::only(fitted, data, &weighed, weighed.len(), hypothesis);
+    let evidence_rows = data.evidence_rows();
+    let few = Hypotheses::only(fitted, data, &evidence_rows, evidence_rows.len(), hypothesis);
     let (shape, sigma) = best_form(fitted, data, &few, best, hypothesis)?;
     let rows = [here, there.as_slice()].concat();
     let hypotheses = Hypotheses::only(fitted, data, &rows, here.len(), hypothesis);
@@ -197,8 +199,8 @@ fn correction(
     })
 }
 
-/// Returns a correction as a function of one covariate, from its displacement of the poses
-/// (`function`) and the remaining residual (`remaining`).
+/// Returns a correction as a function of one covariate, from its part of the residual (`function`)
+/// and the remaining residual (`remaining`), both in units of σ. `None` if it is no such function.
 fn curve(
     hypotheses: &Hypotheses,
     hypothesis: &Hypothesis,

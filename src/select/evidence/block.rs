@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::marginal::{Coefficients, NoiseGrid, Normal, of_block};
+use super::marginal::{Coefficients, NoiseGrid, Normal, ln_likelihood_of_block};
 use crate::select::neighbourhood::LinearNeighbourhood;
 
 /// Columns A of a hypothesis: derivatives of the whitened residuals with respect to its
@@ -17,8 +17,8 @@ pub(super) enum Design {
     /// Columns stored as a full matrix.
     Dense(DMatrix<f64>),
     /// Sparse columns. For each lever, shape = (3 N), there is one column for each group of poses:
-    /// equal to the lever in the group, 0 elsewhere. The levers are orthogonal in every pose, so
-    /// that AᵀA is diagonal.
+    /// equal to the lever in the group, 0 elsewhere. `groups` holds the group of each pose, `None`
+    /// for a pose in no group. The levers are orthogonal in every pose, so that AᵀA is diagonal.
     Grouped { levers: DMatrix<f64>, groups: Vec<Option<usize>> },
 }
 
@@ -65,16 +65,25 @@ impl Design {
         match self {
             Self::Dense(columns) => Cow::Borrowed(columns),
             Self::Grouped { levers, groups } => {
-                let count = count(groups);
-                Cow::Owned(DMatrix::from_fn(levers.nrows(), levers.ncols() * count, |row, j| {
-                    if groups[row / 3] == Some(j % count) { levers[(row, j / count)] } else { 0.0 }
-                }))
+                let group_count = group_count(groups);
+                Cow::Owned(DMatrix::from_fn(
+                    levers.nrows(),
+                    levers.ncols() * group_count,
+                    |row, j| {
+                        if groups[row / 3] == Some(j % group_count) {
+                            levers[(row, j / group_count)]
+                        } else {
+                            0.0
+                        }
+                    },
+                ))
             }
         }
     }
 }
 
-fn count(groups: &[Option<usize>]) -> usize {
+/// Returns the number of groups.
+fn group_count(groups: &[Option<usize>]) -> usize {
     groups.iter().flatten().max().map_or(0, |last| last + 1)
 }
 
@@ -84,14 +93,14 @@ fn times_grouped(
     levers: &DMatrix<f64>,
     groups: &[Option<usize>],
 ) -> DMatrix<f64> {
-    let count = count(groups);
-    let mut all = DMatrix::zeros(rows.nrows(), levers.ncols() * count);
+    let group_count = group_count(groups);
+    let mut all = DMatrix::zeros(rows.nrows(), levers.ncols() * group_count);
     for (pose, group) in
         groups.iter().enumerate().filter_map(|(pose, group)| Some((pose, (*group)?)))
     {
         let here = rows.columns(3 * pose, 3);
         for (k, lever) in levers.column_iter().enumerate() {
-            all.column_mut(k * count + group).gemv(1.0, &here, &lever.rows(3 * pose, 3), 1.0);
+            all.column_mut(k * group_count + group).gemv(1.0, &here, &lever.rows(3 * pose, 3), 1.0);
         }
     }
     all
@@ -99,7 +108,11 @@ fn times_grouped(
 
 /// Returns AᵀA and Aᵀr of the columns A of [`Design::Grouped`], with the fitted parameters
 /// projected out.
-fn grouped(levers: &DMatrix<f64>, groups: &[Option<usize>], fit: &LinearNeighbourhood) -> Normal {
+fn grouped_products(
+    levers: &DMatrix<f64>,
+    groups: &[Option<usize>],
+    fit: &LinearNeighbourhood,
+) -> Normal {
     let squares = levers.map(|value| value * value);
     let diagonal =
         times_grouped(&DMatrix::repeat(1, squares.nrows(), 1.0), &squares, groups).transpose();
@@ -120,11 +133,14 @@ pub(super) struct Block {
     columns: Columns,
     /// Products AᵀA and Aᵀr of the projected columns.
     normal: Normal,
+    /// ln of the prior probability of the hypothesis.
     pub ln_prior: f64,
+    /// Prior on the coefficients of the columns.
     coefficients: Coefficients,
     /// True if the hypothesis is a function of several covariates.
     pub is_surface: bool,
-    /// True if the hypothesis is a periodic error with many orders under one prior.
+    /// True if the hypothesis is a periodic error with many orders, whose coefficients have one
+    /// prior.
     pub is_periodic_of_many_orders: bool,
     /// Name of the family of the hypothesis' effect; `None` for a function without a law.
     pub family: Option<String>,
@@ -182,7 +198,7 @@ impl Block {
                     (Columns::Dense(Arc::new(projected)), Normal::Dense { product, gram })
                 }
                 Design::Grouped { levers, groups } => {
-                    let normal = grouped(&levers, &groups, fit);
+                    let normal = grouped_products(&levers, &groups, fit);
                     (Columns::Grouped { levers, groups }, normal)
                 }
             };
@@ -213,11 +229,11 @@ impl Block {
         self.family.is_some()
     }
 
-    /// Returns true if a set with this block is not extended: it is a periodic error, or has more
-    /// than `MAX_WIDE_COLUMNS` columns that belong to single poses.
+    /// Returns true if a set with this block is not extended: the block is a periodic error with
+    /// many orders, or has more than [`MAX_WIDE_COLUMNS`] grouped columns.
     pub fn is_wide(&self) -> bool {
         self.is_periodic_of_many_orders
-            || matches!(&self.columns, Columns::Grouped { levers, groups } if levers.ncols() * count(groups) > MAX_WIDE_COLUMNS)
+            || matches!(&self.columns, Columns::Grouped { levers, groups } if levers.ncols() * group_count(groups) > MAX_WIDE_COLUMNS)
     }
 
     /// Returns the columns A of the hypothesis, with the fitted parameters projected out.
@@ -243,7 +259,8 @@ impl Block {
     }
 
     /// Returns MᵀA for grouped columns A and columns M from which the fitted parameters are
-    /// projected out, given the transpose of M; no columns for others.
+    /// projected out, given the transpose of M. The result has no columns if A is stored as a full
+    /// matrix.
     pub fn times_grouped(&self, transposed: &DMatrix<f64>) -> DMatrix<f64> {
         match &self.columns {
             Columns::Grouped { levers, groups } => times_grouped(transposed, levers, groups),
@@ -253,9 +270,9 @@ impl Block {
 
     /// Returns ln p(r | set and block) − ln p(r | set), and the most probable size of the block.
     ///
-    /// `set` holds Z A and Z r, by which the set reduces columns and residual; `None` for the empty
-    /// set. `squares_and_freedom` are the sum of squares that the set leaves, and its degrees of
-    /// freedom.
+    /// `set` holds Z A and Z r: the set reduces AᵀA by (Z A)ᵀZ A and Aᵀr by (Z A)ᵀZ r; it is `None`
+    /// for the empty set. `squares_and_freedom` are the sum of squares that the set leaves, and its
+    /// degrees of freedom. `without` is ln p(r | set).
     pub fn gain(
         &self,
         set: Option<(&DMatrix<f64>, &DVector<f64>)>,
@@ -263,8 +280,8 @@ impl Block {
         grid: &NoiseGrid,
     ) -> (f64, f64) {
         let (with, size) = match set {
-            None => self.over_sizes(&self.normal, squares_and_freedom, grid),
-            Some((along, residual_along)) => self.over_sizes(
+            None => self.ln_likelihood_over_sizes(&self.normal, squares_and_freedom, grid),
+            Some((along, residual_along)) => self.ln_likelihood_over_sizes(
                 &self.normal.reduced_by(along, residual_along),
                 squares_and_freedom,
                 grid,
@@ -274,15 +291,20 @@ impl Block {
     }
 
     /// Returns ln p(r | block), up to a constant, and the most probable size. `normal` and
-    /// `squares_and_freedom` belong to the columns and the residual after the other members of the
-    /// set.
-    pub fn over_sizes(
+    /// `squares_and_freedom` are those that remain after the other members of the set are projected
+    /// out of columns and residual.
+    pub fn ln_likelihood_over_sizes(
         &self,
         normal: &Normal,
         squares_and_freedom: (f64, f64),
         grid: &NoiseGrid,
     ) -> (f64, f64) {
-        of_block(normal, squares_and_freedom, grid, (&DISPLACEMENTS, &self.coefficients))
+        ln_likelihood_of_block(
+            normal,
+            squares_and_freedom,
+            grid,
+            (&DISPLACEMENTS, &self.coefficients),
+        )
     }
 }
 
@@ -310,7 +332,7 @@ mod tests {
         let fit = LinearNeighbourhood::new(&jacobian, &residual, &unknowns, 0);
         let (within, grid) = (
             fit.projected_out(&matrix(36, 9).columns(7, 2).into_owned()).transpose() * 0.2,
-            Noise { freedom: 30.0, trust: 0.1, least: 0.0 }.grid(),
+            Noise { freedom: 30.0, ln_half_width: 0.1, min_ln_factor: 0.0 }.grid(),
         );
         let residual_along = &within * fit.residual();
         for is_beside in [true, false] {

@@ -17,8 +17,8 @@ use crate::select::data::Data;
 use crate::select::fitted::Fitted;
 
 /// Returns the blocks of `candidates` and the residual that they are to explain, with the fitted
-/// parameters projected out and some poses left out. `None` if the residual is not finite or the
-/// search was stopped.
+/// parameters projected out. Poses with the indices `left_out` are not used. `None` if the residual
+/// is not finite or the search was stopped.
 pub(super) fn blocks(
     fitted: &Fitted,
     data: &Data,
@@ -33,7 +33,7 @@ pub(super) fn blocks(
     }
     // A declared σ that is larger than the scatter about the fit does not bound the noise from
     // below. The scatter is then used, as if no σ were declared.
-    let holds = fitted.found.noise == Noise::Declared && fitted.found.sigma_scale >= 1.0;
+    let bounds_noise = fitted.found.noise == Noise::Declared && fitted.found.sigma_scale >= 1.0;
     let unless_stopped = |some: &[&Candidate]| {
         (!data.stop.is_requested())
             .then(|| Candidate::blocks(some, (fitted, &neighbourhood), left_out))
@@ -52,8 +52,12 @@ pub(super) fn blocks(
         + rows.iter().enumerate().filter(is_aside).map(|(pose, _)| numbers(pose)).sum::<usize>();
     let noise = marginal::Noise {
         freedom: (neighbourhood.sums().freedom() - without_weight as f64).max(1.0),
-        trust: if holds { SPREAD_OF_DECLARED_NOISE } else { SPREAD_OF_ESTIMATED_NOISE },
-        least: if holds { 0.0 } else { f64::NEG_INFINITY },
+        ln_half_width: if bounds_noise {
+            SPREAD_OF_DECLARED_NOISE
+        } else {
+            SPREAD_OF_ESTIMATED_NOISE
+        },
+        min_ln_factor: if bounds_noise { 0.0 } else { f64::NEG_INFINITY },
     };
     let alike = (PRIOR_OF_SAME_FAMILY.ln() - hypotheses.ln_family - 2.0_f64.ln()).max(0.0);
     let target = ResidualModel { fit: neighbourhood, noise, alike, stop: data.stop.clone() };
@@ -65,9 +69,9 @@ pub(super) fn blocks(
         added.iter().filter_map(|&k| candidates[k].hypothesis.effect()).collect();
     let products = Products::new(&blocks, &target);
     let waves = Waves { hypotheses, products: &products, fitted, left_out };
-    let spreads = waves.spreads(&added, &effects);
-    for (k, ln_spread) in spreads {
-        blocks[k].ln_prior += ln_spread;
+    let ln_likelihood_widths = waves.ln_likelihood_widths(&added, &effects);
+    for (k, ln_width) in ln_likelihood_widths {
+        blocks[k].ln_prior += ln_width;
     }
     Some((blocks, target))
 }

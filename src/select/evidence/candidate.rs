@@ -25,7 +25,9 @@ pub(super) struct Candidate {
     pub variant: usize,
     /// Columns, scaled together to root mean square 1.
     pub design: Design,
+    /// ln of the prior probability of the hypothesis with this function.
     pub ln_prior: f64,
+    /// Prior on the coefficients of the columns.
     pub coefficients: Coefficients,
 }
 
@@ -33,8 +35,8 @@ pub(super) struct Candidate {
 pub(super) const HYPOTHESES_PER_PROJECTION: usize = 32;
 
 impl Candidate {
-    /// Returns the blocks of candidates: columns with the fitted parameters projected out, and some
-    /// poses left out.
+    /// Returns the blocks of candidates: their columns with the fitted parameters projected out and
+    /// the rows of the poses `left_out` set to zero.
     pub fn blocks(
         candidates: &[&Self],
         (fitted, fit): (&Fitted, &LinearNeighbourhood),
@@ -64,24 +66,24 @@ impl Candidate {
 }
 
 /// Returns joint (from 0) and order of a wave; `None` for other effects.
-pub(super) fn order_of(effect: &Effect) -> Option<(usize, f64)> {
+pub(super) fn joint_and_order(effect: &Effect) -> Option<(usize, f64)> {
     if let Effect::JointWave { joint, order } = effect { Some((joint - 1, *order)) } else { None }
 }
 
-/// Scales the columns of an effect to equal length over the first `weighed` poses. Also returns,
-/// for each parameter, the root mean square displacement by its largest plausible value, in units
-/// of σ.
-pub(super) fn even(
+/// Scales the columns of an effect to equal length over the first `evidence_poses` poses. Also
+/// returns, for each parameter, the root mean square displacement by its largest plausible value,
+/// in units of σ.
+pub(super) fn scaled_to_equal_length(
     mut columns: DMatrix<f64>,
     terms: &[Term],
-    weighed: usize,
+    evidence_poses: usize,
 ) -> (DMatrix<f64>, Vec<f64>) {
     let mut largest = Vec::new();
     for (k, mut column) in columns.column_iter_mut().enumerate() {
-        let length = column.rows(0, 3 * weighed).norm();
+        let length = column.rows(0, 3 * evidence_poses).norm();
         let most = terms.get(k).map_or(f64::INFINITY, |term| MAX_PLAUSIBLE * term.size);
         largest.push(if length > 0.0 {
-            most * length / ((3 * weighed) as f64).sqrt()
+            most * length / ((3 * evidence_poses) as f64).sqrt()
         } else {
             MIN_PLAUSIBLE_SIZE
         });

@@ -11,9 +11,11 @@ use rayon::prelude::*;
 use super::block::Block;
 use crate::select::neighbourhood::LinearNeighbourhood;
 
-/// Number of hypotheses whose products are formed together; their columns fit into the cache.
+/// Number of hypotheses whose products are formed together. Their columns fit into the processor
+/// cache.
 const HYPOTHESES_PER_PRODUCT: usize = 32;
-/// Smallest number of rows and of columns of a product. With fewer, nalgebra sums in another order.
+/// Smallest number of rows and of columns of a product. With fewer, nalgebra sums in another order,
+/// and a product would depend on those formed with it.
 pub(super) const MIN_SIDE: usize = 6;
 
 /// Members of sets with their products, by the index of the hypothesis.
@@ -31,7 +33,7 @@ pub(super) struct Member {
 }
 
 impl ColumnProducts {
-    /// Makes room for the products of `count` hypotheses.
+    /// Adds empty entries for the products of `count` hypotheses in all.
     pub fn extend_to(&mut self, count: usize) {
         for member in self.0.iter_mut().filter_map(OnceLock::get_mut) {
             member.products.resize_with(count, OnceLock::new);
@@ -39,10 +41,10 @@ impl ColumnProducts {
         self.0.resize_with(count, OnceLock::new);
     }
 
-    /// Returns the columns of a set member.
+    /// Returns the hypothesis with this index as a set member, with its columns.
     pub fn member(&self, index: usize, blocks: &[Block], fit: &LinearNeighbourhood) -> &Member {
-        if let Some(known) = self.0[index].get() {
-            return known;
+        if let Some(member) = self.0[index].get() {
+            return member;
         }
         // The columns are computed before the cell is locked: a thread that helps with this
         // product may need the same member.
@@ -57,7 +59,7 @@ impl Member {
     /// Returns the product AᵀC with the columns C of another hypothesis.
     pub fn product(&self, other: usize, blocks: &[Block]) -> &DMatrix<f64> {
         self.products[other].get_or_init(|| match blocks[other].dense() {
-            Some(columns) => together(&[self], &[columns]),
+            Some(columns) => products_together(&[self], &[columns]),
             None => blocks[other].times_grouped(&self.transposed),
         })
     }
@@ -68,8 +70,8 @@ impl Member {
 }
 
 /// Forms the products of some members with the hypotheses `others`, as far as they are missing.
-pub(super) fn form(members: &[&Member], others: &[usize], blocks: &[Block]) {
-    let of = |others: &[usize]| {
+pub(super) fn form_products(members: &[&Member], others: &[usize], blocks: &[Block]) {
+    let form_block = |others: &[usize]| {
         let is_missing = |other: usize| members.iter().any(|member| member.lacks(other));
         let missing: Vec<(usize, &DMatrix<f64>)> = others
             .iter()
@@ -85,7 +87,7 @@ pub(super) fn form(members: &[&Member], others: &[usize], blocks: &[Block]) {
             return;
         }
         let columns: Vec<&DMatrix<f64>> = missing.iter().map(|(_, columns)| *columns).collect();
-        let all = together(&lacking, &columns);
+        let all = products_together(&lacking, &columns);
         let mut row = 0;
         for member in lacking {
             let (count, mut column) = (member.columns.ncols(), 0);
@@ -101,12 +103,12 @@ pub(super) fn form(members: &[&Member], others: &[usize], blocks: &[Block]) {
             row += count;
         }
     };
-    others.par_chunks(HYPOTHESES_PER_PRODUCT).for_each(of);
+    others.par_chunks(HYPOTHESES_PER_PRODUCT).for_each(form_block);
 }
 
 /// Returns the products AᵀC of the members' columns, one below the other, with `columns` side by
 /// side. Rows and columns of zeros are added up to [`MIN_SIDE`] for several pairs only.
-fn together(members: &[&Member], columns: &[&DMatrix<f64>]) -> DMatrix<f64> {
+fn products_together(members: &[&Member], columns: &[&DMatrix<f64>]) -> DMatrix<f64> {
     let height: usize = members.iter().map(|member| member.columns.ncols()).sum();
     let width: usize = columns.iter().map(|columns| columns.ncols()).sum();
     let rows = columns.first().map_or(0, |columns| columns.nrows());
@@ -155,7 +157,7 @@ mod tests {
         many.extend_to(blocks.len());
         let members: Vec<&Member> =
             (0..12).map(|member| many.member(member, &blocks, &fit)).collect();
-        form(&members, &all, &blocks);
+        form_products(&members, &all, &blocks);
         for (k, member) in members.iter().enumerate() {
             for &other in &all {
                 let single = alone.member(k, &blocks, &fit).product(other, &blocks);

@@ -1,12 +1,14 @@
-//! Columns of the hypotheses: what each would do to every measured coordinate.
+//! Columns of the hypotheses: derivatives of every whitened residual by their coefficients.
 
 use crate::select::settings::{SLOW_LENGTH, SMOOTH_LENGTHS, SURFACE_LENGTH};
 use nalgebra::{DMatrix, DVector};
 
 use super::block::Design;
-use super::candidate::{Candidate, even};
+use super::candidate::{Candidate, scaled_to_equal_length};
 use super::families::{Families, OtherHypotheses, ln_family};
-use super::functions::{SampledCovariate, goes_with, growing, merge, products_of, times};
+use super::functions::{
+    SampledCovariate, are_combined, expand, merge, products_of, scaled_functions,
+};
 use super::hypothesis::Hypothesis;
 use super::marginal::Coefficients;
 use super::sites::{acts_along_axes, geometry_sites};
@@ -18,8 +20,7 @@ use crate::problem::{Effect, JointKind, Observation, Problem};
 use crate::residual_tests::Covariate;
 use crate::select::neighbourhood::{Linearised, tries};
 
-/// Displacement of the target, in units of σ, up to which a difference between commands that touch
-/// the same point may be noise.
+/// Largest displacement of the target by noise, in units of σ, between touches of the same point.
 const MAX_NOISE_DISPLACEMENT: f64 = 3.0;
 /// Number of candidate indices ([`Candidate::variant`]) reserved for the functions of each load.
 const VARIANTS_PER_LOAD: usize = 4;
@@ -34,14 +35,15 @@ pub(super) struct Columns<'a, 'l> {
     /// Two flags: directions of approach are recorded; times are recorded.
     pub coverage: (bool, bool),
     /// True if the harmonics of all joints may have a common prior.
-    pub takes_gears: bool,
+    pub admits_common_prior: bool,
     /// Number of poses on which evidence is evaluated, the first ones. At the other poses,
     /// functions are only predicted.
-    pub weighed: usize,
+    pub evidence_poses: usize,
     /// Only hypothesis whose functions are built; `None` builds all.
     only: Option<&'a Hypothesis>,
+    /// Candidates built so far; their prior probabilities are set last.
     pub candidates: Vec<Candidate>,
-    /// For each candidate, its family and its share of the family's prior probability.
+    /// For each candidate, its family and its prior weight relative to the others of the family.
     shares: Vec<(String, f64)>,
     /// Effects that displace no pose.
     unseen: Vec<Effect>,
@@ -50,15 +52,15 @@ pub(super) struct Columns<'a, 'l> {
 }
 
 impl<'a, 'l> Columns<'a, 'l> {
-    /// Builds the candidates: effects with their columns, and functions without a law. With `only`,
-    /// it builds the functions of that hypothesis alone.
+    /// Builds the candidates: effects with their columns, and functions without a law; if `only` is
+    /// given, only the functions of that hypothesis.
     ///
     /// Returns the candidates, the covariates of the functions, ln of the prior probability of one
-    /// family of effects, and what that of a single effect needs to know of the others.
+    /// family of effects, and the properties of all hypotheses on which the prior of one depends.
     pub fn all(
         problem: &'a Problem,
         linearised: &'a Linearised<'l>,
-        (coverage, takes_gears, weighed): ((bool, bool), bool, usize),
+        (coverage, admits_common_prior, evidence_poses): ((bool, bool), bool, usize),
         effects: &[(Effect, DMatrix<f64>)],
         only: Option<&'a Hypothesis>,
     ) -> (Vec<Candidate>, Vec<SampledCovariate>, f64, OtherHypotheses) {
@@ -68,19 +70,21 @@ impl<'a, 'l> Columns<'a, 'l> {
             problem,
             linearised,
             coverage,
-            takes_gears,
-            weighed,
+            admits_common_prior,
+            evidence_poses,
             only,
             candidates,
             shares,
             unseen,
             covariates,
         };
-        new_columns.effects(effects);
-        new_columns.functions();
+        new_columns.add_effects(effects);
+        new_columns.add_functions();
         new_columns.into_candidates()
     }
 
+    /// Adds a function without a law; `share` is its prior weight relative to the others of its
+    /// family.
     pub(super) fn add(
         &mut self,
         family: &str,
@@ -101,8 +105,7 @@ impl<'a, 'l> Columns<'a, 'l> {
         if self.only.is_some_and(|only| *only != hypothesis) {
             return;
         }
-        // The space distinguishes this family from families of effects, whose names never begin
-        // with one.
+        // The leading space distinguishes this family from families of effects.
         self.push_candidate(
             &format!(" {family}"),
             share,
@@ -112,6 +115,7 @@ impl<'a, 'l> Columns<'a, 'l> {
         );
     }
 
+    /// Adds a candidate, unless its columns are zero.
     fn push_candidate(
         &mut self,
         family: &str,
@@ -120,7 +124,7 @@ impl<'a, 'l> Columns<'a, 'l> {
         design: Design,
         coefficients: Coefficients,
     ) {
-        if let Some(design) = design.scaled(self.weighed) {
+        if let Some(design) = design.scaled(self.evidence_poses) {
             let same = self.candidates.last().filter(|last| last.hypothesis == hypothesis);
             let variant = same.map_or(0, |last| last.variant + 1);
             self.candidates.push(Candidate {
@@ -150,11 +154,11 @@ impl<'a, 'l> Columns<'a, 'l> {
         }
     }
 
-    fn effects(&mut self, effects: &[(Effect, DMatrix<f64>)]) {
+    fn add_effects(&mut self, effects: &[(Effect, DMatrix<f64>)]) {
         let only: Vec<Effect> = effects.iter().map(|(effect, _)| effect.clone()).collect();
         let (tries, _) = tries(&only, self.problem);
         for ((effect, columns), tries) in effects.iter().zip(tries) {
-            let measured = (self.coverage, self.weighed);
+            let measured = (self.coverage, self.evidence_poses);
             match candidate_of(effect, columns.clone(), self.problem, measured) {
                 Some(candidate) => {
                     self.candidates.push(candidate);
@@ -165,8 +169,8 @@ impl<'a, 'l> Columns<'a, 'l> {
         }
     }
 
-    fn functions(&mut self) {
-        let (known, loads) = (self.recorded_covariates(), self.loads());
+    fn add_functions(&mut self) {
+        let (recorded, loads) = (self.recorded_covariates(), self.loads());
         // The shortest length is used only for the coordinates that joints move, because it needs
         // many poses.
         let lengths = SMOOTH_LENGTHS;
@@ -175,28 +179,33 @@ impl<'a, 'l> Columns<'a, 'l> {
             let moving = self.is_command_coordinate(site);
             let (family, lengths_here) =
                 if moving { ("smooth", &lengths[..]) } else { ("smooth elsewhere", &lengths[..2]) };
-            for of in &known {
-                self.smooth(family, (site, &[&at]), of, (lengths_here, 0));
+            for of in &recorded {
+                self.add_smooth(family, (site, &[&at]), of, (lengths_here, 0));
             }
             for (load, of) in &loads {
-                self.smooth(family, (site, &[&at]), of, (&lengths[..2], load * VARIANTS_PER_LOAD));
+                self.add_smooth(
+                    family,
+                    (site, &[&at]),
+                    of,
+                    (&lengths[..2], load * VARIANTS_PER_LOAD),
+                );
             }
             if moving {
-                self.surfaces(site, &at, &known);
-                self.scaled_by(site, &at, &known);
-                self.per_pose(site, &at);
+                self.add_surfaces(site, &at, &recorded);
+                self.add_scaled(site, &at, &recorded);
+                self.add_per_pose(site, &at);
                 if let ParameterSite::Joint { joint, .. } = site {
-                    self.near_harmonics(site, &at, joint);
-                    self.gears(site, &at, joint);
+                    self.add_near_harmonics(site, &at, joint);
+                    self.add_periodic_errors(site, &at, joint);
                 }
             }
         }
-        self.measurement(&known);
-        self.base(&known);
-        self.warming(&known);
-        self.repeats();
-        self.sag();
-        self.covariates.extend(known);
+        self.add_measurement_functions(&recorded);
+        self.add_base_rotations(&recorded);
+        self.add_link_functions(&recorded);
+        self.add_repeats();
+        self.add_sag();
+        self.covariates.extend(recorded);
     }
 
     /// Returns true if a parameter site is the coordinate that a joint's command moves: θ or, for a
@@ -262,16 +271,16 @@ impl<'a, 'l> Columns<'a, 'l> {
         covariates
             .into_iter()
             .filter_map(|(covariate, values)| {
-                SampledCovariate::new(covariate, values, self.weighed)
+                SampledCovariate::new(covariate, values, self.evidence_poses)
             })
             .collect()
     }
 
-    /// Returns the values of a joint's command in every pose for functions of the command.
+    /// Returns a joint's command in every pose, as the argument of functions of the command.
     ///
     /// In contacts the noise is in the command, not in the measured quantity. If the target cannot
     /// reach the point without the joint, the joint's commands at one point differ by noise alone.
-    /// A function of them would fit the noise, so they are replaced by their mean.
+    /// A function of these commands would fit the noise, so they are replaced by their mean.
     pub(super) fn command(&self, joint: usize) -> Vec<f64> {
         let poses = self.linearised.poses();
         let mut values: Vec<f64> =
@@ -302,8 +311,7 @@ impl<'a, 'l> Columns<'a, 'l> {
 
     /// Returns the moment of the loads about each joint's axis and about its α axis, in every pose.
     /// The moment is the displacement by a compliance there divided by the displacement by an
-    /// angle. The index of each moment counts all joints and both axes; it does not depend on the
-    /// poses.
+    /// angle. The index of each moment counts the axes of all joints.
     fn loads(&self) -> Vec<(usize, SampledCovariate)> {
         let pairs = [
             (JointField::Compliance, JointField::Theta),
@@ -321,9 +329,9 @@ impl<'a, 'l> Columns<'a, 'l> {
             SampledCovariate::new(
                 Covariate::Load,
                 (0..turns.len() / 3).map(moment).collect(),
-                self.weighed,
+                self.evidence_poses,
             )
-            .filter(|known| known.levels > 3)
+            .filter(|moment| moment.levels > 3)
         };
         let axes_of_joints =
             (0..self.problem.joints.len()).flat_map(|joint| pairs.map(|pair| (joint, pair)));
@@ -333,9 +341,8 @@ impl<'a, 'l> Columns<'a, 'l> {
             .collect()
     }
 
-    /// Returns true if a candidate effect adds a term linear in this covariate at `site`, and
-    /// depends on nothing else. If the covariate has only two values, every function of it is
-    /// linear.
+    /// Returns true if a candidate effect adds a term linear in this covariate at `site` and
+    /// depends on nothing else. If the covariate has two values, every function of it is linear.
     fn has_law(&self, site: ParameterSite, of: &SampledCovariate) -> bool {
         let is_line = |term: &Term| {
             let is_linear = matches!(
@@ -355,8 +362,9 @@ impl<'a, 'l> Columns<'a, 'l> {
     }
 
     /// Adds smooth functions of one covariate along the columns `at`, one for each of `lengths`.
-    /// Adds a straight line, too, unless an effect is one. The candidate indices begin at `first`.
-    pub(super) fn smooth(
+    /// For covariates other than commands, approaches and loads, adds a straight line, too, unless
+    /// an effect is one. Candidate indices begin at `first`.
+    pub(super) fn add_smooth(
         &mut self,
         family: &str,
         (site, at): (ParameterSite, &[&DVector<f64>]),
@@ -366,20 +374,24 @@ impl<'a, 'l> Columns<'a, 'l> {
         let hypothesis = Hypothesis::smooth(site, vec![of.covariate.clone()]);
         let [warped, line] = [first + lengths.len(), first + lengths.len() + 1];
         // With few different values, only the longest length is used.
-        let told = match of.levels {
+        let usable_lengths = match of.levels {
             ..3 => 0,
             3 => 1,
             _ => lengths.len(),
         };
-        for (variant, &length) in lengths.iter().take(told).enumerate() {
-            self.add_variant(family, &hypothesis, first + variant, || times(at, &of.basis(length)));
+        for (variant, &length) in lengths.iter().take(usable_lengths).enumerate() {
+            self.add_variant(family, &hypothesis, first + variant, || {
+                expand(at, &of.basis(length))
+            });
         }
         if matches!(of.covariate, Covariate::Time | Covariate::Row) && of.levels > 2 {
             // A settling quantity changes fast at first, so functions of log time are tried, too.
-            let range = of.values[..self.weighed].iter().copied().fold(0.0, f64::max);
+            let range = of.values[..self.evidence_poses].iter().copied().fold(0.0, f64::max);
             let logarithm = of.values.iter().map(|t| (t.max(0.0) + range / 30.0).ln()).collect();
-            if let Some(of) = SampledCovariate::new(of.covariate.clone(), logarithm, self.weighed) {
-                self.add_variant(family, &hypothesis, warped, || times(at, &of.basis(0.25)));
+            if let Some(of) =
+                SampledCovariate::new(of.covariate.clone(), logarithm, self.evidence_poses)
+            {
+                self.add_variant(family, &hypothesis, warped, || expand(at, &of.basis(0.25)));
             }
         }
         // With two different values, every function is a straight line.
@@ -389,18 +401,23 @@ impl<'a, 'l> Columns<'a, 'l> {
         );
         if !is_of_arm && !self.has_law(site, of) {
             let column =
-                || times(at, &DMatrix::from_fn(of.scaled.len(), 1, |row, _| of.scaled[row] - 0.5));
+                || expand(at, &DMatrix::from_fn(of.scaled.len(), 1, |row, _| of.scaled[row] - 0.5));
             self.add_variant(family, &hypothesis, line, column);
         }
     }
 
     /// Adds functions of two covariates: of two commands, of a direction of approach and another
     /// quantity, or of temperature and time, all at `site`.
-    fn surfaces(&mut self, site: ParameterSite, at: &DVector<f64>, recorded: &[SampledCovariate]) {
+    fn add_surfaces(
+        &mut self,
+        site: ParameterSite,
+        at: &DVector<f64>,
+        recorded: &[SampledCovariate],
+    ) {
         for (k, first) in recorded.iter().enumerate() {
             for second in &recorded[k + 1..] {
-                if goes_with(&first.covariate, &second.covariate) {
-                    self.surface("surface", site, &[at], (first, second));
+                if are_combined(&first.covariate, &second.covariate) {
+                    self.add_surface("surface", site, &[at], (first, second));
                 }
             }
         }
@@ -408,7 +425,12 @@ impl<'a, 'l> Columns<'a, 'l> {
 
     /// Adds functions of a joint's command whose amplitude is proportional to another quantity,
     /// such as a gear error that grows with temperature or payload.
-    fn scaled_by(&mut self, site: ParameterSite, at: &DVector<f64>, recorded: &[SampledCovariate]) {
+    fn add_scaled(
+        &mut self,
+        site: ParameterSite,
+        at: &DVector<f64>,
+        recorded: &[SampledCovariate],
+    ) {
         let ParameterSite::Joint { joint, .. } = site else { return };
         let Some(command) =
             recorded.iter().find(|command| command.covariate == Covariate::Command(joint))
@@ -416,17 +438,18 @@ impl<'a, 'l> Columns<'a, 'l> {
             return;
         };
         let reference = self.problem.data.reference_temperature;
-        for size in recorded.iter().filter(|of| of.is_size(reference)) {
+        for size in recorded.iter().filter(|of| of.may_scale_error(reference)) {
             let (zero, length) = (size.zero(reference), SLOW_LENGTH);
             let hypothesis =
                 Hypothesis::smooth(site, vec![command.covariate.clone(), size.covariate.clone()]);
             self.add("surface", 1.0, hypothesis, || {
-                times(&[at], &growing(command, size, zero, length))
+                expand(&[at], &scaled_functions(command, size, zero, length))
             });
         }
     }
 
-    pub(super) fn surface(
+    /// Adds the smooth functions of two covariates along the columns `at`.
+    pub(super) fn add_surface(
         &mut self,
         family: &str,
         site: ParameterSite,
@@ -436,11 +459,10 @@ impl<'a, 'l> Columns<'a, 'l> {
         let mut depends_on = vec![one.covariate.clone(), other.covariate.clone()];
         depends_on.sort();
         let (hypothesis, length) = (Hypothesis::smooth(site, depends_on), SURFACE_LENGTH);
-        self.add(family, 1.0, hypothesis, || times(at, &products_of(&[one, other], length)));
+        self.add(family, 1.0, hypothesis, || expand(at, &products_of(&[one, other], length)));
     }
 
-    /// Returns the candidates with their prior probabilities, the covariates, ln of the prior
-    /// probability of a family of effects, and the weight of the functions without a law.
+    /// Returns the result of [`Self::all`] once all candidates are added.
     fn into_candidates(self) -> (Vec<Candidate>, Vec<SampledCovariate>, f64, OtherHypotheses) {
         let mut families = Families::default();
         for ((family, share), candidate) in self.shares.iter().zip(&self.candidates) {
@@ -463,16 +485,16 @@ pub(super) fn candidate_of(
     effect: &Effect,
     columns: DMatrix<f64>,
     problem: &Problem,
-    (coverage, weighed): ((bool, bool), usize),
+    (coverage, evidence_poses): ((bool, bool), usize),
 ) -> Option<Candidate> {
     let terms = effect.terms(problem);
-    let (columns, largest) = even(columns, &terms, weighed);
+    let (columns, largest) = scaled_to_equal_length(columns, &terms, evidence_poses);
     let coefficients = Coefficients {
         never_negative: terms.iter().map(|term| term.never_negative).collect(),
         alone: acts_along_axes(&terms),
         largest,
     };
-    let design = Design::Dense(columns).scaled(weighed)?;
+    let design = Design::Dense(columns).scaled(evidence_poses)?;
     let hypothesis = Hypothesis::of_effect(effect, problem, coverage);
     Some(Candidate { hypothesis, variant: 0, design, ln_prior: 0.0, coefficients })
 }

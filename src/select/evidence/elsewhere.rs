@@ -1,12 +1,12 @@
-//! Functions without a law that do not act at a single joint: in the measurement, at the base, in
-//! whole configurations, and in links that warm.
+//! Functions without a law that do not act at a single joint: in the measurement, at the base, one
+//! value for each configuration, and in links that warm.
 
 use nalgebra::{DMatrix, DVector};
 
 use super::block::Design;
 use super::candidate::Candidate;
 use super::columns::Columns;
-use super::functions::{SampledCovariate, products_of, rough_basis, times};
+use super::functions::{SampledCovariate, expand, products_of, rough_basis};
 use super::hypothesis::{Hypothesis, HypothesisKind, Site};
 use crate::model::parameter::{BeamField, ParameterSite};
 use crate::problem::Effect;
@@ -15,9 +15,9 @@ use crate::select::data::{bits, numbered};
 use crate::select::settings::{ROUGH_LENGTHS, SLOW_LENGTH, SMOOTH_LENGTHS};
 
 impl Columns<'_, '_> {
-    /// Adds hypotheses about the instrument: functions of one covariate, and of the measured
-    /// position, that displace every measured position.
-    pub(super) fn measurement(&mut self, recorded: &[SampledCovariate]) {
+    /// Adds hypotheses about the instrument: displacements of the measured positions as functions
+    /// of one covariate, or of the measured position.
+    pub(super) fn add_measurement_functions(&mut self, recorded: &[SampledCovariate]) {
         let axes: Vec<DVector<f64>> = (0..3)
             .filter_map(|axis| self.linearised.place(ParameterSite::Shift { axis }))
             .collect();
@@ -26,25 +26,27 @@ impl Columns<'_, '_> {
         }
         let (site, at) = (ParameterSite::Shift { axis: 0 }, axes.iter().collect::<Vec<_>>());
         for of in recorded {
-            self.smooth("smooth in the measurement", (site, &at), of, (&SMOOTH_LENGTHS, 0));
+            self.add_smooth("smooth in the measurement", (site, &at), of, (&SMOOTH_LENGTHS, 0));
         }
         let is_time =
             |of: &&SampledCovariate| matches!(of.covariate, Covariate::Time | Covariate::Row);
         for of in recorded.iter().filter(is_time) {
-            self.wandering(site, &at, of);
+            self.add_wandering(site, &at, of);
         }
         let poses = self.linearised.poses();
         let coordinate = |axis: usize| {
             SampledCovariate::new(
                 Covariate::Position,
                 poses.iter().map(|p| p.measured[axis]).collect(),
-                self.weighed,
+                self.evidence_poses,
             )
         };
         let coordinates: Vec<SampledCovariate> = (0..3).filter_map(coordinate).collect();
         let linear = DMatrix::from_fn(poses.len(), coordinates.len(), |k, j| {
             let scaled = &coordinates[j].scaled;
-            scaled[k] - scaled[..self.weighed].iter().sum::<f64>() / self.weighed.max(1) as f64
+            scaled[k]
+                - scaled[..self.evidence_poses].iter().sum::<f64>()
+                    / self.evidence_poses.max(1) as f64
         });
         let hypothesis = |kind| Hypothesis {
             kind,
@@ -56,18 +58,18 @@ impl Columns<'_, '_> {
         let strain =
             |candidate: &Candidate| candidate.hypothesis.effect() == Some(&Effect::FrameStrain);
         if !self.candidates.iter().any(strain) {
-            self.add("field", 1.0, hypothesis(HypothesisKind::Linear), || times(&at, &linear));
+            self.add("field", 1.0, hypothesis(HypothesisKind::Linear), || expand(&at, &linear));
         }
         if let [x, y, z] = coordinates.as_slice() {
             let plane = products_of(&[x, y, z], SLOW_LENGTH);
-            self.add("field", 1.0, hypothesis(HypothesisKind::Smooth), || times(&at, &plane));
+            self.add("field", 1.0, hypothesis(HypothesisKind::Smooth), || expand(&at, &plane));
         }
         self.covariates.extend(coordinates);
     }
 
     /// Adds errors that wander in time at `site`: the error of each reading is close to that of the
     /// previous reading.
-    pub(super) fn wandering(
+    pub(super) fn add_wandering(
         &mut self,
         site: ParameterSite,
         at: &[&DVector<f64>],
@@ -82,15 +84,15 @@ impl Columns<'_, '_> {
         for (variant, &length) in ROUGH_LENGTHS.iter().enumerate() {
             if let Some(basis) = rough_basis(&of.scaled, length, of.levels) {
                 self.add_variant("smooth in the measurement", &hypothesis, variant, || {
-                    times(at, &basis)
+                    expand(at, &basis)
                 });
             }
         }
     }
 
-    /// Adds rotations of the base as smooth functions of quantities other than commands, such as
-    /// temperature, time or load.
-    pub(super) fn base(&mut self, recorded: &[SampledCovariate]) {
+    /// Adds rotations of the base as smooth functions of quantities other than commands and
+    /// directions of approach, such as temperature, time or payload.
+    pub(super) fn add_base_rotations(&mut self, recorded: &[SampledCovariate]) {
         let axes: Vec<DVector<f64>> =
             (0..3).filter_map(|axis| self.linearised.place(ParameterSite::Turn { axis })).collect();
         let (site, at) = (ParameterSite::Turn { axis: 0 }, axes.iter().collect::<Vec<_>>());
@@ -98,21 +100,21 @@ impl Columns<'_, '_> {
             matches!(of.covariate, Covariate::Command(_) | Covariate::Approach(_))
         };
         for of in recorded.iter().filter(|of| axes.len() == 3 && !is_command(of)) {
-            self.smooth("smooth at the base", (site, &at), of, (&SMOOTH_LENGTHS[..2], 0));
+            self.add_smooth("smooth at the base", (site, &at), of, (&SMOOTH_LENGTHS[..2], 0));
         }
     }
 
     /// Adds a free displacement of every configuration, shared by all positions measured in it.
-    pub(super) fn repeats(&mut self) {
+    pub(super) fn add_repeats(&mut self) {
         let axes: Vec<DVector<f64>> = (0..3)
             .filter_map(|axis| self.linearised.place(ParameterSite::Shift { axis }))
             .collect();
         let poses = self.linearised.poses();
         let configurations: Vec<Vec<u64>> =
             poses.iter().map(|pose| bits(pose.setup.configuration)).collect();
-        let numbers = numbered(configurations[..self.weighed].iter().cloned());
+        let numbers = numbered(configurations[..self.evidence_poses].iter().cloned());
         let count = numbers.iter().max().map_or(0, |last| last + 1);
-        if count == self.weighed || axes.len() < 3 {
+        if count == self.evidence_poses || axes.len() < 3 {
             return;
         }
         let groups = (0..poses.len()).map(|row| numbers.get(row).copied()).collect();
@@ -128,7 +130,7 @@ impl Columns<'_, '_> {
 
     /// Adds curvature and strain of beams as smooth functions of temperature and other quantities,
     /// in addition to the linear laws.
-    pub(super) fn warming(&mut self, recorded: &[SampledCovariate]) {
+    pub(super) fn add_link_functions(&mut self, recorded: &[SampledCovariate]) {
         if self.problem.data.reference_temperature.is_none() {
             return;
         }
@@ -148,18 +150,17 @@ impl Columns<'_, '_> {
                     columns.iter().collect::<Vec<_>>(),
                 );
                 let of_covariate =
-                    |wanted: &Covariate| recorded.iter().find(|known| known.covariate == *wanted);
-                for of in recorded
-                    .iter()
-                    .filter(|known| !matches!(known.covariate, Covariate::Approach(_)))
+                    |wanted: &Covariate| recorded.iter().find(|of| of.covariate == *wanted);
+                for of in
+                    recorded.iter().filter(|of| !matches!(of.covariate, Covariate::Approach(_)))
                 {
-                    self.smooth("smooth in a link", (site, &at), of, (&SMOOTH_LENGTHS[..2], 0));
+                    self.add_smooth("smooth in a link", (site, &at), of, (&SMOOTH_LENGTHS[..2], 0));
                 }
                 let time = Covariate::time(self.coverage.1);
                 if let (Some(one), Some(other)) =
                     (of_covariate(&Covariate::Temperature), of_covariate(&time))
                 {
-                    self.surface("surface in a link", site, &at, (one, other));
+                    self.add_surface("surface in a link", site, &at, (one, other));
                 }
             }
         }

@@ -6,43 +6,44 @@
 //! leave structure.
 
 use super::block::{Block, Design};
-use super::candidate::{Candidate, even};
+use super::candidate::{Candidate, scaled_to_equal_length};
 use super::hypotheses::Hypotheses;
 use super::hypothesis::{Hypothesis, HypothesisKind};
 use super::marginal::Coefficients;
 use super::products::Products;
-use super::search::{Weighted, reduced_by};
+use super::search::{EvaluatedSet, reduced_by};
 use crate::problem::{Effect, Problem};
 use crate::select::settings::{MAX_REVISED_SETS, MIN_REVISED_PROBABILITY};
 
 /// Number of trial values on either side of the present one.
 const TRIALS_PER_SIDE: i32 = 8;
 /// Ratio of the farthest trial value to the present one, in the first and in the second pass. The
-/// first exceeds the spacing of listed values; the second equals the trial spacing of the first
-/// pass.
+/// first ratio exceeds the spacing of listed values; the second one equals the trial spacing of the
+/// first pass.
 const LAST_RATIOS: [f64; 2] = [1.4, 1.043];
-/// Log odds by which another value of an argument must be better than the listed one to be added.
+/// ln of the odds of another value of an argument over the listed one, at which the other value is
+/// added.
 const MIN_LN_ODDS_OF_FINER: f64 = 0.5;
 
 /// Returns effects whose argument lies between the listed values. Each is more probable than the
 /// member of a probable set that it would replace.
-pub(super) fn finer(
+pub(super) fn finer_candidates(
     hypotheses: &Hypotheses,
-    weighted: &[Weighted],
+    evaluated_sets: &[EvaluatedSet],
     products: &Products,
     blocks_of: impl Fn(&[Candidate]) -> Vec<Block>,
     problem: &Problem,
 ) -> Vec<Candidate> {
     let Products { blocks, target, .. } = *products;
     let mut found: Vec<Candidate> = Vec::new();
-    for set in weighted
+    for set in evaluated_sets
         .iter()
         .filter(|set| set.probability > MIN_REVISED_PROBABILITY)
         .take(MAX_REVISED_SETS)
         .filter(|set| !products.has_gear(&set.members))
     {
         for &member in &set.members {
-            let candidate = &hypotheses.all[member];
+            let candidate = &hypotheses.candidates[member];
             if candidate
                 .hypothesis
                 .effect()
@@ -54,7 +55,7 @@ pub(super) fn finer(
             // effects of the same family at the same place. In the latter case one value replaces
             // two members.
             let place =
-                |k: usize| hypotheses.all[k].hypothesis.effect().map(Effect::name_and_place);
+                |k: usize| hypotheses.candidates[k].hypothesis.effect().map(Effect::name_and_place);
             let without_own =
                 set.members.iter().copied().filter(|&other| other != member).collect();
             let without_alike = set
@@ -63,9 +64,9 @@ pub(super) fn finer(
                 .copied()
                 .filter(|&other| place(other) != place(member))
                 .collect();
-            let mut rests: Vec<Vec<usize>> = vec![without_own, without_alike];
-            rests.dedup();
-            for rest in &rests {
+            let mut reduced_sets: Vec<Vec<usize>> = vec![without_own, without_alike];
+            reduced_sets.dedup();
+            for rest in &reduced_sets {
                 let Some(left) = reduced_by(rest, products) else { continue };
                 let mut best: Option<Candidate> = None;
                 let mut least = left.gain(member).0
@@ -81,7 +82,7 @@ pub(super) fn finer(
                         break;
                     }
                     for (candidate, odds) in
-                        std::iter::zip(near.iter(), left.odds_of(&blocks_of(&near)))
+                        std::iter::zip(near.iter(), left.ln_odds_of(&blocks_of(&near)))
                     {
                         if odds > least {
                             (best, least) = (Some(candidate.clone()), odds);
@@ -114,7 +115,7 @@ impl Hypotheses<'_> {
             .map(|step| farthest.powf(f64::from(step) / f64::from(TRIALS_PER_SIDE)));
         let others = factors.filter_map(|factor| effect.scaled(factor));
         let is_new = |effect: &Effect| {
-            !self.all.iter().any(|known| known.hypothesis.effect() == Some(effect))
+            !self.candidates.iter().any(|other| other.hypothesis.effect() == Some(effect))
         };
         others
             .filter(is_new)
@@ -123,7 +124,7 @@ impl Hypotheses<'_> {
     }
 
     /// Returns a copy of the candidate for `effect`, which differs only in the value of its
-    /// argument.
+    /// argument; `None` if `effect` displaces no pose.
     fn with_effect(
         &self,
         candidate: &Candidate,
@@ -131,8 +132,9 @@ impl Hypotheses<'_> {
         problem: &Problem,
     ) -> Option<Candidate> {
         let columns = self.linearised.columns(&effect);
-        let (columns, largest) = even(columns, &effect.terms(problem), self.weighed);
-        let design = Design::Dense(columns).scaled(self.weighed)?;
+        let (columns, largest) =
+            scaled_to_equal_length(columns, &effect.terms(problem), self.evidence_poses);
+        let design = Design::Dense(columns).scaled(self.evidence_poses)?;
         let coefficients = Coefficients { largest, ..candidate.coefficients.clone() };
         let hypothesis =
             Hypothesis { kind: HypothesisKind::Effect(effect), ..candidate.hypothesis.clone() };

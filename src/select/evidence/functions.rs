@@ -52,7 +52,7 @@ impl Shape {
         centres.flat_map(of_centre).collect()
     }
 
-    /// Returns trial shapes near this one.
+    /// Returns trial shapes with centres and widths near those of this one.
     pub fn finer(self) -> Vec<Self> {
         let (steps, factors) = FINER_SHAPES;
         let at = |step: f64| {
@@ -75,7 +75,7 @@ pub(super) struct SampledCovariate {
     pub values: Vec<f64>,
     /// Values scaled so that the range is 0 to 1; values outside are clamped to the nearer end.
     pub scaled: Vec<f64>,
-    /// Range over the poses on which evidence is evaluated.
+    /// Smallest and largest value in the poses on which evidence is evaluated.
     pub range: (f64, f64),
     /// Number of different values in those poses.
     pub levels: usize,
@@ -97,7 +97,7 @@ impl SampledCovariate {
     /// Returns true if an error may grow in proportion to this covariate. The covariate must be a
     /// temperature, a load or a declared one, and vary at least by half its largest distance from
     /// zero. `reference` is the reference temperature \[°C\].
-    pub(super) fn is_size(&self, reference: Option<f64>) -> bool {
+    pub(super) fn may_scale_error(&self, reference: Option<f64>) -> bool {
         use Covariate::{Declared, Hoist, Payload, Temperature};
         let (low, high) = self.range;
         let varies = |zero: f64| 2.0 * (high - low) >= (high - zero).abs().max((low - zero).abs());
@@ -106,14 +106,14 @@ impl SampledCovariate {
     }
 
     /// Creates a covariate from its values in every pose; `None` if it does not vary over the first
-    /// `weighed` poses, which count for the evidence.
-    pub fn new(covariate: Covariate, values: Vec<f64>, weighed: usize) -> Option<Self> {
-        let low = values[..weighed].iter().copied().fold(f64::INFINITY, f64::min);
-        let high = values[..weighed].iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    /// `evidence_poses` poses, on which evidence is evaluated.
+    pub fn new(covariate: Covariate, values: Vec<f64>, evidence_poses: usize) -> Option<Self> {
+        let low = values[..evidence_poses].iter().copied().fold(f64::INFINITY, f64::min);
+        let high = values[..evidence_poses].iter().copied().fold(f64::NEG_INFINITY, f64::max);
         if !(high > low && (high - low).is_finite()) {
             return None;
         }
-        let mut sorted = values[..weighed].to_vec();
+        let mut sorted = values[..evidence_poses].to_vec();
         sorted.sort_by(f64::total_cmp);
         sorted.dedup();
         let scaled =
@@ -144,7 +144,8 @@ impl SampledCovariate {
 }
 
 /// Replaces clusters of the values with indices `some` by their means. In a cluster, successive
-/// values differ by at most `apart`. Clusters wider than noise alone explains are left unchanged.
+/// values differ by at most `apart`. Clusters wider than [`MAX_GAPS_OF_NOISE`] times `apart` stay
+/// unchanged.
 pub(super) fn merge(values: &mut [f64], mut some: Vec<usize>, apart: f64) {
     some.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
     let rows: Vec<Vec<usize>> =
@@ -161,7 +162,7 @@ pub(super) fn merge(values: &mut [f64], mut some: Vec<usize>, apart: f64) {
 }
 
 /// Returns true if the search has hypotheses that are functions of these two covariates together.
-pub(super) fn goes_with(one: &Covariate, other: &Covariate) -> bool {
+pub(super) fn are_combined(one: &Covariate, other: &Covariate) -> bool {
     use Covariate::{Approach, Command, Row, Temperature, Time};
     match (one, other) {
         (Approach(_), other) | (other, Approach(_)) => !matches!(other, Approach(_)),
@@ -171,9 +172,9 @@ pub(super) fn goes_with(one: &Covariate, other: &Covariate) -> bool {
 }
 
 /// Returns basis functions of a Gaussian process with exponential covariance exp(−|Δ|/length),
-/// shape = (poses, functions). It describes an instrument that wanders, and noise that is
-/// correlated from reading to reading. `None` if `levels` values do not determine so many
-/// functions.
+/// shape = (poses, functions). It describes an instrument that drifts at random, and noise that is
+/// correlated from reading to reading. `None` if the covariate has fewer different values
+/// (`levels`) than twice the number of functions.
 pub(super) fn rough_basis(scaled: &[f64], length: f64, levels: usize) -> Option<DMatrix<f64>> {
     // The mean square of the constant is 1, that of each cosine is ½.
     let of_constant = |k: usize| if k == 0 { 0.5 } else { 1.0 };
@@ -199,10 +200,10 @@ fn weights(length: f64) -> Vec<f64> {
     (0..count).map(|k| variance(k).sqrt()).collect()
 }
 
-/// Returns functions of a covariate `of` whose amplitude is proportional to a quantity
-/// (`size`): basis functions times the quantity. If its `zero` is unknown, the basis functions
+/// Returns functions of a covariate `of` whose amplitude is proportional to another one, `size`,
+/// less its `zero`: basis functions times that difference. If `zero` is `None`, the basis functions
 /// alone are included, too. Shape = (poses, functions).
-pub(super) fn growing(
+pub(super) fn scaled_functions(
     of: &SampledCovariate,
     size: &SampledCovariate,
     zero: Option<f64>,
@@ -218,7 +219,8 @@ pub(super) fn growing(
     })
 }
 
-/// Returns products of cosines, one factor for each covariate, as columns.
+/// Returns products of cosines, one factor for each covariate, scaled to their prior standard
+/// deviations, shape = (poses, functions).
 pub(super) fn products_of(covariates: &[&SampledCovariate], length: f64) -> DMatrix<f64> {
     let weights = weights(length);
     let mut indices: Vec<Vec<usize>> = vec![Vec::new()];
@@ -238,9 +240,9 @@ pub(super) fn products_of(covariates: &[&SampledCovariate], length: f64) -> DMat
     })
 }
 
-/// Returns the product of every column with every function of the pose, shape = (3 N, columns ·
-/// functions).
-pub(super) fn times(at: &[&DVector<f64>], functions: &DMatrix<f64>) -> DMatrix<f64> {
+/// Returns the product of every lever in `at` with every function of the pose, shape = (3 N, levers
+/// · functions).
+pub(super) fn expand(at: &[&DVector<f64>], functions: &DMatrix<f64>) -> DMatrix<f64> {
     let k = functions.ncols();
     let mut out = DMatrix::zeros(3 * functions.nrows(), at.len() * k);
     for (j, mut column) in out.column_iter_mut().enumerate() {
@@ -287,11 +289,12 @@ mod tests {
             SampledCovariate::new(Covariate::Temperature, values.to_vec(), values.len()).unwrap()
         };
         assert!(
-            covariate(&[17.0, 20.0, 31.0]).is_size(Some(20.0))
-                && covariate(&[29.5, 30.5]).is_size(None)
+            covariate(&[17.0, 20.0, 31.0]).may_scale_error(Some(20.0))
+                && covariate(&[29.5, 30.5]).may_scale_error(None)
         );
-        assert!(!covariate(&[29.5, 30.5]).is_size(Some(20.0)));
-        let grown = growing(&covariate(&[0.0, 0.5]), &covariate(&[20.0, 31.0]), Some(20.0), 0.5);
+        assert!(!covariate(&[29.5, 30.5]).may_scale_error(Some(20.0)));
+        let grown =
+            scaled_functions(&covariate(&[0.0, 0.5]), &covariate(&[20.0, 31.0]), Some(20.0), 0.5);
         assert!(
             grown.row(0).iter().all(|value| *value == 0.0)
                 && grown.row(1).iter().any(|value| *value != 0.0),

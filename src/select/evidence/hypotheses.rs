@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::block::Design;
-use super::candidate::{Candidate, even, order_of};
+use super::candidate::{Candidate, joint_and_order, scaled_to_equal_length};
 use super::columns::{Columns, candidate_of};
 use super::families::{Families, OtherHypotheses, ln_family};
 use super::functions::{SampledCovariate, Shape};
@@ -29,35 +29,38 @@ pub(in crate::select) struct Hypotheses<'a> {
     pub added: Vec<Effect>,
     /// Indices of the parameters of the `added` effects among the columns of the fit.
     pub unknowns: Vec<usize>,
-    pub(super) all: Vec<Candidate>,
-    /// Number of first poses on which evidence is evaluated.
-    pub(super) weighed: usize,
-    /// Log prior probability of a family of effects.
+    /// Candidates with the columns of all hypotheses.
+    pub(super) candidates: Vec<Candidate>,
+    /// Number of poses, the first ones, on which evidence is evaluated.
+    pub(super) evidence_poses: usize,
+    /// ln of the prior probability of a family of effects.
     pub(super) ln_family: f64,
+    /// Covariates on which functions without a law depend.
     covariates: Vec<SampledCovariate>,
     /// Two flags: directions of approach are recorded; times are recorded.
     coverage: (bool, bool),
     /// Candidate times at which the instrument may have moved.
     pub(super) times: Vec<f64>,
-    /// What the prior probability of an effect needs to know of the other hypotheses.
+    /// Properties of the other hypotheses on which the prior probability of an effect depends.
     pub(super) others: OtherHypotheses,
 }
 
 /// Effect with the columns of its parameters.
 type WithColumns = (Effect, DMatrix<f64>);
 
-/// Splits effects with their columns into those whose prior probability does not depend on the
-/// other candidates, and all others. No list can contain all waves, composed laws and moves.
+/// Splits effects with their columns into waves, composed laws and station moves, and all others.
+/// The former are not listed as candidates, because their argument or formula is searched.
 fn split_unlisted(all: impl Iterator<Item = WithColumns>) -> (Vec<WithColumns>, Vec<WithColumns>) {
     all.partition(|(effect, _)| {
-        order_of(effect).is_some()
+        joint_and_order(effect).is_some()
             || effect.is_described()
             || matches!(effect, Effect::StationMove { .. })
     })
 }
 
-/// Returns the effects `added` with the columns of their parameters `unknowns` in the fit. Only the
-/// coefficients of a law are removed from the fit; inner parameters keep their values.
+/// Returns the effects `added`, each with the columns of the fit with its indices `unknowns`. The
+/// columns of a law's inner parameters are left out, because only its coefficients are removed from
+/// the fit.
 fn columns_of_added<'a>(
     linearised: &'a Linearised,
     (added, unknowns): (&'a [Effect], &'a [Vec<usize>]),
@@ -71,13 +74,13 @@ fn columns_of_added<'a>(
 
 impl<'a> Hypotheses<'a> {
     /// Creates the hypotheses about the residual that the fit without the effects `added` leaves.
-    /// The first `weighed` of the `rows` count for the evidence.
+    /// Evidence is evaluated on the first `evidence_poses` of the `rows`.
     pub fn new(
         fitted: &'a Fitted,
         data: &Data<'a>,
         added: &[Effect],
         rows: &[usize],
-        weighed: usize,
+        evidence_poses: usize,
     ) -> Self {
         let candidates = Candidates::new(&fitted.problem, data).testable;
         let added: Vec<Effect> = added.iter().flat_map(Effect::parts).collect();
@@ -86,16 +89,16 @@ impl<'a> Hypotheses<'a> {
         let unknowns = columns_of_part.concat();
         let linearised =
             fitted.linearised_with(data, rows, &candidates, &hypothesis_sites(&fitted.problem));
-        let (unlisted, known) =
+        let (unlisted, listed_added) =
             split_unlisted(columns_of_added(&linearised, (&added, &columns_of_part)));
         let new =
             candidates.into_iter().map(|effect| (effect.clone(), linearised.columns(&effect)));
-        let effects: Vec<(Effect, DMatrix<f64>)> = known.into_iter().chain(new).collect();
+        let effects: Vec<(Effect, DMatrix<f64>)> = listed_added.into_iter().chain(new).collect();
         let coverage = coverage(&linearised, data);
-        let (all, covariates, ln_family, others) = Columns::all(
+        let (built, covariates, ln_family, others) = Columns::all(
             &fitted.problem,
             &linearised,
-            (coverage, data.takes_gears, weighed),
+            (coverage, data.admits_common_prior, evidence_poses),
             &effects,
             None,
         );
@@ -104,39 +107,42 @@ impl<'a> Hypotheses<'a> {
             linearised,
             added,
             unknowns,
-            all,
-            weighed,
+            candidates: built,
+            evidence_poses,
             ln_family,
             covariates,
             coverage,
             times,
             others,
         };
-        let entered = |(effect, columns)| hypotheses.entered(&effect, columns, &fitted.problem);
-        let unlisted: Vec<Candidate> = unlisted.into_iter().filter_map(entered).collect();
-        hypotheses.all.extend(unlisted);
-        hypotheses.all.extend(limits(
+        let candidate_of_effect =
+            |(effect, columns)| hypotheses.candidate_of_effect(&effect, columns, &fitted.problem);
+        let unlisted: Vec<Candidate> =
+            unlisted.into_iter().filter_map(candidate_of_effect).collect();
+        hypotheses.candidates.extend(unlisted);
+        hypotheses.candidates.extend(limits(
             fitted,
             &hypotheses.linearised,
-            weighed,
+            evidence_poses,
             hypotheses.ln_family,
         ));
         hypotheses
     }
 
-    /// Returns the candidate for an effect with the given `columns`, whose argument is not among
-    /// the listed values, such as a wave or a station move.
-    pub(super) fn entered(
+    /// Returns the candidate for an effect that is not listed, such as a wave or a station move,
+    /// with the given `columns`. Returns `None` if the effect displaces no pose.
+    pub(super) fn candidate_of_effect(
         &self,
         effect: &Effect,
         columns: DMatrix<f64>,
         problem: &Problem,
     ) -> Option<Candidate> {
-        let (columns, largest) = even(columns, &effect.terms(problem), self.weighed);
-        let design = Design::Dense(columns).scaled(self.weighed)?;
+        let (columns, largest) =
+            scaled_to_equal_length(columns, &effect.terms(problem), self.evidence_poses);
+        let design = Design::Dense(columns).scaled(self.evidence_poses)?;
         let coefficients = Coefficients { largest, ..Coefficients::default() };
         let family = self
-            .all
+            .candidates
             .iter()
             .filter_map(|candidate| candidate.hypothesis.effect())
             .filter(|member| member.name() == effect.name());
@@ -150,27 +156,28 @@ impl<'a> Hypotheses<'a> {
         Some(Candidate { hypothesis, variant: 0, design, ln_prior, coefficients })
     }
 
-    /// Creates the functions of one hypothesis alone, about the residual of the whole fit.
+    /// Creates only the functions of the hypothesis `of`, about the residual of the fit with all
+    /// its effects.
     pub fn only(
         fitted: &'a Fitted,
         data: &Data<'a>,
         rows: &[usize],
-        weighed: usize,
+        evidence_poses: usize,
         of: &Hypothesis,
     ) -> Self {
         let linearised =
             fitted.linearised_with(data, rows, &[], &hypothesis_sites(&fitted.problem));
         let coverage = coverage(&linearised, data);
-        let how = (coverage, data.takes_gears, weighed);
-        let (all, covariates, ln_family, others) =
+        let how = (coverage, data.admits_common_prior, evidence_poses);
+        let (built, covariates, ln_family, others) =
             Columns::all(&fitted.problem, &linearised, how, &[], Some(of));
         let (added, unknowns, times) = (Vec::new(), Vec::new(), Vec::new());
         Self {
             linearised,
             added,
             unknowns,
-            all,
-            weighed,
+            candidates: built,
+            evidence_poses,
             ln_family,
             covariates,
             coverage,
@@ -180,9 +187,9 @@ impl<'a> Hypotheses<'a> {
     }
 
     /// Creates the hypotheses of the effects `added` alone, with the prior probabilities that they
-    /// have among all hypotheses. The functions without a law, and the effects that displace no
-    /// pose, are taken to be those about another fit, `others`. Returns `None` if an effect is a
-    /// wave, which needs the columns of other waves.
+    /// have among all hypotheses. The weight of functions without a law, and the effects that
+    /// displace no pose, are those at another fit, `others`. Returns `None` if an effect is a wave,
+    /// which needs the columns of other waves.
     pub(super) fn of_added(
         fitted: &'a Fitted,
         data: &Data<'a>,
@@ -191,28 +198,30 @@ impl<'a> Hypotheses<'a> {
     ) -> Option<Self> {
         let problem = &fitted.problem;
         let added: Vec<Effect> = added.iter().flat_map(Effect::parts).collect();
-        if added.iter().any(|effect| order_of(effect).is_some()) {
+        if added.iter().any(|effect| joint_and_order(effect).is_some()) {
             return None;
         }
         let columns_of_part: Vec<Vec<usize>> =
             added.iter().map(|part| fitted.unknowns_of(part)).collect();
         let linearised = fitted.linearised_at(data, rows, &[]);
-        let (unlisted, known) =
+        let (unlisted, listed_added) =
             split_unlisted(columns_of_added(&linearised, (&added, &columns_of_part)));
-        let (coverage, weighed) = (coverage(&linearised, data), rows.len());
-        let mut listed: Vec<Effect> = known.iter().map(|(effect, _)| effect.clone()).collect();
+        let (coverage, evidence_poses) = (coverage(&linearised, data), rows.len());
+        let mut listed: Vec<Effect> =
+            listed_added.iter().map(|(effect, _)| effect.clone()).collect();
         listed.extend(Candidates::new(problem, data).testable);
         let (tries, _) = tries(&listed, problem);
         let mut families = Families::default();
-        let (mut all, mut shares) = (Vec::new(), Vec::new());
-        let mut known = known.into_iter();
+        let (mut added_candidates, mut shares) = (Vec::new(), Vec::new());
+        let mut listed_added = listed_added.into_iter();
         for (effect, tries) in listed.iter().zip(tries) {
-            let is_seen = match known.next() {
+            let is_seen = match listed_added.next() {
                 Some((_, columns)) => {
-                    let candidate = candidate_of(effect, columns, problem, (coverage, weighed));
+                    let candidate =
+                        candidate_of(effect, columns, problem, (coverage, evidence_poses));
                     let is_seen = candidate.is_some();
                     shares.extend(candidate.is_some().then(|| 1.0 / tries));
-                    all.extend(candidate);
+                    added_candidates.extend(candidate);
                     is_seen
                 }
                 None => !others.unseen.contains(effect),
@@ -222,7 +231,7 @@ impl<'a> Hypotheses<'a> {
             }
         }
         let total_weight = families.weight(false) + others.weight_of_functions;
-        for (candidate, share) in all.iter_mut().zip(shares) {
+        for (candidate, share) in added_candidates.iter_mut().zip(shares) {
             let name = candidate.hypothesis.effect().map_or("", Effect::name);
             candidate.ln_prior = families.ln_prior(name, share, total_weight);
         }
@@ -230,69 +239,73 @@ impl<'a> Hypotheses<'a> {
             linearised,
             unknowns: columns_of_part.concat(),
             added,
-            all,
-            weighed,
+            candidates: added_candidates,
+            evidence_poses,
             ln_family: ln_family(total_weight),
             covariates: Vec::new(),
             coverage,
             times: data.shift_times(),
             others: others.clone(),
         };
-        let entered = |(effect, columns)| hypotheses.entered(&effect, columns, problem);
-        let unlisted: Vec<Candidate> = unlisted.into_iter().filter_map(entered).collect();
-        hypotheses.all.extend(unlisted);
+        let candidate_of_effect =
+            |(effect, columns)| hypotheses.candidate_of_effect(&effect, columns, problem);
+        let unlisted: Vec<Candidate> =
+            unlisted.into_iter().filter_map(candidate_of_effect).collect();
+        hypotheses.candidates.extend(unlisted);
         Some(hypotheses)
     }
 
-    /// Returns the candidate for a hypothesis that is a member of a set, with the function that the
-    /// set contains.
+    /// Returns the candidate for a member of a set, with the variant that the set contains; `None`
+    /// if there is none.
     pub(super) fn candidate(
         &self,
         explanation: &HypothesisSet,
         hypothesis: &Hypothesis,
     ) -> Option<&Candidate> {
         let mut members = explanation.hypotheses.iter().zip(&explanation.functions);
-        let (_, &(variant, _)) = members.find(|(known, _)| *known == hypothesis)?;
-        self.all
+        let (_, &(variant, _)) = members.find(|(member, _)| *member == hypothesis)?;
+        self.candidates
             .iter()
             .find(|candidate| candidate.variant == variant && candidate.hypothesis == *hypothesis)
     }
 
-    /// Returns the columns, at all poses, of a function that a set contains, shape = (3 N, k): the
-    /// smooth function, or the single `shape` if one is given.
+    /// Returns the columns, at all poses, of a function that a set contains, shape = (3 N, k). They
+    /// are those of the smooth function, or the column of the single `shape` if one is given.
     pub fn form(
         &self,
         explanation: &HypothesisSet,
         hypothesis: &Hypothesis,
-        (shape, weighed): (Option<Shape>, usize),
+        (shape, evidence_poses): (Option<Shape>, usize),
     ) -> Option<DMatrix<f64>> {
         let Some(shape) = shape else {
             return Some(self.candidate(explanation, hypothesis)?.design.columns().into_owned());
         };
-        let (_, candidate) = self.shaped(hypothesis, weighed, &[shape]).pop()?;
+        let (_, candidate) = self.shaped(hypothesis, evidence_poses, &[shape]).pop()?;
         Some(candidate.design.columns().into_owned())
     }
 
-    /// Returns candidates with single bumps and steps that may replace a function of one covariate
-    /// at one coordinate. All of them together are as probable a priori as the function.
+    /// Returns candidates with a single bump or step each that may replace a function of one
+    /// covariate at one coordinate; none for other hypotheses. All trial shapes together are as
+    /// probable a priori as the function.
     pub(super) fn shaped(
         &self,
         hypothesis: &Hypothesis,
-        weighed: usize,
+        evidence_poses: usize,
         shapes: &[Shape],
     ) -> Vec<(Shape, Candidate)> {
         let Some((.., values, lever)) = self.coordinate(hypothesis) else { return Vec::new() };
-        let Some(known) = SampledCovariate::new(Covariate::Position, values.to_vec(), weighed)
+        let Some(sampled) =
+            SampledCovariate::new(Covariate::Position, values.to_vec(), evidence_poses)
         else {
             return Vec::new();
         };
         let ln_prior = -(Shape::all().len() as f64).ln();
         let candidate_of_shape = |shape: &Shape| {
             let mut columns = DMatrix::from_columns(std::slice::from_ref(&lever));
-            for (pose, at) in known.scaled.iter().enumerate() {
+            for (pose, at) in sampled.scaled.iter().enumerate() {
                 columns.rows_mut(3 * pose, 3).scale_mut(shape.value(*at));
             }
-            let design = Design::Dense(columns).scaled(weighed)?;
+            let design = Design::Dense(columns).scaled(evidence_poses)?;
             let coefficients = Coefficients::default();
             Some((
                 *shape,
@@ -308,31 +321,33 @@ impl<'a> Hypotheses<'a> {
         shapes.iter().filter_map(candidate_of_shape).collect()
     }
 
-    /// Returns the values of a covariate in every pose; `None` if the table does not record it, or
-    /// if it does not vary.
-    pub(super) fn known(&self, covariate: &Covariate) -> Option<&SampledCovariate> {
-        self.covariates.iter().find(|known| known.covariate == *covariate)
+    /// Returns a covariate with its values in every pose; `None` if the table does not record it,
+    /// or if it does not vary.
+    pub(super) fn sampled(&self, covariate: &Covariate) -> Option<&SampledCovariate> {
+        self.covariates.iter().find(|sampled| sampled.covariate == *covariate)
     }
 
     /// Returns the covariates on which a hypothesis depends.
     fn covariates(&self, hypothesis: &Hypothesis) -> impl Iterator<Item = &SampledCovariate> {
-        self.covariates.iter().filter(|known| hypothesis.depends_on.contains(&known.covariate))
+        self.covariates.iter().filter(|sampled| hypothesis.depends_on.contains(&sampled.covariate))
     }
 
     /// Returns the covariates of a hypothesis with their ranges over the poses of the evidence.
     pub fn ranges(&self, hypothesis: &Hypothesis) -> Vec<(Covariate, (f64, f64))> {
-        self.covariates(hypothesis).map(|known| (known.covariate.clone(), known.range)).collect()
+        self.covariates(hypothesis)
+            .map(|sampled| (sampled.covariate.clone(), sampled.range))
+            .collect()
     }
 
     /// Returns, for each pose from index `first` on, true if all covariates of the hypothesis are
     /// within their ranges over the poses of the evidence.
     pub fn is_in_range(&self, hypothesis: &Hypothesis, first: usize) -> Vec<bool> {
-        let within = |known: &SampledCovariate, pose: usize| {
-            (known.range.0..=known.range.1).contains(&known.values[pose])
+        let within = |sampled: &SampledCovariate, pose: usize| {
+            (sampled.range.0..=sampled.range.1).contains(&sampled.values[pose])
         };
         let poses = self.linearised.poses().len();
         (first..poses)
-            .map(|pose| self.covariates(hypothesis).all(|known| within(known, pose)))
+            .map(|pose| self.covariates(hypothesis).all(|sampled| within(sampled, pose)))
             .collect()
     }
 
@@ -380,12 +395,12 @@ mod tests {
             candidate.hypothesis.effect().is_none()
                 && candidate.hypothesis.depends_on == [Covariate::Load]
         };
-        assert!(hypotheses.all.iter().filter(of_load).count() > 20);
-        for (k, candidate) in hypotheses.all.iter().enumerate() {
+        assert!(hypotheses.candidates.iter().filter(of_load).count() > 20);
+        for (k, candidate) in hypotheses.candidates.iter().enumerate() {
             let is_same = |other: &Candidate| {
                 other.variant == candidate.variant && other.hypothesis == candidate.hypothesis
             };
-            let first = hypotheses.all.iter().position(is_same);
+            let first = hypotheses.candidates.iter().position(is_same);
             assert_eq!(first, Some(k), "{:?} {}", candidate.hypothesis, candidate.variant);
         }
     }

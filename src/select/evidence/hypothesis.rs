@@ -84,8 +84,8 @@ pub enum HypothesisKind {
     Effect(Effect),
     /// Smooth function without a law.
     Smooth,
-    /// Function with approximately this number of periods per turn of the joint, whose amplitude
-    /// and phase change slowly.
+    /// Function with approximately this number of periods per revolution of the joint, whose
+    /// amplitude and phase change slowly along its range.
     NearHarmonic(u32),
     /// Periodic error of a joint: all harmonics up to this order, with one prior on their
     /// coefficients.
@@ -95,18 +95,18 @@ pub enum HypothesisKind {
     /// Error that wanders in time: close to its previous value, but not smooth, like noise that is
     /// correlated from reading to reading.
     Wandering,
-    /// Displacement linear in the position.
+    /// Displacement of the target that is linear in its position.
     Linear,
     /// Deflection under the weight of links whose masses are not declared.
     Sag,
-    /// Limit (bound or constraint) of the declared problem that is active in the fit, but wrong;
-    /// contains its description.
+    /// Limit (bound or constraint) of the declared problem that is active in the fit, but wrong.
+    /// The text describes it.
     Limit(String),
 }
 
 impl HypothesisKind {
     /// Returns true if two kinds have the same law, whatever the value of a searched argument.
-    pub(super) fn is_of(&self, other: &Self) -> bool {
+    pub(super) fn has_same_law_as(&self, other: &Self) -> bool {
         match (self, other) {
             (Self::Effect(effect), Self::Effect(other)) => effect.is_but_for_search(other),
             _ => self == other,

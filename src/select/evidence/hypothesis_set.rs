@@ -10,7 +10,8 @@ pub struct HypothesisSet {
     pub hypotheses: Vec<Hypothesis>,
     /// Probability among all sets that were evaluated.
     pub probability: f64,
-    /// For each member, index of its function, and 1 σ of the function's coefficients.
+    /// For each member, index of its function (`Candidate::variant`), and 1 σ of the function's
+    /// coefficients in units of σ of the noise.
     pub(super) functions: Vec<(usize, f64)>,
 }
 

@@ -11,7 +11,7 @@ use super::candidate::Candidate;
 use super::hypotheses::Hypotheses;
 use super::hypothesis::{Hypothesis, HypothesisKind, Site};
 use super::products::{Products, ReducedProblem};
-use super::search::{Weighted, reduced_by};
+use super::search::{EvaluatedSet, reduced_by};
 use super::sites::tool_site;
 use super::waves::is_free;
 use crate::laws::expression::Vocabulary;
@@ -28,11 +28,12 @@ use crate::select::grammar::{
 /// Smallest probability of a set at which laws are searched in place of its members: at the
 /// coordinate of a joint, and elsewhere.
 const MIN_SET_PROBABILITIES: [f64; 2] = [0.1, 0.2];
-/// Maximum number of pairs of a joint and a set for which laws are searched.
+/// Maximum number of pairs of a joint and a set, the most probable ones, for which laws are
+/// searched.
 const MAX_SEARCHED: usize = 2;
 /// Maximum number of laws at all sites other than joint coordinates together.
 const MAX_ELSEWHERE: usize = 12;
-/// Log odds to the most probable law of all these sites beyond which laws are dropped.
+/// Largest ln odds of the most probable law of all these sites over another law that is kept.
 const MAX_LN_ODDS_ELSEWHERE: f64 = 8.0;
 
 /// Site at which laws are searched.
@@ -42,7 +43,8 @@ struct LawAt {
     name: String,
     /// Part of the arm, which determines the factors of formulas.
     place: FormulaSite,
-    /// Parameter site with the displacements of the target by the law.
+    /// Parameter site at which the law adds its value. The lever is the derivative of the residuals
+    /// there.
     lever: ParameterSite,
 }
 
@@ -54,24 +56,27 @@ impl LawAt {
 }
 
 /// Sites at which laws are searched together, and the other members of a probable set.
-struct Place {
+struct SitesToSearch {
     sites: Vec<LawAt>,
     other_members: Vec<usize>,
 }
 
-/// Returns formulas that may replace the members of probable sets at one joint, and elsewhere.
+/// Returns the formulas that may replace the members of probable sets at single joints, at other
+/// sites, and in links that warm.
 pub(super) fn promising(
     hypotheses: &Hypotheses,
-    weighted: &[Weighted],
+    evaluated_sets: &[EvaluatedSet],
     products: &Products,
     (fitted, data, left_out): (&Fitted, &Data, &[usize]),
 ) -> Vec<Candidate> {
     let problem = &fitted.problem;
     let mut laws: Vec<Candidate> = Vec::new();
-    let places = places(hypotheses, weighted, products);
-    let elsewhere = elsewhere(hypotheses, weighted, products);
-    let links = warming_links(hypotheses, weighted, products);
-    for Place { sites, other_members: rest } in places.into_iter().chain(elsewhere).chain(links) {
+    let places = places(hypotheses, evaluated_sets, products);
+    let elsewhere = elsewhere(hypotheses, evaluated_sets, products);
+    let links = warming_links(hypotheses, evaluated_sets, products);
+    for SitesToSearch { sites, other_members: rest } in
+        places.into_iter().chain(elsewhere).chain(links)
+    {
         if products.target.stop.is_requested() {
             break;
         }
@@ -87,13 +92,13 @@ pub(super) fn promising(
             new
         });
         for effect in proposed {
-            let is_known = |candidate: &Candidate| {
-                candidate.hypothesis.effect().is_some_and(|known| known.is_same_as(&effect))
+            let is_listed = |candidate: &Candidate| {
+                candidate.hypothesis.effect().is_some_and(|other| other.is_same_as(&effect))
             };
-            let is_known = hypotheses.all.iter().chain(&laws).any(is_known);
-            if !is_known && is_free(&effect, problem) {
-                let columns = coefficients(&effect, hypotheses, (problem, &sites));
-                laws.extend(hypotheses.entered(&effect, columns, problem));
+            let is_listed = hypotheses.candidates.iter().chain(&laws).any(is_listed);
+            if !is_listed && is_free(&effect, problem) {
+                let columns = coefficient_columns(&effect, hypotheses, (problem, &sites));
+                laws.extend(hypotheses.candidate_of_effect(&effect, columns, problem));
             }
         }
     }
@@ -103,9 +108,9 @@ pub(super) fn promising(
 /// Returns the columns of the coefficients of a law, without those of the parameters inside its
 /// formulas.
 ///
-/// The columns of a law at another site than a joint's coordinate are products of its formulas and
-/// the lever of its site.
-fn coefficients(
+/// The columns of a law at another site than a joint's coordinate are the products of the values of
+/// its formulas and the lever of its site.
+fn coefficient_columns(
     effect: &Effect,
     hypotheses: &Hypotheses,
     (problem, sites): (&Problem, &[LawAt]),
@@ -135,7 +140,7 @@ fn coefficients(
 /// Returns the names of the `members`, which key the cache of laws.
 fn member_names(hypotheses: &Hypotheses, members: &[usize]) -> Vec<String> {
     let name = |&member: &usize| {
-        let hypothesis = &hypotheses.all[member].hypothesis;
+        let hypothesis = &hypotheses.candidates[member].hypothesis;
         hypothesis.effect().map_or_else(
             || format!("{} {:?} {:?}", hypothesis.site, hypothesis.kind, hypothesis.depends_on),
             Effect::name_and_place,
@@ -147,7 +152,7 @@ fn member_names(hypotheses: &Hypotheses, members: &[usize]) -> Vec<String> {
 }
 
 /// Returns a proposed formula at a site as an effect; `None` if the formula is not valid.
-fn effect(problem: &Problem, at: &LawAt, proposal: &Proposal) -> Option<Effect> {
+fn effect_of_proposal(problem: &Problem, at: &LawAt, proposal: &Proposal) -> Option<Effect> {
     let (slides, covariates) = (problem.slides(), problem.covariate_names());
     let vocabulary =
         Vocabulary { slides: &slides, covariates: &covariates, ..Vocabulary::default() };
@@ -164,7 +169,7 @@ fn effect(problem: &Problem, at: &LawAt, proposal: &Proposal) -> Option<Effect> 
 }
 
 /// Returns the joint, counted from 0, at whose command coordinate or about whose axis a hypothesis
-/// acts; `None` for others.
+/// acts; `None` for other hypotheses and for periodic errors with many orders.
 fn joint_of(hypothesis: &Hypothesis, problem: &Problem) -> Option<usize> {
     let Site::Joint(joint) = hypothesis.site else { return None };
     let is_there = match &hypothesis.kind {
@@ -177,12 +182,16 @@ fn joint_of(hypothesis: &Hypothesis, problem: &Problem) -> Option<usize> {
 
 /// Returns the joints at whose coordinates laws are searched, each with the other members of a
 /// probable set.
-fn places(hypotheses: &Hypotheses, weighted: &[Weighted], products: &Products) -> Vec<Place> {
+fn places(
+    hypotheses: &Hypotheses,
+    evaluated_sets: &[EvaluatedSet],
+    products: &Products,
+) -> Vec<SitesToSearch> {
     let problem = hypotheses.linearised.problem();
-    let of = |member: usize| joint_of(&hypotheses.all[member].hypothesis, problem);
+    let of = |member: usize| joint_of(&hypotheses.candidates[member].hypothesis, problem);
     // The probabilities of sets that differ only at the joint are added.
     let mut probability_of_rest: BTreeMap<(usize, Vec<usize>), f64> = BTreeMap::new();
-    for set in weighted.iter().filter(|set| !products.has_gear(&set.members)) {
+    for set in evaluated_sets.iter().filter(|set| !products.has_gear(&set.members)) {
         let joints: BTreeSet<usize> = set.members.iter().filter_map(|&member| of(member)).collect();
         for joint in joints {
             let mut other_members: Vec<usize> =
@@ -201,7 +210,7 @@ fn places(hypotheses: &Hypotheses, weighted: &[Weighted], products: &Products) -
         let lever = ParameterSite::coordinate(problem, joint + 1);
         let at =
             LawAt { name: format!("joint{}", joint + 1), place: FormulaSite::Joint(joint), lever };
-        Place { sites: vec![at], other_members: rest }
+        SitesToSearch { sites: vec![at], other_members: rest }
     };
     found.into_iter().map(|(found, _)| place(found)).collect()
 }
@@ -210,12 +219,16 @@ fn places(hypotheses: &Hypotheses, weighted: &[Weighted], products: &Products) -
 /// those members of the most probable set that act there. The sites are tool, measurement and base,
 /// and small motions of a joint at which a function without a law acts. Returns `None` if no member
 /// acts there.
-fn elsewhere(hypotheses: &Hypotheses, weighted: &[Weighted], products: &Products) -> Option<Place> {
+fn elsewhere(
+    hypotheses: &Hypotheses,
+    evaluated_sets: &[EvaluatedSet],
+    products: &Products,
+) -> Option<SitesToSearch> {
     let problem = hypotheses.linearised.problem();
-    let set = weighted.first().filter(|set| {
+    let set = evaluated_sets.first().filter(|set| {
         set.probability > MIN_SET_PROBABILITIES[1] && !products.has_gear(&set.members)
     })?;
-    let of = |member: usize| &hypotheses.all[member].hypothesis;
+    let of = |member: usize| &hypotheses.candidates[member].hypothesis;
     let is_elsewhere = |member: usize| {
         let hypothesis = of(member);
         let is_listed = match &hypothesis.kind {
@@ -223,12 +236,12 @@ fn elsewhere(hypotheses: &Hypotheses, weighted: &[Weighted], products: &Products
             HypothesisKind::Smooth | HypothesisKind::Wandering => true,
             _ => false,
         };
-        // Laws elsewhere than at a joint depend on conditions of a pose, such as temperature and
-        // time.
-        let is_condition =
+        // Laws elsewhere than at a joint are no functions of the moments of the loads or of the
+        // position.
+        let can_be_in_formula =
             |covariate: &Covariate| !matches!(covariate, Covariate::Load | Covariate::Position);
         is_listed
-            && hypothesis.depends_on.iter().any(is_condition)
+            && hypothesis.depends_on.iter().any(can_be_in_formula)
             && joint_of(hypothesis, problem).is_none()
     };
     let members: Vec<usize> =
@@ -259,24 +272,24 @@ fn elsewhere(hypotheses: &Hypotheses, weighted: &[Weighted], products: &Products
         };
         add(format!("joint{}.{motion}", joint + 1), coordinate);
     }
-    Some(Place { sites, other_members })
+    Some(SitesToSearch { sites, other_members })
 }
 
 /// Returns the links at which laws are searched: every link with a beam, in place of the members of
-/// the most probable set that depend on temperature and act at a joint or in a link. A joint that
-/// errs with temperature and a link that bends have similar levers, so that both are compared.
+/// the most probable set that depend on temperature and act at a joint or in a link. A joint whose
+/// error depends on temperature and a link that bends have similar levers, so both are compared.
 fn warming_links(
     hypotheses: &Hypotheses,
-    weighted: &[Weighted],
+    evaluated_sets: &[EvaluatedSet],
     products: &Products,
-) -> Option<Place> {
+) -> Option<SitesToSearch> {
     let problem = hypotheses.linearised.problem();
     problem.data.reference_temperature?;
-    let set = weighted.first().filter(|set| {
+    let set = evaluated_sets.first().filter(|set| {
         set.probability > MIN_SET_PROBABILITIES[1] && !products.has_gear(&set.members)
     })?;
     let depends_on_temperature = |member: usize| {
-        let hypothesis = &hypotheses.all[member].hypothesis;
+        let hypothesis = &hypotheses.candidates[member].hypothesis;
         matches!(hypothesis.site, Site::Joint(_) | Site::LinkBefore(_))
             && hypothesis.depends_on.contains(&Covariate::Temperature)
     };
@@ -296,7 +309,7 @@ fn warming_links(
         problem.joints.iter().enumerate().filter_map(of_joint).flatten().collect();
     let mut other_members = other_members;
     other_members.sort_unstable();
-    (!members.is_empty() && !sites.is_empty()).then_some(Place { sites, other_members })
+    (!members.is_empty() && !sites.is_empty()).then_some(SitesToSearch { sites, other_members })
 }
 
 /// Search for formulas that explain the residual that some members of a set leave.
@@ -326,7 +339,7 @@ impl Search<'_, '_, '_> {
                 .map_or_else(Vec::new, |reduced| self.best(sites, &reduced, products, &kept));
         }
         let members: Vec<&Candidate> =
-            other_members.iter().map(|&member| &self.hypotheses.all[member]).collect();
+            other_members.iter().map(|&member| &self.hypotheses.candidates[member]).collect();
         let Some((blocks, target)) =
             blocks(self.fitted, self.data, self.hypotheses, &members, &dropped)
         else {
@@ -338,7 +351,8 @@ impl Search<'_, '_, '_> {
         reduced.map_or_else(Vec::new, |reduced| self.best(sites, &reduced, &products, &kept))
     }
 
-    /// Returns the best laws of all sites, those of one site in the order of their probability.
+    /// Returns the best laws of all sites that the fit does not contain, those of one site in the
+    /// order of their probability.
     fn best(
         &self,
         sites: &[LawAt],
@@ -358,10 +372,11 @@ impl Search<'_, '_, '_> {
             laws_at_sites.truncate(MAX_ELSEWHERE);
         }
         let new = laws_at_sites.iter().filter(|(_, proposal)| !proposal.is_present);
-        new.filter_map(|(at, proposal)| effect(&self.fitted.problem, at, proposal)).collect()
+        new.filter_map(|(at, proposal)| effect_of_proposal(&self.fitted.problem, at, proposal))
+            .collect()
     }
 
-    /// Returns the formulas at one site that best explain a residual.
+    /// Returns the formulas at one site that best explain the residual `left`, in the poses `kept`.
     fn proposals(
         &self,
         at: &LawAt,
@@ -379,19 +394,19 @@ impl Search<'_, '_, '_> {
         let diagonal = DVector::from_iterator(kept.len(), squares);
         let site = WhitenedSite::new(diagonal, &less, product);
         let noise = Noise::new(left.squares, products.target.noise.freedom, |squares| {
-            products.over_noise(squares)
+            products.ln_density(squares)
         });
         let poses_of_fit = linearised.poses();
         let poses: Vec<_> = kept.iter().map(|&pose| &poses_of_fit[pose]).collect();
         let quantities = Quantities::new(problem, &poses, data.measurements.time_measured);
         // The functions of laws that the fit contains follow from their columns and the lever.
         let is_present = |k: &usize| {
-            let effect = hypotheses.all[*k].hypothesis.effect();
+            let effect = hypotheses.candidates[*k].hypothesis.effect();
             matches!(effect, Some(Effect::Law(law)) if law.description().is_some() && law.site() == at.name)
         };
-        let present: Vec<usize> = (0..hypotheses.all.len()).filter(is_present).collect();
+        let present: Vec<usize> = (0..hypotheses.candidates.len()).filter(is_present).collect();
         let functions = |&k: &usize| {
-            let columns = hypotheses.all[k].design.columns();
+            let columns = hypotheses.candidates[k].design.columns();
             let function = |column: nalgebra::DVectorView<f64>| {
                 let value = |pose: &usize| {
                     let lever = of_pose(pose);
@@ -406,9 +421,9 @@ impl Search<'_, '_, '_> {
     }
 }
 
-/// Returns B and p of columns along one lever l, one column for each of the `poses`, with the fitted
-/// parameters and a set projected out. The products of the columns are diag(|l|²) − BᵀB; p are
-/// their products with the residual.
+/// Returns B and p of columns along one lever l, one column for each of the `poses`, with the
+/// fitted parameters and a set projected out. The products of the columns are diag(|l|²) − BᵀB; p
+/// are their products with the residual.
 fn along_lever(
     reduced: &ReducedProblem,
     products: &Products,

@@ -17,32 +17,33 @@ use super::marginal::Coefficients;
 use crate::select::fitted::Fitted;
 use crate::select::neighbourhood::Linearised;
 
-/// Smallest singular value at which rows of constraints count as independent.
+/// Smallest singular value of the constraint rows at which the rows are independent.
 const MIN_SINGULAR_VALUE: f64 = 1e-9;
 
 /// Returns the hypotheses that a limit (bound or constraint) is wrong, one for each limit that is
-/// active in the fit `fitted`. The column of each is the change of the residual if that limit is
-/// dropped, from the derivatives in `linearised`. The first `weighed` rows count for the evidence.
-/// Together the hypotheses have the prior probability exp(`ln_family`).
+/// active in the fit `fitted`. The column of each is the derivative of the residual along the
+/// direction that opens without that limit, from `linearised`. Evidence is evaluated on the first
+/// `evidence_poses` poses. Together the hypotheses have the prior probability exp(`ln_family`).
 pub(super) fn limits(
     fitted: &Fitted,
     linearised: &Linearised,
-    weighed: usize,
+    evidence_poses: usize,
     ln_family: f64,
 ) -> Vec<Candidate> {
     let found = &fitted.found;
-    let is_held = |&k: &usize| {
+    let is_at_bound = |&k: &usize| {
         found.estimates[k].at_bound.is_some() && found.unknowns.contains(&found.estimates[k].name)
     };
-    let held: Vec<usize> = (0..found.estimates.len()).filter(is_held).collect();
-    let count = held.len() + fitted.active().nrows();
+    let at_bound: Vec<usize> = (0..found.estimates.len()).filter(is_at_bound).collect();
+    let count = at_bound.len() + fitted.active().nrows();
     if count == 0 {
         return Vec::new();
     }
     let ln_prior = ln_family - (count as f64).ln();
     let candidate = |words: String, k: usize, columns: DMatrix<f64>, largest: f64| {
         let site = fitted.model.parameters[k].site;
-        let length = columns.rows(0, 3 * weighed).norm() / ((3 * weighed) as f64).sqrt();
+        let length =
+            columns.rows(0, 3 * evidence_poses).norm() / ((3 * evidence_poses) as f64).sqrt();
         let coefficients =
             Coefficients { largest: vec![largest * length], ..Coefficients::default() };
         let hypothesis = Hypothesis {
@@ -51,12 +52,12 @@ pub(super) fn limits(
             coordinate: None,
             depends_on: Vec::new(),
         };
-        let design = Design::Dense(columns).scaled(weighed)?;
+        let design = Design::Dense(columns).scaled(evidence_poses)?;
         Some(Candidate { hypothesis, variant: 0, design, ln_prior, coefficients })
     };
-    let freed = linearised.of_parameters(&fitted.model, &held, &found.x);
+    let freed = linearised.of_parameters(&fitted.model, &at_bound, &found.x);
     let sigma_of = |k: usize| fitted.model.parameters[k].sigma;
-    let bounds = held.iter().enumerate().filter_map(|(j, &k)| {
+    let bounds = at_bound.iter().enumerate().filter_map(|(j, &k)| {
         let largest = sigma_of(k).map_or(f64::INFINITY, |sigma| MAX_PLAUSIBLE * sigma);
         candidate(
             format!("of {}", found.estimates[k].name),

@@ -21,48 +21,56 @@ use crate::numeric::lower_factor;
 /// of the grid is [`MAX_LN_NOISE_STEP`], or half the width 1/√(2ν) of the likelihood with ν degrees
 /// of freedom if that is less.
 const MAX_LN_NOISE_FACTOR: f64 = 3.5;
+/// Largest step of ln f on the grid.
 const MAX_LN_NOISE_STEP: f64 = 0.05;
-/// Smallest step of the grid, which limits its size; no data set has so many degrees of freedom.
+/// Smallest step of ln f on the grid, which limits the grid's size. No data set has so many degrees
+/// of freedom that it needs a smaller step.
 const MIN_LN_NOISE_STEP: f64 = 1e-4;
 
-/// Log odds to the largest term of a sum at which a term is neglected (e⁻⁴⁰).
+/// ln of the ratio of the largest term of a sum to a term that is neglected: e⁻⁴⁰ of the largest
+/// one.
 const NEGLIGIBLE_LN_ODDS: f64 = 40.0;
 
-/// Number of rows of L relative to its columns above which G = D − LᵀL is factored as a full
-/// matrix. Two factors of G then take less work than two of 1 − L E⁻¹ Lᵀ.
-const MIN_DENSE_SHARE: f64 = 0.8;
+/// Ratio of rows to columns of L above which G = D − LᵀL is factored as a full matrix. Two factors
+/// of G then take less work than two of 1 − L E⁻¹ Lᵀ.
+const MIN_DENSE_RATIO: f64 = 0.8;
 /// Largest number of columns whose Gram matrix is formed by dot products.
 const MAX_NARROW_GRAM: usize = 6;
 /// Number of rows of a symmetric product that are formed together.
 const GRAM_ROWS: usize = 48;
 
 /// Degrees of freedom ν of a residual, and the prior on its noise factor f = true σ / assumed σ:
-/// Cauchy in ln f, with half-width `trust`.
+/// Cauchy in ln f, with half-width `ln_half_width`.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Noise {
+    /// Degrees of freedom ν.
     pub freedom: f64,
-    pub trust: f64,
-    /// Smallest ln f considered, 0 for a declared σ: an instrument with that σ cannot show smaller
-    /// effects.
-    pub least: f64,
+    /// Half-width of the Cauchy prior on ln f.
+    pub ln_half_width: f64,
+    /// Smallest ln f considered. It is 0 for a declared σ, because a smaller noise would make
+    /// effects significant that an instrument with that σ cannot show.
+    pub min_ln_factor: f64,
 }
 
 impl Noise {
     /// Returns the grid of noise factors f.
     pub fn grid(self) -> NoiseGrid {
         let step = MAX_LN_NOISE_STEP.min(0.5 / (2.0 * self.freedom).sqrt()).max(MIN_LN_NOISE_STEP);
-        let least = self.least.clamp(-MAX_LN_NOISE_FACTOR, MAX_LN_NOISE_FACTOR);
+        let min_ln_factor = self.min_ln_factor.clamp(-MAX_LN_NOISE_FACTOR, MAX_LN_NOISE_FACTOR);
         #[expect(clippy::cast_possible_truncation, reason = "few steps")]
         let steps = (MAX_LN_NOISE_FACTOR / step).ceil() as i32;
         let at = |number: i32| {
             let ln_f = step * f64::from(number);
-            (-(ln_f / self.trust).powi(2).ln_1p() - self.freedom * ln_f, 0.5 * (-2.0 * ln_f).exp())
+            (
+                -(ln_f / self.ln_half_width).powi(2).ln_1p() - self.freedom * ln_f,
+                0.5 * (-2.0 * ln_f).exp(),
+            )
         };
         let terms = (-steps..=steps)
-            .filter(|&number| step * f64::from(number) >= least - 1e-9)
+            .filter(|&number| step * f64::from(number) >= min_ln_factor - 1e-9)
             .map(at)
             .collect();
-        let prior_range = (MAX_LN_NOISE_FACTOR / self.trust).powi(2).ln_1p();
+        let prior_range = (MAX_LN_NOISE_FACTOR / self.ln_half_width).powi(2).ln_1p();
         NoiseGrid { terms, freedom: self.freedom, prior_range }
     }
 }
@@ -74,7 +82,7 @@ pub(super) struct NoiseGrid {
     terms: Vec<(f64, f64)>,
     /// Degrees of freedom ν of the residual.
     freedom: f64,
-    /// Largest difference of ln prior(f) on the grid.
+    /// Difference between the largest and the smallest ln prior(f) on the grid.
     prior_range: f64,
 }
 
@@ -156,11 +164,12 @@ impl Normal {
         }
     }
 
-    /// Computes G as a full matrix if L has so many rows that this takes less work, for two sizes.
+    /// Computes G as a full matrix if L has so many rows that evaluations for two sizes then take
+    /// less work.
     pub fn dense_if_cheaper(self) -> Self {
         match self {
             Self::LowRankCorrection { diagonal, less, product }
-                if less.nrows() as f64 > MIN_DENSE_SHARE * less.ncols() as f64 =>
+                if less.nrows() as f64 > MIN_DENSE_RATIO * less.ncols() as f64 =>
             {
                 let mut gram = DMatrix::from_diagonal(&diagonal);
                 gram.gemm(-1.0, &less.transpose(), &less, 1.0);
@@ -254,8 +263,8 @@ pub(super) struct Coefficients {
 }
 
 impl Coefficients {
-    /// Returns the trial `sizes` for the coefficients `of`, each limited to the largest plausible
-    /// size. `column` is the root mean square of the columns.
+    /// Returns the trial `sizes` for the coefficients with the indices `of`, each limited to the
+    /// largest plausible size. `column` is the root mean square of each column.
     fn plausible(&self, sizes: &[f64], of: impl Iterator<Item = usize>, column: f64) -> Vec<f64> {
         let largest = of
             .filter_map(|j| self.largest.get(j))
@@ -266,13 +275,14 @@ impl Coefficients {
     }
 }
 
-/// Returns ln p(r | block) summed over sizes, and the most probable size of all columns together,
-/// for a residual with sum of squares S.
+/// Returns ln p(r | block), averaged over the trial `sizes` and up to a constant, and the most
+/// probable size of all columns together. `squares_and_freedom` are the sum of squares of the
+/// residual and its degrees of freedom.
 ///
-/// If each of its k columns may act without the others, all together and each alone have the same
-/// prior probability 1/(k + 1). Otherwise an effect with a single column would be preferred,
-/// because its prior is narrower.
-pub(super) fn of_block(
+/// If each of the block's k columns may act without the others (`Coefficients::alone`), all
+/// together and each alone have the same prior probability 1/(k + 1). Otherwise an effect with a
+/// single column would be preferred, because its prior is narrower.
+pub(super) fn ln_likelihood_of_block(
     normal: &Normal,
     squares_and_freedom: (f64, f64),
     grid: &NoiseGrid,
@@ -282,8 +292,12 @@ pub(super) fn of_block(
     // All k columns together have a root mean square of 1, so each of them has 1/√k.
     let column = (k as f64).sqrt().recip();
     let plausible = coefficients.plausible(sizes, 0..k, column);
-    let (whole, size) =
-        of_columns(normal, squares_and_freedom, grid, (&plausible, &coefficients.never_negative));
+    let (whole, size) = ln_likelihood_of_columns(
+        normal,
+        squares_and_freedom,
+        grid,
+        (&plausible, &coefficients.never_negative),
+    );
     let (gram, product) = match normal {
         Normal::Dense { gram, product } if coefficients.alone && gram.ncols() > 1 => {
             (gram, product)
@@ -301,17 +315,18 @@ pub(super) fn of_block(
             .iter()
             .map(|size| size / column)
             .collect();
-        of_columns(&single, squares_and_freedom, grid, (&sizes, &[sign])).0
+        ln_likelihood_of_columns(&single, squares_and_freedom, grid, (&sizes, &[sign])).0
     };
     let all: Vec<f64> = std::iter::once(whole).chain((0..gram.ncols()).map(ln_of_column)).collect();
     (ln_sum(all.iter().copied()) - (all.len() as f64).ln(), size)
 }
 
-/// Returns ln p(r | block) and the most probable size, for all columns together only.
+/// Returns ln p(r | columns), averaged over the trial `sizes`, and the most probable size, for all
+/// columns together only.
 ///
 /// The prior of a `never_negative` parameter is the half β ≥ 0 of its normal distribution. With the
 /// estimate m and its standard error s, this changes the likelihood by the factor 2 Φ(m / s).
-fn of_columns(
+fn ln_likelihood_of_columns(
     normal: &Normal,
     (squares, freedom): (f64, f64),
     grid: &NoiseGrid,
@@ -322,10 +337,10 @@ fn of_columns(
             return f64::NEG_INFINITY;
         };
         let remaining_squares = (squares - explained).max(0.0);
-        let signs = match normal {
+        let ln_sign_factor = match normal {
             Normal::Dense { gram, product } if never_negative.contains(&true) => {
                 with_prior(gram, (size * size).recip()).cholesky().map(|factor| {
-                    signs(
+                    ln_sign_factor(
                         &factor.inverse(),
                         product,
                         (remaining_squares / freedom).sqrt().max(1.0),
@@ -335,7 +350,7 @@ fn of_columns(
             }
             _ => None,
         };
-        signs.unwrap_or(0.0) - determinant + grid.ln_likelihood(remaining_squares)
+        ln_sign_factor.unwrap_or(0.0) - determinant + grid.ln_likelihood(remaining_squares)
     };
     // Sizes ascend, and above the most probable one the likelihood falls. The loop therefore ends
     // once larger sizes add nothing to the sum.
@@ -355,9 +370,10 @@ fn of_columns(
     (ln_sum(tried.iter().map(|(_, ln)| *ln)) - (sizes.len() as f64).ln(), best.0)
 }
 
-/// Returns Σ ln 2 Φ(m / s) over the coefficients that cannot be negative. Columns are derivatives
-/// of the residual, so m = − (G + 1/c²)⁻¹ b.
-fn signs(
+/// Returns Σ ln 2 Φ(m / s) over the coefficients that cannot be negative, with s the standard error
+/// for noise of standard deviation `scatter`. Columns are derivatives of the residual, so m = − (G
+/// + 1/c²)⁻¹ b, with `covariance` = (G + 1/c²)⁻¹.
+fn ln_sign_factor(
     covariance: &DMatrix<f64>,
     product: &DVector<f64>,
     scatter: f64,
@@ -377,8 +393,8 @@ mod tests {
 
     const SIZES: [f64; 6] = [0.3, 1.0, 3.0, 10.0, 30.0, 100.0];
 
-    /// Returns ln p(r | columns) − ln p(r) for r = 5 A₁ plus noise, with `count` columns, one or
-    /// two.
+    /// Returns ln p(r | columns) − ln p(r) for r = 5 A₁ plus noise, with one or two columns
+    /// (`count`).
     fn gain(count: usize, coefficients: &Coefficients) -> f64 {
         let column = |j: usize, i: usize| {
             ((12.9898 + 3.77 * j as f64) * i as f64 + 0.5).sin() * 2.0_f64.sqrt()
@@ -389,9 +405,9 @@ mod tests {
             gram: columns.transpose() * &columns,
             product: columns.transpose() * &residual,
         };
-        let noise = Noise { freedom: 120.0, trust: 0.1, least: 0.0 };
+        let noise = Noise { freedom: 120.0, ln_half_width: 0.1, min_ln_factor: 0.0 };
         let (squares, grid) = (residual.norm_squared(), noise.grid());
-        of_block(&normal, (squares, 120.0), &grid, (&SIZES, coefficients)).0
+        ln_likelihood_of_block(&normal, (squares, 120.0), &grid, (&SIZES, coefficients)).0
             - grid.ln_likelihood(squares)
     }
 
@@ -413,7 +429,10 @@ mod tests {
     #[test]
     fn a_grid_is_bounded_whatever_the_degrees_of_freedom() {
         let points = |freedom: f64| {
-            Noise { freedom, trust: 0.1, least: f64::NEG_INFINITY }.grid().terms.len()
+            Noise { freedom, ln_half_width: 0.1, min_ln_factor: f64::NEG_INFINITY }
+                .grid()
+                .terms
+                .len()
         };
         assert_eq!((points(30.0), points(1e300)), (141, 70_001));
     }

@@ -3,8 +3,8 @@
 //!
 //! Every hypothesis is a block of columns in the linear neighbourhood of a fit, with the fitted
 //! parameters projected out. One closed-form marginal likelihood ([`marginal`]) compares sets of
-//! them. The prior gives each family its weight, each further member of a set odds of 1 to 2, and
-//! each member its share of its family.
+//! them. The prior gives each family its weight, each additional member of a set odds of 1 to 2,
+//! and each member a part of the weight of its family.
 //!
 //! Effects (laws) compete with functions without a law. These are smooth functions of the same
 //! covariates at the same part, functions of two covariates, harmonics with changing amplitude and
@@ -57,21 +57,21 @@ pub use posterior::{Claims, Evidence};
 use products::{CachedProducts, Products};
 use reevaluation::single_supporting_pose;
 pub(super) use reevaluation::{SubsetEvidence, subset_evidence};
-use search::{Weighted, search};
+use search::{EvaluatedSet, search};
 use waves::Waves;
 
-/// Number of best shapes (bumps and steps) that are refined.
+/// Number of trial shapes (bumps and steps), the best ones, about which finer shapes are tried.
 const MAX_REFINED_SHAPES: usize = 4;
 
 /// Returns ln of the marginal likelihood times the prior of the set that a fit contains: the
 /// effects `added` by the search and functions without a law.
 ///
-/// The fit is linear about its own optimum. Sets with strong effects are compared by this value,
-/// each at a fit of its own set. Each fit scales its residual by its own σ′. The density is that of
-/// the residual over the common `sigma` σ \[m\], with ν degrees of freedom: ln p(r/σ′) = ln p(r/σ)
-/// − ν ln (σ/σ′).
+/// Sets with strong effects are compared by this value, each at the optimum of a fit of that set.
+/// Each fit scales its residual by another σ′. The density is therefore that of the residual over
+/// the common `sigma` σ \[m\], with ν degrees of freedom: ln p(r/σ) = ln p(r/σ′) + ν ln (σ/σ′).
 ///
-/// `evidence` is that about the first of the compared fits.
+/// `evidence` belongs to the first of the compared fits. `functions` holds each function with its
+/// variant. Returns `None` if the residual is not finite.
 pub(super) fn ln_posterior(
     fitted: &Fitted,
     data: &Data,
@@ -86,13 +86,13 @@ pub(super) fn ln_posterior(
     };
     let hypotheses =
         of_effects.unwrap_or_else(|| Hypotheses::new(fitted, data, added, &rows, rows.len()));
-    let is_own = |candidate: &&Candidate| match candidate.hypothesis.effect() {
+    let is_in_set = |candidate: &&Candidate| match candidate.hypothesis.effect() {
         Some(effect) => hypotheses.added.contains(effect),
         None => functions.iter().any(|(function, variant)| {
             candidate.variant == *variant && candidate.hypothesis == *function
         }),
     };
-    let members: Vec<&Candidate> = hypotheses.all.iter().filter(is_own).collect();
+    let members: Vec<&Candidate> = hypotheses.candidates.iter().filter(is_in_set).collect();
     let (blocks, target) = blocks(fitted, data, &hypotheses, &members, &evidence.left_out)?;
     Some(
         search::ln_posterior(&Products::new(&blocks, &target))?
@@ -100,9 +100,9 @@ pub(super) fn ln_posterior(
     )
 }
 
-/// Returns the most probable form of a function without a law, in addition to the effects of the
-/// fit. The form is a bump or a step, or `None` for the smooth function. Also returns 1 σ of its
-/// coefficients.
+/// Returns the most probable form of a function without a law beside the effects of the fit: a bump
+/// or a step, or `None` for the smooth function of the set `best`. Also returns 1 σ of its
+/// coefficients, in units of σ of the noise.
 pub(super) fn best_form(
     fitted: &Fitted,
     data: &Data,
@@ -111,7 +111,7 @@ pub(super) fn best_form(
     hypothesis: &Hypothesis,
 ) -> Option<(Option<Shape>, f64)> {
     let smooth = hypotheses.candidate(best, hypothesis)?;
-    let weighed = hypotheses.linearised.poses().len();
+    let evidence_poses = hypotheses.linearised.poses().len();
     let gains = |forms: &[&Candidate]| {
         let (blocks, target) = blocks(fitted, data, hypotheses, forms, &[])?;
         let all_blocks: Vec<usize> = (0..blocks.len()).collect();
@@ -120,13 +120,13 @@ pub(super) fn best_form(
         Some(gains)
     };
     let mut shapes = Shape::all();
-    let coarse = hypotheses.shaped(hypothesis, weighed, &shapes);
+    let coarse = hypotheses.shaped(hypothesis, evidence_poses, &shapes);
     let best_of = |(k, ..): &(usize, f64, f64)| coarse[*k].0.finer();
     if !coarse.is_empty() {
         let found = gains(&coarse.iter().map(|(_, candidate)| candidate).collect::<Vec<_>>())?;
         shapes = found.iter().take(MAX_REFINED_SHAPES).flat_map(best_of).collect();
     }
-    let finer = hypotheses.shaped(hypothesis, weighed, &shapes);
+    let finer = hypotheses.shaped(hypothesis, evidence_poses, &shapes);
     let forms: Vec<&Candidate> =
         std::iter::once(smooth).chain(finer.iter().map(|(_, candidate)| candidate)).collect();
     // Half of the prior probability belongs to the smooth function, the other half to all shapes
@@ -146,7 +146,7 @@ pub(super) fn best_form(
 pub(super) fn evaluate(fitted: &Fitted, data: &Data, added: &[Effect]) -> Option<Evidence> {
     let mut left_out = Vec::new();
     loop {
-        let (evidence, hypotheses) = evaluated_without(fitted, data, added, &left_out)?;
+        let (evidence, hypotheses) = evaluate_without(fitted, data, added, &left_out)?;
         match single_supporting_pose(fitted, data, (&evidence, &hypotheses)) {
             Some(pose) if left_out.len() < MAX_SINGLE_POSES => left_out.push(pose),
             _ => return Some(evidence),
@@ -156,7 +156,7 @@ pub(super) fn evaluate(fitted: &Fitted, data: &Data, added: &[Effect]) -> Option
 
 /// Evaluates the evidence without the poses `left_out`. Also returns the hypotheses that were
 /// evaluated.
-fn evaluated_without<'a>(
+fn evaluate_without<'a>(
     fitted: &'a Fitted,
     data: &Data<'a>,
     added: &[Effect],
@@ -164,34 +164,40 @@ fn evaluated_without<'a>(
 ) -> Option<(Evidence, Hypotheses<'a>)> {
     let rows = data.evidence_rows();
     let mut hypotheses = Hypotheses::new(fitted, data, added, &rows, rows.len());
-    let (mut blocks, target) =
-        blocks(fitted, data, &hypotheses, &hypotheses.all.iter().collect::<Vec<_>>(), left_out)?;
+    let (mut blocks, target) = blocks(
+        fitted,
+        data,
+        &hypotheses,
+        &hypotheses.candidates.iter().collect::<Vec<_>>(),
+        left_out,
+    )?;
     let is_present = |candidate: &Candidate| {
         candidate.hypothesis.effect().is_some_and(|effect| hypotheses.added.contains(effect))
     };
     let present: Vec<usize> =
-        (0..blocks.len()).filter(|&k| is_present(&hypotheses.all[k])).collect();
+        (0..blocks.len()).filter(|&k| is_present(&hypotheses.candidates[k])).collect();
     let mut explanations: Vec<HypothesisSet> = Vec::new();
-    let (mut weighted, unlisted, mut cache) = {
+    let (mut evaluated_sets, unlisted, mut cache) = {
         let products = Products::new(&blocks, &target);
-        let weighted = search(&products, &present);
+        let evaluated_sets = search(&products, &present);
         if data.stop.is_requested() {
             return None;
         }
         // A periodic error with many orders is fitted before arguments of other effects are
         // searched.
-        let has_gear = weighted.first().is_some_and(|set| products.has_gear(&set.members));
+        let has_gear = evaluated_sets.first().is_some_and(|set| products.has_gear(&set.members));
         let unlisted = if has_gear {
             Vec::new()
         } else {
             let waves = Waves { hypotheses: &hypotheses, products: &products, fitted, left_out }
-                .promising(&weighted);
+                .promising(&evaluated_sets);
             let times = (&products, hypotheses.times.as_slice());
-            let moves = moves::promising(&hypotheses, &weighted, times, (fitted, left_out));
+            let moves = moves::promising(&hypotheses, &evaluated_sets, times, (fitted, left_out));
             [waves, moves].concat()
         };
-        let laws = laws::promising(&hypotheses, &weighted, &products, (fitted, data, left_out));
-        (weighted, [unlisted, laws].concat(), products.into_cache())
+        let laws =
+            laws::promising(&hypotheses, &evaluated_sets, &products, (fitted, data, left_out));
+        (evaluated_sets, [unlisted, laws].concat(), products.into_cache())
     };
     let blocks_of = |some: &[Candidate]| {
         Candidate::blocks(&some.iter().collect::<Vec<_>>(), (fitted, &target.fit), left_out)
@@ -202,18 +208,24 @@ fn evaluated_without<'a>(
     };
     if !unlisted.is_empty() {
         blocks.extend(blocks_of(&unlisted));
-        hypotheses.all.extend(unlisted);
-        (weighted, cache) = search_again(cache, &blocks);
+        hypotheses.candidates.extend(unlisted);
+        (evaluated_sets, cache) = search_again(cache, &blocks);
     }
     let products = Products::with_cache(cache, &blocks, &target);
-    let finer = finer::finer(&hypotheses, &weighted, &products, blocks_of, &fitted.problem);
+    let finer = finer::finer_candidates(
+        &hypotheses,
+        &evaluated_sets,
+        &products,
+        blocks_of,
+        &fitted.problem,
+    );
     cache = products.into_cache();
     if !finer.is_empty() {
         blocks.extend(blocks_of(&finer));
-        hypotheses.all.extend(finer);
-        (weighted, cache) = search_again(cache, &blocks);
+        hypotheses.candidates.extend(finer);
+        (evaluated_sets, cache) = search_again(cache, &blocks);
     }
-    let of = |k: usize| &hypotheses.all[k].hypothesis;
+    let of = |k: usize| &hypotheses.candidates[k].hypothesis;
     if data.stop.is_requested() {
         return None;
     }
@@ -230,8 +242,8 @@ fn evaluated_without<'a>(
         })
     };
     let mut places: BTreeMap<Vec<usize>, usize> = BTreeMap::new();
-    for Weighted { members, sizes, probability } in
-        weighted.into_iter().filter(|set| set.probability > posterior::MIN_KEPT_PROBABILITY)
+    for EvaluatedSet { members, sizes, probability } in
+        evaluated_sets.into_iter().filter(|set| set.probability > posterior::MIN_KEPT_PROBABILITY)
     {
         let mut members_of_set: Vec<usize> = members.iter().map(|&member| number(member)).collect();
         members_of_set.sort_unstable();
@@ -240,7 +252,8 @@ fn evaluated_without<'a>(
             Entry::Vacant(place) => {
                 place.insert(explanations.len());
                 let members_of_set = members.iter().map(|&member| of(member).clone()).collect();
-                let variants = members.into_iter().map(|member| hypotheses.all[member].variant);
+                let variants =
+                    members.into_iter().map(|member| hypotheses.candidates[member].variant);
                 let functions = variants.zip(sizes).collect();
                 explanations.push(HypothesisSet {
                     hypotheses: members_of_set,
@@ -266,21 +279,21 @@ fn evaluated_without<'a>(
     Some((evidence, hypotheses))
 }
 
-/// Returns pairs of a member of the set `best` and an effect that may replace it, the best ones
-/// first. Each effect gains at least half as much as the member; of each family there is one at a
-/// site.
+/// Returns pairs of a member of the set `best` and an effect that may replace it, for each member
+/// the best effects first. Each effect gains more than half as much in ln probability as the
+/// member. One effect is listed of each family at each site.
 fn stand_ins(
     best: &HypothesisSet,
     hypotheses: &Hypotheses,
     products: &Products,
 ) -> Vec<(Hypothesis, Hypothesis)> {
-    let effect = |k: usize| hypotheses.all[k].hypothesis.effect();
+    let effect = |k: usize| hypotheses.candidates[k].hypothesis.effect();
     let tried: Vec<usize> = (0..products.blocks.len()).filter(|&k| effect(k).is_some()).collect();
     let number = |(member, (variant, _)): (&Hypothesis, &(usize, f64))| {
         hypotheses
-            .all
+            .candidates
             .iter()
-            .position(|known| known.variant == *variant && known.hypothesis == *member)
+            .position(|candidate| candidate.variant == *variant && candidate.hypothesis == *member)
     };
     let members: Vec<usize> =
         best.hypotheses.iter().zip(&best.functions).filter_map(number).collect();
@@ -288,8 +301,8 @@ fn stand_ins(
     for &member in &members {
         let others: Vec<usize> = members.iter().copied().filter(|&other| other != member).collect();
         let mut gains = search::gains_beside(&others, &tried, products);
-        let of_own = search::gains_beside(&others, &[member], products);
-        let least = of_own.first().map_or(f64::INFINITY, |(_, gain, _)| 0.5 * gain);
+        let of_member = search::gains_beside(&others, &[member], products);
+        let least = of_member.first().map_or(f64::INFINITY, |(_, gain, _)| 0.5 * gain);
         gains.retain(|(k, gain, _)| *gain > least && !members.contains(k));
         gains.sort_by(|a, b| b.1.total_cmp(&a.1));
         let name = |k: usize| effect(k).map(Effect::name_and_place).unwrap_or_default();
@@ -298,8 +311,8 @@ fn stand_ins(
             if !listed_names.contains(&name(k)) && listed_names.len() <= MAX_STAND_INS {
                 listed_names.push(name(k));
                 stand_ins.push((
-                    hypotheses.all[member].hypothesis.clone(),
-                    hypotheses.all[k].hypothesis.clone(),
+                    hypotheses.candidates[member].hypothesis.clone(),
+                    hypotheses.candidates[k].hypothesis.clone(),
                 ));
             }
         }

@@ -1,5 +1,5 @@
-//! Search for times at which the instrument may have moved and rotated. It is made if probable sets
-//! contain a hypothesis that depends on time.
+//! Search for times at which the instrument may have moved and rotated. The search is made only if
+//! probable sets contain a hypothesis that depends on time.
 
 use std::collections::BTreeSet;
 
@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::candidate::{Candidate, HYPOTHESES_PER_PROJECTION};
 use super::hypotheses::Hypotheses;
 use super::products::Products;
-use super::search::{Weighted, reduced_by};
+use super::search::{EvaluatedSet, reduced_by};
 use super::waves::is_free;
 use crate::problem::Effect;
 use crate::residual_tests::Covariate;
@@ -19,70 +19,76 @@ use crate::select::settings::{MAX_REVISED_SETS, MIN_REVISED_PROBABILITY};
 /// each set, in place of one of these members, or of all together.
 pub(super) fn promising(
     hypotheses: &Hypotheses,
-    weighted: &[Weighted],
+    evaluated_sets: &[EvaluatedSet],
     (products, times): (&Products, &[f64]),
     (fitted, left_out): (&Fitted, &[usize]),
 ) -> Vec<Candidate> {
     let of = |at_time: f64| Effect::StationMove { at_time };
-    let is_known = |effect: &Effect| {
-        hypotheses.all.iter().any(|candidate| candidate.hypothesis.effect() == Some(effect))
+    let is_listed = |effect: &Effect| {
+        hypotheses.candidates.iter().any(|candidate| candidate.hypothesis.effect() == Some(effect))
     };
     let new: Vec<Effect> =
-        times.iter().map(|&time| of(time)).filter(|effect| !is_known(effect)).collect();
+        times.iter().map(|&time| of(time)).filter(|effect| !is_listed(effect)).collect();
     if !new.first().is_some_and(|effect| is_free(effect, &fitted.problem)) {
         return Vec::new();
     }
     let follows_time = |member: &usize| {
-        let on = &hypotheses.all[*member].hypothesis.depends_on;
+        let on = &hypotheses.candidates[*member].hypothesis.depends_on;
         on.iter().any(|covariate| matches!(covariate, Covariate::Time | Covariate::Row))
     };
-    let mut rests: BTreeSet<Vec<usize>> = BTreeSet::new();
-    for set in weighted.iter().filter(|set| set.probability > MIN_REVISED_PROBABILITY) {
-        let gone: Vec<usize> = set.members.iter().copied().filter(follows_time).collect();
-        for gone in
-            gone.iter().map(std::slice::from_ref).chain((gone.len() > 1).then_some(gone.as_slice()))
+    let mut reduced_sets: BTreeSet<Vec<usize>> = BTreeSet::new();
+    for set in evaluated_sets.iter().filter(|set| set.probability > MIN_REVISED_PROBABILITY) {
+        let removed: Vec<usize> = set.members.iter().copied().filter(follows_time).collect();
+        for removed in removed
+            .iter()
+            .map(std::slice::from_ref)
+            .chain((removed.len() > 1).then_some(removed.as_slice()))
         {
             let mut remaining: Vec<usize> =
-                set.members.iter().copied().filter(|member| !gone.contains(member)).collect();
+                set.members.iter().copied().filter(|member| !removed.contains(member)).collect();
             remaining.sort_unstable();
-            if rests.len() < MAX_REVISED_SETS {
-                rests.insert(remaining);
+            if reduced_sets.len() < MAX_REVISED_SETS {
+                reduced_sets.insert(remaining);
             }
         }
     }
     let reduced_problems: Vec<_> =
-        rests.iter().filter_map(|rest| reduced_by(rest, products)).collect();
+        reduced_sets.iter().filter_map(|rest| reduced_by(rest, products)).collect();
     if reduced_problems.is_empty() {
         return Vec::new();
     }
-    let odds_of = |effects: &[Effect]| -> Vec<(Candidate, Vec<f64>)> {
+    let ln_odds_of = |effects: &[Effect]| -> Vec<(Candidate, Vec<f64>)> {
         if products.target.stop.is_requested() {
             return Vec::new();
         }
-        let entered = |effect: &Effect| {
-            hypotheses.entered(effect, hypotheses.linearised.columns(effect), &fitted.problem)
+        let candidate_of_effect = |effect: &Effect| {
+            hypotheses.candidate_of_effect(
+                effect,
+                hypotheses.linearised.columns(effect),
+                &fitted.problem,
+            )
         };
-        let some: Vec<Candidate> = effects.iter().filter_map(entered).collect();
+        let some: Vec<Candidate> = effects.iter().filter_map(candidate_of_effect).collect();
         let blocks = Candidate::blocks(
             &some.iter().collect::<Vec<_>>(),
             (fitted, &products.target.fit),
             left_out,
         );
         let odds: Vec<Vec<f64>> =
-            reduced_problems.iter().map(|left| left.odds_of(&blocks)).collect();
+            reduced_problems.iter().map(|left| left.ln_odds_of(&blocks)).collect();
         some.into_iter()
             .enumerate()
             .map(|(k, candidate)| (candidate, odds.iter().map(|of| of[k]).collect()))
             .collect()
     };
     let all: Vec<(Candidate, Vec<f64>)> =
-        new.par_chunks(HYPOTHESES_PER_PROJECTION).flat_map_iter(odds_of).collect();
+        new.par_chunks(HYPOTHESES_PER_PROJECTION).flat_map_iter(ln_odds_of).collect();
     let mut found: Vec<Candidate> = Vec::new();
     for k in 0..reduced_problems.len() {
         let best =
             all.iter().filter(|(_, odds)| odds[k] > 0.0).max_by(|a, b| a.1[k].total_cmp(&b.1[k]));
         if let Some((best, _)) = best
-            && !found.iter().any(|known| known.hypothesis == best.hypothesis)
+            && !found.iter().any(|other| other.hypothesis == best.hypothesis)
         {
             found.push(best.clone());
         }

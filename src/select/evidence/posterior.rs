@@ -16,9 +16,10 @@ pub struct Evidence {
     pub sets: Vec<HypothesisSet>,
     /// Pairs of a member of the accepted set and an effect that may replace it.
     pub(super) stand_ins: Vec<(Hypothesis, Hypothesis)>,
-    /// Poses that were left out of the evidence, because each alone supported an effect.
+    /// Indices of the poses that were left out of the evidence, because each alone supported an
+    /// effect.
     pub(in crate::select) left_out: Vec<usize>,
-    /// What the prior probability of an effect needs to know of the other hypotheses.
+    /// Properties of the other hypotheses on which the prior probability of an effect depends.
     pub(super) others: OtherHypotheses,
 }
 
@@ -75,10 +76,11 @@ impl Evidence {
     }
 
     /// Returns an upper limit of the probability that noise and fewer hypotheses than in `best`
-    /// cause such evidence. A likelihood ratio exceeds B at most with probability 1/B [Ville 1939].
+    /// cause such strong evidence for as many as in `best`. A likelihood ratio exceeds B at most
+    /// with probability 1/B [Ville 1939].
     pub fn chance(&self, best: &HypothesisSet) -> f64 {
-        let is_fewer = |known: &&HypothesisSet| known.hypotheses.len() < best.hypotheses.len();
-        let fewer: f64 = self.sets.iter().filter(is_fewer).map(|known| known.probability).sum();
+        let is_fewer = |set: &&HypothesisSet| set.hypotheses.len() < best.hypotheses.len();
+        let fewer: f64 = self.sets.iter().filter(is_fewer).map(|set| set.probability).sum();
         odds_against(1.0 - fewer)
     }
 
@@ -92,7 +94,7 @@ impl Evidence {
     ) -> Vec<HypothesisSet> {
         let differ = |one: &HypothesisSet, other: &HypothesisSet| {
             let is_new = |candidate: &&Hypothesis| {
-                !other.hypotheses.iter().any(|known| known.is_same_claim(candidate))
+                !other.hypotheses.iter().any(|member| member.is_same_claim(candidate))
             };
             one.hypotheses.iter().filter(is_new).cloned().collect::<Vec<Hypothesis>>()
         };
@@ -104,24 +106,24 @@ impl Evidence {
         let mut alternatives: Vec<HypothesisSet> =
             self.sets.iter().filter(is_exchange).take(most).cloned().collect();
         for (member, other) in self.stand_ins.iter().filter(|(member, _)| !member.is_limit()) {
-            let Some(place) = best.hypotheses.iter().position(|known| known == member) else {
+            let Some(index) = best.hypotheses.iter().position(|of_best| of_best == member) else {
                 continue;
             };
             let mut exchanged = HypothesisSet { probability: 0.0, ..best.clone() };
-            exchanged.hypotheses[place] = other.clone();
-            exchanged.functions[place].0 = 0;
-            let is_known = |known: &HypothesisSet| {
-                known.hypotheses.iter().all(|member| exchanged.hypotheses.contains(member))
+            exchanged.hypotheses[index] = other.clone();
+            exchanged.functions[index].0 = 0;
+            let is_listed = |set: &HypothesisSet| {
+                set.hypotheses.iter().all(|member| exchanged.hypotheses.contains(member))
             };
-            if !alternatives.iter().any(is_known) && !best.hypotheses.contains(other) {
+            if !alternatives.iter().any(is_listed) && !best.hypotheses.contains(other) {
                 alternatives.push(exchanged);
             }
         }
         alternatives
     }
 
-    /// Returns the evidence with the odds of some sets replaced by `odds`: ln odds to `best`, each
-    /// computed at a fit of that set.
+    /// Returns the evidence with the probabilities of some sets corrected by `odds`: for each set,
+    /// ln of its odds over `best`, computed at a fit of that set.
     pub(in crate::select) fn corrected(
         mut self,
         best: &HypothesisSet,
@@ -137,7 +139,7 @@ impl Evidence {
             let probability = of_best * ln_odds.min(40.0).exp();
             let is_same = |set: &&mut HypothesisSet| {
                 set.hypotheses.len() == explanation.hypotheses.len()
-                    && set.hypotheses.iter().all(|known| explanation.hypotheses.contains(known))
+                    && set.hypotheses.iter().all(|member| explanation.hypotheses.contains(member))
             };
             match self.sets.iter_mut().find(is_same) {
                 Some(set) => set.probability = probability,
@@ -150,8 +152,9 @@ impl Evidence {
         self
     }
 
-    /// Returns effects that may replace `effect` in a model with the effects `held`, each with its
-    /// probability, best first. Each is at least `min_ratio` times as probable as `effect`.
+    /// Returns effects that may replace `effect` in a model with the effects `held`, best first.
+    /// Each has the probability of the sets that contain it instead of `effect`, at least
+    /// `min_ratio` times that of the sets with `effect`.
     pub fn alternatives(
         &self,
         effect: &Effect,
@@ -164,7 +167,7 @@ impl Evidence {
         if !hypotheses
             .by_ref()
             .filter_map(Hypothesis::effect)
-            .any(|known| known.is_but_for_search(effect))
+            .any(|other_effect| other_effect.is_but_for_search(effect))
         {
             return Vec::new();
         }
@@ -174,9 +177,10 @@ impl Evidence {
         let without_others = |explanation: &HypothesisSet| {
             let mut remaining = explanation.effects();
             for other in &others {
-                let exact = remaining.iter().position(|known| known == *other);
-                let place = exact
-                    .or_else(|| remaining.iter().position(|known| known.is_but_for_search(other)));
+                let exact = remaining.iter().position(|other_effect| other_effect == *other);
+                let place = exact.or_else(|| {
+                    remaining.iter().position(|other_effect| other_effect.is_but_for_search(other))
+                });
                 place.map(|place| remaining.remove(place));
             }
             remaining
@@ -187,12 +191,15 @@ impl Evidence {
         let mut instead: Vec<(Effect, f64)> = Vec::new();
         for explanation in &self.sets {
             let remaining = without_others(explanation);
-            if remaining.iter().any(|known| known.is_but_for_search(effect)) {
+            if remaining.iter().any(|other_effect| other_effect.is_but_for_search(effect)) {
                 with += explanation.probability;
                 continue;
             }
             for other in remaining {
-                match instead.iter_mut().find(|(known, _)| known.is_but_for_search(&other)) {
+                match instead
+                    .iter_mut()
+                    .find(|(other_effect, _)| other_effect.is_but_for_search(&other))
+                {
                     Some((_, probability)) => *probability += explanation.probability,
                     None => instead.push((other, explanation.probability)),
                 }
@@ -217,10 +224,10 @@ impl Evidence {
 
     /// Returns place, quantities and law of a hypothesis with their probabilities.
     ///
-    /// A hypothesis with another value of its searched argument counts as the same, unless the most
+    /// A hypothesis with another value of its searched argument is the same claim, unless the most
     /// probable set contains both.
     pub fn claims(&self, of: &Hypothesis) -> Claims {
-        let most = self.sets.iter().map(|known| &known.hypotheses).find(|known| known.contains(of));
+        let most = self.sets.iter().map(|set| &set.hypotheses).find(|members| members.contains(of));
         let is_beside =
             |other: &Hypothesis| other != of && most.is_some_and(|most| most.contains(other));
         // If a limit is wrong, it explains the error at its site alone.
@@ -232,13 +239,13 @@ impl Evidence {
         let has_law = |explanation: &&HypothesisSet| {
             let unknown = |other: &Hypothesis| is_there(other) && other.effect().is_none();
             // All functions without a law make the same claim that the law is unknown. Errors that
-            // wander, and sag under undeclared masses, are claims of their own.
-            let has_one = of.effect().is_some()
+            // // wander in time, and sag under undeclared masses, are separate claims.
+            let is_separate_claim = of.effect().is_some()
                 || of.is_limit()
                 || matches!(of.kind, HypothesisKind::Sag | HypothesisKind::Wandering);
             let is_it = |other: &&Hypothesis| {
-                if has_one {
-                    other.kind.is_of(&of.kind) && other.site == of.site
+                if is_separate_claim {
+                    other.kind.has_same_law_as(&of.kind) && other.site == of.site
                 } else {
                     unknown(other)
                 }
@@ -329,7 +336,7 @@ mod tests {
             others: OtherHypotheses::default(),
         };
         let law = |order: f64| evidence.claims(&wave(order)).law.1;
-        // Order 6.41 counts as 6.4 and 1.6 as 1.5, but 6.4 and 1.5 do not count as each other.
+        // Order 6.41 is the same claim as 6.4, and 1.6 as 1.5, but 6.4 is another claim than 1.5.
         assert!((law(6.4) - 1.0).abs() < 1e-12, "{}", law(6.4));
         assert!((law(1.5) - 0.75).abs() < 1e-12, "{}", law(1.5));
     }

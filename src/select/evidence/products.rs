@@ -1,5 +1,5 @@
-//! Products of the columns of hypotheses with one another and with the residual. The evidence of a
-//! set needs nothing else. Each product is computed on first use and cached.
+//! Products of the columns of hypotheses with one another and with the residual, on which alone
+//! the evidence of a set depends. Each product is computed on first use and cached.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use super::block::Block;
 use super::cache::Cache;
-use super::column_products::{ColumnProducts, MIN_SIDE, Member, form};
+use super::column_products::{ColumnProducts, MIN_SIDE, Member, form_products};
 use super::marginal::{Noise, NoiseGrid, Normal};
 use crate::fit::Stop;
 use crate::numeric::{inverse_factor, inverse_lower, lower_factor, lower_product};
@@ -29,7 +29,7 @@ const MIN_SIZE_OF_MEMBER: f64 = 1e-3;
 pub(super) struct ResidualModel {
     pub fit: LinearNeighbourhood,
     pub noise: Noise,
-    /// Log factor on the prior of a hypothesis if the set already contains one of its family.
+    /// ln of the factor on the prior of a hypothesis if the set already contains one of its family.
     pub alike: f64,
     /// Request to stop the search early.
     pub stop: Stop,
@@ -54,7 +54,7 @@ pub(super) struct CachedProducts {
     columns: ColumnProducts,
     /// Gains of hypotheses when added to a set, by set.
     gains: Mutex<BTreeMap<SizedSet, Gains>>,
-    /// Converged sizes and log posterior of sets.
+    /// Converged sizes and ln posterior of sets.
     settled: Cache<SizedSet, (Vec<f64>, f64)>,
 }
 
@@ -89,8 +89,9 @@ impl<'a> Products<'a> {
         self.cache
     }
 
-    /// Returns ln of the density of a residual with this sum of squares, up to a constant.
-    pub fn over_noise(&self, squares: f64) -> f64 {
+    /// Returns ln of the density of a residual with this sum of squares, integrated over the noise
+    /// factor, up to a constant.
+    pub fn ln_density(&self, squares: f64) -> f64 {
         self.grid.ln_likelihood(squares)
     }
 
@@ -124,7 +125,7 @@ impl<'a> Products<'a> {
         if !self.target.stop.is_requested() {
             let members: Vec<&Member> =
                 members.into_iter().map(|member| self.member(member)).collect();
-            form(&members, others, self.blocks);
+            form_products(&members, others, self.blocks);
         }
     }
 
@@ -134,8 +135,8 @@ impl<'a> Products<'a> {
         let set = sized_set(members, sizes);
         let cached = || self.cache.gains.lock().unwrap_or_else(PoisonError::into_inner);
         let missing: Vec<usize> = match cached().get(&set) {
-            Some(known) => {
-                tried.iter().copied().filter(|block| !known.contains_key(block)).collect()
+            Some(gains) => {
+                tried.iter().copied().filter(|block| !gains.contains_key(block)).collect()
             }
             None => tried.to_vec(),
         };
@@ -153,8 +154,8 @@ impl<'a> Products<'a> {
     }
 
     /// Returns the converged sizes of a set and ln of its posterior; calls `settle` if they are not
-    /// cached. `settle` also returns true if the sizes stay where they are: a set that begins with
-    /// them has the same result.
+    /// cached. `settle` also returns true if its sizes are a fixed point; the result for a set that
+    /// starts with them is then the same.
     pub fn settled(
         &self,
         (members, sizes): (&[usize], &[f64]),
@@ -203,7 +204,7 @@ impl<'a> Products<'a> {
         let residual_along = &within * residual_along;
         within.column_iter_mut().zip(scales).for_each(|(mut column, scale)| column *= scale);
         let squares = self.squares - residual_along.norm_squared();
-        let without = self.over_noise(squares);
+        let without = self.ln_density(squares);
         Some(ReducedProblem {
             products: self,
             members: members.to_vec(),
@@ -220,8 +221,7 @@ impl<'a> Products<'a> {
 }
 
 /// Residual problem that a set leaves. With A the columns of its members, D their sizes, 1 + D AᵀA
-/// D = L Lᵀ and Z = L⁻¹D Aᵀ, it leaves CᵀC − (Z C)ᵀ(Z C) and Cᵀr − (Z C)ᵀ(Z r) of further columns
-/// C.
+/// D = L Lᵀ and Z = L⁻¹D Aᵀ, it leaves CᵀC − (Z C)ᵀ(Z C) and Cᵀr − (Z C)ᵀ(Z r) of other columns C.
 pub(super) struct ReducedProblem<'p, 'a> {
     products: &'p Products<'a>,
     members: Vec<usize>,
@@ -233,8 +233,8 @@ pub(super) struct ReducedProblem<'p, 'a> {
     /// Vector Z r.
     residual_along: DVector<f64>,
     pub squares: f64,
-    /// Logarithm of the density of the residual that remains after the set is fitted, without the
-    /// term in det L.
+    /// ln of the density of the residual that remains after the set is fitted, without the term in
+    /// det L.
     without: f64,
     /// Logarithm of the determinant of the Cholesky factor L.
     ln_determinant: f64,
@@ -248,8 +248,8 @@ impl ReducedProblem<'_, '_> {
         self.without - self.ln_determinant
     }
 
-    /// Returns ln p(r | set) summed over the size of the k-th member, and its most probable size
-    /// given the others.
+    /// Returns ln p(r | set) averaged over the size of the k-th member, and its most probable size
+    /// given the others; `None` if a factorisation fails.
     ///
     /// Let P = (1 + D AᵀA D)⁻¹, t = P D Aᵀr and c the size of member k. Given the others, its
     /// columns have G = (Pₖₖ⁻¹ − 1)/c² and b = Pₖₖ⁻¹tₖ/c. Without it, the set leaves tₖᵀPₖₖ⁻¹tₖ
@@ -277,7 +277,8 @@ impl ReducedProblem<'_, '_> {
         let mut gram = inverse.transpose() * inverse;
         (0..count).for_each(|j| gram[(j, j)] -= 1.0);
         let normal = Normal::Dense { gram: gram / (size * size), product: product / size };
-        let (ln_summed, size) = block.over_sizes(&normal, (squares, target.noise.freedom), grid);
+        let (ln_summed, size) =
+            block.ln_likelihood_over_sizes(&normal, (squares, target.noise.freedom), grid);
         Some((ln_summed - self.ln_determinant - ln_determinant, size))
     }
 
@@ -314,8 +315,8 @@ impl ReducedProblem<'_, '_> {
         })
     }
 
-    /// Returns ln p(r | set and a hypothesis) − ln p(r | set), and the hypothesis' most probable
-    /// size.
+    /// Returns ln p(r | set and hypothesis) − ln p(r | set), without the prior, and the most
+    /// probable size of the hypothesis.
     pub fn gain(&self, block: usize) -> (f64, f64) {
         self.gains_together(&[block])[0]
     }
@@ -356,8 +357,9 @@ impl ReducedProblem<'_, '_> {
         )
     }
 
-    /// Returns the gains, with the priors added, of hypotheses that are not in the list of blocks.
-    pub fn odds_of(&self, blocks: &[Block]) -> Vec<f64> {
+    /// Returns ln of the odds of the set with each of `blocks` over the set alone, priors included.
+    /// These blocks need not be in the list of blocks of the products.
+    pub fn ln_odds_of(&self, blocks: &[Block]) -> Vec<f64> {
         let columns: Vec<Arc<DMatrix<f64>>> =
             blocks.iter().map(|block| block.columns(&self.products.target.fit)).collect();
         let new_columns: Vec<_> = columns.iter().flat_map(|matrix| matrix.column_iter()).collect();
@@ -425,7 +427,7 @@ mod tests {
         let designs =
             designs.map(|effect| (effect.scaled(40).unwrap(), 0.0, Coefficients::default()));
         let blocks = Block::all(designs.to_vec(), &fit);
-        let noise = Noise { freedom: 116.0, trust: 0.1, least: 0.0 };
+        let noise = Noise { freedom: 116.0, ln_half_width: 0.1, min_ln_factor: 0.0 };
         let target = ResidualModel { fit, noise, alike: 0.0, stop: Stop::default() };
         let products = Products::new(&blocks, &target);
         let (members, sizes) = ([0, 1, 2], [3.0, 0.3, 1.0]);
@@ -467,7 +469,7 @@ mod tests {
             let alone = two.gain(block);
             assert!((gain - alone.0).abs() < 1e-9 && (size - alone.1).abs() < 1e-12);
         }
-        assert!((two.gain(2).0 - two.odds_of(&blocks[2..])[0]).abs() < 1e-9);
+        assert!((two.gain(2).0 - two.ln_odds_of(&blocks[2..])[0]).abs() < 1e-9);
     }
 
     #[test]
@@ -484,7 +486,7 @@ mod tests {
             block
         };
         let blocks: Vec<Block> = families.map(block).to_vec();
-        let noise = Noise { freedom: 29.0, trust: 0.1, least: 0.0 };
+        let noise = Noise { freedom: 29.0, ln_half_width: 0.1, min_ln_factor: 0.0 };
         let target = ResidualModel { fit: fit.clone(), noise, alike: 1.5, stop: Stop::default() };
         let products = Products::new(&blocks, &target);
         let of = |block: usize, others: &[usize]| products.ln_prior(&blocks[block], others);

@@ -1,4 +1,4 @@
-//! Evidence without some of the poses.
+//! Evidence evaluated again without some of the poses.
 
 use crate::select::settings::{SUBSET_PARTS, SUBSETS};
 use rand::SeedableRng as _;
@@ -16,13 +16,13 @@ use super::hypothesis::Hypothesis;
 use super::hypothesis_set::HypothesisSet;
 use super::posterior::Evidence;
 use super::products::{Products, ResidualModel};
-use super::search::{Weighted, reduced_by, search};
+use super::search::{EvaluatedSet, reduced_by, search};
 use crate::problem::Effect;
 
 /// Smallest probability of a set whose hypotheses are evaluated again without some poses.
 const MIN_REPEATED_PROBABILITY: f64 = 1e-3;
 
-/// Fit with the probable hypotheses about its residual. They are evaluated again with some poses
+/// Fit with the probable hypotheses about its residual, which are evaluated again with some poses
 /// left out.
 struct Reevaluation<'a> {
     fitted: &'a Fitted,
@@ -44,22 +44,23 @@ impl<'a> Reevaluation<'a> {
             evidence
                 .sets
                 .iter()
-                .filter(|known| known.probability > MIN_REPEATED_PROBABILITY)
+                .filter(|member| member.probability > MIN_REPEATED_PROBABILITY)
                 .chain([best])
         };
-        let all = || worth().flat_map(|known| known.hypotheses.iter().zip(&known.functions));
-        let is_known = |candidate: &Candidate| {
+        let all = || worth().flat_map(|member| member.hypotheses.iter().zip(&member.functions));
+        let is_probable = |candidate: &Candidate| {
             all().any(|(member, (variant, _))| {
                 *variant == candidate.variant && *member == candidate.hypothesis
             })
         };
-        let probable =
-            (0..hypotheses.all.len()).filter(|&k| is_known(&hypotheses.all[k])).collect();
+        let probable = (0..hypotheses.candidates.len())
+            .filter(|&k| is_probable(&hypotheses.candidates[k]))
+            .collect();
         Self { fitted, data, hypotheses, probable, best }
     }
 
     fn probable_candidates(&self) -> Vec<&Candidate> {
-        self.probable.iter().map(|&k| &self.hypotheses.all[k]).collect()
+        self.probable.iter().map(|&k| &self.hypotheses.candidates[k]).collect()
     }
 
     /// Returns the indices, in the list of probable hypotheses, of the best set's members for which
@@ -68,10 +69,10 @@ impl<'a> Reevaluation<'a> {
         let candidates = self.probable_candidates();
         let is_held = |k: &usize| {
             let candidate = candidates[*k];
-            self.best.hypotheses.iter().zip(&self.best.functions).any(|(known, (variant, _))| {
+            self.best.hypotheses.iter().zip(&self.best.functions).any(|(member, (variant, _))| {
                 *variant == candidate.variant
-                    && known.is_same_claim(&candidate.hypothesis)
-                    && of(known)
+                    && member.is_same_claim(&candidate.hypothesis)
+                    && of(member)
             })
         };
         (0..candidates.len()).filter(is_held).collect()
@@ -82,12 +83,12 @@ impl<'a> Reevaluation<'a> {
     }
 
     /// Returns the evidence about the probable hypotheses, evaluated without the poses `left_out`;
-    /// `None` if these poses cannot be left out of the linear model.
+    /// `None` if the residual is not finite or the search was stopped.
     fn without(&self, left_out: &[usize]) -> Option<Evidence> {
         let (blocks, target) = self.blocks(left_out)?;
-        let present = self.members(|known| known.effect().is_some());
+        let present = self.members(|member| member.effect().is_some());
         let candidates = self.probable_candidates();
-        let set = |Weighted { members, sizes, probability }: Weighted| HypothesisSet {
+        let set = |EvaluatedSet { members, sizes, probability }: EvaluatedSet| HypothesisSet {
             hypotheses: members.iter().map(|&k| candidates[k].hypothesis.clone()).collect(),
             probability,
             functions: members.iter().map(|&k| candidates[k].variant).zip(sizes).collect(),
@@ -102,8 +103,8 @@ impl<'a> Reevaluation<'a> {
     }
 
     /// Returns the index of the pose whose squared residual decreases most when `effect` is added
-    /// to all other members of the best set; `None` if the set cannot be evaluated without the
-    /// poses `left_out`.
+    /// to all other members of the best set. The poses `left_out` are not used. Returns `None` if
+    /// the sets cannot be evaluated.
     fn single_influential_pose(&self, effect: &Effect, left_out: &[usize]) -> Option<usize> {
         let (blocks, target) = self.blocks(left_out)?;
         let products = Products::new(&blocks, &target);
@@ -111,7 +112,7 @@ impl<'a> Reevaluation<'a> {
             Some(reduced_by(&self.members(of), &products)?.residual())
         };
         let (with, without) =
-            (residual_of(&|_| true)?, residual_of(&|known| known.effect() != Some(effect))?);
+            (residual_of(&|_| true)?, residual_of(&|member| member.effect() != Some(effect))?);
         let poses = self.hypotheses.linearised.poses().len();
         let gain = |pose: usize| {
             without.rows(3 * pose, 3).norm_squared() - with.rows(3 * pose, 3).norm_squared()
@@ -153,16 +154,16 @@ pub(super) fn single_supporting_pose(
 #[derive(Debug, Clone)]
 pub(in crate::select) struct SubsetEvidence {
     pub effect: Effect,
-    /// Share of the subsets whose most probable set contains the effect.
+    /// Fraction of the subsets whose most probable set contains the effect.
     pub share: f64,
     /// Mean over the subsets of the probabilities of the effect's place, of the quantities on which
-    /// it depends, and of its law.
+    /// it depends, and of its law; 0 in a subset in which no set contains the effect.
     pub means: [f64; 3],
 }
 
 /// Returns the evidence about each effect of a set in random subsets, in the linear neighbourhood
-/// of the fit to all rows. An effect with another value of its searched argument counts as the
-/// same.
+/// of the fit to all rows. An effect with another value of its searched argument is the same
+/// effect.
 pub(in crate::select) fn subset_evidence(
     fitted: &Fitted,
     data: &Data,
@@ -188,10 +189,10 @@ pub(in crate::select) fn subset_evidence(
         reevaluation.without(&(0..rows.len()).filter(is_out).collect::<Vec<usize>>())
     };
     let subsets: Vec<Evidence> = (0..SUBSETS).into_par_iter().filter_map(drawn).collect();
-    best.effects().into_iter().map(|effect| in_subsets(&subsets, effect)).collect()
+    best.effects().into_iter().map(|effect| evidence_in_subsets(&subsets, effect)).collect()
 }
 
-fn in_subsets(subsets: &[Evidence], effect: Effect) -> SubsetEvidence {
+fn evidence_in_subsets(subsets: &[Evidence], effect: Effect) -> SubsetEvidence {
     let is_effect = |hypothesis: &&Hypothesis| {
         hypothesis.effect().is_some_and(|other| other.is_but_for_search(&effect))
     };

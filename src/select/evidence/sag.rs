@@ -7,7 +7,7 @@
 //!
 //! linear in (m, m s). A compliance c at the joint displaces the arm by c M. For each link outboard
 //! of the joint this is a combination of four known functions of the configuration, for any masses.
-//! It is therefore neither a law of the catalogue, which needs masses, nor a free function.
+//! Sag is therefore neither a law of the catalogue, which needs masses, nor a free function.
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
@@ -18,11 +18,12 @@ use crate::model::parameter::{JointField, ParameterSite};
 use crate::problem::{JointKind, Problem};
 use crate::residual_tests::Covariate;
 
-/// Smallest independent part of a function, relative to its largest size, at which it is kept.
+/// Smallest singular value of the moment functions, relative to the largest one, at which a
+/// combination of them is kept.
 const MIN_NEW_SIZE: f64 = 1e-3;
 
 /// Returns true if gravity acts on an arm without declared masses.
-pub(super) fn weight_is_unknown(problem: &Problem) -> bool {
+pub(super) fn is_weight_unknown(problem: &Problem) -> bool {
     let has_mass =
         problem.joints.iter().any(|joint| !joint.bodies.is_empty() || joint.beam.is_some());
     problem.gravity.norm() > 0.0 && !has_mass
@@ -31,8 +32,8 @@ pub(super) fn weight_is_unknown(problem: &Problem) -> bool {
 impl Columns<'_, '_> {
     /// Adds the hypotheses that single revolute joints, or all of them, sag under a weight that is
     /// not declared.
-    pub(super) fn sag(&mut self) {
-        if !weight_is_unknown(self.problem) {
+    pub(super) fn add_sag(&mut self) {
+        if !is_weight_unknown(self.problem) {
             return;
         }
         let mut columns_of_joints: Vec<DMatrix<f64>> = Vec::new();
@@ -66,10 +67,10 @@ impl Columns<'_, '_> {
         }
     }
 
-    /// Returns the displacements of the points by a compliance of the joint: the derivative of each
-    /// position by the joint angle (`lever`) times each moment function about its axis. Linearly
-    /// dependent functions are dropped. Shape = (3 N, functions); `None` if gravity exerts no
-    /// moment about the joint.
+    /// Returns the displacements of the target by a compliance of the joint: the derivative of each
+    /// position by the joint angle (`lever`) times each moment function about the joint's axis.
+    /// Linearly dependent functions are dropped. Shape = (3 N, functions); `None` if gravity exerts
+    /// no moment about the joint.
     fn sag_columns(&self, joint: usize, lever: &DVector<f64>) -> Option<DMatrix<f64>> {
         let moments = moments(
             self.problem,
@@ -78,11 +79,11 @@ impl Columns<'_, '_> {
         );
         // The same functions need fewer columns: M = U Σ Vᵀ, and coefficients with equal priors on
         // the columns of M equal such coefficients on those of U Σ.
-        let weighed = moments.rows(0, self.weighed).into_owned().svd(false, true);
-        let turned = weighed.v_t?.transpose();
-        let most = weighed.singular_values.max();
+        let decomposition = moments.rows(0, self.evidence_poses).into_owned().svd(false, true);
+        let turned = decomposition.v_t?.transpose();
+        let most = decomposition.singular_values.max();
         let kept: Vec<usize> = (0..turned.ncols())
-            .filter(|&k| most > 0.0 && weighed.singular_values[k] > MIN_NEW_SIZE * most)
+            .filter(|&k| most > 0.0 && decomposition.singular_values[k] > MIN_NEW_SIZE * most)
             .collect();
         let functions = moments * turned.select_columns(&kept);
         let column = |row: usize, k: usize| lever[row] * functions[(row / 3, k)];
@@ -90,9 +91,9 @@ impl Columns<'_, '_> {
     }
 }
 
-/// Returns, as columns, moments about the axis of `joint`, shape = (N, functions). For each link
-/// that the joint carries there are four: the moment of 1 kg at the link's origin, and its changes
-/// if the mass moves by the link's length along x, y and z.
+/// Returns, as columns, moments of weights about the axis of `joint` \[N·m\], shape = (N,
+/// functions). For each link that the joint moves there are four: the moment of 1 kg at the link's
+/// origin, and its changes if the mass moves along x, y and z by the mean length of the links.
 fn moments<'a>(
     problem: &Problem,
     joint: usize,
@@ -127,7 +128,7 @@ mod tests {
         let text =
             "name = 'arm'\n[[joint]]\nalpha_deg = 90\n[[joint]]\na_m = 0.5\n[[joint]]\na_m = 0.5\n";
         let problem = Problem::parse(text, Path::new("problem.toml")).unwrap();
-        assert!(weight_is_unknown(&problem));
+        assert!(is_weight_unknown(&problem));
         let (first, second) = (0.3_f64, 0.4_f64);
         let configuration = [first, second, 0.0];
         // The axis of joint 2 is horizontal, and the origin of frame 3 is half a metre from it
@@ -141,6 +142,6 @@ mod tests {
             "{moments}"
         );
         let heavy = format!("{text}[[joint.body]]\nmass_kg = 1\n");
-        assert!(!weight_is_unknown(&Problem::parse(&heavy, Path::new("problem.toml")).unwrap()));
+        assert!(!is_weight_unknown(&Problem::parse(&heavy, Path::new("problem.toml")).unwrap()));
     }
 }

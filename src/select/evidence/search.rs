@@ -9,26 +9,28 @@ use super::block::Block;
 use super::products::{Products, ReducedProblem};
 use super::settling::converged_sizes;
 
-/// Number of most probable sets whose sizes are made to converge at the end.
+/// Number of most probable sets in which the sizes of the members (1 σ of their coefficients) are
+/// iterated to convergence at the end.
 const MAX_SETTLED_SETS: usize = 32;
 /// Number of most probable sets in which a function of several covariates is replaced by two
 /// hypotheses.
 const MAX_SPLIT_SETS: usize = 3;
 /// Largest number of members of a set at which pairs of members are replaced together.
 const MAX_PAIRED_MEMBERS: usize = 6;
-/// Maximum number of replacements in the best set, each in the best set found so far.
+/// Maximum number of passes that replace members of the most probable sets found so far.
 const MAX_EXCHANGES: usize = 4;
 
-/// Difference of ln posteriors of the same members in another order that counts as rounding. The
-/// order found first stays, so that effects are listed alike on every machine.
+/// Largest difference of ln posteriors that rounding alone causes between sets of the same members
+/// in another order. The order found first is kept, so that effects are listed alike on every
+/// machine.
 const MAX_ROUNDING_OF_LN_POSTERIOR: f64 = 1e-6;
 
 /// Set of hypotheses with its probability among all sets evaluated.
 #[derive(Debug, Clone)]
-pub(super) struct Weighted {
+pub(super) struct EvaluatedSet {
     /// Indices of the hypotheses, in the order in which they were added.
     pub members: Vec<usize>,
-    /// Most probable size of each member: 1 σ of its coefficients.
+    /// Most probable size of each member: 1 σ of its coefficients, in units of σ of the noise.
     pub sizes: Vec<f64>,
     pub probability: f64,
 }
@@ -38,6 +40,7 @@ pub(super) struct Weighted {
 struct Set {
     members: Vec<usize>,
     sizes: Vec<f64>,
+    /// ln of likelihood times prior, relative to the likelihood of noise alone.
     ln_posterior: f64,
 }
 
@@ -58,8 +61,8 @@ impl Set {
         self.ln_posterior > other.ln_posterior + MAX_ROUNDING_OF_LN_POSTERIOR
     }
 
-    /// Returns true if the set is not extended: a member is a periodic error, or has more than
-    /// `MAX_WIDE_COLUMNS` columns for single poses.
+    /// Returns true if the set is not extended because of a member for which [`Block::is_wide`] is
+    /// true.
     fn has_wide(&self, blocks: &[Block]) -> bool {
         self.members.iter().any(|&member| blocks[member].is_wide())
     }
@@ -69,8 +72,8 @@ impl Set {
     ///
     /// Sizes are relative to the noise, which includes effects that are not explained yet. Without
     /// this step, members that were added first would have too small a size. ln p(r | set) = l + Σ
-    /// (ln p(r | the others, k) − l), with l at the sizes of all members, and the size of k summed
-    /// over.
+    /// (ln p(r | the others, k) − l), with l at the sizes of all members, and ln p(r | the others,
+    /// k) averaged over the size of member k.
     fn settled(self, products: &Products) -> Self {
         if self.has_wide(products.blocks) { self } else { self.with_converged_sizes(products) }
     }
@@ -90,11 +93,12 @@ impl Set {
     }
 }
 
-/// Returns all sets that were evaluated, the most probable first. The empty set means noise alone.
+/// Returns all sets that were evaluated, the most probable first. The empty set stands for noise
+/// alone.
 ///
 /// The search starts from the empty set, from the set `present`, and from `present` without each of
-/// its members. If it is stopped, it returns only some sets.
-pub(super) fn search(products: &Products, present: &[usize]) -> Vec<Weighted> {
+/// its members. If a stop is requested, only some sets are evaluated.
+pub(super) fn search(products: &Products, present: &[usize]) -> Vec<EvaluatedSet> {
     let Products { blocks, .. } = *products;
     let mut evaluated: BTreeMap<Vec<usize>, Set> = BTreeMap::new();
     let without = |k: usize| [&present[..k], &present[k + 1..]].concat();
@@ -131,9 +135,8 @@ pub(super) fn search(products: &Products, present: &[usize]) -> Vec<Weighted> {
                 }
             }
         }
-        // A set that cannot grow does not limit larger sets of other hypotheses. Periodic errors
-        // with many orders count nevertheless, because they are fitted before other hypotheses are
-        // searched.
+        // The search ends if larger sets fall behind the best one, which does not include sets that
+        // cannot grow. It includes periodic errors with many orders, which are fitted first.
         let is_limit = |set: &&Set| !set.has_wide(blocks) || products.has_gear(&set.members);
         let can_grow = evaluated.values().filter(is_limit);
         let best_known = can_grow.map(|set| set.ln_posterior).fold(f64::NEG_INFINITY, f64::max);
@@ -162,7 +165,7 @@ pub(super) fn search(products: &Products, present: &[usize]) -> Vec<Weighted> {
         }
     }
     add_replacements(&mut evaluated, products);
-    add_gears(&mut evaluated, products);
+    add_periodic_errors(&mut evaluated, products);
     let mut likely: Vec<&Set> = evaluated.values().collect();
     likely.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
     let likely: Vec<Set> = likely.into_iter().take(MAX_SETTLED_SETS).cloned().collect();
@@ -170,15 +173,16 @@ pub(super) fn search(products: &Products, present: &[usize]) -> Vec<Weighted> {
     evaluated.extend(settled.into_iter().map(|set| (sorted(&set.members), set)));
     let most = evaluated.values().map(|set| set.ln_posterior).fold(f64::NEG_INFINITY, f64::max);
     let total: f64 = evaluated.values().map(|set| (set.ln_posterior - most).exp()).sum();
-    let weighted = |Set { members, sizes, ln_posterior }| {
+    let with_probability = |Set { members, sizes, ln_posterior }| {
         let probability = (ln_posterior - most).exp() / total;
-        Weighted { members, sizes, probability }
+        EvaluatedSet { members, sizes, probability }
     };
-    let mut weighted_sets: Vec<Weighted> = evaluated.into_values().map(weighted).collect();
-    weighted_sets.sort_by(|a, b| {
+    let mut evaluated_sets: Vec<EvaluatedSet> =
+        evaluated.into_values().map(with_probability).collect();
+    evaluated_sets.sort_by(|a, b| {
         b.probability.total_cmp(&a.probability).then_with(|| a.members.cmp(&b.members))
     });
-    weighted_sets
+    evaluated_sets
 }
 
 /// Extends the empty set, and the most probable set with a periodic error, by periodic errors as
@@ -187,7 +191,7 @@ pub(super) fn search(products: &Products, present: &[usize]) -> Vec<Weighted> {
 /// Sets with periodic errors are not extended otherwise, because they have many columns. Each of
 /// several such errors alone may gain less than smaller functions. Two errors of one joint, with a
 /// lower and a higher highest order, together describe coefficients that decrease with the order.
-fn add_gears(evaluated: &mut BTreeMap<Vec<usize>, Set>, products: &Products) {
+fn add_periodic_errors(evaluated: &mut BTreeMap<Vec<usize>, Set>, products: &Products) {
     let blocks = products.blocks;
     let gears: Vec<usize> =
         (0..blocks.len()).filter(|&block| blocks[block].is_periodic_of_many_orders).collect();
@@ -207,7 +211,7 @@ fn add_gears(evaluated: &mut BTreeMap<Vec<usize>, Set>, products: &Products) {
     }
 }
 
-/// Returns the set extended by each of the `tried` hypotheses.
+/// Returns, for each of the `tried` hypotheses, the set extended by it.
 fn extended(set: &Set, tried: &[usize], products: &Products) -> Vec<Set> {
     let new: Vec<usize> =
         tried.iter().copied().filter(|block| !set.members.contains(block)).collect();
@@ -217,10 +221,11 @@ fn extended(set: &Set, tried: &[usize], products: &Products) -> Vec<Set> {
 
 /// Adds sets that the stepwise search misses because the steps to them pass sets that explain less.
 ///
-/// In probable sets, it removes the function of several covariates; in the best set, each member
-/// and each pair of members. It then tries one and two other hypotheses in their place. So it finds
-/// two causes that a third hypothesis, or a function of several covariates, explains almost as well
-/// alone. Two members are replaced by effects only, because free functions would always gain.
+/// The function of several covariates is removed from probable sets, and each member and each pair
+/// of members from the best set. One and two other hypotheses are then tried in their place. This
+/// finds two causes that a third hypothesis, or a function of several covariates, explains almost
+/// as well alone. Two members are replaced by effects only, because free functions would always
+/// gain.
 fn add_replacements(evaluated: &mut BTreeMap<Vec<usize>, Set>, products: &Products) {
     let Products { blocks, .. } = *products;
     let every: Vec<usize> = (0..blocks.len()).collect();
@@ -243,27 +248,28 @@ fn add_replacements(evaluated: &mut BTreeMap<Vec<usize>, Set>, products: &Produc
             .iter()
             .filter_map(|set| Some((vec![set.members.iter().copied().find(is_surface)?], *set)));
         let of_best = likely.iter().take(1).flat_map(|set| {
-            members_and_pairs(&set.members).into_iter().map(move |gone| (gone, *set))
+            members_and_pairs(&set.members).into_iter().map(move |removed| (removed, *set))
         });
         let mut rests: Vec<(Vec<usize>, Vec<usize>, usize)> = Vec::new();
-        for (gone, set) in surfaces.take(MAX_SPLIT_SETS).chain(of_best) {
+        for (removed, set) in surfaces.take(MAX_SPLIT_SETS).chain(of_best) {
             let remaining: Vec<usize> =
-                set.members.iter().copied().filter(|member| !gone.contains(member)).collect();
-            let kind = if gone.len() > 1 { 2 } else { usize::from(!gone.iter().any(is_surface)) };
+                set.members.iter().copied().filter(|member| !removed.contains(member)).collect();
+            let kind =
+                if removed.len() > 1 { 2 } else { usize::from(!removed.iter().any(is_surface)) };
             let key = sorted(&remaining);
-            // If a single member was replaced for the same rest before, most pairs of laws were
-            // tried then.
+            // If a single member was replaced beside the same other members before, most pairs of
+            // laws were tried then.
             let is_tried = kind == 2 && tried.contains(&(key.clone(), 1));
             if !is_tried && tried.insert((key, kind)) {
-                rests.push((remaining, gone, kind));
+                rests.push((remaining, removed, kind));
             }
         }
         if rests.is_empty() {
             return;
         }
         let least = best - LOG_ODDS_CUTOFF;
-        let of_rest = |(rest, gone, kind): (Vec<usize>, Vec<usize>, usize)| {
-            replaced((&rest, &gone), instead[kind], least, products)
+        let of_rest = |(rest, removed, kind): (Vec<usize>, Vec<usize>, usize)| {
+            replaced((&rest, &removed), instead[kind], least, products)
         };
         let new: Vec<Vec<Set>> = rests.into_par_iter().map(of_rest).collect();
         if products.target.stop.is_requested() {
@@ -278,10 +284,10 @@ fn add_replacements(evaluated: &mut BTreeMap<Vec<usize>, Set>, products: &Produc
     }
 }
 
-/// Returns sets with other hypotheses in place of the members `gone`: the members `rest` alone, and
-/// `rest` with one and with two others. Sets with a log posterior below `least` are left out.
+/// Returns sets with other hypotheses in place of the members `removed`: the members `rest` alone,
+/// and `rest` with one and with two others. Sets with ln posterior below `least` are left out.
 fn replaced(
-    (rest, gone): (&[usize], &[usize]),
+    (rest, removed): (&[usize], &[usize]),
     [first, second]: [&[usize]; 2],
     least: f64,
     products: &Products,
@@ -293,7 +299,7 @@ fn replaced(
     let mut with_first = extended(&remaining, first, products);
     with_first.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
     let second: BTreeSet<usize> =
-        second.iter().copied().filter(|other| !gone.contains(other)).collect();
+        second.iter().copied().filter(|other| !removed.contains(other)).collect();
     let is_near = |set: &&Set| set.members.last().is_some_and(|last| second.contains(last));
     let near: Vec<&Set> = with_first.iter().filter(is_near).take(MAX_EXTENDING).collect();
     let promising: Vec<usize> = near.iter().filter_map(|set| set.members.last().copied()).collect();
@@ -326,13 +332,15 @@ fn members_and_pairs(members: &[usize]) -> Vec<Vec<usize>> {
     single.chain(pairs).collect()
 }
 
-/// Returns ln p(r | all blocks together) plus ln of their prior; `None` if a factorisation fails.
+/// Returns ln p(r | all blocks together), up to a constant, plus ln of their prior; `None` if a
+/// factorisation fails.
 pub(super) fn ln_posterior(products: &Products) -> Option<f64> {
     let all: Vec<usize> = (0..products.blocks.len()).collect();
-    Some(assembled(&all, products)?.ln_posterior + products.over_noise(products.squares))
+    Some(assembled(&all, products)?.ln_posterior + products.ln_density(products.squares))
 }
 
-/// Returns the residual problem that a set with these members leaves at their most probable sizes.
+/// Returns the residual problem that a set with these members leaves at their most probable sizes;
+/// `None` if a factorisation fails.
 pub(super) fn reduced_by<'p, 'a>(
     members: &[usize],
     products: &'p Products<'a>,
@@ -341,8 +349,8 @@ pub(super) fn reduced_by<'p, 'a>(
     products.reduced(&set.members, &set.sizes)
 }
 
-/// Returns, for each tried hypothesis, the gain in addition to the `others`, prior included, and
-/// its most probable size.
+/// Returns, for each tried hypothesis, its index, its gain in ln posterior in addition to the
+/// `others`, and its most probable size. Empty if the search was stopped.
 pub(super) fn gains_beside(
     others: &[usize],
     tried: &[usize],
@@ -407,7 +415,7 @@ mod tests {
             Block::new(design, &fit, -5.0, Coefficients::default())
         };
         let blocks = names.iter().map(block).collect();
-        let noise = Noise { freedom: 89.0, trust: 0.1, least: 0.0 };
+        let noise = Noise { freedom: 89.0, ln_half_width: 0.1, min_ln_factor: 0.0 };
         (blocks, ResidualModel { fit, noise, alike: 0.0, stop: Stop::default() })
     }
 
@@ -445,7 +453,7 @@ mod tests {
         let blocks = [&third, &one, &other].map(block);
         let target = ResidualModel {
             fit: fit.clone(),
-            noise: Noise { freedom: 89.0, trust: 0.1, least: 0.0 },
+            noise: Noise { freedom: 89.0, ln_half_width: 0.1, min_ln_factor: 0.0 },
             alike: 0.0,
             stop: Stop::default(),
         };

@@ -25,8 +25,8 @@ pub(super) fn hypothesis_sites(problem: &Problem) -> Vec<ParameterSite> {
     sites
 }
 
-/// Returns the site of a displacement of the tool along an axis, 0 to 2, in the frame that carries
-/// it.
+/// Returns the site of a displacement of the tool along an axis, 0 to 2, in the frame of the joint
+/// that carries it.
 pub(super) fn tool_site(problem: &Problem, axis: usize) -> ParameterSite {
     let joint = problem.tool.joint.min(problem.joints.len().saturating_sub(1));
     ParameterSite::Joint { joint, field: JointField::After(axis) }

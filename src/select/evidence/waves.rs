@@ -1,5 +1,5 @@
-//! Search for waves of non-integer order, such as errors of an inner gear stage. It is made at a
-//! joint if a probable set contains a function of that joint's command.
+//! Search for waves of non-integer order, such as errors of an inner gear stage. A joint is
+//! searched if a probable set contains a function of its command.
 //!
 //! The possible orders are unbounded and neighbouring ones hardly differ, so no list can contain
 //! them. A fine grid of orders is scanned, and the best order in addition to the other members of
@@ -12,8 +12,8 @@
 //! that of a harmonic. If the data cannot distinguish an order from an integer, the harmonic is
 //! therefore more probable.
 //!
-//! A prismatic joint errs with its screw or rack: sin kq with q in m, of order k = 2π/lead. Such a
-//! short wave looks like noise to every other function, so it is searched for in addition to every
+//! A prismatic joint errs with its screw or rack: sin kq with q in m, of order k = 2π/lead. No
+//! other function can describe such a short wave, so it is searched for in addition to every
 //! probable set.
 
 use crate::select::settings::{
@@ -25,18 +25,18 @@ use std::f64::consts::{PI, TAU};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use super::candidate::{Candidate, HYPOTHESES_PER_PROJECTION, order_of};
-use super::functions::times;
+use super::candidate::{Candidate, HYPOTHESES_PER_PROJECTION, joint_and_order};
+use super::functions::expand;
 use super::hypotheses::Hypotheses;
 use super::hypothesis::{Hypothesis, HypothesisKind, Site};
 use super::products::{Products, ReducedProblem};
-use super::search::{Weighted, reduced_by};
+use super::search::{EvaluatedSet, reduced_by};
 use crate::model::effect::HIGHEST_ORDER;
 use crate::model::parameter::{ParameterSite, holds_all, refuses};
 use crate::problem::{Effect, JointKind, Problem};
 use crate::residual_tests::Covariate;
 use crate::select::fitted::Fitted;
-use crate::select::harmonic_prior::is_gear_of;
+use crate::select::harmonic_prior::is_periodic_of_many_orders_at;
 
 /// Steps between orders of the first and of the second scan, as phase differences \[rad\] over the
 /// joint's range.
@@ -56,7 +56,7 @@ const DISTANCE_RATIO: f64 = 1.3;
 fn function_of_command(of: &Hypothesis, problem: &Problem) -> Option<usize> {
     let Site::Joint(joint) = of.site else { return None };
     let at_coordinate = of.coordinate == Some(ParameterSite::coordinate(problem, joint + 1));
-    let is_own = match &of.kind {
+    let depends_on_command = match &of.kind {
         HypothesisKind::Effect(Effect::JointHarmonic { .. } | Effect::JointWave { .. }) => true,
         HypothesisKind::Smooth | HypothesisKind::NearHarmonic(_) | HypothesisKind::Gear(_) => {
             at_coordinate && of.depends_on == [Covariate::Command(joint)]
@@ -64,7 +64,7 @@ fn function_of_command(of: &Hypothesis, problem: &Problem) -> Option<usize> {
         HypothesisKind::PerPose => at_coordinate,
         _ => false,
     };
-    is_own.then_some(joint)
+    depends_on_command.then_some(joint)
 }
 
 /// Returns true if the rules of the problem neither fix nor reject the parameters of an effect.
@@ -92,17 +92,20 @@ pub(super) struct Waves<'w, 'h, 'a> {
 impl<'w, 'a> Waves<'w, '_, 'a> {
     /// Returns waves of any order, and harmonics of unlisted orders, that may replace functions in
     /// probable sets.
-    pub fn promising(&self, weighted: &[Weighted]) -> Vec<Candidate> {
+    pub fn promising(&self, evaluated_sets: &[EvaluatedSet]) -> Vec<Candidate> {
         let mut found: Vec<Candidate> = Vec::new();
-        for (joint, rests) in self.sets_without_functions(weighted) {
+        for (joint, rests) in self.sets_without_functions(evaluated_sets) {
             // If the fit contains a periodic error of many orders at the joint, its orders need not
             // be searched.
             let effects = &self.fitted.problem.effects;
-            if effects.iter().any(|declared| is_gear_of(&declared.effect, joint + 1)) {
+            if effects
+                .iter()
+                .any(|declared| is_periodic_of_many_orders_at(&declared.effect, joint + 1))
+            {
                 continue;
             }
             let Some((low, high)) = self.range(joint) else { continue };
-            let (slides, highest) = (self.slides(joint), self.highest_order(joint));
+            let (is_prismatic, highest) = (self.is_prismatic(joint), self.highest_order(joint));
             if !is_free(
                 &Effect::JointWave { joint: joint + 1, order: highest },
                 &self.fitted.problem,
@@ -125,13 +128,13 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
                 // set.
                 let listed_effects = || {
                     self.hypotheses
-                        .all
+                        .candidates
                         .iter()
                         .chain(&found)
                         .filter_map(|candidate| candidate.hypothesis.effect())
                 };
                 let listed_orders = listed_effects()
-                    .filter_map(order_of)
+                    .filter_map(joint_and_order)
                     .filter(|(of, _)| *of == joint)
                     .map(|(_, order)| order);
                 let listed_orders: Vec<f64> = listed_orders.collect();
@@ -139,7 +142,7 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
                 for (order, _) in first.into_iter().take(MAX_REFINED_ORDERS) {
                     let near = equidistant(order - step, order + step, finer);
                     second.extend(near.into_iter().map(|order| rounded_order(order, digits)));
-                    if !slides {
+                    if !is_prismatic {
                         second.extend([order.floor(), order.ceil()]);
                     }
                 }
@@ -155,11 +158,11 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
                     .collect();
                 for effect in new.into_iter().filter(|effect| is_free(effect, &self.fitted.problem))
                 {
-                    let spread = order_of(&effect)
+                    let width = joint_and_order(&effect)
                         .map_or(1.0, |(_, order)| self.likelihood_width(joint, order, left));
-                    let candidate = self.hypotheses.function_of(&effect, &self.fitted.problem);
+                    let candidate = self.hypotheses.wave_candidate(&effect, &self.fitted.problem);
                     found.extend(candidate.map(|candidate| Candidate {
-                        ln_prior: candidate.ln_prior + spread.ln(),
+                        ln_prior: candidate.ln_prior + width.ln(),
                         ..candidate
                     }));
                 }
@@ -168,11 +171,16 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
         found
     }
 
-    /// Returns index and log prior factor of each wave among `effects`. A wave represents all
+    /// Returns, for each wave among `effects`, its number in `numbers` and ln of the width of its
+    /// likelihood \[orders\]. Its prior is multiplied by this width, because it represents all
     /// orders near its order.
-    pub fn spreads(&self, numbers: &[usize], effects: &[&Effect]) -> Vec<(usize, f64)> {
+    pub fn ln_likelihood_widths(
+        &self,
+        numbers: &[usize],
+        effects: &[&Effect],
+    ) -> Vec<(usize, f64)> {
         let ln_width = |(&number, effect): (&usize, &&Effect)| {
-            let (joint, order) = order_of(effect)?;
+            let (joint, order) = joint_and_order(effect)?;
             let others: Vec<usize> =
                 numbers.iter().copied().filter(|&other| other != number).collect();
             Some((number, self.likelihood_width(joint, order, &self.reduced_by_set(&others)?).ln()))
@@ -187,33 +195,40 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
     }
 
     /// Returns true if a joint, counted from 0, is prismatic.
-    fn slides(&self, joint: usize) -> bool {
+    fn is_prismatic(&self, joint: usize) -> bool {
         self.fitted.problem.joints[joint].command_kind() == JointKind::Prismatic
     }
 
     /// Returns the highest order that is searched at a joint: [cycles per revolution], for a
     /// prismatic joint \[rad/m\].
     fn highest_order(&self, joint: usize) -> f64 {
-        if self.slides(joint) { TAU / MIN_LEAD } else { MAX_WAVE_ORDER }
+        if self.is_prismatic(joint) { TAU / MIN_LEAD } else { MAX_WAVE_ORDER }
     }
 
     /// Returns the smallest and largest command of a joint \[rad\] or \[m\]; `None` if the joint
     /// does not move.
     fn range(&self, joint: usize) -> Option<(f64, f64)> {
-        self.hypotheses.known(&Covariate::Command(joint)).map(|entry| entry.range)
+        self.hypotheses.sampled(&Covariate::Command(joint)).map(|entry| entry.range)
     }
 
     /// Returns, for each joint (from 0), the sets to which a wave may be added. They are probable
     /// sets without one function of the joint's command, and without all of them; for prismatic
     /// joints also the whole sets.
-    fn sets_without_functions(&self, weighted: &[Weighted]) -> BTreeMap<usize, Vec<Vec<usize>>> {
+    fn sets_without_functions(
+        &self,
+        evaluated_sets: &[EvaluatedSet],
+    ) -> BTreeMap<usize, Vec<Vec<usize>>> {
         let mut sets_of_function: BTreeMap<usize, Vec<Vec<usize>>> = BTreeMap::new();
         let of = |member: usize| {
-            function_of_command(&self.hypotheses.all[member].hypothesis, &self.fitted.problem)
+            function_of_command(
+                &self.hypotheses.candidates[member].hypothesis,
+                &self.fitted.problem,
+            )
         };
-        let sliding: Vec<usize> =
-            (0..self.fitted.problem.joints.len()).filter(|&joint| self.slides(joint)).collect();
-        for set in weighted.iter().filter(|set| set.probability > MIN_REVISED_PROBABILITY) {
+        let sliding: Vec<usize> = (0..self.fitted.problem.joints.len())
+            .filter(|&joint| self.is_prismatic(joint))
+            .collect();
+        for set in evaluated_sets.iter().filter(|set| set.probability > MIN_REVISED_PROBABILITY) {
             let mut whole = set.members.clone();
             whole.sort_unstable();
             for &joint in &sliding {
@@ -224,9 +239,9 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
             }
             for &member in &set.members {
                 let Some(joint) = of(member) else { continue };
-                let without = |gone: &dyn Fn(usize) -> bool| -> Vec<usize> {
+                let without = |is_removed: &dyn Fn(usize) -> bool| -> Vec<usize> {
                     let mut remaining: Vec<usize> =
-                        set.members.iter().copied().filter(|&other| !gone(other)).collect();
+                        set.members.iter().copied().filter(|&other| !is_removed(other)).collect();
                     remaining.sort_unstable();
                     remaining
                 };
@@ -243,8 +258,8 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
         sets_of_function
     }
 
-    /// Returns, for each residual problem, the orders with the log odds that a wave of that order
-    /// acts, best first.
+    /// Returns, for each residual problem, the orders, each with ln of the odds that a wave of that
+    /// order acts, best first.
     fn gains(
         &self,
         joint: usize,
@@ -260,7 +275,7 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
                 Some((
                     order,
                     self.hypotheses
-                        .function_of(&Effect::JointWave { joint: joint + 1, order }, problem)?,
+                        .wave_candidate(&Effect::JointWave { joint: joint + 1, order }, problem)?,
                 ))
             };
             let (orders, waves): (Vec<f64>, Vec<Candidate>) =
@@ -268,7 +283,7 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
             let fit = (self.fitted, &self.products.target.fit);
             let blocks = Candidate::blocks(&waves.iter().collect::<Vec<_>>(), fit, self.left_out);
             let of_sets: Vec<Vec<f64>> =
-                reduced_problems.iter().map(|left| left.odds_of(&blocks)).collect();
+                reduced_problems.iter().map(|left| left.ln_odds_of(&blocks)).collect();
             let odds = |k: usize| of_sets.iter().map(|odds| odds[k]).collect();
             orders.into_iter().enumerate().map(|(k, order)| (order, odds(k))).collect()
         };
@@ -283,7 +298,7 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
         (0..reduced_problems.len()).map(of_set).collect()
     }
 
-    /// Returns effects for the best orders. `gains` contains orders with their log odds, best
+    /// Returns effects for the best orders. `gains` contains orders with ln of their odds, best
     /// first.
     ///
     /// One is the wave with the best non-integer order, unless an order in `listed_orders` is about
@@ -302,14 +317,14 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
                 gains.iter().take_while(|(_, gain)| *gain > most - LN_ODDS_OF_ANOTHER_ARGUMENT);
             near.map(|(order, _)| *order)
         };
-        let (joint, slides) = (joint + 1, self.slides(joint));
+        let (joint, is_prismatic) = (joint + 1, self.is_prismatic(joint));
         #[expect(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
             reason = "a whole number up to the highest"
         )]
         let harmonic = |order: f64| Effect::JointHarmonic { joint, orders: vec![order as u32] };
-        let is_whole = |order: f64| !slides && order.fract() == 0.0;
+        let is_whole = |order: f64| !is_prismatic && order.fract() == 0.0;
         let is_beyond = |order: &f64| is_whole(*order) && *order > f64::from(HIGHEST_ORDER);
         let mut effects: Vec<Effect> = as_good().filter(is_beyond).map(harmonic).collect();
         if !as_good().any(|order| listed_orders.contains(&order)) {
@@ -328,8 +343,8 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
             std::iter::successors(Some(PHASE_STEPS[1]), |phase| Some(phase * DISTANCE_RATIO))
                 .take_while(|phase| *phase < PI);
         let orders = away.flat_map(|phase| [order - phase / range, order + phase / range]);
-        let is_looked_for = |order: &f64| (TAU / range..=self.highest_order(joint)).contains(order);
-        let mut orders: Vec<f64> = orders.filter(is_looked_for).chain([order]).collect();
+        let is_searched = |order: &f64| (TAU / range..=self.highest_order(joint)).contains(order);
+        let mut orders: Vec<f64> = orders.filter(is_searched).chain([order]).collect();
         orders.sort_by(f64::total_cmp);
         let mut gains = self.gains(joint, &orders, std::slice::from_ref(reduced)).concat();
         gains.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -354,17 +369,17 @@ fn rounded_order(order: f64, digits: usize) -> f64 {
 impl Hypotheses<'_> {
     /// Returns the candidate for an effect that is a wave of its joint's command, with its columns;
     /// `None` if the effect is no such wave, or the command does not vary.
-    fn function_of(&self, effect: &Effect, problem: &Problem) -> Option<Candidate> {
+    fn wave_candidate(&self, effect: &Effect, problem: &Problem) -> Option<Candidate> {
         let (joint, order) = match effect {
             Effect::JointHarmonic { joint, orders } => (joint - 1, f64::from(*orders.first()?)),
-            other => order_of(other)?,
+            other => joint_and_order(other)?,
         };
-        let command = self.known(&Covariate::Command(joint))?;
+        let command = self.sampled(&Covariate::Command(joint))?;
         let at = self.linearised.place(ParameterSite::coordinate(problem, joint + 1))?;
         let waves = DMatrix::from_fn(command.values.len(), 2, |row, k| {
             let (sin, cos) = (order * command.values[row]).sin_cos();
             if k == 0 { sin } else { cos }
         });
-        self.entered(effect, times(&[&at], &waves), problem)
+        self.candidate_of_effect(effect, expand(&[&at], &waves), problem)
     }
 }

@@ -1,4 +1,5 @@
-//! Gram matrix of the lever of one coordinate in all poses, with the parameters of the fit projected out.
+//! Gram matrix of the lever of one coordinate in all poses, with the parameters of the fit
+//! projected out.
 
 use nalgebra::{DMatrix, DVector};
 

@@ -11,8 +11,8 @@ use crate::numeric::kernel::{dot, few_transposed_times, sum_of_squares};
 /// Prior probability that a term has one, two or three factors.
 const FACTOR_COUNT_PROBABILITIES: [f64; 3] = [0.6, 0.3, 0.1];
 /// Prior probability of a sine or a cosine that is multiplied by none of another joint, relative to
-/// one that is. An error by one joint's command has any phase, which their pair fits; in products of
-/// several joints, as rotations give them, the zero positions of the arm determine the phases.
+/// one that is. An error by one joint's command has any phase, which their pair fits; in products
+/// of several joints, as rotations give them, the zero positions of the arm determine the phases.
 pub const LONE_WAVE: f64 = 1.0 / 3.0;
 /// Smallest fraction of a column's length that the fitted parameters must leave unexplained.
 const MIN_LEFT: f64 = 2e-3;

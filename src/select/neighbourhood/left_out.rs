@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::orthonormal::MIN_INDEPENDENT_LENGTH;
 use crate::numeric::{gram, inverse_factor, lower_factor, solve_positive};
 
-/// Products JᵀJ, Jᵀr and rᵀr over some poses, with their number of rows.
+/// Products JᵀJ, Jᵀr and rᵀr over some poses, with the number of their rows.
 struct Squares {
     gram: DMatrix<f64>,
     product: DVector<f64>,
@@ -23,23 +23,24 @@ impl Squares {
     }
 }
 
-/// Sums over all poses of a fit, and over the parts that are left out in turn.
+/// Products JᵀJ, Jᵀr and rᵀr over all poses of a fit, and over each part that is left out in turn.
 pub(in crate::select) struct PartSquares {
     whole: Squares,
     parts: Vec<Squares>,
 }
 
 impl PartSquares {
-    /// Creates the sums from columns, shape = (3 N, n), and the residual; `parts` contain pose
-    /// indices.
+    /// Creates the products from the Jacobian J = `columns`, shape = (3 N, n), and the residual r.
+    /// Each of `parts` contains pose indices.
     pub fn new(columns: &DMatrix<f64>, residual: &DVector<f64>, parts: &[Vec<usize>]) -> Self {
         let every: Vec<usize> = (0..residual.len() / 3).collect();
         let parts = parts.par_iter().map(|poses| Squares::of(columns, residual, poses)).collect();
         Self { whole: Squares::of(columns, residual, &every), parts }
     }
 
-    /// Returns the values of the unknowns fitted to all parts, and their variances; priors are as
-    /// in [`Self::left_out`]. `None` if the normal matrix is not positive definite.
+    /// Returns the values of the unknowns fitted to all poses, and their posterior variances for
+    /// noise of variance 1; priors are as in [`Self::left_out`]. `None` if the normal matrix is not
+    /// positive definite.
     pub fn posterior(&self, priors: &[(f64, Option<f64>)]) -> Option<(DVector<f64>, DVector<f64>)> {
         let (normal, pull) = self.normal_of_all(priors);
         let root = inverse_factor(&normal)?;
@@ -51,7 +52,7 @@ impl PartSquares {
         Some((x, DVector::from_iterator(root.ncols(), variances)))
     }
 
-    /// Returns −2 ln p(r) of all parts for noise of variance φ, up to a constant; `None` if it is
+    /// Returns −2 ln p(r) of all poses for noise of variance φ, up to a constant; `None` if it is
     /// not finite. Priors are as in [`Self::left_out`], with 1 σ divided by √φ.
     ///
     /// With W = diag(1/σ²), G = JᵀJ + W, g = Jᵀr + W x₀ and x₀ the present values, it is ln det G −
@@ -73,7 +74,7 @@ impl PartSquares {
         self.normal(self.whole.gram.clone(), self.whole.product.clone(), priors)
     }
 
-    /// Returns the normal equations of some parts with the priors added.
+    /// Returns the normal equations of some poses, given JᵀJ and Jᵀr, with the priors added.
     ///
     /// `MIN_INDEPENDENT_LENGTH`² of each column's squared length is added to the diagonal, so that
     /// directions that no pose determines do not change.
@@ -96,9 +97,9 @@ impl PartSquares {
         (gram, product)
     }
 
-    /// Returns Σ rows · ln(mean square) over the parts, each predicted from the others; `None` if
-    /// the others do not determine the fit. `priors` holds value and 1 σ (about 0) of the first
-    /// unknowns.
+    /// Returns Σ rows · ln(mean squared residual) over the parts, each predicted from the others;
+    /// `None` if the others do not determine the fit. `priors` holds the present value of each of
+    /// the first unknowns, and 1 σ of its prior about 0.
     pub fn left_out(&self, priors: &[(f64, Option<f64>)]) -> Option<f64> {
         let predicted = |part: &Squares| {
             let (gram, product) =

@@ -6,17 +6,17 @@ use std::borrow::Cow;
 use nalgebra::{DMatrix, DMatrixView, DVector};
 use rayon::prelude::*;
 
-use super::orthonormal::{held, lengthened, orthonormal, orthonormal_above};
+use super::orthonormal::{constrained, lengthened, orthonormal, orthonormal_above};
 use super::score::{Score, Sums};
 use crate::numeric::{gram, inverse_factor, product, transposed_narrow_product};
 
-/// Smallest share of a direction's squared length outside a block of poses at which the other poses
-/// determine it.
+/// Smallest fraction of a direction's squared length outside a block of poses at which the other
+/// poses determine the direction.
 const MIN_DETERMINED_ELSEWHERE: f64 = 1e-6;
 
 /// Largest number of columns that are projected one basis direction at a time.
 const MAX_SEQUENTIAL_COLUMNS: usize = 4;
-/// Smallest remaining share of a column's length at which one projection suffices. Below it, a
+/// Smallest remaining fraction of a column's length at which one projection suffices. Below it, a
 /// second projection removes the rounding errors [Giraud, Langou & Rozložník 2005].
 const MIN_PART_OF_ONE_PROJECTION: f64 = 0.1;
 
@@ -115,7 +115,7 @@ impl LinearNeighbourhood {
         let (basis, root) = if unknowns.active.is_empty() {
             orthonormal_above(jacobian, &below, None)
         } else {
-            held(&jacobian, &below, &unknowns.active.clone().resize_horizontally(n, 0.0))
+            constrained(&jacobian, &below, &unknowns.active.clone().resize_horizontally(n, 0.0))
         };
         let mut fit = Self {
             residual: long,
@@ -182,7 +182,7 @@ impl LinearNeighbourhood {
         new
     }
 
-    /// Returns the neighbourhood with more columns fitted.
+    /// Returns the neighbourhood with additional columns fitted.
     pub fn with(&self, columns: &DMatrix<f64>) -> Self {
         let mut with = self.clone();
         with.add(columns);
@@ -207,7 +207,7 @@ impl LinearNeighbourhood {
         with
     }
 
-    /// Returns the sums of squares and degrees of freedom.
+    /// Returns the sums of squares and the degrees of freedom at the optimum.
     pub fn sums(&self) -> Sums {
         self.sums
     }
@@ -247,7 +247,7 @@ impl LinearNeighbourhood {
     ///
     /// With T_x their rows of T and T_xᵀ = U S its QR factors, only these unknowns fit the
     /// directions Q U, along which they reduce the residual by − S⁻ᵀ x.
-    fn share_within(&self, unknowns: &[usize]) -> Option<(DMatrix<f64>, DVector<f64>)> {
+    fn components_by(&self, unknowns: &[usize]) -> Option<(DMatrix<f64>, DVector<f64>)> {
         let rows = self.root.select_rows(unknowns).transpose();
         // U = T_xᵀ W with W = S⁻¹.
         let (turned, within) = orthonormal(&rows, None);
@@ -258,7 +258,7 @@ impl LinearNeighbourhood {
     /// Returns the increase of the sum of squares if some unknowns are not fitted; `None` if the
     /// fit cannot distinguish them from others.
     pub fn loss_without(&self, unknowns: &[usize]) -> Option<f64> {
-        self.share_within(unknowns).map(|(_, part)| part.norm_squared())
+        self.components_by(unknowns).map(|(_, part)| part.norm_squared())
     }
 
     /// Returns columns of the data, shape = (3 N, k), after the fitted parameters are projected
@@ -404,7 +404,7 @@ fn solve_projected(matrix: DMatrix<f64>, right: &DVector<f64>) -> DVector<f64> {
 mod tests {
     use super::*;
 
-    /// Deterministic numbers without pattern.
+    /// Returns deterministic numbers without pattern.
     fn matrix(rows: usize, columns: usize) -> DMatrix<f64> {
         DMatrix::from_fn(rows, columns, |i, j| {
             (12.9898 * i as f64 + 78.233 * (j + 1) as f64).sin() * 43.7 % 1.0

@@ -17,8 +17,8 @@ use crate::problem::{Effect, Problem};
 /// a mass of 0, the position would have no influence; this mass is too small to change anything
 /// else.
 const MASS_OF_DERIVATIVE: f64 = 1e-4;
-/// Number of poses that are first examined for directions that nothing moves; most arms move in
-/// every direction within them.
+/// Number of poses that are first examined for unmoved directions. Most arms move in every
+/// direction within so few poses.
 const MAX_POSES_OF_FIRST_PASS: usize = 32;
 
 /// Model linearised at some poses, with derivatives at every site where effects may enter.
@@ -36,20 +36,23 @@ pub(crate) struct Linearised<'a> {
 pub(in crate::select) struct Derivatives {
     /// Columns of the fitted parameters, followed by those of relaxed parameters, shape = (3 N, n).
     fitted: Arc<DMatrix<f64>>,
+    /// Whitened residual, length 3 N.
     residual: Arc<DVector<f64>>,
-    /// Standard deviation (1 σ) of each pose \[m\].
+    /// Standard deviation (1 σ) of a measured coordinate of each pose \[m\].
     sigma: Vec<f64>,
-    /// Prior σ of relaxed parameters: those that the problem holds equal and that may differ here.
+    /// Prior 1 σ of each relaxed parameter, the difference of two stiffnesses that the problem
+    /// declares equal; `None` without a prior.
     relaxed: Vec<Option<f64>>,
-    /// Site of each additional column and the column's index, counted after the columns of
-    /// `fitted`.
+    /// Sites that have a column, each with the column's index: first the columns of `fitted`, then
+    /// those of `others`.
     places: Vec<(ParameterSite, usize)>,
+    /// Columns of other sites, each of length 3 N.
     others: Vec<Arc<DVector<f64>>>,
 }
 
 impl Derivatives {
-    /// Returns the derivatives of the fitted parameters as a linear model, which a fit that starts
-    /// at the full parameter vector `x` reuses.
+    /// Returns the derivatives of the parameters `unknowns` as a linear model, which the next fit
+    /// reuses if it starts at the same point. `at` holds all parameters and that point.
     pub fn linear_model(
         &self,
         at: (&[Parameter], &DVector<f64>),
@@ -63,10 +66,10 @@ impl Derivatives {
         )
     }
 
-    fn column(&self, place: usize) -> DVectorView<'_, f64> {
-        match place.checked_sub(self.fitted.ncols()) {
+    fn column(&self, index: usize) -> DVectorView<'_, f64> {
+        match index.checked_sub(self.fitted.ncols()) {
             Some(other) => self.others[other].as_view(),
-            None => self.fitted.column(place),
+            None => self.fitted.column(index),
         }
     }
 
@@ -92,7 +95,7 @@ impl<'a> Linearised<'a> {
         let poses = poses.into();
         let mut slots: Vec<(ParameterSite, f64)> = places.iter().map(|&site| (site, 0.0)).collect();
         for Term { site, nominal, .. } in effects.iter().flat_map(|effect| effect.terms(problem)) {
-            if !slots.iter().any(|(known, _)| *known == site) {
+            if !slots.iter().any(|(other, _)| *other == site) {
                 slots.push((site, nominal));
             }
         }
@@ -161,7 +164,7 @@ impl<'a> Linearised<'a> {
                 },
                 Arc::unwrap_or_clone,
             );
-            slots.retain(|(site, _)| !derivatives.places.iter().any(|(known, _)| known == site));
+            slots.retain(|(site, _)| !derivatives.places.iter().any(|(other, _)| other == site));
             if !slots.is_empty() {
                 derivatives.extend(&slots, pass(&[], &slots).0.as_view());
             }
@@ -174,8 +177,8 @@ impl<'a> Linearised<'a> {
         }
         let unmoved = unmoved(&poses, &derivatives.fitted);
         if unmoved.count() > 0 {
-            // Components along unmoved directions are set to zero in columns and residual: a
-            // constant residual there contradicts no effect.
+            // Components along unmoved directions are set to zero in columns and residual, because
+            // no parameter could fit a constant residual there.
             for column in derivatives.others.iter_mut().chain([&mut derivatives.residual]) {
                 let column = Arc::make_mut(column);
                 for pose in 0..poses.len() {
@@ -228,8 +231,8 @@ impl<'a> Linearised<'a> {
         &self.derivatives.relaxed
     }
 
-    /// Returns the columns of other parameters of a model about its full parameter vector `x`,
-    /// shape = (3 N, parameters).
+    /// Returns the columns of the parameters with the indices `parameters` of another model about
+    /// its full parameter vector `x`, shape = (3 N, parameters).
     pub fn of_parameters(
         &self,
         model: &Model,
@@ -246,14 +249,14 @@ impl<'a> Linearised<'a> {
         &self.derivatives.residual
     }
 
-    /// Returns the number of residual coordinates of a pose that count: those that it measures,
-    /// less the directions in which no fitted parameter moves any pose.
+    /// Returns the number of residual coordinates of a pose in the degrees of freedom: those that
+    /// it measures, less the directions in which no fitted parameter moves any pose.
     pub fn coordinates(&self, pose: usize) -> usize {
         self.poses[pose].observation.coordinates() - self.unmoved
     }
 
-    /// Returns the number of residual coordinates that do not count, because their poses measure
-    /// fewer than three numbers or because no fitted parameter moves them.
+    /// Returns the number of residual coordinates of all poses, of 3 N, that are not in the degrees
+    /// of freedom: their poses measure fewer than three numbers, or no fitted parameter moves them.
     pub fn empty(&self) -> usize {
         (0..self.poses.len()).map(|pose| 3 - self.coordinates(pose)).sum()
     }
@@ -265,16 +268,17 @@ impl<'a> Linearised<'a> {
 
     /// Returns the columns of an effect's parameters, shape = (3 N, k).
     pub fn columns(&self, effect: &Effect) -> DMatrix<f64> {
-        self.columns_of(&Driven::new(self, std::slice::from_ref(effect)), 0)
+        self.columns_of(&EffectTerms::new(self, std::slice::from_ref(effect)), 0)
     }
 
-    /// Returns the columns of the effect with this index in `driven`.
-    pub fn columns_of(&self, driven: &Driven, effect: usize) -> DMatrix<f64> {
-        let terms = driven.terms.get(effect).map_or(&[][..], Vec::as_slice);
+    /// Returns the columns of the effect with this index in `effect_terms`, shape = (3 N, k).
+    pub fn columns_of(&self, effect_terms: &EffectTerms, effect: usize) -> DMatrix<f64> {
+        let terms = effect_terms.terms.get(effect).map_or(&[][..], Vec::as_slice);
         let mut columns = DMatrix::zeros(self.derivatives.fitted.nrows(), terms.len());
         for (&(place, regressor), mut out) in terms.iter().zip(columns.column_iter_mut()) {
             let Some(place) = place else { continue };
-            let (at_place, values) = (self.derivatives.column(place), &driven.values[regressor]);
+            let (at_place, values) =
+                (self.derivatives.column(place), &effect_terms.values[regressor]);
             for (row, (out, derivative)) in out.iter_mut().zip(at_place.iter()).enumerate() {
                 *out = derivative * values[row / 3];
             }
@@ -294,14 +298,14 @@ impl<'a> Linearised<'a> {
 
     /// Returns the column of a site, length 3 N; `None` if no column was computed for it.
     pub fn place(&self, site: ParameterSite) -> Option<DVector<f64>> {
-        let &(_, place) = self.derivatives.places.iter().find(|(known, _)| *known == site)?;
+        let &(_, place) = self.derivatives.places.iter().find(|(other, _)| *other == site)?;
         Some(self.derivatives.column(place).into_owned())
     }
 }
 
 /// Finds the directions in which no fitted parameter moves any pose, such as z of a planar arm. The
-/// residual along them says nothing about the fit. There are none unless every pose measures a
-/// position.
+/// residual along these directions does not depend on the fit. There are none unless every pose
+/// measures a position.
 fn unmoved(poses: &[Pose], fitted: &DMatrix<f64>) -> Unmoved {
     if fitted.ncols() == 0 || !poses.iter().all(|pose| pose.observation.coordinates() == 3) {
         return Unmoved::default();
@@ -314,17 +318,17 @@ fn unmoved(poses: &[Pose], fitted: &DMatrix<f64>) -> Unmoved {
     if few.count() == 0 { few } else { first(poses.len()) }
 }
 
-/// Effects with the site and regressor of each of their terms. Each regressor is evaluated once in
-/// every pose.
-pub(crate) struct Driven {
-    /// For each term of each effect: index of its site's column, if it has one, and index of its
-    /// regressor.
+/// Terms of some effects, each with the column of its site and the values of its regressor. Equal
+/// regressors are evaluated only once.
+pub(crate) struct EffectTerms {
+    /// For each term of each effect: index of its site's column, `None` if no column was computed,
+    /// and index of its regressor in `values`.
     terms: Vec<Vec<(Option<usize>, usize)>>,
     /// Values of each regressor in every pose.
     values: Vec<Vec<f64>>,
 }
 
-impl Driven {
+impl EffectTerms {
     /// Evaluates the regressors of effects in the poses of a linearised model.
     pub fn new(linearised: &Linearised, effects: &[Effect]) -> Self {
         let mut regressors: Vec<Regressor> = Vec::new();
@@ -333,10 +337,10 @@ impl Driven {
                 .derivatives
                 .places
                 .iter()
-                .find(|(known, _)| *known == site)
+                .find(|(other, _)| *other == site)
                 .map(|(_, place)| *place);
             let number =
-                regressors.iter().position(|known| *known == regressor).unwrap_or(regressors.len());
+                regressors.iter().position(|other| *other == regressor).unwrap_or(regressors.len());
             if number == regressors.len() {
                 regressors.push(regressor);
             }

@@ -11,11 +11,11 @@ use crate::numeric::{
     product_with_upper_padded, zeros,
 };
 
-/// Smallest share of a column's length, outside the span of earlier columns, at which it counts as
-/// linearly independent.
+/// Smallest fraction of a column's length outside the span of earlier columns at which the column
+/// is linearly independent.
 ///
 /// Products of columns are exact to about 1e-15 of their lengths, so a remaining squared length is
-/// known to about 1e-14. Below 1e-12, the square of this share, it is rounding.
+/// known to about 1e-14. Below 1e-12, the square of this fraction, it is rounding.
 pub(crate) const MIN_INDEPENDENT_LENGTH: f64 = 1e-6;
 
 /// Returns Q = A W with QᵀQ = I for the columns A, and W, shape = (columns, rank). Columns that are
@@ -31,8 +31,8 @@ pub(super) fn orthonormal(
     orthonormal_above(Cow::Borrowed(columns), &[], lengths)
 }
 
-/// Returns Q and W for columns with additional rows `below` them, each with one entry, given by its
-/// column and value. Columns that are not shared are overwritten.
+/// Returns Q and W of [`orthonormal`] for columns with additional rows `below` them. Each row has
+/// one entry, given by its column index and value. An owned matrix of columns is overwritten.
 pub(super) fn orthonormal_above(
     columns: Cow<DMatrix<f64>>,
     below: &[(usize, f64)],
@@ -76,8 +76,9 @@ pub(super) fn orthonormal_above(
     (basis, within)
 }
 
-/// Returns the indices of linearly independent columns, given the Gram matrix of all, and the
-/// Cholesky factor of their Gram matrix, scaled to unit length.
+/// Returns the indices of linearly independent columns, and the Cholesky factor of their Gram
+/// matrix after scaling to unit length. `norms` are the columns' lengths, `lengths` those before
+/// earlier projections.
 fn independent(gram: &DMatrix<f64>, norms: &[f64], lengths: &[f64]) -> (Vec<usize>, DMatrix<f64>) {
     let mut kept: Vec<usize> = Vec::new();
     let mut factor: Vec<Vec<f64>> = Vec::new();
@@ -85,9 +86,9 @@ fn independent(gram: &DMatrix<f64>, norms: &[f64], lengths: &[f64]) -> (Vec<usiz
         .filter(|&j| norms[j] > MIN_INDEPENDENT_LENGTH * lengths[j] && norms[j].is_finite())
     {
         let mut row: Vec<f64> = Vec::with_capacity(kept.len() + 1);
-        for (&k, known) in kept.iter().zip(&factor) {
-            let along = dot(&known[..row.len()], &row);
-            let value = (gram[(k, j)] / (norms[k] * norms[j]) - along) / known[row.len()];
+        for (&k, factor_row) in kept.iter().zip(&factor) {
+            let along = dot(&factor_row[..row.len()], &row);
+            let value = (gram[(k, j)] / (norms[k] * norms[j]) - along) / factor_row[row.len()];
             row.push(value);
         }
         let independent_square = 1.0 - sum_of_squares(&row);
@@ -105,7 +106,7 @@ fn independent(gram: &DMatrix<f64>, norms: &[f64], lengths: &[f64]) -> (Vec<usiz
 /// Returns a basis Z of the directions that the active constraints leave free: A D⁻¹ Z = 0 and ZᵀZ
 /// = I, for constraint rows A = `active`, shape = (constraints, n), and the scale D of the
 /// unknowns. `None` if there are no constraints.
-pub(super) fn open(active: &DMatrix<f64>, scale: &[f64]) -> Option<DMatrix<f64>> {
+pub(super) fn free_directions(active: &DMatrix<f64>, scale: &[f64]) -> Option<DMatrix<f64>> {
     let mut rows =
         DMatrix::from_fn(active.nrows(), active.ncols(), |i, j| active[(i, j)] / scale[j]);
     if rows.iter().all(|coefficient| *coefficient == 0.0) {
@@ -124,9 +125,9 @@ pub(super) fn open(active: &DMatrix<f64>, scale: &[f64]) -> Option<DMatrix<f64>>
     Some(eigen.eigenvectors.select_columns(&free_directions))
 }
 
-/// Returns Q and T of [`orthonormal`] for the Jacobian with additional rows `below`, each with one
-/// entry. Only directions that the constraints `active` leave free count.
-pub(super) fn held(
+/// Returns Q and T for the Jacobian with additional rows `below`, as [`orthonormal_above`] does,
+/// but only for the directions that the constraints `active` leave free.
+pub(super) fn constrained(
     jacobian: &DMatrix<f64>,
     below: &[(usize, f64)],
     active: &DMatrix<f64>,
@@ -136,10 +137,12 @@ pub(super) fn held(
     below.iter().enumerate().for_each(|(row, &(j, value))| columns[(rows + row, j)] = value);
     let scale: Vec<f64> =
         columns.column_iter().map(|c| c.norm()).map(|s| if s > 0.0 { s } else { 1.0 }).collect();
-    let Some(open) = open(active, &scale) else { return orthonormal(&columns, None) };
+    let Some(free_directions) = free_directions(active, &scale) else {
+        return orthonormal(&columns, None);
+    };
     columns.column_iter_mut().zip(&scale).for_each(|(mut column, scale)| column /= *scale);
-    let (basis, within) = orthonormal(&product(&columns, &open), None);
-    let mut root = open * within;
+    let (basis, within) = orthonormal(&product(&columns, &free_directions), None);
+    let mut root = free_directions * within;
     root.row_iter_mut().zip(&scale).for_each(|(mut row, scale)| row /= *scale);
     (basis, root)
 }
@@ -166,12 +169,12 @@ mod tests {
             &[1., -1., 0., 0., 0., 0., 2., 0., 1., -1., 2., 0., 0., 0., 0., 0.],
         );
         let scale = [10.0, 1.0, 1e-3, 5.0];
-        let basis = open(&active, &scale).unwrap_or_default();
+        let basis = free_directions(&active, &scale).unwrap_or_default();
         assert_eq!(basis.shape(), (4, 2));
         assert!((basis.transpose() * &basis - DMatrix::identity(2, 2)).amax() < 1e-14);
         let moved = DMatrix::from_fn(4, 2, |j, k| basis[(j, k)] / scale[j]);
         assert!((active * moved).amax() < 1e-12);
-        assert_eq!(open(&DMatrix::zeros(1, 3), &[1.0; 3]), None);
+        assert_eq!(free_directions(&DMatrix::zeros(1, 3), &[1.0; 3]), None);
     }
 
     #[test]

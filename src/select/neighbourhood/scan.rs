@@ -8,25 +8,27 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use super::linear::LinearNeighbourhood;
-use super::linearised::{Driven, Linearised};
+use super::linearised::{EffectTerms, Linearised};
 use super::score::{Gain, Score, Sums};
 use crate::problem::{Effect, Problem};
 
 /// All candidates with their scores against one fit.
 pub(crate) struct Scan<'a, 'l> {
     linearised: &'l Linearised<'a>,
+    /// Linear neighbourhood of the fit.
     pub linear: Arc<LinearNeighbourhood>,
     /// Candidates that were scored.
     pub effects: Vec<Effect>,
-    driven: Driven,
+    effect_terms: EffectTerms,
     /// Candidates that are not scored, because a derivative with respect to them is not finite.
     pub refused: Vec<Effect>,
     scores: Vec<Score>,
-    /// Effective number of candidates tried in its family, for each candidate (Bonferroni factor).
+    /// For each candidate, the effective number of candidates tried in its family (Bonferroni
+    /// factor).
     tries: Vec<f64>,
     /// Number of families.
     families: usize,
-    /// True for parameters of each candidate that cannot be negative.
+    /// For each parameter of each candidate, true if it cannot be negative.
     never_negative: Vec<Vec<bool>>,
 }
 
@@ -36,11 +38,11 @@ const CANDIDATES_PER_PROJECTION: usize = 48;
 /// Candidate of the scan with its gain and corrected p-value.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Tried {
-    /// Index of the candidate in the scan's list.
+    /// Index of the candidate in [`Scan::effects`].
     pub index: usize,
     pub gain: Gain,
-    /// Information criterion with the penalty 2 ln(tries) for the search; negative if the candidate
-    /// is better than none.
+    /// Change of the information criterion by the candidate, with the penalty 2 ln(tries) for the
+    /// search; negative if the model is better with it.
     pub criterion: f64,
     /// Corrected p-value: p times the tries in its family times the number of families (Holm's
     /// first step, weighted).
@@ -54,11 +56,13 @@ impl<'a, 'l> Scan<'a, 'l> {
         linear: Arc<LinearNeighbourhood>,
         effects: Vec<Effect>,
     ) -> Self {
-        let driven = Driven::new(linearised, &effects);
+        let effect_terms = EffectTerms::new(linearised, &effects);
         let numbers: Vec<usize> = (0..effects.len()).collect();
         let scored = |numbers: &[usize]| -> Vec<Option<Score>> {
-            let columns: Vec<DMatrix<f64>> =
-                numbers.iter().map(|&number| linearised.columns_of(&driven, number)).collect();
+            let columns: Vec<DMatrix<f64>> = numbers
+                .iter()
+                .map(|&number| linearised.columns_of(&effect_terms, number))
+                .collect();
             let is_finite: Vec<bool> =
                 columns.iter().map(|all| all.iter().all(|value| value.is_finite())).collect();
             let finite: Vec<DMatrix<f64>> = columns
@@ -72,24 +76,29 @@ impl<'a, 'l> Scan<'a, 'l> {
         let all: Vec<Option<Score>> =
             numbers.par_chunks(CANDIDATES_PER_PROJECTION).flat_map_iter(scored).collect();
         let mut refused = Vec::new();
-        let (mut known, mut scores) = (Vec::new(), Vec::new());
+        let (mut scored_effects, mut scores) = (Vec::new(), Vec::new());
         for (effect, score) in effects.into_iter().zip(all) {
             match score {
                 Some(score) => {
-                    known.push(effect);
+                    scored_effects.push(effect);
                     scores.push(score);
                 }
                 None => refused.push(effect),
             }
         }
-        let driven = if refused.is_empty() { driven } else { Driven::new(linearised, &known) };
-        let (tries, families) = tries(&known, linearised.problem());
-        let never_negative = known.iter().map(|effect| linearised.never_negative(effect)).collect();
+        let effect_terms = if refused.is_empty() {
+            effect_terms
+        } else {
+            EffectTerms::new(linearised, &scored_effects)
+        };
+        let (tries, families) = tries(&scored_effects, linearised.problem());
+        let never_negative =
+            scored_effects.iter().map(|effect| linearised.never_negative(effect)).collect();
         Self {
             linearised,
             linear,
-            effects: known,
-            driven,
+            effects: scored_effects,
+            effect_terms,
             refused,
             scores,
             tries,
@@ -98,7 +107,8 @@ impl<'a, 'l> Scan<'a, 'l> {
         }
     }
 
-    /// Returns the candidates that are detectable and physically possible, best first.
+    /// Returns the candidates that are detectable and physically possible, in order of the
+    /// information criterion, best first.
     pub fn ranking(&self) -> Vec<Tried> {
         let sums = self.linear.sums();
         let tried = |(index, score): (usize, &Score)| {
@@ -113,7 +123,8 @@ impl<'a, 'l> Scan<'a, 'l> {
         all
     }
 
-    /// Returns false if a candidate is certainly a negative compliance or mass.
+    /// Returns false if a parameter that cannot be negative, such as a compliance or a mass, is
+    /// significantly negative.
     fn is_possible(&self, index: usize, score: &Score, sums: Sums) -> bool {
         let never_negative = &self.never_negative[index];
         if !never_negative.contains(&true) {
@@ -126,15 +137,15 @@ impl<'a, 'l> Scan<'a, 'l> {
         score.estimates().into_iter().zip(never_negative).all(fine)
     }
 
-    /// Returns the candidates that the fitted parameters can reproduce completely.
+    /// Returns the candidates whose columns the fitted parameters can reproduce completely.
     pub fn absorbed(&self) -> Vec<&Effect> {
-        let gone = |(effect, score): (_, &Score)| (score.rank() == 0).then_some(effect);
-        self.effects.iter().zip(&self.scores).filter_map(gone).collect()
+        let is_absorbed = |(effect, score): (_, &Score)| (score.rank() == 0).then_some(effect);
+        self.effects.iter().zip(&self.scores).filter_map(is_absorbed).collect()
     }
 
     /// Returns the columns of a candidate, shape = (3 N, k).
     pub fn columns(&self, index: usize) -> DMatrix<f64> {
-        self.linearised.columns_of(&self.driven, index)
+        self.linearised.columns_of(&self.effect_terms, index)
     }
 
     /// Returns the largest principal angle \[rad\] between two candidates, with the fitted

@@ -5,7 +5,7 @@ use crate::select::settings::MIN_NEW_LENGTH;
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
 
-/// Score of columns C that were not fitted: products of C̃, the columns with the fitted parameters
+/// Score of columns C that were not fitted: products of C̃, which is C with the fitted parameters
 /// projected out.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Score {
@@ -88,8 +88,8 @@ impl Sums {
 }
 
 impl Score {
-    /// Returns the estimates −G⁺b of the columns' parameters, each with its standard error for
-    /// residuals of unit scatter.
+    /// Returns the estimates −G⁺b of the columns' parameters (G = `gram`, b = `product`), each with
+    /// its standard error for whitened residuals of variance 1.
     pub fn estimates(&self) -> Vec<(f64, f64)> {
         let scale = self.scale();
         let (mut estimates, mut variances) = (vec![0.0; scale.len()], vec![0.0; scale.len()]);
@@ -106,25 +106,26 @@ impl Score {
             .collect()
     }
 
-    /// Returns the number of new directions that the columns add.
+    /// Returns the rank of G: the number of independent directions that the columns add to the fit.
     pub fn rank(&self) -> usize {
         self.detectable_directions().len()
     }
 
-    /// Returns bᵀ G⁺ b and the rank of G; `None` if the fitted parameters reproduce the columns
-    /// completely.
+    /// Returns the reduction bᵀG⁺b of the sum of squares and the rank of G; `None` if the fitted
+    /// parameters reproduce the columns completely.
     fn reduction(&self) -> Option<(f64, usize)> {
         let seen = self.detectable_directions();
         let sum = seen.iter().map(|(value, _, along)| along * along / value).sum();
         (!seen.is_empty()).then_some((sum, seen.len()))
     }
 
+    /// Returns the length ‖C‖ of each column before the projection, 1 for a column of zeros.
     fn scale(&self) -> Vec<f64> {
         self.lengths.iter().map(|length| if *length > 0.0 { length.sqrt() } else { 1.0 }).collect()
     }
 
-    /// Returns eigenvalue, eigenvector and bᵀ along it for each direction of G (columns scaled to
-    /// unit length) that the fitted parameters do not reproduce.
+    /// Returns eigenvalue, eigenvector and the component of b along it for each direction of G that
+    /// the fitted parameters do not reproduce, all for columns scaled to unit length.
     fn detectable_directions(&self) -> Vec<(f64, DVector<f64>, f64)> {
         let (k, scale) = (self.lengths.len(), self.scale());
         let product = DVector::from_fn(k, |i, _| self.product[i] / scale[i]);

@@ -1,5 +1,5 @@
-//! The loop: fits the declared problem, searches the effects that it lacks, and collects the
-//! result.
+//! The loop: fits the declared problem, searches for effects that the problem lacks, and collects
+//! the result.
 
 use std::cell::OnceCell;
 use std::collections::BTreeSet;
@@ -22,7 +22,7 @@ use crate::residual_tests::ResidualTests;
 use crate::select::data::Data;
 use crate::select::evidence::{Evidence, evaluate};
 use crate::select::fitted::Fitted;
-use crate::select::harmonic_prior::{HarmonicPrior, is_gear};
+use crate::select::harmonic_prior::{HarmonicPrior, is_periodic_of_many_orders};
 use crate::select::left_out_gain::LeftOutGain;
 use crate::select::rules::SelectionRules;
 use crate::select::screening::{Trace, check_fit, trace_fit};
@@ -39,11 +39,11 @@ pub struct ClosedLoop {
     pub before: Trace,
     /// Fit with all effects that were found.
     pub after: Identification,
-    /// Errors with the effects of status [`Status::Found`] alone.
+    /// Errors of the declared problem fitted with the effects of status [`Status::Found`] alone.
     pub with_found: Errors,
     /// Residual tests of the fit `after`.
     pub residual_tests: ResidualTests,
-    /// Extended problem: the declared one with the found effects declared.
+    /// Extended problem: the declared one with all effects of `effects` declared, too.
     pub closed: Problem,
     /// Effects in the order in which they were found.
     pub effects: Vec<Found>,
@@ -56,17 +56,20 @@ pub struct ClosedLoop {
     pub(crate) freed: Vec<String>,
     /// Structure without a law, the most probable first.
     pub unexplained: Vec<Unexplained>,
-    /// Mean reduction of the error on held-out poses, with its confidence interval \[m\].
+    /// Mean reduction of the error on held-out rows by the effects, with its confidence interval
+    /// \[m\] or \[rad\]. If no row is held out, it is that of identification rows predicted by fits
+    /// without them.
     pub gain: Interval,
-    /// Identification rows with gross errors, which were excluded from the choice of effects.
+    /// Identification rows that were excluded from the choice of effects: rows with gross errors,
+    /// and rows that alone supported an effect.
     pub set_aside: Vec<Location>,
     /// Settings with which the search ran.
     pub rules: SelectionRules,
 }
 
 impl ClosedLoop {
-    /// Returns the held-out error after the round that added the effect, if later rounds added more
-    /// effects; else `None`.
+    /// Returns the held-out error after the round that added the effect; `None` if it equals that
+    /// of the final fit.
     pub fn held_out_once(&self, found: &Found) -> Option<ErrorSummary> {
         Some(found.held_out_after).filter(|then| *then != self.after.fitted.held_out)
     }
@@ -75,12 +78,12 @@ impl ClosedLoop {
 /// Finds the effects that `problem` lacks, from the identification rows alone; held-out rows only
 /// measure the result.
 ///
-/// If [`Options::stop`] stops it, it abandons the current round and returns the result of the
-/// earlier rounds.
+/// If [`Options::stop`] requests a stop, the current round is abandoned and the result of the
+/// earlier rounds is returned.
 ///
 /// # Errors
-/// Returns an error if problem, data and options do not match, or if it was stopped before the
-/// declared problem was fitted.
+/// Returns an error if problem, data and options do not match, or if a stop was requested before
+/// the declared problem was fitted.
 pub fn close(
     problem: &Problem,
     data: &Dataset,
@@ -122,13 +125,13 @@ pub fn close_by(
     state.data = &data;
     let (fitted, evidence) = if interrupted {
         state.prior = state.prior_of_latest.take();
-        let settled = state.latest.clone().settled(&data, &unstoppable)?;
+        let settled = state.latest.clone().converge(&data, &unstoppable)?;
         let moved = settled.differs_from(&state.latest, &data);
         (settled, state.evidence.take().filter(|_| !moved))
     } else {
         result?
     };
-    // If the declared fit does not describe the arm, it needs no evidence.
+    // If the declared fit does not describe the arm, no evidence about it is used.
     let of_declared = state
         .evidence_of_declared
         .take()
@@ -150,10 +153,10 @@ pub fn close_by(
         Some(_) => gain().is_some_and(LeftOutGain::is_significant),
     };
     let mut conclusion =
-        concluded(&state, &declared, (fitted.clone(), evidence), interrupted, is_used);
+        conclude(&state, &declared, (fitted.clone(), evidence), interrupted, is_used);
     if !is_used(conclusion.effects.iter().map(|found| found.status).min()) {
         conclusion =
-            concluded(&state, &declared, (declared.clone(), of_declared), interrupted, |_| true);
+            conclude(&state, &declared, (declared.clone(), of_declared), interrupted, |_| true);
     }
     let Conclusion { fitted, evidence, residual_tests, effects, mut unexplained } = conclusion;
     if unexplained.is_empty() {
@@ -178,10 +181,11 @@ pub fn close_by(
     };
     let gain = interval::gain(&data, &judged(&declared), &judged(&fitted));
     let rows = data.evidence_rows();
-    let carried = evidence.iter().flat_map(|evidence| &evidence.left_out).map(|&pose| rows[pose]);
-    let aside: BTreeSet<usize> = fitted.set_aside.iter().copied().chain(carried).collect();
+    let supporting_alone =
+        evidence.iter().flat_map(|evidence| &evidence.left_out).map(|&pose| rows[pose]);
+    let aside: BTreeSet<usize> = fitted.set_aside.iter().copied().chain(supporting_alone).collect();
     let set_aside = aside.into_iter().map(|row| data.measurements.location(row)).collect();
-    let has_gear = state.added(&fitted).iter().any(is_gear);
+    let has_gear = state.added(&fitted).iter().any(is_periodic_of_many_orders);
     let misread =
         state.misread.as_ref().filter(|misread| state.added(&fitted).contains(&misread.effect));
     let freed = misread.map_or_else(Vec::new, |misread| misread.parameters(&fitted.problem));
@@ -213,7 +217,8 @@ pub fn close_by(
 }
 
 /// Returns the finding that the extended problem does not fit the measured orientations; `None` if
-/// it does, or if it fits none. The loop itself fits positions alone.
+/// there is no such finding, or if the problem does not fit orientations. The loop itself fits
+/// positions alone.
 fn orientation_finding(problem: &Problem, data: &Data, options: &Options) -> Option<Finding> {
     if !problem.data.fits_orientation {
         return None;
@@ -223,7 +228,7 @@ fn orientation_finding(problem: &Problem, data: &Data, options: &Options) -> Opt
     found.finding(FindingCode::OrientationMisfit).cloned()
 }
 
-/// Fit that the loop ends with, and what is claimed about it.
+/// Fit with which the loop ends, and the claims about it.
 struct Conclusion {
     fitted: Fitted,
     evidence: Option<Evidence>,
@@ -233,9 +238,9 @@ struct Conclusion {
 }
 
 /// Tests the residual of a fit and collects the claims about the effects that it contains, and
-/// about structure without a law. Evidence that is missing is evaluated first. `is_used` tells from
-/// the best status of an effect whether the conclusion is used.
-fn concluded(
+/// about structure without a law. Evidence that is missing is evaluated first. `is_used` receives
+/// the best status of the effects and returns true if the conclusion is used.
+fn conclude(
     state: &SearchState,
     declared: &Fitted,
     (fitted, evidence): (Fitted, Option<Evidence>),
@@ -267,13 +272,13 @@ fn concluded(
     Conclusion { fitted, evidence, residual_tests, effects, unexplained }
 }
 
-/// Returns the fit that the loop ends with: the one found, or the declared one where that predicts
-/// poses that were left out better.
+/// Returns the fit with which the loop ends: that of the search, or the declared one if it predicts
+/// left-out poses significantly better.
 ///
-/// A found fit with cautions is repeated from the nominal arm, because terms that were missing at
-/// first may have driven a parameter to a wrong optimum. If cautions remain, it is kept only if it
-/// predicts significantly better than the declared fit. `of_declared` is the evidence about the
-/// declared fit, if it was evaluated.
+/// A fit of the search with cautions is repeated from the nominal arm, because terms that were
+/// missing at first may have driven a parameter to a wrong optimum. If cautions remain, the fit is
+/// kept only if it predicts significantly better than the declared fit. `of_declared` is the
+/// evidence about the declared fit, if it was evaluated.
 fn found_or_declared(
     (declared, of_declared): (&Fitted, Option<&Evidence>),
     (fitted, evidence): (Fitted, Option<Evidence>),
@@ -294,7 +299,7 @@ fn found_or_declared(
     if anew.found.describes_arm() {
         return Ok((anew, None));
     }
-    // Nothing that is fitted to a misread table says anything about the arm.
+    // Effects that are fitted to a misread table do not describe the arm.
     if declared.found.has(FindingCode::Misread) {
         return Ok((declared.clone(), of_declared.cloned()));
     }
@@ -309,9 +314,9 @@ fn found_or_declared(
     }
 }
 
-/// Returns the evidence about a fit including the rows that are outliers only of the fit with the
-/// added effects; `None` if there are none. Such rows have gross errors, or they contradict the
-/// added effects.
+/// Returns the evidence about a fit that includes the rows which are outliers of this fit but not
+/// of the declared one; `None` if there are no such rows. Such rows have gross errors, or they
+/// contradict the added effects.
 fn evidence_with_doubtful_rows(
     state: &SearchState,
     declared: &Fitted,
@@ -342,5 +347,5 @@ fn fit_with_found(
     } else {
         Options { provisional: true, ..fitted.warm_started_options(options, true) }
     };
-    fitted.next(problem, state.data, &options)
+    fitted.fit_other(problem, state.data, &options)
 }

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
 
 use super::misread;
-use super::plainer::plainer;
+use super::plainer::compare_with_plainer;
 use super::ranges::ranges;
 use super::state::{Round, SearchState};
 use super::status::Status;
@@ -16,12 +16,12 @@ use crate::residual_tests::Covariate;
 use crate::select::candidates::Candidates;
 use crate::select::evidence::{Claims, Evidence, HypothesisSet, SubsetEvidence, subset_evidence};
 use crate::select::fitted::Fitted;
-use crate::select::harmonic_prior::is_gear;
+use crate::select::harmonic_prior::is_periodic_of_many_orders;
 use crate::select::neighbourhood::tries;
 use crate::select::reference_check::{ReferenceCheck, reference_check};
 
-/// Smallest number of orders of one harmonic from which the claim is only that some of the orders
-/// act.
+/// Smallest number of orders of one harmonic at which only the claim is made that some of the
+/// orders act, not all.
 const MIN_SEVERAL_ORDERS: usize = 3;
 
 /// Effect that the loop added, with its status and tests.
@@ -29,12 +29,13 @@ const MIN_SEVERAL_ORDERS: usize = 3;
 pub struct Found {
     /// Effect that was added to the model.
     pub effect: Effect,
-    /// Strongest claim about the effect that the data allow.
+    /// Status: the strongest claim about the effect that the data allow.
     pub status: Status,
     /// Claims with their probabilities; `None` if no evidence about the effect was evaluated, or no
     /// probable set contains it.
     pub claims: Option<Claims>,
-    /// Probability that chance alone gains as much, corrected for the candidates tried.
+    /// p-value of the F test of the fit against the fit without the effect, times the number of
+    /// candidates tried.
     pub p_value: f64,
     /// Estimates of the effect's parameters, fitted together with all others.
     pub estimates: Vec<Estimate>,
@@ -42,26 +43,29 @@ pub struct Found {
     /// probability that it acts instead.
     pub alternatives: Vec<(Effect, f64)>,
     /// Quantities of a law that the search composed, with their ranges over the identification
-    /// poses \[SI\]. Beyond them nothing supports the law.
+    /// poses (SI, temperatures in °C); empty for other effects. Beyond these ranges the law is not
+    /// supported by data.
     pub ranges: Vec<(Covariate, (f64, f64))>,
-    /// Share of refits on random 80 % of the configurations that find the effect again; `None` if
-    /// no evidence was evaluated.
+    /// Fraction of random subsets of 80 % of the configurations in which the evidence finds the
+    /// effect again; `None` if it was not evaluated on subsets.
     pub stability: Option<f64>,
-    /// Check against data that were not fitted; `None` if no such data concern the effect.
+    /// Check against data that were not fitted; `None` if no such data concern the effect, or if
+    /// they do not decide.
     pub reference_check: Option<ReferenceCheck>,
-    /// Held-out error after the first round that contains it and whose effects all remained until
-    /// the end. If there is no such round, that of the final fit.
+    /// Held-out error after the first round that contains the effect and whose effects all remained
+    /// until the end. If there is no such round, it is that of the final fit.
     pub held_out_after: ErrorSummary,
 }
 
 /// Returns every effect that a fit contains in addition to the declared ones, with its tests. If
 /// the fit has cautions (`is_trusted` is false), no effect is more than probable. If the residual
-/// of the fit is not noise (`is_structured`), its claims are means over subsets. No claim is surer
-/// than by the evidence `of_all_rows`, which includes rows that the effects make outliers.
+/// of the fit is not noise (`is_structured`), or if few random subsets contain the effect, its
+/// probabilities are limited to their means over the subsets. They are also limited to those of the
+/// evidence `of_all_rows`, which includes rows that are outliers only of the fit with the effects.
 ///
-/// `is_used` tells from the best status of an effect whether the result is used; no better status
-/// is used less. If it is not used by the evidence on all rows, random subsets, which only reduce
-/// the probabilities, are not evaluated.
+/// `is_used` receives the best status of the effects and returns true if the result is used; if
+/// true for one status, it is true for every better one. Subsets only reduce the probabilities.
+/// They are therefore not evaluated if the result on all rows is not used.
 pub(super) fn found(
     state: &SearchState,
     fitted: &Fitted,
@@ -74,10 +78,10 @@ pub(super) fn found(
     let parts: Vec<Effect> = added.iter().flat_map(Effect::parts).collect();
     let reconsidered = state.reconsidered(fitted);
     let p_values = p_values(state, fitted, &added);
-    let plainer = plainer(state, fitted);
+    let plainer = compare_with_plainer(state, fitted);
     let held_out_after = |effect: &Effect| {
-        let stays = |known: &Effect| added.iter().any(|kept| kept.covers(known));
-        let holds = |round: &&Round| round.effects.iter().any(|known| effect.covers(known));
+        let stays = |other: &Effect| added.iter().any(|kept| kept.covers(other));
+        let holds = |round: &&Round| round.effects.iter().any(|other| effect.covers(other));
         let round =
             state.rounds.iter().find(|round| holds(round) && round.effects.iter().all(stays));
         round.map_or(fitted.found.fitted.held_out, |round| round.held_out)
@@ -119,14 +123,14 @@ pub(super) fn found(
         let alternatives = with_rivals(alternatives, rivals);
         let check = reference_check(fitted, data, &effect);
         let verdict = check.as_ref().map(|check| check.verdict);
-        let gear = match &effect {
-            Effect::JointHarmonic { joint, .. } if is_gear(&effect) => {
+        let gear_probability = match &effect {
+            Effect::JointHarmonic { joint, .. } if is_periodic_of_many_orders(&effect) => {
                 state.gear_probability.get(joint).copied()
             }
             _ => None,
         };
         // An effect that was evaluated but belongs to no probable set has no claims.
-        let is_evaluated = best.is_some() && reconsidered.iter().any(|known| effect.covers(known));
+        let is_evaluated = best.is_some() && reconsidered.iter().any(|other| effect.covers(other));
         let rival = plainer.iter().find(|plainer| plainer.effect == effect);
         let claims = claims.map(|mut claims| {
             if let Some(rival) = rival {
@@ -138,7 +142,7 @@ pub(super) fn found(
             claims
         });
         let instead = rival.into_iter().flat_map(|rival| {
-            // They act together; each of them bears its part of their probability.
+            // The causes act together; their probability is divided equally among them.
             let each = of_class * (1.0 - rival.share) / rival.instead.len() as f64;
             rival.instead.iter().map(move |cause| (cause.clone(), each))
         });
@@ -148,7 +152,7 @@ pub(super) fn found(
             Some(misread) => Some(misread::claims(misread, &fitted.problem)),
             None => claims,
         };
-        let law = claims.as_ref().map(|claims| claims.law.1).or(gear);
+        let law = claims.as_ref().map(|claims| claims.law.1).or(gear_probability);
         let law = law.or_else(|| is_evaluated.then_some(0.0));
         let is_significant = p_value < rules.leaving_level;
         let status = Status::of(law, rules.stated, (is_significant, verdict));
@@ -184,14 +188,21 @@ pub(super) fn found(
 }
 
 /// Returns, for each effect of a fit, the p-value of the F test of the fit against the fit without
-/// it, times the number of candidates tried. For a harmonic of few orders it is the smallest of its
-/// orders.
+/// the effect, times the number of candidates tried. For a harmonic that is no periodic error with
+/// many orders, it is the smallest p-value of its orders.
 fn p_values(state: &SearchState, fitted: &Fitted, effects: &[Effect]) -> Vec<f64> {
     let fit = fitted.around(state.data);
-    let tested: Vec<Vec<Effect>> = effects
-        .iter()
-        .map(|effect| if is_gear(effect) { vec![effect.clone()] } else { effect.parts() })
-        .collect();
+    let tested: Vec<Vec<Effect>> =
+        effects
+            .iter()
+            .map(|effect| {
+                if is_periodic_of_many_orders(effect) {
+                    vec![effect.clone()]
+                } else {
+                    effect.parts()
+                }
+            })
+            .collect();
     let parts: Vec<Effect> = tested.iter().flatten().flat_map(Effect::parts).collect();
     let mut everything = Candidates::new(&fitted.problem, state.data).testable;
     let first = everything.len();
@@ -213,9 +224,9 @@ fn p_values(state: &SearchState, fitted: &Fitted, effects: &[Effect]) -> Vec<f64
     tested.iter().map(|parts| by_part.by_ref().take(parts.len()).fold(1.0, f64::min)).collect()
 }
 
-/// Returns the claims about an effect. For a harmonic of few orders they are those of the least
-/// probable order, for one of several orders those of the most probable one. `None` if the evidence
-/// does not contain the effect.
+/// Returns the claims about an effect. For a harmonic of fewer than [`MIN_SEVERAL_ORDERS`] orders
+/// they are those of the least probable order, for one of more orders those of the most probable
+/// one. `None` if the evidence does not contain the effect.
 fn claims(evidence: &Evidence, effect: &Effect) -> Option<Claims> {
     let parts = effect.parts();
     let claims =
@@ -228,8 +239,8 @@ fn claims(evidence: &Evidence, effect: &Effect) -> Option<Claims> {
     }
 }
 
-/// Returns the claims with no probability above its mean over random subsets of the configurations.
-/// The means are those of the part that [`claims`] chooses.
+/// Returns the claims with each probability limited to its mean over random subsets of the
+/// configurations. The means are those of the order that [`claims`] chooses.
 ///
 /// If no set of hypotheses describes the data, the posterior overstates the probability of the best
 /// one. Its mean over resampled data does not. [Huggins and Miller 2023]
@@ -254,13 +265,14 @@ fn limited_to(mut claims: Claims, others: [f64; 3]) -> Claims {
     claims
 }
 
-/// Returns alternatives with the rivals of a law that are not among them, the most probable first.
+/// Returns the alternatives with `rivals` added, the most probable first. The probability of a
+/// rival that is already an alternative is added to that of the alternative.
 fn with_rivals(
     mut alternatives: Vec<(Effect, f64)>,
     rivals: impl Iterator<Item = (Effect, f64)>,
 ) -> Vec<(Effect, f64)> {
     for (rival, probability) in rivals {
-        match alternatives.iter_mut().find(|(known, _)| known.is_same_as(&rival)) {
+        match alternatives.iter_mut().find(|(other, _)| other.is_same_as(&rival)) {
             Some((_, sum)) => *sum += probability,
             None => alternatives.push((rival, probability)),
         }

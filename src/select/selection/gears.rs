@@ -15,7 +15,7 @@
 use crate::problem::Problem;
 use crate::select::data::Data;
 use crate::select::fitted::Fitted;
-use crate::select::harmonic_prior::{HarmonicPrior, order_of};
+use crate::select::harmonic_prior::{HarmonicPrior, harmonic_order};
 use crate::select::neighbourhood::PartSquares;
 
 /// Number of passes of the spectrum's estimate: σₖ from the coefficients, then the coefficients
@@ -33,9 +33,9 @@ const SPECTRUM_WIDTH: f64 = 1.5;
 /// of coefficients.
 const COMMON_COEFFICIENTS: f64 = 4.0;
 
-/// Returns the indices of harmonic coefficients among the unknowns, with their orders.
-fn coefficients(fitted: &Fitted) -> Vec<(usize, u32)> {
-    let order = |j: usize| order_of(&fitted.model.parameters[fitted.unknowns[j]].regressor);
+/// Returns the indices of the harmonics' coefficients among the unknowns, each with its order.
+fn harmonic_coefficients(fitted: &Fitted) -> Vec<(usize, u32)> {
+    let order = |j: usize| harmonic_order(&fitted.model.parameters[fitted.unknowns[j]].regressor);
     (0..fitted.unknowns.len()).filter_map(|j| Some((j, order(j)?))).collect()
 }
 
@@ -49,7 +49,8 @@ pub(super) enum ScaleBy {
 }
 
 /// Returns the prior whose σₖ are estimated from the coefficients of a fit under the prior `first`.
-/// Its scale is chosen by `criterion` in the linear neighbourhood of the fit.
+/// Its scale is chosen by `criterion` in the linear neighbourhood of the fit. Returns `first` if no
+/// scale can be evaluated.
 pub(super) fn estimated_prior(
     fitted: &Fitted,
     data: &Data,
@@ -71,7 +72,7 @@ pub(super) fn estimated_prior(
     let priors: Vec<(f64, Option<f64>)> =
         values_and_sigmas.map(|(x, sigma)| (x, sigma.map(|sigma| sigma / weight))).collect();
     // Declared harmonics whose orders the prior does not contain keep their declared priors.
-    let coefficients: Vec<(usize, u32)> = coefficients(fitted)
+    let coefficients: Vec<(usize, u32)> = harmonic_coefficients(fitted)
         .into_iter()
         .filter(|(_, order)| first.sigma(*order).is_some())
         .collect();

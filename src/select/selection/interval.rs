@@ -8,8 +8,9 @@ use nalgebra::Vector3;
 use super::super::data::{Data, bits};
 use crate::numeric::{Interval, mean_interval};
 
-/// Returns the mean reduction of the error on held-out rows of the leading kind, \[m\] or \[rad\],
-/// with a bootstrap interval over configurations. If no row is held out, all rows count.
+/// Returns the mean of |`before`| − |`after`|, the errors of the held-out rows of the leading kind
+/// \[m\] or \[rad\], with a bootstrap interval over configurations. If no row is held out, the
+/// errors are those of all identification rows.
 pub(super) fn gain(data: &Data, before: &[Vector3<f64>], after: &[Vector3<f64>]) -> Interval {
     let kind = data.measurements.leading().kind();
     let held_out = &data.split.held_out;

@@ -9,8 +9,8 @@ use crate::select::fitted::Fitted;
 use crate::select::left_out_gain::LeftOutGain;
 
 /// Fits the declared problem with the effect that expresses the misreading of its table, starting
-/// at the size that the checks found. Returns `None` if there is no such effect, or if poses that
-/// are left out do not gain by it.
+/// at the size that the checks found. Returns `None` if there is no such effect, or if it does not
+/// predict left-out poses significantly better.
 ///
 /// A search in the linear neighbourhood of a fit that is far off would not find such an effect.
 ///
@@ -31,7 +31,7 @@ pub(super) fn with_misread_effect(
     let options = Options { start, influential_rows: false, ..state.options.clone() };
     state.misread = Some(misread);
     let problem = state.problem(declared, &[effect]);
-    let fitted = match declared.next(problem, state.data, &options) {
+    let fitted = match declared.fit_other(problem, state.data, &options) {
         Ok(fitted) => fitted,
         Err(error) if error.is_interrupted() => return Err(error),
         Err(_) => {
@@ -44,13 +44,13 @@ pub(super) fn with_misread_effect(
         state.misread = None;
         return Ok(None);
     }
-    state.is_new(&fitted);
+    state.register_new(&fitted);
     state.record(&fitted);
     Ok(Some(fitted))
 }
 
-/// Returns the claims about the effect: its law, and with it place and quantity, has its
-/// probability among the misreadings.
+/// Returns the claims about the effect: place, quantities and law have the probability of this
+/// misreading among all possible ones.
 pub(super) fn claims(misread: &MisreadEffect, problem: &Problem) -> Claims {
     let law = Hypothesis::of_effect(&misread.effect, problem, (false, false));
     let p = misread.probability;

@@ -1,7 +1,8 @@
-//! Plainer causes that together do what an effect does, compared with it by predictions.
+//! Plainer causes that together displace the target as an effect does, compared with the effect by
+//! predictions.
 //!
 //! The evidence prefers one effect to two that explain the residual as well, even where the two are
-//! more common in arms. Left-out poses show whether the data tell them apart.
+//! more common in arms. Predictions of left-out poses show whether the data distinguish them.
 
 use super::state::SearchState;
 use crate::problem::Effect;
@@ -14,14 +15,15 @@ use crate::select::left_out_gain::LeftOutGain;
 pub(super) struct Plainer {
     /// Effect of the fit.
     pub effect: Effect,
-    /// Effects that act together in its place.
+    /// Effects that may act together in its place.
     pub instead: Vec<Effect>,
-    /// Probability of the effect against them; both have the same prior probability.
+    /// Probability of the effect if either the effect or all of `instead` act; both have the same
+    /// prior probability.
     pub share: f64,
 }
 
 /// Returns the plainer causes that together displace the target almost as an effect does: bending
-/// of a link turns and shifts its end, as compliance of the joints at both ends does.
+/// of a link rotates and shifts its end, as compliance of the joints at both ends does.
 fn plainer_causes(effect: &Effect) -> Vec<Effect> {
     match *effect {
         Effect::LinkBending { joint } if joint > 1 => {
@@ -31,9 +33,9 @@ fn plainer_causes(effect: &Effect) -> Vec<Effect> {
     }
 }
 
-/// Fits the plainer causes of each effect in its place, and compares the predictions of poses that
-/// are left out.
-pub(super) fn plainer(state: &SearchState, fitted: &Fitted) -> Vec<Plainer> {
+/// Fits the plainer causes of each added effect in its place, and compares the predictions of
+/// left-out poses. Effects without plainer causes are left out.
+pub(super) fn compare_with_plainer(state: &SearchState, fitted: &Fitted) -> Vec<Plainer> {
     let added = state.added(fitted);
     let compared = |effect: &Effect| {
         let others: Vec<Effect> = added.iter().filter(|other| *other != effect).cloned().collect();

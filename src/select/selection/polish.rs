@@ -1,4 +1,4 @@
-//! Refinement of searched arguments of the added effects on all rows. Trial values are times
+//! Refinement of the searched arguments of added effects on all rows. Trial values are times
 //! between poses that the evidence did not use, and time constants, distances and orders between
 //! the listed ones.
 
@@ -17,9 +17,10 @@ const MAX_POLISHING_PASSES: usize = 8;
 /// Factors by which a time constant, distance or order is multiplied for its trial values.
 const TRIAL_FACTORS: [f64; 10] = [0.8, 0.86, 0.91, 0.95, 0.98, 1.02, 1.05, 1.1, 1.16, 1.25];
 
-/// Returns the fit with refined arguments. Each searched argument is replaced by the one that
-/// explains all identification rows best in the linear neighbourhood, if that is clearly better.
-/// Returns `None` if none is, or if the evidence already used all rows and times.
+/// Returns the fit with refined arguments. Each searched argument is replaced by the value that
+/// explains all identification rows best in the linear neighbourhood, if its odds over the present
+/// value exceed [`LN_ODDS_OF_ANOTHER_ARGUMENT`]. Returns `None` if no argument changes, or if the
+/// evidence already used all rows and times.
 ///
 /// # Errors
 /// Returns an error if the fit fails or the search was stopped.
@@ -51,9 +52,10 @@ pub(super) fn polished(
     if effects == added { Ok(None) } else { state.fit(fitted, &effects).map(Some) }
 }
 
-/// Returns the effect with the argument that explains all rows best; `None` if it is not clearly
-/// better than the present one. The argument moves to the best neighbouring value at most
-/// `MAX_POLISHING_PASSES` times. `linearised` has the sites of the effect at all rows.
+/// Returns the effect with the value of its argument that explains all rows best; `None` if that is
+/// not clearly better than the present value. The argument moves to the best neighbouring value at
+/// most [`MAX_POLISHING_PASSES`] times. `linearised` has the columns of the effect's sites at all
+/// rows.
 fn better_argument(
     (fitted, linearised): (&Fitted, &Linearised),
     data: &Data,
@@ -94,8 +96,8 @@ fn neighbouring_arguments(data: &Data, effect: &Effect) -> Vec<Effect> {
     // The evidence uses every n-th row, and the list of times contains every m-th time.
     let thinned = data.rows().len().div_ceil(data.evidence_rows().len().max(1));
     let reach = 2 * thinned.max(times.len().div_ceil(MAX_SHIFT_TIMES));
-    let place = times.partition_point(|other| *other < time);
-    let near = times[place.saturating_sub(reach)..times.len().min(place + reach)].iter();
+    let index = times.partition_point(|other| *other < time);
+    let near = times[index.saturating_sub(reach)..times.len().min(index + reach)].iter();
     let at = |&at_time: &f64| match effect {
         Effect::StationMove { .. } => Effect::StationMove { at_time },
         _ => Effect::StationShift { at_time },

@@ -1,4 +1,4 @@
-//! Ranges of quantities over which a law was seen.
+//! Ranges of the quantities of a law over the identification poses.
 
 use crate::problem::{Effect, PoseView};
 use crate::residual_tests::Covariate;
@@ -7,7 +7,7 @@ use crate::select::evidence::Hypothesis;
 use crate::select::fitted::Fitted;
 
 /// Returns the recorded quantities on which an effect depends, with their ranges over the
-/// identification poses \[SI\].
+/// identification poses (SI, temperatures in °C).
 pub(super) fn ranges(
     fitted: &Fitted,
     data: &Data,
@@ -39,8 +39,8 @@ fn value(covariate: &Covariate, setup: &PoseView, names: &[String]) -> Option<f6
         Covariate::Approach(joint) => setup.approach.map(|sides| sides[*joint]),
         Covariate::Load | Covariate::Position => None,
         Covariate::Declared(name) => {
-            let place = names.iter().position(|known| known.as_str() == &**name)?;
-            setup.covariates.get(place).copied()
+            let index = names.iter().position(|other| other.as_str() == &**name)?;
+            setup.covariates.get(index).copied()
         }
     }
 }

@@ -11,15 +11,15 @@ use crate::problem::Effect;
 use crate::select::data::Data;
 use crate::select::evidence::{Evidence, Hypothesis, HypothesisSet, evaluate, ln_posterior};
 use crate::select::fitted::Fitted;
-use crate::select::harmonic_prior::is_gear;
+use crate::select::harmonic_prior::is_periodic_of_many_orders;
 use crate::select::settings::MAX_RIVALS;
 
 /// Runs the search from the fit of the declared problem.
 ///
 /// Returns the final, converged fit and the evidence about it. The evidence is `None` if the
-/// residual is not finite or the fit changed since. With periodic errors of many orders, evidence
-/// is evaluated under the prior of the largest evidence. The final fit then has the prior that
-/// predicts best.
+/// residual is not finite, or if the fit changed after the evidence was evaluated. With periodic
+/// errors of many orders, evidence is evaluated under the common prior that has the largest
+/// evidence. The final fit then has the common prior that predicts best.
 ///
 /// # Errors
 /// Returns an error if a fit fails or the search was stopped.
@@ -28,22 +28,25 @@ pub(super) fn search(
     first: Fitted,
 ) -> Result<(Fitted, Option<Evidence>), IdentifyError> {
     let (fitted, evidence) = settled_set(state, first)?;
-    if state.added(&fitted).iter().any(is_gear) {
+    if state.added(&fitted).iter().any(is_periodic_of_many_orders) {
         let used = with_estimated_prior(state, &fitted, ScaleBy::LeftOutRanges)?;
-        return Ok((used.settled(state.data, state.options)?, evidence));
+        return Ok((used.converge(state.data, state.options)?, evidence));
     }
-    let settled = fitted.clone().settled(state.data, state.options)?;
+    let settled = fitted.clone().converge(state.data, state.options)?;
     let evidence = evidence.filter(|_| !settled.differs_from(&fitted, state.data));
     Ok((settled, evidence))
 }
 
+/// Alternates between evaluating evidence and fitting the effects of the most probable set, until
+/// both agree or the rounds are used up. Returns the last fit and the evidence about it.
 fn settled_set(
     state: &mut SearchState,
     first: Fitted,
 ) -> Result<(Fitted, Option<Evidence>), IdentifyError> {
     let rules = state.data.rules;
     let mut fitted = first;
-    // This evidence compared sets at fits of their own and selected the set of the present fit.
+    // This evidence compared each set at a fit of that set and selected the set of the present
+    // fit.
     let mut leading: Option<Evidence> = None;
     // The common prior was estimated from the coefficients of these periodic errors with many
     // orders.
@@ -56,40 +59,41 @@ fn settled_set(
             return Ok((fitted, Some(evidence)));
         };
         let open = state.reconsidered(&fitted);
-        // Refined arguments are kept: they explain all rows, while the evidence uses only some
+        // Polished arguments are kept: they explain all rows, while the evidence uses only some
         // rows.
-        let stays = is_held(best, &open, Effect::eq)
-            || is_polished && is_held(best, &open, Effect::is_but_for_search);
+        let stays = has_same_effects(best, &open, Effect::eq)
+            || is_polished && has_same_effects(best, &open, Effect::is_but_for_search);
         if !stays {
             state.report_progress(1, 1);
             let effects = state.effects_of(&fitted, (&evidence, best));
             let next = state.fit(&fitted, &effects)?;
-            if state.is_new(&next) {
+            if state.register_new(&next) {
                 (leading, is_polished) = (None, false);
                 state.record(&next);
                 fitted = next;
-                let gears: Vec<Effect> = state.added(&fitted).into_iter().filter(is_gear).collect();
+                let gears: Vec<Effect> =
+                    state.added(&fitted).into_iter().filter(is_periodic_of_many_orders).collect();
                 if gears != estimated_from {
                     estimated_from = gears;
                     fitted = with_estimated_prior(state, &fitted, ScaleBy::Evidence)?;
                 }
                 continue;
             }
-            // The evidence prefers a set that was less probable than the present one when it was
-            // fitted itself.
+            // The evidence prefers a set that was fitted before, and then was less probable than
+            // the present one.
             if let Some(leading) = leading {
                 return Ok((fitted, Some(leading)));
             }
         }
-        let (evidence, better) = refitted(state, &fitted, evidence)?;
-        if let Some(better) = better.filter(|better| state.is_new(better)) {
+        let (evidence, better) = fit_rivals(state, &fitted, evidence)?;
+        if let Some(better) = better.filter(|better| state.register_new(better)) {
             (leading, is_polished) = (Some(evidence), false);
             state.record(&better);
             fitted = better;
             continue;
         }
         let next = if is_polished { None } else { polished(state, &fitted)? };
-        let Some(better) = next.filter(|better| state.is_new(better)) else {
+        let Some(better) = next.filter(|better| state.register_new(better)) else {
             return Ok((fitted, Some(evidence)));
         };
         (leading, is_polished) = (None, true);
@@ -114,8 +118,8 @@ fn with_estimated_prior(
 }
 
 /// Returns true if the effects of a set are the `added` ones, compared by `is_same`, and the set
-/// contains no further periodic error.
-fn is_held(
+/// contains no periodic error with many orders that is to be added.
+fn has_same_effects(
     set: &HypothesisSet,
     added: &[Effect],
     is_same: impl Fn(&Effect, &Effect) -> bool,
@@ -130,9 +134,9 @@ fn is_held(
         && unmatched.is_empty()
 }
 
-/// Returns the evidence with its rival sets evaluated at fits of these sets. Also returns the best
-/// of these fits if it is more probable than the given one.
-fn refitted(
+/// Fits the rival sets of the evidence. Returns the evidence with the odds of each rival computed
+/// at its fit, and the best of these fits if it is more probable than `fitted`.
+fn fit_rivals(
     state: &SearchState,
     fitted: &Fitted,
     evidence: Evidence,
@@ -141,7 +145,7 @@ fn refitted(
     let open = state.reconsidered(fitted);
     let held = evidence
         .certain_set(rules.inclusion_threshold)
-        .filter(|best| !best.hypotheses.is_empty() && is_held(best, &open, Effect::eq));
+        .filter(|best| !best.hypotheses.is_empty() && has_same_effects(best, &open, Effect::eq));
     let Some(best) = held.cloned() else { return Ok((evidence, None)) };
     let ln_posterior_of = |fitted: &Fitted, functions: &[(Hypothesis, usize)], sigma: f64| {
         unless_stopped(data, || {
@@ -168,7 +172,7 @@ fn refitted(
             ln_posterior_of(&fit, functions, fitted.sigma)
         };
         let here = match of_held.get(&aside) {
-            Some(known) => *known,
+            Some(ln_posterior) => *ln_posterior,
             None => of(fitted, &functions)?,
         };
         if let Some((here, there)) = here.zip(of(&next, &rival.without_law())?) {
@@ -181,7 +185,8 @@ fn refitted(
     let mut better: Option<Fitted> = None;
     for (rival, ln_odds, next) in tried {
         // A function without a law is linear only about the fit for which it was built. A law that
-        // replaces it must therefore also be confirmed by the evidence about its own fit.
+        // // replaces it must therefore also be confirmed by the evidence about the fit with the
+        // law.
         let functions_left = rival.without_law().len();
         let is_best = ln_odds > 0.0 && better.is_none();
         if is_best
@@ -198,8 +203,8 @@ fn refitted(
     Ok((evidence.corrected(&best, &ln_odds_of), better))
 }
 
-/// Returns true if the most probable set about a fit contains its effects and at most `functions`
-/// functions without a law.
+/// Returns true if the set that the evidence about a fit accepts has the effects of the fit and at
+/// most `functions` functions without a law.
 fn is_confirmed(
     state: &SearchState,
     fitted: &Fitted,
@@ -210,7 +215,7 @@ fn is_confirmed(
     let threshold = state.data.rules.inclusion_threshold;
     let best = evidence.as_ref().and_then(|evidence| evidence.certain_set(threshold));
     Ok(best.is_some_and(|best| {
-        is_held(best, &open, Effect::eq) && best.without_law().len() <= functions
+        has_same_effects(best, &open, Effect::eq) && best.without_law().len() <= functions
     }))
 }
 

@@ -9,7 +9,7 @@ use crate::select::candidates::joined;
 use crate::select::data::Data;
 use crate::select::evidence::{Evidence, HypothesisSet, evaluate};
 use crate::select::fitted::Fitted;
-use crate::select::harmonic_prior::{HarmonicPrior, is_gear};
+use crate::select::harmonic_prior::{HarmonicPrior, is_periodic_of_many_orders};
 use crate::select::settings::MAX_RECONSIDERED;
 
 /// Number of solver steps that an intermediate fit may take for each fit of its size allowed by the
@@ -31,9 +31,9 @@ pub struct Round {
 pub(super) struct SearchState<'a> {
     pub data: &'a Data<'a>,
     pub options: &'a Options,
-    /// Effects that the problem itself declares; the search keeps them.
+    /// Effects that the declared problem contains; the search keeps them.
     pub declared: Vec<Effect>,
-    /// Parameter rules that the problem itself declares.
+    /// Parameter rules of the declared problem.
     declared_rules: Vec<ParameterRule>,
     /// Common prior of the harmonics for the next fit; `None` if no joint has many orders.
     pub prior: Option<HarmonicPrior>,
@@ -42,8 +42,10 @@ pub(super) struct SearchState<'a> {
     /// Probability, by joint counted from 1, of the joint's periodic error when it was added to the
     /// fit.
     pub gear_probability: BTreeMap<usize, f64>,
-    /// Effect that expresses the misreading of the table, if the search began with it.
+    /// Effect that expresses the misreading of the table; `None` if the search did not start with
+    /// one.
     pub misread: Option<MisreadEffect>,
+    /// Results of the rounds so far.
     pub rounds: Vec<Round>,
     /// Fit of the latest round; before the first round, that of the declared problem.
     pub latest: Fitted,
@@ -75,8 +77,8 @@ impl<'a> SearchState<'a> {
         }
     }
 
-    /// Reports that the current round begins fit number `fit` of `fits`; 0 while it evaluates
-    /// evidence.
+    /// Reports that the current round begins fit number `fit` of `fits`; both are 0 while it
+    /// evaluates evidence.
     pub fn report_progress(&self, fit: usize, fits: usize) {
         let (round, effects) = (self.rounds.len() + 1, || self.added(&self.latest));
         self.options.report_progress(|| Progress::Round { round, effects: effects(), fit, fits });
@@ -93,12 +95,12 @@ impl<'a> SearchState<'a> {
     }
 
     /// Returns the added effects that the evidence removes from the fit and evaluates again.
-    /// Periodic errors with many orders stay in the fit, and so does the effect that expresses a
-    /// misread table: it is far larger than any size that the evidence tries. If there are more
-    /// than `MAX_RECONSIDERED` effects, all stay.
+    /// Periodic errors with many orders stay in the fit. So does the effect that expresses a
+    /// misread table, which is far larger than any size that the evidence tries. If there are more
+    /// than [`MAX_RECONSIDERED`] effects, all stay.
     pub fn reconsidered(&self, fitted: &Fitted) -> Vec<Effect> {
         let misread = self.misread.as_ref().map(|misread| &misread.effect);
-        let stays = |effect: &Effect| is_gear(effect) || misread == Some(effect);
+        let stays = |effect: &Effect| is_periodic_of_many_orders(effect) || misread == Some(effect);
         let effects: Vec<Effect> =
             self.added(fitted).into_iter().filter(|effect| !stays(effect)).collect();
         let count = effects.iter().flat_map(Effect::parts).count();
@@ -127,7 +129,7 @@ impl<'a> SearchState<'a> {
         Ok(evidence)
     }
 
-    /// Returns the number of fits, with as many unknowns as this one, that the budget `fit_work`
+    /// Returns the number of fits, with as many unknowns as `fitted`, that the budget `fit_work`
     /// allows; at least one.
     pub fn affordable_fits(&self, fitted: &Fitted) -> usize {
         self.paid_fits_of(fitted.unknowns.len())
@@ -150,7 +152,7 @@ impl<'a> SearchState<'a> {
     pub fn problem(&self, fitted: &Fitted, added: &[Effect]) -> Problem {
         let mut problem = fitted.with_effects(&self.with_declared(added));
         problem.parameters.clone_from(&self.declared_rules);
-        if added.iter().any(is_gear)
+        if added.iter().any(is_periodic_of_many_orders)
             && let Some(prior) = &self.prior
         {
             prior.add_to(&mut problem);
@@ -180,12 +182,12 @@ impl<'a> SearchState<'a> {
         let provisional = paid == 1;
         let options = from.warm_started_options(self.options, true);
         let options = Options { max_steps, provisional, ..options };
-        from.next(problem, self.data, &options)
+        from.fit_other(problem, self.data, &options)
     }
 
     /// Returns the effects of a hypothesis set for the next fit. They are its laws, its periodic
-    /// errors with many orders, and the effects that stay in the fit. Sets the common prior of the
-    /// harmonics if the set contains the first or a longer periodic error.
+    /// errors with many orders, and the effects that stay in the fit. Extends the common prior of
+    /// the harmonics if the set contains periodic errors of orders that the prior lacks.
     pub fn effects_of(
         &mut self,
         fitted: &Fitted,
@@ -201,7 +203,7 @@ impl<'a> SearchState<'a> {
             self.extend_prior(highest, sigma);
             let is_taken = |order: &u32| {
                 let single = Effect::JointHarmonic { joint, orders: vec![*order] };
-                self.declared.iter().chain(&effects).any(|known| known.covers(&single))
+                self.declared.iter().chain(&effects).any(|other| other.covers(&single))
             };
             let orders: Vec<u32> = (1..=highest).filter(|order| !is_taken(order)).collect();
             effects = joined(&effects, &Effect::JointHarmonic { joint, orders });
@@ -209,8 +211,9 @@ impl<'a> SearchState<'a> {
         effects
     }
 
-    /// Returns 1 σ \[rad\] of the coefficients of a periodic error with `highest` orders whose root
-    /// mean square displacement is `size` times the noise.
+    /// Returns 1 σ \[rad\] of the coefficients of a periodic error at `joint`, counted from 1, with
+    /// `highest` orders. Together they displace the target by `size` times the σ of the noise in
+    /// root mean square.
     fn coefficient_sigma(&self, fitted: &Fitted, joint: usize, highest: u32, size: f64) -> f64 {
         let rows = self.data.evidence_rows();
         let site = ParameterSite::coordinate(&fitted.problem, joint);
@@ -220,7 +223,7 @@ impl<'a> SearchState<'a> {
         if squares > 0.0 { size / squares.sqrt() } else { size }
     }
 
-    /// Adds orders up to `highest` to the prior, with σ \[rad\], if it lacks them.
+    /// Adds the orders up to `highest` that the prior lacks, with 1 σ = `sigma` \[rad\].
     fn extend_prior(&mut self, highest: u32, sigma: f64) {
         let prior = self.prior.get_or_insert_with(|| HarmonicPrior { by_order: Vec::new() });
         let first = prior.by_order.last().map_or(1, |(order, _)| order + 1);
@@ -241,11 +244,12 @@ impl<'a> SearchState<'a> {
         self.evidence = None;
     }
 
-    /// Returns true if these effects were not fitted together before, and records that they were.
-    pub fn is_new(&mut self, fitted: &Fitted) -> bool {
+    /// Returns true if the effects of this fit were not fitted together before, and records that
+    /// they now are.
+    pub fn register_new(&mut self, fitted: &Fitted) -> bool {
         let effects = fitted.effects();
-        let is_same = |known: &Vec<Effect>| {
-            known.len() == effects.len() && effects.iter().all(|effect| known.contains(effect))
+        let is_same = |other: &Vec<Effect>| {
+            other.len() == effects.len() && effects.iter().all(|effect| other.contains(effect))
         };
         let is_new = !self.fitted_sets.iter().any(is_same);
         if is_new {

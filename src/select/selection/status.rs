@@ -36,8 +36,9 @@ impl Status {
     }
 
     /// Returns the status of an effect. `law` is the probability of its law, `None` if no evidence
-    /// was evaluated; then it is found if significant. `stated` is the smallest probability of a
-    /// found law. `witness` is the verdict of independent measurements.
+    /// was evaluated; the effect is then found if its F test is significant. `stated` is the
+    /// smallest probability of a found law. `witness` is the verdict of measurements that were not
+    /// fitted.
     pub(super) fn of(
         law: Option<f64>,
         stated: f64,
@@ -79,7 +80,8 @@ impl Verdict {
 
 impl Verdict {
     /// Returns the verdict on effects with these statuses. `is_noise` is true if the fit with all
-    /// of them leaves only noise, `is_noise_with_found` if the fit with the found ones alone does.
+    /// effects leaves only noise, `is_noise_with_found` if the fit with the effects of status
+    /// `found` alone does.
     pub(super) fn of(statuses: &[Status], is_noise: bool, is_noise_with_found: bool) -> Self {
         match statuses {
             [] if is_noise => Self::NothingFound,
