@@ -1,4 +1,4 @@
-//! Misreadings that a problem and the columns of its table allow.
+//! Candidates: the misreadings that a problem and the columns of its table allow.
 
 use std::f64::consts::PI;
 
@@ -7,31 +7,34 @@ use crate::measurement::Measurements;
 use crate::model::parameter::JointField;
 use crate::problem::{Joint, JointKind, Problem};
 
-/// Smallest number of the joint table, declared in degrees, that may be meant in radians.
+/// Smallest absolute angle of the joint table, as a number of degrees, that may be meant in
+/// radians.
 const MIN_RADIANS: f64 = 0.3;
-/// Plausible lengths of a joint \[m\]; others may be in another unit.
+/// Range of plausible lengths of a joint \[m\]. A length is tried in another unit if it is then in
+/// this range.
 const PLAUSIBLE_LENGTHS: std::ops::Range<f64> = 0.01..3.0;
 /// Maximum number of joints for which every pair is tried as exchanged or coupled.
 const MAX_PAIRED: usize = 12;
 /// Maximum number of masses that are tried one by one.
 const MAX_MASSES: usize = 12;
-/// Step between trial zero positions \[°\]. A fit in full finds the values between them.
-const ZERO_POSITION_STEP: i16 = 15;
-/// Trial ratios between motion and command, in hundredths. A fit in full finds the values between
+/// Step between trial errors of a joint's zero position \[°\]. A full fit finds values between
 /// them.
+const ZERO_POSITION_STEP: i16 = 15;
+/// Trial ratios of the motion of a joint to its command, in hundredths. A full fit finds values
+/// between them.
 const TRIAL_RATIOS: [i16; 18] =
     [1, 5, 10, 20, 25, 33, 50, 67, 80, 90, 110, 125, 150, 200, 300, 400, 500, 1000];
-/// Usual leads of ball screws \[mm\]. A fit in full finds the values near them.
+/// Usual leads of ball screws \[mm\]. A full fit finds values near them.
 const SCREW_LEADS: [i16; 12] = [4, 5, 6, 8, 10, 12, 16, 20, 25, 32, 40, 50];
-/// Angles by which α of a row may be wrong \[°\]. A turn by 180° of a right angle is its other
-/// sign.
+/// Trial errors of an angle α of the joint table \[°\]. For α = ±90°, an error of 180° is the same
+/// as the other sign, which is tried anyway.
 const TWISTS: [i16; 3] = [-90, 90, 180];
-/// Maximum number of rows by which positions may be shifted.
+/// Maximum number of rows by which positions are tried as shifted, in either direction.
 const MAX_SHIFT: i8 = 3;
-/// Number of rows, evenly spaced, from which a shift of positions may begin.
+/// Number of rows, evenly spaced, at which a trial shift of positions begins.
 const SHIFT_PLACES: usize = 12;
 
-/// Smallest length that may be a number in millimetres declared in metres \[m\].
+/// Declared length \[m\] above which a number may be in millimetres instead.
 pub(super) const MIN_MILLIMETRE_LENGTH: f64 = 1.0;
 
 /// Returns every misreading that the problem and its table allow.
@@ -61,7 +64,8 @@ pub(super) fn candidates(problem: &Problem, table: &Measurements) -> Vec<Misread
     units
 }
 
-/// Returns true if the target of `[tool]` is so far away that it may be in millimetres.
+/// Returns true if the target of `[tool]` is declared so far from its frame that it may be in
+/// millimetres; false for a problem with several targets.
 pub(super) fn is_far(problem: &Problem) -> bool {
     problem.targets.is_empty() && problem.tool.target.norm() > MIN_MILLIMETRE_LENGTH
 }
@@ -119,12 +123,13 @@ pub(super) fn of_order(table: &Measurements) -> Vec<Misreading> {
     places.flat_map(of_place).collect()
 }
 
-/// Returns the distance between trial rows at which a shift may begin, given the number of rows.
+/// Returns the number of rows between two rows at which a trial shift begins, for a table of `rows`
+/// rows.
 pub(super) fn shift_step(rows: usize) -> usize {
     (rows / SHIFT_PLACES).max(1)
 }
 
-/// Returns misreadings of the joint table: its convention, units and signs.
+/// Returns the misreadings of the joint table: its convention, units, signs and exchanged entries.
 fn of_joint_table(problem: &Problem) -> Vec<Misreading> {
     use JointField::{A, Alpha, Beta, D, Theta};
     let mut forms = vec![Misreading::StandardForm, Misreading::ModifiedForm];
@@ -188,7 +193,7 @@ fn of_joint_table(problem: &Problem) -> Vec<Misreading> {
     forms
 }
 
-/// Returns misreadings of masses, stiffnesses and gravity; none for a rigid arm.
+/// Returns the misreadings of masses, payloads, stiffnesses and gravity; none for a rigid arm.
 pub(super) fn of_loads(problem: &Problem, table: &Measurements) -> Vec<Misreading> {
     if !problem.is_elastic() {
         return Vec::new();
@@ -209,8 +214,8 @@ pub(super) fn of_loads(problem: &Problem, table: &Measurements) -> Vec<Misreadin
     misreadings
 }
 
-/// Returns true if a joint is revolute and its column may be in radians (`radians`), or else in
-/// degrees. Both are possible if the unit is not known.
+/// Returns true if a joint is revolute and its column was read as radians, or as degrees if
+/// `radians` is false. Returns true for both if the unit of the column is not known.
 pub(super) fn turns_in(
     problem: &Problem,
     table: &Measurements,
@@ -223,14 +228,14 @@ pub(super) fn turns_in(
     turns && column.is_none_or(|column| (column.unit >= 1.0) == radians)
 }
 
-/// Returns the lengths of a joint \[m\].
+/// Returns the declared lengths of a joint \[m\]: a, d, and the translation of its placement.
 pub(super) fn lengths_of(joint: &mut Joint) -> Vec<&mut f64> {
     let placement = joint.placement.as_mut().map(|placement| placement.xyz.iter_mut());
     [&mut joint.a, &mut joint.d].into_iter().chain(placement.into_iter().flatten()).collect()
 }
 
-/// Returns the entry of a field in the joint table \[rad\] or \[m\]; `None` if the joint has no
-/// such entry.
+/// Returns the entry of a joint for a field of the joint table \[rad\] or \[m\]; `None` if the
+/// joint has no such entry.
 pub(super) fn number_of(joint: &mut Joint, field: JointField) -> Option<&mut f64> {
     let placement = joint.placement.as_mut();
     match field {

@@ -3,58 +3,62 @@
 use super::Misreading;
 use crate::problem::{Effect, Freedom, ParameterRule, Problem, Quantities};
 
-/// Misreading with which a full fit explains the measurements.
+/// Misreading with whose correction a full fit explains the measurements.
 #[derive(Debug, Clone, PartialEq)]
 pub(in crate::fit) struct Explanation {
     /// Description of the misreading, with the size that the fit found.
     pub words: String,
-    /// Root mean squared error that the fit leaves \[m\], with the deviations from priors.
+    /// Root mean squared error of the full fit \[m\]. Deviations from priors, in units of the prior
+    /// σ, are included like errors in units of the noise σ.
     pub rms: f64,
-    /// Effect that expresses the misreading, with the size that the fit found; `None` if no effect
-    /// does.
+    /// Effect with which the model fits the table as it was read, and the fitted value of its
+    /// parameter; `None` if no effect expresses the misreading.
     pub effect: Option<(Effect, f64)>,
-    /// Misfit of poses that are left out, which compares the misreadings.
+    /// Cross-validation misfit, by which the probabilities of misreadings are compared.
     pub left_out: LeftOutMisfit,
 }
 
-/// Squared errors of rows that are left out one configuration at a time, with the prior of the fit.
+/// Cross-validation misfit of a fit: squared errors of rows that are left out one configuration at
+/// a time, and the deviations from the priors.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::fit) struct LeftOutMisfit {
-    /// Mean squared error of a row \[m²\].
+    /// Mean squared length of the error of a row \[m²\].
     pub mean_square: f64,
-    /// Sum of the squared deviations from priors \[σ²\].
+    /// Sum of the squared deviations from nominal, in units of the prior σ.
     pub deviations: f64,
     /// Number of rows.
     pub rows: usize,
 }
 
 impl LeftOutMisfit {
-    /// Returns −2 ln of the predictive density of the rows for noise with standard deviation
-    /// `sigma` \[m\], but for a constant.
+    /// Returns −2 ln of the predictive density of the rows, up to a constant, for noise with
+    /// standard deviation `sigma` of a coordinate \[m\].
     fn deviance(&self, sigma: f64) -> f64 {
         self.mean_square * self.rows as f64 / sigma.powi(2) + self.deviations
     }
 }
 
-/// Misreadings that would explain the misfit, best first.
+/// Misreadings that would explain the misfit of a fit, best first.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(in crate::fit) struct Explanations {
-    /// Misreadings with which the nominal arm is near the measurements.
+    /// Misreadings with whose correction the registered nominal arm has a far smaller error.
     pub near: Vec<Misreading>,
-    /// Misreadings with which a full fit is far better than without.
+    /// Misreadings with whose correction a full fit has a far smaller error.
     pub fitted: Vec<Explanation>,
-    /// Root mean squared error without a misreading, deviations from priors included \[m\].
+    /// Root mean squared error of the fit of table and problem as read \[m\], with the deviations
+    /// from priors as in [`Explanation::rms`].
     pub as_read: f64,
 }
 
-/// Effect that expresses the misreading of a table: with it the model fits the table as it is.
+/// Effect that expresses the misreading of a table: a model with this effect fits the table as it
+/// was read.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct MisreadEffect {
-    /// Effect with one parameter.
+    /// Effect, which has one parameter.
     pub effect: Effect,
-    /// Value of the parameter that a fit found.
+    /// Fitted value of the effect's parameter.
     pub size: f64,
-    /// Probability of the effect among the misreadings that explain the measurements.
+    /// Posterior probability of this misreading among all that explain the measurements.
     pub probability: f64,
 }
 
@@ -64,8 +68,8 @@ impl MisreadEffect {
         self.effect.parameters(problem).into_iter().map(|parameter| parameter.name).collect()
     }
 
-    /// Frees the effect's parameters in a problem: their priors in the catalogue are for small
-    /// errors.
+    /// Frees the effect's parameters in `problem` without priors, because the priors of the
+    /// catalogue are for small errors.
     pub fn free_in(&self, problem: &mut Problem) {
         let none = Quantities::default();
         let rule = |pattern| ParameterRule {
@@ -84,7 +88,8 @@ impl Explanations {
     /// the same prior probability; `sigma` is the declared noise of a coordinate \[m\].
     ///
     /// The probability follows from predictions of configurations that are left out [Geisser and
-    /// Eddy 1979]. The noise is the larger of `sigma` and what the best misreading leaves.
+    /// Eddy 1979]. The noise is `sigma`, or the rms error of a coordinate with the best misreading
+    /// if that is larger.
     pub fn effect(&self, sigma: f64) -> Option<MisreadEffect> {
         let squares = self.fitted.iter().map(|explanation| explanation.left_out.mean_square / 3.0);
         let sigma = squares.fold(f64::INFINITY, f64::min).sqrt().max(sigma);

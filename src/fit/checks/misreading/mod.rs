@@ -1,9 +1,9 @@
 //! Misreadings of a table or problem: mistakes that would explain why an arm does not fit its
 //! measurements.
 //!
-//! Each [`Misreading`] is undone in a copy of table and problem, with which the nominal arm is
-//! registered ([`search`]). The misreadings with the smallest errors are then fitted in full. Tests
-//! of a fit that is far off would not find them.
+//! Each [`Misreading`] is corrected in a copy of table and problem, and the nominal arm is
+//! registered to that copy ([`search`]). The misreadings with the smallest errors are then fitted
+//! in full. Linearised tests at a fit with a large error would not find them.
 
 mod candidates;
 mod explanation;
@@ -16,8 +16,8 @@ pub(crate) use explanation::MisreadEffect;
 
 use crate::model::parameter::JointField;
 
-/// Misreading: a quantity that may have been declared in the wrong unit, sign, order or
-/// convention.
+/// Misreading: a quantity of table or problem that may have been declared in the wrong unit, sign,
+/// order or convention.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Misreading {
@@ -38,7 +38,7 @@ pub enum Misreading {
     Mirrored,
     /// The measured angles of some joints have the opposite sign.
     Reversed {
-        /// Set of joints as bits: bit k is joint k + 1.
+        /// Set of joints as bits: bit k (from 0) is set for joint k + 1.
         joints: u64,
     },
     /// The columns of two joints, by number, are exchanged.
@@ -69,7 +69,7 @@ pub enum Misreading {
         joint: usize,
         /// Number of the joint whose command is added.
         from: usize,
-        /// True if the command is subtracted.
+        /// True if the other joint's command is subtracted instead of added.
         is_opposite: bool,
     },
     /// A turning joint also turns with a sliding one, as the nut of a ball screw does. Joints are
@@ -82,25 +82,25 @@ pub enum Misreading {
         /// Lead of the screw \[mm\]; negative for a left-handed screw.
         lead: i16,
     },
-    /// Positions belong to the configuration of another row.
+    /// Positions stand in a wrong row, so that they belong to the configuration of another row.
     Shifted {
-        /// Number of rows by which a position comes too late.
+        /// Number of rows by which a position comes after its configuration; negative if before.
         by: i8,
-        /// First row that is shifted, counted from 0.
+        /// First row whose position is shifted, counted from 0.
         from: usize,
     },
     /// The zero position of a joint, counted from 1, is wrong.
     Zero {
         /// Number of the joint.
         joint: usize,
-        /// Angle that must be added to the command \[°\].
+        /// Angle that must be added to the joint's command \[°\].
         degrees: i16,
     },
     /// A joint, counted from 1, turns by a multiple of its command.
     Ratio {
         /// Number of the joint.
         joint: usize,
-        /// Ratio of motion to command, in hundredths.
+        /// Ratio of the joint's motion to its command, in hundredths.
         percent: i16,
     },
     /// The joint table is in standard DH form, declared as modified.
@@ -111,7 +111,7 @@ pub enum Misreading {
     TableRadians {
         /// Number of the joint, from 1; 0 for all joints.
         joint: usize,
-        /// Angle of the joint table.
+        /// Angle (α, θ or β) of the joint table.
         field: JointField,
     },
     /// An angle of the joint table is in degrees, declared in radians.
@@ -160,11 +160,11 @@ pub enum Misreading {
     HeldTarget,
     /// The target of `[tool]` is in millimetres, declared as metres.
     TargetInMillimetres,
-    /// Lengths of joints are in millimetres, declared as metres; likewise a target longer than 1 m.
+    /// Lengths of joints above 1 m are in millimetres, declared as metres; likewise the target.
     ArmInMillimetres,
     /// A declared mass is in another unit or has a misplaced decimal point.
     Mass {
-        /// Number of the mass, counted along the arm from 1; 0 for all masses.
+        /// Number of the mass, from 1, counted along the arm; 0 for all masses.
         mass: usize,
         /// Exponent of the power of ten by which the mass must be multiplied.
         power: i8,
@@ -176,8 +176,8 @@ pub enum Misreading {
     },
     /// Stiffnesses of joints are in another unit.
     Stiffness {
-        /// Exponent of the power of ten by which stiffnesses must be multiplied; 0 if they are per
-        /// degree instead of per radian.
+        /// Exponent of the power of ten by which the stiffnesses must be multiplied; 0 if they are
+        /// per degree, declared per radian.
         power: i8,
     },
     /// Gravity points along another axis of the base frame.
@@ -196,7 +196,7 @@ impl Misreading {
         Self::Reversed { joints: joints.iter().map(|joint| 1 << (joint - 1)).sum() }
     }
 
-    /// Returns the first row that is shifted; `None` for other misreadings.
+    /// Returns the first row whose position is shifted; `None` for misreadings other than shifts.
     fn shifted_from(self) -> Option<usize> {
         match self {
             Self::Shifted { from, .. } => Some(from),
@@ -204,8 +204,8 @@ impl Misreading {
         }
     }
 
-    /// Returns a shift by the same number of rows that begins at the row `from`; other misreadings
-    /// stay as they are.
+    /// Returns the shift by the same number of rows that begins at the row `from`; misreadings
+    /// other than shifts stay as they are.
     fn with_shift_from(self, from: usize) -> Self {
         match self {
             Self::Shifted { by, .. } => Self::Shifted { by, from },
@@ -213,8 +213,8 @@ impl Misreading {
         }
     }
 
-    /// Returns the key of misreadings that differ only in size. Of each key, one misreading is
-    /// fitted in full.
+    /// Returns a key that is equal for misreadings that differ only in size. Of the misreadings
+    /// with one key, only the best is fitted in full.
     fn group(self) -> (std::mem::Discriminant<Self>, usize, usize, Option<JointField>) {
         let (first, second, field) = match self {
             Self::Zero { joint, .. } | Self::Ratio { joint, .. } => (joint, 0, None),
@@ -237,7 +237,7 @@ impl Misreading {
     }
 }
 
-/// Returns the numbers, from 1, of the joints in a set of bits.
+/// Returns the numbers, from 1, of the joints in a set of bits: bit k is set for joint k + 1.
 fn numbers_of(joints: u64) -> impl Iterator<Item = usize> {
     (0..64).filter(move |joint| joints >> joint & 1 == 1).map(|joint| joint + 1)
 }

@@ -21,57 +21,63 @@ use crate::measurement::{Measurements, Split};
 use crate::model::Model;
 use crate::problem::Problem;
 
-/// Largest ratio of the error with a misreading corrected to the error without, at which the
-/// misreading is an explanation.
+/// Largest ratio of the rms error with a misreading corrected to that without a correction, at
+/// which the misreading is an explanation.
 const MAX_EXPLAINED_RATIO: f64 = 0.2;
-/// Largest ratio to the smallest error at which a misreading is named as well as the best one.
+/// Largest ratio of the error with a misreading corrected to that with the best one, at which the
+/// misreading is also named.
 const MAX_RATIO_TO_BEST: f64 = 1.5;
-/// Largest error, as a multiple of the arm's reach, for which misreadings are searched. Millimetres
-/// read as metres give a factor of 1000.
+/// Largest rms error of the registered nominal arm, as a multiple of its reach, for which
+/// misreadings are searched. Millimetres read as metres give a factor of 1000.
 const MAX_REACHES: f64 = 1e4;
-/// Largest error of the nominal arm, as a multiple of the arm's reach, for which only misread loads
-/// are searched. A joint angle that is wrong by one degree causes seven times as much.
+/// Largest rms error of the registered nominal arm, as a multiple of its reach, for which only
+/// misread loads and shifted rows are searched. A joint angle that is wrong by one degree causes
+/// seven times as much.
 const MAX_REACHES_OF_LOADS: f64 = 2e-3;
-/// Smallest motion of a joint over all rows with which a ratio of motion to command is a misreading
-/// \[rad\] or \[m\]. A smaller one means that the data contradict any motion of the joint.
+/// Smallest motion of a joint over all rows, \[rad\] or \[m\], at which a fitted ratio of motion to
+/// command is a misreading. A smaller motion means that the joint does not follow its command at
+/// all.
 const MIN_MOTION: f64 = 0.01;
-/// Range of the lead of a screw that is a misreading \[m\]: that of ball screws, with room.
+/// Range of the fitted lead of a screw \[m\] in which it is a misreading: that of ball screws,
+/// somewhat widened.
 const SCREW_LEAD_RANGE: RangeInclusive<f64> = 1e-3..=0.2;
-/// Error, as a multiple of the arm's reach, up to which an explanation far beyond the priors is
-/// named: nominal arms are wrong by about as much, and their priors may be too narrow.
+/// Largest rms error, as a multiple of the arm's reach, at which a misreading is named although
+/// parameters deviate far beyond their priors. Nominal arms are wrong by about as much, and their
+/// priors may be too narrow.
 const MAX_REACHES_BEYOND_PRIORS: f64 = 5e-4;
-/// Smallest relative error of a ratio of motion to command that is a misreading. Gears deviate by
-/// less.
+/// Smallest deviation from 1 of a ratio of motion to command that is a misreading. The ratios of
+/// gears deviate by less.
 const MIN_RATIO_ERROR: f64 = 1e-3;
-/// Maximum number of rows on which misreadings are tried.
+/// Maximum number of identification rows, evenly spaced, to which misreadings are applied.
 const MAX_ROWS: usize = 120;
-/// Maximum number of moving joints for which every subset is tried as reversed.
+/// Maximum number of moving joints of which every subset is tried as reversed.
 const MAX_REVERSED: usize = 7;
-/// Maximum number of misreadings that are fitted in full: those with which the nominal arm is
-/// nearest.
+/// Maximum number of misreadings that are fitted in full: those with the smallest error of the
+/// registered nominal arm.
 const MAX_FITTED_MISREADINGS: usize = 12;
 /// Maximum number of solver steps of a full fit with a misreading.
 const MAX_STEPS: u64 = 60;
-/// Relative reduction of the cost per step at which a registration without a full fit ends. Its
-/// error is then known far better than [`MAX_RATIO_TO_BEST`] asks.
+/// Relative reduction of the cost by one step below which a registration without a full fit ends.
+/// The error is then accurate enough for a comparison at [`MAX_RATIO_TO_BEST`].
 const TRIAL_TOLERANCE: f64 = 1e-4;
-/// Largest share of the rows that a robust loss may exclude; the error is then that of the other
-/// rows.
+/// Share of the rows with the largest errors that are excluded from rms errors if the problem has a
+/// robust loss.
 const MAX_SET_ASIDE_SHARE: f64 = 0.3;
 
 /// Result of a trial with a misreading corrected.
 struct Outcome {
-    /// Root mean squared error \[m\]; after a full fit with the deviations from priors.
+    /// Root mean squared error \[m\]; after a full fit it includes the deviations from priors.
     rms: f64,
-    /// Size of the misreading that a full fit found, if it has one.
+    /// Fitted size of the misreading; `None` without a full fit, or if the misreading has no size.
     size: Option<f64>,
-    /// Misfit of configurations that are left out of a full fit.
+    /// Cross-validation misfit of a full fit; `None` without one.
     left_out: Option<LeftOutMisfit>,
-    /// True if no parameter of the arm deviates far beyond its prior.
+    /// True if no parameter of the arm deviates far beyond its prior; always true without a full
+    /// fit.
     is_within_priors: bool,
 }
 
-/// Rows and problem with which misreadings are tried.
+/// Fit, problem and chosen rows to which misreadings are applied.
 struct Trial<'a> {
     fitting: &'a Fitting<'a>,
     problem: &'a Problem,
@@ -79,7 +85,8 @@ struct Trial<'a> {
 }
 
 impl CheckedFit<'_> {
-    /// Returns the misreadings of table or problem that explain the misfit.
+    /// Returns the misreadings of table or problem that explain the misfit; the first call searches
+    /// for them.
     pub fn explanations(&self) -> &Explanations {
         self.explanations.get_or_init(|| explanations(self))
     }
@@ -95,11 +102,13 @@ fn explanations(fit: &CheckedFit) -> Explanations {
     let step = split.identification.len().div_ceil(MAX_ROWS).max(1);
     let chosen: Vec<usize> = split.identification.iter().copied().step_by(step).collect();
     let trial = Trial { fitting: fit.fitting, problem: fit.problem, chosen };
-    // This trial leaves out orientations, as all trials do. Reversing no joint changes nothing.
+    // The error as declared, without orientations as in all trials: reversing no joint changes
+    // nothing.
     let as_declared = trial.outcome(Misreading::Reversed { joints: 0 }, false);
     let nominal = as_declared.map_or(nominal, |outcome| outcome.rms.min(nominal));
     let is_position = measurements.leading().is_position();
-    // If the target hardly moves, contacts with one point agree with any arm.
+    // Contacts with one point agree with any arm whose target hardly moves. For rows other than
+    // positions, only reversed joints are therefore tried.
     let is_tested =
         |misreading: &Misreading| is_position || matches!(misreading, Misreading::Reversed { .. });
     let listed = if is_position && nominal < MAX_REACHES_OF_LOADS * model.reach() {
@@ -111,12 +120,12 @@ fn explanations(fit: &CheckedFit) -> Explanations {
     // A base that is only a little off is no misreading.
     let is_base_held = is_position && !fit.is_base_free() && is_nominal_far_off(fit);
     tested.extend(is_base_held.then_some(Misreading::HeldBase));
-    // A target that is far away is in millimetres.
+    // A target that is declared far away is rather in millimetres.
     let is_target_held = is_position && fit.is_target_held() && !is_far(fit.problem);
     tested.extend(is_target_held.then_some(Misreading::HeldTarget));
     let mut errors = trial.registered_errors(&tested);
     errors.sort_by(|a, b| a.1.total_cmp(&b.1));
-    // Two reversed joints look like α between them that is turned by 180°.
+    // Two reversed joints have the same effect as an α between them that is wrong by 180°.
     let alone: Vec<(Misreading, f64)> = errors
         .iter()
         .copied()
@@ -140,16 +149,17 @@ fn explanations(fit: &CheckedFit) -> Explanations {
     explanations
 }
 
-/// Returns the sum of the squared deviations of a fit from its priors \[σ²\]. Declared effects do
-/// not count, because they may be far larger than their priors.
+/// Returns the sum of the squared deviations of the full parameter vector `x` from nominal, in
+/// units of the prior σ. Parameters of declared effects are left out, because they may be far
+/// larger than their priors.
 fn deviations(fitting: &Fitting, x: &DVector<f64>) -> f64 {
     let parameters = fitting.model.parameters.iter().zip(x);
     let of_arm = parameters.filter(|(parameter, _)| is_of_arm(parameter));
     of_arm.filter_map(|(parameter, x)| Some((x / parameter.sigma?).powi(2))).sum()
 }
 
-/// Returns the misreadings with which the nominal arm is far nearer than with the error `nominal`.
-/// `errors` is in ascending order.
+/// Returns the misreadings whose error of the registered nominal arm is far smaller than `nominal`,
+/// the error without a correction. `errors` is in ascending order.
 fn near_misreadings(errors: &[(Misreading, f64)], nominal: f64) -> Vec<Misreading> {
     let best = errors.first().map_or(0.0, |found| found.1);
     let limit = (MAX_EXPLAINED_RATIO * nominal).min(MAX_RATIO_TO_BEST * best);
@@ -157,7 +167,8 @@ fn near_misreadings(errors: &[(Misreading, f64)], nominal: f64) -> Vec<Misreadin
 }
 
 impl Trial<'_> {
-    /// Returns the error of the registered nominal arm with each misreading corrected \[m\].
+    /// Returns the misreadings that can be corrected, each with the rms error of the registered
+    /// nominal arm after the correction \[m\].
     fn registered_errors(&self, misreadings: &[Misreading]) -> Vec<(Misreading, f64)> {
         let error =
             |&misreading: &Misreading| Some((misreading, self.outcome(misreading, false)?.rms));
@@ -165,8 +176,8 @@ impl Trial<'_> {
         errors.into_iter().flatten().collect()
     }
 
-    /// Fits the most promising misreadings in full. Returns those that leave far less than
-    /// `as_read` \[m\], best first.
+    /// Fits the misreadings with the smallest `errors` in full. Returns those with an rms error far
+    /// below `as_read` \[m\], best first.
     fn fit_in_full(&self, errors: &[(Misreading, f64)], as_read: f64) -> Vec<Explanation> {
         let mut groups = Vec::new();
         let mut is_first = |misreading: &Misreading| {
@@ -196,8 +207,9 @@ impl Trial<'_> {
             if size.is_some_and(is_impossible) {
                 return None;
             }
-            // An arm that must be bent far beyond its priors is not the one that was measured. A
-            // shift of rows leaves one of them without its configuration.
+            // An explanation that needs deviations far beyond the priors is of another arm than the
+            // measured one. Shifts of rows are exempt, because they leave one row with a wrong
+            // configuration.
             let is_shift = misreading.shifted_from().is_some();
             if !is_within_priors && !is_shift && rms > self.largest_usual_error() {
                 return None;
@@ -221,8 +233,8 @@ impl Trial<'_> {
         explained
     }
 
-    /// Returns what is left with a misreading corrected: with the registered nominal arm or, if
-    /// `is_fitted`, after a full fit. `None` if it cannot be corrected or fitted.
+    /// Returns the errors with a misreading corrected: those of the registered nominal arm or, if
+    /// `is_fitted`, those after a full fit. `None` if the misreading cannot be corrected or fitted.
     fn outcome(&self, misreading: Misreading, is_fitted: bool) -> Option<Outcome> {
         let Fitting { model, measurements, .. } = *self.fitting;
         let needs_problem = misreading.rewritten(self.problem);
@@ -288,7 +300,7 @@ impl Trial<'_> {
         rms.is_finite().then_some(Outcome { rms, size, left_out, is_within_priors })
     }
 
-    /// Returns the largest error that noise, or priors that are too narrow, leave \[m\].
+    /// Returns the largest rms error \[m\] that noise, or priors that are too narrow, may explain.
     fn largest_usual_error(&self) -> f64 {
         let Fitting { measurements, model, sigma, .. } = self.fitting;
         let noise = MAX_NOISE_SIGMAS * measurements.leading().root() * sigma;
@@ -306,8 +318,8 @@ impl Trial<'_> {
         commands().fold(f64::NEG_INFINITY, f64::max) - commands().fold(f64::INFINITY, f64::min)
     }
 
-    /// Returns the misfit of a fit with each configuration left out. `problem` is that of the fit,
-    /// because a correction may change the number of joints.
+    /// Returns the cross-validation misfit of a fit, with each configuration left out in turn.
+    /// `problem` is the corrected one, which may have another number of joints.
     fn left_out(&self, fitting: &Fitting, end: &FitEnd, problem: &Problem) -> LeftOutMisfit {
         let whole = fitting.whole();
         let free = whole.unknowns.iter().zip(&end.at_bound).filter(|(_, bound)| bound.is_none());
@@ -323,16 +335,17 @@ impl Trial<'_> {
         }
     }
 
-    /// Returns the root mean squared error of `rows` at the full parameter vector `x` \[m\].
-    /// Deviations from priors count like measured numbers: √((Σ e² + σ² Σ (x/σₚ)²) / n).
+    /// Returns the root mean squared error of `rows` at the full parameter vector `x` \[m\] with
+    /// the deviations from priors σₚ included: √((Σ e² + σ² Σ (x/σₚ)²) / n), with the noise σ and n
+    /// rows.
     fn penalised(&self, fitting: &Fitting, rows: &[usize], x: &DVector<f64>) -> f64 {
         let deviations = deviations(fitting, x) / rows.len().max(1) as f64;
         let square = self.error(fitting, rows, x).powi(2);
         (square + fitting.sigma.powi(2) * deviations).sqrt()
     }
 
-    /// Returns a shift of rows with the first shifted row that leaves the smallest error; other
-    /// misreadings stay as they are.
+    /// Returns a shift of rows that begins at the row with the smallest error, near its present
+    /// first row, with that error; misreadings other than shifts stay as they are.
     fn with_best_start(&self, (misreading, error): (Misreading, f64)) -> (Misreading, f64) {
         let step = shift_step(self.fitting.measurements.len());
         let places = misreading.shifted_from().into_iter().flat_map(|from| {
@@ -377,9 +390,10 @@ impl Trial<'_> {
         squares.iter().sum::<f64>() / squares.len().max(1) as f64
     }
 
-    /// Returns the set of two or more joints that, if reversed, leave the smallest error of the
-    /// registered nominal arm, with that error \[m\]. Of sets that are about as good, it is the
-    /// smallest. `None` if fewer than two joints can be reversed.
+    /// Returns the misreading that two or more joints are reversed with the smallest error of the
+    /// registered nominal arm, and that error \[m\]. Of sets of joints with about the same error,
+    /// it is the smallest set. `singles` contains the reversals of single joints that are possible;
+    /// `None` if there are fewer than two.
     fn several_reversed(&self, singles: &[Misreading]) -> Option<(Misreading, f64)> {
         let joint = |misreading: &Misreading| match misreading {
             Misreading::Reversed { joints } => Some(*joints),

@@ -1,4 +1,4 @@
-//! Table and problem as they should have been read.
+//! Correction of misreadings: table and problem as they should have been read.
 
 use std::f64::consts::PI;
 
@@ -15,16 +15,17 @@ use crate::problem::{Effect, Freedom, Joint, JointKind, ParameterRule, Problem, 
 /// Length of an inch \[mm\].
 const MM_PER_INCH: f64 = 25.4;
 
-/// Ratios of a number to the same quantity in another unit: degrees and radians, millimetres and
-/// metres.
+/// Ratios of a quantity in one unit to the same quantity in another unit: degrees and radians,
+/// millimetres and metres.
 const UNIT_RATIOS: [f64; 4] = [PI / 180.0, 180.0 / PI, 1e-3, 1e3];
-/// Largest relative deviation from such a ratio that gears leave.
+/// Largest relative deviation of a fitted ratio from one of [`UNIT_RATIOS`] at which the column is
+/// in another unit; gear errors are smaller.
 const UNIT_RATIO_TOLERANCE: f64 = 0.05;
 
-/// Size of a gradian \[°\].
+/// One gradian in degrees.
 const DEGREES_PER_GRADIAN: f64 = 0.9;
 
-/// Returns true if a ratio of motion to command is that of two units.
+/// Returns true if a ratio of motion to command is that of two units, see [`UNIT_RATIOS`].
 pub(super) fn is_unit_ratio(size: f64) -> bool {
     UNIT_RATIOS.iter().any(|ratio| (size / ratio - 1.0).abs() < UNIT_RATIO_TOLERANCE)
 }
@@ -35,7 +36,7 @@ pub(super) fn power_of_ten(power: i8) -> f64 {
 }
 
 impl Misreading {
-    /// Returns true if the misreading concerns the problem file, not the table.
+    /// Returns true if the misreading concerns the joint table of the problem file.
     pub(super) fn concerns_problem(self) -> bool {
         matches!(
             self,
@@ -51,8 +52,8 @@ impl Misreading {
         )
     }
 
-    /// Returns the problem with the misreading corrected; `None` if it concerns the table or
-    /// corrects nothing.
+    /// Returns the problem with the misreading corrected; `None` if the misreading concerns the
+    /// table of measurements alone, or if the correction changes nothing.
     pub(super) fn rewritten(self, declared: &Problem) -> Option<Problem> {
         let mut problem = declared.clone();
         match self {
@@ -137,7 +138,7 @@ impl Misreading {
     }
 
     /// Returns the problem with the size of the misreading as a free parameter without a prior;
-    /// `None` if it has no size.
+    /// `None` if the misreading has no size.
     pub(super) fn with_free_size(self, problem: &Problem) -> Option<Problem> {
         let (pattern, _) = self.size(0.0)?;
         let mut problem =
@@ -147,7 +148,7 @@ impl Misreading {
         Some(problem)
     }
 
-    /// Returns the effect whose parameter is the size of the misreading; `None` if no effect is.
+    /// Returns the effect whose parameter is the size of the misreading; `None` if there is none.
     fn effect(self) -> Option<Effect> {
         match self {
             Self::Ratio { joint, .. } => Some(Effect::GearRatio { joint }),
@@ -158,9 +159,9 @@ impl Misreading {
         }
     }
 
-    /// Returns the effect with which the model fits the table as it is, and the value of its
-    /// parameter if the misreading has this `size`. `None` if no effect does, or if the ratio is
-    /// that of two units.
+    /// Returns the effect with which the model fits the table as it was read, and the value of its
+    /// parameter for a misreading of this `size`. `None` if there is no such effect, or if the size
+    /// is the ratio of two units.
     pub(super) fn expressed(self, size: f64) -> Option<(Effect, f64)> {
         let effect = self.effect()?;
         match effect {
@@ -169,8 +170,8 @@ impl Misreading {
         }
     }
 
-    /// Returns the name of the parameter for the size of the misreading, and the size if that
-    /// parameter has the value `x`; `None` if it has no size.
+    /// Returns the name of the parameter that stands for the size of the misreading, and the size
+    /// for the deviation `x` of that parameter. `None` if the misreading has no size.
     pub(super) fn size(self, x: f64) -> Option<(String, f64)> {
         match self {
             Self::Ratio { joint, percent } => {
@@ -192,8 +193,8 @@ impl Misreading {
         }
     }
 
-    /// Returns the chosen rows of a table with the misreading corrected. `joints` is the number of
-    /// joints of the corrected problem.
+    /// Returns the chosen rows of `table` with the misreading corrected. `problem` is the declared
+    /// one, and `joints` is the number of joints of the corrected problem.
     pub(super) fn undone(
         self,
         table: &Measurements,
@@ -242,7 +243,7 @@ impl Misreading {
         rows
     }
 
-    /// Corrects a configuration `q` by the misreading.
+    /// Corrects the misreading in a configuration `q` of `table`.
     fn undo_command(self, q: &mut [f64], problem: &Problem, table: &Measurements) {
         match self {
             Self::Degrees | Self::Radians => {
@@ -284,12 +285,13 @@ impl Misreading {
     }
 }
 
-/// Returns the turn of a screw per travel \[rad/m\], given its lead \[mm\].
+/// Returns the rotation of a screw divided by its travel \[rad/m\], given its lead \[mm\].
 fn radians_per_metre(lead: i16) -> f64 {
     2.0 * PI * 1e3 / f64::from(lead)
 }
 
-/// Returns the rule that frees the parameters of a pattern without a prior.
+/// Returns the rule that frees the parameters whose names match `pattern`, without prior and
+/// bounds.
 fn without_prior(pattern: String, problem: &Problem) -> ParameterRule {
     let none = Quantities::default();
     ParameterRule {
@@ -299,7 +301,8 @@ fn without_prior(pattern: String, problem: &Problem) -> ParameterRule {
     }
 }
 
-/// Exchanges two rows of the joint table; `None` if they are equal, or have no rows.
+/// Exchanges the entries of two joints in the joint table. Returns `None`, and changes nothing, if
+/// the entries are equal or a joint has a placement or a beam.
 fn exchange_joint_rows(first: &mut Joint, second: &mut Joint) -> Option<()> {
     let row =
         |joint: &Joint| [joint.alpha, joint.a, joint.theta, joint.d, joint.beta].map(f64::to_bits);
@@ -319,8 +322,9 @@ fn exchange_joint_rows(first: &mut Joint, second: &mut Joint) -> Option<()> {
     Some(())
 }
 
-/// Multiplies an entry of one joint, or of all if `joint` is 0, by `factor` if `applies` returns
-/// true for it. `None` if it does for none.
+/// Multiplies the entry `field` of the joint with number `joint` (from 1), or of all joints if it
+/// is 0, by `factor`. Entries stay if they are 0 or `applies` returns false for them; `None` if all
+/// stay.
 fn scale(
     problem: &mut Problem,
     joint: usize,
@@ -340,7 +344,8 @@ fn scale(
     (count > 0).then_some(())
 }
 
-/// Sets the number of joints of each configuration; added joints are at zero.
+/// Sets the number of joints of each configuration in `rows` to `joints`; the commands of added
+/// joints are 0.
 fn resize(rows: &mut Measurements, joints: usize) {
     let previous = rows.joints;
     let resized = |column: &[f64]| -> Vec<f64> {

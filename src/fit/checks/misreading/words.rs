@@ -1,4 +1,4 @@
-//! Misreadings in words.
+//! Texts that describe misreadings.
 
 use std::f64::consts::PI;
 use std::fmt;
@@ -9,7 +9,8 @@ use crate::error::Location;
 use crate::model::parameter::JointField;
 use crate::problem::{JointKind, Problem};
 
-/// Returns the name of an entry of the joint table, such as `alpha of joint 3`.
+/// Returns the name of an entry of the joint table, such as `alpha of joint 3`; `joint` is 0 for
+/// all joints.
 fn entry_name(joint: usize, field: JointField) -> String {
     match joint {
         0 => format!("{} of all joints", field.name()),
@@ -18,8 +19,8 @@ fn entry_name(joint: usize, field: JointField) -> String {
 }
 
 impl Misreading {
-    /// Describes the misreading, with the size that a fit found if there is one: an angle \[rad\]
-    /// or a ratio. An entry of the joint table has its place in the file.
+    /// Describes the misreading with its fitted `size` (an angle \[rad\], a ratio, or rad/m), if it
+    /// has one. If an entry of the joint table is misread, its place in the file is added.
     pub(super) fn described(self, size: Option<f64>, problem: &Problem) -> String {
         if let Some(place) = self.place(problem) {
             return format!("{self} ({place})");
@@ -45,8 +46,9 @@ impl Misreading {
         }
     }
 
-    /// Returns the place of the entry or row of the joint table that the misreading concerns. In a
-    /// standard table a and α of a parameter's joint are in the row before.
+    /// Returns the place in the file of the entry or row of the joint table that is misread; `None`
+    /// for other misreadings. In a table in standard DH form, a and α of a joint are in the row
+    /// before.
     fn place(self, problem: &Problem) -> Option<String> {
         use JointField::{A, Alpha};
         let is_standard = problem.standard_rows().is_some();
@@ -71,10 +73,12 @@ impl Misreading {
     }
 }
 
-/// Largest relative deviation of a ratio from that of two units at which it is one.
+/// Largest relative deviation of a ratio of motion to command from that of two units, at which the
+/// text names the units.
 const UNIT_TOLERANCE: f64 = 0.02;
 
-/// Returns the units of a joint's column that a ratio of motion to command means.
+/// Returns the text about the unit of a joint's column that follows from a ratio of motion to
+/// command; empty if the ratio is not that of two units.
 fn unit_of_ratio(ratio: f64, kind: Option<JointKind>) -> &'static str {
     let is = |other: f64| (ratio / other - 1.0).abs() < UNIT_TOLERANCE;
     let is_prismatic = kind == Some(JointKind::Prismatic);
@@ -193,7 +197,7 @@ impl fmt::Display for Misreading {
 }
 
 impl Misreading {
-    /// Describes a misreading of the joint table.
+    /// Writes the description of a misreading of the joint table; nothing for other misreadings.
     fn fmt_of_table(self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::ExchangedRows { row } => {
