@@ -1,4 +1,5 @@
-//! Acceptance: pose accuracy and repeatability in held-out poses, in the terms of ISO 9283.
+//! Acceptance of an identified arm: pose accuracy and repeatability in held-out poses, as ISO 9283
+//! defines them.
 
 use std::collections::BTreeMap;
 
@@ -16,9 +17,9 @@ use crate::problem::Problem;
 
 /// Number of bootstrap resamples of a confidence interval.
 const RESAMPLES: usize = 5000;
-/// Probability with which a confidence interval covers the mean.
+/// Level of the confidence intervals of mean accuracies.
 const INTERVAL_LEVEL: f64 = 0.95;
-/// Seed of the resamples.
+/// Seed of the random numbers of the bootstrap.
 const SEED: u64 = 9283;
 /// Smallest number of measurements of a pose for which a repeatability is computed.
 const MIN_CYCLES: usize = 3;
@@ -29,9 +30,10 @@ const MIN_CYCLES: usize = 3;
 pub struct Acceptance {
     /// Held-out poses; rows with equal configuration, base and target form one pose.
     pub poses: Vec<AcceptancePose>,
-    /// Number of held-out rows without a finite prediction. Their poses are missing in `poses`.
+    /// Number of held-out rows that measure a position but have no finite prediction, with the
+    /// nominal or with the identified arm. `poses` does not contain them.
     pub lost: usize,
-    /// True if held-out rows alone use a base or tool, which was then fitted to them. They are then
+    /// True if a base or tool that only held-out rows use was fitted to these rows. They are then
     /// no test of a tolerance.
     pub is_placed_anew: bool,
     /// Accuracy of the registered nominal arm.
@@ -41,9 +43,9 @@ pub struct Acceptance {
 }
 
 impl Acceptance {
-    /// Tests a tolerance on the accuracies AP of the identified arm. Rows without a prediction
-    /// count as beyond the tolerance. If a base or tool was fitted to the held-out rows, the
-    /// verdict is undecided.
+    /// Tests a tolerance on the accuracies AP of the identified arm in all poses. Each row without
+    /// a prediction is a pose beyond the tolerance. If a base or tool was fitted to the held-out
+    /// rows, the verdict is undecided.
     pub fn test(&self, tolerance: Tolerance) -> ToleranceTest {
         let lost = std::iter::repeat_n(f64::NAN, self.lost);
         let errors: Vec<f64> = self.poses.iter().map(|pose| pose.after).chain(lost).collect();
@@ -53,11 +55,11 @@ impl Acceptance {
     }
 }
 
-/// Pose that was measured once or several times.
+/// Held-out pose that was measured once or several times, with its accuracy.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct AcceptancePose {
-    /// Rows of the pose in the measurements, ascending.
+    /// Indices of the rows of the pose in the measurements, ascending.
     pub rows: Vec<usize>,
     /// Accuracy AP of the registered nominal arm: distance from the predicted position to the
     /// barycentre of the measured positions \[m\].
@@ -71,10 +73,11 @@ pub struct AcceptancePose {
     pub repeatability: Option<f64>,
 }
 
-/// Statistics of the accuracy AP over all poses \[m\].
+/// Statistics of the accuracy AP of an arm over all held-out poses \[m\].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Accuracy {
-    /// Mean with its 95 % confidence interval, by the BCa bootstrap over poses  [Efron 1987].
+    /// Mean accuracy AP with its 95 % confidence interval \[m\], by the BCa bootstrap over poses
+    /// [Efron 1987].
     pub mean: Interval,
     /// Root mean square of the accuracies AP over the poses \[m\].
     pub rms: f64,
@@ -83,7 +86,7 @@ pub struct Accuracy {
 }
 
 impl Accuracy {
-    /// Summarises the accuracies of all poses \[m\].
+    /// Computes the statistics of the accuracies AP of all poses \[m\].
     fn of(accuracies: &[f64]) -> Self {
         let sums: Vec<(f64, f64)> = accuracies.iter().map(|accuracy| (*accuracy, 1.0)).collect();
         let squares: f64 = accuracies.iter().map(|accuracy| accuracy * accuracy).sum();
@@ -95,7 +98,8 @@ impl Accuracy {
     }
 }
 
-/// Returns the held-out rows that measure positions, the only ones with a pose accuracy.
+/// Returns the indices of the held-out rows that measure positions. Rows of other kinds have no
+/// pose accuracy.
 ///
 /// # Errors
 /// Returns an error if there are none.
@@ -112,10 +116,10 @@ pub fn held_out_positions(
 }
 
 /// Computes pose accuracy and repeatability of the identified arm in the held-out poses with
-/// measured positions. Poses without an equilibrium are left out.
+/// measured positions. Rows without an equilibrium are left out.
 ///
-/// If a remainder corrects the predictions, `corrected` contains the residuals of all rows after
-/// the correction.
+/// If a remainder corrects the predictions, `corrected` contains the residuals of all rows of the
+/// table after the correction.
 ///
 /// # Errors
 /// Returns an error if problem and data do not fit each other, or no held-out row measures a
@@ -131,7 +135,7 @@ pub fn acceptance(
     let placement = Placement::of(measurements);
     let model = found.model(problem, &placement)?;
     let later = placement.held_out_only(&model, measurements, &data.split);
-    // A fitted number is never exactly at its nominal value.
+    // A fitted parameter is practically never exactly at its nominal value.
     let is_fitted = |(is_later, x): (&bool, &f64)| *is_later && x.abs() > 0.0;
     let is_placed_anew = later.parameters.iter().zip(found.x.iter()).any(is_fitted);
     let errors = |x| placement.position_errors(&model, x, measurements, &held_out);
@@ -148,7 +152,8 @@ pub fn acceptance(
             lost += 1;
             continue;
         }
-        // Loads and temperature may differ in poses that are one pose for the declared arm.
+        // Rows of one pose of the declared arm may differ in load or temperature. They are then
+        // different poses here.
         let set = [&measurements.payload, &measurements.hoist, &measurements.temperature];
         #[expect(
             clippy::cast_possible_truncation,

@@ -1,4 +1,5 @@
-//! Derivatives of the predicted positions by the joint commands, for planners and controllers.
+//! Derivatives of predicted positions with respect to the joint commands, for planners and
+//! controllers.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -7,12 +8,13 @@ use crate::measurement::Measurements;
 use crate::model::Model;
 use crate::problem::Problem;
 
-/// Returns the derivatives of the predicted positions of `rows` by the joint commands, one matrix
-/// per row, shape = (3, joints), measuring frame \[m/rad\], for prismatic joints \[m/m\].
+/// Returns the derivatives of the predicted positions of `rows` with respect to the joint commands:
+/// one matrix per row, shape = (3, joints), measuring frame \[m/rad\], for prismatic joints
+/// \[m/m\].
 ///
-/// Columns of fixed joints are 0; rows without an equilibrium are NaN. The arm is the `identified`
-/// one, with its sessions and targets, or else the nominal one. `problem` is the one that was
-/// identified. The positions in `rows` are not used.
+/// Columns of fixed joints are 0; matrices of rows without an equilibrium are NaN. The arm is the
+/// `identified` one, with its sessions and targets, or the nominal one if that is `None`. `problem`
+/// is the one that was identified. The positions in `rows` are not used.
 ///
 /// # Errors
 /// Returns an error if a parameter of the problem, or of a session or target of `rows`, was not

@@ -14,19 +14,20 @@ use crate::spatial::Frame;
 
 use crate::fit::stages::stage::StageError;
 
-/// Standard deviation (1 σ) of the desired position \[m\]. The distance from the seed has 1 σ = 1
-/// rad or 1 m, so the position decides and the seed only selects between solutions.
-const POSITION_WEIGHT: f64 = 1e-6;
-/// Standard deviation (1 σ) of the desired orientation \[rad\], chosen like [`POSITION_WEIGHT`].
-const ORIENTATION_WEIGHT: f64 = 1e-6;
-/// Largest change of a command in a pass at which it counts as converged \[rad\] or \[m\].
+/// Standard deviation (1 σ) of the desired position in the least-squares problem \[m\]. The
+/// distance from the seed has 1 σ = 1 rad or 1 m, so that the seed only selects among the commands
+/// that reach the position.
+const POSITION_SIGMA: f64 = 1e-6;
+/// Standard deviation (1 σ) of the desired orientation \[rad\], chosen like [`POSITION_SIGMA`].
+const ORIENTATION_SIGMA: f64 = 1e-6;
+/// Largest change of a command in a pass at which the command has converged \[rad\] or \[m\].
 const MAX_CONVERGED_CHANGE: f64 = 1e-10;
-/// Maximum number of passes over all targets. A command that has not converged by then is returned
-/// with its remaining error.
+/// Maximum number of passes of [`damped_search`]. A command that has not converged by then is
+/// returned with its remaining error.
 const MAX_PASSES: usize = 20;
-/// Largest distance to the target at which it counts as reached \[m\].
+/// Largest distance of the predicted from the desired position at which a target is reached \[m\].
 const MAX_REACHED_DISTANCE: f64 = 1e-6;
-/// Largest angle to the desired orientation at which it counts as reached \[rad\].
+/// Largest angle between predicted and desired orientation at which a target is reached \[rad\].
 const MAX_REACHED_ANGLE: f64 = 1e-6;
 /// Number of coordinates of a rigid-body pose, which is also the smallest number of moving joints
 /// that can reach any pose in the workspace.
@@ -35,24 +36,25 @@ const POSE_COORDINATES: usize = 6;
 /// Joint command for one target.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Command {
-    /// Row of the target in the table of targets.
+    /// Index of the target's row in the table of targets.
     pub row: usize,
     /// Configuration, shape = (joints) \[rad\] or \[m\]; the seed's value at fixed joints.
     pub configuration: Vec<f64>,
     /// Remaining position error, desired − predicted, measuring frame \[m\].
     pub miss: Vector3<f64>,
-    /// Position error if the seed were commanded \[m\].
+    /// Length of the position error if the seed were commanded \[m\].
     pub seed_miss: f64,
     /// Remaining rotation vector from the predicted to the desired orientation, measuring frame
     /// \[rad\]; `None` if no orientation is desired.
     pub turn: Option<Vector3<f64>>,
-    /// Angle to the desired orientation if the seed were commanded \[rad\]; `None` if none is
-    /// desired.
+    /// Angle between predicted and desired orientation if the seed were commanded \[rad\]; `None`
+    /// if no orientation is desired.
     pub seed_orientation_error: Option<f64>,
 }
 
 impl Command {
-    /// Returns true if position and orientation errors are within 1 µm and 1 µrad.
+    /// Returns true if the remaining position error is at most 1 µm and the remaining orientation
+    /// error at most 1 µrad.
     pub fn is_reached(&self) -> bool {
         is_reached(&self.miss, self.turn.as_ref())
     }
@@ -62,11 +64,11 @@ fn is_reached(miss: &Vector3<f64>, turn: Option<&Vector3<f64>>) -> bool {
     miss.norm() <= MAX_REACHED_DISTANCE && turn.is_none_or(|turn| turn.norm() <= MAX_REACHED_ANGLE)
 }
 
-/// Returns `rows` with the target poses that the nominal arm would reach by their commands,
-/// measuring frame. Bases and tools are those of the full parameter vector `x`.
+/// Returns `rows` with target poses: those that the nominal arm reaches by the commands of the
+/// rows, measuring frame. Bases and tools are those of the full parameter vector `x`.
 ///
-/// A target has an orientation if at least six moving joints lead to it; with fewer, position and
-/// orientation cannot both be reached.
+/// A target pose has an orientation if at least six moving joints lead to the target; with fewer,
+/// position and orientation cannot both be reached.
 ///
 /// # Errors
 /// Returns an error if the nominal arm has no equilibrium in one of the rows.
@@ -147,9 +149,9 @@ fn transformed_by_bases(targets: &Measurements, bases: &[Frame<f64>]) -> Measure
     moved
 }
 
-/// Computes a command for each row of `targets`. It is the configuration nearest to that of the row
-/// (the seed) that reaches the row's position, and its orientation if it has one. The arm has the
-/// full parameter vector `x`; commands stay within the joint limits of `problem`.
+/// Computes a command for each row of `targets`: the configuration nearest to that of the row (the
+/// seed) with which the arm reaches the row's position, and its orientation if it has one. The arm
+/// has the full parameter vector `x`; commands stay within the joint limits of `problem`.
 ///
 /// Joints that do not lead to the target of a row keep the row's values. Effects on the
 /// measurement, such as instrument drift, are left out, because targets are desired positions of
@@ -174,10 +176,10 @@ pub fn compensate(
     let led = arm.clone().with_mimic_joints(problem);
     let tree = problem.tree();
     let mut commands = Vec::with_capacity(rows.len());
-    let weights = (POSITION_WEIGHT, Some(ORIENTATION_WEIGHT));
-    for (row, mut pose) in placement.oriented_poses(targets, &rows, weights).into_iter().enumerate()
+    let sigmas = (POSITION_SIGMA, Some(ORIENTATION_SIGMA));
+    for (row, mut pose) in placement.oriented_poses(targets, &rows, sigmas).into_iter().enumerate()
     {
-        pose.sigma = POSITION_WEIGHT;
+        pose.sigma = POSITION_SIGMA;
         // The poses before a target are not known.
         pose.setup.past = LazyPast::default();
         let seed = targets.configuration(row);
@@ -220,7 +222,7 @@ pub fn compensate(
                 let (slopes, _) = jacobian_and_residual(&residuals, &DVector::zeros(n));
                 let columns = moving.iter().enumerate().filter(|(_, joint)| serves(**joint));
                 slopes.select_columns(&columns.map(|(k, _)| k).collect::<Vec<_>>())
-                    * -POSITION_WEIGHT
+                    * -POSITION_SIGMA
             },
             limits: &limits,
         };
@@ -245,9 +247,9 @@ pub fn compensate(
     Ok(commands)
 }
 
-/// Computes the configuration for one target by Levenberg–Marquardt steps, if Newton steps do not
-/// reach it. Effects that depend on the command are evaluated at the command of the previous pass.
-/// Only the joints `serving` move.
+/// Computes the configuration for one target by Levenberg–Marquardt steps, for targets that Newton
+/// steps do not reach. Effects that depend on the command are evaluated at the command of the
+/// previous pass. Only the joints `serving`, which lead to the target, move.
 fn damped_search(
     problem: &Problem,
     (arm, led): (&Model, &Model),

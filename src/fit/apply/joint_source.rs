@@ -1,4 +1,5 @@
-//! Comparison of commanded and read joint values: which of the two the arm follows.
+//! Comparison of commanded joint values with those read from encoders: with which of the two is the
+//! error smaller?
 
 use crate::fit::identification::identify;
 use crate::fit::outcome::Identification;
@@ -6,8 +7,8 @@ use crate::fit::{IdentifyError, Options};
 use crate::measurement::Dataset;
 use crate::problem::{JointSource, Problem};
 
-/// Root mean squared errors on the identification rows \[m\], fitted with commanded and with read
-/// joint values.
+/// Root mean squared errors on the identification rows \[m\] of two fits: one with commanded joint
+/// values, one with values read from encoders.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct JointSources {
     /// Source of the joint values that the problem uses.
@@ -19,14 +20,15 @@ pub struct JointSources {
 }
 
 impl JointSources {
-    /// Returns the source of joint values that leaves the smaller error.
+    /// Returns the source of joint values with which the fit has the smaller error.
     pub fn better(&self) -> JointSource {
         if self.read < self.commanded { JointSource::Read } else { JointSource::Commanded }
     }
 }
 
-/// Compares the fit `found` with one that uses the other source of joint values; `None` where the
-/// rows do not have both, or both are equal. Held-out rows decide nothing.
+/// Compares the fit `found` with one that uses the other source of joint values, by their errors on
+/// the identification rows. Returns `None` if the table does not have both sources, or both are
+/// equal.
 ///
 /// # Errors
 /// Returns the errors of [`identify`].

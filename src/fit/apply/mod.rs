@@ -1,4 +1,5 @@
-//! Application of an identified arm: prediction, compensation, acceptance, saved estimates.
+//! Application of an identified arm: predictions with their covariance, compensated commands,
+//! acceptance test, and saved estimates.
 
 pub(super) mod acceptance;
 pub(super) mod command_jacobian;

@@ -1,30 +1,31 @@
-//! Command nearest to a seed that brings an arm to its target: damped Newton steps in closed form.
+//! Inverse kinematics: the command nearest to a seed that brings an arm to its target, by damped
+//! Newton steps.
 
 use nalgebra::{DMatrix, DVector};
 
-/// Weight of the squared distance from the seed [rad² or m²] against the squared misfit [m² or
-/// rad²]. Such a small weight lets the misfit decide.
+/// Weight of the squared distance from the seed [rad² or m²] relative to the squared misfit [m² or
+/// rad²]. It is so small that the distance only selects among the commands that reach the target.
 const WEIGHT_SQUARED: f64 = 1e-12;
 /// Maximum number of steps for one target. Most targets take 4 to 8; near singular poses they take
 /// more.
 const MAX_STEPS: usize = 1000;
-/// Largest step at which a command counts as converged \[rad\] or \[m\].
+/// Largest undamped step of a command at which the search has converged \[rad\] or \[m\].
 const MAX_CONVERGED_STEP: f64 = 1e-12;
-/// Damping μ after the first rejected step, and damping at which the search gives up; both relative
-/// to the weight of the distance from the seed.
+/// Damping μ after the first rejected step, and damping at which the search ends without success;
+/// both relative to the weight of the distance from the seed.
 const DAMPING_RANGE: (f64, f64) = (0.3, 1e20);
 /// Factors on the damping μ after a rejected and after an accepted step.
 const DAMPING_FACTORS: (f64, f64) = (30.0, 0.03);
-/// Relative increase of the cost that counts as rounding, so that the step is accepted.
+/// Largest relative increase of the cost by a step that is rounding, so that the step is accepted.
 const COST_ROUNDING: f64 = 1e4 * f64::EPSILON;
 
 /// Target of an inverse-kinematics search, as functions of the commands q.
 pub(super) struct Goal<'a> {
-    /// Function that returns the misfit desired − predicted, shape = (3 or 6) \[m, rad\]; NaN
-    /// without equilibrium.
+    /// Function that returns the misfit r at q, desired − predicted position \[m\] and, if it is
+    /// desired, the orientation error \[rad\], shape = (3 or 6); NaN without an equilibrium.
     pub misfit: &'a dyn Fn(&DVector<f64>) -> DVector<f64>,
-    /// Function that returns the derivatives J of the prediction with respect to q, shape = (3 or
-    /// 6, commands).
+    /// Function that returns the derivatives J of the predicted pose with respect to q, shape = (3
+    /// or 6, commands).
     pub slopes: &'a dyn Fn(&DVector<f64>) -> DMatrix<f64>,
     /// Lower and upper limit of each command \[rad\] or \[m\].
     pub limits: &'a [(f64, f64)],
@@ -53,8 +54,7 @@ impl Goal<'_> {
             if cost(&tried, &next) <= (1.0 + COST_ROUNDING) * cost(&misfit, &q) {
                 (q, misfit) = (next, tried);
                 slopes = (self.slopes)(&q);
-                // The damping shortens a step, so the remaining undamped step is longer than this
-                // one.
+                // The damping μ shortens a step by up to the factor 1 + μ.
                 if step.amax() * (1.0 + damping) <= MAX_CONVERGED_STEP {
                     break;
                 }
@@ -69,8 +69,8 @@ impl Goal<'_> {
         q
     }
 
-    /// Returns the step of [`nearest`](Self::nearest) at the commands `q`, limited by an active-set
-    /// method.
+    /// Returns the step d of [`nearest`](Self::nearest) at the commands `q` within their limits, by
+    /// an active-set method.
     fn step(
         &self,
         (q, seed): (&DVector<f64>, &DVector<f64>),
@@ -102,7 +102,7 @@ impl Goal<'_> {
                     step[j] = along;
                     (low - along).max(along - high)
                 } else if step[j] <= low {
-                    // If this is positive, the command would move away from its limit.
+                    // A positive value means that the free step leaves the limit inwards.
                     along - step[j]
                 } else {
                     step[j] - along

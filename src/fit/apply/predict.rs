@@ -22,13 +22,15 @@ pub struct Residual {
     pub row: usize,
     /// True if the row is held out.
     pub held_out: bool,
-    /// Predicted position of the target, measuring frame \[m\], also for contacts with a point; a
-    /// predicted distance is along x \[m\].
+    /// Predicted value of what the row measures. For positions and contacts with a point, it is the
+    /// position of the target, measuring frame \[m\]; other rows have their numbers in the unit of
+    /// their kind, a single number along x.
     pub predicted: Vector3<f64>,
-    /// Measured − predicted position, measuring frame \[m\]; a distance is along x. NaN if the
-    /// identified arm has no equilibrium.
+    /// Residual measured − predicted. For positions and contacts with a point, it is that of the
+    /// position of the target, measuring frame \[m\]; other rows have their numbers in the unit of
+    /// their kind, a single number along x. NaN if the arm has no equilibrium.
     pub position: Vector3<f64>,
-    /// Residual `position` divided by 1 σ of a coordinate \[1\].
+    /// Residual of the measured numbers divided by 1 σ of a coordinate \[1\].
     pub whitened: Vector3<f64>,
     /// Rotation vector from the predicted to the measured orientation, measuring frame \[rad\];
     /// `None` if orientation is not fitted.
@@ -42,15 +44,15 @@ pub struct Residual {
 }
 
 impl Residual {
-    /// Returns the length of the whitened residual vector of position and orientation together
-    /// \[1\].
+    /// Returns the length of the whitened residual vector \[1\], orientation included.
     pub(crate) fn length(&self) -> f64 {
         self.whitened.norm().hypot(self.whitened_orientation.map_or(0.0, |turn| turn.norm()))
     }
 }
 
 impl Identification {
-    /// Returns the model that the strategy fitted, for the bases and targets of a placement.
+    /// Returns the model of `problem` that the strategy fitted, with the bases and targets of
+    /// `placement`.
     pub(crate) fn model(
         &self,
         problem: &Problem,
@@ -89,8 +91,8 @@ impl Identification {
         self.predict_with(&self.model(problem, &Placement::of(rows))?, rows)
     }
 
-    /// Predicts positions as [`predict`](Self::predict) does, with a model that the caller has
-    /// changed.
+    /// Predicts positions as [`predict`](Self::predict) does, with a `model` that the caller may
+    /// have changed.
     ///
     /// # Errors
     /// Returns an error if a parameter of the model was not identified.
@@ -103,7 +105,7 @@ impl Identification {
         Ok(rows.positions.iter().zip(errors).map(|(measured, error)| measured - error).collect())
     }
 
-    /// Returns the residuals of every row, in the order of the rows.
+    /// Returns the residual of every row of `data`, in the order of the rows.
     ///
     /// # Errors
     /// Returns an error if a parameter of the problem, or of a session or target of the data, was
@@ -140,7 +142,8 @@ impl Identification {
         Ok(errors.into_iter().enumerate().map(residual).collect())
     }
 
-    /// Returns measured − predicted of every row, measuring frame \[m\].
+    /// Returns the errors measured − predicted of every row: positions in the measuring frame
+    /// \[m\], other rows in the unit of their kind.
     fn errors(
         &self,
         model: &Model,
@@ -167,8 +170,9 @@ impl Identification {
         Ok(Some(model.orientation_residuals(self.poses(rows, Some(1.0)), &self.vector(model)?)))
     }
 
-    /// Returns every row as a pose; `turn` is 1 σ of its orientation \[rad\]. Elapsed time counts
-    /// from the first pose of the session in the identification.
+    /// Returns every row as a pose. `turn` is 1 σ of its orientation \[rad\], or `None` to leave
+    /// out orientations. The elapsed time of a pose is that since the start of its session in the
+    /// identification.
     pub(in crate::fit) fn poses<'a>(
         &self,
         rows: &'a Measurements,
@@ -181,8 +185,12 @@ impl Identification {
         poses
     }
 
-    /// Returns the full parameter vector of `model`, with the estimates of the parameters of the
-    /// same names.
+    /// Returns the full parameter vector of `model`, with the estimated deviations of the
+    /// parameters of the same names.
+    ///
+    /// # Errors
+    /// Returns an error if a parameter of `model` was not identified, or if `model` lacks an
+    /// identified parameter other than those of bases and tools.
     pub(crate) fn vector(&self, model: &Model) -> Result<DVector<f64>, IdentifyError> {
         let x = model.parameters.iter().map(|parameter| {
             let place = self.estimates.iter().position(|estimate| estimate.name == parameter.name);
@@ -205,8 +213,9 @@ impl Identification {
     }
 }
 
-/// Returns predicted position and residual of a row, measuring frame \[m\]. For a contact with a
-/// point, both are those of the target.
+/// Returns the predicted value and the residual of a row. For a contact with a point, both are
+/// converted to the position of the target in the measuring frame \[m\]; the residuals of such rows
+/// are in the base frame.
 pub(in crate::fit) fn in_space(
     rows: &Measurements,
     row: usize,

@@ -1,4 +1,4 @@
-//! Predictions of a saved estimate for any rows, without another fit of the arm.
+//! Predictions of an arm for any rows from a saved estimate, without another fit of the arm.
 
 use std::collections::BTreeMap;
 
@@ -25,18 +25,19 @@ use crate::observation::Needs;
 use crate::problem::{Observation, Problem};
 use crate::quantity::Unit;
 
-/// Largest share of a parameter in undetermined combinations, 0…1, at which the rows determine the
-/// parameter.
+/// Largest component of a parameter in the rows of undetermined combinations, at which the measured
+/// rows determine the parameter.
 const MAX_UNDETERMINED_SHARE: f64 = 1e-6;
 
-/// Predictions of an arm for the rows of a table.
+/// Predictions of an arm for the rows of a table, with residuals if the rows were measured.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct Prediction {
-    /// Predicted position of each row, measuring frame \[m\]; NaN where the arm has no equilibrium.
+    /// Predicted position of the target in each row, measuring frame \[m\]; NaN where the arm has
+    /// no equilibrium.
     pub positions: Vec<Vector3<f64>>,
-    /// Predicted numbers of each row, in the units of its kind: a position \[m\], a pixel \[px\],
-    /// a distance \[m\], tilts \[rad\], followed by zeros.
+    /// Predicted values of the numbers that each row measures, in the units of its kind: a position
+    /// \[m\], a pixel \[px\], a distance \[m\], or tilts \[rad\]; unused entries are 0.
     pub numbers: Vec<Vector3<f64>>,
     /// Predicted orientation of each row, a rotation vector, measuring frame \[rad\]; `None` if
     /// orientation is not fitted.
@@ -49,26 +50,27 @@ pub struct Prediction {
     pub errors: Option<ErrorsBySession>,
     /// Scatter of the predicted target at each point that the rows touch.
     pub spreads: Vec<PointSpread>,
-    /// Names of base and tool parameters that the estimate lacks. They were fitted to the predicted
-    /// rows, with the arm's parameters fixed.
+    /// Names of the parameters of bases, tools and fixtures that the estimate lacks. They were
+    /// fitted to the measured rows, with the arm's parameters fixed.
     pub placed: Vec<String>,
-    /// Full parameter vector of the model of the predicted rows, with the fitted bases and tools.
+    /// Full parameter vector of the model of the predicted rows, with the fitted bases, tools and
+    /// fixtures.
     pub x: DVector<f64>,
 }
 
-/// Errors of all rows, and of each session.
+/// Summaries of the errors of all rows, of each kind of rows, and of each session.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ErrorsBySession {
     /// Errors of all rows of the leading kind: positions, if the table has any.
     pub all: ErrorSummary,
     /// Errors of each kind of rows; empty if there is only one kind.
     pub kinds: Vec<ErrorSummary>,
-    /// Name and errors of each session, in the order of the rows, for the first kind of its rows;
-    /// empty without sessions.
+    /// Name and errors of each session, in the order of the table; the errors are those of the
+    /// leading kind of the session's rows. Empty without sessions.
     pub sessions: Vec<(String, ErrorSummary)>,
 }
 
-/// Error of an estimate that cannot be applied.
+/// Error of predictions that cannot be computed.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PredictError {
@@ -78,7 +80,8 @@ pub enum PredictError {
     /// The estimate belongs to another problem, or lacks a parameter that the rows need.
     #[error(transparent)]
     Estimate(#[from] SavedEstimateError),
-    /// Rows of a new session or tool do not determine its pose.
+    /// The measured rows of a session, tool or fixture that the estimate lacks do not determine its
+    /// pose.
     #[error(
         "{name} is not in the estimate, and its rows do not determine it; measure more poses there"
     )]
@@ -86,7 +89,8 @@ pub enum PredictError {
         /// Name of the parameter that the rows do not determine.
         name: String,
     },
-    /// There is no estimate, and the rows do not determine the pose of base or tool.
+    /// There is no estimate, and the measured rows do not determine the pose of a base, tool or
+    /// fixture.
     #[error(
         "the rows do not determine {name}, and there is no estimate to take it from; measure more poses there"
     )]
@@ -94,14 +98,15 @@ pub enum PredictError {
         /// Name of the parameter that the rows do not determine.
         name: String,
     },
-    /// Bases and tools of new sessions could not be fitted.
+    /// Bases, tools and fixtures that the estimate lacks could not be fitted.
     #[error(transparent)]
     Stage(#[from] StageError),
 }
 
 impl ErrorsBySession {
-    /// Summarises the errors measured − predicted of `rows` \[m\], in total and by session.
-    /// `at_points` converts the image errors of rows to lengths at the observed points \[m\].
+    /// Summarises the `errors` measured − predicted of `rows`, in the unit of their kind.
+    /// `at_points` returns the image errors of the rows with given indices as lengths at the
+    /// observed points \[m\].
     fn new(
         rows: &Measurements,
         errors: &[Vector3<f64>],
@@ -134,13 +139,14 @@ impl ErrorsBySession {
 /// Predicts `rows` with the arm of `problem`: as identified in `estimate`, or the nominal arm if
 /// that is `None`.
 ///
-/// A free base or tool that the estimate lacks is fitted to its rows, with the arm's parameters
-/// fixed, if they measure enough positions. `split` states which rows are held out; `None` if that
-/// is not known.
+/// A free base, tool or fixture that the estimate lacks is fitted to the rows that use it, with the
+/// arm's parameters fixed, if these rows were measured. `split` states which rows are held out;
+/// `None` if that is not known.
 ///
 /// # Errors
-/// Returns an error if the estimate belongs to another problem or lacks a parameter that the rows
-/// need, or if the rows lack a column that an effect needs.
+/// Returns an error if the estimate belongs to another problem or lacks a parameter of the arm, if
+/// the rows do not determine a base, tool or fixture that the estimate lacks, or if the rows lack a
+/// column that an effect needs.
 pub fn predict(
     problem: &Problem,
     estimate: Option<&SavedEstimate>,
@@ -174,7 +180,7 @@ pub fn predict(
     if let Some(estimate) = estimate {
         estimate.count_time_in(&placement, &mut poses);
     }
-    // A point or surface that no row uses is not needed.
+    // The parameters of a fixture that no row uses are not needed.
     let is_needed = |k: usize| {
         let fixture = matches!(model.parameters[k].site, ParameterSite::Fixture { .. });
         !fixture || poses.iter().any(|pose| uses(&model, pose, k))
@@ -277,8 +283,9 @@ fn uses(model: &Model, pose: &Pose, k: usize) -> bool {
     }
 }
 
-/// Returns the first of the `missing` parameters without a prior whose poses measure fewer
-/// coordinates than they have unknowns; `None` if there is none.
+/// Returns the first of the `missing` parameters without a prior for which there are too few
+/// measurements; `None` if there is none. The poses that use its base, tool or fixture must measure
+/// at least as many coordinates as `missing` parameters without a prior act on them.
 fn too_few(model: &Model, poses: &[Pose], missing: &[usize]) -> Option<usize> {
     let open: Vec<usize> =
         missing.iter().copied().filter(|&k| model.parameters[k].sigma.is_none()).collect();
@@ -287,15 +294,16 @@ fn too_few(model: &Model, poses: &[Pose], missing: &[usize]) -> Option<usize> {
         let measured = users.iter().map(|pose| pose.coordinates()).sum::<usize>();
         let unknown =
             open.iter().filter(|&&other| users.iter().any(|pose| uses(model, pose, other))).count();
-        // With as many contacts as unknowns, the fixture would fit its contacts exactly.
+        // With as many coordinates as unknowns, a fixture fits its contacts exactly, so that their
+        // errors say nothing.
         let placed_exactly = matches!(model.parameters[k].site, ParameterSite::Fixture { .. })
             && measured == unknown;
         measured < unknown || placed_exactly
     })
 }
 
-/// Returns the full parameter vector `x` with the `missing` bases and tools fitted to the poses
-/// that use them.
+/// Returns the full parameter vector `x` with the `missing` parameters of bases, tools and fixtures
+/// fitted to the poses that use them.
 fn fit_placements(
     model: &Model,
     poses: &[Pose],
@@ -327,8 +335,9 @@ fn fit_placements(
     }
 }
 
-/// Creates the residuals of all rows from position errors \[m\], predictions `seen` \[m\], and
-/// orientation errors with their σ \[rad\]. Whitened values are NaN if the σ of a row is not known.
+/// Creates the residuals of all rows from the errors measured − predicted, the predicted numbers
+/// `seen`, and the orientation errors `turns` with their σ \[rad\]. `sigmas` and `coordinates` hold
+/// the σ and the number of coordinates of each row. Whitened values are NaN if σ is `None`.
 fn residuals(
     (errors, seen): (&[Vector3<f64>], &[Vector3<f64>]),
     (sigmas, coordinates): (&[Option<f64>], &[usize]),

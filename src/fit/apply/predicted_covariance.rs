@@ -1,5 +1,5 @@
-//! Covariance of predicted positions, and standard errors of predicted rows, from the covariance of
-//! the estimates.
+//! Covariance of predicted positions, and standard errors of the predicted numbers of rows, both
+//! from the covariance of the estimates.
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use rayon::prelude::*;
@@ -25,11 +25,12 @@ pub struct PredictedPosition {
 }
 
 impl Identification {
-    /// Predicts the positions of `rows` with their covariance J C Jᵀ.
+    /// Predicts the positions of the identified arm in the poses of `rows`, with their covariance
+    /// J C Jᵀ.
     ///
     /// J are the derivatives of the position with respect to the estimates that have a variance,
-    /// and C is the covariance of these estimates. `problem` is the one that was identified; `rows`
-    /// as for [`predict`](Self::predict).
+    /// and C is the covariance of these estimates. `problem` and `rows` are as for
+    /// [`predict`](Self::predict).
     ///
     /// # Errors
     /// Returns the errors of [`predict`](Self::predict).
@@ -41,7 +42,7 @@ impl Identification {
         let model = self.model(problem, &Placement::of(rows))?;
         let positions = self.predict_with(&model, rows)?;
         let x = self.vector(&model)?;
-        // Estimates of other sessions have no part in these rows.
+        // Estimates of sessions and targets that these rows do not use are left out.
         let place = |k: usize| {
             let name = &self.estimates[k].name;
             model.parameters.iter().position(|parameter| parameter.name == *name)
@@ -69,17 +70,17 @@ impl Identification {
     }
 }
 
-/// Returns the derivatives of the numbers of a row with respect to the unknowns, shape = (3,
-/// unknowns) [1/σ of the row].
+/// Returns the derivatives of the residuals of a row with respect to the unknowns, shape = (3,
+/// unknowns): those of its predicted numbers, divided by −σ of its pose.
 fn row_jacobian(residuals: &PoseResiduals, at: &DVector<f64>, row: usize) -> DMatrix<f64> {
     let mut block = Block::zeros(residuals.rows_per_item(), residuals.parameters());
     residuals.linearise(at, row..row + 1, &mut block);
     DMatrix::from_fn(3, residuals.parameters(), |i, j| block.column(j)[i])
 }
 
-/// Returns the standard error (1 σ) of each predicted number of `rows`, in the units of the row's
-/// kind, from the covariance of the estimates: neither measurement noise nor errors of the model
-/// count. `x` is the full parameter vector of the prediction.
+/// Returns the standard error (1 σ) of each predicted number of `rows`, in the unit of the row's
+/// kind, from the covariance of the estimates. It contains neither measurement noise nor errors of
+/// the model. `x` is the full parameter vector of the prediction.
 ///
 /// NaN where a row depends on a parameter without a variance, for example one that the data do not
 /// determine.

@@ -1,4 +1,4 @@
-//! Reader of `estimate.json`, to apply an identified arm without another fit.
+//! Reader of `estimate.json`, by which an identified arm is applied without another fit.
 
 use std::collections::{BTreeMap, HashSet};
 use std::io;
@@ -20,7 +20,7 @@ use crate::model::{Model, Pose};
 use crate::problem::Problem;
 use crate::problem::item::MAX_MAGNITUDE;
 
-/// Smallest identified share of a parameter that counts as determined.
+/// Smallest identified share of a parameter, 0…1, at which the data determine it.
 const MIN_IDENTIFIED_SHARE: f64 = 0.99;
 
 /// Identified arm as saved in an `estimate.json`.
@@ -28,7 +28,8 @@ const MIN_IDENTIFIED_SHARE: f64 = 0.99;
 pub struct SavedEstimate {
     /// Path of the file.
     pub file: PathBuf,
-    /// Treatment of files that belong to the estimate and were changed since flexcal wrote them.
+    /// Whether files that belong to the estimate are accepted or refused if they were changed since
+    /// flexcal wrote them.
     pub changes: Changes,
     /// First key of the file that was changed since flexcal wrote it; `None` if nothing changed.
     pub changed_key: Option<String>,
@@ -37,38 +38,43 @@ pub struct SavedEstimate {
     /// Standard deviation (1 σ) of a measured coordinate, estimated from the scatter of the fit
     /// \[m\]; `None` if the problem declares σ.
     pub estimated_sigma: Option<f64>,
-    /// Start of each session, from which time-dependent terms count; `None` in files of older
-    /// versions.
+    /// Start time of each session, relative to which time-dependent terms are evaluated; `None` in
+    /// files of older versions.
     pub start_times: Option<StartTimes>,
     /// Name of the `remainder.json` in the same folder; `None` if no remainder was accepted.
     pub remainder: Option<String>,
-    /// Uncertainty of predictions as JSON text; `None` in files of older versions.
+    /// Section on the uncertainty of predictions, as JSON text; `None` in files of older versions.
     pub prediction: Option<String>,
+    /// Name of the problem.
     problem: String,
     /// Digest of the declared arm; `None` in files of older versions.
     arm_digest: Option<String>,
-    /// Digest of each part of the declared arm; older versions did not write them.
+    /// Digest of each part of the declared arm, by its name; empty in files of older versions.
     arm_parts: BTreeMap<String, String>,
     strategy: Strategy,
     parameters: Vec<Entry>,
     posterior: SavedPosterior,
 }
 
-/// Uncertainty of a saved estimate, as the next identification of the arm needs it.
+/// Uncertainty and noise of a saved estimate, from which the next identification of the arm makes
+/// its prior.
 #[derive(Debug, Clone)]
 pub(crate) struct SavedPosterior {
     /// Covariance of the values of all parameters, SI; NaN where it was not written.
     pub covariance: DMatrix<f64>,
-    /// Standard deviation (1 σ) of a position's coordinate that the fit took \[m\].
+    /// Standard deviation (1 σ) of a measured coordinate that the fit assumed \[m\]; `None` in
+    /// files of older versions.
     pub sigma_taken: Option<f64>,
-    /// Noise variance that the fit took, relative to the declared one.
+    /// Noise variance that the fit assumed, relative to the declared one; 1 in files of older
+    /// versions.
     pub noise_factor: f64,
-    /// Digests of the rows that were fitted.
+    /// Digests of the rows that were fitted; empty in files of older versions.
     pub fitted_rows: HashSet<String>,
-    /// True if the prior of the fit contains that of a fleet.
+    /// True if the prior of a fleet is part of the prior of the fit.
     pub includes_fleet: bool,
 }
 
+/// Parameter of the file.
 #[derive(Debug, Clone, Deserialize)]
 struct Entry {
     name: String,
@@ -86,6 +92,7 @@ struct Entry {
     fitted: Option<bool>,
 }
 
+/// Contents of the file, as far as they are read.
 #[derive(Debug, Deserialize)]
 struct Document {
     /// Name and version of the file format; `None` in files of older versions.
@@ -119,8 +126,8 @@ struct RemainderEntry {
 }
 
 impl SavedEstimate {
-    /// Returns the estimate without the fitted parameters for whose name `is_left_out` returns
-    /// true.
+    /// Returns a copy of the estimate without the fitted parameters for whose name `is_left_out`
+    /// returns true.
     pub(crate) fn without_fitted(&self, is_left_out: impl Fn(&str) -> bool) -> Self {
         let mut estimate = self.clone();
         estimate.parameters.retain(|entry| entry.fitted != Some(true) || !is_left_out(&entry.name));
@@ -256,17 +263,18 @@ impl SavedEstimate {
         self.strategy.model(declared)
     }
 
-    /// Sets the elapsed times of `poses`, placed by `placement`, relative to the starts of their
-    /// sessions in the identification.
+    /// Sets the elapsed times of `poses` to those since the start of their session in the
+    /// identification; `placement` is that of the poses. Without start times in the file, they
+    /// stay.
     pub(crate) fn count_time_in(&self, placement: &Placement, poses: &mut [Pose]) {
         if let Some(starts) = &self.start_times {
             placement.count_time_from(starts, poses);
         }
     }
 
-    /// Checks that the estimate belongs to `problem` with model `model`. Bases and tools that the
-    /// model lacks are ignored: those of sessions without rows, and those of an estimate without
-    /// sessions if the rows name sessions.
+    /// Checks that the estimate belongs to `problem` with the model `model`: equal name, nominal
+    /// values and declared arm. Bases and tools of the estimate that the model lacks are ignored:
+    /// those of sessions without rows, and the single ones if the rows name sessions.
     ///
     /// # Errors
     /// Returns an error if the estimate belongs to another problem, or to a different version of
@@ -314,8 +322,8 @@ impl SavedEstimate {
         self.parameters.iter().filter(is_base).any(is_open)
     }
 
-    /// Returns the names of bases or tools (`of`) in the saved parameter names, in the order of the
-    /// file. Parameters without brackets have the empty name.
+    /// Returns the names in brackets of the saved bases or tools (`of` is "base" or "tool"), in the
+    /// order of the file. If none has a name, the list has one empty name.
     pub(crate) fn words(&self, of: &str) -> Vec<String> {
         let mut words: Vec<String> = Vec::new();
         for entry in &self.parameters {
@@ -345,12 +353,13 @@ impl SavedEstimate {
         (0..table.len()).filter(|&row| fitted.contains(&table.row_digest(row))).collect()
     }
 
-    /// Returns the uncertainty of the estimate.
+    /// Returns the uncertainty and noise of the estimate.
     pub(crate) fn posterior(&self) -> &SavedPosterior {
         &self.posterior
     }
 
-    /// Returns name, value and prior σ of every parameter, in the order of the covariance.
+    /// Returns name, estimated value \[SI\] and prior σ of every parameter, in the order of the
+    /// covariance; the prior σ is `None` without a prior.
     pub(crate) fn entries(&self) -> impl Iterator<Item = (&str, f64, Option<f64>)> {
         self.parameters.iter().map(|entry| (&*entry.name, entry.estimate, entry.prior_sigma))
     }
@@ -366,7 +375,7 @@ impl SavedEstimate {
         self.parameters.iter().find(|entry| entry.name == name)?.unit.as_deref()
     }
 
-    /// Returns the name of the problem.
+    /// Returns the name of the problem that was identified.
     pub(crate) fn problem_name(&self) -> &str {
         &self.problem
     }
@@ -376,7 +385,7 @@ impl SavedEstimate {
         &self.arm_parts
     }
 
-    /// Returns the first part of the declared arm in which two estimates differ; `None`
+    /// Returns the first part of the declared arm in which this estimate and `other` differ; `None`
     /// if both are of the same declared arm.
     pub(crate) fn differing_part(&self, other: &Self) -> Option<DifferingPart> {
         let (parts, others) = (&self.arm_parts, &other.arm_parts);
@@ -398,9 +407,9 @@ impl SavedEstimate {
         self.strategy
     }
 
-    /// Checks that the estimate is of the arm and the laws of `problem`, as [`check`](Self::check)
-    /// does. The estimate must have a value of every parameter of the model except bases, tools and
-    /// fixtures.
+    /// Checks, as [`check`](Self::check) does, that the estimate is of the declared arm of
+    /// `problem`. The estimate must also have a value of every parameter of the model except bases,
+    /// tools and fixtures.
     ///
     /// # Errors
     /// Returns an error that names what differs.
@@ -431,7 +440,8 @@ impl SavedEstimate {
         }
     }
 
-    /// Returns the full parameter vector of a model of `problem`.
+    /// Returns the full parameter vector of `model`, a model of `problem`, with the estimated
+    /// values.
     ///
     /// # Errors
     /// Returns an error if the estimate is of another problem or arm, or lacks a parameter of the
@@ -448,8 +458,8 @@ impl SavedEstimate {
     }
 }
 
-/// Returns true if a saved parameter is of a base or tool, and `model` has others of that kind with
-/// names in brackets, or the saved one has such a name.
+/// Returns true if the saved parameter `name` is of a base or tool with a name in brackets, or of a
+/// single base or tool while those of `model` have names in brackets.
 fn is_other_placement(name: &str, model: &Model) -> bool {
     ["base", "tool"].iter().any(|kind| {
         let (bracketed, single) = (format!("{kind}["), format!("{kind}."));
@@ -467,8 +477,8 @@ pub(crate) struct DifferingPart {
     pub is_declared: [bool; 2],
 }
 
-/// Returns the name of a part of an arm for display. The names of effects are their declarations
-/// without the closing brace.
+/// Returns the name of a part of an arm for display. The name of an effect is its declaration, to
+/// which the closing brace is added.
 fn shown_part(part: &str) -> String {
     if part.contains('{') { format!("{} }}", part.trim_end()) } else { part.to_owned() }
 }

@@ -7,7 +7,7 @@ use serde::Deserialize;
 
 use crate::error::{JSON, TABLE, one_line, text_format};
 
-/// Name of the file format, and the newest version that can be read.
+/// Name of the format of `estimate.json`, and the newest version that this program can read.
 pub(super) const FORMAT: (&str, u32) = ("flexcal-estimate", 2);
 /// Maximum size of an `estimate.json` \[MiB\].
 pub(super) const MAX_FILE_MIB: u64 = 256;
@@ -19,14 +19,14 @@ pub(super) struct Format {
     pub version: u32,
 }
 
-/// Head of another file that flexcal writes.
+/// Beginning of any JSON file that flexcal writes.
 #[derive(Debug, Deserialize)]
 struct Head {
     format: Format,
 }
 
-/// Returns the error of a text that cannot be parsed as an estimate, which names what it is
-/// instead if that is recognised.
+/// Returns the error of a `text` that cannot be parsed as an estimate. The error names the format
+/// of the text if that is recognised.
 pub(super) fn not_an_estimate(
     text: &str,
     file: PathBuf,

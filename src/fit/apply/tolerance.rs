@@ -4,9 +4,9 @@ use statrs::distribution::{Binomial, DiscreteCDF as _};
 
 use crate::numeric::bisect;
 
-/// Number of bisections that locate the confidence bound of a share.
+/// Number of bisections of the interval 0…1 by which a confidence bound of a share is found.
 const BISECTIONS: usize = 50;
-/// Largest number of poses considered in the search for the number that would suffice.
+/// Number of poses at which the search for a sufficient number of poses ends.
 const MAX_POSES: usize = 1_000_000;
 
 /// Requirement on the accuracy of an arm: a given share of its poses has an error of at most a
@@ -15,23 +15,23 @@ const MAX_POSES: usize = 1_000_000;
 pub struct Tolerance {
     /// Tolerance: largest error of a pose that meets the requirement \[m\].
     pub length: f64,
-    /// Share of the poses that must meet the tolerance, between 0 and 1.
+    /// Share of all poses of the arm that must meet the tolerance, between 0 and 1.
     pub share: f64,
-    /// Largest acceptable probability of a pass if a smaller share of the poses meets the
-    /// tolerance, between 0 and 1.
+    /// Largest acceptable probability of a wrong pass, if a smaller share of all poses meets the
+    /// tolerance; between 0 and 1.
     pub risk: f64,
 }
 
 /// Result of the test of a tolerance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
-    /// At least the required share of all poses is within the tolerance; wrong at most with the
-    /// probability `risk`.
+    /// At least the required share of all poses is within the tolerance. The probability of a wrong
+    /// pass is at most [`Tolerance::risk`].
     Pass,
-    /// A smaller share of all poses is within the tolerance; wrong at most with the probability
-    /// `risk`.
+    /// A smaller share than required of all poses is within the tolerance. The probability of a
+    /// wrong failure is at most [`Tolerance::risk`].
     Fail,
-    /// There are too few poses to decide.
+    /// The tested poses are too few to decide.
     Undecided,
 }
 
@@ -58,15 +58,16 @@ pub struct ToleranceTest {
     /// Number of tested poses with an error above the tolerance, or without a prediction.
     pub beyond: usize,
     /// Lower and upper confidence bound of the share of all poses that are within the tolerance.
-    /// Each bound is wrong with at most the probability `risk`. [Clopper & Pearson 1934]
+    /// Each bound is wrong with a probability of at most [`Tolerance::risk`]. [Clopper & Pearson
+    /// 1934]
     pub share_within: [f64; 2],
-    /// Number of poses at which the test would pass if no more poses were beyond the tolerance than
-    /// now; `None` above [`MAX_POSES`].
+    /// Number of tested poses at which the test would pass with the present number of poses beyond
+    /// the tolerance; `None` if a million poses are too few.
     pub poses_to_pass: Option<usize>,
 }
 
 impl Tolerance {
-    /// Tests the requirement on the errors of some poses \[m\].
+    /// Tests the requirement on the errors of some poses \[m\]; NaN is beyond any tolerance.
     ///
     /// The poses must be drawn in the same way as those that the arm will take. The number beyond
     /// the tolerance then has a binomial distribution, whatever the distribution of the errors.
@@ -107,7 +108,7 @@ impl Tolerance {
 }
 
 /// Returns the binomial probability that at most `beyond` of `poses` are beyond the tolerance, if
-/// each one is with `probability`.
+/// each pose is beyond it with this `probability`.
 fn at_most(poses: usize, beyond: usize, probability: f64) -> f64 {
     if beyond >= poses {
         return 1.0;
@@ -119,9 +120,9 @@ fn at_most(poses: usize, beyond: usize, probability: f64) -> f64 {
 /// Returns the lower confidence bound of a share if `within` of `poses` are within the tolerance.
 /// It is above the true share at most with the probability `risk`.
 fn lower_bound(poses: usize, within: usize, risk: f64) -> f64 {
-    // P(at most n − w beyond) falls from 1 to 0 as the share of those beyond rises.
-    let is_likely = |share: f64| at_most(poses, poses - within, 1.0 - share) <= risk;
-    if within == 0 { 0.0 } else { bisect(is_likely, (0.0, 1.0), BISECTIONS).0 }
+    // P(at most n − w beyond the tolerance) rises from 0 to 1 with the share within it.
+    let is_unlikely = |share: f64| at_most(poses, poses - within, 1.0 - share) <= risk;
+    if within == 0 { 0.0 } else { bisect(is_unlikely, (0.0, 1.0), BISECTIONS).0 }
 }
 
 #[cfg(test)]

@@ -49,8 +49,8 @@ impl Placement {
         self.target_of_row[row]
     }
 
-    /// Returns the root mean square over `rows` of the declared σ of a coordinate \[m\], or of
-    /// [`ASSUMED_SIGMA`] in rows without one.
+    /// Returns the root mean square over `rows` of the declared σ of a coordinate \[m\]; rows
+    /// without one have 1 mm.
     pub fn sigma(&self, measurements: &Measurements, rows: &[usize], problem: &Problem) -> f64 {
         let whole = problem.data.position_sigma.unwrap_or(ASSUMED_SIGMA);
         let squares = rows.iter().map(|&row| measurements.sigma_of(row).unwrap_or(whole).powi(2));
