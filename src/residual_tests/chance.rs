@@ -4,7 +4,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF as _, FisherSnedecor, Gamma
 
 use crate::numeric::bisect;
 
-/// Minimum number of draws that must reach a value for their share to estimate its probability.
+/// Minimum number of draws that must reach a value for their fraction to estimate its probability.
 /// With fewer, the tail is that of a fitted gamma distribution.
 const MIN_EXCEEDING_DRAWS: usize = 10;
 /// Smallest skewness of the fitted gamma distribution. At smaller skewness it equals a normal

@@ -39,13 +39,13 @@ pub(super) fn find<'a>(fit: &FitResidual<'a>, leverage: &Leverage, level: f64) -
     let tried = test(&f_statistics);
     let mut out = vec![false; poses];
     loop {
-        let far = largest_outliers(&f_statistics, level);
-        if far.is_empty() {
+        let outliers = largest_outliers(&f_statistics, level);
+        if outliers.is_empty() {
             break;
         }
         let pose_of = |number: usize| kept.as_ref().map_or(number, |kept| kept.poses[number]);
         let before = out.clone();
-        for number in far {
+        for number in outliers {
             out[pose_of(number)] = true;
         }
         if out.iter().filter(|&&out| out).count() > (poses / MIN_POSES_PER_OUTLIER).max(1) {
@@ -111,13 +111,14 @@ fn test(f_statistics: &[Option<FStatistic>]) -> Tried {
 /// one round removes.
 fn largest_outliers(f_statistics: &[Option<FStatistic>], level: f64) -> Vec<usize> {
     let count = f_statistics.len();
-    let far = |(number, f_statistic): (usize, &Option<FStatistic>)| {
+    let outliers = |(number, f_statistic): (usize, &Option<FStatistic>)| {
         let FStatistic { ratio, distribution } = f_statistic.as_ref()?;
         (!ratio.is_nan() && count as f64 * distribution.sf(*ratio) <= level)
             .then_some((number, *ratio))
     };
-    let mut far: Vec<(usize, f64)> = f_statistics.iter().enumerate().filter_map(far).collect();
-    far.sort_by(|a, b| b.1.total_cmp(&a.1));
-    far.truncate((count / POSES_PER_REMOVAL).max(1));
-    far.into_iter().map(|(number, _)| number).collect()
+    let mut outliers: Vec<(usize, f64)> =
+        f_statistics.iter().enumerate().filter_map(outliers).collect();
+    outliers.sort_by(|a, b| b.1.total_cmp(&a.1));
+    outliers.truncate((count / POSES_PER_REMOVAL).max(1));
+    outliers.into_iter().map(|(number, _)| number).collect()
 }

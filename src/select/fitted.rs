@@ -26,8 +26,8 @@ const MAX_CONCENTRATION_STEPS: usize = 10;
 /// Largest work of one least-squares solve, in poses × unknowns², at which outliers are searched
 /// again. Otherwise those of the previous fit are kept, because a search takes about ten solves.
 const MAX_OUTLIER_WORK: f64 = 2e8;
-/// Largest root mean square change of the residuals between a fit that was stopped early and the
-/// converged one, in units of σ. Up to it, evidence about the former remains valid.
+/// Largest root mean square difference of the residuals, in units of σ, between a fit that was
+/// stopped early and the converged one, at which evidence about the former remains valid.
 const MAX_UNSETTLED: f64 = 0.05;
 /// Fraction of the noise variance that is added to the residual's covariance 1 − H of each pose, so
 /// that it stays invertible along directions that the pose alone determines.
@@ -42,17 +42,17 @@ pub(super) struct Fitted {
     pub model: Model,
     /// Result of the fit.
     pub found: Identification,
-    /// Indices of the fitted parameters that are not at a bound.
+    /// Indices in the model of the fitted parameters that are not at a bound.
     pub unknowns: Vec<usize>,
     /// Coefficients of the active constraints, shape = (constraints, unknowns).
     active: DMatrix<f64>,
-    /// Standard deviation (1 σ) of a coordinate in rows without a declared σ \[m\].
+    /// Standard deviation (1 σ) of a measured coordinate in rows without a declared σ \[m\].
     pub sigma: f64,
     /// Table indices of the outliers, which get practically no weight in the linear neighbourhood
     /// and in the evidence.
     pub set_aside: Vec<usize>,
     /// Linear neighbourhood at the identification rows, computed on first use.
-    around: OnceLock<Arc<LinearNeighbourhood>>,
+    at_rows: OnceLock<Arc<LinearNeighbourhood>>,
     /// Derivatives at the fit, cached if there are many unknowns.
     derivatives: Arc<Mutex<Option<Arc<Derivatives>>>>,
 }
@@ -116,7 +116,7 @@ impl Fitted {
         };
         let outliers_of_fit: Vec<usize> =
             found.outliers.iter().map(|outlier| outlier.row).collect();
-        let (around, derivatives) = (OnceLock::new(), Arc::default());
+        let (at_rows, derivatives) = (OnceLock::new(), Arc::default());
         let mut fitted = Self {
             problem,
             model,
@@ -125,7 +125,7 @@ impl Fitted {
             active,
             sigma,
             set_aside: Vec::new(),
-            around,
+            at_rows,
             derivatives,
         };
         let work = data.rows().len() as f64 * (fitted.unknowns.len() as f64).powi(2);
@@ -289,12 +289,12 @@ impl Fitted {
     }
 
     /// Returns the linear neighbourhood of the fit at the identification rows, computed once.
-    pub fn around(&self, data: &Data) -> Arc<LinearNeighbourhood> {
-        if let Some(cached) = self.around.get() {
+    pub fn neighbourhood_at_rows(&self, data: &Data) -> Arc<LinearNeighbourhood> {
+        if let Some(cached) = self.at_rows.get() {
             return Arc::clone(cached);
         }
         let new = Arc::new(self.neighbourhood(&self.linearised(data, &[])));
-        Arc::clone(self.around.get_or_init(|| new))
+        Arc::clone(self.at_rows.get_or_init(|| new))
     }
 
     /// Returns this fit with no row treated as an outlier.
@@ -307,7 +307,7 @@ impl Fitted {
     pub fn with_outliers(&self, rows: Vec<usize>) -> Self {
         Self {
             set_aside: rows,
-            around: OnceLock::new(),
+            at_rows: OnceLock::new(),
             derivatives: Arc::default(),
             ..self.clone()
         }
@@ -436,11 +436,12 @@ fn find_outliers(fitted: &Fitted, data: &Data) -> Vec<usize> {
     let mut aside: Vec<usize> = (0..rows.len()).filter(|&k| !kept.contains(&rows[k])).collect();
     for _ in 0..MAX_CONCENTRATION_STEPS {
         let squares = squared_distances(fitted, &linearised, &aside);
-        let far = squares.iter().filter(|square| **square > OUTLIER_SQUARED_DISTANCE).count();
-        if far > allowed(rows.len()) {
+        let outlier_count =
+            squares.iter().filter(|square| **square > OUTLIER_SQUARED_DISTANCE).count();
+        if outlier_count > allowed(rows.len()) {
             return Vec::new();
         }
-        let next = worst(&squares, far);
+        let next = worst(&squares, outlier_count);
         if next == aside {
             break;
         }

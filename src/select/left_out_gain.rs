@@ -16,7 +16,7 @@ impl LeftOutGain {
         let of_both = |row: &usize| old.set_aside.contains(row);
         let aside: Vec<usize> = new.set_aside.iter().copied().filter(of_both).collect();
         let squares = |fitted: &Fitted| {
-            let fit = fitted.with_outliers(aside.clone()).around(data);
+            let fit = fitted.with_outliers(aside.clone()).neighbourhood_at_rows(data);
             let blocks = fit.left_out_squares(&data.block)?;
             Some(blocks.into_iter().map(|sum| sum * fitted.sigma.powi(2)).collect::<Vec<f64>>())
         };

@@ -25,7 +25,7 @@ use crate::measurement::NestReading;
 use crate::model::parameter::{ParameterSite, Regressor};
 use crate::problem::{Effect, PoseView, Problem};
 
-/// Twice the log odds at which readings decide: 100 to 1.
+/// Twice ln of the odds of 100 to 1, at which readings confirm or contradict an effect.
 const MIN_TWICE_LN_ODDS: f64 = 9.21;
 
 /// Outcome of a reference check.

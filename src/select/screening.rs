@@ -101,7 +101,7 @@ pub(super) fn trace_fit(fitted: &Fitted, data: &Data) -> Trace {
     let rules = data.rules;
     let Candidates { testable, mut untestable } = Candidates::new(&fitted.problem, data);
     let linearised = fitted.linearised(data, &testable);
-    let scan = Scan::new(&linearised, fitted.around(data), testable);
+    let scan = Scan::new(&linearised, fitted.neighbourhood_at_rows(data), testable);
     untestable.extend(scan.refused.iter().map(|effect| (effect.clone(), NOT_FINITE)));
     let mut best: Vec<Tried> = Vec::new();
     for tried in scan.ranking() {

@@ -27,8 +27,8 @@ pub struct Side {
     /// Smallest size at which a scan of the whole catalogue finds the effect. It is the size of the
     /// parameters that have the unit of the first parameter.
     pub found: Size,
-    /// Smallest size of the effect at which the other effect is ruled out as the cause, at the
-    /// level of the loop.
+    /// Smallest size of the effect at which the other effect alone is rejected as the cause, at the
+    /// significance level [`SelectionRules::level`].
     pub told: Size,
     test: Option<ScanTest>,
 }

@@ -51,8 +51,8 @@ pub(super) const MAX_SHIFT_TIMES: usize = 200;
 /// Highest order of a wave [cycles per revolution], integer or not. It is about the number of teeth
 /// of a strain-wave gear, twice its ratio.
 pub(super) const MAX_WAVE_ORDER: f64 = 320.0;
-/// Log odds of 20 to 1 at which another value of an argument (order or time) is added as a
-/// hypothesis besides a listed one.
+/// ln of the odds (20 to 1) over the listed values at which another value of an argument (order or
+/// time) becomes a hypothesis.
 pub(super) const LN_ODDS_OF_ANOTHER_ARGUMENT: f64 = 3.0;
 
 // The following constants concern the beam search over sets of hypotheses.

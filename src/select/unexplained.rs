@@ -58,7 +58,7 @@ pub struct Curve {
     pub covariate: Covariate,
     /// Unit of the corrected coordinate: an angle or a length.
     pub unit: Unit,
-    /// Correction and partial residual of each identification pose, in order of the covariate.
+    /// Correction and partial residual of each identification pose, in the order of the rows.
     pub points: Vec<PartialResidual>,
 }
 
@@ -101,7 +101,7 @@ pub(super) fn without_law(
         let found = Unexplained {
             site: Some(hypothesis.site),
             depends_on: hypothesis.depends_on.clone(),
-            p_value: evidence.chance(best).min(odds_against(claims.law.1)),
+            p_value: evidence.p_value_limit(best).min(odds_against(claims.law.1)),
             claims: Some(claims),
             correction: None,
         };
@@ -121,8 +121,8 @@ pub(super) fn without_law(
     listed.into_iter().map(|(_, found)| found).collect()
 }
 
-/// Returns the structure that the residual tests detect, with unknown site and quantities; `None`
-/// if they detect none.
+/// Returns the structure that the residual tests detect, with unknown site and the quantity of the
+/// test with the smallest p-value; `None` if no test detects structure.
 pub(super) fn unlocated(tests: &ResidualTests) -> Option<Unexplained> {
     if !tests.is_structured() {
         return None;
@@ -162,7 +162,7 @@ fn correction(
     let hypotheses = Hypotheses::only(fitted, data, &rows, here.len(), hypothesis);
     let function_columns = hypotheses.form(best, hypothesis, (shape, here.len()))?;
     let linearised = fitted.linearised(data, &[]);
-    let fit = fitted.around(data);
+    let fit = fitted.neighbourhood_at_rows(data);
     let first = 3 * here.len();
     let (function_columns, beyond) =
         (function_columns.rows(0, first).into_owned(), function_columns.rows_range(first..));

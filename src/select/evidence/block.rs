@@ -94,16 +94,21 @@ fn times_grouped(
     groups: &[Option<usize>],
 ) -> DMatrix<f64> {
     let group_count = group_count(groups);
-    let mut all = DMatrix::zeros(rows.nrows(), levers.ncols() * group_count);
+    let mut product = DMatrix::zeros(rows.nrows(), levers.ncols() * group_count);
     for (pose, group) in
         groups.iter().enumerate().filter_map(|(pose, group)| Some((pose, (*group)?)))
     {
         let here = rows.columns(3 * pose, 3);
         for (k, lever) in levers.column_iter().enumerate() {
-            all.column_mut(k * group_count + group).gemv(1.0, &here, &lever.rows(3 * pose, 3), 1.0);
+            product.column_mut(k * group_count + group).gemv(
+                1.0,
+                &here,
+                &lever.rows(3 * pose, 3),
+                1.0,
+            );
         }
     }
-    all
+    product
 }
 
 /// Returns AᵀA and Aᵀr of the columns A of [`Design::Grouped`], with the fitted parameters
@@ -174,17 +179,21 @@ impl Block {
     /// Creates a block from each design of root mean square 1, the logarithm of its prior
     /// probability, and the prior on its coefficients. All columns are projected in one product,
     /// which is faster.
-    pub fn all(designs: Vec<(Design, f64, Coefficients)>, fit: &LinearNeighbourhood) -> Vec<Self> {
+    pub fn dense_columns(
+        designs: Vec<(Design, f64, Coefficients)>,
+        fit: &LinearNeighbourhood,
+    ) -> Vec<Self> {
         let dense = designs.iter().filter_map(|(design, ..)| {
             if let Design::Dense(columns) = design { Some(columns) } else { None }
         });
         let rows = designs.first().map_or(0, |(design, ..)| design.values().nrows());
-        let mut all = DMatrix::zeros(rows, dense.clone().map(DMatrix::ncols).sum());
+        let mut dense_columns = DMatrix::zeros(rows, dense.clone().map(DMatrix::ncols).sum());
         let columns = dense.flat_map(DMatrix::column_iter);
-        all.column_iter_mut()
+        dense_columns
+            .column_iter_mut()
             .zip(columns)
             .for_each(|(mut target, column)| target.copy_from(&column));
-        let all_projected = fit.projected_out(&all);
+        let all_projected = fit.projected_out(&dense_columns);
         let mut first = 0;
         let of = |(design, ln_prior, coefficients): (Design, f64, Coefficients)| {
             let (columns, normal) = match design {

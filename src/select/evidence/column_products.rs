@@ -87,14 +87,14 @@ pub(super) fn form_products(members: &[&Member], others: &[usize], blocks: &[Blo
             return;
         }
         let columns: Vec<&DMatrix<f64>> = missing.iter().map(|(_, columns)| *columns).collect();
-        let all = products_together(&lacking, &columns);
+        let product_of_lacking = products_together(&lacking, &columns);
         let mut row = 0;
         for member in lacking {
             let (count, mut column) = (member.columns.ncols(), 0);
             for (other, columns) in &missing {
                 let cell = &member.products[*other];
                 if cell.get().is_none() {
-                    let product = all.view((row, column), (count, columns.ncols()));
+                    let product = product_of_lacking.view((row, column), (count, columns.ncols()));
                     // Another thread may have formed the same numbers meanwhile.
                     let _ = cell.set(product.into_owned());
                 }

@@ -175,7 +175,7 @@ impl<'a, 'l> Columns<'a, 'l> {
         // many poses.
         let lengths = SMOOTH_LENGTHS;
         for site in geometry_sites(self.problem) {
-            let Some(at) = self.linearised.place(site) else { continue };
+            let Some(at) = self.linearised.column_at(site) else { continue };
             let moving = self.is_command_coordinate(site);
             let (family, lengths_here) =
                 if moving { ("smooth", &lengths[..]) } else { ("smooth elsewhere", &lengths[..2]) };
@@ -289,7 +289,7 @@ impl<'a, 'l> Columns<'a, 'l> {
             JointKind::Prismatic => JointField::D,
             _ => JointField::Theta,
         };
-        let Some(at) = self.linearised.place(ParameterSite::Joint { joint, field: coordinate })
+        let Some(at) = self.linearised.column_at(ParameterSite::Joint { joint, field: coordinate })
         else {
             return values;
         };
@@ -318,7 +318,7 @@ impl<'a, 'l> Columns<'a, 'l> {
             (JointField::LateralX, JointField::Alpha),
         ];
         let of = |joint: usize, (gives, turns): (JointField, JointField)| {
-            let at = |field| self.linearised.place(ParameterSite::Joint { joint, field });
+            let at = |field| self.linearised.column_at(ParameterSite::Joint { joint, field });
             let (gives, turns) = (at(gives)?, at(turns)?);
             let lever = |k: usize| turns.rows(3 * k, 3).norm_squared();
             let longest = (0..turns.len() / 3).map(lever).fold(0.0, f64::max);

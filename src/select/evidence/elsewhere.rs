@@ -19,7 +19,7 @@ impl Columns<'_, '_> {
     /// of one covariate, or of the measured position.
     pub(super) fn add_measurement_functions(&mut self, recorded: &[SampledCovariate]) {
         let axes: Vec<DVector<f64>> = (0..3)
-            .filter_map(|axis| self.linearised.place(ParameterSite::Shift { axis }))
+            .filter_map(|axis| self.linearised.column_at(ParameterSite::Shift { axis }))
             .collect();
         if axes.len() < 3 {
             return;
@@ -93,8 +93,9 @@ impl Columns<'_, '_> {
     /// Adds rotations of the base as smooth functions of quantities other than commands and
     /// directions of approach, such as temperature, time or payload.
     pub(super) fn add_base_rotations(&mut self, recorded: &[SampledCovariate]) {
-        let axes: Vec<DVector<f64>> =
-            (0..3).filter_map(|axis| self.linearised.place(ParameterSite::Turn { axis })).collect();
+        let axes: Vec<DVector<f64>> = (0..3)
+            .filter_map(|axis| self.linearised.column_at(ParameterSite::Turn { axis }))
+            .collect();
         let (site, at) = (ParameterSite::Turn { axis: 0 }, axes.iter().collect::<Vec<_>>());
         let is_command = |of: &&SampledCovariate| {
             matches!(of.covariate, Covariate::Command(_) | Covariate::Approach(_))
@@ -107,7 +108,7 @@ impl Columns<'_, '_> {
     /// Adds a free displacement of every configuration, shared by all positions measured in it.
     pub(super) fn add_repeats(&mut self) {
         let axes: Vec<DVector<f64>> = (0..3)
-            .filter_map(|axis| self.linearised.place(ParameterSite::Shift { axis }))
+            .filter_map(|axis| self.linearised.column_at(ParameterSite::Shift { axis }))
             .collect();
         let poses = self.linearised.poses();
         let configurations: Vec<Vec<u64>> =
@@ -138,7 +139,7 @@ impl Columns<'_, '_> {
             for fields in [&BeamField::STRAINS[1..], &BeamField::STRAINS[..1]] {
                 let column = |&field: &BeamField| {
                     self.linearised
-                        .place(ParameterSite::Beam { joint, field })
+                        .column_at(ParameterSite::Beam { joint, field })
                         .filter(|column| column.norm_squared() > 0.0)
                 };
                 let columns: Vec<DVector<f64>> = fields.iter().filter_map(column).collect();

@@ -5,7 +5,8 @@
 use crate::problem::Effect;
 use crate::select::settings::{PRIOR_OF_FUNCTIONS, PRIOR_OF_RIGID_LINKS};
 
-/// Families of the hypotheses about a residual: the functions or effects of one type.
+/// Families of the hypotheses about a residual. A family holds the effects of one name, or the
+/// functions without a law of one type.
 #[derive(Default)]
 pub(super) struct Families(Vec<Family>);
 

@@ -56,7 +56,7 @@ pub(super) fn finer_candidates(
             // two members.
             let place =
                 |k: usize| hypotheses.candidates[k].hypothesis.effect().map(Effect::name_and_place);
-            let without_own =
+            let without_member =
                 set.members.iter().copied().filter(|&other| other != member).collect();
             let without_alike = set
                 .members
@@ -64,7 +64,7 @@ pub(super) fn finer_candidates(
                 .copied()
                 .filter(|&other| place(other) != place(member))
                 .collect();
-            let mut reduced_sets: Vec<Vec<usize>> = vec![without_own, without_alike];
+            let mut reduced_sets: Vec<Vec<usize>> = vec![without_member, without_alike];
             reduced_sets.dedup();
             for rest in &reduced_sets {
                 let Some(left) = reduced_by(rest, products) else { continue };

@@ -71,7 +71,7 @@ impl Shape {
 /// Covariate with its value in every pose.
 pub(super) struct SampledCovariate {
     pub covariate: Covariate,
-    /// Value of the covariate in every pose, SI.
+    /// Value of the covariate in every pose, SI, temperatures in °C.
     pub values: Vec<f64>,
     /// Values scaled so that the range is 0 to 1; values outside are clamped to the nearer end.
     pub scaled: Vec<f64>,

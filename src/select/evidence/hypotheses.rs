@@ -361,7 +361,7 @@ impl<'a> Hypotheses<'a> {
             hypothesis.coordinate.filter(|site| matches!(site, ParameterSite::Joint { .. }))?;
         let mut covariates = self.covariates(hypothesis);
         let (only, None) = (covariates.next()?, covariates.next()) else { return None };
-        Some((only.covariate.clone(), site, &only.values, self.linearised.place(site)?))
+        Some((only.covariate.clone(), site, &only.values, self.linearised.column_at(site)?))
     }
 }
 

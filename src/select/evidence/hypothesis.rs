@@ -14,7 +14,7 @@ use crate::residual_tests::Covariate;
 pub enum Site {
     /// Joint, counted from 0.
     Joint(usize),
-    /// Link before a joint, counted from 0.
+    /// Link before the joint with this index, counted from 0.
     LinkBefore(usize),
     /// Base, or the ground below it.
     Base,

@@ -123,7 +123,7 @@ fn coefficient_columns(
     let lever = sites
         .iter()
         .find(|at| !at.is_coordinate() && at.name == site)
-        .and_then(|at| linearised.place(at.lever));
+        .and_then(|at| linearised.column_at(at.lever));
     let Some(lever) = lever else {
         return linearised.columns(effect).columns(0, count).into_owned();
     };
@@ -386,7 +386,7 @@ impl Search<'_, '_, '_> {
         let Self { hypotheses, fitted, data, .. } = *self;
         let problem = &fitted.problem;
         let linearised = &hypotheses.linearised;
-        let lever = linearised.place(at.lever).filter(|lever| lever.norm_squared() > 0.0);
+        let lever = linearised.column_at(at.lever).filter(|lever| lever.norm_squared() > 0.0);
         let Some(lever) = lever else { return Vec::new() };
         let (less, product) = along_lever(left, products, (&lever, kept));
         let of_pose = |pose: &usize| lever.rows(3 * pose, 3);

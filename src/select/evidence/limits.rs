@@ -21,9 +21,10 @@ use crate::select::neighbourhood::Linearised;
 const MIN_SINGULAR_VALUE: f64 = 1e-9;
 
 /// Returns the hypotheses that a limit (bound or constraint) is wrong, one for each limit that is
-/// active in the fit `fitted`. The column of each is the derivative of the residual along the
-/// direction that opens without that limit, from `linearised`. Evidence is evaluated on the first
-/// `evidence_poses` poses. Together the hypotheses have the prior probability exp(`ln_family`).
+/// active in the fit `fitted`. The column of each is the derivative of the residual, from
+/// `linearised`, along the direction of the parameters that is free without that limit. Evidence is
+/// evaluated on the first `evidence_poses` poses. Together the hypotheses have the prior
+/// probability exp(`ln_family`).
 pub(super) fn limits(
     fitted: &Fitted,
     linearised: &Linearised,

@@ -246,8 +246,8 @@ fn with_prior(gram: &DMatrix<f64>, precision: f64) -> DMatrix<f64> {
 /// Returns ln Π c dⱼ, given c = `size` and the factors dⱼ. A few factors are multiplied at a time,
 /// so that no product overflows.
 fn ln_product(diagonal: &DVector<f64>, size: f64) -> f64 {
-    let all: Vec<f64> = diagonal.iter().map(|entry| entry * size).collect();
-    all.chunks(16).map(|some| some.iter().product::<f64>().ln()).sum()
+    let scaled: Vec<f64> = diagonal.iter().map(|entry| entry * size).collect();
+    scaled.chunks(16).map(|some| some.iter().product::<f64>().ln()).sum()
 }
 
 /// Prior on the coefficients of a block.
@@ -317,8 +317,9 @@ pub(super) fn ln_likelihood_of_block(
             .collect();
         ln_likelihood_of_columns(&single, squares_and_freedom, grid, (&sizes, &[sign])).0
     };
-    let all: Vec<f64> = std::iter::once(whole).chain((0..gram.ncols()).map(ln_of_column)).collect();
-    (ln_sum(all.iter().copied()) - (all.len() as f64).ln(), size)
+    let terms: Vec<f64> =
+        std::iter::once(whole).chain((0..gram.ncols()).map(ln_of_column)).collect();
+    (ln_sum(terms.iter().copied()) - (terms.len() as f64).ln(), size)
 }
 
 /// Returns ln p(r | columns), averaged over the trial `sizes`, and the most probable size, for all

@@ -68,25 +68,28 @@ pub(super) fn promising(
                 &fitted.problem,
             )
         };
-        let some: Vec<Candidate> = effects.iter().filter_map(candidate_of_effect).collect();
+        let candidates: Vec<Candidate> = effects.iter().filter_map(candidate_of_effect).collect();
         let blocks = Candidate::blocks(
-            &some.iter().collect::<Vec<_>>(),
+            &candidates.iter().collect::<Vec<_>>(),
             (fitted, &products.target.fit),
             left_out,
         );
         let odds: Vec<Vec<f64>> =
             reduced_problems.iter().map(|left| left.ln_odds_of(&blocks)).collect();
-        some.into_iter()
+        candidates
+            .into_iter()
             .enumerate()
             .map(|(k, candidate)| (candidate, odds.iter().map(|of| of[k]).collect()))
             .collect()
     };
-    let all: Vec<(Candidate, Vec<f64>)> =
+    let moves_with_odds: Vec<(Candidate, Vec<f64>)> =
         new.par_chunks(HYPOTHESES_PER_PROJECTION).flat_map_iter(ln_odds_of).collect();
     let mut found: Vec<Candidate> = Vec::new();
     for k in 0..reduced_problems.len() {
-        let best =
-            all.iter().filter(|(_, odds)| odds[k] > 0.0).max_by(|a, b| a.1[k].total_cmp(&b.1[k]));
+        let best = moves_with_odds
+            .iter()
+            .filter(|(_, odds)| odds[k] > 0.0)
+            .max_by(|a, b| a.1[k].total_cmp(&b.1[k]));
         if let Some((best, _)) = best
             && !found.iter().any(|other| other.hypothesis == best.hypothesis)
         {

@@ -78,7 +78,7 @@ impl Evidence {
     /// Returns an upper limit of the probability that noise and fewer hypotheses than in `best`
     /// cause such strong evidence for as many as in `best`. A likelihood ratio exceeds B at most
     /// with probability 1/B [Ville 1939].
-    pub fn chance(&self, best: &HypothesisSet) -> f64 {
+    pub fn p_value_limit(&self, best: &HypothesisSet) -> f64 {
         let is_fewer = |set: &&HypothesisSet| set.hypotheses.len() < best.hypotheses.len();
         let fewer: f64 = self.sets.iter().filter(is_fewer).map(|set| set.probability).sum();
         odds_against(1.0 - fewer)
@@ -87,7 +87,7 @@ impl Evidence {
     /// Returns sets in which an effect replaces one member of `best`: the `most` most probable
     /// ones, and the best replacement of each member. Hypotheses about wrong limits are not
     /// replaced.
-    pub(in crate::select) fn exchanged(
+    pub(in crate::select) fn rival_sets(
         &self,
         best: &HypothesisSet,
         most: usize,

@@ -58,7 +58,7 @@ pub(super) struct CachedProducts {
     settled: Cache<SizedSet, (Vec<f64>, f64)>,
 }
 
-/// Gain in ln p(r) of each hypothesis, by its index, with its most probable size.
+/// Gain in ln p(r) by each hypothesis, and its most probable size, by the index of the hypothesis.
 type Gains = BTreeMap<usize, (f64, f64)>;
 
 /// Key of a set: its members with the bit patterns of their sizes, in order.
@@ -298,7 +298,7 @@ impl ReducedProblem<'_, '_> {
     /// Returns the matrix Z, which reduces columns and residuals by the set.
     pub fn reach(&self) -> &DMatrix<f64> {
         self.reach.get_or_init(|| {
-            let mut all = DMatrix::zeros(
+            let mut reach = DMatrix::zeros(
                 self.residual_along.len(),
                 self.products.target.fit.residual().len(),
             );
@@ -308,10 +308,10 @@ impl ReducedProblem<'_, '_> {
                 // The factor is lower triangular, so that only its rows below `first` contribute.
                 let below = self.within.nrows() - first;
                 let block_of_within = self.within.view((first, first), (below, transposed.nrows()));
-                all.rows_range_mut(first..).gemm(1.0, &block_of_within, transposed, 1.0);
+                reach.rows_range_mut(first..).gemm(1.0, &block_of_within, transposed, 1.0);
                 first += transposed.nrows();
             }
-            all
+            reach
         })
     }
 

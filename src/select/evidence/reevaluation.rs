@@ -19,7 +19,7 @@ use super::products::{Products, ResidualModel};
 use super::search::{EvaluatedSet, reduced_by, search};
 use crate::problem::Effect;
 
-/// Smallest probability of a set whose hypotheses are evaluated again without some poses.
+/// Smallest probability of a set whose hypotheses are included in evaluations without some poses.
 const MIN_REPEATED_PROBABILITY: f64 = 1e-3;
 
 /// Fit with the probable hypotheses about its residual, which are evaluated again with some poses
@@ -40,16 +40,16 @@ impl<'a> Reevaluation<'a> {
         hypotheses: &'a Hypotheses<'a>,
         (evidence, best): (&Evidence, &'a HypothesisSet),
     ) -> Self {
-        let worth = || {
+        let probable_sets = || {
             evidence
                 .sets
                 .iter()
-                .filter(|member| member.probability > MIN_REPEATED_PROBABILITY)
+                .filter(|set| set.probability > MIN_REPEATED_PROBABILITY)
                 .chain([best])
         };
-        let all = || worth().flat_map(|member| member.hypotheses.iter().zip(&member.functions));
+        let members = || probable_sets().flat_map(|set| set.hypotheses.iter().zip(&set.functions));
         let is_probable = |candidate: &Candidate| {
-            all().any(|(member, (variant, _))| {
+            members().any(|(member, (variant, _))| {
                 *variant == candidate.variant && *member == candidate.hypothesis
             })
         };

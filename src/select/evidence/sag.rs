@@ -41,7 +41,7 @@ impl Columns<'_, '_> {
             .filter(|&j| self.problem.joints[j].kind == JointKind::Revolute)
         {
             let site = ParameterSite::Joint { joint, field: JointField::Theta };
-            let Some(lever) = self.linearised.place(site) else { continue };
+            let Some(lever) = self.linearised.column_at(site) else { continue };
             let Some(columns) = self.sag_columns(joint, &lever) else { continue };
             let site = Site::Joint(joint);
             let hypothesis = Hypothesis {

@@ -335,8 +335,8 @@ fn members_and_pairs(members: &[usize]) -> Vec<Vec<usize>> {
 /// Returns ln p(r | all blocks together), up to a constant, plus ln of their prior; `None` if a
 /// factorisation fails.
 pub(super) fn ln_posterior(products: &Products) -> Option<f64> {
-    let all: Vec<usize> = (0..products.blocks.len()).collect();
-    Some(assembled(&all, products)?.ln_posterior + products.ln_density(products.squares))
+    let every: Vec<usize> = (0..products.blocks.len()).collect();
+    Some(assembled(&every, products)?.ln_posterior + products.ln_density(products.squares))
 }
 
 /// Returns the residual problem that a set with these members leaves at their most probable sizes;

@@ -85,7 +85,7 @@ pub(super) struct Waves<'w, 'h, 'a> {
     pub hypotheses: &'w Hypotheses<'h>,
     pub products: &'w Products<'a>,
     pub fitted: &'w Fitted,
-    /// Poses that are left out of the evidence.
+    /// Indices of the poses that are left out of the evidence.
     pub left_out: &'w [usize],
 }
 
@@ -375,7 +375,7 @@ impl Hypotheses<'_> {
             other => joint_and_order(other)?,
         };
         let command = self.sampled(&Covariate::Command(joint))?;
-        let at = self.linearised.place(ParameterSite::coordinate(problem, joint + 1))?;
+        let at = self.linearised.column_at(ParameterSite::coordinate(problem, joint + 1))?;
         let waves = DMatrix::from_fn(command.values.len(), 2, |row, k| {
             let (sin, cos) = (order * command.values[row]).sin_cos();
             if k == 0 { sin } else { cos }

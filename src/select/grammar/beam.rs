@@ -43,8 +43,8 @@ const MIN_BEAM_DIFFERENCE: f64 = 0.7;
 pub struct Scored {
     /// ln of the posterior: evidence times prior.
     pub ln_posterior: f64,
-    /// ln of the posterior if what the sum leaves of the explainable residual were noise of unknown
-    /// scale. By this score, simple terms are added first.
+    /// ln of the posterior, computed as if the part of the explainable residual that the sum leaves
+    /// were noise of unknown scale. By this score, simple terms are added first.
     guide: f64,
 }
 

@@ -297,7 +297,7 @@ impl<'a> Linearised<'a> {
     }
 
     /// Returns the column of a site, length 3 N; `None` if no column was computed for it.
-    pub fn place(&self, site: ParameterSite) -> Option<DVector<f64>> {
+    pub fn column_at(&self, site: ParameterSite) -> Option<DVector<f64>> {
         let &(_, place) = self.derivatives.places.iter().find(|(other, _)| *other == site)?;
         Some(self.derivatives.column(place).into_owned())
     }

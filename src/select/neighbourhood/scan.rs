@@ -118,9 +118,9 @@ impl<'a, 'l> Scan<'a, 'l> {
                 (gain.criterion + 2.0 * tries.ln(), (gain.p * tries).min(1.0));
             Some(Tried { index, gain, criterion, corrected })
         };
-        let mut all: Vec<Tried> = self.scores.iter().enumerate().filter_map(tried).collect();
-        all.sort_by(|a, b| a.criterion.total_cmp(&b.criterion));
-        all
+        let mut ranked: Vec<Tried> = self.scores.iter().enumerate().filter_map(tried).collect();
+        ranked.sort_by(|a, b| a.criterion.total_cmp(&b.criterion));
+        ranked
     }
 
     /// Returns false if a parameter that cannot be negative, such as a compliance or a mass, is
@@ -131,10 +131,10 @@ impl<'a, 'l> Scan<'a, 'l> {
             return true;
         }
         let scatter = (sums.squares / sums.freedom()).sqrt();
-        let fine = |((value, error), never): ((f64, f64), &bool)| {
+        let is_plausible = |((value, error), never): ((f64, f64), &bool)| {
             !never || value > -MAX_NEGATIVE_ERRORS * error * scatter
         };
-        score.estimates().into_iter().zip(never_negative).all(fine)
+        score.estimates().into_iter().zip(never_negative).all(is_plausible)
     }
 
     /// Returns the candidates whose columns the fitted parameters can reproduce completely.

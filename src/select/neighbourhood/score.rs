@@ -131,9 +131,10 @@ impl Score {
         let product = DVector::from_fn(k, |i, _| self.product[i] / scale[i]);
         let eigen = DMatrix::from_fn(k, k, |i, j| self.gram[(i, j)] / (scale[i] * scale[j]))
             .symmetric_eigen();
-        let all = eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter());
+        let directions = eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter());
         let is_seen = |(value, _): &(&f64, _)| **value > MIN_NEW_LENGTH.powi(2);
-        all.filter(is_seen)
+        directions
+            .filter(is_seen)
             .map(|(value, vector)| (*value, vector.into_owned(), vector.dot(&product)))
             .collect()
     }

@@ -191,7 +191,7 @@ pub(super) fn found(
 /// the effect, times the number of candidates tried. For a harmonic that is no periodic error with
 /// many orders, it is the smallest p-value of its orders.
 fn p_values(state: &SearchState, fitted: &Fitted, effects: &[Effect]) -> Vec<f64> {
-    let fit = fitted.around(state.data);
+    let fit = fitted.neighbourhood_at_rows(state.data);
     let tested: Vec<Vec<Effect>> =
         effects
             .iter()

@@ -148,7 +148,7 @@ fn smoothed(prior: &HarmonicPrior, expected: &[(u32, f64)]) -> HarmonicPrior {
 }
 
 /// Returns the indices of identification poses in each of [`RANGE_PARTS`] parts of the range of
-/// each moving joint; the parts contain equal numbers of poses.
+/// each moving joint; the parts of a joint contain about equal numbers of poses.
 fn parts_of_ranges(problem: &Problem, data: &Data) -> Vec<Vec<usize>> {
     let (rows, conditions) = (data.rows(), data.conditions(problem));
     let coordinate = |pose: usize, joint: usize| data.measurements.configuration(rows[pose])[joint];

@@ -61,7 +61,7 @@ fn better_argument(
     data: &Data,
     effect: &Effect,
 ) -> Option<Effect> {
-    let sums = fitted.around(data).sums();
+    let sums = fitted.neighbourhood_at_rows(data).sums();
     let variance = sums.squares / sums.freedom();
     let fit = fitted.neighbourhood_without(linearised, &fitted.unknowns_of(effect));
     let (mut best, mut gain_of_present) = ((f64::NEG_INFINITY, effect.clone()), f64::INFINITY);

@@ -58,11 +58,11 @@ fn settled_set(
         let Some(best) = evidence.certain_set(rules.inclusion_threshold) else {
             return Ok((fitted, Some(evidence)));
         };
-        let open = state.reconsidered(&fitted);
+        let reconsidered = state.reconsidered(&fitted);
         // Polished arguments are kept: they explain all rows, while the evidence uses only some
         // rows.
-        let stays = has_same_effects(best, &open, Effect::eq)
-            || is_polished && has_same_effects(best, &open, Effect::is_but_for_search);
+        let stays = has_same_effects(best, &reconsidered, Effect::eq)
+            || is_polished && has_same_effects(best, &reconsidered, Effect::is_but_for_search);
         if !stays {
             state.report_progress(1, 1);
             let effects = state.effects_of(&fitted, (&evidence, best));
@@ -142,26 +142,26 @@ fn fit_rivals(
     evidence: Evidence,
 ) -> Result<(Evidence, Option<Fitted>), IdentifyError> {
     let (data, rules) = (state.data, state.data.rules);
-    let open = state.reconsidered(fitted);
-    let held = evidence
-        .certain_set(rules.inclusion_threshold)
-        .filter(|best| !best.hypotheses.is_empty() && has_same_effects(best, &open, Effect::eq));
-    let Some(best) = held.cloned() else { return Ok((evidence, None)) };
+    let reconsidered = state.reconsidered(fitted);
+    let accepted = evidence.certain_set(rules.inclusion_threshold).filter(|best| {
+        !best.hypotheses.is_empty() && has_same_effects(best, &reconsidered, Effect::eq)
+    });
+    let Some(best) = accepted.cloned() else { return Ok((evidence, None)) };
     let ln_posterior_of = |fitted: &Fitted, functions: &[(Hypothesis, usize)], sigma: f64| {
         unless_stopped(data, || {
             ln_posterior(fitted, data, (&state.reconsidered(fitted), &evidence), (functions, sigma))
         })
     };
     let functions = best.without_law();
-    let mut rivals = evidence.exchanged(&best, MAX_RIVALS);
+    let mut rivals = evidence.rival_sets(&best, MAX_RIVALS);
     rivals.truncate(state.affordable_fits(fitted) - 1);
     let mut tried: Vec<(HypothesisSet, f64, Fitted)> = Vec::new();
     // The map holds ln posterior of the present set for each set of outliers.
-    let mut of_held: BTreeMap<BTreeSet<usize>, Option<f64>> = BTreeMap::new();
+    let mut ln_posterior_by_outliers: BTreeMap<BTreeSet<usize>, Option<f64>> = BTreeMap::new();
     let count = rivals.len();
     for (k, rival) in rivals.into_iter().enumerate() {
         state.report_progress(k + 1, count);
-        let kept = state.added(fitted).into_iter().filter(|effect| !open.contains(effect));
+        let kept = state.added(fitted).into_iter().filter(|effect| !reconsidered.contains(effect));
         let effects: Vec<Effect> = kept.chain(rival.effects()).collect();
         let next = state.fit(fitted, &effects)?;
         // Both sets are compared on the same rows.
@@ -171,14 +171,14 @@ fn fit_rivals(
             let fit = fit.with_outliers(aside.iter().copied().collect());
             ln_posterior_of(&fit, functions, fitted.sigma)
         };
-        let here = match of_held.get(&aside) {
+        let here = match ln_posterior_by_outliers.get(&aside) {
             Some(ln_posterior) => *ln_posterior,
             None => of(fitted, &functions)?,
         };
         if let Some((here, there)) = here.zip(of(&next, &rival.without_law())?) {
             tried.push((rival, there - here, next));
         }
-        of_held.insert(aside, here);
+        ln_posterior_by_outliers.insert(aside, here);
     }
     tried.sort_by(|a, b| b.1.total_cmp(&a.1));
     let mut ln_odds_of: Vec<(HypothesisSet, f64)> = Vec::new();
@@ -210,12 +210,12 @@ fn is_confirmed(
     fitted: &Fitted,
     functions: usize,
 ) -> Result<bool, IdentifyError> {
-    let open = state.reconsidered(fitted);
-    let evidence = unless_stopped(state.data, || evaluate(fitted, state.data, &open))?;
+    let reconsidered = state.reconsidered(fitted);
+    let evidence = unless_stopped(state.data, || evaluate(fitted, state.data, &reconsidered))?;
     let threshold = state.data.rules.inclusion_threshold;
     let best = evidence.as_ref().and_then(|evidence| evidence.certain_set(threshold));
     Ok(best.is_some_and(|best| {
-        has_same_effects(best, &open, Effect::eq) && best.without_law().len() <= functions
+        has_same_effects(best, &reconsidered, Effect::eq) && best.without_law().len() <= functions
     }))
 }
 

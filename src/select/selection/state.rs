@@ -12,8 +12,8 @@ use crate::select::fitted::Fitted;
 use crate::select::harmonic_prior::{HarmonicPrior, is_periodic_of_many_orders};
 use crate::select::settings::MAX_RECONSIDERED;
 
-/// Number of solver steps that an intermediate fit may take for each fit of its size allowed by the
-/// budget `fit_work`.
+/// Number of solver steps that an intermediate fit may take, as a multiple of the number of fits of
+/// this size that the budget `fit_work` allows.
 const STEPS_PER_PAID_FIT: u64 = 4;
 
 /// Result of one round of the loop.
@@ -109,8 +109,8 @@ impl<'a> SearchState<'a> {
 
     /// Returns the added effects that stay in the fit while evidence is evaluated.
     fn retained_effects(&self, fitted: &Fitted) -> Vec<Effect> {
-        let open = self.reconsidered(fitted);
-        self.added(fitted).into_iter().filter(|effect| !open.contains(effect)).collect()
+        let reconsidered = self.reconsidered(fitted);
+        self.added(fitted).into_iter().filter(|effect| !reconsidered.contains(effect)).collect()
     }
 
     /// Evaluates the evidence about a fit; `None` if its residual is not finite.
@@ -218,7 +218,7 @@ impl<'a> SearchState<'a> {
         let rows = self.data.evidence_rows();
         let site = ParameterSite::coordinate(&fitted.problem, joint);
         let linearised = fitted.linearised_with(self.data, &rows, &[], &[site]);
-        let lever = linearised.place(site).map_or(0.0, |lever| lever.norm_squared());
+        let lever = linearised.column_at(site).map_or(0.0, |lever| lever.norm_squared());
         let squares = f64::from(highest) * lever / (3 * rows.len()) as f64;
         if squares > 0.0 { size / squares.sqrt() } else { size }
     }
