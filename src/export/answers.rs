@@ -1,4 +1,4 @@
-//! Poses with the results of this library, by which the generated code is tested.
+//! Poses with the results of this library, against which the generated C code is tested.
 
 use nalgebra::{DVector, UnitQuaternion, Vector3};
 use rand::RngExt as _;
@@ -14,13 +14,13 @@ use crate::spatial::rotation_axes;
 
 /// Seed of the random poses.
 const SEED: u64 = 0x6578_706f_7274;
-/// Half-width of the range of commands without limits, \[rad\] and \[m\].
-const UNLIMITED_HALF_WIDTH: (f64, f64) = (3.0, 0.5);
-/// Half-width of the range of temperatures about the reference \[K\].
+/// Largest magnitude of a random command, \[rad\] of a revolute and \[m\] of a prismatic joint.
+const MAX_COMMAND: (f64, f64) = (3.0, 0.5);
+/// Half-width of the range of random temperatures about the reference \[K\].
 const TEMPERATURE_HALF_WIDTH: f64 = 10.0;
-/// Half-width of the range of the hoist force about the declared one, as a fraction of it.
+/// Half-width of the range of random hoist forces about the declared one, as a fraction of it.
 const HOIST_HALF_WIDTH: f64 = 0.1;
-/// Longest time of a pose after the first one \[s\].
+/// Longest random time of a pose after the first one \[s\].
 const MAX_TIME: f64 = 3600.0;
 
 /// Poses of a test, with the results that this library computes for them.
@@ -28,15 +28,15 @@ const MAX_TIME: f64 = 3600.0;
 pub struct Answers {
     /// Names of the bases, in the order of the generated code.
     pub bases: Vec<String>,
-    /// Names of the targets.
+    /// Names of the targets, in the order of the generated code.
     pub targets: Vec<String>,
     /// Input and output numbers of each pose, in the order that the test program reads.
     pub rows: Vec<Vec<f64>>,
 }
 
 /// Draws `count` poses within the limits of the joints and predicts them with the identified arm.
-/// For the first `commands` poses it also computes the command by which the arm reaches the nominal
-/// arm's position. Poses without equilibrium are left out.
+/// For the first `commands` poses, the command is also computed by which the identified arm reaches
+/// the position of the nominal arm. Poses without equilibrium are left out.
 ///
 /// Returns the answers, with the model and full parameter vector for their bases and targets.
 ///
@@ -99,12 +99,12 @@ pub fn answers(
         line.extend(setup.covariates);
         line.resize(9 + 2 * rows.joints + problem.data.covariates.len(), 0.0);
         line.extend(position.iter());
-        line.extend(columns(&turn));
+        line.extend(axis_components(&turn));
         if let (Some(command), Some(goals)) = (found.get(row), &goals) {
             let orientation = goals.orientation(row).map(UnitQuaternion::scaled_axis);
             line.extend(goals.positions[row].iter());
             line.push(flag(orientation.is_some()));
-            line.extend(columns(&orientation.unwrap_or_default()));
+            line.extend(axis_components(&orientation.unwrap_or_default()));
             line.push(flag(command.is_reached()));
             line.extend(&command.configuration);
         } else {
@@ -118,25 +118,22 @@ pub fn answers(
     Ok((Answers { bases, targets, rows: numbers }, model, x))
 }
 
-/// Returns the nine components of the axes of a rotation vector \[rad\], axis by axis.
-fn columns(turn: &Vector3<f64>) -> Vec<f64> {
+/// Returns the nine components of the axes of a frame that is rotated by the rotation vector `turn`
+/// \[rad\], axis by axis.
+fn axis_components(turn: &Vector3<f64>) -> Vec<f64> {
     rotation_axes(turn).iter().flat_map(|axis| axis.iter().copied()).collect()
 }
 
-/// Returns the range from which commands of a joint are drawn: its limits, within
-/// [`UNLIMITED_HALF_WIDTH`].
+/// Returns the range from which commands of a joint are drawn \[rad\] or \[m\]: the limits of the
+/// joint, cut to ±[`MAX_COMMAND`].
 pub(super) fn command_range(joint: &Joint) -> (f64, f64) {
-    let wide = if joint.kind == JointKind::Prismatic {
-        UNLIMITED_HALF_WIDTH.1
-    } else {
-        UNLIMITED_HALF_WIDTH.0
-    };
+    let wide = if joint.kind == JointKind::Prismatic { MAX_COMMAND.1 } else { MAX_COMMAND.0 };
     let (low, high) = joint.limits;
     (low.max(-wide), high.min(wide))
 }
 
-/// Draws random poses over all bases and targets, and over those conditions on which predictions
-/// depend.
+/// Draws `count` poses with random commands and conditions. Bases and targets alternate from row to
+/// row.
 pub(super) fn random_rows(
     problem: &Problem,
     estimate: &SavedEstimate,
@@ -156,8 +153,8 @@ pub(super) fn random_rows(
     let mut list = |range: (f64, f64)| (0..count).map(|_| between(range)).collect::<Vec<f64>>();
     let first = estimate.start_times.as_ref().map_or(0.0, |starts| starts.first);
     let mut time = list((first, first + MAX_TIME));
-    // Time counts from the first row in commands, and from the first pose of the fit in
-    // predictions.
+    // Commands count the time from the first row, predictions from the first pose of the fit; the
+    // first row therefore has the time of that pose.
     if let Some(time) = time.first_mut() {
         *time = first;
     }

@@ -24,8 +24,8 @@ pub enum CameraFormat {
     Kalibr,
 }
 
-/// Returns the identified camera `name` as YAML, with the parameters `x` of the model; all cameras
-/// in the form of Kalibr. The name may be left out if the problem declares one camera.
+/// Returns the identified camera `name` as YAML; in the form of Kalibr, all cameras. `x` is the
+/// full parameter vector of the model. The name may be left out if the problem declares one camera.
 ///
 /// # Errors
 /// Returns an error if the problem has no such camera, the camera does not state the size of its
@@ -105,10 +105,13 @@ pub fn camera_yaml(
     .concat())
 }
 
-/// Camera matrix (row by row), distortion coefficients, and name of the distortion model in ROS.
+/// Lens of a camera as ROS and OpenCV describe it.
 struct Lens {
+    /// Camera matrix, row by row [px].
     matrix: [f64; 9],
+    /// Distortion coefficients, in the order of OpenCV.
     coefficients: Vec<f64>,
+    /// Name of the distortion model in ROS.
     model: &'static str,
 }
 
@@ -123,8 +126,8 @@ impl Lens {
     }
 }
 
-/// Returns the camera chain of Kalibr. The pose relative to the previous camera is written where
-/// one frame carries both.
+/// Returns the camera chain of Kalibr. A camera's pose relative to the previous one is written if
+/// both are mounted on the same frame.
 fn kalibr(
     problem: &Problem,
     cameras: &[(&Fixture, &FixtureValues<f64>)],
@@ -133,7 +136,7 @@ fn kalibr(
     for (k, (fixture, camera)) in cameras.iter().enumerate() {
         let [width, height] = image(fixture)?;
         let Lens { matrix: [fx, _, cx, _, fy, cy, ..], coefficients, model } = Lens::of(camera);
-        // Kalibr's radial-tangential model has k1, k2, p1, p2 alone.
+        // Kalibr's radial-tangential model only has k1, k2, p1 and p2.
         if coefficients.get(4).is_some_and(|k3| *k3 != 0.0) {
             return Err(ExportError::ThirdRadial { camera: fixture.name.clone() });
         }

@@ -1,10 +1,10 @@
-//! Errors of exports.
+//! Errors of exports of an identified arm.
 
 use crate::error::InputError;
 use crate::fit::{IdentifyError, PredictError, SavedEstimateError, StageError};
 use crate::measurement::DatasetError;
 
-/// Error of a model that cannot be written as C.
+/// Error of an identified arm that cannot be exported in the chosen form.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ExportError {
@@ -17,7 +17,7 @@ pub enum ExportError {
         /// Formula of the law.
         formula: String,
     },
-    /// A law follows the moments of the loads.
+    /// The formula of a law contains moments of the loads.
     #[error(
         "{formula} follows moments of the loads, which the generated code does not sum; identify \
          the problem without this effect and export that"
@@ -74,7 +74,7 @@ pub enum ExportError {
         /// Name of the camera.
         camera: String,
     },
-    /// A geometry fitted alone needs measurements.
+    /// The fit of a rigid model without effects needs measurements.
     #[error("--fitted-alone fits the measurements: name them with --data")]
     NeedsData,
     /// The rigid model cannot be fitted.

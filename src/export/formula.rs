@@ -10,7 +10,7 @@ use crate::model::parameter::Regressor;
 /// Number of table entries written on one line.
 const NUMBERS_PER_LINE: usize = 6;
 
-/// Returns the definitions of those functions that `code` calls and that C lacks.
+/// Returns the C definitions of those helper functions that `code` calls, such as the spline.
 pub(super) fn helpers(code: &str) -> String {
     let functions = include_str!("c/helpers.c").split_inclusive("}\n\n");
     let name =
@@ -19,7 +19,7 @@ pub(super) fn helpers(code: &str) -> String {
     functions.filter(is_called).collect()
 }
 
-/// Returns a number as a C constant.
+/// Returns a number as a C constant of type `real`; infinite numbers become ±10³⁰.
 pub(super) fn real(number: f64) -> String {
     if number.is_infinite() {
         return (if number > 0.0 { "R(1e30)" } else { "R(-1e30)" }).to_owned();
@@ -42,6 +42,9 @@ pub(super) fn array(text: &mut String, name: &str, values: &[f64]) {
 
 /// Returns the C expression for the value of a regressor in a pose. The parameters inside its
 /// formula are in the table of numbers from index `first` on.
+///
+/// # Errors
+/// Returns an error if the formula contains moments of the loads, or depends on earlier poses.
 pub(super) fn formula(regressor: &Regressor, first: usize) -> Result<String, ExportError> {
     let Some(expression) = super::numbers::expression(regressor) else {
         return Ok("R(1.0)".to_owned());
@@ -59,14 +62,19 @@ pub(super) fn formula(regressor: &Regressor, first: usize) -> Result<String, Exp
     Printer { first, reference, hoist }.print(&expression).ok_or_else(refuse)
 }
 
+/// Printer of expressions as C.
 struct Printer {
+    /// Index of the formula's first parameter in the table of numbers.
     first: usize,
+    /// Reference temperature [°C].
     reference: f64,
+    /// Hoist force of a pose that states none \[N\].
     hoist: f64,
 }
 
 impl Printer {
-    /// Returns the C text of an expression; `None` if it depends on earlier poses.
+    /// Returns the C text of an expression; `None` if it depends on earlier poses or on moments of
+    /// the loads.
     fn print(&self, expression: &Expression) -> Option<String> {
         Some(match expression {
             Expression::Number(number) => real(*number),
@@ -107,6 +115,7 @@ impl Printer {
         })
     }
 
+    /// Returns the C text of a quantity; `None` if the generated code cannot compute it.
     fn quantity(&self, quantity: Quantity) -> Option<String> {
         Some(match quantity {
             Quantity::Command(joint) => format!("pose->q[{joint}]"),

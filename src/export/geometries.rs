@@ -1,4 +1,4 @@
-//! Rigid geometries that may stand for a whole model, and their errors on held-out rows.
+//! Rigid geometries that may replace a whole model, and their errors on held-out rows.
 
 use nalgebra::DVector;
 
@@ -15,11 +15,11 @@ use crate::remainder::Correction;
 /// Choice of the rigid geometry to export.
 #[derive(Debug, Clone)]
 pub enum GeometryChoice {
-    /// Identified geometry without the other parts of the model.
+    /// Geometry of the identified arm, without the other parts of the model.
     Identified,
     /// Geometry that approximates the whole model best in a workspace.
     BestRigid(Workspace),
-    /// Geometry that a rigid model without effects gives, fitted to the same rows.
+    /// Geometry of a rigid model without effects that is fitted to the same rows.
     FittedAlone,
 }
 
@@ -28,9 +28,9 @@ pub enum GeometryChoice {
 pub struct Geometry {
     /// Arm with this geometry.
     pub arm: Arm<f64>,
-    /// Approximation of the whole model; `None` for other choices.
+    /// Approximation of the whole model, if that was chosen; else `None`.
     pub best_rigid: Option<RigidFit>,
-    /// Fit of the rigid model, with its base and tool; `None` for other choices.
+    /// Fit of the rigid model with its bases and tools, if that was chosen; else `None`.
     pub fitted_alone: Option<fit::Identification>,
 }
 
@@ -69,9 +69,10 @@ impl Geometry {
         }
     }
 
-    /// Computes errors on the held-out rows: of this geometry (`None` if it is the identified one),
-    /// and of the approximation of the whole model and of the geometry fitted alone, unless they
-    /// are this one or are no different.
+    /// Computes errors on the held-out rows of three geometries: this one, the approximation of the
+    /// whole model, and the fit of a rigid model. The first is `None` if this is the identified
+    /// geometry. The others are `None` if they are this one, if the whole model is rigid without
+    /// effects, if a held-out row measures no position, or if they cannot be computed.
     ///
     /// # Errors
     /// Returns an error if the estimate does not match the data.
@@ -99,7 +100,7 @@ impl Geometry {
         if problem.effects.is_empty() && !problem.joints.iter().any(is_elastic) {
             return Ok([exported, None, None]);
         }
-        // The alternatives only inform: if one of them fails, its line is absent.
+        // The alternatives are only shown for comparison, so a failure is no error.
         let best = self.best_rigid.is_none().then(|| {
             let workspace = Workspace { corners: None, planes: Vec::new() };
             best_rigid(problem, estimate, correction, &workspace).ok()
@@ -113,7 +114,7 @@ impl Geometry {
     }
 }
 
-/// Fits a rigid model without effects, and returns its problem too.
+/// Fits a rigid model without effects; returns its problem and the fit.
 fn fit_alone(
     problem: &Problem,
     data: &Dataset,

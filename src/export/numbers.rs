@@ -1,4 +1,5 @@
-//! Numbers of a model in one list, with their names: the parameter table of the generated code.
+//! Numbers of a model in one list with their names, which becomes the table of numbers of the
+//! generated C code.
 
 use crate::laws::expression::Expression;
 use crate::mechanics::{Angle, Beam, Joint, PointMass};
@@ -82,6 +83,7 @@ pub(super) const FRAME: &[(&str, &str)] = &[
 /// Constants of an identified model for the generated C code, in the order of its table of numbers.
 #[derive(Debug, Default)]
 pub(super) struct Numbers {
+    /// Value of each number, SI.
     pub values: Vec<f64>,
     /// Comment that describes each number.
     pub comments: Vec<String>,
@@ -90,54 +92,61 @@ pub(super) struct Numbers {
 }
 
 impl Numbers {
+    /// Appends a number.
     fn push(&mut self, comment: String, value: f64) {
         self.comments.push(comment);
         self.values.push(value);
     }
 
+    /// Begins a group of numbers at the end of the list.
     fn begin(&mut self, group: &'static str) {
         self.groups.push((group, self.values.len()));
     }
 
-    fn block(&mut self, owner: &str, fields: &[(&str, &str)], values: &[f64]) {
+    /// Appends the numbers of one part of the arm, whose names and units are `fields`.
+    fn push_block(&mut self, owner: &str, fields: &[(&str, &str)], values: &[f64]) {
         for ((name, unit), value) in fields.iter().zip(values) {
             self.push(format!("{owner} {} [{unit}]", name.to_lowercase()), *value);
         }
     }
 
-    /// Lists the numbers of a model. `names` are those of joints, bases and targets.
+    /// Lists the numbers of a model. `names` are those of its joints, bases and targets.
     pub fn of(parts: &ModelParts, names: [&[String]; 3]) -> Self {
         let arm = &parts.arm;
         let mut numbers = Self::default();
         numbers.begin("JOINT");
         for (name, joint) in names[0].iter().zip(&arm.joints) {
-            numbers.block(&format!("joint {name}:"), JOINT, &of_joint(joint));
+            numbers.push_block(&format!("joint {name}:"), JOINT, &of_joint(joint));
         }
         let beams = || (1..).zip(&arm.joints).filter_map(|(n, j)| Some((n, j.a, j.beam.as_ref()?)));
         numbers.begin("BEAM");
         for (number, _, beam) in beams() {
-            numbers.block(&format!("beam of joint {number}:"), BEAM, &of_beam(beam));
+            numbers.push_block(&format!("beam of joint {number}:"), BEAM, &of_beam(beam));
         }
         numbers.begin("LOAD");
         for (number, length, beam) in beams() {
             for mass in &beam.masses {
-                numbers.block(&format!("load on beam of joint {number}:"), LOAD, &of_mass(mass));
+                numbers.push_block(
+                    &format!("load on beam of joint {number}:"),
+                    LOAD,
+                    &of_mass(mass),
+                );
             }
             if let Some(added) = &beam.added {
                 let values = [added.mass, added.at * length.signum(), 0.0, 0.0];
-                numbers.block(&format!("undeclared mass on joint {number}:"), LOAD, &values);
+                numbers.push_block(&format!("undeclared mass on joint {number}:"), LOAD, &values);
             }
         }
         numbers.begin("HOIST");
         for (number, hoist) in beams().filter_map(|(n, _, beam)| Some((n, beam.hoist?))) {
             let [at, direction] = [hoist.at, hoist.direction];
             let values = [at.x, at.y, at.z, hoist.force, direction.x, direction.y, direction.z];
-            numbers.block(&format!("hoist of joint {number}:"), HOIST, &values);
+            numbers.push_block(&format!("hoist of joint {number}:"), HOIST, &values);
         }
         numbers.begin("BODY");
         for (number, joint) in (1..).zip(&arm.joints) {
             for body in &joint.bodies {
-                numbers.block(&format!("body on joint {number}:"), LOAD, &of_mass(body));
+                numbers.push_block(&format!("body on joint {number}:"), LOAD, &of_mass(body));
             }
         }
         let mut list = |group, what: &str, values: &[f64]| {
@@ -162,7 +171,7 @@ impl Numbers {
         ] {
             numbers.begin(group);
             for (name, frame) in names.iter().zip(&frames) {
-                numbers.block(&format!("{word} {name}:"), FRAME, &of_frame(frame));
+                numbers.push_block(&format!("{word} {name}:"), FRAME, &of_frame(frame));
             }
         }
         numbers.begin("TERM");
@@ -178,7 +187,7 @@ impl Numbers {
     }
 }
 
-/// Describes a site in words, for a comment.
+/// Describes in words the quantity to which a term adds, for a comment.
 fn site(site: PartSite) -> String {
     let of = |is_error: bool| if is_error { "readings" } else { "base" };
     match site {
@@ -204,6 +213,7 @@ pub(super) fn expression(regressor: &Regressor) -> Option<Expression> {
     (!matches!(regressor, Regressor::Unit | Regressor::Constant)).then(|| regressor.expression())
 }
 
+/// Returns the numbers of a joint in the order of [`JOINT`].
 fn of_joint(joint: &Joint<f64>) -> Vec<f64> {
     let pair = |angle: &Angle<f64>| [angle.sin_cos.0, angle.sin_cos.1];
     let mut values = match &joint.placement {
@@ -226,6 +236,7 @@ fn of_joint(joint: &Joint<f64>) -> Vec<f64> {
     values
 }
 
+/// Returns the numbers of a beam in the order of [`BEAM`].
 fn of_beam(beam: &Beam<f64>) -> Vec<f64> {
     let k = &beam.flexibility;
     let coupling = k.coupling.unwrap_or_default();
@@ -235,10 +246,12 @@ fn of_beam(beam: &Beam<f64>) -> Vec<f64> {
     [&stiff[..], &coupling, &strain].concat()
 }
 
+/// Returns the numbers of a point mass in the order of [`LOAD`].
 fn of_mass(mass: &PointMass) -> [f64; 4] {
     [mass.mass, mass.at.x, mass.at.y, mass.at.z]
 }
 
+/// Returns the numbers of a frame in the order of [`FRAME`].
 fn of_frame(frame: &Frame<f64>) -> Vec<f64> {
     frame.axes.iter().chain([&frame.origin]).flat_map(|v| v.iter().copied()).collect()
 }

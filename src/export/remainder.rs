@@ -1,4 +1,4 @@
-//! Generator of the tables of a remainder in C.
+//! Generator of the C tables of a remainder.
 
 use std::fmt::Write as _;
 
@@ -7,15 +7,16 @@ use nalgebra::DVector;
 use super::formula::{array, real};
 use crate::remainder::{CorrectionTables, InputSource, InputTable, SiteTable};
 
-/// Half the step of a central difference with respect to a parameter, as a fraction of its prior σ.
+/// Half the step of a central difference with respect to a parameter, as a fraction of the σ of the
+/// parameter's prior.
 const PARAMETER_STEP: f64 = 1e-3;
 /// Half the step of a central difference along the change of the parameters that was fitted
 /// together with a remainder, as a fraction of that change.
 const DELTA_STEP: f64 = 0.05;
 
-/// Writes the tables of a remainder as C. `numbers` returns the model's table of numbers at a full
-/// parameter vector.
-pub(super) fn remainder(
+/// Returns the tables of a remainder as C, for a model with the full parameter vector `x`.
+/// `numbers` returns the model's table of numbers at a full parameter vector.
+pub(super) fn remainder_tables(
     tables: &CorrectionTables,
     x: &DVector<f64>,
     numbers: impl Fn(&DVector<f64>) -> Vec<f64>,
@@ -94,23 +95,23 @@ pub(super) fn remainder(
     let row = |row: &Vec<f64>| {
         format!("{{{}}}", row.iter().map(|&x| real(x)).collect::<Vec<_>>().join(", "))
     };
-    list_of(&mut text, "site_info SITE[SITES]", tables.sites.iter().map(site));
-    list_of(&mut text, "input_info INPUT[INPUTS]", tables.inputs.iter().map(input));
-    list_of(
+    push_list(&mut text, "site_info SITE[SITES]", tables.sites.iter().map(site));
+    push_list(&mut text, "input_info INPUT[INPUTS]", tables.inputs.iter().map(input));
+    push_list(
         &mut text,
         "knot_info KNOT[KNOTS + 1]",
         tables.knots.iter().map(knot).chain(["{0, R(0.0)}".to_owned()]),
     );
-    list_of(&mut text, "real CENTRE[CENTRES][INPUTS]", tables.centres.iter().map(row));
-    list_of(&mut text, "real CENTRE_SLOPE[CENTRES][3 * SITES]", tables.slopes.iter().map(row));
+    push_list(&mut text, "real CENTRE[CENTRES][INPUTS]", tables.centres.iter().map(row));
+    push_list(&mut text, "real CENTRE_SLOPE[CENTRES][3 * SITES]", tables.slopes.iter().map(row));
     array(&mut text, "WEIGHT", &tables.weights);
     array(&mut text, "EXPLAINED", &tables.explained);
     text.push('\n');
     text
 }
 
-/// Writes a constant list, one entry on a line.
-fn list_of(text: &mut String, name: &str, entries: impl Iterator<Item = String>) {
+/// Appends the definition of a constant C array called `name`, one entry on a line.
+fn push_list(text: &mut String, name: &str, entries: impl Iterator<Item = String>) {
     let entries: Vec<String> = entries.collect();
     let _ = writeln!(text, "static const {name} = {{\n    {}\n}};", entries.join(",\n    "));
 }

@@ -12,18 +12,20 @@ use crate::problem::{Joint, JointKind, PoseView, Problem};
 use crate::remainder::Correction;
 use crate::spatial::Frame;
 
-/// Number of poses to which the geometry is fitted, and number of other poses that judge it.
+/// Number of poses to which the geometry is fitted, and of other poses in which its errors are
+/// computed.
 const POSES_PER_SET: usize = 300;
-/// Maximum number of drawn poses for each one needed inside the workspace.
+/// Number of poses that are drawn for each fitted one, to have enough inside the workspace.
 const MAX_DRAWS_PER_POSE: usize = 40;
-/// Distance of two additional points from the target, by which its orientation is fitted \[m\].
+/// Distance of two additional fitted points from the target \[m\], which make the fit include the
+/// orientation.
 const ORIENTATION_LEVER: f64 = 0.1;
 /// Step of numerical derivatives with respect to a geometric parameter \[rad\] or \[m\].
 const DIFFERENCE_STEP: f64 = 1e-6;
 /// Number of Gauss–Newton passes. Few suffice, because the problem is nearly linear.
 const GAUSS_NEWTON_PASSES: usize = 5;
-/// Ridge relative to the largest squared singular value. Directions with smaller singular values
-/// keep their identified values.
+/// Number added to the diagonal of the normal matrix, relative to its largest diagonal entry.
+/// Directions with much smaller eigenvalues keep their identified values.
 const RIDGE: f64 = 1e-10;
 
 /// Rigid arm that approximates a whole model best in a workspace.
@@ -31,10 +33,10 @@ const RIDGE: f64 = 1e-10;
 pub struct RigidFit {
     /// Arm with the fitted geometry.
     pub arm: Arm<f64>,
-    /// Errors of the identified geometry alone relative to the whole model, in poses that were not
-    /// fitted.
+    /// Position errors of the identified geometry alone relative to the whole model, in poses that
+    /// were not fitted.
     pub identified: ErrorSummary,
-    /// Errors of the fitted geometry relative to the whole model, in the same poses.
+    /// Position errors of the fitted geometry relative to the whole model, in the same poses.
     pub best: ErrorSummary,
 }
 
@@ -151,8 +153,8 @@ pub fn rigid_errors(
     poses.iter().map(of_pose).collect()
 }
 
-/// Returns the frame that carries the target of a pose on a rigid arm, arm base frame; mimic joints
-/// follow their leaders.
+/// Returns the frame of the joint that carries the target of a pose on a rigid arm, arm base frame.
+/// The commands of mimic joints are computed from their leaders.
 fn rigid_frame(problem: &Problem, model: &Model, arm: &Arm<f64>, pose: &Pose) -> Frame<f64> {
     let commands = pose.setup.configuration;
     let led = |(joint, q): (&Joint, &f64)| {

@@ -8,7 +8,7 @@ use super::answers::Answers;
 use super::error::ExportError;
 use super::formula::{array, formula, helpers, real};
 use super::numbers::{BEAM, FRAME, HOIST, JOINT, LOAD, Numbers, inner};
-use super::remainder::remainder;
+use super::remainder::remainder_tables;
 use crate::laws::RANGE_AXIS;
 use crate::model::parameter::{JointField, ParameterSite};
 use crate::model::{Model, ModelParts, PartSite};
@@ -26,10 +26,12 @@ pub struct Sources {
     pub test: String,
 }
 
-/// Writes the model of an identified arm as C99, with the poses and answers of its test.
+/// Returns the model of an identified arm as C99, with a test program that contains `answers`. `x`
+/// is the full parameter vector of `model`.
 ///
 /// # Errors
-/// Returns an error if a law depends on earlier poses, or a number is not finite.
+/// Returns an error if a law depends on earlier poses or on moments of the loads, or if a number is
+/// not finite.
 pub fn sources(
     problem: &Problem,
     model: &Model,
@@ -37,7 +39,7 @@ pub fn sources(
     correction: Option<&Correction>,
     answers: &Answers,
 ) -> Result<Sources, ExportError> {
-    // Joints whose compliances a remainder corrects need a section that deflects.
+    // The C code must contain a compliance of each joint whose compliance a remainder corrects.
     let tables = correction.and_then(|correction| correction.tables(model, x));
     let compliant = correction.map_or_else(Vec::new, Correction::compliant_joints);
     let field = JointField::Compliance;
@@ -79,14 +81,14 @@ pub fn sources(
     );
     let changes = tables.as_ref().map(|tables| {
         let at = |x: &DVector<f64>| Numbers::of(&model.parts(x.as_slice()), names).values;
-        remainder(tables, x, at)
+        remainder_tables(tables, x, at)
     });
     let terms = terms(&parts, &numbers)?;
     let is_elastic = parts.arm.is_elastic();
     let mut text =
         format!("{about}#include \"flexcal_model.h\"\n\n{}", include_str!("c/prelude.c"));
-    structure(&mut text, problem, &parts, tables.is_some());
-    table(&mut text, &numbers);
+    push_structure(&mut text, problem, &parts, tables.is_some());
+    push_numbers(&mut text, &numbers);
     text.push_str(&changes.unwrap_or_default());
     text.push_str(include_str!("c/frames.c"));
     text.push_str(&helpers(&terms));
@@ -118,8 +120,8 @@ fn plain(name: &str) -> String {
     name.chars().map(|c| if c.is_ascii_graphic() && !"*\\".contains(c) { c } else { '_' }).collect()
 }
 
-/// Writes the structure of the arm: sizes and index tables.
-fn structure(text: &mut String, problem: &Problem, parts: &ModelParts, has_remainder: bool) {
+/// Appends the structure of the arm to the C text: sizes and index tables.
+fn push_structure(text: &mut String, problem: &Problem, parts: &ModelParts, has_remainder: bool) {
     let arm = &parts.arm;
     let beams: Vec<usize> =
         (0..arm.joints.len()).filter(|&j| arm.joints[j].beam.is_some()).collect();
@@ -229,12 +231,13 @@ fn structure(text: &mut String, problem: &Problem, parts: &ModelParts, has_remai
     array(text, "RATIO", &ratios);
 }
 
+/// Returns flags as 0 and 1, separated by commas.
 fn bits(flags: &[bool]) -> String {
     flags.iter().map(|&flag| usize::from(flag).to_string()).collect::<Vec<_>>().join(", ")
 }
 
-/// Writes the numbers of the model, each with a comment.
-fn table(text: &mut String, numbers: &Numbers) {
+/// Appends the numbers of the model to the C text, each with a comment.
+fn push_numbers(text: &mut String, numbers: &Numbers) {
     text.push_str("\n/* Offsets within the numbers of the model. */\nenum {\n");
     for (prefix, fields) in [("J", JOINT), ("B", BEAM), ("L", LOAD), ("H", HOIST), ("F", FRAME)] {
         let names: Vec<String> =
@@ -260,7 +263,7 @@ fn table(text: &mut String, numbers: &Numbers) {
     text.push_str("};\n\n");
 }
 
-/// Writes the C function that evaluates the terms of laws and effects in a pose.
+/// Returns the C function that evaluates the terms of laws and effects in a pose.
 fn terms(parts: &ModelParts, numbers: &Numbers) -> Result<String, ExportError> {
     let mut text = include_str!("c/terms.c").to_owned();
     let mut at = numbers.groups.last().map_or(0, |group| group.1);

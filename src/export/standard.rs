@@ -1,4 +1,5 @@
-//! Rigid geometry as standard Denavit–Hartenberg parameters, close to the nominal ones.
+//! Conversion of a rigid geometry to standard Denavit–Hartenberg parameters close to the nominal
+//! ones.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use std::fmt::Write as _;
@@ -16,23 +17,27 @@ use crate::random::stream;
 use crate::spatial::Frame;
 use crate::urdf::{Steps, yaml_key};
 
-/// Largest sine of the angle between two nominal axes that need β: 6°, as for joints of a URDF.
+/// Largest sine of the angle between consecutive nominal axes between which a row has β: 6°, as for
+/// joints of a URDF.
 ///
 /// The common normal of axes with the angle ε moves by δ/ε along them if one of them tilts by δ, so
 /// that d would become arbitrarily large.
 const MAX_NEARLY_PARALLEL_SINE: f64 = 0.105;
-/// Largest distance from an axis at which the direction of a is undetermined \[m\].
+/// Length of the common normal \[m\] up to which its direction, and thus that of a, is
+/// undetermined.
 const MIN_NORMAL: f64 = 1e-12;
-/// Largest deviation from Rx(α) Tx(a) of a transform that a last row can hold \[1\] or \[m\].
+/// Largest deviation of a transform from the form Rx(α) Tx(a) at which the last row can contain it
+/// \[1\] or \[m\].
 const LAST_ROW_TOLERANCE: f64 = 1e-12;
-/// Largest displacement of the target by β of all rows at which the table does without β \[m\].
+/// Largest displacement of the target by leaving out β in all rows, up to which the table has no β
+/// \[m\].
 const MAX_OMITTED_BETA: f64 = 1e-10;
-/// Difference between an exported and a nominal length that is pointed out \[m\].
+/// Difference between an exported and a nominal length, above which a note mentions it \[m\].
 const MAX_UNMENTIONED_CHANGE: f64 = 0.05;
 /// Number of random poses in which the effect of β is evaluated, and seed of these poses.
 const BETA_POSES: (usize, u64) = (300, 0x6265_7461);
 
-/// Parameters of a row: Rz(θ + q) Tz(d) Tx(a) Rx(α) Ry(β).
+/// Parameters of a row: Rz(θ + q) Tz(d) Tx(a) Rx(α) Ry(β), angles \[rad\] and lengths \[m\].
 #[derive(Debug, Clone, Copy, Default)]
 struct Row {
     theta: f64,
@@ -44,12 +49,15 @@ struct Row {
 
 /// Table of standard DH parameters: base · Π Rz(θ+q) Tz(d) Tx(a) Rx(α) Ry(β) · tool.
 ///
-/// Base, tool and rows have the form of the nominal arm, whose rows are those of a data sheet. β,
-/// the rotation about y by Hayati, stands for d where consecutive axes are nearly parallel.
+/// Base, tool and rows have the form of the nominal arm, whose rows are those of a data sheet. If
+/// consecutive axes are nearly parallel, d keeps its nominal value and β, the rotation about y by
+/// Hayati, is identified instead.
 #[derive(Debug, Clone)]
 pub struct StandardTable {
+    /// Names of the moving joints, one per row.
     names: Vec<String>,
     table: Converted,
+    /// Rows of the nominal arm.
     nominal: Vec<Row>,
     /// Largest displacement of the target if β is left out \[m\]; `None` if no row needs β.
     beta_effect: Option<f64>,
@@ -61,25 +69,31 @@ struct Converted {
     base: Frame<f64>,
     rows: Vec<Row>,
     tool: Frame<f64>,
-    /// θ, d and use of β that the transform behind each axis adds to the row.
+    /// Part of each row but the last that comes from the transform to the next axis.
     links: Vec<Link>,
 }
 
-/// Part of a row that belongs to the transform behind the axis.
+/// Part of a row that comes from the transform between its axis and the next one.
 #[derive(Debug, Clone, Copy)]
 struct Link {
+    /// Part of θ \[rad\].
     theta: f64,
+    /// Part of d \[m\].
     d: f64,
+    /// True if the axes are nearly parallel, so that the row has β.
     has_beta: bool,
 }
 
-/// Transforms of an arm: before each moving joint, without its θ and d, and behind the last.
+/// Transforms between the axes of an arm.
 struct Chain {
+    /// For each moving joint, the transform before it, and its θ \[rad\] and d \[m\].
     joints: Vec<(Frame<f64>, f64, f64)>,
+    /// Transform behind the last moving joint.
     end: Frame<f64>,
 }
 
 impl Chain {
+    /// Takes the transforms of an arm.
     fn of(arm: &Arm<f64>) -> Self {
         let Steps { before, end } = Steps::new(arm);
         let moving = arm.joints.iter().filter(|joint| joint.kind != JointKind::Fixed);
@@ -91,8 +105,8 @@ impl Chain {
         Self { joints: before.into_iter().zip(moving).map(joint).collect(), end }
     }
 
-    /// Converts the chain to rows, close to those of the nominal arm. `None` converts the nominal
-    /// arm itself.
+    /// Converts the chain to rows close to those of the nominal arm, `nominal`; `None` if the chain
+    /// is that of the nominal arm itself.
     fn convert(&self, nominal: Option<&Converted>) -> Converted {
         let base = self.joints.first().map_or_else(Frame::identity, |joint| joint.0);
         let (mut rows, mut links) = (Vec::new(), Vec::new());
@@ -132,14 +146,14 @@ impl Chain {
     }
 }
 
-/// Returns true if a transform is Rx(α) Tx(a), which a last row can hold.
+/// Returns true if a transform has the form Rx(α) Tx(a), so that the last row can contain it.
 fn is_row(end: &Frame<f64>) -> bool {
     (end.axes[0] - Vector3::x()).norm() < LAST_ROW_TOLERANCE
         && end.origin.yz().norm() < LAST_ROW_TOLERANCE
 }
 
-/// Adds to the last row what it can hold of the transform `end` behind its axis, whose twist is
-/// near `alpha`, and returns the remaining transform.
+/// Adds to the last row the part that it can contain of the transform `end` behind its axis, and
+/// returns the remaining transform. The twist of `end` is near `alpha` \[rad\].
 fn last_row(row: &mut Row, end: &Frame<f64>, alpha: f64) -> Frame<f64> {
     // The small rotation before Rx(alpha) is Rz Rx Ry; the rotation about y remains.
     let mut small = *end;
@@ -159,8 +173,8 @@ fn last_row(row: &mut Row, end: &Frame<f64>, alpha: f64) -> Frame<f64> {
     held.frame(0.0, false).inverse().compose(end)
 }
 
-/// Splits the transform between two axes: a row, and behind it a rotation about and a shift along
-/// the second axis. `nominal` is the split of the nominal arm.
+/// Splits the transform between two axes into a row, and a rotation about and a shift along the
+/// second axis, which are not returned. `nominal` is the split of the nominal arm.
 ///
 /// Axes that are nearly parallel keep the nominal d and get β; others have β = 0.
 fn split(frame: &Frame<f64>, nominal: Option<&Link>) -> (Row, Link) {
@@ -193,7 +207,8 @@ fn split(frame: &Frame<f64>, nominal: Option<&Link>) -> (Row, Link) {
 }
 
 impl Row {
-    /// Returns the transform of the row with `q` added to θ.
+    /// Returns the transform of the row with `q` \[rad\] added to θ; without `with_beta`, β is
+    /// taken as 0.
     fn frame(&self, q: f64, with_beta: bool) -> Frame<f64> {
         let mut frame = Frame::identity();
         frame.rotate_z((self.theta + q).sin_cos());
@@ -210,8 +225,8 @@ impl Row {
 impl StandardTable {
     /// Converts the geometry `arm` of a problem.
     ///
-    /// Lengths along parallel axes stay split between rows as in the estimate. The first row holds
-    /// θ and d of joint 1, and the last row all that it can hold of the transform to the tool.
+    /// Lengths along parallel axes are divided between rows as in the estimate. The first row
+    /// contains θ and d of joint 1, and the last row as much of the transform to the tool as fits.
     ///
     /// # Errors
     /// Returns an error if the joints branch.
@@ -283,8 +298,8 @@ impl StandardTable {
         std::iter::once(header).chain(self.names.iter().zip(&self.table.rows).map(line)).collect()
     }
 
-    /// Lists what the reader of the table should know: the effect of β, and lengths far from their
-    /// nominal values.
+    /// Returns notes for the reader of the table: about the effect of β, and about lengths far from
+    /// their nominal values.
     pub fn notes(&self) -> Vec<String> {
         let mut notes = Vec::new();
         if let Some(effect) = self.beta_effect {
@@ -311,7 +326,8 @@ impl StandardTable {
 }
 
 impl Converted {
-    /// Returns the target of `problem` in the frame of the table at the commands `q`.
+    /// Returns the position of the target of `problem` in the arm base frame at the commands `q`
+    /// \[m\].
     fn target(&self, problem: &Problem, q: &[f64], with_beta: bool) -> Vector3<f64> {
         let moving = problem.joints.iter().filter(|joint| joint.kind != JointKind::Fixed);
         let mut frame = self.base;
@@ -323,8 +339,8 @@ impl Converted {
         frame.compose(&self.tool).point(&problem.tool.target)
     }
 
-    /// Returns the largest displacement of the target in random poses if β is left out \[m\]; `None`
-    /// if it is negligible.
+    /// Returns the largest displacement of the target in random poses if β is left out \[m\];
+    /// `None` if it is negligible.
     fn beta_effect(&self, problem: &Problem) -> Option<f64> {
         let mut random = stream(BETA_POSES.1, 0);
         let moving = || problem.joints.iter().filter(|joint| joint.kind != JointKind::Fixed);

@@ -1,4 +1,4 @@
-//! Rigid geometry as modified Denavit–Hartenberg parameters, and numbers of YAML files.
+//! Rigid geometry as modified Denavit–Hartenberg parameters, and format of numbers in YAML files.
 
 use std::fmt::Write as _;
 
@@ -6,8 +6,8 @@ use crate::mechanics::Arm;
 use crate::problem::Problem;
 use crate::urdf::yaml_key;
 
-/// Returns the geometry as YAML in the form of the problem:
-/// `T_i` = Rx(α) Tx(a) Rz(θ+q) Tz(d) Ry(β).
+/// Returns the geometry of `arm` as YAML, with the parameters that a problem file has: `T_i` =
+/// Rx(α) Tx(a) Rz(θ+q) Tz(d) Ry(β).
 pub fn modified_dh(problem: &Problem, arm: &Arm<f64>) -> String {
     let mut text = "# Modified Denavit-Hartenberg parameters with Hayati's beta; q adds to theta, of a prismatic joint to d:\n\
                     # T_i = Rx(alpha) Tx(a) Rz(theta + q) Tz(d) Ry(beta)\nmdh:\n"
@@ -32,7 +32,7 @@ pub fn modified_dh(problem: &Problem, arm: &Arm<f64>) -> String {
     text
 }
 
-/// Returns a number that YAML reads as a float.
+/// Returns a number in a form that YAML reads as a float, rounded to 10⁻¹⁵.
 pub(super) fn float(value: f64) -> String {
     format!("{:?}", (value * 1e15).round() / 1e15 + 0.0)
 }
