@@ -59,8 +59,8 @@ pub enum DatasetError {
     },
 }
 
-/// Builder of a [`Dataset`]. Every method takes one value per row, and a later call replaces an
-/// earlier one.
+/// Builder of a [`Dataset`]. A method that sets a column takes one value per row, and a later call
+/// replaces an earlier one.
 #[derive(Debug, Clone, Default)]
 pub struct DatasetBuilder {
     configurations: Vec<Vec<f64>>,
@@ -96,9 +96,9 @@ macro_rules! columns {
 impl Dataset {
     /// Returns a builder from plain arrays.
     ///
-    /// `configurations`, shape = (rows)(joints) \[rad\] or \[m\], include fixed joints with any
-    /// value. `positions`, shape = (rows), are measured in the measuring frame \[m\]. No row is
-    /// held out without a call of [`held_out`](DatasetBuilder::held_out).
+    /// `configurations`, shape = (rows)(joints) \[rad\] or \[m\], include fixed joints, whose
+    /// values are not used. `positions`, shape = (rows), are the measured ones in the measuring
+    /// frame \[m\]. No row is held out without a call of [`held_out`](DatasetBuilder::held_out).
     pub fn builder<C: AsRef<[f64]>>(
         configurations: impl IntoIterator<Item = C>,
         positions: impl IntoIterator<Item = Vector3<f64>>,
@@ -124,7 +124,7 @@ impl DatasetBuilder {
         /// Sets the measured orientations of the target, measuring frame; they are fitted if the
         /// problem declares an `orientation_sigma`.
         orientation, orientations: UnitQuaternion<f64>;
-        /// Sets the standard deviation of each coordinate of a position, above 0 \[m\].
+        /// Sets the standard deviation of the noise of each row's coordinates, above 0 \[m\].
         sigma, sigma: f64;
         /// Sets the payload, not negative \[kg\].
         payload, payload: f64;
@@ -132,7 +132,7 @@ impl DatasetBuilder {
         hoist, hoist: f64;
         /// Sets the temperature [°C].
         temperature, temperature: f64;
-        /// Sets the time \[s\]; the default is the row number.
+        /// Sets the time \[s\]; the default is the row number, counted from 0.
         time, time: f64;
     }
 
@@ -166,7 +166,8 @@ impl DatasetBuilder {
         self
     }
 
-    /// Sets the rows, counted from 0, in any order, that are not fitted but used to judge the fit.
+    /// Sets the rows that are not fitted but used to judge the fit: their indices from 0, in any
+    /// order.
     #[must_use]
     pub fn held_out(mut self, rows: impl IntoIterator<Item = usize>) -> Self {
         self.held_out = rows.into_iter().collect();
@@ -262,7 +263,7 @@ impl DatasetBuilder {
             time: time.unwrap_or_else(|| (0..rows).map(|row| row as f64).collect()),
             approach: self
                 .approach
-                .map(|approach| directions(flat("approach", &approach)?, joints))
+                .map(|approach| checked_directions(flat("approach", &approach)?, joints))
                 .transpose()?,
             covariates,
             session: words("session", self.session)?.unwrap_or_else(unnamed),
@@ -287,7 +288,7 @@ fn covariates(rows_of_values: &[Vec<f64>], rows: usize) -> Result<Vec<f64>, Data
 }
 
 /// Checks that all directions of approach are −1, 0 or +1, and returns them.
-fn directions(values: Vec<f64>, joints: usize) -> Result<Vec<f64>, DatasetError> {
+fn checked_directions(values: Vec<f64>, joints: usize) -> Result<Vec<f64>, DatasetError> {
     match values.iter().position(|value| ![-1.0, 0.0, 1.0].contains(value)) {
         Some(place) => {
             let (column, row) = ("approach", place / joints.max(1));
@@ -297,14 +298,17 @@ fn directions(values: Vec<f64>, joints: usize) -> Result<Vec<f64>, DatasetError>
     }
 }
 
+/// Copies rows of numbers.
 fn rows_of<C: AsRef<[f64]>>(rows: impl IntoIterator<Item = C>) -> Vec<Vec<f64>> {
     rows.into_iter().map(|row| row.as_ref().to_vec()).collect()
 }
 
+/// Checks that a column has one value per row.
 fn check_length(column: &'static str, found: usize, expected: usize) -> Result<(), DatasetError> {
     if found == expected { Ok(()) } else { Err(DatasetError::Length { column, expected, found }) }
 }
 
+/// Checks that the values of a row are finite and at most 10¹⁵⁰ in magnitude.
 fn check_finite(column: &'static str, row: usize, values: &[f64]) -> Result<(), DatasetError> {
     if !values.iter().all(|value| value.is_finite()) {
         return Err(DatasetError::NotFinite { column, row });

@@ -1,4 +1,4 @@
-//! Words in cells where a number is expected, recognised for error messages.
+//! Recognition of words in cells that should contain a number, for error messages.
 
 /// Units that tables of other programs write into cells.
 pub(super) const UNITS: [&str; 12] =

@@ -4,7 +4,8 @@ use super::columns::Column;
 use super::table::{Table, shortened};
 use crate::error::{InputError, InputErrorKind, TableErrorKind};
 
-/// Reads a number from the current row's cell of `column`, which must be above zero \[SI\].
+/// Reads a number from the current row's cell of `column`, which must be above zero; returns it in
+/// SI units.
 pub(super) fn above_zero(table: &Table, column: &Column) -> Result<f64, InputError> {
     let value = table.number(column.place)?;
     // A tiny length in millimetres may underflow to 0 in metres.
@@ -16,7 +17,8 @@ pub(super) fn above_zero(table: &Table, column: &Column) -> Result<f64, InputErr
     }
 }
 
-/// Reads a number from the current row's cell of `column`, which must not be negative \[SI\].
+/// Reads a number from the current row's cell of `column`, which must not be negative; returns it
+/// in SI units.
 pub(super) fn not_negative(table: &Table, column: &Column) -> Result<f64, InputError> {
     let value = table.number(column.place)?;
     if value < 0.0 {
@@ -36,8 +38,8 @@ pub(super) fn direction(table: &Table, column: &Column) -> Result<f64, InputErro
     }
 }
 
-/// Returns true if the current row's cell in column `place` is the word `validation`, and false if
-/// it is `identification`.
+/// Returns true if the current row's cell in the column with index `place` is the word
+/// `validation`, and false if it is `identification`; other words are errors.
 pub(super) fn is_validation(table: &Table, place: usize) -> Result<bool, InputError> {
     match table.non_empty_text(place)? {
         "validation" => Ok(true),

@@ -1,20 +1,22 @@
 //! Constant difference between the clocks of two tables that are joined by time.
 
-/// Maximum time between paired rows when a shift is searched \[s\].
+/// Maximum time between paired rows when a shift between the clocks is searched \[s\].
 const MAX_PAIR_GAP: f64 = 0.5;
 /// Maximum number of rows of the joint table for which a shift is searched. A table with more rows
 /// is a continuous log, in which every shift finds partners.
 const MAX_LOG_ROWS: usize = 2000;
 /// Maximum number of measured rows with which a shift is tested.
 const MAX_TESTED_ROWS: usize = 200;
-/// Number of measured rows whose differences to all rows of the joint table are tried as shifts.
+/// Maximum number of measured rows from which shifts are tried: the differences of their times to
+/// those of all rows of the joint table.
 const TRIAL_ROWS: usize = 8;
-/// Smallest number of pairs that shows a shift.
+/// Smallest number of pairs of rows with which a shift is accepted.
 const MIN_PAIRS: usize = 5;
 /// Smallest fraction of the tested rows that a shift must pair.
 const MIN_PAIRED_FRACTION: f64 = 0.8;
-/// Largest number of pairs of another shift, as a fraction of those of the best shift. If poses
-/// follow each other at equal intervals, several shifts pair nearly all rows and none is certain.
+/// Largest number of pairs that another shift may have, as a fraction of those of the best shift.
+/// If poses follow each other at equal intervals, several shifts pair nearly all rows and none is
+/// certain.
 const MAX_RIVAL_FRACTION: f64 = 0.7;
 
 /// Returns the shift \[s\] that must be added to the times of a joint table, so that its rows pair
@@ -56,8 +58,8 @@ fn evenly(times: &[f64], most: usize) -> Vec<f64> {
     times.iter().copied().step_by(times.len().div_ceil(most).max(1)).collect()
 }
 
-/// Iterates over the measured times that have a partner if the log is shifted, with the index of
-/// that partner.
+/// Iterates over the measured times that have a partner if `shift` \[s\] is added to the times of
+/// the log, with the index of that partner.
 fn pairs(times: &[f64], log: &[f64], shift: f64) -> impl Iterator<Item = (f64, usize)> {
     times.iter().filter_map(move |&time| {
         let (row, gap) = nearest(log, time - shift)?;
@@ -65,8 +67,8 @@ fn pairs(times: &[f64], log: &[f64], shift: f64) -> impl Iterator<Item = (f64, u
     })
 }
 
-/// Returns the index of the entry of `log`, in ascending order, that is nearest to a time, and the
-/// time between them \[s\].
+/// Returns the index of the entry of `log` that is nearest to `time`, and the time between them
+/// \[s\]; `None` if `log` is empty. `log` must be in ascending order.
 pub(super) fn nearest(log: &[f64], time: f64) -> Option<(usize, f64)> {
     let after = log.partition_point(|logged| *logged < time);
     let around = [after.checked_sub(1), Some(after)].into_iter().flatten();

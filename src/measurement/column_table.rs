@@ -10,8 +10,8 @@ use crate::error::{InputError, Location, TableErrorKind};
 /// Size of the text that is generated at a time \[bytes\].
 const CHUNK_BYTES: usize = 1 << 15;
 
-/// Table of measurements in memory, with the column names that a file would have. Messages name a
-/// row by the line that it would have in a file; the first row is on line 2.
+/// Table of measurements in memory, with the column names that a file would have. Messages refer to
+/// a row by the line that it would have in a file; the first row is on line 2.
 ///
 /// ```
 /// use std::path::Path;
@@ -82,6 +82,7 @@ impl ColumnTable {
 }
 
 impl ColumnValues {
+    /// Returns the number of rows.
     fn len(&self) -> usize {
         match self {
             Self::Numbers(values) => values.len(),
@@ -107,11 +108,14 @@ struct TableTextReader {
     table: ColumnTable,
     /// Next row to generate.
     row: usize,
+    /// Text of the header or of the last rows that were generated.
     chunk: String,
+    /// Number of bytes of the chunk that were read.
     bytes_read: usize,
 }
 
 impl TableTextReader {
+    /// Generates the text of the next rows as a new chunk.
     fn next_rows(&mut self) {
         self.chunk.clear();
         self.bytes_read = 0;

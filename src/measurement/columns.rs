@@ -1,4 +1,4 @@
-//! Columns of a table and their roles.
+//! Search of the columns of a table that are read, with their roles.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::convert::identity;
@@ -26,7 +26,7 @@ pub(super) struct Column {
     pub role: Role,
     /// Index of the column in a row, counted from 0.
     pub place: usize,
-    /// Conversion of a cell's number to the SI unit.
+    /// Conversion of a number in a cell to SI units.
     pub to_si: fn(f64) -> f64,
 }
 
@@ -34,17 +34,17 @@ pub(super) struct Column {
 pub(super) struct Columns {
     /// Columns sorted by role.
     pub read: Vec<Column>,
-    /// Index of the column that marks held-out rows.
+    /// Index of the column that marks held-out rows; `None` without such a column.
     pub marked: Option<usize>,
-    /// Role that the file's name fills in every row; `None` if the name is not used.
+    /// Role whose value in every row is the name of the file; `None` if the name is not used.
     pub file: Option<Role>,
     /// Name of each column of the table in flexcal's vocabulary.
     names: Vec<String>,
 }
 
 impl Columns {
-    /// Finds the columns in a header. Unknown columns cause warnings. If the poses are `measured`,
-    /// columns of positions and of held-out rows are required.
+    /// Finds the columns in the header of a table. Unknown columns cause warnings. If the poses are
+    /// `measured`, columns of measured quantities and of held-out rows are required.
     #[expect(clippy::too_many_lines, reason = "one column after the other, by what it may mean")]
     pub fn find(
         table: &Table,
@@ -194,7 +194,7 @@ impl Columns {
         mistyped.map_or(Ok(columns), Err)
     }
 
-    /// Returns true if a table has a column of joint coordinates.
+    /// Returns true if a table has a column of joint coordinates: commands or encoder readings.
     pub fn has_joints(table: &Table, problem: &Problem) -> bool {
         let names = Names::map_present(table, &problem.data.dialect);
         let numbering = Numbering::detect(names.iter().copied(), problem);
@@ -205,7 +205,8 @@ impl Columns {
         names.iter().any(is_joint)
     }
 
-    /// Checks that all required columns exist; `unknown` columns are suggested for missing ones.
+    /// Checks that all required columns exist. Errors about missing columns suggest similar names
+    /// among the `unknown` columns.
     fn require(
         &self,
         table: &Table,
@@ -325,7 +326,8 @@ impl Columns {
         self.require_marked(table, problem, measured, near)
     }
 
-    /// Returns the error of a column with the name `base` and a unit that files do not use.
+    /// Returns the error of a column whose name is `base` with a unit that files cannot have, such
+    /// as inches; `None` if there is no such column.
     fn in_foreign_unit(&self, table: &Table, base: &str, unit: Unit) -> Option<InputError> {
         let of_base = |name: &String| {
             let suffix = name.strip_prefix(base)?.strip_prefix('_')?;
@@ -364,19 +366,19 @@ impl Columns {
         self.read.iter().map(|column| &column.role).chain(&self.file).any(is_other)
     }
 
-    /// Returns the first of the `chosen` columns that lacks a declaration in the problem, and the
-    /// section that would declare it.
+    /// Returns the index of the first column for which `is_chosen` is true and that lacks a
+    /// declaration in the problem, with the section that would declare it.
     pub fn undeclared(
         &self,
         problem: &Problem,
-        chosen: impl Fn(usize) -> bool,
+        is_chosen: impl Fn(usize) -> bool,
     ) -> Option<(usize, &'static str)> {
         let lacking =
             |(place, name): (usize, &String)| Some((place, Role::undeclared(name, problem)?));
-        self.names.iter().enumerate().filter_map(lacking).find(|&(place, _)| chosen(place))
+        self.names.iter().enumerate().filter_map(lacking).find(|&(place, _)| is_chosen(place))
     }
 
-    /// Returns true if the current row measures something other than a position.
+    /// Returns true if the current row measures a quantity other than a position.
     pub fn observes_at(&self, table: &Table) -> bool {
         let others = || kinds().filter(|kind| !kind.declared_by.is_empty());
         let first_measured = |kind: &Kind| {
@@ -390,7 +392,7 @@ impl Columns {
         self.file == Some(POINT) || others().filter_map(first_measured).any(is_filled)
     }
 
-    /// Returns the index in a row of the column with a role.
+    /// Returns the index in a row of the column with a role; `None` if there is none.
     pub fn place(&self, role: Role) -> Option<usize> {
         let index = self.read.binary_search_by_key(&role, |column| column.role).ok()?;
         self.read.get(index).map(|column| column.place)
@@ -401,7 +403,8 @@ impl Columns {
         self.names.get(column.place).map_or("", String::as_str)
     }
 
-    /// Returns the fixed point that the current row measures without the arm, if there is one.
+    /// Returns the name of the fixed point that the current row measures without the arm; `None`
+    /// for other rows.
     pub fn nest<'t>(&self, table: &'t Table) -> Option<&'t str> {
         let column = self.read.iter().find(|column| column.role == Role::Nest)?;
         table.text(column.place).ok().filter(|word| !word.is_empty())
@@ -420,6 +423,7 @@ impl Columns {
         self.read.iter().any(|column| column.role == Role::Split)
     }
 
+    /// Returns true if a column, or the name of the file, has the role.
     pub fn has(&self, role: Role) -> bool {
         self.file == Some(role)
             || self.read.binary_search_by_key(&role, |column| column.role).is_ok()
@@ -477,8 +481,9 @@ fn display_name(name: &str, theirs: Option<&String>) -> String {
     name.to_owned() + &theirs.unwrap_or_default()
 }
 
-/// Returns the error for a missing column `name`. If a rule of `[data.columns]` gave that name to
-/// another column, the message names the rule as the cause.
+/// Returns `error`; that of a missing column is located at `rule` instead. The rule of
+/// `[data.columns]` gives the name `name` to another column, so that the column of this name is not
+/// used.
 fn with_rule_as_cause(error: InputError, (rule, name): (&ColumnRule, &str)) -> InputError {
     match *error.kind {
         InputErrorKind::Table(TableErrorKind::MissingColumn { write, .. }) => rule

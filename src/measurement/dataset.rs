@@ -7,11 +7,12 @@ use crate::error::{InputError, InputErrorKind, Location, Warning};
 use crate::problem::pattern::matches;
 use crate::problem::{Freedom, Problem};
 
-/// Maximum number of sessions, or of targets, whose bases or tools are fitted. The time of a fit
-/// grows with the cube of their number: 50 take a second, 200 some minutes.
+/// Maximum number of sessions whose bases are fitted, and of targets whose tools are fitted. The
+/// time of a fit grows with the cube of their number: 50 take a second, 200 some minutes.
 const MAX_FITTED_SETUPS: usize = 150;
 
-/// Measured poses with their split into fitted rows and held-out rows, which only judge the fit.
+/// Measured poses with their split into fitted rows and held-out rows, which are only used to judge
+/// the fit.
 ///
 /// ```
 /// use flexcal::measurement::Dataset;
@@ -33,7 +34,7 @@ pub struct Dataset {
 
 /// Checks that not too many bases or tools are fitted.
 fn check_setups(problem: &Problem, measurements: &Measurements) -> Result<(), InputError> {
-    // The last rule that matches a parameter holds.
+    // The last rule that matches a parameter applies.
     let is_fitted = |name: &str| {
         ["x", "y", "z", "rx", "ry", "rz"].iter().any(|axis| {
             let parameter = format!("{name}.{axis}");
@@ -58,8 +59,7 @@ fn check_setups(problem: &Problem, measurements: &Measurements) -> Result<(), In
 }
 
 impl Dataset {
-    /// Creates a data set from measurements and a split; `split` holds row numbers in ascending
-    /// order.
+    /// Creates a data set from measurements and a split.
     #[doc(hidden)]
     pub fn new(measurements: Measurements, split: Split) -> Self {
         Self { measurements, split }
@@ -69,15 +69,15 @@ impl Dataset {
     ///
     /// # Errors
     /// Returns an error if a part of the split is empty, the held-out session does not exist, or no
-    /// split is declared. Also if an unknown point, anchor or surface has too few rows to
-    /// contribute information, or too many bases or tools would be fitted.
+    /// split is declared. It also returns an error if a fixture at an unknown position has too few
+    /// rows to contribute information, or if too many bases or tools would be fitted.
     #[doc(hidden)]
     pub fn from_measurements(
         problem: &Problem,
         measurements: Measurements,
     ) -> Result<Self, InputError> {
         check_setups(problem, &measurements)?;
-        measurements.enough_contacts(problem)?;
+        measurements.check_contacts(problem)?;
         let split = Split::new(problem, &measurements)?;
         Ok(Self { measurements, split })
     }

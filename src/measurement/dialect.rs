@@ -12,15 +12,15 @@ use crate::problem::{ColumnSelector, Delimiter, Dialect};
 pub(super) const HEADER_SEARCH_BYTES: u64 = 1 << 16;
 /// Maximum number of lines in which the header is searched.
 const MAX_HEADER_LINES: usize = 100;
-/// Delimiter that replaces a run of spaces.
+/// Tab, the delimiter that replaces a run of spaces.
 const TAB: u8 = b'\t';
 
 /// Marks that some programs put before the header line, as before a comment.
 const HEADER_MARKS: [&str; 3] = ["//", "#", "%"];
-/// Minimum number of known column names by which a line is recognised as the header.
+/// Minimum number of known column names in a line at which the line is recognised as the header.
 const MIN_KNOWN_NAMES: usize = 2;
 
-/// Delimiter of a table and position of its header.
+/// Delimiter of a table, and place of its header.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Layout {
     pub delimiter: Delimiter,
@@ -35,8 +35,9 @@ impl Layout {
     ///
     /// The header is the line with most names of the map, otherwise the first line with at least
     /// [`MIN_KNOWN_NAMES`] names of flexcal, otherwise the first line with content. A line behind a
-    /// comment mark is the header only if no other line holds known names. The delimiter is that of
-    /// a line `sep=`, or the most frequent of `,` `;` and tab in the header, otherwise spaces.
+    /// comment mark is the header only if no other line has known names, or if rows stand between
+    /// it and that line. The delimiter is that of a line `sep=`, else the declared one, else the
+    /// most frequent of `,` `;` and tab in the header, otherwise spaces.
     pub fn detect(beginning: &[u8], dialect: &Dialect) -> Self {
         let text = decoded(beginning.strip_prefix(BYTE_ORDER_MARK_UTF8).unwrap_or(beginning));
         let text = text.replace("\r\n", "\n").replace('\r', "\n");
@@ -63,7 +64,7 @@ impl Layout {
                 ColumnSelector::Place(_) | ColumnSelector::File => None,
             })
             .collect();
-        // Returns the numbers of names of the map and of known names in a line.
+        // Returns the number of names of the map in a line, and the number of all known names.
         let names_in = |line: &str| {
             let cells = cells(line, delimiter_of(line));
             let mapped = names.iter().filter(|name| cells.iter().any(|cell| cell == *name)).count();
@@ -93,8 +94,8 @@ impl Layout {
             has_names(line.get(mark_bytes..)?).then_some(mark_bytes)
         };
         let marked = || lines.iter().copied().find(|(_, line)| mark_before_names(line).is_some());
-        // Rows between a marked header and a later line of names belong to the marked one, and the
-        // later line repeats it.
+        // If there are rows between a marked header and a later line of names, the marked line is
+        // their header, and the later line repeats it.
         let marked_above_rows = || {
             let (first, header) = marked()?;
             let count =
@@ -142,7 +143,7 @@ impl Layout {
     }
 }
 
-/// Returns the delimiter that a line `sep=;` of Excel declares.
+/// Returns the delimiter that a line such as `sep=;` of Excel declares; `None` for other lines.
 fn excel_delimiter(line: &str) -> Option<Delimiter> {
     let delimiter = line.trim_end().strip_prefix("sep=").unwrap_or_default();
     match (delimiter.as_bytes(), line.trim_end_matches([' ', '"'])) {
@@ -152,8 +153,8 @@ fn excel_delimiter(line: &str) -> Option<Delimiter> {
     }
 }
 
-/// Returns the number of bytes up to the content of a line that begins with the declared `comment`
-/// mark or with one of [`HEADER_MARKS`].
+/// Returns the number of bytes before the content of a line that begins with the declared `comment`
+/// mark or with one of [`HEADER_MARKS`]; `None` for other lines.
 fn mark_bytes(line: &str, comment: Option<&str>) -> Option<usize> {
     let start = line.len() - line.trim_start().len();
     let text = line.trim_start();
@@ -198,23 +199,27 @@ fn cells(line: &str, delimiter: Delimiter) -> Vec<String> {
     }
 }
 
-/// Reader that empties the lines before the header and comments, and replaces runs of spaces by
-/// tabs. Line numbers stay the same.
+/// Reader that empties comments and the lines before the header. If spaces are the delimiter, it
+/// replaces runs of spaces by tabs. Line numbers stay the same.
 pub(super) struct NormalizedText<R> {
     pub lines: R,
     /// Number of lines before the header that are still unread.
     skipped: usize,
     /// Number of bytes of the mark before the header; 0 after the header has been read.
     mark_bytes: usize,
+    /// Mark of comment lines.
     comment: Option<Vec<u8>>,
+    /// True if spaces are the delimiter.
     spaces: bool,
-    /// True if the text passes through unchanged.
+    /// True if the text needs no change.
     is_unchanged: bool,
-    /// Normalised text that the caller has not yet taken.
+    /// Text of the last normalised line.
     ready: Vec<u8>,
+    /// Number of bytes of `ready` that the caller has read.
     given: usize,
     /// Text that was read beyond the end of the last normalised line.
     unread: Vec<u8>,
+    /// True if `lines` has been read to its end.
     ended: bool,
 }
 
@@ -238,7 +243,7 @@ impl<R: Read> NormalizedText<R> {
         }
     }
 
-    /// Normalises the next line into `ready`; leaves it empty at the end of the text.
+    /// Normalises the next line into `ready`, which is empty at the end of the text.
     fn next_line(&mut self) -> Result<()> {
         (self.ready, self.given) = (Vec::new(), 0);
         let mut chunk = [0; 4096];

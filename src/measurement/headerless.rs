@@ -2,8 +2,9 @@
 
 use crate::problem::{ColumnRule, ColumnSelector};
 
-/// Returns true if the `cells` of the first record are a row, not a header: `rules` select columns by
-/// their places, a cell there is a number, and the numbers of the record do not count its columns.
+/// Returns true if the `cells` of the first record are a row, not a header. A rule must select a
+/// column by its place in which the record has a number. The numbers of the record must not be 0,
+/// 1, 2, … or 1, 2, 3, …, which number the columns.
 pub(super) fn is_row_of_numbers(cells: &[String], rules: &[ColumnRule]) -> bool {
     let number = |cell: &String| {
         cell.replace(',', ".").parse::<f64>().ok().filter(|number| number.is_finite())

@@ -16,17 +16,18 @@ use crate::error::{InputError, InputErrorKind, Location, TableErrorKind, Warning
 use crate::problem::{Dialect, JoinRule, JointLog, Problem};
 use crate::quantity::Unit;
 
-/// Maximum number of rows without a partner that a warning lists.
+/// Maximum number of measured rows without a partner that a warning lists.
 const MAX_LISTED_ROWS: usize = 10;
-/// Median time between paired rows above which the pairing is suspect \[s\]: the clocks may differ,
-/// so their offset is searched.
+/// Median time between paired rows above which the pairing is suspect \[s\]. The clocks may then
+/// differ, so their offset is searched.
 const MAX_PLAUSIBLE_MEDIAN_GAP: f64 = 0.5;
 /// Smallest number of measured rows with which the pairing as a whole is checked.
 const MIN_CHECKED_ROWS: usize = 4;
 
-/// Rows of the joint table, with the keys by which they are paired with rows of positions.
+/// Rows of the joint table, with the keys by which they are paired with measured rows.
 pub(super) struct JoinedLog {
     rule: JoinRule,
+    /// Place of the declaration in the problem.
     location: Location,
     header: Vec<String>,
     /// File and line of the header.
@@ -35,57 +36,64 @@ pub(super) struct JoinedLog {
     names: Vec<String>,
     style: CellStyle,
     rows: Vec<LogRow>,
+    /// Index of the row with each name, for a join by name.
     of_name: HashMap<String, usize>,
     /// Row indices in the order of their times, for a join by time.
     by_time: Vec<usize>,
     /// Times of the rows in ascending order, on the clock of the measurements \[s\].
     log_times: Vec<f64>,
-    /// Indices of the joint table's columns that are appended to the current table of positions.
+    /// Indices of the joint table's columns that are appended to the current table of measured
+    /// rows.
     appended: Vec<usize>,
-    /// Column of the key in the current table, and its conversion to seconds.
+    /// Column in the current table by which rows are paired; `None` for a join by order.
     key: Option<Key>,
-    /// Number of rows requested so far, for a join by order.
+    /// Number of measured rows for which a partner has been searched.
     requested: usize,
+    /// Places of the measured rows without a partner.
     unpaired: Vec<Location>,
+    /// Number of measured rows with a partner.
     paired: usize,
     decoding_warnings: Vec<Warning>,
-    /// Names of the positions without a partner, for a join by name.
+    /// Names of the measured rows without a partner, for a join by name.
     unpaired_names: Vec<String>,
-    /// Column of the name in the current table and in the joint table, for a join by order.
+    /// Column of names in the current table and in the joint table, for a join by order.
     name_columns: Option<(usize, usize)>,
-    /// Names of both rows of each pair that is joined by order and whose names differ.
+    /// Names of the measured and of the joint row of each pair by order whose names differ.
     unlike_pairs: Vec<[String; 2]>,
     /// Times of the measured rows \[s\], for a join by time.
     times: Vec<f64>,
     /// Column of the times in the current table, for a join by order.
     clock: Option<Key>,
-    /// Times of rows that are joined by order.
+    /// Times of the pairs that are joined by order.
     timed_pairs: Vec<TimedPair>,
 }
 
 /// Column that pairs rows, and its conversion to seconds if it holds times.
 #[derive(Clone, Copy)]
 struct Key {
+    /// Index of the column.
     place: usize,
     to_si: fn(f64) -> f64,
 }
 
+/// Row of the joint table.
 struct LogRow {
     file: PathBuf,
     line: usize,
     cells: ByteRecord,
+    /// Time of the row \[s\], for a join by time on the clock of the measurements; else NaN.
     time: f64,
     /// Number of measured rows whose partner this row is.
     uses: usize,
 }
 
-/// Returns the column with names of poses.
+/// Returns the index of the column with names of poses, `pose` or else `name`.
 fn name_column(names: &[String]) -> Option<usize> {
     let place = |wanted: &str| names.iter().position(|name| name == wanted);
     place("pose").or_else(|| place("name"))
 }
 
-/// Returns the column with times.
+/// Returns the column with times: one with a unit, else `time`, whose cells must be dates.
 fn time_key(names: &[String]) -> Option<Key> {
     let place = |wanted: &str| names.iter().position(|name| name == wanted);
     let with_unit = Unit::Time.suffixes().iter().find_map(|suffix| {
@@ -151,6 +159,7 @@ impl JoinedLog {
         Ok(joined)
     }
 
+    /// Reads the rows of one file of the joint table.
     fn read_file(&mut self, mut table: Table, dialect: &Dialect) -> Result<(), InputError> {
         if self.header.is_empty() {
             self.header.clone_from(&table.header);
@@ -213,7 +222,7 @@ impl JoinedLog {
         key.map(Some).ok_or_else(|| table.column(write).error(kind))
     }
 
-    /// Prepares a table of positions: appends the columns that only the joint table has.
+    /// Appends to a table of measured rows the columns that only the joint table has.
     ///
     /// # Errors
     /// Returns an error if the table lacks the key column.
@@ -236,8 +245,8 @@ impl JoinedLog {
         Ok(())
     }
 
-    /// Appends the cells of the paired joint row to the current row of positions; returns false if
-    /// there is none.
+    /// Appends the cells of the paired joint row to the current measured row; returns false if it
+    /// has no partner.
     ///
     /// # Errors
     /// Returns an error if the key cell of the row is empty or invalid.
@@ -287,9 +296,9 @@ impl JoinedLog {
         Ok(true)
     }
 
-    /// Returns the times from measured rows to the nearest row of the log, in ascending order
-    /// \[s\]: of the rows without a partner, or of those that have one. Both are empty unless the
-    /// tables are joined by time.
+    /// Returns the times between measured rows and the nearest row of the log, in ascending order
+    /// \[s\]. If `is_unpaired` is true, the measured rows are those without a partner, else those
+    /// with one. Empty unless the tables are joined by time.
     fn gaps(&self, is_unpaired: bool) -> Vec<f64> {
         let JoinRule::Time { tolerance, .. } = self.rule else { return Vec::new() };
         let gap = |time: &f64| nearest(&self.log_times, *time).map(|(_, gap)| gap);
@@ -299,8 +308,8 @@ impl JoinedLog {
         gaps
     }
 
-    /// Returns, in words, the usual time between a row without a partner and the nearest row of the
-    /// log; `None` if the tables are not joined by time.
+    /// Returns, in words, the median time between a measured row without a partner and the nearest
+    /// row of the log; `None` if there is no such row, or if the tables are not joined by time.
     fn gap(&self) -> Option<String> {
         let gaps = self.gaps(true);
         Some(format!("{:.1} s", gaps.get(gaps.len() / 2)?))
@@ -326,10 +335,10 @@ impl JoinedLog {
     /// Checks the pairing as a whole.
     ///
     /// # Errors
-    /// Returns an error if no measured row has a partner, if another offset between the clocks
-    /// certainly pairs the rows and this one does not, or if most rows have the same, distant partner.
-    /// Also if names show that most rows are paired wrongly, or not at all, and if a join by order
-    /// meets a joint table of several rows for each measured row.
+    /// Returns an error if no measured row has a partner, or if names or times show that most rows
+    /// are paired wrongly or not at all. It also returns an error if most rows have the same,
+    /// distant partner, or if a joint table that is joined by order has two or more rows for each
+    /// measured row.
     fn check_pairing(&self) -> Result<(), InputError> {
         let error = |kind: TableErrorKind| Err(self.location.clone().error(kind));
         let quoted = |pair: [&str; 2]| pair.map(|name| format!("\"{}\"", shortened(name)));
@@ -384,8 +393,8 @@ impl JoinedLog {
         }
     }
 
-    /// Returns the table whose times are whole minutes while those of the other are not; `None`
-    /// unless the tables are joined by time.
+    /// Returns the name of the table whose times are whole minutes while those of the other are
+    /// not. `None` if there is no such table, or if the tables are not joined by time.
     fn table_without_seconds(&self) -> Option<&'static str> {
         let JoinRule::Time { offset, .. } = self.rule else { return None };
         if self.times.len().min(self.log_times.len()) < MIN_CHECKED_ROWS {
@@ -400,9 +409,9 @@ impl JoinedLog {
         }
     }
 
-    /// Returns the names of one pair that is joined by order, if most pairs have different names,
-    /// and most of these names occur in both tables. Counters that begin at different numbers are
-    /// no names.
+    /// Returns the names of one pair that is joined by order, if the names of most measured rows
+    /// occur in the joint table at another row. Counters that begin at different numbers are no
+    /// names.
     fn order_contradicted_by_names(&self) -> Option<[&str; 2]> {
         let difference = |[name, other]: &[String; 2]| {
             Some(name.parse::<i64>().ok()?.wrapping_sub(other.parse().ok()?))
@@ -418,9 +427,9 @@ impl JoinedLog {
         (2 * misplaced().count() > self.requested).then_some([name, other])
     }
 
-    /// Returns a name of a position without a partner, and the name of an unused joint row that
-    /// differs from it only in case, spaces, marks or leading zeros, if most names without a
-    /// partner have one.
+    /// Returns the name of a measured row without a partner, and that of an unused joint row that
+    /// differs from it only in case, spaces, marks or leading zeros. `None` unless most names
+    /// without a partner have such a counterpart.
     fn names_written_otherwise(&self) -> Option<[&str; 2]> {
         let is_unused = |row: usize| self.rows.get(row).is_some_and(|row| row.uses == 0);
         let mut unused: Vec<&str> = self
@@ -440,8 +449,8 @@ impl JoinedLog {
         (2 * (1 + pairs.count()) > self.unpaired_names.len()).then_some(first)
     }
 
-    /// Shows the keys of both tables, to find why no row has a partner: one name of each, or the
-    /// ranges of their times; `None` for a join by order.
+    /// Returns examples of the keys of both tables for a message: one name of each, or the ranges
+    /// of their times; `None` for a join by order.
     fn keys(&self) -> Option<[String; 2]> {
         if let Some(name) = self.unpaired_names.first() {
             let log = self.of_name.iter().min_by_key(|(_, row)| **row)?.0;
@@ -464,7 +473,7 @@ impl JoinedLog {
     }
 
     /// Returns warnings about rows without a partner. A joint table that is joined by time usually
-    /// has more rows than there are positions, so its unused rows are not reported.
+    /// has more rows than were measured, so its unused rows are not reported.
     ///
     /// # Errors
     /// Returns an error if no row has a partner, or if the pairing as a whole is implausible.

@@ -10,10 +10,12 @@ use crate::error::one_line;
 #[derive(Default)]
 pub(super) struct LabelsBuilder {
     pub labels: Labels,
+    /// Index of each distinct word.
     places: HashMap<String, usize>,
 }
 
 impl LabelsBuilder {
+    /// Appends the word of the next row.
     pub fn push(&mut self, word: &str) {
         let place = self.places.get(word).copied().unwrap_or_else(|| {
             let place = self.labels.names.len();
@@ -25,16 +27,18 @@ impl LabelsBuilder {
     }
 }
 
-/// Names of poses collected so far: numbers if all names are numbers, otherwise words. Incomplete
-/// if a row has no name.
+/// Names of poses collected so far.
 pub(super) enum PoseNames {
+    /// All names are numbers.
     Numbers(Vec<f64>),
+    /// Not all names are numbers.
     Words(LabelsBuilder),
+    /// A row has no name.
     Incomplete,
 }
 
 impl PoseNames {
-    /// Creates an empty column; `exists` is true if the table has the column `pose`.
+    /// Creates an empty collection; `exists` is true if the table has the column `pose`.
     pub fn new(exists: bool) -> Self {
         if exists { Self::Numbers(Vec::new()) } else { Self::Incomplete }
     }
@@ -58,7 +62,7 @@ impl PoseNames {
         }
     }
 
-    /// Returns the names as numbers or as words; neither if the column is incomplete.
+    /// Returns the names as numbers or as words; neither if a row has no name.
     pub fn finish(self) -> (Option<Vec<f64>>, Option<Labels>) {
         match self {
             Self::Numbers(numbers) => (Some(numbers), None),

@@ -61,7 +61,7 @@ pub(super) fn decoded(bytes: &[u8]) -> Cow<'_, str> {
 }
 
 /// Returns a record in which cells that are not UTF-8 are decoded from Windows-1252. Returns `None`
-/// if all cells are UTF-8, or if one does not look like text.
+/// if all cells are UTF-8, if one does not look like text, or if the record is UTF-16.
 pub(super) fn decoded_record(record: &ByteRecord) -> Option<ByteRecord> {
     let is_utf16 = BYTE_ORDER_MARKS.iter().any(|mark| record.as_slice().starts_with(mark));
     if is_utf16 || record.iter().all(|cell| std::str::from_utf8(cell).is_ok()) {

@@ -6,22 +6,22 @@ use super::Measurements;
 use crate::error::{Warning, WarningKind};
 use crate::problem::{JointKind, Problem};
 
-/// Excess over a joint limit that counts as rounding \[rad\] or \[m\].
+/// Largest excess over a joint limit that counts as rounding \[rad\] or \[m\].
 const LIMIT_TOLERANCE: f64 = 1e-6;
-/// Number of turns from zero at which a warning suggests that a column in radians is in degrees.
+/// Number of turns from zero above which a warning suggests that a column in radians is in degrees.
 const MIN_SUSPICIOUS_TURNS: f64 = 2.0;
-/// Highest plausible temperature [°C]. Above it, a warning suggests kelvins; a cold room in kelvins
-/// exceeds it.
+/// Highest plausible temperature [°C]. Above it, a warning suggests that the column is in kelvins;
+/// even the temperature of a cold room exceeds it in kelvins.
 const MAX_PLAUSIBLE_TEMPERATURE: f64 = 200.0;
 /// Largest plausible payload \[kg\]. The strongest industrial arms carry 2300 kg.
 const MAX_PAYLOAD: f64 = 3000.0;
-/// Largest plausible ratio of a payload to the declared masses of the arm. Arms carry up to about
+/// Largest plausible ratio of a payload to the declared mass of the arm. Arms lift at most about
 /// their own mass.
 const MAX_PAYLOAD_RATIO: f64 = 10.0;
 /// Largest plausible distance between repeated measurements of one pose \[m\]. Repetition and
 /// backlash move an arm by less.
 const MAX_REPEAT_DISTANCE: f64 = 0.02;
-/// Minimum number of rows at which a session for each of them is implausible.
+/// Minimum number of rows in a table at which a separate session for each row is implausible.
 const MIN_SESSION_ROWS: usize = 10;
 /// Largest plausible time \[s\], counted from 1970. Later times are in the year 5138, whereas
 /// milliseconds since 1970 exceed this limit from 1973 on.
@@ -48,7 +48,8 @@ impl Commands<'_> {
         (value / (self.to_si)(1.0) * 1e6).round() / 1e6
     }
 
-    /// Returns the limits of the joint as keys in the unit of the column.
+    /// Returns the limits of the joint as they are written in a problem file, in the unit of the
+    /// column.
     fn limits(&self, (min, max): (f64, f64)) -> String {
         let limit = |(key, limit): (&str, f64)| {
             limit.is_finite().then(|| format!("{key}_{} = {}", self.unit(), self.shown(limit)))
@@ -58,8 +59,8 @@ impl Commands<'_> {
 }
 
 impl Measurements {
-    /// Returns a warning, located at the lowest temperature, if all temperatures are implausibly
-    /// high.
+    /// Returns a warning, located at the lowest temperature, if all temperatures are so high that
+    /// they are probably in kelvins.
     pub(super) fn kelvins(&self) -> Option<Warning> {
         let (row, &least) = self
             .temperature
@@ -86,8 +87,8 @@ impl Measurements {
         (is_heavy_for_arm || heaviest > MAX_PAYLOAD).then_some(Warning { location, kind })
     }
 
-    /// Returns a warning for the first row that has the pose, the configuration, the session, the
-    /// target and the loads of an earlier row, and a position far from it.
+    /// Returns a warning for the first row that has the pose name, configuration, session, target
+    /// and loads of an earlier row, but a position far from that row's position.
     pub(super) fn same_pose_elsewhere(&self) -> Option<Warning> {
         let name = |row: usize| match (&self.pose, &self.pose_names) {
             (Some(numbers), _) => numbers.get(row).map(|number| number.to_bits()),
@@ -112,7 +113,8 @@ impl Measurements {
         })
     }
 
-    /// Returns a warning, located at the first row, if each of several rows has its own session.
+    /// Returns a warning, located at the first row, if there are several rows and each has a
+    /// session of its own.
     pub(super) fn session_per_row(&self) -> Option<Warning> {
         let rows = self.len();
         let location = self.location(0).with_key("session");
@@ -121,7 +123,8 @@ impl Measurements {
             .then_some(Warning { location, kind })
     }
 
-    /// Returns a warning, located at the first row, if all times are implausibly large.
+    /// Returns a warning, located at the first row, if all times are so large that they are
+    /// probably in milliseconds.
     pub(super) fn milliseconds(&self) -> Option<Warning> {
         let first = *self.time.first().filter(|_| self.time_measured)?;
         let is_late = self.time.iter().all(|time| *time > MAX_PLAUSIBLE_TIME);

@@ -9,6 +9,7 @@ pub(super) const MAX_RECORD_KIB: u64 = 1024;
 /// long.
 pub(super) struct Lines<R> {
     inner: R,
+    /// Last byte that was read.
     last: u8,
     /// Bytes of the current record, including read-ahead.
     record_bytes: u64,

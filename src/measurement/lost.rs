@@ -3,19 +3,19 @@
 use super::Measurements;
 use crate::error::{InputError, TableErrorKind, Warning, WarningKind};
 
-/// Largest fraction of rows at 0, 0, 0 that counts as lost targets. In a table with more of them
-/// the positions may be placeholders.
+/// Largest fraction of rows at 0, 0, 0 that counts as lost targets. In a table with more of them,
+/// the zeros may be placeholders of planned poses.
 const MAX_LOST_FRACTION: f64 = 0.5;
-/// Maximum number of such rows that a message lists.
+/// Maximum number of further rows at 0, 0, 0 that a message lists.
 const MAX_LISTED_ROWS: usize = 10;
 
 impl Measurements {
-    /// Returns a warning about a row whose measured position is exactly 0, 0, 0. The message
-    /// proposes to `write` this value of `missing`.
+    /// Returns a warning about the first row whose measured position is exactly 0, 0, 0. The
+    /// message proposes to set the key `missing` to `write`.
     ///
     /// # Errors
-    /// Returns an error if several rows of different configurations measure this position, which no
-    /// arm reaches by chance.
+    /// Returns an error if rows with different configurations measure this position, which does not
+    /// happen by chance.
     pub(super) fn lost_targets(&self, write: &str) -> Result<Option<Warning>, InputError> {
         let is_lost = |row: &usize| {
             self.observation(*row).is_position()

@@ -1,4 +1,4 @@
-//! Names of a table's columns after the map of `[data.columns]`.
+//! Names of a table's columns after the map of `[data.columns]` has been applied.
 
 use super::meaning::{is_numbered_or_position, split_unit};
 use super::table::Table;
@@ -7,15 +7,15 @@ use crate::problem::{ColumnRule, ColumnSelector, Dialect};
 
 /// Names of a table's columns, as in the table and in flexcal's vocabulary.
 pub(super) struct Names<'a> {
-    /// Name of each column in flexcal's vocabulary with the rule that assigns it; the table's name
-    /// if no rule applies.
+    /// Name of each column in flexcal's vocabulary with the rule that assigns it; the name in the
+    /// table and `None` if no rule applies.
     pub of_place: Vec<(&'a str, Option<&'a ColumnRule>)>,
     /// Rule of `[data.columns]` that uses the name of the file.
     pub of_file: Option<&'a ColumnRule>,
     /// True if the rules of `[data.columns]` were applied.
     pub mapped: bool,
-    /// First rule without a column, if the map was not applied because the table has flexcal's
-    /// names.
+    /// First rule whose column does not exist, if the map was not applied because the table has
+    /// none of its names.
     pub unused: Option<&'a ColumnRule>,
 }
 
@@ -82,9 +82,9 @@ impl<'a> Names<'a> {
         Ok(Self { of_place, of_file, mapped: true, unused: None })
     }
 
-    /// Returns the names that rules of `[data.columns]` assign to existing columns of this table.
-    /// Rules without a column are skipped, because another table may have it. Rules by place hold in
-    /// tables without a header alone.
+    /// Returns the name of each column in flexcal's vocabulary, after the rules of `[data.columns]`
+    /// whose columns exist. Rules without a column are skipped, because another table may have it.
+    /// Rules by place only apply to tables without a header.
     pub fn map_present(table: &'a Table, dialect: &'a Dialect) -> Vec<&'a str> {
         let ours = |(place, header): (usize, &'a String)| {
             let place = ColumnSelector::Place(place + 1);
@@ -104,8 +104,9 @@ impl<'a> Names<'a> {
         self.of_place.iter().map(|(name, _)| *name)
     }
 
-    /// Returns (index, name, rule) of the columns, those with a rule first, so that a rule wins if
-    /// another column has the same name. The name of the file comes last.
+    /// Returns (index, name, rule) of the columns, those with a rule first, so that a rule takes
+    /// precedence over another column of the same name. The name of the file is listed as a column
+    /// after all others.
     pub fn mapped_first(&self) -> Vec<(usize, &'a str, Option<&'a ColumnRule>)> {
         let file = self.of_file.map(|rule| (rule.ours.as_str(), Some(rule)));
         let columns = self.of_place.iter().chain(&file).enumerate();
@@ -116,8 +117,9 @@ impl<'a> Names<'a> {
     }
 }
 
-/// Returns the error of a rule that is written ours = theirs: the table has a column of the second
-/// name and none of the first, and the first alone is a name of flexcal.
+/// Returns the error of a rule that is written the wrong way round, theirs = ours; `None` for a
+/// right rule. The table then has a column with the name that should be flexcal's and none with the
+/// other one, and only the other one is a name of flexcal.
 fn reversed(rule: &ColumnRule, table: &Table) -> Option<InputError> {
     let ColumnSelector::Name(name) = &rule.theirs else { return None };
     let is_reversed = is_numbered_or_position(name)
@@ -128,8 +130,8 @@ fn reversed(rule: &ColumnRule, table: &Table) -> Option<InputError> {
     is_reversed.then(|| rule.location.clone().error(kind))
 }
 
-/// Returns the index of the column named `name`; `None` if there is none. Two such columns are an
-/// error of `rule`.
+/// Returns the index of the only column named `name`; `None` if there is none. Two such columns are
+/// an error, located at `rule`.
 fn only_place(rule: &ColumnRule, name: &str, table: &Table) -> Result<Option<usize>, InputError> {
     let mut places =
         (0..).zip(&table.header).filter(|(_, header)| *header == name).map(|(place, _)| place);
@@ -156,7 +158,7 @@ fn is_position(rule: &ColumnRule) -> bool {
 
 /// Returns the error of a rule whose column does not exist.
 ///
-/// A table that has no column of any rule for joints, or for positions, is probably one of two
+/// A table without any column that rules map to joints, or to positions, is probably one of two
 /// tables that belong together.
 pub(super) fn no_such(rule: &ColumnRule, rules: &[ColumnRule], table: &Table) -> InputError {
     let name = rule.theirs.to_string();

@@ -8,9 +8,11 @@ use crate::error::{InputError, InputErrorKind, TableErrorKind, WarningKind, near
 use crate::problem::{Joint, JointKind, Problem};
 use crate::quantity::Unit;
 
-/// Meaning of a column's name: a role with its unit, or none.
+/// Meaning of a column's name.
 pub(super) enum Meaning {
+    /// Role of a column that is read, with the conversion of its numbers to SI units.
     Read(Role, fn(f64) -> f64),
+    /// Column that is ignored, with the warning about it.
     Ignored(WarningKind),
     /// Name without a meaning in this problem.
     Unknown,
@@ -23,7 +25,8 @@ pub(super) struct Numbering {
 }
 
 impl Numbering {
-    /// Chooses the numbering: by joint number, or by position among the moving joints.
+    /// Chooses the numbering that fits the column names: numbers count all joints, or only the
+    /// joints that take a command.
     pub fn detect<'a>(names: impl Iterator<Item = &'a str>, problem: &Problem) -> Self {
         let numbers: Vec<usize> =
             names.filter_map(|name| numbered(split_unit(name).0, "q")).collect();
@@ -40,10 +43,12 @@ impl Numbering {
         Self { joints: if !by_number && by_order { moving } else { by_joint() } }
     }
 
+    /// Returns the index of the joint with a number, from 1; `None` if there is none.
     pub fn joint(&self, number: usize) -> Option<usize> {
         self.joints.get(number.checked_sub(1)?).copied()
     }
 
+    /// Returns the number, from 1, of the joint with an index.
     pub fn number(&self, joint: usize) -> usize {
         self.joints.iter().position(|&index| index == joint).unwrap_or(joint) + 1
     }
@@ -74,7 +79,7 @@ impl Numbering {
         nearest(name, plain.chain(approach).chain(measured).filter(lacking))
     }
 
-    /// Returns the meaning of a column's name.
+    /// Returns the meaning of a column's name; an error if its unit is missing or wrong.
     pub fn recognise(&self, name: &str, problem: &Problem) -> Result<Meaning, InputErrorKind> {
         if let Some(meaning) = by_joint_name(name, problem) {
             return meaning;
@@ -153,8 +158,8 @@ impl Numbering {
     }
 }
 
-/// Returns the role if the name of a file may stand in for its column: roles whose values are
-/// words. Returns an error for other roles.
+/// Returns the role if the name of a file may be its value in every row: session, target or point.
+/// Returns an error for other roles.
 pub(super) fn word_of_row(role: Role) -> Result<Role, InputErrorKind> {
     match role {
         Role::Session | Role::Target | POINT => Ok(role),
@@ -165,8 +170,8 @@ pub(super) fn word_of_row(role: Role) -> Result<Role, InputErrorKind> {
 /// Conversion of a column `time` without a unit. Its cells must be dates, so numbers become NaN.
 pub(super) const DATE_CONVERSION: fn(f64) -> f64 = |_| f64::NAN;
 
-/// Returns the meaning of a column named after a joint, such as `shoulder_pan_joint_rad`. Ambiguous
-/// joint names and names of other columns are not considered.
+/// Returns the meaning of a column named after a joint, such as `shoulder_pan_joint_rad`. `None`
+/// for other columns, and for a joint name that several joints or another column have.
 fn by_joint_name(name: &str, problem: &Problem) -> Option<Result<Meaning, InputErrorKind>> {
     let base = split_unit(name).0;
     let other =
@@ -201,7 +206,8 @@ fn by_joint_name(name: &str, problem: &Problem) -> Option<Result<Meaning, InputE
     }
 }
 
-/// Returns true if the fit uses the column with the name `meant`. Names of poses have no influence.
+/// Returns true if the column with the name `meant` may change the results of a fit. Pose names do
+/// not, and orientations are not considered.
 pub(super) fn affects_results(meant: &str) -> bool {
     let base = split_unit(meant).0;
     base != "pose"
@@ -246,8 +252,8 @@ pub(super) fn lacking_neighbour(
     }
 }
 
-/// Adds to the error of a missing column of encoder readings, whose names have a `suffix`, why it
-/// is needed.
+/// Adds the reason why encoder readings are needed to the error of a missing column; `suffix` is
+/// that of their column names, empty for commands.
 pub(super) fn asked_for_readings(error: InputError, suffix: &str) -> InputError {
     match *error.kind {
         InputErrorKind::Table(TableErrorKind::MissingColumn { write, near, unknown })

@@ -95,19 +95,19 @@ pub struct Measurements {
     /// Observation of each row; empty if all rows measure positions.
     #[doc(hidden)]
     pub observations: Vec<Observation>,
-    /// Measured numbers of each row, padded with zeros \[m\] or \[rad\]: positions in the measuring
-    /// frame, distances or tilts; 0 for a contact.
+    /// Measured numbers of each row, padded with zeros: a position in the measuring frame \[m\], a
+    /// distance \[m\], tilts \[rad\] or pixels; 0 for a contact.
     pub positions: Vec<Vector3<f64>>,
     /// True if the positions were measured; false for planned poses.
     pub position_measured: bool,
-    /// Unit of the positions in the first file in SI (1/1000 for millimetres), or `None` without a
-    /// file.
+    /// Unit of the positions in the first file in m (1/1000 for millimetres); `None` without a file
+    /// or without positions.
     pub position_unit: Option<f64>,
-    /// Measured orientations of the target in the measuring frame; `None` if a column is missing,
-    /// NaN in a row without one.
+    /// Measured orientations of the target in the measuring frame; `None` if a column is missing.
+    /// Rows that measure no position have the identity.
     pub orientations: Option<Vec<UnitQuaternion<f64>>>,
-    /// Standard deviation of each coordinate \[m\] from the column `sigma_mm` or the kind of the
-    /// row; NaN if unknown.
+    /// Standard deviation of the noise of each row's coordinates, from the column `sigma_mm` or the
+    /// kind of the row, in the unit of the row; NaN if unknown.
     pub sigma: Option<Vec<f64>>,
     /// Payload of each row \[kg\]; `None` without a column.
     pub payload: Option<Vec<f64>>,
@@ -119,8 +119,8 @@ pub struct Measurements {
     pub time: Vec<f64>,
     /// True if `time` was recorded, false if it is the row number.
     pub time_measured: bool,
-    /// Direction from which each joint approached, −1, 0 or +1, shape = (rows, joints); 0 for
-    /// joints without a column.
+    /// Direction from which each joint approached its command, −1, 0 or +1, shape = (rows, joints);
+    /// 0 for joints without a column.
     pub approach: Option<Vec<f64>>,
     /// Values of the declared covariates in their order and units, shape = (rows, covariates);
     /// empty if there are none.
@@ -130,13 +130,14 @@ pub struct Measurements {
     /// Pose names from the column `pose`, if every row has one and not all are numbers.
     #[doc(hidden)]
     pub pose_names: Option<Labels>,
-    /// Session of each row; one unnamed label without a column.
+    /// Session of each row; without a column, all rows have one session with an empty name.
     #[doc(hidden)]
     pub session: Labels,
     /// Target of each row; `None` without a column.
     #[doc(hidden)]
     pub target: Option<Labels>,
-    /// True for rows marked `validation` in the column that the problem names, or else in `split`.
+    /// True for rows marked `validation` in the column that the problem names, or else in `split`;
+    /// `None` without the column.
     pub marked_held_out: Option<Vec<bool>>,
     /// Columns of the commands in the first file, one per moving joint; empty without a file.
     #[doc(hidden)]
@@ -149,7 +150,8 @@ pub struct Measurements {
     pub order: RowOrder,
 }
 
-/// Repeated measurement of a fixed point, which shows whether the instrument has moved.
+/// Measurement of a fixed point without the arm. Repeated, it shows whether the instrument has
+/// moved.
 #[doc(hidden)]
 #[derive(Debug, Clone, PartialEq)]
 pub struct NestReading {
@@ -161,8 +163,7 @@ pub struct NestReading {
     pub position: Vector3<f64>,
     /// Time \[s\], if there is a column.
     pub time: Option<f64>,
-    /// Number of rows of the arm before this measurement of a fixed point, which replaces a missing
-    /// time.
+    /// Number of rows of the arm before this measurement, which is used if there is no time.
     pub after: usize,
     /// Session; empty without a column.
     pub session: String,
@@ -170,7 +171,7 @@ pub struct NestReading {
     pub sigma: Option<f64>,
 }
 
-/// Column of a joint's commands in a table.
+/// Column of a joint's commands in a table file.
 #[doc(hidden)]
 #[derive(Debug, Clone, PartialEq)]
 pub struct CommandColumn {
@@ -178,7 +179,7 @@ pub struct CommandColumn {
     pub joint: usize,
     /// Name of the column in the table.
     pub name: String,
-    /// Unit in SI, for example π/180 for degrees.
+    /// Unit of the column in rad or m, for example π/180 for degrees.
     pub unit: f64,
 }
 
@@ -241,7 +242,7 @@ impl Measurements {
         self.kinds().first().copied().unwrap_or_default()
     }
 
-    /// Returns the orientation of a row in the measuring frame, if it was measured.
+    /// Returns the orientation of a row in the measuring frame; `None` if the table has none.
     #[doc(hidden)]
     pub fn orientation(&self, row: usize) -> Option<&UnitQuaternion<f64>> {
         self.orientations
@@ -250,7 +251,8 @@ impl Measurements {
             .filter(|orientation| !orientation.w.is_nan())
     }
 
-    /// Returns the standard deviation stated for a row \[m\], if there is one.
+    /// Returns the standard deviation stated for the noise of a row, in the unit of the row; `None`
+    /// if it is unknown.
     pub(crate) fn sigma_of(&self, row: usize) -> Option<f64> {
         self.sigma.as_ref().map(|column| column[row]).filter(|sigma| !sigma.is_nan())
     }
@@ -280,7 +282,7 @@ impl Measurements {
         self.setup(row, &self.session_starts()).to_owned()
     }
 
-    /// Returns the conditions of all rows without their past: the earlier poses are the other rows.
+    /// Returns the conditions of all rows without their past, which consists of other rows.
     pub(crate) fn conditions_without_past(&self) -> Vec<PoseConditions> {
         let starts = self.session_starts();
         let alone =
@@ -330,9 +332,9 @@ impl Measurements {
         &self.covariates[row * n..(row + 1) * n]
     }
 
-    /// Returns a digest of a row, 16 hexadecimal digits: joints, measured numbers, and session,
-    /// target, payload and time where the table states them. It is the same in every file and for
-    /// equal values in other units.
+    /// Returns a digest of a row, 16 hexadecimal digits. It is computed from joints, measured
+    /// numbers, and session, target, payload and time if the table states them. It does not depend
+    /// on the file, nor on the units in which the values are written.
     pub(crate) fn row_digest(&self, row: usize) -> String {
         let orientation = self.orientation(row).map(UnitQuaternion::scaled_axis);
         let turn = orientation.iter().flat_map(|turn| turn.iter());
@@ -340,7 +342,7 @@ impl Measurements {
         let payload = self.payload.as_ref().map(|payload| (&payload[row], "payload"));
         let time = self.time_measured.then(|| (&self.time[row], "time"));
         let words = [Some(&self.session), self.target.as_ref()].into_iter().flatten();
-        // Adding 0 turns −0 into 0; a change of unit keeps ten digits.
+        // Adding 0 turns −0 into 0. Ten digits stay the same if the unit is changed.
         let text = numbers.fold(format!("{:?}", self.observation(row)), |text, number| {
             format!("{text} {:.9e}", number + 0.0)
         });
@@ -423,7 +425,7 @@ impl Measurements {
         }
     }
 
-    /// Returns these rows followed by those of a table with the same columns and words.
+    /// Returns these rows followed by those of a table with the same columns, sessions and targets.
     #[must_use]
     pub(crate) fn concatenate(&self, other: &Self) -> Self {
         let concatenated = |first: &[f64], second: &[f64]| [first, second].concat();

@@ -1,5 +1,5 @@
-//! Observations other than positions, from the columns of their kinds;
-//! known distances between points.
+//! Quantities that the rows of a table measure, from the columns of each kind of rows; and known
+//! distances between points.
 
 use std::path::Path;
 
@@ -15,16 +15,17 @@ use crate::problem::fixture::unknown;
 use crate::problem::frame::frame;
 use crate::problem::{Fixture, KnownDistance, Observation, Problem};
 
-/// Quantity that a row measures, with its numbers.
+/// Quantity that a row measures.
 pub(super) struct Observed {
     pub observation: Observation,
-    /// True if the numbers of the row have been measured, false for a planned row.
+    /// True if the row has the measured numbers, false for a planned row.
     pub measured: bool,
 }
 
 /// Returns the quantities that the current row measures, in the order of [`Observation`]. A table
-/// of positions has one position per row. `in_point` is the point that the whole file touches. A
-/// position that is `missing` gives no observation.
+/// of positions has one position per row. If the table has to be `measured`, a row without a
+/// measured quantity is an error. `missing` is true if the row has the mark of a missing position.
+/// `in_point` is the name of the point that the whole file touches.
 pub(super) fn of_row(
     table: &Table,
     columns: &Columns,
@@ -55,8 +56,8 @@ pub(super) fn of_row(
     };
     for kind in others() {
         let cells = cells_of(kind);
-        // Kinds of rows may share a column. The kind with more filled cells takes it. The number of
-        // a point alone is no observation.
+        // Kinds of rows may share a column, which then belongs to the kind with more filled cells.
+        // A row with only the number of a point measures nothing.
         let is_taken = |other: &Kind| {
             cells.iter().all(|cell| other.field(cell.field.name).is_some())
                 && cells_of(other).len() > cells.len()
@@ -78,7 +79,7 @@ pub(super) fn of_row(
     }
 }
 
-/// Filled cell of the current row.
+/// Filled cell of the current row, or the name of the file as its value.
 struct Cell<'a> {
     field: &'static Field,
     /// Index of the cell's column; `None` if the name of the file is the value.
@@ -87,8 +88,8 @@ struct Cell<'a> {
     stem: &'a str,
 }
 
-/// Returns the observation of a kind from the filled cells of its columns; `None` without one.
-/// Numbers may be missing in rows that are not yet `measured`.
+/// Returns the observation of a kind from the filled cells of its columns; `None` if the row has no
+/// observation of this kind. Measured numbers may be missing unless the table has to be `measured`.
 fn of_kind(
     table: &Table,
     kind: &Kind,
@@ -129,15 +130,16 @@ fn of_kind(
         .map(|observation| Observed { observation, measured: is_measured }))
 }
 
-/// Returns the frame that a cell names: `base`, a joint by its name, or `joint3`. Without a column
-/// it is the frame of the tool.
+/// Returns the frame that a cell names, `base`, a joint by its name, or `joint3`: 0 is the base, i
+/// the frame of joint i. Without a column it is the frame of the joint that carries the tool.
 fn frame_of(table: &Table, place: Option<usize>, problem: &Problem) -> Result<usize, InputError> {
     let Some(place) = place else { return Ok(problem.tool.joint + 1) };
     frame(table.name(place)?, &problem.joints, problem.tool.joint)
         .map_err(|kind| table.cell_error(place, kind))
 }
 
-/// Returns the number in a cell that selects a point of a marker, counted from 0.
+/// Returns the number in a cell that selects a point of a marker, counted from 0. `marker` is the
+/// index of the fixture.
 fn point(
     table: &Table,
     place: usize,
@@ -156,7 +158,8 @@ fn point(
     })
 }
 
-/// Returns the fixture that a cell names.
+/// Returns the index of the fixture with a `name` whose kind has the name `word`. `place` is the
+/// index of the cell's column, for errors.
 fn fixture(
     table: &Table,
     place: Option<usize>,
@@ -219,8 +222,8 @@ pub(super) fn check_target(
     })
 }
 
-/// Appends a row for each known distance between points, and completes the standard deviation of
-/// every row.
+/// Appends a row for each known distance between points that are measured or declared. Sets the
+/// declared standard deviation in rows that state none.
 pub(super) fn add_known_distances(
     measurements: &mut Measurements,
     problem: &Problem,
@@ -277,8 +280,9 @@ pub(super) fn add_known_distances(
 }
 
 impl Measurements {
-    /// Checks that each unknown fixture has more measurements than unknown coordinates.
-    pub(super) fn enough_contacts(&self, problem: &Problem) -> Result<(), InputError> {
+    /// Checks that each measured fixture with unknown numbers has more measured coordinates than
+    /// unknown numbers.
+    pub(super) fn check_contacts(&self, problem: &Problem) -> Result<(), InputError> {
         for (index, fixture) in problem.fixtures.iter().enumerate() {
             let rows: Vec<usize> = (0..self.len())
                 .filter(|&row| self.observation(row).fixtures().contains(&Some(index)))
@@ -339,6 +343,7 @@ impl Measurements {
         if rows.len() == self.len() { self } else { self.select(&rows) }
     }
 
+    /// Sets the standard deviation of the noise of a row.
     fn set_sigma(&mut self, row: usize, value: f64) {
         if let Some(sigma) = self.sigma.as_mut().and_then(|column| column.get_mut(row)) {
             *sigma = value;

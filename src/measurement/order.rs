@@ -24,10 +24,10 @@ impl PartialEq for RowOrder {
     }
 }
 
-/// Chronological order of the rows. Each row has the position in that order of its session's first
-/// row, and its own.
+/// Chronological order of the rows: session by session, and by time within a session.
 #[derive(Debug)]
 struct Chronology {
+    /// For each row, the position in the order of the first row of its session, and of itself.
     places: Vec<(u32, u32)>,
     /// Columns in chronological order; `None` if the table already has that order.
     sorted: Option<Past>,
@@ -65,9 +65,9 @@ impl Chronology {
 }
 
 impl Measurements {
-    /// Returns the median time between consecutive configurations and the duration of the longest
-    /// session \[s\]. Repeated readings of one configuration are not counted. Returns `None` if
-    /// times were not measured or no configuration changes.
+    /// Returns the median time between successive rows of different configurations, and the
+    /// duration of the longest session \[s\]. Returns `None` if times were not measured or no
+    /// configuration changes.
     pub(crate) fn clock(&self) -> Option<(f64, f64)> {
         let chronology = self.chronology();
         let sorted = chronology.sorted.as_ref();
@@ -89,7 +89,8 @@ impl Measurements {
             .map(|median| (*median, longest))
     }
 
-    /// Returns a warning if a row is earlier than the row above it in the same file and session.
+    /// Returns a warning, located at the first such row, if a row is earlier than the one before it
+    /// in the same file and session.
     pub(crate) fn time_going_back(&self) -> Option<Warning> {
         if !self.time_measured {
             return None;
@@ -109,13 +110,14 @@ impl Measurements {
         Some(Warning { location: self.location(row), kind })
     }
 
+    /// Returns the chronological order, which is computed at the first call.
     fn chronology(&self) -> &Chronology {
         self.order.0.get_or_init(|| Chronology::new(self))
     }
 }
 
 impl PoseTable for Measurements {
-    /// Returns the earlier rows of the same session.
+    /// Returns the earlier rows of the session of a row, in chronological order.
     fn past(&self, row: usize) -> Past<&[f64]> {
         let Chronology { places, sorted } = self.chronology();
         let Some((begin, at)) = places.get(row).map(|&(begin, at)| (begin as usize, at as usize))

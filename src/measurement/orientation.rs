@@ -7,7 +7,7 @@ use crate::problem::RotationKind;
 /// Largest deviation of a quaternion's norm from 1 that counts as rounding.
 const NORM_TOLERANCE: f64 = 0.01;
 
-/// Cells of one row from which its orientation is computed.
+/// Numbers of one row from which its orientation is computed.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Cells {
     /// Angles rx, ry, rz \[rad\].

@@ -7,34 +7,34 @@ use super::limits::Commands;
 use crate::error::{Warning, WarningKind};
 use crate::problem::{JointKind, Problem};
 
-/// Temperatures of rooms, 15 °C to 35 °C, in degrees Fahrenheit.
-const FAHRENHEIT: std::ops::RangeInclusive<f64> = 59.0..=95.0;
-/// Highest reference temperature of an arm at room temperature \[°C\].
+/// Range of room temperatures, 15 °C to 35 °C, in degrees Fahrenheit.
+const ROOM_FAHRENHEIT: std::ops::RangeInclusive<f64> = 59.0..=95.0;
+/// Highest declared reference temperature that is a room temperature \[°C\].
 const MAX_ROOM_TEMPERATURE: f64 = 30.0;
 /// Standard acceleration of gravity \[m/s²\].
 const GRAVITY: f64 = 9.80665;
-/// Largest relative difference between the usual hoist force and that of the declared mass at which
-/// the column probably holds the mass.
+/// Largest relative difference between g times the median of the column `hoist_N` and the declared
+/// hoist force, at which the column is probably in kilograms.
 const MAX_HOIST_DIFFERENCE: f64 = 0.2;
-/// Minimum number of rows from which the range of the joints is judged.
+/// Minimum number of rows of a table at which small ranges of the joints are suspect.
 const MIN_ROWS: usize = 10;
-/// Smallest declared range of a joint with which motions of a few degrees are suspect \[rad\].
+/// Declared range of every revolute joint above which motions of a few degrees are suspect \[rad\].
 const MIN_WIDE_RANGE: f64 = 1.0;
 
 impl Measurements {
-    /// Returns a warning, located at the lowest temperature, if all temperatures are hot for a
-    /// reference temperature of a room.
+    /// Returns a warning, located at the lowest temperature, if all temperatures are room
+    /// temperatures in degrees Fahrenheit, and the declared reference is a room temperature in °C.
     pub(super) fn fahrenheit(&self, problem: &Problem) -> Option<Warning> {
         let reference = problem.data.reference_temperature?;
         let temperatures = || self.temperature.iter().flatten().copied();
         let (row, least) = temperatures().enumerate().min_by(|(_, a), (_, b)| a.total_cmp(b))?;
-        let is_usual = temperatures().all(|value| FAHRENHEIT.contains(&value));
+        let is_usual = temperatures().all(|value| ROOM_FAHRENHEIT.contains(&value));
         let kind = WarningKind::Fahrenheit { least: format!("{least}") };
         let location = self.location(row).with_key("temperature_C");
         (is_usual && reference <= MAX_ROOM_TEMPERATURE).then_some(Warning { location, kind })
     }
 
-    /// Returns a warning, located at the first row, if the hoist forces are those of the declared
+    /// Returns a warning, located at the first row, if the hoist forces are about the declared
     /// force in kilograms.
     pub(super) fn hoist_in_kilograms(&self, problem: &Problem) -> Option<Warning> {
         let hoists = problem.joints.iter().filter_map(|joint| joint.beam.as_ref()?.hoist.as_ref());
@@ -52,8 +52,8 @@ impl Measurements {
         ((ratio - 1.0).abs() < MAX_HOIST_DIFFERENCE).then_some(Warning { location, kind })
     }
 
-    /// Returns a warning, located at the largest angle, if no column in degrees leaves the range
-    /// that is usual for radians, although the joints turn further.
+    /// Returns a warning, located at the largest angle, if all angles of columns in degrees are
+    /// within ±2π, as if they were in radians, although the joints have a larger range.
     pub(super) fn few_degrees(&self, problem: &Problem, columns: &[Commands]) -> Option<Warning> {
         let is_angle = |column: &&Commands| {
             column.unit() == "deg"

@@ -4,32 +4,36 @@ use crate::error::{Location, Warning, WarningKind};
 
 /// Minimum number of timed pairs whose times are compared.
 const MIN_PAIRS: usize = 4;
-/// Minimum number of pairs that have to contradict the order. A single one may be a pause between
-/// arrival and measurement.
+/// Minimum number of pairs that must contradict the order. A single one may be caused by a pause
+/// between arrival and measurement.
 const MIN_CONTRADICTED: usize = 2;
-/// Smallest time between the rows of a pair, after the offset of the clocks, at which the pair
-/// contradicts the order, as a fraction of the usual time between rows of the joint table.
-const MIN_GAP: f64 = 0.75;
-/// Largest time to the nearest row of the joint table at which a pair contradicts the order, as a
-/// fraction of the time to the row of the pair.
-const MAX_NEAREST: f64 = 0.5;
+/// Time between the rows of a pair, without the offset of the clocks, above which the pair may
+/// contradict the order. It is a fraction of the median time between rows of the joint table.
+const MIN_GAP_RATIO: f64 = 0.75;
+/// Time from the measured row to the nearest row of the joint table, below which a pair may
+/// contradict the order. It is a fraction of the time to the row with which it is paired.
+const MAX_NEAREST_RATIO: f64 = 0.5;
 
-/// Times of the rows of a pair \[s\], each on the clock of its table, and their places.
+/// Times of the two rows of a pair, each on the clock of its table, and their places in the files.
 pub(super) struct TimedPair {
+    /// Time of the measured row \[s\].
     pub measured: f64,
+    /// Time of the row of the joint table \[s\].
     pub logged: f64,
+    /// Place of the measured row.
     pub place: Location,
+    /// Place of the row of the joint table.
     pub log_place: Location,
 }
 
-/// Returns the middle one of some values; `None` without values.
+/// Returns the median of some values, the upper one of two middle values; `None` without values.
 fn median(mut values: Vec<f64>) -> Option<f64> {
     values.sort_by(f64::total_cmp);
     values.get(values.len() / 2).copied()
 }
 
-/// Returns a warning, located at the first such row, if rows of the joint table are paired by order
-/// with rows that were measured at other times.
+/// Returns a warning if measured rows are paired by order with rows of the joint table of other
+/// times, while rows of their times exist. It is located at the first such measured row.
 pub(super) fn order_contradicted(pairs: &[TimedPair]) -> Option<Warning> {
     let timed = || pairs.iter().filter(|pair| (pair.measured - pair.logged).is_finite());
     if timed().count() < MIN_PAIRS {
@@ -41,7 +45,8 @@ pub(super) fn order_contradicted(pairs: &[TimedPair]) -> Option<Warning> {
     let steps = by_log_time.iter().zip(by_log_time.iter().skip(1));
     let spacing = median(steps.map(|(a, b)| b.logged - a.logged).collect())?;
     let gap = |pair: &TimedPair, logged: f64| (pair.measured - logged - offset).abs();
-    let is_apart = |pair: &TimedPair| spacing > 0.0 && gap(pair, pair.logged) > MIN_GAP * spacing;
+    let is_apart =
+        |pair: &TimedPair| spacing > 0.0 && gap(pair, pair.logged) > MIN_GAP_RATIO * spacing;
     // A row that is measured after a pause is near a row of the joint table whose pair is right.
     let is_contradicted = |pair: &&TimedPair| {
         if !is_apart(pair) {
@@ -51,7 +56,8 @@ pub(super) fn order_contradicted(pairs: &[TimedPair]) -> Option<Warning> {
         let beside = by_log_time.iter().skip(after.saturating_sub(1)).take(2);
         let nearest = beside.min_by(|a, b| gap(pair, a.logged).total_cmp(&gap(pair, b.logged)));
         nearest.is_some_and(|nearest| {
-            is_apart(nearest) && gap(pair, nearest.logged) < MAX_NEAREST * gap(pair, pair.logged)
+            is_apart(nearest)
+                && gap(pair, nearest.logged) < MAX_NEAREST_RATIO * gap(pair, pair.logged)
         })
     };
     let contradicted: Vec<&TimedPair> = timed().filter(is_contradicted).collect();
@@ -67,6 +73,7 @@ pub(super) fn order_contradicted(pairs: &[TimedPair]) -> Option<Warning> {
 
 /// Returns true if all times \[s\] are whole minutes.
 pub(super) fn are_whole_minutes(mut times: impl Iterator<Item = f64>) -> bool {
+    /// Largest deviation from a whole minute that counts as rounding \[s\].
     const MAX_ROUNDING: f64 = 1e-3;
     times.all(|time| (time / 60.0 - (time / 60.0).round()).abs() * 60.0 < MAX_ROUNDING)
 }

@@ -24,7 +24,7 @@ impl Measurements {
         Self::read_table(files, problem, Use::Measured)
     }
 
-    /// Reads poses that may still be unmeasured; missing positions are zero.
+    /// Reads poses that may still be unmeasured; missing positions are set to 0.
     ///
     /// # Errors
     /// Returns the first error in the files, or an error if a file cannot be read.
@@ -35,8 +35,8 @@ impl Measurements {
         Self::read_table(files, problem, Use::Planned)
     }
 
-    /// Reads poses to predict, which may be unmeasured. Tables without joint columns are joined with
-    /// the joint table of the problem; by order only if they are the problem's own tables.
+    /// Reads poses to predict, which may be unmeasured. Tables without joint columns are joined
+    /// with the joint table of the problem; by order only if they are the problem's own tables.
     ///
     /// # Errors
     /// Returns the first error in the files, or an error if a file cannot be read.
@@ -59,7 +59,8 @@ impl Measurements {
         Self::read_column_table(table, problem, Use::Measured)
     }
 
-    /// Reads poses from a table in memory that may still be unmeasured; missing positions are zero.
+    /// Reads poses from a table in memory, which may still be unmeasured; missing positions are set
+    /// to 0.
     ///
     /// # Errors
     /// Returns the first error in the table.
@@ -71,6 +72,7 @@ impl Measurements {
         Self::read_column_table(table, problem, Use::Planned)
     }
 
+    /// Reads files for a purpose.
     fn read_table(
         files: &[PathBuf],
         problem: &Problem,
@@ -95,6 +97,7 @@ impl Measurements {
         tables.finish()
     }
 
+    /// Reads a table in memory for a purpose.
     fn read_column_table(
         table: ColumnTable,
         problem: &Problem,
@@ -108,14 +111,14 @@ impl Measurements {
     }
 }
 
-/// What tables are read for.
+/// Purpose for which tables are read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Use {
     /// Rows that have to be measured.
     Measured,
-    /// Rows whose predictions may be compared with measurements.
+    /// Rows that are predicted, and compared with measurements if there are any.
     Predicted,
-    /// Planned poses and targets, which carry their commands.
+    /// Planned poses and targets, whose tables contain the commands.
     Planned,
 }
 
@@ -128,7 +131,9 @@ struct Tables<'a> {
     /// True if tables without joint columns are joined with the joint table of the problem.
     joins: bool,
     warnings: Vec<Warning>,
+    /// Builder of the measurements; `None` before the first table.
     builder: Option<RowsBuilder>,
+    /// Joint table of the problem; `None` if the tables have joint columns.
     log: Option<JoinedLog>,
 }
 
@@ -176,7 +181,7 @@ impl<'a> Tables<'a> {
         let rows = self
             .builder
             .get_or_insert_with(|| RowsBuilder::new(self.files, &table, &columns, self.problem));
-        rows.same_columns(&table, &columns)?;
+        rows.check_same_columns(&table, &columns)?;
         let (before, mut left_out) = (rows.row_count(), LeftOut::default());
         loop {
             let is_nest = columns.nest(&table).is_some();
@@ -278,18 +283,21 @@ struct LeftOut {
 }
 
 impl LeftOut {
+    /// Counts the current row of a table.
     fn count(&mut self, table: &Table) {
         self.rows += 1;
         self.first.get_or_insert_with(|| Location::file(&table.file).at_line(table.line()));
     }
 
+    /// Returns a warning, located at the first of the rows; `None` without rows.
     fn warning(self) -> Option<Warning> {
         let rows = self.rows;
         self.first.map(|location| Warning { location, kind: WarningKind::RowsMissing { rows } })
     }
 }
 
-/// Returns true if the position of the current row is the marker for a missing measurement.
+/// Returns true if the position of the current row is the word or number that marks a missing
+/// measurement.
 fn is_missing(missing: &Missing, table: &Table, columns: &Columns) -> bool {
     let axis = |column: &&Column| {
         let axis = POSITION.iter().position(|role| *role == column.role)?;
@@ -322,8 +330,8 @@ fn commands(columns: &[(Column, String)]) -> Vec<Commands<'_>> {
     joints.collect()
 }
 
-/// Returns the error of a data file. It is `named`, at the line of the problem that names the file,
-/// or `given` for a file from the command line.
+/// Returns the error of a data file. If the problem names the file, the error is of kind `named`
+/// and located there; otherwise it is of kind `given` and located at the file.
 fn file_error(
     (file, files): (&Path, &[PathBuf]),
     problem: &Problem,

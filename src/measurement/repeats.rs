@@ -1,4 +1,4 @@
-//! Rows that repeat a configuration or pose.
+//! Grouping of rows that repeat a configuration or a pose.
 
 use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
@@ -6,11 +6,11 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use super::Measurements;
 use crate::problem::{Effect, JointKind, Observation, Problem};
 
-/// Difference up to which angles count as equal: 0.01° \[rad\].
+/// Difference up to which commanded angles count as equal \[rad\]: 0.01°.
 const ANGLE_TOLERANCE: f64 = 0.01 * std::f64::consts::PI / 180.0;
-/// Difference up to which lengths count as equal \[m\].
+/// Difference up to which commanded lengths count as equal \[m\].
 const LENGTH_TOLERANCE: f64 = 1e-4;
-/// Difference up to which payloads and hoist forces count as equal, as a fraction of the largest.
+/// Difference up to which payloads, or hoist forces, count as equal, as a fraction of the largest.
 const LOAD_TOLERANCE: f64 = 0.01;
 /// Difference up to which temperatures count as equal \[K\].
 const TEMPERATURE_TOLERANCE: f64 = 1.0;
@@ -18,9 +18,9 @@ const TEMPERATURE_TOLERANCE: f64 = 1.0;
 const WORD_TOLERANCE: f64 = 0.5;
 
 impl Measurements {
-    /// Returns the number of each row's configuration and the number of distinct configurations.
-    /// The numbering does not depend on the order of the rows: it follows session, pose number,
-    /// time and measured values.
+    /// Returns the index of each row's configuration and the number of distinct configurations. The
+    /// indices do not depend on the order of the rows: they follow session, pose number, time and
+    /// measured values.
     pub(crate) fn configurations(&self, problem: &Problem) -> (Vec<usize>, usize) {
         let mut order: Vec<usize> = (0..self.len()).collect();
         let keys: Vec<_> = order.iter().map(|&row| self.key(row)).collect();
@@ -43,28 +43,31 @@ impl Measurements {
         (session, pose.into_iter().chain(time).chain(measured).collect())
     }
 
-    /// Returns the number of each row's pose, in order of appearance. Rows of one pose contain the
+    /// Returns the index of each row's pose, in order of appearance. Rows of one pose contain the
     /// same information about the arm.
     ///
-    /// They agree in configuration, session and target. They also agree in payload and hoist if the
-    /// arm is elastic or an effect is declared, and in temperature and approach if a declared
-    /// effect depends on them.
+    /// Rows of one pose agree in configuration, session, target and measured quantity. They also
+    /// agree in payload and hoist force if the arm is elastic or an effect is declared, and in
+    /// temperature and approach if a declared effect depends on them.
     #[doc(hidden)]
     pub fn pose_numbers(&self, problem: &Problem) -> Vec<usize> {
         self.numbers(problem, true)
     }
 
-    /// Returns the number of each row's pose of the arm, regardless of the target: rows of several
-    /// targets can show one pose.
+    /// Returns the index of each row's pose of the arm, in order of appearance. Unlike for
+    /// [`pose_numbers`](Self::pose_numbers), rows that measure different targets or quantities may
+    /// have one pose.
     pub(crate) fn arm_pose_numbers(&self, problem: &Problem) -> Vec<usize> {
         self.numbers(problem, false)
     }
 
+    /// Returns the index of each row's pose; `by_target` is true if the rows of a pose must agree
+    /// in target and measured quantity.
     fn numbers(&self, problem: &Problem, by_target: bool) -> Vec<usize> {
         let mut columns = self.joint_columns(problem);
         let words = |of_row: &[usize]| Column {
             values: of_row.iter().map(|&word| word as f64).collect(),
-            step: WORD_TOLERANCE,
+            tolerance: WORD_TOLERANCE,
         };
         columns.push(words(&self.session.of_row));
         columns
@@ -85,21 +88,22 @@ impl Measurements {
         if is_elastic || !problem.effects.is_empty() {
             for load in [&self.payload, &self.hoist].into_iter().flatten() {
                 let largest = load.iter().fold(0.0, |largest: f64, value| largest.max(value.abs()));
-                let step = if largest > 0.0 { LOAD_TOLERANCE * largest } else { 1.0 };
-                columns.push(Column { values: load.clone(), step });
+                let tolerance = if largest > 0.0 { LOAD_TOLERANCE * largest } else { 1.0 };
+                columns.push(Column { values: load.clone(), tolerance });
             }
         }
         if let Some(temperature) =
             self.temperature.as_ref().filter(|_| declared(Effect::is_thermal))
         {
-            columns.push(Column { values: temperature.clone(), step: TEMPERATURE_TOLERANCE });
+            columns.push(Column { values: temperature.clone(), tolerance: TEMPERATURE_TOLERANCE });
         }
         if let Some(approach) = self.approach.as_ref().filter(|_| declared(Effect::has_sides)) {
             let side = |joint: usize| {
                 (0..self.len()).map(|row| approach[row * self.joints + joint]).collect()
             };
             columns.extend(
-                (0..self.joints).map(|joint| Column { values: side(joint), step: WORD_TOLERANCE }),
+                (0..self.joints)
+                    .map(|joint| Column { values: side(joint), tolerance: WORD_TOLERANCE }),
             );
         }
         group_rows(&columns, &(0..self.len()).collect::<Vec<_>>()).0
@@ -109,7 +113,11 @@ impl Measurements {
     fn joint_columns(&self, problem: &Problem) -> Vec<Column> {
         let column = |(index, kind): (usize, JointKind)| Column {
             values: (0..self.len()).map(|row| self.configuration(row)[index]).collect(),
-            step: if kind == JointKind::Prismatic { LENGTH_TOLERANCE } else { ANGLE_TOLERANCE },
+            tolerance: if kind == JointKind::Prismatic {
+                LENGTH_TOLERANCE
+            } else {
+                ANGLE_TOLERANCE
+            },
         };
         let kinds = problem.joints.iter().map(|joint| joint.kind);
         kinds.take(self.joints).enumerate().map(column).collect()
@@ -121,18 +129,18 @@ pub(crate) fn count_distinct(numbers: &[usize], rows: impl IntoIterator<Item = u
     rows.into_iter().map(|row| numbers[row]).collect::<BTreeSet<_>>().len()
 }
 
-/// Values of all rows and the difference up to which they count as equal.
+/// Values of all rows in one column, and the difference up to which they count as equal.
 struct Column {
     values: Vec<f64>,
-    step: f64,
+    tolerance: f64,
 }
 
 /// Returns the group of each row and the number of groups, numbered in the order of the rows in
 /// `order`.
 ///
-/// A row belongs to the group of an earlier row if every column differs by at most its step.
-/// Candidates are found by weighted sums Σ wⱼ vⱼ/stepⱼ in bins of width Σ wⱼ: rows that agree lie
-/// in the same or neighbouring bins.
+/// A row belongs to the group of an earlier row if every column differs by at most its tolerance.
+/// Candidates are found by weighted sums Σ wⱼ vⱼ/tⱼ of the values vⱼ over the tolerances tⱼ, in
+/// bins of width Σ wⱼ: rows that agree lie in the same or neighbouring bins.
 fn group_rows(columns: &[Column], order: &[usize]) -> (Vec<usize>, usize) {
     // With weights in irrational ratios, different rows rarely share a bin.
     let weights: Vec<f64> =
@@ -145,13 +153,13 @@ fn group_rows(columns: &[Column], order: &[usize]) -> (Vec<usize>, usize) {
         let sum: f64 = columns
             .iter()
             .zip(&weights)
-            .map(|(column, weight)| weight * column.values[row] / column.step)
+            .map(|(column, weight)| weight * column.values[row] / column.tolerance)
             .sum();
         let bin = floor(sum / width);
         let agrees = |&&(first, _): &&(usize, usize)| {
             columns
                 .iter()
-                .all(|column| (column.values[row] - column.values[first]).abs() <= column.step)
+                .all(|column| (column.values[row] - column.values[first]).abs() <= column.tolerance)
         };
         let near = (-1..=1).filter_map(|side| first_rows.get(&bin.saturating_add(side))).flatten();
         let number = near.clone().find(agrees).map_or(count, |&(_, number)| number);
@@ -164,6 +172,7 @@ fn group_rows(columns: &[Column], order: &[usize]) -> (Vec<usize>, usize) {
     (of_row, count)
 }
 
+/// Returns the largest integer up to `value`, within the range of i64.
 #[expect(clippy::cast_possible_truncation, reason = "the cast keeps to the range of i64")]
 fn floor(value: f64) -> i64 {
     value.floor() as i64

@@ -1,4 +1,4 @@
-//! Columns that rows other than positions need.
+//! Check for the columns that rows other than positions need.
 
 use super::columns::Columns;
 use super::role::{Role, is_declared};
@@ -8,8 +8,8 @@ use crate::observation::{Content, Field, kinds};
 use crate::problem::Problem;
 
 impl Columns {
-    /// Checks that the columns of every declared kind of rows exist; `unknown` columns are suggested
-    /// for missing ones.
+    /// Checks that every declared kind of rows of which the table has some columns has all columns
+    /// that it needs. Errors suggest similar names among the `unknown` columns.
     pub fn require_fields(
         &self,
         table: &Table,

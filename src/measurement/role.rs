@@ -7,22 +7,30 @@ use crate::quantity::Unit;
 /// Role of a column, the quantity that it contains; joints and axes count from 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Role {
+    /// Command of a joint.
     Joint(usize),
     /// Encoder reading of a joint.
     Reading(usize),
-    /// Column, given by its name, that belongs to a kind of rows.
+    /// Column of a kind of rows, given by its name without unit: a measured number or the name of a
+    /// fixture.
     Field(&'static str),
+    /// Standard deviation of the noise.
     Sigma,
     Payload,
     Hoist,
     Temperature,
     Time,
+    /// Direction from which a joint approached.
     Approach(usize),
+    /// Angle rx, ry or rz of an orientation.
     Orientation(usize),
+    /// Component qx, qy, qz or qw of an orientation.
     Quaternion(usize),
+    /// Mark of held-out rows.
     Split,
     Session,
     Target,
+    /// Number or name of the pose.
     Pose,
     /// Fixed point that a row measures without the arm.
     Nest,
@@ -32,7 +40,7 @@ pub(super) enum Role {
 
 /// Roles of the coordinates of a measured position.
 pub(super) const POSITION: [Role; 3] = [Role::Field("x"), Role::Field("y"), Role::Field("z")];
-/// Role of the column that names the touched point. The name of a file may replace the column.
+/// Role of the column that names the touched point. The name of the file may replace the column.
 pub(super) const POINT: Role = Role::Field("point");
 
 /// Returns true if the problem declares the fixtures that rows of a kind are measured against, or
@@ -55,10 +63,10 @@ impl Role {
         kinds().any(|kind| kind.field(name).is_some() && is_declared(kind, problem))
     }
 
-    /// Returns the section that would have to declare something for a column with this name to have
-    /// a meaning. `None` if nothing is missing.
+    /// Returns the section of a problem that is missing for a column with this name to have a
+    /// meaning; `None` if none is missing.
     ///
-    /// The name is that of a fixture column of a kind of rows, or of a number of a kind without
+    /// The column names a fixture, or contains a measured number of a kind of rows without
     /// fixtures.
     pub fn undeclared(name: &str, problem: &Problem) -> Option<&'static str> {
         let announces = |kind: &&Kind| {
@@ -90,7 +98,7 @@ impl Role {
     }
 }
 
-/// Returns the names of columns without a unit.
+/// Returns the names and roles of columns without a unit.
 pub(super) fn columns_without_unit() -> impl Iterator<Item = (&'static str, Role)> {
     let references = fields().filter(|field| field.unit().is_none());
     references.map(|field| (field.name, Role::Field(field.name))).chain([
@@ -106,8 +114,8 @@ pub(super) fn columns_without_unit() -> impl Iterator<Item = (&'static str, Role
     ])
 }
 
-/// Returns the names of columns with a unit. The flag is true if a missing unit is an error; other
-/// names, such as `time`, may mean something else.
+/// Returns name, role and quantity of columns with a unit. The flag is true if a name without unit
+/// is an error; other names, such as `time`, may mean another quantity.
 pub(super) fn columns_with_unit() -> impl Iterator<Item = (&'static str, Role, Unit, bool)> {
     let measured = fields()
         .filter_map(|field| Some((field.name, Role::Field(field.name), field.unit()?, true)));

@@ -1,4 +1,4 @@
-//! Builder of measurements, which appends row by row.
+//! Builder of measurements, to which the rows of tables are appended.
 
 use std::path::PathBuf;
 
@@ -22,11 +22,12 @@ pub(super) struct RowsBuilder {
     measurements: Measurements,
     session: LabelsBuilder,
     target: LabelsBuilder,
+    /// Names of the poses.
     poses: PoseNames,
-    /// True if encoder readings, not commands, are the configurations.
+    /// True if configurations are encoder readings, false if they are commands.
     uses_readings: bool,
     /// True if rows may measure quantities other than positions.
-    mixed: bool,
+    has_other_kinds: bool,
     /// True if rows name one of several declared targets.
     names_targets: bool,
     /// Convention of the orientation angles rx, ry and rz.
@@ -42,14 +43,14 @@ impl RowsBuilder {
         let list = |role| columns.has(role).then(Vec::new);
         let names_targets = !problem.targets.is_empty();
         let mut others = kinds().filter(|kind| !kind.declared_by.is_empty());
-        let mixed = others.any(|kind| is_declared(kind, problem));
+        let has_other_kinds = others.any(|kind| is_declared(kind, problem));
         let approach = columns.read.iter().any(|column| matches!(column.role, Role::Approach(_)));
         let measurements = Measurements {
             files: files.to_vec(),
             origin: Vec::new(),
             joints: problem.joints.len(),
             configurations: Vec::new(),
-            other_configurations: both_joints(columns).then(Vec::new),
+            other_configurations: has_both_joint_sources(columns).then(Vec::new),
             nests: Vec::new(),
             observations: Vec::new(),
             positions: Vec::new(),
@@ -60,7 +61,7 @@ impl RowsBuilder {
                 .find(|column| column.role == POSITION[0])
                 .map(|column| (column.to_si)(1.0)),
             orientations: (columns.orientations() != (false, false)).then(Vec::new),
-            sigma: if mixed { Some(Vec::new()) } else { list(Role::Sigma) },
+            sigma: if has_other_kinds { Some(Vec::new()) } else { list(Role::Sigma) },
             payload: list(Role::Payload),
             hoist: list(Role::Hoist),
             temperature: list(Role::Temperature),
@@ -94,7 +95,7 @@ impl RowsBuilder {
             target,
             poses,
             uses_readings: problem.data.joints == JointSource::Read,
-            mixed,
+            has_other_kinds,
             names_targets,
             rotation: problem.data.dialect.rotation,
             stems: stems(files),
@@ -113,9 +114,9 @@ impl RowsBuilder {
     }
 
     /// Checks that a file has the same columns as the first one. The column `pose` is optional. If
-    /// rows measure different quantities, the columns of observations and targets are optional,
-    /// too.
-    pub fn same_columns(&self, table: &Table, columns: &Columns) -> Result<(), InputError> {
+    /// rows may measure quantities other than positions, the columns of measured quantities, of
+    /// their σ and of targets are optional, too.
+    pub fn check_same_columns(&self, table: &Table, columns: &Columns) -> Result<(), InputError> {
         let differ = |name: &str, has| {
             let other = self.measurements.files.first().cloned().unwrap_or_default();
             Err(table.column(name).error(TableErrorKind::ColumnsDiffer { other, has }))
@@ -125,14 +126,14 @@ impl RowsBuilder {
                 || role == Role::Sigma
                 || (role == Role::Target && self.names_targets)
         };
-        let comes_and_goes = |role: Role| role == Role::Pose || (self.mixed && of_observed(role));
-        for (column, name) in self.columns.iter().filter(|(column, _)| !comes_and_goes(column.role))
-        {
+        let is_optional =
+            |role: Role| role == Role::Pose || (self.has_other_kinds && of_observed(role));
+        for (column, name) in self.columns.iter().filter(|(column, _)| !is_optional(column.role)) {
             if !columns.has(column.role) {
                 return differ(name, true);
             }
         }
-        for column in columns.read.iter().filter(|column| !comes_and_goes(column.role)) {
+        for column in columns.read.iter().filter(|column| !is_optional(column.role)) {
             if !self.columns.iter().any(|(known, _)| known.role == column.role) {
                 return differ(table.name_of(column.place), false);
             }
@@ -140,7 +141,8 @@ impl RowsBuilder {
         Ok(())
     }
 
-    /// Appends the current row, which measures a fixed point.
+    /// Appends the current row, which measures a fixed point called `name`; `file` is the index of
+    /// the file.
     pub fn push_nest(
         &mut self,
         file: usize,
@@ -179,7 +181,8 @@ impl RowsBuilder {
         Ok(())
     }
 
-    /// Appends the observation of the current row.
+    /// Appends a row for one observation of the current row of a table; `file` is the index of the
+    /// file.
     pub fn push(
         &mut self,
         file: usize,
@@ -239,7 +242,7 @@ impl RowsBuilder {
                     }
                 }
                 Role::Sigma
-                    if self.mixed
+                    if self.has_other_kinds
                         && (kind.unit != Unit::Length || !is_filled(table, column.place)) => {}
                 Role::Sigma => push(&mut measurements.sigma, above_zero(table, column)?),
                 Role::Payload => push(&mut measurements.payload, not_negative(table, column)?),
@@ -258,8 +261,7 @@ impl RowsBuilder {
                 Role::Covariate(_) => measurements.covariates.push(number()?),
                 Role::Split => _ = is_validation(table, column.place)?,
                 Role::Session => self.session.push(table.name(column.place)?),
-                // A row may lack a target if its kind needs none. The name of a target was checked
-                // before.
+                // A row may lack a target if its kind needs none. The name was checked before.
                 Role::Target if self.names_targets && kind.needs != Needs::Target => {
                     self.target.push(table.text(column.place)?);
                 }
@@ -283,7 +285,7 @@ impl RowsBuilder {
         }
         measurements.positions.push(numbers);
         measurements.position_measured &= measured;
-        if self.mixed {
+        if self.has_other_kinds {
             measurements.observations.push(observation);
             measurements.sigma.iter_mut().for_each(|column| column.resize(row + 1, f64::NAN));
         }
@@ -321,14 +323,15 @@ fn set(list: &mut [f64], place: usize, value: f64) {
     }
 }
 
+/// Appends a value to a column, if it exists.
 fn push(list: &mut Option<Vec<f64>>, value: f64) {
     if let Some(list) = list {
         list.push(value);
     }
 }
 
-/// Returns true if a table has both commands and encoder readings of all joints.
-fn both_joints(columns: &Columns) -> bool {
+/// Returns true if a table has both commands and encoder readings of the joints.
+fn has_both_joint_sources(columns: &Columns) -> bool {
     let count = |reading: bool| {
         let of_joint = |column: &&Column| matches!(column.role, Role::Joint(_) | Role::Reading(_));
         columns

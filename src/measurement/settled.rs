@@ -1,4 +1,4 @@
-//! Interpretation of a column `time` by its first cell.
+//! Decision by its first cell whether a column `time` contains dates.
 
 use super::columns::{Column, Columns};
 use super::role::Role;
@@ -8,8 +8,8 @@ use crate::error::{InputError, TableErrorKind, Warning, WarningKind};
 use crate::quantity::Unit;
 
 impl Columns {
-    /// Decides on a column `time` without a unit. It is kept if its first cell is a date, otherwise
-    /// ignored with a warning.
+    /// Keeps a column `time` without a unit if its first cell is a date and time; otherwise the
+    /// column is ignored with a warning. Also warns if the order of day and month is a guess.
     ///
     /// # Errors
     /// Returns an error if `[data.columns]` maps the column to `time`, and its first cell is

@@ -62,8 +62,8 @@ impl Split {
     }
 }
 
-/// Moves each known distance to the fitted rows if both of its points are touched there, otherwise
-/// to the held-out rows.
+/// Moves the row of each known distance to the fitted rows if fitted rows touch both of its points,
+/// otherwise to the held-out rows. `held_out` is true for held-out rows.
 fn with_known_distances(mut held_out: Vec<bool>, measurements: &Measurements) -> Vec<bool> {
     let touched = |point: usize| {
         (0..measurements.len())
@@ -81,7 +81,7 @@ fn with_known_distances(mut held_out: Vec<bool>, measurements: &Measurements) ->
     held_out
 }
 
-/// Returns true for the rows of one session, which are held out.
+/// Returns, for each row, true if it belongs to the session, whose rows are held out.
 fn of_session(session: &str, measurements: &Measurements) -> Result<Vec<bool>, InputErrorKind> {
     let labels = &measurements.session;
     match labels.names.iter().position(|name| name == session) {
@@ -93,8 +93,8 @@ fn of_session(session: &str, measurements: &Measurements) -> Result<Vec<bool>, I
     }
 }
 
-/// Returns true for rows of randomly chosen configurations, until their number reaches the
-/// fraction; these rows are held out.
+/// Returns, for each row, true if it is held out. All rows of randomly chosen configurations are
+/// held out, until their number reaches the `fraction` of all rows.
 fn random_fraction(
     fraction: f64,
     seed: u64,

@@ -1,4 +1,4 @@
-//! Start of each session, from which elapsed time counts.
+//! Time of the first pose of each session, from which elapsed time is counted.
 
 use std::collections::BTreeMap;
 
@@ -14,8 +14,8 @@ pub struct StartTimes {
 }
 
 impl StartTimes {
-    /// Returns the start of a session \[s\]. Without names all rows are one session; `None` for a
-    /// session that is unknown.
+    /// Returns the time of the first pose of a session \[s\]; `None` for an unknown session. If no
+    /// session has a name, all rows are one session.
     pub fn of_session(&self, name: &str) -> Option<f64> {
         if self.sessions.is_empty() { Some(self.first) } else { self.sessions.get(name).copied() }
     }

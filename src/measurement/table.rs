@@ -1,4 +1,4 @@
-//! CSV file that is read record by record with line numbers.
+//! CSV table that is read record by record, with the line numbers of the records.
 
 use std::io::{self, BufReader, Chain, Cursor, Read};
 use std::path::{Path, PathBuf};
@@ -24,10 +24,10 @@ use crate::problem::{ColumnRule, ColumnSelector, Dialect};
 /// Maximum number of columns of a table.
 const MAX_COLUMNS: usize = 10_000;
 
-/// Input that is expected in place of a file of another format.
+/// Description, for messages, of the input that is expected instead of a file of another format.
 const A_TABLE: &str = "a table; save or export it as CSV, text with one row per pose";
-/// Maximum number of cells into which the first line of a file in another format falls, if it
-/// has no mark of its own.
+/// Maximum number of cells into which delimiters divide the first line of a file in another format,
+/// such as a key of YAML. Only a line with a distinct mark may have more.
 const MAX_CELLS_OF_KEY: usize = 2;
 
 /// Text whose beginning has already been read.
@@ -38,16 +38,19 @@ pub(super) struct Table {
     pub file: PathBuf,
     /// Names in the header line without surrounding white space.
     pub header: Vec<String>,
+    /// Line of the header, from 1.
     header_line: usize,
     reader: Reader<NormalizedText<Lines<BufReader<TextFromStart>>>>,
+    /// Cells of the current row.
     record: ByteRecord,
+    /// Line of the current row, from 1.
     line: usize,
     style: CellStyle,
-    /// True if the first record is a row that was not returned yet, because there is no header.
+    /// True if the table has no header, and its first record, a row, has not been returned yet.
     starts_with_row: bool,
-    /// Order of day and month, by the first lines.
+    /// Order of day and month in dates, by the first lines of the table.
     pub date_order: DateOrder,
-    /// Format of the appended cells of another table, and the number of cells before them.
+    /// Format of the appended cells of another table, and the number of cells of this table.
     appended: Option<(CellStyle, usize)>,
     /// File and header line of the appended columns.
     appended_header: Option<(PathBuf, usize)>,
@@ -169,7 +172,7 @@ impl Table {
         })
     }
 
-    /// Reads the next row; returns false at the end.
+    /// Reads the next row, which must have as many cells as the header; returns false at the end.
     pub fn next_row(&mut self) -> Result<bool, InputError> {
         if !std::mem::take(&mut self.starts_with_row) && !self.advance()? {
             return Ok(false);
@@ -198,6 +201,7 @@ impl Table {
         Ok(true)
     }
 
+    /// Reads the next record and its line number; returns false at the end.
     fn advance(&mut self) -> Result<bool, InputError> {
         let first = self.next_line();
         self.reader.get_mut().start_record();
@@ -245,6 +249,7 @@ impl Table {
         self.style
     }
 
+    /// Returns the format of the cells in the column with index `place`.
     fn style_of(&self, place: usize) -> CellStyle {
         self.appended
             .filter(|&(_, own_cells)| place >= own_cells)
@@ -293,6 +298,7 @@ impl Table {
         self.line
     }
 
+    /// Returns a cell of the current row without surrounding white space; empty if there is none.
     pub(super) fn cell(&self, place: usize) -> &[u8] {
         self.record.get(place).unwrap_or_default().trim_ascii()
     }
@@ -377,14 +383,14 @@ impl Table {
         }
     }
 
-    /// Returns true if the word is one of the units in the row below the header.
+    /// Returns true if the word is a unit, and the current row stands directly below the header.
     fn is_unit_below_header(&self, word: &str) -> bool {
         let unit = word.trim_matches(['[', ']', '(', ')', ' ']);
         self.line == self.header_line + 1 && UNITS.contains(&unit)
     }
 
-    /// Returns a cell of the current row as a time: a number with a unit \[s\], or a date and time
-    /// \[s since 1970\].
+    /// Returns a cell of the current row as a time \[s\]: a number, converted by `to_si`, or a date
+    /// and time as seconds since 1970.
     pub fn time(&self, place: usize, to_si: fn(f64) -> f64) -> Result<f64, InputError> {
         let word = self.non_empty_text(place)?;
         match date_time(word, self.date_order) {
@@ -410,7 +416,7 @@ impl Table {
         self.text(place).is_ok_and(|word| date_time(word, self.date_order).is_some())
     }
 
-    /// Returns the name of a column in the header.
+    /// Returns the name in the header of the column with index `place`.
     pub fn name_of(&self, place: usize) -> &str {
         self.header.get(place).map_or("", String::as_str)
     }

@@ -1,8 +1,9 @@
 //! Parsers of dates and times.
 
-/// Order of day and month in dates with slashes and the year last, as `05/31/2024`.
+/// Order of day and month in dates with slashes and the year last, such as `05/31/2024`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) enum DateOrder {
+    /// No number above 12 shows the order, or dates contradict each other.
     #[default]
     Unknown,
     DayFirst,
@@ -10,7 +11,8 @@ pub(super) enum DateOrder {
 }
 
 impl DateOrder {
-    /// Returns the order of the dates in a text, in which numbers above 12 are days.
+    /// Returns the order of the dates in a text. It is known by a date in which one number is above
+    /// 12 and thus the day.
     pub fn of(text: &[u8]) -> Self {
         let words = text.split(|byte| !(byte.is_ascii_digit() || *byte == b'/'));
         let orders = words.filter_map(|word| Self::of_date(slashed(str::from_utf8(word).ok()?)?));
@@ -40,9 +42,9 @@ impl DateOrder {
 /// (`2024/05/31 14:03:20`, `05/31/2024 02:03:20 PM`) and returns the seconds since 1970-01-01T00:00
 /// UTC.
 ///
-/// If the year stands last after slashes, `order` and numbers above 12 tell day and month apart. A
-/// date that they leave open has its month first if its clock has AM or PM, and is not accepted
-/// otherwise ([`is_ambiguous`]).
+/// If the year stands last after slashes, `order` or a number above 12 shows which number is the
+/// day. If neither does, the month is first if the time has AM or PM; otherwise the date is not
+/// accepted ([`is_ambiguous`]).
 pub(super) fn date_time(text: &str, order: DateOrder) -> Option<f64> {
     iso_8601(text)
         .or_else(|| iso_8601(&iso_from_day_first(text.trim())?))
@@ -53,14 +55,15 @@ pub(super) fn date_time(text: &str, order: DateOrder) -> Option<f64> {
         })
 }
 
-/// Returns true for a date with slashes whose day and month may stand in either order.
+/// Returns true for a date with slashes whose day and month may stand in either order, so that
+/// [`date_time`] does not accept it.
 pub(super) fn is_ambiguous(text: &str, order: DateOrder) -> bool {
     iso_from_year_last(text.trim(), order)
         .is_some_and(|(date, basis)| basis == Basis::Guess && iso_8601(&date).is_some())
 }
 
-/// Returns the date, as `2026-11-05`, of a time that is read month first only because its clock has
-/// AM or PM, although the day may come first.
+/// Returns the date, such as `2026-11-05`, of a time that is read month first only because it has
+/// AM or PM, although the day may be first; `None` for other times.
 pub(super) fn assumed_month_first(text: &str, order: DateOrder) -> Option<String> {
     let (date, basis) = iso_from_year_last(text.trim(), order)?;
     let differs = date.get(5..7)? != date.get(8..10)?;
@@ -73,13 +76,13 @@ pub(super) fn assumed_month_first(text: &str, order: DateOrder) -> Option<String
 enum Basis {
     /// A number above 12 in this date or in the other dates of its table.
     Numbers,
-    /// AM or PM, which go with dates that have their month first.
+    /// AM or PM, which are usual with dates that have the month first.
     HalfOfDay,
-    /// No reason: the month is taken to stand first.
+    /// No reason: the month is assumed to be first.
     Guess,
 }
 
-/// Splits a date such as `31/05/2024` into its numbers.
+/// Splits a date such as `31/05/2024` into its numbers; `None` for other texts.
 fn slashed(date: &str) -> Option<[u32; 3]> {
     let [first, second, year] = date.split('/').collect::<Vec<_>>()[..] else { return None };
     let is_short = |word: &str| (1..=2).contains(&word.len());
@@ -89,7 +92,9 @@ fn slashed(date: &str) -> Option<[u32; 3]> {
     Some([first.parse().ok()?, second.parse().ok()?, year.parse().ok()?])
 }
 
-/// Rewrites `11/25/2026 09:00:12 PM` as `2026-11-25 21:00:12`, and `25/11/2026` likewise.
+/// Rewrites a date and time with slashes and the year last in the form of ISO 8601, for example
+/// `11/25/2026 09:00:12 PM` as `2026-11-25 21:00:12`; `None` for other texts. Also returns the
+/// reason for the order of day and month.
 fn iso_from_year_last(text: &str, order: DateOrder) -> Option<(String, Basis)> {
     let (date, clock) = text.split_once(' ')?;
     let numbers @ [first, second, year] = slashed(date)?;
@@ -122,11 +127,11 @@ fn iso_from_year_last(text: &str, order: DateOrder) -> Option<(String, Basis)> {
     Some((format!("{year}-{month:02}-{day:02} {hour:02}:{rest}"), basis))
 }
 
-/// Smallest time that [`shown`] writes as a date \[s\]: 1990-01-01. Smaller numbers are seconds of
-/// a clock that starts anywhere.
+/// Smallest time that [`shown`] writes as a date \[s since 1970\]: 1990-01-01. Smaller numbers are
+/// seconds of a clock with another zero.
 const FIRST_DATE: f64 = 631_152_000.0;
 
-/// Returns a time as text: a date and time, or seconds.
+/// Returns a time as text: a date and time from [`FIRST_DATE`] on, else seconds.
 pub(super) fn shown(seconds: f64) -> String {
     if seconds < FIRST_DATE {
         return format!("{seconds:.1} s");
@@ -210,7 +215,8 @@ fn iso_8601(text: &str) -> Option<f64> {
     Some(whole as f64 + fraction)
 }
 
-/// Splits off the zone [s ahead of UTC]; the zone is `None` if it is invalid.
+/// Splits a time into the part before the zone, and the zone \[s ahead of UTC\], which is `None` if
+/// it is invalid and 0 if there is none.
 fn split_zone(text: &str) -> (&str, Option<i64>) {
     if let Some(clock) = text.strip_suffix('Z') {
         return (clock, Some(0));

@@ -1,14 +1,14 @@
-//! Errors of rows that hold no measurement: summaries, titles of pages, and missing positions.
+//! Errors of rows that contain no measurement: summaries, titles of pages, and missing positions.
 
 use super::table::{Table, shortened};
 use crate::error::{InputError, InputErrorKind, TableErrorKind};
 
-/// Minimum number of empty cells of a row that begins with a word and is probably a summary.
+/// Minimum number of empty cells at which a row that begins with a word is probably a summary.
 const MIN_EMPTY_CELLS: usize = 2;
 
 impl Table {
-    /// Returns true if the first cell of the current row begins with a letter and the row has more
-    /// words than numbers, as in the title or foot of a page.
+    /// Returns true if the first cell of the current row begins with a letter and fewer than half
+    /// of the filled cells are numbers, as in the title or foot of a page.
     pub(super) fn is_line_of_words(&self) -> bool {
         let cells = || self.cells().iter().map(|cell| String::from_utf8_lossy(cell.trim_ascii()));
         let filled = || cells().filter(|cell| !cell.is_empty());
@@ -19,7 +19,8 @@ impl Table {
         begins_with_word && filled().count() > 2 * numbers
     }
 
-    /// Returns the error of an empty cell of the current row.
+    /// Returns the error of an empty cell of the current row, or of the whole row if it is empty or
+    /// probably a summary.
     pub(super) fn empty_cell(&self, place: usize) -> InputError {
         let empty = self.cells().iter().filter(|cell| cell.trim_ascii().is_empty()).count();
         let first = std::str::from_utf8(self.cell(0)).unwrap_or_default();
@@ -34,7 +35,7 @@ impl Table {
     }
 
     /// Returns a coordinate of a measured position in the current row, as [`number`](Self::number)
-    /// does. Errors name the way to leave out rows in which nothing was measured.
+    /// does. Its errors say how rows without a measurement are left out.
     pub fn measured_number(&self, place: usize) -> Result<f64, InputError> {
         self.number(place).map_err(|error| match *error.kind {
             InputErrorKind::Table(
