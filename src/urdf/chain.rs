@@ -7,15 +7,18 @@ use crate::error::{InputError, UrdfErrorKind};
 use crate::problem::Problem;
 use crate::spatial::Frame;
 
-/// Maximum number of joints in a chain: the maximum of a problem, less a fixed joint at each end.
+/// Maximum number of joints in a chain: the maximum of a problem minus a fixed joint at each end.
 const MAX_JOINTS: usize = 98;
-/// Minimum number of moving joints between base and leaf at which a leaf is chosen among several.
+/// Minimum number of moving joints from the base to a leaf at which the leaf is chosen as the tip
+/// although there are others.
 const MIN_PLAIN_JOINTS: usize = 4;
 
 /// Joints of a robot from one link to another.
 pub struct Chain<'a> {
     pub(super) robot: &'a Robot,
+    /// Index of the first link.
     pub(super) base: usize,
+    /// Index of the last link.
     pub(super) tip: usize,
     /// Indices of the joints from base to tip.
     pub(super) joints: Vec<usize>,
@@ -23,24 +26,26 @@ pub struct Chain<'a> {
     pub(super) stages: Vec<Stage>,
     /// Frame of the tip in the last axis frame.
     pub(super) end: Frame<f64>,
-    /// Other leaves, with their numbers of moving joints, if the tip was chosen among several;
-    /// otherwise empty.
+    /// Descriptions of the other leaves, with their numbers of moving joints, if the tip was chosen
+    /// among several; otherwise empty.
     pub(super) other_leaves: Vec<String>,
 }
 
-/// Moving joint of the chain. Its axis frame is the joint's frame before motion, turned so that z
-/// is the axis.
+/// Moving joint of the chain. Its axis frame is the URDF's frame of the joint before motion,
+/// rotated so that z is the axis of the joint.
 pub(super) struct Stage {
     /// Index of the joint in the robot.
     pub joint: usize,
-    /// Axis frame in the previous axis frame, including the offset of a mimic joint.
+    /// Axis frame in the previous axis frame, or in the base for the first stage, including the
+    /// offset of a mimic joint.
     pub step: Frame<f64>,
     /// Axis frame in the URDF's frame of the joint.
     pub axis: Frame<f64>,
-    /// Stage whose command a mimic joint follows, and the factor.
+    /// Index of the stage whose command a mimic joint follows, and the factor; `None` for a joint
+    /// with its own command.
     pub mimic: Option<(usize, f64)>,
-    /// Offset of a mimic joint \[rad\] or \[m\].
-    pub addend: f64,
+    /// Offset of a mimic joint \[rad\] or \[m\]; 0 for other joints.
+    pub offset: f64,
 }
 
 impl<'a> Chain<'a> {
@@ -95,7 +100,7 @@ impl<'a> Chain<'a> {
             end: Frame::identity(),
             other_leaves,
         };
-        chain.walk()?;
+        chain.compute_stages()?;
         if chain.stages.is_empty() {
             return Err(
                 robot.error(UrdfErrorKind::NothingMoves { base: name(base), tip: name(tip) })
@@ -104,7 +109,7 @@ impl<'a> Chain<'a> {
         Ok(chain)
     }
 
-    /// Finds the chain of a problem that was made from a URDF.
+    /// Finds the chain of a problem that was made from a URDF, between the links that it states.
     ///
     /// # Errors
     /// Returns the errors of [`new`](Self::new).
@@ -113,8 +118,8 @@ impl<'a> Chain<'a> {
         Self::new(robot, ends.map(|ends| ends.base.as_str()), ends.map(|ends| ends.tip.as_str()))
     }
 
-    /// Computes the stages and the end frame.
-    fn walk(&mut self) -> Result<(), InputError> {
+    /// Computes the stages and the end frame from the joints of the chain.
+    fn compute_stages(&mut self) -> Result<(), InputError> {
         let robot = self.robot;
         let (mut step, mut leaders) = (Frame::identity(), Vec::new());
         for &index in &self.joints {
@@ -130,10 +135,10 @@ impl<'a> Chain<'a> {
                 return Err(location.clone().error(kind.clone()));
             }
             let axis = axis_frame(&joint.axis);
-            let (leader, addend) = self.leader(index)?;
+            let (leader, offset) = self.leader(index)?;
             leaders.push(leader);
-            step = moved(&step.compose(&axis), joint, addend);
-            self.stages.push(Stage { joint: index, step, axis, mimic: None, addend });
+            step = moved(&step.compose(&axis), joint, offset);
+            self.stages.push(Stage { joint: index, step, axis, mimic: None, offset });
             // The next step starts in the joint's URDF frame, seen from the axis frame.
             step = axis.inverse();
         }
@@ -149,21 +154,22 @@ impl<'a> Chain<'a> {
         Ok(())
     }
 
-    /// Returns the joint of the chain whose command a joint follows, directly or through other
-    /// mimic joints, with factor and offset. `None` if the joint takes a command itself.
+    /// Returns the index of the joint of the chain whose command a joint follows, directly or
+    /// through other mimic joints, with factor and offset. `None` if the joint takes a command
+    /// itself.
     fn leader(&self, index: usize) -> Result<(Option<(usize, f64)>, f64), InputError> {
-        let (mut factor, mut addend, mut at) = (1.0, 0.0, index);
+        let (mut factor, mut offset, mut at) = (1.0, 0.0, index);
         let mut last = (None, 0.0);
         for _ in 0..=self.robot.joints.len() {
             let Some((leader, by, plus)) = self.robot.joints.get(at).and_then(|joint| joint.mimic)
             else {
                 return Ok(last);
             };
-            addend += factor * plus;
+            offset += factor * plus;
             factor *= by;
             at = leader;
             if self.joints.contains(&at) {
-                last = (Some((at, factor)), addend);
+                last = (Some((at, factor)), offset);
             }
         }
         Err(self.robot.error_at(index, UrdfErrorKind::MimicCircle))
@@ -199,7 +205,7 @@ fn axis_frame(axis: &Vector3<f64>) -> Frame<f64> {
     frame
 }
 
-/// Returns `frame` after the joint has moved by q along or about z.
+/// Returns `frame` after the joint has moved by `q` \[rad\] about or \[m\] along z of the frame.
 pub(super) fn moved(frame: &Frame<f64>, joint: &Joint, q: f64) -> Frame<f64> {
     let mut frame = *frame;
     match joint.kind {
@@ -237,6 +243,7 @@ fn parents(robot: &Robot) -> Result<Vec<Option<(usize, usize)>>, InputError> {
     Ok(above)
 }
 
+/// Returns the index of the only link without a parent.
 fn root(robot: &Robot, above: &[Option<(usize, usize)>]) -> Result<usize, InputError> {
     let roots: Vec<usize> =
         (0..above.len()).filter(|&link| above.get(link).is_some_and(Option::is_none)).collect();
@@ -253,8 +260,8 @@ fn root(robot: &Robot, above: &[Option<(usize, usize)>]) -> Result<usize, InputE
     }
 }
 
-/// Returns the only leaf below `base`, or the leaf with at least twice as many moving joints as
-/// every other one. Also returns descriptions of the other leaves.
+/// Returns the index of the only leaf below `base`, or of the leaf with at least twice as many
+/// moving joints as every other one. Also returns descriptions of the other leaves.
 fn leaf(
     robot: &Robot,
     above: &[Option<(usize, usize)>],

@@ -18,8 +18,8 @@ use crate::problem::quoted;
 use crate::problem::read::FORBIDDEN_IN_FOLDER_NAMES;
 use crate::spatial::Frame;
 
-/// Largest magnitude that counts as a rounding error of zero \[rad\] or \[m\]. Right angles written
-/// with eleven decimals have such errors.
+/// Largest magnitude that counts as zero \[rad\] or \[m\]. Right angles written with eleven
+/// decimals have rounding errors of this size.
 const MAX_ROUNDING: f64 = 1e-11;
 /// Default standard deviation of a measured coordinate, typical of a laser tracker in a workshop
 /// \[mm\].
@@ -29,15 +29,15 @@ pub const HELD_OUT: f64 = 0.3;
 /// Maximum length of a problem's name taken from the robot's \[characters\].
 const MAX_NAME_CHARS: usize = 60;
 
-/// Text with the range of a joint without limits, from which `check` and `plan` draw poses.
+/// Lines with the range of a joint without limits, from which `check` and `plan` draw poses.
 const CONTINUOUS_RANGE: &str = "# A joint without limits: poses are planned within one turn.\n\
      min_deg = -180\nmax_deg = 180\n";
 
-/// Section of the measured point, to be filled in.
+/// Section of the measured point, which the user fills in.
 const TOOL: &str = "\n[tool]\ntarget_m = [0, 0, 0]                             # fill in: the measured \
                     point, in the frame of the tip\n";
 
-/// Problem made from a chain.
+/// Problem made from a chain of a URDF.
 #[derive(Debug, Clone)]
 pub struct Description {
     /// Name of the problem.
@@ -52,14 +52,17 @@ pub struct Description {
 #[derive(Default)]
 struct Row {
     name: String,
+    /// Kind of the joint as in problem files: `revolute`, `prismatic` or `fixed`.
     kind: &'static str,
-    /// Placement by xyz and rpy, for fixed joints.
+    /// Placement by xyz and rpy; `None` for moving joints.
     placement: Option<Frame<f64>>,
+    /// Number of the joint that a mimic joint follows, from 1, and the factor.
     mimic: Option<(usize, f64)>,
     /// Joint parameters α \[rad\], a \[m\], θ \[rad\], d \[m\], β \[rad\].
     numbers: [f64; 5],
+    /// Limits of the command \[rad\] or \[m\]; `None` for fixed and mimic joints.
     limits: Option<(f64, f64)>,
-    /// Name, mass and centre of mass of each body.
+    /// Name, mass \[kg\] and centre of mass \[m\], joint frame, of each body.
     bodies: Vec<(String, f64, Vector3<f64>)>,
 }
 
@@ -104,6 +107,7 @@ fn avoid_joint_names(chain: &Chain, name: &str) -> String {
     if is_joint_name { format!("{name} frame") } else { name.to_owned() }
 }
 
+/// Converts a chain to the joints of a problem; adds notes about assumptions to `notes`.
 fn rows(chain: &Chain, notes: &mut Vec<String>) -> Vec<Row> {
     let mut steps: Vec<Step> =
         chain.stages.iter().map(|stage| Step::from_frame(&stage.step)).collect();
@@ -122,7 +126,7 @@ fn rows(chain: &Chain, notes: &mut Vec<String>) -> Vec<Row> {
             ..Row::default()
         });
     }
-    let lead = rows.len();
+    let rows_before_chain = rows.len();
     // The transform after the last joint becomes its θ and d if possible, otherwise a fixed joint.
     let [x, _, z] = &chain.end.axes;
     let on_axis = z.xy().norm() + chain.end.origin.xy().norm() < MAX_ROUNDING && z.z > 0.0;
@@ -135,7 +139,7 @@ fn rows(chain: &Chain, notes: &mut Vec<String>) -> Vec<Row> {
             name: joint.name.clone(),
             kind: if joint.kind == Kind::Prismatic { "prismatic" } else { "revolute" },
             placement: None,
-            mimic: stage.mimic.map(|(leader, ratio)| (leader + lead + 1, ratio)),
+            mimic: stage.mimic.map(|(leader, ratio)| (leader + rows_before_chain + 1, ratio)),
             numbers: [
                 step.alpha,
                 step.a,
@@ -185,7 +189,7 @@ fn rows(chain: &Chain, notes: &mut Vec<String>) -> Vec<Row> {
         .collect();
     let (masses, beside) = carried_masses(chain);
     for link in masses {
-        let place = link.stage + lead;
+        let place = link.stage + rows_before_chain;
         if let (Some(row), Some(frame)) = (rows.get_mut(place), frames.get(place)) {
             let at = frame.resolve(&(link.at - frame.origin));
             row.bodies.push((link.name, link.mass, at));
@@ -209,7 +213,7 @@ fn advanced(frame: &Frame<f64>, row: &Row) -> Frame<f64> {
     frame
 }
 
-/// Returns the robot's name as a valid folder name.
+/// Returns the robot's name, changed so that it is a valid folder name; `arm` if nothing is left.
 fn name(robot: &str) -> String {
     let fit: String = robot
         .chars()
@@ -231,6 +235,7 @@ fn limit_number(value: f64) -> String {
     number((value * 1e6).round() / 1e6)
 }
 
+/// Formats an angle \[rad\] in degrees between −180 and 180; right angles are written exactly.
 fn degrees(angle: f64) -> String {
     let within = angle - (angle / TAU).round() * TAU;
     let right = (within / FRAC_PI_2).round();
@@ -241,11 +246,12 @@ fn degrees(angle: f64) -> String {
     })
 }
 
+/// Formats a vector as a TOML list; `text` formats each number.
 fn list(values: &Vector3<f64>, text: impl Fn(f64) -> String) -> String {
     format!("[{}]", values.iter().map(|value| text(*value)).collect::<Vec<_>>().join(", "))
 }
 
-/// Writes the problem up to the section `[tool]`.
+/// Returns the text of the problem up to the section `[tool]`.
 fn arm_toml(chain: &Chain, name: &str, rows: &[Row]) -> String {
     let (base, tip) = chain.ends();
     let file = chain.robot.file().file_name().unwrap_or_default().to_string_lossy().into_owned();
@@ -318,7 +324,8 @@ fn arm_toml(chain: &Chain, name: &str, rows: &[Row]) -> String {
     text
 }
 
-/// Writes a camera on the tip and a board in the world, numbered as OpenCV numbers its corners.
+/// Returns the sections of a camera on the tip and a board in the world. The board has `columns` ×
+/// `rows` corners at a `distance` \[mm\], in the order of OpenCV.
 fn view([columns, rows]: [usize; 2], distance: f64) -> String {
     let corner = |k: usize| {
         let place = |count: usize| number(count as f64 * distance);
@@ -338,8 +345,8 @@ fn view([columns, rows]: [usize; 2], distance: f64) -> String {
     )
 }
 
-/// Writes `[parameters]`: priors for all parameters, and rules that fix those which positions, or
-/// the views of a camera, cannot distinguish.
+/// Returns the section `[parameters]`: priors for all parameters, and rules that fix those which
+/// positions, or the views of a camera, cannot distinguish. `free` are the names of the others.
 fn parameters(rows: &[Row], free: &[String], has_camera: bool) -> String {
     let mut text = "[parameters]                                     # how far off the nominal arm may be, 1 σ\n\
                     \"joint*.*\" = { sigma_deg = 0.5, sigma_mm = 2.0 }\n"
@@ -376,7 +383,7 @@ fn parameters(rows: &[Row], free: &[String], has_camera: bool) -> String {
     text
 }
 
-/// Writes the section `[data]`.
+/// Returns the section `[data]`, with the names of the columns as comments.
 fn data(chain: &Chain, rows: &[Row], has_camera: bool) -> String {
     let moving = rows.iter().filter(|row| row.kind != "fixed" && row.mimic.is_none());
     let column =

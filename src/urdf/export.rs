@@ -8,10 +8,11 @@ use crate::mechanics::Arm;
 use crate::problem::{JointKind, Problem};
 use crate::spatial::Frame;
 
-/// Largest difference between the nominal arms of problem and URDF that counts as equal \[rad\] or
-/// \[m\].
+/// Largest difference between the nominal arms of problem and URDF at which they count as equal
+/// \[rad\] or \[m\].
 const NOMINAL_TOLERANCE: f64 = 1e-6;
-/// Largest transform after the chain's last origin that may be dropped \[rad\] or \[m\].
+/// Largest transform after the chain's last origin that is dropped, if no origin can contain it
+/// \[rad\] or \[m\].
 const MAX_DROPPED: f64 = 1e-10;
 
 /// URDF with identified origins.
@@ -19,25 +20,28 @@ const MAX_DROPPED: f64 = 1e-10;
 pub struct Export {
     /// Text of the whole file.
     pub text: String,
-    /// Moved origins from base to tip.
+    /// Origins that were changed, from base to tip.
     #[doc(hidden)]
     pub moved: Vec<MovedOrigin>,
-    /// Links of cameras and markers that the file has on another parent, where they stay.
+    /// Links of cameras and markers that were not changed, because the file has them on another
+    /// parent.
     #[doc(hidden)]
     pub elsewhere: Vec<String>,
 }
 
-/// Transforms between the axes of an arm: before each moving joint, relative to the previous one,
-/// and after the last.
+/// Transforms between the axes of an arm, from one moving joint to the next.
 ///
 /// They regroup the joint transforms: `C_k` = Ry(`β_{k−1}`) … Rx(`α_k`) Tx(`a_k`) Rz(`θ_k`)
 /// Tz(`d_k`), with fixed joints in between.
 pub(crate) struct Steps {
+    /// Transform before each moving joint, from the base or from the previous moving joint.
     pub before: Vec<Frame<f64>>,
+    /// Transform after the last moving joint.
     pub end: Frame<f64>,
 }
 
 impl Steps {
+    /// Computes the transforms of an arm at zero commands.
     pub fn new(arm: &Arm<f64>) -> Self {
         let (mut before, mut step) = (Vec::new(), Frame::identity());
         for joint in &arm.joints {
@@ -50,8 +54,9 @@ impl Steps {
         Self { before, end: step }
     }
 
-    /// Returns the gauge of each axis: the transform from the chain's axis frame to that of the
-    /// nominal arm. With it an arm without errors keeps the frames of the file.
+    /// Returns the gauge of each axis, after the identity for the base: the transform from the
+    /// chain's axis frame to that of the nominal arm. It keeps the frames of the file for an arm
+    /// without errors.
     ///
     /// # Errors
     /// Returns an error if the nominal arm differs from the chain.
@@ -80,14 +85,15 @@ impl Steps {
     }
 }
 
+/// Returns an angle \[rad\] and a distance \[m\] in words, in degrees and millimetres.
 fn words((angle, distance): (f64, f64)) -> String {
     format!("{:.3e}° and {:.3e} mm", angle.to_degrees(), distance * 1e3)
 }
 
-/// Writes the geometry of `arm` into `chain`, from which `problem` was made.
+/// Writes the geometry of `arm` into the URDF of `chain`, from which `problem` was made.
 ///
 /// The tip then has the pose of the rigid arm in every configuration. Parameters of one joint may
-/// enter the origin of the next. Inertial data and everything outside the chain stay unchanged.
+/// change the origin of the next. Inertial data and everything outside the chain stay unchanged.
 ///
 /// # Errors
 /// Returns an error if problem and chain describe different arms, or if no origin after the last
@@ -97,7 +103,7 @@ pub fn export(chain: &Chain, problem: &Problem, arm: &Arm<f64>) -> Result<Export
 }
 
 /// Writes the geometry of `arm` as [`export`] does, and the `mounted` cameras and markers as links
-/// with a fixed joint: those that the file has are moved, others are added at its end.
+/// with a fixed joint. Links that the file has are moved; others are added at the end of the file.
 ///
 /// # Errors
 /// Returns the errors of [`export`].
@@ -127,9 +133,9 @@ pub fn export_with_links(
         };
         let step = before.compose(step).compose(&after.inverse());
         let target =
-            from.compose(&moved(&step, joint, -stage.addend)).compose(&stage.axis.inverse());
+            from.compose(&moved(&step, joint, -stage.offset)).compose(&stage.axis.inverse());
         let passed = patches.through(&fixed);
-        patches.place(index, &passed.inverse().compose(&target));
+        patches.set_origin(index, &passed.inverse().compose(&target));
         from = stage.axis;
         fixed.clear();
         next = stages.next();
@@ -138,7 +144,7 @@ pub fn export_with_links(
     let target = from.compose(&last.compose(&steps.end));
     if let Some((&first, others)) = fixed.split_first() {
         let behind = patches.through(others);
-        patches.place(first, &target.compose(&behind.inverse()));
+        patches.set_origin(first, &target.compose(&behind.inverse()));
     } else {
         let off = difference(&Frame::identity(), &target);
         if off.0 > MAX_DROPPED || off.1 > MAX_DROPPED {
@@ -151,6 +157,7 @@ pub fn export_with_links(
     Ok(Export { text, moved, elsewhere })
 }
 
+/// Checks that the moving joints of problem and chain have the same names.
 fn check_names(chain: &Chain, problem: &Problem) -> Result<(), InputError> {
     let moving = problem.joints.iter().filter(|joint| joint.kind != JointKind::Fixed);
     let expected: Vec<String> = moving.map(|joint| joint.name.clone()).collect();

@@ -1,4 +1,4 @@
-//! Choice of the initially free parameters: as many as position measurements distinguish.
+//! Choice of the parameters that are free at first: as many as position measurements distinguish.
 
 use nalgebra::{DMatrix, DVector, Vector3};
 use rand::RngExt as _;
@@ -12,15 +12,16 @@ use crate::problem::{
 };
 use crate::random::stream;
 
-/// Smallest part of a Jacobian column, relative to its norm, that must be independent of the chosen
-/// columns.
+/// Smallest fraction of a Jacobian column's norm that must be independent of the columns of the
+/// parameters chosen before.
 const MIN_INDEPENDENT_FRACTION: f64 = 1e-3;
-/// Largest sampled range of a joint without limits, from −3 to 3 \[rad\] or \[m\].
+/// Largest magnitude of a random command of a revolute joint \[rad\].
 const MAX_SAMPLED_ANGLE: f64 = 3.0;
+/// Largest magnitude of a random command of a prismatic joint \[m\].
 const MAX_SAMPLED_TRAVEL: f64 = 0.5;
 
-/// Returns the names of the parameters that measured positions of an off-axis target distinguish,
-/// or positions with orientations, as views of a board give them, with `are_oriented`.
+/// Returns the names of the parameters that measured positions of an off-axis target distinguish.
+/// If `are_oriented` is true, orientations are measured, too, as by views of a board.
 ///
 /// Base and tool come first, then α, a, θ, d of all joints, then β. A parameter is chosen if its
 /// Jacobian column is independent of the chosen ones, at random poses within the joint limits.
@@ -78,8 +79,8 @@ pub(super) fn distinguishable_parameters(
     Ok(chosen.iter().filter_map(|&k| Some(model.parameters.get(k)?.name.clone())).collect())
 }
 
-/// Returns the rank by which parameters are chosen to be free, lowest first: those of base and
-/// target, then α, a, θ, d, β, then others. Equal ranks follow the order of the arm.
+/// Returns the rank of a parameter in the choice, the lowest first: 0 for those of base and target,
+/// then α, a, θ, d, β, then others. Equal ranks follow the order of the arm.
 fn priority(parameter: &Parameter) -> usize {
     let field = parameter.name.rsplit('.').next().unwrap_or_default();
     let fields = ["alpha", "a", "theta", "d", "beta"];
@@ -90,7 +91,8 @@ fn priority(parameter: &Parameter) -> usize {
     }
 }
 
-/// Returns the columns that are linearly independent of the earlier ones, in the given order.
+/// Returns the indices of those columns that are linearly independent of the columns before them in
+/// the given order.
 fn independent(columns: &DMatrix<f64>, order: &[usize]) -> Vec<usize> {
     let (mut basis, mut chosen): (Vec<DVector<f64>>, Vec<usize>) = (Vec::new(), Vec::new());
     for &k in order {

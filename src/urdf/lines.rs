@@ -4,16 +4,18 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use crate::spatial::Frame;
 
-/// Largest sine of the angle between axes that count as parallel.
+/// Largest sine of the angle between two axes at which they are treated as parallel.
 const MAX_PARALLEL_SINE: f64 = 0.1;
 /// Smallest distance between two points that defines a direction \[m\].
 const MIN_DISTANCE: f64 = 1e-12;
 
-/// Transform Rz(θ₀) Tz(d₀) Ry(β) Rx(α) Tx(a) Rz(θ) Tz(d) between two axes. The first two factors
-/// act along the first axis, the last two along the second.
+/// Transform Rz(θ₀) Tz(d₀) Ry(β) Rx(α) Tx(a) Rz(θ) Tz(d) between two axes, angles \[rad\] and
+/// lengths \[m\]. The first two factors act along the first axis, the last two along the second.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Step {
+    /// Rotation θ₀ about the first axis.
     pub theta_before: f64,
+    /// Shift d₀ along the first axis.
     pub d_before: f64,
     pub beta: f64,
     pub alpha: f64,
@@ -23,9 +25,9 @@ pub(super) struct Step {
 }
 
 impl Step {
-    /// Decomposes a frame on the second axis, given in a frame on the first axis. Crossing axes use
-    /// the common normal with β = 0. Parallel or nearly parallel axes use \[Hayati1983\] with d₀ =
-    /// 0, so that the origin stays near.
+    /// Decomposes a frame on the second axis, given in a frame on the first axis. For crossing axes
+    /// the common normal is used, with β = 0. For parallel or nearly parallel axes the form of
+    /// \[Hayati1983\] is used, with d₀ = 0, so that the origin stays near.
     pub fn from_frame(frame: &Frame<f64>) -> Self {
         let mut step = if frame.axes[2].x.hypot(frame.axes[2].y) > MAX_PARALLEL_SINE {
             crossing(frame)
@@ -44,6 +46,7 @@ impl Step {
     }
 }
 
+/// Returns the factors up to Tx(a) for crossing axes, from their common normal.
 fn crossing(frame: &Frame<f64>) -> Step {
     let (z, p) = (&frame.axes[2], &frame.origin);
     let sin = z.x.hypot(z.y);
@@ -60,6 +63,7 @@ fn crossing(frame: &Frame<f64>) -> Step {
     }
 }
 
+/// Returns the factors up to Tx(a) for parallel or nearly parallel axes, with d₀ = 0.
 fn parallel(frame: &Frame<f64>) -> Step {
     let (z, p) = (&frame.axes[2], &frame.origin);
     let foot = p - z * p.dot(z);
@@ -83,8 +87,8 @@ fn parallel(frame: &Frame<f64>) -> Step {
     step
 }
 
-/// Reduces the angle of an undirected line to (−90°, 90°]; the sign is −1 if the direction was
-/// reversed.
+/// Reduces the angle of an undirected line \[rad\] to (−90°, 90°]. Also returns −1 if the direction
+/// was reversed for that, else 1.
 fn near_zero(angle: f64) -> (f64, f64) {
     const MAX_ROUNDING: f64 = 1e-9;
     if angle > FRAC_PI_2 + MAX_ROUNDING {

@@ -1,4 +1,4 @@
-//! Cameras and markers on the arm as links of a URDF.
+//! Cameras and markers that are mounted on the arm, as links of a URDF.
 
 use super::chain::Chain;
 use super::patches::Patches;
@@ -8,18 +8,20 @@ use crate::model::Model;
 use crate::problem::{JointKind, Problem};
 use crate::spatial::Frame;
 
-/// Camera or marker that a frame of the arm carries, as a link of a URDF.
+/// Camera or marker that is mounted on a frame of the arm, as a link of a URDF.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MountedLink {
-    /// Name of the link: of a camera with the suffix `_optical_frame`, of a marker with `_marker`.
+    /// Name of the link: that of the camera or marker with the suffix `_optical_frame` or
+    /// `_marker`.
     pub link: String,
-    /// Frame that carries it: 0 is the base, i the frame of joint i.
+    /// Frame that it moves with: 0 is the base, i the frame of joint i.
     pub carrier: usize,
-    /// Pose in that frame.
+    /// Pose of the camera or marker in that frame.
     pub pose: Frame<f64>,
 }
 
-/// Returns the cameras and markers on the arm with the parameters `x` of the model.
+/// Returns the cameras and markers that are mounted on the arm. Their poses follow from the full
+/// parameter vector `x` of the model.
 pub fn mounted_links(problem: &Problem, model: &Model, x: &[f64]) -> Vec<MountedLink> {
     let fixtures = problem.fixtures.iter().zip(model.fixtures(x));
     fixtures
@@ -33,9 +35,9 @@ pub fn mounted_links(problem: &Problem, model: &Model, x: &[f64]) -> Vec<Mounted
         .collect()
 }
 
-/// Adds a link with a fixed joint for each of the `mounted`, or moves the origin of that joint where
-/// the file has the link on the same parent. Returns the links that the file has elsewhere, which
-/// stay as they are.
+/// Adds a link with a fixed joint for each of the `mounted`. If the file has the link on the same
+/// parent, the origin of its joint is changed instead. Returns the names of the links that the file
+/// has elsewhere, which stay as they are.
 ///
 /// `gauges` are the transforms from the chain's axis frames to those of the problem.
 pub(super) fn mount(
@@ -50,23 +52,23 @@ pub(super) fn mount(
         let origin = carried.compose(pose);
         let Some(index) = robot.links.iter().position(|known| known.name == *link) else {
             let name = robot.links.get(parent).map_or("", |link| link.name.as_str());
-            patches.append(link, name, &origin);
+            patches.append_link(link, name, &origin);
             continue;
         };
         let joint = robot.joints.iter().position(|joint| {
             joint.child == index && joint.parent == parent && joint.kind == Kind::Fixed
         });
         match joint.filter(|joint| !chain.joints.contains(joint)) {
-            Some(joint) => patches.place(joint, &origin),
+            Some(joint) => patches.set_origin(joint, &origin),
             None => elsewhere.push(link.clone()),
         }
     }
     elsewhere
 }
 
-/// Returns the index of the link that moves with frame `carrier` of the problem, and that frame
-/// seen from the link: the tip for the last joint, otherwise the link behind the moving joint at or
-/// before the carrier.
+/// Returns the index of the link that moves with frame `carrier` of the problem, and that frame in
+/// the frame of the link. It is the tip for the last joint, otherwise the link behind the moving
+/// joint at or before the carrier.
 fn carrying_link(
     chain: &Chain,
     (problem, arm, gauges): (&Problem, &Arm<f64>, &[Frame<f64>]),

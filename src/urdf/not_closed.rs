@@ -1,4 +1,4 @@
-//! Element of a URDF whose closing tag is missing.
+//! Error of a URDF in which the closing tag of an element is missing.
 
 use roxmltree::Error;
 
@@ -8,8 +8,8 @@ use crate::problem::item::Document;
 /// Maximum number of characters of a tag that an error shows.
 const MAX_SHOWN: usize = 60;
 
-/// Returns the error of the element that is not closed before the closing tag of another one;
-/// `None` for other errors.
+/// Returns the error of an element that is not closed before the closing tag of another one.
+/// `error` is that of the parser; `None` if it has another cause.
 pub(super) fn not_closed(source: &Document, error: &Error) -> Option<InputError> {
     let Error::UnexpectedCloseTag(name, before, position) = error else { return None };
     let line = position.row as usize;
@@ -34,8 +34,8 @@ pub(super) fn not_closed(source: &Document, error: &Error) -> Option<InputError>
     (closes && tag.starts_with(name.as_str())).then(|| source.locate(start..start + 1).error(kind))
 }
 
-/// Returns the tags that are open at the end of a text, outermost first, with the places of their
-/// `<`. Tags are shown without brackets.
+/// Returns the tags that are open at the end of a text, outermost first: the byte index of each
+/// `<`, and the tag without its brackets.
 fn open_tags(text: &str) -> Vec<(usize, &str)> {
     let mut open = Vec::new();
     let mut at = 0;
@@ -59,7 +59,7 @@ fn open_tags(text: &str) -> Vec<(usize, &str)> {
     open
 }
 
-/// Returns the place of the `>` that ends a tag; brackets in quotes do not.
+/// Returns the byte index of the `>` that ends a tag; brackets in quotes do not end it.
 fn tag_end(tag: &str) -> Option<usize> {
     let mut quote = None;
     tag.char_indices().find_map(|(at, character)| match (quote, character) {

@@ -1,4 +1,4 @@
-//! Notes about a URDF whose numbers look wrong or were interpreted.
+//! Notes for the user about numbers of a URDF that look wrong or were interpreted.
 
 use std::f64::consts::TAU;
 
@@ -7,7 +7,7 @@ use super::read::{Joint, Kind};
 
 /// Maximum plausible angle of an origin \[rad\]: one turn, with a margin for rounding.
 const MAX_PLAUSIBLE_ANGLE: f64 = TAU + 0.01;
-/// Maximum plausible length of an origin \[m\]; no joint of an arm is farther from the previous
+/// Maximum plausible coordinate of an origin \[m\]; no joint of an arm is farther from the previous
 /// one.
 const MAX_PLAUSIBLE_LENGTH: f64 = 20.0;
 
@@ -17,8 +17,8 @@ pub(super) fn of_chain(chain: &Chain) -> Vec<String> {
         chain.joints.iter().filter_map(|&index| chain.robot.joints.get(index)).collect();
     let mut notes: Vec<String> = chosen_tip(chain).into_iter().collect();
     notes.extend(right_angles(&joints));
-    notes.extend(joints.iter().filter_map(|joint| degrees(joint)));
-    notes.extend(joints.iter().filter_map(|joint| millimetres(joint)));
+    notes.extend(joints.iter().filter_map(|joint| angle_in_degrees(joint)));
+    notes.extend(joints.iter().filter_map(|joint| length_in_millimetres(joint)));
     notes.extend(limits_in_degrees(&joints));
     notes.extend(joints.iter().filter_map(|joint| unlimited_slide(joint)));
     let beside =
@@ -45,8 +45,9 @@ fn chosen_tip(chain: &Chain) -> Option<String> {
     })
 }
 
-/// Returns a note if an angle of an origin is more than one turn.
-fn degrees(joint: &Joint) -> Option<String> {
+/// Returns a note if an angle of an origin is more than one turn, so that it is probably in
+/// degrees.
+fn angle_in_degrees(joint: &Joint) -> Option<String> {
     let angle = joint.origin.written.iter().find(|angle| angle.abs() > MAX_PLAUSIBLE_ANGLE)?;
     Some(format!(
         "{}: rpy holds {angle} rad, which is more than one turn; if the URDF has degrees there, \
@@ -56,8 +57,9 @@ fn degrees(joint: &Joint) -> Option<String> {
     ))
 }
 
-/// Returns a note if an origin is implausibly far from the previous one.
-fn millimetres(joint: &Joint) -> Option<String> {
+/// Returns a note if an origin is implausibly far from the previous one, so that it is probably in
+/// millimetres.
+fn length_in_millimetres(joint: &Joint) -> Option<String> {
     let length = joint.origin.xyz.iter().find(|length| length.abs() > MAX_PLAUSIBLE_LENGTH)?;
     Some(format!(
         "{}: xyz holds {length} m; if the URDF has millimetres there, convert them to metres \
@@ -66,7 +68,7 @@ fn millimetres(joint: &Joint) -> Option<String> {
     ))
 }
 
-/// Returns a note if limits of revolute joints look like degrees.
+/// Returns a note if limits of revolute joints were ignored because they look like degrees.
 fn limits_in_degrees(joints: &[&Joint]) -> Option<String> {
     let limits = |joint: &&Joint| {
         let (lower, upper) = joint.limits_in_degrees?;
@@ -82,7 +84,7 @@ fn limits_in_degrees(joints: &[&Joint]) -> Option<String> {
     })
 }
 
-/// Returns a note if a prismatic joint has no limits, which planning needs.
+/// Returns a note if a commanded prismatic joint lacks a limit, which planning needs.
 fn unlimited_slide(joint: &Joint) -> Option<String> {
     let is_unlimited = !joint.limits.0.is_finite() || !joint.limits.1.is_finite();
     (joint.kind == Kind::Prismatic && is_unlimited && joint.mimic.is_none()).then(|| {

@@ -1,6 +1,7 @@
 //! Numbers in a URDF.
 
-/// Parses exactly N finite numbers.
+/// Parses N numbers separated by white space. Returns `None` if there are fewer or more, or if one
+/// is not finite or larger than 10¹⁵⁰.
 pub(super) fn numbers<const N: usize>(text: &str) -> Option<[f64; N]> {
     let mut words = text.split_ascii_whitespace();
     let mut out = [0.0; N];

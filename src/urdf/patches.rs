@@ -1,4 +1,4 @@
-//! Changes to the origins and links of a URDF. All other bytes stay.
+//! Changes to the origins and links in the text of a URDF. All other bytes stay.
 
 use std::f64::consts::TAU;
 use std::ops::Range;
@@ -9,10 +9,10 @@ use roxmltree::Document as Xml;
 use super::read::{Origin, Robot};
 use crate::spatial::Frame;
 
-/// Smallest displacement for which an origin is rewritten \[rad\] or \[m\].
+/// Displacement of an origin above which it is rewritten \[rad\] or \[m\].
 const MIN_DISPLACEMENT: f64 = 1e-12;
 
-/// Moved origin of a joint.
+/// Changed origin of a joint.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MovedOrigin {
     /// Name of the joint.
@@ -39,6 +39,7 @@ pub(super) fn difference(first: &Frame<f64>, second: &Frame<f64>) -> (f64, f64) 
     ((0.5 * sines.norm()).atan2(cos), relative.origin.norm())
 }
 
+/// Returns the transform of an origin with its angles as they are written in the file.
 fn as_written(origin: &Origin) -> Frame<f64> {
     Frame::from_xyz_rpy(&origin.xyz, &origin.written)
 }
@@ -57,21 +58,21 @@ impl<'a> Patches<'a> {
         Self { robot, text: Vec::new(), moved: Vec::new() }
     }
 
-    /// Returns the transform through some fixed joints, and writes their origins as the file will
-    /// round them.
+    /// Returns the transform through some fixed joints with right angles restored, and changes
+    /// their origins to it.
     pub fn through(&mut self, joints: &[usize]) -> Frame<f64> {
         let mut frame = Frame::identity();
         for &index in joints {
             let Some(joint) = self.robot.joints.get(index) else { continue };
             let origin = joint.origin.frame();
-            self.place(index, &origin);
+            self.set_origin(index, &origin);
             frame = frame.compose(&origin);
         }
         frame
     }
 
-    /// Replaces the origin of a joint if it differs.
-    pub fn place(&mut self, index: usize, frame: &Frame<f64>) {
+    /// Replaces the origin of the joint with this index by `frame` if they differ.
+    pub fn set_origin(&mut self, index: usize, frame: &Frame<f64>) {
         let Some(joint) = self.robot.joints.get(index) else { return };
         let old = as_written(&joint.origin);
         let (angle, distance) = difference(&old, frame);
@@ -114,8 +115,8 @@ impl<'a> Patches<'a> {
         self.moved.push(MovedOrigin { joint: joint.name.clone(), xyz, rpy, distance, angle });
     }
 
-    /// Returns position and text of a new `<origin>` in a joint without one: before the first
-    /// child, with its indentation.
+    /// Returns byte index and text of a new `<origin>` in a joint without one. It stands before the
+    /// first child of the joint, with the same indentation.
     fn new_element(&self, joint: &Range<usize>, attributes: &str) -> (usize, String) {
         let text = self.robot.source.text.get(joint.clone()).unwrap_or_default();
         // The start tag ends at the first bracket outside quotes.
@@ -134,8 +135,9 @@ impl<'a> Patches<'a> {
         (joint.start + end, format!("{indent}<origin{attributes}/>"))
     }
 
-    /// Adds a link with a fixed joint at the end of the robot.
-    pub fn append(&mut self, link: &str, parent: &str, origin: &Frame<f64>) {
+    /// Adds a link with a fixed joint to `parent` at the end of the robot's element; `origin` is
+    /// the pose of the link in the parent.
+    pub fn append_link(&mut self, link: &str, parent: &str, origin: &Frame<f64>) {
         let source = &self.robot.source.text;
         let xml = Xml::parse(source).ok();
         let end = xml.map_or(source.len(), |xml| xml.root_element().range().end);
@@ -166,8 +168,8 @@ impl<'a> Patches<'a> {
     }
 }
 
-/// Returns the equivalent angles nearest to `old`: (r, p, y) and (r + π, π − p, y + π) are the same
-/// rotation.
+/// Returns the roll, pitch and yaw \[rad\] of the same rotation that are nearest to `old`: (r, p,
+/// y) and (r + π, π − p, y + π) are the same rotation.
 fn nearest(rpy: &Vector3<f64>, old: &Vector3<f64>) -> Vector3<f64> {
     let half = 0.5 * TAU;
     let near = |angles: Vector3<f64>| {
@@ -177,14 +179,14 @@ fn nearest(rpy: &Vector3<f64>, old: &Vector3<f64>) -> Vector3<f64> {
     if (first - old).norm() <= (second - old).norm() { first } else { second }
 }
 
-/// Returns the quaternion x, y, z, w of the rotation by roll, pitch and yaw \[rad\].
+/// Returns the quaternion x, y, z, w of the rotation by roll, pitch and yaw \[rad\], as text.
 fn quaternion(rpy: &Vector3<f64>) -> String {
     let rotation = UnitQuaternion::from_euler_angles(rpy.x, rpy.y, rpy.z);
     let [x, y, z, w] = [rotation.i, rotation.j, rotation.k, rotation.w];
     [x, y, z, w].map(|number| number.to_string()).join(" ")
 }
 
-/// Returns three numbers, rounded to 10⁻¹³.
+/// Returns three numbers, rounded to 10⁻¹³, as text.
 fn triple(values: &Vector3<f64>) -> String {
     let number = |value: &f64| (((value * 1e13).round() / 1e13) + 0.0).to_string();
     values.iter().map(number).collect::<Vec<_>>().join(" ")

@@ -16,7 +16,7 @@ use crate::problem::item::Document;
 use crate::quantity::rounded_right_angle;
 use crate::spatial::Frame;
 
-/// Largest deviation of a quaternion's norm from 1 that is attributed to rounding of its
+/// Largest deviation of a quaternion's norm from 1 that is attributed to rounding of the
 /// components.
 const MAX_QUATERNION_NORM_ERROR: f64 = 1e-3;
 /// Largest deviation of an angle from a right angle that is taken for rounding of a quaternion with
@@ -27,8 +27,8 @@ const MAX_QUATERNION_ROUNDING: f64 = 2e-7;
 /// several turns have. Larger limits are probably degrees.
 const MAX_REVOLUTE_LIMIT: f64 = 30.0;
 
-/// Numbers with their byte range in the text.
-type Placed<const N: usize> = ([f64; N], Range<usize>);
+/// Numbers of an attribute, with their byte range in the text.
+type LocatedNumbers<const N: usize> = ([f64; N], Range<usize>);
 
 /// Robot described by a URDF.
 pub struct Robot {
@@ -62,12 +62,15 @@ pub(super) enum Kind {
 pub(super) struct Joint {
     pub name: String,
     pub kind: Kind,
+    /// Index of the parent link.
     pub parent: usize,
+    /// Index of the child link.
     pub child: usize,
+    /// Pose of the joint frame in the frame of the parent link.
     pub origin: Origin,
     /// Unit axis of the motion, joint frame.
     pub axis: Vector3<f64>,
-    /// True if the joint moves and has no `<axis>`; the format then takes x.
+    /// True if the joint moves and has no `<axis>`; its axis is then x.
     pub lacks_axis: bool,
     /// Range of q \[rad\] or \[m\], infinite without limits.
     pub limits: (f64, f64),
@@ -78,16 +81,17 @@ pub(super) struct Joint {
     pub limits_in_degrees: Option<(f64, f64)>,
     /// Index of the joint that a mimic joint follows, factor and offset; `None` for other joints.
     pub mimic: Option<(usize, f64, f64)>,
-    /// Error of a `<mimic>` that names no joint or is invalid. It is reported only if the chain
-    /// needs the joint.
+    /// Error of a `<mimic>` that names no joint or is invalid; `None` without such an error. It is
+    /// reported only if the chain needs the joint.
     pub broken_mimic: Option<(Location, UrdfErrorKind)>,
     /// Byte range of the joint's element in the text.
     pub span: Range<usize>,
 }
 
-/// Element `<origin>` of a joint.
+/// Element `<origin>` of a joint; the identity if the joint has none.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Origin {
+    /// Position \[m\].
     pub xyz: Vector3<f64>,
     /// Roll, pitch, yaw as written \[rad\].
     pub written: Vector3<f64>,
@@ -101,7 +105,7 @@ pub(super) struct Origin {
 }
 
 impl Origin {
-    /// Returns the transform with restored right angles.
+    /// Returns the transform, with rounded right angles restored.
     pub fn frame(&self) -> Frame<f64> {
         Frame::from_xyz_rpy(&self.xyz, &self.meant)
     }
@@ -161,7 +165,7 @@ impl Robot {
         Location::file(&self.source.file).error(kind)
     }
 
-    /// Returns the error for a URDF whose numbers make an invalid problem.
+    /// Converts the error of a problem that was made from this URDF to an error about the URDF.
     pub(super) fn as_problem(&self, error: &InputError) -> InputError {
         let key = error.location.key.clone().unwrap_or_default();
         self.error(UrdfErrorKind::AsProblem { key, why: error.kind.to_string() })
@@ -172,7 +176,7 @@ impl Robot {
         &self.source.file
     }
 
-    /// Returns the index of a link.
+    /// Returns the index of the link with a name; an error if there is none.
     pub(super) fn link(&self, name: &str) -> Result<usize, InputError> {
         let unknown = || {
             let known = self.links.iter().map(|link| link.name.clone()).collect();
@@ -182,18 +186,20 @@ impl Robot {
     }
 }
 
-/// Returns the multiple of 90° \[rad\] that `angle` deviates from by the rounding of a quaternion,
-/// or `angle` itself.
+/// Returns the multiple of 90° \[rad\] from which `angle` only deviates by the rounding of a
+/// quaternion; if there is none, `angle` itself.
 fn right_angle_of_quaternion(angle: f64) -> f64 {
     let right = (angle / FRAC_PI_2).round() * FRAC_PI_2;
     if (angle - right).abs() < MAX_QUATERNION_ROUNDING { right } else { angle }
 }
 
+/// Reader of the elements of a URDF.
 struct Reader<'a> {
     source: &'a Document,
 }
 
 impl Reader<'_> {
+    /// Returns an error at the first line of an element.
     fn fail<T>(&self, node: Node<'_, '_>, kind: UrdfErrorKind) -> Result<T, InputError> {
         self.fail_at(node.range(), kind)
     }
@@ -209,6 +215,7 @@ impl Reader<'_> {
         Err(self.source.locate(span.start..span.start + line.len()).error(kind))
     }
 
+    /// Reads the element `<robot>`.
     fn robot(&self, root: Node<'_, '_>) -> Result<Robot, InputError> {
         if root.tag_name().name() != "robot" {
             return self.fail(
@@ -247,6 +254,7 @@ impl Reader<'_> {
         Ok(Robot { source, name, links, joints })
     }
 
+    /// Returns the value of an attribute, which must exist.
     fn attribute<'n>(&self, node: Node<'n, '_>, name: &'static str) -> Result<&'n str, InputError> {
         if let Some(value) = node.attribute(name) {
             return Ok(value);
@@ -255,6 +263,7 @@ impl Reader<'_> {
         self.fail(node, UrdfErrorKind::NoAttribute { element, attribute: name })
     }
 
+    /// Reads the attribute `name`, which must not be blank.
     fn name(&self, node: Node<'_, '_>) -> Result<String, InputError> {
         let name = self.attribute(node, "name")?;
         let bad = name.trim().is_empty() || name.chars().any(is_hidden) || name.contains("${");
@@ -266,7 +275,7 @@ impl Reader<'_> {
         &self,
         node: Node<'_, '_>,
         attribute: &str,
-    ) -> Result<Option<Placed<N>>, InputError> {
+    ) -> Result<Option<LocatedNumbers<N>>, InputError> {
         let Some(found) = node.attribute_node(attribute) else { return Ok(None) };
         let span = found.range_value();
         match numbers(found.value()) {
@@ -279,6 +288,7 @@ impl Reader<'_> {
         }
     }
 
+    /// Reads an element `<link>`.
     fn link(&self, node: Node<'_, '_>) -> Result<Link, InputError> {
         let name = self.name(node)?;
         let child = |node: Node<'_, '_>, tag: &str| {
@@ -306,6 +316,7 @@ impl Reader<'_> {
         Ok(Link { name, mass, com: com.into() })
     }
 
+    /// Reads an element `<joint>`; `names` are those of all joints.
     fn joint(
         &self,
         node: Node<'_, '_>,
@@ -413,6 +424,7 @@ impl Reader<'_> {
         Ok((leader, number("multiplier", 1.0)?, number("offset", 0.0)?))
     }
 
+    /// Reads an element `<origin>`.
     fn origin(&self, node: Node<'_, '_>) -> Result<Origin, InputError> {
         let mut origin = Origin { element: Some(node.range()), ..Origin::default() };
         if let Some((xyz, span)) = self.numbers::<3>(node, "xyz")? {

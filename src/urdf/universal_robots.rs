@@ -1,4 +1,5 @@
-//! Frames as the description of Universal Robots has them.
+//! Joint origins in the frames of the description that Universal Robots publishes. Each row of the
+//! table is the origin of a link in the frame of the previous one \[m\], \[rad\].
 //!
 //! | link | x y z | roll pitch yaw, nominal |
 //! |---|---|---|
@@ -17,15 +18,16 @@ use crate::spatial::Frame;
 /// Names of the links in the calibration file.
 pub(super) const LINKS: [&str; 6] =
     ["shoulder", "upper_arm", "forearm", "wrist_1", "wrist_2", "wrist_3"];
+/// Nominal roll of each link \[rad\].
 const ROLLS: [f64; 6] = [0.0, FRAC_PI_2, 0.0, 0.0, FRAC_PI_2, -FRAC_PI_2];
-/// Tolerance between the nominal arm and the form above \[rad\] or \[m\].
+/// Largest deviation of the nominal arm from the table of this module \[rad\] or \[m\].
 const FORM_TOLERANCE: f64 = 1e-6;
 
-/// Returns the origins of the six links of an identified arm, in gauges that give the nominal arm
-/// the form above.
+/// Returns the origins of the six links of an identified arm, in the gauges in which the nominal
+/// arm has the origins of the table.
 ///
 /// # Errors
-/// Returns a description of the difference if the nominal arm does not have this form.
+/// Returns a description of the difference if the nominal arm cannot have these origins.
 pub(super) fn origins(nominal: &Steps, identified: &Steps) -> Result<Vec<Frame<f64>>, String> {
     if nominal.before.len() != LINKS.len() {
         return Err(format!("it has {} moving joints, not 6", nominal.before.len()));
@@ -43,6 +45,8 @@ pub(super) fn origins(nominal: &Steps, identified: &Steps) -> Result<Vec<Frame<f
         .collect())
 }
 
+/// Returns the gauge of each axis, after that of the base, in which the nominal arm has the origins
+/// of the table. `base` is the gauge of the base.
 fn gauges(nominal: &Steps, base: &Frame<f64>) -> Result<Vec<Frame<f64>>, String> {
     let mut gauges = vec![*base];
     let mut before = *base;
@@ -88,8 +92,8 @@ fn gauges(nominal: &Steps, base: &Frame<f64>) -> Result<Vec<Frame<f64>>, String>
     Ok(gauges)
 }
 
-/// Returns the z coordinate on this frame's z axis nearest to the z axis of `frame` \[m\]; 0 if
-/// they are parallel.
+/// Returns the z coordinate \[m\] of the point on the reference z axis that is nearest to the z
+/// axis of `frame`; 0 if the axes are parallel.
 fn nearest(frame: &Frame<f64>) -> f64 {
     let (z, p) = (&frame.axes[2], &frame.origin);
     let square = z.xy().norm_squared();

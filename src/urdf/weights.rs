@@ -6,10 +6,11 @@ use super::chain::{Chain, moved};
 use super::read::Kind;
 use crate::spatial::Frame;
 
-/// Mass of a link in the chain or attached to it, with the stage that carries it.
+/// Mass of a link of the chain or of a branch of it, with the moving joint that moves it.
 pub(super) struct CarriedMass {
-    /// Index of the stage that carries the link.
+    /// Index of the last moving joint of the chain before the link, among the stages.
     pub stage: usize,
+    /// Name of the link.
     pub name: String,
     /// Mass of the link \[kg\].
     pub mass: f64,
@@ -17,8 +18,8 @@ pub(super) struct CarriedMass {
     pub at: Vector3<f64>,
 }
 
-/// Returns all links with a mass after the chain's first moving joint, and the names of the moving
-/// joints that branch off after it.
+/// Returns all links with a mass that the chain's moving joints move, in the order of the joints.
+/// Also returns the names of the other moving joints that they move, which are taken at zero.
 pub(super) fn carried_masses(chain: &Chain) -> (Vec<CarriedMass>, Vec<String>) {
     let robot = chain.robot;
     let (mut masses, mut beside) = (Vec::new(), Vec::new());
@@ -42,7 +43,7 @@ pub(super) fn carried_masses(chain: &Chain) -> (Vec<CarriedMass>, Vec<String>) {
             let stage = chain.stages.iter().position(|stage| stage.joint == index);
             if let Some(moving) = stage.and_then(|stage| chain.stages.get(stage)) {
                 // A mimic joint may have an offset when its leader is at zero.
-                next = moved(&next.compose(&moving.axis), joint, moving.addend)
+                next = moved(&next.compose(&moving.axis), joint, moving.offset)
                     .compose(&moving.axis.inverse());
             } else if joint.kind != Kind::Fixed && carrier.is_some() {
                 beside.push(joint.name.clone());

@@ -20,7 +20,8 @@ pub enum YamlFormat {
     Ros,
 }
 
-/// Origin of a joint relative to the previous frame. The joint's axis is the z axis of its frame.
+/// Pose of a joint's frame at zero command, relative to the previous frame. The joint's axis is the
+/// z axis of its frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct JointOrigin {
     /// Name of the joint, or of the link after it.
@@ -104,7 +105,7 @@ pub fn yaml(origins: &[JointOrigin], form: YamlFormat) -> String {
     text
 }
 
-/// Returns a number that YAML reads as a float.
+/// Returns a number in a form that YAML reads as a float, rounded to 10⁻¹³.
 fn float(value: f64) -> String {
     let rounded = (value * 1e13).round() / 1e13 + 0.0;
     let text = rounded.to_string();
