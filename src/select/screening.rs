@@ -194,7 +194,7 @@ pub(super) fn check_fit(fitted: &Fitted, data: &Data) -> ResidualTests {
     let linearised = fitted.linearised(data, &[]);
     let coordinates: Vec<usize> =
         (0..linearised.poses().len()).map(|pose| linearised.coordinates(pose)).collect();
-    // With millions of rows, memory suffices for one such matrix only.
+    // With millions of rows, memory suffices for only one matrix of this size.
     let (columns, residual) = fitted.neighbourhood_as_fitted(linearised).into_fitted();
     let fit = FitResidual {
         residual: &residual,

@@ -146,7 +146,7 @@ fn correction(
     best: &HypothesisSet,
     hypothesis: &Hypothesis,
 ) -> Option<Correction> {
-    // The peak of a narrow function may have been mistaken for outliers. Predictions of left-out
+    // The peak of a narrow function may have been treated as outliers. Predictions of left-out
     // poses distinguish the two.
     let may_hide_peak = fitted.problem.robust.is_none() && !fitted.set_aside.is_empty();
     let with_all_rows = may_hide_peak.then(|| fitted.with_all_rows());

@@ -179,10 +179,7 @@ impl Block {
     /// Creates a block from each design of root mean square 1, the logarithm of its prior
     /// probability, and the prior on its coefficients. All columns are projected in one product,
     /// which is faster.
-    pub fn dense_columns(
-        designs: Vec<(Design, f64, Coefficients)>,
-        fit: &LinearNeighbourhood,
-    ) -> Vec<Self> {
+    pub fn all(designs: Vec<(Design, f64, Coefficients)>, fit: &LinearNeighbourhood) -> Vec<Self> {
         let dense = designs.iter().filter_map(|(design, ..)| {
             if let Design::Dense(columns) = design { Some(columns) } else { None }
         });

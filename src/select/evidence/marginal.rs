@@ -184,7 +184,7 @@ impl Normal {
     fn shrinkage_terms(&self, size: f64) -> Option<(f64, f64)> {
         let precision = (size * size).recip();
         match self {
-            // One column needs no memory.
+            // A single column is solved without allocating memory.
             Self::Dense { gram, product } if product.len() == 1 => {
                 let lower = (gram[0] + precision).sqrt();
                 (lower > 0.0).then(|| ((lower * size).ln(), (product[0] / lower).powi(2)))

@@ -135,7 +135,7 @@ impl Evidence {
             .find(|set| set.hypotheses == best.hypotheses)
             .map_or(0.0, |set| set.probability);
         for (explanation, ln_odds) in odds {
-            // At larger odds the best set has practically no probability left.
+            // At larger odds, the best set has a negligible probability.
             let probability = of_best * ln_odds.min(40.0).exp();
             let is_same = |set: &&mut HypothesisSet| {
                 set.hypotheses.len() == explanation.hypotheses.len()
@@ -239,7 +239,7 @@ impl Evidence {
         let has_law = |explanation: &&HypothesisSet| {
             let unknown = |other: &Hypothesis| is_there(other) && other.effect().is_none();
             // All functions without a law make the same claim that the law is unknown. Errors that
-            // // wander in time, and sag under undeclared masses, are separate claims.
+            // wander in time, and sag under undeclared masses, are separate claims.
             let is_separate_claim = of.effect().is_some()
                 || of.is_limit()
                 || matches!(of.kind, HypothesisKind::Sag | HypothesisKind::Wandering);

@@ -120,7 +120,7 @@ impl<'a> Beam<'a> {
             let of_length = next.values().map(|scored| scored.ln_posterior);
             let of_length = of_length.fold(f64::NEG_INFINITY, f64::max);
             evaluated.extend(next);
-            // If the best sum with one more term hardly gains, longer sums do not gain either.
+            // If the best sum with one more term is less probable, longer sums are not tried.
             if of_length < most - MAX_LN_LOSS_OF_TERM {
                 break;
             }

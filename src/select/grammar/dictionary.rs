@@ -49,7 +49,7 @@ pub fn factors_at_other_sites(quantities: &Quantities) -> Vec<Factor> {
     for factor in &mut listed_factors {
         factor.ln_prior = match factor.form {
             Form::Command(_) => of_joint,
-            // Sine and cosine are equally probable where they stand alone.
+            // Sine and cosine are equally probable as terms of one factor.
             Form::Wave { .. } => of_joint - (2.0 * LONE_WAVE).ln(),
             Form::Settling => -f64::from(SETTLING_TIMES.2).ln(),
             Form::Step => -f64::from(STEP_TIMES).ln(),
@@ -89,7 +89,7 @@ pub fn factors(quantities: &Quantities, joint_of_site: usize) -> Vec<Factor> {
             for cosine in [false, true] {
                 add(Form::Wave { joint, order, cosine }, None, ln_prior);
             }
-            // Sine, cosine and their pair are equally probable where they stand alone.
+            // Sine, cosine and their pair are equally probable as terms of one factor.
             add(Form::Harmonic { joint, order }, None, ln_prior + LONE_WAVE.ln());
         }
         if quantities.turns[joint] && joint == joint_of_site {

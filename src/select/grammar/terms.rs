@@ -216,7 +216,7 @@ impl Terms {
     fn is_allowed(&self, term: &Product) -> bool {
         let of = |k: u16| &self.factors[usize::from(k)];
         let wide = term.iter().filter(|k| of(**k).form.width() > 1).count();
-        // A gas spring stands alone.
+        // A gas spring is multiplied by no other factor.
         let is_lone = term.iter().any(|&k| matches!(of(k).form, Form::Strut { .. }));
         wide <= 1
             && (term.len() == 1 || !is_lone)

@@ -113,7 +113,7 @@ pub fn close_by(
     let declared = Fitted::new(problem.positions_alone(), &data, options)?;
     let before = trace_fit(&declared, &data);
     let mut state = SearchState::new(&stoppable, options, &declared);
-    // An error of a lens would be taken for one of the arm.
+    // With a lens error no effect is searched, because it would be mistaken for one of the arm.
     let result = if declared.found.has(FindingCode::LensContradicted) {
         Ok((declared.clone(), None))
     } else {

@@ -48,7 +48,7 @@ pub(super) fn compare_with_plainer(state: &SearchState, fitted: &Fitted) -> Vec<
         }
         let effects = [others.as_slice(), instead.as_slice()].concat();
         let rival = state.fit(fitted, &effects).ok()?;
-        // The noise is what the better fit leaves.
+        // The σ of the noise is that of the better fit.
         let sigma = fitted.sigma.min(rival.sigma);
         let gain = LeftOutGain::new(fitted, &rival, state.data)?;
         let share = (1.0 + (-gain.ln_odds(sigma)).exp()).recip();

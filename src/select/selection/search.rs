@@ -185,7 +185,7 @@ fn fit_rivals(
     let mut better: Option<Fitted> = None;
     for (rival, ln_odds, next) in tried {
         // A function without a law is linear only about the fit for which it was built. A law that
-        // // replaces it must therefore also be confirmed by the evidence about the fit with the
+        // replaces it must therefore also be confirmed by the evidence about the fit with the
         // law.
         let functions_left = rival.without_law().len();
         let is_best = ln_odds > 0.0 && better.is_none();
