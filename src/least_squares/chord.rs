@@ -25,7 +25,7 @@ const NORMAL_RIDGE: f64 = 1e-10;
 /// part of ‖J₀ δ‖, or ‖ρ‖² is below the mean square ‖r‖² / N of one residual. No unknown may be
 /// without effect at x₀, since it may have an effect elsewhere.
 #[derive(Debug)]
-pub(super) struct Base {
+pub(super) struct BasePoint {
     /// Identifier of the data set.
     pub data: u64,
     /// Unit by which the stored residuals were divided, such as 1 σ of a position \[m\].
@@ -76,7 +76,7 @@ impl Projector {
     }
 
     /// Returns c = c₀ + R₀ δ + R₀ (R₀ᵀR₀)⁻¹ J₀ᵀ ρ, where `gradient` is J₀ᵀ ρ.
-    fn constant(&self, step: &DVector<f64>, gradient: &DVector<f64>) -> DVector<f64> {
+    fn projected_residual(&self, step: &DVector<f64>, gradient: &DVector<f64>) -> DVector<f64> {
         let along = self.root.tr_mul(&(&self.root * gradient.component_div(&self.lengths)));
         &self.constant + &self.scaled * (step.component_mul(&self.lengths) + along)
     }
@@ -90,7 +90,7 @@ struct ChunkError {
     squares: [f64; 3],
 }
 
-impl Base {
+impl BasePoint {
     /// Stores the chunks of all items, linearised at `x`, with their triangular factor. `data`
     /// identifies the data set; residuals were divided by `unit`.
     pub fn new(
@@ -155,7 +155,7 @@ impl Base {
         if !(error.is_finite() && error <= tolerated) {
             return None;
         }
-        let constant = self.projector()?.constant(&step, &gradient);
+        let constant = self.projector()?.projected_residual(&step, &gradient);
         Some(self.triangle().with_residual(&constant, squares / (scale * scale)).scaled(scale))
     }
 

@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector};
 const DIFFERENCE_STEP: f64 = 1e-4;
 
 /// Cost, gradient and Gauss–Newton matrix of an objective at one point.
-pub(super) struct Slopes {
+pub(super) struct QuadraticModel {
     /// Cost ½‖r‖² at the point.
     pub cost: f64,
     /// Gradient Jᵀr of the cost.
@@ -21,12 +21,12 @@ pub(super) struct Slopes {
 /// Calls `slopes` at x and once for each unknown that has an effect. An unknown is moved up, or
 /// down where `within` is false at the upper point. If both points are outside, its row and column
 /// come from the differences of the other unknowns. Returns `None` if an entry is not finite.
-pub(super) fn by_differences(
-    slopes: impl Fn(&DVector<f64>) -> Slopes,
+pub(super) fn curvature_by_differences(
+    slopes: impl Fn(&DVector<f64>) -> QuadraticModel,
     x: &DVector<f64>,
     within: &dyn Fn(&DVector<f64>) -> bool,
 ) -> Option<DMatrix<f64>> {
-    let Slopes { cost, gradient, normal } = slopes(x);
+    let QuadraticModel { cost, gradient, normal } = slopes(x);
     let residual = (2.0 * cost).sqrt();
     let n = x.len();
     let mut second = DMatrix::zeros(n, n);

@@ -5,7 +5,7 @@ use nalgebra::DVector;
 use super::{LeastSquares, jacobian, residual_vector};
 
 /// Largest number of decreasing steps in one extrapolation.
-const MAX_STEPS: usize = 12;
+const MAX_EXTRAPOLATION_STEPS: usize = 12;
 /// Ratio of successive difference steps in one extrapolation.
 const STEP_RATIO: f64 = 1.4;
 /// First steps tried, as fractions of an unknown's typical size.
@@ -118,7 +118,7 @@ fn ridders(difference: impl Fn(f64) -> DVector<f64>, first: f64) -> (DVector<f64
     let mut h = first;
     let mut previous = vec![difference(h)];
     let mut best = (previous[0].clone(), f64::INFINITY);
-    for _ in 1..MAX_STEPS {
+    for _ in 1..MAX_EXTRAPOLATION_STEPS {
         h /= STEP_RATIO;
         let mut row = vec![difference(h)];
         let mut factor = STEP_RATIO * STEP_RATIO;

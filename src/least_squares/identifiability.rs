@@ -17,9 +17,9 @@ pub const UNIDENTIFIABLE_BELOW: f64 = 1e-9;
 const MAX_ZERO_COLUMN_NORM: f64 = 1e-14;
 /// Smallest coefficient of an unknown, relative to the norm of its combination, that makes it a
 /// preferred pivot of the echelon form.
-const MIN_PIVOT_SHARE: f64 = 0.1;
+const MIN_PIVOT_COEFFICIENT: f64 = 0.1;
 /// Largest coefficient of a combination of unit norm that counts as a rounding error.
-const MAX_ROUNDING_ENTRY: f64 = 1e-6;
+const MAX_ROUNDING_COEFFICIENT: f64 = 1e-6;
 /// Smallest relative singular value that certifies full rank without an SVD: twice
 /// [`UNIDENTIFIABLE_BELOW`], to allow for rounding.
 const MIN_CERTAIN_FULL_RANK: f64 = 2.0 * UNIDENTIFIABLE_BELOW;
@@ -63,7 +63,7 @@ impl Identifiability {
         let SingularValues { values: singular_values, right } = SingularValues::of(&scaled);
         let threshold = UNIDENTIFIABLE_BELOW * singular_values.first().copied().unwrap_or(0.0);
         let rank = singular_values.iter().filter(|&&value| value > threshold).count();
-        let null = complement(&right.columns(0, rank).into_owned());
+        let null = orthogonal_complement(&right.columns(0, rank).into_owned());
         let Blind { gauge, visible } = Blind::of(&null, &scale);
         Self {
             singular_values,
@@ -205,7 +205,7 @@ fn certain_null(scaled: &DMatrix<f64>) -> Option<DMatrix<f64>> {
 
 /// Returns orthonormal rows that span the orthogonal complement of the columns of `basis`, which
 /// must be orthonormal.
-pub(super) fn complement(basis: &DMatrix<f64>) -> DMatrix<f64> {
+pub(super) fn orthogonal_complement(basis: &DMatrix<f64>) -> DMatrix<f64> {
     let (n, r) = basis.shape();
     // Squared length of each unit vector outside the span of `basis` and of earlier rows: its
     // projection, whose squared length is its own diagonal entry.
@@ -229,8 +229,8 @@ pub(super) fn complement(basis: &DMatrix<f64>) -> DMatrix<f64> {
 /// span the null space of `scaled`.
 ///
 /// This basis depends only on the space and has few unknowns in each combination. Pivots are the
-/// first unknowns with a relative coefficient of at least [`MIN_PIVOT_SHARE`], then those above
-/// [`MAX_ROUNDING_ENTRY`].
+/// first unknowns with a relative coefficient of at least [`MIN_PIVOT_COEFFICIENT`], then those above
+/// [`MAX_ROUNDING_COEFFICIENT`].
 fn echelon_combinations(
     mut null: DMatrix<f64>,
     scaled: &DMatrix<f64>,
@@ -238,7 +238,7 @@ fn echelon_combinations(
     let (rows, n) = null.shape();
     let mut row = 0;
     let mut pivots = Vec::new();
-    for (least, column) in [MIN_PIVOT_SHARE, MAX_ROUNDING_ENTRY]
+    for (least, column) in [MIN_PIVOT_COEFFICIENT, MAX_ROUNDING_COEFFICIENT]
         .into_iter()
         .flat_map(|least| (0..n).map(move |column| (least, column)))
     {
@@ -247,13 +247,13 @@ fn echelon_combinations(
         }
         let pivot = row + null.column(column).rows_range(row..).iamax();
         let entry = null[(pivot, column)].abs();
-        if entry < MAX_ROUNDING_ENTRY {
+        if entry < MAX_ROUNDING_COEFFICIENT {
             for i in row..rows {
                 null[(i, column)] = 0.0;
             }
         }
         if entry < least * null.row(pivot).norm()
-            || entry < MAX_ROUNDING_ENTRY
+            || entry < MAX_ROUNDING_COEFFICIENT
             || pivots.contains(&column)
         {
             continue;
@@ -280,7 +280,7 @@ fn echelon_combinations(
                 .iter()
                 .map(|weight| weight / norm)
                 .enumerate()
-                .filter(|(_, weight)| weight.abs() > MAX_ROUNDING_ENTRY)
+                .filter(|(_, weight)| weight.abs() > MAX_ROUNDING_COEFFICIENT)
                 .collect();
             let mut vector = DVector::zeros(n);
             for &(j, weight) in &weights {

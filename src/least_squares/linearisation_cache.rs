@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use nalgebra::DVector;
 
-use super::chord::Base;
+use super::chord::BasePoint;
 use super::{Loss, Triangle};
 
 /// Largest number of cached linearisations. They are at the last point, at the one before, and at
@@ -19,7 +19,7 @@ pub struct LinearisationCache {
     cached: Mutex<VecDeque<(Key, f64, Triangle)>>,
     /// Linearisation of all data whose derivatives are reused at later points; `None` unless the
     /// fit is provisional.
-    base: Option<Mutex<Option<Arc<Base>>>>,
+    base: Option<Mutex<Option<Arc<BasePoint>>>>,
 }
 
 /// Identifier of a linearisation: the data set and the point.
@@ -76,13 +76,13 @@ impl LinearisationCache {
 
     /// Returns the linearisation of data set `data` whose derivatives a provisional fit reuses;
     /// `None` if none is stored.
-    pub(super) fn base(&self, data: u64) -> Option<Arc<Base>> {
+    pub(super) fn base_point(&self, data: u64) -> Option<Arc<BasePoint>> {
         let base = self.base.as_ref()?;
         locked(base).as_ref().filter(|base| base.data == data).map(Arc::clone)
     }
 
     /// Stores a linearisation that later steps reuse; does nothing unless the fit is provisional.
-    pub(super) fn set_base(&self, new: Arc<Base>) {
+    pub(super) fn set_base_point(&self, new: Arc<BasePoint>) {
         if let Some(base) = &self.base {
             *locked(base) = Some(new);
         }

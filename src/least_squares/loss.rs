@@ -4,10 +4,10 @@ use super::Block;
 use crate::numeric::kernel::{norm, sum_of_squares};
 
 /// Number of steps of the quadrature over residual lengths that gives the moments of a loss.
-const MOMENT_STEPS: u32 = 2000;
+const MOMENT_QUADRATURE_STEPS: u32 = 2000;
 /// Upper limit of that quadrature \[σ\]: longer normal residuals of a few coordinates have a
 /// negligible probability.
-const MAX_LENGTH: f64 = 10.0;
+const MAX_QUADRATURE_LENGTH: f64 = 10.0;
 
 /// Loss function of an item (a pose). Its cost is ½ρ(s²), where s = ‖r‖ is the whitened residual
 /// length \[σ\].
@@ -87,7 +87,7 @@ impl Loss {
     }
 
     /// Returns Σ ρ over the items of `residuals`, which have `rows` values each.
-    pub(super) fn sum(self, residuals: &[f64], rows: usize) -> f64 {
+    pub(super) fn sum_of_losses(self, residuals: &[f64], rows: usize) -> f64 {
         if self == Self::Squares {
             return sum_of_squares(residuals);
         }
@@ -103,12 +103,12 @@ impl Loss {
 
     /// Scales the rows of each item in `block` by √ρ′ and returns Σ ρ over the items, which have
     /// `rows` rows each. For [`Loss::Squares`] does nothing and returns `None`.
-    pub(super) fn weigh(self, block: &mut Block, rows: usize) -> Option<f64> {
+    pub(super) fn apply_weights(self, block: &mut Block, rows: usize) -> Option<f64> {
         if self == Self::Squares {
             return None;
         }
         let residuals = block.column(block.parameters());
-        let sum = self.sum(residuals, rows);
+        let sum = self.sum_of_losses(residuals, rows);
         let roots: Vec<f64> = residuals
             .chunks_exact(rows.max(1))
             .map(|item| self.weight(norm(item)).sqrt())
@@ -132,8 +132,8 @@ impl Loss {
     pub fn normal_moments(self, coordinates: usize, scale: f64) -> (f64, f64) {
         let k = coordinates as f64;
         let (mut total, mut curvature, mut square) = (0.0, 0.0, 0.0);
-        for step in 0..MOMENT_STEPS {
-            let s = (f64::from(step) + 0.5) / f64::from(MOMENT_STEPS) * MAX_LENGTH;
+        for step in 0..MOMENT_QUADRATURE_STEPS {
+            let s = (f64::from(step) + 0.5) / f64::from(MOMENT_QUADRATURE_STEPS) * MAX_QUADRATURE_LENGTH;
             let density = s.powf(k - 1.0) * (-0.5 * s * s).exp();
             let (weight, length) = (self.weight(s * scale), s * scale);
             total += density;

@@ -24,7 +24,7 @@ mod whole;
 
 use std::ops::Range;
 
-use curvature::{Slopes, by_differences};
+use curvature::{QuadraticModel, curvature_by_differences};
 use nalgebra::{DMatrix, DVector};
 
 pub(crate) use identifiability::Blind;
@@ -144,7 +144,7 @@ pub trait Objective {
         x: &DVector<f64>,
         within: &dyn Fn(&DVector<f64>) -> bool,
     ) -> Option<DMatrix<f64>> {
-        by_differences(|x| slopes(self.linearise(x)), x, within)
+        curvature_by_differences(|x| slopes(self.linearise(x)), x, within)
     }
 
     /// Returns the plausible size (1 σ of its prior) of each unknown, in its unit; `None` if it has
@@ -206,6 +206,6 @@ pub struct Linearisation {
 }
 
 /// Returns the gradient Jᵀr and the Gauss–Newton matrix JᵀJ of a linearised problem.
-fn slopes(Linearisation { cost, triangle, projected }: Linearisation) -> Slopes {
-    Slopes { cost, gradient: triangle.tr_mul(&projected), normal: triangle.tr_mul(&triangle) }
+fn slopes(Linearisation { cost, triangle, projected }: Linearisation) -> QuadraticModel {
+    QuadraticModel { cost, gradient: triangle.tr_mul(&projected), normal: triangle.tr_mul(&triangle) }
 }

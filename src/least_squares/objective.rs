@@ -6,8 +6,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::chord::{Base, Chunk};
-use super::curvature::by_differences;
+use super::chord::{BasePoint, Chunk};
+use super::curvature::curvature_by_differences;
 use super::linearisation_cache::Key;
 use super::{
     Block, LeastSquares, LinearRows, Linearisation, LinearisationCache, Loss, MANY_UNKNOWNS,
@@ -27,7 +27,7 @@ const ACCELERATION_STEP: f64 = 0.1;
 const ROWS_PER_UNKNOWN: usize = 4;
 
 /// Maximum number of chunks whose results are in memory at a time.
-const GROUP_CHUNKS: usize = 64;
+const MAX_CHUNKS_IN_MEMORY: usize = 64;
 
 /// Maximum number of derivatives that a provisional fit stores for later points: 128 MB of 8-byte
 /// numbers.
@@ -86,11 +86,11 @@ impl<'a, P: LeastSquares> Fit<'a, P> {
         Ok(self)
     }
 
-    fn chunks(&self) -> usize {
+    fn chunk_count(&self) -> usize {
         self.problem.items().div_ceil(CHUNK_ITEMS)
     }
 
-    fn chunk(&self, index: usize) -> Range<usize> {
+    fn items_of_chunk(&self, index: usize) -> Range<usize> {
         let start = index * CHUNK_ITEMS;
         start..(start + CHUNK_ITEMS).min(self.problem.items())
     }
@@ -100,11 +100,11 @@ impl<'a, P: LeastSquares> Fit<'a, P> {
         Block::zeros(items * self.problem.rows_per_item(), self.problem.parameters())
     }
 
-    fn chunk_squares(&self, x: &DVector<f64>, index: usize, buffer: &mut [f64]) -> f64 {
-        let items = self.chunk(index);
+    fn chunk_loss(&self, x: &DVector<f64>, index: usize, buffer: &mut [f64]) -> f64 {
+        let items = self.items_of_chunk(index);
         let out = &mut buffer[..items.len() * self.problem.rows_per_item()];
         self.problem.residuals(x, items, out);
-        self.loss.sum(out, self.problem.rows_per_item())
+        self.loss.sum_of_losses(out, self.problem.rows_per_item())
     }
 
     /// Returns the number of chunks that one thread absorbs in sequence.
@@ -114,8 +114,8 @@ impl<'a, P: LeastSquares> Fit<'a, P> {
     }
 
     /// Fills a block with the residuals of chunk `index` and their derivatives at x.
-    fn fill(&self, x: &DVector<f64>, index: usize, block: &mut Block) {
-        let items = self.chunk(index);
+    fn linearise_chunk(&self, x: &DVector<f64>, index: usize, block: &mut Block) {
+        let items = self.items_of_chunk(index);
         block.reshape(items.len() * self.problem.rows_per_item());
         self.problem.linearise(x, items, block);
     }
@@ -131,7 +131,7 @@ impl<'a, P: LeastSquares> Fit<'a, P> {
         for index in run {
             fill(index, block);
             let before = triangle.sum_of_squares();
-            let robust = self.loss.weigh(block, self.problem.rows_per_item());
+            let robust = self.loss.apply_weights(block, self.problem.rows_per_item());
             triangle.absorb(block);
             if let Some(sum) = robust {
                 triangle = triangle.with_sum_of_squares(before + sum);
@@ -142,7 +142,7 @@ impl<'a, P: LeastSquares> Fit<'a, P> {
 
     /// Returns the triangular factor of all data at x.
     fn reduce(&self, x: &DVector<f64>) -> Triangle {
-        self.reduce_by(&|index, block: &mut Block| self.fill(x, index, block))
+        self.reduce_by(&|index, block: &mut Block| self.linearise_chunk(x, index, block))
     }
 
     /// Returns the triangular factor of all chunks, each written by `fill`.
@@ -151,7 +151,7 @@ impl<'a, P: LeastSquares> Fit<'a, P> {
     /// [`Fit::reduce_halves`] merges them pairwise.
     fn reduce_by(&self, fill: &(impl Fn(usize, &mut Block) + Sync)) -> Triangle {
         if self.chunks_per_thread() > 1 {
-            return self.reduce_halves(fill, 0..self.chunks(), &Mutex::default());
+            return self.reduce_halves(fill, 0..self.chunk_count(), &Mutex::default());
         }
         let mut total: Option<Triangle> = None;
         let map = |index, block: &mut Block| self.run_triangle(fill, index..index + 1, block);
@@ -159,7 +159,7 @@ impl<'a, P: LeastSquares> Fit<'a, P> {
             Some(total) => total.merge(&triangle),
             None => total = Some(triangle),
         };
-        in_order(self.chunks(), || self.empty_block(), map, take);
+        map_in_order(self.chunk_count(), || self.empty_block(), map, take);
         total.unwrap_or_else(|| Triangle::new(self.problem.parameters()))
     }
 
@@ -194,12 +194,12 @@ impl<'a, P: LeastSquares> Fit<'a, P> {
             if !(cache.is_provisional() && self.keeps_derivatives()) {
                 return self.reduce(x);
             }
-            let earlier = cache.base(data).and_then(|base| base.triangle_at(self.problem, x, unit));
+            let earlier = cache.base_point(data).and_then(|base| base.triangle_at(self.problem, x, unit));
             earlier.unwrap_or_else(|| {
-                let base = self.base(x, (data, unit));
+                let base = self.linearise_base_point(x, (data, unit));
                 let triangle = base.triangle();
                 if triangle.sum_of_squares().is_finite() {
-                    cache.set_base(Arc::new(base));
+                    cache.set_base_point(Arc::new(base));
                 }
                 triangle
             })
@@ -208,16 +208,16 @@ impl<'a, P: LeastSquares> Fit<'a, P> {
 
     /// Returns residuals and derivatives of all data at x with their triangular factor, to be
     /// reused as a base point; `key` is (data set, unit of residuals).
-    fn base(&self, x: &DVector<f64>, key: (u64, f64)) -> Base {
+    fn linearise_base_point(&self, x: &DVector<f64>, key: (u64, f64)) -> BasePoint {
         let chunk = |index| {
             let mut block = Block::zeros(0, self.problem.parameters());
-            self.fill(x, index, &mut block);
-            Chunk { items: self.chunk(index), block }
+            self.linearise_chunk(x, index, &mut block);
+            Chunk { items: self.items_of_chunk(index), block }
         };
-        let chunks: Vec<Chunk> = (0..self.chunks()).into_par_iter().map(chunk).collect();
+        let chunks: Vec<Chunk> = (0..self.chunk_count()).into_par_iter().map(chunk).collect();
         let triangle =
             self.reduce_by(&|index, block: &mut Block| block.clone_from(&chunks[index].block));
-        Base::new(x, key, chunks, triangle)
+        BasePoint::new(x, key, chunks, triangle)
     }
 
     /// Returns true if a provisional fit may keep the derivatives of all data: squared loss, many
@@ -235,10 +235,10 @@ impl<'a, P: LeastSquares> Fit<'a, P> {
         index: usize,
         block: &mut Block,
     ) -> DVector<f64> {
-        self.fill(x, index, block);
+        self.linearise_chunk(x, index, block);
         let n = block.parameters();
         let mut moved = vec![0.0; block.rows()];
-        self.problem.residuals(&(x + ACCELERATION_STEP * step), self.chunk(index), &mut moved);
+        self.problem.residuals(&(x + ACCELERATION_STEP * step), self.items_of_chunk(index), &mut moved);
         for (i, moved) in moved.iter_mut().enumerate() {
             let linear: f64 = (0..n).map(|j| block.column(j)[i] * step[j]).sum();
             *moved = 2.0 * ((*moved - block.column(n)[i]) / ACCELERATION_STEP - linear)
@@ -252,7 +252,7 @@ impl<'a, P: LeastSquares> Fit<'a, P> {
 
 /// Applies `map` to the index of each of `count` chunks and a `buffer`, in parallel if there are
 /// several chunks. Passes the results to `take` in the order of the chunks.
-fn in_order<B, T: Send>(
+fn map_in_order<B, T: Send>(
     count: usize,
     buffer: impl Fn() -> B + Sync + Send,
     map: impl Fn(usize, &mut B) -> T + Sync + Send,
@@ -262,8 +262,8 @@ fn in_order<B, T: Send>(
         (0..count).for_each(|index| take(map(index, &mut buffer())));
         return;
     }
-    for group in (0..count).step_by(GROUP_CHUNKS) {
-        let results: Vec<T> = (group..(group + GROUP_CHUNKS).min(count))
+    for group in (0..count).step_by(MAX_CHUNKS_IN_MEMORY) {
+        let results: Vec<T> = (group..(group + MAX_CHUNKS_IN_MEMORY).min(count))
             .into_par_iter()
             .map_init(&buffer, |buffer, index| map(index, buffer))
             .collect();
@@ -279,8 +279,8 @@ impl<P: LeastSquares> Objective for Fit<'_, P> {
     fn cost(&self, x: &DVector<f64>) -> f64 {
         let rows = self.problem.items().min(CHUNK_ITEMS) * self.problem.rows_per_item();
         let mut squares = 0.0;
-        let map = |index, buffer: &mut Vec<f64>| self.chunk_squares(x, index, buffer);
-        in_order(self.chunks(), || vec![0.0; rows], map, |s| squares += s);
+        let map = |index, buffer: &mut Vec<f64>| self.chunk_loss(x, index, buffer);
+        map_in_order(self.chunk_count(), || vec![0.0; rows], map, |s| squares += s);
         for rows in &self.rows {
             squares += sum_of_squares((&rows.matrix * x + &rows.constant).as_slice());
         }
@@ -306,7 +306,7 @@ impl<P: LeastSquares> Objective for Fit<'_, P> {
     ) -> Option<DMatrix<f64>> {
         let plain =
             Fit { problem: self.problem, rows: self.rows.clone(), loss: self.loss, cache: None };
-        by_differences(|x| slopes(plain.linearise(x)), x, within)
+        curvature_by_differences(|x| slopes(plain.linearise(x)), x, within)
     }
 
     /// Returns 1 σ of the prior of each unknown that has one: a row a x + b of this unknown alone
@@ -331,7 +331,7 @@ impl<P: LeastSquares> Objective for Fit<'_, P> {
         let mut total = DVector::zeros(x.len());
         let map =
             |index, block: &mut Block| self.chunk_acceleration_gradient((x, step), index, block);
-        in_order(self.chunks(), || self.empty_block(), map, |chunk| total += chunk);
+        map_in_order(self.chunk_count(), || self.empty_block(), map, |chunk| total += chunk);
         total.iter().all(|value| value.is_finite()).then_some(total)
     }
 }
@@ -463,7 +463,7 @@ mod tests {
     fn derivatives_serve_near_where_they_were_taken() {
         let (curve, start) = (Curve { unit: 0.1 }, DVector::from_vec(vec![0.3, -0.1, 0.2, 1.0]));
         let fit = Fit::new(&curve);
-        let base = fit.base(&start, (1, 0.1));
+        let base = fit.linearise_base_point(&start, (1, 0.1));
         let columns = jacobian(&curve, &start);
         for (unit, step) in [(0.1, 0.0), (0.1, 0.02), (0.5, 0.02)] {
             let curve = Curve { unit };

@@ -206,7 +206,7 @@ fn rotate((a, aa, ca): &mut Column, (b, bb, cb): &mut Column) -> bool {
     if product.abs() <= tolerance * aa.sqrt() * bb.sqrt() {
         return false;
     }
-    let (cosine, tangent) = rotation(**aa, **bb, product);
+    let (cosine, tangent) = jacobi_rotation(**aa, **bb, product);
     let sine = cosine * tangent;
     let rows = a.len().min(b.len());
     let (left, right) = (&mut a[..rows], &mut b[..rows]);
@@ -215,15 +215,15 @@ fn rotate((a, aa, ca): &mut Column, (b, bb, cb): &mut Column) -> bool {
         left[i] = cosine * x - sine * y;
         right[i] = sine * x + cosine * y;
     }
-    **aa = updated(**aa, -tangent * product, a);
-    **bb = updated(**bb, tangent * product, b);
+    **aa = updated_square(**aa, -tangent * product, a);
+    **bb = updated_square(**bb, tangent * product, b);
     (**ca, **cb) = (cosine * **ca - sine * **cb, sine * **ca + cosine * **cb);
     true
 }
 
 /// Returns cosine and tangent of the rotation that makes a and b orthogonal, from `aᵀa`, `bᵀb` and
 /// `aᵀb`.
-fn rotation(aa: f64, bb: f64, ab: f64) -> (f64, f64) {
+fn jacobi_rotation(aa: f64, bb: f64, ab: f64) -> (f64, f64) {
     let zeta = (bb - aa) / (2.0 * ab);
     let tangent = (zeta.abs() + (zeta * zeta + 1.0).sqrt()).recip().copysign(zeta);
     ((tangent * tangent + 1.0).sqrt().recip(), tangent)
@@ -232,7 +232,7 @@ fn rotation(aa: f64, bb: f64, ab: f64) -> (f64, f64) {
 /// Returns `square` + `change`, recomputed from the column if the sum cancels.
 #[inline(always)]
 #[expect(clippy::inline_always, reason = "for every kind of processor")]
-fn updated(square: f64, change: f64, column: &[f64]) -> f64 {
+fn updated_square(square: f64, change: f64, column: &[f64]) -> f64 {
     let sum = square + change;
     if sum > 0.25 * square { sum } else { dot(column, column) }
 }

@@ -191,9 +191,9 @@ impl Triangle {
                     |_| used,
                     part_factors,
                 );
-                self.apply(block, (first, end), used, part_factors);
+                self.apply_panel(block, (first, end), used, part_factors);
             }
-            self.apply(block, (first, n + 1), used, &factors[..wide]);
+            self.apply_panel(block, (first, n + 1), used, &factors[..wide]);
             first = end;
         }
         self.reduce_columns(block, first..n, n + 1, filled, &mut []);
@@ -222,7 +222,7 @@ impl Triangle {
                 .for_each(|(out, factor)| *out = *factor);
             let vectors: [&[f64]; PANEL] =
                 std::array::from_fn(|i| &panel[i.min(width - 1) * m..][..used]);
-            let coupling = coupling(&vectors, width);
+            let coupling = reflector_products(&vectors, width);
             for (j, column) in trailing.chunks_exact_mut(m).enumerate() {
                 let column = &mut column[..used];
                 let mut s = dots(&vectors, column);
@@ -243,7 +243,7 @@ impl Triangle {
     ///
     /// With the reflector vectors V below their leading ones, H₁ … H_k = 1 − U T Uᵀ: W = Tᵀ (R + Vᵀ
     /// C), R ← R − W, C ← C − V W [Schreiber & Van Loan 1989].
-    fn apply(
+    fn apply_panel(
         &mut self,
         block: &mut Block,
         (first, end): (usize, usize),
@@ -337,7 +337,7 @@ pub(super) fn reflector(alpha: f64, vector: &mut [f64]) -> (f64, f64) {
 }
 
 /// Returns the products `vᵢᵀvₗ` for l < i.
-fn coupling(vectors: &[&[f64]; PANEL], width: usize) -> [[f64; PANEL]; PANEL] {
+fn reflector_products(vectors: &[&[f64]; PANEL], width: usize) -> [[f64; PANEL]; PANEL] {
     let mut products = [[0.0; PANEL]; PANEL];
     for i in 1..width {
         for l in 0..i {

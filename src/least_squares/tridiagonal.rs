@@ -13,7 +13,7 @@ const MAX_QL_STEPS: usize = 60;
 /// Reflections make the matrix tridiagonal and implicit QL steps make it diagonal. Both are applied
 /// to the vector, so that no eigenvector is formed [Golub & Van Loan 2013, sec. 8.3]. Each
 /// eigenvalue is exact to rounding of the largest one.
-pub(super) fn eigenvalues_along(
+pub(super) fn eigenvalues_with_components(
     mut matrix: DMatrix<f64>,
     vector: &DVector<f64>,
 ) -> Option<Vec<(f64, f64)>> {
@@ -122,7 +122,7 @@ mod tests {
             let root = DMatrix::from_fn(n, n, |i, j| ((7 * i + 13 * j + i * j) as f64).sin());
             for matrix in [root.tr_mul(&root), DMatrix::identity(n, n), DMatrix::zeros(n, n)] {
                 let vector = DVector::from_fn(n, |i, _| (i as f64 + 0.5).cos());
-                let mut found = eigenvalues_along(matrix.clone(), &vector).unwrap();
+                let mut found = eigenvalues_with_components(matrix.clone(), &vector).unwrap();
                 found.sort_by(|a, b| a.0.total_cmp(&b.0));
                 let mut expected = matrix.symmetric_eigenvalues().as_slice().to_vec();
                 expected.sort_by(f64::total_cmp);
@@ -139,8 +139,8 @@ mod tests {
                 }
             }
         }
-        let empty = eigenvalues_along(DMatrix::zeros(0, 0), &DVector::zeros(0));
+        let empty = eigenvalues_with_components(DMatrix::zeros(0, 0), &DVector::zeros(0));
         assert_eq!(empty, Some(Vec::new()));
-        assert_eq!(eigenvalues_along(DMatrix::repeat(3, 3, f64::NAN), &DVector::zeros(3)), None);
+        assert_eq!(eigenvalues_with_components(DMatrix::repeat(3, 3, f64::NAN), &DVector::zeros(3)), None);
     }
 }

@@ -55,7 +55,7 @@ impl Uncertainty {
         for (i, &(j, sigma)) in priors.iter().enumerate() {
             stack[(n + i, j)] = sigma.recip();
         }
-        let free_covariance = inverse_normal(stack);
+        let free_covariance = inverse_of_normal_matrix(stack);
         let mut covariance = DMatrix::zeros(n, n);
         for (a, &j) in free.iter().enumerate() {
             for (b, &k) in free.iter().enumerate() {
@@ -77,7 +77,7 @@ impl Uncertainty {
 
 /// Returns (`AᵀA`)⁺ from the triangular factor of A with columns scaled to unit norm, or from the
 /// singular values if that factor is ill-conditioned.
-fn inverse_normal(mut a: DMatrix<f64>) -> DMatrix<f64> {
+fn inverse_of_normal_matrix(mut a: DMatrix<f64>) -> DMatrix<f64> {
     let n = a.ncols();
     if n == 0 {
         return DMatrix::zeros(0, 0);

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::inverse::sum_of_inverse_row_squares;
-use super::tridiagonal::eigenvalues_along;
+use super::tridiagonal::eigenvalues_with_components;
 use super::uncertainty::CONSTRAINT_WEIGHT;
 use super::{Linearisation, Triangle};
 use crate::numeric::{gram_of_lower, inverse_lower};
@@ -18,7 +18,7 @@ const MAX_PRIOR_RATIO: f64 = 0.1;
 /// Number of golden sections around the best point of the grid; they locate ln s² to 1e-8.
 const GOLDEN_SECTIONS: u32 = 40;
 /// Golden ratio less one, (√5 − 1)/2.
-const GOLDEN: f64 = 0.618_033_988_749_894_8;
+const GOLDEN_SECTION_RATIO: f64 = 0.618_033_988_749_894_8;
 
 /// Restricted likelihood of the data variance for given priors.
 ///
@@ -93,7 +93,7 @@ impl VarianceLikelihood {
             let free_rows = free_rows - k as f64;
             return Self { directions: Vec::new(), residual_squares, free_rows };
         }
-        let directions = spectrum(&prior_block, &y);
+        let directions = noise_directions(&prior_block, &y);
         let free_rows = free_rows - k as f64;
         Self { directions, residual_squares, free_rows }
     }
@@ -124,7 +124,7 @@ impl VarianceLikelihood {
             .unwrap_or(0.0);
         let (mut low, mut high) = (best - step, best + step);
         for _ in 0..GOLDEN_SECTIONS {
-            let (a, b) = (high - GOLDEN * (high - low), low + GOLDEN * (high - low));
+            let (a, b) = (high - GOLDEN_SECTION_RATIO * (high - low), low + GOLDEN_SECTION_RATIO * (high - low));
             if self.deviance(a) < self.deviance(b) { high = b } else { low = a }
         }
         let log = 0.5 * (low + high);
@@ -138,13 +138,13 @@ impl VarianceLikelihood {
 /// They follow from the eigenvalues 1/(1 + a²) of (1 + A Aᵀ)⁻¹, which are exact to rounding where
 /// a² is small. The triangular factor of Aᵀ stacked on the identity is that of 1 + A Aᵀ. Directions
 /// with a = 0 are included; they contain noise alone.
-fn spectrum(a: &DMatrix<f64>, y: &DVector<f64>) -> Vec<(f64, f64)> {
+fn noise_directions(a: &DMatrix<f64>, y: &DVector<f64>) -> Vec<(f64, f64)> {
     let k = a.ncols();
     let mut stack = DMatrix::zeros(2 * k, k);
     stack.rows_mut(0, k).tr_copy_from(a);
     stack.rows_mut(k, k).fill_with_identity();
     let inverse = inverse_lower(&Triangle::factor(&stack).transpose());
-    let Some(spectrum) = eigenvalues_along(gram_of_lower(&inverse), y) else {
+    let Some(spectrum) = eigenvalues_with_components(gram_of_lower(&inverse), y) else {
         return Vec::new();
     };
     // Rounding may make eigenvalues of the largest a² zero or negative.
@@ -204,7 +204,7 @@ mod tests {
         let a = turn * nalgebra::Matrix3::from_diagonal(&size) * turn.transpose();
         let y = a * nalgebra::Vector3::new(1.0, -1.0, 2.0);
         let a = DMatrix::from_column_slice(3, 3, a.as_slice());
-        let counted = spectrum(&a, &DVector::from_column_slice(y.as_slice()));
+        let counted = noise_directions(&a, &DVector::from_column_slice(y.as_slice()));
         assert!(matches!(counted[..], [(square, c)] if square < 1e-4 && c < 1.0), "{counted:?}");
     }
 

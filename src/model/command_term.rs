@@ -38,7 +38,7 @@ pub(super) struct CommandTerm {
 
 impl CommandTerm {
     /// Returns the terms of mimic joints, which follow the commands of other joints.
-    pub fn declared(problem: &Problem) -> Vec<Self> {
+    pub fn of_mimic_joints(problem: &Problem) -> Vec<Self> {
         let joints = problem.joints.iter().enumerate();
         let terms = joints.filter_map(|(joint, declared)| {
             let Mimic { joint: leader, ratio } = declared.mimic?;
@@ -53,7 +53,7 @@ impl CommandTerm {
 
     /// Returns the fixed terms and, after them, the terms of the free parameters at the full
     /// parameter vector `x`.
-    pub fn all(fixed: &[Self], parameters: &[Parameter], x: &[f64]) -> Vec<Self> {
+    pub fn fixed_and_free(fixed: &[Self], parameters: &[Parameter], x: &[f64]) -> Vec<Self> {
         let free = (0..parameters.len()).filter_map(|k| {
             let site = TermSite::of(parameters[k].site)?;
             let regressor = value_regressor(parameters, x, k)?;

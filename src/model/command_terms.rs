@@ -21,7 +21,7 @@ impl CommandTerms {
     /// Creates the sum of the fixed terms and of the free parameters at the full parameter vector
     /// `x`.
     pub fn new(fixed: &[CommandTerm], parameters: &[Parameter], x: &[f64]) -> Self {
-        let mut others = CommandTerm::all(fixed, parameters, x);
+        let mut others = CommandTerm::fixed_and_free(fixed, parameters, x);
         let series = HarmonicSum::take_from(&mut others);
         Self { series, others, ..Self::default() }
     }

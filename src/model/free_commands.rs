@@ -17,10 +17,10 @@ impl Model {
     #[must_use]
     pub(crate) fn with_free_commands(&self, problem: &Problem, x: &DVector<f64>) -> Self {
         let arm = self.arm(|k| x[k]);
-        let parameters = commands(problem, &arm, Joint::command_kind);
+        let parameters = coordinate_corrections(problem, &arm, Joint::command_kind);
         Self {
             nominal: arm,
-            fixed_terms: CommandTerm::all(
+            fixed_terms: CommandTerm::fixed_and_free(
                 &self.fixed_terms,
                 &self.parameters_at(x.as_slice()),
                 x.as_slice(),
@@ -51,7 +51,7 @@ impl Model {
     pub(crate) fn with_mimic_joints(mut self, problem: &Problem) -> Self {
         let kind =
             |joint: &Joint| if joint.mimic.is_some() { joint.kind } else { JointKind::Fixed };
-        self.parameters.extend(commands(problem, &self.nominal, kind));
+        self.parameters.extend(coordinate_corrections(problem, &self.nominal, kind));
         self
     }
 
@@ -94,7 +94,7 @@ impl Model {
 
 /// Creates a parameter q1, q2, … for each joint, without prior: the correction to its θ or d.
 /// Joints for which `kind` returns `Fixed` have none.
-fn commands(problem: &Problem, arm: &Arm<f64>, kind: fn(&Joint) -> JointKind) -> Vec<Parameter> {
+fn coordinate_corrections(problem: &Problem, arm: &Arm<f64>, kind: fn(&Joint) -> JointKind) -> Vec<Parameter> {
     let joints = problem.joints.iter().zip(&arm.joints).enumerate();
     let corrected = joints.filter_map(|(joint, (declared, nominal_joint))| {
         let (field, nominal) = match kind(declared) {

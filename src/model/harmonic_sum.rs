@@ -12,7 +12,7 @@ const LANES: usize = 4;
 const MIN_HARMONICS: usize = 8;
 /// Smallest average number of sines and cosines in a group of [`LANES`] orders at which a sum is
 /// used. With fewer, most lanes would multiply zeros.
-const MIN_DENSITY: usize = 2;
+const MIN_TERMS_PER_GROUP: usize = 2;
 /// Largest order k in a sum; it limits the memory of a sum with few high orders.
 const MAX_ORDER: u32 = 1024;
 
@@ -32,7 +32,7 @@ impl HarmonicSum {
         let mut found: Vec<(Self, usize)> = Vec::new();
         for CommandTerm { site, regressor, value } in &*terms {
             let (site, value) = (*site, *value);
-            let Some((joint, order, of)) = wave(regressor) else { continue };
+            let Some((joint, order, of)) = as_harmonic(regressor) else { continue };
             let is_it = |(sum, _): &(Self, usize)| (sum.site, sum.joint) == (site, joint);
             let number = found.iter().position(is_it).unwrap_or(found.len());
             if number == found.len() {
@@ -47,11 +47,11 @@ impl HarmonicSum {
             series.terms[group][of][lane] += value;
         }
         found.retain(|(series, waves)| {
-            *waves >= MIN_HARMONICS && *waves >= MIN_DENSITY * series.terms.len()
+            *waves >= MIN_HARMONICS && *waves >= MIN_TERMS_PER_GROUP * series.terms.len()
         });
         let series_found: Vec<Self> = found.into_iter().map(|(series, _)| series).collect();
         terms.retain(|term| {
-            wave(&term.regressor).is_none_or(|(joint, ..)| {
+            as_harmonic(&term.regressor).is_none_or(|(joint, ..)| {
                 !series_found.iter().any(|series| (series.site, series.joint) == (term.site, joint))
             })
         });
@@ -60,13 +60,13 @@ impl HarmonicSum {
 
     /// Returns the value of the sum at the commands `configuration` \[rad\] or \[m\].
     pub fn value(&self, configuration: &[f64]) -> f64 {
-        sum(&self.terms, configuration[self.joint].sin_cos())
+        evaluate(&self.terms, configuration[self.joint].sin_cos())
     }
 }
 
 /// Returns (joint, order − 1, 0 for a sine or 1 for a cosine); `None` if the regressor is no
 /// harmonic of integer order up to [`MAX_ORDER`].
-fn wave(regressor: &Regressor) -> Option<(usize, usize, usize)> {
+fn as_harmonic(regressor: &Regressor) -> Option<(usize, usize, usize)> {
     match *regressor {
         Regressor::Sine(joint, order) if (1..=MAX_ORDER).contains(&order) => {
             Some((joint, order as usize - 1, 0))
@@ -80,7 +80,7 @@ fn wave(regressor: &Regressor) -> Option<(usize, usize, usize)> {
 
 /// Returns the sum for `first` = (sin q, cos q). Angle-addition formulas give the higher orders.
 #[multiversion(targets("x86_64+avx2"))]
-fn sum(terms: &[[[f64; LANES]; 2]], first: (f64, f64)) -> f64 {
+fn evaluate(terms: &[[[f64; LANES]; 2]], first: (f64, f64)) -> f64 {
     let rotated = |(sin, cos): (f64, f64), (by_sin, by_cos): (f64, f64)| {
         (sin * by_cos + cos * by_sin, cos * by_cos - sin * by_sin)
     };

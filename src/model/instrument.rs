@@ -27,7 +27,7 @@ pub(super) struct Instrument {
 impl Instrument {
     /// Returns the instrument with the errors that the free parameters add at the full parameter
     /// vector `x`.
-    pub fn with(&self, parameters: &[Parameter], x: &[f64]) -> Self {
+    pub fn with_parameters(&self, parameters: &[Parameter], x: &[f64]) -> Self {
         let mut instrument = self.clone();
         for (k, (parameter, &value)) in parameters.iter().zip(x).enumerate() {
             let regressor = || value_regressor(parameters, x, k);
@@ -59,7 +59,7 @@ impl Instrument {
     /// Returns the six entries of the instrument's strain, in the order of
     /// [`ParameterSite::Strain`]; zeros without a strain.
     pub fn strain_entries(&self) -> [f64; 6] {
-        self.strain.map_or([0.0; 6], |strain| STRAIN_PLACES.map(|place| strain[place]))
+        self.strain.map_or([0.0; 6], |strain| STRAIN_ENTRIES.map(|place| strain[place]))
     }
 
     /// Returns the part of the instrument that displaces the arm itself, the motions of the bases,
@@ -108,7 +108,7 @@ impl Instrument {
     /// Returns the factor I + (E + ∂d/∂p) / (1 + s) that turns derivatives of (1 + s) times a
     /// position into those of its reading. Returns `None` if the factor is 1: without a strain and
     /// without a displacement d along the line of sight.
-    pub fn relative_strain(
+    pub fn reading_factor(
         &self,
         position: &Vector3<f64>,
         setup: &PoseView,
@@ -131,7 +131,7 @@ impl Instrument {
 
     /// Returns the rotation vector of all bases in a pose, measuring frame \[rad\].
     pub fn base_rotation(&self, setup: &PoseView) -> Vector3<f64> {
-        sum(&self.rotations, |regressor| regressor.value(setup))
+        sum_by_axis(&self.rotations, |regressor| regressor.value(setup))
     }
 
     /// Returns the frame of a base in a pose, measuring frame.
@@ -157,7 +157,7 @@ fn direction(axis: usize, position: &Vector3<f64>) -> Vector3<f64> {
 
 /// Returns the vector whose entry for each axis is Σ size × value(regressor) over the terms of this
 /// axis.
-fn sum(terms: &[(usize, Regressor, f64)], value: impl Fn(&Regressor) -> f64) -> Vector3<f64> {
+fn sum_by_axis(terms: &[(usize, Regressor, f64)], value: impl Fn(&Regressor) -> f64) -> Vector3<f64> {
     let mut sum = Vector3::zeros();
     for (axis, regressor, size) in terms {
         if let Some(entry) = sum.get_mut(*axis) {
@@ -168,13 +168,13 @@ fn sum(terms: &[(usize, Regressor, f64)], value: impl Fn(&Regressor) -> f64) -> 
 }
 
 /// Row and column of each entry of a strain, in the order of [`ParameterSite::Strain`].
-const STRAIN_PLACES: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)];
+const STRAIN_ENTRIES: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)];
 
 /// Returns the derivative of E with respect to one of its entries, in the order of
 /// [`ParameterSite::Strain`].
 fn unit_strain(entry: usize) -> Matrix3<f64> {
     let mut matrix = Matrix3::zeros();
-    if let Some(place) = STRAIN_PLACES.get(entry) {
+    if let Some(place) = STRAIN_ENTRIES.get(entry) {
         matrix[*place] = 1.0;
     }
     matrix

@@ -16,7 +16,7 @@ use super::orientation;
 use super::pose::Pose;
 use super::predictor::fixtures_of;
 use super::rigid::Rigid;
-use super::rows::{Rows, clear};
+use super::rows::{Rows, clear_block};
 use super::tilt::TiltDerivatives;
 use crate::least_squares::Block;
 use crate::model::parameter::{ParameterSite, Regressor};
@@ -151,7 +151,7 @@ impl<'m> JacobianWriter<'m> {
                 let base = rotated.as_ref().unwrap_or(base);
                 let setup = self.commands.apply(&pose.setup);
                 let points = &mut self.points;
-                clear(points);
+                clear_block(points);
                 let mut moves = Rows { block: points, row: 0, scale: 1.0 };
                 let point = (target.joint, &target.position);
                 let Some(frame) = self.arm.write((&pose.setup, &setup), base, point, &mut moves)
@@ -204,7 +204,7 @@ impl<'m> JacobianWriter<'m> {
         scene.point = self.model.fixture_point(pose.observation);
         let points = &mut self.points;
         let mut write = |joint: Option<usize>, point: &Vector3<f64>, points: &mut Block| {
-            clear(points);
+            clear_block(points);
             let mut moves = Rows { block: points, row: 0, scale: 1.0 };
             let Some(joint) = joint else { return Some(base.frame) };
             self.arm.write((&pose.setup, &setup), base, (joint, point), &mut moves)
@@ -262,7 +262,7 @@ impl<'m> JacobianWriter<'m> {
             return;
         };
         let predicted = write_placement(&frame, base, target, &mut rows);
-        if let Some(strain) = self.instrument.relative_strain(&predicted, &pose.setup) {
+        if let Some(strain) = self.instrument.reading_factor(&predicted, &pose.setup) {
             rows.multiply(&strain);
         }
         rows.scale = per_sigma;
@@ -273,7 +273,7 @@ impl<'m> JacobianWriter<'m> {
         let reading = self.instrument.reading(&predicted, &pose.setup);
         rows.put(last_column, &(reading - pose.measured));
         if let Some(measured) = &pose.orientation {
-            let place = orientation::Place { setups, base, target, frame: &frame };
+            let place = orientation::OrientedPose { setups, base, target, frame: &frame };
             orientation::write(&mut self.arm, &mut self.points, &place, measured, (block, row + 3));
         }
     }

@@ -41,7 +41,7 @@ use nalgebra::Vector3;
 use crate::error::InputError;
 use crate::mechanics::{Arm, Joint};
 use crate::model::parameter::{
-    LinearConstraint, Parameter, ParameterSite, Regressor, constrain, resolve,
+    LinearConstraint, Parameter, ParameterSite, Regressor, resolve_constraints, resolve,
 };
 use crate::observation::{FixtureValues, Observation};
 use crate::problem::{BasePose, Effect, Fixture, Problem};
@@ -106,9 +106,9 @@ impl Model {
             sites::add_spring(&mut nominal, &effect.effect);
         }
         Ok(Self {
-            constraints: constrain(problem, bases, targets, effects, &parameters)?,
+            constraints: resolve_constraints(problem, bases, targets, effects, &parameters)?,
             nominal,
-            fixed_terms: CommandTerm::declared(problem),
+            fixed_terms: CommandTerm::of_mimic_joints(problem),
             instrument: Instrument::default(),
             bases: vec![problem.base.clone(); bases.len()],
             payload_follows: problem.tool.payload_follows
@@ -254,7 +254,7 @@ impl Model {
     /// Returns the errors of the instrument and the rotations of the bases at the full parameter
     /// vector `x`.
     fn instrument_at(&self, x: &[f64]) -> Instrument {
-        self.instrument.with(&self.parameters_at(x), x)
+        self.instrument.with_parameters(&self.parameters_at(x), x)
     }
 
     /// Returns the base poses at `x`, measuring frame: translation \[m\] and rotation vector

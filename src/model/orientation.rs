@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 
 use super::derivatives::{ArmDerivatives, Base, Target, angular_velocity};
 use super::pose::MeasuredOrientation;
-use super::rows::{Rows, clear};
+use super::rows::{Rows, clear_block};
 use crate::least_squares::Block;
 use crate::problem::PoseView;
 use crate::spatial::{Frame, inverse_right_jacobian, rotation_between};
@@ -15,7 +15,7 @@ use crate::spatial::{Frame, inverse_right_jacobian, rotation_between};
 pub(super) const POINT_ROWS: usize = 12;
 
 /// Pose, base and target at which an orientation is differentiated.
-pub(super) struct Place<'a> {
+pub(super) struct OrientedPose<'a> {
     /// Pose as commanded, and pose with the terms that add to its commands.
     pub setups: (&'a PoseView<'a>, &'a PoseView<'a>),
     /// Base of the arm.
@@ -34,12 +34,12 @@ pub(super) struct Place<'a> {
 pub(super) fn write(
     arm: &mut ArmDerivatives,
     points: &mut Block,
-    place: &Place,
+    place: &OrientedPose,
     orientation: &MeasuredOrientation,
     (block, row): (&mut Block, usize),
 ) {
-    let Place { setups, base, target, frame } = *place;
-    clear(points);
+    let OrientedPose { setups, base, target, frame } = *place;
+    clear_block(points);
     let ends = target.axes.map(|axis| target.position + axis);
     for (k, point) in std::iter::once(&target.position).chain(&ends).enumerate() {
         let mut rows = Rows { block: points, row: 3 * k, scale: 1.0 };

@@ -81,7 +81,7 @@ impl Model {
             PartTerm { site, regressor, value }
         };
         let mut terms: Vec<PartTerm> =
-            CommandTerm::all(&self.fixed_terms, &self.parameters_at(x), x)
+            CommandTerm::fixed_and_free(&self.fixed_terms, &self.parameters_at(x), x)
                 .into_iter()
                 .map(of_joint)
                 .collect();

@@ -16,8 +16,8 @@ use crate::least_squares::{Block, CHUNK_ITEMS, LeastSquares};
 use crate::observation::Needs;
 
 /// Number of residuals of a row if no row has an orientation.
-const POSITION_RESIDUALS: usize = 3;
-const POSE_RESIDUALS: usize = 6;
+const RESIDUALS_PER_POSITION: usize = 3;
+const RESIDUALS_PER_POSE: usize = 6;
 
 /// Whitened residuals (measured − predicted) / σ of some rows as a function of some of the
 /// parameters.
@@ -49,7 +49,7 @@ impl<'a> PoseResiduals<'a> {
     ) -> Self {
         let poses = poses.into();
         let oriented = poses.iter().any(|pose| pose.orientation.is_some());
-        let residuals_per_row = if oriented { POSE_RESIDUALS } else { POSITION_RESIDUALS };
+        let residuals_per_row = if oriented { RESIDUALS_PER_POSE } else { RESIDUALS_PER_POSITION };
         let measures_tilts =
             poses.iter().any(|pose| pose.observation.description().needs == Needs::Frame);
         Self {
@@ -101,7 +101,7 @@ impl<'a> PoseResiduals<'a> {
     /// Returns the rotation vectors from the predicted to the measured orientations, measuring
     /// frame \[rad\]; 0 for rows without one, NaN without equilibrium.
     pub fn orientation_errors(&self, x: &DVector<f64>) -> Vec<Vector3<f64>> {
-        self.errors(x, |_, predicted| predicted.turn.unwrap_or_default())
+        self.errors(x, |_, predicted| predicted.orientation_error.unwrap_or_default())
     }
 
     fn errors(
@@ -140,10 +140,10 @@ impl LeastSquares for PoseResiduals<'_> {
             self.poses[items].iter().zip(out.chunks_exact_mut(self.residuals_per_row))
         {
             let predicted = predictor.predict(pose);
-            let (position, turn) = out.split_at_mut(POSITION_RESIDUALS);
+            let (position, turn) = out.split_at_mut(RESIDUALS_PER_POSITION);
             position.copy_from_slice(((pose.measured - predicted.numbers) / pose.sigma).as_slice());
             let sigma = pose.orientation.map_or(1.0, |orientation| orientation.sigma);
-            let error = predicted.turn.unwrap_or_default() / sigma;
+            let error = predicted.orientation_error.unwrap_or_default() / sigma;
             turn.iter_mut().zip(&error).for_each(|(out, error)| *out = *error);
         }
     }
@@ -151,7 +151,7 @@ impl LeastSquares for PoseResiduals<'_> {
     fn linearise(&self, x: &DVector<f64>, items: Range<usize>, block: &mut Block) {
         let full = self.full(x);
         let write = |unknowns: &[usize], block: &mut Block| {
-            let kinds = (self.residuals_per_row == POSE_RESIDUALS, self.measures_tilts);
+            let kinds = (self.residuals_per_row == RESIDUALS_PER_POSE, self.measures_tilts);
             let columns = Columns::new(self.model, full.as_slice(), unknowns);
             let mut writer = JacobianWriter::new(self.model, full.as_slice(), columns.all(), kinds);
             columns.write(block, |block| {
@@ -160,7 +160,7 @@ impl LeastSquares for PoseResiduals<'_> {
                 }
             });
         };
-        let usable = self.linear_model.filter(|_| self.residuals_per_row == POSITION_RESIDUALS);
+        let usable = self.linear_model.filter(|_| self.residuals_per_row == RESIDUALS_PER_POSITION);
         let is_reused = usable.is_some_and(|linear_model| {
             let parameters = &self.model.parameters;
             linear_model.fill(

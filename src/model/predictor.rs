@@ -40,7 +40,7 @@ pub(super) struct Prediction {
     /// Rotation vector from the predicted to the measured orientation, measuring frame \[rad\]. It
     /// is 0 for a planned orientation without a measured value; `None` if the row has no
     /// orientation.
-    pub turn: Option<Vector3<f64>>,
+    pub orientation_error: Option<Vector3<f64>>,
 }
 
 impl<'m> Predictor<'m> {
@@ -116,7 +116,7 @@ impl<'m> Predictor<'m> {
     pub fn predict(&mut self, pose: &Pose) -> Prediction {
         let undefined = Vector3::from_element(f64::NAN);
         self.try_predict(pose)
-            .unwrap_or(Prediction { numbers: undefined, turn: pose.orientation.map(|_| undefined) })
+            .unwrap_or(Prediction { numbers: undefined, orientation_error: pose.orientation.map(|_| undefined) })
     }
 
     fn try_predict(&mut self, pose: &Pose) -> Option<Prediction> {
@@ -149,7 +149,7 @@ impl<'m> Predictor<'m> {
             }
         };
         let fixtures = fixtures_of(observation, |fixture| self.fixtures[fixture]);
-        Some(Prediction { numbers: observation.predict(&Scene { fixtures, ..scene }), turn })
+        Some(Prediction { numbers: observation.predict(&Scene { fixtures, ..scene }), orientation_error: turn })
     }
 
     /// Returns the frames that carry the two fixtures of a row, measuring frame; `None` without

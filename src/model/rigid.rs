@@ -24,7 +24,7 @@ pub(super) struct Rigid {
     tree: Tree,
     inputs: Vec<Input>,
     /// Derivatives of the target in the current pose, link by link, from the last to the first.
-    carried: Vec<Carried>,
+    carried: Vec<LinkDerivatives>,
     /// Derivatives with respect to the six placement numbers, for those links that have a
     /// placement.
     placed: Vec<[Vector3<f64>; 6]>,
@@ -44,7 +44,7 @@ struct Link {
 
 /// Derivatives of the target with respect to α, a, θ, d, β of a link, each in the frame before its
 /// motion, and the joint's coordinates.
-struct Carried {
+struct LinkDerivatives {
     derivatives: [Vector3<f64>; 5],
     coordinates: Coordinates<Dual64>,
     /// Derivatives with respect to the small motions; `None` if the link has none.
@@ -96,8 +96,8 @@ impl Rigid {
             let coordinates = link.joint.coordinates(q);
             let motion = link.motion(setup.motion(joint));
             let (derivatives, motions);
-            (derivatives, motions, point) = link.carry(&coordinates, &point, motion.as_ref());
-            carried.push(Carried { derivatives, coordinates, motions });
+            (derivatives, motions, point) = link.carry_inward(&coordinates, &point, motion.as_ref());
+            carried.push(LinkDerivatives { derivatives, coordinates, motions });
             if let Some(placement) = &link.joint.placement {
                 let derivatives;
                 (derivatives, point) = carry_through(placement, &point);
@@ -105,7 +105,7 @@ impl Rigid {
             }
         }
         let mut frame = *base;
-        for ((joint, (link, _)), Carried { derivatives, coordinates, motions }) in
+        for ((joint, (link, _)), LinkDerivatives { derivatives, coordinates, motions }) in
             links_on_path().zip(carried.iter().rev())
         {
             if let Some((placement, derivatives)) =
@@ -173,7 +173,7 @@ impl Link {
     /// derivatives with respect to α, a, θ, d, β, those with respect to small motions, if any, and
     /// the point.
     #[inline]
-    fn carry(
+    fn carry_inward(
         &self,
         at: &Coordinates<Dual64>,
         point: &Vector3<f64>,
@@ -186,13 +186,13 @@ impl Link {
             _ => point,
         };
         let point = displaced(1, *point);
-        let (by_beta, point) = derivative(&rotated_about_y(beta.sin_cos, &point));
+        let (by_beta, point) = split_derivative(&rotated_about_y(beta.sin_cos, &point));
         let (by_d, point) =
-            derivative(&Vector3::new(point.x.into(), point.y.into(), at.offset + point.z));
-        let (by_theta, point) = derivative(&rotated_about_z(at.angle, &point));
+            split_derivative(&Vector3::new(point.x.into(), point.y.into(), at.offset + point.z));
+        let (by_theta, point) = split_derivative(&rotated_about_z(at.angle, &point));
         let point = displaced(0, point);
-        let (by_a, point) = derivative(&Vector3::new(*a + point.x, point.y.into(), point.z.into()));
-        let (by_alpha, point) = derivative(&rotated_about_x(alpha.sin_cos, &point));
+        let (by_a, point) = split_derivative(&Vector3::new(*a + point.x, point.y.into(), point.z.into()));
+        let (by_alpha, point) = split_derivative(&rotated_about_x(alpha.sin_cos, &point));
         ([by_alpha, by_a, by_theta, by_d, by_beta], motions, point)
     }
 
@@ -212,22 +212,22 @@ impl Link {
                          before: &mut dyn FnMut(LinkMotion, &Frame<f64>)| {
             if let Some(motion) = motion {
                 before(LinkMotion::Motion(side), frame);
-                let [translation, rotation] = vectors(motion, SIDES[side]);
+                let [translation, rotation] = translation_and_rotation(motion, SIDES[side]);
                 frame.translate(&translation);
                 frame.rotate(&rotation);
             }
         };
         before(LinkMotion::Geometry(0), frame);
-        frame.rotate_x(real(alpha.sin_cos));
+        frame.rotate_x(real_parts(alpha.sin_cos));
         before(LinkMotion::Geometry(1), frame);
         frame.translate_x(a.re);
         displaced(0, frame, &mut before);
         before(LinkMotion::Geometry(2), frame);
-        frame.rotate_z(real(at.angle));
+        frame.rotate_z(real_parts(at.angle));
         before(LinkMotion::Geometry(3), frame);
         frame.translate_z(at.offset.re);
         before(LinkMotion::Geometry(4), frame);
-        frame.rotate_y(real(beta.sin_cos));
+        frame.rotate_y(real_parts(beta.sin_cos));
         displaced(1, frame, &mut before);
     }
 }
@@ -241,7 +241,7 @@ enum LinkMotion {
 
 /// Returns the translation \[m\] and the rotation vector \[rad\] of the small motion whose six
 /// numbers start at `first`.
-fn vectors(motion: &[f64; 2 * MOTION], first: usize) -> [Vector3<f64>; 2] {
+fn translation_and_rotation(motion: &[f64; 2 * MOTION], first: usize) -> [Vector3<f64>; 2] {
     [first, first + 3].map(|first| Vector3::from_column_slice(&motion[first..first + 3]))
 }
 
@@ -253,13 +253,13 @@ fn displace(
     first: usize,
     point: &Vector3<f64>,
 ) -> Vector3<f64> {
-    let [translation, rotation] = vectors(motion, first);
+    let [translation, rotation] = translation_and_rotation(motion, first);
     let dual = point.map(Dual64::from);
     for axis in 0..3 {
         motions[first + axis] = Vector3::ith(axis, 1.0);
         let mut seeded = rotation.map(Dual64::from);
         seeded[axis] = seeded[axis].derivative();
-        motions[first + 3 + axis] = derivative(&rotate(&seeded, &dual)).0;
+        motions[first + 3 + axis] = split_derivative(&rotate(&seeded, &dual)).0;
     }
     translation + rotate(&rotation, point)
 }
@@ -272,9 +272,9 @@ fn carry_through(
     point: &Vector3<f64>,
 ) -> ([Vector3<f64>; 6], Vector3<f64>) {
     let [roll, pitch, yaw] = &placement.rpy;
-    let (by_roll, point) = derivative(&rotated_about_x(roll.sin_cos, point));
-    let (by_pitch, point) = derivative(&rotated_about_y(pitch.sin_cos, &point));
-    let (by_yaw, point) = derivative(&rotated_about_z(yaw.sin_cos, &point));
+    let (by_roll, point) = split_derivative(&rotated_about_x(roll.sin_cos, point));
+    let (by_pitch, point) = split_derivative(&rotated_about_y(pitch.sin_cos, &point));
+    let (by_yaw, point) = split_derivative(&rotated_about_z(yaw.sin_cos, &point));
     let [x, y, z] = [Vector3::x(), Vector3::y(), Vector3::z()];
     ([x, y, z, by_roll, by_pitch, by_yaw], point + placement.xyz.map(|coordinate| coordinate.re))
 }
@@ -290,20 +290,20 @@ fn advance_through(
     (0..3).for_each(|axis| before(axis, frame));
     frame.translate(&placement.xyz.map(|coordinate| coordinate.re));
     before(5, frame);
-    frame.rotate_z(real(yaw.sin_cos));
+    frame.rotate_z(real_parts(yaw.sin_cos));
     before(4, frame);
-    frame.rotate_y(real(pitch.sin_cos));
+    frame.rotate_y(real_parts(pitch.sin_cos));
     before(3, frame);
-    frame.rotate_x(real(roll.sin_cos));
+    frame.rotate_x(real_parts(roll.sin_cos));
 }
 
 /// Returns the real parts of (sin, cos).
-fn real((sin, cos): (Dual64, Dual64)) -> (f64, f64) {
+fn real_parts((sin, cos): (Dual64, Dual64)) -> (f64, f64) {
     (sin.re, cos.re)
 }
 
 /// Splits a dual vector into its derivative and its real part.
 #[inline]
-fn derivative(vector: &Vector3<Dual64>) -> (Vector3<f64>, Vector3<f64>) {
+fn split_derivative(vector: &Vector3<Dual64>) -> (Vector3<f64>, Vector3<f64>) {
     (vector.map(|coordinate| coordinate.eps), vector.map(|coordinate| coordinate.re))
 }

@@ -64,7 +64,7 @@ impl Rows<'_> {
 
 /// Sets all entries of the reused block `points` to zero, because the previous pose may have
 /// written columns that this one does not.
-pub(super) fn clear(points: &mut Block) {
+pub(super) fn clear_block(points: &mut Block) {
     for column in 0..points.parameters() {
         points.column_mut(column).fill(0.0);
     }

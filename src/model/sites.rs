@@ -31,7 +31,7 @@ pub(super) fn prepare_site(arm: &mut Arm<f64>, site: ParameterSite, nominal: f64
             }
         }
         ParameterSite::Beam { joint, field } => {
-            let beam = arm.joints[joint].beam.get_or_insert_with(weightless);
+            let beam = arm.joints[joint].beam.get_or_insert_with(weightless_beam);
             match field {
                 BeamField::BowY | BeamField::BowZ | BeamField::Stretch => {
                     beam.strain.get_or_insert(Strain { curvature: [0.0; 2], axial: 0.0 });
@@ -85,7 +85,7 @@ pub(super) fn add_spring(arm: &mut Arm<f64>, effect: &Effect) {
 }
 
 /// Creates a weightless rigid beam, to which flexibility can be added.
-fn weightless() -> Beam<f64> {
+fn weightless_beam() -> Beam<f64> {
     Beam {
         mass: 0.0,
         flexibility: Flexibility::RIGID,
@@ -152,10 +152,10 @@ pub(super) fn set_site<S: Scalar>(
         }
         ParameterSite::Beam { joint, field } => {
             if let Some(beam) = &mut arm.joints[joint].beam {
-                set_beam(beam, field, nominal, x);
+                set_beam_field(beam, field, nominal, x);
             }
         }
-        ParameterSite::Arm(field) => set_arm(arm, field, x, tilt),
+        ParameterSite::Arm(field) => set_arm_field(arm, field, x, tilt),
         ParameterSite::Base { .. }
         | ParameterSite::Target { .. }
         | ParameterSite::Fixture { .. }
@@ -166,7 +166,7 @@ pub(super) fn set_site<S: Scalar>(
     }
 }
 
-fn set_beam<S: Scalar>(beam: &mut Beam<S>, field: BeamField, nominal: f64, x: S) {
+fn set_beam_field<S: Scalar>(beam: &mut Beam<S>, field: BeamField, nominal: f64, x: S) {
     let flexibilities = &mut beam.flexibility;
     let flexibility = (-x).exp() / nominal;
     match (field, &mut beam.strain, &mut beam.added) {
@@ -198,7 +198,7 @@ fn set_beam<S: Scalar>(beam: &mut Beam<S>, field: BeamField, nominal: f64, x: S)
     }
 }
 
-fn set_arm<S: Scalar>(arm: &mut Arm<S>, field: ArmField, x: S, tilt: &mut [S; 2]) {
+fn set_arm_field<S: Scalar>(arm: &mut Arm<S>, field: ArmField, x: S, tilt: &mut [S; 2]) {
     match (field, &mut arm.rope, &mut arm.mounting) {
         (ArmField::Payload, ..) => arm.payload_error += x,
         (ArmField::GravityX, ..) => tilt[0] += x,

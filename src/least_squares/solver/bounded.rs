@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::interior::interior_point;
+use super::interior::solve_by_interior_point;
 use super::levenberg_marquardt::Model;
 use super::polyhedron::{Faces, Polyhedron};
 use super::polyhedron_step::{FACE_DISTANCE, PolyhedronProblem, PolyhedronSolution};
@@ -52,9 +52,9 @@ pub fn nearest(x: &DVector<f64>, bounds: &Bounds, rows: &Inequalities) -> Option
     let factor = Factor::new(DMatrix::identity(n, n), DVector::zeros(n), f64::EPSILON);
     let polyhedron = Polyhedron::around(x, bounds, rows, &DVector::from_element(n, 1.0));
     let solution =
-        PolyhedronProblem::new(&factor, &polyhedron, polyhedron.touched.clone()).solve(0.0);
+        PolyhedronProblem::new(&factor, &polyhedron, polyhedron.faces_at_origin.clone()).solve(0.0);
     let mut point = x + &solution.q;
-    bounds.hold(&mut point, &solution.faces.bounds);
+    bounds.place_on_bounds(&mut point, &solution.faces.bounds);
     let is_satisfied = |i| rows.at(&point, i).is_some() || rows.holds(&point, i);
     (0..rows.len()).all(is_satisfied).then_some(point)
 }
@@ -81,7 +81,7 @@ impl Constrained {
         let model = self.model.as_ref()?;
         let undamped = self.undamped.get_or_insert_with(|| {
             let polyhedron = Polyhedron::around(x, &self.bounds, &self.rows, &model.scale);
-            PolyhedronProblem::new(&model.factor, &polyhedron, polyhedron.touched.clone())
+            PolyhedronProblem::new(&model.factor, &polyhedron, polyhedron.faces_at_origin.clone())
                 .solve(0.0)
         });
         let is_within_radius =
@@ -100,7 +100,7 @@ impl Constrained {
     ) -> Step {
         let Some(model) = &self.model else { return Step::none(x) };
         let mut point = x + q.component_div(&model.scale);
-        self.bounds.hold(&mut point, &faces.bounds);
+        self.bounds.place_on_bounds(&mut point, &faces.bounds);
         self.guess = Some(faces);
         let slope = -model.factor.gradient().dot(&q);
         let predicted = slope - 0.5 * model.factor.image(&q).norm_squared();
@@ -188,17 +188,17 @@ impl Subproblem for Constrained {
         let polyhedron = Polyhedron::around(x, &self.bounds, &self.rows, &model.scale);
         let PolyhedronSolution { q, faces } = match self.method {
             StepMethod::ActiveSet => {
-                let guess = self.guess.clone().unwrap_or_else(|| polyhedron.touched.clone());
+                let guess = self.guess.clone().unwrap_or_else(|| polyhedron.faces_at_origin.clone());
                 PolyhedronProblem::new(&factor, &polyhedron, guess).solve(damping)
             }
             StepMethod::InteriorPoint => {
-                let (q, _) = interior_point(&factor, damping, &polyhedron.half_spaces(), None)?;
+                let (q, _) = solve_by_interior_point(&factor, damping, &polyhedron.half_spaces(), None)?;
                 polyhedron.pulled_inside(q, FACE_DISTANCE)
             }
             StepMethod::Clamped => return None,
         };
         let mut point = x + q.component_div(&model.scale);
-        self.bounds.hold(&mut point, &faces.bounds);
+        self.bounds.place_on_bounds(&mut point, &faces.bounds);
         Some(point)
     }
 
@@ -220,7 +220,7 @@ impl Subproblem for Constrained {
         let (solution, damping) = match self.method {
             StepMethod::ActiveSet => {
                 let faces =
-                    self.undamped.as_ref().map_or(&polyhedron.touched, |undamped| &undamped.faces);
+                    self.undamped.as_ref().map_or(&polyhedron.faces_at_origin, |undamped| &undamped.faces);
                 let mut problem = PolyhedronProblem::new(&model.factor, &polyhedron, faces.clone());
                 problem.guess_faces(&(&step.point - x).component_mul(&model.scale));
                 let (gradient_norm, undamped) = (problem.gradient_norm(), &mut self.undamped);
@@ -232,7 +232,7 @@ impl Subproblem for Constrained {
             }
             StepMethod::InteriorPoint => {
                 let solution =
-                    interior_point(&model.factor, 0.0, &polyhedron.half_spaces(), Some(radius));
+                    solve_by_interior_point(&model.factor, 0.0, &polyhedron.half_spaces(), Some(radius));
                 let (q, damping) = solution.unwrap_or_else(|| (DVector::zeros(x.len()), 0.0));
                 (polyhedron.pulled_inside(q, FACE_DISTANCE), damping)
             }

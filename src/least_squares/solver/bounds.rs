@@ -99,7 +99,7 @@ impl Bounds {
 
     /// Places each unknown with an active bound exactly on that bound and clamps all others into
     /// the box.
-    pub(super) fn hold(&self, x: &mut DVector<f64>, active: &[Option<AtBound>]) {
+    pub(super) fn place_on_bounds(&self, x: &mut DVector<f64>, active: &[Option<AtBound>]) {
         for (j, active) in active.iter().enumerate() {
             match active {
                 Some(AtBound::Lower) => x[j] = self.lower[j],

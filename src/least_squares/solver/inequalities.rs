@@ -101,7 +101,7 @@ impl Inequalities {
 
     /// Returns the limit that row `i` is on, to within rounding, if any.
     pub fn at(&self, x: &DVector<f64>, i: usize) -> Option<AtBound> {
-        let (value, size) = self.value(x, i);
+        let (value, size) = self.value_and_size(x, i);
         let size = size + self.matrix.row(i).amax() * x.amax();
         let is_at = |limit: f64| {
             limit.is_finite() && (value - limit).abs() <= MAX_ACTIVE_DISTANCE * (size + limit.abs())
@@ -117,7 +117,7 @@ impl Inequalities {
 
     /// Returns true if row `i` is satisfied to within rounding.
     pub(super) fn holds(&self, x: &DVector<f64>, i: usize) -> bool {
-        let (value, size) = self.value(x, i);
+        let (value, size) = self.value_and_size(x, i);
         let (lower, upper) = (self.lower[i], self.upper[i]);
         lower - value <= MAX_ROUNDING_VIOLATION * (size + lower.abs())
             && value - upper <= MAX_ROUNDING_VIOLATION * (size + upper.abs())
@@ -129,7 +129,7 @@ impl Inequalities {
     }
 
     /// Returns the value `aᵢᵀx` of row `i` and its size Σ |aᵢⱼ xⱼ|.
-    fn value(&self, x: &DVector<f64>, i: usize) -> (f64, f64) {
+    fn value_and_size(&self, x: &DVector<f64>, i: usize) -> (f64, f64) {
         let terms = self.matrix.row(i);
         terms
             .iter()

@@ -25,7 +25,7 @@ pub(super) struct HalfSpace {
 ///
 /// The solver works with z = S q (unit columns) and y = B q + c, so that `BᵀB` is never formed;
 /// normals are scaled to unit length. Returns `None` if q is not finite.
-pub(super) fn interior_point(
+pub(super) fn solve_by_interior_point(
     factor: &Factor,
     lambda: f64,
     spaces: &[HalfSpace],

@@ -21,7 +21,7 @@ pub(super) struct Polyhedron {
     /// Offsets h of the half-spaces.
     pub(super) offsets: DVector<f64>,
     /// Faces that contain q = 0, that is x itself.
-    pub(super) touched: Faces,
+    pub(super) faces_at_origin: Faces,
 }
 
 /// Set of faces of the polyhedron.
@@ -42,7 +42,7 @@ pub(super) struct PolyhedronSolution {
 
 impl Faces {
     /// Returns the unknowns without an active bound.
-    pub(super) fn free(&self) -> Vec<usize> {
+    pub(super) fn free_unknowns(&self) -> Vec<usize> {
         (0..self.bounds.len()).filter(|&j| self.bounds[j].is_none()).collect()
     }
 
@@ -103,7 +103,7 @@ impl Polyhedron {
             upper: (bounds.upper() - x).component_mul(scale),
             normals: DMatrix::from_fn(spaces.len(), x.len(), |i, j| spaces[i].0[j]),
             offsets: DVector::from_iterator(spaces.len(), spaces.iter().map(|space| space.1)),
-            touched: Faces {
+            faces_at_origin: Faces {
                 bounds: (0..x.len()).map(|j| bounds.at(x, j)).collect(),
                 rows: spaces.iter().map(|space| space.2).collect(),
             },
@@ -125,7 +125,7 @@ impl Polyhedron {
     /// Returns the faces through q = 0 that a step against `gradient` would violate, and the
     /// gradient without its components along the half-spaces among them.
     pub(super) fn active_faces(&self, gradient: &DVector<f64>) -> (Faces, DVector<f64>) {
-        let mut faces = self.touched.clone();
+        let mut faces = self.faces_at_origin.clone();
         loop {
             let (remainder, multipliers) = self.multipliers(&faces, gradient);
             let retained = self.retained_faces(&faces, &remainder, &multipliers, 0.0);
@@ -161,7 +161,7 @@ impl Polyhedron {
         faces: &Faces,
         force: &DVector<f64>,
     ) -> (DVector<f64>, Vec<(usize, f64)>) {
-        let (active, free) = (faces.active_rows(), faces.free());
+        let (active, free) = (faces.active_rows(), faces.free_unknowns());
         if active.is_empty() {
             return (force.clone(), Vec::new());
         }
@@ -213,7 +213,7 @@ impl Polyhedron {
             Some(AtBound::Upper) => self.upper[j],
             None => 0.0,
         });
-        let (active, free) = (faces.active_rows(), faces.free());
+        let (active, free) = (faces.active_rows(), faces.free_unknowns());
         if active.is_empty() || free.is_empty() {
             return (corner, None);
         }

@@ -3,7 +3,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::interior::interior_point;
+use super::interior::solve_by_interior_point;
 pub(super) use super::polyhedron::PolyhedronSolution;
 use super::polyhedron::{Faces, Polyhedron};
 use super::reduced::retriangularise;
@@ -56,7 +56,7 @@ impl<'a> PolyhedronProblem<'a> {
         let limits = (MAX_JOINT_CORRECTIONS, MAX_SINGLE_CORRECTIONS);
         let solution = self.active_set(self.guess.clone(), lambda, limits).unwrap_or_else(|| {
             let interior =
-                interior_point(self.factor, lambda, &self.polyhedron.half_spaces(), None)
+                solve_by_interior_point(self.factor, lambda, &self.polyhedron.half_spaces(), None)
                     .map(|(q, _)| q);
             let faces_near = |q: &DVector<f64>| self.polyhedron.faces_near(q, FACE_DISTANCE);
             let refined = interior.as_ref().and_then(|q| {
@@ -136,7 +136,7 @@ impl<'a> PolyhedronProblem<'a> {
     /// Returns the minimiser restricted to the given faces.
     fn solve_on_faces(&self, faces: &Faces, lambda: f64) -> DVector<f64> {
         let (mut q, basis) = self.polyhedron.affine_subspace(faces);
-        let free = faces.free();
+        let free = faces.free_unknowns();
         let free_columns = self.factor.matrix().select_columns(&free);
         if basis.as_ref().map_or(free_columns.ncols(), DMatrix::ncols) == 0 {
             return q;
@@ -207,9 +207,9 @@ mod tests {
                 &DVector::from_element(n, 1.0),
             );
             let mut problem =
-                PolyhedronProblem::new(&factor, &polyhedron, polyhedron.touched.clone());
+                PolyhedronProblem::new(&factor, &polyhedron, polyhedron.faces_at_origin.clone());
             let interior =
-                interior_point(&factor, lambda, &polyhedron.half_spaces(), None).unwrap().0;
+                solve_by_interior_point(&factor, lambda, &polyhedron.half_spaces(), None).unwrap().0;
             let solution = problem.solve(lambda);
             let cost = |q: &DVector<f64>| {
                 (factor.image(q) + factor.constant()).norm_squared() + lambda * q.norm_squared()
@@ -246,10 +246,10 @@ mod tests {
             &Inequalities::none(3),
             &DVector::repeat(3, 1.0),
         );
-        let problem = PolyhedronProblem::new(&factor, &polyhedron, polyhedron.touched.clone());
+        let problem = PolyhedronProblem::new(&factor, &polyhedron, polyhedron.faces_at_origin.clone());
         let starts = (0..8).map(|set| Faces {
             bounds: (0..3).map(|j| (set >> j & 1 == 1).then_some(AtBound::Upper)).collect(),
-            rows: polyhedron.touched.rows.clone(),
+            rows: polyhedron.faces_at_origin.rows.clone(),
         });
         let limits = (MAX_JOINT_CORRECTIONS, MAX_SINGLE_CORRECTIONS);
         let mut cycles = 0;

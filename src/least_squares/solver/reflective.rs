@@ -7,10 +7,10 @@ use super::{Bounds, Factor, Settings, Step, Subproblem};
 use crate::least_squares::Linearisation;
 
 /// Fraction of the distance to a bound that a step may take.
-const BOUND_FRACTION: f64 = 0.995;
+const MAX_BOUND_FRACTION: f64 = 0.995;
 /// Smallest distance of a start from its bounds, relative to the magnitude of the bound or 1,
 /// whichever is larger.
-const START_MARGIN: f64 = 1e-10;
+const MIN_START_MARGIN: f64 = 1e-10;
 
 /// Subproblem of the interior reflective step within bounds lo < x < hi [Branch, Coleman & Li
 /// 1999].
@@ -119,15 +119,15 @@ impl Reflective {
             let (to_bound, _) =
                 self.fraction_to_bound(&(x + model.step(&on_bound)), &model.step(&mirrored));
             let limit = to_bound.min(to_radius);
-            let low = if limit > 0.0 { (1.0 - BOUND_FRACTION) * stride / limit } else { 0.0 };
-            let high = if to_bound <= to_radius { BOUND_FRACTION * to_bound } else { to_radius };
+            let low = if limit > 0.0 { (1.0 - MAX_BOUND_FRACTION) * stride / limit } else { 0.0 };
+            let high = if to_bound <= to_radius { MAX_BOUND_FRACTION * to_bound } else { to_radius };
             (limit > 0.0 && low <= high).then(|| model.best_along(&on_bound, &mirrored, low, high))
         };
-        let straight = model.candidate(&on_bound * BOUND_FRACTION);
+        let straight = model.candidate(&on_bound * MAX_BOUND_FRACTION);
         let down = -&model.gradient;
         let to_radius = radius / down.norm().max(f64::MIN_POSITIVE);
         let (to_bound, _) = self.fraction_to_bound(x, &model.step(&down));
-        let high = (BOUND_FRACTION * to_bound).min(to_radius);
+        let high = (MAX_BOUND_FRACTION * to_bound).min(to_radius);
         let descent = model.best_along(&DVector::zeros(x.len()), &down, 0.0, high);
         let best = if descent.change < straight.change { descent } else { straight };
         match reflected {
@@ -159,7 +159,7 @@ impl Subproblem for Reflective {
         for j in 0..n {
             let (lower, upper) = (self.bounds.lower()[j], self.bounds.upper()[j]);
             let margin = |bound: f64| {
-                if bound.is_finite() { START_MARGIN * bound.abs().max(1.0) } else { 0.0 }
+                if bound.is_finite() { MIN_START_MARGIN * bound.abs().max(1.0) } else { 0.0 }
             };
             let (least, most) = (lower + margin(lower), upper - margin(upper));
             start[j] =

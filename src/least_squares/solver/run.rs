@@ -16,7 +16,7 @@ use crate::least_squares::Objective;
 /// moved onto the bound.
 const MAX_DISTANCE_TO_BOUND: f64 = 1e-3;
 /// Largest relative increase of the cost that counts as rounding.
-const COST_ROUNDING: f64 = 1e-12;
+const MAX_COST_ROUNDING: f64 = 1e-12;
 
 /// Minimises ½‖r(x)‖² from `start` by Levenberg–Marquardt.
 ///
@@ -179,7 +179,7 @@ fn move_onto_bounds<O: Objective>(
             }
             let cost = objective.cost(&moved);
             solution.cost_evaluations += 1;
-            if cost <= solution.cost * (1.0 + COST_ROUNDING) {
+            if cost <= solution.cost * (1.0 + MAX_COST_ROUNDING) {
                 (solution.x, solution.cost) = (moved, cost);
             }
         }

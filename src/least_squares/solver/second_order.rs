@@ -36,7 +36,7 @@ const FACE_PENALTY: f64 = 1e3;
 /// curvature.
 const CONVEXITY_MARGIN: f64 = 1.01;
 /// Smallest damping μ that makes the model convex, relative to the largest curvature.
-const MIN_DAMPING: f64 = 1e-10;
+const MIN_CONVEXITY_DAMPING: f64 = 1e-10;
 
 /// Decides when steps are accelerated and when second derivatives are used.
 ///
@@ -79,7 +79,7 @@ pub(super) struct ConvexModel {
 
 impl ConvexModel {
     /// Returns ½(μ‖q‖² + ρ‖N q‖²), by which the model underestimates the reduction of a step q.
-    pub fn excess(&self, q: &DVector<f64>) -> f64 {
+    pub fn underestimated_reduction(&self, q: &DVector<f64>) -> f64 {
         0.5 * (self.damping * q.norm_squared() + (&self.penalty_rows * q).norm_squared())
     }
 }
@@ -111,7 +111,7 @@ impl SecondOrder {
     }
 
     /// Resumes geodesic acceleration if the gain `ratio` shows that the step was predicted poorly.
-    pub fn check_straightness(&mut self, ratio: f64) {
+    pub fn resume_if_missed(&mut self, ratio: f64) {
         self.is_straight &= GOOD_RATIO.contains(&ratio);
     }
 
@@ -222,7 +222,7 @@ impl SecondOrder {
             root
         } else {
             let lowest = hessian.symmetric_eigenvalues().min();
-            damping = CONVEXITY_MARGIN * lowest.abs() + MIN_DAMPING * largest;
+            damping = CONVEXITY_MARGIN * lowest.abs() + MIN_CONVEXITY_DAMPING * largest;
             (0..n).for_each(|j| hessian[(j, j)] += damping);
             hessian.cholesky()?.unpack()
         };
@@ -258,12 +258,12 @@ mod tests {
         assert!(second_order.accelerates());
         // A short (damped) step has a small acceleration on any path.
         second_order.record_acceleration(0.001, 0.5);
-        second_order.check_straightness(1.0);
+        second_order.resume_if_missed(1.0);
         assert!(second_order.accelerates());
         second_order.record_acceleration(0.001, 0.0);
-        second_order.check_straightness(1.0);
+        second_order.resume_if_missed(1.0);
         assert!(!second_order.accelerates());
-        second_order.check_straightness(0.1);
+        second_order.resume_if_missed(0.1);
         assert!(second_order.accelerates());
         // Without S there is nothing to refine.
         assert!(!second_order.stop_second_derivatives() && !second_order.accelerates());

@@ -7,7 +7,7 @@ use super::Step;
 /// 8.
 const TARGET_ACCELERATION: f64 = 0.03;
 /// Smallest gain ratio ρ at which the radius grows.
-pub(super) const GOOD_RATIO: f64 = 0.75;
+pub(super) const MIN_GROWTH_RATIO: f64 = 0.75;
 
 /// Tried step with its actual and predicted reductions, relative to the previous cost.
 pub(super) struct Trial {
@@ -19,7 +19,7 @@ pub(super) struct Trial {
     pub length: f64,
     pub damping: f64,
     /// Factor by which the radius grows after the step.
-    pub growth: f64,
+    pub radius_growth: f64,
 }
 
 impl Trial {
@@ -38,7 +38,7 @@ impl Trial {
             ratio,
             length: step.length,
             damping: step.damping,
-            growth: acceleration.map_or(2.0, |ratio| (TARGET_ACCELERATION / ratio).clamp(1.5, 8.0)),
+            radius_growth: acceleration.map_or(2.0, |ratio| (TARGET_ACCELERATION / ratio).clamp(1.5, 8.0)),
         }
     }
 
@@ -61,8 +61,8 @@ impl Trial {
             let shrink =
                 if self.actual <= -1.0 || shrink.is_nan() { 0.1 } else { shrink.clamp(0.1, 0.5) };
             shrink * radius.min(10.0 * self.length)
-        } else if self.ratio >= GOOD_RATIO || self.damping == 0.0 {
-            self.growth * self.length
+        } else if self.ratio >= MIN_GROWTH_RATIO || self.damping == 0.0 {
+            self.radius_growth * self.length
         } else {
             radius
         }

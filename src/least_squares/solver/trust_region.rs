@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DVector};
 use super::execute::{ReportsTermination, State};
 use super::second_order::{ConvexModel, SecondOrder};
 use super::step::Step;
-use super::trial::{GOOD_RATIO, Trial};
+use super::trial::{MIN_GROWTH_RATIO, Trial};
 use super::{Settings, Termination};
 use crate::least_squares::{Linearisation, Objective};
 
@@ -207,7 +207,7 @@ impl<S: Subproblem> TrustRegion<S> {
         loop {
             let mut step = self.subproblem.step(x, *radius);
             if let Some(convex) = &self.convex {
-                step.predicted += convex.excess(&(&step.point - x).component_mul(&self.scale));
+                step.predicted += convex.underestimated_reduction(&(&step.point - x).component_mul(&self.scale));
             }
             if tries == 0 || step.length == 0.0 {
                 return Ok((step, None));
@@ -266,7 +266,7 @@ impl<S: Subproblem> TrustRegion<S> {
     /// relative.
     fn test_convergence(&self, trial: &Trial, size: f64) -> Option<Termination> {
         let settings = &self.settings;
-        if trial.damping > 0.0 && trial.ratio >= GOOD_RATIO {
+        if trial.damping > 0.0 && trial.ratio >= MIN_GROWTH_RATIO {
             // The radius alone limits this step and will grow, so the length of the step does not
             // indicate convergence.
             return None;
@@ -400,7 +400,7 @@ impl<O: Objective, S: Subproblem> Solver<O, State> for TrustRegion<S> {
         let (x, cost) = if is_accepted { (step.point, trial.cost) } else { (x, cost) };
         if termination.is_none() {
             let ratio = trial.significant_ratio(self.settings.cost_tolerance);
-            self.second_order.check_straightness(ratio);
+            self.second_order.resume_if_missed(ratio);
             if self.subproblem.accelerates_unconstrained() {
                 self.second_order.count_miss(ratio);
             }

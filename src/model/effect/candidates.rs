@@ -12,20 +12,20 @@ pub(crate) const HIGHEST_ORDER: u32 = 60;
 
 /// Longest time constant among the candidates, as a fraction of the duration of the measurement. A
 /// longer one cannot be distinguished from a linear drift.
-const MAX_LAG: f64 = 0.6;
+const MAX_LAG_FRACTION: f64 = 0.6;
 /// Shortest time constant of a lag among the candidates, as a multiple of the typical time between
 /// two poses. A faster lag settles before the next pose.
-const MIN_LAG: f64 = 2.0;
+const MIN_LAG_INTERVALS: f64 = 2.0;
 /// Shortest settling time among the candidates, as a fraction of the duration of the measurement. A
 /// shorter one affects only a few poses.
-const MIN_SETTLING: f64 = 0.03;
+const MIN_SETTLING_FRACTION: f64 = 0.03;
 /// Ratio of successive time constants in the grid of candidates.
-const LAG_STEP: f64 = 1.25;
+const LAG_RATIO: f64 = 1.25;
 /// Shortest and longest friction path among the candidates, as fractions of the range of the
 /// joint's commands. A shorter path acts like play, a longer one like a constant ratio.
-const FRICTION_PATHS: (f64, f64) = (0.1, 1.6);
+const FRICTION_PATH_RANGE: (f64, f64) = (0.1, 1.6);
 /// Ratio of successive friction paths in the grid of candidates.
-const PATH_STEP: f64 = 1.4;
+const PATH_RATIO: f64 = 1.4;
 
 /// Effect that a search may add, with the reason if the data cannot show it.
 #[derive(Debug, Clone, PartialEq)]
@@ -47,7 +47,7 @@ pub fn candidates(problem: &Problem, data: &DataCoverage) -> Vec<Candidate> {
                 arguments.iter().find(|(name, _)| *name == key).map(|(_, value)| value.clone())
             };
             let effect = Effect::build(family.name, argument)?;
-            let conceivable = family.only.iter().all(|only| effect.meets(*only, problem));
+            let conceivable = family.only.iter().all(|only| effect.meets_condition(*only, problem));
             conceivable.then(|| {
                 let untestable =
                     family.needs.iter().find_map(|need| effect.unmet_need(*need, problem, data));
@@ -137,10 +137,10 @@ fn with_searched_values(family: &Family, place: Arguments, data: &DataCoverage) 
         Search::Times => data.times.iter().map(|&time| Argument::Number(time)).collect(),
         Search::TimeConstants => match data.clock {
             None => vec![Argument::Number(1.0)],
-            Some((between, span)) => grid(MIN_LAG * between, MAX_LAG * span, LAG_STEP, 1.0),
+            Some((between, span)) => grid(MIN_LAG_INTERVALS * between, MAX_LAG_FRACTION * span, LAG_RATIO, 1.0),
         },
         Search::SettlingTimes => match (data.times.first(), data.times.last()) {
-            (Some(first), Some(last)) => grid(MIN_SETTLING, MAX_LAG, LAG_STEP, last - first),
+            (Some(first), Some(last)) => grid(MIN_SETTLING_FRACTION, MAX_LAG_FRACTION, LAG_RATIO, last - first),
             _ => Vec::new(),
         },
         Search::Distances => {
@@ -149,8 +149,8 @@ fn with_searched_values(family: &Family, place: Arguments, data: &DataCoverage) 
                 _ => None,
             });
             let range = joint.and_then(|joint| data.ranges.get(joint));
-            let (from, to) = FRICTION_PATHS;
-            grid(from, to, PATH_STEP, range.map_or(0.0, |(low, high)| high - low))
+            let (from, to) = FRICTION_PATH_RANGE;
+            grid(from, to, PATH_RATIO, range.map_or(0.0, |(low, high)| high - low))
         }
     };
     values.into_iter().map(|value| [place.as_slice(), &[(*key, value)]].concat()).collect()
@@ -177,12 +177,12 @@ impl Effect {
                     data.no_temperature.or(data.clock.is_none().then_some(NO_TIMES))
                 }
                 Quantity::Friction { .. } => data.clock.is_none().then_some(NO_TIMES),
-                Quantity::Payload => (!data.carries()).then_some("no payload is carried"),
+                Quantity::Payload => (!data.has_payload()).then_some("no payload is carried"),
                 Quantity::Approach(joint) => {
                     let both = data.both_sides.get(joint).copied().unwrap_or(false);
                     (!both).then_some("the joint was not approached from both sides")
                 }
-                Quantity::Moment(_) => (!data.weighs()).then_some(NO_LOADS),
+                Quantity::Moment(_) => (!data.has_gravity()).then_some(NO_LOADS),
                 Quantity::Covariate(index) => {
                     let varies = data.covariates.get(index).copied().unwrap_or(false);
                     (!varies).then_some("the covariate does not change in these poses")
@@ -194,7 +194,7 @@ impl Effect {
 
     /// Returns true if the arm satisfies the condition `only`, under which the effect is a
     /// candidate.
-    fn meets(&self, only: Only, problem: &Problem) -> bool {
+    fn meets_condition(&self, only: Only, problem: &Problem) -> bool {
         let joint = || problem.joints.get(self.joint()?.checked_sub(1)?);
         let is = |is_it: fn(&Joint) -> bool| joint().is_some_and(is_it);
         match only {
@@ -234,7 +234,7 @@ impl Effect {
             Need::Temperature => data.no_temperature,
             Need::Clock => unless(data.clock.is_some(), NO_TIMES),
             Need::Times => unless(!data.times.is_empty(), "too few poses before or after any time"),
-            Need::Payload => unless(data.carries() && data.weighs(), "no payload is carried"),
+            Need::Payload => unless(data.has_payload() && data.has_gravity(), "no payload is carried"),
             Need::PayloadFromBothSides => unless(
                 both_sides && data.changes_payload(),
                 "no payload that changes, or no approach from both sides",
@@ -245,7 +245,7 @@ impl Effect {
             Need::Play if self.joint().is_some_and(|joint| slides(problem, joint)) => {
                 Some("no directions of approach, and moments move nothing along a slide")
             }
-            Need::Loads | Need::Play => unless(data.weighs(), NO_LOADS),
+            Need::Loads | Need::Play => unless(data.has_gravity(), NO_LOADS),
             Need::Covariate => {
                 let name = self.covariate();
                 let mut covariates = problem.data.covariates.iter();

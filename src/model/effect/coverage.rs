@@ -35,7 +35,7 @@ impl DataCoverage {
     }
 
     /// Returns true if at least one pose has a payload.
-    pub fn carries(&self) -> bool {
+    pub fn has_payload(&self) -> bool {
         self.payload.1 > 0.0
     }
 
@@ -45,7 +45,7 @@ impl DataCoverage {
     }
 
     /// Returns true if gravity is not zero, so that masses load the arm.
-    pub fn weighs(&self) -> bool {
+    pub fn has_gravity(&self) -> bool {
         self.gravity.norm() > 0.0
     }
 }

@@ -44,11 +44,11 @@ impl Effect {
             Vocabulary { slides: &slides, covariates: &covariates, ..Vocabulary::default() };
         self.entries(&vocabulary)
             .into_iter()
-            .filter_map(|entry| self.placed(&entry, problem))
+            .filter_map(|entry| self.place_term(&entry, problem))
             .collect()
     }
 
-    fn placed(&self, entry: &EffectTerm, problem: &Problem) -> Option<Term> {
+    fn place_term(&self, entry: &EffectTerm, problem: &Problem) -> Option<Term> {
         let of_arm =
             |quantity: &Quantity| quantity.joint().is_none_or(|joint| joint < problem.joints.len());
         let quantities = entry.formula.as_ref().map(|formula| formula.expression.quantities());

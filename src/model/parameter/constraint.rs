@@ -30,7 +30,7 @@ pub struct LinearConstraint {
 impl LinearConstraint {
     /// Returns the constraint on the parameters listed in `kept`, with positions in this list as
     /// indices; `None` if it contains a parameter that is not listed.
-    pub fn on(&self, kept: &[usize]) -> Option<Self> {
+    pub fn on_parameters(&self, kept: &[usize]) -> Option<Self> {
         let renumbered =
             |&(k, c): &(usize, f64)| Some((kept.iter().position(|&kept| kept == k)?, c));
         let terms = self.terms.iter().map(renumbered).collect::<Option<Vec<_>>>()?;
@@ -43,7 +43,7 @@ impl LinearConstraint {
 /// # Errors
 /// Returns an error if a name is no parameter, units do not match, a limit has another unit, or no
 /// parameter of the constraint is free.
-pub fn constrain(
+pub fn resolve_constraints(
     problem: &Problem,
     bases: &[String],
     targets: &[String],
@@ -111,7 +111,7 @@ fn resolve_constraint(
     {
         let kind = InputErrorKind::LimitOfAnotherKind {
             parameter: parameter.to_owned(),
-            write: alternatives(kind),
+            write: limit_keys(kind),
         };
         return Err(limit.location.clone().error(kind));
     }
@@ -119,7 +119,7 @@ fn resolve_constraint(
         limit.as_ref().map_or(none, |limit| limit.value - nominal)
     };
     let words = |limit: &Option<Limit>, relation: &str| {
-        Some(format!("{relation} {}", shown(limit.as_ref()?)))
+        Some(format!("{relation} {}", format_limit(limit.as_ref()?)))
     };
     Ok(LinearConstraint {
         terms,
@@ -139,7 +139,7 @@ fn kind_of(unit: Unit) -> LimitKind {
     }
 }
 
-fn alternatives(kind: LimitKind) -> &'static str {
+fn limit_keys(kind: LimitKind) -> &'static str {
     match kind {
         LimitKind::Angle => "at_least_deg or at_least_rad, at_most_deg or at_most_rad",
         LimitKind::Length => "at_least_mm or at_least_m, at_most_mm or at_most_m",
@@ -148,7 +148,7 @@ fn alternatives(kind: LimitKind) -> &'static str {
 }
 
 /// Formats a limit with nine digits, so that rounding by unit conversions is not visible.
-fn shown(limit: &Limit) -> String {
+fn format_limit(limit: &Limit) -> String {
     let (value, unit) = match limit.kind {
         LimitKind::Angle => (limit.value.to_degrees(), "°"),
         LimitKind::Length => (limit.value * 1e3, " mm"),

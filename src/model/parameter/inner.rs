@@ -6,7 +6,7 @@ use std::sync::Arc;
 use num_dual::Dual64;
 
 use super::Parameter;
-use super::regressor::{Formula, Regressor, Slope, Variable};
+use super::regressor::{Formula, Regressor, Slope, Dependence};
 use crate::mechanics::AxisMoments;
 
 /// Returns the regressor that multiplies parameter k in the prediction, with all formula parameters
@@ -32,7 +32,7 @@ pub(crate) fn slope_regressor(parameters: &[Parameter], x: &[f64], k: usize) -> 
             let Regressor::Formula(formula) = &parameter.regressor else { return None };
             let index = formula.parameters().iter().position(|(inner, _)| inner == name)?;
             let formula = Arc::new(with_values_at(formula, parameters, x));
-            Some((*c, formula, Variable::Inner(index)))
+            Some((*c, formula, Dependence::Inner(index)))
         };
         let terms = parameters.iter().zip(x).filter_map(term).collect();
         Regressor::Slope(Arc::new(Slope::new(terms)))
@@ -51,7 +51,7 @@ pub(crate) fn load_regressor(
     let term = |&k: &usize| {
         let Regressor::Formula(formula) = &parameters[k].regressor else { return None };
         let formula = Arc::new(with_values_at(formula, parameters, x));
-        Some((x[k], formula, Variable::Load(moments.clone())))
+        Some((x[k], formula, Dependence::Load(moments.clone())))
     };
     Regressor::Slope(Arc::new(Slope::new(terms.iter().filter_map(term).collect())))
 }

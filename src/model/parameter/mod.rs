@@ -14,7 +14,7 @@ mod waves;
 pub(crate) use crate::laws::ArmField;
 pub use crate::laws::{BeamField, JointField};
 pub use constraint::LinearConstraint;
-pub(crate) use constraint::constrain;
+pub(crate) use constraint::resolve_constraints;
 
 pub(crate) use inner::{
     load_regressor, slope_regressor, uses_moments, value_regressor, with_moments,

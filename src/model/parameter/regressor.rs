@@ -38,12 +38,12 @@ pub enum Regressor {
 pub struct Slope {
     /// Coefficient c, formula f with its parameter values, and way in which f depends on p, for
     /// each term.
-    terms: Vec<(f64, Arc<Formula>, Variable)>,
+    terms: Vec<(f64, Arc<Formula>, Dependence)>,
 }
 
 /// Way in which a formula depends on a parameter.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Variable {
+pub(super) enum Dependence {
     /// Parameter inside the formula, by its index among the formula's parameters.
     Inner(usize),
     /// Load whose moments the formula uses; the load is the dual number's variable.
@@ -52,16 +52,16 @@ pub(super) enum Variable {
 
 impl Slope {
     /// Creates the derivative from the coefficient, the formula and the dependence of each term.
-    pub(super) fn new(terms: Vec<(f64, Arc<Formula>, Variable)>) -> Self {
+    pub(super) fn new(terms: Vec<(f64, Arc<Formula>, Dependence)>) -> Self {
         Self { terms }
     }
 
     /// Returns the value of the derivative in a pose.
     pub(super) fn value(&self, setup: &PoseView) -> f64 {
-        let slope = |(c, formula, variable): &(f64, Arc<Formula>, Variable)| {
+        let slope = |(c, formula, variable): &(f64, Arc<Formula>, Dependence)| {
             c * match variable {
-                Variable::Inner(index) => formula.parameter_slope(setup, *index),
-                Variable::Load(moments) => formula.load_slope(setup, moments),
+                Dependence::Inner(index) => formula.parameter_slope(setup, *index),
+                Dependence::Load(moments) => formula.load_slope(setup, moments),
             }
         };
         self.terms.iter().map(slope).sum()
@@ -245,7 +245,7 @@ impl Regressor {
                 .expression
                 .quantities()
                 .iter()
-                .any(follows_loads)
+                .any(is_load_moment)
                 .then(|| Arc::new(AxisMoments::new(Arm::nominal(problem)))),
             moves_base,
         }))
@@ -390,7 +390,7 @@ impl Regressor {
     /// Returns true if the regressor depends on the commands of joints.
     pub fn follows_commands(&self) -> bool {
         let follows =
-            |quantity: &Quantity| quantity.commanded_joint().is_some() || follows_loads(quantity);
+            |quantity: &Quantity| quantity.commanded_joint().is_some() || is_load_moment(quantity);
         self.quantities().iter().any(follows)
     }
 
@@ -401,7 +401,7 @@ impl Regressor {
 }
 
 /// Returns true if the quantity is a moment of the loads.
-fn follows_loads(quantity: &Quantity) -> bool {
+fn is_load_moment(quantity: &Quantity) -> bool {
     matches!(quantity, Quantity::Moment(_))
 }
 

@@ -65,7 +65,7 @@ impl EffectParameter {
         unit(self.site, &self.regressor)
     }
 
-    fn is_named(&self, rule: &ParameterRule) -> bool {
+    fn is_named_by(&self, rule: &ParameterRule) -> bool {
         matches_name(rule, &self.name, &self.plain)
     }
 }
@@ -109,7 +109,7 @@ pub fn resolve(
                     plain_names.push(plain.clone());
                 }
             }
-            let undeclared = undeclared(problem, &rule.pattern, &plain_names);
+            let undeclared = undeclared_effect_error(problem, &rule.pattern, &plain_names);
             // Undeclared effects that a rule fixes are not searched for.
             if undeclared.is_some() && matches!(rule.freedom, Freedom::Fixed) {
                 continue;
@@ -120,7 +120,7 @@ pub fn resolve(
             });
             return Err(rule.location.clone().error(kind));
         }
-        check_kinds(rule, &candidates)?;
+        check_units(rule, &candidates)?;
     }
     let mut parameters = Vec::new();
     for (candidate, rule) in candidates.into_iter().zip(decided) {
@@ -171,12 +171,12 @@ pub fn rule_of<'a>(problem: &'a Problem, parameter: &EffectParameter) -> Option<
         .parameters
         .iter()
         .rev()
-        .find(|rule| parameter.is_named(rule) && applies_to_unit(rule, parameter.unit()))
+        .find(|rule| parameter.is_named_by(rule) && applies_to_unit(rule, parameter.unit()))
 }
 
 /// Returns the error for a pattern that matches no parameter in `names` but effects which the
 /// problem does not declare; `None` if it matches no effect.
-fn undeclared(problem: &Problem, pattern: &str, names: &[String]) -> Option<InputErrorKind> {
+fn undeclared_effect_error(problem: &Problem, pattern: &str, names: &[String]) -> Option<InputErrorKind> {
     // The word before the dot or bracket of `hoist-force.error`, `gear-ratio[3].error`.
     let head = |name: &str| name.split(['.', '[']).next().unwrap_or_default().to_owned();
     let wanted = head(pattern);
@@ -206,7 +206,7 @@ pub fn refuses(problem: &Problem, parameters: &[EffectParameter]) -> bool {
     let misses = |rule: &ParameterRule| {
         parameters
             .iter()
-            .any(|parameter| parameter.is_named(rule) && !applies_to_unit(rule, parameter.unit()))
+            .any(|parameter| parameter.is_named_by(rule) && !applies_to_unit(rule, parameter.unit()))
     };
     problem.parameters.iter().any(|rule| misses(rule) && !is_for_arm(rule))
 }
@@ -319,7 +319,7 @@ pub(super) fn candidates(
 
 /// Checks a rule against the candidates that it matches: each quantity must fit the unit of one of
 /// them, and each of them needs a quantity.
-fn check_kinds(rule: &ParameterRule, candidates: &[Candidate]) -> Result<(), InputError> {
+fn check_units(rule: &ParameterRule, candidates: &[Candidate]) -> Result<(), InputError> {
     let Freedom::Free { sigma, min, max } = &rule.freedom else { return Ok(()) };
     let fail = |kind| Err(rule.location.clone().error(kind));
     let given = |unit| [sigma, min, max].iter().any(|q| quantity_in(q, unit).is_some());
