@@ -10,7 +10,7 @@ pub(crate) const TOML: &str = "a TOML file";
 pub(crate) const XML: &str = "an XML file";
 
 /// Formats of binary files by their first bytes.
-const SIGNATURES: [(&[u8], &str); 18] = [
+const BINARY_SIGNATURES: [(&[u8], &str); 18] = [
     (b"PK\x03\x04", "a ZIP archive or a workbook (XLSX, ODS)"),
     (b"\xd0\xcf\x11\xe0", "a workbook or document of old Office programs (XLS, DOC)"),
     (b"%PDF", "a PDF document"),
@@ -32,7 +32,7 @@ const SIGNATURES: [(&[u8], &str); 18] = [
 ];
 
 /// Formats of text files by their first characters, in lower case.
-const MARKS: [(&str, &str); 9] = [
+const TEXT_MARKS: [(&str, &str); 9] = [
     ("<!doctype html", "an HTML page"),
     ("<html", "an HTML page"),
     ("<", XML),
@@ -47,7 +47,10 @@ const YAML: &str = "a YAML file";
 
 /// Returns the format of a binary file from its first bytes; `None` for text and unknown formats.
 pub(crate) fn binary_format(bytes: &[u8]) -> Option<&'static str> {
-    SIGNATURES.iter().find(|(signature, _)| bytes.starts_with(signature)).map(|(_, format)| *format)
+    BINARY_SIGNATURES
+        .iter()
+        .find(|(signature, _)| bytes.starts_with(signature))
+        .map(|(_, format)| *format)
 }
 
 /// Returns the format of a text by its first line with content; `None` if the format is unknown.
@@ -57,7 +60,7 @@ pub(crate) fn text_format(text: &str) -> Option<&'static str> {
     let start = text.trim_start_matches(|c: char| c.is_whitespace() || c == '\u{feff}');
     let beginning: String =
         start.chars().filter(|&c| c != '\r').take(20).collect::<String>().to_ascii_lowercase();
-    if let Some((_, format)) = MARKS.iter().find(|(mark, _)| beginning.starts_with(mark)) {
+    if let Some((_, format)) = TEXT_MARKS.iter().find(|(mark, _)| beginning.starts_with(mark)) {
         return Some(format);
     }
     let mut lines = start.lines().map(str::trim);

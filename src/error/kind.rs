@@ -7,7 +7,7 @@ use thiserror::Error;
 
 use super::NoRows;
 use super::near::{is_it_rather, suggestion};
-use super::phrases::{decimal_comma_hint, list, near_quote, plural, with_remedy};
+use super::phrases::{decimal_comma_hint, joined_list, near_quote, plural, with_remedy};
 use super::study::StudyErrorKind;
 use super::table::TableErrorKind;
 use super::urdf::UrdfErrorKind;
@@ -187,7 +187,7 @@ pub enum InputErrorKind {
     #[error(
         "no {what} is called \"{name}\"{}; {}",
         suggestion(name, known),
-        list("there are", known, "none is declared")
+        joined_list("there are", known, "none is declared")
     )]
     UnknownFixture { what: &'static str, name: String, known: Vec<String> },
     #[error(
@@ -237,7 +237,7 @@ pub enum InputErrorKind {
     UnknownEffect { name: String, known: &'static [&'static str] },
     #[error("no joint {joint}; the arm has {joints}, counted from 1")]
     UnknownJoint { joint: u64, joints: usize },
-    #[error("no beam is called \"{link}\"; there {}", list("is", links, "are none"))]
+    #[error("no beam is called \"{link}\"; there {}", joined_list("is", links, "are none"))]
     UnknownLink { link: String, links: Vec<String> },
     #[error(
         "a joint cannot be coupled to itself; for an error of joint {joint} alone write gear-ratio"
@@ -250,7 +250,7 @@ pub enum InputErrorKind {
     NoCovariateName { name: String },
     #[error(
         "no covariate is called \"{name}\"; [data.covariates] {}",
-        list("has", known, "has none")
+        joined_list("has", known, "has none")
     )]
     UnknownCovariate { name: String, known: Vec<String> },
     #[error(
@@ -338,7 +338,7 @@ pub enum InputErrorKind {
     #[error(
         "the pattern matches no parameter of this arm{}; {}",
         suggestion(pattern, known),
-        list("they are", known, "it has none")
+        joined_list("they are", known, "it has none")
     )]
     MatchesNothing { pattern: String, known: Vec<String> },
     #[error(
@@ -367,7 +367,7 @@ pub enum InputErrorKind {
     #[error(
         "no such parameter{}; {}",
         suggestion(name, known),
-        list("there are", known, "the arm has none")
+        joined_list("there are", known, "the arm has none")
     )]
     UnknownParameter { name: String, known: Vec<String> },
     #[error(
@@ -445,7 +445,7 @@ pub enum InputErrorKind {
     NoPositionsHeldOut,
     #[error(
         "no session is called \"{session}\"; there {}",
-        list("is", sessions, "is no column session")
+        joined_list("is", sessions, "is no column session")
     )]
     UnknownSession { session: String, sessions: Vec<String> },
 }

@@ -41,11 +41,11 @@ pub(super) fn column_difference(other: &Path, has: bool) -> String {
 pub(super) fn in_quotes(names: &[String]) -> String {
     let names: Vec<String> =
         names.iter().map(|name| format!("\"{}\"", shortened(name, 40))).collect();
-    list("there are", &names, "its header is empty")
+    joined_list("there are", &names, "its header is empty")
 }
 
 /// Returns `verb` followed by the names, or the text `none` if there are no names.
-pub(super) fn list(verb: &str, names: &[String], none: &str) -> String {
+pub(super) fn joined_list(verb: &str, names: &[String], none: &str) -> String {
     if names.is_empty() { none.to_owned() } else { format!("{verb} {}", names.join(", ")) }
 }
 

@@ -1,7 +1,7 @@
 //! Characters of word processors and spreadsheets that look like those of the keyboard.
 
 /// Groups of typographic characters, each with its description and the remedy, for messages.
-const CHARACTERS: [(&str, &str, &str); 4] = [
+const TYPOGRAPHIC_CHARACTERS: [(&str, &str, &str); 4] = [
     (
         "\u{2212}\u{2010}\u{2011}\u{2012}\u{2013}\u{2014}",
         "a typographic minus sign or dash",
@@ -24,8 +24,9 @@ const CHARACTERS: [(&str, &str, &str); 4] = [
 /// remedy. Returns `None` if the text has none.
 pub(crate) fn typographic(text: &str) -> Option<(String, &'static str)> {
     text.chars().find_map(|character| {
-        let (_, what, remedy) =
-            CHARACTERS.iter().find(|(characters, ..)| characters.contains(character))?;
+        let (_, what, remedy) = TYPOGRAPHIC_CHARACTERS
+            .iter()
+            .find(|(characters, ..)| characters.contains(character))?;
         Some((format!("{what} (U+{:04X})", u32::from(character)), *remedy))
     })
 }

@@ -133,7 +133,8 @@ impl Loss {
         let k = coordinates as f64;
         let (mut total, mut curvature, mut square) = (0.0, 0.0, 0.0);
         for step in 0..MOMENT_QUADRATURE_STEPS {
-            let s = (f64::from(step) + 0.5) / f64::from(MOMENT_QUADRATURE_STEPS) * MAX_QUADRATURE_LENGTH;
+            let s = (f64::from(step) + 0.5) / f64::from(MOMENT_QUADRATURE_STEPS)
+                * MAX_QUADRATURE_LENGTH;
             let density = s.powf(k - 1.0) * (-0.5 * s * s).exp();
             let (weight, length) = (self.weight(s * scale), s * scale);
             total += density;

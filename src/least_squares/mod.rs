@@ -207,5 +207,9 @@ pub struct Linearisation {
 
 /// Returns the gradient Jᵀr and the Gauss–Newton matrix JᵀJ of a linearised problem.
 fn slopes(Linearisation { cost, triangle, projected }: Linearisation) -> QuadraticModel {
-    QuadraticModel { cost, gradient: triangle.tr_mul(&projected), normal: triangle.tr_mul(&triangle) }
+    QuadraticModel {
+        cost,
+        gradient: triangle.tr_mul(&projected),
+        normal: triangle.tr_mul(&triangle),
+    }
 }

@@ -194,7 +194,8 @@ impl<'a, P: LeastSquares> Fit<'a, P> {
             if !(cache.is_provisional() && self.keeps_derivatives()) {
                 return self.reduce(x);
             }
-            let earlier = cache.base_point(data).and_then(|base| base.triangle_at(self.problem, x, unit));
+            let earlier =
+                cache.base_point(data).and_then(|base| base.triangle_at(self.problem, x, unit));
             earlier.unwrap_or_else(|| {
                 let base = self.linearise_base_point(x, (data, unit));
                 let triangle = base.triangle();
@@ -238,7 +239,11 @@ impl<'a, P: LeastSquares> Fit<'a, P> {
         self.linearise_chunk(x, index, block);
         let n = block.parameters();
         let mut moved = vec![0.0; block.rows()];
-        self.problem.residuals(&(x + ACCELERATION_STEP * step), self.items_of_chunk(index), &mut moved);
+        self.problem.residuals(
+            &(x + ACCELERATION_STEP * step),
+            self.items_of_chunk(index),
+            &mut moved,
+        );
         for (i, moved) in moved.iter_mut().enumerate() {
             let linear: f64 = (0..n).map(|j| block.column(j)[i] * step[j]).sum();
             *moved = 2.0 * ((*moved - block.column(n)[i]) / ACCELERATION_STEP - linear)

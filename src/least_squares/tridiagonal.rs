@@ -141,6 +141,9 @@ mod tests {
         }
         let empty = eigenvalues_with_components(DMatrix::zeros(0, 0), &DVector::zeros(0));
         assert_eq!(empty, Some(Vec::new()));
-        assert_eq!(eigenvalues_with_components(DMatrix::repeat(3, 3, f64::NAN), &DVector::zeros(3)), None);
+        assert_eq!(
+            eigenvalues_with_components(DMatrix::repeat(3, 3, f64::NAN), &DVector::zeros(3)),
+            None
+        );
     }
 }

@@ -124,7 +124,10 @@ impl VarianceLikelihood {
             .unwrap_or(0.0);
         let (mut low, mut high) = (best - step, best + step);
         for _ in 0..GOLDEN_SECTIONS {
-            let (a, b) = (high - GOLDEN_SECTION_RATIO * (high - low), low + GOLDEN_SECTION_RATIO * (high - low));
+            let (a, b) = (
+                high - GOLDEN_SECTION_RATIO * (high - low),
+                low + GOLDEN_SECTION_RATIO * (high - low),
+            );
             if self.deviance(a) < self.deviance(b) { high = b } else { low = a }
         }
         let log = 0.5 * (low + high);

@@ -79,7 +79,8 @@ impl Weak {
             .fold(WEAK_THRESHOLD, f64::max);
         let SingularValues { values, right } = SingularValues::of(&conditional);
         let strong = values.iter().filter(|value| **value >= WEAK_THRESHOLD).count();
-        let spanned = super::identifiability::orthogonal_complement(&right.columns(0, strong).into_owned());
+        let spanned =
+            super::identifiability::orthogonal_complement(&right.columns(0, strong).into_owned());
         let mut rows = DMatrix::zeros(spanned.nrows(), n);
         let mut visible = vec![1.0; n];
         for (column, &(j, size)) in sized.iter().enumerate() {

@@ -32,7 +32,7 @@ struct VirtualWrench {
 }
 
 impl VirtualWrench {
-    fn add(&mut self, at: &Vector3<f64>, force: &PerCoordinate) {
+    fn add_force(&mut self, at: &Vector3<f64>, force: &PerCoordinate) {
         for (i, force) in force.iter().enumerate() {
             self.moment[i] += at.cross(force);
             self.force[i] += force;
@@ -96,7 +96,7 @@ impl LinearisedArm {
                     loads[segment.loads.clone()].iter_mut().for_each(|load| weigh(load, &weights));
                 }
                 Step::Section(section) => {
-                    let section_weights = section.weights(influence);
+                    let section_weights = section.weighted_axes(influence);
                     (0..3).for_each(|i| weights[i] += section_weights[i]);
                 }
                 Step::Fork { branches } => forks.extend((0..*branches).map(|_| weights)),
@@ -124,11 +124,11 @@ impl LinearisedArm {
         let (mut wrench, mut ends) = (VirtualWrench::default(), Vec::new());
         for (index, step) in steps.iter().enumerate().rev() {
             if index + 1 == *target {
-                wrench.add(at, &Frame::identity().axes);
+                wrench.add_force(at, &Frame::identity().axes);
             }
             match step {
-                Step::Load(load) => wrench.add(&loads[*load].at, &loads[*load].virtual_force),
-                Step::Section(section) => section.add_to(influence, &mut wrench),
+                Step::Load(load) => wrench.add_force(&loads[*load].at, &loads[*load].virtual_force),
+                Step::Section(section) => section.add_moment_change(influence, &mut wrench),
                 Step::Branch => ends.push(std::mem::take(&mut wrench)),
                 Step::Fork { branches } => {
                     for branch in (0..*branches).filter_map(|_| ends.pop()) {
@@ -141,15 +141,17 @@ impl LinearisedArm {
                 Step::Segment(segment) => {
                     let segment_loads = &loads[segment.loads.clone()];
                     let work = |direction: usize| {
-                        let column = &columns[segment.column(direction)];
+                        let column = &columns[segment.column_index(direction)];
                         let mut work = wrench.work_on(column);
-                        if column.pull != 0.0 {
+                        if column.spring_moment != 0.0 {
                             // A spring adds to the moment of its joint's section.
                             let first = 3 * segment.unknowns.start;
-                            work += Vector3::from_fn(|i, _| influence[first + i] * column.pull);
+                            work += Vector3::from_fn(|i, _| {
+                                influence[first + i] * column.spring_moment
+                            });
                         }
                         for (load, moved) in
-                            segment_loads.iter().zip(&moves[segment.moves(direction)])
+                            segment_loads.iter().zip(&moves[segment.move_range(direction)])
                         {
                             work += Vector3::from_fn(|i, _| load.virtual_force[i].dot(moved));
                         }
@@ -201,7 +203,7 @@ enum SweepResult {
 impl Section {
     /// Returns Σ Λₖ aₖ over the axes aₖ of the section's moments, for each coordinate of the
     /// target.
-    fn weights(&self, influence: &[f64]) -> PerCoordinate {
+    fn weighted_axes(&self, influence: &[f64]) -> PerCoordinate {
         let mut weights = [Vector3::zeros(); 3];
         for (axis, influence) in self
             .axes
@@ -217,13 +219,13 @@ impl Section {
 
     /// Adds to `wrench` the change of the section's moment a·(M − r × F) with its place r, and with
     /// its axes a if they move with the arm.
-    fn add_to(&self, influence: &[f64], wrench: &mut VirtualWrench) {
-        let weights = self.weights(influence);
+    fn add_moment_change(&self, influence: &[f64], wrench: &mut VirtualWrench) {
+        let weights = self.weighted_axes(influence);
         if self.moment_axes == MomentAxes::Moving {
             for (moment, weight) in wrench.moment.iter_mut().zip(&weights) {
                 *moment += weight.cross(&self.moment);
             }
         }
-        wrench.add(&self.at, &weights.map(|weight| weight.cross(&self.force)));
+        wrench.add_force(&self.at, &weights.map(|weight| weight.cross(&self.force)));
     }
 }

@@ -61,7 +61,7 @@ impl<S: Scalar> Deflection<S> {
 /// Factors of the closed-form response to a unit load. They depend on geometry alone and serve both
 /// bending planes.
 #[derive(Clone, Copy)]
-struct Shape<S> {
+struct ResponseFactors<S> {
     /// Deflection per force and flexibility \[m³\]; for an evenly spread load, per N/m and
     /// flexibility \[m⁴\].
     deflection_of_force: S,
@@ -106,7 +106,7 @@ impl<S: Scalar> Cantilever<'_, S> {
         for (station, wrench) in self.points {
             let s = *station;
             let shape = if x.re().abs() <= s.re().abs() {
-                Shape {
+                ResponseFactors {
                     deflection_of_force: x2 * (s * 0.5 - x / 6.0),
                     slope_of_force: x * (s - x * 0.5),
                     deflection_of_moment: x2 * 0.5,
@@ -114,7 +114,7 @@ impl<S: Scalar> Cantilever<'_, S> {
                 }
             } else {
                 let (beyond, half) = (x - s, s * s * 0.5);
-                Shape {
+                ResponseFactors {
                     deflection_of_force: s * half * (2.0 / 3.0) + half * beyond,
                     slope_of_force: half,
                     deflection_of_moment: half + s * beyond,
@@ -147,7 +147,7 @@ impl<S: Scalar> Cantilever<'_, S> {
         for (station, wrench) in self.points {
             let s = *station;
             let (beyond, half) = (l - s, s * s * 0.5);
-            let end = Shape {
+            let end = ResponseFactors {
                 deflection_of_force: s * half * (2.0 / 3.0),
                 slope_of_force: half,
                 deflection_of_moment: half,
@@ -155,7 +155,7 @@ impl<S: Scalar> Cantilever<'_, S> {
             };
             let mean =
                 |inside: S, end: S, slope: S| (inside + (end + slope * beyond * 0.5) * beyond) / l;
-            let shape = Shape {
+            let shape = ResponseFactors {
                 deflection_of_force: mean(
                     half * half * 0.5,
                     end.deflection_of_force,
@@ -225,7 +225,7 @@ impl<S: Scalar> Cantilever<'_, S> {
 fn superpose<S: Scalar>(
     out: &mut Deflection<S>,
     k: &Flexibility<S>,
-    shape: &Shape<S>,
+    shape: &ResponseFactors<S>,
     wrench: &Wrench<S>,
 ) {
     let (f, m) = (&wrench.force, &wrench.moment);

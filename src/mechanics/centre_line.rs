@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::arm::Arm;
-use super::forward::Bend;
+use super::forward::DeflectionMode;
 use super::statics::{StaticState, StaticsError, Workspace};
 use crate::problem::PoseView;
 
@@ -30,7 +30,7 @@ impl Arm<f64> {
             Self { beam_elements: self.beam_elements.max(MIN_DRAWN_ELEMENTS), ..self.clone() };
         let (mut ws, mut state) = (Workspace::default(), StaticState::default());
         drawn.gather_forces(setup, &[], &mut ws);
-        drawn.walk(setup, Bend::Rigid, tip, &mut ws);
+        drawn.walk(setup, DeflectionMode::Rigid, tip, &mut ws);
         let mut rigid = vec![Vector3::zeros()];
         rigid.append(&mut ws.trail);
         if !drawn.is_elastic() {

@@ -8,8 +8,8 @@ use super::arm::Arm;
 use super::element::{Element, LinkLoad};
 use super::joint::Coordinates;
 use super::link::{Beam, Hoist, PointMass};
-use super::motion::SIDES;
-use super::segment::{Cut, SLIDE_TILTS, Segment};
+use super::motion::MOTION_STARTS;
+use super::segment::{Cut, SLIDE_TILT_POSITIONS, Segment};
 use super::workspace::{Event, Workspace};
 use crate::problem::PoseView;
 use crate::scalar::Scalar;
@@ -17,7 +17,7 @@ use crate::spatial::Frame;
 
 /// Way in which a forward pass deflects the arm and what it records.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Bend<'a, S> {
+pub(super) enum DeflectionMode<'a, S> {
     /// No deflection; records loads and sections as events.
     Rigid,
     /// Deflection by the given moments [N·m]; records loads and sections as events.
@@ -34,9 +34,9 @@ pub(super) enum Bend<'a, S> {
 }
 
 /// State of a forward pass.
-struct Walk<'a, S> {
+struct ForwardPass<'a, S> {
     setup: &'a PoseView<'a>,
-    bend: Bend<'a, S>,
+    bend: DeflectionMode<'a, S>,
     frame: Frame<S>,
     /// Index of the next unknown moment.
     next: usize,
@@ -44,14 +44,16 @@ struct Walk<'a, S> {
     tip: usize,
 }
 
-impl<S: Scalar> Walk<'_, S> {
+impl<S: Scalar> ForwardPass<'_, S> {
     /// Returns the next N of the given moments [N·m]; `None` in a pass without deflection.
     fn moments<const N: usize>(&mut self) -> Option<[S; N]> {
         let first = self.next;
         self.next += N;
         match self.bend {
-            Bend::Rigid => None,
-            Bend::Bent(moments) | Bend::BySegment(moments, _) | Bend::FirstOrder(moments) => {
+            DeflectionMode::Rigid => None,
+            DeflectionMode::Bent(moments)
+            | DeflectionMode::BySegment(moments, _)
+            | DeflectionMode::FirstOrder(moments) => {
                 Some(std::array::from_fn(|k| moments[first + k]))
             }
         }
@@ -66,7 +68,7 @@ impl<S: Scalar> Walk<'_, S> {
         events: &mut Vec<Event<S>>,
         cuts: &mut Vec<Cut<S>>,
     ) {
-        if let Bend::BySegment(..) = self.bend {
+        if let DeflectionMode::BySegment(..) = self.bend {
             cuts.push(Cut {
                 frame: self.frame,
                 segment,
@@ -106,7 +108,7 @@ impl<S: Scalar> Walk<'_, S> {
     fn slide(&mut self, flexibility: S, length: S, segment: Segment, ws: &mut Workspace<S>) {
         let half = flexibility * length * (0.5 * length.re().signum());
         let mut passed = 0.0;
-        for at in SLIDE_TILTS {
+        for at in SLIDE_TILT_POSITIONS {
             self.frame.translate_z(length * (at - passed));
             self.tilt(&[half, half], segment, ws);
             passed = at;
@@ -115,7 +117,7 @@ impl<S: Scalar> Walk<'_, S> {
     }
 
     /// Records a fork: a frame where `branches` more branches start besides the one that follows.
-    fn fork(&self, branches: usize, ws: &mut Workspace<S>) {
+    fn record_fork(&self, branches: usize, ws: &mut Workspace<S>) {
         if branches > 0 {
             ws.forks.extend((0..branches).map(|_| self.frame));
             if self.records_events() {
@@ -125,7 +127,7 @@ impl<S: Scalar> Walk<'_, S> {
     }
 
     /// Returns to the last fork at which a branch is still to be passed.
-    fn branch(&mut self, ws: &mut Workspace<S>) {
+    fn return_to_fork(&mut self, ws: &mut Workspace<S>) {
         self.frame = ws.forks.pop().unwrap_or(self.frame);
         if self.records_events() {
             ws.events.push(Event::Branch);
@@ -133,7 +135,7 @@ impl<S: Scalar> Walk<'_, S> {
     }
 
     fn records_events(&self) -> bool {
-        !matches!(self.bend, Bend::FirstOrder(_))
+        !matches!(self.bend, DeflectionMode::FirstOrder(_))
     }
 }
 
@@ -151,14 +153,14 @@ impl<S: Scalar> Arm<S> {
                 return zero;
             };
             let hook = || hooks.next().map_or([S::from(0.0); 2], |hook| [hook[0], hook[1]]);
-            self.pull(hoist, setup, hook)
+            self.rope_force(hoist, setup, hook)
         }));
-        ws.beyond.clear();
-        ws.beyond.resize(self.joints.len(), zero);
+        ws.outboard_forces.clear();
+        ws.outboard_forces.resize(self.joints.len(), zero);
         ws.branch_sums.clear();
         let (mut mass, mut hoisted) = (S::from(0.0), zero);
         for (index, ((joint, beyond), rope)) in
-            self.joints.iter().zip(&mut ws.beyond).zip(&ws.ropes).enumerate().rev()
+            self.joints.iter().zip(&mut ws.outboard_forces).zip(&ws.ropes).enumerate().rev()
         {
             for (more, pull) in
                 (0..self.tree.extra_branches_on(index)).filter_map(|_| ws.branch_sums.pop())
@@ -192,7 +194,12 @@ impl<S: Scalar> Arm<S> {
 
     /// Returns the force of a rope \[N\], arm base frame; `hook` gives the hook's x and y \[m\] and
     /// is evaluated only if the rope may lean.
-    fn pull(&self, hoist: &Hoist, setup: &PoseView, hook: impl FnOnce() -> [S; 2]) -> Vector3<S> {
+    fn rope_force(
+        &self,
+        hoist: &Hoist,
+        setup: &PoseView,
+        hook: impl FnOnce() -> [S; 2],
+    ) -> Vector3<S> {
         let tension = setup.hoist.copied().unwrap_or(hoist.force);
         match &self.rope {
             None => (hoist.direction * tension).map(S::from),
@@ -211,34 +218,34 @@ impl<S: Scalar> Arm<S> {
     pub(super) fn walk(
         &self,
         setup: &PoseView,
-        bend: Bend<S>,
+        bend: DeflectionMode<S>,
         tip: usize,
         ws: &mut Workspace<S>,
     ) -> Frame<S> {
         let mut walk =
-            Walk { setup, bend, frame: Frame::identity(), next: self.hook_unknowns(), tip };
+            ForwardPass { setup, bend, frame: Frame::identity(), next: self.hook_unknowns(), tip };
         let mut found = walk.frame;
         ws.forks.clear();
-        ws.passed = 0;
+        ws.events_before_tip = 0;
         ws.events.clear();
         ws.hooks.clear();
         ws.cuts.clear();
         ws.trail.clear();
-        if matches!(bend, Bend::Rigid) {
+        if matches!(bend, DeflectionMode::Rigid) {
             ws.rigid_roots.clear();
         }
         if let Some(mounting) = &self.mounting {
             walk.tilt(mounting, Segment::Mounting, ws);
         }
         ws.frames.clear();
-        ws.keep(&walk.frame);
-        walk.fork(self.tree.extra_branches_at_base(), ws);
+        ws.keep_frame(&walk.frame);
+        walk.record_fork(self.tree.extra_branches_at_base(), ws);
         for (i, joint) in self.joints.iter().enumerate() {
             if self.tree.begins_branch(i) {
-                walk.branch(ws);
+                walk.return_to_fork(ws);
             }
             joint.advance_to_link(&mut walk.frame);
-            if matches!(bend, Bend::Rigid) {
+            if matches!(bend, DeflectionMode::Rigid) {
                 ws.rigid_roots.push(walk.frame);
             }
             if joint.beam.is_none() {
@@ -254,7 +261,7 @@ impl<S: Scalar> Arm<S> {
                 walk.tilt(lateral, Segment::Joint(i), ws);
             }
             let motion = setup.motion(i);
-            joint.displace(&mut walk.frame, motion, SIDES[0]);
+            joint.displace(&mut walk.frame, motion, MOTION_STARTS[0]);
             if joint.motion.is_some() {
                 // The motion before the joint also moves its axis, so the axis belongs to the next
                 // segment.
@@ -286,11 +293,11 @@ impl<S: Scalar> Arm<S> {
                 walk.frame.translate_z(offset);
             }
             walk.frame.rotate_y(joint.beta.sin_cos);
-            joint.displace(&mut walk.frame, motion, SIDES[1]);
+            joint.displace(&mut walk.frame, motion, MOTION_STARTS[1]);
             if self.tree.path_contains(i, tip) {
                 ws.trail.push(walk.frame.origin);
             }
-            ws.keep(&walk.frame);
+            ws.keep_frame(&walk.frame);
             walk.cut(Segment::Joint(i), deflecting_moments, &mut ws.events, &mut ws.cuts);
             if walk.records_events() {
                 for body in &joint.bodies {
@@ -308,21 +315,27 @@ impl<S: Scalar> Arm<S> {
             }
             if i == tip {
                 found = walk.frame;
-                ws.passed = ws.events.len();
+                ws.events_before_tip = ws.events.len();
             }
-            walk.fork(self.tree.extra_branches_on(i), ws);
+            walk.record_fork(self.tree.extra_branches_on(i), ws);
         }
         found
     }
 
     /// Passes along the beam of the joint with index `link`, element by element.
-    fn walk_beam(&self, beam: &Beam<S>, link: usize, walk: &mut Walk<S>, ws: &mut Workspace<S>) {
+    fn walk_beam(
+        &self,
+        beam: &Beam<S>,
+        link: usize,
+        walk: &mut ForwardPass<S>,
+        ws: &mut Workspace<S>,
+    ) {
         let Workspace {
             events,
             hooks,
             cuts,
             ropes,
-            beyond,
+            outboard_forces: beyond,
             rigid_roots,
             trail,
             link_loads,
@@ -331,7 +344,7 @@ impl<S: Scalar> Arm<S> {
         } = ws;
         let elements = self.beam_elements;
         let length = self.joints[link].a / elements as f64;
-        self.load_beam(beam, ropes[link], length, link_loads);
+        self.list_beam_loads(beam, ropes[link], length, link_loads);
         let of_pose = walk.setup.offsets.and_then(|all| Some(all.get(link)?.strain));
         let strain = beam.strain.as_ref().map(|strain| strain.plus(of_pose.unwrap_or_default()));
         let weight = self.gravity * S::from(beam.mass / elements as f64);
@@ -353,28 +366,28 @@ impl<S: Scalar> Arm<S> {
                 tip: Wrench { force: beyond[link] + outboard, moment },
             };
             let mut root = walk.frame;
-            if let Bend::BySegment(_, Some(rotation)) = walk.bend {
+            if let DeflectionMode::BySegment(_, Some(rotation)) = walk.bend {
                 root.rotate(rotation);
             }
             match walk.bend {
-                Bend::FirstOrder(_) => {
+                DeflectionMode::FirstOrder(_) => {
                     walk.frame = element.first_order_tip(root, &rigid_roots[link], points);
                 }
-                Bend::Rigid => {
+                DeflectionMode::Rigid => {
                     let middle = root.origin + root.axes[0] * (length * 0.5);
                     events.push(Event::Load { at: middle, force: weight });
                     for load in element.loads_on_element() {
                         let (at, mut force) = (element.straight_point(&root, load), load.force);
                         if let (true, Some(hoist), Some(_)) = (load.rope, &beam.hoist, &self.rope) {
                             hooks.push([at.x, at.y]);
-                            force = self.pull(hoist, walk.setup, || [at.x, at.y]);
+                            force = self.rope_force(hoist, walk.setup, || [at.x, at.y]);
                         }
                         events.push(Event::Load { at, force });
                     }
                     walk.frame.translate_x(length);
                     events.push(Event::Tip { at: walk.frame.origin });
                 }
-                Bend::Bent(_) | Bend::BySegment(..) => {
+                DeflectionMode::Bent(_) | DeflectionMode::BySegment(..) => {
                     let bent = element.bend(&root, points);
                     events.push(Event::Load { at: bent.centre_of_mass(), force: weight });
                     for load in element.loads_on_element() {
@@ -397,7 +410,13 @@ impl<S: Scalar> Arm<S> {
 
     /// Writes the loads of a beam with elements of `length` \[m\] into `loads`; `rope` is the force
     /// of its rope \[N\].
-    fn load_beam(&self, beam: &Beam<S>, rope: Vector3<S>, length: S, loads: &mut Vec<LinkLoad<S>>) {
+    fn list_beam_loads(
+        &self,
+        beam: &Beam<S>,
+        rope: Vector3<S>,
+        length: S,
+        loads: &mut Vec<LinkLoad<S>>,
+    ) {
         let last = (self.beam_elements - 1) as f64;
         #[expect(
             clippy::cast_possible_truncation,

@@ -3,7 +3,7 @@
 use num_dual::Dual64;
 
 use super::arm::Arm;
-use super::forward::Bend;
+use super::forward::DeflectionMode;
 use super::statics::{MAX_EQUILIBRIUM_PASSES, MAX_RELATIVE_CHANGE, StaticState};
 use super::workspace::Workspace;
 use crate::problem::{Equilibrium, PoseView};
@@ -23,7 +23,7 @@ impl Arm<Dual64> {
     ) -> Vec<Frame<Dual64>> {
         ws.keeps_frames = true;
         self.gather_forces(setup, &[], ws);
-        self.walk(setup, Bend::Rigid, state.tip, ws);
+        self.walk(setup, DeflectionMode::Rigid, state.tip, ws);
         ws.sum_moments();
         let mut moments = ws.next_moments.clone();
         if !self.is_elastic() || moments.is_empty() {
@@ -32,7 +32,7 @@ impl Arm<Dual64> {
         let mut first_order = None;
         if self.equilibrium == Equilibrium::Undeflected {
             self.update_leaning_ropes(setup, &moments, ws);
-            self.walk(setup, Bend::FirstOrder(&moments), state.tip, ws);
+            self.walk(setup, DeflectionMode::FirstOrder(&moments), state.tip, ws);
             let frames = std::mem::take(&mut ws.frames);
             let Some(mixing) = self.mixing else { return frames };
             first_order = Some((frames, mixing));
@@ -42,7 +42,7 @@ impl Arm<Dual64> {
         }
         for _ in 0..MAX_EQUILIBRIUM_PASSES {
             self.update_leaning_ropes(setup, &moments, ws);
-            self.walk(setup, Bend::Bent(&moments), state.tip, ws);
+            self.walk(setup, DeflectionMode::Bent(&moments), state.tip, ws);
             ws.sum_moments();
             let largest = ws.next_moments.iter().fold(0.0_f64, |m, x| m.max(x.eps.abs()));
             let both = moments.iter().zip(&ws.next_moments);

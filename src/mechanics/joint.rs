@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use super::compensator::Compensator;
 use super::imperfection::Nonlinear;
 use super::link::{Beam, PointMass, point_masses};
-use super::motion::{MOTION, SIDES};
+use super::motion::{MOTION_LEN, MOTION_STARTS};
 use crate::problem::{self, JointKind};
 use crate::scalar::Scalar;
 use crate::spatial::Frame;
@@ -96,7 +96,7 @@ pub struct Joint<S> {
     pub compensator: Option<Compensator<S>>,
     /// Small motion before the joint turns, and behind it: translation \[m\] and rotation vector
     /// \[rad\] each; `None` if the arm has no such parameter.
-    pub motion: Option<Box<[S; 2 * MOTION]>>,
+    pub motion: Option<Box<[S; 2 * MOTION_LEN]>>,
     /// Elastic link along the length a; rigid and without mass if `None`.
     pub beam: Option<Beam<S>>,
     /// Point masses that move with frame i, behind the joint.
@@ -241,14 +241,19 @@ impl<S: Scalar> Joint<S> {
     }
 
     /// Moves `frame` through the whole undeflected `T_i`, with the small motions of a pose.
-    pub(super) fn advance(&self, frame: &mut Frame<S>, q: f64, motion: Option<&[f64; 2 * MOTION]>) {
+    pub(super) fn advance(
+        &self,
+        frame: &mut Frame<S>,
+        q: f64,
+        motion: Option<&[f64; 2 * MOTION_LEN]>,
+    ) {
         self.advance_to_axis(frame);
-        self.displace(frame, motion, SIDES[0]);
+        self.displace(frame, motion, MOTION_STARTS[0]);
         let Coordinates { angle, offset } = self.coordinates(q);
         frame.rotate_z(angle);
         frame.translate_z(offset);
         frame.rotate_y(self.beta.sin_cos);
-        self.displace(frame, motion, SIDES[1]);
+        self.displace(frame, motion, MOTION_STARTS[1]);
     }
 
     /// Moves a frame by the small motion whose six numbers start at `first`: the sum of the arm's
@@ -256,7 +261,7 @@ impl<S: Scalar> Joint<S> {
     pub(super) fn displace(
         &self,
         frame: &mut Frame<S>,
-        of_pose: Option<&[f64; 2 * MOTION]>,
+        of_pose: Option<&[f64; 2 * MOTION_LEN]>,
         first: usize,
     ) {
         if self.motion.is_none() && of_pose.is_none() {

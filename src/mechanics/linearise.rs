@@ -20,7 +20,7 @@ impl LinearisedArm {
         // next, they are its loads.
         let mut element_loads = 0;
         for (index, event) in ws.events.iter().enumerate() {
-            if index == ws.passed {
+            if index == ws.events_before_tip {
                 self.target = self.steps.len();
             }
             match event {
@@ -35,7 +35,7 @@ impl LinearisedArm {
                     self.push_segment(LinearisedSegment {
                         index: segment.index(),
                         root,
-                        tip: cut.real(),
+                        tip: cut.real_frame(),
                         rotates: segment.is_beam(),
                         unknowns: first..first + count,
                         moment_direction: segment.moment_direction(count),
@@ -52,7 +52,7 @@ impl LinearisedArm {
                             .filter(|&last| matches!(ws.events[last], Event::Axis { .. })),
                         ..LinearisedSegment::default()
                     });
-                    root = cut.real();
+                    root = cut.real_frame();
                 }
                 Event::Tip { .. } => {
                     self.push_section(root.origin, &Frame::identity().axes, MomentAxes::Fixed);
@@ -74,7 +74,7 @@ impl LinearisedArm {
             }
             element_loads = 0;
         }
-        if ws.passed == ws.events.len() {
+        if ws.events_before_tip == ws.events.len() {
             self.target = self.steps.len();
         }
         self.sum_loads();
@@ -94,16 +94,16 @@ impl LinearisedArm {
             let [dx, dy, dz] = cut.frame.axes.map(|axis| axis.map(|c| c.eps));
             let rotation = segment.tip.vector(&Vector3::new(dy.dot(z), dz.dot(x), dx.dot(y)));
             let velocity = cut.frame.origin.map(|c| c.eps);
-            let pull = match segment.axis.map(|axis| &ws.events[axis]) {
+            let spring_moment = match segment.axis.map(|axis| &ws.events[axis]) {
                 Some(Event::Axis { pull: Some(pull), .. }) => pull.eps,
                 _ => 0.0,
             };
-            self.columns[segment.column(direction)] = EndTwist {
+            self.columns[segment.column_index(direction)] = EndTwist {
                 rotation,
                 translation: velocity - rotation.cross(&segment.tip.origin),
-                pull,
+                spring_moment,
             };
-            for (moved, event) in self.moves[segment.moves(direction)]
+            for (moved, event) in self.moves[segment.move_range(direction)]
                 .iter_mut()
                 .zip(&ws.events[segment.events.clone()])
             {

@@ -19,7 +19,7 @@ pub(super) struct EndTwist {
     /// Displacement of the point at the base origin per unit \[m\].
     pub translation: Vector3<f64>,
     /// Change of the moment of the spring about a joint's axis, per unit [N·m].
-    pub pull: f64,
+    pub spring_moment: f64,
 }
 
 /// Axes of a section's moment: fixed in space, or moving with the arm.
@@ -76,11 +76,11 @@ pub(super) struct LinearisedSegment {
 }
 
 impl LinearisedSegment {
-    pub fn column(&self, direction: usize) -> usize {
+    pub fn column_index(&self, direction: usize) -> usize {
         self.first_column + direction
     }
 
-    pub fn moves(&self, direction: usize) -> Range<usize> {
+    pub fn move_range(&self, direction: usize) -> Range<usize> {
         let first = self.first_move + direction * self.loads.len();
         first..first + self.loads.len()
     }

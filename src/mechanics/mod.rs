@@ -33,7 +33,7 @@ pub(crate) use joint::Coordinates;
 pub use joint::{Angle, Joint, Placement};
 pub use link::{Beam, Hoist, PointMass};
 pub(crate) use moments::AxisMoments;
-pub(crate) use motion::{MOTION, SIDES};
+pub(crate) use motion::{MOTION_LEN, MOTION_STARTS};
 pub(crate) use segment::Segment;
 pub use sensitivity::Sensitivity;
 pub(crate) use statics::AdjointSolver;

@@ -1,7 +1,7 @@
 //! Moments of the loads about the axes of the joints, which formulas of laws may contain.
 
 use super::arm::Arm;
-use super::forward::Bend;
+use super::forward::DeflectionMode;
 use super::workspace::{Event, Workspace};
 use crate::problem::PoseView;
 use crate::scalar::Scalar;
@@ -50,7 +50,7 @@ impl<S: Scalar> AxisMoments<S> {
         let arm = &self.arm;
         let mut ws = Workspace::default();
         arm.gather_forces(setup, &[], &mut ws);
-        arm.walk(setup, Bend::Rigid, arm.last(), &mut ws);
+        arm.walk(setup, DeflectionMode::Rigid, arm.last(), &mut ws);
         ws.sum_moments();
         // A moment within rounding errors is set to zero, because its sign is meaningless.
         let term = |event: &Event<S>| match event {

@@ -10,7 +10,8 @@ use crate::spatial::Frame;
 
 /// Positions along a slide at which its bending is concentrated, relative to its length:
 /// Gauss–Legendre points (1 ∓ 1/√3)/2.
-pub(super) const SLIDE_TILTS: [f64; 2] = [0.211_324_865_405_187_1, 0.788_675_134_594_812_9];
+pub(super) const SLIDE_TILT_POSITIONS: [f64; 2] =
+    [0.211_324_865_405_187_1, 0.788_675_134_594_812_9];
 
 /// Part of the arm between two frames.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -86,7 +87,7 @@ pub(super) fn moment_directions<S: Scalar>(arm: &Arm<S>) -> Vec<usize> {
             add(Segment::Joint(i), 1);
         }
         if joint.slide.is_some() {
-            for _ in SLIDE_TILTS {
+            for _ in SLIDE_TILT_POSITIONS {
                 add(Segment::Joint(i), 2);
             }
         }
@@ -95,7 +96,7 @@ pub(super) fn moment_directions<S: Scalar>(arm: &Arm<S>) -> Vec<usize> {
 }
 
 impl<S: Scalar> Cut<S> {
-    pub(super) fn real(&self) -> Frame<f64> {
+    pub(super) fn real_frame(&self) -> Frame<f64> {
         Frame {
             axes: self.frame.axes.map(|axis| axis.map(|c| c.re())),
             origin: self.frame.origin.map(|c| c.re()),

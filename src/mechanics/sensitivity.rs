@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 use num_dual::Dual64;
 
 use super::arm::Arm;
-use super::forward::Bend;
+use super::forward::DeflectionMode;
 use super::linearised_arm::LinearisedArm;
 use super::segment::{Segment, moment_directions};
 use super::statics::{StaticState, StaticsError};
@@ -84,7 +84,12 @@ impl Sensitivity {
                 // The parameters of segments do not change the forces.
                 arm.gather_forces(setup, &[], ws);
             }
-            arm.walk(setup, Bend::BySegment(&moments, root_rotation.as_ref()), pose.tip, ws);
+            arm.walk(
+                setup,
+                DeflectionMode::BySegment(&moments, root_rotation.as_ref()),
+                pose.tip,
+                ws,
+            );
             if direction == 0 {
                 linearised.linearise(ws, parameters);
             }

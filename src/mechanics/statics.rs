@@ -16,7 +16,7 @@ use nalgebra::Vector3;
 use num_dual::Dual64;
 
 use super::arm::Arm;
-use super::forward::Bend;
+use super::forward::DeflectionMode;
 use crate::problem::{Equilibrium, PoseView};
 use crate::scalar::Scalar;
 use crate::spatial::Frame;
@@ -93,12 +93,12 @@ impl Arm<f64> {
             return Ok(());
         }
         self.gather_forces(setup, &[], ws);
-        self.walk(setup, Bend::Rigid, tip, ws);
+        self.walk(setup, DeflectionMode::Rigid, tip, ws);
         ws.sum_moments();
         pose.moments.extend_from_slice(&ws.next_moments);
         let first_order = if self.is_first_order() {
             self.update_leaning_ropes(setup, &pose.moments, ws);
-            pose.frame = self.walk(setup, Bend::FirstOrder(&pose.moments), tip, ws);
+            pose.frame = self.walk(setup, DeflectionMode::FirstOrder(&pose.moments), tip, ws);
             let Some(mixing) = self.mixing else { return Ok(()) };
             Some((pose.frame, mixing))
         } else {
@@ -107,7 +107,7 @@ impl Arm<f64> {
         ws.anderson.restart();
         for _ in 0..MAX_EQUILIBRIUM_PASSES {
             self.update_leaning_ropes(setup, &pose.moments, ws);
-            pose.frame = self.walk(setup, Bend::Bent(&pose.moments), tip, ws);
+            pose.frame = self.walk(setup, DeflectionMode::Bent(&pose.moments), tip, ws);
             ws.sum_moments();
             let largest = ws.next_moments.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
             let change = pose
@@ -122,7 +122,7 @@ impl Arm<f64> {
                 || change <= MOMENT_ROUNDING * ws.moment_scale()
             {
                 if let Some((first_order, mixing)) = &first_order {
-                    pose.frame = mixed(first_order, &pose.frame, *mixing);
+                    pose.frame = mix_frames(first_order, &pose.frame, *mixing);
                 }
                 return Ok(());
             }
@@ -134,7 +134,7 @@ impl Arm<f64> {
 
 /// Returns (1 − λ) × `one` + λ × `other`, origins and axes alike, with λ = `mixing`; the result is
 /// not orthonormal.
-fn mixed<S: Scalar>(one: &Frame<S>, other: &Frame<S>, mixing: S) -> Frame<S> {
+fn mix_frames<S: Scalar>(one: &Frame<S>, other: &Frame<S>, mixing: S) -> Frame<S> {
     let mix = |one: &Vector3<S>, other: &Vector3<S>| one + (other - one) * mixing;
     let axes = std::array::from_fn(|i| mix(&one.axes[i], &other.axes[i]));
     Frame { axes, origin: mix(&one.origin, &other.origin) }
@@ -179,7 +179,8 @@ impl AdjointSolver {
             moments.extend(pose.moments.iter().map(|&x| Dual64::from(x)));
             moments[j] = moments[j].derivative();
             self.arm.update_leaning_ropes(setup, &moments, &mut self.ws);
-            let frame = self.arm.walk(setup, Bend::Bent(&moments), pose.tip, &mut self.ws);
+            let frame =
+                self.arm.walk(setup, DeflectionMode::Bent(&moments), pose.tip, &mut self.ws);
             self.ws.sum_moments();
             let position = frame.point(&target);
             for i in 0..3 {
@@ -254,12 +255,12 @@ impl<S: Scalar> Arm<S> {
         self.gather_forces(setup, &[], ws);
         let mut moments = std::mem::take(&mut ws.moments);
         let first_order = self.is_first_order().then(|| {
-            self.walk(setup, Bend::Rigid, pose.tip, ws);
+            self.walk(setup, DeflectionMode::Rigid, pose.tip, ws);
             ws.sum_moments();
             moments.clear();
             moments.extend_from_slice(&ws.next_moments);
             self.update_leaning_ropes(setup, &moments, ws);
-            self.walk(setup, Bend::FirstOrder(&moments), pose.tip, ws).point(&target)
+            self.walk(setup, DeflectionMode::FirstOrder(&moments), pose.tip, ws).point(&target)
         });
         let position = match (first_order, self.mixing) {
             (Some(first_order), None) => first_order,
@@ -288,7 +289,8 @@ impl<S: Scalar> Arm<S> {
         moments.clear();
         moments.extend(pose.moments.iter().map(|&x| S::from(x)));
         self.update_leaning_ropes(setup, moments, ws);
-        let mut position = self.walk(setup, Bend::Bent(moments), pose.tip, ws).point(target);
+        let mut position =
+            self.walk(setup, DeflectionMode::Bent(moments), pose.tip, ws).point(target);
         ws.sum_moments();
         let n = moments.len();
         for (j, (next, &x)) in ws.next_moments.iter().zip(&pose.moments).enumerate() {

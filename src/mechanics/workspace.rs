@@ -41,7 +41,7 @@ pub struct Workspace<S> {
     /// Ends of segments, recorded by a pass made segment by segment.
     pub(super) cuts: Vec<Cut<S>>,
     /// Number of events recorded before the frame of the requested joint.
-    pub(super) passed: usize,
+    pub(super) events_before_tip: usize,
     /// Frames at which branches are still to be passed, the last one first.
     pub(super) forks: Vec<Frame<S>>,
     /// Mass \[kg\] and hoist force \[N\] of branches that have been summed but not yet added to
@@ -54,7 +54,7 @@ pub struct Workspace<S> {
     /// Force of each link's rope \[N\]; zero without a rope.
     pub(super) ropes: Vec<Vector3<S>>,
     /// Force of everything beyond each joint's link \[N\].
-    pub(super) beyond: Vec<Vector3<S>>,
+    pub(super) outboard_forces: Vec<Vector3<S>>,
     /// Frame at each link's root in the last undeflected pass.
     pub(super) rigid_roots: Vec<Frame<S>>,
     /// Points of the last pass, arm base frame \[m\]: ends of beam elements, and each joint before
@@ -74,14 +74,14 @@ impl<S> Default for Workspace<S> {
             next_moments: Vec::new(),
             hooks: Vec::new(),
             cuts: Vec::new(),
-            passed: 0,
+            events_before_tip: 0,
             forks: Vec::new(),
             branch_sums: Vec::new(),
             wrenches: Vec::new(),
             frames: Vec::new(),
             keeps_frames: false,
             ropes: Vec::new(),
-            beyond: Vec::new(),
+            outboard_forces: Vec::new(),
             rigid_roots: Vec::new(),
             trail: Vec::new(),
             link_loads: Vec::new(),
@@ -107,7 +107,7 @@ impl Workspace<f64> {
 impl<S: Scalar> Workspace<S> {
     /// Appends the frame behind a joint, if the caller asked for all frames.
     #[inline]
-    pub(super) fn keep(&mut self, frame: &Frame<S>) {
+    pub(super) fn keep_frame(&mut self, frame: &Frame<S>) {
         if self.keeps_frames {
             self.frames.push(*frame);
         }

@@ -63,8 +63,11 @@ impl Model {
             .filter(|&k| ablation.keeps(model.parameters[k].site))
             .collect();
         model.parameters.retain(|parameter| ablation.keeps(parameter.site));
-        model.constraints =
-            self.constraints.iter().filter_map(|constraint| constraint.on_parameters(&kept)).collect();
+        model.constraints = self
+            .constraints
+            .iter()
+            .filter_map(|constraint| constraint.on_parameters(&kept))
+            .collect();
         for joint in &mut model.nominal.joints {
             if matches!(ablation, Ablation::Rigid | Ablation::LinksOnly | Ablation::BendingOnly) {
                 (joint.flexibility, joint.lateral, joint.slide) = (None, None, None);

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::command_term::TermSite;
 use super::{Model, Pose, PoseResiduals};
 use crate::least_squares::{Block, CHUNK_ITEMS, LeastSquares as _};
-use crate::mechanics::MOTION;
+use crate::mechanics::MOTION_LEN;
 use crate::model::parameter::{BeamField, JointField, ParameterSite, Regressor};
 use crate::problem::Problem;
 
@@ -111,7 +111,7 @@ impl Model {
                     ParameterSite::Beam { joint, field: BeamField::STRAINS[which] }
                 }
                 TermSite::Motion { joint, which } => {
-                    let field = which.checked_sub(MOTION);
+                    let field = which.checked_sub(MOTION_LEN);
                     let field = field.map_or(JointField::Before(which), JointField::After);
                     ParameterSite::Joint { joint, field }
                 }

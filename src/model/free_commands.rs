@@ -94,7 +94,11 @@ impl Model {
 
 /// Creates a parameter q1, q2, … for each joint, without prior: the correction to its θ or d.
 /// Joints for which `kind` returns `Fixed` have none.
-fn coordinate_corrections(problem: &Problem, arm: &Arm<f64>, kind: fn(&Joint) -> JointKind) -> Vec<Parameter> {
+fn coordinate_corrections(
+    problem: &Problem,
+    arm: &Arm<f64>,
+    kind: fn(&Joint) -> JointKind,
+) -> Vec<Parameter> {
     let joints = problem.joints.iter().zip(&arm.joints).enumerate();
     let corrected = joints.filter_map(|(joint, (declared, nominal_joint))| {
         let (field, nominal) = match kind(declared) {

@@ -157,7 +157,10 @@ fn direction(axis: usize, position: &Vector3<f64>) -> Vector3<f64> {
 
 /// Returns the vector whose entry for each axis is Σ size × value(regressor) over the terms of this
 /// axis.
-fn sum_by_axis(terms: &[(usize, Regressor, f64)], value: impl Fn(&Regressor) -> f64) -> Vector3<f64> {
+fn sum_by_axis(
+    terms: &[(usize, Regressor, f64)],
+    value: impl Fn(&Regressor) -> f64,
+) -> Vector3<f64> {
     let mut sum = Vector3::zeros();
     for (axis, regressor, size) in terms {
         if let Some(entry) = sum.get_mut(*axis) {

@@ -20,7 +20,7 @@ use super::rows::{Rows, clear_block};
 use super::tilt::TiltDerivatives;
 use crate::least_squares::Block;
 use crate::model::parameter::{ParameterSite, Regressor};
-use crate::observation::{FixtureValues, MAX_NUMBERS, Needs, Scene, Slopes};
+use crate::observation::{FixtureValues, MAX_FIXTURE_NUMBERS, Needs, Scene, Slopes};
 use crate::spatial::Frame;
 
 /// Writer of residuals and Jacobian rows at one parameter vector, used for every row.
@@ -36,7 +36,7 @@ pub(super) struct JacobianWriter<'m> {
     targets: Vec<Target>,
     fixtures: Vec<FixtureValues<f64>>,
     /// Jacobian columns of the numbers of each fixture; `None` for fixed numbers.
-    fixture_columns: Vec<[Option<usize>; MAX_NUMBERS]>,
+    fixture_columns: Vec<[Option<usize>; MAX_FIXTURE_NUMBERS]>,
     /// Derivatives of tilts; `None` if the rows measure no tilt.
     tilts: Option<TiltDerivatives>,
     arm: ArmDerivatives,
@@ -61,7 +61,7 @@ impl<'m> JacobianWriter<'m> {
         };
         let mut targets: Vec<Target> = placements.enumerate().map(target).collect();
         let fixtures = model.fixtures(x);
-        let mut fixture_columns = vec![[None; MAX_NUMBERS]; fixtures.len()];
+        let mut fixture_columns = vec![[None; MAX_FIXTURE_NUMBERS]; fixtures.len()];
         let (mut instrument_columns, mut base_rotations) = (Vec::new(), Vec::new());
         for (column, of_column) in columns.iter().enumerate() {
             let (site, regressor) = (of_column.site, || of_column.regressor.clone());

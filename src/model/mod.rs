@@ -41,7 +41,7 @@ use nalgebra::Vector3;
 use crate::error::InputError;
 use crate::mechanics::{Arm, Joint};
 use crate::model::parameter::{
-    LinearConstraint, Parameter, ParameterSite, Regressor, resolve_constraints, resolve,
+    LinearConstraint, Parameter, ParameterSite, Regressor, resolve, resolve_constraints,
 };
 use crate::observation::{FixtureValues, Observation};
 use crate::problem::{BasePose, Effect, Fixture, Problem};

@@ -115,8 +115,10 @@ impl<'m> Predictor<'m> {
     #[inline]
     pub fn predict(&mut self, pose: &Pose) -> Prediction {
         let undefined = Vector3::from_element(f64::NAN);
-        self.try_predict(pose)
-            .unwrap_or(Prediction { numbers: undefined, orientation_error: pose.orientation.map(|_| undefined) })
+        self.try_predict(pose).unwrap_or(Prediction {
+            numbers: undefined,
+            orientation_error: pose.orientation.map(|_| undefined),
+        })
     }
 
     fn try_predict(&mut self, pose: &Pose) -> Option<Prediction> {
@@ -149,7 +151,10 @@ impl<'m> Predictor<'m> {
             }
         };
         let fixtures = fixtures_of(observation, |fixture| self.fixtures[fixture]);
-        Some(Prediction { numbers: observation.predict(&Scene { fixtures, ..scene }), orientation_error: turn })
+        Some(Prediction {
+            numbers: observation.predict(&Scene { fixtures, ..scene }),
+            orientation_error: turn,
+        })
     }
 
     /// Returns the frames that carry the two fixtures of a row, measuring frame; `None` without

@@ -10,13 +10,13 @@ use num_dual::Dual64;
 
 use super::inputs::Input;
 use super::rows::Rows;
-use crate::mechanics::{Angle, Arm, Coordinates, Joint, MOTION, Placement, SIDES};
+use crate::mechanics::{Angle, Arm, Coordinates, Joint, MOTION_LEN, MOTION_STARTS, Placement};
 use crate::model::parameter::{JointField, ParameterSite};
 use crate::problem::{PoseView, Tree};
 use crate::spatial::{Frame, rotate, rotated_about_x, rotated_about_y, rotated_about_z};
 
 /// Derivatives of the target with respect to the small motions on either side of a joint.
-type MotionLevers = Box<[Vector3<f64>; 2 * MOTION]>;
+type MotionLevers = Box<[Vector3<f64>; 2 * MOTION_LEN]>;
 
 /// Derivatives of a rigid arm, one elementary motion (rotation or translation) at a time.
 pub(super) struct Rigid {
@@ -39,7 +39,7 @@ struct Link {
     /// Inputs of x, y, z, roll, pitch, yaw of the placement.
     placing: [Option<usize>; 6],
     /// Inputs of the small motions on either side of the joint.
-    moving: [Option<usize>; 2 * MOTION],
+    moving: [Option<usize>; 2 * MOTION_LEN],
 }
 
 /// Derivatives of the target with respect to α, a, θ, d, β of a link, each in the frame before its
@@ -96,7 +96,8 @@ impl Rigid {
             let coordinates = link.joint.coordinates(q);
             let motion = link.motion(setup.motion(joint));
             let (derivatives, motions);
-            (derivatives, motions, point) = link.carry_inward(&coordinates, &point, motion.as_ref());
+            (derivatives, motions, point) =
+                link.carry_inward(&coordinates, &point, motion.as_ref());
             carried.push(LinkDerivatives { derivatives, coordinates, motions });
             if let Some(placement) = &link.joint.placement {
                 let derivatives;
@@ -124,7 +125,7 @@ impl Rigid {
             let motion = link.motion(setup.motion(joint));
             let write_motion = |side: usize, frame: &Frame<f64>, rows: &mut Rows| {
                 let Some(motions) = motions else { return };
-                for place in SIDES[side]..SIDES[side] + MOTION {
+                for place in MOTION_STARTS[side]..MOTION_STARTS[side] + MOTION_LEN {
                     if let Some(input) = link.moving[place] {
                         let column = frame.vector(&motions[place]);
                         rows.put_input(&inputs[input], commanded, &column);
@@ -159,12 +160,12 @@ impl Link {
             joint: Joint { placement, alpha, a, theta, d, beta, ..joint.lift() },
             inputs: [None; 5],
             placing: [None; 6],
-            moving: [None; 2 * MOTION],
+            moving: [None; 2 * MOTION_LEN],
         }
     }
 
     /// Returns the link's small motions in a pose; `None` if the link has none.
-    fn motion(&self, of_pose: Option<&[f64; 2 * MOTION]>) -> Option<[f64; 2 * MOTION]> {
+    fn motion(&self, of_pose: Option<&[f64; 2 * MOTION_LEN]>) -> Option<[f64; 2 * MOTION_LEN]> {
         self.joint.motion.as_ref()?;
         Some(of_pose.copied().unwrap_or_default())
     }
@@ -177,12 +178,12 @@ impl Link {
         &self,
         at: &Coordinates<Dual64>,
         point: &Vector3<f64>,
-        motion: Option<&[f64; 2 * MOTION]>,
+        motion: Option<&[f64; 2 * MOTION_LEN]>,
     ) -> ([Vector3<f64>; 5], Option<MotionLevers>, Vector3<f64>) {
         let Joint { alpha, a, beta, .. } = &self.joint;
-        let mut motions = motion.map(|_| Box::new([Vector3::zeros(); 2 * MOTION]));
+        let mut motions = motion.map(|_| Box::new([Vector3::zeros(); 2 * MOTION_LEN]));
         let mut displaced = |side: usize, point: Vector3<f64>| match (motion, &mut motions) {
-            (Some(motion), Some(motions)) => displace(motion, motions, SIDES[side], &point),
+            (Some(motion), Some(motions)) => displace(motion, motions, MOTION_STARTS[side], &point),
             _ => point,
         };
         let point = displaced(1, *point);
@@ -191,7 +192,8 @@ impl Link {
             split_derivative(&Vector3::new(point.x.into(), point.y.into(), at.offset + point.z));
         let (by_theta, point) = split_derivative(&rotated_about_z(at.angle, &point));
         let point = displaced(0, point);
-        let (by_a, point) = split_derivative(&Vector3::new(*a + point.x, point.y.into(), point.z.into()));
+        let (by_a, point) =
+            split_derivative(&Vector3::new(*a + point.x, point.y.into(), point.z.into()));
         let (by_alpha, point) = split_derivative(&rotated_about_x(alpha.sin_cos, &point));
         ([by_alpha, by_a, by_theta, by_d, by_beta], motions, point)
     }
@@ -203,7 +205,7 @@ impl Link {
         &self,
         at: &Coordinates<Dual64>,
         frame: &mut Frame<f64>,
-        motion: Option<&[f64; 2 * MOTION]>,
+        motion: Option<&[f64; 2 * MOTION_LEN]>,
         mut before: impl FnMut(LinkMotion, &Frame<f64>),
     ) {
         let Joint { alpha, a, beta, .. } = &self.joint;
@@ -212,7 +214,7 @@ impl Link {
                          before: &mut dyn FnMut(LinkMotion, &Frame<f64>)| {
             if let Some(motion) = motion {
                 before(LinkMotion::Motion(side), frame);
-                let [translation, rotation] = translation_and_rotation(motion, SIDES[side]);
+                let [translation, rotation] = translation_and_rotation(motion, MOTION_STARTS[side]);
                 frame.translate(&translation);
                 frame.rotate(&rotation);
             }
@@ -241,15 +243,15 @@ enum LinkMotion {
 
 /// Returns the translation \[m\] and the rotation vector \[rad\] of the small motion whose six
 /// numbers start at `first`.
-fn translation_and_rotation(motion: &[f64; 2 * MOTION], first: usize) -> [Vector3<f64>; 2] {
+fn translation_and_rotation(motion: &[f64; 2 * MOTION_LEN], first: usize) -> [Vector3<f64>; 2] {
     [first, first + 3].map(|first| Vector3::from_column_slice(&motion[first..first + 3]))
 }
 
 /// Transforms a point \[m\] from the frame behind a small motion to the frame before it. Writes its
 /// derivatives, in the frame before the motion, into `motions`.
 fn displace(
-    motion: &[f64; 2 * MOTION],
-    motions: &mut [Vector3<f64>; 2 * MOTION],
+    motion: &[f64; 2 * MOTION_LEN],
+    motions: &mut [Vector3<f64>; 2 * MOTION_LEN],
     first: usize,
     point: &Vector3<f64>,
 ) -> Vector3<f64> {

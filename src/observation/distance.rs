@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::scene::{length, single};
+use super::scene::{length, single_number};
 use super::{Content, Field, Kind, Needs, Scene};
 use crate::quantity::Unit;
 use crate::scalar::Scalar;
@@ -27,5 +27,5 @@ pub(super) const KIND: Kind = Kind {
 
 /// Predicts the distance ‖x − A‖ from the target x to the anchor A \[m\].
 pub(super) fn predict<S: Scalar>(scene: &Scene<S>) -> Vector3<S> {
-    single(length(&(scene.target - scene.fixtures[0].position())))
+    single_number(length(&(scene.target - scene.fixtures[0].position())))
 }

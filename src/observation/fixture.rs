@@ -7,7 +7,7 @@ use crate::scalar::Scalar;
 use crate::spatial::Frame;
 
 /// Largest number of values that describe a fixture (a camera with its lens distortion).
-pub(crate) const MAX_NUMBERS: usize = 15;
+pub(crate) const MAX_FIXTURE_NUMBERS: usize = 15;
 
 /// Kind of a fixture, which determines its numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -99,12 +99,12 @@ pub struct FixtureValues<S> {
     /// Kind of the fixture.
     pub kind: FixtureKind,
     /// Values of the fixture's numbers, in the order of [`FixtureKind::fields`].
-    pub numbers: [S; MAX_NUMBERS],
+    pub numbers: [S; MAX_FIXTURE_NUMBERS],
 }
 
 impl<S: Scalar> Default for FixtureValues<S> {
     fn default() -> Self {
-        Self { kind: FixtureKind::Point, numbers: [S::from(0.0); MAX_NUMBERS] }
+        Self { kind: FixtureKind::Point, numbers: [S::from(0.0); MAX_FIXTURE_NUMBERS] }
     }
 }
 

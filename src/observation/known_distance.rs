@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::scene::{length, single};
+use super::scene::{length, single_number};
 use super::{Kind, Needs, Scene};
 use crate::quantity::Unit;
 use crate::scalar::Scalar;
@@ -25,5 +25,5 @@ pub(super) const KIND: Kind = Kind {
 /// Predicts the distance ‖P₂ − P₁‖ between the two fixtures \[m\].
 pub(super) fn predict<S: Scalar>(scene: &Scene<S>) -> Vector3<S> {
     let [first, second] = scene.fixtures;
-    single(length(&(second.position() - first.position())))
+    single_number(length(&(second.position() - first.position())))
 }

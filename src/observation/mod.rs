@@ -17,7 +17,7 @@ mod scene;
 mod surface;
 mod tilt;
 
-pub(crate) use fixture::{FixtureKind, FixtureValues, MAX_NUMBERS};
+pub(crate) use fixture::{FixtureKind, FixtureValues, MAX_FIXTURE_NUMBERS};
 pub use kind::Kind;
 pub(crate) use kind::{Content, Field, Needs};
 pub(crate) use lens::slopes_of_pixel;
@@ -40,7 +40,7 @@ pub struct Slopes {
     /// Derivative with respect to a small rotation of the base's axes, measuring frame [1/rad].
     pub by_base: Matrix3<f64>,
     /// Derivatives with respect to the numbers of the fixtures.
-    pub by_fixtures: [SMatrix<f64, 3, MAX_NUMBERS>; 2],
+    pub by_fixtures: [SMatrix<f64, 3, MAX_FIXTURE_NUMBERS>; 2],
 }
 
 /// Number of input scalars before those of the fixtures: 3 for the position of the target, 3 for
@@ -49,7 +49,7 @@ const INPUTS_BEFORE_FIXTURES: usize = 6;
 /// Number of input scalars of a prediction with two fixtures of at most four numbers.
 const INPUTS: usize = INPUTS_BEFORE_FIXTURES + 8;
 /// Number of input scalars of a prediction with two fixtures of any kind.
-const ALL_INPUTS: usize = INPUTS_BEFORE_FIXTURES + 2 * MAX_NUMBERS;
+const ALL_INPUTS: usize = INPUTS_BEFORE_FIXTURES + 2 * MAX_FIXTURE_NUMBERS;
 
 /// Declares [`Observation`] and forwards each variant to the file of its kind.
 macro_rules! observations {

@@ -50,6 +50,6 @@ pub(super) fn length<S: Scalar>(vector: &Vector3<S>) -> S {
 }
 
 /// Returns a vector whose first entry is the only number that a row measures.
-pub(super) fn single<S: Scalar>(value: S) -> Vector3<S> {
+pub(super) fn single_number<S: Scalar>(value: S) -> Vector3<S> {
     Vector3::new(value, S::from(0.0), S::from(0.0))
 }

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::scene::{length, single};
+use super::scene::{length, single_number};
 use super::{Content, Field, FixtureKind, Kind, Needs, Scene};
 use crate::quantity::Unit;
 use crate::scalar::Scalar;
@@ -31,7 +31,7 @@ pub(super) const KIND: Kind = Kind {
 pub(super) fn predict<S: Scalar>(scene: &Scene<S>) -> Vector3<S> {
     let [surface, _] = scene.fixtures;
     let [x, y, z, radius, ..] = surface.numbers;
-    single(if surface.kind == FixtureKind::Plane {
+    single_number(if surface.kind == FixtureKind::Plane {
         plane_normal(x, y).dot(&scene.target) - z
     } else {
         length(&(scene.target - surface.position())) - radius

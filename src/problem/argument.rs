@@ -13,14 +13,14 @@ const MAX_ORDERS: usize = 100;
 pub(crate) const HIGHEST_ORDER: f64 = 1e4;
 
 /// Reader of the arguments of one effect, one after the other.
-pub(crate) struct Reader<'s, 'a, 'i> {
+pub(crate) struct ArgumentReader<'s, 'a, 'i> {
     pub section: Section<'a, 'i>,
     joints: &'s [Joint],
     /// Number of the joint that was read last, counted from 1.
     last: Option<usize>,
 }
 
-impl<'s, 'a, 'i> Reader<'s, 'a, 'i> {
+impl<'s, 'a, 'i> ArgumentReader<'s, 'a, 'i> {
     pub fn new(section: Section<'a, 'i>, joints: &'s [Joint]) -> Self {
         Self { section, joints, last: None }
     }

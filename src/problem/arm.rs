@@ -12,7 +12,7 @@ use crate::quantity::Unit;
 
 /// Reads all `[[joint]]` tables, at least one. The returned flag is true if they use the standard
 /// DH form. Implausible values are added to `warnings`.
-pub(super) fn joints(
+pub(super) fn read_joints(
     root: &mut Section<'_, '_>,
     warnings: &mut Vec<Warning>,
 ) -> Result<(Vec<Joint>, bool), InputError> {
@@ -39,8 +39,8 @@ pub(super) fn joints(
             return Err(item.error(InputErrorKind::NotInStandardForm));
         }
         parents.push(parent);
-        warnings.extend(plausible::joint(&section));
-        joints.push(joint(section, number, (form, mimic.is_some()), &mut beams)?);
+        warnings.extend(plausible::joint_warnings(&section));
+        joints.push(read_joint(section, number, (form, mimic.is_some()), &mut beams)?);
         mimics.push(mimic);
     }
     if joints.is_empty() {
@@ -51,15 +51,17 @@ pub(super) fn joints(
         .zip(&mimics)
         .map(|(joint, mimic)| joint.kind != JointKind::Fixed && mimic.is_none())
         .collect();
-    for ((joint, section), parent) in joints.iter_mut().zip(mimics).zip(tree::parents(&parents)?) {
-        joint.mimic = section.map(|section| mimic(section, &can_lead)).transpose()?;
+    for ((joint, section), parent) in
+        joints.iter_mut().zip(mimics).zip(tree::read_parents(&parents)?)
+    {
+        joint.mimic = section.map(|section| read_mimic(section, &can_lead)).transpose()?;
         joint.parent = parent;
     }
     if !form_is_declared && root.peek("urdf").is_none() {
-        warnings.extend(plausible::form(&joints));
+        warnings.extend(plausible::form_warning(&joints));
     }
     let is_standard = form == Form::Standard;
-    Ok((if is_standard { standard::modified(joints) } else { joints }, is_standard))
+    Ok((if is_standard { standard::to_modified_form(joints) } else { joints }, is_standard))
 }
 
 /// Order of the elementary transforms in a row of the joint table.
@@ -73,7 +75,7 @@ enum Form {
 
 /// Reads `mimic = { joint = 2, ratio = -1.0 }`. `can_lead[j]` is true if joint j takes a command,
 /// so that others may follow it.
-fn mimic(mut section: Section<'_, '_>, can_lead: &[bool]) -> Result<Mimic, InputError> {
+fn read_mimic(mut section: Section<'_, '_>, can_lead: &[bool]) -> Result<Mimic, InputError> {
     let item = section.require("joint", "joint = …, the number of the joint that it follows")?;
     let number = item.whole(0)?;
     let joint = usize::try_from(number).ok().and_then(|number| number.checked_sub(1));
@@ -94,7 +96,7 @@ fn mimic(mut section: Section<'_, '_>, can_lead: &[bool]) -> Result<Mimic, Input
     Ok(mimic)
 }
 
-fn joint(
+fn read_joint(
     mut section: Section<'_, '_>,
     number: usize,
     (form, follows): (Form, bool),
@@ -108,7 +110,7 @@ fn joint(
     if follows && kind == JointKind::Fixed {
         return Err(section.error(InputErrorKind::FixedJointMimics));
     }
-    let placement = if kind == JointKind::Fixed { placement(&mut section)? } else { None };
+    let placement = if kind == JointKind::Fixed { read_placement(&mut section)? } else { None };
     let (mut alpha, mut a, mut theta, mut d, mut beta) = (0.0, 0.0, 0.0, 0.0, 0.0);
     if placement.is_none() {
         alpha = section.number("alpha", Unit::Angle)?.unwrap_or(0.0);
@@ -120,17 +122,17 @@ fn joint(
         beta = section.number("beta", Unit::Angle)?.unwrap_or(0.0);
     }
     check_compatible_keys(&section, number, (follows, placement.is_some()))?;
-    let limits = limits(&mut section, if follows { JointKind::Fixed } else { kind })?;
-    let stiffness = stiff(&mut section, "stiffness", Unit::TorsionalStiffness)?;
+    let limits = read_limits(&mut section, if follows { JointKind::Fixed } else { kind })?;
+    let stiffness = read_stiffness(&mut section, "stiffness", Unit::TorsionalStiffness)?;
     let beam = match section.section("beam")? {
         Some(beam) if form == Form::Standard => {
             return Err(beam.error(InputErrorKind::BeamInStandardForm));
         }
         Some(beam) if a == 0.0 => return Err(beam.error(InputErrorKind::BeamWithoutLength)),
-        Some(section) => Some(beam(section, beams)?),
+        Some(section) => Some(read_beam(section, beams)?),
         None => None,
     };
-    let bodies = bodies(&mut section, "body", "com", false)?;
+    let bodies = read_bodies(&mut section, "body", "com", false)?;
     section.finish()?;
     let location = section.location();
     let (parent, mimic) = (None, None);
@@ -186,14 +188,16 @@ fn check_compatible_keys(
 }
 
 /// Reads `xyz_m` and `rpy_deg` in URDF convention; returns `None` if both are absent.
-pub(super) fn placement(section: &mut Section<'_, '_>) -> Result<Option<Placement>, InputError> {
+pub(super) fn read_placement(
+    section: &mut Section<'_, '_>,
+) -> Result<Option<Placement>, InputError> {
     let (xyz, rpy) = (section.vector("xyz", Unit::Length)?, section.vector("rpy", Unit::Angle)?);
     let given = xyz.is_some() || rpy.is_some();
     Ok(given.then(|| Placement { xyz: xyz.unwrap_or_default(), rpy: rpy.unwrap_or_default() }))
 }
 
 /// Reads the range of q; a side without a limit is infinite.
-fn limits(section: &mut Section<'_, '_>, kind: JointKind) -> Result<(f64, f64), InputError> {
+fn read_limits(section: &mut Section<'_, '_>, kind: JointKind) -> Result<(f64, f64), InputError> {
     let unit = match kind {
         JointKind::Revolute => Unit::Angle,
         JointKind::Prismatic => Unit::Length,
@@ -234,23 +238,23 @@ fn with_kind_hint(error: InputError, kind: JointKind) -> InputError {
     }
 }
 
-fn beam(mut section: Section<'_, '_>, beams: &mut Vec<String>) -> Result<Beam, InputError> {
+fn read_beam(mut section: Section<'_, '_>, beams: &mut Vec<String>) -> Result<Beam, InputError> {
     let item = section.require("name", "name = \"…\"")?;
-    let name = beam_name(&item, beams)?;
+    let name = read_beam_name(&item, beams)?;
     beams.push(name.clone());
     let mass = section.not_negative("mass", Unit::Mass)?.unwrap_or(0.0);
-    let ea = stiff(&mut section, "EA", Unit::AxialRigidity)?;
-    let ei_y = stiff(&mut section, "EIy", Unit::FlexuralRigidity)?;
-    let ei_z = stiff(&mut section, "EIz", Unit::FlexuralRigidity)?;
-    let gj = stiff(&mut section, "GJ", Unit::FlexuralRigidity)?;
-    let masses = bodies(&mut section, "mass", "at", true)?;
-    let hoist = section.section("hoist")?.map(hoist).transpose()?;
+    let ea = read_stiffness(&mut section, "EA", Unit::AxialRigidity)?;
+    let ei_y = read_stiffness(&mut section, "EIy", Unit::FlexuralRigidity)?;
+    let ei_z = read_stiffness(&mut section, "EIz", Unit::FlexuralRigidity)?;
+    let gj = read_stiffness(&mut section, "GJ", Unit::FlexuralRigidity)?;
+    let masses = read_bodies(&mut section, "mass", "at", true)?;
+    let hoist = section.section("hoist")?.map(read_hoist).transpose()?;
     section.finish()?;
     Ok(Beam { name, mass, ea, ei_y, ei_z, gj, masses, hoist })
 }
 
 /// Reads the name of a beam, which is the prefix of its parameters.
-fn beam_name(item: &Item<'_, '_>, beams: &[String]) -> Result<String, InputError> {
+fn read_beam_name(item: &Item<'_, '_>, beams: &[String]) -> Result<String, InputError> {
     let name = item.text()?.to_owned();
     let reserved = name
         .strip_prefix("joint")
@@ -268,7 +272,7 @@ fn beam_name(item: &Item<'_, '_>, beams: &[String]) -> Result<String, InputError
     }
 }
 
-fn hoist(mut section: Section<'_, '_>) -> Result<Hoist, InputError> {
+fn read_hoist(mut section: Section<'_, '_>) -> Result<Hoist, InputError> {
     let at = section.require_vector("at", Unit::Length)?;
     let force = section.number("force", Unit::Force)?.unwrap_or(0.0);
     let direction = match section.get("direction") {
@@ -287,7 +291,7 @@ fn hoist(mut section: Section<'_, '_>) -> Result<Hoist, InputError> {
 
 /// Reads the point masses under `key`; `base` is the key of a mass's position without its unit
 /// suffix.
-fn bodies(
+fn read_bodies(
     section: &mut Section<'_, '_>,
     key: &str,
     base: &str,
@@ -312,6 +316,10 @@ fn bodies(
 }
 
 /// Reads an optional stiffness or rigidity, which must be above zero \[SI\].
-fn stiff(section: &mut Section<'_, '_>, base: &str, unit: Unit) -> Result<Option<f64>, InputError> {
+fn read_stiffness(
+    section: &mut Section<'_, '_>,
+    base: &str,
+    unit: Unit,
+) -> Result<Option<f64>, InputError> {
     section.positive(base, unit, |value| InputErrorKind::StiffnessNotPositive { value })
 }

@@ -40,7 +40,7 @@ impl Declared {
 }
 
 /// Reads the keys of a camera other than its name.
-pub(super) fn camera(
+pub(super) fn read_camera(
     section: &mut Section<'_, '_>,
     carriers: Carriers,
 ) -> Result<Declared, InputError> {
@@ -49,9 +49,9 @@ pub(super) fn camera(
     let kind = kind.unwrap_or(FixtureKind::Camera);
     section.word("mm_or_px", &["px"], &[()])?;
     let on = section.require("on", "on = \"joint6\", another frame of the arm, or \"world\"")?;
-    let carrier = carrier(&on, carriers)?;
-    let mut known = pose(section)?;
-    let focal = positive_pair(&section.require("focal_px", "focal_px = [fx, fy]")?)?;
+    let carrier = read_carrier(&on, carriers)?;
+    let mut known = read_pose(section)?;
+    let focal = read_positive_pair(&section.require("focal_px", "focal_px = [fx, fy]")?)?;
     let centre = section.require("centre_px", "centre_px = [cx, cy]")?.pair()?;
     known.extend(focal.into_iter().chain(centre).map(Some));
     let count = kind.fields().len() - known.len();
@@ -68,7 +68,7 @@ pub(super) fn camera(
         }
     }
     known.extend(distortion.into_iter().map(Some));
-    let image = section.get("image_px").map(|item| image_size(&item)).transpose()?;
+    let image = section.get("image_px").map(|item| read_image_size(&item)).transpose()?;
     let item = section.require("pixel_sigma", "pixel_sigma = 0.2, 1 σ of u and v in pixels")?;
     let sigma = item.number()?;
     if sigma <= 0.0 {
@@ -78,8 +78,8 @@ pub(super) fn camera(
 }
 
 /// Reads width and height of images, two whole numbers above zero.
-fn image_size(item: &Item<'_, '_>) -> Result<[f64; 2], InputError> {
-    let size = positive_pair(item)?;
+fn read_image_size(item: &Item<'_, '_>) -> Result<[f64; 2], InputError> {
+    let size = read_positive_pair(item)?;
     if size.iter().all(|pixels| pixels.fract() == 0.0) {
         Ok(size)
     } else {
@@ -88,7 +88,7 @@ fn image_size(item: &Item<'_, '_>) -> Result<[f64; 2], InputError> {
 }
 
 /// Reads two numbers above zero.
-fn positive_pair(item: &Item<'_, '_>) -> Result<[f64; 2], InputError> {
+fn read_positive_pair(item: &Item<'_, '_>) -> Result<[f64; 2], InputError> {
     let pair = item.pair()?;
     match pair.iter().find(|number| **number <= 0.0) {
         Some(&value) => Err(item.error(InputErrorKind::NotPositive { value })),
@@ -97,12 +97,12 @@ fn positive_pair(item: &Item<'_, '_>) -> Result<[f64; 2], InputError> {
 }
 
 /// Reads the keys of a marker other than its name.
-pub(super) fn marker(
+pub(super) fn read_marker(
     section: &mut Section<'_, '_>,
     carriers: Carriers,
 ) -> Result<Declared, InputError> {
-    let carrier = section.get("on").map_or(Ok(None), |on| carrier(&on, carriers))?;
-    let known = pose(section)?;
+    let carrier = section.get("on").map_or(Ok(None), |on| read_carrier(&on, carriers))?;
+    let known = read_pose(section)?;
     let Some((item, suffix)) = section.quantity("points", Unit::Length)? else {
         return Err(section.missing("points_mm", "points_mm = [[x, y, z], …]"));
     };
@@ -118,7 +118,7 @@ pub(super) fn marker(
 
 /// Reads the frame that carries an object: 0 is the base, i that of joint i, `None` the measuring
 /// frame.
-fn carrier(on: &Item<'_, '_>, carriers: Carriers) -> Result<Option<usize>, InputError> {
+fn read_carrier(on: &Item<'_, '_>, carriers: Carriers) -> Result<Option<usize>, InputError> {
     let word = on.text()?;
     if word == "world" {
         return Ok(None);
@@ -128,7 +128,7 @@ fn carrier(on: &Item<'_, '_>, carriers: Carriers) -> Result<Option<usize>, Input
 
 /// Reads the numbers of a pose: position \[m\], then rotation vector \[rad\]. Numbers without the
 /// keys `at` or `rotation` are `None`.
-fn pose(section: &mut Section<'_, '_>) -> Result<Vec<Option<f64>>, InputError> {
+fn read_pose(section: &mut Section<'_, '_>) -> Result<Vec<Option<f64>>, InputError> {
     let at = section.vector("at", Unit::Length)?;
     let rotation = section.vector("rotation", Unit::Angle)?;
     let numbers = [at, rotation].map(|vector| {

@@ -54,10 +54,10 @@ pub enum LimitKind {
 
 /// Reads all constraints in the order of the file.
 pub(super) fn read(root: &mut Section<'_, '_>) -> Result<Vec<Constraint>, InputError> {
-    root.sections("constraint")?.into_iter().map(constraint).collect()
+    root.sections("constraint")?.into_iter().map(read_constraint).collect()
 }
 
-fn constraint(mut section: Section<'_, '_>) -> Result<Constraint, InputError> {
+fn read_constraint(mut section: Section<'_, '_>) -> Result<Constraint, InputError> {
     let item = section.require("terms", "terms = { \"A.EI\" = 1.0, \"B.EI\" = -1.0 }")?;
     let mut terms = Vec::new();
     for (name, term) in item.section()?.entries() {
@@ -81,8 +81,8 @@ fn constraint(mut section: Section<'_, '_>) -> Result<Constraint, InputError> {
     if terms.is_empty() {
         return Err(item.error(InputErrorKind::NoTerms));
     }
-    let at_least = limit(&mut section, "at_least")?;
-    let at_most = limit(&mut section, "at_most")?;
+    let at_least = read_limit(&mut section, "at_least")?;
+    let at_most = read_limit(&mut section, "at_most")?;
     section.finish()?;
     match (&at_least, &at_most) {
         (None, None) => return Err(section.error(InputErrorKind::NoLimit)),
@@ -98,7 +98,7 @@ fn constraint(mut section: Section<'_, '_>) -> Result<Constraint, InputError> {
 }
 
 /// Reads a limit with its unit; a limit of logarithms has none.
-fn limit<'a, 'i>(
+fn read_limit<'a, 'i>(
     section: &mut Section<'a, 'i>,
     base: &str,
 ) -> Result<Option<(Limit, Item<'a, 'i>)>, InputError> {

@@ -167,7 +167,7 @@ pub(super) fn read(root: &mut Section<'_, '_>) -> Result<Data, InputError> {
             Err(_) if !item.holds_tables() => {
                 return Err(item.error(InputErrorKind::NotOneHeldOut));
             }
-            Err(_) => held_out_rows(item.section()?)?,
+            Err(_) => read_held_out_rows(item.section()?)?,
         });
     }
     let reference_temperature = section.number("reference_temperature", Unit::Temperature)?;
@@ -184,8 +184,9 @@ pub(super) fn read(root: &mut Section<'_, '_>) -> Result<Data, InputError> {
         InputErrorKind::NotPositive { value }
     })?;
     let dialect = dialect::read(&mut section)?;
-    let covariates =
-        section.section("covariates")?.map_or(Ok(Vec::new()), |section| covariates(&section))?;
+    let covariates = section
+        .section("covariates")?
+        .map_or(Ok(Vec::new()), |section| read_covariates(&section))?;
     section.finish()?;
     Ok(Data {
         files,
@@ -207,7 +208,7 @@ pub(super) fn read(root: &mut Section<'_, '_>) -> Result<Data, InputError> {
 }
 
 /// Reads the entries `name = "meaning"`.
-fn covariates(section: &Section<'_, '_>) -> Result<Vec<DeclaredCovariate>, InputError> {
+fn read_covariates(section: &Section<'_, '_>) -> Result<Vec<DeclaredCovariate>, InputError> {
     let entries = section.entries();
     if let Some((_, item)) = entries.first() {
         item.check_count("covariates", entries.len(), MAX_COVARIATES)?;
@@ -226,7 +227,7 @@ fn covariates(section: &Section<'_, '_>) -> Result<Vec<DeclaredCovariate>, Input
     entries.into_iter().map(declaration).collect()
 }
 
-fn held_out_rows(mut section: Section<'_, '_>) -> Result<HeldOut, InputError> {
+fn read_held_out_rows(mut section: Section<'_, '_>) -> Result<HeldOut, InputError> {
     let column = section.get("column");
     let fraction = section.get("fraction");
     let session = section.get("session");

@@ -101,7 +101,8 @@ pub enum Missing {
 
 /// Reads both sections; returns flexcal's format if they are absent.
 pub(super) fn read(data: &mut Section<'_, '_>) -> Result<Dialect, InputError> {
-    let columns = data.section("columns")?.map_or(Ok(Vec::new()), |section| columns(&section))?;
+    let columns =
+        data.section("columns")?.map_or(Ok(Vec::new()), |section| read_columns(&section))?;
     let mut dialect = Dialect { columns, ..Dialect::default() };
     let Some(mut format) = data.section("format")? else { return Ok(dialect) };
     if let Some(item) = format.get("delimiter") {
@@ -133,13 +134,13 @@ pub(super) fn read(data: &mut Section<'_, '_>) -> Result<Dialect, InputError> {
         format.word("rotation", &["vector", "euler-xyz", "rpy"], &kinds)?.unwrap_or_default();
     dialect.comment = format.text("comment")?.map(str::to_owned);
     if let Some(item) = format.get("missing") {
-        dialect.missing = Some(missing(item.any_text()?, dialect.decimal_comma));
+        dialect.missing = Some(read_missing(item.any_text()?, dialect.decimal_comma));
     }
     format.finish()?;
     Ok(dialect)
 }
 
-fn columns(section: &Section<'_, '_>) -> Result<Vec<ColumnRule>, InputError> {
+fn read_columns(section: &Section<'_, '_>) -> Result<Vec<ColumnRule>, InputError> {
     let entries = section.entries();
     if let Some((_, item)) = entries.first() {
         item.check_count("columns", entries.len(), MAX_MAPPED_COLUMNS)?;
@@ -159,7 +160,7 @@ fn columns(section: &Section<'_, '_>) -> Result<Vec<ColumnRule>, InputError> {
 
 /// Parses `0,0,0` as three numbers (separated by semicolons with a decimal comma) and any other
 /// text as a word.
-fn missing(text: &str, decimal_comma: bool) -> Missing {
+fn read_missing(text: &str, decimal_comma: bool) -> Missing {
     let number = |cell: &str| {
         let cell = cell.trim();
         if decimal_comma { cell.replace(',', ".").parse().ok() } else { cell.parse::<f64>().ok() }

@@ -13,7 +13,7 @@ use super::{
 };
 
 /// Name of the part of an arm that is neither a joint nor an effect.
-const WHOLE: &str = "gravity, statics, tool or base";
+const WHOLE_ARM_NAME: &str = "gravity, statics, tool or base";
 
 impl Problem {
     /// Returns a digest of everything declared that predictions depend on, as 64 hexadecimal
@@ -50,7 +50,7 @@ impl Problem {
         let text = self.canonical_text();
         let mut joints = 0;
         let mut name = |(place, line): (usize, &str)| match line.split(' ').next() {
-            _ if place == 0 => WHOLE.to_owned(),
+            _ if place == 0 => WHOLE_ARM_NAME.to_owned(),
             Some("revolute" | "prismatic" | "fixed") => {
                 joints += 1;
                 format!("joint {joints}")

@@ -57,7 +57,7 @@ fn append_effect(document: &mut DocumentMut, effect: &Effect, comments: &[String
     let lines: String = comments.iter().flat_map(|line| ["# ", line, "\n"]).collect();
     if let Some(Item::Value(Value::Array(known))) = document.get_mut("effect") {
         let mut value =
-            Value::InlineTable(InlineTable::from_iter([(effect.name(), arguments(effect))]));
+            Value::InlineTable(InlineTable::from_iter([(effect.name(), toml_arguments(effect))]));
         value.decor_mut().set_prefix(format!("\n{lines}"));
         known.push_formatted(value);
         return;
@@ -66,7 +66,7 @@ fn append_effect(document: &mut DocumentMut, effect: &Effect, comments: &[String
     let trailing = document.trailing().as_str().unwrap_or_default().to_owned();
     document.set_trailing(RawString::default());
     let mut table = Table::new();
-    table.insert(effect.name(), Item::Value(arguments(effect)));
+    table.insert(effect.name(), Item::Value(toml_arguments(effect)));
     table.decor_mut().set_prefix(format!("{trailing}\n{lines}"));
     let last = document.iter().map(|(_, item)| last_position(item)).max().unwrap_or(0);
     table.set_position(Some(last + 1));
@@ -103,12 +103,12 @@ fn replace_arguments(document: &mut DocumentMut, k: usize, effect: &Effect) {
         _ => None,
     };
     if let Some(declared) = declared {
-        declared.insert(effect.name(), Item::Value(arguments(effect)));
+        declared.insert(effect.name(), Item::Value(toml_arguments(effect)));
     }
 }
 
 /// Returns the arguments of an effect as a TOML value; `true` if it has none.
-fn arguments(effect: &Effect) -> Value {
+fn toml_arguments(effect: &Effect) -> Value {
     let arguments = effect.arguments();
     if arguments.is_empty() {
         return Value::from(true);

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use toml::de::DeTable;
 
-use super::argument::Reader;
+use super::argument::ArgumentReader;
 use super::effect::example;
 use super::item::{Document, Item};
 use super::law;
@@ -162,7 +162,7 @@ pub(crate) fn effect(
         Ok(false) => return Err(item.wrong_type("a table of arguments, or true")),
         Err(_) => item.section()?,
     };
-    let mut arguments = Reader::new(section, joints);
+    let mut arguments = ArgumentReader::new(section, joints);
     let unknown =
         || item.error(InputErrorKind::UnknownEffect { name: name.to_owned(), known: NAMES });
     let family = FAMILIES.iter().find(|family| family.name == name).ok_or_else(unknown)?;

@@ -8,7 +8,7 @@ use std::f64::consts::PI;
 use nalgebra::Vector3;
 
 use super::Problem;
-use super::camera::{Carriers, Declared, camera, marker};
+use super::camera::{Carriers, Declared, read_camera, read_marker};
 use super::frame::frame_word;
 use super::item::name_of;
 use super::section::Section;
@@ -100,11 +100,11 @@ pub(super) fn read(
                 }));
             }
             let declared = match table {
-                "point" => Declared::new(FixtureKind::Point, place(&mut section)?),
-                "anchor" => Declared::new(FixtureKind::Anchor, place(&mut section)?),
-                "surface" => surface(&mut section)?,
-                "camera" => camera(&mut section, carriers)?,
-                _ => marker(&mut section, carriers)?,
+                "point" => Declared::new(FixtureKind::Point, read_place(&mut section)?),
+                "anchor" => Declared::new(FixtureKind::Anchor, read_place(&mut section)?),
+                "surface" => read_surface(&mut section)?,
+                "camera" => read_camera(&mut section, carriers)?,
+                _ => read_marker(&mut section, carriers)?,
             };
             section.finish()?;
             let Declared { kind, known, carrier, points, sigma, image } = declared;
@@ -113,22 +113,22 @@ pub(super) fn read(
         }
     }
     let distances =
-        root.sections("distance")?.into_iter().map(|section| distance(section, &fixtures));
+        root.sections("distance")?.into_iter().map(|section| read_distance(section, &fixtures));
     let distances = distances.collect::<Result<_, _>>()?;
     Ok((fixtures, distances))
 }
 
-fn place(section: &mut Section<'_, '_>) -> Result<Vec<Option<f64>>, InputError> {
+fn read_place(section: &mut Section<'_, '_>) -> Result<Vec<Option<f64>>, InputError> {
     let at = section.vector("at", Unit::Length)?;
     Ok(at.map_or(vec![None; 3], |at| at.iter().map(|x| Some(*x)).collect()))
 }
 
-fn surface(section: &mut Section<'_, '_>) -> Result<Declared, InputError> {
+fn read_surface(section: &mut Section<'_, '_>) -> Result<Declared, InputError> {
     section.require("kind", "kind = \"plane\" or \"sphere\"")?;
     let kinds = [FixtureKind::Plane, FixtureKind::Sphere];
     let kind = section.word("kind", &["plane", "sphere"], &kinds)?.unwrap_or(FixtureKind::Plane);
     if kind == FixtureKind::Sphere {
-        let mut numbers = place(section)?;
+        let mut numbers = read_place(section)?;
         numbers.push(
             section
                 .positive("radius", Unit::Length, |value| InputErrorKind::NotPositive { value })?,
@@ -164,7 +164,7 @@ pub fn lean(normal: &Vector3<f64>) -> [f64; 2] {
     }
 }
 
-fn distance(
+fn read_distance(
     mut section: Section<'_, '_>,
     fixtures: &[Fixture],
 ) -> Result<KnownDistance, InputError> {

@@ -24,14 +24,14 @@ pub(super) fn read(
     let name = section.require("name", "name = \"…\", a word for its parameters")?;
     let at = section.require("at", "at = \"joint1\", the site that the law adds to")?;
     let terms = section.require("terms", "terms = [\"sin(q1)\"], formulas")?;
-    let named = word(&name, name.text()?, "a law")?;
+    let named = checked_name(&name, name.text()?, "a law")?;
     let names: Vec<(String, usize)> =
         joints.iter().enumerate().map(|(k, joint)| (joint.name.clone(), k)).collect();
     let links = beam_names(joints);
     let site = LawSite::parse(at.text()?, joints.len(), &names, &links)
         .map_err(|reason| at.error(InputErrorKind::LawSite { reason }))?;
-    let prior = prior(&mut section, law_unit(site.at, site.joint(), joints))?;
-    let parameters = parameters(&mut section)?;
+    let prior = read_prior(&mut section, law_unit(site.at, site.joint(), joints))?;
+    let parameters = read_parameters(&mut section)?;
     let formulas = formulas(&terms)?;
     let slides: Vec<bool> = joints.iter().map(|joint| joint.kind == JointKind::Prismatic).collect();
     let covariates: Vec<String> =
@@ -42,11 +42,11 @@ pub(super) fn read(
     let law =
         Law::new(&named, site, &texts, prior, parameters, &vocabulary).map_err(|(k, error)| {
             match formulas.get(k) {
-                Some((item, text)) => mistake(item, text, error),
+                Some((item, text)) => formula_error(item, text, error),
                 None => section.error(InputErrorKind::NoTermsOfLaw),
             }
         })?;
-    check(&law, &at, joints)?;
+    check_command(&law, &at, joints)?;
     for (key, item) in section.entries() {
         let is_parameter = law.parameters().iter().any(|parameter| parameter.name == key);
         if is_parameter && !law.uses(key) {
@@ -58,7 +58,7 @@ pub(super) fn read(
 }
 
 /// Returns an error if the law acts on the coordinate of a fixed joint, which has no command.
-fn check(law: &Law, at: &Item, joints: &[Joint]) -> Result<(), InputError> {
+fn check_command(law: &Law, at: &Item, joints: &[Joint]) -> Result<(), InputError> {
     let joint = law.joint().filter(|_| law.at() == At::Coordinate);
     let declared = joint.and_then(|joint| Some((joint, joints.get(joint.wrapping_sub(1))?)));
     match declared.map(|(joint, declared)| (joint, declared.command_kind())) {
@@ -69,7 +69,7 @@ fn check(law: &Law, at: &Item, joints: &[Joint]) -> Result<(), InputError> {
 
 /// Returns the text as a name if it consists of letters, digits, _ and -, so that it cannot be
 /// confused with a pattern or bracket. `noun` describes it in the error.
-fn word(item: &Item, text: &str, noun: &'static str) -> Result<String, InputError> {
+fn checked_name(item: &Item, text: &str, noun: &'static str) -> Result<String, InputError> {
     let is_word = text.chars().all(|c| c.is_alphanumeric() || c == '_' || c == '-');
     if is_word {
         Ok(text.to_owned())
@@ -94,7 +94,7 @@ pub(crate) fn law_unit(at: At, joint: Option<usize>, joints: &[Joint]) -> Unit {
     }
 }
 
-fn prior(section: &mut Section<'_, '_>, unit: Unit) -> Result<Option<LawPrior>, InputError> {
+fn read_prior(section: &mut Section<'_, '_>, unit: Unit) -> Result<Option<LawPrior>, InputError> {
     let Some((item, suffix)) = section.quantity("sigma", unit)? else { return Ok(None) };
     let written = item.number()?;
     let sigma = (suffix.to_si)(written);
@@ -106,7 +106,7 @@ fn prior(section: &mut Section<'_, '_>, unit: Unit) -> Result<Option<LawPrior>, 
 }
 
 /// Reads the parameters inside the formulas: every table `k = { start, min, max, sigma }`.
-fn parameters(section: &mut Section<'_, '_>) -> Result<Vec<LawParameter>, InputError> {
+fn read_parameters(section: &mut Section<'_, '_>) -> Result<Vec<LawParameter>, InputError> {
     let mut parameters = Vec::new();
     for (key, item) in section.entries() {
         if KEYS.contains(&key) || !item.holds_tables() {
@@ -119,7 +119,7 @@ fn parameters(section: &mut Section<'_, '_>) -> Result<Vec<LawParameter>, InputE
             let (name, noun) = (key.to_owned(), "a parameter of a formula");
             return Err(item.error(InputErrorKind::NotAWord { name, noun }));
         }
-        let name = word(&item, key, "a parameter of a formula")?;
+        let name = checked_name(&item, key, "a parameter of a formula")?;
         let mut section = item.section()?;
         let start = section.require("start", "start = …, the value at which the fit begins")?;
         let mut number = |key: &str| section.get(key).map(|item| item.number()).transpose();
@@ -161,7 +161,7 @@ fn formulas<'a, 'i>(terms: &Item<'a, 'i>) -> Result<Vec<(Item<'a, 'i>, &'a str)>
 }
 
 /// Returns the error of a formula, located at the part of the text that caused it.
-fn mistake(item: &Item, text: &str, error: FormulaError) -> InputError {
+fn formula_error(item: &Item, text: &str, error: FormulaError) -> InputError {
     let FormulaError { column, span, mistake } = error;
     let kind = InputErrorKind::Formula { column, mistake: mistake.to_string() };
     let start = item.span.start + 1;

@@ -91,11 +91,11 @@ pub(super) fn read(root: &mut Section<'_, '_>) -> Result<Vec<ParameterRule>, Inp
     if let Some(item) = root.peek("parameters") {
         item.check_count("rules", section.len(), MAX_RULES)?;
     }
-    section.entries().into_iter().map(|(pattern, item)| rule(pattern, &item)).collect()
+    section.entries().into_iter().map(|(pattern, item)| read_rule(pattern, &item)).collect()
 }
 
 /// Reads the rules of `[drift]` in the order of the file.
-pub(super) fn drift(root: &mut Section<'_, '_>) -> Result<Vec<DriftRule>, InputError> {
+pub(super) fn read_drift(root: &mut Section<'_, '_>) -> Result<Vec<DriftRule>, InputError> {
     let Some(section) = root.section("drift")? else { return Ok(Vec::new()) };
     let rule = |(pattern, item): (&str, Item<'_, '_>)| {
         let mut section = item.section()?;
@@ -113,7 +113,7 @@ pub(super) fn drift(root: &mut Section<'_, '_>) -> Result<Vec<DriftRule>, InputE
     section.entries().into_iter().map(rule).collect()
 }
 
-fn rule(pattern: &str, item: &Item<'_, '_>) -> Result<ParameterRule, InputError> {
+fn read_rule(pattern: &str, item: &Item<'_, '_>) -> Result<ParameterRule, InputError> {
     if pattern.trim().is_empty() {
         return Err(item.error(InputErrorKind::Empty));
     }
@@ -129,8 +129,8 @@ fn rule(pattern: &str, item: &Item<'_, '_>) -> Result<ParameterRule, InputError>
         let name = format!("{pattern}.{inner}");
         return Err(item.error(InputErrorKind::UnquotedName { name }));
     }
-    let fixed = flag(&mut section, "fixed")?;
-    let free = flag(&mut section, "free")?;
+    let fixed = read_flag(&mut section, "fixed")?;
+    let free = read_flag(&mut section, "free")?;
     let sigma = ValuesByUnit::read(&mut section, "sigma")?;
     let min = ValuesByUnit::read(&mut section, "min")?;
     let max = ValuesByUnit::read(&mut section, "max")?;
@@ -158,7 +158,7 @@ fn rule(pattern: &str, item: &Item<'_, '_>) -> Result<ParameterRule, InputError>
     Ok(ParameterRule { pattern: pattern.to_owned(), freedom, location: item.location() })
 }
 
-fn flag(section: &mut Section<'_, '_>, key: &str) -> Result<Option<bool>, InputError> {
+fn read_flag(section: &mut Section<'_, '_>, key: &str) -> Result<Option<bool>, InputError> {
     section.get(key).map(|item| item.boolean()).transpose()
 }
 

@@ -195,17 +195,17 @@ impl ThermalLag {
             return now.1;
         };
         while let Some((before, next)) = reading(processed - 1).zip(reading(processed)) {
-            lagged = self.after(lagged, before, next);
+            lagged = self.advance_reading(lagged, before, next);
             processed += 1;
         }
         self.progress = Some((session, processed, lagged));
-        reading(processed - 1).map_or(now.1, |before| self.after(lagged, before, now))
+        reading(processed - 1).map_or(now.1, |before| self.advance_reading(lagged, before, now))
     }
 
     /// Returns T̃ at the reading `next` after a linear change of T from the reading `before`, each
     /// a time \[s\] and a temperature [°C]. There T̃' is `lagged`: T̃ = T − (1 − e) τ ΔT/Δt + (T̃'
     /// − T') e with e = exp(−Δt/τ).
-    fn after(&self, lagged: f64, before: (f64, f64), next: (f64, f64)) -> f64 {
+    fn advance_reading(&self, lagged: f64, before: (f64, f64), next: (f64, f64)) -> f64 {
         let passed = (next.0 - before.0) / self.time_constant;
         let mean_delay = if passed > 0.0 { -(-passed).exp_m1() / passed } else { 1.0 };
         next.1 - mean_delay * (next.1 - before.1) + (lagged - before.1) * (-passed).exp()

@@ -4,7 +4,7 @@ use crate::error::one_typo;
 use crate::laws::NAMES;
 
 /// Sections with some of their keys that are often written in another section.
-const PLACES: [(&str, &[&str]); 4] = [
+const SECTION_KEYS: [(&str, &[&str]); 4] = [
     ("", &["gravity_m_s2", "dh", "title"]),
     (
         "data",
@@ -34,7 +34,7 @@ pub(super) fn proper_place(key: &str, known: &[String]) -> Option<String> {
             "an effect stands below a line [[effect]]; write that line above {key}"
         ));
     }
-    let (section, _) = PLACES.iter().find(|(_, keys)| keys.contains(&key))?;
+    let (section, _) = SECTION_KEYS.iter().find(|(_, keys)| keys.contains(&key))?;
     // A joint with a placement or a leader has no such keys, so its section is the right one.
     if *section == "joint" && known.iter().any(|known| known == "kind") {
         return None;

@@ -11,13 +11,13 @@ use crate::quantity::rounded_right_angle;
 const MAX_PLAUSIBLE_LENGTH: f64 = 20.0;
 /// Largest usual limit of a joint \[rad\]. If no limit in degrees is larger than this number, the
 /// limits are suspected to be in radians.
-const MAX_RADIANS: f64 = TAU + 0.02;
+const MAX_LIMIT_RADIANS: f64 = TAU + 0.02;
 /// Minimum number of rows or turning joints from which the convention of a table is judged.
 const MIN_ROWS: usize = 3;
 
 /// Returns warnings about a `[[joint]]`: angles that look like radians, lengths that look like
 /// millimetres.
-pub(super) fn joint(section: &Section<'_, '_>) -> Vec<Warning> {
+pub(super) fn joint_warnings(section: &Section<'_, '_>) -> Vec<Warning> {
     let mut warnings = Vec::new();
     for key in ["alpha_deg", "theta_deg", "beta_deg"] {
         let Some(item) = section.peek(key) else { continue };
@@ -48,13 +48,13 @@ pub(super) fn joint(section: &Section<'_, '_>) -> Vec<Warning> {
 
 /// Returns warnings about the conditions of the problem in `root`: the size of gravity and the
 /// reference temperature.
-pub(super) fn conditions(root: &Section<'_, '_>) -> Vec<Warning> {
+pub(super) fn condition_warnings(root: &Section<'_, '_>) -> Vec<Warning> {
     let mut warnings = Vec::new();
     if let Some(item) = root.peek("gravity_m_s2")
         && let Ok(gravity) = item.vector()
     {
         let size = gravity.norm();
-        let is_unit = (size - 1.0).abs() < UNIT_TOLERANCE;
+        let is_unit = (size - 1.0).abs() < MAX_UNIT_DEVIATION;
         if is_unit || size > MAX_GRAVITY {
             let kind = WarningKind::UnusualGravity { size: size.to_string(), is_unit };
             warnings.push(Warning { location: item.location(), kind });
@@ -71,13 +71,13 @@ pub(super) fn conditions(root: &Section<'_, '_>) -> Vec<Warning> {
 }
 
 /// Returns the sum of masses \[kg\].
-fn total(bodies: &[Body]) -> f64 {
+fn total_mass(bodies: &[Body]) -> f64 {
     bodies.iter().map(|body| body.mass).sum()
 }
 
 /// Returns a warning if a joint table without the key `dh` has the zeros of a standard DH table. In
 /// such a table α of the first row is not zero, and both α and a of the last row are.
-pub(super) fn form(joints: &[Joint]) -> Option<Warning> {
+pub(super) fn form_warning(joints: &[Joint]) -> Option<Warning> {
     let (first, last) = (joints.first()?, joints.last()?);
     let is_standard = joints.len() >= MIN_ROWS
         && first.alpha != 0.0
@@ -95,13 +95,13 @@ const MAX_BODY_MASS: f64 = 1000.0;
 /// Largest plausible size of gravity \[m/s²\]; that of Jupiter is 25.
 const MAX_GRAVITY: f64 = 30.0;
 /// Largest plausible rotation of an elastic joint by gravity \[rad\].
-const MAX_SAG: f64 = 1.0;
+const MAX_GRAVITY_ROTATION: f64 = 1.0;
 /// Highest plausible reference temperature \[°C\]. A cold room in kelvins exceeds it.
 const MAX_REFERENCE_TEMPERATURE: f64 = 200.0;
 /// Largest difference from 1 at which the size of gravity counts as that of a unit vector.
-const UNIT_TOLERANCE: f64 = 1e-6;
+const MAX_UNIT_DEVIATION: f64 = 1e-6;
 /// Smallest cosine between a hoist's direction and gravity at which the hoist pulls downwards.
-const MIN_DOWNWARDS: f64 = 0.7;
+const MIN_DOWNWARD_COSINE: f64 = 0.7;
 /// Largest plausible distance of a centre of mass from the frame of its joint \[m\].
 const MAX_BODY_DISTANCE: f64 = 10.0;
 
@@ -110,17 +110,18 @@ impl Problem {
     #[doc(hidden)]
     pub fn plausibility_warnings(&self) -> Vec<Warning> {
         let warnings = self.warnings.iter().cloned();
-        let warnings = warnings.chain(self.far_target()).chain(self.narrow_limits());
+        let warnings =
+            warnings.chain(self.far_target_warning()).chain(self.narrow_limits_warning());
         warnings
-            .chain(self.bodies())
-            .chain(self.stiff_beam())
-            .chain(self.hoist_downwards())
+            .chain(self.body_warnings())
+            .chain(self.stiff_beam_warning())
+            .chain(self.hoist_direction_warning())
             .collect()
     }
 
     /// Returns a warning for the first mass of a joint that is too heavy for an arm, and for the
     /// first one whose centre is too far away.
-    fn bodies(&self) -> Vec<Warning> {
+    fn body_warnings(&self) -> Vec<Warning> {
         let bodies = || {
             self.joints.iter().flat_map(|joint| joint.bodies.iter().map(move |body| (joint, body)))
         };
@@ -143,8 +144,8 @@ impl Problem {
     /// Returns the sum of the declared masses of the arm \[kg\], without the payload.
     pub(crate) fn declared_mass(&self) -> f64 {
         let beams = self.joints.iter().filter_map(|joint| joint.beam.as_ref());
-        let of_beams = beams.map(|beam| beam.mass + total(&beam.masses));
-        of_beams.chain(self.joints.iter().map(|joint| total(&joint.bodies))).sum()
+        let of_beams = beams.map(|beam| beam.mass + total_mass(&beam.masses));
+        of_beams.chain(self.joints.iter().map(|joint| total_mass(&joint.bodies))).sum()
     }
 
     /// Returns the error of a pose without equilibrium with the name of the joint that is probably
@@ -152,7 +153,7 @@ impl Problem {
     pub(crate) fn with_soft_joint(&self, error: InputError) -> InputError {
         match *error.kind {
             InputErrorKind::NoEquilibrium => {
-                let kind = self.soft_joint().unwrap_or(InputErrorKind::NoEquilibrium);
+                let kind = self.soft_joint_error().unwrap_or(InputErrorKind::NoEquilibrium);
                 error.location.error(kind)
             }
             kind => error.location.error(kind),
@@ -160,8 +161,8 @@ impl Problem {
     }
 
     /// Returns an error that names the joint that gravity would turn furthest, if by more than
-    /// [`MAX_SAG`]. The moment is an upper bound, with all links stretched out.
-    fn soft_joint(&self) -> Option<InputErrorKind> {
+    /// [`MAX_GRAVITY_ROTATION`]. The moment is an upper bound, with all links stretched out.
+    fn soft_joint_error(&self) -> Option<InputErrorKind> {
         let gravity = self.gravity.norm();
         if !self.is_chain() || gravity > MAX_GRAVITY {
             return None;
@@ -176,7 +177,7 @@ impl Problem {
             for joint in self.joints.iter().skip(first) {
                 let bodies = joint.bodies.iter().map(|body| (body.mass, body.position.norm()));
                 if let Some(beam) = &joint.beam {
-                    moment += (beam.mass + total(&beam.masses)) * (reach + joint.a.abs());
+                    moment += (beam.mass + total_mass(&beam.masses)) * (reach + joint.a.abs());
                 }
                 reach += length(joint);
                 moment += bodies.map(|(mass, distance)| mass * (reach + distance)).sum::<f64>();
@@ -190,7 +191,7 @@ impl Problem {
         });
         let (number, joint, moment, angle) = sags.max_by(|a, b| a.3.total_cmp(&b.3))?;
         let place = Location { key: None, excerpt: None, ..joint.location.clone() };
-        (angle > MAX_SAG).then(|| InputErrorKind::SoftJoint {
+        (angle > MAX_GRAVITY_ROTATION).then(|| InputErrorKind::SoftJoint {
             joint: format!("joint {number} ({place})"),
             moment: format!("{moment:.1}"),
             angle: format!("{angle:.1}"),
@@ -199,7 +200,7 @@ impl Problem {
 
     /// Returns a warning for the first beam whose radius of gyration, by its rigidities, exceeds
     /// its length.
-    fn stiff_beam(&self) -> Option<Warning> {
+    fn stiff_beam_warning(&self) -> Option<Warning> {
         self.joints.iter().find_map(|joint| {
             let beam = joint.beam.as_ref()?;
             let rigidity = beam.ei_y.into_iter().chain(beam.ei_z).fold(0.0, f64::max);
@@ -215,14 +216,14 @@ impl Problem {
     }
 
     /// Returns a warning for the first hoist that pulls along gravity.
-    fn hoist_downwards(&self) -> Option<Warning> {
+    fn hoist_direction_warning(&self) -> Option<Warning> {
         let down = self.gravity.try_normalize(0.0)?;
         self.joints.iter().find_map(|joint| {
             let beam = joint.beam.as_ref()?;
             let hoist = beam.hoist.as_ref()?;
             let location = Location { excerpt: None, ..joint.location.clone() };
             let key = format!("beam {}.hoist.direction", beam.name);
-            let pulls_down = hoist.direction.dot(&down) > MIN_DOWNWARDS;
+            let pulls_down = hoist.direction.dot(&down) > MIN_DOWNWARD_COSINE;
             pulls_down.then(|| Warning {
                 location: location.with_key(key),
                 kind: WarningKind::HoistPullsDown,
@@ -232,20 +233,20 @@ impl Problem {
 
     /// Returns a warning if the limits of all turning joints, in degrees, are so small that they
     /// are probably in radians.
-    fn narrow_limits(&self) -> Option<Warning> {
+    fn narrow_limits_warning(&self) -> Option<Warning> {
         let turning: Vec<&Joint> =
             self.joints.iter().filter(|joint| joint.kind == JointKind::Revolute).collect();
         let widest = |joint: &&Joint| joint.limits.0.abs().max(joint.limits.1.abs());
         let widest = turning.iter().map(widest).fold(0.0, f64::max).to_degrees();
         let first = turning.first().filter(|_| turning.len() >= MIN_ROWS)?;
-        (widest > 0.0 && widest <= MAX_RADIANS).then(|| Warning {
+        (widest > 0.0 && widest <= MAX_LIMIT_RADIANS).then(|| Warning {
             location: first.location.clone(),
             kind: WarningKind::LimitsLookLikeRadians { widest: format!("{widest:.1}") },
         })
     }
 
     /// Returns a warning if a target is farther from its frame than twice the length of the arm.
-    fn far_target(&self) -> Option<Warning> {
+    fn far_target_warning(&self) -> Option<Warning> {
         let length = |joint: &Joint| {
             let placed = joint.placement.as_ref().map_or(0.0, |placement| placement.xyz.norm());
             let (min, max) = joint.limits;

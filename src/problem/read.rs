@@ -91,18 +91,18 @@ fn problem(mut root: Section<'_, '_>) -> Result<Problem, InputError> {
     let title = root.text("title")?.unwrap_or(&name).to_owned();
     let gravity =
         root.vector("gravity", Unit::Acceleration)?.unwrap_or(Vector3::new(0.0, 0.0, -9.80665));
-    let statics = statics(root.section("statics")?)?;
-    let mut warnings = plausible::conditions(&root);
-    let (joints, is_standard) = arm::joints(&mut root, &mut warnings)?;
+    let statics = read_statics(root.section("statics")?)?;
+    let mut warnings = plausible::condition_warnings(&root);
+    let (joints, is_standard) = arm::read_joints(&mut root, &mut warnings)?;
     let carriers = CarrierJoints { joints: &joints, is_standard };
-    let tool = target::tool(root.section("tool")?, &carriers)?;
-    let targets = target::targets(&mut root, &tool, &carriers)?;
-    let base = base(root.section("base")?)?;
-    let urdf = root.section("urdf")?.map(urdf).transpose()?;
+    let tool = target::read_tool(root.section("tool")?, &carriers)?;
+    let targets = target::read_targets(&mut root, &tool, &carriers)?;
+    let base = read_base(root.section("base")?)?;
+    let urdf = root.section("urdf")?.map(read_urdf).transpose()?;
     let (fixtures, distances) =
         fixture::read(&mut root, Carriers { joints: &joints, tool: tool.joint })?;
     let parameters = parameters::read(&mut root)?;
-    let drift = parameters::drift(&mut root)?;
+    let drift = parameters::read_drift(&mut root)?;
     let constraints = constraints::read(&mut root)?;
     let data = data::read(&mut root)?;
     let effects = effects::read(&mut root, &joints, &data)?;
@@ -153,7 +153,7 @@ pub(crate) fn name(root: &mut Section<'_, '_>) -> Result<String, InputError> {
     Ok(name.to_owned())
 }
 
-fn statics(section: Option<Section<'_, '_>>) -> Result<Statics, InputError> {
+fn read_statics(section: Option<Section<'_, '_>>) -> Result<Statics, InputError> {
     let mut statics = Statics { equilibrium: Equilibrium::Deflected, beam_elements: 1 };
     let Some(mut section) = section else { return Ok(statics) };
     let meanings = [Equilibrium::Deflected, Equilibrium::Undeflected];
@@ -170,7 +170,7 @@ fn statics(section: Option<Section<'_, '_>>) -> Result<Statics, InputError> {
     Ok(statics)
 }
 
-fn urdf(mut section: Section<'_, '_>) -> Result<UrdfEnds, InputError> {
+fn read_urdf(mut section: Section<'_, '_>) -> Result<UrdfEnds, InputError> {
     let base =
         section.require("base", "base = \"…\", the link at the arm's base")?.text()?.to_owned();
     let tip = section.require("tip", "tip = \"…\", the link at its tip")?.text()?.to_owned();
@@ -205,10 +205,10 @@ fn check_one_form(section: &Section<'_, '_>) -> Result<(), InputError> {
     Ok(())
 }
 
-fn base(section: Option<Section<'_, '_>>) -> Result<BasePose, InputError> {
+fn read_base(section: Option<Section<'_, '_>>) -> Result<BasePose, InputError> {
     let mut base = BasePose { translation: Vector3::zeros(), rotation: Vector3::zeros() };
     let Some(mut section) = section else { return Ok(base) };
-    if let Some(Placement { xyz, rpy }) = arm::placement(&mut section)? {
+    if let Some(Placement { xyz, rpy }) = arm::read_placement(&mut section)? {
         base.translation = xyz;
         base.rotation = UnitQuaternion::from_euler_angles(rpy.x, rpy.y, rpy.z).scaled_axis();
         check_one_form(&section)?;

@@ -13,7 +13,7 @@ const FLANGE: &str = "flange";
 /// a and α of a row become those of the next joint, where Rx(α) Tx(a) = Tx(a) Rx(α) come first.
 /// Those of the last row belong to an added fixed joint. Bodies keep their physical positions;
 /// their coordinates change, because a body's frame no longer includes the row's a and α.
-pub(super) fn modified(rows: Vec<Joint>) -> Vec<Joint> {
+pub(super) fn to_modified_form(rows: Vec<Joint>) -> Vec<Joint> {
     let mut joints = Vec::with_capacity(rows.len() + 1);
     // Values of a and α in the previous row.
     let mut previous = (0.0, 0.0);
@@ -22,12 +22,12 @@ pub(super) fn modified(rows: Vec<Joint>) -> Vec<Joint> {
         let (a, alpha) = (row.a, row.alpha);
         (row.a, row.alpha) = previous;
         if let Some(Placement { xyz, rpy }) = &mut row.placement {
-            let frame = link(previous).compose(&Frame::from_xyz_rpy(xyz, rpy));
+            let frame = link_transform(previous).compose(&Frame::from_xyz_rpy(xyz, rpy));
             (*xyz, *rpy) = (frame.origin, frame.roll_pitch_yaw());
             (row.a, row.alpha) = (0.0, 0.0);
         }
         for body in &mut row.bodies {
-            body.position = link((a, alpha)).point(&body.position);
+            body.position = link_transform((a, alpha)).point(&body.position);
         }
         previous = (a, alpha);
         last = Some(row.location.clone());
@@ -69,7 +69,7 @@ impl Problem {
         if !self.is_chain() || !self.joints.iter().all(has_row) {
             return None;
         }
-        Some(self.with_chain(modified(self.joints.clone())))
+        Some(self.with_chain(to_modified_form(self.joints.clone())))
     }
 
     /// Returns the joints that are rows of a standard DH table; `None` for tables in another form.
@@ -89,7 +89,7 @@ impl Problem {
         let mut joints = self.standard_rows()?.to_vec();
         for (joint, next) in joints.iter_mut().zip(self.joints.iter().skip(1)) {
             (joint.a, joint.alpha) = (next.a, next.alpha);
-            let link = link((next.a, next.alpha));
+            let link = link_transform((next.a, next.alpha));
             for body in &mut joint.bodies {
                 body.position = link.resolve(&(body.position - link.origin));
             }
@@ -122,6 +122,6 @@ impl Problem {
 }
 
 /// Returns the transform Tx(a) Rx(α) of a link.
-fn link((a, alpha): (f64, f64)) -> Frame<f64> {
+fn link_transform((a, alpha): (f64, f64)) -> Frame<f64> {
     Frame::from_xyz_rpy(&Vector3::new(a, 0.0, 0.0), &Vector3::new(alpha, 0.0, 0.0))
 }

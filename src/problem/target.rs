@@ -82,7 +82,7 @@ impl CarrierJoints<'_> {
 }
 
 /// Reads `[tool]`; without the section everything is at the origin of the last frame.
-pub(super) fn tool(
+pub(super) fn read_tool(
     section: Option<Section<'_, '_>>,
     carriers: &CarrierJoints,
 ) -> Result<Tool, InputError> {
@@ -114,7 +114,7 @@ pub(super) fn tool(
 }
 
 /// Reads all `[[target]]` tables; missing keys default to the values of `[tool]`.
-pub(super) fn targets(
+pub(super) fn read_targets(
     root: &mut Section<'_, '_>,
     tool: &Tool,
     carriers: &CarrierJoints,

@@ -73,7 +73,9 @@ impl Tree {
 /// Returns the parent of each joint from the values of the key `parent` (counted from 1, 0 for the
 /// base). The default is the joint before. A parent that is listed later, or whose branch has
 /// ended, is an error.
-pub(super) fn parents(given: &[Option<Item<'_, '_>>]) -> Result<Vec<Option<usize>>, InputError> {
+pub(super) fn read_parents(
+    given: &[Option<Item<'_, '_>>],
+) -> Result<Vec<Option<usize>>, InputError> {
     let mut parents = Vec::with_capacity(given.len());
     // Joints on the path from the base to the previous joint, which are the allowed parents of the
     // next.

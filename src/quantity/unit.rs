@@ -120,18 +120,18 @@ pub(crate) struct TableUnit {
 }
 
 /// Row of the unit table: properties of one unit.
-struct Row {
+struct UnitRow {
     /// Name of the quantity with its article, for messages.
     noun: &'static str,
     /// Symbol of the SI unit.
     symbol: &'static str,
     /// Suffixes accepted in files, including the SI unit; empty if no file contains this unit.
     suffixes: &'static [Suffix],
-    shown: Shown,
+    shown: DisplayRule,
 }
 
 /// Rule that selects the displayed unit.
-enum Shown {
+enum DisplayRule {
     /// Multiplies the SI value by a factor and uses another symbol.
     As(f64, &'static str),
     /// Displays the SI value.
@@ -141,7 +141,7 @@ enum Shown {
 }
 
 /// Number of degrees per radian.
-const DEGREES: f64 = 180.0 / PI;
+const DEGREES_PER_RADIAN: f64 = 180.0 / PI;
 
 const fn si(name: &'static str) -> Suffix {
     Suffix { name, to_si: std::convert::identity }
@@ -155,19 +155,21 @@ const fn mm(name: &'static str) -> Suffix {
     Suffix { name, to_si: |x| x / 1000.0 }
 }
 
-/// Expands to a [`Row`] of the unit table.
+/// Expands to a [`UnitRow`] of the unit table.
 macro_rules! row {
     ($noun:literal, $symbol:literal, [$($suffix:expr),*], $shown:expr) => {
-        Row { noun: $noun, symbol: $symbol, suffixes: const { &[$($suffix),*] }, shown: $shown }
+        UnitRow { noun: $noun, symbol: $symbol, suffixes: const { &[$($suffix),*] }, shown: $shown }
     };
 }
 
 impl Unit {
     /// Returns the row of the unit table.
-    fn row(self) -> Row {
-        use Shown::{As, Plain, Prefixed};
+    fn row(self) -> UnitRow {
+        use DisplayRule::{As, Plain, Prefixed};
         match self {
-            Self::Angle => row!("an angle", "rad", [deg("deg"), si("rad")], As(DEGREES, "°")),
+            Self::Angle => {
+                row!("an angle", "rad", [deg("deg"), si("rad")], As(DEGREES_PER_RADIAN, "°"))
+            }
             Self::Length => row!("a length", "m", [si("m"), mm("mm")], As(1e3, "mm")),
             Self::Pixel => row!("a number of pixels", "px", [si("px")], Plain),
             Self::Mass => row!("a mass", "kg", [si("kg")], Plain),
@@ -201,7 +203,7 @@ impl Unit {
                 "an angle per °C",
                 "rad/K",
                 [deg("deg_per_C"), si("rad_per_C")],
-                As(DEGREES, "°/K")
+                As(DEGREES_PER_RADIAN, "°/K")
             ),
             Self::LengthPerDegree => {
                 row!("a length per °C", "m/K", [si("m_per_C"), mm("mm_per_C")], As(1e3, "mm/K"))
@@ -210,7 +212,7 @@ impl Unit {
                 "an angle per kg",
                 "rad/kg",
                 [deg("deg_per_kg"), si("rad_per_kg")],
-                As(DEGREES, "°/kg")
+                As(DEGREES_PER_RADIAN, "°/kg")
             ),
             Self::LengthPerMass => {
                 row!("a length per kg", "m/kg", [si("m_per_kg"), mm("mm_per_kg")], As(1e3, "mm/kg"))
@@ -226,7 +228,7 @@ impl Unit {
                 "an angular speed",
                 "rad/s",
                 [deg("deg_per_s"), si("rad_per_s")],
-                As(3600.0 * DEGREES, "°/h")
+                As(3600.0 * DEGREES_PER_RADIAN, "°/h")
             ),
             Self::LengthPerTorque => {
                 row!("a length per torque", "m/(N·m)", [], As(1e3, "mm/(N·m)"))
@@ -246,12 +248,14 @@ impl Unit {
                 row!("a strain per unit of a covariate", "1/unit", [], As(1e6, "10⁻⁶/unit"))
             }
             Self::LengthPerAngle => row!("a length per angle", "m/rad", [], As(1e3, "mm/rad")),
-            Self::AnglePerLength => row!("an angle per length", "rad/m", [], As(DEGREES, "°/m")),
+            Self::AnglePerLength => {
+                row!("an angle per length", "rad/m", [], As(DEGREES_PER_RADIAN, "°/m"))
+            }
             Self::AnglePerUnit => row!(
                 "an angle per unit of a covariate",
                 "rad/unit",
                 [deg("deg_per_unit"), si("rad_per_unit")],
-                As(DEGREES, "°/unit")
+                As(DEGREES_PER_RADIAN, "°/unit")
             ),
             Self::LengthPerUnit => row!(
                 "a length per unit of a covariate",
@@ -260,7 +264,9 @@ impl Unit {
                 As(1e3, "mm/unit")
             ),
             Self::LengthPerRow => row!("a length per row", "m/row", [], As(1e3, "mm/row")),
-            Self::AnglePerRow => row!("an angle per row", "rad/row", [], As(DEGREES, "°/row")),
+            Self::AnglePerRow => {
+                row!("an angle per row", "rad/row", [], As(DEGREES_PER_RADIAN, "°/row"))
+            }
             Self::Ratio => row!("a ratio", "1", [si("relative")], As(1e3, "‰")),
             Self::Number => row!("a ratio", "1", [si("relative")], Plain),
         }
@@ -281,11 +287,11 @@ impl Unit {
     /// Returns the unit for display: degrees, millimetres, and stiffnesses with the prefix that
     /// suits `magnitude` \[SI\].
     pub(crate) fn display(self, magnitude: f64) -> Display {
-        let Row { symbol, shown, .. } = self.row();
+        let UnitRow { symbol, shown, .. } = self.row();
         match shown {
-            Shown::As(factor, symbol) => Display { factor, symbol: symbol.to_owned() },
-            Shown::Plain => Display { factor: 1.0, symbol: symbol.to_owned() },
-            Shown::Prefixed => {
+            DisplayRule::As(factor, symbol) => Display { factor, symbol: symbol.to_owned() },
+            DisplayRule::Plain => Display { factor: 1.0, symbol: symbol.to_owned() },
+            DisplayRule::Prefixed => {
                 let (factor, prefix) = match magnitude.abs() {
                     m if m >= 1e9 => (1e-9, "G"),
                     m if m >= 1e6 => (1e-6, "M"),
@@ -338,7 +344,7 @@ impl Unit {
     pub(crate) fn in_tables(self) -> TableUnit {
         match self {
             Self::Length => TableUnit { factor: 1e3, suffix: "mm", symbol: "mm" },
-            Self::Angle => TableUnit { factor: DEGREES, suffix: "deg", symbol: "°" },
+            Self::Angle => TableUnit { factor: DEGREES_PER_RADIAN, suffix: "deg", symbol: "°" },
             other => TableUnit { factor: 1.0, suffix: other.si_suffix(), symbol: other.symbol() },
         }
     }

@@ -188,11 +188,13 @@ impl Subproblem for Constrained {
         let polyhedron = Polyhedron::around(x, &self.bounds, &self.rows, &model.scale);
         let PolyhedronSolution { q, faces } = match self.method {
             StepMethod::ActiveSet => {
-                let guess = self.guess.clone().unwrap_or_else(|| polyhedron.faces_at_origin.clone());
+                let guess =
+                    self.guess.clone().unwrap_or_else(|| polyhedron.faces_at_origin.clone());
                 PolyhedronProblem::new(&factor, &polyhedron, guess).solve(damping)
             }
             StepMethod::InteriorPoint => {
-                let (q, _) = solve_by_interior_point(&factor, damping, &polyhedron.half_spaces(), None)?;
+                let (q, _) =
+                    solve_by_interior_point(&factor, damping, &polyhedron.half_spaces(), None)?;
                 polyhedron.pulled_inside(q, FACE_DISTANCE)
             }
             StepMethod::Clamped => return None,
@@ -219,8 +221,10 @@ impl Subproblem for Constrained {
         let polyhedron = Polyhedron::around(x, &self.bounds, &self.rows, &model.scale);
         let (solution, damping) = match self.method {
             StepMethod::ActiveSet => {
-                let faces =
-                    self.undamped.as_ref().map_or(&polyhedron.faces_at_origin, |undamped| &undamped.faces);
+                let faces = self
+                    .undamped
+                    .as_ref()
+                    .map_or(&polyhedron.faces_at_origin, |undamped| &undamped.faces);
                 let mut problem = PolyhedronProblem::new(&model.factor, &polyhedron, faces.clone());
                 problem.guess_faces(&(&step.point - x).component_mul(&model.scale));
                 let (gradient_norm, undamped) = (problem.gradient_norm(), &mut self.undamped);
@@ -231,8 +235,12 @@ impl Subproblem for Constrained {
                 step_within_radius(solve, step.damping, gradient_norm, radius)
             }
             StepMethod::InteriorPoint => {
-                let solution =
-                    solve_by_interior_point(&model.factor, 0.0, &polyhedron.half_spaces(), Some(radius));
+                let solution = solve_by_interior_point(
+                    &model.factor,
+                    0.0,
+                    &polyhedron.half_spaces(),
+                    Some(radius),
+                );
                 let (q, damping) = solution.unwrap_or_else(|| (DVector::zeros(x.len()), 0.0));
                 (polyhedron.pulled_inside(q, FACE_DISTANCE), damping)
             }

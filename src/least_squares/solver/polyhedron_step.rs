@@ -209,7 +209,9 @@ mod tests {
             let mut problem =
                 PolyhedronProblem::new(&factor, &polyhedron, polyhedron.faces_at_origin.clone());
             let interior =
-                solve_by_interior_point(&factor, lambda, &polyhedron.half_spaces(), None).unwrap().0;
+                solve_by_interior_point(&factor, lambda, &polyhedron.half_spaces(), None)
+                    .unwrap()
+                    .0;
             let solution = problem.solve(lambda);
             let cost = |q: &DVector<f64>| {
                 (factor.image(q) + factor.constant()).norm_squared() + lambda * q.norm_squared()
@@ -246,7 +248,8 @@ mod tests {
             &Inequalities::none(3),
             &DVector::repeat(3, 1.0),
         );
-        let problem = PolyhedronProblem::new(&factor, &polyhedron, polyhedron.faces_at_origin.clone());
+        let problem =
+            PolyhedronProblem::new(&factor, &polyhedron, polyhedron.faces_at_origin.clone());
         let starts = (0..8).map(|set| Faces {
             bounds: (0..3).map(|j| (set >> j & 1 == 1).then_some(AtBound::Upper)).collect(),
             rows: polyhedron.faces_at_origin.rows.clone(),

@@ -120,7 +120,8 @@ impl Reflective {
                 self.fraction_to_bound(&(x + model.step(&on_bound)), &model.step(&mirrored));
             let limit = to_bound.min(to_radius);
             let low = if limit > 0.0 { (1.0 - MAX_BOUND_FRACTION) * stride / limit } else { 0.0 };
-            let high = if to_bound <= to_radius { MAX_BOUND_FRACTION * to_bound } else { to_radius };
+            let high =
+                if to_bound <= to_radius { MAX_BOUND_FRACTION * to_bound } else { to_radius };
             (limit > 0.0 && low <= high).then(|| model.best_along(&on_bound, &mirrored, low, high))
         };
         let straight = model.candidate(&on_bound * MAX_BOUND_FRACTION);

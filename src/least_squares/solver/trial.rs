@@ -38,7 +38,8 @@ impl Trial {
             ratio,
             length: step.length,
             damping: step.damping,
-            radius_growth: acceleration.map_or(2.0, |ratio| (TARGET_ACCELERATION / ratio).clamp(1.5, 8.0)),
+            radius_growth: acceleration
+                .map_or(2.0, |ratio| (TARGET_ACCELERATION / ratio).clamp(1.5, 8.0)),
         }
     }
 

@@ -207,7 +207,8 @@ impl<S: Subproblem> TrustRegion<S> {
         loop {
             let mut step = self.subproblem.step(x, *radius);
             if let Some(convex) = &self.convex {
-                step.predicted += convex.underestimated_reduction(&(&step.point - x).component_mul(&self.scale));
+                step.predicted +=
+                    convex.underestimated_reduction(&(&step.point - x).component_mul(&self.scale));
             }
             if tries == 0 || step.length == 0.0 {
                 return Ok((step, None));

@@ -137,10 +137,14 @@ fn with_searched_values(family: &Family, place: Arguments, data: &DataCoverage) 
         Search::Times => data.times.iter().map(|&time| Argument::Number(time)).collect(),
         Search::TimeConstants => match data.clock {
             None => vec![Argument::Number(1.0)],
-            Some((between, span)) => grid(MIN_LAG_INTERVALS * between, MAX_LAG_FRACTION * span, LAG_RATIO, 1.0),
+            Some((between, span)) => {
+                grid(MIN_LAG_INTERVALS * between, MAX_LAG_FRACTION * span, LAG_RATIO, 1.0)
+            }
         },
         Search::SettlingTimes => match (data.times.first(), data.times.last()) {
-            (Some(first), Some(last)) => grid(MIN_SETTLING_FRACTION, MAX_LAG_FRACTION, LAG_RATIO, last - first),
+            (Some(first), Some(last)) => {
+                grid(MIN_SETTLING_FRACTION, MAX_LAG_FRACTION, LAG_RATIO, last - first)
+            }
             _ => Vec::new(),
         },
         Search::Distances => {
@@ -234,7 +238,9 @@ impl Effect {
             Need::Temperature => data.no_temperature,
             Need::Clock => unless(data.clock.is_some(), NO_TIMES),
             Need::Times => unless(!data.times.is_empty(), "too few poses before or after any time"),
-            Need::Payload => unless(data.has_payload() && data.has_gravity(), "no payload is carried"),
+            Need::Payload => {
+                unless(data.has_payload() && data.has_gravity(), "no payload is carried")
+            }
             Need::PayloadFromBothSides => unless(
                 both_sides && data.changes_payload(),
                 "no payload that changes, or no approach from both sides",

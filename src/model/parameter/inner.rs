@@ -6,7 +6,7 @@ use std::sync::Arc;
 use num_dual::Dual64;
 
 use super::Parameter;
-use super::regressor::{Formula, Regressor, Slope, Dependence};
+use super::regressor::{Dependence, Formula, Regressor, Slope};
 use crate::mechanics::AxisMoments;
 
 /// Returns the regressor that multiplies parameter k in the prediction, with all formula parameters

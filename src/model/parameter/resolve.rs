@@ -176,7 +176,11 @@ pub fn rule_of<'a>(problem: &'a Problem, parameter: &EffectParameter) -> Option<
 
 /// Returns the error for a pattern that matches no parameter in `names` but effects which the
 /// problem does not declare; `None` if it matches no effect.
-fn undeclared_effect_error(problem: &Problem, pattern: &str, names: &[String]) -> Option<InputErrorKind> {
+fn undeclared_effect_error(
+    problem: &Problem,
+    pattern: &str,
+    names: &[String],
+) -> Option<InputErrorKind> {
     // The word before the dot or bracket of `hoist-force.error`, `gear-ratio[3].error`.
     let head = |name: &str| name.split(['.', '[']).next().unwrap_or_default().to_owned();
     let wanted = head(pattern);
@@ -204,9 +208,9 @@ pub fn refuses(problem: &Problem, parameters: &[EffectParameter]) -> bool {
         candidates(problem, &none, &none, &[]).iter().any(|candidate| candidate.matches(rule))
     };
     let misses = |rule: &ParameterRule| {
-        parameters
-            .iter()
-            .any(|parameter| parameter.is_named_by(rule) && !applies_to_unit(rule, parameter.unit()))
+        parameters.iter().any(|parameter| {
+            parameter.is_named_by(rule) && !applies_to_unit(rule, parameter.unit())
+        })
     };
     problem.parameters.iter().any(|rule| misses(rule) && !is_for_arm(rule))
 }
