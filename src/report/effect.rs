@@ -4,7 +4,7 @@ use super::document::{Point, code};
 use crate::laws::ArgumentKind;
 use crate::problem::{Effect, JointKind, Problem};
 use crate::quantity::format::{decimals, number, power_of_ten};
-use crate::results::{MAX_COEFFICIENTS, MAX_SHOWN_HARMONICS, ParameterValue, joined};
+use crate::results::{MAX_LISTED_COEFFICIENTS, MAX_SHOWN_HARMONICS, ParameterValue, joined};
 
 /// Maximum number of decimals of a value.
 const MAX_DECIMALS: usize = 6;
@@ -18,7 +18,7 @@ const MAX_SMALL_VALUE: f64 = 1e-3;
 pub(super) fn values(effect: &Effect, parameters: &[ParameterValue]) -> Vec<String> {
     let line = |name: &str, parameter: &ParameterValue| format!("{name} = {}", value(parameter));
     let orders = effect.harmonic_orders().unwrap_or_default();
-    if parameters.len() <= MAX_COEFFICIENTS || parameters.len() != 2 * orders.len() {
+    if parameters.len() <= MAX_LISTED_COEFFICIENTS || parameters.len() != 2 * orders.len() {
         return parameters.iter().map(|parameter| line(&parameter.name, parameter)).collect();
     }
     let mut waves: Vec<(u32, ParameterValue)> = orders

@@ -38,10 +38,10 @@ pub(super) fn parameters<'a>(
     for (k, estimate) in found.estimates.iter().enumerate() {
         let line = (row(estimate), bar(estimate));
         if harmonics.is_smaller(&estimate.name) { &mut lower } else { &mut shown }.push(line);
-        let of_joint = harmonics.joint_of(&estimate.name);
+        let of_joint = harmonics.joint_with_smaller(&estimate.name);
         let is_last = found.estimates[k + 1..]
             .iter()
-            .all(|other| harmonics.joint_of(&other.name) != of_joint);
+            .all(|other| harmonics.joint_with_smaller(&other.name) != of_joint);
         if let Some((joint, smaller)) = of_joint.filter(|_| is_last) {
             let mut cells = vec![String::new(); HEADER.len()];
             cells[0] = format!("and {smaller} smaller harmonics of joint {joint}");

@@ -4,7 +4,9 @@
 use super::document::code;
 use super::probability::{MIN_PROBABLE, percent};
 use crate::quantity::format::{counted, number};
-use crate::results::{AlternativeEffect, FoundEffect, LoopResult, MAX_COEFFICIENTS, NamedEffect};
+use crate::results::{
+    AlternativeEffect, FoundEffect, LoopResult, MAX_LISTED_COEFFICIENTS, NamedEffect,
+};
 use crate::select::{Status, Verdict};
 
 /// Smallest probability at which a law is named as a candidate.
@@ -177,7 +179,7 @@ fn nothing_below(ratio: f64, takes_less: bool) -> String {
 /// Describes an effect, followed by its declaration unless that contains many orders.
 pub(super) fn declared(effect: &NamedEffect) -> String {
     match effect.effect.harmonic_orders() {
-        Some(orders) if orders.len() > MAX_COEFFICIENTS => effect.description.clone(),
+        Some(orders) if orders.len() > MAX_LISTED_COEFFICIENTS => effect.description.clone(),
         _ => format!("{}: {}", effect.description, code(&effect.declaration)),
     }
 }

@@ -19,11 +19,11 @@ use crate::remainder::Bounds;
 /// Input files of an acceptance record, and facts from the command line.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct AcceptanceRecord {
-    /// Each input file with its SHA-256; `None` if it cannot be read a second time.
+    /// Each input file with its SHA-256 digest; `None` if it cannot be read a second time.
     pub inputs: Vec<(PathBuf, Option<String>)>,
-    /// Commit of the repository that holds the problem.
+    /// Commit of the repository that holds the problem; `None` outside a repository.
     pub commit: Option<String>,
-    /// Description of the instrument.
+    /// Description of the measuring instrument, if the user gave one.
     pub instrument: Option<String>,
 }
 
@@ -31,7 +31,7 @@ pub struct AcceptanceRecord {
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct AcceptanceResult {
     pub problem: String,
-    /// Version of the program.
+    /// Version of flexcal.
     pub flexcal: &'static str,
     /// Commit of the repository of the problem.
     pub commit: Option<String>,
@@ -59,7 +59,7 @@ pub struct AcceptanceResult {
     pub after: PoseAccuracy,
     /// Number of poses measured three times or more.
     pub repeated_poses: usize,
-    /// Largest repeatability RP of the poses measured three times or more.
+    /// Largest repeatability RP of the poses measured three times or more; null if there are none.
     pub repeatability_max_mm: Option<f64>,
     /// True if a remainder corrects the predictions of the identified arm.
     pub remainder: bool,
@@ -69,19 +69,19 @@ pub struct AcceptanceResult {
     pub tolerance: Option<TestedTolerance>,
 }
 
-/// Bounds of the errors of some rows, with the share of the rows within theirs.
+/// Summary of the error bounds of the held-out rows, with the share of rows within their bounds.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct CoveredBound {
     #[serde(flatten)]
     pub bounds: BoundSummary,
-    /// Share of the rows whose error lies within its bound.
+    /// Share of the rows whose error is within its bound, 0 to 1.
     pub coverage: f64,
 }
 
 /// Test of a tolerance on the accuracy AP of the identified arm in the held-out poses.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct TestedTolerance {
-    /// `pass`, `fail`, or `undecided` where the poses are too few.
+    /// `pass`, `fail`, or `undecided` if the poses are too few or no test of the arm.
     pub verdict: &'static str,
     pub tolerance_mm: f64,
     /// Share of the poses that must be within the tolerance.
@@ -89,11 +89,13 @@ pub struct TestedTolerance {
     /// Largest acceptable probability of a wrong pass, which is also that of a wrong fail.
     pub risk: f64,
     pub poses: usize,
-    /// Number of tested poses with an error above the tolerance.
+    /// Number of tested poses with an error above the tolerance, or without a prediction.
     pub beyond: usize,
-    /// Bounds of the share of all poses within the tolerance; each is wrong with at most `risk`.
+    /// Lower and upper bound of the share of all poses within the tolerance; each bound is wrong
+    /// with at most the probability `risk`.
     pub share_within: [f64; 2],
-    /// Number of poses at which the test would pass with no more poses beyond the tolerance.
+    /// Number of poses at which the test would pass if no more poses than now were beyond the
+    /// tolerance; null above a million.
     pub poses_to_pass: Option<usize>,
 }
 
@@ -159,7 +161,7 @@ impl From<&Accuracy> for PoseAccuracy {
 }
 
 impl AcceptanceResult {
-    /// Collects the record of an acceptance.
+    /// Collects the record of an acceptance, without bounds and without a tolerance.
     pub fn new(
         problem: &Problem,
         rows: &Measurements,
@@ -199,8 +201,8 @@ impl AcceptanceResult {
         }
     }
 
-    /// Returns the record with the bounds of some rows and their share within these; the
-    /// predictions may be corrected by a remainder.
+    /// Returns the record with the error bounds of the held-out rows and the share (`coverage`) of
+    /// rows within them. `remainder` is true if a remainder corrects the predictions.
     #[must_use]
     pub fn with_bounds(self, bounds: &Bounds, coverage: f64, remainder: bool) -> Self {
         let bounds = BoundSummary::new(bounds);
@@ -233,7 +235,8 @@ fn protocol(problem: &Problem) -> String {
     format!("held out: {chosen}; they took part in no fit of the arm and in no choice")
 }
 
-/// Returns the range of each quantity over the held-out poses.
+/// Returns the range of each quantity over the held-out poses: commands, measured positions, and
+/// the optional columns.
 fn conditions(problem: &Problem, rows: &Measurements, judged: &Acceptance) -> Vec<Condition> {
     let rows_judged = || judged.poses.iter().flat_map(|pose| pose.rows.iter().copied());
     let condition = |of: &str, unit: &str, value: &dyn Fn(usize) -> f64| Condition {
@@ -246,9 +249,9 @@ fn conditions(problem: &Problem, rows: &Measurements, judged: &Acceptance) -> Ve
             rows.configuration(row)[joint.joint] * joint.factor()
         })
     });
-    let places = ["x", "y", "z"].into_iter().enumerate();
-    let places =
-        places.map(|(axis, name)| condition(name, "mm", &|row| rows.positions[row][axis] * 1e3));
+    let axes = ["x", "y", "z"].into_iter().enumerate();
+    let positions =
+        axes.map(|(axis, name)| condition(name, "mm", &|row| rows.positions[row][axis] * 1e3));
     let columns = [
         ("temperature", "°C", &rows.temperature),
         ("payload", "kg", &rows.payload),
@@ -257,5 +260,5 @@ fn conditions(problem: &Problem, rows: &Measurements, judged: &Acceptance) -> Ve
     let measured = columns.into_iter().filter_map(|(name, unit, values)| {
         values.as_ref().map(|values| condition(name, unit, &|row| values[row]))
     });
-    joints.chain(places).chain(measured).collect()
+    joints.chain(positions).chain(measured).collect()
 }

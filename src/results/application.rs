@@ -27,10 +27,10 @@ pub struct PredictionErrors {
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub kinds: Vec<Summary>,
     pub sessions: BTreeMap<String, Summary>,
-    /// Spread of the target at each touched point.
+    /// Spread of the predicted target at each touched point, by the point's name.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub spread: BTreeMap<String, SpreadAtPoint>,
-    /// Share of the rows whose error lies within its bound.
+    /// Share of the rows whose error is within its bound, 0 to 1; absent without bounds.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub coverage: Option<f64>,
     #[serde(flatten)]
@@ -41,7 +41,7 @@ impl Document for PredictionErrors {
     const FORMAT: &'static str = "flexcal-errors";
 }
 
-/// Spread of the target over the rows at one point.
+/// Spread of the predicted target over the `n` rows at one point.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct SpreadAtPoint {
     pub n: usize,
@@ -50,7 +50,7 @@ pub struct SpreadAtPoint {
 }
 
 impl PredictionErrors {
-    /// Collects errors and spreads.
+    /// Collects the errors of predictions and the spreads at touched points.
     pub fn new(errors: &ErrorsBySession, spreads: &[PointSpread]) -> Self {
         let spread = |spread: &PointSpread| {
             (spread.point.clone(), SpreadAtPoint { n: spread.n, spread: Spread::new(spread) })
@@ -66,8 +66,8 @@ impl PredictionErrors {
         }
     }
 
-    /// Returns the errors with their bounds, and with the share of `residuals` that lie within
-    /// them.
+    /// Returns the errors with a summary of their bounds, and with the share of `residuals` that
+    /// are within the bounds.
     #[must_use]
     pub fn with_bounds(self, residuals: &[Residual], bounds: &Bounds) -> Self {
         let lengths = residuals.iter().map(|residual| residual.position.norm());
@@ -76,7 +76,8 @@ impl PredictionErrors {
     }
 }
 
-/// Commands by which the arm reaches targets. Means are over the targets that are reached.
+/// Summary of the commands by which the arm reaches targets. Means are over the targets that are
+/// reached.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct CompensationResult {
     pub problem: String,
@@ -98,7 +99,7 @@ impl Document for CompensationResult {
     const FORMAT: &'static str = "flexcal-compensate";
 }
 
-/// Problem that was made from a URDF.
+/// Problem file that was written from a URDF.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct InitResult {
     pub problem: String,
@@ -138,7 +139,7 @@ impl CompensationResult {
         }
     }
 
-    /// Returns the result with the expected error at the targets and its bounds.
+    /// Returns the result with the expected error at the targets and with its bounds.
     #[must_use]
     pub fn with_bounds(self, bounds: &Bounds) -> Self {
         Self { bounds: Some(BoundSummary::new(bounds)), ..self }

@@ -14,7 +14,7 @@ pub struct Hypothesis {
     /// Effect of the catalogue; null for a function of unknown law.
     #[schemars(with = "Option<EffectKeys>")]
     pub effect: Option<Effect>,
-    /// Name of the effect, or of the kind of function.
+    /// Name of the effect, or of the kind of function such as `smooth`.
     pub law: String,
     pub description: String,
     pub place: String,
@@ -22,7 +22,7 @@ pub struct Hypothesis {
 }
 
 impl Hypothesis {
-    /// Converts a hypothesis about the traced data, with names for its place and law.
+    /// Converts a hypothesis about the traced data to the names that result files use.
     pub(super) fn new(hypothesis: &select::Hypothesis, trace: &Trace) -> Self {
         Self {
             effect: hypothesis.effect().cloned(),
@@ -41,7 +41,7 @@ pub struct Claim<T> {
     pub probability: f64,
 }
 
-/// Claims about a cause, from the weakest to the strongest.
+/// Claims about a cause, from the weakest (place) to the strongest (law).
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Claims {
     /// Claim that a cause acts at the stated place.
@@ -55,7 +55,7 @@ pub struct Claims {
 }
 
 impl Claims {
-    /// Converts claims about the traced data, with names for places and laws.
+    /// Converts claims about the traced data to the names that result files use.
     pub(super) fn new(claims: &select::Claims, trace: &Trace) -> Self {
         let select::Claims { place, depends_on, law } = claims;
         let name = law.0.effect().map(|effect| effect.name().to_owned());

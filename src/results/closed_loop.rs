@@ -35,7 +35,7 @@ pub struct LoopResult {
     pub before: Fit,
     /// Fit of the extended problem.
     pub after: Fit,
-    /// Errors with the effects of status `found` alone.
+    /// Errors of a fit with only those added effects that have the status `found`.
     pub with_found: Errors,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub held_out_gain_mm: Option<Gain>,
@@ -88,7 +88,7 @@ pub struct Fit {
 pub struct Gain {
     /// Mean error with the declared problem minus that with the added effects.
     pub mean: f64,
-    /// Bootstrap interval over configurations, 95 %.
+    /// 95 % bootstrap interval of `mean`, resampled over configurations.
     pub interval_95: [f64; 2],
 }
 
@@ -98,7 +98,8 @@ pub struct FoundEffect {
     #[serde(flatten)]
     pub effect: NamedEffect,
     pub status: Status,
-    /// Claims about the cause; null if no evidence was evaluated.
+    /// Claims about the cause; null if no evidence on the effect was evaluated, or if no probable
+    /// hypothesis set contains it.
     pub claims: Option<Claims>,
     /// Quantities of a law that the search composed, with their ranges over the identification
     /// rows, SI units; absent for other effects.
@@ -108,9 +109,10 @@ pub struct FoundEffect {
     /// table of hints has none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub resembles: Option<String>,
-    /// Share of 20 refits, each on random 80 % of the configurations, that find the effect again.
+    /// Share of 20 refits, each on random 80 % of the configurations, that find the effect again;
+    /// null if no evidence was evaluated.
     pub stability: Option<f64>,
-    /// Verdict of measurements that are independent of the fit.
+    /// Verdict of measurements that are independent of the fit; null if none concern the effect.
     pub witness: Option<Witness>,
     /// Probability that noise alone reduces the residual as much, corrected for the number of
     /// candidates.
@@ -118,7 +120,8 @@ pub struct FoundEffect {
     pub parameters: Vec<ParameterValue>,
     /// Effects that the data cannot distinguish from the found one, most probable first.
     pub alternatives: Vec<AlternativeEffect>,
-    /// Held-out errors after the first round with the effect.
+    /// Held-out errors after the first round that contains the effect and whose effects all
+    /// remained. If there is no such round, those of the last fit.
     pub held_out_after: Summary,
 }
 
@@ -144,7 +147,7 @@ pub struct Witness {
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct ParameterValue {
     pub name: String,
-    #[serde(serialize_with = "symbol")]
+    #[serde(serialize_with = "serialize_symbol")]
     #[schemars(with = "String")]
     pub unit: Unit,
     pub estimate: f64,
@@ -179,7 +182,8 @@ pub struct Correction {
     pub ranges: Vec<(String, (f64, f64))>,
     /// Number of held-out rows at which an input is outside its range.
     pub held_out_beyond: usize,
-    /// Rms error of poses, each left out of the fit in turn, without and with the correction.
+    /// Rms error of identification poses, each left out of the fit in turn: first without, then
+    /// with the correction.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cross_validated_rms_mm: Option<[f64; 2]>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -202,7 +206,7 @@ pub struct OrderPrior {
     pub sigma_rad: f64,
 }
 
-/// Round of the search.
+/// Effects in the model after a round of the search, and its errors.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct Step {
     #[schemars(with = "Vec<EffectKeys>")]
@@ -263,7 +267,8 @@ impl LoopResult {
         self.findings.iter().any(|finding| codes.contains(&finding.code))
     }
 
-    /// Returns the result with the remainder, if one was accepted in addition to the effects.
+    /// Returns the result with the remainder, if one was accepted in addition to the effects. The
+    /// errors of `after` are then those with the remainder.
     #[doc(hidden)]
     #[must_use]
     pub fn with_remainder(mut self, closure: &ClosedLoop, fitted: &Fitted) -> Self {
@@ -279,7 +284,7 @@ impl LoopResult {
         self.effects.iter().filter(move |found| found.status == status)
     }
 
-    /// Iterates over structure whose law is unknown, most probable first.
+    /// Iterates over all structure in the residual whose law is unknown, most probable first.
     pub(crate) fn structures(&self) -> impl Iterator<Item = &Structure> {
         self.unexplained.iter().chain(&self.further)
     }
@@ -305,8 +310,9 @@ impl LoopResult {
         Some((test, test.statistic?))
     }
 
-    /// Returns the ratio of the residual to the declared σ if only the size of the residual is
-    /// significant; `None` if other tests fail too, or if structure is located.
+    /// Returns the ratio √(χ²/ν) of the residual to the declared σ if it is significantly above 1
+    /// and no other test of structure fails. Otherwise, or if structure has a place, returns
+    /// `None`.
     pub(crate) fn size_alone(&self) -> Option<f64> {
         let (size, chi2) = self.size_test()?;
         let failed = self.checks_after.iter().filter(|test| test.structure && test.failed);
@@ -317,16 +323,16 @@ impl LoopResult {
         (is_alone && is_nowhere).then(|| chi2.sqrt())
     }
 
-    /// Returns the ratio of the residual to the declared σ if it is significantly less than 1;
-    /// `None` if it is not, or if no σ is declared.
+    /// Returns the ratio √(χ²/ν) of the residual to the declared σ if it is significantly less than
+    /// 1; `None` if it is not, or if no σ is declared.
     pub(crate) fn overstated_sigma(&self) -> Option<f64> {
         let (size, chi2) = self.size_test()?;
         let (low, _) = size.bounds?;
         (chi2 < low).then(|| chi2.max(0.0).sqrt())
     }
 
-    /// Returns the decrease of the mean held-out error by the effects, in the unit of its key: mm,
-    /// ° or px; `None` if it is not known.
+    /// Returns the decrease of the mean held-out error by the added effects, in the unit of its
+    /// key: mm, ° or px; `None` if the file states none.
     pub(crate) fn gain(&self) -> Option<Gain> {
         self.held_out_gain_mm.or(self.held_out_gain_deg).or(self.held_out_gain_px)
     }
@@ -375,7 +381,8 @@ impl FoundEffect {
         }
     }
 
-    /// Returns true for a cause that is significant alone but whose law is uncertain.
+    /// Returns true if the effect is significant without the other effects, but its law is
+    /// uncertain.
     pub fn is_doubted(&self) -> bool {
         matches!(self.status, Status::Probable | Status::Located) && !self.is_only_with_others()
     }
@@ -388,7 +395,7 @@ impl FoundEffect {
 }
 
 impl ParameterValue {
-    /// Converts the estimate of a parameter.
+    /// Converts the estimate of a parameter, in SI units.
     pub(crate) fn new(estimate: &Estimate) -> Self {
         Self {
             name: estimate.name.clone(),
@@ -398,8 +405,8 @@ impl ParameterValue {
         }
     }
 
-    /// Returns the amplitude of a sine and a cosine of one order, whose errors are treated as
-    /// uncorrelated.
+    /// Returns the amplitude of the harmonic with the coefficients `pair` of its sine and cosine,
+    /// whose errors are treated as uncorrelated.
     pub(crate) fn amplitude(pair: &[Self]) -> Self {
         let (sine, cosine) = (&pair[0], &pair[1]);
         let amplitude = sine.estimate.hypot(cosine.estimate);
@@ -464,6 +471,9 @@ impl Step {
 }
 
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes fields by reference")]
-pub(super) fn symbol<S: serde::Serializer>(unit: &Unit, serializer: S) -> Result<S::Ok, S::Error> {
+pub(super) fn serialize_symbol<S: serde::Serializer>(
+    unit: &Unit,
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
     serializer.serialize_str(unit.symbol())
 }

@@ -30,7 +30,7 @@ impl Document for ComparisonResult {
     const FORMAT: &'static str = "flexcal-compare";
 }
 
-/// One of the compared fits.
+/// Fit of one strategy with one solver, or of one procedure of the paper.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct ComparedFit {
     pub strategy: String,
@@ -67,7 +67,7 @@ pub struct Procedure {
     pub figure_13: PoseErrors,
 }
 
-/// Geometry of one joint.
+/// DH parameters of one joint, numbered from 1.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct JointGeometry {
     pub joint: usize,
@@ -78,13 +78,14 @@ pub struct JointGeometry {
     pub beta_deg: GeometryValue,
 }
 
-/// Nominal and identified value of a geometric parameter.
+/// Nominal and identified value of a DH parameter, in ° or mm as its key states.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct GeometryValue {
     pub nominal: f64,
     pub identified: f64,
     pub change: f64,
-    /// Share of the value that the data determine, 0 to 1; null if the value was not identified.
+    /// Identified share, 0 to 1: part of the value that the data determine; null if the value was
+    /// not identified.
     pub seen: Option<f64>,
 }
 
@@ -93,7 +94,7 @@ pub struct GeometryValue {
 pub struct HeldOutErrors {
     /// True if base and tool of the nominal arm had to be fitted first.
     pub before_registered: bool,
-    /// Errors of the nominal arm without elasticity.
+    /// Errors of the nominal rigid arm.
     pub before: Summary,
     pub after: Summary,
     pub ignoring_elasticity: Option<Summary>,

@@ -30,8 +30,8 @@ pub struct CheckResult {
     pub prediction: JudgedPrediction,
     /// Forecast for smaller and larger numbers of such poses.
     pub growth: Vec<GrowthStep>,
-    /// Smallest number of poses that identify all parameters and predict with an error no larger
-    /// than that of one measurement.
+    /// Smallest number of poses that determine `attainable_rank` combinations and predict with an
+    /// rms error no larger than that of one measurement. Null if the series is too short.
     pub enough: Option<usize>,
     /// Smallest size of each effect that would be found.
     pub detectable: Detectable,
@@ -53,7 +53,7 @@ pub struct PlanResult {
     pub given: usize,
     pub candidates: usize,
     pub sufficient: bool,
-    /// Logarithm of the criterion that each start of the exchange reached.
+    /// Logarithm of the criterion that the exchange algorithm reached from each of its starts.
     pub starts: Vec<f64>,
     /// Logarithm of the criterion of the plan.
     pub value: f64,
@@ -70,7 +70,7 @@ pub struct PlanResult {
     pub conditioning: Conditioning,
     pub parameters: Vec<PlannedParameter>,
     pub unidentified: Vec<Combination>,
-    /// How well the plan distinguishes two effects; absent for other plans.
+    /// How well the plan distinguishes two effects; absent if that is not its purpose.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub separation: Option<SeparationResult>,
 }
@@ -79,7 +79,7 @@ impl Document for PlanResult {
     const FORMAT: &'static str = "flexcal-plan";
 }
 
-/// Parameter before anything is measured, SI units.
+/// Parameter with the standard error that the measurements are expected to give, SI units.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct ExpectedParameter {
     pub name: String,
@@ -93,7 +93,8 @@ pub struct ExpectedParameter {
     pub identified_at_nominal: f64,
 }
 
-/// Parameter with its standard error after planned and after random poses.
+/// Parameter with its expected standard error after the planned poses and after as many random
+/// ones.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct PlannedParameter {
     #[serde(flatten)]
@@ -118,16 +119,17 @@ pub struct JudgedPrediction {
     pub judged_in: &'static str,
     #[serde(flatten)]
     pub error: PredictionError,
-    /// Expected root mean square of measured − predicted, with the noise of a measurement.
+    /// Expected root mean square of measured − predicted, with the noise of a measurement; null
+    /// unless positions are measured.
     pub held_out_rms_mm: Option<f64>,
 }
 
-/// Expectation for one number of poses.
+/// Forecast for one number of poses.
 #[derive(Debug, Clone, Copy, Serialize, JsonSchema)]
 pub struct GrowthStep {
     pub poses: usize,
     pub rank: usize,
-    /// Number of parameter combinations that the poses leave undetermined.
+    /// Number of parameter combinations that neither the poses nor the priors determine.
     pub open: usize,
     /// Number of parameters with an identified share of 90 % or more.
     pub well_identified: usize,
@@ -162,7 +164,8 @@ pub struct DetectableSize {
     pub parameters: Vec<String>,
     pub unit: &'static str,
     pub prior_sigma: f64,
-    /// Smallest size that is found even in the least visible combination of the parameters.
+    /// Smallest size that is found even in the least visible combination of the parameters; null if
+    /// no size is.
     pub found_from: Option<f64>,
     /// Smallest size that is found in the most visible combination of the parameters.
     pub found_from_at_best: Option<f64>,
@@ -171,31 +174,34 @@ pub struct DetectableSize {
 /// How well poses distinguish two effects.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct SeparationResult {
-    /// Largest principal angle between the displacements by the two effects.
+    /// Largest principal angle between the displacements by the two effects, 0 to 90; null if one
+    /// of them displaces nothing.
     pub angle_deg: Option<f64>,
     pub random_angle_deg: Option<f64>,
     pub effects: [SeparatedEffect; 2],
 }
 
-/// One of two effects, after planned poses and as the median over random ones.
+/// Detectability of one of two effects with the planned poses; the keys `random_…` are medians over
+/// random sets of poses.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct SeparatedEffect {
     #[serde(flatten)]
     #[schemars(with = "EffectKeys")]
     pub effect: Effect,
     pub parameters: Vec<String>,
-    #[serde(serialize_with = "super::closed_loop::symbol")]
+    #[serde(serialize_with = "super::closed_loop::serialize_symbol")]
     #[schemars(with = "String")]
     pub unit: Unit,
-    /// 1 σ of the prior of the parameters.
+    /// Standard deviation (1 σ) of the prior of the parameters.
     pub prior_sigma: f64,
-    /// Smallest size at which the effect is found.
+    /// Smallest size at which the effect is found; null if no size suffices.
     pub found_from: Option<f64>,
     pub random_found_from: Option<f64>,
-    /// Smallest size at which the other effect is ruled out as an explanation.
+    /// Smallest size at which the other effect is ruled out as an explanation; null if no size
+    /// suffices.
     pub told_from: Option<f64>,
     pub random_told_from: Option<f64>,
-    /// Size of the effect to which the p-values apply.
+    /// Assumed size of the effect, to which the p-values apply.
     pub size: f64,
     pub p_value: f64,
     pub random_p_value: f64,
@@ -242,7 +248,8 @@ impl CheckResult {
 }
 
 impl PlanResult {
-    /// Collects the result of a plan; `separated` is given if it distinguishes two effects.
+    /// Collects the result of a plan; `separated` is given if the plan is to distinguish two
+    /// effects.
     pub fn new(
         problem: &Problem,
         criterion: &Criterion,

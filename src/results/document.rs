@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 
 use crate::files::{DIGEST_KEY, FORMAT_VERSION, Format, PROGRAM, sealed};
 
-/// Result that is written as a JSON document with its own format name and schema.
+/// Result that is written as a JSON document, with the name and the schema of its format.
 pub trait Document: Serialize + JsonSchema + Sized {
     /// Name of the format, for example `flexcal-loop`.
     const FORMAT: &'static str;
@@ -18,7 +18,7 @@ pub trait Document: Serialize + JsonSchema + Sized {
     const IS_READ_BACK: bool = false;
 
     /// Returns the JSON text of the result, ending in a line break: `format` and `program` first,
-    /// then its own keys. Numbers that are not finite are written as null.
+    /// then the fields of the result. Numbers that are not finite are written as null.
     fn to_json(&self) -> String {
         let format = Format::current(Self::FORMAT);
         let file = File { format, program: PROGRAM, content: self };
@@ -38,7 +38,7 @@ pub trait Document: Serialize + JsonSchema + Sized {
 pub(super) fn schema_of<T: JsonSchema>(name: &'static str, is_sealed: bool) -> String {
     let settings = SchemaSettings::draft2020_12().for_serialize();
     let mut schema = settings.into_generator().into_root_schema_for::<T>();
-    RecursiveTransform(adapted).transform(&mut schema);
+    RecursiveTransform(allow_null_numbers).transform(&mut schema);
     schema.remove("description");
     schema.insert("title".to_owned(), name.into());
     if let Some(format) = schema.pointer_mut("/$defs/Format/properties") {
@@ -69,7 +69,7 @@ struct File<T> {
 
 /// Allows every number to be null, because numbers that are not finite are written as null. Removes
 /// annotations of Rust types such as `"format": "double"`.
-fn adapted(schema: &mut Schema) {
+fn allow_null_numbers(schema: &mut Schema) {
     schema.remove("format");
     if schema.get("type").and_then(Value::as_str) == Some("number") {
         schema.insert("type".to_owned(), json!(["number", "null"]));

@@ -38,7 +38,7 @@ impl NamedEffect {
     }
 }
 
-/// Effect that the data cannot show.
+/// Effect whose presence the data cannot show, with the reason.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Untestable {
     #[serde(flatten)]
@@ -48,7 +48,8 @@ pub struct Untestable {
 }
 
 impl Untestable {
-    /// Lists effects, where parts of one effect with the same reason form one entry.
+    /// Lists effects with the reason why the data cannot show them. Parts of one effect, such as
+    /// harmonics of a joint, form one entry if they share a reason.
     pub(super) fn all(effects: &[(Effect, &'static str)]) -> Vec<Self> {
         let entry = |(effect, reason)| Self { effect, reason };
         joined(effects.iter().cloned()).into_iter().map(entry).collect()
@@ -56,7 +57,7 @@ impl Untestable {
 }
 
 /// Merges effects that are parts of one, such as the harmonics of a joint, if they share a reason.
-/// The order is that of their first parts.
+/// A merged effect stands at the place of its first part.
 pub(crate) fn joined<R: Copy + PartialEq>(
     effects: impl IntoIterator<Item = (Effect, R)>,
 ) -> Vec<(Effect, R)> {

@@ -1,5 +1,5 @@
-//! Result of the command `export`: moved origins, errors, and the parts of the model that the file
-//! cannot represent.
+//! Result of the command `export`: moved origins, errors, and the parts of the model that the
+//! exported file cannot represent.
 
 use std::path::Path;
 
@@ -16,12 +16,12 @@ use crate::model::parameter::{Parameter, ParameterSite};
 use crate::problem::Problem;
 use crate::urdf::MovedOrigin;
 
-/// File with the identified geometry.
+/// Exported file with the identified geometry, and what it leaves out.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct ExportResult {
     pub problem: String,
     pub file: Option<String>,
-    /// Origins that moved in a URDF.
+    /// Joint origins of a URDF that moved; null for other files.
     pub origins: Option<Vec<Origin>>,
     pub held_out: Option<ExportedErrors>,
     /// Parts of the model that the file cannot represent.
@@ -32,7 +32,7 @@ impl Document for ExportResult {
     const FORMAT: &'static str = "flexcal-export";
 }
 
-/// Origin of a joint in a URDF.
+/// New origin of a joint in a URDF, and its motion from the nominal origin.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct Origin {
     pub joint: String,
@@ -42,19 +42,21 @@ pub struct Origin {
     pub turned_deg: f64,
 }
 
-/// Errors on held-out rows, of the whole model and of geometries alone.
+/// Held-out errors of the whole model, and of rigid geometries without its other parts.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct ExportedErrors {
     pub whole: Summary,
     /// Errors of the exported geometry alone.
     pub rigid: Summary,
-    /// Identified geometry without the other parts of the model, unless it was exported.
+    /// Errors of the identified geometry without the other parts of the model, unless it was
+    /// exported.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub identified: Option<Summary>,
-    /// Geometry of `--best-rigid`, unless it was exported.
+    /// Errors of the geometry of `--best-rigid`, unless it was exported.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub best_rigid: Option<Summary>,
-    /// Geometry fitted to the same rows by a rigid model without effects, unless it was exported.
+    /// Errors of a geometry fitted to the same rows by a rigid model without effects, unless it was
+    /// exported.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fitted_alone: Option<Summary>,
 }
@@ -81,13 +83,13 @@ impl ExportResult {
             file: file.map(|file| file.display().to_string()),
             origins: moved.map(|moved| moved.iter().map(origin).collect()),
             held_out,
-            not_held: left_out(problem, model),
+            not_held: unexported_parts(problem, model),
         }
     }
 }
 
 impl ExportedErrors {
-    /// Computes the errors on the held-out rows of `data` of the leading kind (positions, if there
+    /// Computes the errors of the held-out rows of the leading kind in `data` (positions, if there
     /// are any). `x` is the model's full parameter vector; `saved` is the estimate from which it
     /// was read, if any.
     pub fn new(
@@ -129,24 +131,24 @@ impl ExportedErrors {
 }
 
 /// Lists the parts of the model other than the geometry of the chain.
-fn left_out(problem: &Problem, model: &Model) -> Vec<String> {
-    let mut left_out: Vec<String> = Vec::new();
+fn unexported_parts(problem: &Problem, model: &Model) -> Vec<String> {
+    let mut parts: Vec<String> = Vec::new();
     for (number, joint) in (1..).zip(&problem.joints) {
         if joint.stiffness.is_some() {
-            left_out.push(format!("joint{number}.stiffness"));
+            parts.push(format!("joint{number}.stiffness"));
         }
         if let Some(beam) = &joint.beam {
-            left_out.push(format!("elastic link {}", beam.name));
+            parts.push(format!("elastic link {}", beam.name));
         }
     }
-    left_out.extend(problem.effects.iter().map(|declared| declared.effect.declaration()));
+    parts.extend(problem.effects.iter().map(|declared| declared.effect.declaration()));
     let set_up = |parameter: &&Parameter| {
         matches!(parameter.site, ParameterSite::Base { .. } | ParameterSite::Target { .. })
     };
     let set_up: Vec<&str> =
         model.parameters.iter().filter(set_up).map(|parameter| parameter.name.as_str()).collect();
     if !set_up.is_empty() {
-        left_out.push(format!("base and target of the set-up ({})", set_up.join(", ")));
+        parts.push(format!("base and target of the set-up ({})", set_up.join(", ")));
     }
-    left_out
+    parts
 }

@@ -16,7 +16,8 @@ pub struct FleetResult {
     pub arms: Vec<FleetArmResult>,
 }
 
-/// Parameter of the fleet: deviations from nominal, SI, or logarithms of stiffnesses.
+/// Parameter of the fleet. Mean and spread are those of the deviations from nominal, SI; for
+/// stiffnesses, of their logarithms.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct FleetParameterResult {
     pub name: String,
@@ -25,8 +26,8 @@ pub struct FleetParameterResult {
     pub nominal: f64,
     pub mean: f64,
     pub mean_error: f64,
-    /// Standard deviation of the next arm about the mean: the spread of the arms, shrunk towards
-    /// the data sheet.
+    /// Standard deviation about the mean that the next arm is expected to have: the spread of these
+    /// arms, shrunk towards the data sheet.
     pub spread: f64,
     /// Declared 1 σ of the prior; null without a prior.
     pub declared: Option<f64>,
@@ -36,11 +37,12 @@ pub struct FleetParameterResult {
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct FleetArmResult {
     pub file: String,
-    /// True if the arm is unlike the others (probability below 1 % for any arm like them).
+    /// True if the arm is unlike the others: an arm like them would deviate as much with a
+    /// probability below 1 %.
     pub unlike: bool,
-    /// Parameter that deviates most from the other arms.
+    /// Parameter that deviates most from the other arms; null if the rows do not determine any.
     pub parameter: Option<String>,
-    /// Its deviation, in standard deviations.
+    /// Deviation of that parameter from the other arms, in its standard deviations.
     pub sigmas: Option<f64>,
 }
 
@@ -49,7 +51,7 @@ impl Document for FleetResult {
 }
 
 impl FleetResult {
-    /// Converts a fleet.
+    /// Converts the mean, the spread and the arms of a fleet.
     pub fn new(fleet: &Fleet) -> Self {
         let parameter = |parameter: &FleetParameter| FleetParameterResult {
             name: parameter.name.clone(),

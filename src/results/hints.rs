@@ -3,14 +3,14 @@
 use crate::laws::At;
 use crate::problem::Effect;
 
-/// Cause that a law resembles.
+/// Physical cause that a law resembles.
 struct Hint {
-    /// Kind of site: the site in files without the joint's number and the axis.
+    /// Kind of site: the name of the site in files without joint number and axis.
     site: &'static str,
-    /// Formula, with `#` for the number of the law's joint and `*` for that of another one. The
+    /// Formula, with `#` for the number of the law's joint and `*` for that of another joint. The
     /// time of a step is left out.
     formula: &'static str,
-    /// Cause, which follows "as" and precedes "would".
+    /// Noun phrase for the cause, which a sentence puts between "as" and "would".
     cause: &'static str,
 }
 
@@ -18,7 +18,7 @@ const fn hint(site: &'static str, formula: &'static str, cause: &'static str) ->
     Hint { site, formula, cause }
 }
 
-/// Causes by site and formula of a law with one term. Each is one of several possible ones.
+/// Causes of laws with one term, by site and formula. Each cause is one of several possible ones.
 const HINTS: [Hint; 27] = [
     hint("joint", "q#^2", "an encoder scale that changes over the range"),
     hint("joint", "abs(q# - c)", "a tooth flank that changes at c, or a cable that tightens there"),
@@ -49,22 +49,23 @@ const HINTS: [Hint; 27] = [
     hint("base", "t", "a base that sinks"),
 ];
 
-/// Returns the cause that a law of the search resembles, in words; `None` for other effects, and
-/// for laws with several terms or without an entry.
+/// Returns the cause that a law of the search resembles, as a phrase "as … would". `None` for other
+/// effects, for laws with several terms, and for laws without an entry in the table.
 pub(super) fn resembled(effect: &Effect) -> Option<String> {
     let Effect::Law(law) = effect else { return None };
     law.description()?;
     let [formula] = law.formulas().try_into().ok()?;
     let site = law.site();
-    let kind = match law.at() {
+    let site_kind = match law.at() {
         At::Beam(_) => "link",
         _ => site.split('.').next().unwrap_or_default(),
     };
     let is_small_motion = site.contains('.') && law.joint().is_some();
-    let kind = kind.trim_end_matches(|c: char| c.is_ascii_digit());
+    let site_kind = site_kind.trim_end_matches(|c: char| c.is_ascii_digit());
     let pattern = pattern(&formula, law.joint());
-    let is_it = |hint: &&Hint| hint.site == kind && hint.formula == pattern && !is_small_motion;
-    let hint = HINTS.iter().find(is_it)?;
+    let is_of_law =
+        |hint: &&Hint| hint.site == site_kind && hint.formula == pattern && !is_small_motion;
+    let hint = HINTS.iter().find(is_of_law)?;
     Some(format!("as {} would", hint.cause))
 }
 

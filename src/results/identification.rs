@@ -27,7 +27,7 @@ pub struct IdentificationResult {
     pub problem: String,
     /// SHA-256 digest of all declarations on which predictions depend.
     pub arm_digest: String,
-    /// Digest of each part of the declared arm.
+    /// Digest of each part of the declared arm, by the name of the part.
     pub arm_parts: BTreeMap<String, String>,
     pub strategy: &'static str,
     pub solver: &'static str,
@@ -45,17 +45,18 @@ pub struct IdentificationResult {
     /// Errors of each kind of rows, if there are several.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub kinds: Vec<KindErrors>,
-    /// Spread of the target at each touched point.
+    /// Spread of the predicted target at each touched point, by the point's name.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub spread: BTreeMap<String, SpreadChange>,
     pub reduced_chi2: Option<f64>,
     /// Time of the first pose.
     pub first_time_s: f64,
-    /// Time of the first pose of each named session, from which effects that follow the time count.
+    /// Time of the first pose of each named session, where the elapsed time of time-dependent
+    /// effects is zero.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub session_times_s: BTreeMap<String, f64>,
-    /// Standard deviation (1 σ) of a coordinate, estimated from the residuals; null if the problem
-    /// declares σ.
+    /// Standard deviation (1 σ) of a coordinate, estimated from the residuals of this or of the
+    /// earlier fit; null if the problem declares σ, or without degrees of freedom.
     pub estimated_sigma_mm: Option<f64>,
     /// Interval that contains `reduced_chi2` with probability 0.999 if the residual is only noise.
     pub chance: Option<(f64, f64)>,
@@ -87,13 +88,14 @@ pub struct IdentificationResult {
     /// Findings of the checks of the fit.
     #[schemars(with = "Vec<FindingKeys>")]
     pub findings: Vec<Finding>,
-    /// Comparison with the earlier estimate that was the prior.
+    /// Comparison with the earlier estimate that was the prior; absent without one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub prior: Option<PriorUse>,
-    /// Digest of each fitted row, by which a later identification leaves it out.
+    /// Digest of each fitted row. A later identification with this estimate as prior leaves these
+    /// rows out.
     #[schemars(with = "Vec<String>")]
     pub fitted_rows: Option<Box<RawValue>>,
-    /// Remainder that corrects predictions; errors of the identified arm include it.
+    /// Remainder that corrects the predictions and errors of the identified arm; null without one.
     pub remainder: Option<Remainder>,
     /// Uncertainty of predictions without a remainder, in the form of remainder.json.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -139,7 +141,7 @@ pub struct Conditioning {
 
 impl Conditioning {
     /// Summarises an identifiability analysis: its condition number, and the observability indices
-    /// of the analysed parameters for a number of measured `coordinates`.
+    /// of the analysed parameters. `coordinates` is the number of measured coordinates.
     pub(super) fn new(found: &Identifiability, coordinates: usize) -> Self {
         let names = ["O1", "O2", "O3", "O4", "O5"];
         let observability = names.into_iter().zip(found.observability(coordinates)).collect();
@@ -171,21 +173,22 @@ pub struct Parameter {
 pub struct Price {
     /// Lagrange multiplier of the limit.
     pub multiplier: f64,
-    /// Decrease of the root mean square residual if the limit is moved outwards by one `per`.
+    /// Decrease of the root mean square position residual if the limit is moved outwards by one
+    /// step of the size `per`.
     pub rms_mm: f64,
     pub per: &'static str,
 }
 
-/// Linear combination of parameters.
+/// Linear combination of parameters with its singular value.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct Combination {
-    /// Weight of each parameter.
+    /// Coefficient of each parameter in the combination, by the parameter's name.
     pub combination: BTreeMap<String, f64>,
     pub singular_value: f64,
 }
 
 impl Combination {
-    /// Lists combinations by the names of the parameters.
+    /// Lists combinations of parameters; `name` returns the name of the parameter with an index.
     pub(super) fn all(
         combinations: &[UnidentifiableCombination],
         name: impl Fn(usize) -> String,
@@ -233,7 +236,7 @@ pub struct OutlierRow {
     pub sigmas: f64,
 }
 
-/// Few rows whose removal removes most of the misfit.
+/// Influential rows: a few rows whose removal removes most of the misfit.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct InfluentialRowSet {
     pub rows: Vec<OutlierRow>,
@@ -249,24 +252,25 @@ pub struct Orientation {
     pub sigma_taken_deg: f64,
 }
 
-/// Spread of the target about its mean over the rows at one point.
+/// Spread of the predicted target about its mean over the rows at one point. `mean_mm` is the mean
+/// distance from that mean.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct Spread {
     pub mean_mm: f64,
-    /// Direction of the largest spread, measuring frame.
+    /// Unit vector along the largest spread, measuring frame.
     pub along: [f64; 3],
-    /// Share of the squared spread along that direction.
+    /// Share of the squared spread along that direction, 0 to 1.
     pub share: f64,
 }
 
 impl Spread {
-    /// Converts the spread at a point.
+    /// Converts the spread of the target at a point from m to mm.
     pub(super) fn new(spread: &PointSpread) -> Self {
         Self { mean_mm: spread.mean * 1e3, along: spread.along.into(), share: spread.share }
     }
 }
 
-/// Spread at a point with the nominal arm and with the identified arm.
+/// Spread of the target at a point with the registered nominal arm and with the identified arm.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct SpreadChange {
     pub n: usize,
@@ -349,8 +353,8 @@ impl IdentificationResult {
         }
     }
 
-    /// Returns the result with everything that predictions need: posterior covariance, uncertainty
-    /// of predictions, and the remainder if one was accepted.
+    /// Returns the result with what predictions need: posterior covariance, uncertainty, and the
+    /// remainder if one was accepted, which also corrects the errors of the identified arm.
     #[must_use]
     #[doc(hidden)]
     pub fn with_predictions(self, found: &Identification, fitted: &Fitted) -> Self {
@@ -436,11 +440,13 @@ impl Orientation {
     }
 }
 
+/// Returns the word for the active side of a bound.
 fn side(bound: AtBound, [lower, upper]: [&'static str; 2]) -> &'static str {
     if bound == AtBound::Lower { lower } else { upper }
 }
 
-/// Returns the rows of the covariance matrix, each as one line of JSON text.
+/// Returns the rows of the estimates' covariance matrix \[product of their SI units\], each as one
+/// line of JSON text. Entries of parameters without a standard error are null.
 fn covariance(found: &Identification) -> Vec<Box<RawValue>> {
     let n = found.estimates.len();
     let has_error = |k: usize| found.estimates[k].std_error.is_some();

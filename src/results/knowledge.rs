@@ -1,4 +1,4 @@
-//! How well the data determine parameters and their combinations.
+//! Classes of parameters by how well the data determine them, and joints with many harmonics.
 
 use std::collections::BTreeMap;
 
@@ -16,11 +16,12 @@ const MIN_PARTLY_IDENTIFIED: f64 = 0.1;
 /// Identified share up to which a parameter is not identified at all.
 const MAX_UNIDENTIFIED: f64 = 1e-6;
 /// Maximum number of harmonic coefficients of one joint that are listed one by one.
-pub(crate) const MAX_COEFFICIENTS: usize = 8;
-/// Number of largest harmonics of a joint that are listed if it has more coefficients.
+pub(crate) const MAX_LISTED_COEFFICIENTS: usize = 8;
+/// Number of harmonics with the largest amplitudes that are listed for a joint with more
+/// coefficients than [`MAX_LISTED_COEFFICIENTS`].
 pub(crate) const MAX_SHOWN_HARMONICS: usize = 4;
 
-/// How well the data determine a parameter.
+/// Class of a parameter by how well the data determine it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Knowledge {
     /// The estimate rests on a bound.
@@ -41,7 +42,7 @@ pub enum Knowledge {
 }
 
 impl Knowledge {
-    /// Classifies an estimate.
+    /// Classifies an estimate by its bound, its identified share and its standard error.
     pub fn of(estimate: &Estimate) -> Self {
         match (estimate.at_bound, estimate.fitted, estimate.identified) {
             (Some(bound), ..) => Self::AtBound(bound),
@@ -56,18 +57,18 @@ impl Knowledge {
         }
     }
 
-    /// Returns true if the data determine the parameter, rather than its prior.
+    /// Returns true if the data determine the parameter, not its prior or a bound.
     pub fn is_identified(self) -> bool {
         matches!(self, Self::Well | Self::Vaguely)
     }
 
-    /// Returns true if the parameter was not fitted or rests on a bound.
+    /// Returns true if the parameter was not fitted, or if its estimate rests on a bound.
     pub fn is_held(self) -> bool {
         matches!(self, Self::AtBound(_) | Self::NotFitted)
     }
 }
 
-/// Returns true if the standard error is too large for a calibration.
+/// Returns true if the standard error is missing or too large for a calibration.
 fn is_vague(estimate: &Estimate) -> bool {
     let limit = match estimate.unit {
         Unit::Angle => 1.0_f64.to_radians(),
@@ -80,19 +81,20 @@ fn is_vague(estimate: &Estimate) -> bool {
     estimate.std_error.is_none_or(|error| error > limit)
 }
 
-/// Harmonics of joints that have too many coefficients to list one by one. Contains joint (from 1)
-/// and order of each coefficient, and the largest orders of each of these joints.
+/// Harmonics of joints, some of which have too many coefficients to list one by one.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ManyHarmonics {
+    /// Joint (from 1) and order of each harmonic coefficient, by the parameter's name.
     coefficients: BTreeMap<String, (usize, u32)>,
-    /// For each joint, the orders of the largest amplitudes and the number of smaller harmonics.
+    /// For each joint (from 1) with too many coefficients: the orders of its largest amplitudes,
+    /// and the number of its smaller harmonics.
     largest: BTreeMap<usize, (Vec<u32>, usize)>,
 }
 
 impl ManyHarmonics {
-    /// Selects the harmonics that the problem declares.
+    /// Finds the declared harmonics of all joints, and those with the largest estimated amplitudes.
     pub fn new(problem: &Problem, estimates: &[Estimate]) -> Self {
-        let place = |regressor: &Regressor| match *regressor {
+        let joint_and_order = |regressor: &Regressor| match *regressor {
             Regressor::Sine(joint, order) | Regressor::Cosine(joint, order) => {
                 Some((joint + 1, order))
             }
@@ -100,7 +102,7 @@ impl ManyHarmonics {
         };
         let parameters = effect::parameters(problem).into_iter();
         let coefficients = parameters
-            .filter_map(|parameter| Some((parameter.name, place(&parameter.regressor)?)))
+            .filter_map(|parameter| Some((parameter.name, joint_and_order(&parameter.regressor)?)))
             .collect();
         Self::among(coefficients, estimates)
     }
@@ -109,31 +111,33 @@ impl ManyHarmonics {
         let mut joints: BTreeMap<usize, (usize, BTreeMap<u32, f64>)> = BTreeMap::new();
         for estimate in estimates {
             if let Some((joint, order)) = coefficients.get(&estimate.name) {
-                let (count, heights) = joints.entry(*joint).or_default();
+                let (count, squares) = joints.entry(*joint).or_default();
                 *count += 1;
-                *heights.entry(*order).or_default() += estimate.estimate * estimate.estimate;
+                *squares.entry(*order).or_default() += estimate.estimate * estimate.estimate;
             }
         }
-        joints.retain(|_, (count, _)| *count > MAX_COEFFICIENTS);
-        let shown = |(joint, (_, heights)): (usize, (usize, BTreeMap<u32, f64>))| {
-            let mut orders: Vec<u32> = heights.keys().copied().collect();
-            orders.sort_by(|a, b| heights[b].total_cmp(&heights[a]));
+        joints.retain(|_, (count, _)| *count > MAX_LISTED_COEFFICIENTS);
+        let shown = |(joint, (_, squares)): (usize, (usize, BTreeMap<u32, f64>))| {
+            let mut orders: Vec<u32> = squares.keys().copied().collect();
+            orders.sort_by(|a, b| squares[b].total_cmp(&squares[a]));
             orders.truncate(MAX_SHOWN_HARMONICS);
-            (joint, (orders, heights.len().saturating_sub(MAX_SHOWN_HARMONICS)))
+            (joint, (orders, squares.len().saturating_sub(MAX_SHOWN_HARMONICS)))
         };
         Self { largest: joints.into_iter().map(shown).collect(), coefficients }
     }
 
-    /// Returns true if a parameter is a coefficient of one of the smaller harmonics.
+    /// Returns true if the parameter `name` is a coefficient of one of the smaller harmonics, which
+    /// are not listed.
     pub fn is_smaller(&self, name: &str) -> bool {
         self.coefficients.get(name).is_some_and(|(joint, order)| {
             self.largest.get(joint).is_some_and(|(orders, _)| !orders.contains(order))
         })
     }
 
-    /// Returns the joint of a harmonic coefficient (from 1) and the number of smaller harmonics of
-    /// the joint that are not listed; `None` for other parameters, or if all harmonics are listed.
-    pub fn joint_of(&self, name: &str) -> Option<(usize, usize)> {
+    /// Returns the joint (from 1) of the harmonic coefficient `name` and the number of smaller
+    /// harmonics of this joint, which are not listed. `None` for other parameters, or if all
+    /// harmonics of the joint are listed.
+    pub fn joint_with_smaller(&self, name: &str) -> Option<(usize, usize)> {
         let (joint, _) = self.coefficients.get(name)?;
         let (_, smaller) = self.largest.get(joint)?;
         (*smaller > 0).then_some((*joint, *smaller))
@@ -177,6 +181,9 @@ mod tests {
         assert!(
             many.is_smaller("2.sin6") && !many.is_smaller("2.cos7") && !many.is_smaller("1.sin1")
         );
-        assert_eq!((many.joint_of("2.sin9"), many.joint_of("tool.x")), (Some((2, 6)), None));
+        assert_eq!(
+            (many.joint_with_smaller("2.sin9"), many.joint_with_smaller("tool.x")),
+            (Some((2, 6)), None)
+        );
     }
 }

@@ -46,7 +46,9 @@ use document::schema_of;
 pub(crate) use effect::NamedEffect;
 pub(crate) use export::Origin;
 pub use identification::IdentificationResult;
-pub(crate) use knowledge::{Knowledge, MAX_COEFFICIENTS, MAX_SHOWN_HARMONICS, ManyHarmonics};
+pub(crate) use knowledge::{
+    Knowledge, MAX_LISTED_COEFFICIENTS, MAX_SHOWN_HARMONICS, ManyHarmonics,
+};
 pub use plots::PlotData;
 pub(crate) use plots::{
     BoundAt, Contribution, Point, PoseError, ScriptData, Stage, StageErrors, procedure_stages,

@@ -16,8 +16,8 @@ pub struct NextResult {
     #[serde(rename = "for")]
     pub purpose: &'static str,
     pub seed: u64,
-    /// True if no check contradicts the fit to the measured rows. Otherwise no pose is called
-    /// enough.
+    /// True if no check contradicts the fit to the measured rows. If false, `stop` is neither
+    /// `enough` nor `gain-below-noise`.
     pub trusted: bool,
     /// Number of rows that are measured and fitted.
     pub measured: usize,
@@ -40,9 +40,10 @@ pub struct NextResult {
     /// Reason for which fewer poses are named than requested: `enough`, `gain-below-noise` or
     /// `no-candidates`; null if there is none.
     pub stop: Option<&'static str>,
-    /// Number of these poses after which the bound is expected to be below the tolerance.
+    /// Number of these poses after which the bound is expected to be within the tolerance; null if
+    /// there are too few, or without a tolerance.
     pub enough_after: Option<usize>,
-    /// Effects that the poses tell apart.
+    /// Effects that the poses are to distinguish.
     #[schemars(with = "Vec<EffectKeys>")]
     pub effects: Vec<Effect>,
     /// Poses in the order of next.csv.
@@ -59,18 +60,19 @@ pub struct WorkspaceError {
     /// Root mean square of the error length, measurement noise included.
     pub expected_mm: f64,
     pub expected_sigma_mm: f64,
-    /// Length that errors do not exceed with the probability `level`.
+    /// Length that an error in the workspace does not exceed with the probability `level`.
     pub bound_mm: f64,
 }
 
 /// One pose to measure.
 #[derive(Debug, Clone, Copy, Serialize, JsonSchema)]
 pub struct NextStep {
-    /// Largest move of a joint from the pose before, as a share of its range.
+    /// Largest move of a joint from the previous pose, as a share of the joint's range, 0 to 1.
     pub travel: f64,
-    /// Decrease of the goal by this pose, as a share of its present value.
+    /// Decrease of the design criterion by this pose, as a share of its value before the first of
+    /// these poses.
     pub gain: f64,
-    /// Expected error after this pose.
+    /// Expected error over the workspace after this pose; null if `now` is.
     pub after: Option<WorkspaceError>,
 }
 

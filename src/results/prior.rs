@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use crate::fit::{ComparedParameter, PriorComparison};
 
-/// Use of an earlier estimate as prior.
+/// Use of an earlier estimate as prior, and its agreement with the new rows.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct PriorUse {
     pub file: String,
@@ -16,9 +16,9 @@ pub struct PriorUse {
     /// Standard deviation (1 σ) of a coordinate taken from the earlier fit; null if that is the
     /// declared one.
     pub sigma_mm: Option<f64>,
-    /// True if the prior contains that of a fleet.
+    /// True if the prior also contains mean and spread of a fleet.
     pub includes_fleet: bool,
-    /// χ² of the new rows under the prior.
+    /// χ² of the new rows as the prior predicts them.
     pub chi2: Option<f64>,
     pub coordinates: Option<f64>,
     pub p_value: Option<f64>,
@@ -27,18 +27,18 @@ pub struct PriorUse {
     pub parameters: Vec<PriorParameter>,
 }
 
-/// Parameter with its prior, what the new rows say of it, and its posterior.
+/// Parameter with its value by the prior, by the new rows, and by both together (posterior).
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct PriorParameter {
     pub name: String,
     pub unit: &'static str,
-    /// Earlier estimate, widened by drift.
+    /// Earlier estimate; drift widens its standard error.
     pub prior: Value,
-    /// Estimate by the new rows, with the prior of the other parameters; null if they say nothing,
-    /// or if the parameter is at a bound.
+    /// Estimate by the new rows, with the prior of the other parameters only. Null if these rows do
+    /// not determine the parameter, or if it is at a bound.
     pub data: Option<Value>,
     pub posterior: Value,
-    /// Difference of data and prior, in units of its standard deviation.
+    /// Difference `data` − `prior`, divided by the standard deviation of that difference.
     pub difference_sigmas: Option<f64>,
 }
 
@@ -52,7 +52,7 @@ pub struct Value {
 }
 
 impl PriorUse {
-    /// Converts a comparison.
+    /// Converts the comparison of a fit with the earlier estimate that was its prior.
     pub(super) fn new(comparison: &PriorComparison) -> Self {
         let chi2 = comparison.chi2;
         Self {

@@ -1,4 +1,4 @@
-//! Remainders and uncertainty of predictions in the results of other commands.
+//! Remainder, bounds of prediction errors, and posterior covariance in the results of commands.
 
 use nalgebra::DMatrix;
 use schemars::JsonSchema;
@@ -27,16 +27,16 @@ pub struct Remainder {
     pub left_out_mm: Option<f64>,
     /// Mean gain at configurations left out of the fit, divided by its standard error.
     pub gain_over_std_error: Option<f64>,
-    /// Mean rise of the logarithm of the predictive density of these configurations over its
-    /// standard error.
+    /// Mean increase of the logarithm of the predictive density of the left-out rows, divided by
+    /// its standard error.
     pub density_gain_over_std_error: Option<f64>,
     pub identification_without: Summary,
     pub held_out_without: Summary,
 }
 
 impl Remainder {
-    /// Summarises the remainder that was accepted; `found` holds the errors without it. `None` if
-    /// none was accepted.
+    /// Summarises the accepted remainder of `fitted`; `found` has the errors without it. `None` if
+    /// no remainder was accepted.
     pub(super) fn new(found: &Identification, fitted: &Fitted) -> Option<Self> {
         let remainder = fitted.remainder.as_ref()?;
         let joints = remainder.joints().into_iter();
@@ -59,13 +59,13 @@ impl Remainder {
 pub struct BoundSummary {
     /// Expected root mean square of measured − predicted, with the noise of a measurement.
     pub expected_error_mm: f64,
-    /// Probability that an error stays below its bound.
+    /// Probability with which an error stays below its bound, 0 to 1.
     pub level: f64,
     pub mean_bound_mm: f64,
 }
 
 impl BoundSummary {
-    /// Summarises bounds.
+    /// Summarises the error bounds of poses.
     pub(super) fn new(bounds: &Bounds) -> Self {
         Self {
             expected_error_mm: bounds.expected() * 1e3,
@@ -82,22 +82,23 @@ pub(super) fn prediction(fitted: &Fitted) -> Option<Box<RawValue>> {
 }
 
 /// Returns the rows of the posterior covariance of all free parameters, SI, each as one line of
-/// JSON text. They are in the order of the estimates; entries of held parameters are 0.
+/// JSON text. Rows and columns are in the order of the estimates; entries of held parameters are 0.
 ///
-/// The correlations are those of the uncertainty of predictions. The variances are the squares of
-/// the standard errors, where an estimate has one.
+/// The correlations are those of the uncertainty of predictions. The variance of an estimate with a
+/// standard error is the square of that error.
 pub(super) fn covariance(found: &Identification, fitted: &Fitted) -> Vec<Box<RawValue>> {
     let n = found.estimates.len();
     let (names, posterior) = fitted.alone.parameter_covariance();
-    let place = |name: &&str| found.estimates.iter().position(|estimate| estimate.name == **name);
-    let places: Vec<Option<usize>> = names.iter().map(place).collect();
+    let index = |name: &&str| found.estimates.iter().position(|estimate| estimate.name == **name);
+    let indices: Vec<Option<usize>> = names.iter().map(index).collect();
+    // The posterior of a stiffness is that of its logarithm: d value = value · d ln(value).
     let slope = |k: usize| {
         let estimate = &found.estimates[k];
         if estimate.unit.is_relative() { estimate.estimate } else { 1.0 }
     };
     let mut covariance = DMatrix::zeros(n, n);
-    for (i, k) in places.iter().enumerate() {
-        for (j, l) in places.iter().enumerate() {
+    for (i, k) in indices.iter().enumerate() {
+        for (j, l) in indices.iter().enumerate() {
             if let (Some(k), Some(l)) = (*k, *l) {
                 covariance[(k, l)] = slope(k) * posterior[(i, j)] * slope(l);
             }

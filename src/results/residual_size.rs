@@ -6,10 +6,11 @@ use crate::fit::{FindingCode, Identification, Noise};
 /// as equal.
 const MAX_EQUAL_DIFFERENCE: f64 = 1e-9;
 
-/// Verdict on the size of a residual, with its numbers.
+/// Verdict on the size of a fit's residual in comparison with the declared noise.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ResidualSize {
-    /// No σ is declared. The value is the σ estimated from the residual \[m\] or \[rad\].
+    /// No σ is declared. The value is the 1 σ of a coordinate, estimated from the residual \[m\] or
+    /// \[rad\].
     Undeclared(f64),
     /// No σ is declared, and there are no degrees of freedom to estimate it.
     Unknown,
@@ -17,9 +18,10 @@ pub enum ResidualSize {
     TooFewPoses,
     /// There are too few measurements to judge the declared σ.
     TooFewRows,
-    /// χ²/ν, the value, is inside its interval for noise alone.
+    /// The value χ²/ν is inside the interval that noise alone leads to expect.
     Expected(f64),
-    /// χ²/ν, the value, is outside its interval for noise alone, but no other σ is clearly better.
+    /// The value χ²/ν is outside the interval that noise alone leads to expect, but no other σ is
+    /// clearly better.
     Unclear(f64),
     /// Residuals and priors contradict the declared σ, and the fit assumes another one. The value
     /// is χ²/ν.
@@ -45,12 +47,14 @@ impl ResidualSize {
     }
 }
 
-/// Returns true if residuals and priors contradict the declared σ.
+/// Returns true if residuals and priors contradict the declared σ, so that the fit assumed another
+/// σ.
 fn is_contradicted(found: &Identification) -> bool {
     found.noise == Noise::Declared && (found.noise_factor - 1.0).abs() > MAX_EQUAL_DIFFERENCE
 }
 
-/// Returns true if the residual is larger than the declared noise explains.
+/// Returns true if the residual is significantly larger than the declared noise; false if no noise
+/// is declared.
 pub fn exceeds_noise(found: &Identification) -> bool {
     let is_large = |(chi2, (_, high)): (f64, (f64, f64))| chi2 > high;
     let by_chi2 = || found.reduced_chi2.zip(found.chance).is_some_and(is_large);

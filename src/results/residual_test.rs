@@ -17,7 +17,7 @@ pub struct ResidualTest {
     pub failed: bool,
     /// Value of the statistic; null if the test could not be made.
     pub statistic: Option<f64>,
-    /// Interval of the statistic if only noise is left, at the level of the test.
+    /// Lower and upper limit of the statistic if only noise is left, at the level of the test.
     pub bounds: Option<(f64, f64)>,
     pub p_value: Option<f64>,
     pub words: String,

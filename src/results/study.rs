@@ -31,7 +31,7 @@ impl Document for StudyResult {
     const FORMAT: &'static str = "flexcal-study";
 }
 
-/// Results of the fits under one condition.
+/// Results of the fits of one cell: one noise level, number of poses, strategy and solver.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct Cell {
     pub position_sigma_mm: f64,
@@ -61,12 +61,12 @@ pub struct HeldOut {
     pub mean: Option<f64>,
     /// Rms error over fits and poses \[mm\].
     pub rms: Option<f64>,
-    /// Standard deviation, over fits, of the root mean square error.
+    /// Standard deviation over fits of the rms error of one fit \[mm\].
     pub rms_sd: Option<f64>,
     pub rms_max: Option<f64>,
 }
 
-/// Largest ratio of bias to spread of the estimates, over all parameters.
+/// Parameter with the largest ratio of bias to standard deviation of its estimates.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct LargestBias {
     pub parameter: String,
@@ -83,7 +83,8 @@ pub struct MisprintResult {
     pub identification_poses: usize,
     pub held_out_poses: usize,
     pub position_sigma_mm: f64,
-    /// Mean held-out error of the rigid fit, to which the elasticity was scaled.
+    /// Mean held-out error that a rigid fit leaves. The elasticity of the simulated arms is scaled
+    /// until it is reached.
     pub rigid_leaves_mm: f64,
     pub misprints: Vec<MisprintSize>,
     pub cases: Vec<StudiedCase>,
@@ -101,7 +102,7 @@ pub struct MisprintSize {
     pub moves_mm: f64,
 }
 
-/// Specimens under one load.
+/// Simulated arms with one ratio of link to joint flexibility, under one load.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct StudiedCase {
     pub links_over_joints: f64,
@@ -111,7 +112,8 @@ pub struct StudiedCase {
     pub specimens: Vec<Specimen>,
 }
 
-/// Held-out errors of one specimen; null if an iteration did not converge.
+/// Held-out errors of one simulated arm after each procedure; null if an iteration did not
+/// converge.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct Specimen {
     pub scale: f64,
@@ -124,7 +126,7 @@ pub struct Specimen {
     pub rivals: Vec<Rival>,
 }
 
-/// Errors of one reading of the formulas, by the source of the stiffness.
+/// Held-out errors of one reading (printed or corrected formulas), by the source of the stiffness.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct Reading {
     pub reading: String,
@@ -134,7 +136,7 @@ pub struct Reading {
     pub from_load_differences: Option<Summary>,
 }
 
-/// Errors of an alternative model.
+/// Held-out errors of an alternative model.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct Rival {
     pub rival: &'static str,
@@ -142,7 +144,7 @@ pub struct Rival {
 }
 
 impl StudyResult {
-    /// Collects the results of a study, without times.
+    /// Collects the results of a study, without durations.
     pub fn new(study: &Study, results: &Results) -> Self {
         Self {
             study: study.name.clone(),

@@ -1,4 +1,4 @@
-//! Error summaries: mean, largest and root-mean-square errors of rows of one kind.
+//! Error summaries: mean, largest and root mean square errors of the rows of one kind.
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -6,7 +6,7 @@ use serde::Serialize;
 use crate::fit::{self, AxisValues, ErrorSummary, Identification};
 use crate::quantity::Unit;
 
-/// Values along the axes of the measuring frame, and of the Euclidean norm.
+/// Statistic of errors: along each axis of the measuring frame, and of their Euclidean norm.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct Axes {
     pub x: f64,
@@ -27,8 +27,8 @@ pub struct Summary {
     pub sizes: Sizes,
 }
 
-/// Mean absolute value, largest absolute value and root mean square, along each axis and of the
-/// norm.
+/// Mean absolute error, largest absolute error and root mean square error, along each axis and of
+/// the Euclidean norm.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 #[serde(untagged)]
 pub enum Sizes {
@@ -42,7 +42,7 @@ pub enum Sizes {
         max_deg: Axes,
         rms_deg: Axes,
     },
-    /// Image errors, with their lengths at the observed points.
+    /// Image errors, with the same errors converted to lengths at the observed points.
     Pixels {
         mean_px: Axes,
         max_px: Axes,
@@ -54,14 +54,14 @@ pub enum Sizes {
 }
 
 impl Summary {
-    /// Creates the summary of rows in the unit of their kind: mm for lengths, ° for angles, px for
-    /// image errors.
+    /// Creates the summary of `errors` in the unit of their kind of rows: mm for lengths, ° for
+    /// angles, px for image errors.
     pub fn of(errors: &ErrorSummary) -> Self {
         let kind = Some(errors.kind).filter(|kind| !matches!(*kind, "" | "position"));
         Self { kind, n: errors.n, sizes: Sizes::of(errors, errors.unit()) }
     }
 
-    /// Returns mean, root mean square and largest value of the norm, and their unit.
+    /// Returns mean, root mean square and largest value of the error's norm, and their unit.
     pub fn norms(&self) -> ([f64; 3], &'static str) {
         let (axes, unit) = match &self.sizes {
             Sizes::Lengths { mean_mm, max_mm, rms_mm } => ([mean_mm, rms_mm, max_mm], "mm"),
@@ -73,7 +73,7 @@ impl Summary {
 }
 
 impl Sizes {
-    /// Converts sizes in `unit` \[m\], \[rad\] or \[px\] to mm, ° or px.
+    /// Converts statistics of errors, whose `unit` is m, rad or px, to mm, ° or px.
     fn of(errors: &ErrorSummary, unit: Unit) -> Self {
         let axes = |values: &AxisValues, factor: f64| {
             let [x, y, z, norm] =
@@ -96,28 +96,28 @@ impl Sizes {
     }
 }
 
-/// Error summaries of the rows that are fitted and of those that judge.
+/// Error summaries of the fitted rows and of the rows that test the fit.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct Errors {
     pub identification: Summary,
     /// Errors of held-out rows; absent if none is held out.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub held_out: Option<Summary>,
-    /// Errors of all rows, each configuration predicted by a fit without it; only if no row is held
-    /// out.
+    /// Errors of all rows, each configuration predicted by a fit without it; absent if rows are
+    /// held out.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub left_out: Option<Summary>,
 }
 
 impl Errors {
-    /// Creates the summaries of both parts.
+    /// Creates the summaries of the fitted rows and of the rows that test the fit.
     pub fn of(errors: &fit::Errors) -> Self {
         let judged = Summary::of(&errors.held_out);
         Self::new(Summary::of(&errors.identification), judged, errors.is_left_out)
     }
 
-    /// Creates the errors of fitted rows and of those that judge: held out or, if `is_left_out`,
-    /// left out.
+    /// Creates the errors from the summary of the fitted rows and from that of the rows that test
+    /// the fit (`judged`). These are held out or, if `is_left_out`, left out in turn.
     pub(super) fn new(identification: Summary, judged: Summary, is_left_out: bool) -> Self {
         let (held_out, left_out) = (Some(judged), None);
         if is_left_out {
@@ -126,13 +126,14 @@ impl Errors {
         Self { identification, held_out, left_out }
     }
 
-    /// Returns the errors of the rows that judge.
+    /// Returns the errors of the rows that test the fit: held-out rows, or rows left out in turn.
+    /// If there are neither, returns the errors of the fitted rows.
     pub fn judged(&self) -> &Summary {
         self.held_out.as_ref().or(self.left_out.as_ref()).unwrap_or(&self.identification)
     }
 
-    /// Creates both summaries for errors that are angles, if the kind of rows does not determine
-    /// that.
+    /// Creates both summaries of orientation errors \[rad\] in °; the kind of the rows is not
+    /// stated.
     pub(super) fn of_angles(errors: &fit::Errors) -> Self {
         let of = |errors: &ErrorSummary| Summary {
             kind: None,
@@ -153,7 +154,8 @@ pub struct KindErrors {
 }
 
 impl KindErrors {
-    /// Creates the errors of every kind of rows.
+    /// Lists the errors of each kind of rows, given for the registered nominal arm and for the
+    /// fitted arm.
     pub(super) fn all(kinds: &[(fit::Errors, fit::Errors)]) -> Vec<Self> {
         let of = |(registered, fitted): &(fit::Errors, fit::Errors)| Self {
             registered: Errors::of(registered),
@@ -171,8 +173,8 @@ pub(super) fn in_mm_deg_px(unit: Unit, value: f64) -> (Option<f64>, Option<f64>,
     (only(Unit::Length), only(Unit::Angle), only(Unit::Pixel))
 }
 
-/// Describes the nominal arm before identification with the parts that were fitted to the rows:
-/// "nominal arm, base and tool fitted".
+/// Describes the registered nominal arm by the parts that were fitted in it: "nominal arm, base and
+/// tool fitted".
 pub(crate) fn nominal_arm(found: &Identification) -> String {
     match registered_parts(found) {
         Some(parts) => format!("nominal arm, {parts} fitted"),
@@ -180,7 +182,8 @@ pub(crate) fn nominal_arm(found: &Identification) -> String {
     }
 }
 
-/// Lists the parts that were fitted in the nominal arm: "base and tool"; `None` if there are none.
+/// Lists the parts that were fitted in the registered nominal arm: "base and tool"; `None` if no
+/// part was fitted.
 pub(crate) fn registered_parts(found: &Identification) -> Option<String> {
     let (last, first) = found.registered_parts.split_last()?;
     Some(if first.is_empty() {
@@ -190,22 +193,23 @@ pub(crate) fn registered_parts(found: &Identification) -> Option<String> {
     })
 }
 
-/// Returns the number of rows of all kinds in one part of the data (identification or held out).
+/// Returns the number of rows of all kinds in one part of the data (identification or held out),
+/// without known distances.
 pub(crate) fn rows_in(found: &Identification, part: fn(&fit::Errors) -> ErrorSummary) -> usize {
     measured_kinds(found, part).map(|of| of.n).sum()
 }
 
-/// Iterates over the kinds of rows in one part of the data (identification or held out), without
-/// known distances.
+/// Iterates over the error summaries of the kinds of rows in one part of the data (identification
+/// or held out), without known distances.
 pub(crate) fn measured_kinds(
     found: &Identification,
     part: fn(&fit::Errors) -> ErrorSummary,
 ) -> impl Iterator<Item = ErrorSummary> + use<'_> {
-    let alone = found.kinds.is_empty().then(|| part(&found.fitted));
-    let each = found
+    let only_kind = found.kinds.is_empty().then(|| part(&found.fitted));
+    let several_kinds = found
         .kinds
         .iter()
         .map(move |(_, fitted)| part(fitted))
         .filter(|of| of.kind != "known distance");
-    alone.into_iter().chain(each)
+    only_kind.into_iter().chain(several_kinds)
 }

@@ -27,7 +27,7 @@ pub struct TraceResult {
     /// True if the residual tests detect structure that an effect could explain.
     pub structured: bool,
     pub checks: Vec<ResidualTest>,
-    /// Number of candidates tried; each order or time constant counts.
+    /// Number of candidates tried, where each order and each time constant is one candidate.
     pub tried: usize,
     /// Largest corrected p-value at which a candidate is significant.
     pub level: f64,
@@ -36,7 +36,7 @@ pub struct TraceResult {
     /// Sets of hypotheses that may explain the residual together, most probable first. The empty
     /// set means noise alone.
     pub explanations: Vec<HypothesisSet>,
-    /// Claims about the most probable set.
+    /// Claims about each cause in the most probable set.
     pub claims: Vec<Claims>,
     pub untestable: Vec<Untestable>,
     /// Effects that the fitted parameters can reproduce completely, so that they cannot be
@@ -57,7 +57,8 @@ impl Document for TraceResult {
 pub struct Candidate {
     #[serde(flatten)]
     pub effect: NamedEffect,
-    /// Probability that noise alone gains as much, corrected for the number of candidates.
+    /// Probability that noise alone reduces the residual as much, corrected for the number of
+    /// candidates.
     pub p_value: f64,
     pub f: f64,
     /// Degrees of freedom of the numerator of the F statistic `f`.
@@ -69,7 +70,8 @@ pub struct Candidate {
     pub expected_gain_deg: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub expected_gain_px: Option<f64>,
-    /// Decrease of the root mean square error of poses, each left out of the fit in turn.
+    /// Decrease of the root mean square error of poses, each left out of the fit in turn; null if
+    /// it was not computed.
     pub cross_validated_gain_mm: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cross_validated_gain_deg: Option<f64>,
@@ -77,7 +79,7 @@ pub struct Candidate {
     pub cross_validated_gain_px: Option<f64>,
     /// Effects that the measured poses hardly distinguish from the candidate.
     pub alike: Vec<Confounded>,
-    /// Pose that would distinguish the effect from the first confounded one.
+    /// Pose that would distinguish the effect from the first effect of `alike`.
     pub told_apart: Option<SeparatingPose>,
 }
 
@@ -86,8 +88,8 @@ pub struct Candidate {
 pub struct Confounded {
     #[serde(flatten)]
     pub effect: NamedEffect,
-    /// Largest principal angle between the displacements by the two effects: 0 for identical, 90
-    /// for unrelated effects.
+    /// Largest principal angle between the displacements by the two effects: 0 if they are equal,
+    /// 90 if they are orthogonal.
     pub angle_deg: f64,
 }
 
@@ -166,22 +168,22 @@ impl TraceResult {
 }
 
 impl SeparatingPose {
-    /// Returns the difference of the predictions by the two effects, in the unit of the errors: mm,
-    /// ° or px; `None` if it is not known.
+    /// Returns the distance between the predictions by the two effects, in the unit of its key: mm,
+    /// ° or px; `None` if no key is present.
     pub fn difference(&self) -> Option<f64> {
         self.difference_mm.or(self.difference_deg).or(self.difference_px)
     }
 }
 
 impl Candidate {
-    /// Returns the expected decrease of the rms error, in the unit of the errors: mm, ° or px;
-    /// `None` if it is not known.
+    /// Returns the expected decrease of the rms error, in the unit of its key: mm, ° or px; `None`
+    /// if no key is present.
     pub fn expected_gain(&self) -> Option<f64> {
         self.expected_gain_mm.or(self.expected_gain_deg).or(self.expected_gain_px)
     }
 
-    /// Returns the decrease of the rms error of poses left out in turn, in the unit of the errors:
-    /// mm, ° or px; `None` if it is not known.
+    /// Returns the decrease of the rms error of poses left out in turn, in the unit of its key: mm,
+    /// ° or px; `None` if it was not computed.
     pub fn cross_validated_gain(&self) -> Option<f64> {
         let angle = self.cross_validated_gain_deg;
         self.cross_validated_gain_mm.or(angle).or(self.cross_validated_gain_px)

@@ -8,7 +8,7 @@ use crate::life::{Change, Watch, WatchedCause};
 use crate::problem::Problem;
 use crate::quantity::Unit;
 
-/// Verdict on an arm since its estimate.
+/// Verdict whether an arm has changed since its estimate.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct WatchResult {
     pub problem: String,
@@ -27,43 +27,45 @@ pub struct WatchResult {
     pub changed_at_row: Option<usize>,
     /// Number of rows after each look.
     pub look_rows: Vec<usize>,
-    /// Common logarithm of the evidence for a change after each look; an alarm at
-    /// −log10 of the false-alarm rate.
+    /// Common logarithm of the evidence for a change after each look. A value of at least
+    /// −log10(`false_alarm_rate`) raises an alarm.
     pub log10_evidence: Vec<f64>,
-    /// χ² of all rows if nothing has changed.
+    /// χ² of all rows under the assumption that nothing has changed.
     pub chi2: f64,
     pub coordinates: f64,
     pub p_value: f64,
     /// Root mean square error of the rows as the estimate predicts them, in `unit`.
     pub error: f64,
-    /// Standard deviation (1 σ) of a coordinate: noise and known misfit, in `unit`.
+    /// Standard deviation (1 σ) of a coordinate, from noise and from the misfit of the estimate's
+    /// fit, in `unit`.
     pub sigma: f64,
     pub unit: &'static str,
     /// Causes of a change, the most probable first.
     pub causes: Vec<CauseResult>,
 }
 
-/// Cause of a change.
+/// Possible cause of a change, with its probability.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct CauseResult {
     /// Kind of the cause, such as `joint-zero`, `tool`, `noise` or `row`.
     pub kind: &'static str,
     pub label: String,
-    /// Gross row, counted from 1 among all rows of the table, if that is the cause.
+    /// Row with a gross error, counted from 1 among all rows of the table; null for other causes.
     pub row: Option<usize>,
-    /// First row that shows the change, counted likewise; null if it happened before the table.
+    /// First row that shows the change, counted from 1; null if it happened before the table.
     pub from_row: Option<usize>,
     /// Probability among all causes, given that something changed.
     pub probability: f64,
     pub changes: Vec<ChangeResult>,
-    /// Root mean square error of each row with this cause as estimated without it, in `unit`.
+    /// Root mean square error over the rows, each predicted with this cause as estimated without
+    /// the row, in `unit`; null for larger noise and for an unknown change.
     pub left_out_error: Option<f64>,
-    /// Number of further poses after which this cause and the next one can be expected to be told
-    /// apart. Null if no number of such poses would suffice.
+    /// Number of additional poses like these that are expected to distinguish this cause from the
+    /// next one. Null if no number would suffice, or if there is no other cause.
     pub poses_to_tell_apart: Option<usize>,
 }
 
-/// Change of a parameter since the estimate, SI; of the logarithm for stiffnesses.
+/// Change of a parameter since the estimate, SI; for stiffnesses, change of the logarithm.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct ChangeResult {
     pub parameter: String,
@@ -77,7 +79,8 @@ impl Document for WatchResult {
 }
 
 impl WatchResult {
-    /// Converts a verdict on an `estimate` that is `days` days old.
+    /// Converts the verdict `watch` on the arm of the file `estimate`; `days` of drift are allowed
+    /// for.
     pub fn new(problem: &Problem, estimate: &str, days: f64, watch: &Watch) -> Self {
         let unit = watch.unit.display(0.0);
         let (chi2, coordinates, p_value) = watch.chi2;

@@ -124,7 +124,7 @@ fn largest(data: &PlotData) -> Markup {
     rows.truncate(LISTED_POSES);
     html! {
         @let all_positions = data.residuals.iter().all(|residual| residual.observation.is_position());
-        p { "The largest residuals of " (data.placed()) @if all_positions { " poses:" } @else { " rows:" } }
+        p { "The largest residuals of " (data.length_count()) @if all_positions { " poses:" } @else { " rows:" } }
         div.scroll tabindex="0" role="region" aria-label="The largest residuals" { table.sort {
             thead { tr {
                 th.l { "row" } th.l { "pose" }

@@ -1,5 +1,5 @@
-//! Arm and measurements from which figures are drawn: errors of each pose, and sensitivities to a
-//! coordinate.
+//! Arm and measurements from which figures are drawn: errors of each row, and levers of
+//! coordinates.
 
 use nalgebra::{DVector, Vector3};
 
@@ -10,11 +10,12 @@ use crate::model::parameter::ParameterSite;
 use crate::model::{Model, Pose, PoseResiduals};
 use crate::problem::Problem;
 
-/// Smallest sensitivity of a pose to a coordinate, relative to the largest of all poses, at which a
-/// figure shows the pose.
+/// Smallest lever of a coordinate in a pose at which a figure shows the pose, relative to the
+/// longest lever in all poses. Poses with a shorter lever hardly determine the coordinate.
 pub const MIN_LEVER: f64 = 0.1;
 
-/// Measurements with their split and placement.
+/// Measurements with their split into identification and held-out rows, and with the base and
+/// target of each row.
 pub struct Poses<'a> {
     pub measurements: &'a Measurements,
     pub split: &'a Split,
@@ -35,7 +36,7 @@ impl<'a> Poses<'a> {
         Self { measurements, split, placement: Placement::of(measurements) }
     }
 
-    /// Returns the identified arm of `problem`.
+    /// Returns the arm of `problem` as the fit `found` identified it.
     pub fn arm(&self, problem: &Problem, found: &Identification) -> Result<Arm, IdentifyError> {
         let model = Model::new(problem, &self.placement.bases, &self.placement.targets)?;
         Ok(Arm { model: found.strategy.model(model), x: found.x.clone() })
@@ -46,13 +47,14 @@ impl<'a> Poses<'a> {
         (0..self.measurements.len()).collect()
     }
 
-    /// Returns all poses; `sigma` \[m\] applies to rows without a σ.
+    /// Returns the poses of all rows; `sigma` \[m\] is the 1 σ of a coordinate in rows that state
+    /// none.
     pub fn all(&self, sigma: f64) -> Vec<Pose<'_>> {
         self.placement.poses(self.measurements, &self.rows(), sigma)
     }
 
     /// Returns the measured position of each pose, measuring frame \[m\]. For a pose without a
-    /// measured position it is the predicted position of its target.
+    /// measured position, it is the position of the target that `arm` predicts.
     pub fn positions(arm: &Arm, poses: &[Pose]) -> Vec<Vector3<f64>> {
         let (unmeasured, indices): (Vec<Pose>, Vec<usize>) = poses
             .iter()
@@ -73,9 +75,9 @@ impl<'a> Poses<'a> {
         self.placement.position_errors(&arm.model, &arm.x, self.measurements, rows)
     }
 
-    /// Returns the lever of every row for each parameter site: the derivative of the target's
-    /// position with respect to the quantity at the site. It is in the measuring frame \[m/rad\] or
-    /// \[m/m\].
+    /// Returns the lever of every row for each parameter site, shape = (sites, rows). A lever is
+    /// the derivative of the target's position with respect to the quantity at the site, measuring
+    /// frame \[m/rad\] or \[m/m\].
     pub fn levers(&self, arm: &Arm, sites: &[ParameterSite]) -> Vec<Vec<Vector3<f64>>> {
         let (first, count) = (arm.x.len(), sites.len());
         if sites.is_empty() {

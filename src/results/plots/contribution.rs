@@ -7,6 +7,7 @@ use crate::problem::Problem;
 
 /// Maximum number of poses over which contributions are averaged.
 const MAX_POSES: usize = 200;
+
 /// Influence of a parameter, or of an effect with all its parameters, on predicted positions.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Contribution {
@@ -14,13 +15,13 @@ pub struct Contribution {
     pub name: String,
     /// True if the contribution is that of an effect, false if it is that of a parameter.
     pub is_effect: bool,
-    /// Root mean square displacement of predicted positions if the parameter or effect is reset to
-    /// nominal and everything else is unchanged \[m\].
+    /// Root mean square displacement of predicted positions if the parameter, or all parameters of
+    /// the effect, are reset to the registered nominal arm, and all others are unchanged \[m\].
     pub moved: f64,
 }
 
-/// Computes the contribution of every free parameter and effect of `problem` \[m\], averaged over
-/// at most [`MAX_POSES`] of the `rows`.
+/// Computes the contribution of every effect of `problem`, and of every free parameter outside
+/// effects, averaged over at most [`MAX_POSES`] of the `rows`; the largest comes first.
 pub fn of(
     problem: &Problem,
     poses: &Poses,

@@ -12,16 +12,17 @@ const TESTED_CONFIGURATIONS: u32 = 800;
 /// Largest distance to a fitted pose at which a position counts as covered, as a fraction of the
 /// workspace diagonal.
 const COVERED_DISTANCE: f64 = 0.1;
-/// Bases of the van der Corput sequences, one for each joint in turn.
+/// Bases of the van der Corput sequences, one for each joint; an eleventh joint takes the first
+/// base again.
 const PRIMES: [u32; 10] = [2, 3, 5, 7, 11, 13, 17, 19, 23, 29];
 
 /// Coverage of the workspace by fitted poses.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Coverage {
-    /// Reachable positions without a fitted pose nearby, measuring frame of the first session
-    /// \[m\].
+    /// Reachable positions without a fitted pose within the distance `near`, measuring frame of the
+    /// first fitted row's session \[m\].
     pub uncovered: Vec<Vector3<f64>>,
-    /// Number of tested positions.
+    /// Number of tested positions, covered or not.
     pub tried: usize,
     /// Largest distance to a fitted pose at which a position counts as covered \[m\].
     pub near: f64,
@@ -39,8 +40,8 @@ fn radical_inverse(mut k: u32, base: u32) -> f64 {
     sum
 }
 
-/// Computes the coverage over configurations within the joint limits, or within the measured range
-/// of a joint without limits.
+/// Computes the coverage by positions at quasi-random configurations within the joint limits. A
+/// joint without limits takes values within its measured range.
 pub fn of(problem: &Problem, poses: &Poses, arm: &Arm) -> Coverage {
     let all_poses = poses.all(1.0);
     let fitted = poses.split.identification.iter().filter_map(|&row| all_poses.get(row));
@@ -77,7 +78,7 @@ pub fn of(problem: &Problem, poses: &Poses, arm: &Arm) -> Coverage {
             .map(|(a, b)| (b - a).powi(2))
             .sum::<f64>()
             .sqrt();
-    // Sessions have different measuring frames.
+    // Sessions may have different measuring frames; all positions are moved into the first one.
     let bases = arm.model.base_frames(arm.x.as_slice());
     let in_first_frame = |(pose, at): (&Pose, Vector3<f64>)| {
         let base = &bases[pose.base];

@@ -1,5 +1,4 @@
-//! Data of the figures of a report: errors of each pose, correlations, partial residuals of
-//! effects.
+//! Data of all figures of a report, collected from an identification, a comparison or a loop.
 
 use std::path::PathBuf;
 
@@ -61,11 +60,11 @@ pub struct PlotData {
     /// Errors at each stage, from nominal to best.
     #[doc(hidden)]
     pub stages: Vec<StageErrors>,
-    /// Residual of the best arm in each row.
+    /// Residual of each row, with the arm of the last stage (the best arm).
     #[doc(hidden)]
     pub residuals: Vec<PoseError>,
-    /// Rows that figures may draw, in ascending order: those whose target has a position. If there
-    /// are too many, a sample of them that includes the largest residuals.
+    /// Rows that figures may draw, in ascending order: the rows whose residual is a length. If
+    /// there are too many, a sample of them that includes the largest residuals.
     pub shown: Vec<usize>,
     /// Number of rows that each row of `shown` represents: its weight in the sample.
     pub stand_for: Vec<f64>,
@@ -76,12 +75,13 @@ pub struct PlotData {
     pub contributions: Vec<Contribution>,
     /// Coverage of the workspace by fitted poses.
     pub(crate) coverage: Coverage,
-    /// Centre line of the best arm in the poses of `shown`; `None` for a pose without equilibrium.
+    /// Centre line of the best arm in the pose of each row of `shown`; `None` for a pose without
+    /// equilibrium.
     #[doc(hidden)]
     pub arms: Vec<Option<CentreLine>>,
     /// True if the `time` of the residuals was measured.
     pub time_measured: bool,
-    /// Tests of the residual at the fitted poses.
+    /// Tests of the best arm's residual in the fitted poses.
     #[doc(hidden)]
     pub residual_tests: ResidualTests,
     /// Warnings on ignored contents of the measurement files.
@@ -91,9 +91,11 @@ pub struct PlotData {
     /// Partial residuals of each effect found, in the order of discovery.
     #[doc(hidden)]
     pub causes: Vec<Cause>,
-    /// Partial residuals of structure without a known cause.
+    /// Partial residuals of structure without a known cause; `None` if there is no such structure,
+    /// or if it depends on several quantities.
     pub(crate) trend: Option<Cause>,
-    /// Error bounds over the workspace, and the joint errors that a remainder corrects.
+    /// Error bounds over the workspace, and the joint errors that a remainder corrects; `None` if
+    /// they were not computed.
     pub(crate) uncertainty: Option<Uncertainty>,
 }
 
@@ -136,7 +138,7 @@ impl PlotData {
         Ok(Self::new(problem, &poses, stages, (&fitted, joint), examine(problem, data, joint)?))
     }
 
-    /// Collects the data of a closed loop, with the partial residuals of every effect found.
+    /// Collects the data of a finished loop, with the partial residuals of every effect found.
     ///
     /// # Errors
     /// Returns an error if problem and data do not match.
@@ -146,7 +148,7 @@ impl PlotData {
         closure: &ClosedLoop,
     ) -> Result<Self, IdentifyError> {
         let (poses, fit) = (Poses::new(data), &closure.before.fit);
-        // A loop fits positions only.
+        // The first fit of a loop uses only the rows that measure positions.
         let (before, after) = (
             poses.arm(&problem.positions_alone(), fit)?,
             poses.arm(&closure.closed, &closure.after)?,
@@ -196,7 +198,7 @@ impl PlotData {
         let names: Vec<_> = measurements.files.iter().map(|file| file.file_name()).collect();
         let are_distinct =
             names.iter().enumerate().all(|(k, name)| name.is_some() && !names[..k].contains(name));
-        let place = |row: usize| {
+        let location_text = |row: usize| {
             let location = measurements.location(row);
             let name = location.file.file_name().filter(|_| are_distinct).map(PathBuf::from);
             Location { file: name.unwrap_or_else(|| location.file.clone()), ..location }.to_string()
@@ -204,7 +206,7 @@ impl PlotData {
         let all_poses = poses.all(identification.sigma);
         let positions = Poses::positions(best, &all_poses);
         let bases = best.model.base_frames(best.x.as_slice());
-        // The offset from a point is given along the axes of the arm's base.
+        // The residual of a touched point is along the axes of the arm's base.
         let in_measuring_frame = |pose: &Pose, error: Vector3<f64>| match bases.get(pose.base) {
             Some(base) if pose.observation.is_point() => base.point(&error) - base.origin,
             _ => error,
@@ -212,7 +214,7 @@ impl PlotData {
         let residual =
             |((row, pose), (error, before)): ((usize, Pose), (Vector3<f64>, Vector3<f64>))| {
                 PoseError {
-                    place: place(row),
+                    place: location_text(row),
                     configuration: pose.setup.configuration.to_vec(),
                     held_out: poses.split.held_out.binary_search(&row).is_ok(),
                     observation: pose.observation,
@@ -281,12 +283,13 @@ impl PlotData {
         Ok(Self { uncertainty: Some(uncertainty), ..self })
     }
 
-    /// Returns the number of rows whose target has a position.
-    pub(crate) fn placed(&self) -> usize {
+    /// Returns the number of rows whose residual is a length.
+    pub(crate) fn length_count(&self) -> usize {
         self.residuals.iter().filter(|residual| residual.has_place()).count()
     }
 
-    /// Returns true if a row measures a position, along the axes of the measuring frame.
+    /// Returns true if a row measures a position. Its residual is along the axes of the measuring
+    /// frame.
     pub(crate) fn is_position(&self, row: usize) -> bool {
         self.residuals[row].observation.is_position()
     }
@@ -296,7 +299,7 @@ impl PlotData {
         self.residuals.iter().any(|residual| residual.observation.is_position())
     }
 
-    /// Returns the held-out rows, in the order of the errors of `stages`.
+    /// Returns the indices of the held-out rows, in the order of the errors of `stages`.
     pub(crate) fn held_out(&self) -> Vec<usize> {
         (0..self.residuals.len()).filter(|&row| self.residuals[row].held_out).collect()
     }
@@ -307,13 +310,14 @@ impl PlotData {
     }
 }
 
-/// Returns the arm at nominal parameters, with base and target fitted.
+/// Returns the registered nominal arm: nominal parameters, with base and target fitted if they are
+/// free.
 fn nominal_arm(best: &Arm, identification: &Identification) -> Arm {
     Arm { model: best.model.clone(), x: identification.registered_x.clone() }
 }
 
-/// Returns the errors before and after a procedure, and with elasticity ignored [Chen2021, fig.
-/// 13].
+/// Returns the held-out errors before and after a procedure, and those with elasticity ignored if
+/// the procedure has them [Chen2021, fig. 13].
 pub(crate) fn procedure_stages(before: &Before, procedure: &Procedure) -> Vec<StageErrors> {
     let of = |stage, errors: &Vec<Vector3<f64>>| StageErrors { stage, errors: errors.clone() };
     let mut stages = vec![of(Stage::Before, &before.errors)];
@@ -323,21 +327,23 @@ pub(crate) fn procedure_stages(before: &Before, procedure: &Procedure) -> Vec<St
     stages
 }
 
-/// Returns the held-out errors of an arm at one stage.
+/// Returns the held-out errors of `arm`, as those of one stage.
 fn stage(poses: &Poses, stage: Stage, arm: &Arm) -> StageErrors {
     StageErrors { stage, errors: poses.errors(arm, &poses.split.held_out) }
 }
 
+/// Returns the held-out errors of the registered nominal arm.
 fn registered(poses: &Poses, fitted: &Arm, identification: &Identification) -> StageErrors {
     stage(poses, Stage::Registered, &nominal_arm(fitted, identification))
 }
 
+/// Returns the held-out errors of the identified arm.
 fn identified(poses: &Poses, fitted: &Arm, identification: &Identification) -> StageErrors {
     let elastic = is_elastic(&fitted.model) && identification.strategy != Strategy::GeometryOnly;
     stage(poses, if elastic { Stage::Elastic } else { Stage::Identified }, fitted)
 }
 
-/// Returns true if stiffnesses or rigidities are free.
+/// Returns true if a stiffness or a rigidity is a free parameter.
 fn is_elastic(model: &Model) -> bool {
     model.parameters.iter().any(|parameter| parameter.site.is_elastic())
 }

@@ -1,31 +1,32 @@
-//! Residual of a pose, and selection of the poses that a figure draws.
+//! Residual of a row, and selection of the rows that a figure draws.
 
 use nalgebra::Vector3;
 
 use crate::problem::Observation;
 
-/// Pose with its residual.
+/// Row of the measurements with its residual.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PoseError {
     /// File and line of the pose's row, without the folder if the file names are unique.
     pub place: String,
     /// Joint commands, or encoder readings, shape = (joints) \[rad\] or \[m\]; 0 for fixed joints.
     pub configuration: Vec<f64>,
-    /// True for a held-out pose.
+    /// True for a held-out row.
     pub held_out: bool,
     /// Kind of measurement of the row.
     pub observation: Observation,
-    /// Measured position, measuring frame \[m\]. For a row without a position, the target's
+    /// Measured position, measuring frame \[m\]. For a row that measures no position, the target's
     /// position as the best arm predicts it.
     pub position: Vector3<f64>,
-    /// Residual measured − predicted of the best arm, measuring frame \[m\]. A single value is
-    /// along x, tilts are in \[rad\].
+    /// Residual measured − predicted of the best arm, measuring frame \[m\]; of tilts \[rad\]. A
+    /// row with a single number has it along x.
     pub error: Vector3<f64>,
-    /// Residual of the nominal arm, with base and tool fitted if they are free \[m\].
+    /// Residual measured − predicted of the registered nominal arm, in the same frame and unit as
+    /// `error`.
     pub before: Vector3<f64>,
-    /// Standard deviation of each coordinate \[m\].
+    /// Standard deviation (1 σ) of each measured coordinate \[m\].
     pub sigma: f64,
-    /// Time \[s\], or the number of the row if no time was measured.
+    /// Time of the row \[s\], or its number, counted from 1, if no time was measured.
     pub time: f64,
 }
 
@@ -36,18 +37,19 @@ impl PoseError {
     }
 }
 
-/// Number of sampled rows per row that is included because of its large residual.
+/// Size of a sample divided by the number of its rows that are included because of their large
+/// residual.
 const SAMPLE_PER_LARGEST: usize = 10;
 
-/// Returns at most `limit` of some rows in ascending order: those with the largest `size`, and an
-/// even sample of the others.
+/// Returns at most `limit` of the indices `rows` in ascending order: the rows with the largest
+/// `size`, and an even sample of the others.
 pub fn sample(rows: &[usize], limit: usize, size: impl Fn(usize) -> f64) -> Vec<usize> {
     weighted_sample(rows, limit, size).into_iter().map(|(row, _)| row).collect()
 }
 
 /// Returns a sample like [`sample`], each row with the number of rows that it represents. That is 1
-/// for the rows with the largest residuals, and the inverse sampling fraction for the others.
-/// Weighted sums over the sample estimate sums over all rows [Horvitz & Thompson 1952].
+/// for the rows with the largest `size`, and the inverse sampling fraction for the others. Weighted
+/// sums over the sample estimate sums over all rows [Horvitz & Thompson 1952].
 pub fn weighted_sample(
     rows: &[usize],
     limit: usize,

@@ -14,13 +14,13 @@ pub struct ScriptData {
     /// Name, unit and index of each joint that takes a command.
     joints: Vec<(String, String, usize)>,
     poses: Vec<Entry>,
-    /// Regressors of the effects found: label, and row numbers with their values.
+    /// For each effect found: label of its regressor, and the rows (from 0) with its values.
     traced: Vec<(String, Vec<(usize, f64)>)>,
-    /// Positions without a fitted pose nearby \[mm\].
+    /// Reachable positions without a fitted pose nearby \[mm\].
     uncovered: Vec<[f64; 3]>,
 }
 
-/// Pose in the data of the script; lengths in mm.
+/// Row of the measurements in the data of the script; lengths in mm, commands in ° or mm.
 #[derive(Debug, Serialize)]
 struct Entry {
     row: usize,
@@ -29,21 +29,24 @@ struct Entry {
     /// Kind of measurement; absent for positions.
     #[serde(skip_serializing_if = "Option::is_none")]
     kind: Option<&'static str>,
-    /// Number of poses that the sampled pose represents; absent if all poses are included.
+    /// Number of rows that the sampled row represents; absent if it represents only itself.
     #[serde(skip_serializing_if = "Option::is_none")]
     n: Option<f64>,
     q: Vec<f64>,
     position: [f64; 3],
     before: [f64; 3],
     after: [f64; 3],
-    /// Centre line of the rigid arm.
+    /// Centre line of the arm without deflections: x, y, z of each point in turn. Absent without
+    /// equilibrium.
     #[serde(skip_serializing_if = "Option::is_none")]
     rigid: Option<Vec<i64>>,
+    /// Deflections of the points of the centre line: x, y, z of each point in turn. Absent for a
+    /// rigid arm.
     #[serde(skip_serializing_if = "Option::is_none")]
     give: Option<Vec<f64>>,
 }
 
-/// Rounds to a number of decimals; NaN becomes null in JSON.
+/// Rounds a value to a number of decimals. NaN stays NaN, which JSON writes as null.
 fn rounded(value: f64, decimals: i32) -> f64 {
     let power = 10.0_f64.powi(decimals);
     let rounded = (value * power).round() / power;
@@ -51,18 +54,19 @@ fn rounded(value: f64, decimals: i32) -> f64 {
     rounded + 0.0
 }
 
+/// Converts a vector from m to mm, rounded to a number of decimals.
 fn millimetres(length: &Vector3<f64>, decimals: i32) -> [f64; 3] {
     [length.x, length.y, length.z].map(|x| rounded(x * 1e3, decimals))
 }
 
-/// Returns the points of the rigid arm \[mm\].
-fn rigid(arm: &CentreLine) -> Vec<i64> {
+/// Returns the centre line of the arm without deflections \[mm\]: x, y, z of each point in turn.
+fn rigid_points(arm: &CentreLine) -> Vec<i64> {
     #[expect(clippy::cast_possible_truncation, reason = "millimetres of an arm")]
     let rounded = |x: f64| (x * 1e3).round() as i64;
     arm.rigid.iter().flat_map(|at| [at.x, at.y, at.z]).map(rounded).collect()
 }
 
-/// Returns the deflections of the points of the centre line \[mm\].
+/// Returns the deflections of the points of the centre line \[mm\]: x, y, z of each point in turn.
 fn deflections(arm: &CentreLine) -> Vec<f64> {
     arm.bent
         .iter()
@@ -72,7 +76,7 @@ fn deflections(arm: &CentreLine) -> Vec<f64> {
 }
 
 impl ScriptData {
-    /// Collects the poses that a page shows.
+    /// Collects the data of the rows that a page shows.
     pub fn of(data: &PlotData) -> Self {
         let joint = |command: &CommandedJoint| (command.name(), command.symbol(), command.joint);
         let entry = |((&row, &count), arm): ((&usize, &f64), &Option<CentreLine>)| {
@@ -91,7 +95,7 @@ impl ScriptData {
                 position: millimetres(&residual.position, 2),
                 before: millimetres(&residual.before, 4),
                 after: millimetres(&residual.error, 4),
-                rigid: arm.as_ref().map(rigid),
+                rigid: arm.as_ref().map(rigid_points),
                 give: arm.as_ref().filter(|arm| arm.bent != arm.rigid).map(deflections),
             }
         };

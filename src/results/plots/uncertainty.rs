@@ -13,7 +13,7 @@ use crate::remainder::{Bounds, Fitted, JointError, Outcome, predict_identified};
 const DRAWN_CONFIGURATIONS: usize = 1500;
 /// Probability with which an error bound holds.
 const BOUND_LEVEL: f64 = 0.95;
-/// Number of commands at which the error of a joint is drawn.
+/// Number of values of the command at which the error of a joint is drawn.
 const DRAWN_COMMANDS: usize = 120;
 /// Seed of the random configurations.
 const SEED: u64 = 0x0062_6f75_6e64;
@@ -21,7 +21,7 @@ const SEED: u64 = 0x0062_6f75_6e64;
 /// Uncertainty of predictions over the workspace.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Uncertainty {
-    /// Summary of the search for a remainder.
+    /// Outcome of the search for a remainder.
     pub outcome: Outcome,
     /// Probability with which an error bound holds.
     pub level: f64,
@@ -38,7 +38,7 @@ pub struct BoundAt {
     pub position: Vector3<f64>,
     /// Upper bound of the error length ‖measured − predicted‖ \[m\].
     pub bound: f64,
-    /// Length of the correction \[m\].
+    /// Length of the remainder's correction of the position \[m\]; 0 without a remainder.
     pub correction: f64,
     /// True if the pose lies outside the measured range, or too far from measured poses to apply
     /// half of the correction.
@@ -46,8 +46,8 @@ pub struct BoundAt {
 }
 
 impl Uncertainty {
-    /// Computes bounds at random configurations: every joint takes a value between two neighbours
-    /// among its measured values, independently of the other joints.
+    /// Computes error bounds at random configurations. Every joint takes a value between two
+    /// neighbours among its measured values in ascending order, independently of the other joints.
     pub(super) fn of(
         (found, problem): (&Identification, &Problem),
         data: &Dataset,
@@ -74,7 +74,7 @@ impl Uncertainty {
                 joints: Vec::new(),
             });
         }
-        // Each session has a measuring frame of its own, so all poses are taken from the first
+        // Sessions may have different measuring frames, so all poses are taken from the first
         // session.
         let first = table.session.of_row[measured[0]];
         let of_session: Vec<usize> =

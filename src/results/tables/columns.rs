@@ -1,10 +1,11 @@
-//! Tables about rows of measurements, column by column, for CSV files and the Python package.
+//! Tables with a line for each row of the measurements, as columns for CSV files and the Python
+//! package.
 
 use std::collections::BTreeSet;
 
 use nalgebra::{UnitQuaternion, Vector3};
 
-use super::commanded::{commanded_joints, sessions, word};
+use super::commanded::{commanded_joints, label, sessions};
 use crate::files::csv;
 use crate::fit::Residual;
 use crate::measurement::{Labels, Measurements};
@@ -14,26 +15,26 @@ use crate::problem::fixture::reference_cells;
 use crate::quantity::TableUnit;
 use crate::quantity::format::fixed;
 
-/// Values of a column, one per row.
+/// Values of a column of a table, one for each row.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum Column {
-    /// Words, empty for rows without one.
+    /// Texts, empty for rows without one.
     Words(Labels),
     /// Non-negative integers of the rows.
     Counts(Vec<usize>),
-    /// Numbers, NaN for rows without one, and the number of decimals in texts; `None` writes as
-    /// many as needed.
+    /// Numbers, NaN for rows without one, and the number of decimals in CSV files. With `None`, a
+    /// number is written with as many digits as read back as the same number.
     Numbers(Vec<f64>, Option<usize>),
     /// Truth values of the rows.
     Flags(Vec<bool>),
 }
 
 impl Column {
-    /// Returns the cell of a row as text.
+    /// Returns the cell of a row as text; `row` counts from 0.
     pub(super) fn cell(&self, row: usize) -> String {
         match self {
-            Self::Words(labels) => word(labels, row),
+            Self::Words(labels) => label(labels, row),
             Self::Counts(values) => values[row].to_string(),
             Self::Numbers(values, None) => values[row].to_string(),
             Self::Numbers(values, Some(decimals)) => fixed(values[row], *decimals),
@@ -42,21 +43,25 @@ impl Column {
     }
 }
 
-/// Number of decimals of commands in mm and °.
+/// Number of decimals of measured commands in mm and °.
 pub(super) const COMMAND_DECIMALS: usize = 7;
 
 /// Columns and their names, in the order of the table.
 pub type Columns = Vec<(String, Column)>;
 
-/// Formats columns of this many rows as CSV.
+/// Formats columns as CSV; `rows` is their length.
 pub(super) fn to_csv(columns: &Columns, rows: usize) -> String {
     let header = columns.iter().map(|(name, _)| name.clone()).collect();
     csv(header, (0..rows).map(|row| columns.iter().map(|(_, column)| column.cell(row)).collect()))
 }
 
-/// Returns the columns that identify the picked rows: file, line, pose, session, target and
-/// fixtures.
-pub(super) fn names(problem: &Problem, rows: &Measurements, picked: &[usize]) -> Columns {
+/// Returns the columns that identify the rows with the indices `picked`: file, line, pose, session,
+/// target and fixtures.
+pub(super) fn identifying_columns(
+    problem: &Problem,
+    rows: &Measurements,
+    picked: &[usize],
+) -> Columns {
     let of_row = |of: &dyn Fn(usize) -> usize| picked.iter().map(|&row| of(row)).collect();
     let labels = |labels_of_rows: &Labels| {
         Column::Words(Labels {
@@ -81,23 +86,23 @@ pub(super) fn names(problem: &Problem, rows: &Measurements, picked: &[usize]) ->
         ("session", sessions(rows)),
         ("target", rows.target.as_ref()),
     ];
-    for (name, all) in words {
-        if let Some(all) = all {
-            add(name, labels(all));
+    for (name, labels_of_rows) in words {
+        if let Some(labels_of_rows) = labels_of_rows {
+            add(name, labels(labels_of_rows));
         }
     }
-    // These are the columns of the fixtures against which rows are measured, in the order of the
-    // rows.
-    let mut columns_of_rows = Vec::new();
+    // Columns that name the fixtures against which rows are measured, in the order in which the
+    // rows first use them.
+    let mut fixture_columns = Vec::new();
     for observation in (0..rows.len()).map(|row| rows.observation(row)) {
         let references = observation.references().map(|(field, _)| field);
         for field in references.filter(|field| field.content != Content::Frame) {
-            if !columns_of_rows.contains(&field.name) {
-                columns_of_rows.push(field.name);
+            if !fixture_columns.contains(&field.name) {
+                fixture_columns.push(field.name);
             }
         }
     }
-    for name in columns_of_rows {
+    for name in fixture_columns {
         let cell = |row: usize| {
             let mut cells = reference_cells(problem, rows.observation(row));
             cells.find(|(field, _)| field.name == name).map(|(_, cell)| cell).unwrap_or_default()
@@ -107,24 +112,24 @@ pub(super) fn names(problem: &Problem, rows: &Measurements, picked: &[usize]) ->
     columns
 }
 
-/// Group of columns of one kind of residual: its name, the residual vector of a row, and its
-/// rotation vector if there is one.
-type Part<'a> =
+/// Group of columns about predictions or residuals: the prefix of the column names, the vector of a
+/// row \[SI\], and its rotation vector \[rad\], which is `None` without an orientation.
+type ColumnGroup<'a> =
     (&'static str, fn(&Residual) -> Vector3<f64>, &'a dyn Fn(&Residual) -> Option<Vector3<f64>>);
 
-/// Returns the table of residuals. Its columns identify the row and give the commands, predicted
-/// values and residuals in mm and ° of every kind of rows. Further columns are `whitened` (length
-/// in units of σ), `outlier` and `held_out`.
+/// Returns the table of residuals. Its columns identify the row and contain the commands, predicted
+/// values and residuals of every kind of rows in mm, ° or px. The last columns are `whitened`
+/// (length of the residual in units of σ), `outlier` and `held_out`.
 pub fn residual_columns(problem: &Problem, rows: &Measurements, residuals: &[Residual]) -> Columns {
     let picked: Vec<usize> = residuals.iter().map(|residual| residual.row).collect();
-    let mut columns = names(problem, rows, &picked);
-    let turned = residuals.iter().any(|residual| residual.orientation.is_some());
+    let mut columns = identifying_columns(problem, rows, &picked);
+    let has_orientations = residuals.iter().any(|residual| residual.orientation.is_some());
     let kinds = kinds_of(rows);
     let predicted_turn = |residual: &Residual| {
         let (turn, measured) = residual.orientation.zip(rows.orientations.as_ref())?;
         Some((UnitQuaternion::from_scaled_axis(-turn) * measured[residual.row]).scaled_axis())
     };
-    let both: [Part; 2] = [
+    let groups: [ColumnGroup; 2] = [
         ("predicted", |residual| residual.predicted, &predicted_turn),
         ("residual", |residual| residual.position, &|residual: &Residual| residual.orientation),
     ];
@@ -140,7 +145,7 @@ pub fn residual_columns(problem: &Problem, rows: &Measurements, residuals: &[Res
         };
         add(joint.column(), COMMAND_DECIMALS, &cell);
     }
-    for (word, value, turn) in both {
+    for (prefix, value, turn) in groups {
         for kind in &kinds {
             let (group, axes) = kind.residuals;
             let TableUnit { factor, suffix, .. } = kind.unit.in_tables();
@@ -151,11 +156,11 @@ pub fn residual_columns(problem: &Problem, rows: &Measurements, residuals: &[Res
                 let cell = |residual: &Residual| {
                     if is_of_kind(residual) { value(residual)[k] * factor } else { f64::NAN }
                 };
-                add(format!("{word}_{axis}_{suffix}"), 6, &cell);
+                add(format!("{prefix}_{axis}_{suffix}"), 6, &cell);
             }
         }
-        for (k, axis) in ["rx", "ry", "rz"].into_iter().enumerate().filter(|_| turned) {
-            add(format!("{word}_{axis}_deg"), 7, &|residual| {
+        for (k, axis) in ["rx", "ry", "rz"].into_iter().enumerate().filter(|_| has_orientations) {
+            add(format!("{prefix}_{axis}_deg"), 7, &|residual| {
                 turn(residual).map_or(f64::NAN, |turn| turn[k].to_degrees())
             });
         }
@@ -177,12 +182,12 @@ pub fn residuals_csv(problem: &Problem, rows: &Measurements, residuals: &[Residu
     to_csv(&residual_columns(problem, rows, residuals), residuals.len())
 }
 
-/// Returns the columns `word_<axis>_<unit>` of all kinds of rows that are not measured as positions;
-/// `numbers` has a vector for each row \[SI or px\], whose cells in the columns of other kinds are
-/// empty.
+/// Returns the columns `<prefix>_<axis>_<unit>` of all kinds of rows that do not measure a
+/// position. `numbers` has a vector for each row \[SI or px\]; in the columns of other kinds the
+/// cells of the row are empty.
 pub(super) fn columns_of_kinds(
     rows: &Measurements,
-    word: &str,
+    prefix: &str,
     decimals: usize,
     numbers: &[Vector3<f64>],
 ) -> Columns {
@@ -198,14 +203,17 @@ pub(super) fn columns_of_kinds(
                 if is_of_kind { numbers[k] * factor } else { f64::NAN }
             };
             let cells = numbers.iter().enumerate().map(cell).collect();
-            columns
-                .push((format!("{word}_{axis}_{suffix}"), Column::Numbers(cells, Some(decimals))));
+            columns.push((
+                format!("{prefix}_{axis}_{suffix}"),
+                Column::Numbers(cells, Some(decimals)),
+            ));
         }
     }
     columns
 }
 
-/// Returns the kinds of rows in a table, one for each group of residual columns.
+/// Returns the kinds of rows in a table, one for each group of residual columns; positions for a
+/// table without rows.
 fn kinds_of(rows: &Measurements) -> Vec<&'static Kind> {
     let mut kinds: Vec<&Kind> = rows.kinds().into_iter().map(Observation::description).collect();
     let mut groups = BTreeSet::new();

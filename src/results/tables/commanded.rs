@@ -29,13 +29,13 @@ impl CommandedJoint {
         format!("{}_{}", self.name(), if self.unit == Unit::Angle { "deg" } else { "mm" })
     }
 
-    /// Returns the factor from \[rad\] or \[m\] to ° or mm.
+    /// Returns the factor that converts a command from rad or m to ° or mm.
     pub(crate) fn factor(self) -> f64 {
         self.unit.display(1.0).factor
     }
 }
 
-/// Lists the joints that take a command.
+/// Lists the joints that take a command, from the base to the tip.
 pub(crate) fn commanded_joints(problem: &Problem) -> Vec<CommandedJoint> {
     let command = |(joint, kind)| match kind {
         JointKind::Revolute => Some(CommandedJoint { joint, unit: Unit::Angle }),
@@ -45,12 +45,12 @@ pub(crate) fn commanded_joints(problem: &Problem) -> Vec<CommandedJoint> {
     problem.joints.iter().map(Joint::command_kind).enumerate().filter_map(command).collect()
 }
 
-/// Returns the sessions of the rows; `None` if no session has a name.
+/// Returns the labels of the rows' sessions; `None` if no session has a name.
 pub(crate) fn sessions(rows: &Measurements) -> Option<&Labels> {
     Some(&rows.session).filter(|session| session.names.iter().any(|name| !name.is_empty()))
 }
 
-/// Returns the label of a row.
-pub(crate) fn word(labels: &Labels, row: usize) -> String {
+/// Returns the label of a row, which counts from 0.
+pub(crate) fn label(labels: &Labels, row: usize) -> String {
     labels.names[labels.of_row[row]].clone()
 }

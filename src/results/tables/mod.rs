@@ -1,4 +1,4 @@
-//! Results as tables for other programs.
+//! Results as tables: columns and CSV files that other programs read.
 
 mod columns;
 mod commanded;

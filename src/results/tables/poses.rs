@@ -1,6 +1,6 @@
 //! Table of poses to measure.
 
-use super::commanded::{CommandedJoint, commanded_joints, sessions, word};
+use super::commanded::{CommandedJoint, commanded_joints, label, sessions};
 use crate::files::csv;
 use crate::measurement::Measurements;
 use crate::observation::fields;
@@ -9,9 +9,11 @@ use crate::problem::{HeldOut, Problem};
 use crate::quantity::Unit;
 use crate::quantity::format::fixed;
 
-/// Returns poses as CSV with the columns of measurements, except the positions.
+/// Returns poses to measure as CSV with the columns of a measurement table, except the measured
+/// values.
 ///
-/// If the problem names a column that marks held-out rows, every pose is marked as identification.
+/// If the problem names a column that marks held-out rows, that column marks every pose as
+/// identification.
 pub fn poses_csv(problem: &Problem, poses: &Measurements) -> String {
     let (joints, session) = (commanded_joints(problem), sessions(poses));
     let split = match &problem.data.held_out {
@@ -23,13 +25,13 @@ pub fn poses_csv(problem: &Problem, poses: &Measurements) -> String {
             .as_ref()
             .map(|values| values.iter().map(|value| plain(value * factor)).collect::<Vec<String>>())
     };
-    let words = |labels| (0..poses.len()).map(|row| word(labels, row)).collect::<Vec<String>>();
+    let words = |labels| (0..poses.len()).map(|row| label(labels, row)).collect::<Vec<String>>();
     let mut columns = vec![(
         "pose".to_owned(),
         (1..=poses.len()).map(|row| row.to_string()).collect::<Vec<String>>(),
     )];
     columns.extend(split.map(|name| (name, vec!["identification".to_owned(); poses.len()])));
-    columns.extend(surroundings(problem, poses));
+    columns.extend(reference_columns(problem, poses));
     columns.extend(joints.iter().map(|joint| {
         let commands = (0..poses.len())
             .map(|row| plain(poses.configuration(row)[joint.joint] * joint.factor()));
@@ -77,9 +79,9 @@ fn sigmas(poses: &Measurements) -> Option<Vec<String>> {
     poses.sigma.as_ref().map(|sigmas| sigmas.iter().enumerate().map(cell).collect())
 }
 
-/// Returns the columns that name the fixture or frame of each row: `point`, `anchor`, `surface`,
-/// `frame`.
-fn surroundings(problem: &Problem, poses: &Measurements) -> Vec<(String, Vec<String>)> {
+/// Returns the columns that name the fixtures and frames of each row, such as `point`, `anchor`,
+/// `surface` or `frame`. Columns without any entry are left out.
+fn reference_columns(problem: &Problem, poses: &Measurements) -> Vec<(String, Vec<String>)> {
     let column = |name: &str| -> Vec<String> {
         let cell = |row| {
             let mut cells = reference_cells(problem, poses.observation(row));
@@ -98,7 +100,7 @@ fn surroundings(problem: &Problem, poses: &Measurements) -> Vec<(String, Vec<Str
     columns
 }
 
-/// Formats a value with six decimals, without trailing zeros.
+/// Formats a value with at most six decimals, without trailing zeros.
 fn plain(value: f64) -> String {
     let text = fixed(value, 6);
     text.trim_end_matches('0').trim_end_matches('.').to_owned()

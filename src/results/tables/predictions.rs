@@ -1,9 +1,9 @@
-//! Tables of predictions and of commands.
+//! Tables of predictions, and of commands that compensate the errors of the arm.
 
 use nalgebra::Vector3;
 
 use super::columns::{self, COMMAND_DECIMALS, Column, Columns, columns_of_kinds};
-use super::commanded::{commanded_joints, sessions, word};
+use super::commanded::{commanded_joints, label, sessions};
 use crate::files::csv;
 use crate::fit::{Command, Prediction};
 use crate::measurement::Measurements;
@@ -14,8 +14,8 @@ use crate::remainder::Bounds;
 /// Returns predictions as CSV: columns that name the row, commands, the predicted pose, and the
 /// predicted numbers of rows that measure no position.
 ///
-/// `errors` are the standard errors of the predicted numbers of each row, if an estimate is known.
-/// With `bounds`, the uncertainty of positions is that of the bounds.
+/// `errors` are the standard errors of the predicted numbers of each row \[SI or px\]; `None`
+/// without an estimate. If `bounds` are given, the uncertainty of positions is taken from them.
 pub fn predictions_csv(
     problem: &Problem,
     rows: &Measurements,
@@ -23,7 +23,7 @@ pub fn predictions_csv(
     (bounds, errors): (Option<&Bounds>, Option<&[Vector3<f64>]>),
 ) -> String {
     let all_rows: Vec<usize> = (0..prediction.positions.len()).collect();
-    let mut columns = columns::names(problem, rows, &all_rows);
+    let mut columns = columns::identifying_columns(problem, rows, &all_rows);
     let mut add = |name: String, decimals, of: &dyn Fn(usize) -> f64| {
         columns.push((
             name,
@@ -44,14 +44,15 @@ pub fn predictions_csv(
         }
     }
     columns.extend(columns_of_kinds(rows, "predicted", 6, &prediction.numbers));
-    columns.extend(bounds.into_iter().flat_map(uncertainty));
+    columns.extend(bounds.into_iter().flat_map(uncertainty_columns));
     if let Some(errors) = errors {
         let of_position = |row: usize, k: usize| {
             let is_position = rows.observation(row).is_position();
             if is_position { errors[row][k] * 1e3 } else { f64::NAN }
         };
-        let is_told = |&row: &usize| rows.observation(row).is_position() && !errors[row].x.is_nan();
-        if bounds.is_none() && all_rows.iter().any(is_told) {
+        let has_error =
+            |&row: &usize| rows.observation(row).is_position() && !errors[row].x.is_nan();
+        if bounds.is_none() && all_rows.iter().any(has_error) {
             for (k, axis) in ["x", "y", "z"].into_iter().enumerate() {
                 let cells = all_rows.iter().map(|&row| of_position(row, k)).collect();
                 columns.push((format!("sigma_{axis}_mm"), Column::Numbers(cells, Some(4))));
@@ -63,8 +64,8 @@ pub fn predictions_csv(
 }
 
 /// Returns the columns of the uncertainty of predictions: 1 σ along each axis, the bound of the
-/// error, and whether the pose is outside the measured range.
-fn uncertainty(bounds: &Bounds) -> Columns {
+/// error length, and whether the pose is outside the measured range.
+fn uncertainty_columns(bounds: &Bounds) -> Columns {
     let numbers = |of: &dyn Fn(usize) -> f64| {
         Column::Numbers((0..bounds.poses.len()).map(|pose| of(pose) * 1e3).collect(), Some(4))
     };
@@ -81,12 +82,12 @@ fn uncertainty(bounds: &Bounds) -> Columns {
     columns
 }
 
-/// Number of decimals of commands in mm and °.
-const DECIMALS: usize = 9;
+/// Number of decimals of compensated commands, in the units of the table of targets.
+const COMPENSATED_DECIMALS: usize = 9;
 
-/// Returns index, column name and factor from SI of each commanded joint, as in the table of
-/// targets.
-fn columns(problem: &Problem, targets: &Measurements) -> Vec<(usize, String, f64)> {
+/// Returns the index, the column name, and the factor from SI to the unit of the column, of each
+/// commanded joint. Names and units are those of the table of targets, if it has commands.
+fn command_columns(problem: &Problem, targets: &Measurements) -> Vec<(usize, String, f64)> {
     if targets.command_columns.is_empty() {
         let columns = commanded_joints(problem).into_iter();
         return columns.map(|column| (column.joint, column.column(), column.factor())).collect();
@@ -98,14 +99,17 @@ fn columns(problem: &Problem, targets: &Measurements) -> Vec<(usize, String, f64
         .collect()
 }
 
-/// Formats an angle \[rad\] in degrees; empty for `None`.
+/// Formats an angle, given in rad, in degrees; empty for `None`.
 fn degrees(angle: Option<f64>) -> String {
     angle.map_or_else(String::new, |angle| fixed(angle.to_degrees(), 6))
 }
 
-/// Returns commands as CSV, with the names and units of the table of targets. Columns are the name
-/// of the pose, if the targets have one, q of every moving joint (empty if the target is out of reach), desired pose and conditions, and
-/// predicted distances.
+/// Returns commands that compensate the arm's errors as CSV, with the names and units of the table
+/// of targets.
+///
+/// Columns are the name of the pose if the targets have one, the command of every moving joint, the
+/// desired pose, the conditions, and the predicted distances to the target. Commands are empty if
+/// the target is out of reach.
 pub fn commands_csv(
     problem: &Problem,
     targets: &Measurements,
@@ -121,27 +125,29 @@ pub fn commands_csv(
         add("pose", &|command| pose[command.row].to_string());
     }
     if let Some(names) = &targets.pose_names {
-        add("pose", &|command| word(names, command.row));
+        add("pose", &|command| label(names, command.row));
     }
-    for (joint, name, factor) in columns(problem, targets) {
+    for (joint, name, factor) in command_columns(problem, targets) {
         // A controller must not receive a command that misses the target.
-        let show = |command: &Command| {
+        let sent = |command: &Command| {
             if command.is_reached() { command.configuration[joint] * factor } else { f64::NAN }
         };
-        add(&name, &|command| fixed(show(command), DECIMALS));
+        add(&name, &|command| fixed(sent(command), COMPENSATED_DECIMALS));
     }
     for (axis, name) in ["x_mm", "y_mm", "z_mm"].into_iter().enumerate() {
         add(name, &|command| fixed(targets.positions[command.row][axis] * 1e3, 4));
     }
-    let turned = commands.iter().any(|command| command.turn.is_some());
-    for (axis, name) in ["rx_deg", "ry_deg", "rz_deg"].into_iter().enumerate().filter(|_| turned) {
+    let has_orientations = commands.iter().any(|command| command.turn.is_some());
+    for (axis, name) in
+        ["rx_deg", "ry_deg", "rz_deg"].into_iter().enumerate().filter(|_| has_orientations)
+    {
         add(name, &|command| {
             degrees(targets.orientation(command.row).map(|desired| desired.scaled_axis()[axis]))
         });
     }
     for (name, labels) in [("session", sessions(targets)), ("target", targets.target.as_ref())] {
         if let Some(labels) = labels {
-            add(name, &|command| word(labels, command.row));
+            add(name, &|command| label(labels, command.row));
         }
     }
     for (name, values) in [("payload_kg", &targets.payload), ("hoist_N", &targets.hoist)] {
@@ -151,12 +157,12 @@ pub fn commands_csv(
     }
     add("miss_mm", &|command| fixed(command.miss.norm() * 1e3, 4));
     add("miss_before_mm", &|command| fixed(command.seed_miss * 1e3, 4));
-    if turned {
+    if has_orientations {
         add("turn_deg", &|command| degrees(command.turn.map(|turn| turn.norm())));
         add("turn_before_deg", &|command| degrees(command.seed_orientation_error));
     }
     add("reached", &|command| command.is_reached().to_string());
-    for (name, column) in bounds.into_iter().flat_map(uncertainty) {
+    for (name, column) in bounds.into_iter().flat_map(uncertainty_columns) {
         header.push(name);
         for (row, line) in lines.iter_mut().enumerate() {
             line.push(column.cell(row));

@@ -4,8 +4,8 @@ use crate::files;
 use crate::results::{Cell, StudyResult};
 use crate::study::{CellResult, ParameterResult, Results, Study};
 
-/// Names of the first columns of every table, which identify the cell.
-const CELL: &str = "cell,position_sigma_mm,identification_poses,strategy,solver";
+/// Names of the first columns of every table of a study, which identify the cell.
+const CELL_COLUMNS: &str = "cell,position_sigma_mm,identification_poses,strategy,solver";
 
 /// Returns `study.csv` with a line for each cell.
 pub fn study_csv(study: &Study, results: &Results) -> String {
@@ -54,7 +54,8 @@ pub fn study_parameters_csv(study: &Study, results: &Results) -> String {
     })
 }
 
-/// Returns `timing.csv` with a line for each cell, the only result that differs from run to run.
+/// Returns `timing.csv` with a line for each cell. It is the only result of a study that differs
+/// from run to run.
 pub fn study_timing_csv(study: &Study, results: &Results) -> String {
     csv(study, results, "fits,median_ms,slowest_ms,total_s", |_, timed| {
         let timing = timed.timing();
@@ -70,8 +71,8 @@ fn plain(value: Option<f64>) -> String {
     value.map(|value| value.to_string()).unwrap_or_default()
 }
 
-/// Returns a table with the columns of `header` after those that identify the cell; cells are
-/// numbered from 1.
+/// Returns a table as CSV with the columns that identify the cell, followed by those of `header`.
+/// `lines` returns the cells of the table for one cell of the study; these are numbered from 1.
 fn csv(
     study: &Study,
     results: &Results,
@@ -92,5 +93,5 @@ fn csv(
     };
     let rows: Vec<Vec<String>> =
         cells.iter().zip(&results.cells).enumerate().flat_map(named).collect();
-    files::csv(CELL.split(',').chain(header.split(',')).map(str::to_owned).collect(), rows)
+    files::csv(CELL_COLUMNS.split(',').chain(header.split(',')).map(str::to_owned).collect(), rows)
 }

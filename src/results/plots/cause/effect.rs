@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::axis::slides;
+use super::axis::is_prismatic;
 use super::figure::{Cause, Point};
 use super::terms::Rows;
 use super::view::{at_joint, beyond_joints, change_along};
@@ -11,7 +11,7 @@ use crate::numeric::range;
 use crate::problem::{Effect, Problem};
 use crate::results::plots::arm::{Arm, MIN_LEVER, Poses};
 
-/// Number of intervals by which a curve is drawn.
+/// Number of straight segments of the drawn curve of a law.
 const CURVE_STEPS: u32 = 160;
 
 /// Fit of a model that declares the effects, with its residual and levers in every row.
@@ -19,23 +19,24 @@ const CURVE_STEPS: u32 = 160;
 pub struct EffectFit<'a> {
     /// Arm of the fit.
     pub arm: &'a Arm,
-    /// Residual of each row \[m\].
+    /// Residual measured − predicted of each row, measuring frame \[m\].
     pub residuals: &'a [Vector3<f64>],
-    /// Lever of each joint coordinate in each row \[m/rad\] or \[m/m\].
+    /// Levers of the joint coordinates, shape = (joints, rows) \[m/rad\] or \[m/m\].
     pub levers: &'a [Vec<Vector3<f64>>],
 }
 
-/// Returns the parameter site of every joint's coordinate.
+/// Returns the parameter site of every joint's coordinate: d of a prismatic joint, θ of other
+/// joints.
 pub fn coordinates(problem: &Problem) -> Vec<ParameterSite> {
     let field =
-        |joint: usize| if slides(problem, joint) { JointField::D } else { JointField::Theta };
+        |joint: usize| if is_prismatic(problem, joint) { JointField::D } else { JointField::Theta };
     (1..=problem.joints.len())
         .map(|joint| ParameterSite::Joint { joint: joint - 1, field: field(joint) })
         .collect()
 }
 
-/// Computes the figure data of an effect from the fit of `problem`, which declares it; `None` if no
-/// pose depends on the effect.
+/// Computes the figure data of an effect from the fit of `problem`, which declares the effect.
+/// `None` if a parameter of the effect is not free.
 pub fn of(
     effect: &Effect,
     problem: &Problem,
@@ -89,7 +90,7 @@ pub fn of(
     Some(Cause { title, across: view.across, up, points, curve, reading: view.reading })
 }
 
-/// Returns the largest absolute ordinate of points and curve.
+/// Returns the largest finite absolute ordinate of points and curve.
 fn largest(points: &[Point], curve: &[(f64, f64)]) -> f64 {
     let heights = points.iter().map(|point| point.y).chain(curve.iter().map(|at| at.1));
     heights.filter(|height| height.is_finite()).map(f64::abs).fold(0.0, f64::max)

@@ -5,17 +5,18 @@ use super::axis::Quantity;
 /// Partial residual of one pose, SI.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Point {
-    /// Value of the regressor in the pose, SI.
+    /// Abscissa: value of the effect's regressor in the pose, SI.
     pub x: f64,
-    /// Partial residual of the pose, SI.
+    /// Ordinate: partial residual of the pose, SI.
     pub y: f64,
     /// True for a held-out pose.
     pub held_out: bool,
-    /// Row of the pose, counted from 0, if known.
+    /// Row of the pose, counted from 0; `None` if it is unknown.
     pub row: Option<usize>,
 }
 
-/// Figure data of an effect: partial residuals over its regressor, with the fitted law.
+/// Figure data of an effect, or of structure without a known cause: partial residuals over the
+/// regressor, with the fitted law.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cause {
     /// Description of the effect.
@@ -24,9 +25,9 @@ pub struct Cause {
     pub across: Quantity,
     /// Quantity on the vertical axis.
     pub up: Quantity,
-    /// Poses that depend on the effect, in the order of the rows.
+    /// Partial residuals of the poses that depend on the effect.
     pub points: Vec<Point>,
-    /// Points of the fitted law.
+    /// Points (abscissa, ordinate) of the fitted law, SI.
     pub curve: Vec<(f64, f64)>,
     /// Sentence of the caption that explains what a dot shows.
     pub(crate) reading: &'static str,

@@ -7,10 +7,10 @@ use crate::laws::Quantity as LawQuantity;
 use crate::model::parameter::{ParameterSite, Regressor};
 use crate::problem::{PoseView, Problem};
 
-/// Poses with the displacement that an effect causes in each.
+/// Terms of an effect, with the poses of all rows and the displacement by the effect in each row.
 pub struct Rows<'a> {
     pub poses: Vec<PoseView<'a>>,
-    /// Displacement of the target by the effect in each row \[m\].
+    /// Displacement of the target by the effect in each row, measuring frame \[m\].
     pub displacements: Vec<Vector3<f64>>,
     /// Regressor and fitted value of each term.
     pub terms: Vec<(Regressor, f64)>,
@@ -18,17 +18,19 @@ pub struct Rows<'a> {
     pub sites: Vec<ParameterSite>,
 }
 
-/// Function from the value of a regressor to the ordinate of the fitted law.
+/// Function from the abscissa of a figure to the ordinate of the fitted law, both SI.
 pub type Law<'a> = Box<dyn Fn(f64) -> f64 + 'a>;
 
 impl Rows<'_> {
-    /// Returns the common site of all terms; `None` if they have several.
+    /// Returns the common site of all terms; `None` if they have several sites or there are no
+    /// terms.
     pub fn site(&self) -> Option<ParameterSite> {
         let (first, others) = self.sites.split_first()?;
         others.iter().all(|site| site == first).then_some(*first)
     }
 
-    /// Returns true if every term has a regressor, so that the effect varies from pose to pose.
+    /// Returns true if no term has a constant regressor, so that the effect varies from pose to
+    /// pose.
     pub fn is_driven(&self) -> bool {
         self.terms.iter().all(|(regressor, _)| !regressor.is_constant())
     }
@@ -45,11 +47,11 @@ impl Rows<'_> {
     }
 
     /// Returns Σ value × regressor over the terms of the effect in one pose.
-    pub fn driven(&self, pose: &PoseView) -> f64 {
+    pub fn sum_of_terms(&self, pose: &PoseView) -> f64 {
         self.terms.iter().map(|(regressor, value)| value * regressor.value(pose)).sum()
     }
 
-    /// Returns the axis label of a formula, with its unit.
+    /// Returns the axis label of a regressor: its formula with the unit.
     pub fn label(regressor: &Regressor) -> String {
         match regressor.as_quantity() {
             Some(LawQuantity::Friction { joint, .. }) => {
@@ -60,7 +62,7 @@ impl Rows<'_> {
     }
 
     /// Returns the axis of one quantity, its value in each pose, and Σ value × regressor as a
-    /// function of it. `None` if the value of the quantity alone does not determine the regressors.
+    /// function of that quantity. `None` if the quantity alone does not determine the regressors.
     pub fn over_quantity<'r>(
         &'r self,
         quantity: LawQuantity,
@@ -72,19 +74,21 @@ impl Rows<'_> {
         Some(match quantity {
             LawQuantity::Command(joint) => {
                 let count = self.poses.first()?.configuration.len();
-                let law = move |q: f64| self.driven(&PoseView::from_configuration(&vec![q; count]));
+                let law =
+                    move |q: f64| self.sum_of_terms(&PoseView::from_configuration(&vec![q; count]));
                 let across = Quantity::command(problem, joint + 1);
                 (across, each(&|pose| pose.configuration[joint]), Box::new(law))
             }
             LawQuantity::Warming => {
                 let law = move |t: f64| {
                     let pose = PoseView::from_configuration(&[]);
-                    self.driven(&PoseView { temperature: Some(&t), ..pose })
+                    self.sum_of_terms(&PoseView { temperature: Some(&t), ..pose })
                 };
                 let value = |pose: &PoseView| pose.temperature.copied().unwrap_or_default();
                 (Quantity::temperature(), each(&value), Box::new(law))
             }
-            // This case applies if the lagged temperature itself multiplies every term.
+            // The sum is a function of the lagged temperature only if every regressor is that
+            // temperature itself.
             LawQuantity::Lagging { time_constant } if self.has_only_regressor(quantity) => {
                 let sum: f64 = self.terms.iter().map(|term| term.1).sum();
                 let regressor = &self.terms.first()?.0;
@@ -98,7 +102,7 @@ impl Rows<'_> {
                     let mut covariates = vec![0.0; index];
                     covariates.push(value);
                     let pose = PoseView::from_configuration(&[]);
-                    self.driven(&PoseView { covariates: &covariates, ..pose })
+                    self.sum_of_terms(&PoseView { covariates: &covariates, ..pose })
                 };
                 let value =
                     |pose: &PoseView| pose.covariates.get(index).copied().unwrap_or_default();
@@ -110,7 +114,7 @@ impl Rows<'_> {
                 let first = self.poses.first().map_or(0.0, |pose| pose.time - pose.elapsed);
                 let law = move |elapsed: f64| {
                     let pose = PoseView::from_configuration(&[]);
-                    self.driven(&PoseView { elapsed, time: first + elapsed, ..pose })
+                    self.sum_of_terms(&PoseView { elapsed, time: first + elapsed, ..pose })
                 };
                 (Quantity::elapsed(last), elapsed, Box::new(law))
             }
@@ -124,10 +128,10 @@ impl Rows<'_> {
     }
 
     /// Returns the effect's displacement in each row divided by the row's entry of `sizes` \[m per
-    /// unit\]; zero if that entry is 0.
-    pub fn over(&self, sizes: impl Iterator<Item = f64>) -> Vec<Vector3<f64>> {
-        let lever = |(lever_at_pose, size): (&Vector3<f64>, f64)| {
-            if size == 0.0 { Vector3::zeros() } else { lever_at_pose / size }
+    /// unit of size\]; zero if that entry is 0.
+    pub fn displacements_per(&self, sizes: impl Iterator<Item = f64>) -> Vec<Vector3<f64>> {
+        let lever = |(displacement, size): (&Vector3<f64>, f64)| {
+            if size == 0.0 { Vector3::zeros() } else { displacement / size }
         };
         self.displacements.iter().zip(sizes).map(lever).collect()
     }

@@ -2,7 +2,7 @@
 
 use super::axis::Quantity;
 use super::figure::{Cause, Point};
-use super::view::COORDINATE;
+use super::view::COORDINATE_CAPTION;
 use crate::measurement::Split;
 use crate::numeric::range;
 use crate::problem::Problem;
@@ -10,8 +10,9 @@ use crate::residual_tests::Covariate;
 use crate::results::plots::arm::MIN_LEVER;
 use crate::select::{PartialResidual, Unexplained};
 
-/// Returns the figure data of the empirical correction of unexplained structure, less its mean.
-/// `None` unless the correction depends on a single covariate or on the order of the rows.
+/// Returns the figure data of the empirical correction of unexplained structure, whose mean over
+/// the drawn range is subtracted. `None` unless the correction is a function of one covariate at
+/// one coordinate.
 pub fn unexplained(structure: &Unexplained, problem: &Problem, split: &Split) -> Option<Cause> {
     let correction = structure.correction.as_ref()?.curve.as_ref()?;
     let mut curve: Vec<(f64, f64)> =
@@ -46,5 +47,5 @@ pub fn unexplained(structure: &Unexplained, problem: &Problem, split: &Split) ->
     let site = structure.site?;
     let up = Quantity::error(&site.to_string(), correction.unit);
     let title = format!("{site}: structure without a known cause");
-    Some(Cause { title, across, up, points, curve, reading: COORDINATE })
+    Some(Cause { title, across, up, points, curve, reading: COORDINATE_CAPTION })
 }

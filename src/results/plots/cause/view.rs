@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::axis::{Quantity, slides};
+use super::axis::{Quantity, is_prismatic};
 use super::terms::{Law, Rows};
 use crate::laws::Quantity as LawQuantity;
 use crate::model::parameter::{ArmField, BeamField, JointField, ParameterSite};
@@ -10,11 +10,14 @@ use crate::problem::{Effect, PoseView, Problem};
 use crate::quantity::Unit;
 use crate::results::plots::arm::Poses;
 
-pub const COORDINATE: &str = "Each dot is the error of this coordinate from one pose alone, with all other parameters as fitted. \
+/// Caption of a figure whose ordinate is the error of one coordinate.
+pub const COORDINATE_CAPTION: &str = "Each dot is the error of this coordinate from one pose alone, with all other parameters as fitted. \
                           Poses with little sensitivity to the coordinate are omitted.";
-const ALONG: &str = "Each dot is the residual of one pose along the displacement by the effect, with all other parameters \
+/// Caption of a figure whose ordinate is a displacement along that by the effect.
+const DISPLACEMENT_CAPTION: &str = "Each dot is the residual of one pose along the displacement by the effect, with all other parameters \
                      as fitted.";
-const SIZE: &str = "Each dot is the size of the effect from one pose alone, with all other parameters as fitted. Poses with \
+/// Caption of a figure whose ordinate is the size of the effect.
+const SIZE_CAPTION: &str = "Each dot is the size of the effect from one pose alone, with all other parameters as fitted. Poses with \
                     little sensitivity to it are omitted.";
 
 /// Axes, law and levers of an effect's figure, before poses are selected.
@@ -22,22 +25,24 @@ pub struct View<'a> {
     pub across: Quantity,
     /// Function from the largest ordinate \[SI\] to the vertical axis.
     pub up: Box<dyn Fn(f64) -> Quantity + 'a>,
-    /// Value of the regressor in each row.
+    /// Abscissa of each row: the value of the regressor, SI.
     pub x: Vec<f64>,
-    /// Displacement of the target per unit of the ordinate in each row \[m\].
+    /// Displacement of the target by a unit of the ordinate in each row \[m per unit\].
     pub levers: Vec<Vector3<f64>>,
-    /// Fitted law: the ordinate at a value of the regressor.
-    pub law: Box<dyn Fn(f64) -> f64 + 'a>,
+    /// Fitted law: function from the abscissa to the ordinate.
+    pub law: Law<'a>,
+    /// Sentence of the caption that explains what a dot shows.
     pub reading: &'static str,
 }
 
 /// Returns the change of a coordinate that best explains a `displacement` \[m\] by least squares.
-/// `lever` is the displacement per unit of the coordinate.
+/// `lever` is the displacement by a unit change of the coordinate \[m per unit\].
 pub fn change_along(lever: &Vector3<f64>, displacement: &Vector3<f64>) -> f64 {
     lever.dot(displacement) / lever.norm_squared()
 }
 
-/// Returns the view of an effect that changes the coordinate of a joint; `None` for other effects.
+/// Returns the view of an effect that changes the coordinate of one joint; `None` for other
+/// effects. `levers` are those of the joint coordinates, shape = (joints, rows).
 pub fn at_joint<'a>(
     problem: &'a Problem,
     rows: &'a Rows,
@@ -47,7 +52,7 @@ pub fn at_joint<'a>(
     let ParameterSite::Joint { joint, field } = rows.site()? else { return None };
     let (number, levers) = (joint + 1, levers.get(joint)?);
     let first = rows.terms.first()?.1;
-    let unit = if slides(problem, number) { Unit::Length } else { Unit::Angle };
+    let unit = if is_prismatic(problem, number) { Unit::Length } else { Unit::Angle };
     // The law Δθ = c M or c₃ M³ gives the moment M from the fitted change of θ.
     let moments = |of: fn(f64) -> f64| -> (Quantity, Vec<f64>) {
         let moment =
@@ -68,14 +73,14 @@ pub fn at_joint<'a>(
                 }
                 _ => {
                     let across = Quantity::error(&format!("joint {number} by the law"), unit);
-                    let each = rows.poses.iter().map(|pose| rows.driven(pose)).collect();
+                    let each = rows.poses.iter().map(|pose| rows.sum_of_terms(pose)).collect();
                     (across, each, Box::new(|x| x))
                 }
             }
         }
         JointField::Play | JointField::SlidingPlay if poses.measurements.approach.is_some() => {
             let label = format!("side from which joint {number} came [−1 … +1]");
-            let side = |pose: &PoseView| pose.approach.map_or(0.0, |all| all[joint]);
+            let side = |pose: &PoseView| pose.approach.map_or(0.0, |sides| sides[joint]);
             let sides = rows.poses.iter().map(side).collect();
             (Quantity::new(label, 1.0), sides, Box::new(move |side| 0.5 * first * side))
         }
@@ -90,7 +95,7 @@ pub fn at_joint<'a>(
         _ => return None,
     };
     let up = Box::new(move |_| Quantity::error(&format!("joint {number}"), unit));
-    Some(View { across, up, x, levers: levers.clone(), law, reading: COORDINATE })
+    Some(View { across, up, x, levers: levers.clone(), law, reading: COORDINATE_CAPTION })
 }
 
 /// Returns the view of an effect that does not change a joint's coordinate.
@@ -108,7 +113,7 @@ pub fn beyond_joints<'a>(found: &Effect, problem: &Problem, rows: &'a Rows) -> V
                 .map(|axis| axis.try_normalize(0.0).unwrap_or_default())
                 .collect(),
             law: Box::new(|displacement| displacement),
-            reading: ALONG,
+            reading: DISPLACEMENT_CAPTION,
         })
 }
 
@@ -140,15 +145,15 @@ fn at_link<'a>(found: &Effect, problem: &Problem, rows: &'a Rows) -> Option<View
     Some(View {
         across,
         up,
-        levers: rows.over(values.iter().map(|value| size * (value - reference))),
+        levers: rows.displacements_per(values.iter().map(|value| size * (value - reference))),
         x: values,
         law: Box::new(move |value| size * (value - reference)),
-        reading: SIZE,
+        reading: SIZE_CAPTION,
     })
 }
 
 /// Returns the view of an effect that displaces the measuring frame as a function of time; `None`
-/// for other effects. Every pose moves in the same direction.
+/// for other effects. The effect displaces all poses in the same direction.
 fn of_time<'a>(problem: &Problem, rows: &'a Rows) -> Option<View<'a>> {
     let is_shift = |site: &ParameterSite| matches!(site, ParameterSite::Shift { axis: 0..3 });
     let &[quantity @ (LawQuantity::Elapsed | LawQuantity::Time)] = rows.quantities().as_slice()
@@ -164,7 +169,7 @@ fn of_time<'a>(problem: &Problem, rows: &'a Rows) -> Option<View<'a>> {
     let norm = rows.terms.iter().map(|term| term.1 * term.1).sum::<f64>().sqrt();
     let first = rows.poses.first().map_or(0.0, |pose| pose.time - pose.elapsed);
     let longest = |a: Vector3<f64>, b: &Vector3<f64>| if b.norm() > a.norm() { *b } else { a };
-    let most = rows.displacements.iter().fold(Vector3::zeros(), longest);
+    let largest = rows.displacements.iter().fold(Vector3::zeros(), longest);
     let law = move |elapsed: f64| {
         let pose = PoseView::from_configuration(&[]);
         norm * regressor.value(&PoseView { elapsed, time: first + elapsed, ..pose })
@@ -173,13 +178,13 @@ fn of_time<'a>(problem: &Problem, rows: &'a Rows) -> Option<View<'a>> {
         across,
         up: Box::new(|_| Quantity::new("displacement, measured [mm]", 1e3)),
         x,
-        levers: vec![most.try_normalize(0.0).unwrap_or_default(); rows.displacements.len()],
+        levers: vec![largest.try_normalize(0.0).unwrap_or_default(); rows.displacements.len()],
         law: Box::new(law),
-        reading: ALONG,
+        reading: DISPLACEMENT_CAPTION,
     })
 }
 
-/// Returns the view of an effect that adds a mass to payloads; `None` for other effects.
+/// Returns the view of an effect that adds a mass to the payload; `None` for other effects.
 fn of_payload<'a>(rows: &'a Rows) -> Option<View<'a>> {
     if rows.site()? != ParameterSite::Arm(ArmField::Payload) {
         return None;
@@ -189,8 +194,8 @@ fn of_payload<'a>(rows: &'a Rows) -> Option<View<'a>> {
         across: Quantity::new("payload [kg]", 1.0),
         up: Box::new(|_| Quantity::new("missing mass [kg]", 1.0)),
         x: rows.poses.iter().map(|pose| pose.payload.copied().unwrap_or_default()).collect(),
-        levers: rows.over(std::iter::repeat(sum)),
+        levers: rows.displacements_per(std::iter::repeat(sum)),
         law: Box::new(move |_| sum),
-        reading: SIZE,
+        reading: SIZE_CAPTION,
     })
 }
