@@ -39,8 +39,8 @@ pub struct Arguments {
     /// Share of all poses that must be within the tolerance
     #[arg(long, value_name = "P", default_value_t = 0.9, value_parser = super::remainder::level, requires = "tolerance_mm")]
     share: f64,
-    /// Largest probability of a pass where fewer poses are within it, and of a fail where no fewer
-    /// are
+    /// Largest probability of a wrong verdict: a pass although fewer poses are within the
+    /// tolerance, or a fail although enough are
     #[arg(long, value_name = "P", default_value_t = 0.05, value_parser = super::remainder::level, requires = "tolerance_mm")]
     risk: f64,
     /// Correct predictions by what no law explains, if poses left out gain by it
@@ -48,16 +48,17 @@ pub struct Arguments {
     remainder: bool,
 }
 
-/// Probability with which a bound of the record holds.
+/// Probability with which an error bound of the record holds.
 const CONFIDENCE_LEVEL: f64 = 0.95;
 
-/// Reads a length that is greater than 0.
+/// Parses a length in mm, greater than 0.
 fn length(text: &str) -> Result<f64, String> {
     let length = text.parse::<f64>().ok().filter(|length| *length > 0.0 && length.is_finite());
     length.ok_or_else(|| "a length in mm greater than 0 is needed, such as 0.2".to_owned())
 }
 
-/// Identifies, judges the held-out poses, and writes the record and the page.
+/// Identifies the arm, judges its accuracy in the held-out poses, and writes the record and the
+/// page.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let common = &arguments.common;
     let Input { problem, data, results } =
@@ -110,7 +111,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     }
     let (json, page) = (result.to_json(), report::acceptance_page(&problem, &result));
     results.write(&[("acceptance.json", &json), ("acceptance.html", &page)])?;
-    let outcome = diagnostic::judged(&found, common.quiet);
+    let outcome = diagnostic::report_fit(&found, common.quiet);
     common.print_result(&json, || {
         let text = report::acceptance_text(&problem, &result);
         let page = results.path("acceptance.html");
@@ -141,18 +142,21 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     }
 }
 
-/// Returns the SHA-256 digest of a file; `None` for a pipe, which cannot be read a second time.
+/// Returns the SHA-256 digest of a file; `None` if it cannot be read, or for a pipe, which cannot
+/// be read a second time.
 fn sha256(file: &Path) -> Option<String> {
     file.is_file().then(|| fs::read(file).ok()).flatten().map(|bytes| digest(&bytes))
 }
 
-/// Returns the commit at HEAD of the git repository that contains a file; `None` if there is none.
+/// Returns the commit at HEAD of the git repository that contains a file; `None` if the file is in
+/// no repository, or HEAD cannot be read.
 fn commit(file: &Path) -> Option<String> {
     let whole = file.canonicalize().ok()?;
     let git =
         whole.ancestors().skip(1).map(|folder| folder.join(".git")).find(|git| git.exists())?;
     let read = |path: PathBuf| Some(files::read_text(&path).ok()?.trim().to_owned());
-    // In a worktree .git is a file that names its folder, which names the folder of the references.
+    // In a worktree, .git is a file that names a folder. That folder's file commondir names the
+    // folder with the references.
     let folder = match read(git.clone()) {
         Some(text) => git.parent()?.join(text.strip_prefix("gitdir: ")?),
         None => git,

@@ -1,4 +1,4 @@
-//! Suggestion of the next command after a result.
+//! Suggestions of the next command after a fit, a loop or a trace.
 
 use std::path::Path;
 
@@ -15,8 +15,9 @@ use super::plan;
 /// Number of poses that a suggested plan has to distinguish two effects.
 const SEPARATING_POSES: usize = 12;
 
-/// Findings that speak for a mistake in table or problem, not for an effect that the model lacks.
-const CONTRADICTIONS: [FindingCode; 5] = [
+/// Findings that indicate a mistake in the table or the problem, not an effect that the model
+/// lacks.
+const INPUT_MISTAKES: [FindingCode; 5] = [
     FindingCode::MissesMeasurements,
     FindingCode::NoBetterThanNominal,
     FindingCode::OtherSize,
@@ -24,8 +25,8 @@ const CONTRADICTIONS: [FindingCode; 5] = [
     FindingCode::BeyondArmSize,
 ];
 
-/// Returns the command to run after a fit. `is_structured` is true if the residual has structure;
-/// `estimate` is the file written.
+/// Returns what to do after a fit, as a command or in words. `is_structured` is true if the
+/// residual tests detect structure; `estimate` is the path of the estimate.json that was written.
 pub fn after_fit(
     common: &Common,
     (problem, found): (&Problem, &Identification),
@@ -37,7 +38,7 @@ pub fn after_fit(
         let [problem, estimate] = [common.problem(), estimate].map(shell_word);
         format!("flexcal compensate {problem} --estimate {estimate} --data TARGETS.csv {what}")
     };
-    // A loop that wrote a remainder into the problem has searched for causes already.
+    // A problem with a remainder comes from a loop, which has searched for causes already.
     let search = if problem.remainder.is_some() {
         format!(
             "flexcal trace {named} ranks candidates for what is left; {}",
@@ -59,8 +60,8 @@ pub fn after_fit(
         None if found.has(FindingCode::PositionsComputed) => {
             "measure the poses with an instrument".to_owned()
         }
-        // If the priors contradict the fit, neither a cause nor a correction follows from it. Where
-        // the nominal arm is far off, the declared numbers are wrong and not the priors.
+        // If a prior contradicts the data, neither a cause nor a correction follows from the fit.
+        // If the nominal arm is far off, its declared numbers are wrong, not the priors.
         None if found.has(FindingCode::PriorContradicted)
             && !found.has(FindingCode::NominalFarOff) =>
         {
@@ -73,7 +74,7 @@ pub fn after_fit(
                 common.problem_file().display()
             )
         }
-        None if CONTRADICTIONS.iter().any(|code| found.has(*code)) => format!(
+        None if INPUT_MISTAKES.iter().any(|code| found.has(*code)) => format!(
             "correct the table or {} as the warning says, then flexcal identify {named}; if the input is right, flexcal loop {named} looks for what the model lacks",
             common.problem_file().display()
         ),
@@ -98,7 +99,8 @@ pub fn after_fit(
     }
 }
 
-/// Returns the command to run after a loop, which wrote its `results`.
+/// Returns what to do after a loop, as a command or in words. `fit` is the fit of the declared
+/// problem, and `results` are the files that the loop wrote.
 pub fn after_loop(
     common: &Common,
     problem: &Problem,
@@ -127,14 +129,16 @@ pub fn after_loop(
             "flexcal identify {named} -v shows how far the error would fall if a limit moved out; widen those that may be wrong"
         );
     }
-    // A plan separates effects within known ranges, unless they depend on time.
+    // A plan can distinguish two effects if the ranges of the poses are known, and if the effects
+    // do not depend on time.
     let doubted = result.effects.iter().filter(|found| found.is_doubted());
     let mut pairs = doubted.filter_map(|found| {
         let rival = found.alternatives.first()?;
         Some([found.effect.declaration.clone(), rival.effect.declaration.clone()])
     });
-    let can_be_planned =
-        |pair: &[String; 2]| PoseRanges::of(problem).is_ok() && plan::pair(pair, problem).is_ok();
+    let can_be_planned = |pair: &[String; 2]| {
+        PoseRanges::of(problem).is_ok() && plan::effect_pair(pair, problem).is_ok()
+    };
     let closed = shell_word(&results.path("problem.closed.toml"));
     if let Some([effect, rival]) = pairs.find(can_be_planned) {
         let plan = format!(
@@ -174,9 +178,9 @@ pub fn after_loop(
 
 /// Returns the command to run after a trace.
 pub fn after_trace(common: &Common, result: &TraceResult) -> String {
-    let is_pointed =
+    let is_significant =
         result.ranking.first().is_some_and(|candidate| candidate.p_value < result.level);
-    if is_pointed || result.structured {
+    if is_significant || result.structured {
         format!("flexcal loop {} adds what is missing and fits again", common.named())
     } else {
         format!("flexcal identify {} writes the estimate to apply", common.named())

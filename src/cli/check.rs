@@ -36,7 +36,7 @@ pub struct Arguments {
     source: Source,
 }
 
-/// Error of arguments that name no valid poses.
+/// Error of arguments that name no poses, or contradictory ones.
 #[derive(Debug, thiserror::Error)]
 enum PosesError {
     #[error(
@@ -49,7 +49,8 @@ enum PosesError {
     Twice,
 }
 
-/// Runs the check, writes `check.json` and `check.html`, and prints the expected results.
+/// Forecasts the results of measurements in the poses, writes `check.json` and `check.html`, and
+/// prints the forecast.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let common = &arguments.common;
     let problem = Problem::read(common.problem())?;
@@ -59,7 +60,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         &arguments.source.files(),
         &["check.json", "check.html"],
     )?;
-    let check = design::check(&problem, &judged(arguments, &problem)?, arguments.source.seed)?;
+    let check =
+        design::check(&problem, &checked_poses(arguments, &problem)?, arguments.source.seed)?;
     let json = CheckResult::new(&problem, &check).to_json();
     let page = report::check_page(&problem, &check);
     results.write(&[("check.json", &json), ("check.html", &page)])?;
@@ -83,8 +85,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     Ok(Outcome::NotTrusted)
 }
 
-/// Returns the poses that the arguments name, drawn or read.
-fn judged(arguments: &Arguments, problem: &Problem) -> Result<CheckedPoses, Box<dyn Error>> {
+/// Returns the poses to check that the arguments name, drawn from ranges or read from tables.
+fn checked_poses(arguments: &Arguments, problem: &Problem) -> Result<CheckedPoses, Box<dyn Error>> {
     let Arguments { common, poses, source } = arguments;
     let poses = poses.map(|poses| poses as usize);
     let table = source.table(problem, common)?;

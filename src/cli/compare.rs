@@ -27,7 +27,8 @@ pub struct Arguments {
     paper: bool,
 }
 
-/// Compares, writes `compare.json`, `report.md` and `report.html`, and prints the tables.
+/// Compares strategies, solvers and ablations, writes `compare.json` and both reports, and prints
+/// the tables.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let common = &arguments.common;
     let Input { problem, data, results } =
@@ -39,7 +40,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let shown = PlotData::of_comparison(&problem, &data, &comparison)?;
     let told = report::comparison_report(&problem, &comparison, &shown);
     results.write_report(&[("compare.json", &json)], &told)?;
-    let outcome = diagnostic::judged(&comparison.joint, common.quiet);
+    let outcome = diagnostic::report_fit(&comparison.joint, common.quiet);
     common.print_result(&json, || {
         let text = report::compare_text(&problem, &comparison);
         let lacks = exceeds_noise(&comparison.joint);

@@ -13,14 +13,14 @@ use super::estimate::Trust;
 use super::outcome::Outcome;
 use super::output::{self, Results};
 
-/// Name of the page.
+/// Name of the HTML page that the command writes.
 const PAGE: &str = "compare-results.html";
-/// Parts of an estimate.json with errors, and the names that people read.
-const PARTS: [(&str, &str); 3] =
+/// Keys of the errors in an estimate.json, and the names that people read.
+const ERROR_PARTS: [(&str, &str); 3] =
     [("held_out", "held out"), ("left_out", "left out"), ("identification", "fitted rows")];
 
-/// Units of errors in keys and in words.
-const UNITS: [(&str, &str); 3] = [("mm", "mm"), ("deg", "°"), ("px", "px")];
+/// Units of errors, as in the keys of an estimate.json and as printed.
+const ERROR_UNITS: [(&str, &str); 3] = [("mm", "mm"), ("deg", "°"), ("px", "px")];
 
 /// Arguments of `flexcal compare-results`.
 #[derive(Debug, Args)]
@@ -54,7 +54,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let inputs = vec![first.clone(), second.clone()];
     let flags = (*force, *quiet);
     let results = Results::claim("compare-results", out.clone(), inputs, &[PAGE], flags)?;
-    let sides = [side(first, *trust)?, side(second, *trust)?];
+    let sides = [read_side(first, *trust)?, read_side(second, *trust)?];
     if sides[0].estimate.problem_name() != sides[1].estimate.problem_name() {
         diagnostic::warn("the two results are of problems with different names");
     }
@@ -70,18 +70,18 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     Ok(Outcome::Done)
 }
 
-/// Reads one estimate with its errors.
-fn side(file: &Path, trust: Trust) -> Result<Side, Box<dyn Error>> {
+/// Reads one estimate with its errors and held-out rows.
+fn read_side(file: &Path, trust: Trust) -> Result<Side, Box<dyn Error>> {
     let estimate = trust.read(file)?;
     let text = flexcal::files::read_text(file)
         .map_err(|source| SavedEstimateError::Unreadable { file: file.to_owned(), source })?;
     let document: serde_json::Value = serde_json::from_str(&text)
         .map_err(|source| SavedEstimateError::Syntax { file: file.to_owned(), source })?;
     let mut errors = Vec::new();
-    for (key, name) in PARTS {
+    for (key, name) in ERROR_PARTS {
         for (size, unit, symbol) in ["mean", "rms", "max"]
             .into_iter()
-            .flat_map(|size| UNITS.map(|(unit, symbol)| (size, unit, symbol)))
+            .flat_map(|size| ERROR_UNITS.map(|(unit, symbol)| (size, unit, symbol)))
         {
             let value =
                 document.get(key).and_then(|part| part.get(format!("{size}_{unit}"))?.get("norm"));
@@ -92,8 +92,8 @@ fn side(file: &Path, trust: Trust) -> Result<Side, Box<dyn Error>> {
     Ok(Side { estimate, errors, held_out: held_out_rows(file) })
 }
 
-/// Returns the held-out rows of positions in the residuals.csv that `flexcal identify` writes
-/// beside an estimate.json; empty if there is none.
+/// Returns the held-out rows with positions in the residuals.csv beside an estimate.json; empty if
+/// there is no such file. `flexcal identify` writes both files.
 fn held_out_rows(estimate: &Path) -> Vec<HeldOutRow> {
     let is_identified = estimate.file_name().is_some_and(|name| name == "estimate.json");
     let file = estimate.with_file_name("residuals.csv");

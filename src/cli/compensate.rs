@@ -49,14 +49,15 @@ pub struct Arguments {
 #[error("no targets; name them with --data")]
 struct NoTargets;
 
-/// Finds commands, writes `commands.csv`, and prints which targets they reach.
+/// Finds the commands that reach the targets, writes `commands.csv`, and prints which targets are
+/// reached.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let common = &arguments.common;
     if common.data().is_empty() {
         return Err(NoTargets.into());
     }
     let mut problem = Problem::read(common.problem())?;
-    // Every row is a target.
+    // Every row is a target, so none is held out.
     problem.data.held_out = None;
     let results = common.results(
         "compensate",
@@ -66,7 +67,6 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     )?;
     let (targets, warnings) = Measurements::read_poses(common.data(), &problem)?;
     common.warn(&warnings);
-    // Targets may be waypoints without positions.
     for missing in fit::missing_target_columns(&problem, &targets).iter().filter(|_| !common.quiet)
     {
         diagnostic::warn(&format!("{missing}; the commands neglect the effects that depend on it"));
@@ -83,10 +83,10 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     };
     let found = solve(targets.clone(), arguments.frame)?;
     let as_given = (&targets, arguments.frame, found.commands.as_slice());
-    let meant = misplaced::meant(as_given, |targets, frame| {
+    let misplaced = misplaced::warning(as_given, |targets, frame| {
         solve(targets, frame).ok().map(|found| found.commands)
     });
-    // An error of the correction is reported only after the errors of the estimate, which explain
+    // An error of the remainder's file is reported only after errors of the estimate, which explain
     // more.
     correction?;
     if found.is_base_open && !common.quiet {
@@ -95,7 +95,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
              happens to be assumed; --frame base takes them in the frame of the base",
         );
     }
-    if let Some(words) = meant.as_ref().filter(|_| !common.quiet) {
+    if let Some(words) = misplaced.as_ref().filter(|_| !common.quiet) {
         diagnostic::warn(words);
     }
     let Compensation { targets, commands, bounds, .. } = &found;
@@ -110,7 +110,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         let written = results.path("commands.csv");
         let [problem_word, estimate] = [common.problem(), &arguments.estimate].map(shell_word);
         let reached = commands.iter().filter(|command| command.is_reached()).count();
-        let next = if meant.is_some() {
+        let next = if misplaced.is_some() {
             "correct the frame or the unit of the targets, as the warning says".to_owned()
         } else if reached == 0 {
             "check the unit and the frame of the targets (--frame base takes them in the frame of the base) and the limits of the \

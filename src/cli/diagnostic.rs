@@ -1,4 +1,4 @@
-//! Errors and warnings on the terminal, with the line of the file that they concern.
+//! Errors and warnings on the terminal; an error in the input with the line of the file.
 
 use std::error::Error;
 use std::io::Write as _;
@@ -20,15 +20,17 @@ const MESSAGE_WIDTH: usize = 1000;
 /// Prints an error to standard error.
 pub fn print(error: &(dyn Error + 'static)) {
     let mistake = mistake(error);
-    let flagged = error.downcast_ref().and_then(by_arguments).or(mistake.and_then(with_argument));
+    let with_arguments =
+        error.downcast_ref().and_then(by_arguments).or(mistake.and_then(with_argument));
     show(
         Level::ERROR,
-        &flagged.unwrap_or_else(|| message_with_causes(error)),
+        &with_arguments.unwrap_or_else(|| message_with_causes(error)),
         mistake.map(|input| &*input.location),
     );
 }
 
-/// Returns advice on the argument that would avoid an error in the input, if there is one.
+/// Returns the message of an error in the input with the argument that would avoid it; `None` if no
+/// argument would.
 fn with_argument(error: &InputError) -> Option<String> {
     match *error.kind {
         InputErrorKind::Table(TableErrorKind::NoDataFiles) => {
@@ -41,8 +43,8 @@ fn with_argument(error: &InputError) -> Option<String> {
     }
 }
 
-/// Returns the message for an error of a design in terms of the arguments that caused it, if there
-/// is one.
+/// Returns the message for an error of a design with the argument that caused or would avoid it;
+/// `None` if there is no such argument.
 fn by_arguments(error: &DesignError) -> Option<String> {
     match error {
         DesignError::NoRange(_) => Some(format!(
@@ -65,14 +67,14 @@ pub fn print_warnings(warnings: &[Warning]) {
     }
 }
 
-/// Prints one line of warning to standard error.
+/// Prints a warning to standard error.
 pub fn warn(message: &str) {
     show(Level::WARNING, message, None);
 }
 
-/// Prints the warnings of a fit and returns the outcome of the command that made it. The reason for
-/// exit status 1 is printed even if the command is `quiet`.
-pub fn judged(fit: &Identification, quiet: bool) -> Outcome {
+/// Prints the warnings of a fit and returns the outcome of the command that made it. If `quiet`,
+/// prints only the reason why the fit is not trusted.
+pub fn report_fit(fit: &Identification, quiet: bool) -> Outcome {
     if !fit.is_trusted() {
         warn(&report::why_not_trusted(fit));
     }
@@ -84,6 +86,7 @@ pub fn judged(fit: &Identification, quiet: bool) -> Outcome {
     Outcome::from_trust(fit.is_trusted())
 }
 
+/// Prints a message to standard error, with the excerpt of the input file if `location` has one.
 fn show(level: Level<'_>, message: &str, location: Option<&Location>) {
     let (message, path) = (
         one_line(message),

@@ -1,5 +1,4 @@
-//! Command-line argument of commands that apply an estimate, and the function that reads the
-//! estimate.
+//! Argument of the commands that apply an estimate, and the function that reads the estimate.
 
 use std::path::Path;
 
@@ -9,7 +8,7 @@ use flexcal::fit::{SavedEstimate, SavedEstimateError};
 
 use super::diagnostic;
 
-/// Treatment of an estimate that was changed.
+/// Argument that accepts an estimate that was changed since flexcal wrote it.
 #[derive(Debug, Clone, Copy, Args)]
 pub struct Trust {
     /// Take an estimate.json, and the remainder.json beside it, that were changed since flexcal
@@ -19,8 +18,8 @@ pub struct Trust {
 }
 
 impl Trust {
-    /// Reads an estimate. If changed files are accepted, it prints a warning with the first changed
-    /// key.
+    /// Reads an estimate. Returns an error if it was changed since flexcal wrote it, unless `trust`
+    /// is set; then prints a warning with the first changed key.
     pub fn read(self, file: &Path) -> Result<SavedEstimate, SavedEstimateError> {
         let changes = if self.trust { Changes::Accepted } else { Changes::Refused };
         let estimate = SavedEstimate::read_with(file, changes)?;

@@ -73,10 +73,10 @@ pub struct Arguments {
     /// Box of the target in which --best-rigid fits, frame of the arm's base
     #[arg(long, value_name = "X0,X1,Y0,Y1,Z0,Z1", value_parser = numbers::<6>, allow_hyphen_values = true, requires = "best_rigid")]
     workspace_mm: Option<[f64; 6]>,
-    /// Poses in the test program of --format c
+    /// Number of poses in the test program of --format c
     #[arg(long, value_name = "N", default_value_t = 100, requires = "format")]
     test_poses: usize,
-    /// Poses of the test for which it compares commands too
+    /// Number of these poses at which the test program compares compensated commands too
     #[arg(long, value_name = "N", default_value_t = 100, requires = "format")]
     test_commands: usize,
     #[command(flatten)]
@@ -85,7 +85,7 @@ pub struct Arguments {
     flags: Flags,
 }
 
-/// Form of the exported model.
+/// Format of the exported model.
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum Format {
     /// The calibration file of a Universal Robots driver
@@ -107,7 +107,8 @@ enum Format {
 }
 
 impl Format {
-    /// Returns the form and the default file name of a camera; `None` for forms of the arm.
+    /// Returns the format and the default file name of a camera file; `None` for formats of the
+    /// arm.
     fn camera(self) -> Option<(code::CameraFormat, &'static str)> {
         match self {
             Self::RosCamera => Some((code::CameraFormat::Ros, "camera_info.yaml")),
@@ -118,8 +119,8 @@ impl Format {
     }
 }
 
-/// Writes the identified geometry, and prints the parts of the model that the file cannot
-/// represent.
+/// Writes the identified geometry, a camera or the whole model in the requested format. Prints the
+/// parts of the model that the file cannot represent, and its held-out errors.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let flags = &arguments.flags;
     let camera = arguments.format.and_then(Format::camera);
@@ -144,11 +145,11 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let x = estimates.vector(&problem, &model)?;
     let correction = remainder::of_estimate(&problem, &estimates);
     let files = if arguments.data.is_empty() { &problem.data.files } else { &arguments.data };
-    // Measurements that the problem names may have been removed.
-    let at_hand =
+    // Measurement files that the problem names may have been removed; those of --data must exist.
+    let has_files =
         !arguments.data.is_empty() || !files.is_empty() && files.iter().all(|file| file.is_file());
     let data =
-        if at_hand && camera.is_none() { Some(read_data(&problem, files, flags)?) } else { None };
+        if has_files && camera.is_none() { Some(read_data(&problem, files, flags)?) } else { None };
     let choice = if arguments.best_rigid {
         let corners = arguments.workspace_mm.map(|[x0, x1, y0, y1, z0, z1]| {
             [Vector3::new(x0, y0, z0), Vector3::new(x1, y1, z1)].map(|corner| corner * 1e-3)
@@ -159,7 +160,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     } else {
         code::GeometryChoice::Identified
     };
-    // A geometry without corrections needs no remainder, whose file may have been removed.
+    // Only --best-rigid needs the remainder; for other geometries its file may have been removed.
     let correction = match choice {
         code::GeometryChoice::BestRigid(_) => correction?,
         _ => correction.ok().flatten(),
@@ -171,7 +172,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let workspace = geometry.best_rigid.as_ref().map(|best| [best.best, best.identified]);
     let mut remarks = report::ExportRemarks::new(workspace, alone);
     let Rendered { text, moved, name: default, elsewhere } =
-        rendered(arguments, &problem, (&model, &x), (arm, &mut remarks))?;
+        render(arguments, &problem, (&model, &x), (arm, &mut remarks))?;
     let path = flags.out.clone().unwrap_or_else(|| flags.folder(&problem.name).join(default));
     let folder = path
         .parent()
@@ -187,7 +188,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let inputs = [&[file, arguments.estimate.clone()], arguments.urdf.as_slice(), files].concat();
     let results = Results::claim("export", folder, inputs, &[&name], (flags.force, flags.quiet))?;
     if let Some(absent) =
-        files.iter().find(|file| !file.is_file()).filter(|_| !at_hand && !flags.quiet)
+        files.iter().find(|file| !file.is_file()).filter(|_| !has_files && !flags.quiet)
     {
         diagnostic::warn(&format!(
             "no errors are computed, because {} does not exist",
@@ -196,7 +197,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     }
     let errors = match &data {
         Some(data) => {
-            // Bases and tools are those of the data, which may lack some of the fit.
+            // Bases and targets are those that occur in the data, perhaps fewer than in the fit.
             let placement = Placement::of(&data.measurements);
             let (bases, targets) = (&placement.bases, &placement.targets);
             let model = estimates.model(Model::new(&problem, bases, targets)?);
@@ -217,7 +218,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         format!(
             "{}\nNext: {}\n",
             report::export_text(&result, &remarks),
-            next(arguments, &result, &path)
+            next_command(arguments, &result, &path)
         )
     })?;
     if let Some(alone) = alone.filter(|alone| !alone.is_trusted()) {
@@ -226,24 +227,25 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     if !estimates.trusted {
         diagnostic::warn("the estimate is not to be trusted, so this file is not either");
     }
-    // A rigid geometry for an elastic arm always misses by more than σ, so it does not count.
+    // The trust in `alone` has no influence: a rigid geometry fitted to an elastic arm always
+    // misses measurements by more than σ.
     Ok(Outcome::from_trust(estimates.trusted))
 }
 
-/// Text of the exported file.
+/// Text of the exported file, with facts for the printed summary.
 struct Rendered {
     text: String,
     /// Origins of a URDF that were moved; `None` for other formats.
     moved: Option<Vec<MovedOrigin>>,
     /// File name without the option `--out`.
     name: PathBuf,
-    /// Links that the URDF has on another link than the problem.
+    /// Links that are mounted on another link in the URDF than in the problem.
     elsewhere: Vec<String>,
 }
 
-/// Renders the arm in the format of the arguments; adds the table of a standard DH sheet to the
-/// `remarks`.
-fn rendered(
+/// Formats the arm or a camera in the format of the arguments. Adds the table of standard
+/// Denavit-Hartenberg parameters to the `remarks`.
+fn render(
     arguments: &Arguments,
     problem: &Problem,
     (model, x): (&Model, &DVector<f64>),
@@ -282,7 +284,7 @@ fn rendered(
 /// Names of the files of `--format c`.
 const C_FILES: [&str; 3] = ["flexcal_model.h", "flexcal_model.c", "flexcal_model_test.c"];
 
-/// Writes the model as C, with a test program.
+/// Writes the whole model as C99, with a test program.
 fn write_c(
     arguments: &Arguments,
     problem: &Problem,
@@ -321,7 +323,7 @@ fn write_c(
     Ok(Outcome::from_trust(estimate.trusted))
 }
 
-/// Reads the measurements of an export.
+/// Reads the measurements on which the errors of an export are computed.
 fn read_data(
     problem: &Problem,
     files: &[PathBuf],
@@ -333,9 +335,9 @@ fn read_data(
     Ok(Dataset::from_measurements(problem, rows)?)
 }
 
-/// Returns the command to run next: the same export with the geometry of the smallest error, or the
-/// check of new measurements.
-fn next(arguments: &Arguments, result: &ExportResult, path: &Path) -> String {
+/// Returns the command to run next: the same export with the geometry that has the smallest error,
+/// or `flexcal predict` with new measurements.
+fn next_command(arguments: &Arguments, result: &ExportResult, path: &Path) -> String {
     let [problem, estimate] =
         [&arguments.problem, &arguments.estimate].map(|path| shell_word(path));
     if let Some(better) = report::better_geometry(result) {

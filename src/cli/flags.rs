@@ -8,7 +8,7 @@ use flexcal::error::Warning;
 use super::diagnostic;
 use super::output::{self, Results, WriteError};
 
-/// Folder of the results, and format of the output.
+/// Arguments for the folder of the results and the format of the output.
 #[derive(Debug, Clone, Args)]
 pub struct Flags {
     /// Folder for results [default: out/<name of the problem>]
@@ -53,13 +53,13 @@ impl Flags {
         }
     }
 
-    /// Returns the folder for the results of the problem or study `name`.
+    /// Returns the folder for the results of the problem or study with this `name`.
     pub fn folder(&self, name: &str) -> PathBuf {
         self.out.clone().unwrap_or_else(|| Path::new("out").join(name))
     }
 
-    /// Claims file names for the results of a `command` that reads `inputs`. `name` is the problem
-    /// or study, `names` are the files.
+    /// Claims the file names `names` for the results of a `command` that reads `inputs`. `name` is
+    /// that of the problem or study, after which the default folder is called.
     pub fn claim(
         &self,
         command: &'static str,

@@ -38,7 +38,8 @@ pub struct Arguments {
     trust: Trust,
 }
 
-/// Finds mean and spread of the fleet, writes them, and prints them with every arm compared.
+/// Computes mean and spread of the fleet's parameters, writes them as a prior with an HTML page,
+/// and prints them with a comparison of every arm.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let Arguments { estimates, out, force, json, quiet, trust } = arguments;
     let folder = out.parent().filter(|parent| !parent.as_os_str().is_empty());

@@ -39,8 +39,8 @@ pub struct Arguments {
     /// remainder.json
     #[arg(long)]
     remainder: bool,
-    /// Take the estimate.json of an earlier identification of the same arm as prior, rows that it
-    /// was fitted to left out; or the PRIOR.toml of its siblings (flexcal fleet)
+    /// Prior: the estimate.json of an earlier identification of the same arm, whose fitted rows are
+    /// left out, or the PRIOR.toml of arms of the same type (flexcal fleet)
     #[arg(long, value_name = "ESTIMATE.json|PRIOR.toml", conflicts_with = "remainder")]
     prior: Option<PathBuf>,
     /// Days since the earlier identification, by whose drift the prior is widened
@@ -53,8 +53,8 @@ pub struct Arguments {
     verbose: bool,
 }
 
-/// Returns a parser of an argument that accepts one word for each value; `summary` describes the
-/// words in help.
+/// Returns the parser of an argument whose words are the names of the values `each`. In the help,
+/// `summary` describes each value.
 fn words<T: Copy + Send + Sync + 'static>(
     each: &'static [T],
     name: fn(T) -> &'static str,
@@ -75,8 +75,8 @@ pub(super) fn days(text: &str) -> Result<f64, String> {
     days.ok_or_else(|| "a number of days, at least 0, is expected".to_owned())
 }
 
-/// Identifies, writes `estimate.json`, `residuals.csv`, `report.md` and `report.html`, and prints
-/// the result.
+/// Identifies the arm, writes `estimate.json`, `residuals.csv` and both reports, and
+/// `remainder.json` if one is requested and accepted; prints the result.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let common = &arguments.common;
     let mut names = vec!["estimate.json", "residuals.csv", REPORT[0], REPORT[1]];
@@ -99,7 +99,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         None => None,
     };
     let declared = remainder::declared(&problem)?.filter(|_| !arguments.remainder);
-    common.say_if_nothing_is_free(&problem);
+    common.warn_if_nothing_is_free(&problem);
     let stop = interrupt::stop();
     let options = Options::default()
         .with_strategy(arguments.strategy)
@@ -114,15 +114,15 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
                 return Ok((None, identify_with_prior(&problem, &data, &options, prior, days)?));
             }
             let found = fit::identify(&problem, &data, &options)?;
-            // The requested fit is complete, so an interrupt only skips the comparison of joint
-            // sources.
+            // The requested fit is complete, so an interrupt only skips the comparison of the
+            // sources of the joint values.
             match fit::joint_sources(&problem, &data, &options, &found) {
                 Err(error) if error.is_interrupted() => Ok((None, found)),
                 sources => Ok((sources.map_err(PriorError::from)?, found)),
             }
         })?;
-    // With an earlier estimate as prior, no uncertainty of predictions is computed: it would count
-    // the new rows alone.
+    // With a prior from a file, no uncertainty of predictions is computed, because it would use
+    // only the new rows.
     let fitted = if prior.is_some() {
         None
     } else if arguments.remainder {
@@ -141,10 +141,10 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         result = result.with_predictions(&identification, fitted);
     }
     let json = result.to_json();
-    let is_told = |corrected: &&Fitted| arguments.remainder || corrected.remainder.is_some();
+    let is_reported = |corrected: &&Fitted| arguments.remainder || corrected.remainder.is_some();
     let words = fitted
         .as_ref()
-        .filter(is_told)
+        .filter(is_reported)
         .map(|corrected| {
             format!(
                 "\n{}\n",
@@ -172,7 +172,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     interrupt::begin_writing();
     results.write_report(&texts, &told)?;
     let sources = sources.as_ref().map(report::joint_sources_text);
-    let outcome = diagnostic::judged(&identification, common.quiet);
+    let outcome = diagnostic::report_fit(&identification, common.quiet);
     common.print_result(&json, || {
         let accuracy = PredictionAccuracy::new(&identification, &shown);
         let told = if arguments.verbose {

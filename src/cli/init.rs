@@ -38,10 +38,10 @@ pub struct Arguments {
     flags: Flags,
 }
 
-/// Numbers of corners along and across a board, and their distance \[mm\].
+/// Numbers of inner corners along and across a calibration board, and their distance \[mm\].
 type Board = ([usize; 2], f64);
 
-/// Parses the size of a board such as `9x6x25`.
+/// Parses the size of a calibration board such as `9x6x25`.
 fn board(text: &str) -> Result<Board, String> {
     let parts: Vec<&str> = text.split(['x', '×']).collect();
     let [columns, rows, distance] = parts[..] else {
@@ -56,7 +56,7 @@ fn board(text: &str) -> Result<Board, String> {
     Ok(([count(columns)?, count(rows)?], distance))
 }
 
-/// Writes the chain between two links as `problem.toml`.
+/// Writes the chain of a URDF between two links as `problem.toml`.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let robot = Robot::read(&arguments.urdf)?;
     let chain = Chain::new(&robot, arguments.base.as_deref(), arguments.tip.as_deref())?;

@@ -36,15 +36,16 @@ impl Deref for Common {
     }
 }
 
-/// Problem with its data, and the results that the command may write.
+/// Problem with its data, and the folder and file names claimed for the results.
 pub struct Input {
     pub problem: Problem,
     pub data: Dataset,
     pub results: Results,
 }
 
-/// Separates the problem from the files of `--data`, which takes all words that follow. If no
-/// problem is named, the last word is the problem if it is a folder or a TOML file.
+/// Returns the problem and the files of `--data`, which takes all words that follow. If no problem
+/// is `named`, the last of several words is the problem if it is a folder or a TOML file; otherwise
+/// the problem is the current folder.
 fn split<'a>(named: Option<&'a Path>, data: &'a [PathBuf]) -> (&'a Path, &'a [PathBuf]) {
     let is_problem =
         |path: &Path| path.is_dir() || path.extension().is_some_and(|ending| ending == "toml");
@@ -56,12 +57,13 @@ fn split<'a>(named: Option<&'a Path>, data: &'a [PathBuf]) -> (&'a Path, &'a [Pa
 }
 
 impl Common {
-    /// Returns file or folder of the problem.
+    /// Returns the path of the problem's file or folder.
     pub fn problem(&self) -> &Path {
         split(self.named.as_deref(), &self.data).0
     }
 
-    /// Formats the problem, and the named measurement files, as arguments of a suggested command.
+    /// Formats the problem, and the measurement files named by `--data`, as arguments of a
+    /// suggested command.
     pub fn named(&self) -> String {
         let data: Vec<String> =
             self.data().iter().map(|file| format!(" {}", shell_word(file))).collect();
@@ -70,7 +72,7 @@ impl Common {
         format!("{}{data}", shell_word(self.problem()))
     }
 
-    /// Returns the named measurement files; empty if those of the problem are used.
+    /// Returns the measurement files named by `--data`; empty if those of the problem are used.
     pub fn data(&self) -> &[PathBuf] {
         split(self.named.as_deref(), &self.data).1
     }
@@ -81,7 +83,8 @@ impl Common {
         self.read_beside(command, &[], names)
     }
 
-    /// Does the same as [`read`](Self::read) for a command that also reads the files `others`.
+    /// Does the same as [`read`](Self::read) for a command that also reads the files `others`,
+    /// which its results must not replace.
     pub fn read_beside(
         &self,
         command: &'static str,
@@ -94,7 +97,8 @@ impl Common {
         Ok(Input { problem, data, results })
     }
 
-    /// Reads the measurements of a problem.
+    /// Reads the measurements of a problem, prints warnings, and splits the rows into
+    /// identification and held-out rows.
     pub fn measurements(&self, problem: &Problem) -> Result<Dataset, InputError> {
         let (measurements, mut warnings) = Measurements::read(self.files(problem), problem)?;
         warnings.extend(measurements.repeated_rows(problem.data.position_sigma));
@@ -103,8 +107,8 @@ impl Common {
         Dataset::from_measurements(problem, measurements)
     }
 
-    /// Warns if no parameter is free.
-    pub fn say_if_nothing_is_free(&self, problem: &Problem) {
+    /// Prints a warning if no parameter is free, unless the command is quiet.
+    pub fn warn_if_nothing_is_free(&self, problem: &Problem) {
         if problem.parameters.is_empty() && !self.quiet {
             diagnostic::warn(
                 "no parameter is free, so the nominal arm is judged; to identify it, write [parameters] with lines such as \
@@ -116,7 +120,7 @@ impl Common {
 
     /// Prints a warning if the problem fits orientations, which the search for effects ignores.
     /// Adds the warning to `data` for the reports.
-    pub fn say_of_orientation(&self, problem: &Problem, data: &mut Dataset) {
+    pub fn warn_of_orientation(&self, problem: &Problem, data: &mut Dataset) {
         if problem.data.fits_orientation {
             let warning = Warning {
                 location: problem.data.location.clone(),
@@ -143,7 +147,7 @@ impl Common {
         self.claim(command, &self.results_name(problem), inputs, names)
     }
 
-    /// Returns the measurement files.
+    /// Returns the measurement files: those of `--data`, or else those that the problem names.
     pub fn files<'a>(&'a self, problem: &'a Problem) -> &'a [PathBuf] {
         if self.data().is_empty() { &problem.data.files } else { self.data() }
     }
@@ -154,8 +158,8 @@ impl Common {
         if problem.is_dir() { problem.join("problem.toml") } else { problem.to_owned() }
     }
 
-    /// Returns the name of the results' folder. A `problem.closed.toml` has a name different from
-    /// that of the problem from which it was made.
+    /// Returns the name of the default folder of the results: the problem's name, and for a file
+    /// `problem.VARIANT.toml` its variant, as in `arm-closed`.
     fn results_name(&self, problem: &Problem) -> String {
         let file = self.problem_file();
         let variant = file.file_stem().and_then(|stem| stem.to_str()?.strip_prefix("problem."));

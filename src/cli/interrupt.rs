@@ -12,9 +12,9 @@ use flexcal::fit::Stop;
 #[cfg(unix)]
 const TERMINATED_STATUS: u8 = 143;
 /// Exit status after an interrupt with nothing written: 128 + SIGINT, as in shells.
-pub const STATUS: u8 = 130;
-/// Time after an interrupt in which a command may finish by itself, so that it ends within 2 s.
-/// Builds with debug assertions, those of the tests, may take as long as they need.
+pub const INTERRUPTED_STATUS: u8 = 130;
+/// Time after an interrupt in which a command may finish by itself, so that it ends within 2 s. In
+/// builds with debug assertions, as in tests, the time is practically unlimited.
 const MAX_FINISHING_TIME: Duration =
     Duration::from_millis(if cfg!(debug_assertions) { 600_000 } else { 1_700 });
 
@@ -24,17 +24,17 @@ type LastWork = Box<dyn FnOnce() -> u8 + Send>;
 
 /// Lock that is held while finished files are renamed to their final names.
 static WRITE_LOCK: Mutex<()> = Mutex::new(());
-/// True while a command watches for the request to stop.
+/// True once a command heeds the stop request, so that the first interrupt does not end it at once.
 static IS_WATCHED: AtomicBool = AtomicBool::new(false);
 /// State of the running command.
 static STATE: Mutex<State> = Mutex::new(State::Running(None));
 
 /// State of the running command, which decides how an interrupt ends the process.
 enum State {
-    /// The command is working. If it does not end in time after an interrupt, its last work runs
-    /// and the process ends.
+    /// The command is working. If it does not end in time after an interrupt, its last work (if
+    /// any) runs and the process ends.
     Running(Option<LastWork>),
-    /// The command is writing its results, which takes little time; it is not ended.
+    /// The command is writing its results. This takes little time, so the process is not ended.
     Writing,
     /// The time after the interrupt is over, and the process is about to end.
     Over,
@@ -55,8 +55,8 @@ pub fn at_deadline(work: impl FnOnce() -> u8 + Send + 'static) {
     *locked(&STATE) = State::Running(Some(Box::new(work)));
 }
 
-/// Declares that the command is writing its results, so that it is no longer ended. Does not return
-/// if the time after an interrupt is over already.
+/// Declares that the command is writing its results, so that an interrupt no longer ends the
+/// process. Does not return if the time after an interrupt is over, because the process then ends.
 pub fn begin_writing() {
     let is_over = {
         let mut state = locked(&STATE);
@@ -74,7 +74,7 @@ pub fn begin_writing() {
 }
 
 /// Prevents interrupts from ending the process while the returned guard is held.
-pub fn unbroken() -> MutexGuard<'static, ()> {
+pub fn block_exit() -> MutexGuard<'static, ()> {
     install();
     locked(&WRITE_LOCK)
 }
@@ -89,12 +89,12 @@ fn request() -> &'static Stop {
 fn install() -> Stop {
     static INSTALLED: Once = Once::new();
     // If the process already has a handler, that one decides what an interrupt does.
-    INSTALLED.call_once(|| _ = ctrlc::try_set_handler(|| end_early(STATUS)));
+    INSTALLED.call_once(|| _ = ctrlc::try_set_handler(|| end_early(INTERRUPTED_STATUS)));
     request().clone()
 }
 
-/// Makes requests to end (SIGTERM) act as interrupts do. Must be called before other threads start,
-/// because they then leave the signal to the thread that waits for it.
+/// Makes requests to end (SIGTERM) act as interrupts do. Must be called before other threads start:
+/// they inherit the blocked signal and leave it to the thread that waits for it.
 #[cfg(unix)]
 pub fn watch_termination() {
     use nix::sys::signal::{SigSet, Signal};
@@ -112,12 +112,13 @@ pub fn watch_termination() {
     });
 }
 
-/// Does nothing where the system knows no requests to end.
+/// Does nothing on systems without SIGTERM.
 #[cfg(not(unix))]
 pub fn watch_termination() {}
 
-/// Asks a watched command to end in time. Ends other commands at once, and all commands at the
-/// second request, except while files take their names.
+/// Makes the stop request, and gives a command that heeds it a limited time to end. Ends the
+/// process at once for other commands, and at the second interrupt. Waits while files get their
+/// final names.
 fn end_early(status: u8) {
     let is_repeated = request().request();
     if is_repeated || !IS_WATCHED.load(Ordering::Relaxed) {
@@ -143,7 +144,7 @@ fn end_in_time() {
     let status = work.map_or_else(
         || {
             super::diagnostic::warn("interrupted before there was a result");
-            STATUS
+            INTERRUPTED_STATUS
         },
         |work| work(),
     );
@@ -151,6 +152,7 @@ fn end_in_time() {
     exit(i32::from(status));
 }
 
+/// Locks a mutex, also if a thread panicked while it held the lock.
 fn locked<T>(mutex: &'static Mutex<T>) -> MutexGuard<'static, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -39,32 +39,32 @@ pub struct Arguments {
 /// Fits the problem, searches for the effects that it lacks, and prints the result.
 ///
 /// Writes `loop.json`, `problem.closed.toml`, `residuals.csv` and both reports, and
-/// `remainder.json` if a remainder is kept.
+/// `remainder.json` if a remainder is accepted.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let common = &arguments.common;
     let (problem, text) = Problem::read_with_text(common.problem())?;
-    common.files(&problem).iter().try_for_each(|file| nameable(file))?;
+    common.files(&problem).iter().try_for_each(|file| check_data_file(file))?;
     let texts = ["loop.json", "problem.closed.toml", "residuals.csv", REMAINDER_FILE];
     let names = [&texts[..], &REPORT].concat();
     let results = common.results("loop", &problem, &[], &names)?;
     let mut data = common.measurements(&problem)?;
-    common.say_if_nothing_is_free(&problem);
-    common.say_of_orientation(&problem, &mut data);
+    common.warn_if_nothing_is_free(&problem);
+    common.warn_of_orientation(&problem, &mut data);
     let stop = interrupt::stop();
     let unfinished = Unfinished::new(&text, &problem, common.files(&problem), &results);
     let options = Options::default().with_influential_rows().with_stop(stop.clone());
     let close = |sink: Option<ProgressSink>| {
-        let sink = unfinished.watching(sink);
+        let sink = unfinished.recording_sink(sink);
         select::close(&problem, &data, &options.with_progress(sink))
     };
-    let last_work = unfinished.clone();
-    interrupt::at_deadline(move || last_work.write());
+    let at_deadline = unfinished.clone();
+    interrupt::at_deadline(move || at_deadline.write());
     let closure = Line::during(common.prints_text(), stop, close)?;
-    let results = if closure.interrupted { unfinished.keeping_finished()? } else { results };
-    let [files, joint_files] = unfinished.files_from(&results.folder)?;
+    let results = if closure.interrupted { unfinished.beside_finished()? } else { results };
+    let [files, joint_files] = unfinished.files_relative_to(&results.folder)?;
     let mut shown = PlotData::of_loop(&problem, &data, &closure)?;
     let closed = report::closed_problem(&text, &problem, &closure, [&files, &joint_files])?;
-    let fitted = fitted(&problem, &closed, &closure, &data)?;
+    let fitted = fit_remainder(&problem, &closed, &closure, &data)?;
     if let Some(fitted) = &fitted {
         shown = shown.with_uncertainty((&closure.after, &closure.closed), &data, fitted)?;
     }
@@ -99,7 +99,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let told = report::loop_report(&problem, &closure, &shown);
     interrupt::begin_writing();
     results.write_report(&texts, &told)?;
-    let outcome = diagnostic::judged(&closure.after, common.quiet);
+    let outcome = diagnostic::report_fit(&closure.after, common.quiet);
     if closure.interrupted {
         diagnostic::warn(&report::interrupted(closure.rounds.len()));
     }
@@ -116,10 +116,11 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     Ok(if closure.interrupted { Outcome::Interrupted } else { outcome })
 }
 
-/// Fits a remainder in addition to the effects of the closed problem with text `closed`. Returns
-/// `None` if the loop was interrupted or the table was misread. Also if the text declares another
-/// arm than was fitted, for example because an effect that data contradict was removed.
-fn fitted(
+/// Fits a remainder in addition to the effects of the extended problem, whose text is `closed`.
+/// Returns `None` if the loop was interrupted, if the table was misread, or if the text declares
+/// another arm than was fitted. The latter happens if an effect was removed because data contradict
+/// it.
+fn fit_remainder(
     problem: &Problem,
     closed: &str,
     closure: &ClosedLoop,
@@ -133,18 +134,18 @@ fn fitted(
     Ok(remainder::fit(&closure.after, &closure.closed, data)?)
 }
 
-/// Error of a data file that a closed problem cannot name.
+/// Error of a data file that `problem.closed.toml` cannot name.
 #[derive(Debug, thiserror::Error)]
-enum NoName {
+enum DataFileError {
     #[error("{}: loop names its data in problem.closed.toml, and this is no file that can be read again; save it as one", file.display())]
-    Passing { file: PathBuf },
+    NotReadableAgain { file: PathBuf },
     #[error("{}: loop names its data in problem.closed.toml, and the name of this file is not UTF-8; give it another", file.display())]
     NotUtf8 { file: PathBuf },
 }
 
-/// Checks that a closed problem can name a file. Pipes and standard input cannot be read a second
-/// time.
-fn nameable(file: &Path) -> Result<(), NoName> {
+/// Returns an error if `problem.closed.toml` cannot name a data file: a pipe or standard input,
+/// which cannot be read a second time, or a name that is not UTF-8.
+fn check_data_file(file: &Path) -> Result<(), DataFileError> {
     let name = || file.to_owned();
     match file.canonicalize() {
         // A missing file is reported elsewhere.
@@ -153,9 +154,9 @@ fn nameable(file: &Path) -> Result<(), NoName> {
             if real.to_str().is_some() {
                 Ok(())
             } else {
-                Err(NoName::NotUtf8 { file: name() })
+                Err(DataFileError::NotUtf8 { file: name() })
             }
         }
-        _ => Err(NoName::Passing { file: name() }),
+        _ => Err(DataFileError::NotReadableAgain { file: name() }),
     }
 }

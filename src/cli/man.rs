@@ -45,7 +45,7 @@ pub fn run(arguments: &Arguments, flexcal: Command) -> Result<Outcome, Box<dyn E
     Ok(Outcome::Done)
 }
 
-/// Returns the manual page of a command.
+/// Returns the manual page of a command in roff.
 fn page(command: Command) -> Result<String, std::io::Error> {
     let mut page = Vec::new();
     Man::new(command).render(&mut page)?;

@@ -1,18 +1,18 @@
-//! Targets that are probably given in another frame or unit.
+//! Recognition of targets of `compensate` that are given in another frame or unit than stated.
 
 use clap::ValueEnum;
 use flexcal::fit::Command;
 use flexcal::measurement::Measurements;
 use flexcal::remainder::TargetFrame;
 
-/// Smallest mean distance between targets and the poses of their commands at which another frame
-/// or unit is tried \[m\]. Errors of arms are a few millimetres.
+/// Mean distance from the targets to the positions that their joint columns predict, above which
+/// another frame or unit is tried \[m\]. Errors of arms are a few millimetres.
 const MIN_MISS: f64 = 0.05;
-/// Largest ratio of that distance in another frame or unit to that as given at which the other one
-/// is meant.
-const MAX_RATIO: f64 = 0.1;
+/// Largest ratio of this distance in another frame or unit to the distance as given, at which the
+/// other frame or unit is probably meant.
+const MAX_MISS_RATIO: f64 = 0.1;
 
-/// Frame of the targets.
+/// Frame in which the targets are given.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(super) enum Frame {
     /// The measuring frame, as measurements
@@ -30,9 +30,10 @@ impl From<Frame> for TargetFrame {
     }
 }
 
-/// Returns the frame or unit in which the targets are much nearer to where their commands lead, in
-/// words. `solve` finds the commands for targets in a frame.
-pub(super) fn meant(
+/// Returns a warning that names the frame or unit in which the targets are much nearer to the
+/// positions of their joint columns; `None` if there is no such frame or unit. `solve` finds the
+/// commands for targets in a frame.
+pub(super) fn warning(
     (targets, frame, commands): (&Measurements, Frame, &[Command]),
     solve: impl Fn(Measurements, Frame) -> Option<Vec<Command>>,
 ) -> Option<String> {
@@ -49,18 +50,18 @@ pub(super) fn meant(
         scaled.positions.iter_mut().for_each(|position| *position *= factor);
         scaled
     };
-    let is_in = |unit: f64| {
+    let has_unit = |unit: f64| {
         targets.position_unit.is_some_and(|declared| (declared / unit - 1.0).abs() < 1e-9)
     };
     let mut trials = vec![(targets.clone(), other, format!("--frame {name}"))];
-    if is_in(1e-3) {
+    if has_unit(1e-3) {
         trials.push((scaled(1e3), frame, "metres instead of the declared millimetres".to_owned()));
-    } else if is_in(1.0) {
+    } else if has_unit(1.0) {
         trials.push((scaled(1e-3), frame, "millimetres instead of the declared metres".to_owned()));
     }
     let misses = trials.into_iter().filter_map(|(targets, frame, words)| {
         let miss = mean_miss(&solve(targets, frame)?);
-        (miss < MAX_RATIO * given).then_some((miss, words))
+        (miss < MAX_MISS_RATIO * given).then_some((miss, words))
     });
     let (miss, words) = misses.min_by(|a, b| a.0.total_cmp(&b.0))?;
     Some(format!(
@@ -71,7 +72,8 @@ pub(super) fn meant(
     ))
 }
 
-/// Returns the mean distance between the targets and the poses of their joint columns \[m\].
+/// Returns the mean distance from the targets to the positions that their joint columns predict
+/// \[m\].
 fn mean_miss(commands: &[Command]) -> f64 {
     commands.iter().map(|command| command.seed_miss).sum::<f64>() / commands.len().max(1) as f64
 }

@@ -1,4 +1,4 @@
-//! Advice on wrong arguments, printed as a tip below the message.
+//! Tips for usual mistakes in the arguments, printed below the message of the argument parser.
 
 use std::ffi::OsString;
 use std::path::Path;
@@ -7,8 +7,8 @@ use clap::Command;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use flexcal::report::shell_word;
 
-/// Words that are often given as options or values, and where to write what they mean.
-const ELSEWHERE: [(&[&str], &str); 5] = [
+/// Words that are often given as options or values but are neither, with the tip for them.
+const MISTAKEN_WORDS: [(&[&str], &str); 5] = [
     (
         &["--output", "--ouput", "--outdir", "--out-dir", "--output-dir", "-o"],
         "--out DIR names the folder of the results",
@@ -28,7 +28,7 @@ const ELSEWHERE: [(&[&str], &str); 5] = [
     ),
 ];
 
-/// Words that are often given for the name of a command.
+/// Commands, with the words that are often given for their names.
 const SYNONYMS: [(&str, &[&str]); 6] = [
     (
         "identify",
@@ -52,6 +52,7 @@ pub fn with_tip(mut error: clap::Error, words: &[OsString], cli: &Command) -> cl
     error
 }
 
+/// Returns the tip for an error; `None` if no usual mistake is recognised.
 fn tip(error: &clap::Error, words: &[OsString], cli: &Command) -> Option<String> {
     let context = |kind| match error.get(kind) {
         Some(ContextValue::String(word)) => Some(word.as_str()),
@@ -82,7 +83,7 @@ fn tip(error: &clap::Error, words: &[OsString], cli: &Command) -> Option<String>
         }
         _ => {
             let word = context(ContextKind::InvalidValue).or(context(ContextKind::InvalidArg))?;
-            let elsewhere = ELSEWHERE.iter().find(|(words, _)| words.contains(&word));
+            let elsewhere = MISTAKEN_WORDS.iter().find(|(words, _)| words.contains(&word));
             let is_unknown = error.kind() == ErrorKind::UnknownArgument;
             elsewhere.map(|(_, tip)| (*tip).to_owned()).or_else(|| {
                 let other = || other_command(word, first, cli);
@@ -92,7 +93,8 @@ fn tip(error: &clap::Error, words: &[OsString], cli: &Command) -> Option<String>
     }
 }
 
-/// Returns the tip for a negative number behind an option, which is read as another option.
+/// Returns the tip for a negative number after an option, which the parser takes for another
+/// option. `None` if there is no such number.
 fn negative_number(words: &[OsString]) -> Option<String> {
     let words: Vec<&str> = words.iter().filter_map(|word| word.to_str()).collect();
     let mut pairs = words.iter().zip(words.iter().skip(1));
@@ -105,13 +107,15 @@ fn negative_number(words: &[OsString]) -> Option<String> {
     ))
 }
 
-/// Returns the tip for an `option` that `command` does not have and others do.
+/// Returns the tip for an `option` that `command` does not have but others do; `None` if no command
+/// has it.
 fn other_command(option: &str, command: &str, cli: &Command) -> Option<String> {
     let name = option.strip_prefix("--")?;
     cli.find_subcommand(command)?;
-    let has_it =
+    let has_option =
         |other: &&Command| other.get_arguments().any(|argument| argument.get_long() == Some(name));
-    let others: Vec<&str> = cli.get_subcommands().filter(has_it).map(Command::get_name).collect();
+    let others: Vec<&str> =
+        cli.get_subcommands().filter(has_option).map(Command::get_name).collect();
     (!others.is_empty())
         .then(|| format!("{command} takes no {option}; it is an option of {}", others.join(", ")))
 }

@@ -62,7 +62,7 @@ pub struct Arguments {
     source: Source,
 }
 
-/// Parses a positive number.
+/// Parses a finite number greater than 0.
 fn positive(text: &str) -> Result<f64, String> {
     let number = text.parse::<f64>().ok().filter(|number| *number > 0.0 && number.is_finite());
     number.ok_or_else(|| "a positive number is needed".to_owned())
@@ -88,8 +88,8 @@ impl From<PurposeArgument> for Purpose {
     }
 }
 
-/// Chooses poses, writes `next.csv`, `next.json` and `next.html`, and prints what they are expected
-/// to give.
+/// Chooses the next poses, writes `next.csv`, `next.json` and `next.html`, and prints the error
+/// that is expected after them.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let (common, source) = (&arguments.common, &arguments.source);
     let Input { problem, data, results } =
@@ -109,7 +109,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     };
     let workspace = arguments.region.workspace()?;
     let stop = interrupt::stop();
-    let found = |fit: Options| {
+    let choose = |fit: Options| {
         let options = NextOptions {
             poses: arguments.poses as usize,
             purpose: arguments.purpose.into(),
@@ -124,7 +124,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         design::next(&problem, &data, &candidates, &options).map(|next| (next, options))
     };
     let (next, options) = Line::during(common.prints_text(), stop.clone(), |sink| {
-        found(Options::default().with_stop(stop).with_progress(sink))
+        choose(Options::default().with_stop(stop).with_progress(sink))
     })?;
     let json = NextResult::new(&problem, &options, &next).to_json();
     let table = poses_csv(&problem, &next.poses);

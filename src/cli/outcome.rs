@@ -7,7 +7,7 @@ pub enum Outcome {
     Done,
     /// The fit is not trusted: exit status 1.
     NotTrusted,
-    /// An arm does not pass the tolerance that it is tested for: exit status 1.
+    /// The arm does not pass a tolerance, or further poses cannot reach it: exit status 1.
     NotPassed,
     /// The arm has changed since its estimate: exit status 3.
     Changed,
@@ -16,7 +16,8 @@ pub enum Outcome {
 }
 
 impl Outcome {
-    /// Returns the outcome of a command whose result is to be trusted or not.
+    /// Returns [`Done`](Self::Done) if the result of a command is trusted, else
+    /// [`NotTrusted`](Self::NotTrusted).
     pub fn from_trust(is_trusted: bool) -> Self {
         if is_trusted { Self::Done } else { Self::NotTrusted }
     }

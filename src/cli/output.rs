@@ -1,4 +1,4 @@
-//! Results on disk and on standard output.
+//! Writing of results to a folder, and printing to standard output.
 
 use std::fs;
 use std::io::{self, Write as _};
@@ -11,11 +11,12 @@ use flexcal::report::{Report, is_figure};
 
 use super::{diagnostic, interrupt};
 
-/// Names of the files of a report.
+/// Names of the two files of a report, without its figures.
 pub const REPORT: [&str; 2] = ["report.md", "report.html"];
+/// Subfolder of the results for the figures of a report.
 const FIGURES: &str = "figures";
 /// Maximum time for which a command waits while another command writes to the same folder.
-const MAX_WAIT: Duration = Duration::from_secs(10);
+const MAX_LOCK_WAIT: Duration = Duration::from_secs(10);
 
 /// Error of results that cannot be written.
 #[derive(Debug, thiserror::Error)]
@@ -25,7 +26,7 @@ pub enum WriteError {
     #[error(
         "{}: another flexcal has been writing there for {} s; wait for its end, or name another folder with --out",
         folder.display(),
-        MAX_WAIT.as_secs()
+        MAX_LOCK_WAIT.as_secs()
     )]
     Busy { folder: PathBuf },
     #[error("cannot write {}: {why}", path.display())]
@@ -41,24 +42,27 @@ pub enum WriteError {
     Foreign { path: PathBuf },
 }
 
-/// Results of a command, as file names in a folder. They may replace files that flexcal wrote
-/// there, except files that the command reads.
+/// Folder and file names that a command has claimed for its results. The results may replace files
+/// that flexcal wrote there, except files that the command reads.
 #[derive(Clone)]
 pub struct Results {
     pub folder: PathBuf,
+    /// Name of the command, as the record of the folder states it.
     command: &'static str,
     /// Names of the files that the command may write, without figures.
     names: Vec<String>,
     /// Paths of the files that the command or its problem reads.
     inputs: Vec<PathBuf>,
+    /// True if the results may replace any file.
     force: bool,
+    /// True if no warning is printed.
     quiet: bool,
 }
 
 impl Results {
-    /// Reserves the files `names` in `folder` for results of `command`. Fails if they would replace
-    /// a file that flexcal did not write or that the command reads. [`write`](Self::write) may
-    /// write more files.
+    /// Claims the files `names` in `folder` for results of `command`. Returns an error if they
+    /// would replace a file that flexcal did not write or that the command reads.
+    /// [`write`](Self::write) may write files with other names too.
     pub fn claim(
         command: &'static str,
         folder: PathBuf,
@@ -72,93 +76,96 @@ impl Results {
         let record = claimed.record()?;
         claimed.names.iter().try_for_each(|name| claimed.check(&record, name))?;
         if claimed.names.iter().any(|name| name == REPORT[0]) {
-            claimed.figures().iter().try_for_each(|name| claimed.check(&record, name))?;
+            claimed.existing_figures().iter().try_for_each(|name| claimed.check(&record, name))?;
         }
         Ok(claimed)
     }
 
-    /// Returns the existing files whose names are those of figures; a new page may replace them.
-    fn figures(&self) -> Vec<String> {
+    /// Returns the existing files in the folder of figures whose names are those of figures. A new
+    /// report may replace them.
+    fn existing_figures(&self) -> Vec<String> {
         let Ok(entries) = fs::read_dir(self.folder.join(FIGURES)) else { return Vec::new() };
         let names = entries.filter_map(|entry| entry.ok()?.file_name().into_string().ok());
         names.filter(|name| is_figure(name)).map(|name| format!("{FIGURES}/{name}")).collect()
     }
 
-    /// Returns a sentence that states where the results are.
+    /// Returns a sentence that names the folder and the claimed files that exist.
     pub fn written(&self) -> String {
-        // Some names are claimed for files that are not always written.
+        // A command does not always write all files that it claims.
         let is_there = |name: &&String| self.path(name).exists();
         let names: Vec<&str> = self.names.iter().filter(is_there).map(String::as_str).collect();
         format!("\nWritten to {}: {}\n", self.folder.display(), names.join(", "))
     }
 
-    /// Returns true if this command has written the file `name` and the file has not changed since.
+    /// Returns true if this command wrote the file `name`, perhaps in an earlier run, and the file
+    /// has not changed since.
     pub fn is_recorded(&self, name: &str) -> bool {
         self.record().is_ok_and(|record| record.writer(&self.folder, name) == Some(self.command))
     }
 
-    /// Returns results that are written to the subfolder `name` instead; the subfolder may contain
-    /// no other files with the same names.
+    /// Claims the same file names in the subfolder `name` instead. Returns an error if they would
+    /// replace a file there that flexcal did not write.
     pub fn below(&self, name: &str) -> Result<Self, WriteError> {
         let names: Vec<&str> = self.names.iter().map(String::as_str).collect();
         let (folder, flags) = (self.folder.join(name), (self.force, self.quiet));
         Self::claim(self.command, folder, self.inputs.clone(), &names, flags)
     }
 
-    /// Returns the path of a result.
+    /// Returns the path of the result `name`.
     pub fn path(&self, name: &str) -> PathBuf {
         self.folder.join(name)
     }
 
-    /// Writes texts to named files after all of them are on the disk, so that each file is complete
-    /// or absent.
+    /// Writes texts, given as (file name, text). All of them are on the disk before the first file
+    /// takes its name, so that each file is complete or absent.
     pub fn write(&self, texts: &[(&str, &str)]) -> Result<(), WriteError> {
-        self.keep(texts, |_| false)
+        self.write_all(texts, |_| false)
     }
 
-    /// Writes texts and a report: `report.md`, `report.html` and its figures, which replace those
-    /// of an earlier report.
+    /// Writes texts, given as (file name, text), and a report: `report.md`, `report.html` and its
+    /// figures. These replace the figures of an earlier report.
     pub fn write_report(&self, texts: &[(&str, &str)], report: &Report) -> Result<(), WriteError> {
         let drawn: Vec<(String, &str)> = report
             .figures
             .iter()
             .map(|(name, figure)| (format!("{FIGURES}/{name}"), figure.as_str()))
             .collect();
-        let told = REPORT.into_iter().zip([report.markdown.as_str(), report.html.as_str()]);
+        let pages = REPORT.into_iter().zip([report.markdown.as_str(), report.html.as_str()]);
         let figures = drawn.iter().map(|(name, figure)| (name.as_str(), *figure));
-        let texts: Vec<(&str, &str)> = texts.iter().copied().chain(told).chain(figures).collect();
-        let is_older = |name: &str| {
+        let texts: Vec<(&str, &str)> = texts.iter().copied().chain(pages).chain(figures).collect();
+        let is_outdated = |name: &str| {
             let figure = name.strip_prefix("figures/").is_some_and(is_figure);
             figure && drawn.iter().all(|(drawn, _)| drawn != name)
         };
-        self.keep(&texts, is_older)
+        self.write_all(&texts, is_outdated)
     }
 
     /// Writes all files or none, as far as file systems allow: obstacles are found before the first
-    /// file takes its name. Removes recorded files for which `is_older` is true, and earlier files
-    /// of the same command that it does not write now.
-    fn keep(
+    /// file takes its name. Removes recorded files for which `is_outdated` returns true, and
+    /// claimed files of an earlier run of this command that are not written now.
+    fn write_all(
         &self,
         texts: &[(&str, &str)],
-        is_older: impl Fn(&str) -> bool,
+        is_outdated: impl Fn(&str) -> bool,
     ) -> Result<(), WriteError> {
         fs::create_dir_all(&self.folder)
             .map_err(|source| WriteError::Io { path: self.folder.clone(), source })?;
         let _lock = self.lock()?;
         let mut record = self.record()?;
         texts.iter().try_for_each(|(name, _)| self.check(&record, name))?;
-        let others = self.others(&record, texts);
+        let replaced = self.replaced_by_other_command(&record, texts);
         let is_left = |name: &str| {
             let claimed = self.names.iter().any(|claimed| claimed == name)
                 && texts.iter().all(|(written, _)| *written != name);
             claimed && record.writer(&self.folder, name) == Some(self.command)
         };
-        let is_ours = |name: &&str| {
-            is_left(name) || (is_older(name) && record.writer(&self.folder, name).is_some())
+        let is_removed = |name: &&str| {
+            is_left(name) || (is_outdated(name) && record.writer(&self.folder, name).is_some())
         };
-        let mut older: Vec<String> = record.names().filter(is_ours).map(str::to_owned).collect();
-        older.sort();
-        older.dedup();
+        let mut outdated: Vec<String> =
+            record.names().filter(is_removed).map(str::to_owned).collect();
+        outdated.sort();
+        outdated.dedup();
         let mut ready = Vec::with_capacity(texts.len());
         for (name, text) in texts {
             let path = self.path(name);
@@ -168,20 +175,20 @@ impl Results {
             }
             record.add(self.command, name, text);
         }
-        let _unbroken = interrupt::unbroken();
-        // The record is written before the files, with the digests of the files that it replaces.
-        // After an interruption here, the next run still recognises all files as written by flexcal.
+        let _exit_blocked = interrupt::block_exit();
+        // The record is written before the files, with the digests of old and new files. After an
+        // interruption here, the next run still recognises all of them as written by flexcal.
         self.write_record(&record)?;
         for (file, path) in ready {
             file.commit().map_err(|source| WriteError::Io { path, source })?;
         }
-        for name in &older {
+        for name in &outdated {
             let path = self.path(name);
             fs::remove_file(&path).map_err(|source| WriteError::Io { path, source })?;
         }
-        record.settle(|name| older.iter().any(|older| *older == name));
+        record.settle(|name| outdated.iter().any(|removed| *removed == name));
         self.write_record(&record)?;
-        if let (Some((name, other)), false) = (others, self.quiet) {
+        if let (Some((name, other)), false) = (replaced, self.quiet) {
             let what = if name == REPORT[0] { "the report" } else { &name };
             diagnostic::warn(&format!(
                 "{what} of {other} in the same folder is replaced; --out keeps both"
@@ -190,9 +197,13 @@ impl Results {
         Ok(())
     }
 
-    /// Returns the first file that another command wrote, with the name of that command; reports
-    /// come first.
-    fn others(&self, record: &FolderRecord, texts: &[(&str, &str)]) -> Option<(String, String)> {
+    /// Returns the first of the files `texts` that another command wrote, a report before other
+    /// files, and the name of that command. `None` if no other command wrote any of them.
+    fn replaced_by_other_command(
+        &self,
+        record: &FolderRecord,
+        texts: &[(&str, &str)],
+    ) -> Option<(String, String)> {
         let other = |&(name, _): &(&str, &str)| {
             let writer =
                 record.writer(&self.folder, name).filter(|writer| *writer != self.command)?;
@@ -202,12 +213,14 @@ impl Results {
         report.and_then(other).or_else(|| texts.iter().find_map(other))
     }
 
-    /// Locks the folder, so that no other flexcal process writes there at the same time.
+    /// Locks the folder, so that no other flexcal process writes there at the same time. Returns an
+    /// error if another process holds the lock for longer than [`MAX_LOCK_WAIT`].
     fn lock(&self) -> Result<FolderLock, WriteError> {
         let busy = |_| WriteError::Busy { folder: self.folder.clone() };
-        FolderLock::take(&self.folder, MAX_WAIT).map_err(busy)
+        FolderLock::take(&self.folder, MAX_LOCK_WAIT).map_err(busy)
     }
 
+    /// Reads the record of the files that flexcal wrote to the folder.
     fn record(&self) -> Result<FolderRecord, WriteError> {
         FolderRecord::read(&self.folder)
             .map_err(|source| WriteError::Io { path: FolderRecord::file(&self.folder), source })
@@ -219,7 +232,8 @@ impl Results {
             .map_err(|source| WriteError::Io { path: FolderRecord::file(&self.folder), source })
     }
 
-    /// Checks that a result may take the file name `name`.
+    /// Returns an error if a result may not take the file name `name`: something else has it, or a
+    /// file would be replaced that is an input or that flexcal did not write.
     fn check(&self, record: &FolderRecord, name: &str) -> Result<(), WriteError> {
         let path = self.path(name);
         let why = |why| Err(WriteError::InTheWay { path: path.clone(), why });
@@ -252,20 +266,20 @@ impl Results {
     }
 }
 
-/// Returns the number of columns of the terminal on standard output; unlimited if there is no
-/// terminal.
+/// Returns the number of columns of the terminal on standard output, at least 40; `usize::MAX` if
+/// there is no terminal.
 pub fn columns() -> usize {
     terminal_size::terminal_size_of(io::stdout())
         .map_or(usize::MAX, |(width, _)| usize::from(width.0).max(40))
 }
 
-/// Prints text to standard output without control characters; a closed pipe ends the printing
-/// quietly.
+/// Prints text to standard output, with hidden characters such as control characters escaped. A
+/// closed pipe is no error.
 pub fn print(text: &str) -> Result<(), WriteError> {
     print_all(&escape_hidden(text))
 }
 
-/// Prints JSON to standard output, with control characters in its strings escaped.
+/// Prints JSON to standard output, with hidden characters in its strings escaped as `\uXXXX`.
 pub fn print_json(json: &str) -> Result<(), WriteError> {
     let mut text = String::with_capacity(json.len());
     for character in json.chars() {
@@ -281,7 +295,7 @@ pub fn print_json(json: &str) -> Result<(), WriteError> {
     print_all(&text)
 }
 
-/// Prints a text unchanged, for other programs.
+/// Prints a text unchanged to standard output. A closed pipe is no error.
 pub fn print_all(text: &str) -> Result<(), WriteError> {
     match anstream::stdout().write_all(text.as_bytes()) {
         Err(source) if source.kind() != io::ErrorKind::BrokenPipe => {

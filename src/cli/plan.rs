@@ -81,15 +81,15 @@ impl From<CriterionArgument> for Criterion {
     }
 }
 
-/// Makes the plan, writes `plan.csv`, `plan.json` and `plan.html`, and prints the accuracy that it
-/// is expected to give.
+/// Chooses the poses of the plan, writes `plan.csv`, `plan.json` and `plan.html`, and prints the
+/// accuracy that the plan is expected to give.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let (common, source) = (&arguments.common, &arguments.source);
     let declared = Problem::read(common.problem())?;
     if declared.data.fits_orientation && !arguments.separate.is_empty() && !common.quiet {
         diagnostic::warn("effects are told apart by positions: orientations do not count");
     }
-    let pair = pair(&arguments.separate, &declared)?;
+    let pair = effect_pair(&arguments.separate, &declared)?;
     let problem = pair.as_ref().map_or(declared, |pair| pair.declared.clone());
     let results = common.results(
         "plan",
@@ -166,8 +166,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     Ok(Outcome::NotTrusted)
 }
 
-/// Returns the two effects that the plan should distinguish, if `named` contains them.
-pub(super) fn pair(
+/// Parses the two effects that the plan is to distinguish; `None` if `named` is empty.
+pub(super) fn effect_pair(
     named: &[String],
     problem: &Problem,
 ) -> Result<Option<EffectPair>, Box<dyn Error>> {

@@ -1,4 +1,4 @@
-//! Source of poses that are to be measured.
+//! Arguments for the source of poses that are to be measured.
 
 use std::path::PathBuf;
 
@@ -11,13 +11,13 @@ use flexcal::rig::Truth;
 
 use super::flags::Flags;
 
-/// Parses a number of poses from 1 to `MOST`.
-pub fn count<const MOST: u32>(text: &str) -> Result<u32, String> {
-    let number = text.parse().ok().filter(|number| (1..=MOST).contains(number));
-    number.ok_or_else(|| format!("a whole number from 1 to {MOST} is needed, such as 40"))
+/// Parses a number of poses from 1 to `MAX`.
+pub fn count<const MAX: u32>(text: &str) -> Result<u32, String> {
+    let number = text.parse().ok().filter(|number| (1..=MAX).contains(number));
+    number.ok_or_else(|| format!("a whole number from 1 to {MAX} is needed, such as 40"))
 }
 
-/// Ranges or tables of poses.
+/// Arguments for the ranges in which poses are drawn, or for tables of poses.
 #[derive(Debug, Args)]
 pub struct Source {
     /// Tables of poses to take, with the columns of measurements; positions are not needed
@@ -33,7 +33,7 @@ pub struct Source {
 }
 
 impl Source {
-    /// Returns the files that the arguments name.
+    /// Returns the files that the arguments name: tables of candidates, and TRUTH.toml.
     pub fn files(&self) -> Vec<PathBuf> {
         let truth = self
             .truth
@@ -42,7 +42,7 @@ impl Source {
         self.candidates.iter().cloned().chain(truth).collect()
     }
 
-    /// Reads the table of candidates, if one is named.
+    /// Reads the tables of candidates as one table; `None` if none is named.
     pub fn table(
         &self,
         problem: &Problem,
@@ -56,20 +56,21 @@ impl Source {
         Ok(Some(poses))
     }
 
-    /// Returns the ranges of the poses, with all quantities that can be set.
+    /// Returns the ranges of all quantities of a pose, from TRUTH.toml or from the joint limits.
+    /// Returns an error if a limit is missing.
     pub fn all_ranges(&self, problem: &Problem) -> Result<PoseRanges, DesignError> {
         let Some(file) = &self.truth else { return PoseRanges::of(problem) };
         Ok(Truth::read(file, problem)?.poses)
     }
 
-    /// Returns the ranges without temperatures and approach directions on which no declared effect
-    /// depends.
+    /// Returns the ranges of a pose without the temperature and the approach directions if no
+    /// declared effect depends on them.
     pub fn ranges(&self, problem: &Problem) -> Result<PoseRanges, DesignError> {
         Ok(self.all_ranges(problem)?.relevant_to(problem))
     }
 
-    /// Returns the ranges if they are known. A named TRUTH.toml must be valid; limits may be
-    /// missing.
+    /// Returns the ranges of all quantities of a pose; `None` if a joint limit is missing. A
+    /// TRUTH.toml that is named must be valid.
     pub fn known_ranges(&self, problem: &Problem) -> Result<Option<PoseRanges>, DesignError> {
         match self.all_ranges(problem) {
             Err(DesignError::NoRange(_)) => Ok(None),

@@ -42,13 +42,14 @@ pub struct Arguments {
     trust: Trust,
 }
 
-/// Number of standard deviations by which the share of rows within their bounds may fall short.
-const MAX_SPREADS: f64 = 3.0;
+/// Number of binomial standard deviations by which the share of rows within their bounds may be
+/// below the level of the bounds.
+const MAX_SHORTFALL_SIGMAS: f64 = 3.0;
 
 /// Names of the files that the command may write.
 const RESULTS: [&str; 4] = ["predictions.csv", "residuals.csv", "errors.json", "predictions.html"];
 
-/// Predicts, writes predictions and their residuals, and prints the errors.
+/// Predicts the rows, writes predictions, residuals and errors, and prints the errors.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let common = &arguments.common;
     let problem = Problem::read(common.problem())?;
@@ -62,9 +63,11 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     if !trusted {
         diagnostic::warn("the estimate is not to be trusted, so the predictions are not either");
     }
-    // Rows without a split are predicted too. A random split applies only to the fitted rows.
-    let by_chance = matches!(problem.data.held_out, Some(HeldOut::Fraction { .. }));
-    let split = Split::new(&problem, &rows).ok().filter(|_| !by_chance || common.data().is_empty());
+    // Rows without a split are predicted too. A random split applies only to the rows of the
+    // problem, not to new rows.
+    let is_random_split = matches!(problem.data.held_out, Some(HeldOut::Fraction { .. }));
+    let split =
+        Split::new(&problem, &rows).ok().filter(|_| !is_random_split || common.data().is_empty());
     let correction = match &estimate {
         Some(estimate) => remainder::of_estimate(&problem, estimate)?,
         None => None,
@@ -79,10 +82,10 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     };
     let bounds = bounds.as_ref();
     let is_position = |row: usize| rows.observation(row).is_position();
-    let is_told = bounds.is_some() && (0..rows.len()).all(is_position);
+    let bounds_suffice = bounds.is_some() && (0..rows.len()).all(is_position);
     let errors = estimate
         .as_ref()
-        .filter(|_| !is_told)
+        .filter(|_| !bounds_suffice)
         .map(|estimate| fit::standard_errors(&problem, estimate, &rows, &prediction.x))
         .transpose()?;
     let table = predictions_csv(&problem, &rows, &prediction, (bounds, errors.as_deref()));
@@ -91,7 +94,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         prediction
             .residuals
             .as_ref()
-            .map(|all| ("residuals.csv", residuals_csv(&problem, &rows, all))),
+            .map(|residuals| ("residuals.csv", residuals_csv(&problem, &rows, residuals))),
     );
     let residuals = prediction.residuals.as_deref().unwrap_or_default();
     let errors = prediction.errors.as_ref().map(|errors_of_rows| {
@@ -114,7 +117,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         let names: Vec<&str> = texts.iter().map(|(name, _)| *name).collect();
         let problem = shell_word(common.problem());
         let next = match &arguments.estimate {
-            Some(file) if is_beyond(residuals, bounds) => format!(
+            Some(file) if exceeds_bounds(residuals, bounds) => format!(
                 "flexcal watch {} --estimate {} says whether the arm has changed: fewer rows than foreseen lie within their bounds",
                 common.named(),
                 shell_word(file)
@@ -131,11 +134,11 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     Ok(Outcome::from_trust(trusted))
 }
 
-/// Returns true if the share of rows within their bounds is below the level of the bounds by more
-/// than chance explains.
-fn is_beyond(residuals: &[Residual], bounds: Option<&Bounds>) -> bool {
+/// Returns true if the share of rows within their bounds is significantly below the level of the
+/// bounds; false without bounds or rows.
+fn exceeds_bounds(residuals: &[Residual], bounds: Option<&Bounds>) -> bool {
     let Some(bounds) = bounds.filter(|_| !residuals.is_empty()) else { return false };
     let share = bounds.coverage(residuals.iter().map(|row| row.position.norm()));
     let spread = (bounds.level * (1.0 - bounds.level) / residuals.len() as f64).sqrt();
-    share < bounds.level - MAX_SPREADS * spread
+    share < bounds.level - MAX_SHORTFALL_SIGMAS * spread
 }

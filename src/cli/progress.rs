@@ -13,23 +13,25 @@ const DELAY_BEFORE_PROGRESS: Duration = Duration::from_millis(500);
 /// Time between two refreshes of the line.
 const REFRESH_INTERVAL: Duration = Duration::from_millis(200);
 
-/// Line of progress with its source.
+/// Line on the terminal that shows the progress of a fit, a loop or a plan in words.
 pub struct Line {
     bar: ProgressBar,
     begun: Instant,
     course: Mutex<Course>,
+    /// Start of the periodic refresh, with the first message.
     ticking: Once,
+    /// Request that ends the work early; the line says so once it is made.
     stop: Option<Stop>,
 }
 
 impl Line {
     /// Creates a line that is not shown yet.
     pub fn new() -> Arc<Self> {
-        Self::until(None)
+        Self::with_stop(None)
     }
 
     /// Creates a line for work that the request `stop` ends early.
-    fn until(stop: impl Into<Option<Stop>>) -> Arc<Self> {
+    fn with_stop(stop: impl Into<Option<Stop>>) -> Arc<Self> {
         let bar = ProgressBar::new_spinner();
         let shown = ProgressStyle::with_template("{spinner} {elapsed} {wide_msg}");
         bar.set_style(shown.unwrap_or_else(|_| ProgressStyle::default_spinner()));
@@ -42,14 +44,14 @@ impl Line {
         })
     }
 
-    /// Runs `work` with a line of progress if `shown`, and clears the line afterwards. The request
-    /// `stop` ends the work early.
+    /// Runs `work` with a line of progress if `shown` is true, and removes the line afterwards.
+    /// `stop` is the request that ends the work early.
     pub fn during<T>(
         shown: bool,
         stop: impl Into<Option<Stop>>,
         work: impl FnOnce(Option<ProgressSink>) -> T,
     ) -> T {
-        let line = shown.then(|| Self::until(stop));
+        let line = shown.then(|| Self::with_stop(stop));
         let done = work(line.as_ref().map(Self::sink));
         if let Some(line) = line {
             line.bar.finish_and_clear();
@@ -63,9 +65,10 @@ impl Line {
         Arc::new(move |progress| line.show(&progress))
     }
 
+    /// Records progress and shows it.
     fn show(&self, progress: &Progress) {
         let mut course = self.course.lock().unwrap_or_else(PoisonError::into_inner);
-        course.take(progress, self.begun.elapsed().as_secs_f64());
+        course.record(progress, self.begun.elapsed().as_secs_f64());
         let interrupted = self.stop.as_ref().is_some_and(Stop::is_requested);
         self.say(|| {
             let end = if interrupted { "interrupted (Ctrl-C again ends at once): " } else { "" };

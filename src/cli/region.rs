@@ -1,9 +1,9 @@
-//! Region in which the target must stay, as arguments.
+//! Arguments for the region in which the target must stay, in mm.
 
 use clap::Args;
 use flexcal::design::{RegionError, Workspace};
 
-/// Box and half-spaces of the nominal target.
+/// Arguments for the box and the half-spaces in which the nominal target must stay.
 #[derive(Debug, Args)]
 pub struct Region {
     /// Box that the nominal target stays in, frame of the arm's base
@@ -20,13 +20,13 @@ pub struct Region {
 pub struct RegionArgumentError(#[from] RegionError);
 
 impl Region {
-    /// Returns the workspace of the arguments, if they restrict it.
+    /// Converts the region from mm to m; `None` if no argument restricts it.
     pub fn workspace(&self) -> Result<Option<Workspace>, RegionArgumentError> {
         Ok(Workspace::from_mm(self.workspace_mm, &self.keep_out_mm)?)
     }
 }
 
-/// Parses `N` finite numbers with commas between them.
+/// Parses exactly `N` finite numbers with commas between them.
 pub fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
     let numbers = text
         .split(',')

@@ -32,7 +32,7 @@ pub struct Arguments {
     /// Number of poses, drawn in the ranges of [poses]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = count::<1_000_000>, required_unless_present = "data")]
     poses: Option<u32>,
-    /// Tables of poses to measure instead, such as plan.csv; positions in them do not count
+    /// Tables of poses to measure instead, such as plan.csv; positions in them are ignored
     #[arg(long, value_name = "FILE", num_args = 1.., conflicts_with = "poses")]
     data: Vec<PathBuf>,
     /// Seed of every random number
@@ -42,7 +42,8 @@ pub struct Arguments {
     flags: Flags,
 }
 
-/// Measures the true arm on the virtual test rig; writes `measurements.csv` and `truth.json`.
+/// Simulates measurements of the true arm on the virtual test rig; writes `measurements.csv` and
+/// `truth.json`.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let problem = Problem::read(&arguments.problem)?;
     let truth = Truth::read(&arguments.truth, &problem)?;
@@ -72,14 +73,15 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let simulation = simulation?;
     let (json, table) = (simulation.truth_json(), results.path("measurements.csv"));
     results.write(&[("measurements.csv", &simulation.csv()), ("truth.json", &json)])?;
-    // A fraction is split when the rows are read.
-    let divided = matches!(problem.data.held_out, Some(HeldOut::Fraction { .. }))
+    // With a declared fraction, rows are held out when the file is read.
+    let has_held_out = matches!(problem.data.held_out, Some(HeldOut::Fraction { .. }))
         || simulation.held_out() > 0;
     flags.print_result(&json, || {
-        let next = if divided { next(&arguments.problem, &table) } else { String::new() };
+        let next =
+            if has_held_out { next_command(&arguments.problem, &table) } else { String::new() };
         summary(&simulation, &table) + &next
     })?;
-    if !divided && !flags.quiet {
+    if !has_held_out && !flags.quiet {
         diagnostic::warn(
             "no row is held out, and identify needs some to judge by: simulate more poses, or change held_out or \
              identification in [poses]",
@@ -88,6 +90,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     Ok(Outcome::Done)
 }
 
+/// Describes the simulation: poses, noise, effects, and where the table is.
 fn summary(simulation: &Simulation, table: &Path) -> String {
     let (poses, rows) = (simulation.poses(), simulation.rows.len());
     let held_out = simulation.held_out();
@@ -111,7 +114,8 @@ fn summary(simulation: &Simulation, table: &Path) -> String {
     )
 }
 
-fn next(problem: &Path, table: &Path) -> String {
+/// Returns the line with the command that identifies the simulated arm.
+fn next_command(problem: &Path, table: &Path) -> String {
     let folder = table.parent().unwrap_or(table).join("identified");
     let [problem, table, folder] = [problem, table, &folder].map(shell_word);
     format!("Next: flexcal identify {problem} --data {table} --out {folder}\n")

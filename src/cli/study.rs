@@ -74,11 +74,10 @@ struct Common {
 struct Sentinel<'a>(&'a Path);
 
 impl<'a> Sentinel<'a> {
-    /// Contents of the file.
+    /// Contents of the file, by which it is recognised.
     const TEXT: &'static str = "flexcal study: done\n";
 
-    /// Removes an existing file at `path` until the work is done. Returns an error if `--done` did
-    /// not write it.
+    /// Removes an existing file at `path`. Returns an error if `--done` did not write it.
     fn claim(path: &'a Path) -> Result<Self, WriteError> {
         let io = |source| WriteError::Io { path: path.to_owned(), source };
         if path.symlink_metadata().is_ok() {
@@ -93,7 +92,8 @@ impl<'a> Sentinel<'a> {
         Ok(Self(path))
     }
 
-    fn put(self) -> Result<(), WriteError> {
+    /// Writes the file.
+    fn write(self) -> Result<(), WriteError> {
         let ready = StagedFile::new(self.0, Self::TEXT).and_then(StagedFile::commit);
         ready.map_err(|source| WriteError::Io { path: self.0.to_owned(), source })
     }
@@ -106,7 +106,7 @@ struct NoFolder {
     folder: PathBuf,
 }
 
-/// Names of the files that the command may write.
+/// Names of the files that a study of fits writes.
 const NAMES: [&str; 5] = ["study.json", "parameters.csv", "timing.csv", "study.csv", "study.html"];
 
 impl Common {
@@ -121,8 +121,8 @@ impl Common {
     }
 }
 
-/// Computes the unfinished fits, or merges shares; then writes `study.csv`, `study.json`,
-/// `parameters.csv`, `timing.csv` and `study.html`, and prints the table.
+/// Computes the unfinished fits, or merges shares. Then writes the files [`NAMES`] and prints the
+/// table. For a share alone, writes no results.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     if let Some(Merge::Merge { common, from }) = &arguments.merge {
         let study = Study::read(&common.study)?;
@@ -139,18 +139,19 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let Some(study) = arguments.study.clone() else { return Ok(Outcome::Done) };
     let common = &Common { study, flags: arguments.flags.clone() };
     let sentinel = arguments.done.as_deref().map(Sentinel::claim).transpose()?;
-    let outcome = work(common, arguments.shard)?;
+    let outcome = compute(common, arguments.shard)?;
     if let (Some(sentinel), Outcome::Done) = (sentinel, &outcome) {
-        sentinel.put()?;
+        sentinel.write()?;
     }
     Ok(outcome)
 }
 
-/// Computes the unfinished fits of a study, or of a share of it.
-fn work(common: &Common, shard: Option<Shard>) -> Result<Outcome, Box<dyn Error>> {
+/// Computes the unfinished fits of a study, or only those of a share, and writes the results of a
+/// whole study.
+fn compute(common: &Common, shard: Option<Shard>) -> Result<Outcome, Box<dyn Error>> {
     let study = match Request::read(&common.study)? {
         Request::Fits(study) => *study,
-        Request::Misprints(study) if shard.is_none() => return misprints(common, &study),
+        Request::Misprints(study) if shard.is_none() => return run_misprints(common, &study),
         // The reader of studies of fits reports why this file cannot be divided into shards.
         Request::Misprints(_) => Study::read(&common.study)?,
     };
@@ -159,7 +160,7 @@ fn work(common: &Common, shard: Option<Shard>) -> Result<Outcome, Box<dyn Error>
     }
     let results = common.results(&study)?;
     let store = Store::new(&results.folder);
-    fit(common, &study, &store, shard.unwrap_or(Shard::WHOLE))?;
+    compute_parts(common, &study, &store, shard.unwrap_or(Shard::WHOLE))?;
     if shard.is_none() {
         return finish(common, &study, &results, &[store]);
     }
@@ -173,7 +174,7 @@ fn work(common: &Common, shard: Option<Shard>) -> Result<Outcome, Box<dyn Error>
 }
 
 /// Runs a study of the misprints, writes `misprints.json` and the reports, and prints the tables.
-fn misprints(common: &Common, study: &MisprintStudy) -> Result<Outcome, Box<dyn Error>> {
+fn run_misprints(common: &Common, study: &MisprintStudy) -> Result<Outcome, Box<dyn Error>> {
     let names = ["misprints.json", REPORT[0], REPORT[1]];
     let results = common.claim(&study.name, &study.files, &names)?;
     let bar = common
@@ -191,7 +192,13 @@ fn misprints(common: &Common, study: &MisprintStudy) -> Result<Outcome, Box<dyn 
     Ok(Outcome::Done)
 }
 
-fn fit(common: &Common, study: &Study, store: &Store, shard: Shard) -> Result<(), Box<dyn Error>> {
+/// Computes the unfinished parts of a share of a study, with a progress bar.
+fn compute_parts(
+    common: &Common,
+    study: &Study,
+    store: &Store,
+    shard: Shard,
+) -> Result<(), Box<dyn Error>> {
     let parts = study::pending(study, store, shard)?;
     let share = study.parts().into_iter().enumerate().filter(|(index, _)| shard.holds(*index));
     let repetitions: usize = share.map(|(_, part)| part.repetitions.len()).sum();
@@ -205,6 +212,8 @@ fn fit(common: &Common, study: &Study, store: &Store, shard: Shard) -> Result<()
     Ok(done?)
 }
 
+/// Collects the results of all parts, writes the files [`NAMES`] and prints the table. The outcome
+/// is not trusted if all fits of a cell failed.
 fn finish(
     common: &Common,
     study: &Study,

@@ -1,10 +1,10 @@
-//! Check of the number of threads that the environment variable requests.
+//! Check of the number of threads that the environment variable `RAYON_NUM_THREADS` requests.
 
 use std::env;
 
 /// Environment variable with the number of threads.
 const VARIABLE: &str = "RAYON_NUM_THREADS";
-/// Maximum number of threads; additional ones would only wait for each other.
+/// Maximum number of threads that may be requested; more threads would only wait for each other.
 pub const MAX_THREADS: usize = 1024;
 
 /// Error for a number of threads that is not valid.
@@ -16,7 +16,8 @@ pub struct BadThreads {
     text: String,
 }
 
-/// Checks the requested number of threads before the first thread starts.
+/// Returns an error if the environment requests no valid number of threads. Must be called before
+/// the first thread starts.
 pub fn check() -> Result<(), BadThreads> {
     let Some(text) = env::var_os(VARIABLE) else { return Ok(()) };
     let text = text.to_string_lossy().into_owned();

@@ -29,8 +29,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let common = &arguments.common;
     let Input { problem, mut data, results } =
         common.read("trace", &["trace.json", "trace.html"])?;
-    common.say_if_nothing_is_free(&problem);
-    common.say_of_orientation(&problem, &mut data);
+    common.warn_if_nothing_is_free(&problem);
+    common.warn_of_orientation(&problem, &mut data);
     let trace = Line::during(common.prints_text(), None, |sink| {
         select::trace(&problem, &data, &Options::default().with_progress(sink))
     })?;
@@ -39,7 +39,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let plots = PlotData::of_identification(&problem, &data, &trace.fit)?;
     let page = report::trace_page(&problem, &trace, &plots);
     results.write(&[("trace.json", &json), ("trace.html", &page)])?;
-    let outcome = diagnostic::judged(&trace.fit, common.quiet);
+    let outcome = diagnostic::report_fit(&trace.fit, common.quiet);
     common.print_result(&json, || {
         let (text, next) =
             (report::trace_text(&problem, &trace), advice::after_trace(common, &result));

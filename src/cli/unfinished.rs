@@ -13,13 +13,13 @@ use serde_json::Value;
 use super::output::{Results, WriteError};
 use super::{diagnostic, interrupt};
 
-/// Subfolder of the results for an interrupted loop, used if the results already contain a finished
+/// Subfolder of the results for an interrupted loop, used if the folder already contains a finished
 /// loop.
-const FOLDER: &str = "interrupted";
-/// Name of the file with the effects that were found.
+const INTERRUPTED_FOLDER: &str = "interrupted";
+/// Name of the problem file that declares the effects that were found.
 const CLOSED_PROBLEM: &str = "problem.closed.toml";
 /// Exit status of an interrupted loop that has written a file.
-const STATUS: u8 = 1;
+const WRITTEN_STATUS: u8 = 1;
 
 /// Record of a running loop, from which results are written if it is interrupted and cannot end in
 /// time.
@@ -27,11 +27,13 @@ const STATUS: u8 = 1;
 pub struct Unfinished {
     /// Text of the problem file.
     text: String,
+    /// Effects that the problem file declares.
     declared: Vec<Effect>,
     /// Paths of the measurement files and of the joint tables.
     files: [Vec<PathBuf>; 2],
+    /// Folder and file names of the loop's results.
     results: Results,
-    /// Effects that the finished rounds have added.
+    /// Effects of the model after the last finished round.
     added: Arc<Mutex<Vec<Effect>>>,
 }
 
@@ -48,9 +50,9 @@ impl Unfinished {
         }
     }
 
-    /// Returns a progress receiver that records the effects of finished rounds and passes progress
-    /// on to `shown`.
-    pub fn watching(&self, shown: Option<ProgressSink>) -> ProgressSink {
+    /// Returns a progress receiver that records the effects of finished rounds and forwards
+    /// progress to `shown`.
+    pub fn recording_sink(&self, shown: Option<ProgressSink>) -> ProgressSink {
         let added = Arc::clone(&self.added);
         Arc::new(move |progress: Progress| {
             if let Progress::Round { effects, .. } = &progress {
@@ -62,13 +64,13 @@ impl Unfinished {
         })
     }
 
-    /// Returns the folder of the results, or a subfolder if the folder already contains a finished
-    /// loop.
-    pub fn keeping_finished(&self) -> Result<Results, WriteError> {
+    /// Returns the results in their folder, or in a subfolder if the folder already contains the
+    /// results of a finished loop.
+    pub fn beside_finished(&self) -> Result<Results, WriteError> {
         if !self.results.is_recorded("loop.json") || !is_finished(&self.results.path("loop.json")) {
             return Ok(self.results.clone());
         }
-        let below = self.results.below(FOLDER)?;
+        let below = self.results.below(INTERRUPTED_FOLDER)?;
         diagnostic::warn(&format!(
             "{} holds a finished loop, which stays; the interrupted one is in {}",
             self.results.folder.display(),
@@ -77,46 +79,49 @@ impl Unfinished {
         Ok(below)
     }
 
-    /// Creates a folder, and returns the paths of the measurement files and joint tables relative
-    /// to it.
-    pub fn files_from(&self, folder: &Path) -> Result<[Vec<PathBuf>; 2], WriteError> {
+    /// Creates `folder`, and returns the paths of the measurement files and of the joint tables
+    /// relative to it.
+    pub fn files_relative_to(&self, folder: &Path) -> Result<[Vec<PathBuf>; 2], WriteError> {
         let of = |files: &[PathBuf]| -> io::Result<Vec<PathBuf>> {
             fs::create_dir_all(folder)?;
-            files.iter().map(|file| seen_from(folder, file)).collect()
+            files.iter().map(|file| relative_path(folder, file)).collect()
         };
         let [files, joint_files] = &self.files;
-        let unseen = |source| WriteError::Io { path: folder.to_owned(), source };
-        Ok([of(files).map_err(unseen)?, of(joint_files).map_err(unseen)?])
+        let failed = |source| WriteError::Io { path: folder.to_owned(), source };
+        Ok([of(files).map_err(failed)?, of(joint_files).map_err(failed)?])
     }
 
     /// Writes the problem with the effects of the finished rounds, prints a message, and returns
-    /// the exit status.
+    /// the exit status. Writes nothing if no round has added an effect.
     pub fn write(self) -> u8 {
         let added = self.added.lock().unwrap_or_else(PoisonError::into_inner).clone();
         if added.is_empty() {
             diagnostic::warn("interrupted before the first round was done: nothing is written");
-            return interrupt::STATUS;
+            return interrupt::INTERRUPTED_STATUS;
         }
-        match self.declare(&added) {
+        match self.write_closed_problem(&added) {
             Ok(file) => {
                 diagnostic::warn(&format!(
                     "interrupted: {} declares the effects of the finished rounds; flexcal loop {} searches on",
                     file.display(),
                     shell_word(&file)
                 ));
-                STATUS
+                WRITTEN_STATUS
             }
             Err(error) => {
                 diagnostic::print(error.as_ref());
-                interrupt::STATUS
+                interrupt::INTERRUPTED_STATUS
             }
         }
     }
 
-    /// Writes the problem with the `added` effects declared, and returns the path of its file.
-    fn declare(&self, added: &[Effect]) -> Result<PathBuf, Box<dyn std::error::Error>> {
-        let results = self.keeping_finished()?;
-        let [files, joint_files] = self.files_from(&results.folder)?;
+    /// Writes the problem file with the `added` effects declared, and returns its path.
+    fn write_closed_problem(
+        &self,
+        added: &[Effect],
+    ) -> Result<PathBuf, Box<dyn std::error::Error>> {
+        let results = self.beside_finished()?;
+        let [files, joint_files] = self.files_relative_to(&results.folder)?;
         let declared = self.declared.iter().map(|effect| (effect.clone(), Vec::new()));
         let comment = "Found by flexcal loop before it was interrupted.".to_owned();
         let found = added.iter().filter(|effect| !self.declared.contains(effect));
@@ -129,7 +134,8 @@ impl Unfinished {
     }
 }
 
-/// Returns true if a `loop.json` is the result of a loop that was not interrupted.
+/// Returns true if a `loop.json` is the result of a loop that was not interrupted; false if the
+/// file cannot be read.
 fn is_finished(file: &Path) -> bool {
     let result: Option<Value> =
         fs::read_to_string(file).ok().and_then(|text| serde_json::from_str(&text).ok());
@@ -137,7 +143,7 @@ fn is_finished(file: &Path) -> bool {
 }
 
 /// Returns the path of a file relative to a folder, or its absolute path if no relative one exists.
-fn seen_from(folder: &Path, file: &Path) -> io::Result<PathBuf> {
+fn relative_path(folder: &Path, file: &Path) -> io::Result<PathBuf> {
     let (folder, file) = (folder.canonicalize()?, file.canonicalize()?);
     Ok(pathdiff::diff_paths(&file, folder).unwrap_or(file))
 }

@@ -38,13 +38,14 @@ pub struct Arguments {
     trust: Trust,
 }
 
-/// Parses a probability between 0 and 0.5.
+/// Parses a probability greater than 0 and at most 0.5.
 fn probability(text: &str) -> Result<f64, String> {
     let number = text.parse::<f64>().ok().filter(|number| *number > 0.0 && *number <= 0.5);
     number.ok_or_else(|| "a probability above 0 and up to 0.5 is expected".to_owned())
 }
 
-/// Tests the rows, writes `watch.json` and `watch.html`, and prints the verdict.
+/// Tests whether the rows contradict the estimate, writes `watch.json` and `watch.html`, and prints
+/// the verdict.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let common = &arguments.common;
     let problem = Problem::read(common.problem())?;
