@@ -1,25 +1,25 @@
 //! Record of the command `accept`, to be signed: accuracy before and after, conditions and inputs.
 
 use super::document::{Block, Headline, Table};
-use super::identify::BEFORE;
+use super::identify::NOMINAL_ARM;
 use super::render::{report, text};
 use crate::fit::Verdict;
 use crate::problem::Problem;
 use crate::quantity::format::{about_three_digits, counted, number};
 use crate::results::{AcceptanceResult, PoseAccuracy, TestedTolerance};
 
-/// Number of cycles in each pose that ISO 9283 requires.
+/// Number of measurements (cycles) of each pose that ISO 9283 requires.
 const ISO_CYCLES: usize = 30;
 
 /// Sentence on the scope of the reported errors.
-const SCOPE: &str = "These are errors of predicted positions. The accuracy that a controller reaches with corrected commands is not judged.";
+const SCOPE_NOTE: &str = "These are errors of predicted positions. The accuracy that a controller reaches with corrected commands is not judged.";
 
 /// Returns a summary of the accuracy as text, ending in a line break.
 pub fn acceptance_text(problem: &Problem, result: &AcceptanceResult) -> String {
     let poses = counted(result.poses, "held-out pose");
     let mut blocks = vec![Block::lines(format!("{}\n{poses}; {}", problem.title, result.protocol))];
     blocks.extend(result.tolerance.as_ref().map(|test| Block::Text(tolerance_text(test))));
-    blocks.extend(judgement(result));
+    blocks.extend(accuracy_blocks(result));
     text(&blocks)
 }
 
@@ -28,7 +28,7 @@ pub fn acceptance_page(problem: &Problem, result: &AcceptanceResult) -> String {
     let head = Headline {
         unit: "mm",
         states: vec![
-            (BEFORE, about_three_digits(result.before.mean_mm)),
+            (NOMINAL_ARM, about_three_digits(result.before.mean_mm)),
             ("as identified", about_three_digits(result.after.mean_mm)),
         ],
         of: counted(result.poses, "held-out pose"),
@@ -62,7 +62,7 @@ pub fn acceptance_page(problem: &Problem, result: &AcceptanceResult) -> String {
     });
     let mut blocks = vec![Block::Headline(head)];
     blocks.extend(result.tolerance.as_ref().map(|test| Block::Text(tolerance_text(test))));
-    blocks.extend(judgement(result));
+    blocks.extend(accuracy_blocks(result));
     blocks.extend([
         Block::heading("How it was measured"),
         Block::Text(format!("Instrument: {instrument}; its noise: {sigma}.")),
@@ -86,7 +86,7 @@ pub fn acceptance_page(problem: &Problem, result: &AcceptanceResult) -> String {
     report(problem, "acceptance", &blocks).html
 }
 
-/// Returns sentences with the verdict on a tolerance and the reasons for it.
+/// States the verdict on a tolerance and the reasons for it.
 pub fn tolerance_text(test: &TestedTolerance) -> String {
     let percent = |share: f64| format!("{} %", (share * 1e4).round() / 100.0);
     let (share, risk) = (percent(test.share), percent(test.risk));
@@ -124,7 +124,7 @@ pub fn tolerance_text(test: &TestedTolerance) -> String {
 
 /// Returns the blocks of the record on accuracy AP before and after identification, on the poses,
 /// the error bounds, and the repeatability.
-fn judgement<'a>(result: &AcceptanceResult) -> Vec<Block<'a>> {
+fn accuracy_blocks<'a>(result: &AcceptanceResult) -> Vec<Block<'a>> {
     let row = |name: &str, of: &PoseAccuracy| {
         let [low, high] = of.interval_95_mm;
         let values = [of.mean_mm, low, high, of.rms_mm, of.max_mm].map(|value| number(value, 4));
@@ -160,6 +160,6 @@ fn judgement<'a>(result: &AcceptanceResult) -> Vec<Block<'a>> {
             number(bound.coverage * 100.0, 1),
         ))
     });
-    let blocks = [Block::Table(table), Block::Text(SCOPE.to_owned())];
+    let blocks = [Block::Table(table), Block::Text(SCOPE_NOTE.to_owned())];
     blocks.into_iter().chain(bound).chain([Block::Text(repeats)]).collect()
 }

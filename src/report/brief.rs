@@ -1,14 +1,14 @@
 //! Result of the command `identify` on one screen.
 
 use super::document::Block;
-use super::errors::noun;
+use super::errors::row_noun;
 use super::identify::{errors_by_axis, headline};
 use super::noise::{influential_rows, noise};
 use super::parameters::correlated;
 use super::prior::summary;
 use super::remainder::PredictionAccuracy;
 use super::render::text;
-use super::row_kinds::unsteady;
+use super::row_kinds::unsteady_points;
 use super::trust::outcome;
 use crate::fit::{Estimate, Finding, FindingCode, Identification, size_of_kind};
 use crate::problem::Problem;
@@ -33,17 +33,17 @@ pub fn estimate_brief(
     ]);
     blocks.extend(influential_rows(found));
     blocks.extend(found.prior.as_ref().map(|comparison| Block::Text(summary(comparison))));
-    blocks.push(Block::Lines(parameters(&found.estimates), remarks(found)));
+    blocks.push(Block::Lines(parameter_counts(&found.estimates), remarks(found)));
     text(&blocks)
 }
 
-/// Returns true if the data determine no parameter of the fit.
+/// Returns true if the data determine no parameter of the fit well.
 pub fn determines_nothing(found: &Identification) -> bool {
     !found.estimates.iter().any(|estimate| Knowledge::of(estimate).is_identified())
 }
 
-/// Counts the parameters by how well the data determine them.
-fn parameters(estimates: &[Estimate]) -> String {
+/// States how many parameters the data determine well, in part, or hardly.
+fn parameter_counts(estimates: &[Estimate]) -> String {
     let count = |is: fn(Knowledge) -> bool| {
         estimates.iter().filter(|estimate| is(Knowledge::of(estimate))).count()
     };
@@ -64,8 +64,8 @@ fn parameters(estimates: &[Estimate]) -> String {
     )
 }
 
-/// Lists short remarks on what the full text explains: outliers, undetermined combinations, active
-/// limits.
+/// Returns short remarks on what the full text explains, such as orientation errors, outliers,
+/// undetermined combinations and active constraints.
 fn remarks(found: &Identification) -> Vec<String> {
     let mut points = Vec::new();
     if let Some(orientation) = &found.orientation {
@@ -78,14 +78,14 @@ fn remarks(found: &Identification) -> Vec<String> {
     }
     let farthest = found.outliers.iter().max_by(|a, b| a.distance.total_cmp(&b.distance));
     points.extend(farthest.map(|outlier| {
-        let n = counted(found.outliers.len(), noun(found));
+        let n = counted(found.outliers.len(), row_noun(found));
         format!(
             "{n} too far off to be noise, the largest at {}: {}",
             outlier.location,
             size_of_kind(outlier.kind, outlier.error.norm(), 3)
         )
     }));
-    points.extend(unsteady(found.spreads.iter().map(|spread| &spread.1)));
+    points.extend(unsteady_points(found.spreads.iter().map(|spread| &spread.1)));
     let of_parameters =
         format!("of the {} cannot be identified", counted(found.unknowns.len(), "parameter"));
     let counts = [

@@ -3,7 +3,7 @@
 use super::detection;
 use super::document::{Block, Column, Table, opening};
 use super::figures::{ACCENT, Curve, Drawing, FAINT, INK, Series};
-use super::forecast::{assumptions, cells, measured_for};
+use super::forecast::{assumptions, cells, poses_to_measure};
 use super::parameters::{conditioning, rows_of_sheet, unidentifiable};
 use super::render::{page, text};
 use crate::design::{Check, ExpectedParameter, Forecast, GrowthStep, Prediction, PredictionPoses};
@@ -16,7 +16,8 @@ pub fn check_text(problem: &Problem, check: &Check) -> String {
     text(&blocks(problem, check))
 }
 
-/// Returns the forecast as a page, with the error of predictions against the number of poses.
+/// Returns the forecast as a page, with a figure of the error of predictions against the number of
+/// poses.
 pub(crate) fn check_page(problem: &Problem, check: &Check) -> String {
     page(&problem.title, "check", &blocks(problem, check))
 }
@@ -45,8 +46,8 @@ fn blocks<'a>(problem: &Problem, check: &Check) -> Vec<Block<'a>> {
         format!("{}, {}", counted(names.len(), "parameter"), counted(forecast.poses, "pose"));
     let mut blocks = opening(&problem.title, counts).to_vec();
     blocks.extend([
-        Block::lines(enough(problem, check)),
-        Block::lines(prediction(check)),
+        Block::lines(recommendation(problem, check)),
+        Block::lines(prediction_sentences(check)),
         Block::Table(Table::new(&header, rows.collect(), &[0, 4, 5]).noted(&notes)),
         Block::Page(vec![conditioning(
             &forecast.identifiability,
@@ -57,10 +58,10 @@ fn blocks<'a>(problem: &Problem, check: &Check) -> Vec<Block<'a>> {
         Block::lines(
             "With more or fewer such poses (rank; parameters of the arm identified to 90 % or more; error of predictions):",
         ),
-        Block::Table(growth(check)),
+        Block::Table(growth_table(check)),
         Block::figures([growth_figure(check)]),
     ]);
-    // Measured poses do not include the held-out ones.
+    // If held-out rows are predicted, the checked poses are the fitted ones of a table.
     let poses = (check.predicted_at != PredictionPoses::HeldOut).then_some(forecast.poses);
     blocks.extend(assumptions(problem, &forecast.expected, poses));
     blocks.extend(detection::blocks(problem, &check.detection));
@@ -95,8 +96,8 @@ fn growth_figure(check: &Check) -> Option<Drawing> {
     .drawing()
 }
 
-/// Smallest difference between the identified shares at the nominal and at drawn arms at which both
-/// are shown.
+/// Difference between the identified shares at drawn arms and at the nominal arm, above which a
+/// table shows both.
 const MIN_SHOWN_DIFFERENCE: f64 = 0.05;
 
 /// Returns true if a parameter is confounded with others at the nominal arm, but identified at arms
@@ -136,7 +137,8 @@ pub fn why_not_sufficient(check: &Check) -> String {
     )
 }
 
-fn prediction(check: &Check) -> String {
+/// States the expected error of predicted positions, and the noise of one measurement.
+fn prediction_sentences(check: &Check) -> String {
     let place = match check.predicted_at {
         PredictionPoses::Ranges => "anywhere within the ranges",
         PredictionPoses::HeldOut => "in the held-out poses",
@@ -162,12 +164,13 @@ fn prediction(check: &Check) -> String {
     )
 }
 
-/// Returns true if at least one of the poses measures a position.
+/// Returns true if at least one of the checked poses measures a position.
 fn measures_positions(check: &Check) -> bool {
     check.noise_of == "position"
 }
 
-fn growth(check: &Check) -> Table {
+/// Returns the table of forecasts for smaller and larger numbers of poses.
+fn growth_table(check: &Check) -> Table {
     let count = |name, of: fn(&GrowthStep) -> usize| {
         Column::number(name, move |step: &GrowthStep| of(step).to_string())
     };
@@ -191,9 +194,10 @@ fn growth(check: &Check) -> Table {
     )
 }
 
-fn enough(problem: &Problem, check: &Check) -> String {
+/// States the recommended number of poses.
+fn recommendation(problem: &Problem, check: &Check) -> String {
     match check.growth.enough {
-        Some(enough) if let Some(measured) = measured_for(problem, enough) => format!(
+        Some(enough) if let Some(measured) = poses_to_measure(problem, enough) => format!(
             "Measure {measured} poses, of which held_out removes {}; more barely help: then all that such poses can identify is identified, and predictions are as accurate as one measured position.",
             measured - enough
         ),

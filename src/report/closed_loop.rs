@@ -1,20 +1,22 @@
-//! Texts of the command `loop`: summary for one screen, full text for the terminal, and report.
+//! Texts of the command `loop`: summary for one screen, full text (`--verbose`), and report.
 
-use super::document::{Block, Headline, Point, Table, code, first_of, named};
-use super::errors::{both_parts, held_out_rows, judging, measure, rows_of, unpredicted};
+use super::document::{Block, Headline, Point, Table, code, first_of, joined};
+use super::errors::{both_parts, error_label, held_out_rows, rows_of, test_rows_word, unpredicted};
 use super::figures;
-use super::found_effects::{found, found_heading, rounds, status_table};
+use super::found_effects::{found_effects, found_heading, rounds, status_table};
 use super::identify::{
-    BEFORE, fit_warnings, fitted_parameters, identifiability_with_figures, mean, poses, spread,
-    why_not_trusted,
+    NOMINAL_ARM, fit_warnings, identifiability_with_figures, mean_error, parameters_fact,
+    rms_and_largest, row_counts_fact, why_not_trusted,
 };
-use super::noise::{expected, influential_rows, short, size};
+use super::noise::{expected_interval, format_chi2, influential_rows, residual_fact};
 use super::parameters::{against_priors, parameters};
 use super::probability::percent;
 use super::remainder::PredictionAccuracy;
 use super::render::{Report, report, text};
-use super::unexplained::{places, to_declare, unexplained};
-use super::verdict::{alternative, causes, counts, has_place, stand_in, title, verdict};
+use super::unexplained::{structure_places, structure_sentences, to_declare};
+use super::verdict::{
+    alternative, causes, effect_counts, has_place, stand_in_sentence, title, verdict,
+};
 use super::{effect, residual_tests, trace};
 use crate::problem::Problem;
 use crate::quantity::format::{counted, decimals, number};
@@ -29,10 +31,10 @@ const MAX_SHOWN_CANDIDATES: usize = 8;
 const MAX_SHOWN_ROWS: usize = 3;
 /// Maximum number of limits of the declared problem that a text names.
 const MAX_SHOWN_LIMITS: usize = 3;
-/// Number of screen lines available for the summary, after file names and next steps.
+/// Number of lines of the summary that fit on one screen beside file names and next steps.
 const SCREEN_LINES: usize = 22;
-/// Name of the arm with the effects of the extended problem.
-const EXTENDED: &str = "with what was found";
+/// Name of the arm of the extended problem in tables and headlines.
+const EXTENDED_ARM: &str = "with what was found";
 
 /// Returns a summary of the outcome for one screen, ending in a line break.
 pub fn loop_brief(
@@ -42,7 +44,7 @@ pub fn loop_brief(
 ) -> String {
     let result = &LoopResult::new(problem, closure);
     let mut blocks = head(problem, closure, result);
-    // The summary shows the held-out rows without their column of χ², which is empty.
+    // The summary shows only the errors of held-out rows, whose column of χ² is empty.
     let mut table = errors(closure, result);
     table.rows.truncate(table.rows.len() / 2);
     table.header.pop();
@@ -67,7 +69,7 @@ pub fn loop_brief(
     let lines_used = text(&blocks).lines().count() + end.lines().count();
     let room = SCREEN_LINES.saturating_sub(lines_used);
     let fits = |count: &usize| {
-        // One line is reserved for the note that tells where the other entries are listed.
+        // One line is reserved for the note on where the hidden entries are listed.
         let note = usize::from(*count < points.len());
         height(&points[..*count]) + note <= room
     };
@@ -86,8 +88,8 @@ pub fn loop_brief(
 /// data do not exclude in its place.
 fn cause(found: &FoundEffect) -> Point {
     let values = effect::values(&found.effect.effect, &found.parameters);
-    // Values of a law that only stands for an unknown one inform nobody.
-    let is_stand_in = stand_in(found).is_some();
+    // If the law only represents an unknown one, its values have no meaning.
+    let is_stand_in = stand_in_sentence(found).is_some();
     let mut facts: Vec<String> =
         values.iter().filter(|_| !is_stand_in).map(|value| without_effect(value)).collect();
     let law = found.claims.as_ref().map(|claims| claims.law.probability);
@@ -105,15 +107,15 @@ fn cause(found: &FoundEffect) -> Point {
     Point { text: title(found) + &others, details, mark: None }
 }
 
-/// Removes the name of the effect from "effect[1].parameter = value".
+/// Removes the name of the effect from a text such as "effect[1].parameter = value".
 fn without_effect(value: &str) -> String {
     let Some((name, _)) = value.split_once(" = ") else { return value.to_owned() };
     let parameter = name.rsplit('.').next().unwrap_or_default();
     value.replacen(name, parameter, 1)
 }
 
-/// Returns the beginning of the text: title, counts of rows, verdict, and cautions that concern the
-/// causes.
+/// Returns the beginning of the summary and of the full text: title, counts of rows, verdict, and
+/// cautions that concern the causes.
 fn head<'a>(problem: &Problem, closure: &ClosedLoop, result: &LoopResult) -> Vec<Block<'a>> {
     let mut blocks = vec![
         Block::Text(format!("{}\n{}", problem.title, both_parts(&closure.before.fit))),
@@ -138,7 +140,7 @@ fn cautions_on_causes<'a>(
     blocks
 }
 
-/// Names the rows that were excluded from the choice of effects.
+/// Names the rows that were excluded from the choice of effects; `None` if there are none.
 fn set_aside<'a>(problem: &Problem, result: &LoopResult) -> Option<Block<'a>> {
     let rows = &result.set_aside;
     let treatment = if problem.robust.is_some() {
@@ -163,18 +165,18 @@ fn set_aside<'a>(problem: &Problem, result: &LoopResult) -> Option<Block<'a>> {
 pub fn loop_text(problem: &Problem, closure: &ClosedLoop) -> String {
     let result = &LoopResult::new(problem, closure);
     let mut blocks = head(problem, closure, result);
-    blocks.extend([Block::Table(errors(closure, result)), gain(closure, result)]);
+    blocks.extend([Block::Table(errors(closure, result)), gain_block(closure, result)]);
     let failed = residual_tests::failed(&closure.before.residual_tests);
     if !failed.is_empty() {
         blocks.push(Block::heading("Residual tests that the declared problem fails"));
         blocks.push(Block::list(failed));
         blocks.extend(other_chi2_before(closure));
     }
-    blocks.extend(found(result, MAX_SHOWN_ALTERNATIVES));
+    blocks.extend(found_effects(result, MAX_SHOWN_ALTERNATIVES));
     let failed = residual_tests::failed(&closure.residual_tests);
     if result.unexplained.is_some() || (!failed.is_empty() && !result.effects.is_empty()) {
         blocks.push(Block::heading("Remaining residual"));
-        let unexplained = unexplained(problem, closure, result).into_iter();
+        let unexplained = structure_sentences(problem, closure, result).into_iter();
         // Without found effects, the failed tests are already listed above.
         let has_failed = !failed.is_empty();
         let failed = failed.into_iter().filter(|_| !result.effects.is_empty());
@@ -227,9 +229,9 @@ fn blocks<'a>(
     blocks.extend(fit_warnings(after, plots));
     blocks.extend([
         Block::Table(errors(closure, result)),
-        gain(closure, result),
-        Block::Words(found(result, MAX_SHOWN_ALTERNATIVES)),
-        Block::Page(found(result, 2 * MAX_SHOWN_ALTERNATIVES)),
+        gain_block(closure, result),
+        Block::Words(found_effects(result, MAX_SHOWN_ALTERNATIVES)),
+        Block::Page(found_effects(result, 2 * MAX_SHOWN_ALTERNATIVES)),
         Block::figures(
             plots
                 .causes
@@ -255,10 +257,10 @@ fn blocks<'a>(
     blocks.push(Block::Page(trace::undetectable_effects(problem, &closure.before)));
     blocks.extend(rounds(closure, result));
     blocks.push(Block::heading("Remaining residual"));
-    let unexplained = unexplained(problem, closure, result).into_iter().map(Point::from);
+    let unexplained = structure_sentences(problem, closure, result).into_iter().map(Point::from);
     let (tests, page) = (
-        residual_tests::all(&closure.residual_tests),
-        residual_tests::each(&closure.residual_tests),
+        residual_tests::by_outcome(&closure.residual_tests),
+        residual_tests::in_order(&closure.residual_tests),
     );
     blocks.extend([
         Block::Words(vec![Block::List(unexplained.clone().chain(tests).collect())]),
@@ -282,7 +284,8 @@ fn blocks<'a>(
     blocks
 }
 
-/// Returns the outcome at a glance, with the remainder if there is one.
+/// Returns the summary at the top of the report. If there is a remainder, the last error includes
+/// it.
 fn headline(
     problem: &Problem,
     closure: &ClosedLoop,
@@ -304,14 +307,16 @@ fn headline(
                 _ => result.verdict.as_str().replace('-', " "),
             },
         ),
-        ("Effects found", counts(result)),
-        poses(after),
-        fitted_parameters(after),
-        size("Residual before", fit),
-        size("Residual after", after),
-        ("Held out, after", spread(&best)),
+        ("Effects found", effect_counts(result)),
+        row_counts_fact(after),
+        parameters_fact(after),
+        residual_fact("Residual before", fit),
+        residual_fact("Residual after", after),
+        ("Held out, after", rms_and_largest(&best)),
     ];
-    facts.extend(corrected.map(|_| ("Without the remainder", format!("{} {unit}", mean(&last)))));
+    facts.extend(
+        corrected.map(|_| ("Without the remainder", format!("{} {unit}", mean_error(&last)))),
+    );
     facts.retain(|(name, _)| result.trusted || *name != "Effects found");
     facts.extend(known_gain(result).map(|Gain { mean, interval_95: [low, high] }| {
         let digits = decimals(high - low, 4).max(2);
@@ -323,16 +328,18 @@ fn headline(
             .then(|| ("Effects declared", problem.effects.len().to_string())),
     );
     let of = format!("{}{with}", held_out_rows(after));
-    let mut states =
-        vec![(BEFORE, mean(&fit.registered.held_out)), ("as declared, fitted", mean(&first))];
+    let mut states = vec![
+        (NOMINAL_ARM, mean_error(&fit.registered.held_out)),
+        ("as declared, fitted", mean_error(&first)),
+    ];
     if !result.effects.is_empty() || corrected.is_some() {
-        states.push((EXTENDED, mean(&best)));
+        states.push((EXTENDED_ARM, mean_error(&best)));
     }
     Headline { states, unit, of, facts, is_doubtful: !result.trusted }
 }
 
-/// Returns reasons for doubt. The fit may not be trusted, or a limit may be active, so that an
-/// effect may only compensate for that limit.
+/// Returns the warnings that the fit is not trusted, and that active limits of the declared problem
+/// may be what the found effects compensate for.
 fn cautions<'a>(closure: &ClosedLoop, result: &LoopResult) -> Vec<Block<'a>> {
     let (before, after) = (&closure.before.fit, &closure.after);
     let untrusted = (!result.trusted).then(|| format!("Warning: {}.", why_not_trusted(after)));
@@ -343,7 +350,7 @@ fn cautions<'a>(closure: &ClosedLoop, result: &LoopResult) -> Vec<Block<'a>> {
         .map(|estimate| estimate.name.clone());
     let held =
         bounds.chain(before.active_constraints.iter().map(|constraint| constraint.words.clone()));
-    let held = named(held, MAX_SHOWN_LIMITS, ", ");
+    let held = joined(held, MAX_SHOWN_LIMITS, ", ");
     let limits = (!held.is_empty() && !result.effects.is_empty()).then(|| {
         format!(
             "Limits are active in the declared fit ({held}). If one is wrong, an effect that was found may only compensate for it. \
@@ -353,7 +360,8 @@ fn cautions<'a>(closure: &ClosedLoop, result: &LoopResult) -> Vec<Block<'a>> {
     untrusted.into_iter().chain(limits).map(Block::Note).collect()
 }
 
-/// Returns the table of errors with the nominal arm, the declared problem and the extended problem.
+/// Returns the table of errors of the nominal arm, of the declared problem's fit and of the
+/// extended problem's fit.
 fn errors(closure: &ClosedLoop, result: &LoopResult) -> Table {
     let LoopResult { registered, before, after, .. } = result;
     let row = |rows: &str, arm: &str, summary: &Summary, chi2: Option<f64>| {
@@ -365,35 +373,37 @@ fn errors(closure: &ClosedLoop, result: &LoopResult) -> Table {
     let (fitted, extended) = (&before.errors, &after.errors);
     let (nominal, declared) = (nominal_arm(&closure.before.fit), "as declared, fitted");
     let mut rows = vec![
-        row(judging(&closure.after.fitted), &nominal, registered.judged(), None),
+        row(test_rows_word(&closure.after.fitted), &nominal, registered.judged(), None),
         row("", declared, fitted.judged(), None),
-        row("", EXTENDED, extended.judged(), None),
+        row("", EXTENDED_ARM, extended.judged(), None),
         row("identification", &nominal, &registered.identification, None),
         row("", declared, &fitted.identification, before.reduced_chi2),
-        row("", EXTENDED, &extended.identification, after.reduced_chi2),
+        row("", EXTENDED_ARM, &extended.identification, after.reduced_chi2),
     ];
     if result.effects.is_empty() {
-        rows.retain(|row| row[1] != EXTENDED);
+        rows.retain(|row| row[1] != EXTENDED_ARM);
     }
-    let header = [measure(&closure.after.fitted.held_out), "", "mean", "rms", "max", "χ²/ν"];
+    let header = [error_label(&closure.after.fitted.held_out), "", "mean", "rms", "max", "χ²/ν"];
     Table { minor: vec![3, 4], ..Table::new(&header, rows, &[0, 1]) }
 }
 
-/// Returns the gain on held-out rows, if effects were found, the fit is trusted and the gain is
-/// finite.
+/// Returns the gain on held-out rows; `None` unless effects were found, the fit is trusted and the
+/// gain is finite.
 fn known_gain(result: &LoopResult) -> Option<Gain> {
     let is_known =
         |gain: &Gain| result.trusted && !result.effects.is_empty() && gain.mean.is_finite();
     result.gain().filter(is_known)
 }
 
-/// States why the tests of the declared problem's residual have another χ²/ν than its fit.
+/// States why the tests of the declared problem's residual have another χ²/ν than its fit; `None`
+/// if both agree.
 fn other_chi2_before(closure: &ClosedLoop) -> Option<Block<'static>> {
     let Trace { residual_tests: tests, fit, .. } = &closure.before;
     residual_tests::other_reduced_chi2(tests, fit.reduced_chi2).map(Block::Text)
 }
 
-/// States why the tests of the remaining residual have another χ²/ν than the final fit.
+/// States why the tests of the remaining residual have another χ²/ν than the final fit; `None` if
+/// both agree.
 fn other_chi2_after(closure: &ClosedLoop) -> Option<Block<'static>> {
     let tests = &closure.residual_tests;
     residual_tests::other_reduced_chi2(tests, closure.after.reduced_chi2).map(Block::Text)
@@ -415,22 +425,24 @@ fn gain_sentence(closure: &ClosedLoop, result: &LoopResult) -> Option<String> {
     let has_effects = !result.effects.is_empty();
     let size = match (result.before.reduced_chi2, result.after.reduced_chi2) {
         (Some(before), Some(after)) if has_effects => {
-            Some(format!("{} before, {} after", short(before), short(after)))
+            Some(format!("{} before, {} after", format_chi2(before), format_chi2(after)))
         }
-        (before, _) => before.map(short),
+        (before, _) => before.map(format_chi2),
     };
     let is_overstated = has_effects && after.sigma_scale < 1.0;
     let overstated = if is_overstated { " The declared σ is too large." } else { "" };
-    let chi2 =
-        size.map(|size| format!("Reduced χ² (χ²/ν): {size}; {}.{overstated}", expected(after)));
+    let chi2 = size.map(|size| {
+        format!("Reduced χ² (χ²/ν): {size}; {}.{overstated}", expected_interval(after))
+    });
     let words: Vec<String> = gain.into_iter().chain(chi2).collect();
     (!words.is_empty()).then(|| words.join(" "))
 }
 
-/// States what structure remains and where it is shown.
+/// States what structure remains in the residual and where it is shown; `None` if no residual test
+/// failed and no place is known.
 fn remaining_structure(closure: &ClosedLoop, result: &LoopResult) -> Option<String> {
     let failed = residual_tests::failed(&closure.residual_tests).len();
-    let places = if result.size_alone().is_none() { places(result) } else { Vec::new() };
+    let places = if result.size_alone().is_none() { structure_places(result) } else { Vec::new() };
     let structure = (!places.is_empty())
         .then(|| format!("structure without a known law ({})", places.join("; ")));
     let tests = (failed > 0).then(|| format!("{} failed", counted(failed, "residual test")));
@@ -439,8 +451,8 @@ fn remaining_structure(closure: &ClosedLoop, result: &LoopResult) -> Option<Stri
         .then(|| format!("What remains: {}; -v lists it, report.html shows it.", parts.join(", ")))
 }
 
-/// States the gain, and names the arms that have poses without an equilibrium.
-fn gain(closure: &ClosedLoop, result: &LoopResult) -> Block<'static> {
+/// States the gain on held-out rows, and the arms that have poses without an equilibrium.
+fn gain_block(closure: &ClosedLoop, result: &LoopResult) -> Block<'static> {
     let (before, after) = (&closure.before, &closure.after);
     let mut arms = vec![
         ("the nominal arm", &before.fit.registered),

@@ -1,4 +1,4 @@
-//! Text of `problem.closed.toml`: the problem as written, with the found effects declared.
+//! Text of `problem.closed.toml`: the text of the declared problem with the found effects added.
 
 use std::path::PathBuf;
 
@@ -12,9 +12,9 @@ use crate::residual_tests::Covariate;
 use crate::results::ParameterValue;
 use crate::select::{ClosedLoop, Found, Status};
 
-/// Adds the found effects to the `text` of `problem` and replaces its data `files` (measurements,
-/// then the joint table). The paths are relative to the folder of the new text. Everything else,
-/// including comments, is unchanged.
+/// Returns the `text` of `problem` with the found effects added and the data files replaced by
+/// `files` (measurements, then the joint table). The paths are relative to the folder of the new
+/// file. Everything else, including comments, is unchanged.
 ///
 /// # Errors
 /// Returns an error if the text is not TOML.
@@ -27,19 +27,20 @@ pub fn closed_problem(
     let declared: Vec<Effect> =
         problem.effects.iter().map(|declared| declared.effect.clone()).collect();
     let of = |effect: &Effect| closure.effects.iter().find(|found| found.effect == *effect);
-    // Effects that data outside the fit contradict are not declared.
-    let holds = |effect: &Effect| {
+    // An effect that data outside the fit contradict is not added.
+    let is_kept = |effect: &Effect| {
         declared.contains(effect)
             || of(effect).is_none_or(|found| found.status != Status::Contradicted)
     };
-    let closed =
-        closure.closed.effects.iter().filter(|declared| holds(&declared.effect)).map(|declared| {
+    let closed = closure.closed.effects.iter().filter(|declared| is_kept(&declared.effect)).map(
+        |declared| {
             let found = of(&declared.effect);
             (
                 declared.effect.clone(),
                 found.map(|found| comments(found, closure)).unwrap_or_default(),
             )
-        });
+        },
+    );
     let edited = edit::with_effects(text, &declared, &closed.collect::<Vec<_>>(), files)?;
     let free: Vec<_> = closure.freed.iter().map(|name| (name.clone(), None)).collect();
     let comment = "Found by flexcal loop: larger than the prior of the effect.";
@@ -55,7 +56,7 @@ pub fn closed_problem(
     }
 }
 
-/// Returns comments on a found effect: p-value, status and values.
+/// Returns the comment lines on a found effect: p-value, doubt about its law, values and ranges.
 fn comments(found: &Found, closure: &ClosedLoop) -> Vec<String> {
     let doubt = match (found.status, &found.claims) {
         (Status::Found, _) => "",
@@ -76,7 +77,8 @@ fn comments(found: &Found, closure: &ClosedLoop) -> Vec<String> {
         .collect()
 }
 
-/// States the ranges of the quantities of a law that the search composed; `None` for other effects.
+/// States the identification ranges of the quantities in a law that the search composed; `None` for
+/// other effects.
 fn ranges_of_law(found: &Found) -> Option<String> {
     let range = |(of, (low, high)): &(Covariate, (f64, f64))| {
         format!("{of} from {} to {}", number(*low, 3), number(*high, 3))

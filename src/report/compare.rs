@@ -2,13 +2,13 @@
 //! and 3.
 
 use super::document::{Block, Column, Headline, Table, code};
-use super::errors::{both_parts, header, held_out_rows, noun, unit};
+use super::errors::{both_parts, header, held_out_rows, row_noun, unit};
 use super::figures;
 use super::identify::{
-    BEFORE, counts, errors_by_axis, fit_details, fit_warnings, fitted_parameters, mean, no_errors,
-    poses,
+    NOMINAL_ARM, errors_by_axis, fit_details, fit_sentence, fit_warnings, mean_error, no_errors,
+    parameters_fact, row_counts_fact,
 };
-use super::noise::size;
+use super::noise::residual_fact;
 use super::paper_tables::{table_2, table_3, title};
 use super::render::{Report, report, text};
 use crate::fit::{Comparison, Identification};
@@ -16,7 +16,7 @@ use crate::problem::Problem;
 use crate::quantity::format::{counted, number, or_dash};
 use crate::results::{ComparedFit, PlotData, Summary};
 
-/// Result of a fit with its name in a table.
+/// Name of a fit in a table, with its result.
 type NamedFit = (String, ComparedFit);
 
 /// Returns the comparison as text, ending in a line break.
@@ -34,29 +34,29 @@ pub fn compare_text(problem: &Problem, comparison: &Comparison) -> String {
         blocks.extend(as_paper_tables(comparison));
     }
     blocks.extend(no_errors(joint).map(|words| Block::lines(format!("  –: {words}"))));
-    blocks.push(Block::Table(grouped(comparison, true)));
+    blocks.push(Block::Table(grouped_strategies(comparison, true)));
     if !comparison.paper.is_empty() && !problem.effects.is_empty() {
         blocks.push(Block::lines(
             "  paper: the closed forms of [Chen2021], without the declared effects",
         ));
     }
     if is_elastic(comparison) {
-        blocks.push(Block::Table(parts(comparison, true)));
+        blocks.push(Block::Table(ablations(comparison, true)));
     }
     text(&blocks)
 }
 
-/// Returns true if the problem has the arm of the paper, or the paper's procedure was asked for.
+/// Returns true if the problem declares the arm of the paper, or if the paper's procedure was run.
 fn concerns_paper(comparison: &Comparison) -> bool {
     comparison.is_papers_arm || !comparison.paper.is_empty()
 }
 
-/// Returns true if the arm has elasticity that fits can leave out.
+/// Returns true if the arm has elasticity, so that there are fits without parts of it.
 fn is_elastic(comparison: &Comparison) -> bool {
     comparison.ablations.len() > 1
 }
 
-/// States which strategy and solver has the smallest held-out error, or that all agree.
+/// States which strategy and solver has the smallest mean held-out error, or that all agree.
 fn verdict(comparison: &Comparison) -> String {
     let fits = named_strategies(comparison);
     let mean = |(_, fit): &&NamedFit| fit.errors.judged().norms().0[0];
@@ -88,14 +88,14 @@ fn verdict(comparison: &Comparison) -> String {
     )
 }
 
-/// Returns the table of strategies and solvers without the fits whose errors are those of a row
-/// above, which a note names.
-fn grouped(comparison: &Comparison, is_timed: bool) -> Table {
+/// Returns the table of strategies and solvers in which fits with equal errors share a row. Notes
+/// name the fits of each shared row. If `is_timed`, the table contains durations.
+fn grouped_strategies(comparison: &Comparison, is_timed: bool) -> Table {
     let (mut shown, mut same): (Vec<NamedFit>, Vec<Vec<NamedFit>>) = (Vec::new(), Vec::new());
     for fit in named_strategies(comparison) {
         let is_equal = |other: &NamedFit| errors_in_digits(other) == errors_in_digits(&fit);
-        if let Some(place) = shown.iter().position(is_equal) {
-            same[place].push(fit);
+        if let Some(index) = shown.iter().position(is_equal) {
+            same[index].push(fit);
         } else {
             shown.push(fit);
             same.push(Vec::new());
@@ -122,7 +122,7 @@ fn grouped(comparison: &Comparison, is_timed: bool) -> Table {
     table
 }
 
-/// Returns the errors of a fit in the digits that the table shows.
+/// Returns the errors of a fit, rounded to the digits that the table shows.
 fn errors_in_digits((_, fit): &NamedFit) -> Vec<String> {
     let summaries = [fit.errors.judged(), &fit.errors.identification];
     summaries.iter().flat_map(|summary| summary.norms().0).map(|value| number(value, 4)).collect()
@@ -130,7 +130,7 @@ fn errors_in_digits((_, fit): &NamedFit) -> Vec<String> {
 
 /// Returns true if every row of the data measures a position.
 fn of_positions(found: &Identification) -> bool {
-    noun(found) == "pose"
+    row_noun(found) == "pose"
 }
 
 /// Returns the results of each procedure in the form of tables 2 and 3 of the paper.
@@ -158,7 +158,10 @@ fn blocks<'a>(
     let joint = &comparison.joint;
     let held_out = joint.fitted.held_out;
     let mut head = Headline {
-        states: vec![(BEFORE, mean(&joint.registered.held_out)), ("identified", mean(&held_out))],
+        states: vec![
+            (NOMINAL_ARM, mean_error(&joint.registered.held_out)),
+            ("identified", mean_error(&held_out)),
+        ],
         unit: unit(&held_out),
         of: format!(
             "{}, everything fitted at once",
@@ -168,25 +171,32 @@ fn blocks<'a>(
                 held_out_rows(joint)
             }
         ),
-        facts: vec![poses(joint), fitted_parameters(joint), size("Residual against σ", joint)],
+        facts: vec![
+            row_counts_fact(joint),
+            parameters_fact(joint),
+            residual_fact("Residual against σ", joint),
+        ],
         is_doubtful: !joint.is_trusted(),
     };
     if is_elastic(comparison) {
-        let error = mean(&comparison.rigid.fitted.held_out);
+        let error = mean_error(&comparison.rigid.fitted.held_out);
         head.facts.push(("Elasticity ignored", format!("{error} {}", unit(&held_out))));
     }
-    let mut blocks =
-        vec![Block::Headline(head), Block::Text(verdict(comparison)), Block::Text(counts(joint))];
+    let mut blocks = vec![
+        Block::Headline(head),
+        Block::Text(verdict(comparison)),
+        Block::Text(fit_sentence(joint)),
+    ];
     blocks.extend(fit_warnings(joint, plots));
     blocks.extend([
         Block::heading("Strategies and solvers side by side"),
         Block::Figures(vec![figures::strategies(comparison)]),
-        Block::Words(vec![Block::Table(strategies(comparison))]),
+        Block::Words(vec![Block::Table(every_strategy(comparison))]),
         Block::Page(vec![
-            Block::Table(grouped(comparison, false)),
+            Block::Table(grouped_strategies(comparison, false)),
             Block::Folded(
                 "Every strategy and solver".to_owned(),
-                vec![Block::Table(strategies(comparison))],
+                vec![Block::Table(every_strategy(comparison))],
                 "compare.json holds every strategy and solver.".to_owned(),
             ),
         ]),
@@ -195,7 +205,7 @@ fn blocks<'a>(
         blocks.extend([
             Block::heading("Gain of each part of the elasticity"),
             Block::figures([figures::ablations(comparison)]),
-            Block::Table(parts(comparison, false)),
+            Block::Table(ablations(comparison, false)),
         ]);
     }
     let procedures = comparison.procedures.iter().filter(|_| concerns_paper(comparison));
@@ -237,21 +247,21 @@ fn named_strategies(comparison: &Comparison) -> Vec<NamedFit> {
     fits.map(|fit| (fit.strategy.clone(), fit)).collect()
 }
 
-/// Returns the table of every strategy and solver.
-fn strategies(comparison: &Comparison) -> Table {
+/// Returns the table with one row for every strategy and solver.
+fn every_strategy(comparison: &Comparison) -> Table {
     side_by_side(comparison, "strategy", &named_strategies(comparison), false)
 }
 
-/// Returns the table of the fits without some part of the elasticity, one row for each part.
-fn parts(comparison: &Comparison, is_timed: bool) -> Table {
+/// Returns the table of the fits with only a part of the elasticity, one row for each part.
+fn ablations(comparison: &Comparison, is_timed: bool) -> Table {
     let named = comparison.ablations.iter();
     let named: Vec<NamedFit> =
         named.map(|(part, found)| (part.as_str().to_owned(), found.into())).collect();
     side_by_side(comparison, "elasticity", &named, is_timed)
 }
 
-/// Returns the table of some fits. If `is_timed`, it contains times, which differ from run to run;
-/// otherwise it contains more errors.
+/// Returns the table of `fits`; `first` is the header of the column of their names. If `is_timed`,
+/// the table contains durations, which differ from run to run; otherwise it contains more errors.
 fn side_by_side(
     comparison: &Comparison,
     first: &'static str,

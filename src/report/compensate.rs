@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::document::Block;
-use super::remainder::bounded;
+use super::remainder::bound_sentence;
 use super::render::text;
 use crate::fit::Command;
 use crate::measurement::Measurements;
@@ -12,7 +12,8 @@ use crate::quantity::format::{mm, number};
 use crate::remainder::Bounds;
 use crate::results::CompensationResult;
 
-/// Returns the outcome as text, with file and line of the targets that cannot be reached.
+/// Returns the summary of the commands as text, with file and line of each target that cannot be
+/// reached.
 pub fn commands_text(
     problem: &Problem,
     targets: &Measurements,
@@ -26,8 +27,8 @@ pub fn commands_text(
     );
     if let (Some(before), Some(after)) = (result.mean_miss_before_mm, result.mean_miss_mm) {
         let before = number(before, 4);
-        // If bounds are known, the text states the expected error instead of the distance that the
-        // solver leaves.
+        // With bounds, the text states the expected error (below) instead of the distance to the
+        // target that the solver leaves.
         let _ = match bounds {
             Some(_) => write!(
                 words,
@@ -50,7 +51,7 @@ pub fn commands_text(
         );
     }
     if let Some(bounds) = bounds.filter(|_| result.reached > 0) {
-        let _ = write!(words, ".\n{}", bounded(bounds, None));
+        let _ = write!(words, ".\n{}", bound_sentence(bounds, None));
     }
     let point = |command: &Command| {
         let (place, miss) = (targets.location(command.row), command.miss.norm());

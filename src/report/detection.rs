@@ -1,25 +1,25 @@
-//! Effects that measurements at some poses would show, in words.
+//! Effects that measurements at the checked poses would show, in words.
 
 use super::document::{Block, Table, code};
 use super::effect;
-use super::forecast::size as shown;
+use super::forecast::format_size;
 use crate::problem::{Effect, Problem};
 use crate::select::{Detectable, Detection, Size};
 
-/// Maximum number of effects of a family that a text lists.
+/// Maximum number of effects of one family that a table lists.
 const MAX_SHOWN_EFFECTS: usize = 3;
-/// Effects that only a load shows.
+/// Names of the effects that only a load makes visible.
 pub(super) const LOAD_EFFECTS: [&str; 3] = ["joint-compliance", "link-bending", "base-compliance"];
 /// Note on the columns of the table.
-const COLUMNS: &str = "found from: smallest size that is found for every axis or phase; at best: for the most visible axis or phase; –: for some axis or phase, no size is found";
+const COLUMNS_NOTE: &str = "found from: smallest size that is found for every axis or phase; at best: for the most visible axis or phase; –: for some axis or phase, no size is found";
 
-/// Returns the effects of each family that are hardest to detect, and those that the poses cannot
-/// show.
+/// Returns the table of the effects of each family that are hardest to detect, and lists of those
+/// that the poses cannot show.
 pub(super) fn blocks<'a>(problem: &Problem, detection: &Detection) -> Vec<Block<'a>> {
     let seen = |effect: &&Detectable| effect.sizes.iter().any(Size::is_within_prior);
     let (mut visible, mut hidden): (Vec<&Detectable>, Vec<&Detectable>) =
         detection.effects.iter().partition(seen);
-    // One visible value of a searched argument, for example a time, is enough.
+    // An effect with a searched argument, for example a time, is visible if one trial value is.
     let places: Vec<String> = visible.iter().map(|effect| effect.effect.name_and_place()).collect();
     hidden.retain(|effect| {
         !effect.effect.is_searched() || !places.contains(&effect.effect.name_and_place())
@@ -44,7 +44,7 @@ pub(super) fn blocks<'a>(problem: &Problem, detection: &Detection) -> Vec<Block<
     ))];
     if !rows.is_empty() {
         let header = ["effect", "found from", "at best", "prior ± 1 σ", "unit", "parameters"];
-        blocks.push(Block::Table(Table::new(&header, rows, &[0, 4, 5]).noted(&[COLUMNS])));
+        blocks.push(Block::Table(Table::new(&header, rows, &[0, 4, 5]).noted(&[COLUMNS_NOTE])));
     }
     if !if_timed.is_empty() {
         let list = effect::listed(if_timed).join("; ");
@@ -81,8 +81,8 @@ pub(super) fn blocks<'a>(problem: &Problem, detection: &Detection) -> Vec<Block<
     blocks
 }
 
-/// Returns table rows of a family: for each place, the effect that is hardest to detect; the
-/// easiest place first.
+/// Returns the table rows of a family of effects: for each place the effect that is hardest to
+/// detect, and of these at most [`MAX_SHOWN_EFFECTS`], the hardest first.
 fn hardest_rows(shown: &[&Detectable], family: &str) -> Vec<Vec<String>> {
     let mut members: Vec<(&Detectable, f64)> = Vec::new();
     for effect in shown.iter().filter(|effect| effect.effect.name() == family) {
@@ -110,9 +110,9 @@ fn row(effect: &Effect, size: &Size) -> Vec<String> {
     let short = |name: &String| name.rsplit('.').next().unwrap_or_default().to_owned();
     vec![
         effect.declaration(),
-        shown(size.worst, &unit),
-        shown(size.best, &unit),
-        shown(Some(size.prior), &unit),
+        format_size(size.worst, &unit),
+        format_size(size.best, &unit),
+        format_size(Some(size.prior), &unit),
         unit.symbol.clone(),
         size.parameters.iter().map(short).collect::<Vec<_>>().join(", "),
     ]

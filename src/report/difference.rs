@@ -13,38 +13,40 @@ use crate::numeric::{Interval, mean_interval};
 use crate::quantity::Unit;
 use crate::quantity::format::{counted, decimals, number, or_dash};
 
-/// Probability that any parameter of two estimates of an unchanged arm is said to differ.
-const FALSE_ALARMS: f64 = 0.01;
+/// Probability that any parameter is said to differ although the arm has not changed.
+const FALSE_ALARM_PROBABILITY: f64 = 0.01;
 /// Maximum number of parameters that the terminal lists.
 const MAX_LISTED: usize = 20;
-/// Smallest number of configurations in common from which the held-out errors are compared.
-const MIN_PAIRS: usize = 8;
+/// Smallest number of common configurations at which the held-out errors of both results are
+/// compared.
+const MIN_COMMON_CONFIGURATIONS: usize = 8;
 /// Number of bootstrap resamples of an interval.
 const RESAMPLES: usize = 5000;
-/// Probability with which an interval covers the mean difference.
+/// Probability with which an interval covers the mean difference of held-out errors.
 const INTERVAL_LEVEL: f64 = 0.95;
 /// Seed of the bootstrap.
 const SEED: u64 = 1;
-/// Largest difference between two measured positions of one row \[mm\]: tables state 1e-6 mm.
-const SAME_POSITION: f64 = 1e-5;
+/// Distance below which two measured positions are those of one row \[mm\]. Tables state positions
+/// to 1e-6 mm.
+const MAX_SAME_DISTANCE: f64 = 1e-5;
 /// Maximum number of decimals of a value.
 const MAX_DECIMALS: usize = 6;
 
-/// Estimate with its errors, as one of two sides.
+/// One of the two results that are compared: estimate, errors and held-out rows.
 pub(crate) struct Side {
     pub estimate: SavedEstimate,
-    /// Names of errors with their values, for example `held out, mean_mm`.
+    /// Names of errors with their values in mm, ° or px, for example `held out, mean, mm`.
     pub errors: Vec<(String, f64)>,
-    /// Held-out rows of positions; empty if they are not known.
+    /// Held-out rows that measure positions; empty if no file with them was found.
     pub held_out: Vec<HeldOutRow>,
 }
 
-/// Held-out row of a measured position. Its file is not named, because problems in other folders
-/// name the same file by another path.
+/// Held-out row that measures a position. It does not name its file, because problems in other
+/// folders name the same file by another path.
 pub(crate) struct HeldOutRow {
     /// Line of the row in its table.
     pub line: String,
-    /// Configuration in words.
+    /// Configuration as text: the joint commands with commas between them.
     pub configuration: String,
     /// Measured position \[mm\].
     pub measured: Vector3<f64>,
@@ -53,24 +55,28 @@ pub(crate) struct HeldOutRow {
 }
 
 impl HeldOutRow {
-    /// Returns true if both are the same row of one table, read for two results.
+    /// Returns true if both are the same row of a table: same line, configuration and measured
+    /// position.
     fn is_same(&self, other: &Self) -> bool {
         self.line == other.line
             && self.configuration == other.configuration
-            && (self.measured - other.measured).norm() < SAME_POSITION
+            && (self.measured - other.measured).norm() < MAX_SAME_DISTANCE
     }
 }
 
-/// Parameter that both estimates have, in the unit of tables.
+/// Parameter that both estimates have.
 struct Difference {
+    /// Name and unit of the parameter.
     name: String,
+    /// Values of both estimates in that unit.
     values: [f64; 2],
-    /// Second value minus first one, and its standard error if both have one.
+    /// Second value minus first one, and the standard error of this change; `None` unless both
+    /// values have a standard error.
     change: (f64, Option<f64>),
 }
 
 impl Difference {
-    /// Returns the change in units of its standard error.
+    /// Returns the change in units of its standard error; `None` without one.
     fn sigmas(&self) -> Option<f64> {
         self.change.1.filter(|sigma| *sigma > 0.0).map(|sigma| self.change.0 / sigma)
     }
@@ -89,7 +95,8 @@ pub(crate) fn difference_page(sides: &[Side; 2]) -> String {
 fn blocks<'a>(sides: &[Side; 2]) -> Vec<Block<'a>> {
     let differences = differences(sides);
     let tested = differences.iter().filter(|of| of.sigmas().is_some()).count();
-    let limit = Normal::standard().inverse_cdf(1.0 - 0.5 * FALSE_ALARMS / tested.max(1) as f64);
+    let limit =
+        Normal::standard().inverse_cdf(1.0 - 0.5 * FALSE_ALARM_PROBABILITY / tested.max(1) as f64);
     let [a, b] = sides.each_ref().map(|side| &side.estimate);
     let files = [("A", a), ("B", b)].map(|(name, side)| format!("{name}: {}", side.file.display()));
     let mut blocks = vec![Block::Lines("Estimates side by side".to_owned(), files.to_vec())];
@@ -104,8 +111,8 @@ fn blocks<'a>(sides: &[Side; 2]) -> Vec<Block<'a>> {
         .iter()
         .map(|(name, _)| vec![name.clone(), error(&sides[0], name), error(&sides[1], name)]);
     blocks.push(Block::Table(Table::new(&["error", "A", "B"], rows.collect(), &[0])));
-    blocks.extend(paired(sides).map(Block::Text));
-    blocks.push(Block::figures([drawn(&differences, limit)]));
+    blocks.extend(held_out_sentence(sides).map(Block::Text));
+    blocks.push(Block::figures([draw(&differences, limit)]));
     let listed = &differences[..differences.len().min(MAX_LISTED)];
     blocks.push(Block::Words(vec![Block::Table(table(listed))]));
     if listed.len() < differences.len() {
@@ -120,29 +127,30 @@ fn blocks<'a>(sides: &[Side; 2]) -> Vec<Block<'a>> {
     blocks
 }
 
-/// Units that are shown with the prefix that suits the value.
-const STIFFNESSES: [Unit; 3] =
+/// Units of stiffnesses, which are shown with an SI prefix that suits the value.
+const STIFFNESS_UNITS: [Unit; 3] =
     [Unit::TorsionalStiffness, Unit::AxialRigidity, Unit::FlexuralRigidity];
 
-/// Returns the parameters that both estimates have, the largest difference first.
+/// Returns the parameters that both estimates have, the largest difference in standard errors
+/// first.
 fn differences([a, b]: &[Side; 2]) -> Vec<Difference> {
     let variance = |side: &Side, k: usize| side.estimate.posterior().covariance[(k, k)];
     let others: Vec<(&str, f64, Option<f64>)> = b.estimate.entries().collect();
     let of = |(k, (name, value, _)): (usize, (&str, f64, Option<f64>))| {
-        let place = others.iter().position(|entry| entry.0 == name)?;
+        let index = others.iter().position(|entry| entry.0 == name)?;
         let (factor, symbol) = match a.estimate.unit_of(name).unwrap_or_default() {
             "rad" => (1_f64.to_degrees(), "°"),
             "m" => (1e3, "mm"),
             symbol => (1.0, symbol),
         };
-        let magnitude = value.abs().max(others[place].1.abs());
-        let prefixed = STIFFNESSES.into_iter().find(|unit| unit.symbol() == symbol);
+        let magnitude = value.abs().max(others[index].1.abs());
+        let prefixed = STIFFNESS_UNITS.into_iter().find(|unit| unit.symbol() == symbol);
         let (factor, symbol) = prefixed.map_or((factor, symbol.to_owned()), |unit| {
             let display = unit.display(magnitude);
             (display.factor, display.symbol)
         });
-        let values = [value, others[place].1].map(|value| value * factor);
-        let sigma = (variance(a, k) + variance(b, place)).sqrt() * factor;
+        let values = [value, others[index].1].map(|value| value * factor);
+        let sigma = (variance(a, k) + variance(b, index)).sqrt() * factor;
         let sigma = Some(sigma).filter(|sigma| sigma.is_finite());
         Some(Difference {
             name: format!("{name} [{symbol}]"),
@@ -156,7 +164,8 @@ fn differences([a, b]: &[Side; 2]) -> Vec<Difference> {
     found
 }
 
-/// States whether the estimates differ by more than their errors.
+/// States whether the estimates differ by more than their standard errors allow. `tested` is the
+/// number of parameters with standard errors, `limit` the largest change \[standard errors\].
 fn verdict(differences: &[Difference], tested: usize, limit: f64) -> String {
     let beyond = differences
         .iter()
@@ -175,7 +184,7 @@ fn verdict(differences: &[Difference], tested: usize, limit: f64) -> String {
         "limit {} σ for {}, false alarms {} %",
         number(limit, 1),
         counted(tested, "parameter"),
-        number(100.0 * FALSE_ALARMS, 0)
+        number(100.0 * FALSE_ALARM_PROBABILITY, 0)
     );
     match beyond {
         0 => format!(
@@ -188,14 +197,15 @@ fn verdict(differences: &[Difference], tested: usize, limit: f64) -> String {
     }
 }
 
-/// Returns true if B predicts the rows that neither fitted better than A, beyond chance.
+/// Returns true if the second result predicts the common held-out rows significantly better than
+/// the first.
 pub fn predicts_better(sides: &[Side; 2]) -> bool {
     paired_change(sides).is_some_and(|(_, change)| change.high < 0.0)
 }
 
 /// Returns the number of held-out rows that both results predict, and the mean of error B − A
-/// \[mm\] with its interval over configurations; `None` if fewer than [`MIN_PAIRS`] configurations
-/// are common.
+/// \[mm\] with its interval over configurations; `None` if fewer than [`MIN_COMMON_CONFIGURATIONS`]
+/// configurations are common, or if both are one file.
 fn paired_change([a, b]: &[Side; 2]) -> Option<(f64, Interval)> {
     let mut of_lines: BTreeMap<&str, Vec<&HeldOutRow>> = BTreeMap::new();
     for row in &a.held_out {
@@ -209,15 +219,16 @@ fn paired_change([a, b]: &[Side; 2]) -> Option<(f64, Interval)> {
         *sum = (sum.0 + row.error - of_a.error, sum.1 + 1.0);
     }
     let changes: Vec<(f64, f64)> = of_configurations.into_values().collect();
-    if changes.len() < MIN_PAIRS || a.estimate.file == b.estimate.file {
+    if changes.len() < MIN_COMMON_CONFIGURATIONS || a.estimate.file == b.estimate.file {
         return None;
     }
     let rows = changes.iter().map(|(_, count)| count).sum::<f64>();
     Some((rows, mean_interval(&changes, RESAMPLES, INTERVAL_LEVEL, SEED)))
 }
 
-/// States the mean difference of the held-out errors of rows that both results predict.
-fn paired(sides: &[Side; 2]) -> Option<String> {
+/// States which result predicts the common held-out rows better, and the mean difference of their
+/// errors; `None` if there are too few of these rows.
+fn held_out_sentence(sides: &[Side; 2]) -> Option<String> {
     let (rows, Interval { value, low, high }) = paired_change(sides)?;
     let verdict = match (low > 0.0, high < 0.0) {
         (true, _) => "B predicts them worse",
@@ -231,7 +242,8 @@ fn paired(sides: &[Side; 2]) -> Option<String> {
     ))
 }
 
-/// Lists what limits the comparison.
+/// Lists what limits the comparison: different declarations, common rows, fits that are not
+/// trusted.
 fn notes([a, b]: [&SavedEstimate; 2]) -> Vec<String> {
     let mut notes = Vec::new();
     if let Some(part) = a.differing_part(b) {
@@ -272,7 +284,8 @@ fn table(differences: &[Difference]) -> Table {
     Table::of(differences, &columns)
 }
 
-fn drawn(differences: &[Difference], limit: f64) -> Option<Drawing> {
+/// Draws the change of each parameter in standard errors, with the limits of the test.
+fn draw(differences: &[Difference], limit: f64) -> Option<Drawing> {
     let row = |of: &Difference| Some((of.name.clone(), vec![Some((of.sigmas()?, 1.0))]));
     Forest {
         names: ("differences", "Differences of the two results"),

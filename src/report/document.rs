@@ -1,18 +1,18 @@
-//! Report as a list of blocks, which are rendered for terminals, as Markdown and as a page.
+//! Report as a list of blocks, which are rendered for terminals, as Markdown and as an HTML page.
 //!
 //! Texts mark code with [`code`]. Only the page shows figures and folded sections; [`Block::Page`]
-//! and [`Block::Words`] restrict blocks to one kind of output.
+//! and [`Block::Words`] restrict blocks to the page or to the other outputs.
 
 use std::path::Path;
 
 use super::figures::Drawing;
 use crate::results::PlotData;
 
-/// Marks before and after code in texts: control characters, which titles do not contain and
-/// terminals remove.
+/// Marks before and after code in texts. They are control characters, which titles do not contain,
+/// and which the text for terminals leaves out.
 pub(super) const CODE: (char, char) = ('\u{2}', '\u{3}');
 
-/// Block of a report.
+/// Part of a report: heading, paragraph, list, table or figures.
 #[derive(Debug, Clone)]
 pub(super) enum Block<'a> {
     /// Title of the blocks that follow.
@@ -21,24 +21,25 @@ pub(super) enum Block<'a> {
     Text(String),
     /// Paragraph with a warning.
     Note(String),
-    /// Lines with fixed line breaks, followed by list items.
+    /// Text with fixed line breaks, followed by list items.
     Lines(String, Vec<String>),
-    /// Bullet list with details.
+    /// Bullet list with details below each item.
     List(Vec<Point>),
-    /// List numbered from 1, with details.
+    /// List numbered from 1, with details below each item.
     Ranking(Vec<Point>),
     /// Table of texts and numbers.
     Table(Table),
-    /// Labelled lines to fill in by hand; on the page alone.
+    /// Labels of empty lines to fill in by hand; on the page alone.
     Blanks(Vec<&'static str>),
     /// Errors and facts at the top of the page; on the page alone.
     Headline(Headline),
     /// Figures side by side; on the page alone.
     Figures(Vec<Drawing>),
-    /// List of all drawn poses; on the page alone.
+    /// Section on individual poses: the arm, ranges of joints, the largest residuals; on the page
+    /// alone.
     Poses(&'a PlotData),
-    /// Section that the page shows on request: title, blocks, and the sentence that stands for them
-    /// in print; on the page alone.
+    /// Section that the page shows on request: title, blocks, and the sentence that replaces the
+    /// blocks in print; on the page alone.
     Folded(String, Vec<Block<'a>>, String),
     /// Blocks that only the page shows.
     Page(Vec<Block<'a>>),
@@ -46,7 +47,7 @@ pub(super) enum Block<'a> {
     Words(Vec<Block<'a>>),
 }
 
-/// Item of a list, with details below it.
+/// Item of a list: its text, and details below it.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct Point {
     pub text: String,
@@ -63,7 +64,7 @@ pub(super) enum Mark {
     Untested,
 }
 
-/// Table; numbers are aligned to the right, the columns in `left` to the left.
+/// Table of texts. Columns are aligned to the right, except those with the indices `left`.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct Table {
     pub header: Vec<&'static str>,
@@ -71,9 +72,9 @@ pub(super) struct Table {
     pub left: Vec<usize>,
     /// Notes that explain the table: below it on terminals, above it on the page.
     pub notes: Vec<String>,
-    /// Indices of columns that a narrow page omits.
+    /// Indices of columns that narrow pages and terminals omit.
     pub minor: Vec<usize>,
-    /// Last column of bars, on the page alone.
+    /// Header and bars of an additional last column, on the page alone.
     pub bars: Option<(&'static str, Vec<Bar>)>,
 }
 
@@ -91,36 +92,39 @@ impl<'a, T> Column<'a, T> {
         Self { name, is_left: false, is_minor: false, cell: Box::new(cell) }
     }
 
-    /// Creates a column of words, aligned to the left.
+    /// Creates a column of texts, aligned to the left.
     pub fn words(name: &'static str, cell: impl Fn(&T) -> String + 'a) -> Self {
         Self { is_left: true, ..Self::number(name, cell) }
     }
 
-    /// Marks the column as one that narrow pages omit.
+    /// Returns the column as one that narrow pages and terminals omit.
     pub fn minor(self) -> Self {
         Self { is_minor: true, ..self }
     }
 }
 
-/// Change of a parameter from nominal in units of its standard error, drawn as a bar.
+/// Change of a parameter from nominal, drawn as a bar in a table.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Bar {
+    /// Change in units of the standard error; `None` without a standard error.
     pub change: Option<f64>,
-    /// Active bound: 0 for the lower one, 1 for the upper one; `None` if none is active.
+    /// Position of the active bound: 0 for the lower one, at the left end of the bar, 1 for the
+    /// upper one; `None` if no bound is active.
     pub bound: Option<f64>,
 }
 
-/// Summary of the outcome with the errors of successive states of the arm.
+/// Summary at the top of a page: errors of successive states of the arm, and facts.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct Headline {
-    /// States of the arm in order, each with its error.
+    /// States of the arm in order, for example the nominal arm, each with its formatted error.
     pub states: Vec<(&'static str, String)>,
     /// Unit of the errors.
     pub unit: &'static str,
-    /// Description of the rows over which the headline's errors are averaged.
+    /// Description of the rows over which the errors are averaged.
     pub of: String,
+    /// Labels with their values.
     pub facts: Vec<(&'static str, String)>,
-    /// True if the errors are of a fit that is not to be trusted, so that the last is no gain.
+    /// True if the fit is not to be trusted, so that the last error is not emphasised.
     pub is_doubtful: bool,
 }
 
@@ -134,12 +138,12 @@ impl Block<'_> {
         Self::Figures(drawn.into_iter().flatten().collect())
     }
 
-    /// Creates a list of points without details.
+    /// Creates a bullet list of items without details.
     pub fn list(points: impl IntoIterator<Item = String>) -> Self {
         Self::List(points.into_iter().map(Point::from).collect())
     }
 
-    /// Creates lines without points.
+    /// Creates text with fixed line breaks, without list items.
     pub fn lines(words: impl Into<String>) -> Self {
         Self::Lines(words.into(), Vec::new())
     }
@@ -156,28 +160,29 @@ impl Table {
         Self { header: header.to_vec(), rows, left: left.to_vec(), ..Self::default() }
     }
 
-    /// Creates a table with a row for each item.
+    /// Creates a table with a row for each of `items`.
     pub fn of<'t, T: 't>(items: impl IntoIterator<Item = &'t T>, columns: &[Column<T>]) -> Self {
-        let places = |is: fn(&Column<T>) -> bool| {
+        let indices = |is: fn(&Column<T>) -> bool| {
             columns.iter().enumerate().filter(|(_, column)| is(column)).map(|(k, _)| k).collect()
         };
         let row = |item: &'t T| columns.iter().map(|column| (column.cell)(item)).collect();
         Self {
             header: columns.iter().map(|column| column.name).collect(),
             rows: items.into_iter().map(row).collect(),
-            left: places(|column| column.is_left),
-            minor: places(|column| column.is_minor),
+            left: indices(|column| column.is_left),
+            minor: indices(|column| column.is_minor),
             ..Self::default()
         }
     }
 
+    /// Returns the table with these notes instead of its own.
     pub fn noted(self, notes: &[&str]) -> Self {
         Self { notes: notes.iter().map(|&note| note.to_owned()).collect(), ..self }
     }
 }
 
-/// Creates the opening lines: on terminals below the title, on the page, whose heading is the
-/// title, without it.
+/// Creates the opening lines of a report. On terminals, they follow the title; on the page they
+/// stand alone, because its heading is the title.
 pub(super) fn opening<'a>(title: &str, words: impl Into<String>) -> [Block<'a>; 2] {
     let words = words.into();
     let titled = Block::lines(format!("{title}\n{words}"));
@@ -186,44 +191,44 @@ pub(super) fn opening<'a>(title: &str, words: impl Into<String>) -> [Block<'a>; 
     [Block::Words(vec![titled]), Block::Page(untitled)]
 }
 
-/// Returns the last two parts of a path, which tell files of one name apart.
+/// Returns the last two parts of a path, which usually distinguish files of the same name.
 pub(super) fn last_parts(file: &Path) -> String {
     let parts: Vec<_> = file.components().map(|part| part.as_os_str().to_string_lossy()).collect();
     let first = parts.len().saturating_sub(2);
     parts.get(first..).unwrap_or_default().join("/")
 }
 
-/// Encloses words in code marks.
+/// Marks a text as code.
 pub(super) fn code(words: &str) -> String {
     format!("{}{words}{}", CODE.0, CODE.1)
 }
 
-/// Returns the first `most` words, and a note with the number of omitted ones and the `file` that
-/// contains them.
+/// Returns the first `max` of some texts. If texts are omitted, adds a note with their number and
+/// the `file` that contains them.
 pub(super) fn first_of(
     words: impl IntoIterator<Item = String>,
-    most: usize,
+    max: usize,
     file: &str,
 ) -> Vec<String> {
-    let (mut shown, more) = some_of(words, most);
+    let (mut shown, more) = split_at_most(words, max);
     shown.extend((more > 0).then(|| format!("and {more} more in {file}")));
     shown
 }
 
-/// Joins the first `most` words by `between` and counts the others: "a, b and 3 more".
-pub(super) fn named(words: impl IntoIterator<Item = String>, most: usize, between: &str) -> String {
-    let (shown, more) = some_of(words, most);
+/// Joins the first `max` of some texts by `between` and counts the others: "a, b and 3 more".
+pub(super) fn joined(words: impl IntoIterator<Item = String>, max: usize, between: &str) -> String {
+    let (shown, more) = split_at_most(words, max);
     let more = if more > 0 { format!(" and {more} more") } else { String::new() };
     shown.join(between) + &more
 }
 
-/// Returns the first `most` words and the number of others.
-pub(super) fn some_of(
+/// Returns the first `max` of some texts, and the number of the others.
+pub(super) fn split_at_most(
     words: impl IntoIterator<Item = String>,
-    most: usize,
+    max: usize,
 ) -> (Vec<String>, usize) {
     let mut listed: Vec<String> = words.into_iter().collect();
-    let more = listed.len().saturating_sub(most);
-    listed.truncate(most);
+    let more = listed.len().saturating_sub(max);
+    listed.truncate(max);
     (listed, more)
 }

@@ -8,13 +8,13 @@ use crate::results::{MAX_LISTED_COEFFICIENTS, MAX_SHOWN_HARMONICS, ParameterValu
 
 /// Maximum number of decimals of a value.
 const MAX_DECIMALS: usize = 6;
-/// Smallest standard error that has two digits within [`MAX_DECIMALS`].
+/// Standard error below which [`MAX_DECIMALS`] decimals show less than two of its digits.
 const MIN_PLAIN_ERROR: f64 = 1e-5;
-/// Value below which a power of ten shows more digits than decimals do.
+/// Absolute value below which a value with such a standard error is written with a power of ten.
 const MAX_SMALL_VALUE: f64 = 1e-3;
 
-/// Lists the parameters of an effect with their values. For many harmonics, it lists the amplitudes
-/// of the largest.
+/// Lists the parameters of an effect with their values, one text each. Of many harmonics, only the
+/// largest amplitudes are listed.
 pub(super) fn values(effect: &Effect, parameters: &[ParameterValue]) -> Vec<String> {
     let line = |name: &str, parameter: &ParameterValue| format!("{name} = {}", value(parameter));
     let orders = effect.harmonic_orders().unwrap_or_default();
@@ -27,16 +27,16 @@ pub(super) fn values(effect: &Effect, parameters: &[ParameterValue]) -> Vec<Stri
         .zip(parameters.chunks_exact(2).map(ParameterValue::amplitude))
         .collect();
     waves.sort_by(|(_, a), (_, b)| b.estimate.total_cmp(&a.estimate));
-    let highest = waves
+    let largest = waves
         .iter()
         .take(MAX_SHOWN_HARMONICS)
         .map(|(order, wave)| line(&format!("amplitude of order {order}"), wave));
-    let lower = waves.len().saturating_sub(MAX_SHOWN_HARMONICS);
-    highest.chain((lower > 0).then(|| format!("{lower} smaller ones in loop.json"))).collect()
+    let smaller = waves.len().saturating_sub(MAX_SHOWN_HARMONICS);
+    largest.chain((smaller > 0).then(|| format!("{smaller} smaller ones in loop.json"))).collect()
 }
 
-/// Returns a value with its standard error in a convenient unit: `4.12 ± 0.05 µrad/(m·K)`. Small
-/// values whose error has less than two digits within [`MAX_DECIMALS`] are written with a power of
+/// Formats a value ± its standard error in a convenient unit: `4.12 ± 0.05 µrad/(m·K)`. A small
+/// value whose error has less than two digits within [`MAX_DECIMALS`] is written with a power of
 /// ten: `(9.82 ± 0.31)·10⁻⁶ °`.
 fn value(parameter: &ParameterValue) -> String {
     let unit = parameter.unit.display(parameter.estimate);
@@ -55,8 +55,8 @@ fn value(parameter: &ParameterValue) -> String {
     format!("{} ± {} {}", number(scaled, digits), number(error, digits), unit.symbol)
 }
 
-/// Returns true if an effect acts at a moving joint or at no joint. Fixed joints, such as the flange
-/// of a standard DH table, are left out of lists of effects that nothing shows.
+/// Returns true if an effect acts at a moving joint or at no joint. Lists of effects that the data
+/// cannot show leave out those at fixed joints, such as the flange of a standard DH table.
 pub(super) fn is_at_moving_joint(problem: &Problem, effect: &Effect) -> bool {
     let index = effect.joint().and_then(|number| number.checked_sub(1));
     index
@@ -73,7 +73,7 @@ pub(super) fn reasons<'a>(effects: impl IntoIterator<Item = (Effect, &'a str)>) 
         .collect()
 }
 
-/// Returns a line for each group of effects.
+/// Groups effects by family, and describes each group in one text.
 pub(super) fn listed<'a>(effects: impl IntoIterator<Item = &'a Effect>) -> Vec<String> {
     grouped(effects.into_iter().map(|effect| (effect.clone(), ())))
         .into_iter()
@@ -97,11 +97,12 @@ fn grouped<R: Copy + PartialEq>(
             None => groups.push((vec![effect], reason)),
         }
     }
-    groups.into_iter().map(|(members, reason)| (group(&members), reason)).collect()
+    groups.into_iter().map(|(members, reason)| (describe_group(&members), reason)).collect()
 }
 
-/// Describes effects that differ in time constants or distances by their places alone.
-fn of_places(members: &[Effect]) -> String {
+/// Describes effects of one family that differ in time constants or distances by their places
+/// alone.
+fn describe_places(members: &[Effect]) -> String {
     let mut places: Vec<String> = Vec::new();
     for place in members
         .iter()
@@ -123,13 +124,14 @@ fn of_places(members: &[Effect]) -> String {
     )
 }
 
-fn group(members: &[Effect]) -> String {
+/// Describes effects of one family: name, places, and orders or numbers of trial values.
+fn describe_group(members: &[Effect]) -> String {
     let name = members[0].name();
     match (members[0].searched_value(), members.len()) {
         (Some((ArgumentKind::Time, _)), 2..) => {
             return format!("{} at {} times", code(name), members.len());
         }
-        (_, 2..) if members[0].has_memory() => return of_places(members),
+        (_, 2..) if members[0].has_memory() => return describe_places(members),
         (Some((ArgumentKind::Duration, _)), 2..) => {
             return format!("{} of {} time constants", code(name), members.len());
         }
@@ -161,7 +163,7 @@ fn group(members: &[Effect]) -> String {
     format!("{} {of}{places}{orders}", code(name))
 }
 
-/// Lists increasing numbers, with three or more successive ones as a range: "1, 3–6, 8–60".
+/// Lists increasing numbers; three or more successive ones become a range: "1, 3–6, 8–60".
 fn ranges(numbers: &[u32]) -> String {
     let run = |run: &[u32]| match run {
         [first, _, .., last] if run.len() > 2 => format!("{first}–{last}"),

@@ -1,4 +1,5 @@
-//! Errors in words: kinds of rows, their units and counts, and poses without an equilibrium.
+//! Errors in words: labels and units by kind of rows, counts of rows, and poses without an
+//! equilibrium.
 
 use crate::fit::{ErrorSummary, Errors, Identification};
 use crate::observation::kind_named;
@@ -7,36 +8,39 @@ use crate::quantity::format::{about_three_digits, counted, number};
 use crate::results::measured_kinds;
 
 /// Returns the table header for errors of a kind of rows, with the unit.
-pub(super) fn measure(of: &ErrorSummary) -> &'static str {
+pub(super) fn error_label(of: &ErrorSummary) -> &'static str {
     kind_named(of.kind).error_label
 }
 
-/// Formats an error with four decimals, in the unit of its kind (mm or °).
-pub(super) fn shown(of: &ErrorSummary, value: f64) -> String {
+/// Formats an error \[m\], \[rad\] or \[px\] with four decimals, in the unit of its kind of rows
+/// (mm, ° or px).
+pub(super) fn format_error(of: &ErrorSummary, value: f64) -> String {
     number(of.in_unit(value), 4)
 }
 
-/// Returns the number of axes along which errors of a kind of rows are listed.
-pub(super) fn axes(of: &ErrorSummary) -> usize {
+/// Returns the number of axes along which errors of a kind of rows are listed; 0 for a kind with a
+/// single number.
+pub(super) fn axis_count(of: &ErrorSummary) -> usize {
     Some(kind_named(of.kind).numbers).filter(|numbers| *numbers > 1).unwrap_or(0)
 }
 
-/// Formats an error with four decimals and its unit.
+/// Formats an error \[m\], \[rad\] or \[px\] with four decimals and its unit.
 pub(super) fn with_unit(of: &ErrorSummary, value: f64) -> String {
-    format!("{} {}", shown(of, value), unit(of))
+    format!("{} {}", format_error(of, value), unit(of))
 }
 
-/// Formats an error with about three significant digits, in the unit of its kind (mm or °).
+/// Formats an error \[m\], \[rad\] or \[px\] with about three significant digits, in the unit of
+/// its kind of rows (mm, ° or px).
 pub(super) fn brief(of: &ErrorSummary, value: f64) -> String {
     about_three_digits(of.in_unit(value))
 }
 
-/// Returns the unit in which errors of a kind of rows are shown.
+/// Returns the unit in which errors of a kind of rows are shown: mm, ° or px.
 pub(super) fn unit(of: &ErrorSummary) -> &'static str {
     of.unit().in_tables().symbol
 }
 
-/// Returns the header for the unit of the errors' kind: mm, ° or px.
+/// Returns one of three table headers, that for the unit of the errors: mm, ° or px.
 pub(super) fn header(of: &ErrorSummary, [mm, degrees, px]: [&'static str; 3]) -> &'static str {
     match of.unit() {
         Unit::Angle => degrees,
@@ -45,13 +49,13 @@ pub(super) fn header(of: &ErrorSummary, [mm, degrees, px]: [&'static str; 3]) ->
     }
 }
 
-/// Formats mean, rms and largest error.
-pub(super) fn sizes(of: &ErrorSummary) -> [String; 3] {
-    [of.mean.norm, of.rms.norm, of.max.norm].map(|value| shown(of, value))
+/// Formats the mean, rms and largest error length.
+pub(super) fn mean_rms_max(of: &ErrorSummary) -> [String; 3] {
+    [of.mean.norm, of.rms.norm, of.max.norm].map(|value| format_error(of, value))
 }
 
-/// Counts the rows of each kind in one part of the data: "50 poses", "71 contacts with points, 47
-/// distances". Known distances between points do not count.
+/// States the number of rows of each kind in one part of the data: "50 poses", "71 contacts with
+/// points, 47 distances". Known distances between points are left out.
 pub(super) fn rows_of(found: &Identification, part: fn(&Errors) -> ErrorSummary) -> String {
     let parts: Vec<String> = measured_kinds(found, part)
         .filter(|of| of.n > 0)
@@ -60,7 +64,7 @@ pub(super) fn rows_of(found: &Identification, part: fn(&Errors) -> ErrorSummary)
     if parts.is_empty() { counted_rows(found, &part(&found.fitted), "") } else { parts.join(", ") }
 }
 
-/// Counts both parts of the data: "50 poses to identify, 20 held out".
+/// States the number of rows in both parts of the data: "50 poses to identify, 20 held out".
 pub(super) fn both_parts(found: &Identification) -> String {
     if found.fitted.is_left_out {
         let rows = rows_of(found, |errors| errors.identification);
@@ -74,19 +78,19 @@ pub(super) fn both_parts(found: &Identification) -> String {
     format!("{} to identify, {held_out} held out", rows_of(found, |errors| errors.identification))
 }
 
-/// Returns "held out", or "left out" if no row is held out and configurations are left out of the
-/// fit in turn.
-pub(super) fn judging(errors: &Errors) -> &'static str {
+/// Returns the word for the rows that test the fit: "held out", or "left out" if no row is held out
+/// and configurations are left out of the fit in turn.
+pub(super) fn test_rows_word(errors: &Errors) -> &'static str {
     if errors.is_left_out { "left out" } else { "held out" }
 }
 
-/// Counts the held-out rows of the leading kind: "50 held-out poses".
+/// States the number of held-out (or left-out) rows of the leading kind: "50 held-out poses".
 pub(super) fn held_out_rows(found: &Identification) -> String {
     let adjective = if found.fitted.is_left_out { "left-out " } else { "held-out " };
     counted_rows(found, &found.fitted.held_out, adjective)
 }
 
-/// Counts rows of a kind; `adjective` precedes the noun and ends in a space.
+/// States the number of rows of a kind; `adjective` precedes the noun and ends in a space.
 fn counted_rows(found: &Identification, of: &ErrorSummary, adjective: &str) -> String {
     let (one, many) = match kind_named(of.kind).row {
         words if words.0 != "pose" => words,
@@ -97,14 +101,14 @@ fn counted_rows(found: &Identification, of: &ErrorSummary, adjective: &str) -> S
     format!("{} {adjective}{}", of.n, if of.n == 1 { one } else { many })
 }
 
-/// Returns the noun for one row of the data.
-pub(super) fn noun(found: &Identification) -> &'static str {
+/// Returns the noun for one row of the data: "pose" if all rows measure positions, else "row".
+pub(super) fn row_noun(found: &Identification) -> &'static str {
     let positions = found.kinds.is_empty() && found.fitted.identification.kind == "position";
     if positions { "pose" } else { "row" }
 }
 
-/// Names for each arm the poses without an equilibrium, because of which its mean errors do not
-/// exist; `None` if there are none.
+/// States for each arm how many poses have no equilibrium, because of which it has no mean errors.
+/// Also says if errors overflow. `None` if all errors are finite.
 pub(super) fn unpredicted(arms: &[(&str, &Errors)]) -> Option<String> {
     let mut parts = Vec::new();
     for (arm, errors) in arms {
@@ -126,7 +130,7 @@ pub(super) fn unpredicted(arms: &[(&str, &Errors)]) -> Option<String> {
     }
 }
 
-/// Counts the poses without an equilibrium: "3 of 50 held-out poses have no equilibrium".
+/// States the number of poses without an equilibrium: "3 of 50 held-out poses have no equilibrium".
 pub(super) fn without_equilibrium(of: &ErrorSummary, poses: &str) -> String {
     let have = if of.unpredicted == 1 { "has" } else { "have" };
     format!(

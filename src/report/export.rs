@@ -1,5 +1,5 @@
-//! Text of the command `export`: moved origins, errors, and the parts of the model that the file
-//! cannot represent.
+//! Text of the command `export`: moved origins, errors, and the parts of the model that the
+//! exported file cannot represent.
 
 use std::fmt::Write as _;
 
@@ -9,20 +9,23 @@ use crate::fit::{ErrorSummary, Estimate, Identification, rows_of_kind};
 use crate::quantity::format::{mm, number};
 use crate::results::{ExportResult, ExportedErrors, Origin, Summary};
 
-/// Ratio of mean errors above which another geometry counts as better than the exported one.
-const MIN_WORSE_RATIO: f64 = 1.1;
+/// Ratio of the mean error of one geometry to that of another, above which the other one is clearly
+/// better.
+const MAX_EQUAL_RATIO: f64 = 1.1;
 
-/// Options that export another rigid geometry than the identified one: the one nearest to the whole
-/// model, and the one fitted alone.
-const OPTIONS: [&str; 2] = ["--best-rigid", "--fitted-alone"];
+/// Options that export another rigid geometry than the identified one: that nearest to the whole
+/// model, and that fitted alone.
+const GEOMETRY_OPTIONS: [&str; 2] = ["--best-rigid", "--fitted-alone"];
 
-/// Statements on an export that its result does not hold.
+/// Facts about an export that its JSON result does not contain.
 #[derive(Debug, Default)]
 pub struct ExportRemarks {
-    /// Errors of the exported and the identified geometry relative to the whole model in poses of
-    /// the workspace, if the exported one approximates the whole model.
+    /// Differences between the whole model and the exported geometry, and between the whole model
+    /// and the identified geometry, in poses of the workspace; `None` unless `--best-rigid` was
+    /// given.
     pub workspace: Option<[ErrorSummary; 2]>,
-    /// Base and tool of a geometry that was fitted alone.
+    /// Values of base and tool of a geometry that was fitted alone, as texts; `None` unless
+    /// `--fitted-alone` was given.
     pub set_up: Option<Vec<String>>,
     /// Lines of an exported table, its header first; empty for other files.
     pub table: Vec<Vec<String>>,
@@ -41,18 +44,18 @@ impl ExportRemarks {
     }
 }
 
-/// Returns the option that exports a clearly better geometry than the exported one; the better of
-/// them, if there are two.
+/// Returns the option that would export a clearly better geometry than the exported one, the best
+/// if there are two; `None` if there is none.
 pub fn better_geometry(result: &ExportResult) -> Option<&'static str> {
     let errors = result.held_out.as_ref()?;
-    let alternatives = [&errors.best_rigid, &errors.fitted_alone].into_iter().zip(OPTIONS);
+    let alternatives = [&errors.best_rigid, &errors.fitted_alone].into_iter().zip(GEOMETRY_OPTIONS);
     let known =
         alternatives.filter_map(|(summary, option)| Some((mean(summary.as_ref()?), option)));
     let (least, option) = known.min_by(|a, b| a.0.total_cmp(&b.0))?;
-    (mean(&errors.rigid) > MIN_WORSE_RATIO * least).then_some(option)
+    (mean(&errors.rigid) > MAX_EQUAL_RATIO * least).then_some(option)
 }
 
-/// Returns the values of base and tool of a fit, a line for each.
+/// Returns the values of base and tool of a fit, one text for each parameter.
 fn set_up_values(found: &Identification) -> Vec<String> {
     let is_set_up = |estimate: &&Estimate| {
         ["base", "tool", "target"].iter().any(|owner| estimate.name.starts_with(owner))
@@ -69,7 +72,7 @@ fn set_up_values(found: &Identification) -> Vec<String> {
     found.estimates.iter().filter(is_set_up).map(line).collect()
 }
 
-/// Returns the mean length of the errors.
+/// Returns the mean length of the errors, in the unit of the summary.
 fn mean(summary: &Summary) -> f64 {
     summary.norms().0[0]
 }
@@ -78,7 +81,7 @@ fn mean(summary: &Summary) -> f64 {
 pub fn export_text(result: &ExportResult, remarks: &ExportRemarks) -> String {
     let mut blocks = Vec::new();
     if let Some(errors) = &result.held_out {
-        blocks.extend(compared(errors, better_geometry(result), remarks));
+        blocks.extend(comparison_blocks(errors, better_geometry(result), remarks));
     }
     blocks.extend(remarks.workspace.as_ref().map(|[exported, identified]| {
         let [mean, max] = [exported.mean.norm, exported.max.norm].map(|of| mm(of, 4));
@@ -115,9 +118,10 @@ pub fn export_text(result: &ExportResult, remarks: &ExportRemarks) -> String {
     text(&blocks)
 }
 
-/// Compares the errors of the exported geometry with those of the whole model and of the geometries
-/// that could be exported instead, the best first.
-fn compared<'a>(
+/// Compares the held-out errors of the exported geometry with those of the whole model and of the
+/// geometries that could be exported instead, the best first. `better` is the option that exports a
+/// clearly better geometry.
+fn comparison_blocks<'a>(
     errors: &ExportedErrors,
     better: Option<&'static str>,
     remarks: &ExportRemarks,
@@ -141,7 +145,7 @@ fn compared<'a>(
     geometries.extend(fitted_alone.as_ref().map(|errors| (alone, errors)));
     geometries.sort_by(|(_, a), (_, b)| mean(a).total_cmp(&mean(b)));
     let least = geometries.first().map_or(0.0, |(_, summary)| mean(summary));
-    let is_worse = mean(rigid) > MIN_WORSE_RATIO * least;
+    let is_worse = mean(rigid) > MAX_EQUAL_RATIO * least;
     let mut verdict = format!(
         "The exported geometry alone misses {} held-out {rows} by {} on average, the whole model by \
          {}.",
@@ -150,7 +154,7 @@ fn compared<'a>(
         size(whole)
     );
     let better_summary = match better {
-        Some(option) if option == OPTIONS[0] => best_rigid.as_ref(),
+        Some(option) if option == GEOMETRY_OPTIONS[0] => best_rigid.as_ref(),
         Some(_) => fitted_alone.as_ref(),
         None => None,
     };
@@ -167,7 +171,7 @@ fn compared<'a>(
     }
     let nearest_summary = best_rigid.as_ref().or_else(|| remarks.workspace.and(Some(rigid)));
     let is_surpassed =
-        |(nearest, alone): (&Summary, &Summary)| mean(nearest) > MIN_WORSE_RATIO * mean(alone);
+        |(nearest, alone): (&Summary, &Summary)| mean(nearest) > MAX_EQUAL_RATIO * mean(alone);
     if nearest_summary.zip(fitted_alone.as_ref()).is_some_and(is_surpassed) {
         verdict += " --best-rigid is worse here than a geometry fitted alone, because it approximates the whole model over the \
                     whole range of the joints (or --workspace-mm) with base and tool of the whole model; a fit alone adapts base and \

@@ -9,9 +9,9 @@ use crate::life::{Fleet, FleetArm, FleetParameter};
 use crate::quantity::format::{counted, number, or_dash, two_digits};
 
 /// Header of the table of parameters.
-const PARAMETERS: [&str; 5] = ["parameter", "mean", "± 1 σ", "spread", "data sheet"];
+const PARAMETER_HEADER: [&str; 5] = ["parameter", "mean", "± 1 σ", "spread", "data sheet"];
 /// Header of the table of arms.
-const ARMS: [&str; 4] = ["arm", "", "deviates most in", "sigmas"];
+const ARM_HEADER: [&str; 4] = ["arm", "", "deviates most in", "sigmas"];
 /// Maximum number of decimals of a deviation.
 const MAX_DECIMALS: usize = 5;
 
@@ -43,14 +43,14 @@ fn blocks<'a>(fleet: &Fleet) -> Vec<Block<'a>> {
     ];
     vec![
         Block::lines(head),
-        Block::figures([drawn_arms(fleet), drawn_parameters(fleet)]),
-        Block::Table(Table::new(&PARAMETERS, parameters, &[0]).noted(&notes)),
-        Block::Table(Table::new(&ARMS, arms, &[0, 1, 2])),
+        Block::figures([draw_arms(fleet), draw_parameters(fleet)]),
+        Block::Table(Table::new(&PARAMETER_HEADER, parameters, &[0]).noted(&notes)),
+        Block::Table(Table::new(&ARM_HEADER, arms, &[0, 1, 2])),
     ]
 }
 
-/// Draws the largest deviation of each arm from its siblings.
-fn drawn_arms(fleet: &Fleet) -> Option<Drawing> {
+/// Draws the largest deviation of each arm from the other arms.
+fn draw_arms(fleet: &Fleet) -> Option<Drawing> {
     let row = |arm: &FleetArm| {
         let (parameter, sigmas) = arm.most.as_ref()?;
         let value = Some((*sigmas, 0.0));
@@ -70,8 +70,8 @@ fn drawn_arms(fleet: &Fleet) -> Option<Drawing> {
     .drawing()
 }
 
-/// Draws mean and spread of each parameter beside the tolerance of the data sheet.
-fn drawn_parameters(fleet: &Fleet) -> Option<Drawing> {
+/// Draws mean and spread of each parameter in units of its declared σ.
+fn draw_parameters(fleet: &Fleet) -> Option<Drawing> {
     let row = |parameter: &FleetParameter| {
         let declared = parameter.declared.filter(|sigma| *sigma > 0.0)?;
         let within = Some((parameter.mean / declared, parameter.spread / declared));

@@ -1,4 +1,4 @@
-//! Expected standard errors in words, with the assumptions behind them.
+//! Expected standard errors in words, and the assumptions of forecasts.
 
 use super::document::Block;
 use crate::design::ExpectedParameter;
@@ -9,8 +9,8 @@ use crate::quantity::format::{counted, decimals, number, or_dash, two_digits};
 /// Maximum number of decimals of a value.
 const MAX_DECIMALS: usize = 6;
 
-/// Formats nominal value and some errors \[SI\] of a parameter in a convenient unit; returns the
-/// cells and the unit.
+/// Formats the nominal value and some standard errors \[SI\] of a parameter in a convenient unit.
+/// Returns the table cells (name, nominal value, errors) and the unit.
 pub(super) fn cells(expected: &ExpectedParameter, errors: &[Option<f64>]) -> (Vec<String>, String) {
     let unit = expected.unit.display(expected.nominal);
     let digits = errors
@@ -21,12 +21,12 @@ pub(super) fn cells(expected: &ExpectedParameter, errors: &[Option<f64>]) -> (Ve
         .unwrap_or(4)
         .min(4);
     let mut cells = vec![expected.name.clone(), number(expected.nominal * unit.factor, digits)];
-    cells.extend(errors.iter().map(|&error| size(error, &unit)));
+    cells.extend(errors.iter().map(|&error| format_size(error, &unit)));
     (cells, unit.symbol)
 }
 
-/// States the assumptions of forecasts: that all of `fitted` poses are fitted, and where the target
-/// is.
+/// States the assumptions of a forecast: that all of `fitted` poses are fitted, and that the target
+/// is at its default place. `None` if neither needs saying.
 pub(super) fn assumptions<'a>(
     problem: &Problem,
     expected: &[ExpectedParameter],
@@ -35,7 +35,7 @@ pub(super) fn assumptions<'a>(
     let mut points = Vec::new();
     if let Some(HeldOut::Fraction { fraction, .. }) = &problem.data.held_out
         && let Some(fitted) = fitted
-        && let Some(measured) = measured_for(problem, fitted)
+        && let Some(measured) = poses_to_measure(problem, fitted)
     {
         let share = 100.0 * fraction;
         points.push(format!(
@@ -58,16 +58,16 @@ pub(super) fn assumptions<'a>(
     (!points.is_empty()).then(|| Block::Lines("These figures assume:".to_owned(), points))
 }
 
-/// Returns the number of poses to measure so that `fitted` are fitted; `None` unless a fraction of
-/// the poses is held out.
-pub(super) fn measured_for(problem: &Problem, fitted: usize) -> Option<usize> {
+/// Returns the number of poses to measure so that `fitted` of them are fitted; `None` unless the
+/// problem holds a fraction of the poses out.
+pub(super) fn poses_to_measure(problem: &Problem, fitted: usize) -> Option<usize> {
     let Some(HeldOut::Fraction { fraction, .. }) = &problem.data.held_out else { return None };
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a count of poses")]
     let measured = (fitted as f64 / (1.0 - fraction) - 1e-9).ceil() as usize;
     Some(measured)
 }
 
-/// Formats a size \[SI\] with two significant digits.
-pub(super) fn size(value: Option<f64>, unit: &Display) -> String {
+/// Formats a size \[SI\] in `unit` with two significant digits; a dash for `None`.
+pub(super) fn format_size(value: Option<f64>, unit: &Display) -> String {
     or_dash(value, |value| two_digits(value * unit.factor, MAX_DECIMALS))
 }

@@ -1,23 +1,24 @@
-//! Effects that a loop found: each with its grounds, their status, and the rounds that found them.
+//! Effects that a loop found: list with the evidence for each, table of statuses, and rounds.
 
 use std::fmt::Write as _;
 
-use super::document::{Block, Column, Point, Table, some_of};
+use super::document::{Block, Column, Point, Table, split_at_most};
 use super::errors::header;
-use super::verdict::{alternative, stand_in, title};
+use super::verdict::{alternative, stand_in_sentence, title};
 use super::{effect, figures, trace};
 use crate::quantity::format::{number, or_dash, p_value};
 use crate::results::{FoundEffect, LoopResult, Step, Witness};
 use crate::select::ClosedLoop;
 
-/// Returns the heading of the list of effects: nothing is claimed after a fit that is not trusted.
+/// Returns the heading of the list of effects, which claims nothing after a fit that is not
+/// trusted.
 pub(super) fn found_heading(result: &LoopResult) -> &'static str {
     if result.trusted { "What was found" } else { "What the search added, and does not claim" }
 }
 
-/// Lists every effect of the extended problem with its status, at most `alternatives` alternatives
-/// each.
-pub(super) fn found<'a>(result: &LoopResult, alternatives: usize) -> Vec<Block<'a>> {
+/// Lists the effects that the loop added, each with its status and at most `alternatives`
+/// alternatives.
+pub(super) fn found_effects<'a>(result: &LoopResult, alternatives: usize) -> Vec<Block<'a>> {
     if result.effects.is_empty() {
         return Vec::new();
     }
@@ -37,9 +38,9 @@ pub(super) fn found<'a>(result: &LoopResult, alternatives: usize) -> Vec<Block<'
 }
 
 fn point(result: &LoopResult, found: &FoundEffect, alternatives: usize) -> Point {
-    let mut details: Vec<String> = stand_in(found).into_iter().collect();
+    let mut details: Vec<String> = stand_in_sentence(found).into_iter().collect();
     details.extend(effect::values(&found.effect.effect, &found.parameters));
-    details.extend(found.claims.as_ref().map(trace::claimed));
+    details.extend(found.claims.as_ref().map(trace::claims_text));
     details.extend(ranges_of_law(found));
     details.extend(found.resembles.as_ref().map(|cause| format!("hint: {cause}")));
     details.extend(found.stability.map(|share| {
@@ -68,14 +69,15 @@ fn point(result: &LoopResult, found: &FoundEffect, alternatives: usize) -> Point
     details.push(chance);
     if !found.alternatives.is_empty() {
         let others = found.alternatives.iter().map(alternative);
-        let (mut others, more) = some_of(others, alternatives);
+        let (mut others, more) = split_at_most(others, alternatives);
         others.extend((more > 0).then(|| format!("{more} more in loop.json")));
         details.push(format!("these data do not exclude: {}", others.join("; ")));
     }
     Point { text: title(found), details, mark: None }
 }
 
-/// States the ranges of the quantities of a law that the search composed; `None` for other effects.
+/// States the identification ranges of the quantities in a law that the search composed; `None` for
+/// other effects.
 fn ranges_of_law(found: &FoundEffect) -> Option<String> {
     let range = |(of, (low, high)): &(String, (f64, f64))| {
         format!("{of} from {} to {}", number(*low, 3), number(*high, 3))
@@ -88,7 +90,7 @@ fn witness(witness: &Witness) -> String {
     format!("{} by {}, which took no part in the fit", witness.says, witness.data)
 }
 
-/// Returns the rounds of fit, trace and refit with their errors.
+/// Returns the table and the figure of the rounds of the loop, with the errors after each.
 pub(super) fn rounds<'a>(closure: &'a ClosedLoop, result: &LoopResult) -> Vec<Block<'a>> {
     if result.steps.is_empty() {
         return Vec::new();
@@ -120,7 +122,8 @@ pub(super) fn rounds<'a>(closure: &'a ClosedLoop, result: &LoopResult) -> Vec<Bl
     ]
 }
 
-/// Returns the status of each effect with the evidence for it.
+/// Returns the table of the effects with their status and the evidence for each; `None` if no
+/// effect was found.
 pub(super) fn status_table<'a>(closure: &ClosedLoop, result: &LoopResult) -> Option<Block<'a>> {
     let share = |part: f64| format!("{} %", number(part * 100.0, 0));
     let law = |found: &FoundEffect| {

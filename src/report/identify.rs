@@ -1,12 +1,13 @@
-//! Texts of the command `identify`: full text for the terminal, and report on one fit.
+//! Texts of the command `identify`: full text (`--verbose`), and report on one fit.
 
 use super::document::{Block, Headline, Table};
 use super::errors::{
-    axes, brief, held_out_rows, judging, measure, rows_of, shown, unit, unpredicted,
+    axis_count, brief, error_label, format_error, held_out_rows, rows_of, test_rows_word, unit,
+    unpredicted,
 };
 use super::figures;
 use super::limits::{active_limits, alternation};
-use super::noise::{influential_rows, noise, outliers, size};
+use super::noise::{influential_rows, noise, outliers, residual_fact};
 use super::parameters::{
     against_priors, conditioning, correlations, more_unidentifiable, parameters, unidentifiable,
     weak,
@@ -23,7 +24,7 @@ use crate::quantity::format::{counted, mm, number};
 use crate::results::{PlotData, nominal_arm, rows_in};
 
 /// Name of the file with the complete result.
-const FILE: &str = "estimate.json";
+const RESULT_FILE: &str = "estimate.json";
 
 /// Returns the full result as text, ending in a line break.
 pub fn estimate_text(
@@ -45,9 +46,9 @@ pub fn estimate_text(
     blocks.extend(row_kind_tables(found));
     blocks.extend(orientation(found));
     blocks.extend(outliers(problem, found));
-    blocks.extend(parameters(problem, found, FILE));
+    blocks.extend(parameters(problem, found, RESULT_FILE));
     blocks.extend(limits(found));
-    blocks.extend(identifiability_blocks(found, FILE));
+    blocks.extend(identifiability_blocks(found, RESULT_FILE));
     text(&blocks)
 }
 
@@ -62,28 +63,30 @@ pub fn identification_report(
 
 fn blocks<'a>(problem: &Problem, found: &'a Identification, plots: &'a PlotData) -> Vec<Block<'a>> {
     let held_out = found.fitted.held_out;
-    let mut states =
-        vec![(BEFORE, mean(&found.registered.held_out)), ("identified", mean(&held_out))];
+    let mut states = vec![
+        (NOMINAL_ARM, mean_error(&found.registered.held_out)),
+        ("identified", mean_error(&held_out)),
+    ];
     let corrected = PredictionAccuracy::new(found, plots).and_then(|accuracy| accuracy.corrected);
-    states.extend(corrected.map(|errors| ("with the remainder", mean(&errors))));
+    states.extend(corrected.map(|errors| ("with the remainder", mean_error(&errors))));
     let head = Headline {
         states,
         unit: unit(&held_out),
         of: held_out_rows(found),
         facts: vec![
-            poses(found),
-            fitted_parameters(found),
+            row_counts_fact(found),
+            parameters_fact(found),
             (
                 if found.fitted.is_left_out { "Left out, after" } else { "Held out, after" },
-                spread(&corrected.unwrap_or(held_out)),
+                rms_and_largest(&corrected.unwrap_or(held_out)),
             ),
-            size("Residual against σ", found),
+            residual_fact("Residual against σ", found),
             ("Strategy", found.strategy.as_str().to_owned()),
             ("Solver", format!("{}, {} steps", found.solver.as_str(), found.iterations)),
         ],
         is_doubtful: !found.is_trusted(),
     };
-    let mut blocks = vec![Block::Headline(head), Block::Text(counts(found))];
+    let mut blocks = vec![Block::Headline(head), Block::Text(fit_sentence(found))];
     blocks.extend(fit_warnings(found, plots));
     blocks.push(Block::Table(errors_by_axis(found)));
     blocks.extend(orientation(found));
@@ -92,7 +95,7 @@ fn blocks<'a>(problem: &Problem, found: &'a Identification, plots: &'a PlotData)
     blocks.push(Block::figures([figures::errors(plots), figures::vectors(plots)]));
     blocks.push(Block::Poses(plots));
     blocks.extend(super::remainder::uncertainty(found, plots));
-    blocks.extend(fit_details(problem, found, plots, FILE));
+    blocks.extend(fit_details(problem, found, plots, RESULT_FILE));
     blocks
 }
 
@@ -104,25 +107,27 @@ pub fn why_not_trusted(found: &Identification) -> String {
     }
 }
 
-/// States in one line each the title, the `outcome`, which parameters were fitted to which rows, and
-/// how the fit ended.
+/// States, in one line each, the title, the `outcome`, the numbers of parameters and rows, and how
+/// the fit ended.
 pub(super) fn headline(problem: &Problem, found: &Identification, outcome: &str) -> String {
     let seconds = found.seconds;
-    format!("{}\n{outcome}\n{}, {seconds:.3} s", problem.title, fitted(found, "\n"))
+    format!("{}\n{outcome}\n{}, {seconds:.3} s", problem.title, describe_fit(found, "\n"))
 }
 
-/// States the number of fitted parameters and rows, strategy and solver, and how the fit ended.
-pub(super) fn counts(found: &Identification) -> String {
+/// States the numbers of fitted parameters and rows, strategy and solver, and how the fit ended,
+/// with a warning if the fit is not trusted.
+pub(super) fn fit_sentence(found: &Identification) -> String {
     let warning = if found.is_trusted() {
         String::new()
     } else {
         format!(" Warning: {}.", why_not_trusted(found))
     };
-    format!("{}.{warning}", fitted(found, "; "))
+    format!("{}.{warning}", describe_fit(found, "; "))
 }
 
-/// States counts, strategy and solver, then after `separator` how the fit ended.
-fn fitted(found: &Identification, separator: &str) -> String {
+/// States the numbers of parameters and rows, strategy and solver, then after `separator` how the
+/// fit ended.
+fn describe_fit(found: &Identification, separator: &str) -> String {
     let end = if found.termination.converged() {
         if separator == "\n" { "Converged in" } else { "converged in" }.to_owned()
     } else {
@@ -132,7 +137,7 @@ fn fitted(found: &Identification, separator: &str) -> String {
     format!(
         "{} from {}, {} held out; strategy {}, solver {}{reason}{separator}{end} {}",
         counted(found.unknowns.len(), "parameter"),
-        measured(found),
+        fitted_rows(found),
         if found.fitted.is_left_out {
             "none".to_owned()
         } else {
@@ -144,17 +149,17 @@ fn fitted(found: &Identification, separator: &str) -> String {
     )
 }
 
-/// Returns the warnings of the fit that the terminal shows, except the one that a fit is not
-/// trusted.
+/// Returns the warnings on the measurement files and on the fit that the terminal shows, except the
+/// one that a fit is not trusted; `None` if there are none.
 pub(super) fn fit_warnings<'a>(found: &Identification, plots: &PlotData) -> Option<Block<'a>> {
     let points: Vec<String> =
         plots.warnings.iter().map(ToString::to_string).chain(found.reasons_to_ask()).collect();
     (!points.is_empty()).then(|| Block::Lines("Warnings:".to_owned(), points))
 }
 
-/// States the number of fitted rows, and the number of different poses if one pose may have several
+/// States the number of fitted rows, and the number of different poses if some pose has several
 /// targets.
-fn measured(found: &Identification) -> String {
+fn fitted_rows(found: &Identification) -> String {
     let rows = rows_of(found, |errors| errors.identification);
     if found.several_targets {
         format!("{rows} in {}", counted(found.poses, "different pose"))
@@ -163,22 +168,27 @@ fn measured(found: &Identification) -> String {
     }
 }
 
+/// Returns the table of errors before and after the fit, along each axis and of the norm.
 pub(super) fn errors_by_axis(found: &Identification) -> Table {
     let row = |poses: &str, when: &str, of: &ErrorSummary| {
-        let axes = &[of.mean.x, of.mean.y, of.mean.z][..axes(of)];
+        let axes = &[of.mean.x, of.mean.y, of.mean.z][..axis_count(of)];
         let values = axes
             .iter()
             .chain([&of.mean.norm, &of.rms.norm, &of.max.norm])
-            .map(|value| shown(of, *value));
+            .map(|value| format_error(of, *value));
         [poses.to_owned(), when.to_owned()].into_iter().chain(values).collect::<Vec<String>>()
     };
     let rows = before_and_after((&found.registered, &found.fitted), row);
     let of = &found.fitted.held_out;
-    let sizes =
-        if axes(of) > 0 { ["mean norm", "rms norm", "max norm"] } else { ["mean", "rms", "max"] };
+    let sizes = if axis_count(of) > 0 {
+        ["mean norm", "rms norm", "max norm"]
+    } else {
+        ["mean", "rms", "max"]
+    };
     let header =
-        [&[measure(of), ""], &["mean |x|", "mean |y|", "mean |z|"][..axes(of)], &sizes].concat();
-    let minor = (2..2 + axes(of)).collect();
+        [&[error_label(of), ""], &["mean |x|", "mean |y|", "mean |z|"][..axis_count(of)], &sizes]
+            .concat();
+    let minor = (2..2 + axis_count(of)).collect();
     let mut table = Table { minor, ..Table::new(&header, rows, &[0, 1]) };
     table.notes.push(format!("before: {}", nominal_arm(found)));
     if found.fitted.is_left_out {
@@ -189,7 +199,8 @@ pub(super) fn errors_by_axis(found: &Identification) -> Table {
     table
 }
 
-/// Returns rows of errors before and after, on identification and held-out poses.
+/// Returns four table rows: errors of identification and of held-out rows, each `before` and
+/// `after` the fit.
 fn before_and_after(
     (before, after): (&Errors, &Errors),
     row: impl Fn(&str, &str, &ErrorSummary) -> Vec<String>,
@@ -197,12 +208,13 @@ fn before_and_after(
     vec![
         row("identification", "before", &before.identification),
         row("", "after", &after.identification),
-        row(judging(after), "before", &before.held_out),
+        row(test_rows_word(after), "before", &before.held_out),
         row("", "after", &after.held_out),
     ]
 }
 
-/// Returns errors of orientation before and after, if orientation is fitted.
+/// Returns the table of orientation errors before and after the fit; `None` if no orientation is
+/// fitted.
 fn orientation<'a>(found: &Identification) -> Option<Block<'a>> {
     let OrientationErrors { registered, fitted, .. } = found.orientation.as_ref()?;
     let row = |poses: &str, when: &str, of: &ErrorSummary| {
@@ -223,12 +235,14 @@ fn at_points(held_out: &ErrorSummary) -> Option<String> {
     ))
 }
 
-/// Names the poses without an equilibrium in an identification; `None` if there are none.
+/// States how many poses have no equilibrium, so that there are no mean errors; `None` if all
+/// errors are finite.
 pub(super) fn no_errors(found: &Identification) -> Option<String> {
     unpredicted(&[("the nominal arm", &found.registered), ("the arm as identified", &found.fitted)])
 }
 
-/// Returns the blocks on residual, parameters and identifiability; `file` contains what they omit.
+/// Returns the blocks on residual, parameters and identifiability. `file` names what contains the
+/// omitted entries.
 pub(super) fn fit_details<'a>(
     problem: &Problem,
     found: &'a Identification,
@@ -264,7 +278,8 @@ fn limits<'a>(found: &Identification) -> Vec<Block<'a>> {
     active_limits(found).into_iter().chain(alternation(found)).collect()
 }
 
-/// Returns the blocks on identifiability, with figures; `file` contains what they omit.
+/// Returns the blocks on identifiability, with figures. `file` names what contains the omitted
+/// entries.
 pub(super) fn identifiability_with_figures<'a>(
     found: &Identification,
     plots: &PlotData,
@@ -277,7 +292,8 @@ pub(super) fn identifiability_with_figures<'a>(
     blocks
 }
 
-/// Returns the blocks on identifiability without figures; `file` contains what they omit.
+/// Returns the blocks on identifiability without figures. `file` names what contains the omitted
+/// entries.
 fn identifiability_blocks<'a>(found: &Identification, file: &str) -> Vec<Block<'a>> {
     let mut blocks = vec![
         conditioning(found.identifiability(), found.unknowns.len(), found.coordinates),
@@ -306,15 +322,16 @@ pub fn joint_sources_text(sources: &JointSources) -> String {
     )
 }
 
-/// Name of the arm before identification, in a headline.
-pub(super) const BEFORE: &str = "nominal arm";
+/// Name of the registered nominal arm in a headline.
+pub(super) const NOMINAL_ARM: &str = "nominal arm";
 
 /// Formats the mean error for a headline.
-pub(super) fn mean(of: &ErrorSummary) -> String {
+pub(super) fn mean_error(of: &ErrorSummary) -> String {
     brief(of, of.mean.norm)
 }
 
-pub(super) fn poses(found: &Identification) -> (&'static str, String) {
+/// Returns the numbers of fitted and held-out rows as a fact of a headline.
+pub(super) fn row_counts_fact(found: &Identification) -> (&'static str, String) {
     let (fitted, held_out) =
         (rows_in(found, |errors| errors.identification), rows_in(found, |errors| errors.held_out));
     let what = match found.fitted.identification.kind {
@@ -326,14 +343,16 @@ pub(super) fn poses(found: &Identification) -> (&'static str, String) {
     (what, format!("{fitted} fitted, {held_out} held out"))
 }
 
-pub(super) fn fitted_parameters(found: &Identification) -> (&'static str, String) {
+/// Returns the number of fitted parameters and the rank as a fact of a headline.
+pub(super) fn parameters_fact(found: &Identification) -> (&'static str, String) {
     (
         "Parameters",
         format!("{} fitted, rank {}", found.unknowns.len(), found.identifiability().rank),
     )
 }
 
-pub(super) fn spread(errors: &ErrorSummary) -> String {
+/// Formats the rms and the largest error for a headline.
+pub(super) fn rms_and_largest(errors: &ErrorSummary) -> String {
     let [rms, max] = [errors.rms.norm, errors.max.norm]
         .map(|value| format!("{} {}", brief(errors, value), unit(errors)));
     format!("rms {rms}, largest {max}")

@@ -6,8 +6,8 @@ use std::path::Path;
 use super::shell::shell_word;
 use crate::urdf::{Chain, Description, HELD_OUT, SIGMA_MM};
 
-/// Returns a description of the problem in a folder that was made from a URDF, and the next steps;
-/// with `has_camera`, for a camera that sees a board.
+/// Describes the problem that was made from a URDF and written to `folder`, and the next steps. If
+/// `has_camera`, these are for a camera that sees a board.
 pub fn init_text(
     chain: &Chain,
     description: &Description,

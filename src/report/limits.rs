@@ -1,4 +1,5 @@
-//! Sentences of the command `identify` on active limits and on alternating stages.
+//! Sentences of the command `identify` on active limits and on the convergence of alternating
+//! stages.
 
 use super::document::Block;
 use crate::fit::{ActiveConstraint, Alternation, Estimate, Identification, ShadowPrice};
@@ -6,7 +7,7 @@ use crate::least_squares::solver::AtBound;
 use crate::quantity::Unit;
 use crate::quantity::format::{decimals, number, two_digits};
 
-/// Lists active bounds and constraints with their shadow prices, if there are any.
+/// Lists active bounds and constraints with their shadow prices; `None` if there are none.
 pub(super) fn active_limits<'a>(found: &Identification) -> Option<Block<'a>> {
     let line = |name: &str, price: ShadowPrice, unit: Unit| {
         let (fall, per) = price.in_mm(unit);
@@ -30,7 +31,8 @@ pub(super) fn active_limits<'a>(found: &Identification) -> Option<Block<'a>> {
     (!points.is_empty()).then_some(Block::Lines(words, points))
 }
 
-/// States the rate at which a sequential strategy converges without acceleration.
+/// States the number of sweeps of a sequential strategy, and the rate of convergence without
+/// acceleration; `None` for strategies without alternating stages.
 pub(super) fn alternation<'a>(found: &Identification) -> Option<Block<'a>> {
     let Alternation { sweeps, contraction } = found.alternation?;
     let slow = contraction.map_or_else(String::new, |rate| {

@@ -1,7 +1,8 @@
-//! Texts, pages and tables of results.
+//! Texts, Markdown reports and HTML pages of results.
 //!
-//! Each command has a file that converts its result to blocks (`document`). `render` shows blocks
-//! on terminals, as Markdown and as a page; `figures` draws the figures of pages.
+//! Each command has a file that converts its result to blocks (`document`). `render` renders blocks
+//! for terminals, as Markdown and as an HTML page ("page" for short); `figures` draws the figures
+//! of pages.
 
 mod acceptance;
 mod brief;

@@ -9,7 +9,7 @@ use crate::problem::Problem;
 use crate::quantity::format::{counted, number, or_dash};
 use crate::results::{CommandedJoint, commanded_joints};
 
-/// Formats a length in mm with three decimals.
+/// Formats a length, given in m, in mm with three decimals.
 fn mm(length: f64) -> String {
     number(length * 1e3, 3)
 }
@@ -19,7 +19,7 @@ pub fn next_text(problem: &Problem, options: &NextOptions, next: &NextPoses) -> 
     text(&blocks(problem, options, next))
 }
 
-/// Returns the page of a choice of poses, with the error expected after each of them.
+/// Returns the page of a choice of poses, with a figure of the error expected after each of them.
 pub(crate) fn next_page(problem: &Problem, options: &NextOptions, next: &NextPoses) -> String {
     page(&problem.title, "next poses", &blocks(problem, options, next))
 }
@@ -65,7 +65,7 @@ fn blocks<'a>(problem: &Problem, options: &NextOptions, next: &NextPoses) -> Vec
             effects.collect(),
         ));
     }
-    blocks.push(Block::figures([errors(options, next, percent)]));
+    blocks.push(Block::figures([draw_errors(options, next, percent)]));
     if !next.steps.is_empty() {
         blocks.push(Block::Table(steps(options, next, percent)));
         blocks.push(Block::Page(vec![
@@ -76,8 +76,9 @@ fn blocks<'a>(problem: &Problem, options: &NextOptions, next: &NextPoses) -> Vec
     blocks
 }
 
-/// Draws the error in the workspace against the number of further poses; `None` without one.
-fn errors(options: &NextOptions, next: &NextPoses, percent: &str) -> Option<Drawing> {
+/// Draws the error in the workspace against the number of chosen poses; `None` if the error is
+/// unknown.
+fn draw_errors(options: &NextOptions, next: &NextPoses, percent: &str) -> Option<Drawing> {
     let after: Vec<_> =
         std::iter::once(next.error).chain(next.steps.iter().map(|step| step.error)).collect();
     let curve = |name, colour, of: fn(&WorkspaceError) -> f64| {
@@ -111,7 +112,7 @@ fn errors(options: &NextOptions, next: &NextPoses, percent: &str) -> Option<Draw
     .drawing()
 }
 
-/// Returns the table of the commands of chosen poses.
+/// Returns the table of the joint commands of chosen poses.
 pub(super) fn commands(problem: &Problem, poses: &Measurements) -> Table {
     let joints = commanded_joints(problem);
     let rows = (0..poses.len()).map(|pose| {
@@ -127,7 +128,8 @@ pub(super) fn commands(problem: &Problem, poses: &Measurements) -> Table {
     Table::new(&["pose", "commands"], rows.collect(), &[1])
 }
 
-/// Returns the sentence that ends a series of measurements, or forecasts its end.
+/// States whether enough poses are measured, or after how many more there are expected to be
+/// enough.
 fn verdict(options: &NextOptions, next: &NextPoses) -> String {
     let tolerance = options.tolerance.map(mm);
     if !next.found.is_trusted() {
@@ -168,7 +170,8 @@ fn verdict(options: &NextOptions, next: &NextPoses) -> String {
     }
 }
 
-/// Returns the table of the chosen poses.
+/// Returns the table of the chosen poses with the error expected after each. `percent` is the level
+/// of the bound.
 fn steps(options: &NextOptions, next: &NextPoses, percent: &str) -> Table {
     let rows = next.steps.iter().enumerate().map(|(k, step)| {
         vec![

@@ -3,8 +3,8 @@
 
 use std::path::Path;
 
-use super::document::{Block, first_of, named};
-use super::errors::{brief, noun, unit, with_unit};
+use super::document::{Block, first_of, joined};
+use super::errors::{brief, row_noun, unit, with_unit};
 use crate::fit::{Identification, Noise, Outlier, TypicalScatter, size_of_kind};
 use crate::problem::Problem;
 use crate::quantity::format::{counted, decimals, mm, number};
@@ -15,7 +15,7 @@ const MAX_SHOWN_OUTLIERS: usize = 20;
 /// Maximum number of influential rows that a text names.
 const MAX_SHOWN_INFLUENTIAL: usize = 3;
 /// Name of the file that contains all outliers and influential rows.
-const FILE: &str = "estimate.json";
+const RESULT_FILE: &str = "estimate.json";
 
 /// States the size of the residual relative to the declared noise.
 pub(super) fn noise(problem: &Problem, found: &Identification) -> String {
@@ -36,8 +36,8 @@ pub(super) fn noise(problem: &Problem, found: &Identification) -> String {
         }
         ResidualSize::Contradicted(chi2) => format!(
             "Reduced χ² (χ²/ν) is {}; {}.\n{}",
-            short(chi2),
-            expected(found),
+            format_chi2(chi2),
+            expected_interval(found),
             other_sigma(problem, found)
         ),
         ResidualSize::Expected(chi2) => format!(
@@ -51,15 +51,15 @@ pub(super) fn noise(problem: &Problem, found: &Identification) -> String {
                 "Reduced χ² (χ²/ν) is {}; {}: the residual is {size} than the declared σ {what}.\n\
                  Standard errors assume the declared σ, because the data do not clearly contradict \
                  it.",
-                short(chi2),
-                expected(found),
+                format_chi2(chi2),
+                expected_interval(found),
             )
         }
     }
 }
 
-/// States the interval of χ²/ν that noise alone gives.
-pub(super) fn expected(found: &Identification) -> String {
+/// States the interval that contains χ²/ν with 99.9 % probability if only noise is left.
+pub(super) fn expected_interval(found: &Identification) -> String {
     match found.chance {
         Some((low, high)) => format!(
             "expected {} to {} (99.9 %) if only noise is left",
@@ -70,7 +70,8 @@ pub(super) fn expected(found: &Identification) -> String {
     }
 }
 
-/// States the σ that the fit assumed, if residuals and priors contradict the declared one.
+/// States the σ that the fit assumed because residuals and priors contradict the declared one, and
+/// the probable cause.
 fn other_sigma(problem: &Problem, found: &Identification) -> String {
     let errors = &found.fitted.identification;
     let sigma = problem.data.position_sigma.filter(|_| errors.kind == "position");
@@ -97,7 +98,7 @@ fn other_sigma(problem: &Problem, found: &Identification) -> String {
                 1 => "that stands out from the others",
                 _ => "that stand out from the others",
             };
-            let rows = counted(influential.rows.len(), noun(found));
+            let rows = counted(influential.rows.len(), row_noun(found));
             format!("mostly because of {rows} {cause}")
         }
         None => "so the declared σ is too small or the model lacks something".to_owned(),
@@ -109,12 +110,12 @@ fn other_sigma(problem: &Problem, found: &Identification) -> String {
 }
 
 /// Formats χ²/ν with two decimals, or with two significant digits if it is small.
-pub(super) fn short(chi2: f64) -> String {
+pub(super) fn format_chi2(chi2: f64) -> String {
     number(chi2, decimals(chi2, 6).clamp(2, 6))
 }
 
-/// Returns true if the declared σ explains the residual of all rows, or of the rows that are not
-/// influential. Outliers may then be called gross errors.
+/// Returns true if the declared σ explains the residual of the rows that are not influential, or of
+/// all rows if none is. Outliers may then be called gross errors.
 fn others_agree_with_sigma(found: &Identification) -> bool {
     match &found.influential_rows {
         Some(influential) => influential
@@ -125,7 +126,7 @@ fn others_agree_with_sigma(found: &Identification) -> bool {
     }
 }
 
-/// Lists the rows that stand out from the others, if there are any.
+/// Lists the rows whose residual is too large to be noise; `None` if there are none.
 pub(super) fn outliers<'a>(problem: &Problem, found: &Identification) -> Option<Block<'a>> {
     let treatment = if problem.robust.is_some() {
         "the robust loss limits their influence; flexcal loop looks for a cause"
@@ -146,13 +147,13 @@ pub(super) fn outliers<'a>(problem: &Problem, found: &Identification) -> Option<
             outlier.scatter.map_or_else(String::new, |scatter| scatter_size(outlier.kind, scatter))
         )
     };
-    let points = first_of(found.outliers.iter().map(point), MAX_SHOWN_OUTLIERS, FILE);
+    let points = first_of(found.outliers.iter().map(point), MAX_SHOWN_OUTLIERS, RESULT_FILE);
     let is_influential = |outlier: &Outlier| {
         found.influential_rows.as_ref().is_none_or(|influential| {
             influential.rows.iter().any(|influential| influential.row == outlier.row)
         })
     };
-    let noun = noun(found);
+    let noun = row_noun(found);
     let are_gross = others_agree_with_sigma(found) && found.outliers.iter().all(is_influential);
     let have = match (are_gross, n) {
         (true, 1) => "has a gross error".to_owned(),
@@ -182,7 +183,8 @@ fn scatter_size(kind: &str, scatter: TypicalScatter) -> String {
     format!(" ({}, from {source})", size_of_kind(kind, size, 3))
 }
 
-/// Names the influential rows and the size of the residual without them, if there are any.
+/// Names the influential rows and states the size of the residual without them; `None` if there are
+/// none.
 pub(super) fn influential_rows<'a>(found: &Identification) -> Option<Block<'a>> {
     let influential = found.influential_rows.as_ref()?;
     let row = |row: &Outlier| {
@@ -193,7 +195,7 @@ pub(super) fn influential_rows<'a>(found: &Identification) -> Option<Block<'a>> 
     let errors = &found.fitted.identification;
     let comparison = match (influential.reduced_chi2, found.reduced_chi2) {
         (Some(without), Some(with)) => {
-            format!("χ²/ν is {} instead of {}", short(without), short(with))
+            format!("χ²/ν is {} instead of {}", format_chi2(without), format_chi2(with))
         }
         _ => format!(
             "the scatter is {} instead of {}",
@@ -203,25 +205,26 @@ pub(super) fn influential_rows<'a>(found: &Identification) -> Option<Block<'a>> 
     };
     Some(Block::Text(format!(
         "{} {cause} most of the residual: {}. Without {them} {comparison}.",
-        counted(influential.rows.len(), noun(found)),
-        named(influential.rows.iter().map(row), MAX_SHOWN_INFLUENTIAL, ", ")
+        counted(influential.rows.len(), row_noun(found)),
+        joined(influential.rows.iter().map(row), MAX_SHOWN_INFLUENTIAL, ", ")
     )))
 }
 
-/// States in one line what to do about influential rows; `problem` is the problem's file.
+/// States in one line what to do about influential rows; `None` if there are none. `problem` is the
+/// path of the problem file.
 pub fn show_influential_rows(found: &Identification, problem: &Path) -> Option<String> {
     let rows = found.influential_rows.as_ref()?.rows.iter();
-    let rows = named(rows.map(|row| row.location.to_string()), MAX_SHOWN_INFLUENTIAL, ", ");
+    let rows = joined(rows.map(|row| row.location.to_string()), MAX_SHOWN_INFLUENTIAL, ", ");
     Some(format!(
         "check {rows}; a section [robust] in {} would limit the influence of such rows",
         problem.display()
     ))
 }
 
-/// Returns the size of the residual as an entry of a headline, with the label `term`.
-pub(super) fn size(term: &'static str, found: &Identification) -> (&'static str, String) {
+/// Returns the size of the residual as a fact of a headline, with the label `term`.
+pub(super) fn residual_fact(term: &'static str, found: &Identification) -> (&'static str, String) {
     let size = match (found.noise, found.reduced_chi2) {
-        (Noise::Declared, Some(chi2)) => format!("χ²/ν {}", short(chi2)),
+        (Noise::Declared, Some(chi2)) => format!("χ²/ν {}", format_chi2(chi2)),
         (Noise::Estimated(sigma), _) => {
             let of = &found.fitted.identification;
             format!("{} {} per coordinate", brief(of, sigma), unit(of))

@@ -1,4 +1,4 @@
-//! Tables 2 and 3 of \[Chen2021\] from any procedure.
+//! Results of any procedure in the form of tables 2 and 3 of \[Chen2021\].
 
 use super::document::Table;
 use crate::fit::{AxisValues, Comparison, ErrorSummary, Procedure, TableEntry};
@@ -13,7 +13,7 @@ const MIN_UNMARKED_SHARE: f64 = 0.9;
 /// Header of the parameters of a joint in table 2.
 const FIELDS: [&str; 5] = ["α °", "a mm", "θ °", "d mm", "β °"];
 
-/// Describes a procedure in words.
+/// Describes a procedure of the paper, or the joint fit, in words.
 pub(super) fn title(procedure: &Procedure) -> String {
     let Some((form, stage)) = procedure.paper else {
         return "Everything fitted at once (joint)".to_owned();
@@ -34,8 +34,8 @@ pub(super) fn title(procedure: &Procedure) -> String {
 /// Returns table 2: nominal value, identified value and change of each joint's geometry. Brackets
 /// mark values that the data determine only in combination with others.
 pub(super) fn table_2(procedure: &Procedure) -> Table {
-    let show = |place: usize, value: f64| {
-        if place.is_multiple_of(2) { number(value.to_degrees(), 3) } else { mm(value, 2) }
+    let show = |column: usize, value: f64| {
+        if column.is_multiple_of(2) { number(value.to_degrees(), 3) } else { mm(value, 2) }
     };
     let marked = |entry: &TableEntry, text: String| match entry.seen {
         Some(seen) if seen < MIN_UNMARKED_SHARE => format!("({text})"),
@@ -43,11 +43,11 @@ pub(super) fn table_2(procedure: &Procedure) -> Table {
     };
     let row = |(joint, entries): &(usize, [TableEntry; 5])| {
         let fields = || entries.iter().enumerate();
-        let nominal = fields().map(|(place, entry)| show(place, entry.nominal));
+        let nominal = fields().map(|(column, entry)| show(column, entry.nominal));
         let identified =
-            fields().map(|(place, entry)| marked(entry, show(place, entry.identified)));
-        let change = fields().map(|(place, entry)| {
-            let text = show(place, entry.identified - entry.nominal);
+            fields().map(|(column, entry)| marked(entry, show(column, entry.identified)));
+        let change = fields().map(|(column, entry)| {
+            let text = show(column, entry.identified - entry.nominal);
             or_dash(entry.seen, |_| marked(entry, text))
         });
         std::iter::once(joint.to_string()).chain(nominal).chain(identified).chain(change).collect()
@@ -78,19 +78,19 @@ pub(super) fn table_3(comparison: &Comparison, procedure: &Procedure) -> Table {
         ["paper: before", "with elasticity", "reduction, %", "ignoring it", "reduction, %"];
     header.extend(beside.then_some(published).into_iter().flatten());
     let mut rows = Vec::new();
-    for (kind, of, printed) in KINDS {
+    for (kind, of, printed) in STATISTICS {
         for (axis, name) in ["x", "y", "z", "norm"].into_iter().enumerate() {
-            let value = |summary: &ErrorSummary| on(of(summary), axis) * 1e3;
+            let value = |summary: &ErrorSummary| along(of(summary), axis) * 1e3;
             let mut row =
                 vec![if axis == 0 { kind.to_owned() } else { String::new() }, name.to_owned()];
-            row.extend(reduced(
+            row.extend(with_reductions(
                 value(&before),
                 [Some(value(&after)), ignoring.as_ref().map(value)],
             ));
             if beside {
                 let [before, with, without] = [&BEFORE, &WITH_ELASTICITY, &WITHOUT_ELASTICITY]
                     .map(|errors| printed(errors)[axis]);
-                row.extend(reduced(before, [Some(with), Some(without)]));
+                row.extend(with_reductions(before, [Some(with), Some(without)]));
             }
             rows.push(row);
         }
@@ -109,19 +109,23 @@ pub(super) fn table_3(comparison: &Comparison, procedure: &Procedure) -> Table {
     Table::new(&header, rows, &[0, 1]).noted(&notes)
 }
 
-/// Kind of error in table 3: its name, and functions that return computed and published values.
-type Kind = (&'static str, fn(&ErrorSummary) -> &AxisValues, fn(&Published) -> [f64; 4]);
-const KINDS: [Kind; 2] = [
+/// Statistic of the errors in table 3: its name, and functions that return the computed values
+/// \[m\] and the published values \[mm\] by axis.
+type Statistic = (&'static str, fn(&ErrorSummary) -> &AxisValues, fn(&Published) -> [f64; 4]);
+/// Statistics of the errors in table 3.
+const STATISTICS: [Statistic; 2] = [
     ("max", |errors| &errors.max, |errors| errors.max),
     ("mean", |errors| &errors.mean, |errors| errors.mean),
 ];
 
-fn on(values: &AxisValues, axis: usize) -> f64 {
+/// Returns the value along an axis (0 to 2 for x, y, z), or of the norm (3).
+fn along(values: &AxisValues, axis: usize) -> f64 {
     [values.x, values.y, values.z, values.norm][axis]
 }
 
-/// Formats a value before \[mm\], and each later value with its reduction in percent.
-fn reduced(before: f64, after: [Option<f64>; 2]) -> Vec<String> {
+/// Formats an error before identification \[mm\], and each error `after` it with its reduction in
+/// percent.
+fn with_reductions(before: f64, after: [Option<f64>; 2]) -> Vec<String> {
     let pair = |after: f64| [number(after, 4), number(100.0 * (1.0 - after / before), 2)];
     std::iter::once(number(before, 4)).chain(after.into_iter().flatten().flat_map(pair)).collect()
 }

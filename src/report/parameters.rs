@@ -1,4 +1,4 @@
-//! Parameters in words: their table, unidentifiable and weak combinations, correlations.
+//! Parameters in words: table of estimates, unidentifiable and weak combinations, correlations.
 
 use super::document::{Bar, Block, Table, first_of};
 use super::figures::{ACCENT, Drawing, Forest};
@@ -13,21 +13,21 @@ use crate::results::{Knowledge, ManyHarmonics};
 const DEFAULT_DECIMALS: usize = 4;
 /// Maximum number of decimals of a value.
 const MAX_DECIMALS: usize = 6;
-/// Smallest absolute weight at which a term of an unidentifiable combination is named.
-const MIN_WEIGHT: f64 = 0.02;
-/// Maximum number of terms of an unidentifiable combination that are named.
-const MAX_TERMS: usize = 8;
-/// Maximum number of combinations and of correlations that a text lists.
+/// Smallest absolute coefficient at which a parameter of a combination is named.
+const MIN_NAMED_COEFFICIENT: f64 = 0.02;
+/// Maximum number of parameters of a combination that are named.
+const MAX_NAMED_PARAMETERS: usize = 8;
+/// Maximum number of combinations, and of correlations, that a text lists.
 const MAX_LISTED: usize = 12;
 /// Header of the table of parameters.
 const HEADER: [&str; 7] =
     ["parameter", "nominal", "estimate", "change", "± 1 σ", "unit", "identified"];
 
-/// Row of the table of parameters with its bar.
+/// Cells of a row of the table of parameters, with its bar.
 type Line = (Vec<String>, Bar);
 
-/// Returns the table of all free parameters. If a joint has many harmonics, it shows the largest;
-/// the others are in `file`, and folded on the page.
+/// Returns the table of all free parameters. If a joint has many harmonics, the table shows the
+/// largest; the smaller ones are in a folded section of the page, and in `file`.
 pub(super) fn parameters<'a>(
     problem: &Problem,
     found: &Identification,
@@ -72,7 +72,7 @@ pub(super) fn parameters<'a>(
             .to_owned(),
     );
     notes.extend(rows_of_sheet(problem));
-    notes.extend(sizes(&found.prior_sizes));
+    notes.extend(suggested_prior_sigmas(&found.prior_sizes));
     let mut blocks = vec![Block::Table(Table { notes, ..table(shown) })];
     if count > 0 {
         let on_paper = format!("The smaller harmonics are left out on paper: they are in {file}.");
@@ -93,9 +93,9 @@ pub(super) fn rows_of_sheet(problem: &Problem) -> Option<String> {
     ))
 }
 
-/// States the prior widths that the estimated deviations suggest if they contradict the declared
-/// ones.
-fn sizes(sizes: &[PriorSize]) -> Option<String> {
+/// States the prior σ that the estimated deviations suggest where they contradict the declared one;
+/// `None` if they contradict none.
+fn suggested_prior_sigmas(sizes: &[PriorSize]) -> Option<String> {
     let rule = |size: &PriorSize| {
         let unit = size.unit.display(size.declared);
         let [found, declared] =
@@ -123,11 +123,11 @@ fn row(estimate: &Estimate) -> Vec<String> {
         show(estimate.estimate - estimate.nominal),
         or_dash(error, |error| number(error, digits)),
         unit.symbol,
-        identified(estimate),
+        format_identified(estimate),
     ]
 }
 
-/// Returns the change of a parameter in units of its standard error.
+/// Returns the bar of a parameter: its change in units of its standard error, and its active bound.
 fn bar(estimate: &Estimate) -> Bar {
     let error = estimate.std_error.filter(|error| *error > 0.0);
     Bar {
@@ -136,9 +136,9 @@ fn bar(estimate: &Estimate) -> Bar {
     }
 }
 
-/// Returns the identified share of a parameter in percent, with a word for how well it is
-/// identified.
-fn identified(estimate: &Estimate) -> String {
+/// Formats the identified share of a parameter in percent, with a word for how well the data
+/// determine it.
+fn format_identified(estimate: &Estimate) -> String {
     let share = format!("{:3.0} %", estimate.identified * 100.0);
     match Knowledge::of(estimate) {
         Knowledge::AtBound(AtBound::Lower) => "at its lower bound".to_owned(),
@@ -152,7 +152,8 @@ fn identified(estimate: &Estimate) -> String {
     }
 }
 
-/// Draws the estimates in units of their prior σ; `None` if no fitted parameter has a prior.
+/// Draws the change of each parameter from nominal in units of its prior σ; `None` if no fitted
+/// parameter has a prior.
 pub(super) fn against_priors(found: &Identification) -> Option<Drawing> {
     let row = |estimate: &Estimate| {
         let (prior, error) = (estimate.prior_sigma?, estimate.std_error?);
@@ -177,8 +178,8 @@ pub(super) fn against_priors(found: &Identification) -> Option<Drawing> {
     .drawing()
 }
 
-/// Lists the combinations of parameters that no measurement determines; `file` contains all of
-/// them.
+/// Lists the combinations of parameters that the measurements do not determine at the nominal arm.
+/// `file` names what contains all of them.
 pub(super) fn unidentifiable<'a>(
     found: &Identifiability,
     unknowns: &[String],
@@ -207,7 +208,8 @@ pub(super) fn unidentifiable<'a>(
     Block::Lines(words, points)
 }
 
-/// Lists the combinations that the data determine too weakly, if there are any.
+/// Lists the combinations that keep their start values because the data determine them too weakly;
+/// `None` if there are none.
 pub(super) fn weak<'a>(found: &Identification, file: &str) -> Option<Block<'a>> {
     let count = found.weak.len();
     let (noun, hold) =
@@ -226,7 +228,7 @@ pub(super) fn weak<'a>(found: &Identification, file: &str) -> Option<Block<'a>> 
     (count > 0).then_some(Block::Lines(words, points))
 }
 
-/// Lists on the page the combinations that [`unidentifiable`] omits.
+/// Lists on the page the combinations that [`unidentifiable`] omits; `None` if it omits none.
 pub(super) fn more_unidentifiable<'a>(found: &Identification, file: &str) -> Option<Block<'a>> {
     let unidentifiable = found.identifiability().unidentifiable.iter().skip(MAX_LISTED);
     let words: Vec<String> =
@@ -238,30 +240,35 @@ pub(super) fn more_unidentifiable<'a>(found: &Identification, file: &str) -> Opt
     })
 }
 
+/// Formats a combination as a sum of parameters with their coefficients, the largest first.
 fn combination_words(combination: &UnidentifiableCombination, unknowns: &[String]) -> String {
     let name = |k: usize| unknowns[k].as_str();
     if let [(k, _)] = combination.weights[..] {
         return format!("{} alone", name(k));
     }
-    let mut named: Vec<&(usize, f64)> =
-        combination.weights.iter().filter(|(_, weight)| weight.abs() > MIN_WEIGHT).collect();
+    let mut named: Vec<&(usize, f64)> = combination
+        .weights
+        .iter()
+        .filter(|(_, weight)| weight.abs() > MIN_NAMED_COEFFICIENT)
+        .collect();
     // The rounding of equal weights differs between machines: sort by the shown digits.
     let shown = |weight: f64| (weight.abs() * 100.0).round();
     named.sort_by(|a, b| shown(b.1).total_cmp(&shown(a.1)).then(a.0.cmp(&b.0)));
     let mut terms: Vec<String> = named
         .iter()
-        .take(MAX_TERMS)
+        .take(MAX_NAMED_PARAMETERS)
         .map(|(k, weight)| {
             format!("{} {:.2} {}", if *weight < 0.0 { '−' } else { '+' }, weight.abs(), name(*k))
         })
         .collect();
-    if named.len() > MAX_TERMS {
-        terms.push(format!("… and {} smaller", named.len() - MAX_TERMS));
+    if named.len() > MAX_NAMED_PARAMETERS {
+        terms.push(format!("… and {} smaller", named.len() - MAX_NAMED_PARAMETERS));
     }
     terms.join(" ")
 }
 
-/// Returns pairs of correlated parameters, without pairs within one unidentifiable combination.
+/// Returns pairs of strongly correlated parameters with their correlation, except pairs within one
+/// unidentifiable combination.
 pub(super) fn correlated(found: &Identification) -> Vec<(String, String, f64)> {
     let tied = |a: &str, b: &str| {
         let holds = |combination: &UnidentifiableCombination, name: &str| {
@@ -273,7 +280,7 @@ pub(super) fn correlated(found: &Identification) -> Vec<(String, String, f64)> {
     found.strong_correlations().into_iter().filter(|(a, b, _)| !tied(a, b)).collect()
 }
 
-/// Lists pairs of correlated parameters; `file` contains all of them.
+/// Lists pairs of strongly correlated parameters. `file` names what contains all of them.
 pub(super) fn correlations<'a>(found: &Identification, file: &str) -> Block<'a> {
     let pairs = correlated(found).into_iter().map(|(a, b, correlation)| {
         let sign = if correlation < 0.0 { '−' } else { '+' };
@@ -292,7 +299,7 @@ pub(super) fn correlations<'a>(found: &Identification, file: &str) -> Block<'a> 
     Block::Lines(words.to_owned(), points)
 }
 
-/// States rank, condition number and observability indices in one line.
+/// States rank, condition number and observability indices at the nominal arm in one line.
 pub(super) fn conditioning<'a>(
     found: &Identifiability,
     unknowns: usize,

@@ -12,8 +12,9 @@ use crate::design::{Criterion, PairSeparation, Plan};
 use crate::problem::Problem;
 use crate::quantity::format::{counted, number, or_dash};
 
-/// States whether the poses determine everything that such poses can determine.
-fn enough<'a>(plan: &Plan) -> Block<'a> {
+/// States whether the planned poses determine all combinations of parameters that such poses can
+/// determine.
+fn sufficiency<'a>(plan: &Plan) -> Block<'a> {
     let Plan { attainable_rank, least_poses, .. } = *plan;
     let (rank, poses) = (plan.planned.identifiability.rank, plan.poses.len());
     let at_least = if least_poses > poses {
@@ -37,8 +38,8 @@ fn enough<'a>(plan: &Plan) -> Block<'a> {
     ))
 }
 
-/// Returns the plan as text, ending in a line break; `separated` is given if it distinguishes two
-/// effects.
+/// Returns the plan as text, ending in a line break; `separated` is given if the plan is to
+/// distinguish two effects.
 pub fn plan_text(
     problem: &Problem,
     criterion: &Criterion,
@@ -48,7 +49,7 @@ pub fn plan_text(
     text(&blocks(problem, criterion, plan, separated))
 }
 
-/// Returns the plan as a page, with the gain over random poses.
+/// Returns the plan as a page, with a figure of the gain over random poses.
 pub(crate) fn plan_page(
     problem: &Problem,
     criterion: &Criterion,
@@ -101,12 +102,12 @@ fn blocks<'a>(
         counted(plan.starts.len(), "start"),
     );
     let mut blocks = opening(&problem.title, counts).to_vec();
-    blocks.push(enough(plan));
+    blocks.push(sufficiency(plan));
     blocks.extend(gain);
     blocks.extend(at_limits(problem, plan).map(Block::Text));
     let notes: Vec<String> = [note].into_iter().chain(rows_of_sheet(problem)).collect();
     blocks.push(Block::Table(Table { notes, ..Table::new(&header, rows.collect(), &[0, 6]) }));
-    blocks.push(Block::figures([gains(plan)]));
+    blocks.push(Block::figures([draw_gains(plan)]));
     blocks.push(Block::Page(vec![conditioning(
         &planned.identifiability,
         names.len(),
@@ -158,8 +159,9 @@ fn at_limits(problem: &Problem, plan: &Plan) -> Option<String> {
     })
 }
 
-/// Draws the standard error of each parameter after random poses over that after planned ones.
-fn gains(plan: &Plan) -> Option<Drawing> {
+/// Draws the gain of each parameter: its standard error after random poses divided by that after
+/// the planned poses.
+fn draw_gains(plan: &Plan) -> Option<Drawing> {
     let rows = plan.planned.expected.iter().enumerate().filter_map(|(k, expected)| {
         let gain = plan.random_error(k)? / expected.std_error?;
         gain.is_finite().then(|| (expected.name.clone(), vec![Some((gain, 0.0))]))

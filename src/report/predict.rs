@@ -3,18 +3,18 @@
 use std::fmt::Write as _;
 
 use super::document::{Block, Table, opening};
-use super::errors::{measure, sizes};
+use super::errors::{error_label, mean_rms_max};
 use super::figures::{ACCENT, Curve, Drawing, INK, Series, WARM};
-use super::remainder::bounded;
+use super::remainder::bound_sentence;
 use super::render::{page, text};
-use super::row_kinds::unsteady;
+use super::row_kinds::unsteady_points;
 use crate::fit::{ErrorSummary, Prediction};
 use crate::problem::Problem;
 use crate::quantity::format::{counted, mm};
 use crate::remainder::Bounds;
 
-/// Returns the predictions as text; `arm` describes the arm that was used, and `fitted` lists the
-/// rows to which it was fitted.
+/// Returns the predictions as text. `arm` describes the arm that was used, and `fitted` lists the
+/// predicted rows (from 0, ascending) to which that arm was fitted.
 pub fn prediction_text(
     problem: &Problem,
     arm: &str,
@@ -24,7 +24,7 @@ pub fn prediction_text(
     text(&blocks(problem, arm, prediction, (bounds, fitted)))
 }
 
-/// Returns the predictions as a page, with the errors of measured rows.
+/// Returns the predictions as a page, with a figure of the errors of measured rows.
 pub(crate) fn prediction_page(
     problem: &Problem,
     arm: &str,
@@ -56,49 +56,49 @@ fn blocks<'a>(
     }
     if let Some(errors) = &prediction.errors {
         let row = |name: &str, of: &ErrorSummary| {
-            [vec![name.to_owned(), of.n.to_string()], sizes(of).to_vec()].concat()
+            [vec![name.to_owned(), of.n.to_string()], mean_rms_max(of).to_vec()].concat()
         };
         let named = |(name, errors_of): &(String, ErrorSummary)| {
             let kind = if errors_of.kind == errors.all.kind {
                 String::new()
             } else {
-                format!(": {}", measure(errors_of))
+                format!(": {}", error_label(errors_of))
             };
             row(&format!("session {name}{kind}"), errors_of)
         };
         let mut rows = vec![row("all rows", &errors.all)];
         rows.extend(
-            errors.kinds.iter().skip(1).map(|errors_of| row(measure(errors_of), errors_of)),
+            errors.kinds.iter().skip(1).map(|errors_of| row(error_label(errors_of), errors_of)),
         );
         rows.extend(errors.sessions.iter().map(named));
         blocks.push(Block::Table(Table::new(
-            &[measure(&errors.all), "rows", "mean", "rms", "max"],
+            &[error_label(&errors.all), "rows", "mean", "rms", "max"],
             rows,
             &[0],
         )));
     }
-    // Rows to which base or tool are fitted say nothing if they are too few.
+    // If base or tool are fitted to these rows, a few rows do not test the bounds.
     let residuals = prediction.residuals.as_deref();
     let residuals = residuals.filter(|rows| 3 * rows.len() > prediction.placed.len());
-    blocks.extend(of_fitted_rows(prediction, fitted).map(Block::Text));
-    blocks.extend(bounds.map(|bounds| Block::lines(bounded(bounds, residuals))));
-    let unsteady = unsteady(&prediction.spreads);
+    blocks.extend(fitted_rows_sentence(prediction, fitted).map(Block::Text));
+    blocks.extend(bounds.map(|bounds| Block::lines(bound_sentence(bounds, residuals))));
+    let unsteady = unsteady_points(&prediction.spreads);
     if !unsteady.is_empty() {
         blocks.push(Block::list(unsteady));
     }
-    blocks.push(Block::figures([errors(prediction, bounds)]));
+    blocks.push(Block::figures([draw_errors(prediction, bounds)]));
     blocks
 }
 
-/// Returns true if all rows measure positions.
+/// Returns true if all predicted rows measure positions; false if they contain no measurements.
 fn is_of_positions(prediction: &Prediction) -> bool {
     let errors = prediction.errors.as_ref();
     errors.is_some_and(|errors| errors.kinds.is_empty() && errors.all.kind == "position")
 }
 
-/// States how many of the rows were fitted, and the error of the others if all rows measure
-/// positions; `None` if no row was fitted.
-fn of_fitted_rows(prediction: &Prediction, fitted: &[usize]) -> Option<String> {
+/// States to how many of the predicted rows the arm was fitted, and the error of the others if all
+/// rows measure positions; `None` if it was fitted to no row.
+fn fitted_rows_sentence(prediction: &Prediction, fitted: &[usize]) -> Option<String> {
     let residuals = prediction.residuals.as_ref().filter(|_| !fitted.is_empty())?;
     let others = residuals.iter().enumerate().filter(|(row, _)| fitted.binary_search(row).is_err());
     let errors: Vec<f64> = others.map(|(_, residual)| residual.position.norm()).collect();
@@ -120,9 +120,9 @@ fn of_fitted_rows(prediction: &Prediction, fitted: &[usize]) -> Option<String> {
     ))
 }
 
-/// Draws the error of each row against its bound, or against its number if there are no bounds;
-/// `None` unless all rows measure positions.
-fn errors(prediction: &Prediction, bounds: Option<&Bounds>) -> Option<Drawing> {
+/// Draws the error of each row against its bound, or against the number of the row if there are no
+/// bounds; `None` unless all rows measure positions.
+fn draw_errors(prediction: &Prediction, bounds: Option<&Bounds>) -> Option<Drawing> {
     if !is_of_positions(prediction) {
         return None;
     }

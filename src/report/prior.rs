@@ -1,4 +1,4 @@
-//! Prior, new data and posterior of a fit with an earlier estimate, in words.
+//! Comparison of an earlier estimate (the prior) with new rows and the posterior, in words.
 
 use std::fmt::Write as _;
 
@@ -10,16 +10,16 @@ use crate::quantity::format::{counted, decimals, number, or_dash, p_value};
 /// Header of the table of parameters.
 const HEADER: [&str; 7] =
     ["parameter", "earlier", "± 1 σ", "new rows", "± 1 σ", "posterior", "± 1 σ"];
-/// p-value of χ² below which new rows do not agree with the prior.
+/// p-value of χ² below which a text does not say that the new rows agree with the prior.
 const MIN_AGREEING_P: f64 = 0.001;
-/// Standard error of the new rows, in units of the earlier one, beyond which the figure omits a
-/// parameter: the rows say next to nothing.
+/// Largest standard error by the new rows, in units of the earlier one, at which the figure shows a
+/// parameter. Above it the new rows add hardly any information.
 const MAX_DRAWN_ERROR: f64 = 10.0;
 /// Maximum number of decimals of a value.
 const MAX_DECIMALS: usize = 6;
 
-/// Returns the comparison with the earlier estimate: a summary, and a table of all parameters that
-/// it informs on; nothing without one.
+/// Returns the comparison with the earlier estimate: a summary, a figure and a table of the
+/// parameters that it informs on. Empty without an earlier estimate.
 pub(super) fn prior<'a>(found: &Identification) -> Vec<Block<'a>> {
     let Some(comparison) = &found.prior else { return Vec::new() };
     let rows = comparison.parameters.iter().map(row).collect();
@@ -31,14 +31,14 @@ pub(super) fn prior<'a>(found: &Identification) -> Vec<Block<'a>> {
     vec![
         Block::Heading("Earlier estimate as prior".to_owned()),
         Block::Text(summary(comparison)),
-        Block::figures([drawn(comparison)]),
+        Block::figures([draw(comparison)]),
         Block::Table(table),
     ]
 }
 
-/// Draws what new rows and posterior say of each parameter, in standard errors of the earlier
-/// estimate.
-fn drawn(comparison: &PriorComparison) -> Option<Drawing> {
+/// Draws the estimate by the new rows and the posterior of each parameter, in standard errors of
+/// the earlier estimate.
+fn draw(comparison: &PriorComparison) -> Option<Drawing> {
     let row = |compared: &ComparedParameter| {
         let (earlier, sigma) = compared.prior;
         let scaled = |(value, error): (f64, f64)| ((value - earlier) / sigma, error / sigma);
@@ -63,7 +63,7 @@ fn drawn(comparison: &PriorComparison) -> Option<Drawing> {
 pub(super) fn summary(comparison: &PriorComparison) -> String {
     let mut text = format!("Prior: {}", comparison.file.display());
     if comparison.days > 0.0 {
-        let _ = write!(text, ", widened by the drift of {}", counted_days(comparison.days));
+        let _ = write!(text, ", widened by the drift of {}", format_days(comparison.days));
     }
     if comparison.left_out > 0 {
         let rows = counted(comparison.left_out, "row");
@@ -88,7 +88,7 @@ pub(super) fn summary(comparison: &PriorComparison) -> String {
     text + &verdict
 }
 
-fn counted_days(days: f64) -> String {
+fn format_days(days: f64) -> String {
     format!("{days} {}", if days > 1.0 { "days" } else { "day" })
 }
 

@@ -1,9 +1,9 @@
 //! Probabilities in words.
 
-/// Smallest probability at which a law, or a cause at a place, is more probable than not.
+/// Smallest probability at which a text calls a law, or a cause at a place, more probable than not.
 pub(super) const MIN_PROBABLE: f64 = 0.5;
 
-/// Returns a probability in percent.
+/// Formats a probability (0 to 1) as a percentage, as "over 99 %" or "under 1 %" at the ends.
 pub(super) fn percent(probability: f64) -> String {
     match probability {
         p if p > 0.995 => "over 99 %".to_owned(),

@@ -9,8 +9,7 @@ use crate::quantity::format::{counted, mm, number, two_digits};
 use crate::remainder::{Bounds, Gain, JointError, Outcome};
 use crate::results::PlotData;
 
-/// Returns one sentence on the result of the search for a remainder; `found` contains the errors
-/// without it.
+/// States the result of the search for a remainder; `found` has the errors without a remainder.
 pub fn remainder_text(found: &Identification, outcome: &Outcome) -> String {
     let before = number(found.fitted.held_out.mean.norm * 1e3, 4);
     let after = outcome.held_out.map(|errors| number(errors.mean.norm * 1e3, 4));
@@ -46,7 +45,8 @@ pub fn remainder_text(found: &Identification, outcome: &Outcome) -> String {
     }
 }
 
-/// Returns the blocks about the remainder and the uncertainty of predictions.
+/// Returns the blocks about the remainder and the uncertainty of predictions; empty if the
+/// uncertainty was not estimated.
 pub(super) fn uncertainty<'a>(found: &Identification, plots: &'a PlotData) -> Vec<Block<'a>> {
     let Some(uncertainty) = &plots.uncertainty else { return Vec::new() };
     let outcome = &uncertainty.outcome;
@@ -79,7 +79,7 @@ pub(super) fn uncertainty<'a>(found: &Identification, plots: &'a PlotData) -> Ve
     blocks
 }
 
-/// Accuracy of predictions, as the summaries of `identify` and `loop` state it.
+/// Accuracy of predictions that the summaries of `identify` and `loop` state.
 #[derive(Debug, Clone)]
 pub struct PredictionAccuracy {
     /// Sentence on the mean error bound over the workspace; `None` if the bound is not known.
@@ -108,11 +108,12 @@ impl PredictionAccuracy {
     }
 }
 
-/// Largest error of positions that were computed by the model, relative to the expected error. Tables
-/// round positions to 0.1 µm.
+/// Largest error, relative to the expected error, at which measured positions are probably
+/// predictions of the model itself. Tables round positions to 0.1 µm.
 const MAX_COMPUTED_ERROR: f64 = 2e-3;
 
-/// Returns true if no measurement agrees so closely with predictions as these residuals.
+/// Returns true if the residuals are so small that the positions of all rows must be predictions of
+/// the model, not measurements.
 fn are_predicted(bounds: &Bounds, residuals: &[Residual]) -> bool {
     let lengths = || residuals.iter().map(|row| row.position.norm());
     let largest = lengths().fold(0.0, f64::max);
@@ -121,9 +122,9 @@ fn are_predicted(bounds: &Bounds, residuals: &[Residual]) -> bool {
         && largest <= MAX_COMPUTED_ERROR * bounds.expected()
 }
 
-/// Returns the expected error and its bound in words. If there are `residuals`, adds the share of
-/// rows within their bounds.
-pub(super) fn bounded(bounds: &Bounds, residuals: Option<&[Residual]>) -> String {
+/// States the expected error and its mean bound. With `residuals`, adds the share of rows within
+/// their bounds.
+pub(super) fn bound_sentence(bounds: &Bounds, residuals: Option<&[Residual]>) -> String {
     let mut words = format!(
         "Expected error {} mm rms, measurement noise included; the {} % bound is {} mm on average",
         number(bounds.expected() * 1e3, 3),

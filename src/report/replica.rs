@@ -11,13 +11,13 @@ use crate::study::{
     AlternativeModel, Case, HeldOutError, MisprintStudy, Replica, ReplicaResults, Spread,
 };
 
-/// Source of the stiffness of each stage, in the order of the results of a replica.
-const STAGES: [&str; 4] =
+/// Sources of the stiffness, in the order of the results of a replica.
+const STIFFNESS_SOURCES: [&str; 4] =
     ["stiffness known", "as declared", "from positions", "from load differences"];
 
 /// Returns the results of a study of the misprints as text, ending in a line break.
 pub fn replica_text(study: &MisprintStudy, found: &ReplicaResults) -> String {
-    let mut blocks = vec![Block::lines(format!("{}\n{}", study.title, counts(study)))];
+    let mut blocks = vec![Block::lines(format!("{}\n{}", study.title, describe_study(study)))];
     blocks.extend(tables(study, found));
     text(&blocks)
 }
@@ -42,13 +42,14 @@ pub fn replica_report(study: &MisprintStudy, found: &ReplicaResults) -> Report {
         )],
         is_doubtful: false,
     };
-    let mut blocks = vec![Block::Headline(head), Block::Text(counts(study))];
+    let mut blocks = vec![Block::Headline(head), Block::Text(describe_study(study))];
     blocks.push(Block::Figures(vec![figures::misprints(study, found)]));
     blocks.extend(tables(study, found));
     report(&study.problem, "misprints", &blocks)
 }
 
-fn counts(study: &MisprintStudy) -> String {
+/// Describes the study: specimens, cases, poses, noise, and scale of the elasticity.
+fn describe_study(study: &MisprintStudy) -> String {
     format!(
         "{} specimens of each of {} cases, measured by the virtual test rig: {} poses to identify, {} held out,\n\
          noise {} mm per axis; elasticity scaled so that the rigid fit errs by {} mm",
@@ -69,16 +70,17 @@ fn main_case<'a>(study: &MisprintStudy, found: &'a ReplicaResults) -> Vec<&'a Re
 fn tables<'a>(study: &MisprintStudy, found: &ReplicaResults) -> Vec<Block<'a>> {
     vec![
         Block::heading("Procedures and readings: mean error of the held-out poses, mm"),
-        Block::Table(procedures(study, found)),
+        Block::Table(readings_table(study, found)),
         Block::heading("For comparison"),
-        Block::Table(others(study, found)),
+        Block::Table(comparison_table(study, found)),
         Block::heading("Ratio to the error of the rigid fit, stiffness known"),
-        Block::Table(ratios(study, found)),
+        Block::Table(ratio_table(study, found)),
     ]
 }
 
-/// Formats mean ± standard deviation, with the number of converged fits if not all converged.
-fn shown(spread: Option<Spread>, show: impl Fn(f64) -> String) -> String {
+/// Formats mean ± standard deviation over specimens, with the number of converged fits if not all
+/// converged; "diverges" for `None`.
+fn format_spread(spread: Option<Spread>, show: impl Fn(f64) -> String) -> String {
     let Some(Spread { mean, deviation, count: (there, all) }) = spread else {
         return "diverges".to_owned();
     };
@@ -86,37 +88,41 @@ fn shown(spread: Option<Spread>, show: impl Fn(f64) -> String) -> String {
     format!("{} ± {}{few}", show(mean), show(deviation))
 }
 
-fn procedures(study: &MisprintStudy, found: &ReplicaResults) -> Table {
+/// Returns the table of mean held-out errors of each reading, by the source of the stiffness.
+fn readings_table(study: &MisprintStudy, found: &ReplicaResults) -> Table {
     let main = main_case(study, found);
-    let row = |(place, named): (usize, &crate::study::NamedReading)| {
+    let row = |(index, named): (usize, &crate::study::NamedReading)| {
         let size = Misprint::EACH
             .iter()
             .zip(&found.sizes)
             .find(|(misprint, _)| Some(**misprint) == named.misprint);
         let cell = |stage: usize| {
             let means =
-                main.iter().map(|replica| Some(replica.reading_error(place, stage)?.mean.norm));
-            shown(Spread::of(means), |value| mm(value, 3))
+                main.iter().map(|replica| Some(replica.reading_error(index, stage)?.mean.norm));
+            format_spread(Spread::of(means), |value| mm(value, 3))
         };
         let head =
             [named.name.clone(), named.place.clone(), or_dash(size, |(_, size)| mm(*size, 3))];
-        head.into_iter().chain((0..STAGES.len()).map(cell)).collect()
+        head.into_iter().chain((0..STIFFNESS_SOURCES.len()).map(cell)).collect()
     };
     let rows = found.readings.iter().enumerate().map(row).collect();
-    let header = ["as printed", "where", "moves, mm", STAGES[0], STAGES[1], STAGES[2], STAGES[3]];
+    let [known, declared, positions, differences] = STIFFNESS_SOURCES;
+    let header = ["as printed", "where", "moves, mm", known, declared, positions, differences];
     Table::new(&header, rows, &[0, 1]).noted(&[
         "moves: largest change of the end point at the errors of the truth, on the arm as declared; ± standard deviation",
         "over specimens; links and joints share their flexibility as declared; diverges: eq. 45 does not converge",
     ])
 }
 
-fn others(study: &MisprintStudy, found: &ReplicaResults) -> Table {
+/// Returns the table of simulated and published held-out errors of some procedures.
+fn comparison_table(study: &MisprintStudy, found: &ReplicaResults) -> Table {
     let main = main_case(study, found);
     let row = |name: &str, of: fn(&Replica) -> HeldOutError, published: Option<&Published>| {
         let of_kind = |kind: fn(&ErrorSummary) -> f64| {
-            shown(Spread::of(main.iter().map(|replica| of(replica).as_ref().map(kind))), |value| {
-                mm(value, 3)
-            })
+            format_spread(
+                Spread::of(main.iter().map(|replica| of(replica).as_ref().map(kind))),
+                |value| mm(value, 3),
+            )
         };
         let [mean, max] =
             [published.map(|table| table.mean[3]), published.map(|table| table.max[3])];
@@ -144,27 +150,28 @@ fn others(study: &MisprintStudy, found: &ReplicaResults) -> Table {
     ])
 }
 
-fn ratios(study: &MisprintStudy, found: &ReplicaResults) -> Table {
+/// Returns the table of error ratios of each reading and alternative model to the rigid fit.
+fn ratio_table(study: &MisprintStudy, found: &ReplicaResults) -> Table {
     let main = main_case(study, found);
     let row = |name: &str, summary: &str, error_of: &dyn Fn(&Replica) -> HeldOutError| {
         let ratio = |case: &Case| {
             let ratios = found.of_case(case).map(|replica| replica.ratio(error_of(replica)));
-            shown(Spread::of(ratios), |value| number(value, 3))
+            format_spread(Spread::of(ratios), |value| number(value, 3))
         };
         let of_z = |replica: &&Replica| error_of(replica).map(|left| left.mean.z / left.mean.norm);
-        let along = shown(Spread::of(main.iter().map(of_z)), |value| number(value, 2));
+        let along = format_spread(Spread::of(main.iter().map(of_z)), |value| number(value, 2));
         let largest =
             Spread::of(main.iter().map(|replica| replica.largest_ratio(error_of(replica))));
         let cases: Vec<String> = study.cases.iter().map(ratio).collect();
-        let largest = shown(largest, |value| number(value, 2));
+        let largest = format_spread(largest, |value| number(value, 2));
         [vec![name.to_owned(), summary.to_owned()], cases, vec![along, largest]].concat()
     };
     let mut rows: Vec<Vec<String>> = found
         .readings
         .iter()
         .enumerate()
-        .map(|(place, named)| {
-            row(&named.name, &named.summary, &|replica| replica.reading_error(place, 0))
+        .map(|(index, named)| {
+            row(&named.name, &named.summary, &|replica| replica.reading_error(index, 0))
         })
         .collect();
     rows.extend(AlternativeModel::EACH.map(|rival| {

@@ -4,12 +4,13 @@ use super::document::{Block, Mark, Point};
 use crate::quantity::format::number;
 use crate::residual_tests::{ResidualTest, ResidualTests, Test};
 
-/// Describes the tests that failed.
+/// Describes the failed tests, one sentence each.
 pub(super) fn failed(tests: &ResidualTests) -> Vec<String> {
     tests.tests.iter().filter(|check| check.failed()).map(ToString::to_string).collect()
 }
 
-/// States why the tests have a χ²/ν different from the fit's, if both differ in the shown digits.
+/// States why the tests have another χ²/ν than the fit, whose value is `chi2`; `None` if both agree
+/// in the shown digits.
 pub(super) fn other_reduced_chi2(tests: &ResidualTests, chi2: Option<f64>) -> Option<String> {
     let size = tests
         .tests
@@ -33,9 +34,9 @@ fn point(check: &ResidualTest) -> Point {
     Point { text: check.to_string(), mark: Some(mark), ..Point::default() }
 }
 
-/// Lists the tests: failed ones, passed ones, then those that could not be made. All covariates
-/// without dependence share one line.
-pub(super) fn all(tests: &ResidualTests) -> Vec<Point> {
+/// Lists the tests: failed ones, passed ones, then those that could not be made. All quantities on
+/// which the residual does not depend share one item.
+pub(super) fn by_outcome(tests: &ResidualTests) -> Vec<Point> {
     let of = |mark: Mark| {
         tests
             .tests
@@ -56,13 +57,13 @@ pub(super) fn all(tests: &ResidualTests) -> Vec<Point> {
     points.chain(of(Mark::Untested).map(|(_, point)| point)).collect()
 }
 
-/// Lists the tests in the order in which they were made.
-pub(super) fn each(tests: &ResidualTests) -> Vec<Point> {
+/// Lists the tests in the order in which they were made, one item each.
+pub(super) fn in_order(tests: &ResidualTests) -> Vec<Point> {
     tests.tests.iter().map(point).collect()
 }
 
-/// Returns the tests as blocks: a summary in texts, one by one on the page.
+/// Returns the tests as blocks: grouped by outcome in texts, one by one on the page.
 pub(super) fn blocks<'a>(tests: &ResidualTests) -> Vec<Block<'a>> {
-    let (brief, page) = (Block::List(all(tests)), Block::List(each(tests)));
+    let (brief, page) = (Block::List(by_outcome(tests)), Block::List(in_order(tests)));
     vec![Block::Words(vec![brief]), Block::Page(vec![page])]
 }

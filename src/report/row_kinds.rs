@@ -1,19 +1,20 @@
-//! Errors of rows that measure against points, anchors and surfaces.
+//! Errors by kind of rows, and spread of the target at touched points.
 
 use super::document::{Block, Table};
-use super::errors::{measure, shown};
+use super::errors::{error_label, format_error};
 use crate::fit::{ErrorSummary, Identification, PointSpread};
 use crate::quantity::format::{mm, number};
 
-/// Returns tables of errors by kind of rows, if there are several, and of the spread at points.
+/// Returns the table of errors by kind of rows, if there are several kinds, and the table of the
+/// spread at touched points, if there are any.
 pub(super) fn row_kind_tables<'a>(found: &Identification) -> Vec<Block<'a>> {
     let row = |kind: &str, rows: &str, before: &ErrorSummary, after: &ErrorSummary| {
-        let values = [before.rms.norm, after.rms.norm].map(|value| shown(after, value));
+        let values = [before.rms.norm, after.rms.norm].map(|value| format_error(after, value));
         [vec![kind.to_owned(), rows.to_owned(), after.n.to_string()], values.to_vec()].concat()
     };
     let mut blocks = Vec::new();
     let kinds = found.kinds.iter().flat_map(|(before, after)| {
-        let kind = measure(&after.held_out);
+        let kind = error_label(&after.held_out);
         [
             row(kind, "held out", &before.held_out, &after.held_out),
             row("", "identification", &before.identification, &after.identification),
@@ -42,14 +43,16 @@ pub(super) fn row_kind_tables<'a>(found: &Identification) -> Vec<Block<'a>> {
             "mean distance of the predicted target from its mean over the rows at one point"
                 .to_owned(),
         );
-        table.notes.extend(unsteady(found.spreads.iter().map(|spread| &spread.1)));
+        table.notes.extend(unsteady_points(found.spreads.iter().map(|spread| &spread.1)));
         blocks.push(Block::Table(table));
     }
     blocks
 }
 
-/// Returns a sentence for each point whose spread is far larger than that of the others.
-pub(super) fn unsteady<'a>(spreads: impl IntoIterator<Item = &'a PointSpread>) -> Vec<String> {
+/// Returns a sentence for each touched point whose spread is far larger than that of the others.
+pub(super) fn unsteady_points<'a>(
+    spreads: impl IntoIterator<Item = &'a PointSpread>,
+) -> Vec<String> {
     let sentence = |(spread, times): (&PointSpread, f64)| {
         let [x, y, z] =
             [spread.along.x, spread.along.y, spread.along.z].map(|value| number(value, 2));

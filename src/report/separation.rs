@@ -1,12 +1,13 @@
-//! Distinction of two effects by planned poses, in words.
+//! How well planned poses distinguish two effects, in words.
 
 use super::document::{Block, Table};
-use super::forecast::size as shown;
+use super::forecast::format_size;
 use crate::design::PairSeparation;
 use crate::quantity::format::{number, or_dash, p_value};
 use crate::results::SeparationResult;
 
-/// Returns the table of the two effects, for planned and for random poses.
+/// Returns the table of the angle, detectable sizes and p-values of the two effects, for planned
+/// and for random poses.
 pub(super) fn blocks<'a>(separated: &PairSeparation) -> Vec<Block<'a>> {
     let result = SeparationResult::new(separated);
     let angle = |angle: Option<f64>| or_dash(angle, |angle| number(angle, 1));
@@ -15,7 +16,7 @@ pub(super) fn blocks<'a>(separated: &PairSeparation) -> Vec<Block<'a>> {
     let mut rows = vec![cells(["angle between them", &angles[0], &angles[1], "°"])];
     for effect in &result.effects {
         let unit = effect.unit.display(effect.prior_sigma);
-        let show = |value: Option<f64>| shown(value, &unit);
+        let show = |value: Option<f64>| format_size(value, &unit);
         let symbol = unit.symbol.as_str();
         let row =
             |name: &str, random, planned| cells([name, &show(random), &show(planned), symbol]);

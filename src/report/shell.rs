@@ -1,8 +1,8 @@
-//! Quoting of words in commands that the user may copy.
+//! Quoting of paths in commands that the user may copy to a shell.
 
 use std::path::Path;
 
-/// Formats a path as a word of a command, in quotes if a shell would split or expand it.
+/// Formats a path as one word of a shell command, in quotes if the shell would split or expand it.
 pub fn shell_word(path: &Path) -> String {
     let word = path.display().to_string();
     let is_plain = |letter: char| letter.is_alphanumeric() || "/._-+,:=@%\\".contains(letter);

@@ -9,15 +9,15 @@ use crate::quantity::format::{number, or_dash};
 use crate::results::{Cell, StudyResult};
 use crate::study::{Results, Source, Study};
 
-/// Cell of a study with the median time of a fit \[s\].
-type Timed = (Cell, f64);
+/// Cell of a study with the median duration of a fit \[s\].
+type TimedCell = (Cell, f64);
 
 /// Returns the study as text, ending in a line break.
 pub fn study_text(study: &Study, results: &Results) -> String {
     text(&blocks(study, results))
 }
 
-/// Returns the study as a page, with the error of each cell.
+/// Returns the study as a page, with a figure of the error of each cell.
 pub(crate) fn study_page(study: &Study, results: &Results) -> String {
     page(&study.title, "study", &blocks(study, results))
 }
@@ -34,32 +34,35 @@ fn blocks<'a>(study: &Study, results: &Results) -> Vec<Block<'a>> {
         study.parameters.len(),
         study.held_out
     );
-    let cells: Vec<Timed> = StudyResult::new(study, results)
+    let cells: Vec<TimedCell> = StudyResult::new(study, results)
         .cells
         .into_iter()
         .zip(results.cells.iter().map(|timed| timed.timing().median))
         .collect();
     let shown = |value: Option<f64>, decimals| or_dash(value, |value| number(value, decimals));
     let percent = |share: Option<f64>| or_dash(share, |share| format!("{:.1} %", 100.0 * share));
-    let bias = |(cell, _): &Timed| cell.largest_bias.as_ref().map(|bias| bias.bias_sd);
+    let bias = |(cell, _): &TimedCell| cell.largest_bias.as_ref().map(|bias| bias.bias_sd);
     let biased =
-        |(cell, _): &Timed| or_dash(cell.largest_bias.as_ref(), |bias| bias.parameter.clone());
+        |(cell, _): &TimedCell| or_dash(cell.largest_bias.as_ref(), |bias| bias.parameter.clone());
     let table = Table::of(
         &cells,
         &[
-            Column::number("noise mm", |(cell, _): &Timed| cell.position_sigma_mm.to_string()),
-            Column::number("poses", |(cell, _): &Timed| cell.identification_poses.to_string()),
-            Column::words("strategy", |(cell, _): &Timed| cell.strategy.to_owned()),
-            Column::words("solver", |(cell, _): &Timed| cell.solver.to_owned()).minor(),
-            Column::number("failed", |(cell, _): &Timed| percent(Some(cell.failure_rate))),
-            Column::number("held out mean", |(cell, _): &Timed| shown(cell.held_out_mm.mean, 4)),
-            Column::number("rms, mm", |(cell, _): &Timed| shown(cell.held_out_mm.rms, 4)),
-            Column::number("± sd", |(cell, _): &Timed| shown(cell.held_out_mm.rms_sd, 4)).minor(),
-            Column::number("covered", |(cell, _): &Timed| percent(cell.coverage)),
+            Column::number("noise mm", |(cell, _): &TimedCell| cell.position_sigma_mm.to_string()),
+            Column::number("poses", |(cell, _): &TimedCell| cell.identification_poses.to_string()),
+            Column::words("strategy", |(cell, _): &TimedCell| cell.strategy.to_owned()),
+            Column::words("solver", |(cell, _): &TimedCell| cell.solver.to_owned()).minor(),
+            Column::number("failed", |(cell, _): &TimedCell| percent(Some(cell.failure_rate))),
+            Column::number("held out mean", |(cell, _): &TimedCell| {
+                shown(cell.held_out_mm.mean, 4)
+            }),
+            Column::number("rms, mm", |(cell, _): &TimedCell| shown(cell.held_out_mm.rms, 4)),
+            Column::number("± sd", |(cell, _): &TimedCell| shown(cell.held_out_mm.rms_sd, 4))
+                .minor(),
+            Column::number("covered", |(cell, _): &TimedCell| percent(cell.coverage)),
             Column::number("largest bias", |cell| shown(bias(cell), 2)).minor(),
             Column::words("of", biased).minor(),
-            Column::number("steps", |(cell, _): &Timed| shown(cell.iterations_mean, 1)).minor(),
-            Column::number("ms", |(_, median): &Timed| number(median * 1e3, 1)).minor(),
+            Column::number("steps", |(cell, _): &TimedCell| shown(cell.iterations_mean, 1)).minor(),
+            Column::number("ms", |(_, median): &TimedCell| number(median * 1e3, 1)).minor(),
         ],
     );
     let table = table.noted(&[
@@ -68,12 +71,13 @@ fn blocks<'a>(study: &Study, results: &Results) -> Vec<Block<'a>> {
     ]);
     let [titled, untitled] = opening(&study.title, head);
     let conclusion = Block::lines(conclusion(&cells));
-    vec![titled, untitled, conclusion, Block::Table(table), Block::figures([errors(&cells)])]
+    vec![titled, untitled, conclusion, Block::Table(table), Block::figures([draw_errors(&cells)])]
 }
 
-/// States the cell with the least held-out error, and the cells in which every fit failed.
-fn conclusion(cells: &[Timed]) -> String {
-    let rms = |cell: &&Timed| cell.0.held_out_mm.rms.unwrap_or(f64::INFINITY);
+/// States the cell with the smallest rms error of held-out poses, and the cells in which every fit
+/// failed.
+fn conclusion(cells: &[TimedCell]) -> String {
+    let rms = |cell: &&TimedCell| cell.0.held_out_mm.rms.unwrap_or(f64::INFINITY);
     let best = cells.iter().filter(|cell| cell.0.held_out_mm.rms.is_some());
     let best = best.min_by(|a, b| rms(a).total_cmp(&rms(b)));
     let mut words = match best {
@@ -84,7 +88,7 @@ fn conclusion(cells: &[Timed]) -> String {
         ),
         None => "No fit succeeded".to_owned(),
     };
-    let is_lost = |(cell, _): &&Timed| cell.failure_rate >= 1.0;
+    let is_lost = |(cell, _): &&TimedCell| cell.failure_rate >= 1.0;
     let lost: Vec<String> = cells.iter().filter(is_lost).map(|cell| name(&cell.0)).collect();
     if !lost.is_empty() {
         let _ = write!(words, ". Every fit failed or is not to be trusted: {}", lost.join("; "));
@@ -100,9 +104,9 @@ fn name(cell: &Cell) -> String {
     )
 }
 
-/// Draws the held-out error of each cell.
-fn errors(cells: &[Timed]) -> Option<Drawing> {
-    let row = |(cell, _): &Timed| {
+/// Draws the rms error of held-out poses of each cell.
+fn draw_errors(cells: &[TimedCell]) -> Option<Drawing> {
+    let row = |(cell, _): &TimedCell| {
         let rms = cell.held_out_mm.rms?;
         Some((name(cell), vec![Some((rms, cell.held_out_mm.rms_sd.unwrap_or_default()))]))
     };

@@ -3,9 +3,9 @@
 use std::fmt::Write as _;
 
 use super::detection::{LOAD_EFFECTS, has_no_mass};
-use super::document::{Block, Point, named, opening};
+use super::document::{Block, Point, joined, opening};
 use super::errors::{held_out_rows, rows_of, without_equilibrium};
-use super::noise::short;
+use super::noise::format_chi2;
 use super::probability::percent;
 use super::render::{page, text};
 use super::verdict::declared;
@@ -33,7 +33,7 @@ pub fn trace_text(problem: &Problem, trace: &Trace) -> String {
     text(&blocks(problem, trace, None))
 }
 
-/// Returns the result as a page, with the ranking and the residuals `plots`.
+/// Returns the result as a page, with figures of the ranking and of the residuals in `plots`.
 pub(crate) fn trace_page(problem: &Problem, trace: &Trace, plots: &PlotData) -> String {
     page(&problem.title, "trace", &blocks(problem, trace, Some(plots)))
 }
@@ -45,7 +45,7 @@ fn blocks<'a>(problem: &Problem, trace: &Trace, plots: Option<&PlotData>) -> Vec
     blocks.extend(hypothesis_sets(&result));
     blocks.extend([
         Block::heading("Tests of the residual (measured − predicted) of the identification poses"),
-        Block::List(residual_tests::all(&trace.residual_tests)),
+        Block::List(residual_tests::by_outcome(&trace.residual_tests)),
     ]);
     blocks.extend(
         residual_tests::other_reduced_chi2(&trace.residual_tests, trace.fit.reduced_chi2)
@@ -67,7 +67,7 @@ fn blocks<'a>(problem: &Problem, trace: &Trace, plots: Option<&PlotData>) -> Vec
 fn headline(fit: &Identification) -> String {
     let held_out = &fit.fitted.held_out;
     let size = fit.reduced_chi2.map_or_else(String::new, |chi2| {
-        format!("; χ²/ν {}, 1 if only noise is left", short(chi2))
+        format!("; χ²/ν {}, 1 if only noise is left", format_chi2(chi2))
     });
     let error = match held_out.unpredicted {
         0 => {
@@ -87,7 +87,7 @@ fn headline(fit: &Identification) -> String {
     )
 }
 
-/// States what the residual points to.
+/// States whether the residual has structure, and its most probable cause.
 fn verdict(result: &TraceResult) -> String {
     if !result.trusted {
         return "No cause is claimed, because the fit is not to be trusted. Correct first what the \
@@ -123,7 +123,8 @@ fn numbered(causes: &[String]) -> String {
     }
 }
 
-/// Lists the hypothesis sets with their probabilities, and the claims about the most probable one.
+/// Lists the most probable hypothesis sets with their probabilities, and the claims about the
+/// causes in the first set; nothing if no set was evaluated.
 fn hypothesis_sets<'a>(result: &TraceResult) -> Vec<Block<'a>> {
     let words = |hypothesis: &Hypothesis| hypothesis.description.clone();
     let point = |set: &HypothesisSet| {
@@ -140,13 +141,13 @@ fn hypothesis_sets<'a>(result: &TraceResult) -> Vec<Block<'a>> {
         blocks.push(Block::heading(
             "How sure the most probable explanation is: where it acts, what it depends on, and its law",
         ));
-        blocks.push(Block::list(result.claims.iter().map(claimed)));
+        blocks.push(Block::list(result.claims.iter().map(claims_text)));
     }
     blocks
 }
 
-/// States the claims about a cause, from the weakest to the strongest.
-pub(super) fn claimed(claims: &Claims) -> String {
+/// States the claims about a cause with their probabilities: place, inputs, law.
+pub(super) fn claims_text(claims: &Claims) -> String {
     let Claims { place, depends_on, law, .. } = claims;
     let words = match &law.value {
         Some(name) => format!("law {name}: {}", percent(law.probability)),
@@ -161,12 +162,12 @@ pub(super) fn claimed(claims: &Claims) -> String {
     format!("acts {}: {}{inputs}; {words}", at_place(&place.value), percent(place.probability))
 }
 
-/// Lists at most `most` significant candidates and explains how to read them; `where_all` states
-/// where all of them are listed.
+/// Lists at most `max` significant candidates and explains the list; `where_all` is the clause that
+/// states where all of them are listed.
 pub(super) fn ranking<'a>(
     problem: &Problem,
     result: &TraceResult,
-    most: usize,
+    max: usize,
     where_all: &str,
 ) -> Vec<Block<'a>> {
     let TraceResult { level, tried, .. } = result;
@@ -190,15 +191,15 @@ pub(super) fn ranking<'a>(
         ];
     }
     let (_, unit) = result.errors.identification.norms();
-    let shown = &significant[..most.min(significant.len())];
+    let shown = &significant[..max.min(significant.len())];
     let points = shown.iter().map(|candidate| point(problem, candidate, unit)).collect();
     let mut notes = format!(
         "{tried} candidates were tried one by one. p is the probability that noise alone does as well, corrected for their number; \
          below {level} a candidate is significant. One cause makes similar effects significant, too: the first entry is the best explanation, \
              and the others need not be present."
     );
-    if significant.len() > most {
-        let more = significant.len() - most;
+    if significant.len() > max {
+        let more = significant.len() - max;
         let _ = write!(notes, " {more} more significant ones are left out here; {where_all}.");
     }
     if shown.iter().any(|candidate| !candidate.alike.is_empty()) {
@@ -236,7 +237,7 @@ fn point(problem: &Problem, candidate: &Candidate, unit: &str) -> Point {
             |other: &Confounded| format!("{} ({:.0}°)", other.effect.description, other.angle_deg);
         details.push(format!(
             "hard to tell from: {}",
-            named(candidate.alike.iter().map(alike), MAX_SHOWN_CONFOUNDED, "; ")
+            joined(candidate.alike.iter().map(alike), MAX_SHOWN_CONFOUNDED, "; ")
         ));
     }
     if let (Some(pose), Some(first)) = (&candidate.told_apart, candidate.alike.first()) {
@@ -265,7 +266,7 @@ fn pose_words(problem: &Problem, pose: &SeparatingPose) -> String {
     words.join(", ")
 }
 
-/// Lists the effects that these data cannot show.
+/// Lists the effects that these data cannot show, by the reason.
 pub(super) fn undetectable_effects<'a>(problem: &Problem, trace: &Trace) -> Vec<Block<'a>> {
     let is_listed = |of: &Effect| effect::is_at_moving_joint(problem, of);
     let untestable: Vec<_> =

@@ -1,6 +1,6 @@
-//! Sentence that says whether a fit is to be trusted.
+//! Sentence that states whether a fit is to be trusted.
 
-use super::errors::{judging, with_unit};
+use super::errors::{test_rows_word, with_unit};
 use super::remainder::PredictionAccuracy;
 use crate::fit::Identification;
 use crate::quantity::format::number;
@@ -37,7 +37,7 @@ pub(super) fn outcome(found: &Identification, accuracy: Option<&PredictionAccura
     };
     format!(
         "Trusted{scope}: the mean {} error {falls} from {} to {}{without}.{}",
-        judging(&found.fitted).replace(' ', "-"),
+        test_rows_word(&found.fitted).replace(' ', "-"),
         with_unit(before, before.mean.norm),
         with_unit(after, after.mean.norm),
         if is_larger {

@@ -13,14 +13,14 @@ use crate::residual_tests::Covariate;
 use crate::results::{LoopResult, Structure, Summary, at_place};
 use crate::select::{ClosedLoop, Correction, HELD_FIXED, REFUSED};
 
-/// Returns the empirical correction of structure without a law, if there is one.
+/// Returns the empirical correction of structure without a law; `None` if none was accepted.
 fn correction(closure: &ClosedLoop) -> Option<&Correction> {
     closure.unexplained.iter().find_map(|left| left.correction.as_ref())
 }
 
-/// Returns the reason why an effect was not tried. A rule that fixes its parameters precedes a
-/// missing reference temperature, which would not free them.
-fn untried(problem: &Problem, (effect, reason): &(Effect, &'static str)) -> &'static str {
+/// Returns the reason why an effect was not tried. If [parameters] holds the effect's parameters
+/// fixed, that is the reason, even if a reference temperature is missing too.
+fn reason_untried(problem: &Problem, (effect, reason): &(Effect, &'static str)) -> &'static str {
     let is_held = *reason == NO_REFERENCE && holds_all(problem, &effect.parameters(problem));
     if is_held { HELD_FIXED } else { reason }
 }
@@ -43,7 +43,12 @@ pub(super) fn to_declare(
             code("joint-compliance"),
         ));
     }
-    if closure.before.untestable.iter().any(|untested| untried(problem, untested) == NO_REFERENCE) {
+    if closure
+        .before
+        .untestable
+        .iter()
+        .any(|untested| reason_untried(problem, untested) == NO_REFERENCE)
+    {
         declarations.push(format!(
             "Declare {} in [data], the temperature at which the arm is as declared. Without it no law of the measured temperatures was \
              tried.",
@@ -66,9 +71,9 @@ pub(super) fn to_declare(
     declarations
 }
 
-/// Returns the places of all structure whose law is unknown, without duplicates, with their
-/// probabilities.
-pub(super) fn places(result: &LoopResult) -> Vec<String> {
+/// Describes the places of all structure whose law is unknown, with their probabilities; each place
+/// once.
+pub(super) fn structure_places(result: &LoopResult) -> Vec<String> {
     let mut places: Vec<(&str, String)> = Vec::new();
     for left in result.structures() {
         if places.iter().all(|(place, _)| *place != left.place) {
@@ -90,8 +95,9 @@ pub(super) fn places(result: &LoopResult) -> Vec<String> {
     places.into_iter().map(|(_, words)| words).collect()
 }
 
-/// Describes structure whose law is unknown, sentence by sentence.
-pub(super) fn unexplained(
+/// Describes all structure whose law is unknown, its correction, and effects that were not tried,
+/// one sentence each. Empty if there is no such structure.
+pub(super) fn structure_sentences(
     problem: &Problem,
     closure: &ClosedLoop,
     result: &LoopResult,
@@ -107,7 +113,7 @@ pub(super) fn unexplained(
         )];
     }
     let mut sentences: Vec<String> = Vec::new();
-    for words in result.structures().map(located) {
+    for words in result.structures().map(structure_sentence) {
         if !sentences.contains(&words) {
             sentences.push(words);
         }
@@ -127,7 +133,7 @@ pub(super) fn unexplained(
             .before
             .untestable
             .iter()
-            .filter(|untested| untried(problem, untested) == why)
+            .filter(|untested| reason_untried(problem, untested) == why)
             .count()
         {
             0 => {}
@@ -145,23 +151,23 @@ pub(super) fn unexplained(
              fit has cautions."
                 .to_owned(),
         ),
-        Some(correction) => sentences.extend(corrected(problem, closure, correction)),
+        Some(correction) => sentences.extend(correction_sentences(problem, closure, correction)),
     }
     sentences
 }
 
-/// Returns true if the loop found sag under weights that the problem does not declare.
+/// Returns true if the loop found deflections under weights that the problem does not declare.
 pub(crate) fn lacks_masses(result: &LoopResult) -> bool {
     result.structures().any(is_sag)
 }
 
-/// Returns true if the structure is sag under a weight that is not declared.
+/// Returns true if the structure is the deflection under a weight that is not declared.
 fn is_sag(structure: &Structure) -> bool {
     structure.law.as_deref() == Some("sag")
 }
 
-/// Iterates over limits of the declared problem that are wrong with a probability above one half,
-/// with that probability.
+/// Iterates over limits of the declared problem that are wrong with a probability of at least one
+/// half, with that probability.
 fn wrong_limits(result: &LoopResult) -> impl Iterator<Item = (&str, f64)> {
     let limit =
         |left: &'_ Structure| left.claims.as_ref().map_or(0.0, |claims| claims.law.probability);
@@ -171,8 +177,8 @@ fn wrong_limits(result: &LoopResult) -> impl Iterator<Item = (&str, f64)> {
         .filter(|(_, probability)| *probability >= MIN_PROBABLE)
 }
 
-/// Describes the place and the inputs (quantities that it depends on) of one structure.
-fn located(structure: &Structure) -> String {
+/// Describes one structure: its place, the quantities that it depends on, and their probabilities.
+fn structure_sentence(structure: &Structure) -> String {
     let (place, inputs) = (&structure.place, structure.depends_on.join(", "));
     let Some(claims) = &structure.claims else {
         let inputs = if inputs.is_empty() { inputs } else { format!(", dependent on {inputs}") };
@@ -208,8 +214,13 @@ fn located(structure: &Structure) -> String {
     )
 }
 
-/// States the gain of a correction and the input range in which it is valid.
-fn corrected(problem: &Problem, closure: &ClosedLoop, correction: &Correction) -> Vec<String> {
+/// States the errors without and with an empirical correction, and the ranges of its inputs in
+/// which it is valid.
+fn correction_sentences(
+    problem: &Problem,
+    closure: &ClosedLoop,
+    correction: &Correction,
+) -> Vec<String> {
     let Correction { ranges, beyond, cross_validated: (without, with), held_out, .. } = correction;
     let ([mean, rms, _], unit) = Summary::of(held_out).norms();
     let ([mean_before, rms_before, _], _) = Summary::of(&closure.after.fitted.held_out).norms();
@@ -245,7 +256,8 @@ fn corrected(problem: &Problem, closure: &ClosedLoop, correction: &Correction) -
     sentences
 }
 
-/// Returns the factor from SI units to the displayed unit of a quantity, and that unit.
+/// Returns the factor from SI units to the displayed unit of a quantity, and that unit after a
+/// space.
 fn unit_of(problem: &Problem, covariate: &Covariate) -> (f64, &'static str) {
     match covariate {
         Covariate::Temperature => (1.0, " °C"),

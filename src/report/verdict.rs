@@ -1,5 +1,5 @@
-//! Sentences about the outcome of a loop: its verdict, and the title of each cause. They claim no
-//! more than a cause's status allows.
+//! Sentences about the outcome of a loop: its verdict, and the title of each cause. No sentence
+//! claims more than the status of the cause allows.
 
 use super::document::code;
 use super::probability::{MIN_PROBABLE, percent};
@@ -9,10 +9,10 @@ use crate::results::{
 };
 use crate::select::{Status, Verdict};
 
-/// Smallest probability at which a law is named as a candidate.
+/// Smallest probability at which a text names a law as candidate for a cause.
 const MIN_CANDIDATE_PROBABILITY: f64 = 0.005;
 
-/// States after how many rounds a search ended early.
+/// States after how many rounds a search was interrupted.
 pub fn interrupted(rounds: usize) -> String {
     let rounds = match rounds {
         0 => "before the first round was done".to_owned(),
@@ -21,9 +21,9 @@ pub fn interrupted(rounds: usize) -> String {
     format!("interrupted {rounds}: there may be more to find")
 }
 
-/// States the outcome of the loop in one to three sentences. `takes_less` is true if the fit
-/// assumed a smaller σ than the declared one.
-pub(super) fn verdict(result: &LoopResult, takes_less: bool) -> String {
+/// States the outcome of the loop in one to three sentences. `assumes_smaller_sigma` is true if the
+/// fit assumed a smaller σ than the declared one.
+pub(super) fn verdict(result: &LoopResult, assumes_smaller_sigma: bool) -> String {
     let rounds = result.steps.len();
     let end = if result.interrupted {
         format!("Search {}. ", interrupted(rounds))
@@ -34,16 +34,16 @@ pub(super) fn verdict(result: &LoopResult, takes_less: bool) -> String {
         return end
             + "The residual was not examined to the end: no cause is named, and none is ruled out.";
     }
-    let first = if result.before.misfit_carried_by.is_some() {
+    let caution = if result.before.misfit_carried_by.is_some() {
         "Check the influential rows first: wrong rows hide causes, and a cause that acts in them alone looks like wrong rows. "
     } else {
         ""
     };
-    end + first + &outcome(result, takes_less)
+    end + caution + &outcome(result, assumes_smaller_sigma)
 }
 
-/// States how many effects were found, and how many other causes are not sure.
-pub(super) fn counts(result: &LoopResult) -> String {
+/// States how many effects were found, and how many other causes are uncertain: "2; 1 not sure".
+pub(super) fn effect_counts(result: &LoopResult) -> String {
     let found = result.with_status(Status::Found).count();
     match causes(result).filter(|cause| cause.is_doubted()).count() {
         0 => found.to_string(),
@@ -51,16 +51,17 @@ pub(super) fn counts(result: &LoopResult) -> String {
     }
 }
 
-/// Iterates over the effects that are causes by themselves, not only together with others.
+/// Iterates over the effects except those that are significant only together with others.
 pub(super) fn causes(result: &LoopResult) -> impl Iterator<Item = &FoundEffect> {
     result.effects.iter().filter(|found| !found.is_only_with_others())
 }
 
-fn outcome(result: &LoopResult, takes_less: bool) -> String {
+/// States the outcome of a loop, apart from interruption and influential rows.
+fn outcome(result: &LoopResult, assumes_smaller_sigma: bool) -> String {
     if !result.trusted {
         return "No cause is claimed, because the fit is not to be trusted. Correct first what the warnings name.".to_owned();
     }
-    let found = found(result);
+    let found = found_clause(result);
     if let (Verdict::Unexplained, Some(size)) = (result.verdict, result.size_alone()) {
         // An interrupted search cannot state that there is no structure.
         let seen = if result.interrupted { "" } else { ", and no structure is seen in it" };
@@ -70,7 +71,7 @@ fn outcome(result: &LoopResult, takes_less: bool) -> String {
         );
     }
     if result.is_probably_explained() {
-        return probable(result);
+        return probably_explained(result);
     }
     let is_structured = result.unexplained.is_some();
     match (result.verdict, result.tested) {
@@ -86,14 +87,14 @@ fn outcome(result: &LoopResult, takes_less: bool) -> String {
             } else {
                 " With what is in the model, the residual looks like noise."
             };
-            format!("Unexplained: {}.{noise}", lower(&found))
+            format!("Unexplained: {}.{noise}", with_lower_initial(&found))
         }
         (Verdict::Explained, true) => {
-            format!("Explained: {}, and the residual looks like noise.", lower(&found))
+            format!("Explained: {}, and the residual looks like noise.", with_lower_initial(&found))
         }
         (Verdict::NothingFound, true) => {
             if let Some(ratio) = result.overstated_sigma() {
-                nothing_below(ratio, takes_less)
+                overstated_sigma_sentence(ratio, assumes_smaller_sigma)
             } else {
                 let apart = match result.set_aside.len() {
                     0 => String::new(),
@@ -109,8 +110,8 @@ fn outcome(result: &LoopResult, takes_less: bool) -> String {
 }
 
 /// States the outcome if at least one law is probable and the residual looks like noise: each
-/// probable cause with its probability and its first rival.
-fn probable(result: &LoopResult) -> String {
+/// probable cause with its probability and its most probable alternative.
+fn probably_explained(result: &LoopResult) -> String {
     let cause = |found: &FoundEffect| {
         let law = found.claims.as_ref().map(|claims| percent(claims.law.probability));
         let law = law.map_or_else(String::new, |law| format!(" ({law})"));
@@ -130,8 +131,8 @@ fn probable(result: &LoopResult) -> String {
     format!("Probably explained: {sure}{}. The residual looks like noise.", probable.join("; and "))
 }
 
-/// States which effects were found, without the full stop.
-fn found(result: &LoopResult) -> String {
+/// States which effects were found, are in doubt or are contradicted, without the full stop.
+fn found_clause(result: &LoopResult) -> String {
     let found: Vec<&FoundEffect> = result.with_status(Status::Found).collect();
     let doubted: Vec<&FoundEffect> = causes(result).filter(|cause| cause.is_doubted()).collect();
     let mut words = match found.as_slice() {
@@ -145,7 +146,7 @@ fn found(result: &LoopResult) -> String {
         [cause] => {
             let rival = cause.alternatives.first();
             // Without a place and a law, the effects in doubt are examples of what may act.
-            let is_unknown = !has_place(cause) && stand_in(cause).is_some();
+            let is_unknown = !has_place(cause) && stand_in_sentence(cause).is_some();
             let link = if is_unknown { "for example" } else { "or else" };
             let or_else = rival
                 .map_or_else(String::new, |rival| format!(", {link} {}", rival.effect.description));
@@ -162,10 +163,10 @@ fn found(result: &LoopResult) -> String {
     }
 }
 
-/// States that no effect was found, although the residual is smaller than the declared σ explains
-/// (`ratio` < 1). `takes_less` is true if the fit assumed a smaller σ.
-fn nothing_below(ratio: f64, takes_less: bool) -> String {
-    let consequence = if takes_less {
+/// States that no effect was found, and that the residual is only `ratio` (below 1) times the
+/// declared σ. `assumes_smaller_sigma` is true if the fit assumed a smaller σ.
+fn overstated_sigma_sentence(ratio: f64, assumes_smaller_sigma: bool) -> String {
+    let consequence = if assumes_smaller_sigma {
         ", which is too large; causes are judged by the scatter of the residual instead"
     } else {
         "; causes are judged by that σ, and smaller ones may be missed"
@@ -176,7 +177,7 @@ fn nothing_below(ratio: f64, takes_less: bool) -> String {
     )
 }
 
-/// Describes an effect, followed by its declaration unless that contains many orders.
+/// Describes an effect, followed by its declaration unless that has many harmonic orders.
 pub(super) fn declared(effect: &NamedEffect) -> String {
     match effect.effect.harmonic_orders() {
         Some(orders) if orders.len() > MAX_LISTED_COEFFICIENTS => effect.description.clone(),
@@ -189,8 +190,8 @@ pub(super) fn alternative(other: &AlternativeEffect) -> String {
     format!("{} ({})", other.effect.description, percent(other.probability))
 }
 
-/// Returns the title of a cause: its status unless it is found, what may be claimed about it, and
-/// the line that declares it.
+/// Returns the title of a cause: its status unless that is `found`, what the data allow to claim
+/// about it, and the line that declares it.
 pub(super) fn title(found: &FoundEffect) -> String {
     match found.status {
         Status::Found => declared(&found.effect),
@@ -198,7 +199,8 @@ pub(super) fn title(found: &FoundEffect) -> String {
     }
 }
 
-/// States the status of an effect and what may be claimed about it; `words` describe the effect.
+/// States the status of an effect and what the data allow to claim about it; `words` describe the
+/// effect.
 fn claim(found: &FoundEffect, words: &str) -> String {
     let status = found.status.as_str();
     match (found.status, &found.claims) {
@@ -217,13 +219,13 @@ fn claim(found: &FoundEffect, words: &str) -> String {
     }
 }
 
-/// Returns true if the place of a cause is more probable than not.
+/// Returns true if the place of a cause is more probable than not, or if no evidence was evaluated.
 pub(super) fn has_place(found: &FoundEffect) -> bool {
     found.claims.as_ref().is_none_or(|claims| claims.place.probability >= MIN_PROBABLE)
 }
 
-/// Returns the claim about a cause whose law is unknown: `place` with its probability `at`, and the
-/// law's probability.
+/// States the claim about a cause whose law is unknown: the `place` with its probability `at`, and
+/// one candidate law, which `words` describe, with its probability `law`.
 fn located((place, at): (&str, f64), law: f64, words: &str) -> String {
     let unknown = if at >= MIN_PROBABLE {
         format!("{place} ({}), law not known", percent(at))
@@ -238,15 +240,16 @@ fn located((place, at): (&str, f64), law: f64, words: &str) -> String {
     }
 }
 
-/// Returns the name of the effect by which the model represents a cause of unknown law; `None` if
-/// the law is known.
-pub(super) fn stand_in(found: &FoundEffect) -> Option<String> {
+/// Names the effect by which the model represents a cause of unknown law; `None` if that effect is
+/// at least a candidate for the law.
+pub(super) fn stand_in_sentence(found: &FoundEffect) -> Option<String> {
     let law = found.claims.as_ref()?.law.probability;
     (law < MIN_CANDIDATE_PROBABILITY && found.status != Status::Contradicted)
         .then(|| format!("the model represents it by: {}", declared(&found.effect)))
 }
 
-fn lower(words: &str) -> String {
+/// Returns the text with its first letter in lower case.
+fn with_lower_initial(words: &str) -> String {
     let mut letters = words.chars();
     letters.next().map_or_else(String::new, |first| first.to_lowercase().chain(letters).collect())
 }
@@ -267,7 +270,8 @@ mod tests {
 
     #[test]
     fn an_overstated_sigma_is_said_with_its_number() {
-        let (near, far) = (nothing_below(0.94, false), nothing_below(0.012, true));
+        let (near, far) =
+            (overstated_sigma_sentence(0.94, false), overstated_sigma_sentence(0.012, true));
         assert!(near.starts_with("Nothing found: the residual is 0.94 × the declared σ; causes"));
         let expected = "Nothing found: the residual is 0.012 × the declared σ, which is too large;";
         assert!(far.starts_with(expected), "{far}");

@@ -12,8 +12,9 @@ use crate::quantity::format::{counted, decimals, number, or_dash, p_value, two_d
 
 /// Header of the table of causes.
 const HEADER: [&str; 5] = ["cause", "probability", "change ± 1 σ", "error left out", "more poses"];
-/// Probability of an error as large by noise alone below which the text does not call it noise.
-const SIGNIFICANT: f64 = 0.01;
+/// p-value of the errors below which the text does not say that noise and known misfit explain
+/// them.
+const MIN_EXPECTED_P: f64 = 0.01;
 /// Maximum number of decimals of a change.
 const MAX_DECIMALS: usize = 6;
 
@@ -22,7 +23,7 @@ pub fn watch_text(problem: &Problem, watch: &Watch) -> String {
     text(&blocks(problem, watch, None))
 }
 
-/// Returns the verdict as a page, with the evidence after each of the tested `rows`.
+/// Returns the verdict as a page, with a figure of the evidence after each of the tested `rows`.
 pub(crate) fn watch_page(problem: &Problem, watch: &Watch, rows: &Measurements) -> String {
     page(&problem.title, "watch", &blocks(problem, watch, control_chart(watch, rows)))
 }
@@ -43,7 +44,7 @@ fn blocks<'a>(problem: &Problem, watch: &Watch, drawn: Option<Drawing>) -> Vec<B
         in_unit(watch.error),
         match p {
             _ if watch.is_changed() => "",
-            p if p < SIGNIFICANT => ", more than noise and the known misfit explain",
+            p if p < MIN_EXPECTED_P => ", more than noise and the known misfit explain",
             _ => ", as expected from noise and the known misfit",
         }
     );
@@ -73,7 +74,7 @@ fn blocks<'a>(problem: &Problem, watch: &Watch, drawn: Option<Drawing>) -> Vec<B
 }
 
 /// Draws the evidence for a change after each row, with the level of an alarm; `None` for fewer
-/// than two looks.
+/// than two evaluations.
 fn control_chart(watch: &Watch, rows: &Measurements) -> Option<Drawing> {
     let evidence = watch.looks.iter().map(|look| (look.0 as f64, look.1 / 10_f64.ln()));
     // If rows were left out, the row numbers of the curve differ from those of the table.
@@ -95,8 +96,8 @@ fn control_chart(watch: &Watch, rows: &Measurements) -> Option<Drawing> {
     .drawing()
 }
 
-/// Returns name and first row (from 1) of each session, or of each file where sessions have no
-/// names; nothing if there is only one.
+/// Returns the name and the first row (from 1) of each session, or of each file if sessions have no
+/// names; empty if there is only one.
 fn first_rows(rows: &Measurements) -> Vec<(String, f64)> {
     let session = |row: usize| rows.session.names.get(*rows.session.of_row.get(row)?);
     let file =
@@ -112,7 +113,7 @@ fn first_rows(rows: &Measurements) -> Vec<(String, f64)> {
     if found.len() > 1 { found } else { Vec::new() }
 }
 
-/// States whether the arm has changed, and what.
+/// States whether the arm has changed, and what has changed.
 fn verdict(watch: &Watch) -> String {
     let evidence = watch.looks.last().map_or(0.0, |look| look.1.exp());
     let Some(row) = watch.changed_at else {
@@ -144,7 +145,8 @@ fn row(cause: &WatchedCause, in_unit: &impl Fn(f64) -> String) -> Vec<String> {
     ]
 }
 
-/// Formats a change with its standard error, without the word before the last dot of the name.
+/// Formats a change with its standard error; the name is the part of the parameter's name after the
+/// last dot.
 fn change(change: &Change) -> String {
     let (factor, symbol) = if change.unit.is_relative() {
         (100.0, "%".to_owned())

@@ -87,7 +87,7 @@ pub(super) fn law_name(law: &HypothesisKind) -> &str {
 /// Describes a hypothesis in words; `effect_words` describes an effect.
 fn describe(hypothesis: &select::Hypothesis, effect_words: impl Fn(&Effect) -> String) -> String {
     let (place, inputs) =
-        (at_place(&hypothesis.site.to_string()), joined_words(&hypothesis.depends_on));
+        (at_place(&hypothesis.site.to_string()), join_with_and(&hypothesis.depends_on));
     match &hypothesis.kind {
         HypothesisKind::Effect(effect) => effect_words(effect),
         HypothesisKind::NearHarmonic(1) => {
@@ -137,6 +137,6 @@ pub(crate) fn at_place(place: &str) -> String {
 }
 
 /// Joins the names of quantities by "and".
-fn joined_words(covariates: &[Covariate]) -> String {
+fn join_with_and(covariates: &[Covariate]) -> String {
     covariates.iter().map(ToString::to_string).collect::<Vec<_>>().join(" and ")
 }

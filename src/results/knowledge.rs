@@ -104,10 +104,13 @@ impl ManyHarmonics {
         let coefficients = parameters
             .filter_map(|parameter| Some((parameter.name, joint_and_order(&parameter.regressor)?)))
             .collect();
-        Self::among(coefficients, estimates)
+        Self::from_coefficients(coefficients, estimates)
     }
 
-    fn among(coefficients: BTreeMap<String, (usize, u32)>, estimates: &[Estimate]) -> Self {
+    fn from_coefficients(
+        coefficients: BTreeMap<String, (usize, u32)>,
+        estimates: &[Estimate],
+    ) -> Self {
         let mut joints: BTreeMap<usize, (usize, BTreeMap<u32, f64>)> = BTreeMap::new();
         for estimate in estimates {
             if let Some((joint, order)) = coefficients.get(&estimate.name) {
@@ -175,7 +178,7 @@ mod tests {
         estimates.extend(
             coefficients.iter().map(|(name, (_, order))| estimate(name, f64::from(*order))),
         );
-        let many = ManyHarmonics::among(coefficients, &estimates);
+        let many = ManyHarmonics::from_coefficients(coefficients, &estimates);
         // Joint 1 has few enough to list all of them.
         assert_eq!(many.largest, BTreeMap::from([(2, (vec![10, 9, 8, 7], 6))]));
         assert!(

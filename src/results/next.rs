@@ -26,8 +26,8 @@ pub struct NextResult {
     pub workspace_poses: usize,
     /// 1 σ of the noise of one coordinate; null if cameras measure.
     pub noise_mm: f64,
-    /// Root mean square misfit of the model along each axis that the choice allows for; null if
-    /// cameras measure.
+    /// Root mean square misfit of the model along each axis, which the choice of poses takes into
+    /// account; null if cameras measure.
     pub misfit_mm: f64,
     /// Probability with which an error in the workspace stays below the bound.
     pub level: f64,

@@ -23,9 +23,9 @@ pub struct WatchResult {
     pub rows: usize,
     /// Number of rows that were left out, because the estimate was fitted to them.
     pub rows_left_out: usize,
-    /// Number of rows at the first look with an alarm; null without one.
+    /// Number of rows up to the first look with an alarm; null without an alarm.
     pub changed_at_row: Option<usize>,
-    /// Number of rows after each look.
+    /// Number of rows up to each evaluation of the evidence (look).
     pub look_rows: Vec<usize>,
     /// Common logarithm of the evidence for a change after each look. A value of at least
     /// −log10(`false_alarm_rate`) raises an alarm.

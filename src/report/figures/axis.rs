@@ -3,15 +3,17 @@
 use super::svg::{Colour, MUTED};
 use crate::quantity::format::{number, power_of_ten};
 
-/// Fraction of the values, the inner ones, that the axis always includes.
+/// Fraction of the values, the smallest in absolute value, that an axis always includes (the inner
+/// values).
 const INNER_FRACTION: f64 = 0.95;
-/// Ratio of the largest value to the inner ones, above which outlying values are left outside the
-/// axis. Noise alone gives 2.3 for a hundred thousand values.
+/// Ratio of the largest absolute value to the largest inner value, above which an axis leaves out
+/// the outlying values. Noise alone gives 2.3 for a hundred thousand values.
 const OUTLIER_RATIO: f64 = 2.5;
-/// Ratio of the axis limit to the largest inner value, if outlying values are left outside.
+/// Ratio of the axis limit to the largest inner value, if outlying values are left out.
 const INNER_MARGIN: f64 = 1.8;
-/// Tick values within a decade. The first set whose number of ticks is small enough is used.
-const STEPS: [&[f64]; 4] =
+/// Sets of tick values within a decade of a logarithmic axis. The first set with few enough ticks
+/// is used.
+const DECADE_TICKS: [&[f64]; 4] =
     [&[1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0], &[1.0, 2.0, 5.0], &[1.0, 3.0], &[1.0]];
 
 /// Axis of a panel.
@@ -22,13 +24,13 @@ pub struct Axis {
     pub range: (f64, f64),
     /// Label with the unit; empty for none.
     pub label: String,
-    /// Values with their texts.
+    /// Ticks with their texts.
     pub ticks: Vec<Tick>,
     /// True if the ticks are numbers, false if they name rows.
     pub is_numeric: bool,
 }
 
-/// Tick of an axis: value and text.
+/// Tick of an axis: value, text and colour of the text.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tick {
     pub at: f64,
@@ -37,13 +39,13 @@ pub struct Tick {
 }
 
 impl Axis {
-    /// Creates a linear axis with about `count` numbers.
+    /// Creates a linear axis with about `count` tick labels.
     pub fn linear(range: (f64, f64), label: &str, count: usize) -> Self {
         let (low, high) = widened(range);
         // `count` numbers divide the axis into `count` + 1 parts.
         let parts = (count + 1) as f64;
         let step = if count > 0 { round_step((high - low) / parts) } else { f64::INFINITY };
-        let digits = whole((-step.log10()).ceil());
+        let digits = clamped_integer((-step.log10()).ceil());
         let first = (low / step - 1e-9).ceil();
         let values = (0..=64).map(|k| (first + f64::from(k)) * step);
         let ticks = values.take_while(|value| *value <= high + 1e-9 * (high - low));
@@ -52,7 +54,7 @@ impl Axis {
         Self::new((low, high), label, ticks)
     }
 
-    /// Creates a logarithmic axis with about `count` numbers; `range` is in decades.
+    /// Creates a logarithmic axis with about `count` tick labels; `range` is in common logarithms.
     pub fn logarithmic(range: (f64, f64), label: &str, count: usize) -> Self {
         let (low, high) = widened(range);
         let every = ((high - low) / count.max(1) as f64).round().max(1.0);
@@ -64,9 +66,9 @@ impl Axis {
                 decades.flat_map(|decade| steps.iter().map(move |step| value(decade, *step)));
             values.filter(|(at, _)| (low - 1e-9..=high + 1e-9).contains(at)).collect()
         };
-        let steps = if every > 1.0 { &STEPS[3..] } else { &STEPS };
+        let steps = if every > 1.0 { &DECADE_TICKS[3..] } else { &DECADE_TICKS };
         let dense = steps.iter().map(|steps| ticks(steps)).find(|ticks| ticks.len() <= count + 2);
-        let ticks = dense.unwrap_or_else(|| ticks(STEPS[3]));
+        let ticks = dense.unwrap_or_else(|| ticks(DECADE_TICKS[3]));
         Self::new((low, high), label, ticks)
     }
 
@@ -79,7 +81,7 @@ impl Axis {
         Self { range, label: String::new(), ticks, is_numeric: false }
     }
 
-    /// Creates an axis without numbers and label.
+    /// Creates an axis without ticks and label.
     pub fn bare(range: (f64, f64)) -> Self {
         Self::new(widened(range), "", Vec::new())
     }
@@ -93,15 +95,15 @@ impl Axis {
 /// Returns 10^`exponent` × `step` as text: `0.05`, `30`, or `10⁻⁶`.
 fn power(exponent: f64, step: f64) -> String {
     if (-4.0..5.0).contains(&exponent) {
-        let digits = whole(-exponent) + usize::from(step.fract() > 0.0 && exponent < 1.0);
+        let digits = clamped_integer(-exponent) + usize::from(step.fract() > 0.0 && exponent < 1.0);
         return number(step * 10.0_f64.powf(exponent), digits);
     }
     let power = power_of_ten(exponent);
     if step > 1.0 { format!("{step}·{power}") } else { power }
 }
 
-/// Returns the integer part of a small number, 0 for a negative one.
-fn whole(value: f64) -> usize {
+/// Returns the integer part of a number, limited to 0…12.
+fn clamped_integer(value: f64) -> usize {
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
@@ -118,7 +120,7 @@ fn round_step(value: f64) -> f64 {
     steps.into_iter().find(|step| *step >= value).unwrap_or(10.0 * power)
 }
 
-/// Returns a range of positive width, also for a single value or none.
+/// Returns the range, or one of positive width for a single value or for none.
 fn widened((low, high): (f64, f64)) -> (f64, f64) {
     match (low.is_finite() && high.is_finite(), high - low) {
         (false, _) => (0.0, 1.0),
@@ -127,14 +129,14 @@ fn widened((low, high): (f64, f64)) -> (f64, f64) {
     }
 }
 
-/// Adds a margin to both ends of a range, as a fraction of its width.
+/// Widens a range at both ends by a fraction of its width.
 pub fn with_margin((low, high): (f64, f64), fraction: f64) -> (f64, f64) {
     let margin = fraction * (high - low);
     (low - margin, high + margin)
 }
 
-/// Returns the limit of an axis symmetric about zero: the largest absolute value, or, with
-/// outliers, a multiple of the inner values.
+/// Returns the limit of an axis that is symmetric about zero: the largest absolute value or, if
+/// there are outliers, a multiple of the largest inner value.
 pub fn axis_limit(values: impl IntoIterator<Item = f64>) -> f64 {
     let mut sizes: Vec<f64> =
         values.into_iter().map(f64::abs).filter(|size| size.is_finite()).collect();

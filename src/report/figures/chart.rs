@@ -1,56 +1,41 @@
 //! Charts: panels with axes, the shapes in them, and a legend. One renderer draws every figure.
 
 use super::axis::Axis;
-use super::svg::{Anchor, Colour, FAINT, GRID, INK, MUTED, Paint, Svg, TEXT, WARM};
+use super::svg::{Anchor, Colour, FAINT, GRID, INK, MUTED, Paint, Svg, TEXT_SIZE, WARM};
 
-/// Width of a figure in displayed pixels.
-pub const WIDTH: f64 = 480.0;
-/// Space left of a panel's area in displayed pixels.
-pub const LEFT: f64 = 62.0;
-/// Space right of a panel's area in displayed pixels.
-pub const RIGHT: f64 = 12.0;
-/// Space above a panel's area in displayed pixels.
-const ABOVE: f64 = 8.0;
+/// Width of every figure in displayed pixels, without its left margin.
+pub const FIGURE_WIDTH: f64 = 480.0;
+/// Default space left of a panel's plot area in displayed pixels.
+pub const LEFT_SPACE: f64 = 62.0;
+/// Default space right of a panel's plot area in displayed pixels.
+pub const RIGHT_SPACE: f64 = 12.0;
+/// Space above a panel's plot area in displayed pixels.
+const SPACE_ABOVE: f64 = 8.0;
 /// Height of the legend in displayed pixels.
-const LEGEND: f64 = 20.0;
-/// Opacity of a band.
+const LEGEND_HEIGHT: f64 = 20.0;
+/// Opacity of a band behind the data, 0 to 1.
 const BAND_OPACITY: f64 = 0.16;
 
-/// Position in the coordinates of a panel.
+/// Position (x, y) in the units of a panel's axes.
 pub type At = (f64, f64);
 
-/// Shape in the coordinates of a panel.
+/// Shape in the units of a panel's axes.
 #[derive(Debug, Clone)]
 pub enum Shape {
-    Dot {
-        at: At,
-        radius: f64,
-        paint: Paint,
-        row: Option<usize>,
-    },
-    Line {
-        points: Vec<At>,
-        paint: Paint,
-    },
+    /// Circle with a radius in displayed pixels; `row` is the row of the measurements (from 0) that
+    /// it shows.
+    Dot { at: At, radius: f64, paint: Paint, row: Option<usize> },
+    /// Polyline through points.
+    Line { points: Vec<At>, paint: Paint },
     /// Rectangle between two corners, with attributes for the script of the page.
-    Box {
-        corners: [At; 2],
-        paint: Paint,
-        tag: String,
-    },
-    /// Text at a position, shifted by displayed pixels.
-    Text {
-        at: At,
-        shift: (f64, f64),
-        text: String,
-        colour: Colour,
-        anchor: Anchor,
-    },
+    Box { corners: [At; 2], paint: Paint, tag: String },
+    /// Text at a position, shifted by displayed pixels to the right and downwards.
+    Text { at: At, shift: (f64, f64), text: String, colour: Colour, anchor: Anchor },
 }
 
 impl Shape {
-    /// Creates the dot of a pose. If it is a row of the measurements, the page's script can find
-    /// it.
+    /// Creates a dot. If it shows a `row` of the measurements, the page's script can select that
+    /// row.
     pub fn dot(at: At, radius: f64, paint: Paint, row: Option<usize>) -> Self {
         Self::Dot { at, radius, paint, row }
     }
@@ -76,26 +61,27 @@ impl Shape {
     }
 }
 
-/// Panel with its axes.
+/// Plot area with its axes and the shapes in it.
 #[derive(Debug, Clone)]
 pub struct Panel {
     pub x: Axis,
     pub y: Axis,
-    /// Height between the ends of the vertical axis in displayed pixels.
+    /// Height of the plot area in displayed pixels.
     pub height: f64,
-    /// Space left and right of the area in displayed pixels.
+    /// Space left and right of the plot area in displayed pixels.
     pub sides: (f64, f64),
-    /// Size of the texts of the vertical axis in displayed pixels.
+    /// Size of the tick labels of the vertical axis in displayed pixels.
     pub text: f64,
     pub shapes: Vec<Shape>,
 }
 
 impl Panel {
     pub fn new(height: f64, x: Axis, y: Axis) -> Self {
-        Self { x, y, height, sides: (LEFT, RIGHT), text: TEXT, shapes: Vec::new() }
+        Self { x, y, height, sides: (LEFT_SPACE, RIGHT_SPACE), text: TEXT_SIZE, shapes: Vec::new() }
     }
 
-    /// Creates a panel with a name left of each row.
+    /// Creates a panel of rows with names. `row` is the height of a row, `names` and `numbers` are
+    /// the space left and right of the plot area, all in displayed pixels.
     pub fn of_rows(
         row: f64,
         (names, numbers): (f64, f64),
@@ -124,7 +110,8 @@ impl Panel {
         self.with([Shape::line([(x, bottom), (x, top)], Paint::line(colour, 1.0))])
     }
 
-    /// Writes the number of values outside the axes at the top, if there are any.
+    /// Writes the number of values outside the axes (`count`) at the top, unless it is 0; at the
+    /// left for `Anchor::Start`, else at the right.
     pub fn noting_beyond(self, count: usize, anchor: Anchor) -> Self {
         let (x, shift) = match anchor {
             Anchor::Start => (self.x.range.0, 6.0),
@@ -135,7 +122,7 @@ impl Panel {
         self.with((count > 0).then_some(note))
     }
 
-    /// Returns the space below the area in displayed pixels.
+    /// Returns the space below the plot area in displayed pixels, for tick labels and axis label.
     fn below(&self) -> f64 {
         match (self.x.label.is_empty(), self.x.ticks.is_empty()) {
             (true, true) => 6.0,
@@ -144,14 +131,15 @@ impl Panel {
         }
     }
 
+    /// Returns the height of the panel with the space above and below in displayed pixels.
     fn total_height(&self) -> f64 {
-        ABOVE + self.height + self.below()
+        SPACE_ABOVE + self.height + self.below()
     }
 
-    /// Draws the panel at distance `top` from the top of the figure.
+    /// Draws the panel at the distance `top` \[displayed pixels\] from the top of the figure.
     fn draw(&self, svg: &mut Svg, top: f64) {
-        let (left, right) = (self.sides.0, WIDTH - self.sides.1);
-        let (top, bottom) = (top + ABOVE, top + ABOVE + self.height);
+        let (left, right) = (self.sides.0, FIGURE_WIDTH - self.sides.1);
+        let (top, bottom) = (top + SPACE_ABOVE, top + SPACE_ABOVE + self.height);
         let share = |value: f64, (from, to): (f64, f64)| (value - from) / (to - from);
         let x = |value: f64| left + (right - left) * share(value, self.x.range);
         let y = |value: f64| bottom - (bottom - top) * share(value, self.y.range);
@@ -159,7 +147,12 @@ impl Panel {
         let grid = Paint::line(GRID, 1.0);
         for tick in &self.x.ticks {
             svg.line([(x(tick.at), top), (x(tick.at), bottom)], grid);
-            svg.text(&tick.text, (x(tick.at), bottom + 11.0), (tick.colour, TEXT), Anchor::Middle);
+            svg.text(
+                &tick.text,
+                (x(tick.at), bottom + 11.0),
+                (tick.colour, TEXT_SIZE),
+                Anchor::Middle,
+            );
         }
         for tick in &self.y.ticks {
             if self.y.is_numeric {
@@ -172,7 +165,7 @@ impl Panel {
         }
         if !self.x.label.is_empty() {
             let at = (0.5 * (left + right), bottom + self.below() - 10.0);
-            svg.text(&self.x.label, at, (INK, TEXT), Anchor::Middle);
+            svg.text(&self.x.label, at, (INK, TEXT_SIZE), Anchor::Middle);
         }
         if !self.y.label.is_empty() {
             svg.text_upwards(&self.y.label, (6.0, 0.5 * (top + bottom)), INK);
@@ -191,14 +184,14 @@ impl Panel {
                 }
                 Shape::Text { at, shift, text, colour, anchor } => {
                     let (x, y) = place(*at);
-                    svg.text(text, (x + shift.0, y + shift.1), (*colour, TEXT), *anchor);
+                    svg.text(text, (x + shift.0, y + shift.1), (*colour, TEXT_SIZE), *anchor);
                 }
             }
         }
     }
 }
 
-/// Mark of an entry of the legend.
+/// Symbol of an entry of a legend.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Mark {
     Dot,
@@ -210,7 +203,7 @@ pub enum Mark {
     Scale(f64),
 }
 
-/// Entry of the legend: name, colour and mark.
+/// Entry of a legend: name, colour and symbol.
 pub type Entry<'a> = (&'a str, Colour, Mark);
 
 /// Returns the legend of fitted and held-out poses.
@@ -218,12 +211,12 @@ pub fn poses_legend() -> Vec<Entry<'static>> {
     vec![("fitted pose", FAINT, Mark::Dot), ("held-out pose", INK, Mark::Dot)]
 }
 
-/// Draws panels one below the other under a legend; `label` describes the figure for screen
-/// readers.
+/// Draws a legend, and below it the panels one below the other. Returns SVG text; `label` describes
+/// the figure for screen readers.
 pub fn chart(label: &str, legend: &[Entry], panels: &[Panel]) -> String {
     let mut svg = Svg::default();
-    let mut top = if legend.is_empty() { 0.0 } else { LEGEND };
-    let mut at = LEFT;
+    let mut top = if legend.is_empty() { 0.0 } else { LEGEND_HEIGHT };
+    let mut at = LEFT_SPACE;
     for &(name, colour, mark) in legend {
         let square = [(at, 6.0), (at + 8.0, 14.0)];
         let width = if let Mark::Scale(length) = mark { length } else { 8.0 };
@@ -235,12 +228,12 @@ pub fn chart(label: &str, legend: &[Entry], panels: &[Panel]) -> String {
             Mark::Bar => svg.rectangle(square, Paint::fill(colour), ""),
             Mark::Band => svg.rectangle(square, Paint::fill(colour).faded(BAND_OPACITY), ""),
         }
-        svg.text(name, (at + width + 5.0, 10.0), (MUTED, TEXT), Anchor::Start);
+        svg.text(name, (at + width + 5.0, 10.0), (MUTED, TEXT_SIZE), Anchor::Start);
         at += width + 19.0 + 6.0 * name.chars().count() as f64;
     }
     for panel in panels {
         panel.draw(&mut svg, top);
         top += panel.total_height();
     }
-    svg.finish((WIDTH, top), label)
+    svg.finish((FIGURE_WIDTH, top), label)
 }

@@ -1,15 +1,15 @@
-//! Contribution of each parameter and effect to the predicted positions of the measured poses.
+//! Figure of the contribution of each parameter and effect to the predicted positions.
 
 use super::prelude::*;
 use crate::results::Contribution;
 
-/// Maximum number of bars.
+/// Maximum number of bars that the figure shows.
 const MAX_BARS: usize = 20;
 /// Maximum number of decades of the logarithmic scale.
 const MAX_DECADES: f64 = 4.0;
 
-/// Draws the largest contributions as bars on a logarithmic scale; half of the bars are reserved
-/// for effects.
+/// Draws the largest contributions as bars on a logarithmic scale. At most half of the bars are
+/// those of effects. `None` if all contributions are 0.
 pub fn contributions(contributions: &[Contribution]) -> Option<Drawing> {
     let (mut effects, parameters): (Vec<&Contribution>, Vec<&Contribution>) = contributions
         .iter()

@@ -1,15 +1,15 @@
-//! Correlations of the estimates.
+//! Figure of the correlations of the estimates.
 
 use nalgebra::DMatrix;
 
 use super::prelude::*;
 use crate::fit::Correlations;
 
-/// Maximum number of parameters in the matrix.
+/// Maximum number of parameters that the matrix shows.
 const MAX_PARAMETERS: usize = 20;
-/// Minimum and maximum width for names in pixels.
+/// Minimum and maximum width of the column of names in displayed pixels.
 const NAME_WIDTH: (f64, f64) = (118.0, 230.0);
-/// Ratio of a letter's width to its height, by which the width of names is estimated.
+/// Ratio of the mean width of a letter to the text size, by which the width of names is estimated.
 const LETTER_WIDTH: f64 = 0.62;
 /// Smallest absolute correlation that is coloured.
 const MIN_CORRELATION: f64 = 0.05;
@@ -23,7 +23,8 @@ fn shade(value: f64) -> Option<Paint> {
     (value.abs() >= MIN_CORRELATION).then(|| Paint::fill(colour).faded(depth))
 }
 
-/// Draws the correlation matrix in colours; with many parameters only the most correlated ones.
+/// Draws the correlation matrix in colours; of many parameters only the most correlated ones.
+/// `None` for less than two parameters.
 pub fn correlation(correlations: &Correlations) -> Option<Drawing> {
     let (matrix, total) = (&correlations.matrix, correlations.names.len());
     if total < 2 {
@@ -33,8 +34,8 @@ pub fn correlation(correlations: &Correlations) -> Option<Drawing> {
     let count = shown.len() as f64;
     let names: Vec<&str> = shown.iter().map(|&i| correlations.names[i].as_str()).collect();
     let longest = names.iter().map(|name| name.chars().count()).max().unwrap_or_default() as f64;
-    let cell_beside = |names: f64| ((WIDTH - names - 4.0) / count).clamp(8.0, 26.0).floor();
-    let text_of = |cell: f64| (0.85 * cell).min(TEXT);
+    let cell_beside = |names: f64| ((FIGURE_WIDTH - names - 4.0) / count).clamp(8.0, 26.0).floor();
+    let text_of = |cell: f64| (0.85 * cell).min(TEXT_SIZE);
     let wanted = LETTER_WIDTH * text_of(cell_beside(NAME_WIDTH.0)) * longest + 12.0;
     let left = wanted.clamp(NAME_WIDTH.0, NAME_WIDTH.1);
     let cell = cell_beside(left);
@@ -46,7 +47,7 @@ pub fn correlation(correlations: &Correlations) -> Option<Drawing> {
             Some(Shape::area((x - 0.48, y - 0.48), (x + 0.48, y + 0.48), paint?))
         })
     });
-    let sides = (left, WIDTH - left - cell * count);
+    let sides = (left, FIGURE_WIDTH - left - cell * count);
     let rows = names.iter().map(|name| ((*name).to_owned(), MUTED));
     let matrix_panel =
         Panel { text: text_of(cell), ..Panel::of_rows(cell, sides, x, rows) }.with(boxes);
@@ -56,7 +57,7 @@ pub fn correlation(correlations: &Correlations) -> Option<Drawing> {
     });
     let (low, high) = (("−1".to_owned(), MUTED), "+1   correlation");
     let x = Axis::bare((-0.5, 10.5));
-    let scale = Panel::of_rows(12.0, (left, WIDTH - left - 14.0 * 11.0), x, [low])
+    let scale = Panel::of_rows(12.0, (left, FIGURE_WIDTH - left - 14.0 * 11.0), x, [low])
         .with(steps)
         .with([Shape::text((10.5, 0.0), 6.0, high, MUTED)]);
     let note = if total > shown.len() {
@@ -80,10 +81,11 @@ pub fn correlation(correlations: &Correlations) -> Option<Drawing> {
     Some(Drawing::new(titles, caption, svg, sheet(header, rows)))
 }
 
-/// Returns the most correlated parameters, at most [`MAX_PARAMETERS`], with correlated ones side by
-/// side.
+/// Returns the indices of the most correlated parameters, at most [`MAX_PARAMETERS`], with
+/// correlated ones side by side.
 ///
-/// Groups are joined end to end in descending order of the correlations (single linkage).
+/// Groups of parameters are joined end to end in descending order of the absolute correlation
+/// (single linkage).
 fn clustered_order(matrix: &DMatrix<f64>) -> Vec<usize> {
     let count = matrix.ncols();
     let size = |&(i, j): &(usize, usize)| {

@@ -1,16 +1,16 @@
-//! Quantities along a series: errors against the number of poses, evidence after each row.
+//! Line charts, for example of errors against the number of poses or of evidence after each row.
 
 use super::chart::At;
 use super::prelude::*;
 
-/// Maximum number of points of a curve that are also drawn as dots.
+/// Number of points of a joined curve up to which they are also drawn as dots.
 const MAX_DOTS: usize = 60;
-/// Maximum number of points of a curve without a line.
-const MAX_SCATTERED: usize = 600;
-/// Smallest value on a logarithmic axis.
+/// Maximum number of dots that are drawn of a curve without a line.
+const MAX_SCATTERED_DOTS: usize = 600;
+/// Smallest value that a logarithmic axis shows; smaller values are drawn there.
 const MIN_LOGARITHMIC_VALUE: f64 = 1e-12;
 /// Height of the panel in displayed pixels.
-const HEIGHT: f64 = 210.0;
+const PANEL_HEIGHT: f64 = 210.0;
 
 /// Named points of a figure, joined by a line or scattered.
 #[derive(Debug, Clone)]
@@ -18,6 +18,7 @@ pub struct Curve<'a> {
     pub name: &'a str,
     pub colour: Colour,
     pub points: Vec<At>,
+    /// True if a line joins the points.
     pub is_joined: bool,
 }
 
@@ -28,13 +29,13 @@ impl<'a> Curve<'a> {
         Self { name, colour, points, is_joined: true }
     }
 
-    /// Draws dots without a line between them.
+    /// Returns the curve as dots without a line between them.
     pub fn scattered(self) -> Self {
         Self { is_joined: false, ..self }
     }
 }
 
-/// Figure of curves over one pair of axes.
+/// Figure of curves in one panel.
 #[derive(Debug, Clone, Default)]
 pub struct Series<'a> {
     /// File name and title.
@@ -45,14 +46,14 @@ pub struct Series<'a> {
     /// True if both axes are logarithmic.
     pub is_logarithmic: bool,
     pub curves: Vec<Curve<'a>>,
-    /// Horizontal lines with their names.
+    /// Names and ordinates of horizontal lines, such as a tolerance.
     pub levels: Vec<(String, f64)>,
-    /// Vertical lines with their names, for example the first row of each file.
+    /// Names and abscissas of vertical lines, for example the first row of each file.
     pub starts: Vec<(String, f64)>,
 }
 
 impl Series<'_> {
-    /// Draws the curves; `None` if none has two points.
+    /// Draws the curves; `None` if no curve has two points.
     pub fn drawing(&self) -> Option<Drawing> {
         let points = || self.curves.iter().flat_map(|curve| &curve.points);
         if self.curves.iter().all(|curve| curve.points.len() < 2) {
@@ -105,13 +106,13 @@ impl Series<'_> {
                 .is_joined
                 .then(|| Shape::line(curve.points.iter().map(at), Paint::line(curve.colour, 1.8)));
             let dots = curve
-                .drawn()
+                .drawn_points()
                 .into_iter()
                 .filter(move |_| is_dotted)
                 .map(move |point| Shape::dot(at(point), 2.4, Paint::fill(curve.colour), None));
             line.into_iter().chain(dots)
         });
-        let panel = Panel::new(HEIGHT, x, y).with(starts).with(levels).with(shapes);
+        let panel = Panel::new(PANEL_HEIGHT, x, y).with(starts).with(levels).with(shapes);
         let mark = |curve: &Curve| if curve.is_joined { Mark::Line } else { Mark::Dot };
         let legend: Vec<_> =
             self.curves.iter().map(|curve| (curve.name, curve.colour, mark(curve))).collect();
@@ -120,7 +121,7 @@ impl Series<'_> {
             curve.points.iter().map(row)
         });
         let data = sheet(["curve", self.labels.0, self.labels.1], rows);
-        let drawn = self.curves.iter().map(|curve| curve.drawn().len()).sum();
+        let drawn = self.curves.iter().map(|curve| curve.drawn_points().len()).sum();
         let caption = format!("{}{}", self.caption, thinning_note(drawn, points().count()));
         let svg = chart(self.names.1, &legend, &[panel]);
         Some(Drawing::new(self.names, caption, svg, data))
@@ -128,13 +129,13 @@ impl Series<'_> {
 }
 
 impl Curve<'_> {
-    /// Returns the points that are drawn: all of a line, some of many scattered ones.
-    fn drawn(&self) -> Vec<&At> {
+    /// Returns the points that are drawn: all points of a line, a sample of many scattered ones.
+    fn drawn_points(&self) -> Vec<&At> {
         let every: Vec<usize> = (0..self.points.len()).collect();
         let kept = if self.is_joined {
             every
         } else {
-            sample(&every, MAX_SCATTERED, |k| self.points[k].1)
+            sample(&every, MAX_SCATTERED_DOTS, |k| self.points[k].1)
         };
         kept.into_iter().map(|k| &self.points[k]).collect()
     }

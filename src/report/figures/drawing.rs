@@ -1,4 +1,4 @@
-//! Figure with its title, caption and data, and the sentences that captions share.
+//! Figure with its title, caption and CSV data, and the sentences that captions share.
 
 use crate::files::csv;
 use crate::quantity::format::fixed;
@@ -30,7 +30,7 @@ impl Drawing {
     }
 }
 
-/// Returns the plotted data as CSV text.
+/// Formats the plotted data of a figure as CSV text.
 pub fn sheet<'a>(
     header: impl IntoIterator<Item = &'a str>,
     rows: impl IntoIterator<Item = Vec<String>>,
@@ -38,8 +38,8 @@ pub fn sheet<'a>(
     csv(header.into_iter().map(str::to_owned).collect(), rows)
 }
 
-/// Returns plotted data of poses as CSV text: file and line, whether the pose is held out, and the
-/// given columns.
+/// Formats the plotted data of some poses as CSV text: file and line, whether the pose is held out,
+/// and the values of `columns`.
 pub fn pose_sheet<'a>(
     columns: &[&str],
     rows: impl IntoIterator<Item = (&'a PoseError, Vec<f64>)>,
@@ -51,8 +51,8 @@ pub fn pose_sheet<'a>(
     sheet([&["row", "held_out"], columns].concat(), rows.into_iter().map(cells))
 }
 
-/// Returns the sentence of a caption on omitted poses, for example " 300 of 6487 poses are drawn,
-/// including those with the largest residuals."; empty if all are drawn.
+/// Returns the sentence of a caption on poses omitted from a sample, for example " 300 of 6487
+/// poses are drawn, including those with the largest residuals."; empty if all are drawn.
 pub fn thinning_note(drawn: usize, total: usize) -> String {
     if drawn < total {
         format!(" {drawn} of {total} poses are drawn, including those with the largest residuals.")

@@ -3,10 +3,11 @@
 use super::prelude::*;
 use crate::results::{Cause, Point};
 
-/// Maximum number of poses in a figure.
-const MAX_POSES: usize = 500;
+/// Maximum number of poses that a figure shows.
+const MAX_SHOWN_POSES: usize = 500;
 
-/// Returns the fitted law at a value, by linear interpolation of its curve; 0 without a curve.
+/// Returns the ordinate of the fitted law at the abscissa `x`, by linear interpolation of its
+/// curve; constant beyond its ends, 0 without a curve.
 fn law_at(curve: &[(f64, f64)], x: f64) -> f64 {
     let next = curve.partition_point(|at| at.0 < x);
     match (next.checked_sub(1).and_then(|k| curve.get(k)), curve.get(next)) {
@@ -16,21 +17,23 @@ fn law_at(curve: &[(f64, f64)], x: f64) -> f64 {
     }
 }
 
-/// Draws the figure of an effect that the loop found as number `number`; `shown` are the rows to
-/// draw.
+/// Draws the figure of the effect that the loop found as number `number` (from 1). `shown` are the
+/// rows that figures may draw, ascending.
 pub fn effect(cause: &Cause, number: usize, shown: &[usize]) -> Drawing {
     let lead = "Found by the loop; the line is the fitted law.";
     draw(cause, shown, (&format!("effect-{number}"), "fitted law", lead))
 }
 
-/// Draws the figure of structure that no effect explains; `shown` are the rows to draw.
+/// Draws the figure of structure that no effect explains. `shown` are the rows that figures may
+/// draw, ascending.
 pub fn unexplained(trend: &Cause, shown: &[usize]) -> Drawing {
     let lead = "No effect explains this; the line is the empirical correction. Its mean over this \
                 range is subtracted from line and dots, since base and geometry absorb a constant.";
     draw(trend, shown, ("unexplained", "correction", lead))
 }
 
-/// Draws the partial residuals of the rows in `shown` as dots, and the law as a line.
+/// Draws the partial residuals of the rows in `shown` as dots, and the law as a line. `name` is
+/// that of the figure, `law` that of the line in the legend, and `lead` begins the caption.
 fn draw(cause: &Cause, shown: &[usize], (name, law, lead): (&str, &str, &str)) -> Drawing {
     let is_finite = |point: &&Point| point.x.is_finite() && point.y.is_finite();
     let finite: Vec<&Point> = cause.points.iter().filter(is_finite).collect();
@@ -38,7 +41,7 @@ fn draw(cause: &Cause, shown: &[usize], (name, law, lead): (&str, &str, &str)) -
     let is_shown = |k: &usize| finite[*k].row.is_none_or(|row| shown.binary_search(&row).is_ok());
     let candidates: Vec<usize> = (0..finite.len()).filter(is_shown).collect();
     let deviation = |k: usize| finite[k].y - law_at(&cause.curve, finite[k].x);
-    let sampled = sample(&candidates, MAX_POSES, deviation);
+    let sampled = sample(&candidates, MAX_SHOWN_POSES, deviation);
     let points: Vec<((f64, f64), &Point)> =
         sampled.iter().map(|&k| (scaled(finite[k].x, finite[k].y), finite[k])).collect();
     let curve: Vec<(f64, f64)> = cause.curve.iter().map(|&(x, y)| scaled(x, y)).collect();

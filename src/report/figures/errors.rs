@@ -1,4 +1,4 @@
-//! Errors of each held-out pose along each axis, stage by stage.
+//! Figure of the errors of each held-out pose along each axis, at each stage of the calibration.
 
 use nalgebra::Vector3;
 
@@ -6,10 +6,10 @@ use super::prelude::*;
 use crate::fit::{Before, Procedure};
 use crate::results::{Stage, StageErrors, procedure_stages};
 
-/// Maximum number of poses in the figure.
-const MAX_POSES: usize = 90;
-/// Smallest error that is drawn at its value, as a fraction of the best stage's median; smaller
-/// ones are drawn at the lower edge.
+/// Maximum number of poses that the figure shows.
+const MAX_SHOWN_POSES: usize = 90;
+/// Smallest error that is drawn at its value, as a fraction of the median error of the last stage.
+/// Smaller errors are drawn at the lower edge.
 const MIN_DRAWN_FRACTION: f64 = 0.03;
 
 /// Returns the name of a stage in the legend.
@@ -23,7 +23,7 @@ fn stage_name(stage: Stage) -> &'static str {
     }
 }
 
-/// Returns the colour of stage `index` of `count`; the best stage is accented.
+/// Returns the colour of stage `index` (from 0) of `count`; the last stage is accented.
 fn colour(index: usize, count: usize) -> Colour {
     match (index, count - 1 - index) {
         (_, 0) => ACCENT,
@@ -33,8 +33,8 @@ fn colour(index: usize, count: usize) -> Colour {
     }
 }
 
-/// Returns the columns of the data: the norm of the error at each stage \[mm\].
-fn columns(stages: &[StageErrors]) -> Vec<String> {
+/// Returns the names of the columns of the data: the norm of the error at each stage \[mm\].
+fn column_names(stages: &[StageErrors]) -> Vec<String> {
     stages.iter().map(|stage| format!("{} [mm]", stage_name(stage.stage))).collect()
 }
 
@@ -61,7 +61,7 @@ pub fn errors(data: &PlotData) -> Option<Drawing> {
     }
     let candidates: Vec<usize> =
         (0..rows.len()).filter(|&k| data.shown.binary_search(&rows[k]).is_ok()).collect();
-    let names = columns(&stages);
+    let names = column_names(&stages);
     let names: Vec<&str> = names.iter().map(String::as_str).collect();
     let cells = candidates.iter().map(|&k| (&data.residuals[rows[k]], norms(&stages, k)));
     let data = pose_sheet(&names, cells);
@@ -69,7 +69,8 @@ pub fn errors(data: &PlotData) -> Option<Drawing> {
     Some(draw_stages(("held-out-errors", title), &stages, &candidates, &rows, data))
 }
 
-/// Draws the held-out errors of one procedure of a comparison, named after it.
+/// Draws the held-out errors of one procedure of a comparison. The figure is named after the
+/// procedure.
 pub fn of_procedure(before: &Before, procedure: &Procedure) -> Drawing {
     let name = procedure.name();
     let title = format!("Error of each held-out pose: {name}");
@@ -79,14 +80,15 @@ pub fn of_procedure(before: &Before, procedure: &Procedure) -> Drawing {
         let norms = norms(&stages, k).into_iter().map(|norm| fixed(norm, 6));
         std::iter::once((k + 1).to_string()).chain(norms).collect()
     });
-    let names = columns(&stages);
+    let names = column_names(&stages);
     let header = std::iter::once("held_out_pose").chain(names.iter().map(String::as_str));
     let data = sheet(header, cells);
     draw_stages((&format!("held-out-errors-{name}"), &title), &stages, &poses, &[], data)
 }
 
-/// Draws the held-out errors of all stages. `candidates` are the indices of the held-out poses that
-/// may be drawn; `rows` are the rows of all held-out poses, empty if the page does not know them.
+/// Draws the held-out errors of all stages. `candidates` are the indices of those held-out poses
+/// that may be drawn. `rows` are the rows (from 0) of all held-out poses, empty if the page does
+/// not list them.
 fn draw_stages(
     titles: (&str, &str),
     stages: &[StageErrors],
@@ -96,7 +98,7 @@ fn draw_stages(
 ) -> Drawing {
     let count = stages.first().map_or(0, |stage| stage.errors.len());
     let best = stages.last().map_or(&[][..], |stage| &stage.errors);
-    let shown = sample(candidates, MAX_POSES, |k| best.get(k).map_or(0.0, Vector3::norm));
+    let shown = sample(candidates, MAX_SHOWN_POSES, |k| best.get(k).map_or(0.0, Vector3::norm));
     let mut sizes: Vec<f64> =
         best.iter().map(Vector3::norm).filter(|norm| norm.is_finite()).collect();
     sizes.sort_by(f64::total_cmp);
@@ -134,7 +136,7 @@ fn draw_stages(
         (stage_name(stage.stage), colour(index, stages.len()), mark)
     };
     let legend: Vec<_> = stages.iter().enumerate().map(entry).collect();
-    // Poses without equilibrium at any stage have no dot there.
+    // A pose without equilibrium at a stage has no dot there.
     let is_lost = |k: &usize| stages.iter().any(|stage| !stage.errors[*k].norm().is_finite());
     let caption = format!(
         "Absolute error in x, y, z of the measuring frame and its norm, on a logarithmic scale: \

@@ -1,17 +1,17 @@
-//! Values with their intervals, a row for each name.
+//! Forest plot: values with their intervals, one row for each name.
 
 use super::prelude::*;
 
-/// Maximum number of rows of a figure.
+/// Maximum number of rows that a figure shows.
 const MAX_ROWS: usize = 24;
 /// Distance between the marks of one row, as a share of the height of the row.
-const OFFSET: f64 = 0.22;
+const MARK_SPACING: f64 = 0.22;
 
-/// Row of the figure: its name, and the values with the half-width of their intervals, in the
-/// order of the legend.
+/// Row of a forest plot: its name, and values with the half-widths of their intervals, in the order
+/// of the legend. A missing value is `None`.
 pub type Row = (String, Vec<Option<(f64, f64)>>);
 
-/// Figure with a row for each name.
+/// Forest plot: one row of values with intervals for each name.
 #[derive(Debug, Clone, Default)]
 pub struct Forest<'a> {
     /// File name and title.
@@ -21,14 +21,14 @@ pub struct Forest<'a> {
     pub label: &'a str,
     /// Names and colours of the values of a row.
     pub legend: Vec<(&'a str, Colour)>,
-    /// Values at vertical lines.
+    /// Values at which vertical lines are drawn; the first one is the reference of all rows.
     pub references: Vec<f64>,
     pub rows: Vec<Row>,
 }
 
 impl Forest<'_> {
-    /// Draws the rows; `None` if there are none. Of many rows it draws those with values farthest
-    /// from the first reference.
+    /// Draws the rows; `None` if there are none. Of too many rows, draws those with values farthest
+    /// from the first of the references (0 without references).
     pub fn drawing(&self) -> Option<Drawing> {
         let centre = self.references.first().copied().unwrap_or_default();
         let size = |row: &Row| {
@@ -50,7 +50,7 @@ impl Forest<'_> {
         let marks = shown.iter().enumerate().flat_map(|(k, (_, values))| {
             let marks = values.iter().zip(&self.legend).enumerate();
             marks.flat_map(move |(of, (value, &(_, colour)))| {
-                let row = k as f64 + OFFSET * (of as f64 - 0.5 * (count - 1.0));
+                let row = k as f64 + MARK_SPACING * (of as f64 - 0.5 * (count - 1.0));
                 value.iter().flat_map(move |&(value, error)| {
                     let interval = [(value - error, row), (value + error, row)];
                     let dot = Shape::dot((value, row), 3.2, Paint::fill(colour), None);

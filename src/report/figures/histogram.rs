@@ -1,13 +1,13 @@
-//! Histogram of the residuals.
+//! Figure of the distribution of the residuals.
 
 use super::prelude::*;
 use crate::numeric::median;
 
-/// Smallest half-width of the axis \[σ\]. The axis spans four times the scatter of most residuals
-/// if that is more; values outside it are counted in the outermost bars.
+/// Smallest half-width of the axis \[σ\]. The half-width is four times the scatter of the residuals
+/// if that is more. Values outside the axis are counted in the outermost bars.
 const MIN_HALF_WIDTH: f64 = 5.0;
-/// Number of values above which bars are half as wide.
-const MAX_WIDE_BAR_VALUES: usize = 150;
+/// Number of values from which bars are half as wide.
+const MIN_NARROW_BAR_VALUES: usize = 150;
 
 /// Returns the residual coordinates of a row in units of σ.
 fn coordinates(residual: &PoseError) -> impl Iterator<Item = f64> + use<> {
@@ -15,7 +15,8 @@ fn coordinates(residual: &PoseError) -> impl Iterator<Item = f64> + use<> {
     whitened.data.0[0].into_iter().take(residual.observation.coordinates())
 }
 
-/// Draws the residual coordinates of the fitted poses in units of σ, with the normal distribution.
+/// Draws the histogram of the residual coordinates of the fitted poses in units of σ, with the
+/// normal distribution. `None` for less than three coordinates.
 pub fn histogram(data: &PlotData) -> Option<Drawing> {
     let fitted = data.residuals.iter().filter(|residual| !residual.held_out);
     let values: Vec<f64> = fitted.flat_map(coordinates).filter(|v| v.is_finite()).collect();
@@ -25,7 +26,7 @@ pub fn histogram(data: &PlotData) -> Option<Drawing> {
     // The median absolute value is robust against a few large residuals.
     let scatter = 1.4826 * median(values.iter().map(|value| value.abs()))?;
     let reach = (4.0 * scatter).ceil().max(MIN_HALF_WIDTH);
-    let bars: usize = if values.len() < MAX_WIDE_BAR_VALUES { 20 } else { 40 };
+    let bars: usize = if values.len() < MIN_NARROW_BAR_VALUES { 20 } else { 40 };
     let width = 2.0 * reach / bars as f64;
     let mut counts = vec![0_usize; bars];
     for value in &values {

@@ -1,19 +1,23 @@
-//! Residual as a function of each joint's command, in ranges.
+//! Figure of the residual by ranges of each joint's command.
 
 use super::prelude::*;
 use crate::results::CommandedJoint;
 
-/// Number of ranges into which a joint's commands are divided.
+/// Number of equal ranges into which the commands of a joint are divided.
 const COMMAND_RANGES: usize = 12;
 
-/// Range of a joint with its ends and the root mean square residual of the poses in it \[m\].
+/// Range of a joint's commands, with the residuals of the poses in it.
 struct JointRange {
+    /// Lowest and highest command \[rad\] or \[m\].
     ends: (f64, f64),
+    /// Root mean square residual \[m\]; `None` without a pose.
     rms: Option<f64>,
+    /// Number of poses.
     count: usize,
 }
 
-/// Returns the ranges of a joint in ascending order; empty for a joint that does not move.
+/// Returns the ranges of a joint, numbered from 0, in ascending order; empty if the joint has the
+/// same command in all poses.
 fn joint_ranges(data: &PlotData, joint: usize) -> Vec<JointRange> {
     let poses = || data.residuals.iter().filter(|pose| pose.has_place());
     let poses = || poses().filter(|pose| pose.error.norm().is_finite());
@@ -42,7 +46,8 @@ fn joint_ranges(data: &PlotData, joint: usize) -> Vec<JointRange> {
     sums.into_iter().enumerate().map(part).collect()
 }
 
-/// Draws a row for each joint and a box for each range, darker for a larger residual.
+/// Draws a row for each joint and a box for each range, darker for a larger residual. `None` if no
+/// joint moves.
 pub fn joint_map(data: &PlotData) -> Option<Drawing> {
     let joints: Vec<(CommandedJoint, Vec<JointRange>)> = data
         .commands

@@ -1,4 +1,4 @@
-//! Errors with each misprint and each alternative model, relative to the rigid fit.
+//! Figure of the errors with each misprint and each alternative model, relative to the rigid fit.
 
 use super::prelude::*;
 use crate::paper::published::{WITH_ELASTICITY, WITHOUT_ELASTICITY};
@@ -6,15 +6,16 @@ use crate::study::{
     AlternativeModel, Case, HeldOutError, MisprintStudy, Replica, ReplicaResults, Spread,
 };
 
-/// Ends of the logarithmic axis.
-const AXIS_RANGE: (f64, f64) = (0.02, 5.0);
-/// Colours of the cases.
-const COLOURS: [Colour; 4] = [INK, ACCENT, FAINT, MUTED];
+/// Smallest and largest ratio on the logarithmic axis.
+const RATIO_RANGE: (f64, f64) = (0.02, 5.0);
+/// Colours of the cases of the study; a fifth case takes the first colour again.
+const CASE_COLOURS: [Colour; 4] = [INK, ACCENT, FAINT, MUTED];
 
-/// Name of a row with mean and spread of each case.
+/// Name of a row, with mean and spread of the ratio over specimens in each case; `None` if no fit
+/// converged.
 type Row = (String, Vec<Option<Spread>>);
 
-/// Draws the ratio of the held-out mean to that of the rigid fit, for every reading and every
+/// Draws the ratio of the mean held-out error to that of the rigid fit, for every reading and every
 /// alternative model.
 pub fn misprints(study: &MisprintStudy, results: &ReplicaResults) -> Drawing {
     let spreads = |error: &dyn Fn(&Replica) -> HeldOutError| -> Vec<Option<Spread>> {
@@ -34,18 +35,18 @@ pub fn misprints(study: &MisprintStudy, results: &ReplicaResults) -> Drawing {
     let cases: Vec<String> = study.cases.iter().map(Case::name).collect();
     let mut legend: Vec<_> = cases
         .iter()
-        .zip(COLOURS.into_iter().cycle())
+        .zip(CASE_COLOURS.into_iter().cycle())
         .map(|(case, colour)| (case.as_str(), colour, Mark::Dot))
         .collect();
     legend.push(("the paper", WARM, Mark::Line));
-    let (low, high) = (AXIS_RANGE.0.log10(), AXIS_RANGE.1.log10());
-    let at = |value: f64| value.max(AXIS_RANGE.0).log10().clamp(low, high);
+    let (low, high) = (RATIO_RANGE.0.log10(), RATIO_RANGE.1.log10());
+    let at = |value: f64| value.max(RATIO_RANGE.0).log10().clamp(low, high);
     let marks = rows.iter().enumerate().flat_map(|(k, (_, spreads))| {
         let row = k as f64;
         let mark = |(j, spread): (usize, &Option<Spread>)| {
             let Spread { mean, deviation, .. } = (*spread)?;
             let y = row + 0.21 * (j as f64 - 0.5 * (spreads.len() as f64 - 1.0));
-            let colour = COLOURS[j % COLOURS.len()];
+            let colour = CASE_COLOURS[j % CASE_COLOURS.len()];
             let ends = [mean - deviation, mean + deviation].map(|value| (at(value), y));
             let line = Shape::line(ends, Paint::line(colour, 1.2));
             Some([line, Shape::dot((at(mean), y), 2.4, Paint::fill(colour), None)])

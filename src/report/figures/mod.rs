@@ -1,4 +1,5 @@
-//! Figures of the reports, one per file: data in, SVG with title and caption out.
+//! Figures of the reports, one per file. Each converts data to an SVG with title, caption and CSV
+//! data.
 
 mod axis;
 mod chart;
@@ -39,7 +40,8 @@ pub(super) use svg::{ACCENT, Colour, FAINT, GRID, INK, MUTED, WARM};
 pub(super) use uncertainty::{bounds_over_workspace, joint_errors};
 pub(super) use vectors::vectors;
 
-/// File names of all figures, except those of effects (numbered) and procedures (named).
+/// File names, without extension, of all figures that are separate files. Those of effects
+/// (numbered) and of procedures (named) are missing here.
 const NAMES: &[&str] = &[
     "ablations",
     "bounds",
@@ -61,7 +63,7 @@ const NAMES: &[&str] = &[
     "unexplained",
 ];
 
-/// Returns true if the file name is that of a figure, for example `effect-1.svg`.
+/// Returns true if the file name is that of a figure of a report, for example `effect-1.svg`.
 pub fn is_figure(file: &str) -> bool {
     let Some(name) = file.strip_suffix(".svg") else { return false };
     let is_number =

@@ -1,15 +1,16 @@
-//! Residuals in the order of measurement.
+//! Figure of the residuals in the order of measurement.
 
 use super::prelude::*;
 
-/// Maximum number of poses in the figure.
-const MAX_POSES: usize = 300;
-/// Smallest time span that is labelled in hours \[s\].
+/// Maximum number of poses that the figure shows.
+const MAX_SHOWN_POSES: usize = 300;
+/// Time span above which the axis is in hours \[s\].
 const MIN_HOURS_SPAN: f64 = 7200.0;
-/// Shortest duration of measurements for which the time is shown in minutes \[s\].
+/// Time span above which the axis is in minutes \[s\].
 const MIN_MINUTES_SPAN: f64 = 180.0;
 
-/// Draws the residual coordinates of positions in order of time, with a band of ±2 σ.
+/// Draws the residual coordinates of fitted positions in order of time, with a band of ±2 σ of the
+/// noise. `None` for less than two such rows.
 pub fn order(data: &PlotData) -> Option<Drawing> {
     let is_fitted = |row: &usize| data.is_position(*row) && !data.residuals[*row].held_out;
     let is_finite = |row: &usize| data.residual_length(*row).is_finite();
@@ -17,7 +18,7 @@ pub fn order(data: &PlotData) -> Option<Drawing> {
     let finite = fitted.iter().filter(|row| is_finite(row)).count();
     let candidates: Vec<usize> =
         data.shown.iter().copied().filter(|row| is_fitted(row) && is_finite(row)).collect();
-    let rows = sample(&candidates, MAX_POSES, |row| data.residual_length(row));
+    let rows = sample(&candidates, MAX_SHOWN_POSES, |row| data.residual_length(row));
     let shown: Vec<&PoseError> = rows.iter().map(|&row| &data.residuals[row]).collect();
     if shown.len() < 2 {
         return None;

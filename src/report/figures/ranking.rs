@@ -1,17 +1,17 @@
-//! Ranking of candidate effects by their evidence.
+//! Figure of the ranking of candidate effects.
 
 use super::prelude::*;
 use crate::laws::ArgumentKind;
 use crate::problem::Effect;
 use crate::select::{Ranked, Trace};
 
-/// Maximum number of candidates in the figure.
+/// Maximum number of candidates that the figure shows.
 const MAX_CANDIDATES: usize = 12;
-/// Smallest p value that is distinguished from zero.
-const MIN_P: f64 = 1e-300;
+/// Smallest p-value that is drawn at its value.
+const MIN_DRAWN_P: f64 = 1e-300;
 
-/// Returns the name of an effect with its site, as in a problem file.
-fn named(effect: &Effect, trace: &Trace) -> String {
+/// Returns the name of an effect with its place and its trial value, such as an order or a time.
+fn label(effect: &Effect, trace: &Trace) -> String {
     let name = effect.name();
     match (effect.searched_value(), effect.joint()) {
         (Some((ArgumentKind::Time, time)), _) if trace.time_measured => {
@@ -30,17 +30,18 @@ fn named(effect: &Effect, trace: &Trace) -> String {
     }
 }
 
-/// Draws −log₁₀ p of the best candidates; candidates confounded with the first are marked.
+/// Draws −log₁₀ p of the best candidates, with marks at those that are confounded with the first.
+/// `None` without candidates.
 pub fn ranking(trace: &Trace) -> Option<Drawing> {
     let shown: Vec<&Ranked> = trace.ranking.iter().take(MAX_CANDIDATES).collect();
     let first = shown.first()?;
     let level = -trace.level.log10();
-    let evidence = |ranked: &Ranked| -ranked.p_value.max(MIN_P).log10();
+    let evidence = |ranked: &Ranked| -ranked.p_value.max(MIN_DRAWN_P).log10();
     let highest = shown.iter().map(|ranked| evidence(ranked)).fold(1.0, f64::max).max(2.0 * level);
     let is_alike = |ranked: &Ranked| first.alike.iter().any(|(other, _)| *other == ranked.effect);
     let names = shown.iter().map(|ranked| {
         let colour = if ranked.p_value < trace.level { INK } else { MUTED };
-        (named(&ranked.effect, trace), colour)
+        (label(&ranked.effect, trace), colour)
     });
     let shapes = shown.iter().enumerate().flat_map(|(k, ranked)| {
         let (row, end) = (k as f64, evidence(ranked).max(0.004 * highest));
@@ -52,7 +53,7 @@ pub fn ranking(trace: &Trace) -> Option<Drawing> {
         };
         let mark = if is_alike { "≈ first, " } else { "" };
         let gain = format!("{mark}{} mm", mm(ranked.gain.max(0.0), 4));
-        // The text is to the right of both bar and line.
+        // The text is to the right of the bar and of the line of significance.
         let text = Shape::text((end.max(level), row), 6.0, gain, MUTED);
         [Shape::area((0.0, row - 0.28), (end, row + 0.28), paint), text]
     });
@@ -67,7 +68,7 @@ pub fn ranking(trace: &Trace) -> Option<Drawing> {
         trace.tried, trace.level
     );
     let rows = shown.iter().map(|ranked| {
-        let name = named(&ranked.effect, trace);
+        let name = label(&ranked.effect, trace);
         vec![name, format!("{:e}", ranked.p_value), fixed(ranked.gain * 1e3, 6)]
     });
     let title = "Candidate effects by evidence";

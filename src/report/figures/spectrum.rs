@@ -1,17 +1,18 @@
-//! Singular values of the scaled Jacobian.
+//! Figure of the singular values of the scaled Jacobian.
 
 use super::prelude::*;
 use crate::least_squares::Identifiability;
 
-/// Smallest relative singular value that is drawn at its value; smaller ones are drawn at the lower
-/// edge.
-const MIN_VALUE: f64 = 1e-17;
+/// Smallest ratio to the largest singular value that is drawn at its value; smaller ones are drawn
+/// at this ratio.
+const MIN_DRAWN_RATIO: f64 = 1e-17;
 
-/// Draws the singular values of the scaled Jacobian in descending order.
+/// Draws the singular values of the scaled Jacobian, relative to the largest, in descending order.
+/// `None` if there is no positive one.
 pub fn spectrum(found: &Identifiability) -> Option<Drawing> {
     let values = &found.singular_values;
     let largest = values.first().copied().filter(|value| *value > 0.0)?;
-    let relative = |value: &f64| (value / largest).max(MIN_VALUE).log10();
+    let relative = |value: &f64| (value / largest).max(MIN_DRAWN_RATIO).log10();
     let lowest = values.iter().map(relative).fold(0.0, f64::min).floor().min(-2.0);
     let shapes = values.iter().enumerate().flat_map(|(k, value)| {
         let at = (k as f64 + 1.0, relative(value));

@@ -1,14 +1,14 @@
-//! Errors of strategies, of parts of the elasticity, and of rounds of a loop.
+//! Figures of the errors of strategies, of parts of the elasticity, and of rounds of a loop.
 
 use super::prelude::*;
 use crate::fit::{Comparison, Errors};
 use crate::problem::Effect;
 use crate::select::{ClosedLoop, Round};
 
-/// Difference of the logarithms of two errors up to which they count as equal.
+/// Largest difference of the common logarithms of two errors at which both are marked as best.
 const MAX_TIE_DIFFERENCE: f64 = 1e-4;
 
-/// Row of the figure: name and mean errors of one fit or group of fits.
+/// Row of a figure: name and errors of one fit, or of several fits with equal errors.
 struct Entry {
     strategy: String,
     name: String,
@@ -17,8 +17,8 @@ struct Entry {
     errors: Errors,
 }
 
-/// Draws held-out and identification error of every strategy with every solver, and of the
-/// procedure of \[Chen2021\].
+/// Draws the mean held-out and identification errors of every strategy with every solver, and of
+/// the procedures of \[Chen2021\].
 pub fn strategies(comparison: &Comparison) -> Drawing {
     let mut entries: Vec<Entry> = Vec::new();
     for outcome in &comparison.strategies {
@@ -45,11 +45,13 @@ pub fn strategies(comparison: &Comparison) -> Drawing {
     draw_entries("strategies", titles, caption, &entries)
 }
 
+/// Creates the row of one fit, whose name is that of its strategy, ablation or round.
 fn entry(strategy: String, errors: &Errors) -> Entry {
     Entry { name: strategy.clone(), strategy, solvers: 1, errors: *errors }
 }
 
-/// Draws the errors with every part of the elasticity; `None` for an arm without elasticity.
+/// Draws the mean errors of fits with only a part of the elasticity; `None` for an arm without
+/// elasticity.
 pub fn ablations(comparison: &Comparison) -> Option<Drawing> {
     let entries: Vec<Entry> = comparison
         .ablations
@@ -63,7 +65,8 @@ pub fn ablations(comparison: &Comparison) -> Option<Drawing> {
     (entries.len() > 1).then(|| draw_entries("ablations", titles, caption, &entries))
 }
 
-/// Draws the errors after each round of a loop, with the effects that it added.
+/// Draws the mean errors after each round of a loop, with the effects that the round added. `None`
+/// without rounds.
 pub fn draw_rounds(closure: &ClosedLoop) -> Option<Drawing> {
     let after = |(k, round): (usize, &Round)| {
         let errors = Errors {
@@ -81,8 +84,8 @@ pub fn draw_rounds(closure: &ClosedLoop) -> Option<Drawing> {
     (entries.len() > 1).then(|| draw_entries("rounds", titles, caption, &entries))
 }
 
-/// Draws the mean errors of entries as a figure with a title; `label` describes it for screen
-/// readers.
+/// Draws the mean errors of some fits as the figure `name` with a title; `label` describes the
+/// figure for screen readers.
 fn draw_entries(
     name: &str,
     (title, label): (&str, &str),
@@ -124,8 +127,8 @@ fn draw_entries(
     Drawing::new((name, title), caption, chart(label, &legend, &[panel]), data)
 }
 
-/// Returns the label of round `k` (from 0): its number from 1, and which effects it added or
-/// removed.
+/// Returns the label of round `k` (from 0): its number from 1, and the effects that it added, or
+/// the number that it removed.
 fn round_name(closure: &ClosedLoop, k: usize) -> String {
     let before = k.checked_sub(1).map_or(&[][..], |last| closure.rounds[last].effects.as_slice());
     let effects = &closure.rounds[k].effects;

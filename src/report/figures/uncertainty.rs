@@ -3,14 +3,15 @@
 
 use std::collections::BTreeMap;
 
-use super::chart::{LEFT, RIGHT};
+use super::chart::{LEFT_SPACE, RIGHT_SPACE};
 use super::prelude::*;
 use crate::remainder::{JointError, JointErrorPoint};
 use crate::results::{BoundAt, CommandedJoint};
 
-/// Number of cells along the width of a view.
+/// Number of square cells along the width of a view of the workspace.
 const CELLS_PER_WIDTH: usize = 24;
-/// Number of cells for each cell that may exceed the end of the colour scale.
+/// Total number of cells divided by the number of cells that may exceed the end of the colour
+/// scale.
 const CELLS_PER_SATURATED: usize = 20;
 /// Maximum height of a view in displayed pixels.
 const MAX_HEIGHT: f64 = 330.0;
@@ -28,8 +29,8 @@ pub fn bounds_over_workspace(data: &PlotData) -> Option<Drawing> {
     if bounds.is_empty() || !(finite(size(0)) && finite(size(1)) && finite(size(2))) {
         return None;
     }
-    // Both views have cells of one size and one scale of colours.
-    let width = WIDTH - LEFT - RIGHT;
+    // Both views share the size of their cells and the scale of their colours.
+    let width = FIGURE_WIDTH - LEFT_SPACE - RIGHT_SPACE;
     let per_pixel = (size(0) / width).max(size(1).max(size(2)) / MAX_HEIGHT);
     let middle = 0.5 * (extent(0).0 + extent(0).1);
     let across = (middle - 0.5 * width * per_pixel, middle + 0.5 * width * per_pixel);
@@ -81,17 +82,20 @@ pub fn bounds_over_workspace(data: &PlotData) -> Option<Drawing> {
     Some(Drawing::new(("bounds", title), caption, svg, sheet(header, rows)))
 }
 
-/// Cell of a view, with the mean error bound of the configurations whose position is in it.
+/// Square cell of a view, with the mean error bound of the configurations whose position is in it.
 struct Cell {
+    /// Lower left corner \[m\].
     from: (f64, f64),
     /// Mean error bound \[m\].
     bound: f64,
+    /// Number of configurations in the cell.
     count: usize,
+    /// Number of these that are far from all measured poses.
     extrapolated: usize,
 }
 
 /// Returns the cells of a view that contain at least one configuration. The view is spanned by x
-/// and `axis`.
+/// and `axis`; `cell` is the side of a cell, `left` and `bottom` are the edges of the view \[m\].
 fn cells(bounds: &[BoundAt], (axis, cell): (usize, f64), (left, bottom): (f64, f64)) -> Vec<Cell> {
     let mut cells: BTreeMap<(i64, i64), Cell> = BTreeMap::new();
     for at in bounds {
@@ -112,8 +116,8 @@ fn cells(bounds: &[BoundAt], (axis, cell): (usize, f64), (left, bottom): (f64, f
     cells.into_values().map(mean).collect()
 }
 
-/// Draws the error of each joint that a remainder corrects as a function of its command; `None`
-/// without a remainder.
+/// Draws the error of each joint that a remainder corrects, as a function of the joint's command;
+/// `None` without a remainder.
 pub fn joint_errors(data: &PlotData) -> Option<Drawing> {
     let joints = &data.uncertainty.as_ref()?.joints;
     let ends = |of: fn(f64, f64) -> f64| {

@@ -1,17 +1,18 @@
-//! Residual vectors over the workspace.
+//! Figure of the residual vectors over the workspace.
 
-use super::chart::{LEFT, RIGHT};
+use super::chart::{LEFT_SPACE, RIGHT_SPACE};
 use super::prelude::*;
 
-/// Maximum number of poses in the figure.
-const MAX_POSES: usize = 400;
-/// Length of a large residual vector on the drawing, as a fraction of its width.
+/// Maximum number of poses that the figure shows.
+const MAX_SHOWN_POSES: usize = 400;
+/// Length of the scale bar, and so of a large residual vector, as a fraction of the drawing's
+/// width.
 const VECTOR_LENGTH: f64 = 0.09;
 /// Minimum and maximum height of a view in displayed pixels.
 const HEIGHT_RANGE: (f64, f64) = (150.0, 330.0);
 
-/// Draws the residuals from above and from the side at their measured positions; `None` if no row
-/// measures a position.
+/// Draws the residual vectors at the measured positions, from above and from the side; `None` if no
+/// row measures a position.
 pub fn vectors(data: &PlotData) -> Option<Drawing> {
     if !data.has_positions() {
         return None;
@@ -20,7 +21,7 @@ pub fn vectors(data: &PlotData) -> Option<Drawing> {
     let is_finite = |row: &usize| data.is_position(*row) && data.residual_length(*row).is_finite();
     let count = positions().filter(is_finite).count();
     let finite: Vec<usize> = data.shown.iter().copied().filter(is_finite).collect();
-    let rows = sample(&finite, MAX_POSES, |row| data.residual_length(row));
+    let rows = sample(&finite, MAX_SHOWN_POSES, |row| data.residual_length(row));
     let shown: Vec<&PoseError> = rows.iter().map(|&row| &data.residuals[row]).collect();
     let extent =
         |axis: usize| with_margin(range(shown.iter().map(|pose| pose.position[axis])), 0.12);
@@ -29,14 +30,14 @@ pub fn vectors(data: &PlotData) -> Option<Drawing> {
         high - low
     };
     // All views share one scale, so that vectors keep their directions.
-    let width = WIDTH - LEFT - RIGHT;
+    let width = FIGURE_WIDTH - LEFT_SPACE - RIGHT_SPACE;
     let per_pixel = (size(0) / width).max(size(1).max(size(2)) / HEIGHT_RANGE.1);
     let across = centred(extent(0), width * per_pixel);
     let mut lengths: Vec<f64> = shown.iter().map(|pose| pose.error.norm()).collect();
     lengths.sort_by(f64::total_cmp);
-    let long = lengths.get(lengths.len() * 9 / 10).copied().unwrap_or(1e-3).max(1e-9);
+    let large = lengths.get(lengths.len() * 9 / 10).copied().unwrap_or(1e-3).max(1e-9);
     // The scale bar is 1, 2 or 5 times a power of ten.
-    let bar = rounded(long);
+    let bar = round_down(large);
     let magnification = VECTOR_LENGTH * (across.1 - across.0) / bar;
     let view = |(axis, label, below): (usize, &str, &str)| {
         let height = (size(axis) / per_pixel).max(HEIGHT_RANGE.0).round();
@@ -55,7 +56,7 @@ pub fn vectors(data: &PlotData) -> Option<Drawing> {
             .with(shown.iter().zip(&rows).flat_map(vector))
     };
     let views = [(1, "y [m]", "x [m], seen from above"), (2, "z [m]", "x [m], seen from the side")];
-    let scale = format!("{} mm", short(bar * 1e3));
+    let scale = format!("{} mm", two_significant(bar * 1e3));
     let mut legend = poses_legend();
     legend.push((&scale, INK, Mark::Scale(VECTOR_LENGTH * width)));
     let caption = format!(
@@ -63,7 +64,7 @@ pub fn vectors(data: &PlotData) -> Option<Drawing> {
          predicted there, magnified {} times: from above (x, y) and from the side (x, z) of the \
          measuring frame. Similar directions of neighbours are structure; random directions are \
          noise.{}{}",
-        short(magnification),
+        two_significant(magnification),
         omission_note(positions().count() - count),
         thinning_note(shown.len(), count)
     );
@@ -80,14 +81,14 @@ pub fn vectors(data: &PlotData) -> Option<Drawing> {
 }
 
 /// Returns the largest of 1, 2 or 5 times a power of ten that is not above the value.
-fn rounded(value: f64) -> f64 {
+fn round_down(value: f64) -> f64 {
     let power = 10.0_f64.powf(value.log10().floor());
     let steps = [5.0, 2.0, 1.0].map(|factor| factor * power);
     steps.into_iter().find(|round| *round <= value * 1.001).unwrap_or(power)
 }
 
-/// Returns a number with two significant digits, without an exponent.
-fn short(value: f64) -> String {
+/// Formats a number with two significant digits, without an exponent.
+fn two_significant(value: f64) -> String {
     #[expect(clippy::cast_possible_truncation, reason = "a power of ten")]
     let digits = 1 - value.abs().max(1e-12).log10().floor() as i32;
     let power = 10.0_f64.powi(-digits);
@@ -99,13 +100,14 @@ fn short(value: f64) -> String {
     }
 }
 
-/// Returns a range of a given width about the centre of another.
+/// Returns the range of a given width about the centre of another range.
 fn centred((low, high): (f64, f64), width: f64) -> (f64, f64) {
     let middle = 0.5 * (low + high);
     (middle - 0.5 * width, middle + 0.5 * width)
 }
 
-/// Returns the share of a shift that can be applied to a value before it leaves a range, 0…1.
+/// Returns the largest share, 0…1, of a shift that can be added to the value `from` without leaving
+/// the range.
 fn share_inside(from: f64, shift: f64, (low, high): (f64, f64)) -> f64 {
     let edge = if shift > 0.0 { high } else { low };
     let is_inside = (low..=high).contains(&(from + shift));

@@ -1,30 +1,30 @@
-//! HTML report: one self-contained page. Scripts add interaction with poses; figures are also
-//! separate files.
+//! Rendering of blocks as one self-contained HTML page, and as a report with Markdown and with
+//! figures in separate files. Scripts of the page add interaction with poses.
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::markdown::markdown;
 use super::poses;
 use super::style;
-use super::text::marked;
+use super::text::with_outcome;
 use crate::error::is_hidden;
 use crate::problem::Problem;
 use crate::report::document::{Bar, Block, CODE, Headline, Mark, Point, Table};
 use crate::report::figures::Drawing;
 
-/// Half-width of a bar in standard errors. Larger changes end at its edge.
+/// Change in standard errors at which a bar ends; larger changes end there too.
 const BAR_SIGMAS: f64 = 10.0;
 
-/// Number of characters above which a word of a table may be broken.
-const MAX_WORD: usize = 32;
-/// Number of columns above which headings may take several lines.
-const MANY_COLUMNS: usize = 9;
+/// Number of characters above which a word in a table may be broken.
+const MAX_UNBROKEN_WORD: usize = 32;
+/// Number of columns above which the headings of a table may take several lines.
+const MAX_ONE_LINE_COLUMNS: usize = 9;
 
 /// Scripts of the page: interaction, and the three-dimensional view of the arm.
 const SCRIPTS: [&str; 2] = [include_str!("page.js"), include_str!("view.js")];
 
 /// Sentences at the end of a report that explain its errors.
-const ERRORS: &str = " Errors are distances between measured and predicted positions. Before: the nominal arm; its free base and \
+const ERRORS_NOTE: &str = " Errors are distances between measured and predicted positions. Before: the nominal arm; its free base and \
                       tool parameters are fitted first. A note under a table names any other arm. Held-out poses influence nothing: \
                       no parameter is fitted to them and no effect chosen by them.";
 
@@ -40,24 +40,25 @@ pub struct Report {
     pub figures: Vec<(String, String)>,
 }
 
-/// Renders blocks as a report; `kind` names the command or analysis in the title.
+/// Renders blocks as a report on a problem; `kind` names the analysis in the title of the page.
 pub(in crate::report) fn report(problem: &Problem, kind: &str, blocks: &[Block]) -> Report {
     let title = if problem.title.is_empty() { &problem.name } else { &problem.title };
-    let (html, figures) = rendered(title, [&format!("{}, ", problem.name), kind], ERRORS, blocks);
+    let (html, figures) =
+        render_page(title, [&format!("{}, ", problem.name), kind], ERRORS_NOTE, blocks);
     let files = figures
         .iter()
         .map(|figure| (format!("{}.svg", figure.name), printable(&style::standalone(&figure.svg))));
     Report { markdown: markdown(&problem.title, blocks), figures: files.collect(), html }
 }
 
-/// Renders blocks as a page without separate files; `kind` names the command in the title.
+/// Renders blocks as a page without separate files; `kind` names the analysis in its title.
 pub(in crate::report) fn page(title: &str, kind: &str, blocks: &[Block]) -> String {
-    rendered(title, ["", kind], "", blocks).0
+    render_page(title, ["", kind], "", blocks).0
 }
 
-/// Renders blocks as a page, and returns it with its figures; `before_kind` precedes the kind in
-/// the heading, and `note` explains errors at the end.
-fn rendered<'a>(
+/// Renders blocks as a page, and returns it with its figures. `before_kind` precedes the kind in
+/// the heading; `note` stands at the end of the page.
+fn render_page<'a>(
     title: &str,
     [before_kind, kind]: [&str; 2],
     note: &str,
@@ -97,7 +98,7 @@ fn rendered<'a>(
 
 /// Renders the blocks before the first heading, then a section for each heading.
 fn sections<'a>(blocks: &'a [Block], figures: &mut Vec<&'a Drawing>) -> Markup {
-    let shown = on_page(blocks);
+    let shown = page_blocks(blocks);
     let starts: Vec<usize> =
         (1..shown.len()).filter(|&k| matches!(shown[k], Block::Heading(_))).collect();
     let ends = starts.iter().copied().chain([shown.len()]);
@@ -107,12 +108,12 @@ fn sections<'a>(blocks: &'a [Block], figures: &mut Vec<&'a Drawing>) -> Markup {
     }
 }
 
-/// Returns the blocks that the page shows, in order.
-fn on_page<'a, 'b>(blocks: &'b [Block<'a>]) -> Vec<&'b Block<'a>> {
+/// Returns the blocks that the page shows, in order, without nesting.
+fn page_blocks<'a, 'b>(blocks: &'b [Block<'a>]) -> Vec<&'b Block<'a>> {
     let mut shown = Vec::new();
     for block in blocks {
         match block {
-            Block::Page(inner) => shown.extend(on_page(inner)),
+            Block::Page(inner) => shown.extend(page_blocks(inner)),
             Block::Words(_) => {}
             block => shown.push(block),
         }
@@ -120,7 +121,7 @@ fn on_page<'a, 'b>(blocks: &'b [Block<'a>]) -> Vec<&'b Block<'a>> {
     shown
 }
 
-/// Renders one block and collects its figures.
+/// Renders one block, and adds its figures to `figures`.
 fn block<'a>(item: &'a Block, figures: &mut Vec<&'a Drawing>) -> Markup {
     html! {
         @match item {
@@ -142,7 +143,7 @@ fn block<'a>(item: &'a Block, figures: &mut Vec<&'a Drawing>) -> Markup {
                 details { summary { (words(title)) } @for item in inner { (block(item, figures)) } }
                 p.folded { (words(on_paper)) }
             },
-            Block::Page(inner) => @for item in on_page(inner) { (block(item, figures)) },
+            Block::Page(inner) => @for item in page_blocks(inner) { (block(item, figures)) },
             Block::Words(_) => "",
         }
     }
@@ -161,7 +162,7 @@ fn words(text: &str) -> Markup {
     }
 }
 
-/// Removes control characters and other invisible characters.
+/// Removes control characters (except line breaks) and other invisible characters.
 fn printable(text: &str) -> String {
     text.chars().filter(|&c| c == '\n' || !is_hidden(c)).collect()
 }
@@ -175,13 +176,13 @@ fn list_item(point: &Point) -> Markup {
     });
     html! {
         li class=[class] {
-            (words(&marked(point)))
+            (words(&with_outcome(point)))
             @if !point.details.is_empty() { ul { @for detail in &point.details { li { (words(detail)) } } } }
         }
     }
 }
 
-/// Renders the summary of an outcome: errors of all states, and facts.
+/// Renders the summary at the top of a page: errors of all states, and facts.
 fn headline(headline: &Headline) -> Markup {
     html! {
         @let last = headline.states.len().saturating_sub(1);
@@ -199,6 +200,7 @@ fn headline(headline: &Headline) -> Markup {
     }
 }
 
+/// Renders a table with its notes above it.
 fn table(table: &Table) -> Markup {
     let class = |k: usize| match (table.left.contains(&k), table.minor.contains(&k)) {
         (true, true) => Some("l o"),
@@ -208,7 +210,7 @@ fn table(table: &Table) -> Markup {
     };
     // Long words, such as digests, may be broken anywhere.
     let classes = |k: usize, text: &str| {
-        let is_long = text.split_whitespace().any(|word| word.chars().count() > MAX_WORD);
+        let is_long = text.split_whitespace().any(|word| word.chars().count() > MAX_UNBROKEN_WORD);
         match class(k) {
             Some(class) if is_long => Some(format!("{class} long")),
             class => class.map(str::to_owned),
@@ -227,7 +229,7 @@ fn table(table: &Table) -> Markup {
         }
         // Rows that continue the row above cannot be sorted.
         @let sorts = table.rows.len() > 3 && table.rows.iter().all(|row| row.first().is_some_and(|cell| !cell.is_empty()));
-        div.scroll tabindex="0" role="region" aria-label={ "table: " (table.header.iter().find(|head| !head.is_empty()).unwrap_or(&"")) } { table.sort[sorts].many[table.header.len() > MANY_COLUMNS] {
+        div.scroll tabindex="0" role="region" aria-label={ "table: " (table.header.iter().find(|head| !head.is_empty()).unwrap_or(&"")) } { table.sort[sorts].many[table.header.len() > MAX_ONE_LINE_COLUMNS] {
             thead { tr {
                 @for (k, text) in table.header.iter().enumerate() { th class=[class(k)] { (text) } }
                 @if let Some((title, _)) = bars { th.l.wide { (title) } }
@@ -242,7 +244,8 @@ fn table(table: &Table) -> Markup {
     }
 }
 
-/// Renders the change from nominal in standard errors, with an interval of one standard error.
+/// Renders the change of a parameter from nominal as a bar with an interval of ± 1 standard error,
+/// or as a mark at an active bound.
 fn bar(bar: &Bar) -> Markup {
     let position = |sigmas: f64| 50.0 + 50.0 * (sigmas / BAR_SIGMAS).clamp(-1.0, 1.0);
     html! {
@@ -260,7 +263,7 @@ fn bar(bar: &Bar) -> Markup {
 }
 
 /// Returns a data URL that contains a CSV table.
-fn address(csv: &str) -> String {
+fn data_url(csv: &str) -> String {
     let escapes =
         [("%", "%25"), ("#", "%23"), ("\n", "%0A"), ("\r", ""), (" ", "%20"), ("/", "%2F")];
     let csv = escapes
@@ -269,7 +272,7 @@ fn address(csv: &str) -> String {
     format!("data:text/csv;charset=utf-8,{csv}")
 }
 
-/// Renders figures in a grid, numbered after those already shown.
+/// Renders figures in a grid, numbered after those in `shown`, and adds them to `shown`.
 fn grid<'a>(new: &'a [Drawing], shown: &mut Vec<&'a Drawing>) -> Markup {
     let first = shown.len() + 1;
     let grid = html! {
@@ -281,7 +284,7 @@ fn grid<'a>(new: &'a [Drawing], shown: &mut Vec<&'a Drawing>) -> Markup {
                         figcaption {
                             b { "Figure " (first + k) ". " (figure.title) }
                             (figure.caption) " "
-                            a.data download={ (figure.name) ".csv" } href=(address(&figure.data)) { "Data of this figure (CSV)" }
+                            a.data download={ (figure.name) ".csv" } href=(data_url(&figure.data)) { "Data of this figure (CSV)" }
                         }
                     }
                 }

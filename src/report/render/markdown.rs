@@ -1,15 +1,15 @@
-//! Markdown report with GitHub's tables.
+//! Rendering of blocks as Markdown with GitHub's tables.
 
 use std::fmt::Write as _;
 
-use super::text::{flat, marked};
+use super::text::{text_blocks, with_outcome};
 use crate::error::is_hidden;
 use crate::report::document::{Block, CODE, Point, Table};
 
 /// Renders blocks below a title, ending in a line break.
 pub(in crate::report) fn markdown(title: &str, blocks: &[Block]) -> String {
     let mut text = format!("# {}\n", escaped(&one_line(title)));
-    for block in flat(blocks) {
+    for block in text_blocks(blocks) {
         text.push('\n');
         // Writing to a String cannot fail.
         match block {
@@ -22,15 +22,15 @@ pub(in crate::report) fn markdown(title: &str, blocks: &[Block]) -> String {
                 }
                 text.extend(points.iter().map(|words| format!("- {}\n", escaped(words))));
             }
-            Block::List(points) => points.iter().for_each(|item| point(&mut text, "- ", item)),
+            Block::List(points) => points.iter().for_each(|item| push_item(&mut text, "- ", item)),
             Block::Ranking(points) => {
                 points
                     .iter()
                     .enumerate()
-                    .for_each(|(k, item)| point(&mut text, &format!("{}. ", k + 1), item));
+                    .for_each(|(k, item)| push_item(&mut text, &format!("{}. ", k + 1), item));
             }
             Block::Table(content) => {
-                table(&mut text, content);
+                push_table(&mut text, content);
                 if !content.notes.is_empty() {
                     let _ = writeln!(text, "{}\n", escaped(&content.notes.join("\n")));
                 }
@@ -42,15 +42,17 @@ pub(in crate::report) fn markdown(title: &str, blocks: &[Block]) -> String {
     text
 }
 
-fn point(text: &mut String, mark: &str, point: &Point) {
+/// Appends a list item with its details; `mark` is its bullet or number.
+fn push_item(text: &mut String, mark: &str, point: &Point) {
     let indent = " ".repeat(mark.len());
-    let _ = writeln!(text, "{mark}{}", escaped(&marked(point)));
+    let _ = writeln!(text, "{mark}{}", escaped(&with_outcome(point)));
     for detail in &point.details {
         let _ = writeln!(text, "{indent}- {}", escaped(detail));
     }
 }
 
-fn table(text: &mut String, table: &Table) {
+/// Appends a table without its notes.
+fn push_table(text: &mut String, table: &Table) {
     let row = |cells: &mut dyn Iterator<Item = String>| {
         format!("| {} |\n", cells.collect::<Vec<_>>().join(" | "))
     };
@@ -72,7 +74,7 @@ fn escaped(words: &str) -> String {
     let mut text = String::with_capacity(words.len());
     let mut remaining = words;
     while let Some((before, after)) = remaining.split_once(CODE.0) {
-        plain(&mut text, before);
+        push_escaped(&mut text, before);
         let (code, after) = after.split_once(CODE.1).unwrap_or((after, ""));
         // Code that contains backticks is fenced by more of them.
         let longest = code.split(|c| c != '`').map(str::len).max().unwrap_or(0);
@@ -80,13 +82,13 @@ fn escaped(words: &str) -> String {
         let _ = write!(text, "{fence}{space}{code}{space}{fence}");
         remaining = after;
     }
-    plain(&mut text, remaining);
+    push_escaped(&mut text, remaining);
     text
 }
 
-/// Appends text, escaped so that Markdown finds no code, emphasis, tag, entity, link, image, URL or
-/// heading in it.
-fn plain(text: &mut String, words: &str) {
+/// Appends text without code spans, escaped so that Markdown finds no code, emphasis, tag, entity,
+/// link, image, URL or heading in it.
+fn push_escaped(text: &mut String, words: &str) {
     let words: Vec<char> = words.chars().filter(|&c| c == '\n' || !is_hidden(c)).collect();
     let is_followed_by =
         |k: usize, word: &str| word.chars().zip(k + 1..).all(|(c, k)| words.get(k) == Some(&c));

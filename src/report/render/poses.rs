@@ -1,16 +1,16 @@
-//! Section on individual poses: view of the arm, ranges of joints, the largest residuals, and the
-//! data of the script.
+//! Section of the page on individual poses: view of the arm, ranges of joints, the largest
+//! residuals, and the data of the script.
 
 use maud::{Markup, PreEscaped, html};
 
 use crate::quantity::format::{mm, number};
 use crate::results::{PlotData, ScriptData};
 
-/// Number of poses in the table of the largest residuals.
-const LISTED_POSES: usize = 12;
+/// Maximum number of rows in the table of the largest residuals.
+const MAX_LISTED_ROWS: usize = 12;
 
-/// Returns the data of the script as JSON, escaped so that it cannot end the HTML element that
-/// contains it.
+/// Returns the data of the page's script as JSON, escaped so that it cannot end the HTML element
+/// that contains it.
 fn script_data(data: &PlotData) -> String {
     serde_json::to_string(&ScriptData::of(data))
         .unwrap_or_default()
@@ -18,7 +18,7 @@ fn script_data(data: &PlotData) -> String {
         .replace("//", "/\\/")
 }
 
-/// Renders the section on individual poses.
+/// Renders the section on individual poses; a sentence alone if no row can be drawn.
 pub(super) fn section(data: &PlotData) -> Markup {
     let without = without_positions(data);
     if data.shown.is_empty() && !without.is_empty() {
@@ -41,7 +41,7 @@ pub(super) fn section(data: &PlotData) -> Markup {
     }
 }
 
-/// Returns a sentence about rows without positions; empty if all rows measure positions.
+/// Returns sentences on how figures treat rows that do not measure positions; empty if all rows do.
 fn without_positions(data: &PlotData) -> String {
     if data.residuals.iter().all(|residual| residual.observation.is_position()) {
         return String::new();
@@ -69,7 +69,8 @@ fn without_positions(data: &PlotData) -> String {
     )
 }
 
-/// Renders the view of the arm in its poses, which the script shows if WebGL is available.
+/// Renders the view of the arm in its poses, which the script shows if WebGL is available, and
+/// states the coverage of the workspace.
 fn view(data: &PlotData) -> Markup {
     let coverage = &data.coverage;
     let share = 100.0 * (1.0 - coverage.uncovered.len() as f64 / coverage.tried.max(1) as f64);
@@ -99,7 +100,7 @@ fn view(data: &PlotData) -> Markup {
     }
 }
 
-/// Renders two range inputs (lower and upper limit) for each joint.
+/// Renders two sliders (lower and upper limit) for each joint, by which the script selects poses.
 fn ranges(data: &PlotData) -> Markup {
     html! {
         div.brush id="brush" hidden {
@@ -121,7 +122,7 @@ fn largest(data: &PlotData) -> Markup {
     let mut rows: Vec<usize> =
         data.shown.iter().copied().filter(|&row| data.residual_length(row).is_finite()).collect();
     rows.sort_by(|&a, &b| data.residual_length(b).total_cmp(&data.residual_length(a)));
-    rows.truncate(LISTED_POSES);
+    rows.truncate(MAX_LISTED_ROWS);
     html! {
         @let all_positions = data.residuals.iter().all(|residual| residual.observation.is_position());
         p { "The largest residuals of " (data.length_count()) @if all_positions { " poses:" } @else { " rows:" } }

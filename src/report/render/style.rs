@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use crate::report::figures::{ACCENT, Colour, FAINT, GRID, INK, MUTED, WARM};
 
-/// Colours of the figures with their names and their values in the dark theme.
+/// Colours of the figures: value in the light theme, name, and value in the dark theme.
 const COLOURS: [(Colour, &str, &str); 6] = [
     (INK, "ink", "#e6e9ec"),
     (MUTED, "muted", "#9aa4ae"),
@@ -13,13 +13,17 @@ const COLOURS: [(Colour, &str, &str); 6] = [
     (ACCENT, "accent", "#58a6ff"),
     (WARM, "warm", "#f08c52"),
 ];
+/// Background in the light theme and in print.
 const LIGHT_PAPER: &str = "#ffffff";
+/// Background in the dark theme.
 const DARK_PAPER: &str = "#14181c";
 
+/// Style rules of the page without colours.
 const LAYOUT: &str = include_str!("page.css");
 
-/// Returns the colour variables of both themes; printed paper is always light.
-fn themes() -> String {
+/// Returns the style rules that define the colour variables of both themes. Print always uses the
+/// light theme.
+fn theme_variables() -> String {
     let mut text = format!(":root{{color-scheme:light dark;--paper:{LIGHT_PAPER}");
     for (light, name, _) in COLOURS {
         let _ = write!(text, ";--{name}:{light}");
@@ -35,8 +39,8 @@ fn themes() -> String {
     text
 }
 
-/// Returns style rules that replace each colour of the drawings by `colour(name, dark value)`.
-fn replaced_colours(colour: impl Fn(&'static str, &'static str) -> String) -> String {
+/// Returns style rules that replace each colour of the figures by `colour(name, dark value)`.
+fn colour_rules(colour: impl Fn(&'static str, &'static str) -> String) -> String {
     let mut text = String::new();
     for (light, name, dark) in COLOURS {
         let colour = colour(name, dark);
@@ -50,15 +54,15 @@ fn replaced_colours(colour: impl Fn(&'static str, &'static str) -> String) -> St
 
 /// Returns the style sheet of a page.
 pub(super) fn sheet() -> String {
-    format!("{}{LAYOUT}{}", themes(), replaced_colours(|name, _| format!("var(--{name})")))
+    format!("{}{LAYOUT}{}", theme_variables(), colour_rules(|name, _| format!("var(--{name})")))
 }
 
-/// Returns a figure as a separate SVG file, with a background, and with dark colours for viewers
-/// that support styles.
+/// Returns the text of a figure as a separate SVG file: with a background, and with a dark theme
+/// for viewers that support styles.
 pub(super) fn standalone(svg: &str) -> String {
     let style = format!(
         "<style>@media screen and (prefers-color-scheme:dark){{\n[fill=\"{LIGHT_PAPER}\"]{{fill:{DARK_PAPER}}}\n{}}}</style>",
-        replaced_colours(|_, dark| dark.to_owned())
+        colour_rules(|_, dark| dark.to_owned())
     );
     let paper = format!("<rect x=\"-50%\" width=\"200%\" height=\"100%\" fill=\"{LIGHT_PAPER}\"/>");
     match svg.split_once('>') {

@@ -1,4 +1,4 @@
-//! Text report for terminals.
+//! Rendering of blocks as text for terminals.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -8,34 +8,34 @@ use textwrap::core::display_width;
 
 use crate::report::document::{Block, CODE, Mark, Point, Table};
 
-/// Maximum width of running text in columns; tables may be wider on wide terminals.
+/// Maximum width of running text \[characters\]; tables may be wider on wide terminals.
 const MAX_TEXT_WIDTH: usize = 110;
 
-/// Width of this process's output in columns: that of its terminal, unlimited without one.
-static WIDTH: AtomicUsize = AtomicUsize::new(usize::MAX);
+/// Width of the output of this process \[characters\]: that of its terminal, unlimited without one.
+static OUTPUT_WIDTH: AtomicUsize = AtomicUsize::new(usize::MAX);
 
 /// Limits text and tables of all reports of this process to `columns` characters a line.
 pub fn limit_text_width(columns: usize) {
-    WIDTH.store(columns, Ordering::Relaxed);
+    OUTPUT_WIDTH.store(columns, Ordering::Relaxed);
 }
 
-/// Returns the width of running text in columns.
+/// Returns the width of running text in reports of this process \[characters\].
 pub fn text_width() -> usize {
-    WIDTH.load(Ordering::Relaxed).min(MAX_TEXT_WIDTH)
+    OUTPUT_WIDTH.load(Ordering::Relaxed).min(MAX_TEXT_WIDTH)
 }
 
 /// Renders blocks as text, ending in a line break.
 pub(in crate::report) fn text(blocks: &[Block]) -> String {
-    text_within(blocks, WIDTH.load(Ordering::Relaxed))
+    text_within(blocks, OUTPUT_WIDTH.load(Ordering::Relaxed))
 }
 
-/// Renders blocks as text. Lines hold at most `columns` characters, running text at most
+/// Renders blocks as text. Lines have at most `columns` characters, those of running text at most
 /// [`MAX_TEXT_WIDTH`].
 fn text_within(blocks: &[Block], columns: usize) -> String {
     let width = columns.min(MAX_TEXT_WIDTH);
     let mut text = String::new();
     let mut follows_heading = false;
-    for block in flat(blocks) {
+    for block in text_blocks(blocks) {
         if !text.is_empty() && !follows_heading {
             text.push('\n');
         }
@@ -52,12 +52,12 @@ fn text_within(blocks: &[Block], columns: usize) -> String {
             }
             Block::List(points) => {
                 for item in points {
-                    point(&mut text, "- ", item, width);
+                    push_item(&mut text, "- ", item, width);
                 }
             }
             Block::Ranking(points) => {
                 for (k, item) in points.iter().enumerate() {
-                    point(&mut text, &format!("{}. ", k + 1), item, width);
+                    push_item(&mut text, &format!("{}. ", k + 1), item, width);
                 }
             }
             Block::Table(content) => {
@@ -71,12 +71,12 @@ fn text_within(blocks: &[Block], columns: usize) -> String {
     text
 }
 
-/// Returns the blocks that terminals and Markdown show, in order.
-pub(super) fn flat<'a, 'b>(blocks: &'b [Block<'a>]) -> Vec<&'b Block<'a>> {
+/// Returns the blocks that terminals and Markdown show, in order, without nesting.
+pub(super) fn text_blocks<'a, 'b>(blocks: &'b [Block<'a>]) -> Vec<&'b Block<'a>> {
     let mut shown = Vec::new();
     for block in blocks {
         match block {
-            Block::Words(inner) => shown.extend(flat(inner)),
+            Block::Words(inner) => shown.extend(text_blocks(inner)),
             Block::Headline(_)
             | Block::Blanks(_)
             | Block::Figures(_)
@@ -89,8 +89,8 @@ pub(super) fn flat<'a, 'b>(blocks: &'b [Block<'a>]) -> Vec<&'b Block<'a>> {
     shown
 }
 
-/// Returns the text of a point with the result of its test.
-pub(super) fn marked(point: &Point) -> String {
+/// Returns the text of a list item, after the outcome if it is a test.
+pub(super) fn with_outcome(point: &Point) -> String {
     let mark = match point.mark {
         Some(Mark::Failed) => "failed: ",
         Some(Mark::Passed) => "passed: ",
@@ -99,20 +99,21 @@ pub(super) fn marked(point: &Point) -> String {
     format!("{mark}{}", point.text)
 }
 
-fn point(text: &mut String, mark: &str, point: &Point, width: usize) {
+/// Appends a list item with its details; `mark` is its bullet or number.
+fn push_item(text: &mut String, mark: &str, point: &Point, width: usize) {
     let (first, indent) = (format!("  {mark}"), " ".repeat(2 + mark.len()));
-    text.push_str(&wrapped(&marked(point), (&first, &indent), width));
+    text.push_str(&wrapped(&with_outcome(point), (&first, &indent), width));
     for detail in &point.details {
         text.push_str(&wrapped(detail, (&indent, &format!("{indent}  ")), width));
     }
 }
 
-/// Units that stay on the line of their number.
-const UNITS: [&str; 6] = ["%", "mm", "°", "σ", "px", "kg"];
+/// Units that are not separated from their number by a line break.
+const UNBROKEN_UNITS: [&str; 6] = ["%", "mm", "°", "σ", "px", "kg"];
 
-/// Replaces spaces in code by unbreakable ones if the code fits on a line of `width` characters. It
-/// can then be copied as a whole.
-fn whole_code(words: &str, width: usize) -> String {
+/// Replaces the spaces in code by non-breaking spaces if the code fits on a line of `width`
+/// characters, so that it can be copied as a whole.
+fn unbroken_code(words: &str, width: usize) -> String {
     let part = |(k, part): (usize, &str)| match part.split_once(CODE.1) {
         Some((code, plain)) if k > 0 && code.chars().count() <= width => {
             code.replace(' ', "\u{a0}") + plain
@@ -122,13 +123,14 @@ fn whole_code(words: &str, width: usize) -> String {
     words.split(CODE.0).enumerate().map(part).collect()
 }
 
-/// Wraps text, each line ending in a line break. Line breaks in the text are kept, and a unit stays
-/// with its number. Code that fits on a line is not broken.
+/// Wraps text to `width` characters, each line ending in a line break. `first` and `following` are
+/// the indents of the first and of the other lines. Line breaks in the text are kept. Numbers with
+/// their units, and code that fits on a line, are not broken.
 fn wrapped(words: &str, (first, following): (&str, &str), width: usize) -> String {
     let joined =
         |text: String, unit: &str| text.replace(&format!(" {unit}"), &format!("\u{a0}{unit}"));
-    let whole = whole_code(words, width.saturating_sub(following.len()));
-    let plain = UNITS.into_iter().fold(plain(&whole), joined);
+    let whole = unbroken_code(words, width.saturating_sub(following.len()));
+    let plain = UNBROKEN_UNITS.into_iter().fold(plain(&whole), joined);
     // Names of effects and files are not split, so that they can be copied.
     let options = textwrap::Options::new(width)
         .initial_indent(first)
@@ -144,8 +146,8 @@ fn plain(words: &str) -> String {
     words.chars().filter(|c| !c.is_control() || *c == '\n').collect()
 }
 
-/// Renders a table without ruled lines. The cells of a table wider than `width` are wrapped at
-/// spaces. If it is still too wide, a last line names the minor columns that are omitted.
+/// Renders a table without ruled lines. Cells of a table wider than `width` are wrapped at spaces.
+/// If the table is still too wide, minor columns are omitted, and a last line names them.
 fn table(table: &Table, width: usize) -> String {
     let header = table.header.iter().map(|&name| name.to_owned()).collect();
     let mut lines: Vec<Vec<String>> = vec![header];
@@ -178,8 +180,8 @@ fn table(table: &Table, width: usize) -> String {
     text
 }
 
-/// Returns the width of each column so that a table of `lines` takes at most `width` if possible,
-/// and the columns of `minor` to omit.
+/// Returns the width of each column, so that a table of `lines` is at most `width` wide if
+/// possible, and the indices of the columns of `minor` to omit.
 fn column_widths(lines: &[Vec<String>], minor: &[usize], width: usize) -> (Vec<usize>, Vec<usize>) {
     let columns = 0..lines.first().map_or(0, Vec::len);
     let cells = |k: usize| lines.iter().filter_map(move |line| line.get(k));

@@ -6,7 +6,7 @@ use crate::fit::Identification;
 use crate::problem::Problem;
 
 /// Maximum number of poses over which contributions are averaged.
-const MAX_POSES: usize = 200;
+const MAX_AVERAGED_POSES: usize = 200;
 
 /// Influence of a parameter, or of an effect with all its parameters, on predicted positions.
 #[derive(Debug, Clone, PartialEq)]
@@ -21,14 +21,14 @@ pub struct Contribution {
 }
 
 /// Computes the contribution of every effect of `problem`, and of every free parameter outside
-/// effects, averaged over at most [`MAX_POSES`] of the `rows`; the largest comes first.
+/// effects, averaged over at most [`MAX_AVERAGED_POSES`] of the `rows`; the largest comes first.
 pub fn of(
     problem: &Problem,
     poses: &Poses,
     arm: &Arm,
     (identification, rows): (&Identification, &[usize]),
 ) -> Vec<Contribution> {
-    let rows = sample(rows, MAX_POSES, |_| 0.0);
+    let rows = sample(rows, MAX_AVERAGED_POSES, |_| 0.0);
     let errors = poses.errors(arm, &rows);
     let moved = |indices: &[usize]| {
         let mut without = arm.clone();

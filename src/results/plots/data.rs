@@ -24,7 +24,7 @@ use crate::results::tables::{CommandedJoint, commanded_joints};
 use crate::select::{ClosedLoop, Found, examine};
 
 /// Maximum number of poses that a report page contains individually.
-const MAX_POSES: usize = 600;
+const MAX_SHOWN_POSES: usize = 600;
 
 /// Stage of the calibration of an arm.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -112,8 +112,8 @@ impl PlotData {
         let poses = Poses::new(data);
         let fitted = poses.arm(problem, identification)?;
         let stages = vec![
-            registered(&poses, &fitted, identification),
-            identified(&poses, &fitted, identification),
+            registered_errors(&poses, &fitted, identification),
+            identified_errors(&poses, &fitted, identification),
         ];
         let residual_tests = examine(problem, data, identification)?;
         Ok(Self::new(problem, &poses, stages, (&fitted, identification), residual_tests))
@@ -154,9 +154,9 @@ impl PlotData {
             poses.arm(&closure.closed, &closure.after)?,
         );
         let stages = vec![
-            registered(&poses, &before, fit),
-            identified(&poses, &before, fit),
-            stage(&poses, Stage::Closed, &after),
+            registered_errors(&poses, &before, fit),
+            identified_errors(&poses, &before, fit),
+            stage_errors(&poses, Stage::Closed, &after),
         ];
         let residuals = poses.errors(&after, &poses.rows());
         let coordinates = if closure.effects.is_empty() {
@@ -236,9 +236,10 @@ impl PlotData {
         let placed = rows.iter().filter(|&&row| residuals[row].has_place());
         let (held_out, fitted): (Vec<usize>, Vec<usize>) =
             placed.partition(|&&row| residuals[row].held_out);
-        let smaller = held_out.len().min(fitted.len()).min(MAX_POSES / 2);
-        let room =
-            |kind: &[usize]| if kind.len() <= smaller { smaller } else { MAX_POSES - smaller };
+        let smaller = held_out.len().min(fitted.len()).min(MAX_SHOWN_POSES / 2);
+        let room = |kind: &[usize]| {
+            if kind.len() <= smaller { smaller } else { MAX_SHOWN_POSES - smaller }
+        };
         let size = |row: usize| residuals[row].error.norm();
         let mut drawn = [
             weighted_sample(&fitted, room(&fitted), size),
@@ -328,19 +329,19 @@ pub(crate) fn procedure_stages(before: &Before, procedure: &Procedure) -> Vec<St
 }
 
 /// Returns the held-out errors of `arm`, as those of one stage.
-fn stage(poses: &Poses, stage: Stage, arm: &Arm) -> StageErrors {
+fn stage_errors(poses: &Poses, stage: Stage, arm: &Arm) -> StageErrors {
     StageErrors { stage, errors: poses.errors(arm, &poses.split.held_out) }
 }
 
 /// Returns the held-out errors of the registered nominal arm.
-fn registered(poses: &Poses, fitted: &Arm, identification: &Identification) -> StageErrors {
-    stage(poses, Stage::Registered, &nominal_arm(fitted, identification))
+fn registered_errors(poses: &Poses, fitted: &Arm, identification: &Identification) -> StageErrors {
+    stage_errors(poses, Stage::Registered, &nominal_arm(fitted, identification))
 }
 
 /// Returns the held-out errors of the identified arm.
-fn identified(poses: &Poses, fitted: &Arm, identification: &Identification) -> StageErrors {
+fn identified_errors(poses: &Poses, fitted: &Arm, identification: &Identification) -> StageErrors {
     let elastic = is_elastic(&fitted.model) && identification.strategy != Strategy::GeometryOnly;
-    stage(poses, if elastic { Stage::Elastic } else { Stage::Identified }, fitted)
+    stage_errors(poses, if elastic { Stage::Elastic } else { Stage::Identified }, fitted)
 }
 
 /// Returns true if a stiffness or a rigidity is a free parameter.

@@ -21,9 +21,9 @@ pub fn poses_csv(problem: &Problem, poses: &Measurements) -> String {
         _ => None,
     };
     let values = |values: &Option<Vec<f64>>, factor: f64| {
-        values
-            .as_ref()
-            .map(|values| values.iter().map(|value| plain(value * factor)).collect::<Vec<String>>())
+        values.as_ref().map(|values| {
+            values.iter().map(|value| format_trimmed(value * factor)).collect::<Vec<String>>()
+        })
     };
     let words = |labels| (0..poses.len()).map(|row| label(labels, row)).collect::<Vec<String>>();
     let mut columns = vec![(
@@ -34,7 +34,7 @@ pub fn poses_csv(problem: &Problem, poses: &Measurements) -> String {
     columns.extend(reference_columns(problem, poses));
     columns.extend(joints.iter().map(|joint| {
         let commands = (0..poses.len())
-            .map(|row| plain(poses.configuration(row)[joint.joint] * joint.factor()));
+            .map(|row| format_trimmed(poses.configuration(row)[joint.joint] * joint.factor()));
         (joint.column(), commands.collect())
     }));
     let optional = [
@@ -45,7 +45,9 @@ pub fn poses_csv(problem: &Problem, poses: &Measurements) -> String {
         ("temperature_C", values(&poses.temperature, 1.0)),
         (
             "time_s",
-            poses.time_measured.then(|| poses.time.iter().map(|&time| plain(time)).collect()),
+            poses
+                .time_measured
+                .then(|| poses.time.iter().map(|&time| format_trimmed(time)).collect()),
         ),
         ("sigma_mm", sigmas(poses)),
     ];
@@ -54,13 +56,15 @@ pub fn poses_csv(problem: &Problem, poses: &Measurements) -> String {
     let has_covariates = poses.covariates.len() == problem.data.covariates.len() * poses.len();
     columns.extend(problem.data.covariates.iter().enumerate().filter(|_| has_covariates).map(
         |(which, covariate)| {
-            let values = (0..poses.len()).map(|row| plain(poses.covariates_of(row)[which]));
+            let values =
+                (0..poses.len()).map(|row| format_trimmed(poses.covariates_of(row)[which]));
             (covariate.name.clone(), values.collect())
         },
     ));
     if let Some(approach) = &poses.approach {
         columns.extend(joints.iter().map(|CommandedJoint { joint, .. }| {
-            let sides = (0..poses.len()).map(|row| plain(approach[row * poses.joints + joint]));
+            let sides =
+                (0..poses.len()).map(|row| format_trimmed(approach[row * poses.joints + joint]));
             (format!("approach{}", joint + 1), sides.collect())
         }));
     }
@@ -74,7 +78,7 @@ pub fn poses_csv(problem: &Problem, poses: &Measurements) -> String {
 fn sigmas(poses: &Measurements) -> Option<Vec<String>> {
     let cell = |(row, sigma): (usize, &f64)| {
         let is_length = poses.observation(row).description().unit == Unit::Length;
-        if is_length { plain(sigma * 1e3) } else { String::new() }
+        if is_length { format_trimmed(sigma * 1e3) } else { String::new() }
     };
     poses.sigma.as_ref().map(|sigmas| sigmas.iter().enumerate().map(cell).collect())
 }
@@ -101,7 +105,7 @@ fn reference_columns(problem: &Problem, poses: &Measurements) -> Vec<(String, Ve
 }
 
 /// Formats a value with at most six decimals, without trailing zeros.
-fn plain(value: f64) -> String {
+fn format_trimmed(value: f64) -> String {
     let text = fixed(value, 6);
     text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }

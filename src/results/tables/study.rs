@@ -17,16 +17,16 @@ pub fn study_csv(study: &Study, results: &Results) -> String {
             cell.fits.to_string(),
             cell.failed.to_string(),
             cell.failure_rate.to_string(),
-            plain(held_out.mean),
-            plain(held_out.rms),
-            plain(held_out.rms_sd),
-            plain(held_out.rms_max),
-            plain(cell.reduced_chi2),
-            plain(cell.coverage),
-            plain(bias.map(|bias| bias.bias_sd)),
+            number_or_empty(held_out.mean),
+            number_or_empty(held_out.rms),
+            number_or_empty(held_out.rms_sd),
+            number_or_empty(held_out.rms_max),
+            number_or_empty(cell.reduced_chi2),
+            number_or_empty(cell.coverage),
+            number_or_empty(bias.map(|bias| bias.bias_sd)),
             bias.map(|bias| bias.parameter.clone()).unwrap_or_default(),
-            plain(cell.iterations_mean),
-            plain(cell.iterations_max),
+            number_or_empty(cell.iterations_mean),
+            number_or_empty(cell.iterations_max),
         ]]
     };
     csv(study, results, header, |cell, _| line(cell))
@@ -42,12 +42,12 @@ pub fn study_parameters_csv(study: &Study, results: &Results) -> String {
                 parameter.name.clone(),
                 parameter.unit.to_owned(),
                 parameter.fits.to_string(),
-                plain(parameter.bias),
-                plain(parameter.spread),
-                plain(parameter.rms_error),
+                number_or_empty(parameter.bias),
+                number_or_empty(parameter.spread),
+                number_or_empty(parameter.rms_error),
                 parameter.with_std_error.to_string(),
-                plain(parameter.std_error),
-                plain(parameter.coverage),
+                number_or_empty(parameter.std_error),
+                number_or_empty(parameter.coverage),
             ]
         };
         cell.parameters.iter().map(line).collect()
@@ -67,7 +67,7 @@ pub fn study_timing_csv(study: &Study, results: &Results) -> String {
 }
 
 /// Formats a number as the shortest text that reads back as the same number; empty for `None`.
-fn plain(value: Option<f64>) -> String {
+fn number_or_empty(value: Option<f64>) -> String {
     value.map(|value| value.to_string()).unwrap_or_default()
 }
 

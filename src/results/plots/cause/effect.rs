@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use super::axis::is_prismatic;
 use super::figure::{Cause, Point};
-use super::terms::Rows;
+use super::terms::EffectRows;
 use super::view::{at_joint, beyond_joints, change_along};
 use crate::model::parameter::{EffectParameter, JointField, ParameterSite, value_regressor};
 use crate::numeric::range;
@@ -61,7 +61,7 @@ pub fn of(
     };
     let (terms, sites) = indices.iter().filter_map(term).unzip();
     let displacements = partial.iter().zip(residuals).map(|(partial, residual)| partial - residual);
-    let rows = Rows {
+    let rows = EffectRows {
         poses: all_poses.iter().map(|pose| pose.setup).collect(),
         displacements: displacements.collect(),
         terms,

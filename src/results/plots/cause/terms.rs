@@ -8,7 +8,7 @@ use crate::model::parameter::{ParameterSite, Regressor};
 use crate::problem::{PoseView, Problem};
 
 /// Terms of an effect, with the poses of all rows and the displacement by the effect in each row.
-pub struct Rows<'a> {
+pub struct EffectRows<'a> {
     pub poses: Vec<PoseView<'a>>,
     /// Displacement of the target by the effect in each row, measuring frame \[m\].
     pub displacements: Vec<Vector3<f64>>,
@@ -21,7 +21,7 @@ pub struct Rows<'a> {
 /// Function from the abscissa of a figure to the ordinate of the fitted law, both SI.
 pub type Law<'a> = Box<dyn Fn(f64) -> f64 + 'a>;
 
-impl Rows<'_> {
+impl EffectRows<'_> {
     /// Returns the common site of all terms; `None` if they have several sites or there are no
     /// terms.
     pub fn site(&self) -> Option<ParameterSite> {

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::axis::{Quantity, is_prismatic};
-use super::terms::{Law, Rows};
+use super::terms::{EffectRows, Law};
 use crate::laws::Quantity as LawQuantity;
 use crate::model::parameter::{ArmField, BeamField, JointField, ParameterSite};
 use crate::problem::{Effect, PoseView, Problem};
@@ -45,7 +45,7 @@ pub fn change_along(lever: &Vector3<f64>, displacement: &Vector3<f64>) -> f64 {
 /// effects. `levers` are those of the joint coordinates, shape = (joints, rows).
 pub fn at_joint<'a>(
     problem: &'a Problem,
-    rows: &'a Rows,
+    rows: &'a EffectRows,
     levers: &[Vec<Vector3<f64>>],
     poses: &Poses,
 ) -> Option<View<'a>> {
@@ -67,7 +67,7 @@ pub fn at_joint<'a>(
                     rows.over_quantity(quantity, problem)?
                 }
                 (_, [(regressor, value)]) => {
-                    let across = Quantity::new(Rows::label(regressor), 1.0);
+                    let across = Quantity::new(EffectRows::label(regressor), 1.0);
                     let each = rows.poses.iter().map(|pose| regressor.value(pose)).collect();
                     (across, each, Box::new(move |x| value * x))
                 }
@@ -99,7 +99,7 @@ pub fn at_joint<'a>(
 }
 
 /// Returns the view of an effect that does not change a joint's coordinate.
-pub fn beyond_joints<'a>(found: &Effect, problem: &Problem, rows: &'a Rows) -> View<'a> {
+pub fn beyond_joints<'a>(found: &Effect, problem: &Problem, rows: &'a EffectRows) -> View<'a> {
     at_link(found, problem, rows)
         .or_else(|| of_time(problem, rows))
         .or_else(|| of_payload(rows))
@@ -119,7 +119,7 @@ pub fn beyond_joints<'a>(found: &Effect, problem: &Problem, rows: &'a Rows) -> V
 
 /// Returns the view of an effect that strains a link as a function of one temperature; `None` for
 /// other effects.
-fn at_link<'a>(found: &Effect, problem: &Problem, rows: &'a Rows) -> Option<View<'a>> {
+fn at_link<'a>(found: &Effect, problem: &Problem, rows: &'a EffectRows) -> Option<View<'a>> {
     let is_strain = |site: &ParameterSite| matches!(site, ParameterSite::Beam { field, .. } if field.is_strain());
     let &[quantity] = rows.quantities().as_slice() else { return None };
     if !(quantity.is_thermal()
@@ -154,7 +154,7 @@ fn at_link<'a>(found: &Effect, problem: &Problem, rows: &'a Rows) -> Option<View
 
 /// Returns the view of an effect that displaces the measuring frame as a function of time; `None`
 /// for other effects. The effect displaces all poses in the same direction.
-fn of_time<'a>(problem: &Problem, rows: &'a Rows) -> Option<View<'a>> {
+fn of_time<'a>(problem: &Problem, rows: &'a EffectRows) -> Option<View<'a>> {
     let is_shift = |site: &ParameterSite| matches!(site, ParameterSite::Shift { axis: 0..3 });
     let &[quantity @ (LawQuantity::Elapsed | LawQuantity::Time)] = rows.quantities().as_slice()
     else {
@@ -185,7 +185,7 @@ fn of_time<'a>(problem: &Problem, rows: &'a Rows) -> Option<View<'a>> {
 }
 
 /// Returns the view of an effect that adds a mass to the payload; `None` for other effects.
-fn of_payload<'a>(rows: &'a Rows) -> Option<View<'a>> {
+fn of_payload<'a>(rows: &'a EffectRows) -> Option<View<'a>> {
     if rows.site()? != ParameterSite::Arm(ArmField::Payload) {
         return None;
     }
