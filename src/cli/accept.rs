@@ -34,16 +34,17 @@ pub struct Arguments {
     instrument: Option<String>,
     /// Largest error that a pose may have [mm]; the arm passes if the share of poses within it is
     /// large enough
-    #[arg(long, value_name = "MM", value_parser = length)]
+    #[arg(long, value_name = "MM", value_parser = parse_length)]
     tolerance_mm: Option<f64>,
     /// Share of all poses that must be within the tolerance
-    #[arg(long, value_name = "P", default_value_t = 0.9, value_parser = super::remainder::level, requires = "tolerance_mm")]
+    #[arg(long, value_name = "P", default_value_t = 0.9, value_parser = super::remainder::parse_level, requires = "tolerance_mm")]
     share: f64,
     /// Largest probability of a wrong verdict: a pass although fewer poses are within the
     /// tolerance, or a fail although enough are
-    #[arg(long, value_name = "P", default_value_t = 0.05, value_parser = super::remainder::level, requires = "tolerance_mm")]
+    #[arg(long, value_name = "P", default_value_t = 0.05, value_parser = super::remainder::parse_level, requires = "tolerance_mm")]
     risk: f64,
-    /// Correct predictions by what no law explains, if poses left out gain by it
+    /// Correct predictions by a smooth remainder that no law explains, if it improves predictions
+    /// of poses left out of the fit
     #[arg(long)]
     remainder: bool,
 }
@@ -52,7 +53,7 @@ pub struct Arguments {
 const CONFIDENCE_LEVEL: f64 = 0.95;
 
 /// Parses a length in mm, greater than 0.
-fn length(text: &str) -> Result<f64, String> {
+fn parse_length(text: &str) -> Result<f64, String> {
     let length = text.parse::<f64>().ok().filter(|length| *length > 0.0 && length.is_finite());
     length.ok_or_else(|| "a length in mm greater than 0 is needed, such as 0.2".to_owned())
 }
@@ -117,12 +118,12 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         let page = results.path("acceptance.html");
         let verdict = result.tolerance.as_ref().map(|tested| tested.verdict);
         let next = if !found.is_trusted() {
-            format!("flexcal identify {} says what to correct", common.named())
+            format!("flexcal identify {} says what to correct", common.problem_arguments())
         } else if verdict == Some(Verdict::Fail.as_str()) {
             let page = page.display();
             format!(
                 "flexcal loop {} looks for what the model lacks; {page} records the failure",
-                common.named()
+                common.problem_arguments()
             )
         } else if verdict == Some(Verdict::Undecided.as_str()) {
             "measure and hold out more poses, then the same command again".to_owned()

@@ -33,7 +33,7 @@ pub fn after_fit(
     is_structured: bool,
     estimate: &Path,
 ) -> String {
-    let named = common.named();
+    let named = common.problem_arguments();
     let to_apply = |what: &str| {
         let [problem, estimate] = [common.problem(), estimate].map(shell_word);
         format!("flexcal compensate {problem} --estimate {estimate} --data TARGETS.csv {what}")
@@ -108,7 +108,7 @@ pub fn after_loop(
     result: &LoopResult,
     results: &Results,
 ) -> String {
-    let named = common.named();
+    let named = common.problem_arguments();
     if let Some(look) = report::show_influential_rows(fit, &common.problem_file()) {
         return look;
     }
@@ -181,8 +181,8 @@ pub fn after_trace(common: &Common, result: &TraceResult) -> String {
     let is_significant =
         result.ranking.first().is_some_and(|candidate| candidate.p_value < result.level);
     if is_significant || result.structured {
-        format!("flexcal loop {} adds what is missing and fits again", common.named())
+        format!("flexcal loop {} adds what is missing and fits again", common.problem_arguments())
     } else {
-        format!("flexcal identify {} writes the estimate to apply", common.named())
+        format!("flexcal identify {} writes the estimate to apply", common.problem_arguments())
     }
 }

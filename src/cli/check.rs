@@ -13,7 +13,7 @@ use flexcal::results::{CheckResult, Document as _};
 use super::diagnostic;
 use super::input::Common;
 use super::outcome::Outcome;
-use super::poses::{Source, count};
+use super::poses::{Source, parse_count};
 
 /// Arguments of `flexcal check`.
 #[derive(Debug, Args)]
@@ -30,7 +30,7 @@ pub struct Arguments {
     #[command(flatten)]
     common: Common,
     /// Number of poses to draw
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = count::<10_000>)]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = parse_count::<10_000>)]
     poses: Option<u32>,
     #[command(flatten)]
     source: Source,
@@ -69,7 +69,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         let problem_word = shell_word(common.problem());
         let is_measured = arguments.poses.is_none() && arguments.source.candidates.is_empty();
         let next = if check.suffices() && is_measured {
-            format!("flexcal identify {} fits these measurements", common.named())
+            format!("flexcal identify {} fits these measurements", common.problem_arguments())
         } else if check.suffices() {
             format!("measure such poses, then flexcal identify {problem_word} --data MEASURED.csv")
         } else {

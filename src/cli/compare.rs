@@ -49,7 +49,11 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         } else {
             ("identify", "writes the estimate of the joint fit")
         };
-        format!("{text}{}Next: flexcal {command} {} {what}\n", results.written(), common.named())
+        format!(
+            "{text}{}Next: flexcal {command} {} {what}\n",
+            results.written(),
+            common.problem_arguments()
+        )
     })?;
     Ok(outcome)
 }

@@ -14,7 +14,7 @@ use super::outcome::Outcome;
 use super::output::{self, Results};
 
 /// Name of the HTML page that the command writes.
-const PAGE: &str = "compare-results.html";
+const PAGE_FILE: &str = "compare-results.html";
 /// Keys of the errors in an estimate.json, and the names that people read.
 const ERROR_PARTS: [(&str, &str); 3] =
     [("held_out", "held out"), ("left_out", "left out"), ("identification", "fitted rows")];
@@ -53,12 +53,12 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let Arguments { first, second, out, force, quiet, trust } = arguments;
     let inputs = vec![first.clone(), second.clone()];
     let flags = (*force, *quiet);
-    let results = Results::claim("compare-results", out.clone(), inputs, &[PAGE], flags)?;
+    let results = Results::claim("compare-results", out.clone(), inputs, &[PAGE_FILE], flags)?;
     let sides = [read_side(first, *trust)?, read_side(second, *trust)?];
     if sides[0].estimate.problem_name() != sides[1].estimate.problem_name() {
         diagnostic::warn("the two results are of problems with different names");
     }
-    results.write(&[(PAGE, &report::difference_page(&sides))])?;
+    results.write(&[(PAGE_FILE, &report::difference_page(&sides))])?;
     if !quiet {
         let better = shell_word(if report::predicts_better(&sides) { second } else { first });
         output::print(&format!(

@@ -38,7 +38,7 @@ pub struct Arguments {
     #[arg(long, value_enum, default_value_t = Frame::Measuring)]
     frame: Frame,
     /// Probability with which the bound of an error holds
-    #[arg(long, value_name = "P", default_value_t = 0.95, value_parser = super::remainder::level)]
+    #[arg(long, value_name = "P", default_value_t = 0.95, value_parser = super::remainder::parse_level)]
     level: f64,
     #[command(flatten)]
     trust: Trust,

@@ -24,6 +24,6 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments, mut flexcal: Command) -> Result<Outcome, Box<dyn Error>> {
     let mut script = Vec::new();
     clap_complete::generate(arguments.shell, &mut flexcal, "flexcal", &mut script);
-    output::print_all(&String::from_utf8_lossy(&script))?;
+    output::print_unchanged(&String::from_utf8_lossy(&script))?;
     Ok(Outcome::Done)
 }

@@ -24,7 +24,7 @@ use super::estimate::Trust;
 use super::flags::Flags;
 use super::outcome::Outcome;
 use super::output::Results;
-use super::region::numbers;
+use super::region::parse_numbers;
 
 /// Arguments of `flexcal export`.
 #[derive(Debug, Args)]
@@ -71,7 +71,7 @@ pub struct Arguments {
     #[arg(long, conflicts_with = "best_rigid")]
     fitted_alone: bool,
     /// Box of the target in which --best-rigid fits, frame of the arm's base
-    #[arg(long, value_name = "X0,X1,Y0,Y1,Z0,Z1", value_parser = numbers::<6>, allow_hyphen_values = true, requires = "best_rigid")]
+    #[arg(long, value_name = "X0,X1,Y0,Y1,Z0,Z1", value_parser = parse_numbers::<6>, allow_hyphen_values = true, requires = "best_rigid")]
     workspace_mm: Option<[f64; 6]>,
     /// Number of poses in the test program of --format c
     #[arg(long, value_name = "N", default_value_t = 100, requires = "format")]

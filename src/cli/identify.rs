@@ -35,8 +35,8 @@ pub struct Arguments {
     /// Solver; auto keeps bounds and constraints if there are any
     #[arg(long, default_value = SolverChoice::Auto.as_str(), value_parser = words(SolverChoice::CHOICES, SolverChoice::as_str, SolverChoice::summary))]
     solver: SolverChoice,
-    /// Correct predictions by what no law explains, if poses left out gain by it; writes
-    /// remainder.json
+    /// Correct predictions by a smooth remainder that no law explains, if it improves predictions
+    /// of poses left out of the fit; writes remainder.json
     #[arg(long)]
     remainder: bool,
     /// Prior: the estimate.json of an earlier identification of the same arm, whose fitted rows are
@@ -44,7 +44,7 @@ pub struct Arguments {
     #[arg(long, value_name = "ESTIMATE.json|PRIOR.toml", conflicts_with = "remainder")]
     prior: Option<PathBuf>,
     /// Days since the earlier identification, by whose drift the prior is widened
-    #[arg(long, value_name = "DAYS", default_value_t = 0.0, requires = "prior", value_parser = days)]
+    #[arg(long, value_name = "DAYS", default_value_t = 0.0, requires = "prior", value_parser = parse_days)]
     drift: f64,
     #[command(flatten)]
     trust: Trust,
@@ -70,7 +70,7 @@ fn words<T: Copy + Send + Sync + 'static>(
 }
 
 /// Parses a number of days, at least 0.
-pub(super) fn days(text: &str) -> Result<f64, String> {
+pub(super) fn parse_days(text: &str) -> Result<f64, String> {
     let days = text.parse::<f64>().ok().filter(|days| days.is_finite() && *days >= 0.0);
     days.ok_or_else(|| "a number of days, at least 0, is expected".to_owned())
 }

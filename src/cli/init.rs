@@ -32,7 +32,7 @@ pub struct Arguments {
     tip: Option<String>,
     /// Board that a camera on the tip sees: inner corners along and across, and their distance in
     /// mm. The problem then measures its pixels instead of positions
-    #[arg(long, value_name = "9x6x25", value_parser = board)]
+    #[arg(long, value_name = "9x6x25", value_parser = parse_board)]
     board: Option<Board>,
     #[command(flatten)]
     flags: Flags,
@@ -42,7 +42,7 @@ pub struct Arguments {
 type Board = ([usize; 2], f64);
 
 /// Parses the size of a calibration board such as `9x6x25`.
-fn board(text: &str) -> Result<Board, String> {
+fn parse_board(text: &str) -> Result<Board, String> {
     let parts: Vec<&str> = text.split(['x', '×']).collect();
     let [columns, rows, distance] = parts[..] else {
         return Err("corners along, across and their distance in mm, such as 9x6x25".to_owned());

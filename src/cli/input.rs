@@ -64,7 +64,7 @@ impl Common {
 
     /// Formats the problem, and the measurement files named by `--data`, as arguments of a
     /// suggested command.
-    pub fn named(&self) -> String {
+    pub fn problem_arguments(&self) -> String {
         let data: Vec<String> =
             self.data().iter().map(|file| format!(" {}", shell_word(file))).collect();
         let data =

@@ -25,7 +25,7 @@ type LastWork = Box<dyn FnOnce() -> u8 + Send>;
 /// Lock that is held while finished files are renamed to their final names.
 static WRITE_LOCK: Mutex<()> = Mutex::new(());
 /// True once a command heeds the stop request, so that the first interrupt does not end it at once.
-static IS_WATCHED: AtomicBool = AtomicBool::new(false);
+static HEEDS_STOP_REQUEST: AtomicBool = AtomicBool::new(false);
 /// State of the running command.
 static STATE: Mutex<State> = Mutex::new(State::Running(None));
 
@@ -45,21 +45,21 @@ enum State {
 ///
 /// Interrupts that were ignored, or handled by a host program, before the call remain so.
 pub fn stop() -> Stop {
-    IS_WATCHED.store(true, Ordering::Relaxed);
+    HEEDS_STOP_REQUEST.store(true, Ordering::Relaxed);
     install()
 }
 
 /// Sets the last work of the running command, which runs if the command has not ended in time after
 /// an interrupt.
 pub fn at_deadline(work: impl FnOnce() -> u8 + Send + 'static) {
-    *locked(&STATE) = State::Running(Some(Box::new(work)));
+    *lock(&STATE) = State::Running(Some(Box::new(work)));
 }
 
 /// Declares that the command is writing its results, so that an interrupt no longer ends the
 /// process. Does not return if the time after an interrupt is over, because the process then ends.
 pub fn begin_writing() {
     let is_over = {
-        let mut state = locked(&STATE);
+        let mut state = lock(&STATE);
         let is_over = matches!(*state, State::Over);
         if !is_over {
             *state = State::Writing;
@@ -76,11 +76,11 @@ pub fn begin_writing() {
 /// Prevents interrupts from ending the process while the returned guard is held.
 pub fn block_exit() -> MutexGuard<'static, ()> {
     install();
-    locked(&WRITE_LOCK)
+    lock(&WRITE_LOCK)
 }
 
 /// Returns the stop request of this process.
-fn request() -> &'static Stop {
+fn stop_request() -> &'static Stop {
     static STOP: OnceLock<Stop> = OnceLock::new();
     STOP.get_or_init(Stop::default)
 }
@@ -90,7 +90,7 @@ fn install() -> Stop {
     static INSTALLED: Once = Once::new();
     // If the process already has a handler, that one decides what an interrupt does.
     INSTALLED.call_once(|| _ = ctrlc::try_set_handler(|| end_early(INTERRUPTED_STATUS)));
-    request().clone()
+    stop_request().clone()
 }
 
 /// Makes requests to end (SIGTERM) act as interrupts do. Must be called before other threads start:
@@ -120,9 +120,9 @@ pub fn watch_termination() {}
 /// process at once for other commands, and at the second interrupt. Waits while files get their
 /// final names.
 fn end_early(status: u8) {
-    let is_repeated = request().request();
-    if is_repeated || !IS_WATCHED.load(Ordering::Relaxed) {
-        let _files = locked(&WRITE_LOCK);
+    let is_repeated = stop_request().request();
+    if is_repeated || !HEEDS_STOP_REQUEST.load(Ordering::Relaxed) {
+        let _files = lock(&WRITE_LOCK);
         exit(i32::from(status));
     }
     thread::spawn(end_in_time);
@@ -132,7 +132,7 @@ fn end_early(status: u8) {
 fn end_in_time() {
     thread::sleep(MAX_FINISHING_TIME);
     let work = {
-        let mut state = locked(&STATE);
+        let mut state = lock(&STATE);
         if matches!(*state, State::Writing) {
             return;
         }
@@ -148,11 +148,11 @@ fn end_in_time() {
         },
         |work| work(),
     );
-    let _files = locked(&WRITE_LOCK);
+    let _files = lock(&WRITE_LOCK);
     exit(i32::from(status));
 }
 
 /// Locks a mutex, also if a thread panicked while it held the lock.
-fn locked<T>(mutex: &'static Mutex<T>) -> MutexGuard<'static, T> {
+fn lock<T>(mutex: &'static Mutex<T>) -> MutexGuard<'static, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -29,7 +29,7 @@ pub fn run(arguments: &Arguments, flexcal: Command) -> Result<Outcome, Box<dyn E
     let mut flexcal = flexcal.disable_help_subcommand(true);
     flexcal.build();
     let Some(folder) = &arguments.out else {
-        output::print_all(&page(flexcal)?)?;
+        output::print_unchanged(&page(flexcal)?)?;
         return Ok(Outcome::Done);
     };
     let mut pages = Vec::new();

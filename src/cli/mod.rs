@@ -126,7 +126,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
             return if error.use_stderr() { 2 } else { 0 };
         }
     };
-    flexcal::report::limit_text_width(output::columns());
+    flexcal::report::limit_text_width(output::terminal_columns());
     interrupt::watch_termination();
     if let Err(error) = threads::check() {
         diagnostic::print(&error);

@@ -12,7 +12,7 @@ use flexcal::results::{Document as _, NextResult, poses_csv};
 
 use super::input::{Common, Input};
 use super::outcome::Outcome;
-use super::poses::{Source, count};
+use super::poses::{Source, parse_count};
 use super::progress::Line;
 use super::region::Region;
 use super::{diagnostic, interrupt};
@@ -37,10 +37,10 @@ pub struct Arguments {
     #[command(flatten)]
     common: Common,
     /// Number of poses to choose
-    #[arg(long, value_name = "K", default_value_t = 5, allow_negative_numbers = true, value_parser = count::<10_000>)]
+    #[arg(long, value_name = "K", default_value_t = 5, allow_negative_numbers = true, value_parser = parse_count::<10_000>)]
     poses: u32,
     /// Say "enough" once errors in the workspace are below this, with the probability of --level
-    #[arg(long, value_name = "MM", value_parser = positive)]
+    #[arg(long, value_name = "MM", value_parser = parse_positive)]
     tolerance_mm: Option<f64>,
     /// Aim of the poses
     #[arg(long = "for", value_enum, default_value_t = PurposeArgument::Accuracy)]
@@ -50,7 +50,7 @@ pub struct Arguments {
     #[arg(long, value_name = "LOOP.json")]
     explanations: Option<PathBuf>,
     /// Probability with which errors stay below the bound
-    #[arg(long, value_name = "P", default_value_t = 0.95, value_parser = super::remainder::level)]
+    #[arg(long, value_name = "P", default_value_t = 0.95, value_parser = super::remainder::parse_level)]
     level: f64,
     /// Judge predictions with a remainder fitted to the measured poses, as identify --remainder
     /// makes them
@@ -63,7 +63,7 @@ pub struct Arguments {
 }
 
 /// Parses a finite number greater than 0.
-fn positive(text: &str) -> Result<f64, String> {
+fn parse_positive(text: &str) -> Result<f64, String> {
     let number = text.parse::<f64>().ok().filter(|number| *number > 0.0 && number.is_finite());
     number.ok_or_else(|| "a positive number is needed".to_owned())
 }
@@ -137,7 +137,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     results.write(&texts)?;
     common.print_result(&json, || {
         let text = report::next_text(&problem, &options, &next);
-        let (named, written) = (common.named(), results.written());
+        let (named, written) = (common.problem_arguments(), results.written());
         // More poses cannot correct a model that lacks an effect.
         let lacks = if next.error.is_some() && next.misfit > next.noise {
             format!("flexcal loop {named} looks for what the model lacks, because the misfit exceeds the noise; or ")
@@ -154,7 +154,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
             return format!(
                 "{text}{written}Next: {lacks}measure these poses, append them to the measurements and to the joint table of \
                  {named}, then\nflexcal next {}\n",
-                common.named()
+                common.problem_arguments()
             );
         }
         let measure = if next.is_of_cameras {

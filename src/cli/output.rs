@@ -268,7 +268,7 @@ impl Results {
 
 /// Returns the number of columns of the terminal on standard output, at least 40; `usize::MAX` if
 /// there is no terminal.
-pub fn columns() -> usize {
+pub fn terminal_columns() -> usize {
     terminal_size::terminal_size_of(io::stdout())
         .map_or(usize::MAX, |(width, _)| usize::from(width.0).max(40))
 }
@@ -276,7 +276,7 @@ pub fn columns() -> usize {
 /// Prints text to standard output, with hidden characters such as control characters escaped. A
 /// closed pipe is no error.
 pub fn print(text: &str) -> Result<(), WriteError> {
-    print_all(&escape_hidden(text))
+    print_unchanged(&escape_hidden(text))
 }
 
 /// Prints JSON to standard output, with hidden characters in its strings escaped as `\uXXXX`.
@@ -292,11 +292,11 @@ pub fn print_json(json: &str) -> Result<(), WriteError> {
             text.push(character);
         }
     }
-    print_all(&text)
+    print_unchanged(&text)
 }
 
 /// Prints a text unchanged to standard output. A closed pipe is no error.
-pub fn print_all(text: &str) -> Result<(), WriteError> {
+pub fn print_unchanged(text: &str) -> Result<(), WriteError> {
     match anstream::stdout().write_all(text.as_bytes()) {
         Err(source) if source.kind() != io::ErrorKind::BrokenPipe => {
             Err(WriteError::Io { path: PathBuf::from("standard output"), source })

@@ -13,7 +13,7 @@ use flexcal::results::{Document as _, PlanResult, poses_csv};
 use super::diagnostic;
 use super::input::Common;
 use super::outcome::Outcome;
-use super::poses::{Source, count};
+use super::poses::{Source, parse_count};
 use super::progress::Line;
 use super::region::Region;
 
@@ -35,7 +35,7 @@ pub struct Arguments {
     #[command(flatten)]
     common: Common,
     /// Number of poses to measure
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = count::<10_000>)]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = parse_count::<10_000>)]
     poses: u32,
     /// Quantity to minimise
     #[arg(long, value_enum, ignore_case = true, default_value_t = CriterionArgument::S)]

@@ -36,7 +36,7 @@ pub struct Arguments {
     #[arg(long, value_name = "ESTIMATE.json")]
     estimate: Option<PathBuf>,
     /// Probability with which the bound of an error holds
-    #[arg(long, value_name = "P", default_value_t = 0.95, value_parser = super::remainder::level)]
+    #[arg(long, value_name = "P", default_value_t = 0.95, value_parser = super::remainder::parse_level)]
     level: f64,
     #[command(flatten)]
     trust: Trust,
@@ -47,13 +47,15 @@ pub struct Arguments {
 const MAX_SHORTFALL_SIGMAS: f64 = 3.0;
 
 /// Names of the files that the command may write.
-const RESULTS: [&str; 4] = ["predictions.csv", "residuals.csv", "errors.json", "predictions.html"];
+const RESULT_FILES: [&str; 4] =
+    ["predictions.csv", "residuals.csv", "errors.json", "predictions.html"];
 
 /// Predicts the rows, writes predictions, residuals and errors, and prints the errors.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let common = &arguments.common;
     let problem = Problem::read(common.problem())?;
-    let results = common.results("predict", &problem, arguments.estimate.as_slice(), &RESULTS)?;
+    let results =
+        common.results("predict", &problem, arguments.estimate.as_slice(), &RESULT_FILES)?;
     let (rows, warnings) = Measurements::read_to_predict(common.files(&problem), &problem)?;
     let rows = rows.arm_rows();
     common.warn(&warnings);
@@ -107,8 +109,10 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     texts.extend(errors.clone().map(|json| ("errors.json", json)));
     let fitted = estimate.as_ref().map_or_else(Vec::new, |estimate| estimate.fitted_among(&rows));
     let arm = if estimate.is_some() { "the identified arm" } else { "the nominal arm" };
-    texts
-        .push((RESULTS[3], report::prediction_page(&problem, arm, &prediction, (bounds, &fitted))));
+    texts.push((
+        RESULT_FILES[3],
+        report::prediction_page(&problem, arm, &prediction, (bounds, &fitted)),
+    ));
     let borrowed: Vec<(&str, &str)> =
         texts.iter().map(|(name, text)| (*name, text.as_str())).collect();
     results.write(&borrowed)?;
@@ -119,7 +123,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         let next = match &arguments.estimate {
             Some(file) if exceeds_bounds(residuals, bounds) => format!(
                 "flexcal watch {} --estimate {} says whether the arm has changed: fewer rows than foreseen lie within their bounds",
-                common.named(),
+                common.problem_arguments(),
                 shell_word(file)
             ),
             Some(file) => format!(

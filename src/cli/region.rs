@@ -7,10 +7,10 @@ use flexcal::design::{RegionError, Workspace};
 #[derive(Debug, Args)]
 pub struct Region {
     /// Box that the nominal target stays in, frame of the arm's base
-    #[arg(long, value_name = "X0,X1,Y0,Y1,Z0,Z1", value_parser = numbers::<6>, allow_hyphen_values = true)]
+    #[arg(long, value_name = "X0,X1,Y0,Y1,Z0,Z1", value_parser = parse_numbers::<6>, allow_hyphen_values = true)]
     workspace_mm: Option<[f64; 6]>,
     /// Plane that the nominal target stays beyond, frame of the arm's base: N·p ≥ D for a normal N
-    #[arg(long, value_name = "NX,NY,NZ,D", value_parser = numbers::<4>, allow_hyphen_values = true)]
+    #[arg(long, value_name = "NX,NY,NZ,D", value_parser = parse_numbers::<4>, allow_hyphen_values = true)]
     keep_out_mm: Vec<[f64; 4]>,
 }
 
@@ -27,7 +27,7 @@ impl Region {
 }
 
 /// Parses exactly `N` finite numbers with commas between them.
-pub fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
+pub fn parse_numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
     let numbers = text
         .split(',')
         .map(|word| word.trim().parse().ok().filter(|number: &f64| number.is_finite()));

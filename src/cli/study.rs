@@ -107,12 +107,13 @@ struct NoFolder {
 }
 
 /// Names of the files that a study of fits writes.
-const NAMES: [&str; 5] = ["study.json", "parameters.csv", "timing.csv", "study.csv", "study.html"];
+const RESULT_FILES: [&str; 5] =
+    ["study.json", "parameters.csv", "timing.csv", "study.csv", "study.html"];
 
 impl Common {
     /// Claims the file names for the results of a study.
     fn results(&self, study: &Study) -> Result<Results, WriteError> {
-        self.claim(&study.name, &study.files, &NAMES)
+        self.claim(&study.name, &study.files, &RESULT_FILES)
     }
 
     /// Claims the file names `names` for results of the study `name`, which reads `files`.
@@ -121,8 +122,8 @@ impl Common {
     }
 }
 
-/// Computes the unfinished fits, or merges shares. Then writes the files [`NAMES`] and prints the
-/// table. For a share alone, writes no results.
+/// Computes the unfinished fits, or merges shares. Then writes the files [`RESULT_FILES`] and
+/// prints the table. For a share alone, writes no results.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     if let Some(Merge::Merge { common, from }) = &arguments.merge {
         let study = Study::read(&common.study)?;
@@ -212,8 +213,8 @@ fn compute_parts(
     Ok(done?)
 }
 
-/// Collects the results of all parts, writes the files [`NAMES`] and prints the table. The outcome
-/// is not trusted if all fits of a cell failed.
+/// Collects the results of all parts, writes the files [`RESULT_FILES`] and prints the table. The
+/// outcome is not trusted if all fits of a cell failed.
 fn finish(
     common: &Common,
     study: &Study,
@@ -223,11 +224,11 @@ fn finish(
     let found = study::collect(study, stores)?;
     let json = StudyResult::new(study, &found).to_json();
     let texts = [
-        (NAMES[0], json.as_str()),
-        (NAMES[1], &study_parameters_csv(study, &found)),
-        (NAMES[2], &study_timing_csv(study, &found)),
-        (NAMES[3], &study_csv(study, &found)),
-        (NAMES[4], &report::study_page(study, &found)),
+        (RESULT_FILES[0], json.as_str()),
+        (RESULT_FILES[1], &study_parameters_csv(study, &found)),
+        (RESULT_FILES[2], &study_timing_csv(study, &found)),
+        (RESULT_FILES[3], &study_csv(study, &found)),
+        (RESULT_FILES[4], &report::study_page(study, &found)),
     ];
     results.write(&texts)?;
     common.flags.print_result(&json, || {

@@ -17,7 +17,7 @@ use super::{diagnostic, interrupt};
 /// loop.
 const INTERRUPTED_FOLDER: &str = "interrupted";
 /// Name of the problem file that declares the effects that were found.
-const CLOSED_PROBLEM: &str = "problem.closed.toml";
+const CLOSED_PROBLEM_FILE: &str = "problem.closed.toml";
 /// Exit status of an interrupted loop that has written a file.
 const WRITTEN_STATUS: u8 = 1;
 
@@ -129,8 +129,8 @@ impl Unfinished {
         let effects: Vec<_> = declared.chain(found).collect();
         let text =
             edit::with_effects(&self.text, &self.declared, &effects, [&files, &joint_files])?;
-        results.write(&[(CLOSED_PROBLEM, &text)])?;
-        Ok(results.path(CLOSED_PROBLEM))
+        results.write(&[(CLOSED_PROBLEM_FILE, &text)])?;
+        Ok(results.path(CLOSED_PROBLEM_FILE))
     }
 }
 

@@ -12,7 +12,7 @@ use flexcal::results::{Document as _, WatchResult};
 
 use super::diagnostic;
 use super::estimate::Trust;
-use super::identify::days;
+use super::identify::parse_days;
 use super::input::Common;
 use super::outcome::Outcome;
 
@@ -29,17 +29,17 @@ pub struct Arguments {
     #[arg(long, value_name = "ESTIMATE.json")]
     estimate: PathBuf,
     /// Days since the estimate, whose drift counts as no change
-    #[arg(long, value_name = "DAYS", default_value_t = 0.0, value_parser = days)]
+    #[arg(long, value_name = "DAYS", default_value_t = 0.0, value_parser = parse_days)]
     drift: f64,
     /// Probability of an alarm at any row if nothing has changed
-    #[arg(long, value_name = "P", default_value_t = 0.01, value_parser = probability)]
+    #[arg(long, value_name = "P", default_value_t = 0.01, value_parser = parse_probability)]
     false_alarms: f64,
     #[command(flatten)]
     trust: Trust,
 }
 
 /// Parses a probability greater than 0 and at most 0.5.
-fn probability(text: &str) -> Result<f64, String> {
+fn parse_probability(text: &str) -> Result<f64, String> {
     let number = text.parse::<f64>().ok().filter(|number| *number > 0.0 && *number <= 0.5);
     number.ok_or_else(|| "a probability above 0 and up to 0.5 is expected".to_owned())
 }
@@ -70,17 +70,17 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         let next = if watch.is_changed() && first == Some(CauseKind::Other) {
             format!(
                 "flexcal identify {} says whether units, signs, columns or the order of joints are read wrongly",
-                common.named()
+                common.problem_arguments()
             )
         } else if watch.is_changed() && first == Some(CauseKind::Noise) {
             "measure a few of these poses again. If watch.html shows the evidence rise from some row on, give the rows from there on alone"
                 .to_owned()
         } else if watch.is_changed() && first == Some(CauseKind::Row) {
-            format!("check that row, then flexcal watch {} --estimate {estimate} without it", common.named())
+            format!("check that row, then flexcal watch {} --estimate {estimate} without it", common.problem_arguments())
         } else if watch.is_changed() {
             format!(
                 "flexcal identify {} --prior {estimate} takes the change over into an estimate",
-                common.named()
+                common.problem_arguments()
             )
         } else {
             format!("flexcal compensate {problem_word} --estimate {estimate} --data TARGETS.csv corrects commands")
