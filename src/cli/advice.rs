@@ -38,7 +38,7 @@ pub fn after_fit(
         let [problem, estimate] = [common.problem(), estimate].map(shell_word);
         format!("flexcal compensate {problem} --estimate {estimate} --data TARGETS.csv {what}")
     };
-    // A problem with a remainder comes from a loop, which has searched for causes already.
+    // A remainder in the problem comes from a loop, which has searched for causes already.
     let search = if problem.remainder.is_some() {
         format!(
             "flexcal trace {named} ranks candidates for what is left; {}",

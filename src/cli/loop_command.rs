@@ -143,8 +143,8 @@ enum DataFileError {
     NotUtf8 { file: PathBuf },
 }
 
-/// Returns an error if `problem.closed.toml` cannot name a data file: a pipe or standard input,
-/// which cannot be read a second time, or a name that is not UTF-8.
+/// Returns an error if `problem.closed.toml` cannot name a data file: if the name is not UTF-8, or
+/// if the file is a pipe or standard input, which cannot be read a second time.
 fn check_data_file(file: &Path) -> Result<(), DataFileError> {
     let name = || file.to_owned();
     match file.canonicalize() {

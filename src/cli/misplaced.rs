@@ -15,7 +15,7 @@ const MAX_MISS_RATIO: f64 = 0.1;
 /// Frame in which the targets are given.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(super) enum Frame {
-    /// The measuring frame, as measurements
+    /// The measuring frame, as for measurements
     Measuring,
     /// The frame of the arm's base
     Base,

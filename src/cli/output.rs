@@ -232,8 +232,8 @@ impl Results {
             .map_err(|source| WriteError::Io { path: FolderRecord::file(&self.folder), source })
     }
 
-    /// Returns an error if a result may not take the file name `name`: something else has it, or a
-    /// file would be replaced that is an input or that flexcal did not write.
+    /// Returns an error if a result may not take the file name `name`. A folder may have that name,
+    /// or the result would replace an input or a file that flexcal did not write.
     fn check(&self, record: &FolderRecord, name: &str) -> Result<(), WriteError> {
         let path = self.path(name);
         let why = |why| Err(WriteError::InTheWay { path: path.clone(), why });

@@ -84,8 +84,8 @@ pub fn loop_brief(
     text(&blocks) + &more + &end
 }
 
-/// Returns a found effect as a list item: value ± 1 σ, probability of its law, and effects that the
-/// data do not exclude in its place.
+/// Returns a found effect as a list item: values ± 1 σ, probability of its law, and effects that
+/// the data do not exclude instead.
 fn cause(found: &FoundEffect) -> Point {
     let values = effect::values(&found.effect.effect, &found.parameters);
     // If the law only represents an unknown one, its values have no meaning.

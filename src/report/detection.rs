@@ -81,8 +81,8 @@ pub(super) fn blocks<'a>(problem: &Problem, detection: &Detection) -> Vec<Block<
     blocks
 }
 
-/// Returns the table rows of a family of effects: for each place the effect that is hardest to
-/// detect, and of these at most [`MAX_SHOWN_EFFECTS`], the hardest first.
+/// Returns the table rows of a family of effects, for at most [`MAX_SHOWN_EFFECTS`] places. Each
+/// place shows its effect that is hardest to detect; the hardest one comes first.
 fn hardest_rows(shown: &[&Detectable], family: &str) -> Vec<Vec<String>> {
     let mut members: Vec<(&Detectable, f64)> = Vec::new();
     for effect in shown.iter().filter(|effect| effect.effect.name() == family) {

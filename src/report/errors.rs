@@ -78,8 +78,8 @@ pub(super) fn both_parts(found: &Identification) -> String {
     format!("{} to identify, {held_out} held out", rows_of(found, |errors| errors.identification))
 }
 
-/// Returns the word for the rows that test the fit: "held out", or "left out" if no row is held out
-/// and configurations are left out of the fit in turn.
+/// Returns the word for the rows that test the fit: "held out" or "left out". They are left out if
+/// no row is held out: each configuration is then predicted by a fit without it.
 pub(super) fn test_rows_word(errors: &Errors) -> &'static str {
     if errors.is_left_out { "left out" } else { "held out" }
 }

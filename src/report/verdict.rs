@@ -224,8 +224,8 @@ pub(super) fn has_place(found: &FoundEffect) -> bool {
     found.claims.as_ref().is_none_or(|claims| claims.place.probability >= MIN_PROBABLE)
 }
 
-/// States the claim about a cause whose law is unknown: the `place` with its probability `at`, and
-/// one candidate law, which `words` describe, with its probability `law`.
+/// States the claim about a cause whose law is unknown: its `place` with the probability `at`, and
+/// a candidate law with the probability `law`. `words` describe that law.
 fn located((place, at): (&str, f64), law: f64, words: &str) -> String {
     let unknown = if at >= MIN_PROBABLE {
         format!("{place} ({}), law not known", percent(at))

@@ -97,7 +97,7 @@ fn control_chart(watch: &Watch, rows: &Measurements) -> Option<Drawing> {
 }
 
 /// Returns the name and the first row (from 1) of each session, or of each file if sessions have no
-/// names; empty if there is only one.
+/// names. Empty if there is only one session or file.
 fn first_rows(rows: &Measurements) -> Vec<(String, f64)> {
     let session = |row: usize| rows.session.names.get(*rows.session.of_row.get(row)?);
     let file =

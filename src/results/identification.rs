@@ -56,7 +56,7 @@ pub struct IdentificationResult {
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub session_times_s: BTreeMap<String, f64>,
     /// Standard deviation (1 σ) of a coordinate, estimated from the residuals of this or of the
-    /// earlier fit; null if the problem declares σ, or without degrees of freedom.
+    /// earlier fit. Null if the problem declares σ, or without degrees of freedom.
     pub estimated_sigma_mm: Option<f64>,
     /// Interval that contains `reduced_chi2` with probability 0.999 if the residual is only noise.
     pub chance: Option<(f64, f64)>,

@@ -57,8 +57,8 @@ pub struct CauseResult {
     /// Probability among all causes, given that something changed.
     pub probability: f64,
     pub changes: Vec<ChangeResult>,
-    /// Root mean square error over the rows, each predicted with this cause as estimated without
-    /// the row, in `unit`; null for larger noise and for an unknown change.
+    /// Root mean square error over the rows, in `unit`. Each row is predicted with this cause as
+    /// estimated without the row. Null for larger noise and for an unknown change.
     pub left_out_error: Option<f64>,
     /// Number of additional poses like these that are expected to distinguish this cause from the
     /// next one. Null if no number would suffice, or if there is no other cause.

@@ -51,8 +51,8 @@ pub fn pose_sheet<'a>(
     sheet([&["row", "held_out"], columns].concat(), rows.into_iter().map(cells))
 }
 
-/// Returns the sentence of a caption on poses omitted from a sample, for example " 300 of 6487
-/// poses are drawn, including those with the largest residuals."; empty if all are drawn.
+/// Returns the sentence of a caption on poses that are not drawn, such as " 300 of 6487 poses are
+/// drawn, including those with the largest residuals." Returns an empty text if all are drawn.
 pub fn thinning_note(drawn: usize, total: usize) -> String {
     if drawn < total {
         format!(" {drawn} of {total} poses are drawn, including those with the largest residuals.")

@@ -180,8 +180,8 @@ fn table(table: &Table, width: usize) -> String {
     text
 }
 
-/// Returns the width of each column, so that a table of `lines` is at most `width` wide if
-/// possible, and the indices of the columns of `minor` to omit.
+/// Returns the width of each column, and the indices of the columns of `minor` to omit. A table of
+/// `lines` is then at most `width` wide, if possible.
 fn column_widths(lines: &[Vec<String>], minor: &[usize], width: usize) -> (Vec<usize>, Vec<usize>) {
     let columns = 0..lines.first().map_or(0, Vec::len);
     let cells = |k: usize| lines.iter().filter_map(move |line| line.get(k));

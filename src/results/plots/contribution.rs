@@ -15,13 +15,15 @@ pub struct Contribution {
     pub name: String,
     /// True if the contribution is that of an effect, false if it is that of a parameter.
     pub is_effect: bool,
-    /// Root mean square displacement of predicted positions if the parameter, or all parameters of
-    /// the effect, are reset to the registered nominal arm, and all others are unchanged \[m\].
+    /// Root mean square displacement of predicted positions \[m\] if the parameter, or all
+    /// parameters of the effect, return to their values in the registered nominal arm. All others
+    /// stay.
     pub moved: f64,
 }
 
 /// Computes the contribution of every effect of `problem`, and of every free parameter outside
-/// effects, averaged over at most [`MAX_AVERAGED_POSES`] of the `rows`; the largest comes first.
+/// effects. Each is averaged over at most [`MAX_AVERAGED_POSES`] of the `rows`; the largest comes
+/// first.
 pub fn of(
     problem: &Problem,
     poses: &Poses,

@@ -148,7 +148,7 @@ impl PlotData {
         closure: &ClosedLoop,
     ) -> Result<Self, IdentifyError> {
         let (poses, fit) = (Poses::new(data), &closure.before.fit);
-        // The first fit of a loop uses only the rows that measure positions.
+        // A loop fits no orientations.
         let (before, after) = (
             poses.arm(&problem.positions_alone(), fit)?,
             poses.arm(&closure.closed, &closure.after)?,

@@ -112,8 +112,9 @@ pub(super) fn identifying_columns(
     columns
 }
 
-/// Group of columns about predictions or residuals: the prefix of the column names, the vector of a
-/// row \[SI\], and its rotation vector \[rad\], which is `None` without an orientation.
+/// Group of columns about predictions or residuals: the prefix of the column names, and functions
+/// that return the vector \[SI\] and the rotation vector \[rad\] of a row. The latter is `None`
+/// without an orientation.
 type ColumnGroup<'a> =
     (&'static str, fn(&Residual) -> Vector3<f64>, &'a dyn Fn(&Residual) -> Option<Vector3<f64>>);
 
