@@ -44,7 +44,7 @@ use crate::problem::{HeldOut, ParameterRule, Problem, Robust, RobustLoss, patter
 /// rows do not influence the estimates of the arm.
 ///
 /// # Errors
-/// Returns an error if problem, data, strategy and solver do not fit each other, or if the fit was
+/// Returns an error if problem, data, strategy and solver are not compatible, or if the fit was
 /// stopped.
 pub fn identify(
     problem: &Problem,
@@ -84,7 +84,7 @@ fn check_data(
 /// for example by [`Strategy::model`].
 ///
 /// # Errors
-/// Returns an error if problem, data, strategy and solver do not fit each other, or if the fit was
+/// Returns an error if problem, data, strategy and solver are not compatible, or if the fit was
 /// stopped.
 pub fn identify_model(
     model: &Model,

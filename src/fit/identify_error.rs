@@ -10,7 +10,7 @@ pub enum IdentifyError {
     /// The data have no identification row.
     #[error("no pose to identify from")]
     NoPoses,
-    /// Problem and data do not fit each other.
+    /// The problem or the data are wrong, or do not belong together.
     #[error("{0}")]
     Input(#[from] InputError),
     /// A fit could not be set up.
@@ -47,7 +47,7 @@ pub enum IdentifyError {
     /// The configurations of the data have another number of joints than the arm.
     #[error("configurations of {found} joints for an arm of {joints}")]
     JointCount {
-        /// Number of joints of the data.
+        /// Number of joints in the configurations of the data.
         found: usize,
         /// Number of joints of the problem, including fixed ones.
         joints: usize,

@@ -301,7 +301,7 @@ pub(super) fn enter(
     covariance.enter(stage.model, &stage.unknowns, end.x.as_slice(), &statistics.covariance);
     for (j, (&k, parameter)) in stage.unknowns.iter().zip(stage.parameters()).enumerate() {
         let x = end.x[k];
-        let learned = statistics.known[j] && statistics.identified[j] > MAX_UNIDENTIFIED_SHARE;
+        let learned = statistics.determined[j] && statistics.identified[j] > MAX_UNIDENTIFIED_SHARE;
         let estimate = &mut estimates[k];
         estimate.estimate = parameter.value(x);
         estimate.std_error = learned.then(|| parameter.value_error(x, statistics.errors[j]));

@@ -21,8 +21,9 @@ const NUMBERS: usize = 3;
 
 /// Whitened residuals of the identification rows and of the priors as a function of the unknowns.
 ///
-/// r(x) = ((measured − predicted) / σ of every measured number, x / σ of every prior). Half its
-/// squared length is the cost that an identification with squared loss minimises.
+/// r(x) consists of (measured − predicted) / σ for every measured number, and x / σ for every
+/// unknown with a prior. Half its squared length is the cost that an identification with squared
+/// loss minimises.
 #[derive(Debug, Clone)]
 pub struct ResidualFunction {
     model: Model,
@@ -58,7 +59,7 @@ impl ResidualFunction {
     /// arm, with free bases and targets fitted.
     ///
     /// # Errors
-    /// Returns an error if problem, data and strategy do not fit each other.
+    /// Returns an error if problem, data and strategy are not compatible.
     pub fn new(
         problem: &Problem,
         data: Arc<Dataset>,

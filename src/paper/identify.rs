@@ -11,10 +11,10 @@ use crate::least_squares::solver::{PseudoInverseSettings, Solution, minimise_pse
 use crate::least_squares::{Fit, Identifiability, Objective as _};
 use crate::problem::Problem;
 
-/// Options of the identification procedure.
+/// Options of the paper's identification procedure.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Options {
-    /// Form of each formula.
+    /// Form (printed or corrected) in which each misprinted formula is evaluated.
     pub reading: Reading,
     /// Source of the stiffness, which the first stage determines.
     pub stiffness: StiffnessStage,
@@ -32,7 +32,7 @@ impl Options {
     }
 }
 
-/// Result of the identification procedure.
+/// Result of the paper's identification procedure.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Identified {
     /// Identified geometry E and flexibilities S; estimated flexibilities may be negative.

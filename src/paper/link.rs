@@ -23,9 +23,9 @@ pub struct LinkFlexibility {
 pub struct LinkTerms {
     /// Elongation EA Δx [N·m].
     pub stretch: f64,
-    /// Deflection EI Δy [N·m³] and slope EI dΔy/dx [N·m²].
+    /// Bending along y: deflection EI Δy [N·m³] and slope EI dΔy/dx [N·m²] of the tip.
     pub bend_y: (f64, f64),
-    /// Deflection EI Δz [N·m³] and slope EI dΔz/dx [N·m²].
+    /// Bending along z: deflection EI Δz [N·m³] and slope EI dΔz/dx [N·m²] of the tip.
     pub bend_z: (f64, f64),
     /// Twist `GI_p` Δφ [N·m²].
     pub twist: f64,

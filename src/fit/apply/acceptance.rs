@@ -122,7 +122,7 @@ pub fn held_out_positions(
 /// table after the correction.
 ///
 /// # Errors
-/// Returns an error if problem and data do not fit each other, or no held-out row measures a
+/// Returns an error if problem and data are not compatible, or no held-out row measures a
 /// position.
 pub fn acceptance(
     problem: &Problem,

@@ -18,7 +18,7 @@ use crate::problem::Problem;
 ///
 /// # Errors
 /// Returns an error if a parameter of the problem, or of a session or target of `rows`, was not
-/// identified, if the problem lacks one that was, or if the number of joints differs.
+/// identified, if the problem lacks an identified parameter, or if the number of joints differs.
 pub fn jacobian(
     problem: &Problem,
     identified: Option<&Identification>,

@@ -173,7 +173,7 @@ pub fn compensate(
     let arm = model.with_free_commands(problem, x).without_instrument_errors();
     let rows: Vec<usize> = (0..targets.len()).collect();
     let moving = arm.moving_joints();
-    let led = arm.clone().with_mimic_joints(problem);
+    let arm_with_mimics = arm.clone().with_mimic_joints(problem);
     let tree = problem.tree();
     let mut commands = Vec::with_capacity(rows.len());
     let sigmas = (POSITION_SIGMA, Some(ORIENTATION_SIGMA));
@@ -217,8 +217,12 @@ pub fn compensate(
             slopes: &|q| {
                 let configuration = full(q);
                 let setup = PoseView { configuration: &configuration, ..pose.setup };
-                let residuals =
-                    CommandResiduals::new(problem, &led, n, vec![Pose { setup, ..pose }]);
+                let residuals = CommandResiduals::new(
+                    problem,
+                    &arm_with_mimics,
+                    n,
+                    vec![Pose { setup, ..pose }],
+                );
                 let (slopes, _) = jacobian_and_residual(&residuals, &DVector::zeros(n));
                 let columns = moving.iter().enumerate().filter(|(_, joint)| serves(**joint));
                 slopes.select_columns(&columns.map(|(k, _)| k).collect::<Vec<_>>())
@@ -230,7 +234,7 @@ pub fn compensate(
         let mut configuration = full(&goal.nearest(&start));
         let (miss, turn) = at(&configuration);
         if !is_reached(&miss, turn.as_ref()) {
-            configuration = damped_search(problem, (&arm, &led), &serving, pose)?;
+            configuration = damped_search(problem, (&arm, &arm_with_mimics), &serving, pose)?;
         }
         let ((miss, turn), (before, turn_before)) = (at(&configuration), at(seed));
         let (seed_miss, seed_orientation_error) =
@@ -252,7 +256,7 @@ pub fn compensate(
 /// previous pass. Only the joints `serving`, which lead to the target, move.
 fn damped_search(
     problem: &Problem,
-    (arm, led): (&Model, &Model),
+    (arm, arm_with_mimics): (&Model, &Model),
     serving: &[usize],
     pose: Pose,
 ) -> Result<Vec<f64>, StageError> {
@@ -268,7 +272,7 @@ fn damped_search(
         let bounds = Bounds::new(bound(|limits| limits.0), bound(|limits| limits.1))?;
         let away = DVector::from_iterator(n, moving.iter().map(|&j| configuration[j] - seed[j]));
         let pose = Pose { setup: PoseView { configuration: &configuration, ..pose.setup }, ..pose };
-        let residuals = CommandResiduals::new(problem, led, n, vec![pose]);
+        let residuals = CommandResiduals::new(problem, arm_with_mimics, n, vec![pose]);
         let near = LinearRows { matrix: DMatrix::identity(n, n), constant: away };
         let fit = Fit::new(&residuals).with_rows(near)?;
         let step =

@@ -19,7 +19,8 @@ const DAMPING_FACTORS: (f64, f64) = (30.0, 0.03);
 /// Largest relative increase of the cost by a step that is rounding, so that the step is accepted.
 const COST_ROUNDING: f64 = 1e4 * f64::EPSILON;
 
-/// Target of an inverse-kinematics search, as functions of the commands q.
+/// Target of an inverse-kinematics search: its misfit and the derivatives as functions of the
+/// commands q, and the limits of q.
 pub(super) struct Goal<'a> {
     /// Function that returns the misfit r at q, desired − predicted position \[m\] and, if it is
     /// desired, the orientation error \[rad\], shape = (3 or 6); NaN without an equilibrium.

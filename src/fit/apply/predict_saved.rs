@@ -74,7 +74,7 @@ pub struct ErrorsBySession {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PredictError {
-    /// Problem and rows do not fit each other.
+    /// Problem and rows are not compatible.
     #[error("{0}")]
     Input(#[from] InputError),
     /// The estimate belongs to another problem, or lacks a parameter that the rows need.
@@ -233,10 +233,10 @@ pub fn predict(
     let (fixtures, bases) = (model.fixtures(x.as_slice()), model.base_frames(x.as_slice()));
     let of_row =
         |(row, error): (usize, &Vector3<f64>)| in_space(rows, row, (&fixtures, &bases), error);
-    let (seen, errors): (Vec<Vector3<f64>>, Vec<Vector3<f64>>) =
+    let (predicted, errors): (Vec<Vector3<f64>>, Vec<Vector3<f64>>) =
         errors.iter().enumerate().map(of_row).unzip();
     let position = |row: usize| match rows.observation(row) {
-        Observation::Position => seen[row],
+        Observation::Position => predicted[row],
         _ => targets[row]
             .map_or(Vector3::from_element(f64::NAN), |point| bases[base_of[row]].point(&point)),
     };
@@ -244,12 +244,21 @@ pub fn predict(
     let numbers: Vec<usize> =
         all_rows.iter().map(|&row| rows.observation(row).coordinates()).collect();
     let residuals = rows.position_measured.then(|| {
-        residuals((&errors, &seen), (&sigmas, &numbers), turns.as_deref().zip(turn), split)
+        residuals((&errors, &predicted), (&sigmas, &numbers), turns.as_deref().zip(turn), split)
     });
     let errors = rows.position_measured.then(|| ErrorsBySession::new(rows, &errors, at_points));
     let placed = if rows.position_measured { missing } else { Vec::new() };
     let placed = placed.into_iter().map(|k| model.parameters[k].name.clone()).collect();
-    Ok(Prediction { positions, numbers: seen, orientations, residuals, errors, spreads, placed, x })
+    Ok(Prediction {
+        positions,
+        numbers: predicted,
+        orientations,
+        residuals,
+        errors,
+        spreads,
+        placed,
+        x,
+    })
 }
 
 /// Returns the error that the `estimate` lacks the parameter `name`, or that there is no estimate.
@@ -295,7 +304,7 @@ fn too_few(model: &Model, poses: &[Pose], missing: &[usize]) -> Option<usize> {
         let unknown =
             open.iter().filter(|&&other| users.iter().any(|pose| uses(model, pose, other))).count();
         // With as many coordinates as unknowns, a fixture fits its contacts exactly, so that their
-        // errors say nothing.
+        // errors would be 0.
         let placed_exactly = matches!(model.parameters[k].site, ParameterSite::Fixture { .. })
             && measured == unknown;
         measured < unknown || placed_exactly
@@ -336,10 +345,10 @@ fn fit_placements(
 }
 
 /// Creates the residuals of all rows from the errors measured − predicted, the predicted numbers
-/// `seen`, and the orientation errors `turns` with their σ \[rad\]. `sigmas` and `coordinates` hold
-/// the σ and the number of coordinates of each row. Whitened values are NaN if σ is `None`.
+/// `predicted`, and the orientation errors `turns` with their σ \[rad\]. `sigmas` and `coordinates`
+/// hold the σ and the number of coordinates of each row. Whitened values are NaN if σ is `None`.
 fn residuals(
-    (errors, seen): (&[Vector3<f64>], &[Vector3<f64>]),
+    (errors, predicted): (&[Vector3<f64>], &[Vector3<f64>]),
     (sigmas, coordinates): (&[Option<f64>], &[usize]),
     turns: Option<(&[Vector3<f64>], f64)>,
     split: Option<&Split>,
@@ -353,7 +362,7 @@ fn residuals(
     let residual =
         |(row, (&position, &whitened)): (usize, (&Vector3<f64>, &Vector3<f64>))| Residual {
             row,
-            predicted: seen[row],
+            predicted: predicted[row],
             held_out: held_out(row),
             position,
             whitened,

@@ -86,7 +86,7 @@ fn row_jacobian(residuals: &PoseResiduals, at: &DVector<f64>, row: usize) -> DMa
 /// determine.
 ///
 /// # Errors
-/// Returns an error if problem and rows do not fit each other.
+/// Returns an error if problem and rows are not compatible.
 pub fn standard_errors(
     problem: &Problem,
     estimate: &SavedEstimate,

@@ -471,7 +471,7 @@ fn is_other_placement(name: &str, model: &Model) -> bool {
 
 /// Part of the declared arm in which two estimates differ.
 pub(crate) struct DifferingPart {
-    /// Name of the part for display.
+    /// Name of the part as users read it.
     pub name: String,
     /// True for each of the two estimates whose arm declares the part.
     pub is_declared: [bool; 2],

@@ -38,7 +38,7 @@ pub(in crate::fit) struct CheckedFit<'a> {
     pub registered: &'a Errors,
     /// Errors of the arm with all parameters fitted.
     pub fitted: &'a Errors,
-    /// Identification rows whose residual is too long to be noise.
+    /// Identification rows whose residual is too large to be noise.
     pub outliers: &'a [Outlier],
     /// Held-out rows whose prediction error is too large for its uncertainty.
     pub held_out_outliers: &'a [Outlier],

@@ -32,7 +32,8 @@ pub(super) struct ContradictedEntry {
 }
 
 /// Returns the declared entry of the joint table, or the declared target, that the measurements
-/// contradict; `None` unless this entry alone is far off and the fit explains the measurements.
+/// contradict; `None` unless this entry alone deviates far beyond its prior and the fit explains
+/// the measurements.
 ///
 /// `parameter` is the one with the largest deviation `x` from nominal, in σ of its prior. `is_far`
 /// returns true for a parameter and its deviation if the deviation is far beyond the prior.
@@ -65,7 +66,7 @@ pub(super) fn contradicted_entry(
     let left = format_error(kind.observation.kind(), rms, 2);
     match parameter.site {
         ParameterSite::Joint { joint, .. } => {
-            Some(of_joint(fit.problem.joints.get(joint)?, parameter, x, &left))
+            Some(joint_entry(fit.problem.joints.get(joint)?, parameter, x, &left))
         }
         ParameterSite::Target { axis: 0..3, .. } if fit.problem.targets.is_empty() => {
             let declared = fit.problem.tool.target;
@@ -75,7 +76,7 @@ pub(super) fn contradicted_entry(
                     moved[axis] += x;
                 }
             }
-            Some(of_tool(fit.problem, declared, moved, &left))
+            Some(tool_entry(fit.problem, declared, moved, &left))
         }
         _ => None,
     }
@@ -83,7 +84,7 @@ pub(super) fn contradicted_entry(
 
 /// Describes the entry of the joint table that declares `parameter`, whose fitted deviation is `x`.
 /// `left` is the formatted rms residual of the fit.
-fn of_joint(joint: &Joint, parameter: &Parameter, x: f64, left: &str) -> ContradictedEntry {
+fn joint_entry(joint: &Joint, parameter: &Parameter, x: f64, left: &str) -> ContradictedEntry {
     let display = parameter.unit().display(parameter.nominal);
     let shown = |value: f64| value * display.factor;
     let (declared, fitted) = (shown(parameter.nominal), shown(parameter.value(x)));
@@ -107,7 +108,7 @@ fn of_joint(joint: &Joint, parameter: &Parameter, x: f64, left: &str) -> Contrad
 
 /// Describes the target of `[tool]` as declared and as fitted, both in the frame that carries it
 /// \[m\]. `left` is the formatted rms residual of the fit.
-fn of_tool(
+fn tool_entry(
     problem: &Problem,
     declared: Vector3<f64>,
     fitted: Vector3<f64>,

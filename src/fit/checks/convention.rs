@@ -97,20 +97,21 @@ fn readings(kind: RotationKind) -> Vec<(String, Reading)> {
         readings.push((name, Box::new(move |q| vec![reordered(q)])));
     }
     if kind != RotationKind::Vector {
-        let of_vector: Reading =
-            Box::new(move |q| angles(kind, q).map(UnitQuaternion::from_scaled_axis).to_vec());
+        let of_vector: Reading = Box::new(move |q| {
+            table_numbers(kind, q).map(UnitQuaternion::from_scaled_axis).to_vec()
+        });
         readings.push(("rotation vectors".to_owned(), of_vector));
     }
     let in_radians: Reading = Box::new(move |q| {
-        let scaled = angles(kind, q).map(|angles| angles * (180.0 / PI));
-        scaled.map(|angles| of_kind(kind, &angles)).to_vec()
+        let scaled = table_numbers(kind, q).map(|angles| angles * (180.0 / PI));
+        scaled.map(|angles| rotation_of(kind, &angles)).to_vec()
     });
     readings.push((IN_RADIANS.to_owned(), in_radians));
     for order in ROTATION_AXES {
         let letters: Vec<char> = order.iter().map(|&axis| ['x', 'y', 'z'][axis]).collect();
         let [a, b, c] = [letters[0], letters[1], letters[2]];
         let of_order: Reading =
-            Box::new(move |q| angles(kind, q).map(|angles| euler(order, &angles)).to_vec());
+            Box::new(move |q| table_numbers(kind, q).map(|angles| euler(order, &angles)).to_vec());
         readings.push((format!("Euler angles with R = R{a} R{b} R{c}"), of_order));
     }
     readings
@@ -127,7 +128,7 @@ fn quaternion_orders() -> impl Iterator<Item = [usize; 4]> {
 /// Returns the three numbers of the table \[rad\] from which the orientation `q` was read with the
 /// convention `kind`, twice if they are unique. A rotation vector may be shorter or longer than
 /// half a turn.
-fn angles(kind: RotationKind, q: &UnitQuaternion<f64>) -> [Vector3<f64>; 2] {
+fn table_numbers(kind: RotationKind, q: &UnitQuaternion<f64>) -> [Vector3<f64>; 2] {
     match kind {
         RotationKind::Vector => {
             let vector = q.scaled_axis();
@@ -148,7 +149,7 @@ fn angles(kind: RotationKind, q: &UnitQuaternion<f64>) -> [Vector3<f64>; 2] {
 }
 
 /// Returns the rotation that three numbers \[rad\] mean in the convention `kind`.
-fn of_kind(kind: RotationKind, angles: &Vector3<f64>) -> UnitQuaternion<f64> {
+fn rotation_of(kind: RotationKind, angles: &Vector3<f64>) -> UnitQuaternion<f64> {
     match kind {
         RotationKind::Vector => UnitQuaternion::from_scaled_axis(*angles),
         RotationKind::EulerXyz => euler([0, 1, 2], angles),

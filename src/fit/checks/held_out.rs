@@ -44,17 +44,18 @@ pub(in crate::fit) fn outliers(
     let residuals = stage.residuals(x);
     let at = residuals.reduced(x);
     let n = unknowns.len();
-    let of_pose = stage.coordinates();
+    let rows_per_pose = stage.coordinates();
     let of_chunk = |chunk: usize| -> Vec<f64> {
         let items = chunk * CHUNK_ITEMS..((chunk + 1) * CHUNK_ITEMS).min(rows.len());
         let poses = items.len();
-        let mut block = Block::zeros(of_pose * poses, n);
+        let mut block = Block::zeros(rows_per_pose * poses, n);
         residuals.linearise(&at, items, &mut block);
-        let jacobian =
-            DMatrix::from_fn(3 * poses, n, |row, j| block.column(j)[of_pose * (row / 3) + row % 3]);
+        let jacobian = DMatrix::from_fn(3 * poses, n, |row, j| {
+            block.column(j)[rows_per_pose * (row / 3) + row % 3]
+        });
         let spread = &jacobian * covariance;
         let length = |pose: usize| {
-            let residual = Vector3::from_fn(|i, _| block.column(n)[of_pose * pose + i]);
+            let residual = Vector3::from_fn(|i, _| block.column(n)[rows_per_pose * pose + i]);
             let entry =
                 |i: usize, k: usize| spread.row(3 * pose + i).dot(&jacobian.row(3 * pose + k));
             let variance = Matrix3::identity() + Matrix3::from_fn(entry);

@@ -57,7 +57,7 @@ pub(in crate::fit) fn lens_finding(
         let name = fixture.name.clone();
         fields.map(move |field| format!("camera[{name}].{field}")).collect::<Vec<_>>()
     };
-    let held: Vec<String> = problem
+    let fixed: Vec<String> = problem
         .fixtures
         .iter()
         .enumerate()
@@ -65,11 +65,11 @@ pub(in crate::fit) fn lens_finding(
         .filter(|name| !found.unknowns.contains(name))
         .collect();
     let before = found.reduced_chi2?;
-    if held.is_empty() {
+    if fixed.is_empty() {
         return None;
     }
     let mut freed = problem.clone();
-    freed.parameters.extend(held.iter().map(|name| ParameterRule {
+    freed.parameters.extend(fixed.iter().map(|name| ParameterRule {
         pattern: name.clone(),
         freedom: Freedom::Free {
             sigma: Quantities::default(),
@@ -95,7 +95,7 @@ pub(in crate::fit) fn lens_finding(
     }
     let sigmas = |estimate: &Estimate| {
         let deviation = (estimate.estimate - estimate.nominal).abs();
-        estimate.std_error.filter(|_| held.contains(&estimate.name)).map(|error| deviation / error)
+        estimate.std_error.filter(|_| fixed.contains(&estimate.name)).map(|error| deviation / error)
     };
     let largest = other.estimates.iter().filter_map(sigmas).fold(0.0, f64::max);
     let limit = MIN_NAMED_SIGMAS.min(largest);

@@ -27,9 +27,9 @@ pub(super) fn is_nominal_far_off(fit: &CheckedFit) -> bool {
     let rms = fit.registered.identification.rms.norm;
     let RowKind { observation, spread, .. } = fit.kind(fit.fitting.measurements.leading());
     let is_measured_directly = observation.is_measured_directly();
-    let least =
+    let min_spread =
         if is_measured_directly { 0.0 } else { MIN_RELATIVE_SPREAD * fit.fitting.model.reach() };
-    spread > least && rms > MAX_NOMINAL_MISS * spread
+    spread > min_spread && rms > MAX_NOMINAL_MISS * spread
 }
 
 impl CheckedFit<'_> {

@@ -108,8 +108,10 @@ impl Check for NamedDirections {
             })
         };
         let sizes: Vec<f64> = parameters.iter().map(size).collect();
-        let all: Vec<Option<f64>> = sizes.iter().copied().map(Some).collect();
-        let Some(Weak { rows, .. }) = Weak::of(fit.triangle, &all) else { return Vec::new() };
+        let plausible_sizes: Vec<Option<f64>> = sizes.iter().copied().map(Some).collect();
+        let Some(Weak { rows, .. }) = Weak::of(fit.triangle, &plausible_sizes) else {
+            return Vec::new();
+        };
         let scaled = DMatrix::from_fn(rows.nrows(), rows.ncols(), |i, j| rows[(i, j)] * sizes[j]);
         let names: Vec<&str> = parameters.iter().map(|parameter| &*parameter.name).collect();
         let finding = |(open, names): (Open, Vec<String>)| {

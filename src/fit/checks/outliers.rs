@@ -10,7 +10,7 @@ use crate::measurement::Measurements;
 /// Row whose residual is too large to be noise.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Outlier {
-    /// Row of the measurements, counted from 0 over all files.
+    /// Index of the row in the measurements, from 0 over all files.
     pub row: usize,
     /// File and line of the row.
     pub location: Location,

@@ -183,8 +183,8 @@ fn undetermined_base_finding(
 ) -> Option<Finding> {
     let Fitting { model, placement, .. } = fitting;
     let open = |b: &usize| {
-        // Contacts may leave the pose of a base open, which is then reported as an unidentifiable
-        // combination.
+        // Contacts may not determine the pose of a base, which is then reported as an
+        // unidentifiable combination.
         let of_base = rows.iter().copied().filter(|&row| placement.base_of(row) == *b);
         let points: Vec<usize> =
             of_base.filter(|&row| fitting.measurements.observation(row).is_position()).collect();

@@ -67,10 +67,10 @@ impl Check for PointsInOrder {
         // Reversed views may spoil the fit. The views are therefore judged by the fitted or the
         // registered nominal arm, whichever has the smaller error.
         let errors = |poses: &[Pose], x| fitting.model.residuals(poses.to_vec(), x);
-        let all: Vec<usize> = (0..rows.len()).collect();
-        let at = [fit.registered_x, &fit.end.x].map(|x| (errors(&poses, x), x));
-        let [nominal, fitted] = at;
-        let is_fitted = mean_square(&fitted.0, &all) < mean_square(&nominal.0, &all);
+        let all_places: Vec<usize> = (0..rows.len()).collect();
+        let arms = [fit.registered_x, &fit.end.x].map(|x| (errors(&poses, x), x));
+        let [nominal, fitted] = arms;
+        let is_fitted = mean_square(&fitted.0, &all_places) < mean_square(&nominal.0, &all_places);
         let (errors_here, x) = if is_fitted { fitted } else { nominal };
         let errors_reversed = errors(&reversed, x);
         let squares = |view: &[usize]| {

@@ -64,7 +64,7 @@ pub struct CompareOptions {
 /// bounds or constraints. Without free elastic parameters, [`Ablation::All`] alone runs.
 ///
 /// # Errors
-/// Returns an error if problem and data do not fit each other.
+/// Returns an error if problem and data are not compatible.
 pub fn compare(
     problem: &Problem,
     data: &Dataset,

@@ -7,7 +7,7 @@ use crate::least_squares::solver::AtBound;
 /// Active constraint of a stage, as a row of coefficients of its unknowns.
 #[derive(Debug, Clone)]
 pub(in crate::fit) struct ActiveLimit {
-    /// Index of the constraint in the model.
+    /// Index of the constraint among those of the model.
     pub constraint: usize,
     /// Limit (lower or upper) that is active.
     pub side: AtBound,

@@ -43,31 +43,31 @@ pub(super) fn poses_from_views(
     let fixtures = model.fixtures(x.as_slice());
     let views = views(model, poses, &fixtures, x);
     let declared = (0..fixtures.len()).filter(|fixture| !wanted.contains(fixture));
-    let mut known: BTreeMap<usize, Isometry3<f64>> =
+    let mut located: BTreeMap<usize, Isometry3<f64>> =
         declared.map(|fixture| (fixture, isometry(&fixtures[fixture].frame()))).collect();
     loop {
-        let half_known = views
+        let half_located = views
             .iter()
-            .find(|view| known.contains_key(&view.camera) != known.contains_key(&view.marker));
-        if let Some(view) = half_known {
-            let (fixture, pose) = if let Some(camera) = known.get(&view.camera) {
+            .find(|view| located.contains_key(&view.camera) != located.contains_key(&view.marker));
+        if let Some(view) = half_located {
+            let (fixture, pose) = if let Some(camera) = located.get(&view.camera) {
                 let marker = |view: &View| view.carrier * camera * view.marker_in_camera;
                 let of_pair =
                     |other: &&View| (other.camera, other.marker) == (view.camera, view.marker);
                 (view.marker, mean_pose(views.iter().filter(of_pair).map(marker)))
             } else {
-                let marker = known.get(&view.marker).copied().unwrap_or_default();
+                let marker = located.get(&view.marker).copied().unwrap_or_default();
                 let camera =
                     |view: &View| view.carrier.inverse() * marker * view.marker_in_camera.inverse();
                 let of_pair =
                     |other: &&View| (other.camera, other.marker) == (view.camera, view.marker);
                 (view.camera, mean_pose(views.iter().filter(of_pair).map(camera)))
             };
-            known.insert(fixture, pose);
+            located.insert(fixture, pose);
             continue;
         }
         let mut of_pairs: BTreeMap<(usize, usize), Vec<&View>> = BTreeMap::new();
-        for view in views.iter().filter(|view| !known.contains_key(&view.camera)) {
+        for view in views.iter().filter(|view| !located.contains_key(&view.camera)) {
             of_pairs.entry((view.camera, view.marker)).or_default().push(view);
         }
         let mut by_count: Vec<_> = of_pairs.into_iter().collect();
@@ -76,11 +76,11 @@ pub(super) fn poses_from_views(
             .iter()
             .find_map(|((camera, marker), views)| Some((*camera, *marker, solve_pair(views)?)));
         let Some((camera, marker, [of_camera, of_marker])) = solved else { break };
-        known.insert(camera, of_camera);
-        known.insert(marker, of_marker);
+        located.insert(camera, of_camera);
+        located.insert(marker, of_marker);
     }
-    known.retain(|fixture, _| wanted.contains(fixture));
-    known
+    located.retain(|fixture, _| wanted.contains(fixture));
+    located
 }
 
 /// Returns a `wanted` camera and a `wanted` marker whose poses the views do not determine, with the
@@ -91,8 +91,8 @@ pub(super) fn undetermined_pair(
     wanted: &[usize],
     x: &DVector<f64>,
 ) -> Option<([usize; 2], &'static str)> {
-    let known = poses_from_views(model, poses, wanted, x);
-    let is_open = |fixture: &usize| wanted.contains(fixture) && !known.contains_key(fixture);
+    let located = poses_from_views(model, poses, wanted, x);
+    let is_open = |fixture: &usize| wanted.contains(fixture) && !located.contains_key(fixture);
     let views = views(model, poses, &model.fixtures(x.as_slice()), x);
     let open = views.iter().find(|view| is_open(&view.camera) && is_open(&view.marker))?;
     let pair = [open.camera, open.marker];

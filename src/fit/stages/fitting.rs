@@ -146,7 +146,7 @@ impl<'a> Fitting<'a> {
         self.earlier.is_some_and(|earlier| earlier.covers(&self.model.parameters[k].name))
     }
 
-    /// Returns `rows` as poses with their declared σ.
+    /// Returns `rows` as poses with their declared σ, or `sigma` in rows that state none.
     pub fn poses(&self, rows: &[usize]) -> Vec<Pose<'a>> {
         self.placement.oriented_poses(self.measurements, rows, (self.sigma, self.turn_sigma))
     }

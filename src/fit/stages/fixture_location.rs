@@ -31,7 +31,7 @@ pub(crate) fn locate(
     chosen: impl Fn(usize) -> bool,
     x: &mut DVector<f64>,
 ) {
-    let free = free_numbers(model, chosen);
+    let free = free_coordinates(model, chosen);
     if free.is_empty() {
         return;
     }
@@ -64,7 +64,7 @@ pub(crate) fn locate(
 
 /// Returns the coordinates of fixtures that [`locate`] sets, as (fixture, kind, axis, index of the
 /// parameter): free without prior and bounds, without a declared value, and chosen.
-fn free_numbers(
+fn free_coordinates(
     model: &Model,
     chosen: impl Fn(usize) -> bool,
 ) -> Vec<(usize, FixtureKind, usize, usize)> {
@@ -101,7 +101,7 @@ pub(crate) fn undecided_views(
     poses: &[Pose],
     x: &DVector<f64>,
 ) -> Option<([usize; 2], &'static str)> {
-    let wanted = wanted_poses(&free_numbers(model, |_| true));
+    let wanted = wanted_poses(&free_coordinates(model, |_| true));
     if wanted.is_empty() { None } else { undetermined_pair(model, poses, &wanted, x) }
 }
 

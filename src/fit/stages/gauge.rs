@@ -33,28 +33,28 @@ impl Gauge {
         active: &[ActiveLimit],
     ) -> Self {
         let n = data.ncols();
-        let seen = n + priors.nrows();
-        let stacked = DMatrix::from_fn(seen + active.len(), n, |i, j| match i {
+        let data_rows = n + priors.nrows();
+        let stacked = DMatrix::from_fn(data_rows + active.len(), n, |i, j| match i {
             i if i < n => data[(i, j)],
-            i if i < seen => priors[(i - n, j)],
+            i if i < data_rows => priors[(i - n, j)],
             // A constraint is weighted like a measurement of each of its parameters.
             i => {
-                active[i - seen].row[j].signum()
-                    * f64::from(active[i - seen].row[j] != 0.0)
+                active[i - data_rows].row[j].signum()
+                    * f64::from(active[i - data_rows].row[j] != 0.0)
                     * data.column(j).norm()
             }
         });
         let free: Vec<usize> = (0..n).filter(|&j| !held[j]).collect();
-        let seen = Triangle::factor(&stacked.select_columns(&free));
-        let Blind { gauge: unseen, visible: outside } = Blind::in_triangle(&seen);
+        let factor = Triangle::factor(&stacked.select_columns(&free));
+        let Blind { gauge: undetermined, visible: outside } = Blind::in_triangle(&factor);
         let sizes: Vec<Option<f64>> = free.iter().map(|&k| sizes[k]).collect();
-        let weak = Weak::of(&below(&seen, &unseen), &sizes);
-        let unidentifiable = unseen.nrows();
+        let weak = Weak::of(&factor_of_stacked(&factor, &undetermined), &sizes);
+        let unidentifiable = undetermined.nrows();
         let count = unidentifiable + weak.as_ref().map_or(0, |weak| weak.rows.nrows());
         let mut gauge =
             Gauge { rows: DMatrix::zeros(count, n), visible: vec![0.0; n], weak: Vec::new() };
         for (j, &k) in free.iter().enumerate() {
-            gauge.rows.view_mut((0, k), (unidentifiable, 1)).copy_from(&unseen.column(j));
+            gauge.rows.view_mut((0, k), (unidentifiable, 1)).copy_from(&undetermined.column(j));
             gauge.visible[k] = outside[j];
             if let Some(weak) = &weak {
                 gauge
@@ -74,7 +74,7 @@ impl Gauge {
 }
 
 /// Returns the triangular factor of `triangle` with `rows` appended below.
-pub(super) fn below(triangle: &DMatrix<f64>, rows: &DMatrix<f64>) -> DMatrix<f64> {
+pub(super) fn factor_of_stacked(triangle: &DMatrix<f64>, rows: &DMatrix<f64>) -> DMatrix<f64> {
     let n = triangle.ncols();
     let mut stack =
         triangle.clone().resize_vertically((triangle.nrows() + rows.nrows()).max(n), 0.0);

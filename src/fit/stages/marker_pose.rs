@@ -43,8 +43,8 @@ fn linear_pose(places: &[Vector3<f64>], slopes: &[[f64; 2]]) -> Option<Isometry3
     order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
     let [first, second, third] = order.map(|k| eigen.eigenvalues[k].max(0.0).sqrt());
     let is_flat = third < MAX_COPLANAR_RATIO * first;
-    let (least, columns) = if is_flat { (MIN_POINTS[0], 3) } else { (MIN_POINTS[1], 4) };
-    if places.len() < least || second < MAX_COPLANAR_RATIO * first {
+    let (min_points, columns) = if is_flat { (MIN_POINTS[0], 3) } else { (MIN_POINTS[1], 4) };
+    if places.len() < min_points || second < MAX_COPLANAR_RATIO * first {
         return None;
     }
     let [x, y] = [0, 1].map(|k| eigen.eigenvectors.column(order[k]).into_owned());
@@ -98,18 +98,19 @@ fn refined(
         let (mut normal, mut right) = (SMatrix::<f64, 6, 6>::zeros(), SVector::<f64, 6>::zeros());
         for (place, slope) in places.iter().zip(slopes) {
             let turned = pose.rotation * place;
-            let seen = turned + pose.translation.vector;
-            if seen.z <= 0.0 {
+            let in_camera = turned + pose.translation.vector;
+            if in_camera.z <= 0.0 {
                 return None;
             }
             for axis in 0..2 {
-                let mut by_seen = Vector3::zeros();
-                by_seen[axis] = 1.0 / seen.z;
-                by_seen.z = -seen[axis] / (seen.z * seen.z);
-                let by_turn = turned.cross(&by_seen);
-                let row = SVector::<f64, 6>::from_iterator(by_seen.iter().chain(&by_turn).copied());
+                let mut by_position = Vector3::zeros();
+                by_position[axis] = 1.0 / in_camera.z;
+                by_position.z = -in_camera[axis] / (in_camera.z * in_camera.z);
+                let by_turn = turned.cross(&by_position);
+                let row =
+                    SVector::<f64, 6>::from_iterator(by_position.iter().chain(&by_turn).copied());
                 normal += row * row.transpose();
-                right += row * (slope[axis] - seen[axis] / seen.z);
+                right += row * (slope[axis] - in_camera[axis] / in_camera.z);
             }
         }
         let step = normal.cholesky()?.solve(&right);

@@ -5,7 +5,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 /// Probability of so large or so small a residual under the declared σ, below which the declared σ
 /// is contradicted.
 pub(in crate::fit) const MAX_CHANCE_PROBABILITY: f64 = 1e-3;
-/// Smallest σ that a fit assumes \[m\]: predicted positions have rounding errors of this size.
+/// Smallest σ that a fit assumes \[m\]; it is above the rounding errors of predicted positions.
 pub(in crate::fit) const MIN_SIGMA: f64 = 1e-9;
 
 /// Noise model: a fit assumes √((scale σ)² + e²) for a row with the declared σ.
@@ -36,8 +36,11 @@ impl NoiseModel {
         let sum: f64 =
             declared.iter().zip(assumed).map(|(sigma, assumed)| (sigma / assumed).powi(2)).sum();
         let largest = declared.iter().copied().fold(0.0, f64::max);
-        let least = (MIN_SIGMA / largest).min(1.0);
-        Self { scale: (declared.len() as f64 * ratio / sum).sqrt().max(least), model_error: 0.0 }
+        let min_scale = (MIN_SIGMA / largest).min(1.0);
+        Self {
+            scale: (declared.len() as f64 * ratio / sum).sqrt().max(min_scale),
+            model_error: 0.0,
+        }
     }
 
     /// Creates the model that adds one model error e to all `declared` σ, so that the mean variance

@@ -105,8 +105,9 @@ impl Placement {
             for (pose, &row) in
                 poses.iter_mut().zip(rows).filter(|(pose, _)| pose.observation.is_position())
             {
-                let seen = |orientation| MeasuredOrientation { measured: Some(orientation), sigma };
-                pose.orientation = measurements.orientation(row).map(seen);
+                let measured =
+                    |orientation| MeasuredOrientation { measured: Some(orientation), sigma };
+                pose.orientation = measurements.orientation(row).map(measured);
             }
         }
         poses

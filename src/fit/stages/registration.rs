@@ -58,9 +58,9 @@ pub fn register(model: &Model, poses: &[Pose], x: &mut DVector<f64>) {
         if columns.len() < 6 || points.is_empty() {
             continue;
         }
-        let known =
+        let reference_poses =
             oriented.iter().filter(|(pose, _)| of_base(pose) && !is_orientation_free(pose.target));
-        let pairs = known.filter_map(|(pose, last)| {
+        let pairs = reference_poses.filter_map(|(pose, last)| {
             Some((last.compose(&target_frames[pose.target]).axes, axes(pose)?))
         });
         let nominal_rotation = best_rotation(pairs).unwrap_or(nominal.rotation);
@@ -93,7 +93,7 @@ fn register_target_orientations(
     for (target, nominal) in nominal.iter().enumerate().filter(|(target, _)| is_chosen(*target)) {
         // The target's rotation R rotates the axes of the frame that carries it into the measured
         // axes, all given in that frame.
-        let seen =
+        let pairs =
             poses.iter().filter(|(pose, _)| pose.target == target).filter_map(|(pose, last)| {
                 let last = bases[pose.base].compose(last);
                 Some((
@@ -101,7 +101,7 @@ fn register_target_orientations(
                     axes(pose)?.map(|axis| last.resolve(&axis)),
                 ))
             });
-        let Some(rotation) = best_rotation(seen) else { continue };
+        let Some(rotation) = best_rotation(pairs) else { continue };
         for (k, parameter) in model.parameters.iter().enumerate() {
             if let ParameterSite::Target { target: of, axis: axis @ 3.. } = parameter.site
                 && of == target

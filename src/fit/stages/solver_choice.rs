@@ -14,7 +14,7 @@ worded! {
         Auto = "auto", "Bounded where there are bounds or constraints, else levenberg-marquardt";
         /// Levenberg–Marquardt without bounds.
         LevenbergMarquardt = "levenberg-marquardt", "Levenberg-Marquardt without bounds";
-        /// argmin's Gauss–Newton method: undamped.
+        /// Gauss–Newton method of the crate argmin, with undamped steps.
         GaussNewton = "gauss-newton", "Gauss-Newton: undamped steps";
         /// The paper's iteration by a truncated pseudo-inverse [Chen2021, eq. 45]: undamped.
         PseudoInverse = "pseudo-inverse",

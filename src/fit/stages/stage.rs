@@ -6,7 +6,7 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector};
 
 use super::custom_solver::CustomSolver;
-use super::gauge::{Gauge, below};
+use super::gauge::{Gauge, factor_of_stacked};
 use crate::fit::SolverChoice;
 use crate::fit::stages::active_limits::ActiveLimit;
 use crate::fit::stages::earlier_data::EarlierData;
@@ -230,7 +230,7 @@ impl<'a> Stage<'a> {
     /// Returns the triangular factor of `triangle` with the rows of earlier data appended below.
     pub fn with_earlier(&self, triangle: DMatrix<f64>, at: &DVector<f64>) -> DMatrix<f64> {
         match self.earlier {
-            Some(_) => below(&triangle, &self.earlier_rows(at).matrix),
+            Some(_) => factor_of_stacked(&triangle, &self.earlier_rows(at).matrix),
             None => triangle,
         }
     }
@@ -250,7 +250,7 @@ impl<'a> Stage<'a> {
     /// Returns the triangular factor R of [`weighted_triangle`](Self::weighted_triangle) and the
     /// priors.
     pub fn triangle_with_priors(&self, at: &DVector<f64>) -> DMatrix<f64> {
-        below(&self.weighted_triangle(at), &self.priors())
+        factor_of_stacked(&self.weighted_triangle(at), &self.priors())
     }
 
     /// Returns the values of the unknowns in the full parameter vector `at`.

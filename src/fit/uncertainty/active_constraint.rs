@@ -21,7 +21,7 @@ pub struct ActiveConstraint {
     pub shadow_price: ShadowPrice,
     /// Unit of the terms of the constraint; stiffnesses and rigidities enter by their logarithms.
     pub unit: Unit,
-    /// Location in the problem file.
+    /// Location of the constraint in the problem file.
     pub location: Location,
 }
 

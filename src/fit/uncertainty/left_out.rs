@@ -75,8 +75,8 @@ impl Fitting<'_> {
             places.iter().enumerate().map(error).collect()
         };
         let mut errors = vec![Vector3::zeros(); rows.len()];
-        let each: Vec<_> = groups.par_iter().flat_map_iter(of_group).collect();
-        for (place, error) in each {
+        let errors_of_places: Vec<_> = groups.par_iter().flat_map_iter(of_group).collect();
+        for (place, error) in errors_of_places {
             errors[place] = error;
         }
         errors

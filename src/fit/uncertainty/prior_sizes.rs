@@ -68,7 +68,7 @@ pub(in crate::fit) fn prior_sizes(
     x: &[f64],
     covariance: &DMatrix<f64>,
 ) -> Vec<PriorSize> {
-    let seen: Vec<(usize, JointField, f64)> = unknowns
+    let geometry: Vec<(usize, JointField, f64)> = unknowns
         .iter()
         .enumerate()
         .filter_map(|(k, parameter)| match (parameter.site, parameter.sigma) {
@@ -81,8 +81,10 @@ pub(in crate::fit) fn prior_sizes(
             _ => None,
         })
         .collect();
-    let Some(likelihood) = GeometryLikelihood::of(&seen, x, covariance) else { return Vec::new() };
-    let groups = groups(&seen);
+    let Some(likelihood) = GeometryLikelihood::of(&geometry, x, covariance) else {
+        return Vec::new();
+    };
+    let groups = groups(&geometry);
     let (factors, determined) = likelihood.widths(&groups, None);
     let best = likelihood.evidence(&groups, &factors);
     let contradicted = |g: &usize| {
@@ -98,7 +100,7 @@ pub(in crate::fit) fn prior_sizes(
         let Group { field, sigma, places } = &groups[g];
         PriorSize {
             pattern: format!("joint*.{}", field.name()),
-            unit: unknowns[seen[places[0]].0].unit(),
+            unit: unknowns[geometry[places[0]].0].unit(),
             count: places.len(),
             declared: *sigma,
             found: sigma * factors[g],
@@ -108,26 +110,32 @@ pub(in crate::fit) fn prior_sizes(
 }
 
 /// Returns the groups of parameters of a kind with at least [`MIN_COUNT`] members whose declared σ
-/// are all equal. `seen` holds index, kind and σ of each parameter.
-fn groups(seen: &[(usize, JointField, f64)]) -> Vec<Group> {
+/// are all equal. `geometry` holds index, kind and σ of each parameter.
+fn groups(geometry: &[(usize, JointField, f64)]) -> Vec<Group> {
     let fields = JointField::GEOMETRY.into_iter().chain(JointField::PLACEMENT);
     let group = |field: JointField| {
-        let places: Vec<usize> = (0..seen.len()).filter(|&i| seen[i].1 == field).collect();
-        let sigma = seen[*places.first()?].2;
-        let alike = places.iter().all(|&i| (seen[i].2 / sigma - 1.0).abs() < 1e-9);
-        (alike && places.len() >= MIN_COUNT).then_some(Group { field, sigma, places })
+        let places: Vec<usize> = (0..geometry.len()).filter(|&i| geometry[i].1 == field).collect();
+        let sigma = geometry[*places.first()?].2;
+        let is_uniform = places.iter().all(|&i| (geometry[i].2 / sigma - 1.0).abs() < 1e-9);
+        (is_uniform && places.len() >= MIN_COUNT).then_some(Group { field, sigma, places })
     };
     fields.filter_map(group).collect()
 }
 
 impl GeometryLikelihood {
-    /// Creates the likelihood of the unknowns `seen` (index, kind, σ) with all other unknowns
-    /// integrated out; `None` if the covariance of those `seen` is singular.
-    fn of(seen: &[(usize, JointField, f64)], x: &[f64], covariance: &DMatrix<f64>) -> Option<Self> {
-        let n = seen.len();
-        let of = |i: usize, j: usize| covariance[(seen[i].0, seen[j].0)] / (seen[i].2 * seen[j].2);
+    /// Creates the likelihood of the geometric parameters in `geometry` (index, kind, σ) with all
+    /// other unknowns integrated out; `None` if the covariance of these parameters is singular.
+    fn of(
+        geometry: &[(usize, JointField, f64)],
+        x: &[f64],
+        covariance: &DMatrix<f64>,
+    ) -> Option<Self> {
+        let n = geometry.len();
+        let of = |i: usize, j: usize| {
+            covariance[(geometry[i].0, geometry[j].0)] / (geometry[i].2 * geometry[j].2)
+        };
         let posterior = DMatrix::from_fn(n, n, of).cholesky()?.inverse();
-        let vector = &posterior * DVector::from_fn(n, |i, _| x[seen[i].0] / seen[i].2);
+        let vector = &posterior * DVector::from_fn(n, |i, _| x[geometry[i].0] / geometry[i].2);
         let information = posterior - DMatrix::identity(n, n);
         Some(Self { information, vector })
     }
@@ -225,7 +233,7 @@ mod tests {
         let n = 8;
         // The data determine only the sum of two parameters of a joint. Each has the declared σ 1,
         // and the sum deviates three times as far as the priors expect.
-        let seen: Vec<(usize, JointField, f64)> = (0..2 * n)
+        let geometry: Vec<(usize, JointField, f64)> = (0..2 * n)
             .map(|k| (k, if k < n { JointField::Theta } else { JointField::Beta }, 1e-3))
             .collect();
         let mut precision = DMatrix::identity(2 * n, 2 * n);
@@ -239,7 +247,7 @@ mod tests {
         }
         let likelihood =
             GeometryLikelihood { information: precision - DMatrix::identity(2 * n, 2 * n), vector };
-        let groups = groups(&seen);
+        let groups = groups(&geometry);
         let best = likelihood.evidence(&groups, &likelihood.widths(&groups, None).0).unwrap();
         for g in 0..2 {
             let held = likelihood.widths(&groups, Some(g)).0;

@@ -111,10 +111,10 @@ impl Lengths {
             _ => unmoved.moved_part(Vector3::new(r[0], r[1], r[2])).norm(),
         };
         let items = || whitened.as_slice().chunks_exact(stage.coordinates());
-        let both = |r: &[f64], position: f64| {
+        let with_orientation = |r: &[f64], position: f64| {
             if r.len() > 3 { position.hypot(length(&r[3..])) } else { position }
         };
-        let weighed: Vec<f64> = items().map(|r| both(r, length(r))).collect();
+        let weighed: Vec<f64> = items().map(|r| with_orientation(r, length(r))).collect();
         let in_declared = |(r, (pose, declared)): (&[f64], (&Pose, &f64))| {
             let position = length(r) * (pose.sigma / declared);
             match (pose.orientation, stage.declared_turn) {
@@ -126,14 +126,14 @@ impl Lengths {
         };
         let values: Vec<f64> =
             items().zip(stage.poses.iter().zip(&stage.declared)).map(in_declared).collect();
-        let least = declared.unwrap_or(0.0);
+        let min_scatter = declared.unwrap_or(0.0);
         let moved = |pose: &Pose| pose.coordinates().saturating_sub(unmoved.count()).max(1);
         let noise_lengths =
             noise_lengths_of_all(&stage.poses.iter().map(moved).collect::<Vec<_>>());
         let scatter = scatter(&values, &noise_lengths) / freedom.clamp(0.01, 1.0).sqrt();
         let limits = noise_lengths.into_iter().map(|(_, limit)| limit).collect();
-        let is_limited = scatter < least;
-        let scatter = scatter.max(least);
+        let is_limited = scatter < min_scatter;
+        let scatter = scatter.max(min_scatter);
         Self { values, weighed, scatter, is_limited, declared: stage.declared.clone(), limits }
     }
 

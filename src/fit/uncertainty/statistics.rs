@@ -25,7 +25,7 @@ pub(in crate::fit) struct Statistics {
     pub errors: Vec<f64>,
     /// For each unknown, true if data and priors determine it: it rests on no bound and has no part
     /// in an unidentifiable combination.
-    pub known: Vec<bool>,
+    pub determined: Vec<bool>,
     /// Identified share of each unknown, 0…1; 1 for unknowns without a prior in a provisional fit.
     pub identified: Vec<f64>,
     /// Covariance of the unknowns, in the units of `errors`, shape = (unknowns, unknowns); 0 for
@@ -95,15 +95,16 @@ impl Statistics {
         let aside = (0..lengths.values.len()).filter(|&place| !counts(place));
         let left_out = aside.map(|place| moved(&stage.poses[place]) as f64).sum::<f64>();
         if robust {
-            let each: Vec<usize> = stage.poses.iter().map(moved).collect();
+            let counts_of_poses: Vec<usize> = stage.poses.iter().map(moved).collect();
             uncertainty = if let Loss::L1 { .. } = stage.loss {
                 let kept = (1.0 - left_out / coordinates.max(1.0)).max(MIN_SHARE_KEPT);
                 let declared = noise_model.map_or(1.0, |model| model.scale);
                 let scale = if lengths.scatter > 0.0 { lengths.scatter / declared } else { 1.0 };
-                sandwich(stage, &end.x, (&each, scale, kept), (&closed, &held))
+                sandwich(stage, &end.x, (&counts_of_poses, scale, kept), (&closed, &held))
             } else {
                 // The factor applies to the new data alone, not to the earlier ones.
-                let factor = stage.loss.variance_factor(&lengths.weighed, &each, freedom);
+                let factor =
+                    stage.loss.variance_factor(&lengths.weighed, &counts_of_poses, freedom);
                 let data = stage.linearised(&end.x, stage.loss).triangle / factor.sqrt();
                 let data = stage.with_earlier(data, &end.x);
                 Uncertainty::of(&data, &priors, &closed, &held, 1.0)
@@ -155,18 +156,18 @@ impl Statistics {
             .collect();
         // A combination that the data determined at the start may be undetermined at the end, for
         // example if a rigidity went towards infinity.
-        let seen = stage.gauge(&end.x, &held, &constraints).visible;
-        let is_determined = (0..errors.len())
+        let visible_at_end = stage.gauge(&end.x, &held, &constraints).visible;
+        let determined = (0..errors.len())
             .map(|j| {
                 !held[j]
                     && !is_open(j)
-                    && seen[j].min(end.gauge.visible[j]) > 1.0 - MAX_UNIDENTIFIABLE_SHARE
+                    && visible_at_end[j].min(end.gauge.visible[j]) > 1.0 - MAX_UNIDENTIFIABLE_SHARE
             })
             .collect();
         Ok(Self {
             covariance: uncertainty.covariance,
             errors,
-            known: is_determined,
+            determined,
             identified,
             reduced_chi2: (freedom > 0.5).then_some(chi2 / freedom),
             chance: noise_interval(freedom),

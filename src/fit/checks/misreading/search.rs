@@ -120,7 +120,8 @@ fn explanations(fit: &CheckedFit) -> Explanations {
     // A base that is only a little off is no misreading.
     let is_base_held = is_position && !fit.is_base_free() && is_nominal_far_off(fit);
     tested.extend(is_base_held.then_some(Misreading::HeldBase));
-    // A target that is declared far away is rather in millimetres.
+    // A target that is declared far from its frame may be in millimetres, which another misreading
+    // covers.
     let is_target_held = is_position && fit.is_target_held() && !is_far(fit.problem);
     tested.extend(is_target_held.then_some(Misreading::HeldTarget));
     let mut errors = trial.registered_errors(&tested);
