@@ -19,11 +19,11 @@ const MAX_RECORD_BYTES: u64 = 1 << 20;
 /// A file that was changed afterwards no longer counts as written by flexcal.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct FolderRecord {
-    lines: Vec<Line>,
+    lines: Vec<RecordLine>,
 }
 
 #[derive(Debug, Clone, PartialEq, Eq)]
-struct Line {
+struct RecordLine {
     digest: String,
     command: String,
     name: String,
@@ -55,7 +55,7 @@ impl FolderRecord {
         let line = |line: &str| {
             let (digest, rest) = line.split_once(' ')?;
             let (command, name) = rest.split_once(' ')?;
-            Some(Line {
+            Some(RecordLine {
                 digest: digest.to_owned(),
                 command: command.to_owned(),
                 name: name.to_owned(),
@@ -82,12 +82,12 @@ impl FolderRecord {
     pub fn add(&mut self, command: &str, name: &str, text: &str) {
         let (digest, command, name) =
             (hexadecimal(Sha256::digest(text).as_slice()), command.to_owned(), name.to_owned());
-        self.lines.push(Line { digest, command, name });
+        self.lines.push(RecordLine { digest, command, name });
     }
 
     /// Keeps the newest line of each name and removes the names for which `is_gone` returns true.
     pub fn settle(&mut self, is_gone: impl Fn(&str) -> bool) {
-        let newest: Vec<Line> = self
+        let newest: Vec<RecordLine> = self
             .lines
             .iter()
             .enumerate()
@@ -105,7 +105,9 @@ impl FolderRecord {
     /// # Errors
     /// Returns an error if the record cannot be written.
     pub fn write(&self, folder: &Path) -> io::Result<()> {
-        let line = |Line { digest, command, name }: &Line| format!("{digest} {command} {name}\n");
+        let line = |RecordLine { digest, command, name }: &RecordLine| {
+            format!("{digest} {command} {name}\n")
+        };
         let lines = self.lines.iter().map(line).collect::<Vec<_>>().concat();
         StagedFile::new(&Self::file(folder), &lines)?.commit()
     }

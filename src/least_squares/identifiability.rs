@@ -59,7 +59,7 @@ impl Identifiability {
     /// Analyses the Jacobian with triangular factor `triangle` (n × n).
     #[doc(hidden)]
     pub fn of(triangle: &DMatrix<f64>) -> Self {
-        let Scaled { matrix: scaled, scale } = Scaled::of(triangle);
+        let ScaledTriangle { matrix: scaled, scale } = ScaledTriangle::of(triangle);
         let SingularValues { values: singular_values, right } = SingularValues::of(&scaled);
         let threshold = UNIDENTIFIABLE_BELOW * singular_values.first().copied().unwrap_or(0.0);
         let rank = singular_values.iter().filter(|&&value| value > threshold).count();
@@ -123,7 +123,7 @@ impl Blind {
     /// spanned by P [−R₁⁻¹R₂; 1].
     pub fn in_triangle(triangle: &DMatrix<f64>) -> Self {
         let n = triangle.ncols();
-        let Scaled { matrix: scaled, scale } = Scaled::of(triangle);
+        let ScaledTriangle { matrix: scaled, scale } = ScaledTriangle::of(triangle);
         if regular_inverse(&scaled, MIN_CERTAIN_FULL_RANK).is_some() {
             return Self { gauge: DMatrix::zeros(0, n), visible: vec![1.0; n] };
         }
@@ -150,12 +150,12 @@ impl Blind {
 
 /// Triangle whose columns are scaled to unit norm, and the norms. Columns that count as zero are
 /// set to zero and have scale 1.
-struct Scaled {
+struct ScaledTriangle {
     matrix: DMatrix<f64>,
     scale: Vec<f64>,
 }
 
-impl Scaled {
+impl ScaledTriangle {
     fn of(triangle: &DMatrix<f64>) -> Self {
         let norms: Vec<f64> = triangle.column_iter().map(|column| column.norm()).collect();
         let largest = norms.iter().copied().fold(0.0, f64::max);
@@ -336,7 +336,7 @@ mod tests {
         assert!((unscaled(&triangle) * rows.transpose()).amax() < 1e-12);
         // The tests without singular values find the same space.
         let blind = Blind::in_triangle(&triangle);
-        assert!(certain_null(&Scaled::of(&triangle).matrix).is_some());
+        assert!(certain_null(&ScaledTriangle::of(&triangle).matrix).is_some());
         let recovered = unscaled(&blind.gauge);
         assert!((recovered.transpose() * &recovered - rows.transpose() * &rows).amax() < 1e-12);
         assert!(

@@ -16,7 +16,7 @@ const MAX_CACHED: usize = 3;
 /// of the triangular factor.
 #[derive(Debug, Default)]
 pub struct LinearisationCache {
-    cached: Mutex<VecDeque<(Key, f64, Triangle)>>,
+    cached: Mutex<VecDeque<(LinearisationKey, f64, Triangle)>>,
     /// Linearisation of all data whose derivatives are reused at later points; `None` unless the
     /// fit is provisional.
     base: Option<Mutex<Option<Arc<BasePoint>>>>,
@@ -24,7 +24,7 @@ pub struct LinearisationCache {
 
 /// Identifier of a linearisation: the data set and the point.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Key {
+pub(super) struct LinearisationKey {
     /// Identifier of the data set, whatever the unit by which residuals are divided.
     pub data: u64,
     pub loss: Loss,
@@ -50,11 +50,11 @@ impl LinearisationCache {
     /// scales the cached factor.
     pub(super) fn get_or_reduce(
         &self,
-        key: &Key,
+        key: &LinearisationKey,
         unit: f64,
         reduce: impl FnOnce() -> Triangle,
     ) -> Triangle {
-        let fits = |(other, other_unit, _): &&(Key, f64, Triangle)| {
+        let fits = |(other, other_unit, _): &&(LinearisationKey, f64, Triangle)| {
             let same_unit = other_unit.to_bits() == unit.to_bits();
             other == key && (key.loss == Loss::Squares || same_unit)
         };

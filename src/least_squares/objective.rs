@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::chord::{BasePoint, Chunk};
 use super::curvature::curvature_by_differences;
-use super::linearisation_cache::Key;
+use super::linearisation_cache::LinearisationKey;
 use super::{
     Block, LeastSquares, LinearRows, Linearisation, LinearisationCache, Loss, MANY_UNKNOWNS,
     Objective, RowsError, Triangle, slopes,
@@ -24,7 +24,7 @@ const ACCELERATION_STEP: f64 = 0.1;
 
 /// Rows per unknown that one thread absorbs chunk after chunk before factors are merged. Merging
 /// two factors costs as much as absorbing n/2 rows.
-const ROWS_PER_UNKNOWN: usize = 4;
+const ROWS_PER_UNKNOWN_AND_THREAD: usize = 4;
 
 /// Maximum number of chunks whose results are in memory at a time.
 const MAX_CHUNKS_IN_MEMORY: usize = 64;
@@ -110,7 +110,7 @@ impl<'a, P: LeastSquares> Fit<'a, P> {
     /// Returns the number of chunks that one thread absorbs in sequence.
     fn chunks_per_thread(&self) -> usize {
         let rows = CHUNK_ITEMS * self.problem.rows_per_item().max(1);
-        (ROWS_PER_UNKNOWN * self.problem.parameters()).div_ceil(rows).max(1)
+        (ROWS_PER_UNKNOWN_AND_THREAD * self.problem.parameters()).div_ceil(rows).max(1)
     }
 
     /// Fills a block with the residuals of chunk `index` and their derivatives at x.
@@ -190,7 +190,7 @@ impl<'a, P: LeastSquares> Fit<'a, P> {
     /// derivatives of an earlier point where these are accurate enough.
     fn triangle_at(&self, x: &DVector<f64>) -> Triangle {
         let Some((cache, data, unit)) = self.cache else { return self.reduce(x) };
-        cache.get_or_reduce(&Key { data, loss: self.loss, x: x.clone() }, unit, || {
+        cache.get_or_reduce(&LinearisationKey { data, loss: self.loss, x: x.clone() }, unit, || {
             if !(cache.is_provisional() && self.keeps_derivatives()) {
                 return self.reduce(x);
             }

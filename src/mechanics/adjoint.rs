@@ -16,7 +16,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::linearised_arm::{
-    EndTwist, LinearisedArm, Load, MomentAxes, PerCoordinate, Section, Step,
+    EndTwist, LinearisedArm, Load, MomentAxes, MomentSection, PerCoordinate, Step,
 };
 use super::statics::{
     MAX_ACCEPTED_CHANGE, MAX_EQUILIBRIUM_PASSES, MAX_RELATIVE_CHANGE, StaticsError,
@@ -95,7 +95,7 @@ impl LinearisedArm {
                 Step::Segment(segment) => {
                     loads[segment.loads.clone()].iter_mut().for_each(|load| weigh(load, &weights));
                 }
-                Step::Section(section) => {
+                Step::MomentSection(section) => {
                     let section_weights = section.weighted_axes(influence);
                     (0..3).for_each(|i| weights[i] += section_weights[i]);
                 }
@@ -128,7 +128,7 @@ impl LinearisedArm {
             }
             match step {
                 Step::Load(load) => wrench.add_force(&loads[*load].at, &loads[*load].virtual_force),
-                Step::Section(section) => section.add_moment_change(influence, &mut wrench),
+                Step::MomentSection(section) => section.add_moment_change(influence, &mut wrench),
                 Step::Branch => ends.push(std::mem::take(&mut wrench)),
                 Step::Fork { branches } => {
                     for branch in (0..*branches).filter_map(|_| ends.pop()) {
@@ -200,7 +200,7 @@ enum SweepResult {
     Parameters,
 }
 
-impl Section {
+impl MomentSection {
     /// Returns Σ Λₖ aₖ over the axes aₖ of the section's moments, for each coordinate of the
     /// target.
     fn weighted_axes(&self, influence: &[f64]) -> PerCoordinate {

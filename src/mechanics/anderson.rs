@@ -49,8 +49,8 @@ impl Anderson {
         if *passes > 0 && squares < MAX_CONTRACTION * MAX_CONTRACTION * last.squares {
             let (oldest, newer) = (*used % MAX_PAIRS, (*used).min(MAX_PAIRS));
             let mut pair = std::mem::take(&mut pairs[oldest]);
-            set(&mut pair.residual, n, |k| residual(k) - last.residual[k]);
-            set(&mut pair.image, n, |k| image[k] - last.image[k]);
+            refill(&mut pair.residual, n, |k| residual(k) - last.residual[k]);
+            refill(&mut pair.image, n, |k| image[k] - last.image[k]);
             let whole = dot(&pair.residual, &pair.residual);
             let others = pairs[..newer]
                 .iter()
@@ -70,8 +70,8 @@ impl Anderson {
         } else {
             *used = 0;
         }
-        set(&mut last.residual, n, residual);
-        set(&mut last.image, n, |k| image[k]);
+        refill(&mut last.residual, n, residual);
+        refill(&mut last.image, n, |k| image[k]);
         last.squares = squares;
         *passes += 1;
         x.copy_from_slice(image);
@@ -81,7 +81,7 @@ impl Anderson {
     }
 }
 
-fn set(list: &mut Vec<f64>, n: usize, value: impl Fn(usize) -> f64) {
+fn refill(list: &mut Vec<f64>, n: usize, value: impl Fn(usize) -> f64) {
     list.clear();
     list.extend((0..n).map(value));
 }

@@ -46,7 +46,7 @@ struct ForwardPass<'a, S> {
 
 impl<S: Scalar> ForwardPass<'_, S> {
     /// Returns the next N of the given moments [N·m]; `None` in a pass without deflection.
-    fn moments<const N: usize>(&mut self) -> Option<[S; N]> {
+    fn next_moments<const N: usize>(&mut self) -> Option<[S; N]> {
         let first = self.next;
         self.next += N;
         match self.bend {
@@ -60,8 +60,9 @@ impl<S: Scalar> ForwardPass<'_, S> {
     }
 
     /// Ends a segment that the last `unknowns` moments deflect: records its end frame and continues
-    /// from that frame without derivatives. Does nothing in other passes than [`Bend::BySegment`].
-    fn cut(
+    /// from that frame without derivatives. Does nothing in other passes than
+    /// [`DeflectionMode::BySegment`].
+    fn record_cut(
         &mut self,
         segment: Segment,
         unknowns: usize,
@@ -81,13 +82,13 @@ impl<S: Scalar> ForwardPass<'_, S> {
 
     /// Rotates the frame by the unknown moments times flexibilities [rad/(N·m)] about x and y. The
     /// moments act about the axes at half the rotation.
-    fn tilt(&mut self, [about_x, about_y]: &[S; 2], segment: Segment, ws: &mut Workspace<S>) {
+    fn apply_tilt(&mut self, [about_x, about_y]: &[S; 2], segment: Segment, ws: &mut Workspace<S>) {
         let half = self
-            .moments()
+            .next_moments()
             .map(|[x, y]| Vector3::new(*about_x * x, *about_y * y, S::from(0.0)) * S::from(0.5));
         if let Some(half) = &half {
             self.frame.rotate(half);
-            self.cut(segment, 2, &mut ws.events, &mut ws.cuts);
+            self.record_cut(segment, 2, &mut ws.events, &mut ws.cuts);
         }
         if self.records_events() {
             let [x, y, _] = self.frame.axes;
@@ -95,7 +96,7 @@ impl<S: Scalar> ForwardPass<'_, S> {
         }
         if let Some(half) = &half {
             self.frame.rotate(half);
-            self.cut(segment, 2, &mut ws.events, &mut ws.cuts);
+            self.record_cut(segment, 2, &mut ws.events, &mut ws.cuts);
         }
     }
 
@@ -105,12 +106,12 @@ impl<S: Scalar> ForwardPass<'_, S> {
     /// δ = F L³/(3EI) + M L²/(2EI),  φ = F L²/(2EI) + M L/(EI). The moment is linear along the
     /// slide. Two tilts at the Gauss–Legendre points, each by the moment there times L/(2EI),
     /// integrate it exactly. Small slopes only.
-    fn slide(&mut self, flexibility: S, length: S, segment: Segment, ws: &mut Workspace<S>) {
+    fn apply_slide(&mut self, flexibility: S, length: S, segment: Segment, ws: &mut Workspace<S>) {
         let half = flexibility * length * (0.5 * length.re().signum());
         let mut passed = 0.0;
         for at in SLIDE_TILT_POSITIONS {
             self.frame.translate_z(length * (at - passed));
-            self.tilt(&[half, half], segment, ws);
+            self.apply_tilt(&[half, half], segment, ws);
             passed = at;
         }
         self.frame.translate_z(length * (1.0 - passed));
@@ -209,7 +210,7 @@ impl<S: Scalar> Arm<S> {
 
     /// Returns the number of unknowns that are coordinates of hooks: two for each rope that may
     /// lean.
-    fn hook_unknowns(&self) -> usize {
+    fn hook_unknown_count(&self) -> usize {
         let hoists = || self.joints.iter().filter_map(|joint| joint.beam.as_ref()?.hoist.as_ref());
         self.rope.as_ref().map_or(0, |_| 2 * hoists().count())
     }
@@ -222,9 +223,14 @@ impl<S: Scalar> Arm<S> {
         tip: usize,
         ws: &mut Workspace<S>,
     ) -> Frame<S> {
-        let mut walk =
-            ForwardPass { setup, bend, frame: Frame::identity(), next: self.hook_unknowns(), tip };
-        let mut found = walk.frame;
+        let mut pass = ForwardPass {
+            setup,
+            bend,
+            frame: Frame::identity(),
+            next: self.hook_unknown_count(),
+            tip,
+        };
+        let mut found = pass.frame;
         ws.forks.clear();
         ws.events_before_tip = 0;
         ws.events.clear();
@@ -235,89 +241,94 @@ impl<S: Scalar> Arm<S> {
             ws.rigid_roots.clear();
         }
         if let Some(mounting) = &self.mounting {
-            walk.tilt(mounting, Segment::Mounting, ws);
+            pass.apply_tilt(mounting, Segment::Mounting, ws);
         }
         ws.frames.clear();
-        ws.keep_frame(&walk.frame);
-        walk.record_fork(self.tree.extra_branches_at_base(), ws);
+        ws.keep_frame(&pass.frame);
+        pass.record_fork(self.tree.extra_branches_at_base(), ws);
         for (i, joint) in self.joints.iter().enumerate() {
             if self.tree.begins_branch(i) {
-                walk.return_to_fork(ws);
+                pass.return_to_fork(ws);
             }
-            joint.advance_to_link(&mut walk.frame);
+            joint.advance_to_link(&mut pass.frame);
             if matches!(bend, DeflectionMode::Rigid) {
-                ws.rigid_roots.push(walk.frame);
+                ws.rigid_roots.push(pass.frame);
             }
             if joint.beam.is_none() {
-                walk.frame.translate_x(joint.a);
+                pass.frame.translate_x(joint.a);
             }
-            walk.cut(Segment::Joint(i), 0, &mut ws.events, &mut ws.cuts);
+            pass.record_cut(Segment::Joint(i), 0, &mut ws.events, &mut ws.cuts);
             if let Some(beam) = &joint.beam {
-                self.walk_beam(beam, i, &mut walk, ws);
+                self.walk_beam(beam, i, &mut pass, ws);
             } else if self.tree.path_contains(i, tip) {
-                ws.trail.push(walk.frame.origin);
+                ws.trail.push(pass.frame.origin);
             }
             if let Some(lateral) = &joint.lateral {
-                walk.tilt(lateral, Segment::Joint(i), ws);
+                pass.apply_tilt(lateral, Segment::Joint(i), ws);
             }
             let motion = setup.motion(i);
-            joint.displace(&mut walk.frame, motion, MOTION_STARTS[0]);
+            joint.displace(&mut pass.frame, motion, MOTION_STARTS[0]);
             if joint.motion.is_some() {
                 // The motion before the joint also moves its axis, so the axis belongs to the next
                 // segment.
-                walk.cut(Segment::Joint(i), 0, &mut ws.events, &mut ws.cuts);
+                pass.record_cut(Segment::Joint(i), 0, &mut ws.events, &mut ws.cuts);
             }
             let (mut twist, mut play_offset) = (None, None);
             if joint.has_twist() {
                 let approach = setup.approach.map(|approach| approach[i]);
-                twist = walk.moments().map(|[moment]| joint.twist(moment, approach));
+                twist = pass.next_moments().map(|[moment]| joint.twist(moment, approach));
                 play_offset = joint.play_offset(approach);
             }
             let Coordinates { angle, offset } =
                 joint.coordinates_with(setup.configuration[i], play_offset, twist);
-            if joint.has_twist() && walk.records_events() {
+            if joint.has_twist() && pass.records_events() {
                 let pull = joint.compensator.as_ref().map(|spring| spring.moment(angle));
                 ws.events.push(Event::Axis {
-                    at: walk.frame.origin,
-                    axis: walk.frame.axes[2],
+                    at: pass.frame.origin,
+                    axis: pass.frame.axes[2],
                     pull,
                 });
             }
-            walk.frame.rotate_z(angle);
+            pass.frame.rotate_z(angle);
             let mut deflecting_moments = usize::from(joint.has_twist());
             if let Some(flexibility) = joint.slide {
-                walk.cut(Segment::Joint(i), deflecting_moments, &mut ws.events, &mut ws.cuts);
-                walk.slide(flexibility, offset, Segment::Joint(i), ws);
+                pass.record_cut(
+                    Segment::Joint(i),
+                    deflecting_moments,
+                    &mut ws.events,
+                    &mut ws.cuts,
+                );
+                pass.apply_slide(flexibility, offset, Segment::Joint(i), ws);
                 deflecting_moments = 0;
             } else {
-                walk.frame.translate_z(offset);
+                pass.frame.translate_z(offset);
             }
-            walk.frame.rotate_y(joint.beta.sin_cos);
-            joint.displace(&mut walk.frame, motion, MOTION_STARTS[1]);
+            pass.frame.rotate_y(joint.beta.sin_cos);
+            joint.displace(&mut pass.frame, motion, MOTION_STARTS[1]);
             if self.tree.path_contains(i, tip) {
-                ws.trail.push(walk.frame.origin);
+                ws.trail.push(pass.frame.origin);
             }
-            ws.keep_frame(&walk.frame);
-            walk.cut(Segment::Joint(i), deflecting_moments, &mut ws.events, &mut ws.cuts);
-            if walk.records_events() {
+            ws.keep_frame(&pass.frame);
+            pass.record_cut(Segment::Joint(i), deflecting_moments, &mut ws.events, &mut ws.cuts);
+            if pass.records_events() {
                 for body in &joint.bodies {
                     let force = self.gravity * S::from(body.mass);
                     ws.events
-                        .push(Event::Load { at: walk.frame.point(&body.at.map(S::from)), force });
+                        .push(Event::Load { at: pass.frame.point(&body.at.map(S::from)), force });
                 }
             }
             if i == self.payload_joint() {
                 let payload = self.payload(setup);
-                if walk.records_events() && payload.re() != 0.0 {
-                    let at = walk.frame.point(&self.payload_at);
+                if pass.records_events() && payload.re() != 0.0 {
+                    let at = pass.frame.point(&self.payload_at);
                     ws.events.push(Event::Load { at, force: self.gravity * payload });
                 }
             }
             if i == tip {
-                found = walk.frame;
+                found = pass.frame;
                 ws.events_before_tip = ws.events.len();
             }
-            walk.record_fork(self.tree.extra_branches_on(i), ws);
+            pass.record_fork(self.tree.extra_branches_on(i), ws);
         }
         found
     }
@@ -327,7 +338,7 @@ impl<S: Scalar> Arm<S> {
         &self,
         beam: &Beam<S>,
         link: usize,
-        walk: &mut ForwardPass<S>,
+        pass: &mut ForwardPass<S>,
         ws: &mut Workspace<S>,
     ) {
         let Workspace {
@@ -345,7 +356,7 @@ impl<S: Scalar> Arm<S> {
         let elements = self.beam_elements;
         let length = self.joints[link].a / elements as f64;
         self.list_beam_loads(beam, ropes[link], length, link_loads);
-        let of_pose = walk.setup.offsets.and_then(|all| Some(all.get(link)?.strain));
+        let of_pose = pass.setup.offsets.and_then(|all| Some(all.get(link)?.strain));
         let strain = beam.strain.as_ref().map(|strain| strain.plus(of_pose.unwrap_or_default()));
         let weight = self.gravity * S::from(beam.mass / elements as f64);
         for number in 0..elements {
@@ -353,8 +364,9 @@ impl<S: Scalar> Arm<S> {
                 link_loads.iter().filter(|load| load.element > number).map(|load| load.force);
             let outboard =
                 weight * S::from((elements - 1 - number) as f64) + outboard.sum::<Vector3<S>>();
-            let moment =
-                walk.moments().map_or_else(|| Vector3::from_element(S::from(0.0)), Vector3::from);
+            let moment = pass
+                .next_moments()
+                .map_or_else(|| Vector3::from_element(S::from(0.0)), Vector3::from);
             let element = Element {
                 number,
                 length,
@@ -365,13 +377,13 @@ impl<S: Scalar> Arm<S> {
                 loads: link_loads,
                 tip: Wrench { force: beyond[link] + outboard, moment },
             };
-            let mut root = walk.frame;
-            if let DeflectionMode::BySegment(_, Some(rotation)) = walk.bend {
+            let mut root = pass.frame;
+            if let DeflectionMode::BySegment(_, Some(rotation)) = pass.bend {
                 root.rotate(rotation);
             }
-            match walk.bend {
+            match pass.bend {
                 DeflectionMode::FirstOrder(_) => {
-                    walk.frame = element.first_order_tip(root, &rigid_roots[link], points);
+                    pass.frame = element.first_order_tip(root, &rigid_roots[link], points);
                 }
                 DeflectionMode::Rigid => {
                     let middle = root.origin + root.axes[0] * (length * 0.5);
@@ -380,12 +392,12 @@ impl<S: Scalar> Arm<S> {
                         let (at, mut force) = (element.straight_point(&root, load), load.force);
                         if let (true, Some(hoist), Some(_)) = (load.rope, &beam.hoist, &self.rope) {
                             hooks.push([at.x, at.y]);
-                            force = self.rope_force(hoist, walk.setup, || [at.x, at.y]);
+                            force = self.rope_force(hoist, pass.setup, || [at.x, at.y]);
                         }
                         events.push(Event::Load { at, force });
                     }
-                    walk.frame.translate_x(length);
-                    events.push(Event::Tip { at: walk.frame.origin });
+                    pass.frame.translate_x(length);
+                    events.push(Event::Tip { at: pass.frame.origin });
                 }
                 DeflectionMode::Bent(_) | DeflectionMode::BySegment(..) => {
                     let bent = element.bend(&root, points);
@@ -397,13 +409,13 @@ impl<S: Scalar> Arm<S> {
                         }
                         events.push(Event::Load { at, force: load.force });
                     }
-                    walk.frame = bent.tip();
-                    walk.cut(Segment::Beam(link), 3, events, cuts);
-                    events.push(Event::Tip { at: walk.frame.origin });
+                    pass.frame = bent.tip();
+                    pass.record_cut(Segment::Beam(link), 3, events, cuts);
+                    events.push(Event::Tip { at: pass.frame.origin });
                 }
             }
-            if self.tree.path_contains(link, walk.tip) {
-                trail.push(walk.frame.origin);
+            if self.tree.path_contains(link, pass.tip) {
+                trail.push(pass.frame.origin);
             }
         }
     }

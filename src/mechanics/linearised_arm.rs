@@ -35,7 +35,7 @@ pub(super) enum Step {
     /// Load on a rigid part, by its index in [`LinearisedArm::loads`].
     Load(usize),
     /// Point of the arm where moments are unknown.
-    Section(Section),
+    MomentSection(MomentSection),
     /// Segment of the arm.
     Segment(LinearisedSegment),
     /// Fork at which `branches` branches start besides the one that follows.
@@ -89,7 +89,7 @@ impl LinearisedSegment {
 /// Point of the arm where moments are unknowns of the equilibrium: position, axes of the moments,
 /// indices of the unknowns.
 #[derive(Debug, Clone)]
-pub(super) struct Section {
+pub(super) struct MomentSection {
     pub at: Vector3<f64>,
     pub axes: PerCoordinate,
     pub unknowns: Range<usize>,
@@ -187,7 +187,7 @@ impl LinearisedArm {
         let mut axes_with_zeros = [Vector3::zeros(); 3];
         axes_with_zeros[..axes.len()].copy_from_slice(axes);
         let (force, moment) = (Vector3::zeros(), Vector3::zeros());
-        self.steps.push(Step::Section(Section {
+        self.steps.push(Step::MomentSection(MomentSection {
             at,
             axes: axes_with_zeros,
             unknowns: first..first + axes.len(),
@@ -220,7 +220,7 @@ impl LinearisedArm {
                 Step::Segment(segment) => {
                     self.loads[segment.loads.clone()].iter().for_each(|load| beyond.add(load));
                 }
-                Step::Section(section) => {
+                Step::MomentSection(section) => {
                     section.force = beyond.force;
                     section.moment = beyond.moment - section.at.cross(&beyond.force);
                 }

@@ -3,8 +3,8 @@
 use nalgebra::Vector3;
 use num_dual::DualSVec64;
 
-use super::elastic::Elastic;
-use super::rigid::Rigid;
+use super::elastic::ElasticDerivatives;
+use super::rigid::RigidDerivatives;
 use super::rows::Rows;
 use crate::problem::{BasePose, PoseView};
 use crate::scalar::{gradient, seeded};
@@ -12,7 +12,7 @@ use crate::spatial::{Frame, rotation_axes};
 
 /// Base frame with its derivatives, and the Jacobian column of each of its six coordinates.
 #[derive(Clone)]
-pub(super) struct Base {
+pub(super) struct BaseDerivatives {
     /// Frame of the base, expressed in the measuring frame.
     pub frame: Frame<f64>,
     /// Unit vectors along which the translation coordinates x, y and z move the base, measuring
@@ -30,7 +30,7 @@ pub(super) struct Base {
 }
 
 /// Target with its derivatives, and the Jacobian column of each of its six coordinates.
-pub(super) struct Target {
+pub(super) struct TargetDerivatives {
     /// Index of the joint whose frame carries the target.
     pub joint: usize,
     /// Position of the target in the joint's frame \[m\].
@@ -46,12 +46,12 @@ pub(super) struct Target {
 /// Method that differentiates the arm with respect to its parameters: rigid kinematics or statics.
 pub(super) enum ArmDerivatives {
     /// Derivatives of a rigid arm, one elementary motion (rotation or translation) at a time.
-    Rigid(Rigid),
+    Rigid(RigidDerivatives),
     /// Derivatives of an elastic arm, through the statics.
-    Elastic(Box<Elastic>),
+    Elastic(Box<ElasticDerivatives>),
 }
 
-impl Base {
+impl BaseDerivatives {
     /// Creates the base at a pose in the measuring frame, with all its coordinates fixed.
     pub fn new(pose: &BasePose) -> Self {
         Self {
@@ -120,7 +120,7 @@ impl Base {
     }
 }
 
-impl Target {
+impl TargetDerivatives {
     /// Creates the target at a position \[m\] and with a rotation vector \[rad\] in the frame of a
     /// joint, with all its coordinates fixed.
     pub fn new(joint: usize, position: Vector3<f64>, rotation: &Vector3<f64>) -> Self {
@@ -151,7 +151,7 @@ impl ArmDerivatives {
     pub(super) fn write(
         &mut self,
         (commanded, setup): (&PoseView, &PoseView),
-        base: &Base,
+        base: &BaseDerivatives,
         (joint, point): (usize, &Vector3<f64>),
         rows: &mut Rows,
     ) -> Option<Frame<f64>> {

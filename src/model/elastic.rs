@@ -17,7 +17,7 @@ use crate::spatial::Frame;
 
 /// Derivatives of an elastic arm: segment by segment for parameters that act on a single segment,
 /// through the whole statics for the others.
-pub(super) struct Elastic {
+pub(super) struct ElasticDerivatives {
     segments: Option<SegmentInputs>,
     adjoint: AdjointSolver,
     whole: Vec<WholeArmInput>,
@@ -41,7 +41,7 @@ struct WholeArmInput {
     input: Input,
 }
 
-impl Elastic {
+impl ElasticDerivatives {
     /// Creates the derivatives of `arm` with respect to `inputs`. `arm` is that of the model at the
     /// full parameter vector `x`.
     pub fn new(model: &Model, x: &[f64], arm: Arm<f64>, inputs: Vec<Input>) -> Self {

@@ -2,7 +2,7 @@
 //! site.
 
 use super::Model;
-use super::load_moments::Column;
+use super::load_moments::JacobianColumn;
 use crate::model::parameter::{ParameterSite, Regressor};
 
 /// Scalar quantity of the arm, with the Jacobian columns of the parameters that act on it.
@@ -19,7 +19,7 @@ pub(super) struct Input {
 }
 
 /// Returns the inputs of the arm that the parameters of these Jacobian columns act on.
-pub(super) fn inputs(model: &Model, columns: &[Column]) -> Vec<Input> {
+pub(super) fn inputs(model: &Model, columns: &[JacobianColumn]) -> Vec<Input> {
     let mut inputs: Vec<Input> = Vec::new();
     for (index_of_column, column) in columns.iter().enumerate() {
         let site = column.site;

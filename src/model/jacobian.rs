@@ -7,15 +7,15 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::Model;
 use super::command_terms::CommandTerms;
-use super::derivatives::{ArmDerivatives, Base, Target};
-use super::elastic::Elastic;
+use super::derivatives::{ArmDerivatives, BaseDerivatives, TargetDerivatives};
+use super::elastic::ElasticDerivatives;
 use super::inputs::inputs;
 use super::instrument::Instrument;
-use super::load_moments::Column;
+use super::load_moments::JacobianColumn;
 use super::orientation;
 use super::pose::Pose;
 use super::predictor::fixtures_of;
-use super::rigid::Rigid;
+use super::rigid::RigidDerivatives;
 use super::rows::{Rows, clear_block};
 use super::tilt::TiltDerivatives;
 use crate::least_squares::Block;
@@ -32,8 +32,8 @@ pub(super) struct JacobianWriter<'m> {
     instrument_columns: Vec<(ParameterSite, Regressor, usize)>,
     /// Axis, regressor and Jacobian column of each unknown that rotates every base.
     base_rotations: Vec<(usize, Regressor, usize)>,
-    bases: Vec<Base>,
-    targets: Vec<Target>,
+    bases: Vec<BaseDerivatives>,
+    targets: Vec<TargetDerivatives>,
     fixtures: Vec<FixtureValues<f64>>,
     /// Jacobian columns of the numbers of each fixture; `None` for fixed numbers.
     fixture_columns: Vec<[Option<usize>; MAX_FIXTURE_NUMBERS]>,
@@ -50,16 +50,17 @@ impl<'m> JacobianWriter<'m> {
     pub fn new(
         model: &'m Model,
         x: &[f64],
-        columns: &[Column],
+        columns: &[JacobianColumn],
         (oriented, tilted): (bool, bool),
     ) -> Self {
         let arm = model.arm(|k| x[k]);
-        let mut bases: Vec<Base> = model.base_poses(x).iter().map(Base::new).collect();
+        let mut bases: Vec<BaseDerivatives> =
+            model.base_poses(x).iter().map(BaseDerivatives::new).collect();
         let placements = model.target_positions(x).into_iter().zip(model.target_rotations(x));
         let target = |(index, (position, rotation))| {
-            Target::new(model.target_joint(index), position, &rotation)
+            TargetDerivatives::new(model.target_joint(index), position, &rotation)
         };
-        let mut targets: Vec<Target> = placements.enumerate().map(target).collect();
+        let mut targets: Vec<TargetDerivatives> = placements.enumerate().map(target).collect();
         let fixtures = model.fixtures(x);
         let mut fixture_columns = vec![[None; MAX_FIXTURE_NUMBERS]; fixtures.len()];
         let (mut instrument_columns, mut base_rotations) = (Vec::new(), Vec::new());
@@ -87,9 +88,9 @@ impl<'m> JacobianWriter<'m> {
         let inputs = inputs(model, columns);
         let tilts = tilted.then(|| TiltDerivatives::new(model, x, arm.clone(), inputs.clone()));
         let arm = if arm.is_elastic() {
-            ArmDerivatives::Elastic(Box::new(Elastic::new(model, x, arm, inputs)))
+            ArmDerivatives::Elastic(Box::new(ElasticDerivatives::new(model, x, arm, inputs)))
         } else {
-            ArmDerivatives::Rigid(Rigid::new(&arm, inputs))
+            ArmDerivatives::Rigid(RigidDerivatives::new(&arm, inputs))
         };
         let point_rows = match (oriented, fixtures.is_empty()) {
             (true, _) => orientation::POINT_ROWS,
@@ -237,7 +238,7 @@ impl<'m> JacobianWriter<'m> {
     }
 
     /// Returns the base as effects rotate it in a pose; `None` if no effect rotates bases.
-    fn rotated(&self, base: &Base, pose: &Pose) -> Option<Base> {
+    fn rotated(&self, base: &BaseDerivatives, pose: &Pose) -> Option<BaseDerivatives> {
         self.instrument.rotates_bases().then(|| {
             let columns = self
                 .base_rotations
@@ -284,8 +285,8 @@ impl<'m> JacobianWriter<'m> {
 #[inline]
 fn write_placement(
     frame: &Frame<f64>,
-    base: &Base,
-    target: &Target,
+    base: &BaseDerivatives,
+    target: &TargetDerivatives,
     rows: &mut Rows,
 ) -> Vector3<f64> {
     let position = frame.point(&target.position);

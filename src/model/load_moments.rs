@@ -15,7 +15,7 @@ use crate::model::parameter::{
 };
 
 /// Column of a Jacobian: a site of the model and the regressor that multiplies its derivative.
-pub(super) struct Column {
+pub(super) struct JacobianColumn {
     /// Index of the parameter; `None` for the effect of a load through the moments in formulas.
     pub parameter: Option<usize>,
     pub site: ParameterSite,
@@ -24,22 +24,22 @@ pub(super) struct Column {
 
 /// Columns of the unknown parameters, followed by the effects of loads through the moments in
 /// formulas. The latter are added to the columns of the loads.
-pub(super) struct Columns {
-    columns: Vec<Column>,
+pub(super) struct JacobianColumns {
+    columns: Vec<JacobianColumn>,
     /// Index of the load's column to which each column after those of the unknowns is added.
     added_to: Vec<usize>,
 }
 
-impl Columns {
+impl JacobianColumns {
     /// Creates the columns of the `unknowns` of a model at the full parameter vector `x`.
     pub fn new(model: &Model, x: &[f64], unknowns: &[usize]) -> Self {
         let parameters = &*model.parameters_at(x);
-        let column = |&k: &usize| Column {
+        let column = |&k: &usize| JacobianColumn {
             parameter: Some(k),
             site: parameters[k].site,
             regressor: slope_regressor(parameters, x, k),
         };
-        let mut columns: Vec<Column> = unknowns.iter().map(column).collect();
+        let mut columns: Vec<JacobianColumn> = unknowns.iter().map(column).collect();
         let mut added_to = Vec::new();
         let terms: Vec<usize> =
             (0..parameters.len()).filter(|&k| uses_moments(&parameters[k])).collect();
@@ -59,7 +59,7 @@ impl Columns {
                 let at_site: Vec<usize> =
                     terms.iter().copied().filter(|&k| parameters[k].site == site).collect();
                 let regressor = load_regressor(parameters, x, &at_site, &moments);
-                columns.push(Column { parameter: None, site, regressor });
+                columns.push(JacobianColumn { parameter: None, site, regressor });
                 added_to.push(column);
             }
         }
@@ -67,8 +67,8 @@ impl Columns {
     }
 
     /// Returns all columns, in the order of the block that the function passed to
-    /// [`Columns::write`] fills.
-    pub fn all(&self) -> &[Column] {
+    /// [`JacobianColumns::write`] fills.
+    pub fn all(&self) -> &[JacobianColumn] {
         &self.columns
     }
 

@@ -3,7 +3,7 @@
 
 use nalgebra::Vector3;
 
-use super::derivatives::{ArmDerivatives, Base, Target, angular_velocity};
+use super::derivatives::{ArmDerivatives, BaseDerivatives, TargetDerivatives, angular_velocity};
 use super::pose::MeasuredOrientation;
 use super::rows::{Rows, clear_block};
 use crate::least_squares::Block;
@@ -19,9 +19,9 @@ pub(super) struct OrientedPose<'a> {
     /// Pose as commanded, and pose with the terms that add to its commands.
     pub setups: (&'a PoseView<'a>, &'a PoseView<'a>),
     /// Base of the arm.
-    pub base: &'a Base,
+    pub base: &'a BaseDerivatives,
     /// Target whose orientation is measured.
-    pub target: &'a Target,
+    pub target: &'a TargetDerivatives,
     /// Frame that carries the target, measuring frame.
     pub frame: &'a Frame<f64>,
 }

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::Model;
 use super::jacobian::JacobianWriter;
 use super::linear_model::LinearModel;
-use super::load_moments::Columns;
+use super::load_moments::JacobianColumns;
 use super::pose::Pose;
 use super::predictor::{Prediction, Predictor};
 use crate::least_squares::{Block, CHUNK_ITEMS, LeastSquares};
@@ -152,7 +152,7 @@ impl LeastSquares for PoseResiduals<'_> {
         let full = self.full(x);
         let write = |unknowns: &[usize], block: &mut Block| {
             let kinds = (self.residuals_per_row == RESIDUALS_PER_POSE, self.measures_tilts);
-            let columns = Columns::new(self.model, full.as_slice(), unknowns);
+            let columns = JacobianColumns::new(self.model, full.as_slice(), unknowns);
             let mut writer = JacobianWriter::new(self.model, full.as_slice(), columns.all(), kinds);
             columns.write(block, |block| {
                 for (k, pose) in self.poses[items.clone()].iter().enumerate() {

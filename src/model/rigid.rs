@@ -19,7 +19,7 @@ use crate::spatial::{Frame, rotate, rotated_about_x, rotated_about_y, rotated_ab
 type MotionLevers = Box<[Vector3<f64>; 2 * MOTION_LEN]>;
 
 /// Derivatives of a rigid arm, one elementary motion (rotation or translation) at a time.
-pub(super) struct Rigid {
+pub(super) struct RigidDerivatives {
     links: Vec<Link>,
     tree: Tree,
     inputs: Vec<Input>,
@@ -51,7 +51,7 @@ struct LinkDerivatives {
     motions: Option<MotionLevers>,
 }
 
-impl Rigid {
+impl RigidDerivatives {
     /// Creates the derivatives of an arm with respect to `inputs`.
     pub fn new(arm: &Arm<f64>, inputs: Vec<Input>) -> Self {
         let mut links: Vec<Link> = arm.joints.iter().map(Link::seeded).collect();

@@ -35,31 +35,31 @@ impl<'s, 'a, 'i> ArgumentReader<'s, 'a, 'i> {
         match kind {
             // That a link precedes the joint, or that the joint rotates under a moment, is checked
             // after all effects are read.
-            ArgumentKind::AnyJoint | ArgumentKind::LinkedJoint => self.any_joint(key),
-            ArgumentKind::MovingJoint => self.moving_joint(key),
+            ArgumentKind::AnyJoint | ArgumentKind::LinkedJoint => self.read_any_joint(key),
+            ArgumentKind::MovingJoint => self.read_moving_joint(key),
             ArgumentKind::TurningJoint | ArgumentKind::RelievedJoint => {
-                self.joint_of(key, turns, |joint| InputErrorKind::NotRevolute { joint })
+                self.read_joint_of_kind(key, turns, |joint| InputErrorKind::NotRevolute { joint })
             }
             ArgumentKind::SlidingJoint => {
                 let slides = |kind| kind == JointKind::Prismatic;
-                self.joint_of(key, slides, |joint| InputErrorKind::NoSlide { joint })
+                self.read_joint_of_kind(key, slides, |joint| InputErrorKind::NoSlide { joint })
             }
-            ArgumentKind::OtherJoint => return self.other_joint(key),
-            ArgumentKind::Mount => return self.mount(key),
-            ArgumentKind::Beam => return self.beam(key),
-            ArgumentKind::Covariate => return self.covariate(key),
-            ArgumentKind::Orders => return self.orders(key),
-            ArgumentKind::Order => return self.order(key),
-            ArgumentKind::Time => return self.time(key),
-            ArgumentKind::Duration => return self.positive(key, Unit::Time),
-            ArgumentKind::Distance => return self.positive(key, Unit::Angle),
-            ArgumentKind::Point => return self.point(key),
-            ArgumentKind::FreeLength => return self.free_length(key),
+            ArgumentKind::OtherJoint => return self.read_other_joint(key),
+            ArgumentKind::Mount => return self.read_mount(key),
+            ArgumentKind::Beam => return self.read_beam(key),
+            ArgumentKind::Covariate => return self.read_covariate(key),
+            ArgumentKind::Orders => return self.read_orders(key),
+            ArgumentKind::Order => return self.read_order(key),
+            ArgumentKind::Time => return self.read_time(key),
+            ArgumentKind::Duration => return self.read_positive(key, Unit::Time),
+            ArgumentKind::Distance => return self.read_positive(key, Unit::Angle),
+            ArgumentKind::Point => return self.read_point(key),
+            ArgumentKind::FreeLength => return self.read_free_length(key),
         }
         .map(Argument::Joint)
     }
 
-    fn any_joint(&mut self, key: &str) -> Result<usize, InputError> {
+    fn read_any_joint(&mut self, key: &str) -> Result<usize, InputError> {
         let item = self.section.require(key, &format!("{key} = …, a joint's number"))?;
         let joint = item.whole(0)?;
         match usize::try_from(joint) {
@@ -68,8 +68,8 @@ impl<'s, 'a, 'i> ArgumentReader<'s, 'a, 'i> {
         }
     }
 
-    fn moving_joint(&mut self, key: &str) -> Result<usize, InputError> {
-        let joint = self.any_joint(key)?;
+    fn read_moving_joint(&mut self, key: &str) -> Result<usize, InputError> {
+        let joint = self.read_any_joint(key)?;
         let kind = self.joints.get(joint - 1).map(Joint::command_kind);
         if let (Some(JointKind::Fixed), Some(item)) = (kind, self.section.peek(key)) {
             return Err(item.error(InputErrorKind::NoCommand { joint }));
@@ -80,13 +80,13 @@ impl<'s, 'a, 'i> ArgumentReader<'s, 'a, 'i> {
 
     /// Reads the number of a joint that takes a command and whose kind satisfies `is_it`; for
     /// another kind returns the error that `mistake` makes of the number.
-    fn joint_of(
+    fn read_joint_of_kind(
         &mut self,
         key: &str,
         is_it: fn(JointKind) -> bool,
         mistake: fn(usize) -> InputErrorKind,
     ) -> Result<usize, InputError> {
-        let joint = self.moving_joint(key)?;
+        let joint = self.read_moving_joint(key)?;
         let fits = self.joints.get(joint - 1).is_some_and(|declared| is_it(declared.kind));
         match self.section.peek(key) {
             Some(item) if !fits => Err(item.error(mistake(joint))),
@@ -94,9 +94,9 @@ impl<'s, 'a, 'i> ArgumentReader<'s, 'a, 'i> {
         }
     }
 
-    fn other_joint(&mut self, key: &str) -> Result<Argument, InputError> {
+    fn read_other_joint(&mut self, key: &str) -> Result<Argument, InputError> {
         let before = self.last;
-        let joint = self.moving_joint(key)?;
+        let joint = self.read_moving_joint(key)?;
         if before == Some(joint) {
             return Err(self.section.error(InputErrorKind::CoupledToItself { joint }));
         }
@@ -104,25 +104,25 @@ impl<'s, 'a, 'i> ArgumentReader<'s, 'a, 'i> {
     }
 
     /// Reads the place where an effect is mounted: a joint that takes a command, or `base = true`.
-    fn mount(&mut self, key: &str) -> Result<Argument, InputError> {
+    fn read_mount(&mut self, key: &str) -> Result<Argument, InputError> {
         match self.section.get("base") {
             Some(item) if !item.boolean()? || self.section.peek(key).is_some() => {
                 Err(item.error(InputErrorKind::NotOnePlace))
             }
             Some(_) => Ok(Argument::Base(true)),
-            None => self.moving_joint(key).map(Argument::Joint),
+            None => self.read_moving_joint(key).map(Argument::Joint),
         }
     }
 
     /// Reads the name of a covariate. Its existence is checked when the data are read.
-    fn covariate(&mut self, key: &str) -> Result<Argument, InputError> {
+    fn read_covariate(&mut self, key: &str) -> Result<Argument, InputError> {
         let item = self
             .section
             .require(key, &format!("{key} = \"…\", the name of a column in [data.covariates]"))?;
         Ok(Argument::Name(item.text()?.to_owned()))
     }
 
-    fn beam(&mut self, key: &str) -> Result<Argument, InputError> {
+    fn read_beam(&mut self, key: &str) -> Result<Argument, InputError> {
         let item = self.section.require(key, &format!("{key} = \"…\", the name of a beam"))?;
         let link = item.text()?.to_owned();
         let links = beam_names(self.joints);
@@ -134,7 +134,7 @@ impl<'s, 'a, 'i> ArgumentReader<'s, 'a, 'i> {
     }
 
     /// Reads the orders of harmonics: at least one, without duplicates.
-    fn orders(&mut self, key: &str) -> Result<Argument, InputError> {
+    fn read_orders(&mut self, key: &str) -> Result<Argument, InputError> {
         let item = self.section.require(key, &format!("{key} = [1], the harmonics"))?;
         let mut orders = Vec::new();
         let elements = item.list("a list of whole numbers")?;
@@ -153,7 +153,7 @@ impl<'s, 'a, 'i> ArgumentReader<'s, 'a, 'i> {
     }
 
     /// Reads the order of a wave in cycles per revolution, which must be above zero.
-    fn order(&mut self, key: &str) -> Result<Argument, InputError> {
+    fn read_order(&mut self, key: &str) -> Result<Argument, InputError> {
         let item = self.section.require(key, &format!("{key} = 7.5, cycles a revolution"))?;
         let order = item.number()?;
         if order > 0.0 && order <= HIGHEST_ORDER {
@@ -163,14 +163,14 @@ impl<'s, 'a, 'i> ArgumentReader<'s, 'a, 'i> {
         }
     }
 
-    fn time(&mut self, key: &str) -> Result<Argument, InputError> {
+    fn read_time(&mut self, key: &str) -> Result<Argument, InputError> {
         let base = without_suffix(key, Unit::Time);
         let time = self.section.number(base, Unit::Time)?;
         time.map(Argument::Number)
             .ok_or_else(|| self.section.missing(base, Unit::Time.alternatives(base)))
     }
 
-    fn positive(&mut self, key: &str, unit: Unit) -> Result<Argument, InputError> {
+    fn read_positive(&mut self, key: &str, unit: Unit) -> Result<Argument, InputError> {
         let base = without_suffix(key, unit);
         let found =
             self.section.positive(base, unit, |value| InputErrorKind::NotPositive { value })?;
@@ -181,7 +181,7 @@ impl<'s, 'a, 'i> ArgumentReader<'s, 'a, 'i> {
 
     /// Reads the end point of a spring: x and y in the plane normal to the joint's axis, not on the
     /// axis.
-    fn point(&mut self, key: &str) -> Result<Argument, InputError> {
+    fn read_point(&mut self, key: &str) -> Result<Argument, InputError> {
         let base = without_suffix(key, Unit::Length);
         let Some((item, suffix)) = self.section.quantity(base, Unit::Length)? else {
             return Err(self.section.missing(base, Unit::Length.alternatives(base)));
@@ -194,7 +194,7 @@ impl<'s, 'a, 'i> ArgumentReader<'s, 'a, 'i> {
         }
     }
 
-    fn free_length(&mut self, key: &str) -> Result<Argument, InputError> {
+    fn read_free_length(&mut self, key: &str) -> Result<Argument, InputError> {
         let base = without_suffix(key, Unit::Length);
         let found = self.section.not_negative(base, Unit::Length)?;
         found

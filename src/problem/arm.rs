@@ -22,8 +22,8 @@ pub(super) fn read_joints(
     }
     let form_is_declared = root.peek("dh").is_some();
     let form = root
-        .word("dh", &["modified", "standard"], &[Form::Modified, Form::Standard])?
-        .unwrap_or(Form::Modified);
+        .word("dh", &["modified", "standard"], &[DhForm::Modified, DhForm::Standard])?
+        .unwrap_or(DhForm::Modified);
     let (mut joints, mut beams, mut mimics, mut parents) =
         (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     for mut section in root.sections("joint")? {
@@ -35,7 +35,7 @@ pub(super) fn read_joints(
             return Err(leader.error(InputErrorKind::MimicsItself { joint: number }));
         }
         let parent = section.get("parent");
-        if let Some(item) = parent.as_ref().filter(|_| form == Form::Standard) {
+        if let Some(item) = parent.as_ref().filter(|_| form == DhForm::Standard) {
             return Err(item.error(InputErrorKind::NotInStandardForm));
         }
         parents.push(parent);
@@ -60,13 +60,13 @@ pub(super) fn read_joints(
     if !form_is_declared && root.peek("urdf").is_none() {
         warnings.extend(plausible::form_warning(&joints));
     }
-    let is_standard = form == Form::Standard;
+    let is_standard = form == DhForm::Standard;
     Ok((if is_standard { standard::to_modified_form(joints) } else { joints }, is_standard))
 }
 
 /// Order of the elementary transforms in a row of the joint table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Form {
+enum DhForm {
     /// Modified DH: α and a act before θ and d.
     Modified,
     /// Standard DH: θ and d act before a and α.
@@ -99,7 +99,7 @@ fn read_mimic(mut section: Section<'_, '_>, can_lead: &[bool]) -> Result<Mimic, 
 fn read_joint(
     mut section: Section<'_, '_>,
     number: usize,
-    (form, follows): (Form, bool),
+    (form, follows): (DhForm, bool),
     beams: &mut Vec<String>,
 ) -> Result<Joint, InputError> {
     let name = section.text("name")?.map_or_else(|| format!("joint {number}"), str::to_owned);
@@ -118,14 +118,14 @@ fn read_joint(
         theta = section.number("theta", Unit::Angle)?.unwrap_or(0.0);
         d = section.number("d", Unit::Length)?.unwrap_or(0.0);
     }
-    if placement.is_none() && form == Form::Modified {
+    if placement.is_none() && form == DhForm::Modified {
         beta = section.number("beta", Unit::Angle)?.unwrap_or(0.0);
     }
     check_compatible_keys(&section, number, (follows, placement.is_some()))?;
     let limits = read_limits(&mut section, if follows { JointKind::Fixed } else { kind })?;
     let stiffness = read_stiffness(&mut section, "stiffness", Unit::TorsionalStiffness)?;
     let beam = match section.section("beam")? {
-        Some(beam) if form == Form::Standard => {
+        Some(beam) if form == DhForm::Standard => {
             return Err(beam.error(InputErrorKind::BeamInStandardForm));
         }
         Some(beam) if a == 0.0 => return Err(beam.error(InputErrorKind::BeamWithoutLength)),
@@ -209,7 +209,9 @@ fn read_limits(section: &mut Section<'_, '_>, kind: JointKind) -> Result<(f64, f
         Ok(Some(((suffix.to_si)(item.number()?), item)))
     };
     match (limit("min")?, limit("max")?) {
-        (Some((min, lower)), Some((max, upper))) if min > max => Err(lower.above(&upper)),
+        (Some((min, lower)), Some((max, upper))) if min > max => {
+            Err(lower.crossed_limits_error(&upper))
+        }
         (min, max) => Ok((
             min.map_or(f64::NEG_INFINITY, |(min, _)| min),
             max.map_or(f64::INFINITY, |(max, _)| max),

@@ -23,7 +23,7 @@ pub(super) struct Carriers<'a> {
 }
 
 /// Declared properties of a fixture, with the fields of [`Fixture`](super::Fixture).
-pub(super) struct Declared {
+pub(super) struct DeclaredFixture {
     pub kind: FixtureKind,
     pub known: Vec<Option<f64>>,
     pub carrier: Option<usize>,
@@ -32,7 +32,7 @@ pub(super) struct Declared {
     pub image: Option<[f64; 2]>,
 }
 
-impl Declared {
+impl DeclaredFixture {
     /// Creates the properties of a fixture that is at rest in the measuring frame.
     pub fn new(kind: FixtureKind, known: Vec<Option<f64>>) -> Self {
         Self { kind, known, carrier: None, points: Vec::new(), sigma: None, image: None }
@@ -43,7 +43,7 @@ impl Declared {
 pub(super) fn read_camera(
     section: &mut Section<'_, '_>,
     carriers: Carriers,
-) -> Result<Declared, InputError> {
+) -> Result<DeclaredFixture, InputError> {
     let kinds = [FixtureKind::Camera, FixtureKind::Fisheye];
     let kind = section.word("model", &["pinhole", "fisheye"], &kinds)?;
     let kind = kind.unwrap_or(FixtureKind::Camera);
@@ -74,7 +74,7 @@ pub(super) fn read_camera(
     if sigma <= 0.0 {
         return Err(item.error(InputErrorKind::NotPositive { value: sigma }));
     }
-    Ok(Declared { carrier, sigma: Some(sigma), image, ..Declared::new(kind, known) })
+    Ok(DeclaredFixture { carrier, sigma: Some(sigma), image, ..DeclaredFixture::new(kind, known) })
 }
 
 /// Reads width and height of images, two whole numbers above zero.
@@ -100,7 +100,7 @@ fn read_positive_pair(item: &Item<'_, '_>) -> Result<[f64; 2], InputError> {
 pub(super) fn read_marker(
     section: &mut Section<'_, '_>,
     carriers: Carriers,
-) -> Result<Declared, InputError> {
+) -> Result<DeclaredFixture, InputError> {
     let carrier = section.get("on").map_or(Ok(None), |on| read_carrier(&on, carriers))?;
     let known = read_pose(section)?;
     let Some((item, suffix)) = section.quantity("points", Unit::Length)? else {
@@ -113,7 +113,7 @@ pub(super) fn read_marker(
     }
     let point = |point: &Item<'_, '_>| Ok(point.vector()?.map(suffix.to_si));
     let points = listed.iter().map(point).collect::<Result<_, InputError>>()?;
-    Ok(Declared { carrier, points, ..Declared::new(FixtureKind::Marker, known) })
+    Ok(DeclaredFixture { carrier, points, ..DeclaredFixture::new(FixtureKind::Marker, known) })
 }
 
 /// Reads the frame that carries an object: 0 is the base, i that of joint i, `None` the measuring

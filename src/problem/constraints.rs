@@ -89,7 +89,7 @@ fn read_constraint(mut section: Section<'_, '_>) -> Result<Constraint, InputErro
         (Some((least, lower)), Some((most, upper)))
             if least.kind == most.kind && least.value > most.value =>
         {
-            return Err(lower.above(upper));
+            return Err(lower.crossed_limits_error(upper));
         }
         _ => {}
     }

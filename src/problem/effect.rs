@@ -41,22 +41,29 @@ impl Effect {
         data: &Data,
     ) -> Option<InputErrorKind> {
         let only = self.family().map_or(&[][..], |family| family.only);
-        only.iter().find_map(|only| self.unmet(*only, statics, joints)).or_else(|| {
-            if let Some(name) = self.covariate()
-                && !data.covariates.iter().any(|known| known.name == name)
-            {
-                let known = data.covariates.iter().map(|known| known.name.clone()).collect();
-                return Some(InputErrorKind::UnknownCovariate { name, known });
-            }
-            let write = "reference_temperature_C in [data]";
-            (self.is_thermal() && data.reference_temperature.is_none())
-                .then_some(InputErrorKind::NeedsTemperature { write })
-        })
+        only.iter().find_map(|only| self.unmet_condition_error(*only, statics, joints)).or_else(
+            || {
+                if let Some(name) = self.covariate()
+                    && !data.covariates.iter().any(|known| known.name == name)
+                {
+                    let known = data.covariates.iter().map(|known| known.name.clone()).collect();
+                    return Some(InputErrorKind::UnknownCovariate { name, known });
+                }
+                let write = "reference_temperature_C in [data]";
+                (self.is_thermal() && data.reference_temperature.is_none())
+                    .then_some(InputErrorKind::NeedsTemperature { write })
+            },
+        )
     }
 
     /// Returns the error if the arm does not meet the condition `only`, which the effect requires;
     /// `None` if it does.
-    fn unmet(&self, only: Only, statics: Statics, joints: &[Joint]) -> Option<InputErrorKind> {
+    fn unmet_condition_error(
+        &self,
+        only: Only,
+        statics: Statics,
+        joints: &[Joint],
+    ) -> Option<InputErrorKind> {
         match only {
             Only::Link => {
                 let joint = self.joint()?;

@@ -8,7 +8,7 @@ use std::f64::consts::PI;
 use nalgebra::Vector3;
 
 use super::Problem;
-use super::camera::{Carriers, Declared, read_camera, read_marker};
+use super::camera::{Carriers, DeclaredFixture, read_camera, read_marker};
 use super::frame::frame_word;
 use super::item::name_of;
 use super::section::Section;
@@ -100,14 +100,14 @@ pub(super) fn read(
                 }));
             }
             let declared = match table {
-                "point" => Declared::new(FixtureKind::Point, read_place(&mut section)?),
-                "anchor" => Declared::new(FixtureKind::Anchor, read_place(&mut section)?),
+                "point" => DeclaredFixture::new(FixtureKind::Point, read_place(&mut section)?),
+                "anchor" => DeclaredFixture::new(FixtureKind::Anchor, read_place(&mut section)?),
                 "surface" => read_surface(&mut section)?,
                 "camera" => read_camera(&mut section, carriers)?,
                 _ => read_marker(&mut section, carriers)?,
             };
             section.finish()?;
-            let Declared { kind, known, carrier, points, sigma, image } = declared;
+            let DeclaredFixture { kind, known, carrier, points, sigma, image } = declared;
             let location = section.location();
             fixtures.push(Fixture { name, kind, known, carrier, points, sigma, image, location });
         }
@@ -123,7 +123,7 @@ fn read_place(section: &mut Section<'_, '_>) -> Result<Vec<Option<f64>>, InputEr
     Ok(at.map_or(vec![None; 3], |at| at.iter().map(|x| Some(*x)).collect()))
 }
 
-fn read_surface(section: &mut Section<'_, '_>) -> Result<Declared, InputError> {
+fn read_surface(section: &mut Section<'_, '_>) -> Result<DeclaredFixture, InputError> {
     section.require("kind", "kind = \"plane\" or \"sphere\"")?;
     let kinds = [FixtureKind::Plane, FixtureKind::Sphere];
     let kind = section.word("kind", &["plane", "sphere"], &kinds)?.unwrap_or(FixtureKind::Plane);
@@ -133,11 +133,11 @@ fn read_surface(section: &mut Section<'_, '_>) -> Result<Declared, InputError> {
             section
                 .positive("radius", Unit::Length, |value| InputErrorKind::NotPositive { value })?,
         );
-        return Ok(Declared::new(kind, numbers));
+        return Ok(DeclaredFixture::new(kind, numbers));
     }
     let at = section.vector("at", Unit::Length)?;
     let Some(item) = section.get("normal") else {
-        return Ok(Declared::new(kind, vec![None; 3]));
+        return Ok(DeclaredFixture::new(kind, vec![None; 3]));
     };
     let normal = item.vector()?;
     let length = normal.norm();
@@ -146,7 +146,7 @@ fn read_surface(section: &mut Section<'_, '_>) -> Result<Declared, InputError> {
     }
     let [rx, ry] = lean(&(normal / length));
     let distance = at.map(|at| at.dot(&normal) / length);
-    Ok(Declared::new(kind, vec![Some(rx), Some(ry), distance]))
+    Ok(DeclaredFixture::new(kind, vec![Some(rx), Some(ry), distance]))
 }
 
 /// Returns the coordinates (rx, ry) of a plane from its unit normal \[rad\]; see

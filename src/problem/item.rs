@@ -101,7 +101,7 @@ impl<'a, 'i> Item<'a, 'i> {
 
     /// Returns the error that this value, a lower limit, is above the upper limit `upper`. The
     /// message quotes both entries.
-    pub fn above(&self, upper: &Self) -> InputError {
+    pub fn crossed_limits_error(&self, upper: &Self) -> InputError {
         let written = |item: &Self| {
             item.document
                 .text

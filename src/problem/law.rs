@@ -13,7 +13,7 @@ const MAX_TERMS: usize = 50;
 /// Maximum number of parameters inside the formulas of one law.
 const MAX_PARAMETERS: usize = 20;
 /// Keys of a law other than the prior, whose key has a unit suffix.
-const KEYS: [&str; 3] = ["name", "at", "terms"];
+const LAW_KEYS: [&str; 3] = ["name", "at", "terms"];
 
 /// Reads a law for an arm with these joints and data with these covariates.
 pub(super) fn read(
@@ -32,7 +32,7 @@ pub(super) fn read(
         .map_err(|reason| at.error(InputErrorKind::LawSite { reason }))?;
     let prior = read_prior(&mut section, law_unit(site.at, site.joint(), joints))?;
     let parameters = read_parameters(&mut section)?;
-    let formulas = formulas(&terms)?;
+    let formulas = read_formulas(&terms)?;
     let slides: Vec<bool> = joints.iter().map(|joint| joint.kind == JointKind::Prismatic).collect();
     let covariates: Vec<String> =
         data.covariates.iter().map(|covariate| covariate.name.clone()).collect();
@@ -109,7 +109,7 @@ fn read_prior(section: &mut Section<'_, '_>, unit: Unit) -> Result<Option<LawPri
 fn read_parameters(section: &mut Section<'_, '_>) -> Result<Vec<LawParameter>, InputError> {
     let mut parameters = Vec::new();
     for (key, item) in section.entries() {
-        if KEYS.contains(&key) || !item.holds_tables() {
+        if LAW_KEYS.contains(&key) || !item.holds_tables() {
             continue;
         }
         section.get(key);
@@ -147,7 +147,7 @@ fn read_parameters(section: &mut Section<'_, '_>) -> Result<Vec<LawParameter>, I
 }
 
 /// Reads the formulas, each with its location.
-fn formulas<'a, 'i>(terms: &Item<'a, 'i>) -> Result<Vec<(Item<'a, 'i>, &'a str)>, InputError> {
+fn read_formulas<'a, 'i>(terms: &Item<'a, 'i>) -> Result<Vec<(Item<'a, 'i>, &'a str)>, InputError> {
     let elements = terms.list("a list of formulas in quotes")?;
     terms.check_count("terms", elements.len(), MAX_TERMS)?;
     if elements.is_empty() {

@@ -80,8 +80,8 @@ const MAX_RULES: usize = 2000;
 const MAX_PATTERN_BYTES: usize = 500;
 
 /// Units of the values that a rule may give, in the order of [`Quantities`].
-const KINDS: [Unit; 4] = [Unit::Angle, Unit::Length, Unit::Pixel, Unit::Ratio];
-/// Nominal value for each unit in [`KINDS`], on the scale of bounds: deviation 0, or ratio 1 to the
+const RULE_UNITS: [Unit; 4] = [Unit::Angle, Unit::Length, Unit::Pixel, Unit::Ratio];
+/// Nominal value for each unit in [`RULE_UNITS`], on the scale of bounds: deviation 0, or ratio 1 to the
 /// nominal value.
 const NOMINAL_VALUES: [f64; 4] = [0.0, 0.0, 0.0, 1.0];
 
@@ -151,7 +151,7 @@ fn read_rule(pattern: &str, item: &Item<'_, '_>) -> Result<ParameterRule, InputE
     } else {
         let kinds = NOMINAL_VALUES.into_iter().zip(&sigma.0).zip(&min.0).zip(&max.0);
         for (((nominal, sigma), min), max) in kinds {
-            check(nominal, sigma.as_ref(), min.as_ref(), max.as_ref())?;
+            check_consistency(nominal, sigma.as_ref(), min.as_ref(), max.as_ref())?;
         }
         Freedom::Free { sigma: sigma.quantities(), min: min.quantities(), max: max.quantities() }
     };
@@ -165,17 +165,17 @@ fn read_flag(section: &mut Section<'_, '_>, key: &str) -> Result<Option<bool>, I
 /// Prior width or bound in SI, with its entry in the file.
 type Value<'a, 'i> = (f64, Item<'a, 'i>);
 
-/// Prior widths or bounds, one for each unit in [`KINDS`].
-struct ValuesByUnit<'a, 'i>([Option<Value<'a, 'i>>; KINDS.len()]);
+/// Prior widths or bounds, one for each unit in [`RULE_UNITS`].
+struct ValuesByUnit<'a, 'i>([Option<Value<'a, 'i>>; RULE_UNITS.len()]);
 
 impl<'a, 'i> ValuesByUnit<'a, 'i> {
     fn read(section: &mut Section<'a, 'i>, base: &str) -> Result<Self, InputError> {
         if let Some(bare) = section.peek(base) {
-            let write = KINDS.map(|unit| unit.alternatives(base)).join(" or ");
+            let write = RULE_UNITS.map(|unit| unit.alternatives(base)).join(" or ");
             return Err(bare.error(InputErrorKind::NeedsUnit { noun: "a spread or bound", write }));
         }
         let mut values = [None, None, None, None];
-        for (value, unit) in values.iter_mut().zip(KINDS) {
+        for (value, unit) in values.iter_mut().zip(RULE_UNITS) {
             if let Some((item, suffix)) = section.pick(base, unit)? {
                 *value = Some(((suffix.to_si)(item.number()?), item));
             }
@@ -192,7 +192,7 @@ impl<'a, 'i> ValuesByUnit<'a, 'i> {
 
 /// Returns an error if prior width and bounds for one unit contradict each other. `nominal` is the
 /// nominal value on the scale of the bounds.
-fn check(
+fn check_consistency(
     nominal: f64,
     sigma: Option<&Value<'_, '_>>,
     min: Option<&Value<'_, '_>>,
@@ -204,7 +204,7 @@ fn check(
     if let (Some((min, item)), Some((max, upper))) = (min, max)
         && min > max
     {
-        return Err(item.above(upper));
+        return Err(item.crossed_limits_error(upper));
     }
     // A ratio to the nominal value must be positive, because its logarithm is bounded.
     if let Some((value, item)) =

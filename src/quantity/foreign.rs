@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 use super::Unit;
 
 /// Suffixes of units that are not read: quantity, and factor that converts to SI.
-const FOREIGN: [(&str, Unit, f64); 31] = [
+const FOREIGN_UNITS: [(&str, Unit, f64); 31] = [
     ("um", Unit::Length, 1e-6),
     ("µm", Unit::Length, 1e-6),
     ("micron", Unit::Length, 1e-6),
@@ -42,13 +42,13 @@ const FOREIGN: [(&str, Unit, f64); 31] = [
 impl Unit {
     /// Returns the suffixes of units of this quantity that files do not use.
     pub(crate) fn foreign_suffixes(self) -> impl Iterator<Item = &'static str> {
-        FOREIGN.iter().filter(move |(_, unit, _)| *unit == self).map(|(suffix, ..)| *suffix)
+        FOREIGN_UNITS.iter().filter(move |(_, unit, _)| *unit == self).map(|(suffix, ..)| *suffix)
     }
 
     /// Converts a value in a unit that files do not use to the unit of tables, rounded to twelve
     /// digits. Returns `None` if `suffix` is not such a unit of this quantity.
     pub(crate) fn convert_foreign(self, suffix: &str, value: f64) -> Option<f64> {
-        let known = FOREIGN.iter().find(|(known, unit, _)| *unit == self && *known == suffix);
+        let known = FOREIGN_UNITS.iter().find(|(known, unit, _)| *unit == self && *known == suffix);
         let converted = value * known?.2 * self.in_tables().factor;
         format!("{converted:.11e}").parse().ok()
     }
@@ -69,7 +69,7 @@ mod tests {
         ] {
             assert_eq!(unit.convert_foreign(suffix, value), converted, "{suffix}");
         }
-        for (suffix, unit, _) in FOREIGN {
+        for (suffix, unit, _) in FOREIGN_UNITS {
             assert!(unit.suffix(suffix).is_none(), "{suffix} is read");
         }
     }

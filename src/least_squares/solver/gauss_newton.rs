@@ -53,7 +53,7 @@ pub fn minimise_gauss_newton<O: Objective>(
         linearisations: 0,
         termination: None,
     });
-    let adapter = Adapter { objective, record };
+    let adapter = ArgminAdapter { objective, record };
     let mut solution = Solution::at(start);
     if adapter.objective.parameters() != solution.x.len() {
         solution.termination = Termination::SizeMismatch;
@@ -99,7 +99,7 @@ pub fn minimise_gauss_newton<O: Objective>(
 type GaussNewtonState = IterState<DVector<f64>, (), DMatrix<f64>, (), DVector<f64>, f64>;
 
 /// Objective with a record of the run, in the form that argmin's method expects.
-struct Adapter<O> {
+struct ArgminAdapter<O> {
     objective: O,
     record: RefCell<RunRecord>,
 }
@@ -118,7 +118,7 @@ struct RunRecord {
 #[error("{0}")]
 struct Stopped(Termination);
 
-impl<O: Objective> Adapter<O> {
+impl<O: Objective> ArgminAdapter<O> {
     /// Calls `extract` with the linearisation at x, which is computed unless x is the last point.
     /// Returns an error if the run ends there.
     fn with_linearisation<T>(
@@ -158,7 +158,7 @@ impl<O: Objective> Adapter<O> {
     }
 }
 
-impl<O: Objective> Operator for &Adapter<O> {
+impl<O: Objective> Operator for &ArgminAdapter<O> {
     type Param = DVector<f64>;
     type Output = DVector<f64>;
 
@@ -167,7 +167,7 @@ impl<O: Objective> Operator for &Adapter<O> {
     }
 }
 
-impl<O: Objective> Jacobian for &Adapter<O> {
+impl<O: Objective> Jacobian for &ArgminAdapter<O> {
     type Param = DVector<f64>;
     type Jacobian = DMatrix<f64>;
 

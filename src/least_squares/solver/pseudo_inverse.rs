@@ -8,7 +8,7 @@ use nalgebra::DVector;
 use super::divergence::DivergenceMonitor;
 use super::execute::{NoObserver, ReportsTermination, run};
 use super::spectrum::Spectrum;
-use super::trust_region::{ended, take_point};
+use super::trust_region::{state_after_iteration, take_point};
 use super::{Divergence, Solution, State, Termination};
 use crate::least_squares::{Linearisation, Objective};
 
@@ -109,7 +109,7 @@ impl<O: Objective> Solver<O, State> for PseudoInverse {
         let x = take_point(&mut state)?;
         if problem.problem.as_ref().map(Objective::parameters) != Some(x.len()) {
             self.termination = Some(Termination::SizeMismatch);
-            return Ok((ended(state, x, f64::INFINITY, self.termination), None));
+            return Ok((state_after_iteration(state, x, f64::INFINITY, self.termination), None));
         }
         let linearisation = problem.problem("linearise_count", |o| Ok(o.linearise(&x)))?;
         let cost = linearisation.cost;
@@ -117,7 +117,7 @@ impl<O: Objective> Solver<O, State> for PseudoInverse {
             Some(Termination::Diverged) => Some(Termination::OutsideDomainAtStart),
             termination => termination,
         };
-        Ok((ended(state, x, cost, self.termination), None))
+        Ok((state_after_iteration(state, x, cost, self.termination), None))
     }
 
     fn next_iter(
@@ -140,7 +140,7 @@ impl<O: Objective> Solver<O, State> for PseudoInverse {
         self.termination = self.accept_linearisation(linearisation).or(small_step);
         let cost = if cost.is_nan() { f64::INFINITY } else { cost };
         let log = kv!("length" => length;);
-        Ok((ended(state, point, cost, self.termination), Some(log)))
+        Ok((state_after_iteration(state, point, cost, self.termination), Some(log)))
     }
 }
 

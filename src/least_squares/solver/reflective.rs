@@ -49,7 +49,7 @@ impl ScaledModel {
         Candidate { scaled, change }
     }
 
-    fn step(&self, scaled: &DVector<f64>) -> DVector<f64> {
+    fn unscaled_step(&self, scaled: &DVector<f64>) -> DVector<f64> {
         scaled.component_mul(&self.size)
     }
 
@@ -108,7 +108,7 @@ impl Reflective {
         scaled: &DVector<f64>,
         radius: f64,
     ) -> Candidate {
-        let (stride, hits) = self.fraction_to_bound(x, &model.step(scaled));
+        let (stride, hits) = self.fraction_to_bound(x, &model.unscaled_step(scaled));
         let on_bound = scaled * stride;
         let mut mirrored = scaled.clone();
         for &j in &hits {
@@ -116,8 +116,10 @@ impl Reflective {
         }
         let reflected = {
             let to_radius = fraction_to_radius(&on_bound, &mirrored, radius);
-            let (to_bound, _) =
-                self.fraction_to_bound(&(x + model.step(&on_bound)), &model.step(&mirrored));
+            let (to_bound, _) = self.fraction_to_bound(
+                &(x + model.unscaled_step(&on_bound)),
+                &model.unscaled_step(&mirrored),
+            );
             let limit = to_bound.min(to_radius);
             let low = if limit > 0.0 { (1.0 - MAX_BOUND_FRACTION) * stride / limit } else { 0.0 };
             let high =
@@ -127,7 +129,7 @@ impl Reflective {
         let straight = model.candidate(&on_bound * MAX_BOUND_FRACTION);
         let down = -&model.gradient;
         let to_radius = radius / down.norm().max(f64::MIN_POSITIVE);
-        let (to_bound, _) = self.fraction_to_bound(x, &model.step(&down));
+        let (to_bound, _) = self.fraction_to_bound(x, &model.unscaled_step(&down));
         let high = (MAX_BOUND_FRACTION * to_bound).min(to_radius);
         let descent = model.best_along(&DVector::zeros(x.len()), &down, 0.0, high);
         let best = if descent.change < straight.change { descent } else { straight };
@@ -222,13 +224,13 @@ impl Subproblem for Reflective {
     fn step(&mut self, x: &DVector<f64>, radius: f64) -> Step {
         let Some(mut model) = self.model.take() else { return Step::none(x) };
         let (scaled, damping) = model.factor.limited(radius);
-        let is_inside = self.bounds.contain(&(x + model.step(&scaled)));
+        let is_inside = self.bounds.contain(&(x + model.unscaled_step(&scaled)));
         let Candidate { scaled, change } = if is_inside {
             model.candidate(scaled)
         } else {
             self.best_inside(&model, x, &scaled, radius)
         };
-        let mut point = x + model.step(&scaled);
+        let mut point = x + model.unscaled_step(&scaled);
         self.bounds.clamp(&mut point);
         let slope = -model.gradient.dot(&scaled);
         self.model = Some(model);

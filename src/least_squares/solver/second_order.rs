@@ -25,7 +25,7 @@ const MIN_MISSES_PER_UNKNOWN_FOR_FORMATION: f64 = 1.0 / 6.0;
 /// formed if those steps would cost more than S, or exceed the iteration limit.
 const MIN_SLOW_STEPS: usize = 3;
 /// Number of steps per unknown that must pass before S is formed again.
-const MIN_STEPS_PER_UNKNOWN: f64 = 1.0 / 40.0;
+const MIN_STEPS_PER_UNKNOWN_BETWEEN_FORMATIONS: f64 = 1.0 / 40.0;
 /// Ratio of the lengths of successive undamped steps above which convergence is slow.
 const MIN_SLOW_RATIO: f64 = 0.5;
 /// Maximum number of times that S is formed in one run.
@@ -142,7 +142,7 @@ impl SecondOrder {
         self.age += 1;
         let per_unknown = |factor: f64| factor * unknowns as f64;
         let pays = if self.matrix.is_some() {
-            self.age as f64 >= per_unknown(MIN_STEPS_PER_UNKNOWN)
+            self.age as f64 >= per_unknown(MIN_STEPS_PER_UNKNOWN_BETWEEN_FORMATIONS)
         } else {
             let limit = per_unknown(MIN_MISSES_PER_UNKNOWN_FOR_FORMATION)
                 .max(MIN_MISSES_FOR_FORMATION as f64);

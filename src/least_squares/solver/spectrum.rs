@@ -11,12 +11,12 @@ const MAX_SECULAR_STEPS: usize = 50;
 /// Singular value expansion of min ‖B q + c‖ with B = U Σ Vᵀ, restricted to the retained σᵢ.
 #[derive(Debug, Clone)]
 pub(super) struct Spectrum {
-    terms: Vec<Term>,
+    terms: Vec<SpectralTerm>,
 }
 
 /// Term of the expansion that belongs to one singular value.
 #[derive(Debug, Clone)]
-struct Term {
+struct SpectralTerm {
     /// Singular value σᵢ of B.
     singular: f64,
     /// Projection `−uᵢᵀc` of the constant.
@@ -25,7 +25,7 @@ struct Term {
     direction: DVector<f64>,
 }
 
-impl Term {
+impl SpectralTerm {
     /// Returns the length of q(λ) along vᵢ, in a form that needs no σ² at λ = 0.
     fn length(&self, lambda: f64) -> f64 {
         self.projected / (self.singular + lambda / self.singular)
@@ -40,7 +40,7 @@ impl Spectrum {
         let largest = singular.iter().copied().fold(0.0, f64::max);
         let terms = (0..singular.len())
             .filter(|&i| singular[i] > cut * largest && singular[i].is_normal())
-            .map(|i| Term {
+            .map(|i| SpectralTerm {
                 singular: singular[i],
                 projected: -projected[i],
                 direction: columns.column(i) / singular[i],

@@ -307,7 +307,7 @@ impl<S: Subproblem> ReportsTermination for TrustRegion<S> {
 }
 
 /// Returns the state at x after an iteration, marked as terminated if there is a `termination`.
-pub(super) fn ended(
+pub(super) fn state_after_iteration(
     state: State,
     x: DVector<f64>,
     cost: f64,
@@ -345,7 +345,7 @@ impl<O: Objective, S: Subproblem> Solver<O, State> for TrustRegion<S> {
         let parameters = problem.problem.as_ref().map(Objective::parameters);
         if parameters != Some(x.len()) || !self.subproblem.admit_start(&mut x) {
             self.termination = Some(Termination::SizeMismatch);
-            return Ok((ended(state, x, f64::INFINITY, self.termination), None));
+            return Ok((state_after_iteration(state, x, f64::INFINITY, self.termination), None));
         }
         let linearisation = problem.problem("linearise_count", |o| Ok(o.linearise(&x)))?;
         let cost = linearisation.cost;
@@ -357,7 +357,7 @@ impl<O: Objective, S: Subproblem> Solver<O, State> for TrustRegion<S> {
         if self.termination.is_none() {
             self.prepare(&x);
         }
-        Ok((ended(state, x, cost, self.termination), None))
+        Ok((state_after_iteration(state, x, cost, self.termination), None))
     }
 
     fn next_iter(
@@ -425,6 +425,6 @@ impl<O: Objective, S: Subproblem> Solver<O, State> for TrustRegion<S> {
             }
         }
         self.termination = termination;
-        Ok((ended(state, x, cost, termination), Some(log)))
+        Ok((state_after_iteration(state, x, cost, termination), Some(log)))
     }
 }
