@@ -49,8 +49,9 @@ fn parse_probability(text: &str) -> Result<f64, String> {
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let common = &arguments.common;
     let problem = Problem::read(common.problem())?;
-    let others = std::slice::from_ref(&arguments.estimate);
-    let results = common.results("watch", &problem, others, &["watch.json", "watch.html"])?;
+    let estimate_file = std::slice::from_ref(&arguments.estimate);
+    let results =
+        common.results("watch", &problem, estimate_file, &["watch.json", "watch.html"])?;
     let (rows, warnings) = Measurements::read(common.files(&problem), &problem)?;
     common.warn(&warnings);
     let estimate = arguments.trust.read(&arguments.estimate)?;

@@ -135,21 +135,21 @@ const STIFFNESS_UNITS: [Unit; 3] =
 /// first.
 fn differences([a, b]: &[Side; 2]) -> Vec<Difference> {
     let variance = |side: &Side, k: usize| side.estimate.posterior().covariance[(k, k)];
-    let others: Vec<(&str, f64, Option<f64>)> = b.estimate.entries().collect();
+    let entries_of_b: Vec<(&str, f64, Option<f64>)> = b.estimate.entries().collect();
     let of = |(k, (name, value, _)): (usize, (&str, f64, Option<f64>))| {
-        let index = others.iter().position(|entry| entry.0 == name)?;
+        let index = entries_of_b.iter().position(|entry| entry.0 == name)?;
         let (factor, symbol) = match a.estimate.unit_of(name).unwrap_or_default() {
             "rad" => (1_f64.to_degrees(), "°"),
             "m" => (1e3, "mm"),
             symbol => (1.0, symbol),
         };
-        let magnitude = value.abs().max(others[index].1.abs());
+        let magnitude = value.abs().max(entries_of_b[index].1.abs());
         let prefixed = STIFFNESS_UNITS.into_iter().find(|unit| unit.symbol() == symbol);
         let (factor, symbol) = prefixed.map_or((factor, symbol.to_owned()), |unit| {
             let display = unit.display(magnitude);
             (display.factor, display.symbol)
         });
-        let values = [value, others[index].1].map(|value| value * factor);
+        let values = [value, entries_of_b[index].1].map(|value| value * factor);
         let sigma = (variance(a, k) + variance(b, index)).sqrt() * factor;
         let sigma = Some(sigma).filter(|sigma| sigma.is_finite());
         Some(Difference {

@@ -49,9 +49,9 @@ impl ExportRemarks {
 pub fn better_geometry(result: &ExportResult) -> Option<&'static str> {
     let errors = result.held_out.as_ref()?;
     let alternatives = [&errors.best_rigid, &errors.fitted_alone].into_iter().zip(GEOMETRY_OPTIONS);
-    let known =
+    let compared =
         alternatives.filter_map(|(summary, option)| Some((mean(summary.as_ref()?), option)));
-    let (least, option) = known.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    let (least, option) = compared.min_by(|a, b| a.0.total_cmp(&b.0))?;
     (mean(&errors.rigid) > MAX_EQUAL_RATIO * least).then_some(option)
 }
 

@@ -191,6 +191,6 @@ fn ratio_table(study: &MisprintStudy, found: &ReplicaResults) -> Table {
     let words: Vec<String> = study.cases.iter().map(Case::name).collect();
     let note =
         format!("mean/mean: of {}; links: ratio of link to joint flexibility,", words.join(", "));
-    let rest = "relative to the declared ratio; one load: all poses under one load; z/sum and max/max: of the first case";
-    Table::new(&header, rows, &[0, 1]).noted(&[&note, rest])
+    let continued = "relative to the declared ratio; one load: all poses under one load; z/sum and max/max: of the first case";
+    Table::new(&header, rows, &[0, 1]).noted(&[&note, continued])
 }

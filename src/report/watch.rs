@@ -12,7 +12,7 @@ use crate::quantity::format::{counted, decimals, number, or_dash, p_value, two_d
 
 /// Header of the table of causes.
 const HEADER: [&str; 5] = ["cause", "probability", "change ± 1 σ", "error left out", "more poses"];
-/// p-value of the errors below which the text does not say that noise and known misfit explain
+/// p-value of the errors below which the text does not say that noise and the misfit explain
 /// them.
 const MIN_EXPECTED_P: f64 = 0.01;
 /// Maximum number of decimals of a change.

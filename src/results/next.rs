@@ -35,7 +35,8 @@ pub struct NextResult {
     /// Error over the workspace; null with fewer than ten measured configurations, or fewer measured
     /// coordinates than fitted parameters.
     pub now: Option<WorkspaceError>,
-    /// Expected error after any number of further poses.
+    /// Expected error over the workspace after arbitrarily many additional poses; null if it is
+    /// unknown.
     pub attainable_mm: Option<f64>,
     /// Reason for which fewer poses are named than requested: `enough`, `gain-below-noise` or
     /// `no-candidates`; null if there is none.
