@@ -13,8 +13,8 @@ const BLOCK_CANDIDATES: usize = 128;
 
 /// Covariance of the unknowns, with the products by which every candidate is evaluated.
 ///
-/// A further pose J changes C to C − W S⁻¹ Wᵀ with W = C Jᵀ and S = I + J C Jᵀ. The goal tr(C M)
-/// falls by tr(S⁻¹ Wᵀ M W). V = C Jᵀ and T = M V of all candidates follow each chosen pose by
+/// An additional pose J changes C to C − W S⁻¹ Wᵀ with W = C Jᵀ and S = I + J C Jᵀ. The goal tr(C
+/// M) falls by tr(S⁻¹ Wᵀ M W). V = C Jᵀ and T = M V of all candidates follow each chosen pose by
 /// updates of rank 3 (6 with orientation, 12 for views of cameras). One pose costs a number of
 /// operations proportional to unknowns times candidates. [Fedorov 1972, ch. 3]
 pub(super) struct Greedy<'a> {

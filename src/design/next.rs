@@ -388,9 +388,8 @@ fn pool_and_workspace(
     }
 }
 
-/// Returns the uncertainty of predictions by the fit `found`, with a remainder that is fitted to
-/// the rows at hand if the problem declares one or the options ask for it. `None` if the data are
-/// too few to estimate it.
+/// Returns the uncertainty of predictions by the fit `found`. A remainder is fitted to the same
+/// rows if the problem declares one or the options ask for it. `None` if the data are too few.
 fn correction(
     problem: &Problem,
     data: &Dataset,

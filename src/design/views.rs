@@ -114,8 +114,8 @@ struct View {
 }
 
 impl View {
-    /// Returns true if a point (marker frame) is in front of the camera and in its image, and the
-    /// line of sight makes at most 60° with the marker's normal.
+    /// Returns true if a point (marker frame) is in front of the camera and in its image. The line
+    /// of sight must also make at most 60° with the marker's normal.
     fn shows(&self, pixel: Observation, point: Vector3<f64>) -> bool {
         let Self { lens, marker, carriers, .. } = self;
         let fixtures = [*lens, *marker];

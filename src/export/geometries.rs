@@ -71,8 +71,9 @@ impl Geometry {
 
     /// Computes errors on the held-out rows of three geometries: this one, the approximation of the
     /// whole model, and the fit of a rigid model. The first is `None` if this is the identified
-    /// geometry. The others are `None` if they are this one, if the whole model is rigid without
-    /// effects, if a held-out row measures no position, or if they cannot be computed.
+    /// geometry. The others are `None` if they are this one or cannot be computed. They are also
+    /// `None` if the whole model is rigid without effects, or if a held-out row measures no
+    /// position.
     ///
     /// # Errors
     /// Returns an error if the estimate does not match the data.

@@ -153,7 +153,7 @@ pub fn rigid_errors(
     poses.iter().map(of_pose).collect()
 }
 
-/// Returns the frame of the joint that carries the target of a pose on a rigid arm, arm base frame.
+/// Returns the frame of the joint that a pose's target is mounted on, for a rigid arm, base frame.
 /// The commands of mimic joints are computed from their leaders.
 fn rigid_frame(problem: &Problem, model: &Model, arm: &Arm<f64>, pose: &Pose) -> Frame<f64> {
     let commands = pose.setup.configuration;

@@ -2,7 +2,7 @@
 //! of the effects follow.
 //!
 //! An entry reads `Variant "name-in-files" { field: Type = Kind as "key" } => Family { … }`.
-//! Formulas are those of [`expression`](super::expression); `{joint}` stands for the argument
+//! Formulas are those of [`expression`](super::expression); `{joint}` is replaced by the argument
 //! `joint`, and `T` for T − T₀. In the comments, θ is the joint's command, M the moment that the
 //! loads beyond the joint, link or base exert on it, T the temperature and T₀ its reference. Every
 //! effect vanishes if its parameters are zero.

@@ -136,7 +136,8 @@ pub enum At {
     Before(usize),
     /// Small motion of the frame behind the joint: x, y, z, rx, ry, rz.
     After(usize),
-    /// Small motion of the tool in the frame that carries it: x, y, z, rx, ry, rz.
+    /// Small motion of the tool in the frame of the joint that it is mounted on: x, y, z, rx, ry,
+    /// rz.
     Tool(usize),
     /// Relative error of every measured coordinate.
     Scale,

@@ -42,7 +42,7 @@ worded! {
         Zero = "joint-zero";
         /// Geometry of a link, except the zero of its joint.
         Link = "link";
-        /// Position of a target in the frame of the joint that carries it.
+        /// Position of a target in the frame of the joint that it is mounted on.
         Tool = "tool";
         /// Pose of the base in the measuring frame.
         Base = "base";

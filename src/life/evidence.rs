@@ -10,9 +10,9 @@
 //! Larger noise, and something else: their part of Σ becomes κ² I. One gross row i: S + λ² on the
 //! coordinates of row i.
 //!
-//! Each ratio is a density of all rows so far over that of "unchanged", so it is a martingale while
-//! the arm is unchanged, and so is a mixture of them. It exceeds 1/α at any time with a probability
-//! of at most α [Ville 1939; Grünwald, de Heide & Koolen 2024].
+//! Each ratio is a density of all rows so far over that of "unchanged". It is a martingale while
+//! the arm is unchanged, and so is a mixture of such ratios. The mixture exceeds 1/α at any time
+//! with a probability of at most α [Ville 1939; Grünwald, de Heide & Koolen 2024].
 
 use nalgebra::{DMatrix, DVector};
 

@@ -13,7 +13,7 @@ const MIN_SUSPICIOUS_TURNS: f64 = 2.0;
 /// Highest plausible temperature [°C]. Above it, a warning suggests that the column is in kelvins;
 /// even the temperature of a cold room exceeds it in kelvins.
 const MAX_PLAUSIBLE_TEMPERATURE: f64 = 200.0;
-/// Largest plausible payload \[kg\]. The strongest industrial arms carry 2300 kg.
+/// Largest plausible payload \[kg\]. The strongest industrial arms lift 2300 kg.
 const MAX_PAYLOAD: f64 = 3000.0;
 /// Largest plausible ratio of a payload to the declared mass of the arm. Arms lift at most about
 /// their own mass.

@@ -6,7 +6,7 @@ use crate::error::{InputError, TableErrorKind, Warning, WarningKind};
 /// Largest fraction of rows at 0, 0, 0 that counts as lost targets. In a table with more of them,
 /// the zeros may be placeholders of planned poses.
 const MAX_LOST_FRACTION: f64 = 0.5;
-/// Maximum number of further rows at 0, 0, 0 that a message lists.
+/// Maximum number of rows at 0, 0, 0 that a message lists after the first.
 const MAX_LISTED_ROWS: usize = 10;
 
 impl Measurements {

@@ -131,7 +131,7 @@ fn of_kind(
 }
 
 /// Returns the frame that a cell names, `base`, a joint by its name, or `joint3`: 0 is the base, i
-/// the frame of joint i. Without a column it is the frame of the joint that carries the tool.
+/// the frame of joint i. Without a column it is the frame of the joint that the tool is mounted on.
 fn frame_of(table: &Table, place: Option<usize>, problem: &Problem) -> Result<usize, InputError> {
     let Some(place) = place else { return Ok(problem.tool.joint + 1) };
     frame(table.name(place)?, &problem.joints, problem.tool.joint)

@@ -52,8 +52,8 @@ impl Measurements {
         ((ratio - 1.0).abs() < MAX_HOIST_DIFFERENCE).then_some(Warning { location, kind })
     }
 
-    /// Returns a warning, located at the largest angle, if all angles of columns in degrees are
-    /// within ±2π, as if they were in radians, although the joints have a larger range.
+    /// Returns a warning, located at the largest angle, if columns in degrees are probably in
+    /// radians: all their numbers are within ±2π, although the joints have a larger range.
     pub(super) fn few_degrees(&self, problem: &Problem, columns: &[Commands]) -> Option<Warning> {
         let is_angle = |column: &&Commands| {
             column.unit() == "deg"

@@ -7,8 +7,8 @@ use crate::error::{InputError, InputErrorKind, TableErrorKind};
 const MIN_EMPTY_CELLS: usize = 2;
 
 impl Table {
-    /// Returns true if the first cell of the current row begins with a letter and fewer than half
-    /// of the filled cells are numbers, as in the title or foot of a page.
+    /// Returns true if the current row is probably the title or foot of a page: its first cell
+    /// begins with a letter, and fewer than half of the filled cells are numbers.
     pub(super) fn is_line_of_words(&self) -> bool {
         let cells = || self.cells().iter().map(|cell| String::from_utf8_lossy(cell.trim_ascii()));
         let filled = || cells().filter(|cell| !cell.is_empty());

@@ -56,7 +56,7 @@ pub fn of_estimate(
     }
     let parse = |text: &str| Correction::parse(text, &estimate.file);
     let correction = estimate.prediction.as_deref().map(parse).transpose()?;
-    // An estimate of another arm is refused with a message of its own.
+    // Another check refuses an estimate of another arm, with a better message.
     Ok(correction.filter(|declared| declared.check(problem, &estimate.file).is_ok()))
 }
 

@@ -25,8 +25,9 @@ const LENGTH_BOUNDS: (f64, f64) = (-3.912_023, 2.079_441_5);
 const AMPLITUDE_BOUNDS: (f64, f64) = (-7.0, 2.0);
 /// Bounds of ln σ and ln σ_c, relative to ln(root mean square length of a residual).
 pub(super) const NOISE_BOUNDS: (f64, f64) = (-4.0, 2.0);
-/// Initial values of σ (noise of a coordinate) and σ_c (noise that the rows of one configuration
-/// share) in the search, as fractions of the root mean square length of a residual.
+/// Initial values of σ and σ_c in the search, as fractions of the root mean square length of a
+/// residual. σ is the noise of a coordinate, σ_c the noise that the rows of one configuration
+/// share.
 pub(super) const NOISE_STARTS: [f64; 2] = [0.7, 0.3];
 
 /// Negative logarithm of marginal likelihood times hyperparameter priors, as a function of the
@@ -135,7 +136,7 @@ impl<'a> MarginalLikelihood<'a> {
     }
 
     /// Returns families of hyperparameter indices whose lengths are expected to be similar. All ℓᵤ
-    /// form one family, all ℓᵥ of commands another, and each ℓᵥ of a condition one of its own.
+    /// form one family, all ℓᵥ of commands another, and each ℓᵥ of a condition a separate one.
     fn length_families(&self) -> Vec<Range<usize>> {
         let Range { start, end } = self.input_lengths();
         let is_command = |source: &&Source| matches!(source, Source::Command(_));

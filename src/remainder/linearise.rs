@@ -14,9 +14,9 @@ use crate::model::parameter::{JointField, ParameterSite};
 use crate::model::{Model, Pose, PoseResiduals};
 use crate::problem::{Joint, JointKind, Problem};
 
-/// Smallest root mean square derivative of the position with respect to a joint's coordinate or
-/// compliance at which the remainder models its error, as a fraction of the largest over the
-/// joints.
+/// Smallest lever of a joint's coordinate or compliance, as a fraction of the largest over the
+/// joints, at which the remainder models its error. The lever is a root mean square derivative of
+/// the position.
 const MIN_LEVER: f64 = 1e-3;
 /// Largest ratio of standard deviation to mean at which a temperature, payload or hoist force
 /// counts as constant, so that errors do not depend on it.

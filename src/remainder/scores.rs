@@ -156,8 +156,8 @@ impl Scores {
     /// the probability 1 − `confidence`, if the scores have `freedom` degrees of freedom. `None`
     /// without scores.
     ///
-    /// Errors are normal vectors whose scale the scores give, stretched if the scores have a longer
-    /// tail than such vectors by more than the standard error of their quantile.
+    /// Errors are assumed to be normal vectors with the scale of the scores. They are stretched if
+    /// the scores have a longer tail by more than the standard error of their quantile.
     pub(super) fn pooled_bound(
         &self,
         sizes: &[f64],

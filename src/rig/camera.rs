@@ -18,7 +18,7 @@ const MAX_DRAWS: usize = 3000;
 /// its points are found: 60°.
 const MIN_COS_INCIDENCE: f64 = 0.5;
 /// Largest distance of a marker's point from the plane of the others at which the marker counts as
-/// flat, as a fraction of the largest distance of a point from the first.
+/// flat. It is a fraction of the marker's size, the largest distance from its first point.
 const MAX_FLAT_RATIO: f64 = 0.05;
 
 impl Rig {

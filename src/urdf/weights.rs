@@ -23,7 +23,7 @@ pub(super) struct CarriedMass {
 pub(super) fn carried_masses(chain: &Chain) -> (Vec<CarriedMass>, Vec<String>) {
     let robot = chain.robot;
     let (mut masses, mut beside) = (Vec::new(), Vec::new());
-    // Each entry is a link with its frame and carrying stage, from the base outwards.
+    // Each entry is a link with its frame and the stage that moves it, from the base outwards.
     let mut open = vec![(chain.base, Frame::identity(), None)];
     while let Some((link, frame, carrier)) = open.pop() {
         if let (Some(stage), Some(body)) = (carrier, robot.links.get(link))
