@@ -71,8 +71,8 @@ pub struct Identification {
     pub solver_reason: Option<&'static str>,
     /// Reason why the last least-squares fit stopped.
     pub termination: Termination,
-    /// Effect with which the model fits the table as it was read, if the checks found that the
-    /// table was misread and an effect expresses the mistake; else `None`.
+    /// Effect with which the model fits the table as it was read. `None` unless the checks found
+    /// that the table was misread, and an effect expresses the mistake.
     pub(crate) misread: Option<MisreadEffect>,
     /// Findings of the checks, errors first; a provisional fit is only checked for convergence.
     pub findings: Vec<Finding>,
@@ -103,8 +103,8 @@ pub struct Identification {
     /// Errors of the registered nominal arm and of the identified arm, for each kind of rows. Empty
     /// if there is only one kind.
     pub kinds: Vec<(Errors, Errors)>,
-    /// Scatter of the predicted target at each touched point: that of the registered nominal arm,
-    /// that of the identified arm, and true if all rows of the point are held out.
+    /// Scatter of the predicted target at each touched point: with the registered nominal arm and
+    /// with the identified arm. The flag is true if all rows of the point are held out.
     #[doc(hidden)]
     pub spreads: Vec<(PointSpread, PointSpread, bool)>,
     /// Errors of orientation; `None` if orientation is not fitted.
@@ -186,8 +186,8 @@ impl Identification {
         self.first_error().is_none()
     }
 
-    /// Returns true if the fit describes the measured arm well enough to search for effects: no
-    /// finding is an error, except one about a residual beyond the declared noise.
+    /// Returns true if the fit describes the measured arm well enough to search for effects. No
+    /// finding may be an error, except one about a residual beyond the declared noise.
     pub(crate) fn describes_arm(&self) -> bool {
         let is_noise = |finding: &Finding| finding.code == FindingCode::NoiseBeyondDeclared;
         let mut findings = self.findings.iter();

@@ -29,7 +29,7 @@ pub(crate) struct PriorComparison {
     /// `None` if it was not computed.
     pub chi2: Option<(f64, f64, f64)>,
     /// Texts of the causes of change that explain why the new rows contradict the prior, in the
-    /// order in which they were found; empty if the rows agree with it.
+    /// order in which they were found. Empty if the rows agree with the prior.
     pub causes: Vec<String>,
     /// Comparison of each parameter of which the prior contains information.
     pub parameters: Vec<ComparedParameter>,

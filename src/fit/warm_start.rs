@@ -6,8 +6,9 @@ use crate::fit::stages::noise_model::NoiseModel;
 use crate::fit::{Errors, Identification};
 use crate::model::{LinearModel, Model};
 
-/// State of a fit from which a fit of the same data, or of most of their rows, with other effects
-/// starts: registered parameters, noise models, and the linear model at the optimum.
+/// State of a fit from which the next fit starts: registered parameters, noise models, and the
+/// linear model at the optimum. The next fit is of the same data, or of most of their rows, with
+/// other effects.
 #[derive(Debug, Clone)]
 pub(crate) struct WarmStart {
     /// Names and deviations from nominal of the parameters that registration changed, mostly those

@@ -10,7 +10,7 @@ use super::{Elastic, geometric};
 use crate::problem::{PoseView, Problem};
 
 /// Arm in one pose in the notation of the paper: frames of the rigid arm with geometry E, and its
-/// deflections, from which the position of the end point follows.
+/// deflections. The position of the end point follows from both.
 #[derive(Debug, Clone)]
 pub struct EndPoint {
     /// Frames of the rigid arm.

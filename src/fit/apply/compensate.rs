@@ -149,9 +149,9 @@ fn transformed_by_bases(targets: &Measurements, bases: &[Frame<f64>]) -> Measure
     moved
 }
 
-/// Computes a command for each row of `targets`: the configuration nearest to that of the row (the
-/// seed) with which the arm reaches the row's position, and its orientation if it has one. The arm
-/// has the full parameter vector `x`; commands stay within the joint limits of `problem`.
+/// Computes a command for each row of `targets`. It is the configuration nearest to that of the row
+/// (the seed) with which the arm reaches the row's position, and its orientation if it has one. The
+/// arm has the full parameter vector `x`; commands stay within the joint limits of `problem`.
 ///
 /// Joints that do not lead to the target of a row keep the row's values. Effects on the
 /// measurement, such as instrument drift, are left out, because targets are desired positions of

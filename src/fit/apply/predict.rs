@@ -22,13 +22,13 @@ pub struct Residual {
     pub row: usize,
     /// True if the row is held out.
     pub held_out: bool,
-    /// Predicted value of what the row measures. For positions and contacts with a point, it is the
-    /// position of the target, measuring frame \[m\]; other rows have their numbers in the unit of
+    /// Predicted value of what the row measures: for positions and contacts with a point, the
+    /// position of the target, measuring frame \[m\]. Other rows have their numbers in the unit of
     /// their kind, a single number along x.
     pub predicted: Vector3<f64>,
-    /// Residual measured − predicted. For positions and contacts with a point, it is that of the
-    /// position of the target, measuring frame \[m\]; other rows have their numbers in the unit of
-    /// their kind, a single number along x. NaN if the arm has no equilibrium.
+    /// Residual measured − predicted: for positions and contacts with a point, that of the position
+    /// of the target, measuring frame \[m\]. Other rows have their numbers in the unit of their
+    /// kind, a single number along x. NaN if the arm has no equilibrium.
     pub position: Vector3<f64>,
     /// Residual of the measured numbers divided by 1 σ of a coordinate \[1\].
     pub whitened: Vector3<f64>,

@@ -144,9 +144,9 @@ impl ErrorsBySession {
 /// `None` if that is not known.
 ///
 /// # Errors
-/// Returns an error if the estimate belongs to another problem or lacks a parameter of the arm, if
-/// the rows do not determine a base, tool or fixture that the estimate lacks, or if the rows lack a
-/// column that an effect needs.
+/// Returns an error if the estimate belongs to another problem or lacks a parameter of the arm, or
+/// if the rows lack a column that an effect needs. A base, tool or fixture that the estimate lacks
+/// is an error if the rows do not determine it.
 pub fn predict(
     problem: &Problem,
     estimate: Option<&SavedEstimate>,

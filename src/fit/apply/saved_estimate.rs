@@ -458,8 +458,8 @@ impl SavedEstimate {
     }
 }
 
-/// Returns true if the saved parameter `name` is of a base or tool with a name in brackets, or of a
-/// single base or tool while those of `model` have names in brackets.
+/// Returns true if the saved parameter `name` is of a base or tool with a name in brackets. Also
+/// true for that of a single base or tool if those of `model` have names in brackets.
 fn is_other_placement(name: &str, model: &Model) -> bool {
     ["base", "tool"].iter().any(|kind| {
         let (bracketed, single) = (format!("{kind}["), format!("{kind}."));

@@ -69,8 +69,8 @@ pub(in crate::fit) struct CheckedFit<'a> {
     pub hidden: &'a [HiddenByBound],
     /// Prior widths that the fitted deviations contradict.
     pub prior_sizes: &'a [PriorSize],
-    /// Scatter of the predicted target at each touched point: that of the registered nominal arm,
-    /// that of the fitted arm, and true if all rows of the point are held out.
+    /// Scatter of the predicted target at each touched point: with the registered nominal arm and
+    /// with the fitted arm. The flag is true if all rows of the point are held out.
     pub spreads: &'a [(PointSpread, PointSpread, bool)],
     /// Misreadings of the input that would explain the misfit; the search for them runs at first
     /// use.

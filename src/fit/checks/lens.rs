@@ -21,7 +21,7 @@ const LEAST_STATED_CHANCE: f64 = 1e-16;
 /// which the finding names the parameter.
 const MIN_NAMED_SIGMAS: f64 = 3.0;
 /// Smallest ratio of the decrease of χ² by free intrinsics to the χ² that remains beyond noise, at
-/// which the intrinsics are the cause: they remove three quarters of the misfit.
+/// which the intrinsics are the cause. They then remove three quarters of the misfit.
 const MIN_GAIN_RATIO: f64 = 3.0;
 /// Number of standard deviations of χ² of noise that are subtracted from the remaining misfit.
 const REMAINING_SIGMAS: f64 = 2.0;

@@ -125,9 +125,9 @@ fn no_better_finding(kind: &RowKind, before: f64, after: f64) -> Option<Finding>
     Some(Finding::new(FindingCode::NoBetterThanNominal, numbers, text).with_remedy(remedy))
 }
 
-/// Returns the finding that the spread `measured` \[m\] of the measured points differs much from
-/// the spread `expected` \[m\] of the points that the nominal arm predicts: they belong to an arm
-/// of another size. `None` if the two are alike.
+/// Returns the finding that the measured points belong to an arm of another size. Their spread
+/// `measured` \[m\] then differs much from the spread `expected` \[m\] of the points that the
+/// nominal arm predicts. `None` if the two are alike.
 fn other_size_finding(measured: f64, expected: f64) -> Option<Finding> {
     let is_same = (expected / MAX_SIZE_RATIO..=expected * MAX_SIZE_RATIO).contains(&measured);
     let text = format!(

@@ -1,4 +1,4 @@
-//! Texts about the combinations of unknowns that no row determines, for example the pose of the
+//! Texts about the combinations of unknowns that no row determines. Examples are the pose of the
 //! base in the measuring frame, the scale, or a focal length and the distance together.
 //!
 //! The unknowns are grouped by the part that they describe: a joint, base, tool, fixture or lens. A

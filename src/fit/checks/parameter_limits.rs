@@ -61,8 +61,8 @@ impl Check for WithinPriors {
     }
 }
 
-/// Checks that no parameter deviates from nominal by more than is possible on this arm: its reach
-/// for a length, half a turn for an angle, a factor of 100 for a stiffness.
+/// Checks that no parameter deviates from nominal by more than is possible on this arm. Limits are
+/// its reach for a length, half a turn for an angle, and a factor of 100 for a stiffness.
 pub(super) struct WithinArmSize;
 
 impl Check for WithinArmSize {

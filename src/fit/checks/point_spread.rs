@@ -38,8 +38,8 @@ pub struct PointSpread {
 
 impl PointSpread {
     /// Returns the points at which the prediction scatters far more than at the others, and mainly
-    /// along one direction, each with the ratio of its scatter to the median. Such points may have
-    /// moved or yielded, which no model of the arm explains.
+    /// along one direction. The number is the ratio of the scatter to the median. Such points may
+    /// have moved or yielded, which no model of the arm explains.
     #[doc(hidden)]
     pub fn unsteady<'a>(spreads: impl IntoIterator<Item = &'a Self>) -> Vec<(&'a Self, f64)> {
         let compared: Vec<&Self> = spreads
@@ -95,9 +95,9 @@ pub(in crate::fit) fn spreads(
 }
 
 impl Fitting<'_> {
-    /// Returns the scatter of the predicted target at each touched point: that of the registered
-    /// nominal arm, that of the fitted arm, and true if all rows of the point are held out. Both
-    /// arms are given by their full parameter vectors.
+    /// Returns the scatter of the predicted target at each touched point: with the registered
+    /// nominal arm and with the fitted arm, given by their full parameter vectors. The flag is true
+    /// if all rows of the point are held out.
     pub fn spreads(
         &self,
         fixtures: &[Fixture],

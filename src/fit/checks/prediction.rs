@@ -25,8 +25,8 @@ const MIN_ROWS: usize = 6;
 /// Checks that the held-out residuals are as large as the fit predicts.
 ///
 /// The residuals are r ∼ N(0, Σ + J C Jᵀ) with the noise covariance Σ that the fit assumed and the
-/// covariance C of its unknowns. χ² = rᵀ(Σ + J C Jᵀ)⁻¹ r has a χ² distribution; divided by the
-/// number of coordinates, it has an F distribution if Σ is estimated. Rows that are reported as
+/// covariance C of its unknowns. Then χ² = rᵀ(Σ + J C Jᵀ)⁻¹ r has a χ² distribution. If Σ is
+/// estimated, χ² over the number of coordinates has an F distribution. Rows that are reported as
 /// outliers are left out.
 pub(super) struct PredictionHolds;
 

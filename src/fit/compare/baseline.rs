@@ -52,8 +52,8 @@ impl Baseline {
 }
 
 /// Runs every form of the paper's procedure [Chen2021, eq. 1-45] that the identification rows
-/// allow: first with elasticity ignored, then with corrected and with printed equations, each with
-/// declared stiffness, with stiffness from positions, and with stiffness from load differences.
+/// allow. The first ignores elasticity. The others have corrected or printed equations, each with
+/// declared stiffness, stiffness from positions, or stiffness from load differences.
 ///
 /// Returns an empty list if the procedure does not apply. The procedure needs one session and
 /// target, one chain of joints in DH form without mimic joints, and at least as many equations as

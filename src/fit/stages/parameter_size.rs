@@ -12,9 +12,10 @@ const PLAUSIBLE_LN_STIFFNESS: f64 = 4.605_170_185_988_092;
 /// one of the other sign.
 const MAX_ANGLE: f64 = std::f64::consts::PI;
 
-/// Returns the plausible size of a parameter without a prior: the reach of the arm for a length,
-/// 1 rad for an angle, and ln 100 for the logarithm of a stiffness. Returns `None` for parameters
-/// with a prior, for positions of bases and fixtures, which are arbitrary, and for other units.
+/// Returns the plausible size of a parameter without a prior. It is the reach of the arm for a
+/// length, 1 rad for an angle, and ln 100 for the logarithm of a stiffness. Returns `None` for
+/// parameters with a prior, for positions of bases and fixtures, which are arbitrary, and for other
+/// units.
 pub(in crate::fit) fn plausible_size(model: &Model, parameter: &Parameter) -> Option<f64> {
     if parameter.sigma.is_some()
         || matches!(
@@ -31,9 +32,9 @@ pub(in crate::fit) fn plausible_size(model: &Model, parameter: &Parameter) -> Op
     }
 }
 
-/// Returns the largest possible deviation of a parameter of the arm from nominal: the reach of the
-/// arm for a length, π for an angle, and ln 100 for the logarithm of a stiffness. Returns `None`
-/// for bases, fixtures, orientations of targets, and other units.
+/// Returns the largest possible deviation of a parameter of the arm from nominal. It is the reach
+/// of the arm for a length, π for an angle, and ln 100 for the logarithm of a stiffness. Returns
+/// `None` for bases, fixtures, orientations of targets, and other units.
 pub(in crate::fit) fn largest_deviation(model: &Model, parameter: &Parameter) -> Option<f64> {
     match (parameter.site, parameter.unit()) {
         (

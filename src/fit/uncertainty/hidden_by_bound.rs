@@ -17,9 +17,9 @@ use crate::fit::stages::stage::Stage;
 use crate::least_squares::Triangle;
 use crate::least_squares::solver::AtBound;
 
-/// Smallest ratio at which the bound of one unknown hides the uncertainty of another: that of its
-/// deviation along the valley to its standard error with the first unknown held at the bound. At 3,
-/// the valley has nine tenths of the variance.
+/// Smallest ratio of two deviations of an unknown at which the bound of another unknown hides its
+/// uncertainty. They are its deviation along the valley, and its standard error with the other
+/// unknown held at the bound. At 3, the valley has nine tenths of the variance.
 const MIN_HIDDEN_RATIO: f64 = 3.0;
 /// Factor on the rows that hold combinations constant, so large that data and priors hardly change
 /// these combinations.

@@ -144,8 +144,8 @@ pub(in crate::fit) fn fitted(
 }
 
 /// Returns true if the noise variance that a stage assumes, r times the declared one, certainly
-/// contradicts the declared one: 2 ln of the likelihood ratio, ν (r − 1 − ln r) with ν degrees of
-/// freedom, exceeds [`REJECTION_FACTOR`] times its critical value.
+/// contradicts the declared one. The test statistic is 2 ln of the likelihood ratio, ν (r − 1 − ln
+/// r) with ν degrees of freedom. It must exceed [`REJECTION_FACTOR`] times its critical value.
 fn is_beyond_doubt(stage: &Stage) -> bool {
     let ratios = stage
         .poses

@@ -9,8 +9,9 @@ use crate::least_squares::solver::{AtBound, Factor};
 use crate::least_squares::{Fit, LinearRows, Objective as _};
 use crate::model::parameter::Parameter;
 
-/// Smallest length of the part of a constraint normal that is orthogonal to the others, relative to
-/// the length of the normal, at which the constraint counts as linearly independent.
+/// Smallest length of the part of a constraint normal that is orthogonal to the other normals,
+/// relative to the length of the normal. If it is shorter, the constraint is linearly dependent on
+/// the others.
 const MIN_INDEPENDENT_LENGTH: f64 = 1e-10;
 
 /// Shadow prices of bounds (`None` for an unknown inside its bounds) and of active constraints.
@@ -24,9 +25,9 @@ impl Stage<'_> {
     /// Computes the shadow prices of bounds and active constraints at the full parameter vector
     /// `at`, from their Lagrange multipliers.
     ///
-    /// At a minimum, the gradient of the cost is g = Aᵀμ + w with the active constraints as rows of
-    /// A, their multipliers μ, and the multipliers w of the bounds. A multiplier is ≥ 0 at a lower
-    /// limit and ≤ 0 at an upper one.
+    /// At a minimum, the gradient of the cost is g = Aᵀμ + w. The rows of A are the active
+    /// constraints with the multipliers μ; w holds the multipliers of the bounds. A multiplier is ≥
+    /// 0 at a lower limit and ≤ 0 at an upper one.
     ///
     /// # Errors
     /// Returns an error if the rows of the priors do not match the unknowns.

@@ -345,8 +345,8 @@ impl Trial<'_> {
         (square + fitting.sigma.powi(2) * deviations).sqrt()
     }
 
-    /// Returns a shift of rows that begins at the row with the smallest error, near its present
-    /// first row, with that error; misreadings other than shifts stay as they are.
+    /// Returns a shift of rows with its first row moved to where the error is smallest, near its
+    /// present first row, and that error. Misreadings other than shifts stay as they are.
     fn with_best_start(&self, (misreading, error): (Misreading, f64)) -> (Misreading, f64) {
         let step = shift_step(self.fitting.measurements.len());
         let places = misreading.shifted_from().into_iter().flat_map(|from| {

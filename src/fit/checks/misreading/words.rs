@@ -78,7 +78,7 @@ impl Misreading {
 const UNIT_TOLERANCE: f64 = 0.02;
 
 /// Returns the text about the unit of a joint's column that follows from a ratio of motion to
-/// command; empty if the ratio is not that of two units.
+/// command. Empty if the ratio is not that of two units.
 fn unit_of_ratio(ratio: f64, kind: Option<JointKind>) -> &'static str {
     let is = |other: f64| (ratio / other - 1.0).abs() < UNIT_TOLERANCE;
     let is_prismatic = kind == Some(JointKind::Prismatic);
