@@ -82,7 +82,7 @@ impl LinearisedArm {
 
     /// Sets the derivatives of one direction, from the same pass in dual numbers with that
     /// direction's variables.
-    pub(super) fn fill(&mut self, direction: usize, ws: &Workspace<Dual64>) {
+    pub(super) fn fill_derivatives(&mut self, direction: usize, ws: &Workspace<Dual64>) {
         let segments = self.steps.iter().filter_map(|step| match step {
             Step::Segment(segment) => Some(segment),
             _ => None,

@@ -93,7 +93,7 @@ impl Sensitivity {
             if direction == 0 {
                 linearised.linearise(ws, parameters);
             }
-            linearised.fill(direction, ws);
+            linearised.fill_derivatives(direction, ws);
         }
         ws.moments = moments;
         linearised.differentiate(&pose.frame.point(target))?;

@@ -95,16 +95,16 @@ impl<'a> PoseResiduals<'a> {
 
     /// Returns measured − predicted of each row \[m\], \[rad\] or \[px\]; NaN without equilibrium.
     pub fn position_errors(&self, x: &DVector<f64>) -> Vec<Vector3<f64>> {
-        self.errors(x, |pose, predicted| pose.measured - predicted.numbers)
+        self.map_errors(x, |pose, predicted| pose.measured - predicted.numbers)
     }
 
     /// Returns the rotation vectors from the predicted to the measured orientations, measuring
     /// frame \[rad\]; 0 for rows without one, NaN without equilibrium.
     pub fn orientation_errors(&self, x: &DVector<f64>) -> Vec<Vector3<f64>> {
-        self.errors(x, |_, predicted| predicted.orientation_error.unwrap_or_default())
+        self.map_errors(x, |_, predicted| predicted.orientation_error.unwrap_or_default())
     }
 
-    fn errors(
+    fn map_errors(
         &self,
         x: &DVector<f64>,
         error: impl Fn(&Pose, &Prediction) -> Vector3<f64> + Sync,

@@ -2,7 +2,7 @@
 //! generic over the scalar.
 //!
 //! A new sensor needs a file with a `KIND` and a `predict`, and a line in the table below. A
-//! prediction uses only a [`Scene`], which the model fills in. The model then propagates its
+//! prediction uses only a `Scene`, which the model fills in. The model then propagates its
 //! derivatives to the free parameters.
 
 mod distance;

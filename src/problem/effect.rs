@@ -83,7 +83,7 @@ impl Effect {
 
     /// Returns true if the effect makes a joint, counted from 1, rotate under a moment about its
     /// axis.
-    pub(super) fn gives_way(&self, joint: usize) -> bool {
+    pub(super) fn makes_compliant(&self, joint: usize) -> bool {
         self.joint() == Some(joint) && self.acts_at(At::Joint(JointField::Compliance))
     }
 }

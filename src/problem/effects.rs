@@ -88,7 +88,7 @@ pub(crate) fn gives_way<'e>(
     mut effects: impl Iterator<Item = &'e Effect>,
 ) -> bool {
     let stiff = joints.get(joint.wrapping_sub(1)).is_some_and(|joint| joint.stiffness.is_some());
-    stiff || effects.any(|effect| effect.gives_way(joint))
+    stiff || effects.any(|effect| effect.makes_compliant(joint))
 }
 
 /// Parses one effect, written as in a problem file, without its `[[effect]]`: `gear-ratio = { joint

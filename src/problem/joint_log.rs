@@ -35,7 +35,7 @@ pub enum JoinRule {
 }
 
 /// Maximum time between paired rows if the file states none \[s\].
-const DEFAULT_TOLERANCE: f64 = 0.5;
+const DEFAULT_TIME_TOLERANCE: f64 = 0.5;
 
 /// Reads the table, and the joint source that its optional key `source` names.
 pub(super) fn read(
@@ -57,7 +57,7 @@ pub(super) fn read(
         _ => JoinRule::Time {
             tolerance: section
                 .positive("tolerance", Unit::Time, not_positive)?
-                .unwrap_or(DEFAULT_TOLERANCE),
+                .unwrap_or(DEFAULT_TIME_TOLERANCE),
             offset: section.number("offset", Unit::Time)?.unwrap_or(0.0),
         },
     };

@@ -13,7 +13,7 @@ const MAX_PLAUSIBLE_LENGTH: f64 = 20.0;
 /// limits are suspected to be in radians.
 const MAX_LIMIT_RADIANS: f64 = TAU + 0.02;
 /// Minimum number of rows or turning joints from which the convention of a table is judged.
-const MIN_ROWS: usize = 3;
+const MIN_ROWS_TO_JUDGE_FORM: usize = 3;
 
 /// Returns warnings about a `[[joint]]`: angles that look like radians, lengths that look like
 /// millimetres.
@@ -79,7 +79,7 @@ fn total_mass(bodies: &[Body]) -> f64 {
 /// such a table α of the first row is not zero, and both α and a of the last row are.
 pub(super) fn form_warning(joints: &[Joint]) -> Option<Warning> {
     let (first, last) = (joints.first()?, joints.last()?);
-    let is_standard = joints.len() >= MIN_ROWS
+    let is_standard = joints.len() >= MIN_ROWS_TO_JUDGE_FORM
         && first.alpha != 0.0
         && (last.alpha, last.a) == (0.0, 0.0)
         && joints.iter().all(|joint| joint.kind != JointKind::Fixed && joint.beta == 0.0);
@@ -238,7 +238,7 @@ impl Problem {
             self.joints.iter().filter(|joint| joint.kind == JointKind::Revolute).collect();
         let widest = |joint: &&Joint| joint.limits.0.abs().max(joint.limits.1.abs());
         let widest = turning.iter().map(widest).fold(0.0, f64::max).to_degrees();
-        let first = turning.first().filter(|_| turning.len() >= MIN_ROWS)?;
+        let first = turning.first().filter(|_| turning.len() >= MIN_ROWS_TO_JUDGE_FORM)?;
         (widest > 0.0 && widest <= MAX_LIMIT_RADIANS).then(|| Warning {
             location: first.location.clone(),
             kind: WarningKind::LimitsLookLikeRadians { widest: format!("{widest:.1}") },

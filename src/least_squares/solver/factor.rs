@@ -37,7 +37,7 @@ impl Factor {
     }
 
     /// Returns the constant c.
-    pub fn constant(&self) -> &DVector<f64> {
+    pub fn projected(&self) -> &DVector<f64> {
         &self.constant
     }
 

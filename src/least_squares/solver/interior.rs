@@ -38,7 +38,7 @@ pub(super) fn solve_by_interior_point(
         .map(|c| (c.norm_squared() + lambda).sqrt())
         .map(|s| if s > 0.0 { s } else { 1.0 })
         .collect();
-    let scale = match factor.constant().norm() {
+    let scale = match factor.projected().norm() {
         0.0 => spaces.iter().fold(f64::MIN_POSITIVE, |scale, space| scale.max(space.offset.abs())),
         norm => norm,
     };
@@ -54,7 +54,7 @@ pub(super) fn solve_by_interior_point(
     for i in 0..rows {
         push_entry(i, n + i, 1.0);
         (0..n).for_each(|j| push_entry(i, j, -matrix[(i, j)] / column_norms[j]));
-        right.push(factor.constant()[i] / scale);
+        right.push(factor.projected()[i] / scale);
     }
     for space in spaces {
         let length =

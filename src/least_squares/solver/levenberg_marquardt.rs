@@ -49,7 +49,7 @@ impl Model {
         }
         Some(Factor::new(
             self.factor.matrix().clone(),
-            self.factor.constant() + shift,
+            self.factor.projected() + shift,
             self.factor.tolerance(),
         ))
     }

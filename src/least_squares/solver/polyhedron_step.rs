@@ -141,7 +141,7 @@ impl<'a> PolyhedronProblem<'a> {
         if basis.as_ref().map_or(free_columns.ncols(), DMatrix::ncols) == 0 {
             return q;
         }
-        let constant = self.factor.image(&q) + self.factor.constant();
+        let constant = self.factor.image(&q) + self.factor.projected();
         let y = match basis {
             Some(basis) => &basis * self.minimiser(free_columns * &basis, constant, lambda),
             None if self.factor.is_well_conditioned() => {
@@ -214,7 +214,7 @@ mod tests {
                     .0;
             let solution = problem.solve(lambda);
             let cost = |q: &DVector<f64>| {
-                (factor.image(q) + factor.constant()).norm_squared() + lambda * q.norm_squared()
+                (factor.image(q) + factor.projected()).norm_squared() + lambda * q.norm_squared()
             };
             assert!((cost(&solution.q) / cost(&interior) - 1.0).abs() < 1e-8, "{lambda}");
             assert!(solution.faces.bounds.iter().any(Option::is_some));

@@ -120,7 +120,7 @@ impl SecondOrder {
     /// `ratio` is the gain ratio of the step, `taken` true if it was accepted, `length` its ‖D p‖
     /// and `damping` its λ. `worth` is its predicted reduction over the smallest one that is worth
     /// a step, `remaining` the number of steps that the iteration limit leaves.
-    pub fn should_form(
+    pub fn should_form_second_derivatives(
         &mut self,
         (ratio, taken): (f64, bool),
         (length, damping): (f64, f64),
@@ -245,7 +245,7 @@ mod tests {
         (0..8).any(|k| {
             let length = shrinkage.powi(k);
             let worth = (1e8 * length * length, remaining);
-            second_order.should_form((1.0, true), (length, 0.0), worth, unknowns)
+            second_order.should_form_second_derivatives((1.0, true), (length, 0.0), worth, unknowns)
         })
     }
 

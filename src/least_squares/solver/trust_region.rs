@@ -408,7 +408,7 @@ impl<O: Objective, S: Subproblem> Solver<O, State> for TrustRegion<S> {
             let worth = trial.predicted / self.settings.cost_tolerance;
             let remaining = state.get_max_iters().saturating_sub(state.get_iter());
             let forms = self.subproblem.is_step_constrained()
-                && self.second_order.should_form(
+                && self.second_order.should_form_second_derivatives(
                     (ratio, is_accepted),
                     (trial.length, trial.damping),
                     (worth, remaining),

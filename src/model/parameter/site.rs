@@ -41,7 +41,7 @@ pub enum ParameterSite {
         axis: usize,
     },
     /// Number of a fixture, such as a coordinate of a point or the focal length of a camera, in the
-    /// order of [`FixtureKind::fields`].
+    /// order of `FixtureKind::fields`.
     Fixture {
         /// Index of the fixture.
         fixture: usize,
