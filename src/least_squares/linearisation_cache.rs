@@ -10,7 +10,7 @@ use super::{Loss, Triangle};
 
 /// Largest number of cached linearisations. They are at the last point, at the one before, and at
 /// the first point of the same data, which is needed again at the end.
-const MAX_CACHED: usize = 3;
+const MAX_CACHED_LINEARISATIONS: usize = 3;
 
 /// Most recent linearisations of a few data sets. Reducing many rows takes far longer than any use
 /// of the triangular factor.
@@ -65,9 +65,9 @@ impl LinearisationCache {
         cached.unwrap_or_else(|| {
             let triangle = reduce();
             let mut cached = locked(&self.cached);
-            if cached.len() == MAX_CACHED {
+            if cached.len() == MAX_CACHED_LINEARISATIONS {
                 let of_other_data = cached.iter().rposition(|(other, ..)| other.data != key.data);
-                cached.remove(of_other_data.unwrap_or(MAX_CACHED - 2));
+                cached.remove(of_other_data.unwrap_or(MAX_CACHED_LINEARISATIONS - 2));
             }
             cached.push_front((key.clone(), unit, triangle.clone()));
             triangle

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use crate::numeric::kernel::dot;
 
 /// Maximum number of sweeps over all pairs of columns. Usually five suffice.
-const MAX_SWEEPS: usize = 60;
+const MAX_JACOBI_SWEEPS: usize = 60;
 /// Number of columns in a group whose rotations one thread performs.
 const GROUP_COLUMNS: usize = 32;
 /// Smallest number of columns that is split into groups for threads; fewer are rotated on one
@@ -96,7 +96,7 @@ fn orthogonalise(columns: &mut DMatrix<f64>, projected: &mut DVector<f64>) {
     if groups.len() > 1 && groups.len() % 2 == 1 {
         groups.push(ColumnGroup::new(rows, &[], &[]));
     }
-    for _ in 0..MAX_SWEEPS {
+    for _ in 0..MAX_JACOBI_SWEEPS {
         if !sweep(&mut groups) {
             break;
         }

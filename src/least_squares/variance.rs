@@ -11,7 +11,7 @@ use crate::numeric::{gram_of_lower, inverse_lower};
 /// Range of ln s² that is searched, s² being relative to the assumed variance.
 const LOG_VARIANCE_RANGE: (f64, f64) = (-60.0, 60.0);
 /// Number of steps of the grid search over ln s².
-const GRID_STEPS: u32 = 480;
+const VARIANCE_GRID_STEPS: u32 = 480;
 /// Largest ratio a² of prior variance to assumed data variance in a direction that informs on the
 /// noise. Directions above it are projected out.
 const MAX_PRIOR_RATIO: f64 = 0.1;
@@ -116,9 +116,9 @@ impl VarianceLikelihood {
 
     /// Returns the s² of the largest likelihood and the excess of its 2 ln L over that of s² = 1.
     pub fn maximum(&self) -> (f64, f64) {
-        let step = (LOG_VARIANCE_RANGE.1 - LOG_VARIANCE_RANGE.0) / f64::from(GRID_STEPS);
+        let step = (LOG_VARIANCE_RANGE.1 - LOG_VARIANCE_RANGE.0) / f64::from(VARIANCE_GRID_STEPS);
         let grid = |k: u32| LOG_VARIANCE_RANGE.0 + f64::from(k) * step;
-        let best = (0..=GRID_STEPS)
+        let best = (0..=VARIANCE_GRID_STEPS)
             .map(grid)
             .min_by(|a, b| self.deviance(*a).total_cmp(&self.deviance(*b)))
             .unwrap_or(0.0);

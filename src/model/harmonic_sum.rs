@@ -14,7 +14,7 @@ const MIN_HARMONICS: usize = 8;
 /// used. With fewer, most lanes would multiply zeros.
 const MIN_TERMS_PER_GROUP: usize = 2;
 /// Largest order k in a sum; it limits the memory of a sum with few high orders.
-const MAX_ORDER: u32 = 1024;
+const MAX_SUMMED_ORDER: u32 = 1024;
 
 /// Sum Σ aₖ sin kq + bₖ cos kq over orders k = 1, 2, … of one joint's command q.
 #[derive(Debug, Clone)]
@@ -65,13 +65,13 @@ impl HarmonicSum {
 }
 
 /// Returns (joint, order − 1, 0 for a sine or 1 for a cosine); `None` if the regressor is no
-/// harmonic of integer order up to [`MAX_ORDER`].
+/// harmonic of integer order up to [`MAX_SUMMED_ORDER`].
 fn as_harmonic(regressor: &Regressor) -> Option<(usize, usize, usize)> {
     match *regressor {
-        Regressor::Sine(joint, order) if (1..=MAX_ORDER).contains(&order) => {
+        Regressor::Sine(joint, order) if (1..=MAX_SUMMED_ORDER).contains(&order) => {
             Some((joint, order as usize - 1, 0))
         }
-        Regressor::Cosine(joint, order) if (1..=MAX_ORDER).contains(&order) => {
+        Regressor::Cosine(joint, order) if (1..=MAX_SUMMED_ORDER).contains(&order) => {
             Some((joint, order as usize - 1, 1))
         }
         _ => None,

@@ -93,7 +93,7 @@ impl<'m> JacobianWriter<'m> {
             ArmDerivatives::Rigid(RigidDerivatives::new(&arm, inputs))
         };
         let point_rows = match (oriented, fixtures.is_empty()) {
-            (true, _) => orientation::POINT_ROWS,
+            (true, _) => orientation::ROWS_OF_FOUR_POINTS,
             (false, false) => 3,
             (false, true) => 0,
         };

@@ -12,7 +12,7 @@ use crate::spatial::{Frame, inverse_right_jacobian, rotation_between};
 
 /// Number of rows for the derivatives of four points: the target and the ends of its three axes, 1
 /// m long.
-pub(super) const POINT_ROWS: usize = 12;
+pub(super) const ROWS_OF_FOUR_POINTS: usize = 12;
 
 /// Pose, base and target at which an orientation is differentiated.
 pub(super) struct OrientedPose<'a> {

@@ -12,7 +12,7 @@ use crate::observation::FixtureKind;
 use crate::quantity::Unit;
 
 /// Maximum number of points of a marker.
-const MAX_POINTS: usize = 10_000;
+const MAX_MARKER_POINTS: usize = 10_000;
 
 /// Arm whose frames may carry a camera or a marker: its joints, and the index of the joint that
 /// carries the tool.
@@ -107,7 +107,7 @@ pub(super) fn read_marker(
         return Err(section.missing("points_mm", "points_mm = [[x, y, z], …]"));
     };
     let listed = item.list("a list of points, each a list of 3 numbers")?;
-    item.check_count("points", listed.len(), MAX_POINTS)?;
+    item.check_count("points", listed.len(), MAX_MARKER_POINTS)?;
     if listed.is_empty() {
         return Err(item.error(InputErrorKind::Empty));
     }

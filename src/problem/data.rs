@@ -14,7 +14,7 @@ use crate::observation::{Needs, Observation, kinds};
 use crate::quantity::{Suffix, Unit};
 
 /// Maximum number of measurement files.
-const MAX_FILES: usize = 1000;
+const MAX_DATA_FILES: usize = 1000;
 /// Maximum number of declared covariates; the search tests each of them at every joint.
 const MAX_COVARIATES: usize = 20;
 
@@ -138,7 +138,7 @@ pub(super) fn read(root: &mut Section<'_, '_>) -> Result<Data, InputError> {
     if let Some(item) = section.get("files") {
         let folder = file.file.parent().unwrap_or(Path::new(""));
         let names = item.list("a list of file names")?;
-        item.check_count("files", names.len(), MAX_FILES)?;
+        item.check_count("files", names.len(), MAX_DATA_FILES)?;
         for element in names {
             files.push(folder.join(element.text()?));
         }

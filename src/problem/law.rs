@@ -9,9 +9,9 @@ use crate::laws::{At, BeamField, Effect, Law, LawParameter, LawPrior, LawSite};
 use crate::quantity::Unit;
 
 /// Maximum number of terms of one law.
-const MAX_TERMS: usize = 50;
+const MAX_LAW_TERMS: usize = 50;
 /// Maximum number of parameters inside the formulas of one law.
-const MAX_PARAMETERS: usize = 20;
+const MAX_LAW_PARAMETERS: usize = 20;
 /// Keys of a law other than the prior, whose key has a unit suffix.
 const LAW_KEYS: [&str; 3] = ["name", "at", "terms"];
 
@@ -138,10 +138,10 @@ fn read_parameters(section: &mut Section<'_, '_>) -> Result<Vec<LawParameter>, I
         section.finish()?;
         parameters.push(parameter);
     }
-    if let Some(extra) = parameters.get(MAX_PARAMETERS)
+    if let Some(extra) = parameters.get(MAX_LAW_PARAMETERS)
         && let Some(item) = section.peek(&extra.name)
     {
-        item.check_count("parameters of a law", parameters.len(), MAX_PARAMETERS)?;
+        item.check_count("parameters of a law", parameters.len(), MAX_LAW_PARAMETERS)?;
     }
     Ok(parameters)
 }
@@ -149,7 +149,7 @@ fn read_parameters(section: &mut Section<'_, '_>) -> Result<Vec<LawParameter>, I
 /// Reads the formulas, each with its location.
 fn read_formulas<'a, 'i>(terms: &Item<'a, 'i>) -> Result<Vec<(Item<'a, 'i>, &'a str)>, InputError> {
     let elements = terms.list("a list of formulas in quotes")?;
-    terms.check_count("terms", elements.len(), MAX_TERMS)?;
+    terms.check_count("terms", elements.len(), MAX_LAW_TERMS)?;
     if elements.is_empty() {
         return Err(terms.error(InputErrorKind::NoTermsOfLaw));
     }

@@ -101,7 +101,7 @@ impl fmt::Debug for LazyPast<'_> {
 
 /// Number of time constants or friction distances after which the past has no influence, because
 /// exp(−36) is below double precision.
-const MAX_MEMORY: f64 = 36.0;
+const MAX_DECAY_LENGTHS: f64 = 36.0;
 
 impl Past<&[f64]> {
     /// Returns the temperature T̃ of a body that follows the measured temperature T with a time
@@ -112,7 +112,7 @@ impl Past<&[f64]> {
     pub fn lagged_temperature(&self, now: (f64, f64), time_constant: f64) -> f64 {
         let first = self
             .times
-            .partition_point(|time| *time < now.0 - MAX_MEMORY * time_constant)
+            .partition_point(|time| *time < now.0 - MAX_DECAY_LENGTHS * time_constant)
             .saturating_sub(1);
         ThermalLag { time_constant, progress: None }.advance_from(first, self, now)
     }
@@ -136,7 +136,7 @@ impl Past<&[f64]> {
             state += towards * f64::exp(-travelled) * -(-travel).exp_m1();
             travelled += travel;
             (q, side) = (before, value_at(self.approaches, pose));
-            if travelled > MAX_MEMORY {
+            if travelled > MAX_DECAY_LENGTHS {
                 return state;
             }
         }

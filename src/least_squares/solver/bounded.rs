@@ -5,8 +5,8 @@ use nalgebra::{DMatrix, DVector};
 use super::interior::solve_by_interior_point;
 use super::levenberg_marquardt::Model;
 use super::polyhedron::{Faces, Polyhedron};
-use super::polyhedron_step::{FACE_DISTANCE, PolyhedronProblem, PolyhedronSolution};
-use super::settings::RADIUS_SLACK;
+use super::polyhedron_step::{MAX_FACE_DISTANCE, PolyhedronProblem, PolyhedronSolution};
+use super::settings::MAX_RADIUS_DEVIATION;
 use super::{Bounds, Factor, Inequalities, Settings, Step, Subproblem};
 use crate::least_squares::Linearisation;
 
@@ -84,8 +84,8 @@ impl Constrained {
             PolyhedronProblem::new(&model.factor, &polyhedron, polyhedron.faces_at_origin.clone())
                 .solve(0.0)
         });
-        let is_within_radius =
-            !undamped.faces.is_empty() && undamped.q.norm() <= (1.0 + RADIUS_SLACK) * radius;
+        let is_within_radius = !undamped.faces.is_empty()
+            && undamped.q.norm() <= (1.0 + MAX_RADIUS_DEVIATION) * radius;
         let solution = is_within_radius.then(|| undamped.clone())?;
         Some(self.step_from(x, solution, 0.0))
     }
@@ -195,7 +195,7 @@ impl Subproblem for Constrained {
             StepMethod::InteriorPoint => {
                 let (q, _) =
                     solve_by_interior_point(&factor, damping, &polyhedron.half_spaces(), None)?;
-                polyhedron.pulled_inside(q, FACE_DISTANCE)
+                polyhedron.pulled_inside(q, MAX_FACE_DISTANCE)
             }
             StepMethod::Clamped => return None,
         };
@@ -242,7 +242,7 @@ impl Subproblem for Constrained {
                     Some(radius),
                 );
                 let (q, damping) = solution.unwrap_or_else(|| (DVector::zeros(x.len()), 0.0));
-                (polyhedron.pulled_inside(q, FACE_DISTANCE), damping)
+                (polyhedron.pulled_inside(q, MAX_FACE_DISTANCE), damping)
             }
             StepMethod::Clamped => {
                 let q = (step.point - x).component_mul(&model.scale);
@@ -265,8 +265,9 @@ fn step_within_radius(
     gradient_norm: f64,
     radius: f64,
 ) -> (PolyhedronSolution, f64) {
-    let is_short = |length: f64| length <= (1.0 + RADIUS_SLACK) * radius;
-    let fills_radius = |length: f64| is_short(length) && length >= (1.0 - RADIUS_SLACK) * radius;
+    let is_short = |length: f64| length <= (1.0 + MAX_RADIUS_DEVIATION) * radius;
+    let fills_radius =
+        |length: f64| is_short(length) && length >= (1.0 - MAX_RADIUS_DEVIATION) * radius;
     let mut first_solution = (first > 0.0).then(|| solve(first));
     if let Some(solution) = first_solution.take_if(|solution| fills_radius(solution.q.norm())) {
         return (solution, first);

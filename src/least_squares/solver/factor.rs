@@ -122,7 +122,7 @@ fn spectral_cut(matrix: &DMatrix<f64>, tolerance: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::settings::RADIUS_SLACK;
+    use super::super::settings::MAX_RADIUS_DEVIATION;
     use super::*;
 
     fn example(n: usize) -> (DMatrix<f64>, DVector<f64>) {
@@ -148,7 +148,7 @@ mod tests {
         let full = factor.gauss_newton().norm();
         for fraction in [0.7, 0.1, 1e-3, 1e-8] {
             let (step, lambda) = factor.limited(fraction * full);
-            assert!((step.norm() / (fraction * full) - 1.0).abs() <= RADIUS_SLACK + 1e-12);
+            assert!((step.norm() / (fraction * full) - 1.0).abs() <= MAX_RADIUS_DEVIATION + 1e-12);
             let normal = matrix.tr_mul(&(&matrix * &step + &constant)) + lambda * &step;
             assert!(normal.norm() <= 1e-10 * factor.gradient().norm());
         }

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector, Dyn, PermutationSequence};
 
-use super::settings::RADIUS_SLACK;
+use super::settings::MAX_RADIUS_DEVIATION;
 use crate::least_squares::Triangle;
 use crate::least_squares::inverse::regular_inverse;
 
@@ -96,7 +96,7 @@ impl Pivoted {
         let mut triangle = self.triangle.clone();
         for _ in 0..MAX_SECULAR_STEPS {
             let length = q.norm();
-            if length <= (1.0 + RADIUS_SLACK) * radius {
+            if length <= (1.0 + MAX_RADIUS_DEVIATION) * radius {
                 return Some((self.unpermuted(q), lambda));
             }
             let mut w = q.component_mul(&self.inverse_norms) / length;

@@ -9,7 +9,7 @@ use super::{AtBound, Bounds, Factor, Inequalities};
 /// dependent.
 const MIN_INDEPENDENT_LENGTH: f64 = 1e-10;
 /// Rounding error allowed in the distance to a half-space, relative to the size of its terms.
-const HALF_SPACE_ROUNDING: f64 = 1e-14;
+const MAX_HALF_SPACE_ROUNDING: f64 = 1e-14;
 
 /// Set of steps lower ≤ q ≤ upper with G q ≥ h; the rows of G have unit length.
 #[derive(Debug, Clone)]
@@ -239,7 +239,7 @@ impl Polyhedron {
     /// Returns true if q violates half-space `i` beyond rounding.
     pub(super) fn violates(&self, i: usize, q: &DVector<f64>) -> bool {
         self.normals.row(i).transpose().dot(q)
-            < self.offsets[i] - HALF_SPACE_ROUNDING * (q.norm() + self.offsets[i].abs())
+            < self.offsets[i] - MAX_HALF_SPACE_ROUNDING * (q.norm() + self.offsets[i].abs())
     }
 
     /// Returns the finite bounds and all inequalities as half-spaces.

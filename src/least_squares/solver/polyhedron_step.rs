@@ -12,7 +12,7 @@ use crate::least_squares::{Linearisation, Triangle};
 
 /// Distance to a face, relative to the size of the step, at which an interior point counts as on
 /// the face.
-pub(super) const FACE_DISTANCE: f64 = 1e-6;
+pub(super) const MAX_FACE_DISTANCE: f64 = 1e-6;
 /// Maximum number of corrections of all wrong faces at once without progress; each costs one
 /// factorisation, the interior-point method more than twenty.
 const MAX_JOINT_CORRECTIONS: usize = 10;
@@ -22,7 +22,7 @@ const MAX_SINGLE_CORRECTIONS: usize = 40;
 /// Maximum number of corrections that start from the faces near the interior-point solution.
 const MAX_INTERIOR_CORRECTIONS: usize = 30;
 /// Relative rounding allowed in the optimality conditions.
-const OPTIMALITY_ROUNDING: f64 = 1e-12;
+const MAX_OPTIMALITY_ROUNDING: f64 = 1e-12;
 
 /// Problem min ½‖B q + c‖² + ½λ‖q‖² within a polyhedron, for any λ.
 pub(super) struct PolyhedronProblem<'a> {
@@ -58,7 +58,7 @@ impl<'a> PolyhedronProblem<'a> {
             let interior =
                 solve_by_interior_point(self.factor, lambda, &self.polyhedron.half_spaces(), None)
                     .map(|(q, _)| q);
-            let faces_near = |q: &DVector<f64>| self.polyhedron.faces_near(q, FACE_DISTANCE);
+            let faces_near = |q: &DVector<f64>| self.polyhedron.faces_near(q, MAX_FACE_DISTANCE);
             let refined = interior.as_ref().and_then(|q| {
                 self.active_set(faces_near(q), lambda, (MAX_INTERIOR_CORRECTIONS, 0))
             });
@@ -115,11 +115,11 @@ impl<'a> PolyhedronProblem<'a> {
         // upper bound, and μ ≥ 0.
         let force =
             self.factor.matrix().tr_mul(&self.factor.image(q)) + &self.gradient + lambda * q;
-        let slack = OPTIMALITY_ROUNDING * (self.gradient.amax() + lambda * q.amax());
+        let slack = MAX_OPTIMALITY_ROUNDING * (self.gradient.amax() + lambda * q.amax());
         let (bounds, rows) = self.polyhedron.multipliers(faces, &force);
         let mut corrected = self.polyhedron.retained_faces(faces, &bounds, &rows, slack);
         let Polyhedron { lower, upper, .. } = self.polyhedron;
-        let tolerance = OPTIMALITY_ROUNDING * q.amax();
+        let tolerance = MAX_OPTIMALITY_ROUNDING * q.amax();
         for j in 0..q.len() {
             if lower[j] >= upper[j] || (faces.bounds[j].is_none() && q[j] < lower[j] - tolerance) {
                 corrected.bounds[j] = Some(AtBound::Lower);

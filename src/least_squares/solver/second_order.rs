@@ -6,10 +6,10 @@ use crate::least_squares::Linearisation;
 
 /// Range of the gain ratio (actual over predicted reduction) of a step that the model predicted
 /// well.
-const GOOD_RATIO: std::ops::RangeInclusive<f64> = 0.5..=1.5;
+const ACCURATE_RATIO_RANGE: std::ops::RangeInclusive<f64> = 0.5..=1.5;
 /// Narrower range of the gain ratio for undamped steps of the model with the second-order term S,
 /// which is exact near an optimum.
-const GOOD_RATIO_WITH_S: std::ops::RangeInclusive<f64> = 0.9..=1.1;
+const ACCURATE_RATIO_RANGE_WITH_S: std::ops::RangeInclusive<f64> = 0.9..=1.1;
 /// Number of poorly predicted steps in a run from which the steps that follow get geodesic
 /// acceleration.
 const MIN_MISSES_FOR_ACCELERATION: usize = 2;
@@ -105,14 +105,14 @@ impl SecondOrder {
         self.matrix.take().is_some()
     }
 
-    /// Counts the step as poorly predicted if its gain `ratio` is outside [`GOOD_RATIO`].
+    /// Counts the step as poorly predicted if its gain `ratio` is outside [`ACCURATE_RATIO_RANGE`].
     pub fn count_miss(&mut self, ratio: f64) {
-        self.misses += usize::from(!GOOD_RATIO.contains(&ratio));
+        self.misses += usize::from(!ACCURATE_RATIO_RANGE.contains(&ratio));
     }
 
     /// Resumes geodesic acceleration if the gain `ratio` shows that the step was predicted poorly.
     pub fn resume_if_missed(&mut self, ratio: f64) {
-        self.is_straight &= GOOD_RATIO.contains(&ratio);
+        self.is_straight &= ACCURATE_RATIO_RANGE.contains(&ratio);
     }
 
     /// Records a step and returns true if S should be formed at the present point.
@@ -128,7 +128,7 @@ impl SecondOrder {
         unknowns: usize,
     ) -> bool {
         let is_exact = self.matrix.is_some() && damping == 0.0;
-        let range = if is_exact { GOOD_RATIO_WITH_S } else { GOOD_RATIO };
+        let range = if is_exact { ACCURATE_RATIO_RANGE_WITH_S } else { ACCURATE_RATIO_RANGE };
         let missed = !range.contains(&ratio);
         if taken && damping == 0.0 {
             self.lengths.push(length);

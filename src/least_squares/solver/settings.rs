@@ -36,4 +36,4 @@ impl Default for Settings {
 
 /// Relative deviation of a step length from the radius that is accepted, so that λ needs few
 /// iterations [Moré 1978].
-pub(super) const RADIUS_SLACK: f64 = 0.1;
+pub(super) const MAX_RADIUS_DEVIATION: f64 = 0.1;

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::settings::RADIUS_SLACK;
+use super::settings::MAX_RADIUS_DEVIATION;
 use crate::least_squares::singular::Decomposition;
 
 /// Maximum number of Newton steps on the secular equation.
@@ -72,7 +72,7 @@ impl Spectrum {
                 slope += square / (term.singular * term.singular + lambda);
             }
             let length = f64::sqrt(squares);
-            if length <= (1.0 + RADIUS_SLACK) * radius {
+            if length <= (1.0 + MAX_RADIUS_DEVIATION) * radius {
                 break;
             }
             lambda += squares / slope * (length - radius) / radius;

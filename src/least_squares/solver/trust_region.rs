@@ -15,7 +15,7 @@ use crate::least_squares::{Linearisation, Objective};
 /// Smallest gain ratio ρ at which a step is accepted.
 const MIN_ACCEPTED_RATIO: f64 = 1e-4;
 /// Largest ratio of geodesic acceleration to step length at which an accelerated step is used.
-const MAX_ACCELERATION: f64 = 0.75;
+const MAX_ACCELERATION_RATIO: f64 = 0.75;
 /// Maximum number of accelerated steps tried from one point, with decreasing radius.
 const MAX_ACCELERATION_TRIES: usize = 6;
 /// Largest relative change of the cost that counts as rounding.
@@ -226,12 +226,12 @@ impl<S: Subproblem> TrustRegion<S> {
             if ratio.is_nan() {
                 return Ok((step, None));
             }
-            if ratio <= MAX_ACCELERATION {
+            if ratio <= MAX_ACCELERATION_RATIO {
                 self.second_order.record_acceleration(ratio, step.damping);
                 step.point = point;
                 return Ok((step, Some(ratio)));
             }
-            *radius = step.length * (MAX_ACCELERATION / ratio).clamp(0.1, 0.5);
+            *radius = step.length * (MAX_ACCELERATION_RATIO / ratio).clamp(0.1, 0.5);
             tries -= 1;
         }
     }
