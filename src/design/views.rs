@@ -109,7 +109,7 @@ struct View {
     carriers: [Frame<f64>; 2],
     /// Normal of a flat marker, marker frame; `None` for points in space.
     normal: Option<Vector3<f64>>,
-    /// Width and height of the image [px].
+    /// Width and height of the image \[px\].
     image: [f64; 2],
 }
 

@@ -107,7 +107,7 @@ pub fn camera_yaml(
 
 /// Lens of a camera as ROS and OpenCV describe it.
 struct Lens {
-    /// Camera matrix, row by row [px].
+    /// Camera matrix, row by row \[px\].
     matrix: [f64; 9],
     /// Distortion coefficients, in the order of OpenCV.
     coefficients: Vec<f64>,

@@ -2,7 +2,7 @@
 //!
 //! A law multiplies parameters by formulas of recorded quantities of a pose, and adds the products
 //! to a quantity of the arm, its base, or the measurement. `catalogue` has one entry for each
-//! family; a [`Law`] is declared in a problem file. Everything about an effect follows from these
+//! family; a `Law` is declared in a problem file. Everything about an effect follows from these
 //! data: its parameters and their units, the columns it needs, the candidates of a search, words,
 //! and file syntax.
 

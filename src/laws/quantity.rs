@@ -15,8 +15,7 @@ pub enum Quantity {
         time_constant: f64,
     },
     /// Friction state of a joint: share of its friction that opposes its approach, −1 to 1, written
-    /// `friction(q3, 0.8)` ([`Past::friction_state`](crate::problem::Past::friction_state)). \[Dahl
-    /// 1968\]
+    /// `friction(q3, 0.8)` (`Past::friction_state`). \[Dahl 1968\]
     Friction {
         /// Index of the joint.
         joint: usize,

@@ -14,7 +14,7 @@ use crate::files::read_limited;
 const FORMAT: &str = "flexcal-prior";
 /// Newest version of the format that is read.
 const VERSION: u32 = 1;
-/// Maximum size of a PRIOR.toml [MiB].
+/// Maximum size of a PRIOR.toml \[MiB\].
 const MAX_FILE_MIB: u64 = 16;
 
 /// Prior of an arm from its siblings, as read from PRIOR.toml.

@@ -74,7 +74,7 @@ pub struct CorrectedPose {
     /// applied.
     pub covariance: Matrix3<f64>,
     /// Expected root mean square of the error length ‖measured − predicted‖ \[m\]. Multiplied by
-    /// [`Scores::quantile`], it is an error bound.
+    /// `Scores::quantile`, it is an error bound.
     pub size: f64,
     /// True if an input of the pose is outside its measured range. Also true if less than half of
     /// the correction is applied, because measured poses are far away.

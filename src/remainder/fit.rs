@@ -89,7 +89,7 @@ impl Fitted {
 
 /// Fits a remainder and the parameters of `found` to the identification rows of `data` that are no
 /// outliers. The remainder is kept if it predicts left-out configurations significantly better
-/// ([`Gain::is_significant`]).
+/// (`Gain::is_significant`).
 ///
 /// Returns `None` if some rows measure no position, or there are fewer than ten configurations.
 ///
