@@ -14,6 +14,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::likelihood_table::{Jet, LikelihoodTable};
 use crate::numeric::kernel::few_transposed_times;
 use crate::numeric::lower_factor;
 
@@ -71,7 +72,8 @@ impl Noise {
             .map(at)
             .collect();
         let prior_range = (MAX_LN_NOISE_FACTOR / self.ln_half_width).powi(2).ln_1p();
-        NoiseGrid { terms, freedom: self.freedom, prior_range }
+        let table = LikelihoodTable::new(self.freedom, step);
+        NoiseGrid { terms, freedom: self.freedom, prior_range, table }
     }
 }
 
@@ -84,15 +86,23 @@ pub(super) struct NoiseGrid {
     freedom: f64,
     /// Difference between the largest and the smallest ln prior(f) on the grid.
     prior_range: f64,
+    /// Tabulated likelihood.
+    table: LikelihoodTable,
 }
 
 impl NoiseGrid {
     /// Returns ln of the likelihood of a residual with sum of squares S, summed over the noise
-    /// factor f, up to a constant.
+    /// factor f, up to a constant. It is interpolated with an error below 1e-8.
+    pub fn ln_likelihood(&self, squares: f64) -> f64 {
+        self.table.value(squares, |squares| self.summed(squares))
+    }
+
+    /// Returns the sum that [`NoiseGrid::ln_likelihood`] interpolates, and its first and second
+    /// derivative by S.
     ///
     /// Without the prior, the terms −ν ln f − S/(2f²) rise up to f² = S/ν and fall beyond. From
     /// there, terms are computed until they are negligible, whatever the prior.
-    pub fn ln_likelihood(&self, squares: f64) -> f64 {
+    fn summed(&self, squares: f64) -> Jet {
         let term = |&(ln_weight, half): &(f64, f64)| ln_weight - half * squares;
         let is_before_peak = |(_, half): &(f64, f64)| 2.0 * half * squares > self.freedom;
         let peak = self.terms.partition_point(is_before_peak);
@@ -105,7 +115,14 @@ impl NoiseGrid {
         let (before, behind) = self.terms.split_at(peak);
         let end = behind.iter().position(&mut is_negligible).map_or(self.terms.len(), |k| peak + k);
         let start = before.iter().rposition(is_negligible).map_or(0, |k| k + 1);
-        ln_sum(self.terms[start..end].iter().map(term))
+        let terms = &self.terms[start..end];
+        let ln_summed = ln_sum(terms.iter().map(term));
+        // The derivatives of the sum are moments of 1/(2 f²) over the posterior of f.
+        let mean_of = |value: &dyn Fn(f64) -> f64| {
+            terms.iter().map(|entry| (term(entry) - ln_summed).exp() * value(entry.1)).sum::<f64>()
+        };
+        let mean = mean_of(&|half| half);
+        [ln_summed, -mean, mean_of(&|half| (half - mean).powi(2))]
     }
 }
 
@@ -425,6 +442,28 @@ mod tests {
         );
         assert!(one_column > 50.0 && one_column - two_columns > 2.0, "{one_column} {two_columns}");
         assert!((one_column - alone - 3.0_f64.ln()).abs() < 0.2, "{one_column} {alone}");
+    }
+
+    #[test]
+    fn an_interpolated_likelihood_is_the_summed_one() {
+        for freedom in [1.5, 12.0, 90.0, 300.0, 3000.0, 20_000.0] {
+            for (ln_half_width, min_ln_factor) in
+                [(0.1, f64::NEG_INFINITY), (0.1, 0.0), (0.3, -0.2), (0.01, 0.0)]
+            {
+                let grid = Noise { freedom, ln_half_width, min_ln_factor }.grid();
+                for k in 0..4000 {
+                    let squares = freedom * (-10.0 + 0.00507 * f64::from(k)).exp();
+                    let (summed, tabulated) =
+                        (grid.summed(squares)[0], grid.ln_likelihood(squares));
+                    let error = (summed - tabulated).abs();
+                    assert!(
+                        error < 1e-8 * (1.0 + 1e-7 * summed.abs()),
+                        "{error} at ν {freedom}, S/ν {}",
+                        squares / freedom
+                    );
+                }
+            }
+        }
     }
 
     #[test]

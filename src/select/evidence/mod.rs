@@ -25,6 +25,7 @@ mod hypotheses;
 mod hypothesis;
 mod hypothesis_set;
 mod laws;
+mod likelihood_table;
 mod limits;
 mod marginal;
 mod moves;
