@@ -82,3 +82,18 @@ fn predictions_scatter_as_their_covariance_says() {
     let mean = squares / count as f64;
     assert!((0.9..1.1).contains(&mean), "{mean}");
 }
+
+#[test]
+fn the_covariance_of_a_prediction_does_not_depend_on_the_sigma_of_a_row() {
+    let problem = parse(&text(PRIORS));
+    let data = measured(&problem, 99);
+    let found = identify(&problem, &data, &Options::default()).unwrap();
+    let mut rows = data.measurements;
+    let plain = found.predict_with_covariance(&problem, &rows).unwrap();
+    rows.sigma = Some(vec![2e-4; rows.len()]);
+    let stated = found.predict_with_covariance(&problem, &rows).unwrap();
+    for (plain, stated) in plain.iter().zip(&stated) {
+        let difference = (plain.covariance - stated.covariance).norm();
+        assert!(difference < 1e-12 * plain.covariance.norm(), "{difference}");
+    }
+}

@@ -57,7 +57,9 @@ impl Identification {
         let covariance = DMatrix::from_fn(kept.len(), kept.len(), |i, j| {
             of_values[(i, j)] / (scale[i] * scale[j])
         });
-        let poses = self.poses(rows, None);
+        // The derivatives are those of metres, also for rows that state their σ.
+        let poses: Vec<Pose> =
+            self.poses(rows, None).into_iter().map(|pose| Pose { sigma: 1.0, ..pose }).collect();
         let residuals = PoseResiduals::new(&model, poses, unknowns, x.clone());
         let at = residuals.reduced(&x);
         let of_row = |(row, position): (usize, Vector3<f64>)| {
