@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use super::Misreading;
+use super::{MassScale, Misreading};
 use crate::measurement::Measurements;
 use crate::model::parameter::JointField;
 use crate::problem::{Joint, JointKind, Problem};
@@ -17,6 +17,12 @@ const PLAUSIBLE_LENGTHS: std::ops::Range<f64> = 0.01..3.0;
 const MAX_PAIRED: usize = 12;
 /// Maximum number of masses that are tried one by one.
 const MAX_MASSES: usize = 12;
+/// Scales of masses that leave an error far beyond the noise.
+const GROSS_MASS_SCALES: [MassScale; 4] =
+    [MassScale::Power(-3), MassScale::Power(-1), MassScale::Power(1), MassScale::Power(3)];
+/// Scales of masses that an arm with compliances nearly makes up for.
+pub(super) const MASS_SCALES: [MassScale; 4] =
+    [MassScale::Power(-1), MassScale::Power(1), MassScale::Pounds, MassScale::Newtons];
 /// Step between trial errors of a joint's zero position \[°\]. A full fit finds values between
 /// them.
 const ZERO_POSITION_STEP: i16 = 15;
@@ -193,19 +199,29 @@ fn of_joint_table(problem: &Problem) -> Vec<Misreading> {
     forms
 }
 
+/// Returns misreadings of masses and payloads by each of `scales`.
+pub(super) fn of_masses(
+    problem: &Problem,
+    table: &Measurements,
+    scales: &[MassScale],
+) -> Vec<Misreading> {
+    let masses = masses_of(&mut problem.clone()).len();
+    let single = if masses > MAX_MASSES { 0 } else { masses };
+    let numbers = 0..=single;
+    let has_payload = table.payload.is_some() || problem.tool.payload_mass > 0.0;
+    let payloads = scales.iter().map(|&scale| Misreading::Payload { scale });
+    numbers
+        .flat_map(|mass| scales.iter().map(move |&scale| Misreading::Mass { mass, scale }))
+        .chain(payloads.filter(|_| has_payload))
+        .collect()
+}
+
 /// Returns the misreadings of masses, payloads, stiffnesses and gravity; none for a rigid arm.
 pub(super) fn of_loads(problem: &Problem, table: &Measurements) -> Vec<Misreading> {
     if !problem.is_elastic() {
         return Vec::new();
     }
-    let powers = [-3, -1, 1, 3];
-    let masses = masses_of(&mut problem.clone()).len();
-    let single = if masses > MAX_MASSES { 0 } else { masses };
-    let of_mass = |mass: usize| powers.map(|power| Misreading::Mass { mass, power });
-    let mut misreadings: Vec<Misreading> = (0..=single).flat_map(of_mass).collect();
-    if table.payload.is_some() || problem.tool.payload_mass > 0.0 {
-        misreadings.extend(powers.map(|power| Misreading::Payload { power }));
-    }
+    let mut misreadings = of_masses(problem, table, &GROSS_MASS_SCALES);
     misreadings.extend([-3, 3, 0].map(|power| Misreading::Stiffness { power }));
     for axis in 0..3 {
         let of_sign = |is_negative| Misreading::Gravity { axis, is_negative };
@@ -249,6 +265,25 @@ pub(super) fn number_of(joint: &mut Joint, field: JointField) -> Option<&mut f64
         JointField::Z => placement.map(|placement| &mut placement.xyz.z),
         _ => None,
     }
+}
+
+/// Returns the name of a mass and the number of its joint; `mass` counts the numbers of
+/// [`masses_of`] from 1. `None` if there is no such mass, such as for 0.
+pub(super) fn name_of_mass(problem: &Problem, mass: usize) -> Option<(&str, usize)> {
+    let joints = problem.joints.iter().zip(1..);
+    let names = joints.flat_map(|(joint, number)| {
+        names_of_masses(joint).into_iter().map(move |name| (name, number))
+    });
+    names.into_iter().nth(mass.checked_sub(1)?)
+}
+
+/// Returns the names of the masses of a joint, in the order of [`masses_of`].
+fn names_of_masses(joint: &Joint) -> Vec<&str> {
+    let beam = joint.beam.iter().flat_map(|beam| {
+        let bodies = beam.masses.iter().map(|body| body.name.as_str());
+        std::iter::once(beam.name.as_str()).chain(bodies)
+    });
+    beam.chain(joint.bodies.iter().map(|body| body.name.as_str())).collect()
 }
 
 /// Returns the declared masses along the arm \[kg\], joint by joint: its beam, the load on the

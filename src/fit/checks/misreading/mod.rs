@@ -166,13 +166,13 @@ pub enum Misreading {
     Mass {
         /// Number of the mass, from 1, counted along the arm; 0 for all masses.
         mass: usize,
-        /// Exponent of the power of ten by which the mass must be multiplied.
-        power: i8,
+        /// Unit or decimal point of the declared number.
+        scale: MassScale,
     },
     /// The payloads of the table are in another unit.
     Payload {
-        /// Exponent of the power of ten by which the payloads must be multiplied.
-        power: i8,
+        /// Unit or decimal point of the numbers in the table.
+        scale: MassScale,
     },
     /// Stiffnesses of joints are in another unit.
     Stiffness {
@@ -187,6 +187,29 @@ pub enum Misreading {
         /// True if gravity points in the negative direction of the axis.
         is_negative: bool,
     },
+}
+
+/// Unit or decimal point of a number that was declared as a mass in kilograms.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum MassScale {
+    /// The number must be multiplied by this power of ten.
+    Power(i8),
+    /// The number is in pounds.
+    Pounds,
+    /// The number is a weight in newtons.
+    Newtons,
+}
+
+impl MassScale {
+    /// Returns the factor by which the number must be multiplied.
+    fn factor(self) -> f64 {
+        match self {
+            Self::Power(power) => undo::power_of_ten(power),
+            Self::Pounds => 0.453_592_37,
+            Self::Newtons => 9.80665_f64.recip(),
+        }
+    }
 }
 
 impl Misreading {

@@ -7,7 +7,9 @@ use nalgebra::{DVector, Vector3};
 use rayon::prelude::*;
 
 use super::Misreading;
-use super::candidates::{candidates, is_far, of_loads, of_order, shift_step};
+use super::candidates::{
+    MASS_SCALES, candidates, is_far, of_loads, of_masses, of_order, shift_step,
+};
 use super::explanation::{Explanation, Explanations, LeftOutMisfit};
 use super::undo::is_unit_ratio;
 use crate::fit::checks::checked_fit::CheckedFit;
@@ -38,6 +40,9 @@ const MAX_REACHES_OF_LOADS: f64 = 2e-3;
 /// command is a misreading. A smaller motion means that the joint does not follow its command at
 /// all.
 const MIN_MOTION: f64 = 0.01;
+/// Largest ratio of the error with a mass corrected to the error without, at which the mass is an
+/// explanation.
+const MAX_RATIO_OF_MASSES: f64 = 0.5;
 /// Range of the fitted lead of a screw \[m\] in which it is a misreading: that of ball screws,
 /// somewhat widened.
 const SCREW_LEAD_RANGE: RangeInclusive<f64> = 1e-3..=0.2;
@@ -90,18 +95,21 @@ impl CheckedFit<'_> {
     pub fn explanations(&self) -> &Explanations {
         self.explanations.get_or_init(|| explanations(self))
     }
+
+    /// Returns the masses in another unit that leave at most `limit` \[m\].
+    pub fn misread_masses(&self, limit: f64) -> Explanations {
+        misread_masses(self, limit)
+    }
 }
 
 /// Finds the misreadings that explain why the fit does not agree with its measurements.
 fn explanations(fit: &CheckedFit) -> Explanations {
-    let Fitting { split, measurements, model, .. } = fit.fitting;
+    let Fitting { measurements, model, .. } = fit.fitting;
     let nominal = fit.registered.identification.rms.norm;
     if nominal.is_nan() || nominal > MAX_REACHES * model.reach() {
         return Explanations::default();
     }
-    let step = split.identification.len().div_ceil(MAX_ROWS).max(1);
-    let chosen: Vec<usize> = split.identification.iter().copied().step_by(step).collect();
-    let trial = Trial { fitting: fit.fitting, problem: fit.problem, chosen };
+    let trial = Trial::new(fit);
     // The error as declared, without orientations as in all trials: reversing no joint changes
     // nothing.
     let as_declared = trial.outcome(Misreading::Reversed { joints: 0 }, false);
@@ -143,11 +151,26 @@ fn explanations(fit: &CheckedFit) -> Explanations {
     let near = if near_alone.is_empty() { near_misreadings(&errors, nominal) } else { near_alone };
     let mut explanations = Explanations { near, ..Explanations::default() };
     if is_position {
-        let at = |x: &DVector<f64>| trial.penalised(fit.fitting, &trial.chosen, x);
-        explanations.as_read = at(&fit.end.x).min(at(fit.registered_x));
+        explanations.as_read = trial.error_as_read(fit);
         explanations.fitted = trial.fit_in_full(&errors, explanations.as_read);
     }
     explanations
+}
+
+/// Finds the masses in another unit that leave at most `limit` \[m\] after a full fit, where the
+/// fit as declared leaves several times the noise. An arm that gives way hides such a mistake in
+/// other parameters, so that the nominal arm does not show it.
+fn misread_masses(fit: &CheckedFit, limit: f64) -> Explanations {
+    let gives_way =
+        fit.fitting.model.parameters.iter().any(|parameter| parameter.site.is_elastic());
+    if !gives_way && !fit.problem.is_elastic() {
+        return Explanations::default();
+    }
+    let trial = Trial::new(fit);
+    let as_read = trial.error_as_read(fit);
+    let tested = of_masses(fit.problem, fit.fitting.measurements, &MASS_SCALES);
+    let fitted = trial.explained(&tested, limit.min(MAX_RATIO_OF_MASSES * as_read));
+    Explanations { near: Vec::new(), fitted, as_read }
 }
 
 /// Returns the sum of the squared deviations of the full parameter vector `x` from nominal, in
@@ -167,7 +190,22 @@ fn near_misreadings(errors: &[(Misreading, f64)], nominal: f64) -> Vec<Misreadin
     errors.iter().take_while(|found| found.1 <= limit).map(|(misreading, _)| *misreading).collect()
 }
 
-impl Trial<'_> {
+impl<'a> Trial<'a> {
+    /// Creates the trial on some of the rows of a fit.
+    fn new(fit: &'a CheckedFit) -> Self {
+        let identification = &fit.fitting.split.identification;
+        let step = identification.len().div_ceil(MAX_ROWS).max(1);
+        let chosen = identification.iter().copied().step_by(step).collect();
+        Self { fitting: fit.fitting, problem: fit.problem, chosen }
+    }
+
+    /// Returns the error of the fit as declared, or of its registered nominal arm if that is less
+    /// \[m\].
+    fn error_as_read(&self, fit: &CheckedFit) -> f64 {
+        let at = |x: &DVector<f64>| self.penalised(self.fitting, &self.chosen, x);
+        at(&fit.end.x).min(at(fit.registered_x))
+    }
+
     /// Returns the misreadings that can be corrected, each with the rms error of the registered
     /// nominal arm after the correction \[m\].
     fn registered_errors(&self, misreadings: &[Misreading]) -> Vec<(Misreading, f64)> {
@@ -192,6 +230,12 @@ impl Trial<'_> {
             .filter(|misreading| is_first(misreading))
             .take(MAX_FITTED_MISREADINGS)
             .collect();
+        self.explained(&chosen, MAX_EXPLAINED_RATIO * as_read)
+    }
+
+    /// Returns those of the `chosen` misreadings that leave less than `limit` \[m\] after a full
+    /// fit, best first.
+    fn explained(&self, chosen: &[Misreading], limit: f64) -> Vec<Explanation> {
         let explanation = |&misreading: &Misreading| {
             let Outcome { rms, size, left_out, is_within_priors } =
                 self.outcome(misreading, true)?;
@@ -223,11 +267,8 @@ impl Trial<'_> {
             })
         };
         let explained: Vec<_> = chosen.par_iter().map(explanation).collect();
-        let mut explained: Vec<Explanation> = explained
-            .into_iter()
-            .flatten()
-            .filter(|explanation| explanation.rms < MAX_EXPLAINED_RATIO * as_read)
-            .collect();
+        let mut explained: Vec<Explanation> =
+            explained.into_iter().flatten().filter(|explanation| explanation.rms < limit).collect();
         explained.sort_by(|a, b| a.rms.total_cmp(&b.rms));
         let best = explained.first().map_or(0.0, |explanation| explanation.rms);
         explained.retain(|explanation| explanation.rms <= MAX_RATIO_TO_BEST * best);

@@ -110,13 +110,13 @@ impl Misreading {
                     can_change.then(|| std::mem::swap(&mut joint.a, &mut joint.d))
                 });
             }
-            Self::Mass { mass, power } => {
+            Self::Mass { mass, scale } => {
                 let masses = (1..).zip(masses_of(&mut problem));
                 let chosen = masses.filter(|(number, _)| mass == 0 || *number == mass);
-                chosen.for_each(|(_, value)| *value *= power_of_ten(power));
+                chosen.for_each(|(_, value)| *value *= scale.factor());
                 return Some(problem);
             }
-            Self::Payload { power } => problem.tool.payload_mass *= power_of_ten(power),
+            Self::Payload { scale } => problem.tool.payload_mass *= scale.factor(),
             Self::Stiffness { power } => {
                 let factor = if power == 0 { 180.0 / PI } else { power_of_ten(power) };
                 let stiffnesses =
@@ -232,11 +232,8 @@ impl Misreading {
                     .iter_mut()
                     .for_each(|position| position[axis] *= power_of_ten(power));
             }
-            Self::Payload { power } => {
-                rows.payload
-                    .iter_mut()
-                    .flatten()
-                    .for_each(|payload| *payload *= power_of_ten(power));
+            Self::Payload { scale } => {
+                rows.payload.iter_mut().flatten().for_each(|payload| *payload *= scale.factor());
             }
             _ => {}
         }

@@ -3,8 +3,9 @@
 use std::f64::consts::PI;
 use std::fmt;
 
+use super::candidates::name_of_mass;
 use super::undo::power_of_ten;
-use super::{Misreading, numbers_of};
+use super::{MassScale, Misreading, numbers_of};
 use crate::error::Location;
 use crate::model::parameter::JointField;
 use crate::problem::{JointKind, Problem};
@@ -42,6 +43,12 @@ impl Misreading {
             (Self::Coupled { joint, from, .. }, Some(size)) => format!(
                 "joint {joint} that also turns by {size:.3} times the command of joint {from} (declare joint-coupling)"
             ),
+            (Self::Mass { mass, scale }, _) => match name_of_mass(problem, mass) {
+                Some((name, joint)) => {
+                    format!("the mass of {name} at joint {joint} that is {scale}")
+                }
+                None => self.to_string(),
+            },
             _ => self.to_string(),
         }
     }
@@ -92,6 +99,16 @@ fn unit_of_ratio(ratio: f64, kind: Option<JointKind>) -> &'static str {
         " (its column is in degrees, declared in radians)"
     } else {
         ""
+    }
+}
+
+impl fmt::Display for MassScale {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Power(power) => write!(f, "to be multiplied by {}", power_of_ten(*power)),
+            Self::Pounds => f.write_str("in pounds, declared as kilograms"),
+            Self::Newtons => f.write_str("a weight in newtons, declared as kilograms"),
+        }
     }
 }
 
@@ -167,16 +184,11 @@ impl fmt::Display for Misreading {
             Self::ArmInMillimetres => {
                 f.write_str("lengths of joints that are in millimetres, declared in metres")
             }
-            Self::Mass { mass: 0, power } => {
-                write!(f, "masses that are to be multiplied by {}", power_of_ten(power))
+            Self::Mass { mass: 0, scale } => write!(f, "masses that are {scale}"),
+            Self::Mass { mass, scale } => {
+                write!(f, "mass {mass}, counted along the arm, that is {scale}")
             }
-            Self::Mass { mass, power } => {
-                let times = power_of_ten(power);
-                write!(f, "mass {mass}, counted along the arm, that is to be multiplied by {times}")
-            }
-            Self::Payload { power } => {
-                write!(f, "payloads that are to be multiplied by {}", power_of_ten(power))
-            }
+            Self::Payload { scale } => write!(f, "payloads that are {scale}"),
             Self::Stiffness { power: 0 } => {
                 f.write_str("stiffnesses of joints per degree, declared per radian")
             }
