@@ -30,6 +30,7 @@ use crate::fit::uncertainty::covariance::Collected;
 use crate::fit::uncertainty::noise::{Noise, assumed_noise, fitted};
 use crate::fit::uncertainty::prior_sizes::prior_sizes;
 use crate::fit::uncertainty::refuted_priors::refuted_priors;
+use crate::fit::uncertainty::second_solution::best_of_two;
 use crate::fit::uncertainty::statistics::Statistics;
 use crate::fit::warm_start::WarmStart;
 use crate::fit::{ErrorSummary, Errors, IdentifyError, Options, Placement, SolverChoice, Strategy};
@@ -199,10 +200,15 @@ fn fit_rows(
     let enough = PoseSufficiency::new(&fitting, problem, &unknowns, &start);
     // A few new rows cannot distinguish a larger noise from a change since the earlier data.
     let judged = options.earlier.is_none() && enough.judges_noise(unknowns.len());
-    let (mut end, statistics, noise) = fitted(&mut fitting, &begin, (has_declared_noise, judged))?;
+    let asked = !options.provisional;
+    let first = fitted(&mut fitting, &begin, (has_declared_noise, judged))?;
+    let ((mut end, statistics, noise), second) = if asked {
+        best_of_two(&mut fitting, first, (has_declared_noise, judged))?
+    } else {
+        (first, None)
+    };
     let errors = fitting.position_errors(&split.identification, &end.x);
     let outliers = outliers(&statistics.lengths, &split.identification, &errors, measurements);
-    let asked = !options.provisional;
     // The triangle is computed before other rows are fitted, while the cache still holds the first
     // linearisation of this fit.
     let whitened_triangle =
@@ -267,6 +273,8 @@ fn fit_rows(
             noise_factor,
             sigma_taken,
             covariance: &statistics.covariance,
+            statistics: &statistics,
+            second: second.as_ref(),
             refuted_priors: &refuted_priors,
             poses: &enough,
             not_converged: not_converged.as_ref(),

@@ -19,6 +19,7 @@ mod recovery;
 mod remainder;
 mod robust;
 mod runaway;
+mod second_solution;
 mod sigma;
 mod told;
 mod tolerance;

@@ -17,6 +17,8 @@ use crate::fit::uncertainty::hidden_by_bound::HiddenByBound;
 use crate::fit::uncertainty::noise::{Noise, together};
 use crate::fit::uncertainty::prior_sizes::PriorSize;
 use crate::fit::uncertainty::refuted_priors::RefutedPrior;
+use crate::fit::uncertainty::second_solution::SecondSolution;
+use crate::fit::uncertainty::statistics::Statistics;
 use crate::least_squares::Loss;
 use crate::problem::{Observation, Problem};
 
@@ -58,6 +60,10 @@ pub(in crate::fit) struct CheckedFit<'a> {
     pub sigma_taken: f64,
     /// Covariance of the unknowns of `whole`, shape = (unknowns, unknowns); 0 for held unknowns.
     pub covariance: &'a DMatrix<f64>,
+    /// Statistics of the unknowns of `whole`.
+    pub statistics: &'a Statistics,
+    /// Second optimum that the measurements do not exclude; `None` if none was found.
+    pub second: Option<&'a SecondSolution>,
     /// Rules of `[parameters]` whose σ the data refute.
     pub refuted_priors: &'a [RefutedPrior],
     /// Number of different poses and of independent coordinates, with findings if they are too few

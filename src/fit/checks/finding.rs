@@ -94,6 +94,9 @@ finding_codes! {
     HeldOutNotConverged: Error "held-out-not-converged" ["termination"]
         "The fit of bases and tools of held-out sessions did not converge.",
         "check these sessions, or hold out other rows";
+    TwoSolutions: Error "two-solutions" ["parameter", "estimate", "second", "excess", "probability", "apart", "configuration"]
+        "A second arm, more than 3 standard errors from the fitted one, explains the measurements as well: its probability is above 0.001.",
+        "measure poses in which the two differ, or give priors that decide between them";
     BeyondPrior: Error "beyond-prior" ["parameter", "sigmas"]
         "A parameter of the arm deviates from nominal by more than 5 times the σ of its prior.",
         "check axes of the measuring frame, signs of joints, units, and the prior";

@@ -29,6 +29,7 @@ pub(super) mod required_columns;
 pub(super) mod row_kind;
 pub(super) mod set_aside;
 mod table_digits;
+mod two_solutions;
 mod view_order;
 
 use checked_fit::{Check, CheckedFit, Convergence, EnoughEquations};
@@ -44,6 +45,7 @@ const CHECKS: &[&dyn Check] = &[
     &misfit::Misfit,
     &misfit::SizeOfArm,
     &Convergence,
+    &two_solutions::OneSolution,
     &parameter_limits::WithinPriors,
     &parameter_limits::WithinArmSize,
     &held_out::NotAllCopied,

@@ -10,5 +10,6 @@ pub(super) mod prices;
 pub(super) mod prior_sizes;
 pub(super) mod refuted_priors;
 pub(super) mod residual_lengths;
+pub(super) mod second_solution;
 pub(super) mod shadow_price;
 pub(super) mod statistics;
