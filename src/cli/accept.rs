@@ -101,6 +101,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
             held_out.iter().filter_map(|&row| Some(predicted.rows.get(row)?.position.norm()));
         result = result.with_bounds(&bounds, bounds.coverage(errors), has_remainder);
     }
+    super::tolerance::warn_if_tiny(arguments.tolerance_mm, common.quiet);
     let tolerance = arguments.tolerance_mm.map(|length| Tolerance {
         length: length * 1e-3,
         share: arguments.share,

@@ -73,6 +73,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     }
     let estimate = arguments.trust.read(&arguments.estimate)?;
     let trusted = estimate.trusted;
+    common.warn_of_loads(&problem, &estimate, &targets);
     if !trusted {
         diagnostic::warn("the estimate is not to be trusted, so the commands are not either");
     }
@@ -83,7 +84,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     };
     let found = solve(targets.clone(), arguments.frame)?;
     let as_given = (&targets, arguments.frame, found.commands.as_slice());
-    let misplaced = misplaced::warning(as_given, |targets, frame| {
+    let misplaced = misplaced::warning(&problem, as_given, |targets, frame| {
         solve(targets, frame).ok().map(|found| found.commands)
     });
     // An error of the remainder's file is reported only after errors of the estimate, which explain
@@ -99,6 +100,11 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         diagnostic::warn(words);
     }
     let Compensation { targets, commands, bounds, .. } = &found;
+    let doubts = [
+        misplaced::common_offset(targets, commands).filter(|_| misplaced.is_none()),
+        misplaced::too_few_joints(&problem, targets, commands),
+    ];
+    doubts.iter().flatten().filter(|_| !common.quiet).for_each(|words| diagnostic::warn(words));
     let bounds = bounds.as_ref();
     let table = commands_csv(&problem, targets, commands, bounds);
     results.write(&[("commands.csv", &table)])?;

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use flexcal::error::{InputError, Warning, WarningKind};
+use flexcal::fit::{self, SavedEstimate};
 use flexcal::measurement::{Dataset, Measurements};
 use flexcal::problem::Problem;
 use flexcal::report::shell_word;
@@ -101,10 +102,15 @@ impl Common {
     /// identification and held-out rows.
     pub fn measurements(&self, problem: &Problem) -> Result<Dataset, InputError> {
         let (measurements, mut warnings) = Measurements::read(self.files(problem), problem)?;
-        warnings.extend(measurements.repeated_rows(problem.data.position_sigma));
-        warnings.extend(measurements.time_going_back());
+        warnings.extend(measurements.row_warnings(problem));
         self.warn(&warnings);
         Dataset::from_measurements(problem, measurements)
+    }
+
+    /// Warns if `rows` lack a load that the rows of an estimate had.
+    pub fn warn_of_loads(&self, problem: &Problem, estimate: &SavedEstimate, rows: &Measurements) {
+        let missing = fit::missing_loads(problem, estimate, rows);
+        missing.iter().filter(|_| !self.quiet).for_each(|words| diagnostic::warn(words));
     }
 
     /// Prints a warning if no parameter is free, unless the command is quiet.

@@ -35,6 +35,7 @@ mod remainder;
 mod simulate;
 mod study;
 mod threads;
+mod tolerance;
 mod trace;
 mod unfinished;
 mod watch;

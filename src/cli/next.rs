@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use flexcal::design::{self, Candidates, Explanations, NextOptions, Purpose, StopReason};
 use flexcal::fit::Options;
+use flexcal::measurement::Measurements;
 use flexcal::problem::PoseRanges;
 use flexcal::report::{self, shell_word};
 use flexcal::results::{Document as _, NextResult, poses_csv};
@@ -88,6 +89,32 @@ impl From<PurposeArgument> for Purpose {
     }
 }
 
+/// Difference up to which two commands are those of one pose \[rad\] or \[m\].
+const SAME_COMMAND: f64 = 1e-4;
+
+/// Returns a warning if chosen poses of a pool are poses of the measurements: equal in joints and
+/// payload.
+fn measured_already(measured: &Measurements, chosen: &Measurements) -> Option<String> {
+    let load = |rows: &Measurements, row: usize| {
+        rows.payload.as_ref().and_then(|payload| payload.get(row).copied())
+    };
+    let is_same = |row: usize, other: usize| {
+        let (q, p) = (chosen.configuration(row), measured.configuration(other));
+        let is_near = |(a, b): (&f64, &f64)| (a - b).abs() < SAME_COMMAND;
+        q.iter().zip(p).all(is_near) && load(chosen, row) == load(measured, other)
+    };
+    let repeated: Vec<usize> = (0..chosen.len())
+        .filter_map(|row| (0..measured.len()).find(|&other| is_same(row, other)))
+        .collect();
+    let first = measured.location(*repeated.first()?);
+    Some(format!(
+        "{} of the {} chosen poses of the pool are measured already, such as {first}; take rows that \
+         are measured out of the pool, unless they are to be measured again",
+        repeated.len(),
+        chosen.len()
+    ))
+}
+
 /// Chooses the next poses, writes `next.csv`, `next.json` and `next.html`, and prints the error
 /// that is expected after them.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
@@ -108,6 +135,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         Some(Explanations::read(&file, &problem)?)
     };
     let workspace = arguments.region.workspace()?;
+    super::tolerance::warn_if_tiny(arguments.tolerance_mm, common.quiet);
     let stop = interrupt::stop();
     let choose = |fit: Options| {
         let options = NextOptions {
@@ -126,6 +154,11 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let (next, options) = Line::during(common.prints_text(), stop.clone(), |sink| {
         choose(Options::default().with_stop(stop).with_progress(sink))
     })?;
+    if let Some(words) = measured_already(&data.measurements, &next.poses)
+        .filter(|_| !source.candidates.is_empty() && !common.quiet)
+    {
+        diagnostic::warn(&words);
+    }
     let json = NextResult::new(&problem, &options, &next).to_json();
     let table = poses_csv(&problem, &next.poses);
     interrupt::begin_writing();

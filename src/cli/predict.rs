@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use clap::Args;
 use flexcal::fit::{self, Residual};
 use flexcal::measurement::{Measurements, Split};
+use flexcal::nalgebra::Vector3;
 use flexcal::problem::{HeldOut, Problem};
 use flexcal::remainder::{self, Bounds, CorrectedPrediction};
 use flexcal::report::{self, shell_word};
@@ -46,6 +47,13 @@ pub struct Arguments {
 /// below the level of the bounds.
 const MAX_SHORTFALL_SIGMAS: f64 = 3.0;
 
+/// Minimum number of rows that show a common error.
+const MIN_COMMON_ROWS: usize = 3;
+/// Smallest ratio of a common error to the scatter around it that is reported.
+const MIN_COMMON_SCATTERS: f64 = 5.0;
+/// Smallest common error that is reported \[m\].
+const MIN_COMMON_ERROR: f64 = 1e-3;
+
 /// Names of the files that the command may write.
 const RESULT_FILES: [&str; 4] =
     ["predictions.csv", "residuals.csv", "errors.json", "predictions.html"];
@@ -65,6 +73,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     if !trusted {
         diagnostic::warn("the estimate is not to be trusted, so the predictions are not either");
     }
+    if let Some(estimate) = &estimate {
+        common.warn_of_loads(&problem, estimate, &rows);
+    }
     // Rows without a split are predicted too. A random split applies only to the rows of the
     // problem, not to new rows.
     let is_random_split = matches!(problem.data.held_out, Some(HeldOut::Fraction { .. }));
@@ -83,6 +94,10 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         _ => (fit::predict(&problem, estimate.as_ref(), &rows, split.as_ref())?, None),
     };
     let bounds = bounds.as_ref();
+    let measured = prediction.residuals.as_deref().unwrap_or_default();
+    if let Some(words) = common_error(&rows, measured).filter(|_| !common.quiet) {
+        diagnostic::warn(&words);
+    }
     let is_position = |row: usize| rows.observation(row).is_position();
     let bounds_suffice = bounds.is_some() && (0..rows.len()).all(is_position);
     let errors = estimate
@@ -136,6 +151,29 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         format!("{text}\nWritten to {folder}: {}\nNext: {next}\n", names.join(", "))
     })?;
     Ok(Outcome::from_trust(trusted))
+}
+
+/// Returns a warning if all measured positions of one session are off by nearly the same vector.
+fn common_error(rows: &Measurements, residuals: &[Residual]) -> Option<String> {
+    let is_one_session = rows.session.names.len() == 1 && residuals.len() == rows.len();
+    if !is_one_session || residuals.len() < MIN_COMMON_ROWS {
+        return None;
+    }
+    let count = residuals.len() as f64;
+    let mean = residuals.iter().map(|row| row.position).sum::<Vector3<f64>>() / count;
+    let scatter = residuals.iter().map(|row| (row.position - mean).norm_squared()).sum::<f64>();
+    let is_common = mean.norm() > MIN_COMMON_SCATTERS * (scatter / count).sqrt();
+    let are_positions = (0..rows.len()).all(|row| rows.observation(row).is_position());
+    (are_positions && is_common && mean.norm() > MIN_COMMON_ERROR).then(|| {
+        format!(
+            "all {} rows are off by about the same vector ({:.3}, {:.3}, {:.3} mm): if the instrument \
+             was set up anew, give these rows a session of their own in the column session",
+            residuals.len(),
+            mean.x * 1e3,
+            mean.y * 1e3,
+            mean.z * 1e3
+        )
+    })
 }
 
 /// Returns true if the share of rows within their bounds is significantly below the level of the

@@ -52,12 +52,14 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let estimate_file = std::slice::from_ref(&arguments.estimate);
     let results =
         common.results("watch", &problem, estimate_file, &["watch.json", "watch.html"])?;
-    let (rows, warnings) = Measurements::read(common.files(&problem), &problem)?;
+    let (rows, mut warnings) = Measurements::read(common.files(&problem), &problem)?;
+    warnings.extend(rows.row_warnings(&problem));
     common.warn(&warnings);
     let estimate = arguments.trust.read(&arguments.estimate)?;
     if !estimate.trusted {
         diagnostic::warn("the estimate is not to be trusted, so the verdict is not either");
     }
+    common.warn_of_loads(&problem, &estimate, &rows);
     let settings = (arguments.drift, arguments.false_alarms);
     let rows = rows.arm_rows();
     let watch = life::watch(&problem, &estimate, &rows, settings)?;

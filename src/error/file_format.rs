@@ -73,7 +73,8 @@ pub(crate) fn text_format(text: &str) -> Option<&'static str> {
         !key.is_empty() && key.chars().all(|c| c.is_alphanumeric() || "_-.\"' ".contains(c))
     };
     let has_key = |sign| line.split_once(sign).is_some_and(|(key, _)| is_key(key.trim()));
-    if line.strip_prefix('[').is_some_and(|inner| inner.trim_start().starts_with('{')) {
+    let is_list = |inner: &str| inner.is_empty() || inner.trim_start().starts_with(['{', '[']);
+    if line != "[[" && line.strip_prefix('[').is_some_and(is_list) && !line.ends_with("]]") {
         Some(JSON)
     } else if has_key('=') || (line.starts_with('[') && is_key(line.trim_matches(['[', ']']))) {
         Some(TOML)
@@ -104,6 +105,7 @@ mod tests {
             ("<?xml version='1.0'?>", Some(XML)),
             ("{\n \"a\": 1}", Some(JSON)),
             ("[ {\"q1\": 1}]", Some(JSON)),
+            ("[\n {\n \"q1\": 1}]", Some(JSON)),
             ("---\r\na: 1", Some(YAML)),
             ("# arm\nname: arm", Some(YAML)),
             ("# arm\n\nname = 'arm'", Some(TOML)),

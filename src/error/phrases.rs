@@ -36,12 +36,25 @@ pub(super) fn column_difference(other: &Path, has: bool) -> String {
     format!("{} {says}", other.display())
 }
 
+/// Returns the remedy for a time of the day without its date, such as `09:12:06.7`; empty for
+/// other words.
+pub(super) fn missing_date_hint(value: &str) -> String {
+    let mut parts = value.split([':', '.', ',']);
+    let is_number = |part: &str| !part.is_empty() && part.bytes().all(|byte| byte.is_ascii_digit());
+    let is_clock = value.contains(':') && parts.all(is_number);
+    if is_clock {
+        format!("; its date is missing: write 2024-05-31T{value}")
+    } else {
+        String::new()
+    }
+}
+
 /// Returns the column names of a header in quotes, as in `there are "a", "b"`, or a clause that
-/// there are none.
+/// there are no others.
 pub(super) fn in_quotes(names: &[String]) -> String {
     let names: Vec<String> =
         names.iter().map(|name| format!("\"{}\"", shortened(name, 40))).collect();
-    joined_list("there are", &names, "its header is empty")
+    joined_list("there are", &names, "it has no columns of other names")
 }
 
 /// Returns `verb` followed by the names, or the text `none` if there are no names.

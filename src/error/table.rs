@@ -7,7 +7,7 @@ use thiserror::Error;
 use super::near::{did_you_mean, is_it_rather, suggestion};
 use super::phrases::{
     clock_offset_remedy, column_difference, compared_keys, decimal_comma_remedy, in_quotes,
-    missing_column_remedy, plural, with_remedy,
+    missing_column_remedy, missing_date_hint, plural, with_remedy,
 };
 use super::warning::{listed, nearest_in_time_hint};
 
@@ -161,7 +161,10 @@ pub enum TableErrorKind {
          (2024-05-31 14:03:20), or the month first with AM or PM"
     )]
     AmbiguousDate { value: String },
-    #[error("\"{value}\" is neither a number nor a time such as 2024-05-31T14:03:20.5")]
+    #[error(
+        "\"{value}\" is neither a number nor a time such as 2024-05-31T14:03:20.5{}",
+        missing_date_hint(value)
+    )]
     NotATime { value: String },
     #[error(
         "\"{value}\" is not a number; if numbers have a decimal comma, write decimal = \",\" in \
@@ -269,6 +272,42 @@ pub enum TableErrorKind {
     UnitRow { value: String },
     #[error("{value} is not a direction; write -1, 0 or 1")]
     NotADirection { value: f64 },
+    #[error(
+        "\"{value}\" is not a direction; write 1 where the joint came from smaller values, -1 where \
+         it came from larger ones, and 0 if that is not known"
+    )]
+    DirectionInWords { value: String },
+    #[error("\"{value}\" has the exponent of Fortran; write {write}")]
+    FortranExponent { value: String, write: String },
+    #[error("\"{value}\" are degrees, minutes and seconds; write degrees with decimals: {write}")]
+    Sexagesimal { value: String, write: String },
+    #[error(
+        "a table with bars, as in Markdown; remove the bars at both ends of the lines and the line \
+         of dashes below the header, and write delimiter = \"|\" in [data.format]"
+    )]
+    MarkdownTable,
+    #[error(
+        "the table is transposed: its first column holds the names and each further one a pose; \
+         transpose it, so that the first line is {first},…"
+    )]
+    Transposed { first: String },
+    #[error(
+        "the joints of the table are counted from 2 ({first} to {last}), those of the arm from 1; if \
+         {first} is joint 1, rename each column to the number before"
+    )]
+    JointsFromTwo { first: String, last: String },
+    #[error(
+        "columns are missing: {}; if the table has them under other names, write in {section}: \
+         {map}",
+        missing.join(", ")
+    )]
+    MissingColumns { missing: Vec<String>, section: &'static str, map: String },
+    #[error(
+        "`files` and joints.files both name {}; `files` names what the instrument measured, \
+         joints.files the table with the joint coordinates",
+        path.display()
+    )]
+    JoinedWithItself { path: PathBuf },
     #[error(
         "\"{word}\" is neither identification nor validation, the two words of this column{}",
         is_it_rather("", *meant)

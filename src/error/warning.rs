@@ -47,6 +47,17 @@ pub enum WarningKind {
     #[error("unknown column; ignored (write {write})")]
     UnitIgnored { write: String },
     #[error(
+        "holds dates and times and is ignored; \"{name}\" = \"time\" in [data.columns] reads them, and \
+         effects that depend on time can be found"
+    )]
+    DatesIgnored { name: String },
+    #[error(
+        "{rows} row{} pair with the joint table if their clock is set {by} by {hours}, as if summer \
+         time began or ended between the rows; correct the times of these rows",
+        plural(*rows)
+    )]
+    ClockJump { rows: usize, hours: String, by: &'static str },
+    #[error(
         "{value:?} is not a date and time such as 2024-05-31T14:03:20.5; ignored, and rows \
          count in their order instead (write {write} for \
          seconds)"
@@ -62,6 +73,31 @@ pub enum WarningKind {
         repeated_rows(*rows, others)
     )]
     RowsRepeated { rows: usize, first: String, others: Vec<String> },
+    #[error(
+        "equal in all digits to {first} of another session (\"{}\" here, \"{}\" there){}; a \
+         measurement that is given twice counts twice",
+        sessions[0], sessions[1], repeated_rows(*rows, others)
+    )]
+    RowsOfAnotherSession { rows: usize, sessions: [String; 2], first: String, others: Vec<String> },
+    #[error(
+        "the same joint angles as {first}, and the same position but for digits below {step} \
+         mm{}; one measurement with two numbers of digits counts twice, and standard errors come \
+         out too small: keep one of the two",
+        repeated_rows(*rows, others)
+    )]
+    RowsRounded { rows: usize, first: String, step: String, others: Vec<String> },
+    #[error(
+        "measures the position of {before} in all digits at other joint angles{}; the instrument \
+         probably held its last value: remove such rows, or measure them again",
+        further_rows(*rows, others)
+    )]
+    PositionHeld { before: String, rows: usize, others: Vec<String> },
+    #[error(
+        "\"{name}\" ({rows} row{}) differs from \"{other}\" in case, spaces or hyphens only, and is \
+         read as another session with a base of its own; write both alike",
+        plural(*rows)
+    )]
+    SessionsAlike { name: String, other: String, rows: usize },
     #[error(
         "the time is {back} s earlier than in the previous row{}; rows are used in the order of \
          their times",
@@ -174,6 +210,21 @@ pub enum WarningKind {
          these are millimetres, write target_mm"
     )]
     FarTarget { distance: String, links: String },
+    #[error(
+        "{length} m is far beyond the arm, whose links together are {links} m long; if these are \
+         millimetres, write {write}"
+    )]
+    FarFixture { length: String, links: String, write: String },
+    #[error(
+        "no distance is longer than {longest} mm, while the links of the arm are together {links} m \
+         long; if these are metres, name the column distance_m"
+    )]
+    ShortDistances { longest: String, links: String },
+    #[error(
+        "the payloads divided by 9.80665 are round numbers ({newtons} N is {kilograms} kg); if the \
+         column holds newtons, write kilograms"
+    )]
+    PayloadInNewtons { newtons: String, kilograms: String },
 }
 
 fn declared_mass_hint(arm: Option<&str>) -> String {
@@ -188,6 +239,17 @@ fn repeated_rows(rows: usize, named: &[String]) -> String {
         0 => String::new(),
         1 => format!(", and 1 further row repeats another ({named})"),
         _ => format!(", and {further} further rows repeat others ({named}{left})"),
+    }
+}
+
+/// Returns a clause that names the further rows of which a warning is true.
+fn further_rows(rows: usize, named: &[String]) -> String {
+    let (further, left) = (rows.saturating_sub(1), rows.saturating_sub(1 + named.len()));
+    let left = if left > 0 { format!(" and {left} more") } else { String::new() };
+    match further {
+        0 => String::new(),
+        1 => format!(", as does {}", named.join(", ")),
+        _ => format!(", as do {further} further rows ({}{left})", named.join(", ")),
     }
 }
 

@@ -1,5 +1,7 @@
 //! Recognition of words in cells that should contain a number, for error messages.
 
+use crate::error::{TableErrorKind, shortened};
+
 /// Units that tables of other programs write into cells.
 pub(super) const UNITS: [&str; 12] =
     ["degrees", "degree", "deg", "°C", "°", "rad", "mm", "kg", "m", "s", "N", "C"];
@@ -19,6 +21,43 @@ pub(super) fn has_thousands(word: &str) -> bool {
     groups.next().is_some_and(|first| (1..=3).contains(&first.len()) && is_digits(first))
         && groups.all(|group| group.len() == 3 && is_digits(group))
         && word.replace(',', "").parse::<f64>().is_ok()
+}
+
+/// Returns the error of a number in a notation that is not read: thousands that are separated by
+/// spaces, the exponent of Fortran, or degrees with minutes and seconds. `None` for other words.
+pub(super) fn other_notation(word: &str) -> Option<TableErrorKind> {
+    let value = shortened(word, 40);
+    let is_digits = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
+    let unsigned = word.trim_start_matches(['-', '+']);
+    let whole = unsigned.split(['.', ',']).next().unwrap_or_default();
+    let mut groups = whole.split([' ', '\u{a0}', '\u{2009}', '\u{202f}', '\'']);
+    let first = groups.next().is_some_and(|first| first.len() <= 3 && is_digits(first));
+    let mut others = groups.peekable();
+    if first && others.peek().is_some() && others.all(|group| group.len() == 3 && is_digits(group))
+    {
+        return Some(TableErrorKind::ThousandsSeparator { value });
+    }
+    let number = |text: &str| text.replace(',', ".").parse::<f64>().ok();
+    let with_e = word.replace(['D', 'd'], "E");
+    if with_e != word && number(&with_e).is_some() {
+        return Some(TableErrorKind::FortranExponent { value, write: with_e });
+    }
+    let parts: Vec<f64> = unsigned
+        .split([':', '°', '\'', '"', '′', '″', ' '])
+        .filter(|part| !part.is_empty())
+        .map_while(number)
+        .collect();
+    let is_sexagesimal = unsigned.contains([':', '°'])
+        && unsigned.chars().all(|c| c.is_ascii_digit() || ":°'\"′″ .,".contains(c))
+        && parts.iter().skip(1).all(|part| (0.0..60.0).contains(part));
+    let (degrees, minutes, seconds) = match parts[..] {
+        [degrees, minutes] if is_sexagesimal => (degrees, minutes, 0.0),
+        [degrees, minutes, seconds] if is_sexagesimal => (degrees, minutes, seconds),
+        _ => return None,
+    };
+    let sign = if word.starts_with('-') { "-" } else { "" };
+    let decimal = degrees + minutes / 60.0 + seconds / 3600.0;
+    Some(TableErrorKind::Sexagesimal { value, write: format!("{sign}{decimal:.6}") })
 }
 
 /// Returns true for a day and a month such as `18. Mrz` or `Mar-18`, into which spreadsheets turn

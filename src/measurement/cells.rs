@@ -30,6 +30,11 @@ pub(super) fn not_negative(table: &Table, column: &Column) -> Result<f64, InputE
 
 /// Reads a direction of approach from the current row's cell of `column`: −1, 0 or +1.
 pub(super) fn direction(table: &Table, column: &Column) -> Result<f64, InputError> {
+    let word = table.non_empty_text(column.place)?;
+    if word.chars().all(char::is_alphabetic) {
+        let kind = TableErrorKind::DirectionInWords { value: shortened(word) };
+        return Err(table.cell_error(column.place, kind));
+    }
     let value = table.number(column.place)?;
     if [-1.0, 0.0, 1.0].contains(&value) {
         Ok(value)

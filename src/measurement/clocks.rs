@@ -1,5 +1,8 @@
 //! Constant difference between the clocks of two tables that are joined by time.
 
+use crate::error::{Location, Warning, WarningKind};
+use crate::problem::JoinRule;
+
 /// Maximum time between paired rows when a shift between the clocks is searched \[s\].
 const MAX_PAIR_GAP: f64 = 0.5;
 /// Maximum number of rows of the joint table for which a shift is searched. A table with more rows
@@ -53,6 +56,40 @@ pub(super) fn best_shift(times: &[f64], log: &[f64]) -> Option<f64> {
     differences.get(differences.len() / 2).copied()
 }
 
+/// Unit of the differences between time zones \[s\].
+const QUARTER_HOUR: f64 = 900.0;
+/// Largest deviation from a whole number of quarter hours that a change of the time zone leaves
+/// \[s\].
+const MAX_OFF_QUARTER: f64 = 2.0;
+
+/// Returns the whole quarters of an hour \[s\] that must be added to `times` \[s\], those of the
+/// rows without a partner, so that they have partners in `log`. `None` if no such shift is certain.
+fn zone_change(times: &[f64], log: &[f64]) -> Option<f64> {
+    let shift = -best_shift(times, log)?;
+    let whole = (shift / QUARTER_HOUR).round() * QUARTER_HOUR;
+    (whole != 0.0 && (shift - whole).abs() < MAX_OFF_QUARTER).then_some(whole)
+}
+
+/// Returns a warning, located at the row `first` without a partner, if the rows measured at `times`
+/// without a partner in `log` have one at another hour of the clock. `None` unless both tables are
+/// joined by time.
+pub(super) fn clock_jump(
+    rule: JoinRule,
+    (times, log): (&[f64], &[f64]),
+    first: Option<&Location>,
+) -> Option<Warning> {
+    let JoinRule::Time { tolerance, .. } = rule else { return None };
+    let is_unpaired = |time: &&f64| nearest(log, **time).is_some_and(|(_, gap)| gap > tolerance);
+    let times: Vec<f64> = times.iter().filter(is_unpaired).copied().collect();
+    let shift = zone_change(&times, log)?;
+    let kind = WarningKind::ClockJump {
+        rows: times.len(),
+        hours: format!("{} h", shift.abs() / 3600.0),
+        by: if shift > 0.0 { "forward" } else { "back" },
+    };
+    Some(Warning { location: first?.clone(), kind })
+}
+
 /// Returns at most `most` of the times, evenly spaced.
 fn evenly(times: &[f64], most: usize) -> Vec<f64> {
     times.iter().copied().step_by(times.len().div_ceil(most).max(1)).collect()
@@ -91,5 +128,9 @@ mod tests {
         let late: Vec<f64> = even.iter().map(|time| time + 47.03).collect();
         assert_eq!(best_shift(&late, &even), None);
         assert_eq!(best_shift(&[], &even), None);
+        let late: Vec<f64> = uneven.iter().map(|time| time + 3600.3).collect();
+        assert_eq!(zone_change(&late, &uneven), Some(-3600.0));
+        let late: Vec<f64> = uneven.iter().map(|time| time + 47.03).collect();
+        assert_eq!(zone_change(&late, &uneven), None);
     }
 }

@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::convert::identity;
 
+use super::headerless::no_header;
 use super::mapped::{Names, no_such};
 use super::meaning::{
     Meaning, Numbering, affects_results, asked_for_readings, lacking_neighbour, split_unit,
@@ -183,11 +184,14 @@ impl Columns {
         let required = columns.require(table, problem, measured, &numbering, &unknown);
         required.map_err(|error| match (hidden, named.unused) {
             _ if is_missing_column(&error) && holds_numbers(&table.header) => {
-                Location { key: None, ..table.column("") }.error(TableErrorKind::NoHeader)
+                Location { key: None, ..table.column("") }.error(no_header(&table.header))
             }
             (Some(hidden), _) => with_rule_as_cause(error, hidden),
             (None, Some(rule)) if measured && is_missing_column(&error) => {
                 no_such(rule, &problem.data.dialect.columns, table)
+            }
+            _ if is_missing_column(&error) => {
+                columns.renamed(table, (problem, &numbering), (measured, &unknown)).unwrap_or(error)
             }
             _ => error,
         })?;

@@ -100,8 +100,7 @@ impl Dataset {
         problem: &Problem,
     ) -> Result<(Self, Vec<Warning>), InputError> {
         let (measurements, mut warnings) = Measurements::read(files, problem)?;
-        warnings.extend(measurements.repeated_rows(problem.data.position_sigma));
-        warnings.extend(measurements.time_going_back());
+        warnings.extend(measurements.row_warnings(problem));
         Ok((Self::from_measurements(problem, measurements)?, warnings))
     }
 
@@ -115,8 +114,7 @@ impl Dataset {
         problem: &Problem,
     ) -> Result<(Self, Vec<Warning>), InputError> {
         let (measurements, mut warnings) = Measurements::read_columns(table, problem)?;
-        warnings.extend(measurements.repeated_rows(problem.data.position_sigma));
-        warnings.extend(measurements.time_going_back());
+        warnings.extend(measurements.row_warnings(problem));
         Ok((Self::from_measurements(problem, measurements)?, warnings))
     }
 }

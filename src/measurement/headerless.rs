@@ -1,5 +1,6 @@
 //! Tables without a header, whose columns are selected by their places.
 
+use crate::error::TableErrorKind;
 use crate::problem::{ColumnRule, ColumnSelector};
 
 /// Returns true if the `cells` of the first record are a row, not a header. A rule must select a
@@ -20,4 +21,29 @@ pub(super) fn is_row_of_numbers(cells: &[String], rules: &[ColumnRule]) -> bool 
     };
     let is_selected = rules.iter().filter_map(cell).any(|cell| number(cell).is_some());
     is_selected && !counts(0.0) && !counts(1.0)
+}
+
+/// Returns the error of a table whose first line holds numbers.
+pub(super) fn no_header(header: &[String]) -> TableErrorKind {
+    let is_number = |name: &String| name.replace(',', ".").parse::<f64>().is_ok();
+    match header {
+        [first, others @ ..] if !is_number(first) && others.iter().all(is_number) => {
+            TableErrorKind::Transposed { first: first.clone() }
+        }
+        _ => TableErrorKind::NoHeader,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_first_line_of_numbers_is_no_header() {
+        let header =
+            |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
+        let transposed = no_header(&header(&["q1_deg", "1.5", "2"]));
+        assert_eq!(transposed, TableErrorKind::Transposed { first: "q1_deg".to_owned() });
+        assert_eq!(no_header(&header(&["1", "1.5", "2"])), TableErrorKind::NoHeader);
+    }
 }

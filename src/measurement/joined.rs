@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use csv::ByteRecord;
 
 use super::cell_style::CellStyle;
-use super::clocks::{best_shift, nearest};
+use super::clocks::{best_shift, clock_jump, nearest};
 use super::mapped::Names;
 use super::meaning::is_numbered_or_position;
 use super::paired_times::{TimedPair, are_whole_minutes, order_contradicted};
@@ -480,21 +480,21 @@ impl JoinedLog {
     pub fn warnings(&self) -> Result<Vec<Warning>, InputError> {
         self.check_pairing()?;
         let unused = self.rows.iter().filter(|row| row.uses == 0);
-        let unused: Vec<Location> = match self.rule {
+        let unused: Vec<_> = match self.rule {
             JoinRule::Time { .. } => Vec::new(),
             _ => unused.map(|row| Location::file(&row.file).at_line(row.line)).collect(),
         };
         // Measured rows are listed, because they are lost; unused joint rows are only counted.
         let warning = |rows: &[Location], gap: Option<String>, listed: usize| {
-            let location = rows.first()?.clone();
             let others = rows.iter().skip(1).take(listed).map(ToString::to_string).collect();
             let kind = WarningKind::WithoutPartner { rows: rows.len(), others, gap };
-            Some(Warning { location, kind })
+            Some(Warning { location: rows.first()?.clone(), kind })
         };
         let unpaired =
             [warning(&self.unpaired, self.gap(), MAX_LISTED_ROWS), warning(&unused, None, 0)];
-        let unpaired = unpaired.into_iter().flatten();
-        let order = order_contradicted(&self.timed_pairs);
-        Ok(self.decoding_warnings.iter().cloned().chain(unpaired).chain(order).collect())
+        let jump = clock_jump(self.rule, (&self.times, &self.log_times), self.unpaired.first());
+        let others = unpaired.into_iter().flatten();
+        let others = others.chain(jump.or_else(|| order_contradicted(&self.timed_pairs)));
+        Ok(self.decoding_warnings.iter().cloned().chain(others).collect())
     }
 }

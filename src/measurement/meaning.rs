@@ -149,7 +149,10 @@ impl Numbering {
                         write: write(),
                     })
                 }
-                None => Ok(Meaning::Ignored(WarningKind::UnitIgnored { write: write() })),
+                None => {
+                    let write = write() + &conversion(unit, suffix);
+                    Ok(Meaning::Ignored(WarningKind::UnitIgnored { write }))
+                }
             },
             None if role == Role::Time => Ok(Meaning::Read(Role::Time, DATE_CONVERSION)),
             None if strict => Err(InputErrorKind::NeedsUnit { noun: unit.noun(), write: write() }),
@@ -220,6 +223,18 @@ pub(super) fn unit_of(joint: JointKind) -> Option<Unit> {
         JointKind::Revolute => Some(Unit::Angle),
         JointKind::Prismatic => Some(Unit::Length),
         JointKind::Fixed => None,
+    }
+}
+
+/// Returns the conversion of the numbers of a column with another unit, for a message; empty if the
+/// unit is unknown.
+fn conversion(unit: Unit, suffix: &str) -> String {
+    let symbol = unit.in_tables().suffix;
+    match (suffix, unit.convert_foreign(suffix, 1.0)) {
+        (_, Some(factor)) => format!(" and convert the numbers: 1 {suffix} is {factor} {symbol}"),
+        ("F", None) if symbol == "C" => " and convert the numbers: °C = (°F − 32) / 1.8".to_owned(),
+        ("K", None) if symbol == "C" => " and subtract 273.15 from the numbers".to_owned(),
+        _ => String::new(),
     }
 }
 

@@ -19,7 +19,11 @@ mod dataset;
 mod dialect;
 #[deny(clippy::indexing_slicing)]
 mod duplicates;
+#[deny(clippy::indexing_slicing)]
+mod guessed_names;
 mod headerless;
+#[deny(clippy::indexing_slicing)]
+mod held_value;
 #[deny(clippy::indexing_slicing)]
 mod joined;
 #[deny(clippy::indexing_slicing)]

@@ -91,7 +91,7 @@ impl Measurements {
 
     /// Returns a warning, located at the first such row, if a row is earlier than the one before it
     /// in the same file and session.
-    pub(crate) fn time_going_back(&self) -> Option<Warning> {
+    pub(super) fn time_going_back(&self) -> Option<Warning> {
         if !self.time_measured {
             return None;
         }

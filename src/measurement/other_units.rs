@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use super::Measurements;
 use super::limits::Commands;
 use crate::error::{Warning, WarningKind};
-use crate::problem::{JointKind, Problem};
+use crate::problem::{JointKind, Observation, Problem};
 
 /// Range of room temperatures, 15 °C to 35 °C, in degrees Fahrenheit.
 const ROOM_FAHRENHEIT: std::ops::RangeInclusive<f64> = 59.0..=95.0;
@@ -16,6 +16,13 @@ const GRAVITY: f64 = 9.80665;
 /// Largest relative difference between g times the median of the column `hoist_N` and the declared
 /// hoist force, at which the column is probably in kilograms.
 const MAX_HOIST_DIFFERENCE: f64 = 0.2;
+/// Step of round payloads \[kg\].
+const ROUND_PAYLOAD: f64 = 0.5;
+/// Largest relative deviation from a round payload.
+const MAX_OFF_ROUND: f64 = 5e-4;
+/// Smallest plausible distance to an anchor, as a fraction of the length of the arm's links, if no
+/// other is longer.
+const MIN_PLAUSIBLE_DISTANCE: f64 = 0.005;
 /// Minimum number of rows of a table at which small ranges of the joints are suspect.
 const MIN_ROWS: usize = 10;
 /// Declared range of every revolute joint above which motions of a few degrees are suspect \[rad\].
@@ -50,6 +57,46 @@ impl Measurements {
         };
         let location = self.location(0).with_key("hoist_N");
         ((ratio - 1.0).abs() < MAX_HOIST_DIFFERENCE).then_some(Warning { location, kind })
+    }
+
+    /// Returns a warning, located at the first payload, if the payloads are round numbers of
+    /// kilograms as weights in newtons, and not round in kilograms.
+    pub(super) fn payload_in_newtons(&self) -> Option<Warning> {
+        let payloads = self.payload.as_deref().unwrap_or_default();
+        let is_round = |value: f64| {
+            let steps = value / ROUND_PAYLOAD;
+            (steps - steps.round()).abs() * ROUND_PAYLOAD < MAX_OFF_ROUND * value
+        };
+        let mut different: Vec<f64> = payloads.iter().copied().filter(|mass| *mass > 0.0).collect();
+        different.sort_by(f64::total_cmp);
+        different.dedup();
+        let looks_like_weights = different
+            .iter()
+            .all(|&value| is_round(value / GRAVITY) && value >= GRAVITY && !is_round(value));
+        let row = payloads.iter().position(|mass| *mass > 0.0)?;
+        let newtons = *payloads.get(row)?;
+        let kind = WarningKind::PayloadInNewtons {
+            newtons: format!("{newtons}"),
+            kilograms: format!("{:.1}", newtons / GRAVITY),
+        };
+        let location = self.location(row).with_key("payload_kg");
+        (different.len() > 1 && looks_like_weights).then_some(Warning { location, kind })
+    }
+
+    /// Returns a warning, located at the longest distance to an anchor, if all are far shorter than
+    /// the arm.
+    pub(super) fn short_distances(&self, problem: &Problem) -> Option<Warning> {
+        let rows = (0..self.len())
+            .filter(|&row| matches!(self.observation(row), Observation::Distance(..)));
+        let length = |row: usize| self.positions.get(row).map_or(0.0, |numbers| numbers.x);
+        let longest = rows.max_by(|&a, &b| length(a).total_cmp(&length(b)))?;
+        let links = problem.length_of_links();
+        let kind = WarningKind::ShortDistances {
+            longest: format!("{:.3}", length(longest) * 1e3),
+            links: format!("{links:.3}"),
+        };
+        let location = self.location(longest).with_key("distance_mm");
+        (length(longest) < MIN_PLAUSIBLE_DISTANCE * links).then_some(Warning { location, kind })
     }
 
     /// Returns a warning, located at the largest angle, if columns in degrees are probably in

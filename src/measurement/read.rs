@@ -163,13 +163,21 @@ impl<'a> Tables<'a> {
         let is_joined = self.joins && !Columns::has_joints(&table, self.problem);
         let mut log = match (joint_log.filter(|_| is_joined), self.log.take()) {
             (Some(_), Some(log)) => Some(log),
-            (Some(declared), None) => Some(JoinedLog::read(declared, self.problem)?),
+            (Some(declared), None) => {
+                let is_both = |file: &&PathBuf| declared.files.iter().any(|log| log == *file);
+                if let Some(path) = self.files.iter().find(is_both) {
+                    let kind = TableErrorKind::JoinedWithItself { path: path.clone() };
+                    return Err(declared.location.clone().error(kind));
+                }
+                Some(JoinedLog::read(declared, self.problem)?)
+            }
             (None, _) => None,
         };
         if let Some(log) = &mut log {
             log.extend(&mut table, dialect)?;
         }
-        let mut columns = Columns::find(&table, self.problem, self.measured, &mut self.warnings)?;
+        let mut ignored = Vec::new();
+        let mut columns = Columns::find(&table, self.problem, self.measured, &mut ignored)?;
         observed::check_target_column(&table, &columns, self.problem)?;
         if !table.next_row()? {
             let line = table.line();
@@ -177,7 +185,9 @@ impl<'a> Tables<'a> {
                 .at_line(line)
                 .error(TableErrorKind::NoRowsBelowHeader));
         }
-        columns.decide_time_column(&table, &mut self.warnings)?;
+        columns.decide_time_column(&table, &mut ignored)?;
+        columns.propose_times(&table, &mut ignored);
+        self.warnings.append(&mut ignored);
         let rows = self
             .builder
             .get_or_insert_with(|| RowsBuilder::new(self.files, &table, &columns, self.problem));
@@ -258,12 +268,16 @@ impl<'a> Tables<'a> {
                 warnings.extend(measurements.few_degrees(problem, &commands));
                 warnings.extend(measurements.milliseconds());
                 warnings.extend(measurements.heavy_payload(problem));
-                warnings.extend(measurements.session_per_row());
+                warnings.extend(measurements.payload_in_newtons());
+                warnings.extend(measurements.short_distances(problem));
+                warnings.extend(
+                    measurements.session_per_row().or_else(|| measurements.sessions_alike()),
+                );
+                warnings.extend(measurements.beyond_limits(problem, &commands));
                 if measured {
                     let is_comma = problem.data.dialect.decimal_comma;
                     let zeros = if is_comma { "0;0;0" } else { "0,0,0" };
                     warnings.extend(measurements.lost_targets(zeros)?);
-                    warnings.extend(measurements.beyond_limits(problem, &commands));
                     warnings.extend(measurements.same_pose_elsewhere());
                 }
                 warnings.extend(problem.plausibility_warnings());

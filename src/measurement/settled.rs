@@ -8,6 +8,26 @@ use crate::error::{InputError, TableErrorKind, Warning, WarningKind};
 use crate::quantity::Unit;
 
 impl Columns {
+    /// Replaces the warnings that columns of dates are ignored by one that says how to read them as
+    /// times. `ignored` are the warnings about the columns of this table.
+    pub fn propose_times(&self, table: &Table, ignored: &mut Vec<Warning>) {
+        if self.has(Role::Time) {
+            return;
+        }
+        let is_read = |place: usize| self.read.iter().any(|column| column.place == place);
+        let dates =
+            (0..table.header.len()).filter(|&place| !is_read(place) && table.is_date(place));
+        let Some(name) = dates.map(|place| table.name_of(place)).next() else { return };
+        let location = table.column(name);
+        let is_replaced = |warning: &Warning| {
+            matches!(warning.kind, WarningKind::ColumnIgnored { .. })
+                && warning.location == location
+        };
+        ignored.retain(|warning| !is_replaced(warning));
+        let kind = WarningKind::DatesIgnored { name: shortened(name) };
+        ignored.push(Warning { location, kind });
+    }
+
     /// Keeps a column `time` without a unit if its first cell is a date and time; otherwise the
     /// column is ignored with a warning. Also warns if the order of day and month is a guess.
     ///

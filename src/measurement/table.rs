@@ -7,7 +7,7 @@ use std::sync::Arc;
 use csv::{ByteRecord, Reader, ReaderBuilder};
 
 use super::cell_style::CellStyle;
-use super::cell_words::{UNITS, has_thousands, is_spreadsheet_date, unit_behind};
+use super::cell_words::{UNITS, has_thousands, is_spreadsheet_date, other_notation, unit_behind};
 use super::dialect::{HEADER_SEARCH_BYTES, Layout, NormalizedText};
 use super::headerless::is_row_of_numbers;
 use super::latin::decoded_record;
@@ -139,6 +139,9 @@ impl Table {
                 // A header that is not text cannot be shown.
                 _ => return Err(header_error(InputErrorKind::HeaderNotUtf8)),
             }
+        }
+        if table.header.first().is_some_and(|first| first.starts_with('|')) {
+            return Err(header_error(TableErrorKind::MarkdownTable.into()));
         }
         if is_row_of_numbers(&table.header, &dialect.columns) {
             table.header = (1..=table.header.len()).map(|place| format!("#{place}")).collect();
@@ -362,7 +365,7 @@ impl Table {
             Err(_) if !decimal_comma && has_thousands(word) => {
                 Err(self.cell_error(place, TableErrorKind::ThousandsSeparator { value: value() }))
             }
-            Err(_) if word.contains(',') && !decimal_comma => {
+            Err(_) if word.contains(',') && !decimal_comma && other_notation(word).is_none() => {
                 Err(self.cell_error(place, TableErrorKind::DecimalComma { value: value() }))
             }
             Err(_) if self.is_unit_below_header(word) => {
@@ -370,14 +373,15 @@ impl Table {
             }
             Err(_) => Err(self.cell_error(
                 place,
-                match (unit_behind(word), typographic(word)) {
-                    (Some(unit), _) => {
+                match (unit_behind(word), other_notation(word), typographic(word)) {
+                    (Some(unit), ..) => {
                         TableErrorKind::NumberWithUnit { value: value(), unit: unit.to_owned() }
                     }
-                    (None, Some((found, remedy))) => {
+                    (None, Some(notation), _) => notation,
+                    (None, None, Some((found, remedy))) => {
                         TableErrorKind::Typographic { value: value(), found, remedy }
                     }
-                    (None, None) => TableErrorKind::NotANumber { value: value() },
+                    (None, None, None) => TableErrorKind::NotANumber { value: value() },
                 },
             )),
         }

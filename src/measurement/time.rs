@@ -98,6 +98,21 @@ fn slashed(date: &str) -> Option<[u32; 3]> {
 fn iso_from_year_last(text: &str, order: DateOrder) -> Option<(String, Basis)> {
     let (date, clock) = text.split_once(' ')?;
     let numbers @ [first, second, year] = slashed(date)?;
+    let (hour, rest, is_halved) = hour_of_day(clock)?;
+    let (order, basis) = match (order, DateOrder::of_date(numbers)) {
+        // Other dates of the table were read month first because of AM or PM.
+        (DateOrder::Unknown, Some(DateOrder::DayFirst)) if is_halved => return None,
+        (DateOrder::Unknown, None) if is_halved => (DateOrder::MonthFirst, Basis::HalfOfDay),
+        (DateOrder::Unknown, None) => (DateOrder::MonthFirst, Basis::Guess),
+        (DateOrder::Unknown, Some(order)) | (order, _) => (order, Basis::Numbers),
+    };
+    let (month, day) = if order == DateOrder::DayFirst { (second, first) } else { (first, second) };
+    Some((format!("{year}-{month:02}-{day:02} {hour:02}:{rest}"), basis))
+}
+
+/// Splits a clock such as `9:05:12 PM` into the hour, 0 to 23, and what follows it, and tells
+/// whether it has AM or PM.
+fn hour_of_day(clock: &str) -> Option<(u32, &str, bool)> {
     let clock = clock.trim();
     let half = |mark: &str| {
         let place = clock.len().checked_sub(mark.len())?;
@@ -116,15 +131,7 @@ fn iso_from_year_last(text: &str, order: DateOrder) -> Option<(String, Basis)> {
         Some(_) => return None,
         None => hour,
     };
-    let (order, basis) = match (order, DateOrder::of_date(numbers)) {
-        // Other dates of the table were read month first because of AM or PM.
-        (DateOrder::Unknown, Some(DateOrder::DayFirst)) if noon.is_some() => return None,
-        (DateOrder::Unknown, None) if noon.is_some() => (DateOrder::MonthFirst, Basis::HalfOfDay),
-        (DateOrder::Unknown, None) => (DateOrder::MonthFirst, Basis::Guess),
-        (DateOrder::Unknown, Some(order)) | (order, _) => (order, Basis::Numbers),
-    };
-    let (month, day) = if order == DateOrder::DayFirst { (second, first) } else { (first, second) };
-    Some((format!("{year}-{month:02}-{day:02} {hour:02}:{rest}"), basis))
+    Some((hour, rest, noon.is_some()))
 }
 
 /// Smallest time that [`shown`] writes as a date \[s since 1970\]: 1990-01-01. Smaller numbers are
@@ -161,9 +168,9 @@ fn iso_from_day_first(text: &str) -> Option<String> {
     let (date, clock) = text.split_once([' ', 'T'])?;
     let [day, month, year] = date.split('.').collect::<Vec<_>>()[..] else { return None };
     let is_number = |word: &str| !word.is_empty() && word.bytes().all(|byte| byte.is_ascii_digit());
-    let (hour, rest) = clock.trim_start().split_once(':')?;
-    let are_numbers = [day, month, year, hour].into_iter().all(is_number);
-    (are_numbers && year.len() == 4 && day.len() <= 2 && month.len() <= 2 && hour.len() <= 2)
+    let (hour, rest, _) = hour_of_day(clock)?;
+    let are_numbers = [day, month, year].into_iter().all(is_number);
+    (are_numbers && year.len() == 4 && day.len() <= 2 && month.len() <= 2 && hour < 100)
         .then(|| format!("{year}-{month:0>2}-{day:0>2} {hour:0>2}:{rest}"))
 }
 
@@ -283,6 +290,7 @@ mod tests {
             ("1.2.2024 9:05", "2024-02-01T09:05"),
             ("31.05.2024 14:03:20+02:00", "2024-05-31T14:03:20+02:00"),
             ("2024/5/31 14:03:20", "2024-05-31T14:03:20"),
+            ("18.03.2025 1:12:07 PM", "2025-03-18T13:12:07"),
             ("05/31/2024 14:03", "2024-05-31T14:03"),
             ("28/05/2024 14:03", "2024-05-28T14:03"),
             ("11/05/2026 09:00:12 AM", "2026-11-05T09:00:12"),

@@ -3,8 +3,9 @@
 use std::f64::consts::TAU;
 
 use super::section::Section;
-use super::{Body, Joint, JointKind, Problem};
+use super::{Body, Fixture, Joint, JointKind, Problem};
 use crate::error::{InputError, InputErrorKind, Location, Warning, WarningKind};
+use crate::observation::FixtureKind;
 use crate::quantity::rounded_right_angle;
 
 /// Largest plausible length in the joint table \[m\]. Longer ones are probably in millimetres.
@@ -12,6 +13,9 @@ const MAX_PLAUSIBLE_LENGTH: f64 = 20.0;
 /// Largest usual limit of a joint \[rad\]. If no limit in degrees is larger than this number, the
 /// limits are suspected to be in radians.
 const MAX_LIMIT_RADIANS: f64 = TAU + 0.02;
+/// Largest plausible distance of a fixture from the origin of the measuring frame, or between two
+/// points, as a multiple of the length of the arm's links.
+const MAX_FIXTURE_LINKS: f64 = 20.0;
 /// Minimum number of rows or turning joints from which the convention of a table is judged.
 const MIN_ROWS_TO_JUDGE_FORM: usize = 3;
 
@@ -112,6 +116,7 @@ impl Problem {
         let warnings = self.warnings.iter().cloned();
         let warnings =
             warnings.chain(self.far_target_warning()).chain(self.narrow_limits_warning());
+        let warnings = warnings.chain(self.far_fixtures());
         warnings
             .chain(self.body_warnings())
             .chain(self.stiff_beam_warning())
@@ -247,13 +252,6 @@ impl Problem {
 
     /// Returns a warning if a target is farther from its frame than twice the length of the arm.
     fn far_target_warning(&self) -> Option<Warning> {
-        let length = |joint: &Joint| {
-            let placed = joint.placement.as_ref().map_or(0.0, |placement| placement.xyz.norm());
-            let (min, max) = joint.limits;
-            let travel =
-                if joint.kind == JointKind::Prismatic { min.abs().max(max.abs()) } else { 0.0 };
-            joint.a.hypot(joint.d) + placed + travel
-        };
         let tool_location = || Location {
             line: None,
             excerpt: None,
@@ -264,11 +262,52 @@ impl Problem {
             || (tool_location(), self.tool.target),
             |target| (target.location.clone(), target.at),
         );
-        let (links, distance) = (self.joints.iter().map(length).sum::<f64>(), target.norm());
+        let (links, distance) = (self.length_of_links(), target.norm());
         let kind = WarningKind::FarTarget {
             distance: format!("{distance:.3}"),
             links: format!("{links:.3}"),
         };
         (links > 0.0 && distance > 2.0 * links).then_some(Warning { location, kind })
+    }
+
+    /// Returns a warning for the first fixture, and for the first known distance, that is far beyond
+    /// the size of the arm.
+    fn far_fixtures(&self) -> Vec<Warning> {
+        let links = self.length_of_links();
+        let limit = (MAX_FIXTURE_LINKS * links).max(MAX_PLAUSIBLE_LENGTH);
+        let warning = |location: &Location, key: &str, length: f64| {
+            let kind = WarningKind::FarFixture {
+                length: format!("{length:.3}"),
+                links: format!("{links:.3}"),
+                write: format!("{key}mm"),
+            };
+            let location = Location { excerpt: None, ..location.clone() };
+            Warning { location: location.with_key(format!("{key}m")), kind }
+        };
+        let place = |fixture: &Fixture| {
+            let axes = fixture.known.iter().take(3).map(|known| known.unwrap_or(0.0).powi(2));
+            axes.sum::<f64>().sqrt()
+        };
+        let has_place = |fixture: &&Fixture| {
+            let kind = fixture.kind;
+            matches!(kind, FixtureKind::Point | FixtureKind::Anchor | FixtureKind::Sphere)
+        };
+        let far = self.fixtures.iter().filter(has_place).find(|fixture| place(fixture) > limit);
+        let far = far.map(|fixture| warning(&fixture.location, "at_", place(fixture)));
+        let long = self.distances.iter().find(|known| known.length > limit);
+        let long = long.map(|known| warning(&known.location, "", known.length));
+        if links > 0.0 { far.into_iter().chain(long).collect() } else { Vec::new() }
+    }
+
+    /// Returns the length of all links together, with the travel of sliding joints \[m\].
+    pub(crate) fn length_of_links(&self) -> f64 {
+        let length = |joint: &Joint| {
+            let placed = joint.placement.as_ref().map_or(0.0, |placement| placement.xyz.norm());
+            let (min, max) = joint.limits;
+            let travel =
+                if joint.kind == JointKind::Prismatic { min.abs().max(max.abs()) } else { 0.0 };
+            joint.a.hypot(joint.d) + placed + travel
+        };
+        self.joints.iter().map(length).sum()
     }
 }

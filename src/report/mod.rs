@@ -23,6 +23,7 @@ mod forecast;
 mod found_effects;
 mod identify;
 mod init;
+mod limited_poses;
 mod limits;
 mod next;
 mod noise;

@@ -2,6 +2,7 @@
 
 use super::document::{Block, Table, opening};
 use super::figures::{ACCENT, Curve, Drawing, INK, Series};
+use super::limited_poses::at_limits;
 use super::render::{page, text};
 use crate::design::{NextOptions, NextPoses, Purpose, StopReason, WorkspaceError};
 use crate::measurement::Measurements;
@@ -68,6 +69,7 @@ fn blocks<'a>(problem: &Problem, options: &NextOptions, next: &NextPoses) -> Vec
     blocks.push(Block::figures([draw_errors(options, next, percent)]));
     if !next.steps.is_empty() {
         blocks.push(Block::Table(steps(options, next, percent)));
+        blocks.extend(at_limits(problem, &next.poses, "choose").map(Block::Text));
         blocks.push(Block::Page(vec![
             Block::heading("The chosen poses, in the order of measurement"),
             Block::Table(commands(problem, &next.poses)),

@@ -1,9 +1,10 @@
 //! Text and page of the command `plan`: the poses to measure and the accuracy that they are
 //! expected to give.
 
-use super::document::{Block, Table, code, opening};
+use super::document::{Block, Table, opening};
 use super::figures::{ACCENT, Drawing, Forest};
 use super::forecast::{assumptions, cells};
+use super::limited_poses::at_limits;
 use super::next::commands;
 use super::parameters::{conditioning, rows_of_sheet, unidentifiable};
 use super::render::{page, text};
@@ -104,7 +105,7 @@ fn blocks<'a>(
     let mut blocks = opening(&problem.title, counts).to_vec();
     blocks.push(sufficiency(plan));
     blocks.extend(gain);
-    blocks.extend(at_limits(problem, plan).map(Block::Text));
+    blocks.extend(at_limits(problem, &plan.poses, "plan").map(Block::Text));
     let notes: Vec<String> = [note].into_iter().chain(rows_of_sheet(problem)).collect();
     blocks.push(Block::Table(Table { notes, ..Table::new(&header, rows.collect(), &[0, 6]) }));
     blocks.push(Block::figures([draw_gains(plan)]));
@@ -136,27 +137,6 @@ fn criterion_words(criterion: &Criterion) -> &'static str {
         }
         Criterion::Subset(_) => "D of chosen parameters",
     }
-}
-
-/// States how many poses command a joint to its limit, where controllers may refuse them; `None` if
-/// no pose does.
-fn at_limits(problem: &Problem, plan: &Plan) -> Option<String> {
-    let is_at_limit = |pose: &usize| {
-        let joints = plan.poses.configuration(*pose).iter().zip(&problem.joints);
-        joints.into_iter().any(|(q, joint)| {
-            let (low, high) = joint.limits;
-            low < high && (*q <= low || *q >= high)
-        })
-    };
-    let count = (0..plan.poses.len()).filter(is_at_limit).count();
-    (count > 0).then(|| {
-        format!(
-            "{count} of the poses have a joint at its limit. If the controller refuses such commands, declare limits with a margin ({}, \
-             {}) and plan again.",
-            code("min_deg"),
-            code("max_deg")
-        )
-    })
 }
 
 /// Draws the gain of each parameter: its standard error after random poses divided by that after

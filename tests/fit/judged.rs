@@ -66,6 +66,16 @@ fn held_out_rows_are_judged() {
     let [repeated] = some.findings.as_slice() else { panic!("{:?}", some.findings) };
     assert_eq!(repeated.code, FindingCode::HeldOutRepeated);
     assert_eq!((repeated.number("rows"), repeated.number("of")), (Some(10.0), Some(30.0)));
+    // Each pose is measured twice, and the second time is held out.
+    let twice = with(&|data| {
+        let rows: Vec<usize> = (0..30).chain(0..30).collect();
+        data.measurements = data.measurements.select(&rows);
+        data.measurements.positions[30..].iter_mut().for_each(|position| position.x += 1e-6);
+        data.split.identification = (0..30).collect();
+        data.split.held_out = (30..60).collect();
+    });
+    let fitted = twice.findings.iter().find(|f| f.code == FindingCode::HeldOutPosesFitted);
+    assert_eq!(fitted.and_then(|finding| finding.number("rows")), Some(30.0));
     for by in [1e-3, 0.3, 1e147] {
         let wrong = with(&|data| data.measurements.positions[77].y += by);
         let [outliers] = wrong.findings.as_slice() else { panic!("{by}: {:?}", wrong.findings) };
@@ -301,4 +311,50 @@ fn targets_of_one_pose_are_points_not_poses() {
     for (name, expected) in [("poses", 6.0), ("coordinates", 39.0), ("parameters", 40.0)] {
         assert!((fewer.number(name).unwrap() - expected).abs() < 1e-9, "{name}");
     }
+}
+
+#[test]
+fn columns_that_hold_no_measurements_are_named() {
+    let problem = arm(PRIORS);
+    let clean = measured(&problem, 3);
+    let joints = clean.measurements.joints;
+    let with = |edit: &dyn Fn(&mut Dataset)| {
+        let mut data = clean.clone();
+        edit(&mut data);
+        fit(&problem, &data)
+    };
+    let doubted = |found: &flexcal::fit::Identification| -> String {
+        let finding = found.findings.iter().find(|f| f.code == FindingCode::ColumnDoubted);
+        finding.map_or_else(String::new, |finding| finding.text.clone())
+    };
+    assert_eq!(doubted(&with(&|_| {})), "");
+    let set = |data: &mut Dataset, joint: usize, value: &dyn Fn(usize, f64) -> f64| {
+        for row in 0..data.measurements.len() {
+            let q = &mut data.measurements.configurations[row * joints + joint];
+            *q = value(row, *q);
+        }
+    };
+    let q = clean.measurements.configuration(40)[3];
+    let frozen = doubted(&with(&|data| set(data, 3, &|row, q0| if row < 40 { q0 } else { q })));
+    assert!(frozen.contains("column q4 stays at"), "{frozen}");
+    let filled = with(&|data| {
+        set(data, 2, &|row, q0| if row < 40 { q0 } else { q + 0.01 * (row - 40) as f64 });
+    });
+    assert!(doubted(&filled).contains("column q3 rises by 0.572958° a row"), "{filled:?}");
+    let still = doubted(&with(&|data| set(data, 1, &|row, _| 1e-4 * (row % 3) as f64)));
+    assert!(still.contains("column q2 stays within 0.1°"), "{still}");
+    let sorted = with(&|data| {
+        let mut y: Vec<f64> = data.measurements.positions.iter().map(|x| x.y).collect();
+        y.sort_by(f64::total_cmp);
+        for (position, y) in data.measurements.positions.iter_mut().zip(y) {
+            position.y = y;
+        }
+    });
+    assert!(doubted(&sorted).contains("the coordinate y is sorted"), "{:?}", sorted.findings);
+    let rounded = with(&|data| {
+        set(data, 2, &|_, q| q.to_degrees().round().to_radians());
+    });
+    let digits = rounded.findings.iter().find(|f| f.code == FindingCode::CommandsRounded);
+    let text = digits.map_or_else(String::new, |finding| finding.text.clone());
+    assert!(text.contains("column q3 holds multiples of 1° alone"), "{:?}", rounded.findings);
 }

@@ -7,6 +7,7 @@ mod common;
 
 mod bad_input;
 mod dialects;
+mod doubtful;
 mod exchange;
 mod files;
 mod formats;

@@ -5,6 +5,7 @@ pub(super) mod acceptance;
 pub(super) mod command_jacobian;
 pub(super) mod compensate;
 pub(super) mod joint_source;
+pub(super) mod missing_loads;
 mod nearest_command;
 pub(super) mod predict;
 pub(super) mod predict_saved;

@@ -9,7 +9,7 @@ use serde::Deserialize;
 use serde_json::value::RawValue;
 
 use super::saved_estimate_error::{
-    FORMAT, Format, MAX_FILE_MIB, SavedEstimateError, not_an_estimate,
+    FORMAT, Format, MAX_FILE_MIB, SavedEstimateError, missing, not_an_estimate,
 };
 use crate::error::{binary_format, one_line};
 use crate::files::{Changes, changed_key, read_limited};
@@ -453,7 +453,7 @@ impl SavedEstimate {
         model: &Model,
     ) -> Result<DVector<f64>, SavedEstimateError> {
         self.check(problem, model)?;
-        let missing = |name| SavedEstimateError::Missing { file: self.file.clone(), name };
+        let missing = |name| missing(self.file.clone(), name, |kind| self.words(kind));
         model.parameter_vector(|name| self.value(name)).map_err(missing)
     }
 }

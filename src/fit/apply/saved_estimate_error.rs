@@ -42,6 +42,46 @@ pub(super) fn not_an_estimate(
     }
 }
 
+/// Returns the error of a parameter that the estimate lacks. For a base or a tool it names the
+/// sessions or targets that were identified, which `words` returns.
+pub(super) fn missing(
+    file: PathBuf,
+    name: String,
+    words: impl Fn(&str) -> Vec<String>,
+) -> SavedEstimateError {
+    let placements = [("base", "session"), ("tool", "target")];
+    let placement = placements.into_iter().find(|(kind, _)| name.starts_with(kind));
+    let Some((kind, column)) = placement else {
+        return SavedEstimateError::Missing { file, name };
+    };
+    let known = words(kind);
+    let word = name.split_once('[').and_then(|(_, rest)| Some(rest.split_once(']')?.0));
+    match word {
+        Some(word) => {
+            let word = word.to_owned();
+            SavedEstimateError::NotIdentified { file, column, word, known }
+        }
+        None if known.iter().any(|known| !known.is_empty()) => {
+            SavedEstimateError::NoSuchColumn { file, column, known }
+        }
+        None => SavedEstimateError::Missing { file, name },
+    }
+}
+
+/// Maximum number of sessions or targets that a message names.
+const MAX_NAMED_WORDS: usize = 12;
+
+/// Returns a clause that names the identified sessions or targets; empty without names.
+fn identified(known: &[String]) -> String {
+    let names: Vec<String> = known
+        .iter()
+        .filter(|name| !name.is_empty())
+        .take(MAX_NAMED_WORDS)
+        .map(|name| format!("\"{name}\""))
+        .collect();
+    if names.is_empty() { String::new() } else { format!("; identified are {}", names.join(", ")) }
+}
+
 /// Error of an `estimate.json` that cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -61,6 +101,10 @@ pub enum SavedEstimateError {
     Changed { file: PathBuf, key: String },
     #[error("{}: has no estimate of {name}; identify the same problem and sessions", file.display())]
     Missing { file: PathBuf, name: String },
+    #[error("{}: {column} \"{word}\" of the table was not identified{}; identify its rows too, or correct the name", file.display(), identified(known))]
+    NotIdentified { file: PathBuf, column: &'static str, word: String, known: Vec<String> },
+    #[error("{}: the table has no column {column}{}; add the column, which says whose base or tool holds", file.display(), identified(known))]
+    NoSuchColumn { file: PathBuf, column: &'static str, known: Vec<String> },
     #[error("{}: identifies problem {found}, not {expected}", file.display())]
     OtherProblem { file: PathBuf, found: String, expected: String },
     #[error("{}: {name} is {found} nominally there, {expected} in the problem; identify again", file.display())]

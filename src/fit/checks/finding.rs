@@ -76,6 +76,9 @@ finding_codes! {
     ViewsReversed: Error "views-reversed" ["views", "before", "after"]
         "Some views number the points of a marker from the other end.",
         "reverse the column point in these views or leave them out; a board that looks different after half a turn prevents it";
+    ColumnDoubted: Error "column-doubted" ["columns", "before", "after"]
+        "The fit is far off, and a column of the table stands still, is filled down or is sorted by itself.",
+        "correct the column, or leave its rows out";
     PositionsComputed: Error "positions-computed" ["rms"]
         "The registered nominal arm predicts the positions to 10 µm per metre of its reach and a fifth of σ, as no built arm does.",
         "measure the positions with an instrument; those that the controller shows are computed from the joint angles";
@@ -148,6 +151,9 @@ finding_codes! {
     HeldOutRepeated: Warning "held-out-repeated" ["rows", "of"]
         "Some held-out rows are identification rows again.",
         "hold out rows that were not fitted";
+    HeldOutPosesFitted: Warning "held-out-poses-fitted" ["rows", "of"]
+        "More than half of the held-out rows are of poses that identification rows measure too.",
+        "hold out poses that are not fitted, as held_out = { fraction = 0.3, seed = 1 } does";
     HeldOutOutliers: Warning "held-out-outliers" ["rows", "of"]
         "Some held-out rows are farther from the prediction than its σ allows.",
         "look at these rows";

@@ -141,6 +141,31 @@ impl Check for NotRepeated {
     }
 }
 
+/// Smallest share of held-out rows of fitted poses that is reported.
+const MIN_FITTED_SHARE: f64 = 0.5;
+
+/// Checks that at most half of the held-out rows are of poses that were fitted too.
+pub(super) struct OtherPosesHeldOut;
+
+impl Check for OtherPosesHeldOut {
+    fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
+        let Fitting { measurements, split, .. } = fit.fitting;
+        let poses = measurements.pose_numbers(fit.problem);
+        let fitted: HashSet<usize> = split.identification.iter().map(|&row| poses[row]).collect();
+        let rows = split.held_out.iter().filter(|&&row| fitted.contains(&poses[row])).count();
+        let of = split.held_out.len();
+        if rows as f64 <= MIN_FITTED_SHARE * of as f64 || copies_in_fit(fit) > 0 {
+            return Vec::new();
+        }
+        let text = format!(
+            "{rows} of {of} held-out rows are of poses that are fitted too: their errors show how well \
+             poses repeat, not how well other poses are predicted"
+        );
+        let numbers = [rows.into(), of.into()];
+        vec![Finding::new(FindingCode::HeldOutPosesFitted, numbers, text)]
+    }
+}
+
 /// Checks that the median prediction error of the held-out rows of each kind is small relative to
 /// the spread of the fitted rows, or to σ.
 pub(super) struct HeldOutReached;

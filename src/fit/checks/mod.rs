@@ -7,6 +7,7 @@ pub(super) mod bounds;
 pub(super) mod checked_fit;
 mod contradicted_entry;
 mod convention;
+mod doubted_columns;
 pub(super) mod finding;
 pub(super) mod fitted_rows;
 pub(super) mod held_out;
@@ -40,6 +41,7 @@ use finding::Finding;
 const CHECKS: &[&dyn Check] = &[
     &EnoughEquations,
     &misread::ReadAsMeant,
+    &doubted_columns::ColumnsHoldMeasurements,
     &view_order::PointsInOrder,
     &table_digits::PositionsAreMeasured,
     &misfit::Misfit,
@@ -63,6 +65,7 @@ const CHECKS: &[&dyn Check] = &[
     &prediction::NotWorseThanNominal,
     &bounds::BoundsAreSeen,
     &held_out::NotRepeated,
+    &held_out::OtherPosesHeldOut,
     &held_out::WithoutOutliers,
     &held_out_placed::HeldOutPlaced,
     &set_aside::SetAsideByChance,

@@ -1,6 +1,7 @@
 //! Checks of the numbers in the table: positions that a controller computed instead of an
 //! instrument, and commands with few digits.
 
+use nalgebra::DMatrix;
 use serde_json::json;
 
 use super::checked_fit::{Check, CheckedFit};
@@ -30,6 +31,14 @@ const MIN_SIGMAS: f64 = 3.0;
 /// Range of the ratio of the rms position error by rounded commands to the rms residual, in which
 /// rounding may be the cause of the residual.
 const ROUNDING_RATIOS: std::ops::Range<f64> = 0.5..2.0;
+
+/// Smallest share of the squared residual along the motion of a joint whose rounded commands cause
+/// it; chance gives a third.
+const MIN_SHARE_ALONG: f64 = 0.8;
+/// Largest turn of a joint by rounding, in half steps, with room for the other errors.
+const MAX_HALF_STEPS: f64 = 1.3;
+/// Smallest share of rows within that turn.
+const MIN_SHARE_WITHIN: f64 = 0.9;
 
 /// Checks that the positions were measured: the registered nominal arm does not predict them to
 /// 10 µm per metre of its reach and a fifth of the declared σ.
@@ -76,7 +85,8 @@ impl Check for CommandsHaveDigits {
         let steps: Vec<(usize, f64)> = revolute_joints(fit)
             .filter_map(|joint| Some((joint, command_step(fit, &kind.rows, joint)?)))
             .collect();
-        if steps.is_empty() || steps.len() < revolute_joints(fit).count() {
+        let is_of_all = steps.len() == revolute_joints(fit).count();
+        if steps.is_empty() {
             return Vec::new();
         }
         let poses = fit.fitting.poses(&kind.rows);
@@ -90,6 +100,9 @@ impl Check for CommandsHaveDigits {
         if !ROUNDING_RATIOS.contains(&(rounding / rms)) {
             return Vec::new();
         }
+        if !is_of_all {
+            return Self::of_some(fit, &kind, (&steps, &slopes), (rounding, rms));
+        }
         let coarsest = steps.iter().map(|(_, step)| step.to_degrees()).fold(0.0, f64::max);
         let text = format!(
             "the commands of each joint are multiples of a step of up to {coarsest}°; if the table \
@@ -98,6 +111,44 @@ impl Check for CommandsHaveDigits {
             format_error("position", rms, 3)
         );
         let numbers = [json!(coarsest), rounding.into(), rms.into()];
+        vec![Finding::new(FindingCode::CommandsRounded, numbers, text)]
+    }
+}
+
+impl CommandsHaveDigits {
+    /// Reports the rounding of some joints whose columns are coarser than the others. The residual
+    /// must lie along the motions of these joints, and within half a step in most rows.
+    fn of_some(
+        fit: &CheckedFit,
+        kind: &RowKind,
+        (steps, slopes): (&[(usize, f64)], &[DMatrix<f64>]),
+        (rounding, rms): (f64, f64),
+    ) -> Vec<Finding> {
+        let errors = fit.fitting.position_errors(&kind.rows, &fit.end.x);
+        let [(joint, step)] = *steps else { return Vec::new() };
+        let (mut along, mut all, mut within) = (0.0, 0.0, 0);
+        for (error, slope) in errors.iter().zip(slopes) {
+            let motion = slope.column(joint);
+            let turn = error.dot(&motion) / motion.norm_squared().max(f64::MIN_POSITIVE);
+            along += turn.powi(2) * motion.norm_squared();
+            all += error.norm_squared();
+            within += usize::from(turn.abs() <= MAX_HALF_STEPS * step / 2.0);
+        }
+        if along < MIN_SHARE_ALONG * all || (within as f64) < MIN_SHARE_WITHIN * errors.len() as f64
+        {
+            return Vec::new();
+        }
+        let measurements = fit.fitting.measurements;
+        let column = measurements.command_columns.iter().find(|column| column.joint == joint);
+        let name = column.map_or_else(|| format!("q{}", joint + 1), |column| column.name.clone());
+        let text = format!(
+            "column {name} holds multiples of {}° alone, unlike the other joints; such rounding moves \
+             the target by {} rms, as large as the residual of {}, which lies along this joint's motion",
+            step.to_degrees(),
+            format_error("position", rounding, 3),
+            format_error("position", rms, 3)
+        );
+        let numbers = [json!(step.to_degrees()), rounding.into(), rms.into()];
         vec![Finding::new(FindingCode::CommandsRounded, numbers, text)]
     }
 }

@@ -16,7 +16,10 @@ fn headers() {
         ("x_m,y_m,z_m\n1,2,3\n", &["rows.csv:1: column q1: missing; add q1_deg or q1_rad"]),
         (
             "J1,X,Y,Z\n1,2,3,4\n",
-            &["flexcal does not know: J1, X, Y, Z; if it is one", "as in \"J1\" = \"q1_deg\""],
+            &[
+                "columns are missing: q1, x, y, z; ",
+                "columns = { \"J1\" = \"q1_deg\", \"X\" = \"x_mm\"",
+            ],
         ),
         ("q1 [deg],x_m,y_m,z_m\n1,2,3,4\n", &["(is it column q1 [deg]? [data.columns] maps it"]),
         (

@@ -58,8 +58,12 @@ pub(super) fn candidates(problem: &Problem, table: &Measurements) -> Vec<Misread
     units.extend(lengths(false).then_some(Misreading::Metres));
     units.extend(lengths(true).then_some(Misreading::Millimetres));
     units.extend(lengths(false).then_some(Misreading::Inches));
-    let power = if lengths(false) { 3 } else { -3 };
-    units.extend((0..3).map(|axis| Misreading::AxisUnit { axis, power }));
+    let powers = if lengths(false) { [3, 1] } else { [-3, -2] };
+    let of_axis = |axis: usize| powers.map(|power| Misreading::AxisUnit { axis, power });
+    units.extend((0..3).flat_map(of_axis));
+    if lengths(false) {
+        units.extend((0..3).map(|axis| Misreading::AxisInches { axis }));
+    }
     units.push(Misreading::Mirrored);
     units.extend(is_far(problem).then_some(Misreading::TargetInMillimetres));
     units.extend(long.then_some(Misreading::ArmInMillimetres));

@@ -62,6 +62,11 @@ pub enum Misreading {
         /// Exponent of the power of ten by which the coordinate must be multiplied.
         power: i8,
     },
+    /// One coordinate of the positions is in inches, declared as millimetres.
+    AxisInches {
+        /// Coordinate, 0…2 for x, y, z.
+        axis: usize,
+    },
     /// The angle of a joint contains the command of another joint (mechanical coupling). Joints are
     /// counted from 1.
     Coupled {
@@ -251,7 +256,7 @@ impl Misreading {
             | Self::TableDegrees { joint, field } => (joint, 0, Some(field)),
             Self::Twist { joint, .. } => (joint, 0, Some(JointField::Alpha)),
             Self::Mass { mass, .. } => (mass, 0, None),
-            Self::AxisUnit { axis, .. } => (axis, 0, None),
+            Self::AxisUnit { axis, .. } | Self::AxisInches { axis } => (axis, 0, None),
             Self::ExchangedRows { row } | Self::ExchangedLengths { row } => (row, 0, None),
             Self::Reversed { joints } => (usize::try_from(joints).unwrap_or(usize::MAX), 0, None),
             _ => (0, 0, None),

@@ -232,6 +232,9 @@ impl Misreading {
                     .iter_mut()
                     .for_each(|position| position[axis] *= power_of_ten(power));
             }
+            Self::AxisInches { axis } => {
+                rows.positions.iter_mut().for_each(|position| position[axis] *= MM_PER_INCH);
+            }
             Self::Payload { scale } => {
                 rows.payload.iter_mut().flatten().for_each(|payload| *payload *= scale.factor());
             }

@@ -141,13 +141,18 @@ impl fmt::Display for Misreading {
                 write!(f, "columns of the joints that are moved on by {by} {places}")
             }
             Self::AxisUnit { axis, power } => {
-                let (found, declared) = if power > 0 {
-                    ("metres", "millimetres")
-                } else {
-                    ("millimetres", "metres")
+                let (found, declared) = match power {
+                    3 => ("metres", "millimetres"),
+                    1 => ("centimetres", "millimetres"),
+                    -2 => ("centimetres", "metres"),
+                    _ => ("millimetres", "metres"),
                 };
                 let name = ['x', 'y', 'z'][axis];
                 write!(f, "{name} alone that is in {found}, declared in {declared}")
+            }
+            Self::AxisInches { axis } => {
+                let name = ['x', 'y', 'z'][axis];
+                write!(f, "{name} alone that is in inches, declared in millimetres")
             }
             Self::Exchanged { joint, with } => {
                 write!(f, "columns of joints {joint} and {with} that are exchanged")

@@ -1,0 +1,50 @@
+//! Loads that the rows of an estimate had and a table to which it is applied lacks.
+
+use serde::Deserialize;
+
+use super::saved_estimate::SavedEstimate;
+use crate::measurement::Measurements;
+use crate::problem::Problem;
+
+/// Inputs of the fitted poses in an `estimate.json`.
+#[derive(Deserialize)]
+struct Inputs {
+    inputs: Vec<Input>,
+}
+
+/// Range of one input over the fitted poses.
+#[derive(Deserialize)]
+struct Input {
+    name: String,
+    min: f64,
+    max: f64,
+}
+
+/// Returns a sentence for each load column that the table `rows` lacks although the fitted rows of
+/// `estimate` had it, and the arm gives way to loads.
+pub(crate) fn missing_loads(
+    problem: &Problem,
+    estimate: &SavedEstimate,
+    rows: &Measurements,
+) -> Vec<String> {
+    let depends = problem.is_elastic() || !problem.effects.is_empty();
+    let parsed = estimate.prediction.as_deref().map(serde_json::from_str::<Inputs>);
+    let Some(Ok(Inputs { inputs })) = parsed.filter(|_| depends) else { return Vec::new() };
+    let columns = [
+        ("payload", "payload_kg", "kg", rows.payload.is_none(), Some(problem.tool.payload_mass)),
+        ("hoist", "hoist_N", "N", rows.hoist.is_none(), None),
+    ];
+    let lacking = columns.into_iter().filter(|(.., is_missing, _)| *is_missing);
+    let sentence = |(name, column, unit, _, taken): (&str, &str, &str, bool, Option<f64>)| {
+        let Input { min, max, .. } = inputs.iter().find(|input| input.name == name)?;
+        let had =
+            if min < max { format!("{min} to {max} {unit}") } else { format!("{min} {unit}") };
+        let taken =
+            taken.map_or_else(|| "the declared force".to_owned(), |m| format!("{m} {unit}"));
+        Some(format!(
+            "the table has no column {column}, and the rows of the estimate had {had}; {taken} is \
+             taken in every row: add the column if the arm carries something else"
+        ))
+    };
+    lacking.filter_map(sentence).collect()
+}

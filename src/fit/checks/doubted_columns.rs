@@ -1,0 +1,174 @@
+//! Check of a fit that is far off: a column that stands still, was filled down by a spreadsheet, or
+//! was sorted by itself.
+
+use serde_json::{Value, json};
+
+use super::checked_fit::{Check, CheckedFit};
+use super::finding::{Finding, FindingCode};
+use super::misfit::Misfit;
+use super::row_kind::format_error;
+use crate::fit::stages::fitting::Fitting;
+use crate::measurement::{Measurements, Split};
+use crate::problem::JointKind;
+
+/// Largest range of the commands of a joint that stands still: 0.1° \[rad\], or 0.1 mm \[m\].
+const MAX_STILL_TURN: f64 = 0.1 * std::f64::consts::PI / 180.0;
+const MAX_STILL_TRAVEL: f64 = 1e-4;
+/// Minimum number of rows at the end of a table that show a column filled down or frozen, and
+/// minimum number of rows before them.
+const MIN_ROWS: usize = 8;
+/// Largest difference between two steps of a column that was filled down, relative to the step.
+const MAX_UNEQUAL: f64 = 1e-6;
+/// Largest ratio of the error without the doubted rows to the error with them at which these rows
+/// are the cause.
+const MAX_RATIO: f64 = 0.2;
+
+/// Checks, if the fit is far off, that no joint stands still in all rows or from a row on while the
+/// rows before fit, that no column rises by the same step from a row on, and that no coordinate is
+/// sorted by itself.
+pub(super) struct ColumnsHoldMeasurements;
+
+impl Check for ColumnsHoldMeasurements {
+    fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
+        let positions = fit.fitting.measurements.leading().is_position();
+        let missed = Misfit.check(fit).into_iter().next();
+        let Some(before) = missed.filter(|_| positions).and_then(|found| found.number("rms"))
+        else {
+            return Vec::new();
+        };
+        let found = filled_or_frozen(fit, before)
+            .or_else(|| standing_still(fit, before))
+            .or_else(|| sorted_by_itself(fit, before));
+        found.into_iter().collect()
+    }
+}
+
+/// Returns the name of the column of a joint.
+fn column_name(rows: &Measurements, joint: usize) -> String {
+    let column = rows.command_columns.iter().find(|column| column.joint == joint);
+    column.map_or_else(|| format!("q{}", joint + 1), |column| column.name.clone())
+}
+
+/// Returns the joints with commands.
+fn moving<'f>(fit: &'f CheckedFit) -> impl Iterator<Item = usize> + 'f {
+    let joints = fit.problem.joints.iter().enumerate();
+    let moving = joints.filter(|(_, joint)| joint.command_kind() != JointKind::Fixed);
+    moving.map(|(joint, _)| joint).filter(|joint| *joint < fit.fitting.measurements.joints)
+}
+
+/// Returns the commands of a joint in all rows.
+fn commands(rows: &Measurements, joint: usize) -> Vec<f64> {
+    (0..rows.len()).map(|row| rows.configuration(row)[joint]).collect()
+}
+
+/// Reports joints that stand still in all rows.
+fn standing_still(fit: &CheckedFit, before: f64) -> Option<Finding> {
+    let rows = fit.fitting.measurements;
+    let is_still = |joint: &usize| {
+        let values = commands(rows, *joint);
+        let most = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let least = values.iter().copied().fold(f64::INFINITY, f64::min);
+        let is_turning = fit.problem.joints[*joint].command_kind() == JointKind::Revolute;
+        most - least < if is_turning { MAX_STILL_TURN } else { MAX_STILL_TRAVEL }
+    };
+    let still: Vec<usize> = moving(fit).filter(is_still).collect();
+    if still.is_empty() || rows.len() < MIN_ROWS {
+        return None;
+    }
+    let names: Vec<String> = still.iter().map(|&joint| column_name(rows, joint)).collect();
+    let (noun, verb) = if names.len() == 1 { ("column", "stays") } else { ("columns", "stay") };
+    let text = format!(
+        "{noun} {} {verb} within 0.1° or 0.1 mm in all rows, and the fitted arm misses the measurements \
+         by {}: if the arm moved there, the table does not hold these commands",
+        names.join(", "),
+        format_error("position", before, 1)
+    );
+    Some(finding(&names, before, None, text))
+}
+
+/// Reports a column that keeps its value, or rises by the same step, from a row to the end of the
+/// table, if the rows before that fit far better by themselves.
+fn filled_or_frozen(fit: &CheckedFit, before: f64) -> Option<Finding> {
+    let rows = fit.fitting.measurements;
+    moving(fit).find_map(|joint| {
+        let values = commands(rows, joint);
+        let steps: Vec<f64> = values.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        let &last = steps.last()?;
+        let is_equal = |step: &&f64| (**step - last).abs() <= MAX_UNEQUAL * last.abs() + 1e-12;
+        let equal = steps.iter().rev().take_while(is_equal).count();
+        let from = rows.len() - 1 - equal;
+        if equal + 1 < MIN_ROWS || from < MIN_ROWS {
+            return None;
+        }
+        // The row at which the column freezes may be right.
+        let after = error_before(fit, from + 1)?;
+        if after > MAX_RATIO * before {
+            return None;
+        }
+        let (name, place) = (column_name(rows, joint), rows.location(from + 1));
+        let is_turning = fit.problem.joints[joint].command_kind() == JointKind::Revolute;
+        let shown = |value: f64| {
+            if is_turning {
+                format!("{:.6}°", value.to_degrees())
+            } else {
+                format!("{:.6} mm", value * 1e3)
+            }
+        };
+        let how = if last.abs() <= 1e-12 {
+            format!("stays at {} from {place} on, as a log that froze", shown(values[from]))
+        } else {
+            format!("rises by {} a row from {place} on, as a spreadsheet fills cells", shown(last))
+        };
+        let text = format!(
+            "column {name} {how}; the rows before that fit by themselves (the nominal arm misses them by \
+             {}, the fitted arm misses all rows by {})",
+            format_error("position", after, 3),
+            format_error("position", before, 1)
+        );
+        Some(finding(&[name], before, Some(after), text))
+    })
+}
+
+/// Reports a coordinate that rises or falls from row to row in the whole table while no other does.
+fn sorted_by_itself(fit: &CheckedFit, before: f64) -> Option<Finding> {
+    let rows = fit.fitting.measurements;
+    let is_sorted = |values: &[f64]| {
+        let mut steps = values.windows(2).map(|pair| pair[1] - pair[0]);
+        steps.clone().all(|step| step >= 0.0) || steps.all(|step| step <= 0.0)
+    };
+    let axis = |axis: usize| rows.positions.iter().map(|x| x[axis]).collect::<Vec<f64>>();
+    let sorted: Vec<usize> = (0..3).filter(|&k| is_sorted(&axis(k))).collect();
+    let &[only] = sorted.as_slice() else { return None };
+    if rows.len() < 2 * MIN_ROWS || moving(fit).any(|joint| is_sorted(&commands(rows, joint))) {
+        return None;
+    }
+    let name = ["x", "y", "z"][only].to_owned();
+    let text = format!(
+        "the coordinate {name} is sorted from the first row to the last, no other column of positions \
+         and joints is, and the fitted arm misses the measurements by {}: this column was probably \
+         sorted by itself",
+        format_error("position", before, 1)
+    );
+    Some(finding(&[name], before, None, text))
+}
+
+/// Creates the finding about doubted columns.
+fn finding(columns: &[String], before: f64, after: Option<f64>, text: String) -> Finding {
+    let numbers = [json!(columns), before.into(), after.map_or(Value::Null, Value::from)];
+    Finding::new(FindingCode::ColumnDoubted, numbers, text)
+}
+
+/// Returns the error of the registered nominal arm in the identification rows before `row` \[m\];
+/// `None` if too few are left.
+fn error_before(fit: &CheckedFit, row: usize) -> Option<f64> {
+    let chosen: Vec<usize> =
+        fit.fitting.split.identification.iter().copied().filter(|&k| k < row).collect();
+    let split = Split { identification: chosen.clone(), held_out: Vec::new() };
+    let fitting = Fitting { split: &split, turn_sigma: None, ..fit.fitting.with_declared_noise() };
+    if chosen.len() < MIN_ROWS {
+        return None;
+    }
+    let x = fitting.registered().ok()?;
+    let errors = fitting.position_errors(&chosen, &x);
+    Some(fit.rms(&chosen, &errors))
+}

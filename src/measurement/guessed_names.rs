@@ -1,0 +1,130 @@
+//! Guesses what the columns of a table without the expected names are, for messages about missing
+//! columns.
+
+use super::columns::Columns;
+use super::meaning::{Numbering, split_unit, unit_of};
+use super::role::{POSITION, Role};
+use super::table::Table;
+use crate::error::{InputError, Location, TableErrorKind};
+use crate::problem::{JointSource, Problem};
+use crate::quantity::Unit;
+
+/// Words that other programs write before the number of a joint.
+const JOINT_WORDS: [&str; 12] =
+    ["j", "q", "a", "ax", "axis", "axe", "achse", "joint", "jt", "gelenk", "theta", "th"];
+/// Words that other programs write before the letter of a coordinate.
+const POSITION_WORDS: [&str; 10] =
+    ["", "pos", "position", "p", "tcp", "target", "point", "meas", "measured", "coord"];
+
+/// Returns a name of flexcal without its unit, such as `q2` or `x`, that a name of another program
+/// means, and the suffix of the unit if the name has one.
+fn guess(name: &str) -> Option<(String, Option<&'static str>)> {
+    let lower = name.to_lowercase();
+    let words = lower.split(|letter: char| !letter.is_alphanumeric());
+    let (mut unit, mut plain) = (None, String::new());
+    for word in words.filter(|word| !word.is_empty()) {
+        match word {
+            "mm" | "millimeter" | "millimetre" => unit = Some("mm"),
+            "m" | "meter" | "metre" => unit = Some("m"),
+            "deg" | "degree" | "degrees" | "grad" => unit = Some("deg"),
+            "rad" | "radian" | "radians" => unit = Some("rad"),
+            word => plain.push_str(word),
+        }
+    }
+    unit = unit.or_else(|| name.contains('°').then_some("deg"));
+    let letters = plain.trim_end_matches(|letter: char| letter.is_ascii_digit());
+    let number = plain.strip_prefix(letters)?.trim_start_matches('0');
+    if !number.is_empty() {
+        return JOINT_WORDS.contains(&letters).then(|| (format!("q{number}"), unit));
+    }
+    let axis = ["x", "y", "z"].into_iter().find(|axis| letters.ends_with(axis))?;
+    let before = letters.strip_suffix(axis)?;
+    POSITION_WORDS.contains(&before).then(|| (axis.to_owned(), unit))
+}
+
+impl Columns {
+    /// Returns the error that names all missing columns at once, with the map of the `unknown`
+    /// columns that are probably meant; or that joints are counted from 2. `None` if one column is
+    /// missing, or a missing column of joints or positions is not among the unknown ones.
+    pub fn renamed(
+        &self,
+        table: &Table,
+        (problem, numbering): (&Problem, &Numbering),
+        (measured, unknown): (bool, &[&str]),
+    ) -> Option<InputError> {
+        if problem.data.joints == JointSource::Read {
+            return None;
+        }
+        let commanded = problem.joints.iter().enumerate();
+        let commanded =
+            commanded.filter_map(|(index, joint)| Some((index, unit_of(joint.command_kind())?)));
+        let commanded: Vec<(usize, Unit)> = commanded.collect();
+        let header = || table.header.iter().map(String::as_str);
+        let has = |number: usize| header().any(|name| split_unit(name).0 == format!("q{number}"));
+        let count = commanded.len();
+        if count > 1 && !has(1) && (2..=count + 1).all(has) && !has(count + 2) {
+            let kind = TableErrorKind::JointsFromTwo {
+                first: "q2".to_owned(),
+                last: format!("q{}", count + 1),
+            };
+            let location = Location { key: None, ..table.column("") };
+            return Some(location.error(kind));
+        }
+        let joints = commanded.iter().filter(|(index, _)| !self.has(Role::Joint(*index)));
+        let mut missing: Vec<(String, Unit)> =
+            joints.map(|(index, unit)| (format!("q{}", numbering.number(*index)), *unit)).collect();
+        let axes = POSITION.into_iter().zip(["x", "y", "z"]).filter(|(role, _)| !self.has(*role));
+        if measured && !self.observes() {
+            missing.extend(axes.map(|(_, name)| (name.to_owned(), Unit::Length)));
+        }
+        // The message about a single column names the similar one.
+        if missing.len() < 2 {
+            return None;
+        }
+        let mut map = Vec::new();
+        for (base, unit) in &missing {
+            let suffix = if *unit == Unit::Length { "mm" } else { "deg" };
+            let found = unknown.iter().find_map(|theirs| {
+                let (guessed, written) = guess(theirs).filter(|(guessed, _)| guessed == base)?;
+                let fits = written.is_none_or(|written| unit.suffix(written).is_some());
+                fits.then(|| (*theirs, format!("{guessed}_{}", written.unwrap_or(suffix))))
+            });
+            map.push(found?);
+        }
+        let (section, entries): (_, Vec<String>) = (
+            if problem.data.dialect.columns.is_empty() { "[data]" } else { "[data.columns]" },
+            map.iter().map(|(theirs, ours)| format!("\"{theirs}\" = \"{ours}\"")).collect(),
+        );
+        let map = if section == "[data]" {
+            format!("columns = {{ {} }}", entries.join(", "))
+        } else {
+            entries.join(", ")
+        };
+        let missing: Vec<String> = missing.into_iter().map(|(base, _)| base).collect();
+        let kind = TableErrorKind::MissingColumns { missing, section, map };
+        let location = Location { key: None, ..table.column("") };
+        Some(location.error(kind))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_of_other_programs_are_recognised() {
+        for (name, base, unit) in [
+            ("J1 [deg]", "q1", Some("deg")),
+            ("A06", "q6", None),
+            ("Axis 3 (rad)", "q3", Some("rad")),
+            ("theta_2", "q2", None),
+            ("X (mm)", "x", Some("mm")),
+            ("TCP.z [m]", "z", Some("m")),
+        ] {
+            assert_eq!(guess(name), Some((base.to_owned(), unit)), "{name}");
+        }
+        for name in ["Name", "RMS", "Timestamp", "Point 3", "rx", "max", "dx1"] {
+            assert_eq!(guess(name), None, "{name}");
+        }
+    }
+}

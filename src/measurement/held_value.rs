@@ -1,0 +1,96 @@
+//! Detection of an instrument that held its last value, and of session names that are written in two
+//! ways.
+
+use super::Measurements;
+use crate::error::{Warning, WarningKind};
+use crate::problem::{Joint, JointKind, Problem};
+
+/// Smallest difference between the commands of a joint that moves the target: 1° \[rad\], or 1 mm
+/// \[m\].
+const MIN_TURN: f64 = std::f64::consts::PI / 180.0;
+const MIN_TRAVEL: f64 = 1e-3;
+/// Maximum number of rows that the warning names in addition to the first.
+const MAX_NAMED_ROWS: usize = 3;
+
+impl Measurements {
+    /// Returns the warnings about rows that repeat others, and about the order of times.
+    pub(crate) fn row_warnings(&self, problem: &Problem) -> Vec<Warning> {
+        let sigma = problem.data.position_sigma;
+        let repeated = self
+            .repeated_rows(sigma)
+            .or_else(|| self.rows_of_another_session(sigma))
+            .or_else(|| self.rounded_copies(problem));
+        let held = self.held_positions(problem);
+        repeated.into_iter().chain(held).chain(self.time_going_back()).collect()
+    }
+
+    /// Returns a warning if rows measure exactly the position of the row above them, although the
+    /// arm moved.
+    ///
+    /// The last moving joint does not count, because a target on its axis stays where it is. The
+    /// digits must be fine against the declared σ.
+    fn held_positions(&self, problem: &Problem) -> Option<Warning> {
+        if !self.position_measured || self.is_coarse(problem.data.position_sigma) {
+            return None;
+        }
+        let is_moving = |joint: &usize| {
+            let declared = problem.joints.get(*joint);
+            declared.is_some_and(|joint| joint.command_kind() != JointKind::Fixed)
+        };
+        let mut moving: Vec<usize> = (0..self.joints).filter(is_moving).collect();
+        moving.pop();
+        let moves = |row: usize, joint: usize| {
+            let command = |row: usize| self.configuration(row).get(joint).copied().unwrap_or(0.0);
+            let kind = problem.joints.get(joint).map(Joint::command_kind);
+            let least = if kind == Some(JointKind::Prismatic) { MIN_TRAVEL } else { MIN_TURN };
+            (command(row) - command(row - 1)).abs() > least
+        };
+        let word = |row: usize| {
+            let target = self.target.as_ref().and_then(|target| target.of_row.get(row));
+            (self.session.of_row.get(row), target, self.observation(row).key())
+        };
+        let is_held = |row: &usize| {
+            let (position, before) = (self.positions.get(*row), self.positions.get(row - 1));
+            self.observation(*row).is_position()
+                && position.is_some_and(|position| position.norm() > 0.0)
+                && position == before
+                && word(*row) == word(row - 1)
+                && moving.iter().any(|&joint| moves(*row, joint))
+        };
+        let held: Vec<usize> = (1..self.len()).filter(is_held).collect();
+        let &first = held.first()?;
+        let others = held.iter().skip(1).take(MAX_NAMED_ROWS);
+        let kind = WarningKind::PositionHeld {
+            before: self.location(first - 1).to_string(),
+            rows: held.len(),
+            others: others.map(|&row| self.location(row).to_string()).collect(),
+        };
+        Some(Warning { location: self.location(first), kind })
+    }
+
+    /// Returns a warning if two sessions have the same name but for case, spaces and hyphens. It is
+    /// located at the first row of the rarer one.
+    pub(super) fn sessions_alike(&self) -> Option<Warning> {
+        let names = &self.session.names;
+        let plain = |name: &String| -> String {
+            let letters = name.chars().filter(|letter| !letter.is_whitespace());
+            letters.filter(|letter| !"-_".contains(*letter)).flat_map(char::to_lowercase).collect()
+        };
+        let count = |place: usize| self.session.of_row.iter().filter(|of| **of == place).count();
+        let plains: Vec<String> = names.iter().map(plain).collect();
+        let mut pairs = (0..names.len()).flat_map(|second| (0..second).map(move |k| (k, second)));
+        let (first, second) = pairs.find(|&(first, second)| {
+            plains.get(first) == plains.get(second)
+                && plains.get(first).is_some_and(|plain| !plain.is_empty())
+        })?;
+        let (rare, usual) =
+            if count(first) < count(second) { (first, second) } else { (second, first) };
+        let row = self.session.of_row.iter().position(|of| *of == rare)?;
+        let kind = WarningKind::SessionsAlike {
+            name: names.get(rare)?.clone(),
+            other: names.get(usual)?.clone(),
+            rows: count(rare),
+        };
+        Some(Warning { location: self.location(row).with_key("session"), kind })
+    }
+}

@@ -1,0 +1,156 @@
+//! Tables that are read, but whose rows or columns are doubtful: repeated rows, held values, names
+//! of sessions, other units.
+
+use std::fmt::Write as _;
+
+use flexcal::error::{Warning, WarningKind};
+use flexcal::measurement::Dataset;
+use flexcal::problem::Problem;
+
+use crate::common::arms::parse;
+use crate::common::program::Folder;
+use crate::common::reading::{assert_says, table_error, try_table};
+
+const ARM: &str = "name = 'arm'\n[[joint]]\n[[joint]]\na_m = 0.5\n[[joint]]\na_m = 0.4\n";
+
+/// Returns the problem [`ARM`] with everything held out or fitted by none.
+fn arm() -> Problem {
+    parse(&format!("{ARM}[data]\nposition_sigma_mm = 0.05\nheld_out = \"none\"\n"))
+}
+
+/// Returns `count` rows of a table with the session `session` and positions of `decimals`.
+fn rows(count: usize, session: &str, decimals: usize) -> String {
+    let mut text = String::new();
+    for k in 0..count {
+        let at = |factor: f64| 400.0 * (factor * (k as f64 + 1.0)).sin();
+        let (q1, q2, q3) = (at(0.7) / 4.0, at(1.3) / 4.0, at(2.1) / 4.0);
+        let (x, y, z) = (at(0.31), at(0.53), at(0.77));
+        let row = format!("{q1:.3},{q2:.3},{q3:.3},{x:.decimals$},{y:.decimals$},{z:.decimals$}");
+        writeln!(text, "{row},{session}").unwrap();
+    }
+    text
+}
+
+const HEADER: &str = "q1_deg,q2_deg,q3_deg,x_mm,y_mm,z_mm,session\n";
+
+/// Returns the warnings of a table in a file.
+fn warnings(text: &str) -> Vec<Warning> {
+    let folder = Folder::new();
+    folder.write("rows.csv", text);
+    Dataset::read_files(&[folder.path("rows.csv")], &arm()).unwrap().1
+}
+
+#[test]
+fn a_measurement_that_is_given_twice_is_named() {
+    let a = rows(20, "A", 4);
+    assert_eq!(warnings(&format!("{HEADER}{a}")), []);
+    let [of_session] = &warnings(&format!("{HEADER}{a}{}", rows(20, "B", 4)))[..] else { panic!() };
+    let is_expected = |kind: &WarningKind| matches!(kind, WarningKind::RowsOfAnotherSession { rows: 20, sessions, .. } if *sessions == ["B", "A"]);
+    assert!(is_expected(&of_session.kind), "{of_session:?}");
+    assert_eq!(of_session.location.line, Some(22));
+    let [rounded] = &warnings(&format!("{HEADER}{a}{}", rows(20, "A", 2)))[..] else { panic!() };
+    let WarningKind::RowsRounded { rows: 20, step, .. } = &rounded.kind else {
+        panic!("{rounded:?}")
+    };
+    assert_eq!(step, "0.01");
+    // A pose that is measured again differs by more than its digits.
+    let moved = rows(20, "A", 2).replace(",A", "1,A");
+    let off = moved.lines().map(|line| line.replacen(',', ",", 1)).collect::<Vec<_>>().join("\n");
+    assert_eq!(warnings(&format!("{HEADER}{}{}\n", rows(20, "A", 3), off)), []);
+}
+
+#[test]
+fn a_position_that_stays_while_the_arm_moves_was_held() {
+    let text = rows(20, "A", 4);
+    let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
+    let cells = |line: &str| line.split(',').map(str::to_owned).collect::<Vec<_>>();
+    let held = cells(&lines[7])[3..6].to_vec();
+    for line in &mut lines[8..11] {
+        let mut row = cells(line);
+        row.splice(3..6, held.clone());
+        *line = row.join(",");
+    }
+    let [found] = &warnings(&format!("{HEADER}{}\n", lines.join("\n")))[..] else { panic!() };
+    let WarningKind::PositionHeld { rows: 3, .. } = &found.kind else { panic!("{found:?}") };
+    assert_eq!(found.location.line, Some(10));
+    // A target on the axis of the last joint stays where it is.
+    let mut turned = cells(&lines[7]);
+    turned[2] = "12.5".to_owned();
+    let axis = format!("{HEADER}{}\n{}\n", lines[..8].join("\n"), turned.join(","));
+    assert_eq!(warnings(&axis), []);
+}
+
+#[test]
+fn sessions_that_differ_in_case_alone_are_named() {
+    let text = rows(20, "Tag 1", 4).replacen("Tag 1", "tag1", 2);
+    let [found] = &warnings(&format!("{HEADER}{text}"))[..] else { panic!() };
+    let expected =
+        WarningKind::SessionsAlike { name: "tag1".to_owned(), other: "Tag 1".to_owned(), rows: 2 };
+    assert_eq!((&found.kind, found.location.line), (&expected, Some(2)));
+}
+
+#[test]
+fn columns_in_other_units_are_named() {
+    let with = |column: &str, values: &[&str], problem: &Problem| {
+        let text = rows(values.len(), "A", 4);
+        let lines = text.lines().zip(values).map(|(line, value)| format!("{line},{value}\n"));
+        let header = HEADER.replace('\n', &format!(",{column}\n"));
+        try_table(problem, &(header + &lines.collect::<String>())).unwrap().1
+    };
+    let newtons = with("payload_kg", &["0", "39.2266", "78.4532"], &arm());
+    assert!(matches!(newtons[..], [Warning { kind: WarningKind::PayloadInNewtons { .. }, .. }]));
+    assert_eq!(with("payload_kg", &["0", "4", "8.5"], &arm()), []);
+    assert_eq!(with("payload_kg", &["0", "9.81", "9.81"], &arm()), []);
+    let dates = with("Shot", &["2024-05-31 14:03:20", "2024-05-31 14:04:20"], &arm());
+    let [Warning { kind: WarningKind::DatesIgnored { name }, .. }] = &dates[..] else {
+        panic!("{dates:?}")
+    };
+    assert_eq!(name, "Shot");
+    let far = "[[point]]\nname = 'a'\nat_m = [750, 300, 350]\n[[point]]\nname = 'b'\n\
+               [[distance]]\nbetween = ['a', 'b']\nm = 320\n";
+    let warnings = parse(&format!("{ARM}{far}")).plausibility_warnings();
+    let is_far = |warning: &Warning| matches!(warning.kind, WarningKind::FarFixture { .. });
+    assert_eq!(warnings.iter().filter(|warning| is_far(warning)).count(), 2, "{warnings:?}");
+    let near = far.replace("750, 300, 350", "7.5, 3, 3.5").replace("m = 320", "mm = 320");
+    assert_eq!(parse(&format!("{ARM}{near}")).plausibility_warnings(), []);
+    let anchor = parse(&format!("{ARM}[[anchor]]\nname = 'a'\nat_m = [1, 0, 0]\n"));
+    let short = "q1_deg,q2_deg,q3_deg,anchor,distance_mm\n1,2,3,a,1.3\n4,5,6,a,1.1\n";
+    let said = try_table(&anchor, short).unwrap().1;
+    assert!(matches!(said[..], [Warning { kind: WarningKind::ShortDistances { .. }, .. }]));
+    assert_eq!(try_table(&anchor, &short.replace("distance_mm", "distance_m")).unwrap().1, []);
+}
+
+#[test]
+fn columns_under_other_names_are_proposed_all_at_once() {
+    let error = table_error(
+        &arm(),
+        "Name,J1 [deg],J2 [deg],J3 [deg],X (mm),Y (mm),Z (mm)\n1,1,2,3,4,5,6\n",
+    );
+    let map = "columns = { \"J1 [deg]\" = \"q1_deg\", \"J2 [deg]\" = \"q2_deg\", \"J3 [deg]\" = \
+               \"q3_deg\", \"X (mm)\" = \"x_mm\", \"Y (mm)\" = \"y_mm\", \"Z (mm)\" = \"z_mm\" }";
+    assert_says(&error, &["rows.csv:1: columns are missing: q1, q2, q3, x, y, z; ", map]);
+    let from_two = table_error(&arm(), "q2_deg,q3_deg,q4_deg,x_mm,y_mm,z_mm\n1,2,3,4,5,6\n");
+    assert_says(&from_two, &["rows.csv:1: the joints of the table are counted from 2 (q2 to q4)"]);
+    let transposed = table_error(&arm(), "q1_deg,1.5,2.5\nq2_deg,3,4\nx_mm,5,6\n");
+    assert_says(&transposed, &["rows.csv:1: the table is transposed"]);
+    let bars = "| q1_deg | q2_deg | x_mm |\n| --- | --- | --- |\n| 1 | 2 | 3 |\n";
+    assert_says(&table_error(&arm(), bars), &["rows.csv:1: a table with bars, as in Markdown"]);
+}
+
+#[test]
+fn numbers_in_other_notations_are_named() {
+    for (cell, words) in [
+        ("2 310.123", "has separators of thousands"),
+        ("1.4871D+03", "has the exponent of Fortran; write 1.4871E+03"),
+        ("-111:25:00", "write degrees with decimals: -111.416667"),
+        ("12°30'", "write degrees with decimals: 12.500000"),
+    ] {
+        let table = format!("{HEADER}{cell},2,3,4,5,6,A\n");
+        assert_says(&table_error(&arm(), &table), &["rows.csv:2: column q1_deg: ", words]);
+    }
+    let side = "q1_deg,q2_deg,q3_deg,x_mm,y_mm,z_mm,approach2\n1,2,3,4,5,6,R\n";
+    assert_says(
+        &table_error(&arm(), side),
+        &["column approach2: \"R\" is not a direction; write 1"],
+    );
+}
