@@ -56,12 +56,16 @@ impl Export {
             found.strategy.model(Model::new(problem, &placement.bases, &placement.targets)?);
         let estimate = SavedEstimate::parse(estimate, Path::new("estimate.json"))?;
         let fitted = (&estimate, correction);
-        let geometry = Geometry::new(problem, fitted, (&model, &found.x), Some(data), choice)?;
+        let last_joint = chain.moving_end();
+        let choice = (choice, last_joint.is_none());
+        let geometry = Geometry::for_file(problem, fitted, (&model, &found.x), Some(data), choice)?;
         let mounted = mounted_links(problem, &model, found.x.as_slice());
         let moved = export_with_links(&chain, problem, &geometry.arm, &mounted)?;
         let errors = ExportedErrors::new(&model, &found.x, data, None)
             .with_geometries(geometry.errors(problem, fitted, data)?);
-        let result = ExportResult::new(problem, &model, None, Some(&moved.moved), Some(errors));
+        let mut result = ExportResult::new(problem, &model, None, Some(&moved.moved), Some(errors));
+        let kept = last_joint.filter(|_| geometry.best_rigid.is_some());
+        result.not_held.extend(kept.map(report::kept_at_end));
         let remarks = ExportRemarks::new(
             geometry.best_rigid.as_ref().map(|best| [best.best, best.identified]),
             geometry.fitted_alone.as_ref(),

@@ -80,7 +80,7 @@ def test_export_urdf(command: Command, tmp_path: Path) -> None:
     # The URDF of another arm is refused.
     other = tmp_path / "other.urdf"
     other.write_text(ODD.read_text().replace("0.45 0 0.02", "0.55 0 0.02"))
-    with pytest.raises(flexcal.InputError, match="is not that of the URDF") as caught:
+    with pytest.raises(flexcal.InputError, match="differs from the URDF") as caught:
         result.export_urdf(other)
     run, _ = command("export", tmp_path, *estimate, "--urdf", other)
     assert run.returncode == 2 and str(caught.value) in run.stderr and caught.value.file == str(other)

@@ -99,7 +99,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         let bounds = Bounds::new(correction, poses, CONFIDENCE_LEVEL);
         let errors =
             held_out.iter().filter_map(|&row| Some(predicted.rows.get(row)?.position.norm()));
-        result = result.with_bounds(&bounds, bounds.coverage(errors), has_remainder);
+        let errors: Vec<f64> = errors.collect();
+        let rows = errors.len();
+        result = result.with_bounds(&bounds, (bounds.coverage(errors), rows), has_remainder);
     }
     super::tolerance::warn_if_tiny(arguments.tolerance_mm, common.quiet);
     let tolerance = arguments.tolerance_mm.map(|length| Tolerance {

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use flexcal::fit::{FindingCode, Identification};
+use flexcal::fit::{Finding, FindingCode, Identification};
 use flexcal::problem::{PoseRanges, Problem};
 use flexcal::report::{self, shell_word};
 use flexcal::results::{LoopResult, TraceResult, exceeds_noise};
@@ -53,13 +53,24 @@ pub fn after_fit(
                 "{look}; if they are right, flexcal loop {named} looks for what the model lacks"
             )
         }
+        None if found.finding(FindingCode::Misread).is_some_and(is_partial) => format!(
+            "check what the warning names, then flexcal identify {named}; if the input is right, flexcal loop {named} looks for what the model lacks"
+        ),
         None if found.has(FindingCode::Misread) => format!(
             "correct the table or {} as the warning says, then flexcal identify {named}",
+            common.problem_file().display()
+        ),
+        None if found.has(FindingCode::LensContradicted) => format!(
+            "free the intrinsics in [parameters] of {}, as in \"camera*.f*\" = {{ free = true }}, then flexcal identify {named}",
             common.problem_file().display()
         ),
         None if found.has(FindingCode::PositionsComputed) => {
             "measure the poses with an instrument".to_owned()
         }
+        None if found.has(FindingCode::LimitContradicted) => format!(
+            "check the limits in {} that the warning names, then flexcal identify {named}",
+            common.problem_file().display()
+        ),
         // If a prior contradicts the data, neither a cause nor a correction follows from the fit.
         // If the nominal arm is far off, its declared numbers are wrong, not the priors.
         None if found.has(FindingCode::PriorContradicted)
@@ -97,6 +108,11 @@ pub fn after_fit(
         }
         None => to_apply("corrects commands"),
     }
+}
+
+/// Returns true if a misreading leaves more than noise, so that it explains the misfit in part only.
+fn is_partial(misread: &Finding) -> bool {
+    misread.remedy != FindingCode::Misread.entry().remedy
 }
 
 /// Returns what to do after a loop, as a command or in words. `fit` is the fit of the declared

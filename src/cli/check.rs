@@ -71,7 +71,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         let next = if check.suffices() && is_measured {
             format!("flexcal identify {} fits these measurements", common.problem_arguments())
         } else if check.suffices() {
-            format!("measure such poses, then flexcal identify {problem_word} --data MEASURED.csv")
+            format!("measure such poses, then flexcal loop {problem_word} --data MEASURED.csv")
         } else {
             format!("flexcal plan {problem_word} --poses N chooses poses that tell more")
         };

@@ -166,7 +166,15 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         _ => correction.ok().flatten(),
     };
     let fitted = (&estimates, correction.as_ref());
-    let geometry = code::Geometry::new(&problem, fitted, (&model, &x), data.as_ref(), &choice)?;
+    let last_joint = match &arguments.urdf {
+        Some(file) => {
+            let robot = Robot::read(file)?;
+            Chain::from_problem(&robot, &problem)?.moving_end().map(str::to_owned)
+        }
+        None => None,
+    };
+    let (fit, choice) = ((&model, &x), (&choice, last_joint.is_none()));
+    let geometry = code::Geometry::for_file(&problem, fitted, fit, data.as_ref(), choice)?;
     let arm = &geometry.arm;
     let alone = geometry.fitted_alone.as_ref();
     let workspace = geometry.best_rigid.as_ref().map(|best| [best.best, best.identified]);
@@ -214,6 +222,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     }
     let stays = |link: String| format!("link {link}, which the URDF has on another link");
     result.not_held.extend(elsewhere.into_iter().map(stays));
+    let kept = last_joint.filter(|_| geometry.best_rigid.is_some());
+    result.not_held.extend(kept.map(|joint| report::kept_at_end(&joint)));
     flags.print_result(&result.to_json(), || {
         format!(
             "{}\nNext: {}\n",

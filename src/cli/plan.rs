@@ -90,6 +90,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         diagnostic::warn("effects are told apart by positions: orientations do not count");
     }
     let pair = effect_pair(&arguments.separate, &declared)?;
+    let declared_files = declared.data.files.clone();
     let problem = pair.as_ref().map_or(declared, |pair| pair.declared.clone());
     let results = common.results(
         "plan",
@@ -149,14 +150,21 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         let text = report::plan_text(&problem, criterion, &plan, separated.as_ref());
         let (problem, table) =
             (shell_word(common.problem()), shell_word(&results.path("plan.csv")));
-        let next = if plan.is_of_cameras {
+        let measure = if plan.is_of_cameras {
             "take an image in each of these poses, write a row for each point that is found"
         } else {
             "measure these poses, add the columns x_mm, y_mm, z_mm"
         };
+        // Two effects are told apart by the measurements at hand and the planned ones together.
+        let named = if common.data().is_empty() { &declared_files[..] } else { common.data() };
+        let at_hand = named.iter().filter(|_| pair.is_some() || !common.data().is_empty());
+        let at_hand = at_hand.filter(|file| file.is_file());
+        let files: Vec<String> = at_hand.map(|file| shell_word(file)).chain([table]).collect();
+        let command = if pair.is_some() { "loop" } else { "identify" };
         format!(
-            "{text}{}Next: {next}, then flexcal identify {problem} --data {table}\n",
-            results.written()
+            "{text}{}Next: {measure}, then flexcal {command} {problem} --data {}\n",
+            results.written(),
+            files.join(" ")
         )
     })?;
     if plan.suffices {

@@ -84,7 +84,7 @@ fn of_size(millimetres: Option<f64>) -> String {
         Some(side) if side < MIN_PLAUSIBLE_SIDE_MM => format!(
             ", whose longest side is {side:.3} mm: if its numbers are metres, multiply them by 1000"
         ),
-        _ => "; check --workspace-mm, --plane and the ranges of the joints (coordinates are those \
+        _ => "; check --workspace-mm, --keep-out-mm and the ranges of the joints (coordinates are those \
              of the arm's base, in millimetres)"
             .to_owned(),
     }

@@ -6,8 +6,11 @@ use std::path::PathBuf;
 use thiserror::Error;
 
 use super::NoRows;
-use super::near::{is_it_rather, suggestion};
-use super::phrases::{decimal_comma_hint, joined_list, near_quote, plural, with_remedy};
+use super::near::{is_it_rather, key_suggestion, pattern_suggestion, suggestion};
+use super::phrases::{
+    decimal_comma_hint, joined_list, near_quote, plural, stiffness_units, windows_path_hint,
+    with_remedy,
+};
 use super::study::StudyErrorKind;
 use super::table::TableErrorKind;
 use super::urdf::UrdfErrorKind;
@@ -23,14 +26,17 @@ pub enum InputErrorKind {
     // The following errors concern files.
     #[error("no such file; give a problem.toml or the folder that holds one")]
     ProblemMissing,
+    #[error("no such file; the folder holds the results of a loop: give {}", closed.display())]
+    FolderOfResults { closed: PathBuf },
     #[error(
         "no such file; give the TRUTH.toml that describes the simulation, or the folder that \
          holds one"
     )]
     TruthMissing,
     #[error(
-        "no such file: {}; paths in `files` are relative to the problem's folder",
-        path.display()
+        "no such file: {}; paths in `files` are relative to the problem's folder{}",
+        path.display(),
+        windows_path_hint(path)
     )]
     DataFileMissing { path: PathBuf },
     #[error("no such file; paths on the command line are relative to the current folder")]
@@ -55,7 +61,7 @@ pub enum InputErrorKind {
     Syntax { message: String, near_text: String, remedy: Option<&'static str> },
 
     // The following errors concern keys.
-    #[error("unknown key{}; known here: {}", suggestion(key, known), known.join(", "))]
+    #[error("unknown key{}; known here: {}", key_suggestion(key, known), known.join(", "))]
     UnknownKey { key: String, known: Vec<String> },
     #[error("does not belong here: {place}")]
     MisplacedKey { place: String },
@@ -187,7 +193,7 @@ pub enum InputErrorKind {
     #[error(
         "no {what} is called \"{name}\"{}; {}",
         suggestion(name, known),
-        joined_list("there are", known, "none is declared")
+        joined_list("there are", known, &format!("none is declared by a section [[{what}]]"))
     )]
     UnknownFixture { what: &'static str, name: String, known: Vec<String> },
     #[error(
@@ -229,7 +235,10 @@ pub enum InputErrorKind {
     NoSigmaOfKind { write: String },
 
     // The following errors concern effects.
-    #[error("an effect is one key, as in `gear-ratio = {{ joint = 2 }}`; found {found}")]
+    #[error(
+        "an effect is one key, as in `gear-ratio = {{ joint = 2 }}`; found {found}{}",
+        if *found > 1 { ": a key of another section stands above the sections [[effect]]" } else { "" }
+    )]
     NotOneEffect { found: usize },
     #[error("needs arguments; write {write}")]
     NeedsArguments { write: String },
@@ -337,7 +346,7 @@ pub enum InputErrorKind {
 
     #[error(
         "the pattern matches no parameter of this arm{}; {}",
-        suggestion(pattern, known),
+        pattern_suggestion(pattern, known),
         joined_list("they are", known, "it has none")
     )]
     MatchesNothing { pattern: String, known: Vec<String> },
@@ -391,7 +400,8 @@ pub enum InputErrorKind {
     #[error(
         "the nominal arm has no equilibrium under its loads here; {joint} may be too soft: gravity \
          on the masses beyond it has a moment of up to {moment} N·m, which could turn it by up to {angle} \
-         rad; a stiffness in N·m/arcmin times 3438, or in N·m/° times 57.3, is one in N·m/rad"
+         rad; {}",
+        stiffness_units(angle)
     )]
     SoftJoint { joint: String, moment: String, angle: String },
 

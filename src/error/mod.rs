@@ -7,6 +7,7 @@ mod near;
 mod no_rows;
 mod phrases;
 mod plain;
+mod remedy;
 mod study;
 mod table;
 mod typography;
@@ -133,12 +134,6 @@ pub struct InputError {
     pub location: Box<Location>,
     /// Kind of the message, with cause and remedy.
     pub kind: Box<InputErrorKind>,
-}
-
-impl fmt::Display for InputError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}: {}", self.location, one_line(&self.kind.to_string()))
-    }
 }
 
 impl std::error::Error for InputError {

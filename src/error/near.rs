@@ -38,6 +38,29 @@ pub(super) fn suggestion<T: AsRef<str>>(word: &str, known: impl IntoIterator<Ite
     did_you_mean(nearest(word, known).as_ref().map(AsRef::as_ref))
 }
 
+/// Returns the suggestion for an unknown key: a unit if several known keys differ from it by their
+/// unit alone, otherwise a similar key.
+pub(super) fn key_suggestion(key: &str, known: &[String]) -> String {
+    let is_with_unit =
+        |name: &&String| name.strip_prefix(key).is_some_and(|end| end.starts_with('_'));
+    if known.iter().filter(is_with_unit).count() > 1 {
+        return format!(" ({key} needs a unit)");
+    }
+    suggestion(key, known)
+}
+
+/// Characters of regular expressions, none of which is in a name of a parameter.
+const EXPRESSION_CHARACTERS: [char; 8] = ['{', '}', '|', '?', '(', ')', '^', '$'];
+
+/// Returns the suggestion for a pattern that matches no parameter: rules without character classes,
+/// or else a similar parameter.
+pub(super) fn pattern_suggestion(pattern: &str, known: &[String]) -> String {
+    if pattern.starts_with("joint[") || pattern.contains(EXPRESSION_CHARACTERS) {
+        return " (only * stands for other text: write a rule for each joint)".to_owned();
+    }
+    suggestion(pattern, known)
+}
+
 /// Returns ` (is it …?)` with a similar word and its noun; an empty text for `None`.
 pub(super) fn is_it_rather(noun: &str, near: Option<&str>) -> String {
     near.map_or_else(String::new, |near| format!(" (is it {noun}{near}?)"))

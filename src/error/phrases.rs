@@ -19,6 +19,34 @@ pub(super) fn with_remedy(remedy: Option<&str>) -> String {
     remedy.map_or_else(String::new, |remedy| format!("; {remedy}"))
 }
 
+/// Returns the hint that a path is an absolute one of Windows, or an empty text.
+pub(super) fn windows_path_hint(path: &Path) -> &'static str {
+    let text = path.to_string_lossy();
+    let has_drive = text.split('/').any(|part| {
+        let drive = part.strip_suffix(':').unwrap_or_default();
+        drive.len() == 1 && drive.starts_with(|letter: char| letter.is_ascii_alphabetic())
+    });
+    if has_drive && cfg!(not(windows)) {
+        "; an absolute path of Windows names no file on this system"
+    } else {
+        ""
+    }
+}
+
+/// Angle by which no soft joint turns, so that its stiffness is rather a compliance \[rad\].
+const MIN_ANGLE_OF_COMPLIANCE: f64 = 1e3;
+
+/// Returns the units that may have been meant by a stiffness, with which a joint would turn by
+/// `angle` \[rad\].
+pub(super) fn stiffness_units(angle: &str) -> &'static str {
+    if angle.parse::<f64>().is_ok_and(|angle| angle > MIN_ANGLE_OF_COMPLIANCE) {
+        "if the number is a compliance in rad/(N·m), its reciprocal is the stiffness"
+    } else {
+        "a stiffness in kN·m/rad times 1000, in N·m/arcmin times 3438, or in N·m/° times 57.3, is one \
+         in N·m/rad"
+    }
+}
+
 /// Returns the remedy for a list with too many numbers; empty unless some of them follow a comma
 /// without a space.
 pub(super) fn decimal_comma_hint(has_close_commas: bool) -> &'static str {
@@ -54,7 +82,7 @@ pub(super) fn missing_date_hint(value: &str) -> String {
 pub(super) fn in_quotes(names: &[String]) -> String {
     let names: Vec<String> =
         names.iter().map(|name| format!("\"{}\"", shortened(name, 40))).collect();
-    joined_list("there are", &names, "it has no columns of other names")
+    joined_list("there are", &names, "its other columns have names of flexcal")
 }
 
 /// Returns `verb` followed by the names, or the text `none` if there are no names.

@@ -95,10 +95,14 @@ pub enum TableErrorKind {
     #[error("no rows below the header")]
     NoRowsBelowHeader,
     #[error(
-        "the table has poses and no measurement; measure these poses, then add the columns x_mm, \
-         y_mm and z_mm"
+        "the table has poses and no measurement; {}",
+        if *is_result {
+            "residuals.csv is a result of identify: give the table of its measurements"
+        } else {
+            "measure these poses, then add the columns x_mm, y_mm and z_mm"
+        }
     )]
-    NotMeasured,
+    NotMeasured { is_result: bool },
     #[error(
         "missing; add {write}, or, if another table holds the joints, write {JOINED} in [data]"
     )]

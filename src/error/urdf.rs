@@ -48,10 +48,10 @@ pub enum UrdfErrorKind {
     Kind { kind: String },
     #[error(
         "no link is called \"{name}\"{}; the links are {}",
-        suggestion(name, known),
+        joint_or_suggestion(name, child.as_deref(), known),
         listed(known)
     )]
-    NoLink { name: String, known: Vec<String> },
+    NoLink { name: String, known: Vec<String>, child: Option<String> },
     #[error("no joint is called \"{name}\"{}", suggestion(name, known))]
     NoJoint { name: String, known: Vec<String> },
     #[error("the joints follow each other in a cycle of <mimic>")]
@@ -64,7 +64,7 @@ pub enum UrdfErrorKind {
     Loop { link: String },
     #[error("cannot be converted to a problem: {key}: {why}")]
     AsProblem { key: String, why: String },
-    #[error("there are no links")]
+    #[error("there are no links; is it an SRDF, whose URDF is another file?")]
     NoLinks,
     #[error("several links have no parent: {}; choose one with --base", roots.join(", "))]
     Roots { roots: Vec<String> },
@@ -88,13 +88,14 @@ pub enum UrdfErrorKind {
     )]
     OtherJoints { base: String, tip: String, found: Vec<String>, expected: Vec<String> },
     #[error(
-        "the nominal arm of the problem is not that of the URDF at joint \"{joint}\": {off}; \
-         was the problem made from this file?"
+        "the nominal arm of the problem differs from the URDF at joint \"{joint}\" by {off}; was the \
+         problem made from this file? If the file is a calibrated URDF, give the original"
     )]
     OtherArm { joint: String, off: String },
     #[error(
         "no joint after \"{joint}\" has an origin that can hold the identified transform after \
-         it ({off}); choose a --tip behind a fixed joint"
+         it ({off}); add a fixed joint behind it to the URDF, and make the problem anew: flexcal init \
+         with the link of that joint as --tip"
     )]
     NoRoom { joint: String, off: String },
     #[error("not an arm with the joint layout of Universal Robots: {why}")]
@@ -111,6 +112,15 @@ fn conversion(found: &str) -> &'static str {
         "sdf" => "; an SDFormat model (SDF): convert it first, for example with sdf2urdf of pysdf",
         "COLLADA" => "; a mesh (COLLADA): give the URDF that refers to it",
         _ => "",
+    }
+}
+
+/// Returns the link of the joint that is called `name`, if there is one, or else the most similar
+/// name.
+fn joint_or_suggestion(name: &str, child: Option<&str>, known: &[String]) -> String {
+    match child {
+        Some(child) => format!(" (that is a joint; its link is {child})"),
+        None => suggestion(name, known),
     }
 }
 

@@ -42,8 +42,16 @@ pub enum WarningKind {
          = \"split\" }} follows the marks"
     )]
     SplitUnused,
-    #[error("joint {joint} is fixed, so the column is ignored")]
-    JointIgnored { joint: usize },
+    #[error(
+        "the rule has no effect, because \"{by}\" (line {line}) is a later rule for the same \
+         parameters; write the more general rule first"
+    )]
+    RuleOverridden { by: String, line: usize },
+    #[error(
+        "joint {joint} is fixed, so the column is ignored; the joints that move are {}",
+        moving.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
+    )]
+    JointIgnored { joint: usize, moving: Vec<usize> },
     #[error("unknown column; ignored (write {write})")]
     UnitIgnored { write: String },
     #[error(

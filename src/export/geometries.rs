@@ -32,6 +32,8 @@ pub struct Geometry {
     pub best_rigid: Option<RigidFit>,
     /// Fit of the rigid model with its bases and tools, if that was chosen; else `None`.
     pub fitted_alone: Option<fit::Identification>,
+    /// True if the exported file can hold a transform after the last moving joint.
+    has_room: bool,
 }
 
 impl Geometry {
@@ -48,14 +50,32 @@ impl Geometry {
         data: Option<&Dataset>,
         choice: &GeometryChoice,
     ) -> Result<Self, ExportError> {
+        Self::for_file(problem, (estimate, correction), (model, x), data, (choice, true))
+    }
+
+    /// Computes the chosen geometry as [`new`](Self::new) does. If `has_room` is false, the file
+    /// cannot hold a transform after the last moving joint, and the approximation of the whole model
+    /// keeps the identified one.
+    ///
+    /// # Errors
+    /// Returns the errors of [`new`](Self::new).
+    #[doc(hidden)]
+    pub fn for_file(
+        problem: &Problem,
+        (estimate, correction): (&SavedEstimate, Option<&Correction>),
+        (model, x): (&Model, &DVector<f64>),
+        data: Option<&Dataset>,
+        (choice, has_room): (&GeometryChoice, bool),
+    ) -> Result<Self, ExportError> {
         let arm = |model: &Model, x: &DVector<f64>| model.arm(|k| x.get(k).copied().unwrap_or(0.0));
         match choice {
             GeometryChoice::Identified => {
-                Ok(Self { arm: arm(model, x), best_rigid: None, fitted_alone: None })
+                Ok(Self { arm: arm(model, x), best_rigid: None, fitted_alone: None, has_room })
             }
             GeometryChoice::BestRigid(workspace) => {
-                let best = best_rigid(problem, estimate, correction, workspace)?;
-                Ok(Self { arm: best.arm.clone(), best_rigid: Some(best), fitted_alone: None })
+                let best = best_rigid(problem, estimate, correction, (workspace, has_room))?;
+                let arm = best.arm.clone();
+                Ok(Self { arm, best_rigid: Some(best), fitted_alone: None, has_room })
             }
             GeometryChoice::FittedAlone => {
                 let data = data.ok_or(ExportError::NeedsData)?;
@@ -64,7 +84,7 @@ impl Geometry {
                 let model = Model::new(&rigid, &placement.bases, &placement.targets)?;
                 let model = found.strategy.model(model);
                 let arm = arm(&model, &found.x);
-                Ok(Self { arm, best_rigid: None, fitted_alone: Some(found) })
+                Ok(Self { arm, best_rigid: None, fitted_alone: Some(found), has_room })
             }
         }
     }
@@ -104,7 +124,7 @@ impl Geometry {
         // The alternatives are only shown for comparison, so a failure is no error.
         let best = self.best_rigid.is_none().then(|| {
             let workspace = Workspace { corners: None, planes: Vec::new() };
-            best_rigid(problem, estimate, correction, &workspace).ok()
+            best_rigid(problem, estimate, correction, (&workspace, self.has_room)).ok()
         });
         let alone = self.fitted_alone.is_none().then(|| fit_alone(problem, data).ok());
         Ok([

@@ -24,6 +24,8 @@ const ORIENTATION_LEVER: f64 = 0.1;
 const DIFFERENCE_STEP: f64 = 1e-6;
 /// Number of Gauss–Newton passes. Few suffice, because the problem is nearly linear.
 const GAUSS_NEWTON_PASSES: usize = 5;
+/// Index of β in the order of the fitted parameters of a joint.
+const BETA: usize = 4;
 /// Number added to the diagonal of the normal matrix, relative to its largest diagonal entry.
 /// Directions with much smaller eigenvalues keep their identified values.
 const RIDGE: f64 = 1e-10;
@@ -44,7 +46,8 @@ pub struct RigidFit {
 /// predicts, in poses drawn within the joint limits and a workspace.
 ///
 /// Minimises Σ ‖p − p̂(x)‖² over the target and two points near it. Directions that no pose
-/// determines keep their identified values; base and target are fixed.
+/// determines keep their identified values; base and target are fixed. `has_room` is false if the
+/// exported file cannot hold a transform after the last moving joint, whose β is then fixed too.
 ///
 /// # Errors
 /// Returns an error if the estimate belongs to another problem, or if too few poses reach the
@@ -53,7 +56,7 @@ pub fn best_rigid(
     problem: &Problem,
     estimate: &SavedEstimate,
     correction: Option<&Correction>,
-    workspace: &Workspace,
+    (workspace, has_room): (&Workspace, bool),
 ) -> Result<RigidFit, ExportError> {
     let rows = random_rows(problem, estimate, MAX_DRAWS_PER_POSE * POSES_PER_SET)?;
     let placement = Placement::of(&rows);
@@ -106,9 +109,12 @@ pub fn best_rigid(
         DVector::from_vec(each.flat_map(of_pose).collect())
     };
     let identified = model.arm(|k| x[k]);
+    let moves = |&joint: &usize| identified.joints[joint].kind != JointKind::Fixed;
+    let last = (0..identified.joints.len()).rfind(moves);
     let free: Vec<(usize, usize)> = (0..identified.joints.len())
-        .filter(|&joint| identified.joints[joint].kind != JointKind::Fixed)
+        .filter(moves)
         .flat_map(|joint| (0..5).map(move |field| (joint, field)))
+        .filter(|&(joint, field)| has_room || Some(joint) != last || field != BETA)
         .collect();
     let mut arm = identified.clone();
     for _ in 0..GAUSS_NEWTON_PASSES {

@@ -147,12 +147,20 @@ impl LawSite {
                 }
             }
             Some(joint) => Err(format!("no joint {joint}; the arm has {joints}, counted from 1")),
+            None if is_joint_coordinate(text) => {
+                Err(format!("{text} is no site; write joint{}", &text[1..]))
+            }
             None => Err(format!(
                 "{text} is no site; write joint1, measurement.x, base.rx{}",
                 links.first().map_or_else(String::new, |link| format!(" or {link}.curvature_y"))
             )),
         }
     }
+}
+
+/// Returns true if a text is the coordinate of a joint in formulas, such as `q3`.
+fn is_joint_coordinate(text: &str) -> bool {
+    text.strip_prefix('q').is_some_and(|number| number.parse::<usize>().is_ok())
 }
 
 impl Law {

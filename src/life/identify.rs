@@ -206,12 +206,12 @@ impl Contradiction {
     /// Returns the finding that the new rows contradict the prior in `file`.
     fn finding(&self, file: &Path) -> Finding {
         let treatment = match (self.widened.is_empty(), self.noise_ratio) {
-            (false, _) => "; the prior of its parameters was widened",
-            (true, Some(_)) => "; the fit took the larger noise",
-            (true, None) => "",
+            (false, _) => "; the prior of its parameters was widened".to_owned(),
+            (true, Some(ratio)) => format!("; the fit took a σ {ratio:.0} times as large"),
+            (true, None) => String::new(),
         };
         let text = format!(
-            "the new rows contradict {} (error of this statement below 1 %); most probable cause: {} ({:.0} %){treatment}",
+            "the new rows contradict {} (false alarms: below 1 %); most probable cause: {} ({:.0} %){treatment}",
             file.display(),
             self.label,
             100.0 * self.probability
@@ -271,8 +271,13 @@ fn most_probable(
     let cause = &causes[first.cause];
     let size = |i: usize| first.sizes[i].max(first.mean[i].abs());
     let widened = cause.columns.iter().enumerate().filter(|(_, k)| **k < declared);
+    // A misfit that no cause explains looks like noise.
+    let label = match cause.kind {
+        CauseKind::Noise => "larger noise, or something that the model lacks".to_owned(),
+        _ => first.label(causes, location),
+    };
     Some(Contradiction {
-        label: first.label(causes, location),
+        label,
         probability: first.probability,
         widened: widened.map(|(i, &k)| (k, size(i))).collect(),
         noise_ratio: (cause.kind == CauseKind::Noise).then(|| first.mean[0]),

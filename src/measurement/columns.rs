@@ -315,7 +315,9 @@ impl Columns {
                 let is_unmeasured = !has_position && unknown.is_empty();
                 return missing(&[name], Unit::Length).map_err(|error| {
                     if is_unmeasured && is_missing_column(&error) {
-                        Location { key: None, ..*error.location }.error(TableErrorKind::NotMeasured)
+                        let is_result = error.location.file.ends_with("residuals.csv");
+                        let kind = TableErrorKind::NotMeasured { is_result };
+                        Location { key: None, ..*error.location }.error(kind)
                     } else {
                         error
                     }

@@ -99,7 +99,7 @@ impl Numbering {
             };
             return match self.joint(number).filter(moves) {
                 Some(joint) => plain(Role::Approach(joint)),
-                None => Ok(Meaning::Ignored(WarningKind::JointIgnored { joint: number })),
+                None => Ok(Meaning::Ignored(joint_ignored(problem, number))),
             };
         }
         let underscored = columns_with_unit().filter(|(known, ..)| known.contains('_'));
@@ -128,7 +128,7 @@ impl Numbering {
             let Some((joint, unit)) = joint.and_then(|joint| {
                 Some((joint, unit_of(problem.joints.get(joint)?.command_kind())?))
             }) else {
-                return Ok(Meaning::Ignored(WarningKind::JointIgnored { joint: number }));
+                return Ok(Meaning::Ignored(joint_ignored(problem, number)));
             };
             (if reading.is_some() { Role::Reading(joint) } else { Role::Joint(joint) }, unit, true)
         };
@@ -295,4 +295,12 @@ pub(super) fn is_numbered_or_position(name: &str) -> bool {
 fn numbered(name: &str, prefix: &str) -> Option<usize> {
     let number = name.strip_prefix(prefix)?;
     if number.bytes().all(|byte| byte.is_ascii_digit()) { number.parse().ok() } else { None }
+}
+
+/// Returns the warning that the column of a joint, counted from 1, is ignored because it is fixed.
+fn joint_ignored(problem: &Problem, joint: usize) -> WarningKind {
+    let moves = |joint: &usize| {
+        problem.joints.get(joint - 1).is_some_and(|of| of.command_kind() != JointKind::Fixed)
+    };
+    WarningKind::JointIgnored { joint, moving: (1..=problem.joints.len()).filter(moves).collect() }
 }

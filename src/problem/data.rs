@@ -1,7 +1,7 @@
 //! Reader of `[data]`: measurement files and their use.
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 use super::Problem;
 use super::dialect::{self, Dialect};
@@ -109,6 +109,22 @@ impl Problem {
     }
 }
 
+/// Returns a path without folders that a following `..` leaves again, if the shorter path leads to
+/// the same file.
+fn without_detours(path: PathBuf) -> PathBuf {
+    let mut short = PathBuf::new();
+    for component in path.components() {
+        match (component, short.components().next_back()) {
+            (Component::ParentDir, Some(Component::Normal(_))) => {
+                short.pop();
+            }
+            _ => short.push(component),
+        }
+    }
+    let is_same = || Some(short.canonicalize().ok()? == path.canonicalize().ok()?);
+    if short != path && is_same() == Some(true) { short } else { path }
+}
+
 /// Reads the section; returns empty settings if it is absent.
 pub(super) fn read(root: &mut Section<'_, '_>) -> Result<Data, InputError> {
     let file = root.location();
@@ -140,7 +156,7 @@ pub(super) fn read(root: &mut Section<'_, '_>) -> Result<Data, InputError> {
         let names = item.list("a list of file names")?;
         item.check_count("files", names.len(), MAX_DATA_FILES)?;
         for element in names {
-            files.push(folder.join(element.text()?));
+            files.push(without_detours(folder.join(element.text()?)));
         }
         files_location = item.location();
     }

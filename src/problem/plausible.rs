@@ -2,8 +2,9 @@
 
 use std::f64::consts::TAU;
 
+use super::pattern::matches;
 use super::section::Section;
-use super::{Body, Fixture, Joint, JointKind, Problem};
+use super::{Body, Fixture, Joint, JointKind, ParameterRule, Problem};
 use crate::error::{InputError, InputErrorKind, Location, Warning, WarningKind};
 use crate::observation::FixtureKind;
 use crate::quantity::rounded_right_angle;
@@ -121,7 +122,32 @@ impl Problem {
             .chain(self.body_warnings())
             .chain(self.stiff_beam_warning())
             .chain(self.hoist_direction_warning())
+            .chain(self.overridden_rule())
             .collect()
+    }
+
+    /// Returns a warning for the first rule of `[parameters]` that one later rule replaces for all
+    /// of its parameters.
+    ///
+    /// A pattern that matches the text of another one, whose `*` count as characters, matches every
+    /// name that this one matches.
+    fn overridden_rule(&self) -> Option<Warning> {
+        let rules = || self.parameters.iter().enumerate();
+        let mut of_geometry = rules().filter(|(_, rule)| {
+            ["joint", "base", "tool"].iter().any(|owner| rule.pattern.starts_with(owner))
+        });
+        let overridden = |(place, rule): (usize, &ParameterRule)| {
+            let mut later = rules().skip(place + 1).map(|(_, later)| later);
+            let by = later.find(|later| matches(&later.pattern, &rule.pattern))?;
+            Some(Warning {
+                location: rule.location.clone(),
+                kind: WarningKind::RuleOverridden {
+                    by: by.pattern.clone(),
+                    line: by.location.line?,
+                },
+            })
+        };
+        of_geometry.find_map(overridden)
     }
 
     /// Returns a warning for the first mass of a joint that is too heavy for an arm, and for the

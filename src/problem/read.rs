@@ -37,7 +37,13 @@ impl Problem {
     #[doc(hidden)]
     pub fn read_with_text(path: &Path) -> Result<(Self, Arc<str>), InputError> {
         let file = if path.is_dir() { path.join("problem.toml") } else { path.to_owned() };
-        let document = Document::read(&file, InputErrorKind::ProblemMissing)?;
+        let closed = file.with_file_name("problem.closed.toml");
+        let missing = if path.is_dir() && closed.is_file() {
+            InputErrorKind::FolderOfResults { closed }
+        } else {
+            InputErrorKind::ProblemMissing
+        };
+        let document = Document::read(&file, missing)?;
         Ok((problem_of(&document)?, document.text))
     }
 

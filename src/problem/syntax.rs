@@ -49,6 +49,9 @@ fn expected_instead_of(format: &str) -> &'static str {
         JSON => {
             "TOML; PROBLEM is a problem.toml or its folder, and --estimate names an estimate.json"
         }
+        "a YAML file" => {
+            "TOML; PROBLEM is a problem.toml, whose lines are `key = value`, or its folder"
+        }
         _ => "TOML; PROBLEM is a problem.toml or its folder",
     }
 }
@@ -90,6 +93,8 @@ fn usual_mistake(before: &str, after: &str, message: &str) -> Option<(String, &'
             "a calculation",
             "write its result, such as 0.333 for 1/3, or an angle in degrees with a key in _deg",
         )
+    } else if message.contains("duplicate key") && before.starts_with('[') {
+        mistake("the section is given twice", "write its lines into the first section of this name")
     } else if message.contains("key with no value") && line_has_spaced_key(after) {
         mistake("a key with a space", "put the key in quotes, as in \"Joint 1\" = \"q1_deg\"")
     } else if message.contains("key with no value") {

@@ -46,6 +46,8 @@ pub enum Unit {
     LengthPerDegree,
     /// Angle per payload mass [rad/kg].
     AnglePerMass,
+    /// Angle per torque and payload mass [rad/(N·m·kg)].
+    AnglePerTorqueMass,
     /// Length per payload mass [m/kg].
     LengthPerMass,
     /// Number per length [1/m].
@@ -214,6 +216,9 @@ impl Unit {
                 [deg("deg_per_kg"), si("rad_per_kg")],
                 As(DEGREES_PER_RADIAN, "°/kg")
             ),
+            Self::AnglePerTorqueMass => {
+                row!("an angle per torque and mass", "rad/(N·m·kg)", [], As(1e6, "µrad/(N·m·kg)"))
+            }
             Self::LengthPerMass => {
                 row!("a length per kg", "m/kg", [si("m_per_kg"), mm("mm_per_kg")], As(1e3, "mm/kg"))
             }

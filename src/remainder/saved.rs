@@ -37,6 +37,8 @@ pub enum SavedRemainderError {
     Unreadable { file: PathBuf, source: io::Error },
     #[error("{}: not a remainder.json: {source}", file.display())]
     Syntax { file: PathBuf, source: serde_json::Error },
+    #[error("{}: a {found}, not a remainder.json", file.display())]
+    OtherDocument { file: PathBuf, found: &'static str },
     #[error("{}: not a remainder.json of this version: {what}", file.display())]
     Format { file: PathBuf, what: &'static str },
     #[error("{}: {key}: changed since flexcal wrote it; fit it again with flexcal identify --remainder, or take it as it is with --trust", file.display())]
@@ -49,6 +51,17 @@ pub enum SavedRemainderError {
         "{location}: {source}; fit a remainder with flexcal identify --remainder, or write use = false"
     )]
     Declared { location: Location, source: Box<SavedRemainderError> },
+}
+
+/// Returns the name of the file if a text is another result of flexcal; `None` otherwise.
+fn other_document(text: &str) -> Option<&'static str> {
+    let document: serde_json::Value = serde_json::from_str(text).ok()?;
+    match document.get("format")?.get("name").or_else(|| document.get("format"))?.as_str()? {
+        "flexcal-estimate" => Some("file estimate.json"),
+        "flexcal-loop" => Some("file loop.json"),
+        "flexcal-trace" => Some("file trace.json"),
+        _ => None,
+    }
 }
 
 #[derive(Serialize, Deserialize, JsonSchema)]
@@ -255,6 +268,9 @@ impl Correction {
     /// Returns the errors of [`read`](Self::read).
     #[doc(hidden)]
     pub fn parse(text: &str, file: &Path) -> Result<Self, SavedRemainderError> {
+        if let Some(found) = other_document(text) {
+            return Err(SavedRemainderError::OtherDocument { file: file.to_owned(), found });
+        }
         let syntax = |source| SavedRemainderError::Syntax { file: file.to_owned(), source };
         let wrong = |what| SavedRemainderError::Format { file: file.to_owned(), what };
         let document: SavedRemainder = serde_json::from_str(text).map_err(syntax)?;

@@ -153,10 +153,12 @@ fn accuracy_blocks<'a>(result: &AcceptanceResult) -> Vec<Block<'a>> {
     };
     let bound = result.bound.as_ref().map(|bound| {
         Block::Text(format!(
-            "The fit expects {} % of the errors to stay below a bound of {} mm on average; {} % of the \
-             held-out rows do stay below theirs.",
+            "The fit expects {} % of the errors to stay below a bound of {} mm on average; {:.0} of the {} \
+             held-out rows do stay below theirs ({} %).",
             (bound.bounds.level * 1e6).round() / 1e4,
             number(bound.bounds.mean_bound_mm, 4),
+            bound.coverage * bound.rows as f64,
+            bound.rows,
             number(bound.coverage * 100.0, 1),
         ))
     });

@@ -111,6 +111,10 @@ fn cause(found: &FoundEffect) -> Point {
 fn without_effect(value: &str) -> String {
     let Some((name, _)) = value.split_once(" = ") else { return value.to_owned() };
     let parameter = name.rsplit('.').next().unwrap_or_default();
+    // Coefficients of the terms of a law are numbered.
+    if parameter.bytes().all(|byte| byte.is_ascii_digit()) {
+        return value.replacen(name, &format!("coefficient {parameter}"), 1);
+    }
     value.replacen(name, parameter, 1)
 }
 

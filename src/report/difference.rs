@@ -290,7 +290,7 @@ fn draw(differences: &[Difference], limit: f64) -> Option<Drawing> {
     Forest {
         names: ("differences", "Differences of the two results"),
         caption: "Second estimate minus first one with an interval of ± 1 σ, in standard errors of the difference. Beyond the outer \
-                  lines errors alone do not explain it."
+                  lines the standard errors alone do not explain the difference."
             .to_owned(),
         label: "B − A [standard errors]",
         legend: vec![("difference", ACCENT)],

@@ -55,6 +55,15 @@ pub fn better_geometry(result: &ExportResult) -> Option<&'static str> {
     (mean(&errors.rigid) > MAX_EQUAL_RATIO * least).then_some(option)
 }
 
+/// States that the rotation β of the last `joint` was not fitted, because the URDF has no origin
+/// behind it.
+pub fn kept_at_end(joint: &str) -> String {
+    format!(
+        "a tilt behind {joint} (its β), which keeps its identified value: the tip hangs on this moving joint, so that no origin \
+         behind it can hold a tilt"
+    )
+}
+
 /// Returns the values of base and tool of a fit, one text for each parameter.
 fn set_up_values(found: &Identification) -> Vec<String> {
     let is_set_up = |estimate: &&Estimate| {

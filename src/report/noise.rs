@@ -14,11 +14,17 @@ use crate::results::{ResidualSize, rows_in};
 const MAX_SHOWN_OUTLIERS: usize = 20;
 /// Maximum number of influential rows that a text names.
 const MAX_SHOWN_INFLUENTIAL: usize = 3;
+/// Largest ratio of the noise variance that a fit with a prior assumes to the declared one, at which
+/// they are equal but for rounding.
+const MAX_EQUAL_VARIANCE_RATIO: f64 = 1.0 + 1e-9;
 /// Name of the file that contains all outliers and influential rows.
 const RESULT_FILE: &str = "estimate.json";
 
 /// States the size of the residual relative to the declared noise.
 pub(super) fn noise(problem: &Problem, found: &Identification) -> String {
+    if let Some(words) = raised_sigma(found) {
+        return words;
+    }
     match ResidualSize::of(found) {
         ResidualSize::Undeclared(sigma) => format!(
             "No σ is declared; the scatter of the residual is {} per coordinate, model errors \
@@ -56,6 +62,29 @@ pub(super) fn noise(problem: &Problem, found: &Identification) -> String {
             )
         }
     }
+}
+
+/// States the size of the residual if the fit took a larger σ than the declared one because of its
+/// prior; `None` if it did not.
+fn raised_sigma(found: &Identification) -> Option<String> {
+    let prior = found.prior.as_ref().filter(|prior| prior.estimated_sigma.is_none())?;
+    let (chi2, ratio) = (found.reduced_chi2?, prior.variance_ratio);
+    if ratio <= MAX_EQUAL_VARIANCE_RATIO {
+        return None;
+    }
+    let reason = if prior.causes.is_empty() {
+        "the earlier estimate was fitted with it"
+    } else {
+        "the new rows contradict the prior"
+    };
+    Some(format!(
+        "Reduced χ² (χ²/ν) is {} with the declared σ and {} with the σ that the fit assumes; {}.\n\
+         Fit and standard errors assume {} × the declared σ, because {reason}.",
+        format_chi2(chi2 * ratio),
+        format_chi2(chi2),
+        expected_interval(found),
+        number(ratio.sqrt(), 1)
+    ))
 }
 
 /// States the interval that contains χ²/ν with 99.9 % probability if only noise is left.

@@ -72,7 +72,7 @@ pub(super) fn parameters<'a>(
             .to_owned(),
     );
     notes.extend(rows_of_sheet(problem));
-    notes.extend(suggested_prior_sigmas(&found.prior_sizes));
+    notes.extend(suggested_prior_sigmas(&found.prior_sizes).filter(|_| found.is_trusted()));
     let mut blocks = vec![Block::Table(Table { notes, ..table(shown) })];
     if count > 0 {
         let on_paper = format!("The smaller harmonics are left out on paper: they are in {file}.");

@@ -195,8 +195,8 @@ pub(super) fn ranking<'a>(
     let points = shown.iter().map(|candidate| point(problem, candidate, unit)).collect();
     let mut notes = format!(
         "{tried} candidates were tried one by one. p is the probability that noise alone does as well, corrected for their number; \
-         below {level} a candidate is significant. One cause makes similar effects significant, too: the first entry is the best explanation, \
-             and the others need not be present."
+         below {level} a candidate is significant. One cause makes similar effects significant, too: the first entry explains most by itself, \
+             and several effects together may explain more."
     );
     if significant.len() > max {
         let more = significant.len() - max;

@@ -136,6 +136,9 @@ fn found_clause(result: &LoopResult) -> String {
     let found: Vec<&FoundEffect> = result.with_status(Status::Found).collect();
     let doubted: Vec<&FoundEffect> = causes(result).filter(|cause| cause.is_doubted()).collect();
     let mut words = match found.as_slice() {
+        [] if doubted.is_empty() && result.interrupted => {
+            "No effect has been found so far".to_owned()
+        }
         [] if doubted.is_empty() => "No effect was found".to_owned(),
         [] => "No effect is sure".to_owned(),
         [effect] => format!("One effect was found ({})", effect.effect.description),

@@ -76,6 +76,8 @@ pub struct CoveredBound {
     pub bounds: BoundSummary,
     /// Share of the rows whose error is within its bound, 0 to 1.
     pub coverage: f64,
+    /// Number of these rows.
+    pub rows: usize,
 }
 
 /// Test of a tolerance on the accuracy AP of the identified arm in the held-out poses.
@@ -204,9 +206,14 @@ impl AcceptanceResult {
     /// Returns the record with the error bounds of the held-out rows and the share (`coverage`) of
     /// rows within them. `remainder` is true if a remainder corrects the predictions.
     #[must_use]
-    pub fn with_bounds(self, bounds: &Bounds, coverage: f64, remainder: bool) -> Self {
+    pub fn with_bounds(
+        self,
+        bounds: &Bounds,
+        (coverage, rows): (f64, usize),
+        remainder: bool,
+    ) -> Self {
         let bounds = BoundSummary::new(bounds);
-        Self { remainder, bound: Some(CoveredBound { bounds, coverage }), ..self }
+        Self { remainder, bound: Some(CoveredBound { bounds, coverage, rows }), ..self }
     }
 
     /// Returns the record with the test of a tolerance.

@@ -118,6 +118,15 @@ impl<'a> Chain<'a> {
         Self::new(robot, ends.map(|ends| ends.base.as_str()), ends.map(|ends| ends.tip.as_str()))
     }
 
+    /// Returns the name of the last moving joint if no fixed joint follows it, so that no origin of
+    /// the URDF can hold a transform after it; `None` otherwise.
+    #[doc(hidden)]
+    pub fn moving_end(&self) -> Option<&str> {
+        let last = self.stages.last()?.joint;
+        let joint = self.robot.joints.get(last)?;
+        (self.joints.last() == Some(&last)).then_some(joint.name.as_str())
+    }
+
     /// Computes the stages and the end frame from the joints of the chain.
     fn compute_stages(&mut self) -> Result<(), InputError> {
         let robot = self.robot;

@@ -6,6 +6,7 @@ use super::patches::{MovedOrigin, Patches, difference};
 use crate::error::{InputError, UrdfErrorKind};
 use crate::mechanics::Arm;
 use crate::problem::{JointKind, Problem};
+use crate::quantity::format::{decimals, number};
 use crate::spatial::Frame;
 
 /// Largest difference between the nominal arms of problem and URDF at which they count as equal
@@ -85,9 +86,12 @@ impl Steps {
     }
 }
 
-/// Returns an angle \[rad\] and a distance \[m\] in words, in degrees and millimetres.
+/// Returns an angle \[rad\] and a distance \[m\] in words, in degrees and millimetres, with
+/// three significant digits.
 fn words((angle, distance): (f64, f64)) -> String {
-    format!("{:.3e}° and {:.3e} mm", angle.to_degrees(), distance * 1e3)
+    let digits = |value: f64| decimals(value, 3).clamp(2, 12);
+    let (angle, distance) = (angle.to_degrees(), distance * 1e3);
+    format!("{}° and {} mm", number(angle, digits(angle)), number(distance, digits(distance)))
 }
 
 /// Writes the geometry of `arm` into the URDF of `chain`, from which `problem` was made.

@@ -15,7 +15,7 @@ const MAX_PLAUSIBLE_LENGTH: f64 = 20.0;
 pub(super) fn of_chain(chain: &Chain) -> Vec<String> {
     let joints: Vec<&Joint> =
         chain.joints.iter().filter_map(|&index| chain.robot.joints.get(index)).collect();
-    let mut notes: Vec<String> = chosen_tip(chain).into_iter().collect();
+    let mut notes: Vec<String> = chosen_tip(chain).into_iter().chain(moving_end(chain)).collect();
     notes.extend(right_angles(&joints));
     notes.extend(joints.iter().filter_map(|joint| angle_in_degrees(joint)));
     notes.extend(joints.iter().filter_map(|joint| length_in_millimetres(joint)));
@@ -43,6 +43,15 @@ fn chosen_tip(chain: &Chain) -> Option<String> {
             others.join(", ")
         )
     })
+}
+
+/// Returns a note if no fixed joint follows the last moving one.
+fn moving_end(chain: &Chain) -> Option<String> {
+    let (joint, tip) = (chain.moving_end()?, chain.ends().1);
+    Some(format!(
+        "{tip} hangs on the moving joint {joint}, so that an export into this URDF can hold no tilt behind it; a fixed joint \
+         behind it, with its link as --tip, could"
+    ))
 }
 
 /// Returns a note if an angle of an origin is more than one turn, so that it is probably in

@@ -180,7 +180,10 @@ impl Robot {
     pub(super) fn link(&self, name: &str) -> Result<usize, InputError> {
         let unknown = || {
             let known = self.links.iter().map(|link| link.name.clone()).collect();
-            self.error(UrdfErrorKind::NoLink { name: name.to_owned(), known })
+            let joint = self.joints.iter().find(|joint| joint.name == name);
+            let child = joint.and_then(|joint| self.links.get(joint.child));
+            let child = child.map(|link| link.name.clone());
+            self.error(UrdfErrorKind::NoLink { name: name.to_owned(), known, child })
         };
         self.links.iter().position(|link| link.name == name).ok_or_else(unknown)
     }
@@ -341,7 +344,11 @@ impl Reader<'_> {
                 Some(link) => Ok(link),
                 None => self.fail(
                     element,
-                    UrdfErrorKind::NoLink { name: shortened(name, 80), known: known() },
+                    UrdfErrorKind::NoLink {
+                        name: shortened(name, 80),
+                        known: known(),
+                        child: None,
+                    },
                 ),
             }
         };

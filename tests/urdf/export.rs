@@ -84,7 +84,10 @@ fn exported_origins_have_the_identified_pose_and_nothing_else_moves() {
     let mut other = problem.clone();
     other.joints[3].a += 1e-3;
     let error = export(&chain, &other, &Arm::nominal(&other)).unwrap_err().to_string();
-    assert!(error.contains("not that of the URDF at joint \"elbow\""), "{error}");
+    assert!(
+        error.contains("differs from the URDF at joint \"elbow\" by 0.000° and 1.00 mm"),
+        "{error}"
+    );
     other = problem.clone();
     other.joints[3].name = "knee".to_owned();
     assert!(

@@ -232,7 +232,8 @@ fn other_units_and_broken_followers_are_noted() {
         let robot = Robot::parse(&arm(origin, beside), Path::new("r.urdf")).unwrap();
         describe(&Chain::new(&robot, None, Some("c")).unwrap()).unwrap().notes.join("\n")
     };
-    assert_eq!(notes("xyz=\"0.2 0 0\" rpy=\"3.1 0 0.2\"", ""), "");
+    let usual = notes("xyz=\"0.2 0 0\" rpy=\"3.1 0 0.2\"", "");
+    assert!(usual.starts_with("c hangs on the moving joint j2") && usual.lines().count() == 1);
     let said = notes("xyz=\"0.2 0 0\" rpy=\"90 0 0\"", "");
     assert!(said.contains("j2: rpy holds 90 rad") && said.contains("degrees"), "{said}");
     let said = notes("xyz=\"200 0 0\"", "");
@@ -355,6 +356,11 @@ fn the_tip_is_guessed_where_one_link_is_plainly_meant() {
     let robot = Robot::parse(&text, Path::new("r.urdf")).unwrap();
     let notes = describe(&Chain::new(&robot, None, None).unwrap()).unwrap().notes.join("\n");
     assert!(notes.contains("tip l5 taken") && notes.contains("side (1 moving joint)"), "{notes}");
+    assert!(notes.contains("l5 hangs on the moving joint j5"), "{notes}");
+    let fixed = describe(&Chain::new(&robot, None, Some("side")).unwrap()).unwrap().notes.join("");
+    assert!(!fixed.contains("hangs"), "{fixed}");
+    let error = Chain::new(&robot, None, Some("j5")).map(|_| ()).unwrap_err().to_string();
+    assert!(error.contains("(that is a joint; its link is l5)"), "{error}");
     let text = arm(&side("l4"));
     let robot = Robot::parse(&text, Path::new("r.urdf")).unwrap();
     let error = Chain::new(&robot, None, None).map(|_| ()).unwrap_err().to_string();

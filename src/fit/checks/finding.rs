@@ -166,6 +166,9 @@ finding_codes! {
     BoundInUnidentifiedDirection: Warning "bound-in-unidentified-direction" ["parameter", "bound", "deviation", "partners"]
         "A parameter rests on a bound along a direction that the data hardly see, and others follow it.",
         "fix one of these parameters, or give them priors";
+    LimitContradicted: Warning "limit-contradicted" ["limits", "before", "after"]
+        "Bounds or constraints cause most of a misfit that contradicts the declared σ: without them less than half of the error remains.",
+        "check these limits";
     InfluentialRows: Warning "influential-rows" ["rows", "reduced_chi2_without"]
         "A few rows cause most of the misfit.",
         "look at these rows; a section [robust] limits their influence";

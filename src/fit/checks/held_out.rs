@@ -14,6 +14,7 @@ use crate::fit::stages::fitting::Fitting;
 use crate::fit::uncertainty::residual_lengths::{noise_lengths_of_all, scatter};
 use crate::least_squares::{Block, CHUNK_ITEMS, LeastSquares as _};
 use crate::measurement::Measurements;
+use crate::model::parameter::{Parameter, ParameterSite};
 use crate::numeric::median;
 use crate::observation::kind_named;
 
@@ -190,11 +191,34 @@ impl Check for HeldOutReached {
                 100.0 * median / spread
             );
             let numbers = [kind.into(), median.into(), spread.into()];
-            (spread > MIN_SPREAD && median > MAX_MISS * spread && median > noise)
-                .then(|| Finding::new(FindingCode::HeldOutMissed, numbers, text))
+            let finding = || {
+                let finding = Finding::new(FindingCode::HeldOutMissed, numbers, text);
+                match held_base(fitting) {
+                    Some(base) => finding.with_remedy(format!(
+                        "base[{base}] is held where it is declared, while another base is free: free it in [parameters], \"base[{base}].*\" = {{ free = true }}"
+                    )),
+                    None => finding,
+                }
+            };
+            (spread > MIN_SPREAD && median > MAX_MISS * spread && median > noise).then(finding)
         };
         fit.kinds().into_iter().filter_map(of_kind).collect()
     }
+}
+
+/// Returns the name of a base that held-out rows use and of which no coordinate is free, while those
+/// of another base are.
+fn held_base<'a>(fitting: &Fitting<'a>) -> Option<&'a str> {
+    let is_free = |base: usize| {
+        let is_of = |parameter: &Parameter| matches!(parameter.site, ParameterSite::Base { base: of, .. } if of == base);
+        fitting.model.parameters.iter().any(is_of)
+    };
+    let names = &fitting.placement.bases;
+    if !(0..names.len()).any(is_free) {
+        return None;
+    }
+    let mut bases = fitting.split.held_out.iter().map(|&row| fitting.placement.base_of(row));
+    bases.find(|&base| !is_free(base)).map(|base| names[base].as_str())
 }
 
 /// Checks that the fitted arm predicts held-out rows not much worse than the registered nominal

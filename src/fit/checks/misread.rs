@@ -25,6 +25,9 @@ const MIN_SIGMAS_OF_MASSES: f64 = 3.0;
 /// Largest rms residual of a fit with a mass corrected, as a multiple of the declared σ, with which
 /// the mass explains what a fit near the noise leaves.
 const MAX_SIGMAS_LEFT_BY_MASS: f64 = 1.5;
+/// Largest ratio of the error with a misreading undone to that as read, at which the misreading is
+/// sure although more than noise is left.
+const MAX_CLEAR_RATIO: f64 = 0.02;
 
 /// Maximum number of misreadings that the text of the finding names.
 const MAX_NAMED: usize = 4;
@@ -65,21 +68,28 @@ impl Check for ReadAsMeant {
         let is_noise = kind
             .declared_sigma
             .is_none_or(|sigma| best.rms <= MAX_NOISE_SIGMAS * kind.observation.root() * sigma);
-        let (fit_words, rest) = if is_noise {
-            ("fit", "")
-        } else {
-            (
-                "fit better",
-                ", which is more than the declared σ: the model lacks something, or another mistake remains",
-            )
-        };
-        let text = format!(
-            "the measurements {fit_words} if they are read in another way: with {}{more}, the error would be {} instead of {}{rest}",
-            words[..words.len().min(MAX_NAMED)].join(", or "),
-            format_error(name, best.rms, 3),
-            format_error(name, explanations.as_read, 3)
-        );
+        let named = words[..words.len().min(MAX_NAMED)].join(", or ");
+        let [rest, as_read] =
+            [best.rms, explanations.as_read].map(|error| format_error(name, error, 3));
         let numbers = [json!(words), explanations.as_read.into(), best.rms.into()];
-        vec![Finding::new(FindingCode::Misread, numbers, text)]
+        if is_noise {
+            let text = format!(
+                "the measurements fit if they are read in another way: with {named}{more}, the error would be {rest} instead of {as_read}"
+            );
+            return vec![Finding::new(FindingCode::Misread, numbers, text)];
+        }
+        let is_clear = best.rms <= MAX_CLEAR_RATIO * explanations.as_read;
+        if is_clear {
+            let text = format!(
+                "the measurements fit better if they are read in another way: with {named}{more}, the error would be {rest} instead of {as_read}, which is more than the declared σ: the model lacks something, or another mistake remains"
+            );
+            return vec![Finding::new(FindingCode::Misread, numbers, text)];
+        }
+        // Another cause may leave as much.
+        let text = format!(
+            "the error of {as_read} has no explanation yet; it would fall to {rest}, which is still more than the declared σ, with {named}{more}"
+        );
+        let remedy = "check that and what acts alike; the model may also lack something".to_owned();
+        vec![Finding::new(FindingCode::Misread, numbers, text).with_remedy(remedy)]
     }
 }

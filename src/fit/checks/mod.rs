@@ -13,6 +13,7 @@ pub(super) mod fitted_rows;
 pub(super) mod held_out;
 mod held_out_placed;
 pub(super) mod lens;
+mod limits;
 pub(super) mod misfit;
 mod misread;
 pub(super) mod misreading;
@@ -34,7 +35,7 @@ mod two_solutions;
 mod view_order;
 
 use checked_fit::{Check, CheckedFit, Convergence, EnoughEquations};
-use finding::Finding;
+use finding::{Finding, FindingCode};
 
 /// All checks, in the order in which their findings are listed. If a fit is not trusted, commands
 /// print the first finding that is an error as the reason.
@@ -64,6 +65,7 @@ const CHECKS: &[&dyn Check] = &[
     &prediction::PredictionHolds,
     &prediction::NotWorseThanNominal,
     &bounds::BoundsAreSeen,
+    &limits::LimitsHold,
     &held_out::NotRepeated,
     &held_out::OtherPosesHeldOut,
     &held_out::WithoutOutliers,
@@ -75,7 +77,24 @@ const CHECKS: &[&dyn Check] = &[
     &open_directions::NamedDirections,
 ];
 
+/// Codes of findings on a misfit that wrong limits cause as well.
+const OF_MISFIT: [FindingCode; 3] =
+    [FindingCode::MissesMeasurements, FindingCode::BeyondPrior, FindingCode::BeyondArmSize];
+
 /// Runs every check on a fit.
 pub(super) fn findings(fit: &CheckedFit) -> Vec<Finding> {
-    CHECKS.iter().flat_map(|check| check.check(fit)).collect()
+    let mut findings: Vec<Finding> = CHECKS.iter().flat_map(|check| check.check(fit)).collect();
+    // A misfit that limits of the problem cause is none of units, signs or priors.
+    let limits = findings.iter().find(|finding| finding.code == FindingCode::LimitContradicted);
+    // The finding on the limits states the errors.
+    let named =
+        |finding: &Finding| finding.text.split("; without limits").next().map(str::to_owned);
+    if let Some(text) = limits.and_then(named) {
+        for finding in &mut findings {
+            if OF_MISFIT.contains(&finding.code) {
+                *finding = finding.clone().with_remedy(text.clone());
+            }
+        }
+    }
+    findings
 }

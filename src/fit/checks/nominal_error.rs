@@ -5,13 +5,17 @@ use serde_json::json;
 
 use super::checked_fit::{Check, CheckedFit};
 use super::finding::{Finding, FindingCode};
-use super::misreading::Misreading;
+use super::misreading::{Explanations, Misreading};
 use super::row_kind::{RowKind, format_error, quantity_noun, suspects};
 use crate::model::parameter::{Parameter, ParameterSite};
 
 /// Largest rms error of the registered nominal arm, relative to the spread of the measurements,
 /// that is not reported.
 const MAX_NOMINAL_MISS: f64 = 0.1;
+/// Largest rms error of the nominal arm with a misreading corrected, relative to the spread of the
+/// measurements, at which the misreading explains its error: nominal arms are wrong by about as
+/// much.
+const MAX_EXPLAINED_MISS: f64 = 0.02;
 /// Smallest spread of the predicted targets of contacts, relative to the arm's reach, with which
 /// the error is compared. If it is smaller, all contacts are at one place, and the spread is only
 /// the arm's error.
@@ -56,18 +60,20 @@ impl Check for NominalIsNear {
         let rms = fit.registered.identification.rms.norm;
         let RowKind { observation, spread, .. } = fit.kind(fit.fitting.measurements.leading());
         let kind = observation.kind();
-        vec![far_off_finding(kind, (rms, spread), fit.is_base_free(), &fit.explanations().near)]
+        let Explanations { near, near_error, .. } = fit.explanations();
+        let explanations = (&near[..], *near_error);
+        vec![far_off_finding(kind, (rms, spread), fit.is_base_free(), explanations)]
     }
 }
 
 /// Creates the finding that the rms error `rms` of the nominal arm is large relative to the
-/// `spread` of rows of a kind \[m\] or \[rad\]. Each of `explanations`, best first, would explain
-/// the error alone.
+/// `spread` of rows of a kind \[m\] or \[rad\]. Each of `explanations`, best first, would reduce
+/// the error alone; `left` is what the best one leaves.
 fn far_off_finding(
     kind: &str,
     (rms, spread): (f64, f64),
     is_base_free: bool,
-    explanations: &[Misreading],
+    (explanations, left): (&[Misreading], f64),
 ) -> Finding {
     let words: Vec<String> = explanations.iter().map(Misreading::to_string).collect();
     let numbers = [kind.into(), rms.into(), spread.into(), json!(words)];
@@ -86,7 +92,14 @@ fn far_off_finding(
         format!("the nominal arm misses the {what} by {by}, {part:.0} % of their spread{standing}");
     let finding = Finding::new(FindingCode::NominalFarOff, numbers, text);
     match words.is_empty() {
-        false => finding.with_remedy(format!("this would explain it: {}", words.join(", or "))),
+        false => {
+            let effect = if left <= MAX_EXPLAINED_MISS * spread {
+                "explain it".to_owned()
+            } else {
+                format!("reduce it to {}", format_error(kind, left, 1))
+            };
+            finding.with_remedy(format!("this would {effect}: {}", words.join(", or ")))
+        }
         true if kind == "position" && !is_base_free => finding.with_remedy(
             "free the base in [parameters]: \"base.*\" = { free = true }; or check units and signs of \
              joints"

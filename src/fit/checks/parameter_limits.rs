@@ -135,7 +135,10 @@ fn largest_ratio<'a>(
     fit: &CheckedFit<'a>,
     ratio: impl Fn(&Parameter, f64) -> Option<f64>,
 ) -> Option<(&'a Parameter, f64)> {
-    let parameters = fit.fitting.model.parameters.iter().zip(&fit.end.x);
-    let ratios = parameters.filter_map(|(parameter, &x)| Some((parameter, ratio(parameter, x)?)));
+    // Parameters that only held-out rows use are not fitted.
+    let later = &fit.fitting.held_out_only.parameters;
+    let parameters = fit.fitting.model.parameters.iter().zip(&fit.end.x).zip(later);
+    let fitted = parameters.filter(|(_, later)| !**later).map(|(fitted, _)| fitted);
+    let ratios = fitted.filter_map(|(parameter, &x)| Some((parameter, ratio(parameter, x)?)));
     ratios.max_by(|a, b| a.1.total_cmp(&b.1))
 }

@@ -4,9 +4,12 @@ use serde_json::json;
 
 use super::checked_fit::{Check, CheckedFit};
 use super::finding::{Finding, FindingCode};
+use super::misread::ReadAsMeant;
 use super::row_kind::format_error;
+use crate::error::Location;
 use crate::fit::uncertainty::noise::Noise;
 use crate::fit::uncertainty::refuted_priors::RefutedPrior;
+use crate::quantity::Unit;
 
 /// Checks that the poses measure at least as many independent coordinates as there are fitted
 /// parameters.
@@ -137,11 +140,25 @@ impl Check for SigmaIsNotOverstated {
             return Vec::new();
         }
         let name = kind.observation.kind();
-        let place = match measurements.files.first() {
-            Some(file) if measurements.sigma.is_some() => {
+        // Beside a mistake of table or problem, the residual does not tell the noise.
+        if !ReadAsMeant.check(fit).is_empty() {
+            return Vec::new();
+        }
+        let is_position = kind.observation.is_position();
+        let camera = kind.rows.first().and_then(|&row| {
+            let fixture = measurements.observation(row).fixtures()[0]?;
+            fit.problem.fixtures.get(fixture).filter(|fixture| fixture.sigma.is_some())
+        });
+        let place = match (measurements.files.first(), camera) {
+            (_, Some(camera)) => {
+                let line = Location { key: None, excerpt: None, ..camera.location.clone() };
+                format!("pixel_sigma of camera {}, {line}", camera.name)
+            }
+            (Some(file), _) if is_position && measurements.sigma.is_some() => {
                 format!("column sigma_mm of {}", file.display())
             }
-            _ => fit.problem.data.position_sigma_location.to_string(),
+            _ if is_position => fit.problem.data.position_sigma_location.to_string(),
+            _ => format!("{}_sigma, {}", kind.observation.kind(), fit.problem.data.location),
         };
         let text = format!(
             "the declared σ of {} ({place}) is {:.0} times the {} that the fit leaves",
@@ -156,8 +173,10 @@ impl Check for SigmaIsNotOverstated {
                  computed positions"
                     .to_owned(),
             )
-        } else {
+        } else if kind.observation.description().unit == Unit::Length {
             finding
+        } else {
+            finding.with_remedy("check its size and unit".to_owned())
         }]
     }
 }

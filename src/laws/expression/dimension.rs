@@ -36,6 +36,8 @@ pub enum Per {
     Second,
     /// Torque [N·m].
     Torque,
+    /// Torque times mass [N·m·kg].
+    TorqueMass,
     /// Unit of a covariate, which the problem declares.
     Covariate,
 }
@@ -53,6 +55,8 @@ impl Dimension {
     pub(super) const FORCE: Self = Self::base(5);
     /// Unit of torque, N·m.
     pub(super) const TORQUE: Self = Self { powers: [0, 1, 0, 0, 0, 1, 0], ..Self::base(5) };
+    /// Unit of torque times mass, N·m·kg.
+    pub(super) const TORQUE_MASS: Self = Self { powers: [0, 1, 0, 1, 0, 1, 0], ..Self::base(5) };
     pub(super) const COVARIATE: Self = Self { flexible: true, ..Self::base(6) };
 
     const fn base(index: usize) -> Self {
@@ -71,6 +75,7 @@ impl Dimension {
             (Self::MASS, Per::Mass),
             (Self::SECOND, Per::Second),
             (Self::TORQUE, Per::Torque),
+            (Self::TORQUE_MASS, Per::TorqueMass),
             (Self::COVARIATE, Per::Covariate),
         ];
         denominators.into_iter().find(|(of, _)| is(*of)).map_or(Per::Number, |(_, per)| per)

@@ -21,7 +21,7 @@ pub struct FormulaError {
 #[non_exhaustive]
 pub enum Mistake {
     /// A word or sign is not allowed at this position.
-    #[error("expected {expected}, found {found}")]
+    #[error("expected {expected}, found {found}{}", power_hint(.found))]
     Unexpected {
         /// Kinds of words that are allowed there.
         expected: &'static str,
@@ -29,7 +29,7 @@ pub enum Mistake {
         found: String,
     },
     /// A word that is neither quantity, function nor parameter.
-    #[error("unknown word {word}{}; a parameter of the formula takes {word} = {{ start = … }}", meant(.near.as_deref()))]
+    #[error("{}", unknown_word(.word, .near.as_deref()))]
     UnknownWord {
         /// Unknown word.
         word: String,
@@ -53,7 +53,11 @@ pub enum Mistake {
         joints: usize,
     },
     /// A function with the wrong number of arguments.
-    #[error("{function} takes {takes} argument{}, found {found}", if *.takes == 1 { "" } else { "s" })]
+    #[error(
+        "{function} takes {takes} argument{}, found {found}{}",
+        if *.takes == 1 { "" } else { "s" },
+        if *.has_decimal_comma { "; a decimal comma is written as a point: 0.5 for 0,5" } else { "" }
+    )]
     Arguments {
         /// Name of the function.
         function: &'static str,
@@ -61,6 +65,8 @@ pub enum Mistake {
         takes: usize,
         /// Number of arguments in the text.
         found: usize,
+        /// True if a comma stands between two digits.
+        has_decimal_comma: bool,
     },
     /// An argument is not the literal number or the quantity that the function requires.
     #[error("write {write}")]
@@ -98,6 +104,23 @@ pub enum Mistake {
         /// Noun for the quantity that is limited.
         of: &'static str,
     },
+}
+
+/// Returns the hint on powers for a second `*`, or an empty text.
+fn power_hint(found: &str) -> &'static str {
+    if found == "*" { "; a power is written with ^, as in q3^2" } else { "" }
+}
+
+/// Describes a word without a meaning. A function that is written without parentheses is its own
+/// most similar word.
+fn unknown_word(word: &str, near: Option<&str>) -> String {
+    match near {
+        Some(near) if near == word => format!("{word} needs parentheses: {word}(q1)"),
+        _ => format!(
+            "unknown word {word}{}; a parameter of the formula takes {word} = {{ start = … }}",
+            meant(near)
+        ),
+    }
 }
 
 /// Returns ` (did you mean …?)` with a similar known word; an empty text for `None`.

@@ -376,7 +376,13 @@ impl<'a> Parser<'a> {
         }
         let whole = span.start..self.at;
         let found = arguments.len();
-        let wrong = |function, takes| Mistake::Arguments { function, takes, found };
+        let characters: Vec<char> = self.text.chars().collect();
+        let is_decimal_comma = |three: &[char]| {
+            three[1] == ',' && three[0].is_ascii_digit() && three[2].is_ascii_digit()
+        };
+        let has_decimal_comma = characters.windows(3).any(is_decimal_comma);
+        let wrong =
+            |function, takes| Mistake::Arguments { function, takes, found, has_decimal_comma };
         if let Some((function, known)) = Function::ALL.iter().find(|(_, known)| *known == name) {
             let Ok([argument]) = <[Part; 1]>::try_from(arguments) else {
                 return Err(self.error(span, wrong(known, 1)));

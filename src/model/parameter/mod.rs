@@ -99,6 +99,7 @@ pub(crate) fn unit(site: ParameterSite, regressor: &Regressor) -> Unit {
         (Per::Torque, Unit::PerLength) => Unit::Flexibility,
         (Per::Torque, Unit::Ratio) => Unit::StrainPerTorque,
         (Per::Torque, Unit::Length) => Unit::LengthPerTorque,
+        (Per::TorqueMass, Unit::Angle) => Unit::AnglePerTorqueMass,
         (Per::Covariate, Unit::Angle) => Unit::AnglePerUnit,
         (Per::Covariate, Unit::PerLength) => Unit::CurvaturePerUnit,
         (Per::Covariate, Unit::Ratio) => Unit::StrainPerUnit,

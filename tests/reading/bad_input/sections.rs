@@ -207,7 +207,10 @@ fn other_sections() {
         ("[data]\nheld_out = 0.3", &["as in held_out = { fraction = 0.3, seed = 1 }"]),
         ("[base]\nrotation_m = [0, 0, 0]", &[":4: base.rotation_m: an angle is not given in m"]),
         ("[base]\nyaw_deg = 1", &[":4: base.yaw_deg: unknown key"]),
-        ("[data]\nposition_sigma_mm = 0", &[":4: data.position_sigma_mm: 0 is not above zero"]),
+        (
+            "[data]\nposition_sigma_mm = 0",
+            &[":4: data.position_sigma_mm: 0 is not above zero; without this key, σ is estimated"],
+        ),
         (
             "[data]\nposition_sigma_deg = 1",
             &[":4: data.position_sigma_deg: a length is not given in deg"],
@@ -247,7 +250,7 @@ fn rules_of_parameters() {
         ("'base.*' = 'free'", &["expected a table such as { free = true }", "found text"]),
         ("tool.x = { free = true }", &[":4: parameters.tool: ", "needs quotes: \"tool.x\""]),
         ("a = { sigma = 1 }", &[":4: parameters.a.sigma: ", "needs a unit", "sigma_mm"]),
-        ("a = { sigma_mm = 0 }", &[":4: parameters.a.sigma_mm: 0 is not above zero"]),
+        ("a = { sigma_mm = 0 }", &[":4: parameters.a.sigma_mm: 0 is not above zero; fixed = true"]),
         ("a = { sigma_kg = 1 }", &[":4: parameters.a.sigma_kg: unknown key", "sigma_relative"]),
         (
             "a = { sigma_mm = 1, sigma_m = 1 }",
@@ -324,7 +327,7 @@ fn effects() {
         ("", &[":3: effect[1]: an effect is one key", "found 0"]),
         (
             "payload-mass = {}\nhoist-force = {}",
-            &[":3: effect[1]: an effect is one key", "found 2"],
+            &[":3: effect[1]: an effect is one key", "found 2: a key of another section"],
         ),
         ("wobble = {}", &[":4: effect[1].wobble: unknown effect; known: ", "backlash"]),
         (

@@ -171,3 +171,20 @@ fn payloads_sessions_and_targets_that_are_no_measurements_are_asked_about() {
     let commands = warned("reached,miss_mm", &|_| "true,0".to_owned());
     assert!(commands.contains(&WarningKind::TargetsAsMeasurements), "{commands:?}");
 }
+
+#[test]
+fn a_rule_that_a_later_rule_replaces_is_named() {
+    let warned = |rules: &str| {
+        let text = format!("name = 'arm'\n[[joint]]\na_m = 1\n[parameters]\n{rules}\n");
+        let warnings = parse(&text).plausibility_warnings();
+        warnings
+            .into_iter()
+            .map(|warning| (warning.location.line, warning.kind))
+            .collect::<Vec<_>>()
+    };
+    let [one, all] =
+        ["'joint1.theta' = { fixed = true }", "'joint*.*' = { sigma_deg = 1, sigma_mm = 1 }"];
+    assert_eq!(warned(&format!("{all}\n{one}")), []);
+    let kind = WarningKind::RuleOverridden { by: "joint*.*".to_owned(), line: 6 };
+    assert_eq!(warned(&format!("{one}\n{all}")), [(Some(5), kind)]);
+}

@@ -133,6 +133,14 @@ pub(super) fn of_order(table: &Measurements) -> Vec<Misreading> {
     places.flat_map(of_place).collect()
 }
 
+/// Returns the misreadings of images: exchanged or reversed axes, the numbering of the points, and
+/// images that are shifted against the configurations.
+pub(super) fn of_images() -> Vec<Misreading> {
+    let shifts = [-1, 1].map(|by| Misreading::ShiftedViews { by });
+    let axes = [Misreading::ExchangedAxes, Misreading::FromBottom, Misreading::Transposed];
+    axes.into_iter().chain(shifts).collect()
+}
+
 /// Returns the number of rows between two rows at which a trial shift begins, for a table of `rows`
 /// rows.
 pub(super) fn shift_step(rows: usize) -> usize {
@@ -226,7 +234,7 @@ pub(super) fn of_loads(problem: &Problem, table: &Measurements) -> Vec<Misreadin
         return Vec::new();
     }
     let mut misreadings = of_masses(problem, table, &GROSS_MASS_SCALES);
-    misreadings.extend([-3, 3, 0].map(|power| Misreading::Stiffness { power }));
+    misreadings.extend([-3, -1, 1, 3, 0].map(|power| Misreading::Stiffness { power }));
     for axis in 0..3 {
         let of_sign = |is_negative| Misreading::Gravity { axis, is_negative };
         misreadings.extend([false, true].map(of_sign));

@@ -43,6 +43,9 @@ impl LeftOutMisfit {
 pub(in crate::fit) struct Explanations {
     /// Misreadings with whose correction the registered nominal arm has a far smaller error.
     pub near: Vec<Misreading>,
+    /// Root mean squared error of the registered nominal arm with the best of `near` corrected
+    /// \[m\], \[rad\] or \[px\].
+    pub near_error: f64,
     /// Misreadings with whose correction a full fit has a far smaller error.
     pub fitted: Vec<Explanation>,
     /// Root mean squared error of the fit of table and problem as read \[m\], with the deviations

@@ -185,6 +185,17 @@ pub enum Misreading {
         /// per degree, declared per radian.
         power: i8,
     },
+    /// The columns u and v of images are exchanged.
+    ExchangedAxes,
+    /// Rows of pixels are counted from the bottom of the image.
+    FromBottom,
+    /// The points of a marker, which form a grid, are numbered column by column.
+    Transposed,
+    /// Images belong to the configuration of another view.
+    ShiftedViews {
+        /// Number of views by which an image comes too late.
+        by: i8,
+    },
     /// Gravity points along another axis of the base frame.
     Gravity {
         /// Axis along which gravity points, 0…2 for x, y, z.

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::Misreading;
 use super::candidates::{
-    MASS_SCALES, candidates, is_far, of_loads, of_masses, of_order, shift_step,
+    MASS_SCALES, candidates, is_far, of_images, of_loads, of_masses, of_order, shift_step,
 };
 use super::explanation::{Explanation, Explanations, LeftOutMisfit};
 use super::undo::is_unit_ratio;
@@ -21,7 +21,7 @@ use crate::fit::{Placement, SolverChoice};
 use crate::least_squares::{LinearisationCache, Loss};
 use crate::measurement::{Measurements, Split};
 use crate::model::Model;
-use crate::problem::Problem;
+use crate::problem::{Observation, Problem};
 
 /// Largest ratio of the rms error with a misreading corrected to that without a correction, at
 /// which the misreading is an explanation.
@@ -117,14 +117,22 @@ fn explanations(fit: &CheckedFit) -> Explanations {
     let is_position = measurements.leading().is_position();
     // Contacts with one point agree with any arm whose target hardly moves. For rows other than
     // positions, only reversed joints are therefore tried.
-    let is_tested =
-        |misreading: &Misreading| is_position || matches!(misreading, Misreading::Reversed { .. });
+    let last = trial.chosen.last().copied().unwrap_or_default();
+    let is_tested = |misreading: &Misreading| match misreading {
+        Misreading::Reversed { .. } => true,
+        // A shift that begins behind the last row changes nothing.
+        Misreading::Shifted { from, .. } => is_position && *from <= last,
+        _ => is_position,
+    };
     let listed = if is_position && nominal < MAX_REACHES_OF_LOADS * model.reach() {
         [of_loads(fit.problem, measurements), of_order(measurements)].concat()
     } else {
         candidates(fit.problem, measurements)
     };
     let mut tested: Vec<Misreading> = listed.into_iter().filter(is_tested).collect();
+    if measurements.leading().kind() == Observation::Pixel(0, 0, 0).kind() {
+        tested.extend(of_images());
+    }
     // A base that is only a little off is no misreading.
     let is_base_held = is_position && !fit.is_base_free() && is_nominal_far_off(fit);
     tested.extend(is_base_held.then_some(Misreading::HeldBase));
@@ -149,7 +157,9 @@ fn explanations(fit: &CheckedFit) -> Explanations {
     }
     errors.sort_by(|a, b| a.1.total_cmp(&b.1));
     let near = if near_alone.is_empty() { near_misreadings(&errors, nominal) } else { near_alone };
-    let mut explanations = Explanations { near, ..Explanations::default() };
+    let near_error = errors.iter().find(|(found, _)| near.first() == Some(found));
+    let near_error = near_error.map_or(f64::NAN, |(_, error)| *error);
+    let mut explanations = Explanations { near, near_error, ..Explanations::default() };
     if is_position {
         explanations.as_read = trial.error_as_read(fit);
         explanations.fitted = trial.fit_in_full(&errors, explanations.as_read);
@@ -170,16 +180,18 @@ fn misread_masses(fit: &CheckedFit, limit: f64) -> Explanations {
     let as_read = trial.error_as_read(fit);
     let tested = of_masses(fit.problem, fit.fitting.measurements, &MASS_SCALES);
     let fitted = trial.explained(&tested, limit.min(MAX_RATIO_OF_MASSES * as_read));
-    Explanations { near: Vec::new(), fitted, as_read }
+    Explanations { fitted, as_read, ..Explanations::default() }
 }
 
 /// Returns the sum of the squared deviations of the full parameter vector `x` from nominal, in
 /// units of the prior σ. Parameters of declared effects are left out, because they may be far
-/// larger than their priors.
+/// larger than their priors. So are parameters that only held-out
+/// rows use, because they are not fitted.
 fn deviations(fitting: &Fitting, x: &DVector<f64>) -> f64 {
-    let parameters = fitting.model.parameters.iter().zip(x);
-    let of_arm = parameters.filter(|(parameter, _)| is_of_arm(parameter));
-    of_arm.filter_map(|(parameter, x)| Some((x / parameter.sigma?).powi(2))).sum()
+    let later = &fitting.held_out_only.parameters;
+    let parameters = fitting.model.parameters.iter().zip(x).zip(later);
+    let of_arm = parameters.filter(|((parameter, _), later)| is_of_arm(parameter) && !**later);
+    of_arm.filter_map(|((parameter, x), _)| Some((x / parameter.sigma?).powi(2))).sum()
 }
 
 /// Returns the misreadings whose error of the registered nominal arm is far smaller than `nominal`,

@@ -10,7 +10,9 @@ use super::candidates::{
 use super::{Misreading, numbers_of};
 use crate::measurement::Measurements;
 use crate::model::parameter::JointField;
-use crate::problem::{Effect, Freedom, Joint, JointKind, ParameterRule, Problem, Quantities};
+use crate::problem::{
+    Effect, Freedom, Joint, JointKind, Observation, ParameterRule, Problem, Quantities,
+};
 
 /// Length of an inch \[mm\].
 const MM_PER_INCH: f64 = 25.4;
@@ -217,6 +219,9 @@ impl Misreading {
         if joints != rows.joints {
             resize(&mut rows, joints);
         }
+        if let Self::ShiftedViews { by } = self {
+            shift_views(&mut rows, table, (chosen, by));
+        }
         for q in rows.configurations.chunks_exact_mut(joints.max(1)) {
             self.undo_command(q, problem, table);
         }
@@ -226,6 +231,9 @@ impl Misreading {
             Self::Inches => rows.positions.iter_mut().for_each(|position| *position *= MM_PER_INCH),
             Self::Mirrored => {
                 rows.positions.iter_mut().for_each(|position| position.swap_rows(0, 1));
+            }
+            Self::ExchangedAxes | Self::FromBottom | Self::Transposed => {
+                self.undo_image(&mut rows, problem);
             }
             Self::AxisUnit { axis, power } => {
                 rows.positions
@@ -241,6 +249,27 @@ impl Misreading {
             _ => {}
         }
         rows
+    }
+
+    /// Corrects the pixels of images, or the numbers of their points, by the misreading.
+    fn undo_image(self, rows: &mut Measurements, problem: &Problem) {
+        for (observation, pixel) in rows.observations.iter_mut().zip(&mut rows.positions) {
+            let Observation::Pixel(camera, marker, point) = *observation else { continue };
+            match self {
+                Self::ExchangedAxes => pixel.swap_rows(0, 1),
+                Self::FromBottom => {
+                    if let Some(height) = image_height(problem, camera as usize) {
+                        pixel.y = height - pixel.y;
+                    }
+                }
+                _ => {
+                    let points = problem.fixtures.get(marker as usize).map(|of| &of.points[..]);
+                    if let Some(other) = points.and_then(|points| transposed(points, point)) {
+                        *observation = Observation::Pixel(camera, marker, other);
+                    }
+                }
+            }
+        }
     }
 
     /// Corrects the misreading in a configuration `q` of `table`.
@@ -281,6 +310,54 @@ impl Misreading {
             Self::Zero { joint, degrees } => q[joint - 1] += f64::from(degrees).to_radians(),
             Self::Ratio { joint, percent } => q[joint - 1] *= f64::from(percent) / 100.0,
             _ => {}
+        }
+    }
+}
+
+/// Index of the vertical image centre in the numbers of a camera.
+const CENTRE_Y: usize = 9;
+
+/// Returns the height of a camera's image \[px\]: the declared one, or twice the vertical centre.
+/// `None` if neither is declared.
+fn image_height(problem: &Problem, camera: usize) -> Option<f64> {
+    let camera = problem.fixtures.get(camera)?;
+    let centre = camera.known.get(CENTRE_Y).copied().flatten();
+    camera.image.map(|[_, height]| height).or(centre.map(|centre| 2.0 * centre))
+}
+
+/// Returns the number of the point that has the number `point` if a grid is counted along its other
+/// side; `None` if the points form no grid that is numbered row by row.
+///
+/// With R rows of C points, point r C + c of the file has the number c R + r.
+fn transposed(points: &[Vector3<f64>], point: u32) -> Option<u32> {
+    let step = points.get(1)? - points[0];
+    let is_next =
+        |pair: &&[Vector3<f64>]| (pair[1] - pair[0] - step).norm() <= MAX_GRID_ERROR * step.norm();
+    let columns = 1 + points.windows(2).take_while(is_next).count();
+    let rows = points.len() / columns;
+    if rows < 2 || rows * columns != points.len() {
+        return None;
+    }
+    let point = point as usize;
+    u32::try_from(point % rows * columns + point / rows).ok()
+}
+
+/// Largest deviation of the distance between neighbouring points of a grid, relative to it.
+const MAX_GRID_ERROR: f64 = 1e-6;
+
+/// Gives each of the `chosen` rows of `table` the configuration of the view that comes `by` views
+/// earlier. A view is a run of rows with one configuration; at the ends of the table, a row keeps
+/// its configuration.
+fn shift_views(rows: &mut Measurements, table: &Measurements, (chosen, by): (&[usize], i8)) {
+    let starts: Vec<usize> = (0..table.len())
+        .filter(|&row| row == 0 || table.configuration(row) != table.configuration(row - 1))
+        .collect();
+    let joints = rows.joints.max(1);
+    for (q, &row) in rows.configurations.chunks_exact_mut(joints).zip(chosen) {
+        let view = starts.partition_point(|&start| start <= row).saturating_sub(1);
+        let source = view.checked_add_signed(-isize::from(by)).and_then(|view| starts.get(view));
+        if let Some(&source) = source {
+            q.copy_from_slice(table.configuration(source));
         }
     }
 }

@@ -1,0 +1,181 @@
+//! Check of bounds and constraints against the measurements.
+
+use nalgebra::Vector3;
+use serde_json::json;
+
+use super::checked_fit::{Check, CheckedFit};
+use super::finding::{Finding, FindingCode};
+use super::row_kind::format_error;
+use crate::error::Location;
+use crate::fit::stages::fitting::Fitting;
+use crate::fit::{Noise, SolverChoice};
+use crate::least_squares::LinearisationCache;
+use crate::least_squares::solver::AtBound;
+use crate::model::Model;
+use crate::model::parameter::{LinearConstraint, Parameter};
+use crate::problem::pattern::matches;
+use crate::problem::{Freedom, ParameterRule, Problem, Quantities};
+use crate::quantity::format::{decimals, number};
+
+/// Largest ratio of the rms residual without limits to that with them, at which the limits are
+/// refuted. The σ of a prior is refuted by the same ratio.
+const MAX_RATIO: f64 = 0.5;
+/// Maximum number of solver steps of the fit without limits.
+const MAX_STEPS: u64 = 60;
+/// Maximum number of limits that the text names.
+const MAX_NAMED: usize = 3;
+/// Distance from a limit, relative to its size, at which the fit rests on it.
+const AT_LIMIT: f64 = 1e-6;
+
+/// Checks that bounds and constraints do not cause most of a misfit that contradicts the declared σ.
+pub(super) struct LimitsHold;
+
+impl Check for LimitsHold {
+    fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
+        let is_contradicted = fit.noise != Noise::Declared || fit.noise_factor > 1.0;
+        if !is_contradicted || fit.fitting.earlier.is_some() {
+            return Vec::new();
+        }
+        let limits = suspected(fit);
+        if limits.is_empty() {
+            return Vec::new();
+        }
+        let kind = fit.kind(fit.fitting.measurements.leading());
+        let before = fit.rms(&kind.rows, &fit.fitting.position_errors(&kind.rows, &fit.end.x));
+        let after = refitted(fit, &without_limits(fit.problem), &kind.rows)
+            .map(|errors| fit.rms(&kind.rows, &errors));
+        let Some(after) = after.filter(|after| *after < MAX_RATIO * before) else {
+            return Vec::new();
+        };
+        let more = limits.len().saturating_sub(MAX_NAMED);
+        let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+        let named = limits[..limits.len().min(MAX_NAMED)].join(", ");
+        let name = kind.observation.kind();
+        let text = format!(
+            "limits of the problem cause most of the misfit: {named}{more}; without limits the rms error is {} instead of {}",
+            format_error(name, after, 3),
+            format_error(name, before, 3)
+        );
+        let numbers = [json!(limits), before.into(), after.into()];
+        vec![Finding::new(FindingCode::LimitContradicted, numbers, text)]
+    }
+}
+
+/// Returns the limits on which the fit rests, and those that exclude the nominal arm, in words with
+/// their places.
+fn suspected(fit: &CheckedFit) -> Vec<String> {
+    let model = fit.fitting.model;
+    let bounds = fit.whole.unknowns.iter().zip(&fit.end.at_bound).filter_map(|(&k, at_bound)| {
+        let parameter = &model.parameters[k];
+        let excludes_nominal = parameter.lower > 0.0 || parameter.upper < 0.0;
+        let side = match at_bound {
+            Some(side) => *side,
+            None if parameter.lower > 0.0 => AtBound::Lower,
+            None if parameter.upper < 0.0 => AtBound::Upper,
+            None => return None,
+        };
+        bound_words(fit.problem, parameter, (side, excludes_nominal))
+    });
+    let constraints = model.constraints.iter().filter_map(|constraint| {
+        let sum: f64 = constraint.terms.iter().map(|&(k, factor)| factor * fit.end.x[k]).sum();
+        let [lower, upper] = [constraint.lower, constraint.upper];
+        let scale = [lower, upper].into_iter().filter(|limit| limit.is_finite());
+        let margin = AT_LIMIT * scale.map(f64::abs).fold(f64::MIN_POSITIVE, f64::max);
+        let is_low = sum <= lower + margin || lower > 0.0;
+        let is_high = sum >= upper - margin || upper < 0.0;
+        constraint_words(constraint, (is_low, is_high))
+    });
+    bounds.chain(constraints).collect()
+}
+
+/// Describes a bound with its place: `joint4.theta, upper bound 0.1 ° (./problem.toml:90)`. `None`
+/// if no rule of the problem gives it.
+fn bound_words(
+    problem: &Problem,
+    parameter: &Parameter,
+    (side, excludes_nominal): (AtBound, bool),
+) -> Option<String> {
+    let name = &parameter.name;
+    let plain = match name.split_once('[') {
+        Some((head, tail)) => format!("{head}{}", tail.split_once(']').map_or("", |tail| tail.1)),
+        None => name.clone(),
+    };
+    let is_of =
+        |rule: &&ParameterRule| matches(&rule.pattern, name) || matches(&rule.pattern, &plain);
+    let rule = problem.parameters.iter().rev().find(is_of)?;
+    let (word, x) = match side {
+        AtBound::Lower => ("lower", parameter.lower),
+        AtBound::Upper => ("upper", parameter.upper),
+    };
+    let bound = if parameter.unit().is_relative() {
+        format!("{} times nominal", number(x.exp(), decimals(x.exp(), 4)))
+    } else {
+        let unit = parameter.unit().display(parameter.nominal);
+        let shown = x * unit.factor;
+        format!("{} {}", number(shown, decimals(shown, 4)), unit.symbol)
+    };
+    let hint = if !excludes_nominal {
+        ""
+    } else if parameter.unit().is_relative() {
+        "; bounds of a stiffness are multiples of the nominal one"
+    } else {
+        "; bounds are of the deviation from nominal"
+    };
+    Some(format!("{name}, {word} bound {bound} ({}{hint})", place(&rule.location)))
+}
+
+/// Describes a constraint with its place: `joint3.a ≥ -600 mm (./problem.toml:110)`. `None` if
+/// neither limit is suspected.
+fn constraint_words(
+    constraint: &LinearConstraint,
+    (is_low, is_high): (bool, bool),
+) -> Option<String> {
+    let [lower, upper] = &constraint.limits;
+    let limit = lower.as_ref().filter(|_| is_low).or(upper.as_ref().filter(|_| is_high))?;
+    let excludes_nominal = constraint.lower > 0.0 || constraint.upper < 0.0;
+    let hint = if excludes_nominal {
+        "; the nominal arm does not keep it: a constraint is of values, not of deviations"
+    } else {
+        ""
+    };
+    Some(format!("{} {limit} ({}{hint})", constraint.sum, place(&constraint.location)))
+}
+
+/// Returns file and line of a location.
+fn place(location: &Location) -> String {
+    Location { key: None, excerpt: None, ..location.clone() }.to_string()
+}
+
+/// Returns the problem without bounds in `[parameters]` and without constraints.
+fn without_limits(declared: &Problem) -> Problem {
+    let mut problem = declared.clone();
+    problem.constraints.clear();
+    for rule in &mut problem.parameters {
+        if let Freedom::Free { min, max, .. } = &mut rule.freedom {
+            (*min, *max) = (Quantities::default(), Quantities::default());
+        }
+    }
+    problem
+}
+
+/// Fits another problem to the identification rows. Returns the residuals of `rows`; `None` if the
+/// fit fails.
+fn refitted(fit: &CheckedFit, problem: &Problem, rows: &[usize]) -> Option<Vec<Vector3<f64>>> {
+    let Fitting { placement, measurements, split, .. } = *fit.fitting;
+    let declared = Model::new(problem, &placement.bases, &placement.targets).ok()?;
+    let model = &fit.fitting.strategy.model(declared);
+    let cache = &LinearisationCache::default();
+    let fitting = Fitting {
+        model,
+        held_out_only: placement.held_out_only(model, measurements, split),
+        solver: SolverChoice::Auto.decide(model),
+        custom_solver: None,
+        progress: None,
+        max_steps: Some(MAX_STEPS),
+        cache,
+        linear_model: None,
+        ..fit.fitting.with_declared_noise()
+    };
+    let end = fitting.run(&fitting.registered().ok()?).ok()?;
+    Some(fitting.position_errors(rows, &end.x))
+}
