@@ -21,6 +21,8 @@ const MIN_TARGETS: usize = 3;
 const MIN_COMMON_OFFSET: f64 = 0.02;
 /// Largest ratio between the offsets of two targets that count as equal.
 const MAX_COMMON_RATIO: f64 = 1.1;
+/// Maximum number of targets with which other readings are tried.
+const MAX_TRIED_TARGETS: usize = 50;
 /// Number of coordinates of a position and an orientation.
 const POSE_NUMBERS: usize = 6;
 
@@ -54,6 +56,9 @@ pub(super) fn warning(
     if !targets.position_measured || given <= MIN_MISS {
         return None;
     }
+    // Some of the targets tell as much as all of them.
+    let step = targets.len().div_ceil(MAX_TRIED_TARGETS).max(1);
+    let targets = &targets.select(&(0..targets.len()).step_by(step).collect::<Vec<_>>());
     let (other, name) = match frame {
         Frame::Measuring => (Frame::Base, "base"),
         Frame::Base => (Frame::Measuring, "measuring"),

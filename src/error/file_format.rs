@@ -73,7 +73,14 @@ pub(crate) fn text_format(text: &str) -> Option<&'static str> {
         !key.is_empty() && key.chars().all(|c| c.is_alphanumeric() || "_-.\"' ".contains(c))
     };
     let has_key = |sign| line.split_once(sign).is_some_and(|(key, _)| is_key(key.trim()));
-    let is_list = |inner: &str| inner.is_empty() || inner.trim_start().starts_with(['{', '[']);
+    let is_value = |c: char| c.is_ascii_digit() || "{[]\"'-".contains(c);
+    let is_list = |inner: &str| {
+        let inner = inner.trim_start();
+        let nested = inner.strip_prefix('[').map(str::trim_start);
+        inner.is_empty()
+            || inner.starts_with('{')
+            || nested.is_some_and(|nested| nested.is_empty() || nested.starts_with(is_value))
+    };
     if line != "[[" && line.strip_prefix('[').is_some_and(is_list) && !line.ends_with("]]") {
         Some(JSON)
     } else if has_key('=') || (line.starts_with('[') && is_key(line.trim_matches(['[', ']']))) {

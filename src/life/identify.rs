@@ -207,7 +207,7 @@ impl Contradiction {
     fn finding(&self, file: &Path) -> Finding {
         let treatment = match (self.widened.is_empty(), self.noise_ratio) {
             (false, _) => "; the prior of its parameters was widened".to_owned(),
-            (true, Some(ratio)) => format!("; the fit took a σ {ratio:.0} times as large"),
+            (true, Some(ratio)) => format!("; the fit took a σ {ratio:.1} times as large"),
             (true, None) => String::new(),
         };
         let text = format!(

@@ -62,7 +62,8 @@ impl Columns {
         let header = || table.header.iter().map(String::as_str);
         let has = |number: usize| header().any(|name| split_unit(name).0 == format!("q{number}"));
         let count = commanded.len();
-        if count > 1 && !has(1) && (2..=count + 1).all(has) && !has(count + 2) {
+        let are_read = commanded.iter().all(|(index, _)| self.has(Role::Joint(*index)));
+        if count > 1 && !are_read && !has(1) && (2..=count + 1).all(has) && !has(count + 2) {
             let kind = TableErrorKind::JointsFromTwo {
                 first: "q2".to_owned(),
                 last: format!("q{}", count + 1),
@@ -98,7 +99,7 @@ impl Columns {
         let map = if section == "[data]" {
             format!("columns = {{ {} }}", entries.join(", "))
         } else {
-            entries.join(", ")
+            format!("the lines {}", entries.join(" and "))
         };
         let missing: Vec<String> = missing.into_iter().map(|(base, _)| base).collect();
         let kind = TableErrorKind::MissingColumns { missing, section, map };

@@ -134,7 +134,10 @@ impl Problem {
     fn overridden_rule(&self) -> Option<Warning> {
         let rules = || self.parameters.iter().enumerate();
         let mut of_geometry = rules().filter(|(_, rule)| {
-            ["joint", "base", "tool"].iter().any(|owner| rule.pattern.starts_with(owner))
+            let of_joint = rule.pattern.strip_prefix("joint");
+            let is_of_joint = of_joint
+                .is_some_and(|rest| rest.starts_with(|c: char| c == '*' || c.is_ascii_digit()));
+            is_of_joint || ["base", "tool"].iter().any(|owner| rule.pattern.starts_with(owner))
         });
         let overridden = |(place, rule): (usize, &ParameterRule)| {
             let mut later = rules().skip(place + 1).map(|(_, later)| later);

@@ -37,6 +37,11 @@ pub(crate) fn missing_loads(
     let lacking = columns.into_iter().filter(|(.., is_missing, _)| *is_missing);
     let sentence = |(name, column, unit, _, taken): (&str, &str, &str, bool, Option<f64>)| {
         let Input { min, max, .. } = inputs.iter().find(|input| input.name == name)?;
+        let is_same =
+            min.total_cmp(max).is_eq() && taken.is_some_and(|taken| taken.total_cmp(min).is_eq());
+        if is_same {
+            return None;
+        }
         let had =
             if min < max { format!("{min} to {max} {unit}") } else { format!("{min} {unit}") };
         let taken =

@@ -98,7 +98,7 @@ finding_codes! {
         "The fit of bases and tools of held-out sessions did not converge.",
         "check these sessions, or hold out other rows";
     TwoSolutions: Error "two-solutions" ["parameter", "estimate", "second", "excess", "probability", "apart", "configuration"]
-        "A second arm, more than 3 standard errors from the fitted one, explains the measurements as well: its probability is above 0.001.",
+        "A second arm, more than 3 standard errors from the fitted one, explains the measurements too: its probability is above 0.1 %.",
         "measure poses in which the two differ, or give priors that decide between them";
     BeyondPrior: Error "beyond-prior" ["parameter", "sigmas"]
         "A parameter of the arm deviates from nominal by more than 5 times the σ of its prior.",

@@ -152,8 +152,20 @@ impl Check for OtherPosesHeldOut {
     fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
         let Fitting { measurements, split, .. } = fit.fitting;
         let poses = measurements.pose_numbers(fit.problem);
-        let fitted: HashSet<usize> = split.identification.iter().map(|&row| poses[row]).collect();
-        let rows = split.held_out.iter().filter(|&&row| fitted.contains(&poses[row])).count();
+        // Other loads and temperatures judge the model, also at the same joint angles.
+        let bits = |column: &Option<Vec<f64>>, row: usize| {
+            column.as_ref().map(|values| values[row].to_bits())
+        };
+        let temperature = |row: usize| {
+            measurements.temperature.as_ref().map(|values| values[row].round().to_bits())
+        };
+        let state = |&row: &usize| {
+            let loads =
+                [&measurements.payload, &measurements.hoist].map(|column| bits(column, row));
+            (poses[row], loads, temperature(row))
+        };
+        let fitted: HashSet<_> = split.identification.iter().map(state).collect();
+        let rows = split.held_out.iter().filter(|row| fitted.contains(&state(row))).count();
         let of = split.held_out.len();
         if rows as f64 <= MIN_FITTED_SHARE * of as f64 || copies_in_fit(fit) > 0 {
             return Vec::new();

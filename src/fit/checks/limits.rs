@@ -32,7 +32,7 @@ pub(super) struct LimitsHold;
 
 impl Check for LimitsHold {
     fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
-        let is_contradicted = fit.noise != Noise::Declared || fit.noise_factor > 1.0;
+        let is_contradicted = fit.noise == Noise::Declared && fit.noise_factor > 1.0;
         if !is_contradicted || fit.fitting.earlier.is_some() {
             return Vec::new();
         }

@@ -20,8 +20,8 @@ const MIN_PART: f64 = 0.01;
 pub(super) const MAX_NOISE_SIGMAS: f64 = 5.0;
 
 /// Smallest rms residual of the fit, as a multiple of the declared σ, for which masses in another
-/// unit are searched on an arm that gives way.
-const MIN_SIGMAS_OF_MASSES: f64 = 3.0;
+/// unit are searched on an arm that gives way. A fifth of it is noise alone.
+const MIN_SIGMAS_OF_MASSES: f64 = 5.0;
 /// Largest rms residual of a fit with a mass corrected, as a multiple of the declared σ, with which
 /// the mass explains what a fit near the noise leaves.
 const MAX_SIGMAS_LEFT_BY_MASS: f64 = 1.5;
@@ -47,18 +47,17 @@ impl Check for ReadAsMeant {
         };
         let is_within_priors = WithinPriors.check(fit).is_empty();
         let is_near = rms <= limit && is_within_priors && !is_nominal_far_off(fit);
-        let of_masses = if is_near {
+        let explanations = if is_near {
             // Close to the noise, only a mistake that leaves nothing but noise is an explanation.
             let noise = kind.declared_sigma.filter(|_| kind.observation.is_position());
             let noise = noise.map(|sigma| kind.observation.root() * sigma);
             match noise.filter(|noise| rms > MIN_SIGMAS_OF_MASSES * noise) {
-                Some(noise) => Some(fit.misread_masses(MAX_SIGMAS_LEFT_BY_MASS * noise)),
+                Some(noise) => fit.misread_masses(MAX_SIGMAS_LEFT_BY_MASS * noise),
                 None => return Vec::new(),
             }
         } else {
-            None
+            fit.explanations()
         };
-        let explanations = of_masses.as_ref().unwrap_or_else(|| fit.explanations());
         let Some(best) = explanations.fitted.first() else { return Vec::new() };
         let words: Vec<&str> =
             explanations.fitted.iter().map(|explanation| explanation.words.as_str()).collect();

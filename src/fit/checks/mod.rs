@@ -42,11 +42,11 @@ use finding::{Finding, FindingCode};
 const CHECKS: &[&dyn Check] = &[
     &EnoughEquations,
     &misread::ReadAsMeant,
-    &doubted_columns::ColumnsHoldMeasurements,
     &view_order::PointsInOrder,
     &table_digits::PositionsAreMeasured,
     &misfit::Misfit,
     &misfit::SizeOfArm,
+    &doubted_columns::ColumnsHoldMeasurements,
     &Convergence,
     &two_solutions::OneSolution,
     &parameter_limits::WithinPriors,

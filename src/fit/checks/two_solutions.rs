@@ -44,24 +44,27 @@ fn two_solutions_finding(fit: &CheckedFit, second: &SecondSolution) -> Option<Fi
     let [estimate, other] = [x, &second.x].map(|x| parameter.value(x[k]));
     let probability = second.probability();
     let text = format!(
-        "a second arm explains the measurements as well, with a probability of {probability:.2}: {name} is {} instead of {} (χ² \
+        "a second arm explains the measurements too, with a probability of {:.1} %: {name} is {} instead of {} (χ² \
          with priors is {} larger)",
+        probability * 100.0,
         shown(parameter, other, error),
         shown(parameter, estimate, error),
         about_three_digits(second.excess.max(0.0)),
     );
-    let (configuration, apart) = most_different(fit, &second.x)?;
-    let is_told = apart > MIN_APART * fit.sigma_taken;
+    let is_position = fit.fitting.measurements.leading().is_position();
+    let told = if is_position { most_different(fit, &second.x) } else { None };
     let numbers = [
         json!(name),
         estimate.into(),
         other.into(),
         second.excess.into(),
         probability.into(),
-        apart.into(),
-        json!(configuration),
+        json!(told.as_ref().map(|told| told.1)),
+        json!(told.as_ref().map(|told| &told.0)),
     ];
-    let remedy = if is_told {
+    let finding = Finding::new(FindingCode::TwoSolutions, numbers, text);
+    let Some((configuration, apart)) = told else { return Some(finding) };
+    let remedy = if apart > MIN_APART * fit.sigma_taken {
         format!(
             "measure poses like q = {}, in which their targets are {} mm apart",
             words(fit, &configuration),
@@ -72,7 +75,7 @@ fn two_solutions_finding(fit: &CheckedFit, second: &SecondSolution) -> Option<Fi
             "no pose within the ranges of the joints tells their targets apart: hold {name}, or give it a narrower prior"
         )
     };
-    Some(Finding::new(FindingCode::TwoSolutions, numbers, text).with_remedy(remedy))
+    Some(finding.with_remedy(remedy))
 }
 
 /// Returns a value with its unit, to the digits of its standard error.

@@ -26,9 +26,12 @@ use crate::model::PoseResiduals;
 use crate::model::parameter::Parameter;
 use crate::quantity::Unit;
 
-/// Largest number of predicted rows in the search for starts. It takes a hundredth of a second on
-/// two cores with a rigid arm; problems with more rows or unknowns are not searched.
+/// Largest number of predicted rows of a rigid arm in the search for starts, which takes about a
+/// hundredth of a second. Problems with more rows or unknowns are not searched.
 const MAX_PREDICTIONS: usize = 100_000;
+/// Number of predictions of a rigid arm that take as long as one of an arm that gives way, with its
+/// equilibrium.
+const RIGID_PREDICTIONS_PER_ELASTIC: usize = 50;
 /// Largest increase of χ², foretold by the curvature, at which a fit is started. Far from the
 /// optimum the second derivatives are not constant, so that fits that end near it are foretold up
 /// to 2000; without a second solution it is 10 000 and more.
@@ -43,7 +46,7 @@ const MAX_SAME_DIRECTION: f64 = 0.9;
 /// Maximum number of fits from one optimum: one for each of the best starts.
 const MAX_FITS: usize = 3;
 /// Maximum number of steps of such a fit. From the far side of a fold 4 to 10 are enough.
-const MAX_STEPS: u64 = 40;
+const MAX_STEPS: u64 = 15;
 /// Maximum number of times that a better solution replaces the optimum.
 const MAX_REPLACEMENTS: usize = 3;
 /// Least difference of a parameter, in standard errors, that makes two solutions. Chance alone
@@ -114,10 +117,12 @@ pub(in crate::fit) fn best_of_two(
 /// Returns true if the fit has an optimum and standard errors, and few enough rows and unknowns.
 fn is_searched(fitting: &Fitting, (end, _, noise): &Fitted) -> bool {
     let whole = fitting.whole();
+    let gives_way = fitting.model.arm(|k| end.x[k]).is_elastic();
+    let weight = if gives_way { RIGID_PREDICTIONS_PER_ELASTIC } else { 1 };
     fitting.strategy != Strategy::OneSweep
         && end.termination.converged()
         && *noise != Noise::Unknown
-        && 4 * whole.unknowns.len() * whole.poses.len() <= MAX_PREDICTIONS
+        && 4 * weight * whole.unknowns.len() * whole.poses.len() <= MAX_PREDICTIONS
 }
 
 /// Returns the other optima to which the curvature at an optimum leads.

@@ -40,9 +40,6 @@ const MAX_REACHES_OF_LOADS: f64 = 2e-3;
 /// command is a misreading. A smaller motion means that the joint does not follow its command at
 /// all.
 const MIN_MOTION: f64 = 0.01;
-/// Largest ratio of the error with a mass corrected to the error without, at which the mass is an
-/// explanation.
-const MAX_RATIO_OF_MASSES: f64 = 0.5;
 /// Range of the fitted lead of a screw \[m\] in which it is a misreading: that of ball screws,
 /// somewhat widened.
 const SCREW_LEAD_RANGE: RangeInclusive<f64> = 1e-3..=0.2;
@@ -96,9 +93,10 @@ impl CheckedFit<'_> {
         self.explanations.get_or_init(|| explanations(self))
     }
 
-    /// Returns the masses in another unit that leave at most `limit` \[m\].
-    pub fn misread_masses(&self, limit: f64) -> Explanations {
-        misread_masses(self, limit)
+    /// Returns the masses in another unit that leave at most `limit` \[m\]. For a fit near the
+    /// noise, they replace the other misreadings.
+    pub fn misread_masses(&self, limit: f64) -> &Explanations {
+        self.explanations.get_or_init(|| misread_masses(self, limit))
     }
 }
 
@@ -179,14 +177,14 @@ fn misread_masses(fit: &CheckedFit, limit: f64) -> Explanations {
     let trial = Trial::new(fit);
     let as_read = trial.error_as_read(fit);
     let tested = of_masses(fit.problem, fit.fitting.measurements, &MASS_SCALES);
-    let fitted = trial.explained(&tested, limit.min(MAX_RATIO_OF_MASSES * as_read));
+    let fitted = trial.explained(&tested, limit.min(MAX_EXPLAINED_RATIO * as_read));
     Explanations { fitted, as_read, ..Explanations::default() }
 }
 
 /// Returns the sum of the squared deviations of the full parameter vector `x` from nominal, in
 /// units of the prior σ. Parameters of declared effects are left out, because they may be far
-/// larger than their priors. So are parameters that only held-out
-/// rows use, because they are not fitted.
+/// larger than their priors. So are parameters that only held-out rows use, because they are not
+/// fitted.
 fn deviations(fitting: &Fitting, x: &DVector<f64>) -> f64 {
     let later = &fitting.held_out_only.parameters;
     let parameters = fitting.model.parameters.iter().zip(x).zip(later);
