@@ -14,6 +14,7 @@ mod face;
 mod findings;
 mod identified;
 mod judged;
+mod masses;
 mod orientation;
 mod recovery;
 mod remainder;

@@ -1,0 +1,66 @@
+//! A mass in another unit is named where compliances and a payload nearly make up for it.
+
+use flexcal::fit::{FindingCode, Identification};
+use flexcal::problem::Problem;
+use nalgebra::DVector;
+use rand::SeedableRng as _;
+use rand_chacha::ChaCha8Rng;
+
+use crate::common::arms::parse;
+use crate::common::made::{at_random, divided, fit, measure, model_of};
+
+/// Noise of a coordinate [m].
+const SIGMA: f64 = 4e-5;
+/// Number of fitted rows; as many again are held out.
+const ROWS: usize = 40;
+/// True compliance of joints 2 and 3 [rad/(N·m)].
+const COMPLIANCES: [f64; 2] = [1.6e-5, 3.6e-5];
+
+/// Returns an arm of four joints, two of which give way, with a forearm of `mass` kilograms.
+fn arm(mass: f64) -> Problem {
+    parse(&format!(
+        "name = 'arm'\n[[joint]]\nd_m = 0.4\n[[joint]]\nalpha_deg = -90\na_m = 0.1\n[[joint.body]]\nname = 'upper'\n\
+         mass_kg = 8\ncom_m = [0.3, 0, 0]\n[[joint]]\na_m = 0.6\n[[joint.body]]\nname = 'fore'\nmass_kg = {mass:?}\n\
+         com_m = [0.25, 0, 0]\n[[joint]]\na_m = 0.5\nalpha_deg = 90\n[tool]\ntarget_m = [0.1, 0.05, 0.1]\npayload_at = 'target'\n\
+         [parameters]\n'joint*.theta' = {{ sigma_deg = 0.3 }}\n'joint*.a' = {{ sigma_mm = 1 }}\n\
+         'base.*' = {{ free = true }}\n[data]\nposition_sigma_mm = 0.04\n[[effect]]\njoint-compliance = {{ joint = 2 }}\n\
+         [[effect]]\njoint-compliance = {{ joint = 3 }}\n"
+    ))
+}
+
+/// Fits an arm with a forearm of 5.2 kg that is declared with another mass.
+fn declared_with(mass: f64) -> Identification {
+    let truth = arm(5.2);
+    let mut rng = ChaCha8Rng::seed_from_u64(7);
+    let mut rows = at_random(&truth, 2 * ROWS, 1.2, &mut rng);
+    rows.payload = Some((0..rows.len()).map(|row| [0.0, 4.0, 8.0][row % 3]).collect());
+    let model = model_of(&truth, &rows);
+    let value = |name: &str| match name {
+        "joint-compliance[2].compliance" => COMPLIANCES[0],
+        "joint-compliance[3].compliance" => COMPLIANCES[1],
+        _ => 0.0,
+    };
+    let x = DVector::from_iterator(
+        model.parameters.len(),
+        model.parameters.iter().map(|parameter| value(&parameter.name)),
+    );
+    measure(&truth, &mut rows, &x, SIGMA, &mut rng);
+    fit(&arm(mass), &divided(ROWS, &rows))
+}
+
+#[test]
+fn a_mass_with_a_misplaced_decimal_point_is_named() {
+    let found = declared_with(52.0);
+    let finding = found.finding(FindingCode::Misread).unwrap();
+    let words = finding.to_string();
+    assert!(words.contains("the mass of fore at joint 3"), "{words}");
+    assert!(words.contains("multiplied by 0.1"), "{words}");
+}
+
+#[test]
+fn a_mass_that_is_right_or_a_little_wrong_is_no_mistake_of_its_unit() {
+    for mass in [5.2, 6.0, 8.0] {
+        let found = declared_with(mass);
+        assert!(!found.has(FindingCode::Misread), "{mass} kg: {:?}", found.findings);
+    }
+}
