@@ -332,8 +332,7 @@ impl Columns {
         self.require_marked(table, problem, measured, near)
     }
 
-    /// Returns the error of a column whose name is `base` with a unit that files cannot have, such
-    /// as inches; `None` if there is no such column.
+    /// Returns the error of a column `base` in a unit that files cannot have; `None` without one.
     fn in_foreign_unit(&self, table: &Table, base: &str, unit: Unit) -> Option<InputError> {
         let of_base = |name: &String| {
             let suffix = name.strip_prefix(base)?.strip_prefix('_')?;

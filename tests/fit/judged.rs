@@ -364,12 +364,12 @@ fn limits_that_cause_the_misfit_are_named_with_their_lines() {
     let data = measured(&arm(PRIORS), 2);
     let free = fit(&arm(PRIORS), &data);
     assert!(free.is_trusted() && !free.has(FindingCode::LimitContradicted), "{:?}", free.findings);
-    let rule = "'joint4.theta' = { free = true, min_deg = 3, max_deg = 4 }";
+    let rule = "'joint3.a' = { free = true, min_mm = 10, max_mm = 12 }";
     let held = fit(&arm(&format!("{PRIORS}\n{rule}")), &data);
     let finding = held.finding(FindingCode::LimitContradicted);
     let finding = finding.unwrap_or_else(|| panic!("{:?}", held.findings));
     let words = finding.to_string();
-    let bound = "joint4.theta, lower bound 3.000 ° (problem.toml:19; bounds are of the deviation";
+    let bound = "joint3.a, lower bound 10 mm (problem.toml:19; bounds are of the deviation";
     assert!(words.contains(bound), "{words}");
     let [before, after] = ["before", "after"].map(|name| finding.number(name).unwrap());
     assert!(after < 3e-4 && before > 10.0 * after, "{before} {after}");

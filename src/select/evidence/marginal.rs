@@ -72,7 +72,7 @@ impl Noise {
             .map(at)
             .collect();
         let prior_range = (MAX_LN_NOISE_FACTOR / self.ln_half_width).powi(2).ln_1p();
-        let table = LikelihoodTable::new(self.freedom, step);
+        let table = LikelihoodTable::new(self.freedom, 0.5 * step);
         NoiseGrid { terms, freedom: self.freedom, prior_range, table }
     }
 }

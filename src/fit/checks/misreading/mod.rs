@@ -217,17 +217,6 @@ pub enum MassScale {
     Newtons,
 }
 
-impl MassScale {
-    /// Returns the factor by which the number must be multiplied.
-    fn factor(self) -> f64 {
-        match self {
-            Self::Power(power) => undo::power_of_ten(power),
-            Self::Pounds => 0.453_592_37,
-            Self::Newtons => 9.80665_f64.recip(),
-        }
-    }
-}
-
 impl Misreading {
     /// Creates the misreading that the angles of these joints, counted from 1, have the opposite
     /// sign.

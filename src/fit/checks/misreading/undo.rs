@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 use super::candidates::{
     MIN_MILLIMETRE_LENGTH, is_far, lengths_of, masses_of, number_of, turns_in,
 };
-use super::{Misreading, numbers_of};
+use super::{MassScale, Misreading, numbers_of};
 use crate::measurement::Measurements;
 use crate::model::parameter::JointField;
 use crate::problem::{
@@ -35,6 +35,17 @@ pub(super) fn is_unit_ratio(size: f64) -> bool {
 /// Returns 10 to the power `power`, the factor between two units of a length or a mass.
 pub(super) fn power_of_ten(power: i8) -> f64 {
     10.0_f64.powi(power.into())
+}
+
+impl MassScale {
+    /// Returns the factor by which the number must be multiplied.
+    pub(super) fn factor(self) -> f64 {
+        match self {
+            Self::Power(power) => power_of_ten(power),
+            Self::Pounds => 0.453_592_37,
+            Self::Newtons => 9.80665_f64.recip(),
+        }
+    }
 }
 
 impl Misreading {
