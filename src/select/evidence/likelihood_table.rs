@@ -39,7 +39,8 @@ impl LikelihoodTable {
         let place = (squares.ln() - self.first) / self.step;
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "in range")]
         let number = place as usize;
-        let nodes = if place >= 0.0 { self.nodes.get(number..=number + 1) } else { None };
+        let is_inside = place >= 0.0 && place < self.nodes.len() as f64;
+        let nodes = if is_inside { self.nodes.get(number..=number + 1) } else { None };
         let Some([left, right]) = nodes else { return of(squares)[0] };
         let at = |node: &OnceLock<Jet>, number: usize| {
             *node.get_or_init(|| {
