@@ -358,22 +358,3 @@ fn columns_that_hold_no_measurements_are_named() {
     let text = digits.map_or_else(String::new, |finding| finding.text.clone());
     assert!(text.contains("column q3 holds multiples of 1° alone"), "{:?}", rounded.findings);
 }
-
-#[test]
-fn limits_that_cause_the_misfit_are_named_with_their_lines() {
-    let data = measured(&arm(PRIORS), 2);
-    let free = fit(&arm(PRIORS), &data);
-    assert!(free.is_trusted() && !free.has(FindingCode::LimitContradicted), "{:?}", free.findings);
-    let rule = "'joint3.a' = { free = true, min_mm = 10, max_mm = 12 }";
-    let held = fit(&arm(&format!("{PRIORS}\n{rule}")), &data);
-    let finding = held.finding(FindingCode::LimitContradicted);
-    let finding = finding.unwrap_or_else(|| panic!("{:?}", held.findings));
-    let words = finding.to_string();
-    let bound = "joint3.a, lower bound 10 mm (problem.toml:19; bounds are of the deviation";
-    assert!(words.contains(bound), "{words}");
-    let [before, after] = ["before", "after"].map(|name| finding.number(name).unwrap());
-    assert!(after < 3e-4 && before > 10.0 * after, "{before} {after}");
-    // A reason not to trust the fit names the limit as well.
-    let error = held.first_error().unwrap();
-    assert!(error.to_string().contains("limits of the problem cause"), "{error}");
-}
