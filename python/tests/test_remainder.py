@@ -77,7 +77,8 @@ def test_a_remainder_corrects_and_bounds_predictions(problem: flexcal.Problem, c
     one = corrected.predict(q[1])
     np.testing.assert_allclose(one, predicted[0], rtol=0, atol=1e-12)
     assert one.covariance.shape == (3, 3) and float(one.bound95) == pytest.approx(predicted.bound95[0])
-    far = corrected.predict(q[1] + np.pi)
+    with pytest.warns(flexcal.FlexcalWarning, match="beyond its limits"):
+        far = corrected.predict(q[1] + np.pi)
     assert far.extrapolated and far.bound95 > 2.0 * one.bound95
     with pytest.raises(ValueError, match="prediction itself"):
         _ = predicted[0].covariance
