@@ -18,12 +18,12 @@ mod dataset;
 #[deny(clippy::indexing_slicing)]
 mod dialect;
 #[deny(clippy::indexing_slicing)]
+mod doubtful_rows;
+#[deny(clippy::indexing_slicing)]
 mod duplicates;
 #[deny(clippy::indexing_slicing)]
 mod guessed_names;
 mod headerless;
-#[deny(clippy::indexing_slicing)]
-mod held_value;
 #[deny(clippy::indexing_slicing)]
 mod joined;
 #[deny(clippy::indexing_slicing)]
