@@ -1,5 +1,5 @@
-//! Warnings about rows and words of a table that are doubtful: an instrument that held its last value,
-//! and session names that are written in two ways.
+//! Warnings about doubtful rows and words of a table: an instrument that held its last value, and
+//! session names that are written in two ways.
 
 use super::Measurements;
 use crate::error::{Warning, WarningKind};

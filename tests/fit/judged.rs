@@ -358,3 +358,21 @@ fn columns_that_hold_no_measurements_are_named() {
     let text = digits.map_or_else(String::new, |finding| finding.text.clone());
     assert!(text.contains("column q3 holds multiples of 1° alone"), "{:?}", rounded.findings);
 }
+
+#[test]
+fn a_bound_that_causes_the_misfit_is_named_with_its_line() {
+    let base = "'base.*' = { free = true }";
+    let free = arm(&format!("'joint3.a' = {{ sigma_mm = 1 }}\n{base}"));
+    let data = measured(&free, 2);
+    let found = fit(&free, &data);
+    assert!(!found.has(FindingCode::LimitContradicted), "{:?}", found.findings);
+    let bounded = format!("'joint3.a' = {{ free = true, min_mm = 10, max_mm = 12 }}\n{base}");
+    let held = fit(&arm(&bounded), &data);
+    let finding = held.finding(FindingCode::LimitContradicted);
+    let finding = finding.unwrap_or_else(|| panic!("{:?}", held.findings));
+    let words = finding.to_string();
+    let bound = "joint3.a, lower bound 10 mm (problem.toml:";
+    assert!(words.contains(bound) && words.contains("deviation from nominal"), "{words}");
+    let [before, after] = ["before", "after"].map(|name| finding.number(name).unwrap());
+    assert!(after < 2.0 * SIGMA && before > 10.0 * after, "{before} {after}");
+}
