@@ -274,6 +274,7 @@ fn fit_rows(
             sigma_taken,
             covariance: &statistics.covariance,
             statistics: &statistics,
+            has_further_fits: options.influential_rows,
             second: second.as_ref(),
             refuted_priors: &refuted_priors,
             poses: &enough,

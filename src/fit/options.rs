@@ -43,7 +43,8 @@ pub struct Options {
     /// True if the fit is provisional: another fit follows, so the fit stops at a larger tolerance
     /// and its result is only checked for convergence.
     pub(crate) provisional: bool,
-    /// True to search for influential rows by further fits.
+    /// True to search by further fits for influential rows, and for masses and limits that cause a
+    /// misfit.
     pub(crate) influential_rows: bool,
 }
 
@@ -68,8 +69,9 @@ impl Options {
     }
 
     /// Enables the search for influential rows
-    /// ([`Identification::influential_rows`](super::Identification::influential_rows)) by further
-    /// fits. A loop searches for them in the problem as declared.
+    /// ([`Identification::influential_rows`](super::Identification::influential_rows)), and for
+    /// masses and limits that cause a misfit, by further fits. A loop searches for them in the
+    /// problem as declared.
     #[must_use]
     pub fn with_influential_rows(self) -> Self {
         Self { influential_rows: true, ..self }

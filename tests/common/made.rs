@@ -141,3 +141,8 @@ pub fn divided(count: usize, measurements: &Measurements) -> Dataset {
 pub fn fit(problem: &Problem, data: &Dataset) -> Identification {
     identify(problem, data, &Options::default()).unwrap()
 }
+
+/// Fits the data as the command does, with further fits that search for the cause of a misfit.
+pub fn fit_as_command(problem: &Problem, data: &Dataset) -> Identification {
+    identify(problem, data, &Options::default().with_influential_rows()).unwrap()
+}

@@ -2,7 +2,9 @@
 //! sessions, gross errors without priors, and targets counted as poses.
 
 use crate::common::arms::parse;
-use crate::common::made::{at_random, divided, draw, fit, labels, measure, model_of};
+use crate::common::made::{
+    at_random, divided, draw, fit, fit_as_command, labels, measure, model_of,
+};
 use flexcal::fit::{FindingCode, Misreading};
 use flexcal::measurement::{CommandColumn, Dataset};
 use flexcal::problem::{Problem, Robust, RobustLoss};
@@ -364,10 +366,10 @@ fn a_bound_that_causes_the_misfit_is_named_with_its_line() {
     let base = "'base.*' = { free = true }";
     let free = arm(&format!("'joint3.a' = {{ sigma_mm = 1 }}\n{base}"));
     let data = measured(&free, 2);
-    let found = fit(&free, &data);
+    let found = fit_as_command(&free, &data);
     assert!(!found.has(FindingCode::LimitContradicted), "{:?}", found.findings);
     let bounded = format!("'joint3.a' = {{ free = true, min_mm = 10, max_mm = 12 }}\n{base}");
-    let held = fit(&arm(&bounded), &data);
+    let held = fit_as_command(&arm(&bounded), &data);
     let finding = held.finding(FindingCode::LimitContradicted);
     let finding = finding.unwrap_or_else(|| panic!("{:?}", held.findings));
     let words = finding.to_string();

@@ -7,7 +7,7 @@ use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 
 use crate::common::arms::parse;
-use crate::common::made::{at_random, divided, fit, measure, model_of};
+use crate::common::made::{at_random, divided, fit_as_command, measure, model_of};
 
 /// Noise of a coordinate [m].
 const SIGMA: f64 = 4e-5;
@@ -45,7 +45,7 @@ fn declared_with(mass: f64) -> Identification {
         model.parameters.iter().map(|parameter| value(&parameter.name)),
     );
     measure(&truth, &mut rows, &x, SIGMA, &mut rng);
-    fit(&arm(mass), &divided(ROWS, &rows))
+    fit_as_command(&arm(mass), &divided(ROWS, &rows))
 }
 
 #[test]

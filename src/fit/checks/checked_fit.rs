@@ -62,6 +62,9 @@ pub(in crate::fit) struct CheckedFit<'a> {
     pub covariance: &'a DMatrix<f64>,
     /// Statistics of the unknowns of `whole`.
     pub statistics: &'a Statistics,
+    /// True if further fits may search for the cause of a misfit. Fits that are only compared with
+    /// one another do without.
+    pub has_further_fits: bool,
     /// Second optimum that the measurements do not exclude; `None` if none was found.
     pub second: Option<&'a SecondSolution>,
     /// Rules of `[parameters]` whose σ the data refute.

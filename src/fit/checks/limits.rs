@@ -33,7 +33,7 @@ pub(super) struct LimitsHold;
 impl Check for LimitsHold {
     fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
         let is_contradicted = fit.noise == Noise::Declared && fit.noise_factor > 1.0;
-        if !is_contradicted || fit.fitting.earlier.is_some() {
+        if !is_contradicted || !fit.has_further_fits || fit.fitting.earlier.is_some() {
             return Vec::new();
         }
         let limits = suspected(fit);

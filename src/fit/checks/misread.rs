@@ -49,7 +49,8 @@ impl Check for ReadAsMeant {
         let is_near = rms <= limit && is_within_priors && !is_nominal_far_off(fit);
         let explanations = if is_near {
             // Close to the noise, only a mistake that leaves nothing but noise is an explanation.
-            let noise = kind.declared_sigma.filter(|_| kind.observation.is_position());
+            let is_searched = fit.has_further_fits && kind.observation.is_position();
+            let noise = kind.declared_sigma.filter(|_| is_searched);
             let noise = noise.map(|sigma| kind.observation.root() * sigma);
             match noise.filter(|noise| rms > MIN_SIGMAS_OF_MASSES * noise) {
                 Some(noise) => fit.misread_masses(MAX_SIGMAS_LEFT_BY_MASS * noise),
