@@ -291,6 +291,8 @@ pub enum InputErrorKind {
     NoCommand { joint: usize },
     #[error("joint {joint} has no link that can bend, because its a is 0")]
     NoLink { joint: usize },
+    #[error("joint {joint} carries no bodies with a mass; declare them as [[joint.body]]")]
+    NoBodies { joint: usize },
     #[error("joint {joint} has no slide that can bend, because it is not prismatic")]
     NoSlide { joint: usize },
     #[error("joint {joint} does not rotate, because it is not revolute")]

@@ -145,8 +145,9 @@ impl Numbers {
         }
         numbers.begin("BODY");
         for (number, joint) in (1..).zip(&arm.joints) {
-            for body in &joint.bodies {
-                numbers.push_block(&format!("body on joint {number}:"), LOAD, &of_mass(body));
+            for (mass, at) in joint.masses() {
+                let values = [mass, at.x, at.y, at.z];
+                numbers.push_block(&format!("body on joint {number}:"), LOAD, &values);
             }
         }
         let mut list = |group, what: &str, values: &[f64]| {

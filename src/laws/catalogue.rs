@@ -104,6 +104,8 @@ const READING_SHIFT_SIGMA: f64 = 5e-3;
 const SETUP_SHIFT_SIGMA: f64 = 1e-2;
 /// Prior σ of a bending flexibility 1/EI [1/(N·m²)].
 const FLEXIBILITY_SIGMA: f64 = 1e-2;
+/// Prior σ of a displacement of the payload's centre of mass \[m\].
+const PAYLOAD_SHIFT_SIGMA: f64 = 0.1;
 /// Largest plausible rotation of a joint by the cubic term of its torsion, under the largest
 /// plausible moment \[rad\].
 const MAX_TURN: f64 = 0.1;
@@ -302,10 +304,31 @@ catalogue! {
         needs: &[Need::Loads],
         ..Family::PLAIN
     };
+    /// Error m of the mass of a joint's bodies, which is spread over them in proportion to their
+    /// declared masses.
+    BodyMass "body-mass" { joint: usize = AnyJoint } => Family {
+        terms: &[TermEntry::at(At::Joint(JointField::BodyMass), "mass", 0.0).prior(Prior::BodyMass)],
+        says: "bodies of joint {joint} weigh more or less than declared",
+        only: &[Only::Bodies],
+        needs: &[Need::Loads],
+        ..Family::PLAIN
+    };
     /// Error m of the payload's mass, in all poses with a payload.
     PayloadMass "payload-mass" => Family {
         terms: &[TermEntry::at(At::Arm(ArmField::Payload), "mass", 2.0)],
         says: "payloads weigh more or less than declared",
+        needs: &[Need::Payload],
+        ..Family::PLAIN
+    };
+    /// Displacement of the payload's centre of mass from its declared position, in the frame that
+    /// carries the payload.
+    PayloadPosition "payload-position" => Family {
+        terms: &[
+            TermEntry::at(At::Arm(ArmField::PayloadAt(0)), "x", PAYLOAD_SHIFT_SIGMA),
+            TermEntry::at(At::Arm(ArmField::PayloadAt(1)), "y", PAYLOAD_SHIFT_SIGMA),
+            TermEntry::at(At::Arm(ArmField::PayloadAt(2)), "z", PAYLOAD_SHIFT_SIGMA),
+        ],
+        says: "the payload's centre of mass is not where it is declared",
         needs: &[Need::Payload],
         ..Family::PLAIN
     };

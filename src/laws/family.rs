@@ -166,6 +166,8 @@ pub enum Prior {
     },
     /// Half the length of the link.
     HalfLength,
+    /// Declared mass of the joint's bodies.
+    BodyMass,
 }
 
 /// Condition on the arm. If it is not met, the effect is no candidate of the search, or its
@@ -187,6 +189,8 @@ pub enum Only {
     Undeflected,
     /// Requires a beam with a hoist; otherwise the effect is refused.
     Hoisted,
+    /// Requires a joint that carries bodies with mass; otherwise the effect is refused.
+    Bodies,
 }
 
 /// Condition that data must meet to show an effect.

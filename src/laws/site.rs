@@ -31,6 +31,8 @@ pub enum JointField {
     SpringRate,
     /// Preload of a gravity compensator \[N\].
     SpringPreload,
+    /// Mass that is added to the bodies of the joint, in proportion to their declared masses \[kg\].
+    BodyMass,
     /// Coordinates of a fixed joint's placement \[m\].
     X,
     Y,
@@ -92,6 +94,8 @@ worded! {
 pub enum ArmField {
     /// Mass that is added to every payload \[kg\].
     Payload,
+    /// Displacement of the payload along an axis, 0 to 2, of the frame that carries it \[m\].
+    PayloadAt(usize),
     /// Relative error of the hoist's force.
     HoistForce,
     /// Number added to the x component of the unit vector along the hoist's rope.
@@ -166,6 +170,7 @@ impl JointField {
             Self::SlideFlexibility => "slide_flexibility",
             Self::SpringRate => "spring_rate",
             Self::SpringPreload => "spring_preload",
+            Self::BodyMass => "body_mass",
             Self::X => "x",
             Self::Y => "y",
             Self::Z => "z",

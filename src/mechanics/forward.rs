@@ -172,7 +172,9 @@ impl<S: Scalar> Arm<S> {
             if index == self.payload_joint() {
                 mass += self.payload(setup);
             }
-            mass += joint.bodies.iter().map(|body| body.mass).sum::<f64>();
+            for (of_body, _) in joint.masses() {
+                mass += of_body;
+            }
             *beyond = self.gravity * mass + hoisted;
             if let Some(beam) = &joint.beam {
                 mass += beam.mass + beam.masses.iter().map(|carried| carried.mass).sum::<f64>();
@@ -311,10 +313,9 @@ impl<S: Scalar> Arm<S> {
             ws.keep_frame(&pass.frame);
             pass.record_cut(Segment::Joint(i), deflecting_moments, &mut ws.events, &mut ws.cuts);
             if pass.records_events() {
-                for body in &joint.bodies {
-                    let force = self.gravity * S::from(body.mass);
-                    ws.events
-                        .push(Event::Load { at: pass.frame.point(&body.at.map(S::from)), force });
+                for (mass, at) in joint.masses() {
+                    let at = pass.frame.point(&at.map(S::from));
+                    ws.events.push(Event::Load { at, force: self.gravity * mass });
                 }
             }
             if i == self.payload_joint() {

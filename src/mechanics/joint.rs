@@ -101,6 +101,8 @@ pub struct Joint<S> {
     pub beam: Option<Beam<S>>,
     /// Point masses that move with frame i, behind the joint.
     pub bodies: Vec<PointMass>,
+    /// Relative error of these masses; `None` if the arm has no such parameter.
+    pub body_error: Option<S>,
 }
 
 /// Angle and offset of a joint in a pose: its constants θ and d with the command q added to one of
@@ -131,6 +133,7 @@ impl Joint<f64> {
             motion: None,
             beam: joint.beam.as_ref().map(Beam::nominal),
             bodies: point_masses(&joint.bodies),
+            body_error: None,
         }
     }
 
@@ -152,11 +155,20 @@ impl Joint<f64> {
             motion: self.motion.as_ref().map(|motion| Box::new(motion.map(S::from))),
             beam: self.beam.as_ref().map(Beam::lift),
             bodies: self.bodies.clone(),
+            body_error: self.body_error.map(S::from),
         }
     }
 }
 
 impl<S: Scalar> Joint<S> {
+    /// Returns the true masses \[kg\] of the bodies, with their positions.
+    pub(crate) fn masses(&self) -> impl Iterator<Item = (S, &Vector3<f64>)> {
+        let factor = self.body_error.map(|error| error + 1.0);
+        self.bodies.iter().map(move |body| {
+            (factor.map_or_else(|| S::from(body.mass), |factor| factor * body.mass), &body.at)
+        })
+    }
+
     /// Returns true if the joint rotates about its axis under load.
     pub(super) fn has_twist(&self) -> bool {
         self.flexibility.is_some() || self.nonlinear.is_some()

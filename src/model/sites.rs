@@ -24,6 +24,7 @@ pub(super) fn prepare_site(arm: &mut Arm<f64>, site: ParameterSite, nominal: f64
                     _ = joint.lateral.get_or_insert([0.0; 2]);
                 }
                 JointField::SlideFlexibility => _ = joint.slide.get_or_insert(0.0),
+                JointField::BodyMass => _ = joint.body_error.get_or_insert(0.0),
                 JointField::Before(_) | JointField::After(_) => {
                     joint.motion.get_or_insert_with(Box::default);
                 }
@@ -57,7 +58,10 @@ pub(super) fn prepare_site(arm: &mut Arm<f64>, site: ParameterSite, nominal: f64
             }
             ArmField::MountingX | ArmField::MountingY => _ = arm.mounting.get_or_insert([0.0; 2]),
             ArmField::Mixing => _ = arm.mixing.get_or_insert(0.0),
-            ArmField::Payload | ArmField::GravityX | ArmField::GravityY => {}
+            ArmField::Payload
+            | ArmField::PayloadAt(_)
+            | ArmField::GravityX
+            | ArmField::GravityY => {}
         },
         ParameterSite::Base { .. }
         | ParameterSite::Target { .. }
@@ -147,6 +151,10 @@ pub(super) fn set_site<S: Scalar>(
                 (JointField::SlideFlexibility, ..) => {
                     joint.slide = Some(joint.slide.map_or(x, |declared| declared + x));
                 }
+                (JointField::BodyMass, ..) => {
+                    let declared: f64 = joint.bodies.iter().map(|body| body.mass).sum();
+                    joint.body_error = joint.body_error.map(|error| error + x / declared);
+                }
                 _ => {}
             }
         }
@@ -201,6 +209,7 @@ fn set_beam_field<S: Scalar>(beam: &mut Beam<S>, field: BeamField, nominal: f64,
 fn set_arm_field<S: Scalar>(arm: &mut Arm<S>, field: ArmField, x: S, tilt: &mut [S; 2]) {
     match (field, &mut arm.rope, &mut arm.mounting) {
         (ArmField::Payload, ..) => arm.payload_error += x,
+        (ArmField::PayloadAt(axis), ..) => arm.payload_at[axis] += x,
         (ArmField::GravityX, ..) => tilt[0] += x,
         (ArmField::GravityY, ..) => tilt[1] += x,
         (ArmField::Mixing, ..) => arm.mixing = Some(arm.mixing.map_or(x, |declared| declared + x)),

@@ -1,6 +1,6 @@
 //! Effects that a problem declares, and the reasons why they cannot act on its arm.
 
-use super::{Data, Equilibrium, Joint, JointKind, Problem, Statics};
+use super::{Body, Data, Equilibrium, Joint, JointKind, Problem, Statics};
 use crate::error::{InputErrorKind, Location};
 pub(crate) use crate::laws::NAMES;
 use crate::laws::{At, Effect, FAMILIES, JointField, LAW, Only, declaration};
@@ -69,6 +69,12 @@ impl Effect {
                 let joint = self.joint()?;
                 let link = joints.get(joint.wrapping_sub(1)).is_some_and(|joint| joint.a != 0.0);
                 (!link).then_some(InputErrorKind::NoLink { joint })
+            }
+            Only::Bodies => {
+                let joint = self.joint()?;
+                let bodies = joints.get(joint.wrapping_sub(1)).map(|joint| &joint.bodies[..]);
+                let is_bare = Body::total_mass(bodies.unwrap_or_default()) == 0.0;
+                is_bare.then_some(InputErrorKind::NoBodies { joint })
             }
             Only::Undeflected => (statics.equilibrium == Equilibrium::Deflected)
                 .then_some(InputErrorKind::InEquilibriumAlready),

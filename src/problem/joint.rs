@@ -115,6 +115,13 @@ pub struct Body {
     pub position: Vector3<f64>,
 }
 
+impl Body {
+    /// Returns the sum of the masses \[kg\].
+    pub(crate) fn total_mass(bodies: &[Self]) -> f64 {
+        bodies.iter().map(|body| body.mass).sum()
+    }
+}
+
 /// Suspension force `[joint.beam.hoist]` on a beam.
 #[derive(Debug, Clone)]
 pub struct Hoist {

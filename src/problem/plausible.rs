@@ -75,11 +75,6 @@ pub(super) fn condition_warnings(root: &Section<'_, '_>) -> Vec<Warning> {
     warnings
 }
 
-/// Returns the sum of masses \[kg\].
-fn total_mass(bodies: &[Body]) -> f64 {
-    bodies.iter().map(|body| body.mass).sum()
-}
-
 /// Returns a warning if a joint table without the key `dh` has the zeros of a standard DH table. In
 /// such a table α of the first row is not zero, and both α and a of the last row are.
 pub(super) fn form_warning(joints: &[Joint]) -> Option<Warning> {
@@ -178,8 +173,8 @@ impl Problem {
     /// Returns the sum of the declared masses of the arm \[kg\], without the payload.
     pub(crate) fn declared_mass(&self) -> f64 {
         let beams = self.joints.iter().filter_map(|joint| joint.beam.as_ref());
-        let of_beams = beams.map(|beam| beam.mass + total_mass(&beam.masses));
-        of_beams.chain(self.joints.iter().map(|joint| total_mass(&joint.bodies))).sum()
+        let of_beams = beams.map(|beam| beam.mass + Body::total_mass(&beam.masses));
+        of_beams.chain(self.joints.iter().map(|joint| Body::total_mass(&joint.bodies))).sum()
     }
 
     /// Returns the error of a pose without equilibrium with the name of the joint that is probably
@@ -211,7 +206,8 @@ impl Problem {
             for joint in self.joints.iter().skip(first) {
                 let bodies = joint.bodies.iter().map(|body| (body.mass, body.position.norm()));
                 if let Some(beam) = &joint.beam {
-                    moment += (beam.mass + total_mass(&beam.masses)) * (reach + joint.a.abs());
+                    moment +=
+                        (beam.mass + Body::total_mass(&beam.masses)) * (reach + joint.a.abs());
                 }
                 reach += length(joint);
                 moment += bodies.map(|(mass, distance)| mass * (reach + distance)).sum::<f64>();

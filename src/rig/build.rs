@@ -6,7 +6,7 @@ use super::Rig;
 use super::chain::{Chain, Force, Hinge, PieceFrame, Spring};
 use super::effect::TrueEffect;
 use crate::laws::At;
-use crate::problem::{Effect, Joint, JointKind, Placement, PoseConditions};
+use crate::problem::{Body, Effect, Joint, JointKind, Placement, PoseConditions};
 use crate::spatial::rotate;
 
 /// Effect of the catalogue with its true parameter values, SI units.
@@ -60,15 +60,16 @@ impl Rig {
                 let tool = self.moved_by_laws(conditions, At::Tool, None);
                 *chain.end() = chain.end().compose(&tool);
             }
-            for body in &joint.bodies {
-                chain.add_load(&body.position, weight(body.mass));
+            let masses = self.masses(&joint.bodies, number);
+            for (body, mass) in joint.bodies.iter().zip(masses) {
+                chain.add_load(&body.position, weight(mass));
             }
             frames.push(chain.end_frame());
         }
         let payload = self.payload(conditions);
         if let Some(tool) = frames.get(self.arm.tool.joint).filter(|_| payload != 0.0) {
             chain.continue_from(tool);
-            chain.add_load(&self.arm.tool.payload_at, weight(payload));
+            chain.add_load(&self.payload_position(), weight(payload));
         }
         (chain, frames)
     }
@@ -158,6 +159,28 @@ impl Rig {
             _ => payload,
         };
         self.effect_values().fold(declared, add)
+    }
+
+    /// Returns the true position of the payload \[m\], in the frame that carries it.
+    fn payload_position(&self) -> Vector3<f64> {
+        let add = |at, effect: EffectValues<'_>| match effect {
+            (Effect::PayloadPosition, &[x, y, z]) => at + Vector3::new(x, y, z),
+            _ => at,
+        };
+        self.effect_values().fold(self.arm.tool.payload_at, add)
+    }
+
+    /// Returns the true masses \[kg\] of the bodies of a joint; `number` counts joints from 1.
+    fn masses(&self, bodies: &[Body], number: usize) -> Vec<f64> {
+        let error: f64 = self
+            .effect_values()
+            .filter_map(|effect| match effect {
+                (Effect::BodyMass { joint }, &[mass]) if *joint == number => Some(mass),
+                _ => None,
+            })
+            .sum();
+        let declared = Body::total_mass(bodies);
+        bodies.iter().map(|body| body.mass + error * body.mass / declared).collect()
     }
 }
 

@@ -147,7 +147,8 @@ pub(super) fn keys(cause: &Cause, joints: &[Joint]) -> Vec<(String, Unit)> {
             named(&[("strain", Unit::PerDegree)])
         }
         Effect::UnmodelledMass { .. } => named(&[("mass", Unit::Mass), ("at", Unit::Length)]),
-        Effect::PayloadMass => named(&[("mass", Unit::Mass)]),
+        Effect::PayloadMass | Effect::BodyMass { .. } => named(&[("mass", Unit::Mass)]),
+        Effect::PayloadPosition => xyz(Unit::Length),
         Effect::HoistDirection => {
             named(&[("lean_x", Unit::Ratio), ("lean_y", Unit::Ratio), ("trolley", Unit::PerLength)])
         }

@@ -94,6 +94,8 @@ impl Rig {
                 effect.catalogued(),
                 Some((
                     Effect::PayloadMass
+                        | Effect::PayloadPosition
+                        | Effect::BodyMass { .. }
                         | Effect::UnmodelledMass { .. }
                         | Effect::HoistForce
                         | Effect::HoistDirection

@@ -5,7 +5,7 @@ use super::place::slides;
 use crate::laws::{
     Argument, ArgumentKind, Effect, FAMILIES, Family, Need, Only, Quantity, Search, to_three_digits,
 };
-use crate::problem::{Equilibrium, Joint, JointKind, Problem};
+use crate::problem::{Body, Equilibrium, Joint, JointKind, Problem};
 
 /// Highest order of a single harmonic (periods per revolution of the joint) among the candidates.
 pub(crate) const HIGHEST_ORDER: u32 = 60;
@@ -210,6 +210,7 @@ impl Effect {
                 let bends = joint.beam.as_ref();
                 !bends.is_some_and(|beam| beam.ei_y.is_some() || beam.ei_z.is_some())
             }),
+            Only::Bodies => is(|joint| Body::total_mass(&joint.bodies) > 0.0),
             Only::Undeflected => problem.statics.equilibrium == Equilibrium::Undeflected,
             Only::Hoisted => {
                 let hoisted =

@@ -29,9 +29,8 @@ pub(super) const MIN_MOMENT: f64 = 10.0;
 /// Returns an upper estimate of the moment on a joint, counted from 1 [N·m]: weight of everything
 /// declared beyond it, payload included, times the length of its longest branch.
 pub(super) fn greatest_moment(problem: &Problem, joint: usize) -> f64 {
-    let total_mass = |bodies: &[Body]| bodies.iter().map(|body| body.mass).sum::<f64>();
     let beam = |joint: &Joint| {
-        joint.beam.as_ref().map_or(0.0, |beam| beam.mass + total_mass(&beam.masses))
+        joint.beam.as_ref().map_or(0.0, |beam| beam.mass + Body::total_mass(&beam.masses))
     };
     let tree = problem.tree();
     let first = &problem.joints[joint - 1];
@@ -43,8 +42,8 @@ pub(super) fn greatest_moment(problem: &Problem, joint: usize) -> f64 {
             .skip(joint)
             .filter(|(k, _)| tree.path_contains(joint - 1, *k))
     };
-    let mass = total_mass(&first.bodies)
-        + beyond().map(|(_, joint)| total_mass(&joint.bodies) + beam(joint)).sum::<f64>();
+    let mass = Body::total_mass(&first.bodies)
+        + beyond().map(|(_, joint)| Body::total_mass(&joint.bodies) + beam(joint)).sum::<f64>();
     let payload = if tree.path_contains(joint - 1, problem.tool.joint) {
         problem.tool.payload_mass
     } else {

@@ -2,7 +2,7 @@
 
 use super::place::{MIN_MOMENT, greatest_moment};
 use crate::laws::{Argument, Effect, Prior};
-use crate::problem::Problem;
+use crate::problem::{Body, Problem};
 
 /// Prior size of the coupling of twist and bending for a beam declared rigid in both [1/(N·m²)].
 const RIGID_COUPLING: f64 = 1e-2;
@@ -35,6 +35,7 @@ impl Effect {
                 }
             }
             Prior::HalfLength => problem.joints.get(self.beam(problem)?)?.a.abs() / 2.0,
+            Prior::BodyMass => Body::total_mass(&problem.joints.get(self.joint()? - 1)?.bodies),
         })
     }
 }

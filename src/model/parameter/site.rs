@@ -106,6 +106,7 @@ impl ParameterSite {
                 JointField::SlideFlexibility => Unit::Flexibility,
                 JointField::SpringRate => Unit::ForcePerLength,
                 JointField::SpringPreload => Unit::Force,
+                JointField::BodyMass => Unit::Mass,
             },
             Self::Beam { field, .. } => match field {
                 BeamField::Axial => Unit::AxialRigidity,
@@ -123,6 +124,7 @@ impl ParameterSite {
             },
             Self::Arm(field) => match field {
                 ArmField::Payload => Unit::Mass,
+                ArmField::PayloadAt(_) => Unit::Length,
                 ArmField::HoistForce | ArmField::HoistLeanX | ArmField::HoistLeanY => Unit::Ratio,
                 ArmField::Mixing => Unit::Number,
                 ArmField::HoistTrolley => Unit::PerLength,
@@ -160,6 +162,7 @@ impl ParameterSite {
     /// Returns true for errors of loads: masses, payload, hoists and gravity.
     pub(crate) fn is_load(self) -> bool {
         match self {
+            Self::Joint { field, .. } => field == JointField::BodyMass,
             Self::Beam { field, .. } => matches!(field, BeamField::AddedMass | BeamField::AddedAt),
             Self::Arm(field) => {
                 !matches!(field, ArmField::Mixing | ArmField::MountingX | ArmField::MountingY)

@@ -40,7 +40,7 @@ impl Site {
             ParameterSite::Arm(field) => {
                 use crate::model::parameter::ArmField as Field;
                 match field {
-                    Field::Payload => Self::Payload,
+                    Field::Payload | Field::PayloadAt(_) => Self::Payload,
                     Field::HoistForce
                     | Field::HoistLeanX
                     | Field::HoistLeanY
@@ -203,7 +203,7 @@ fn covariates(
         {
             Covariate::Approach(joint)
         }
-        ParameterSite::Arm(ArmField::Payload) => Covariate::Payload,
+        ParameterSite::Arm(ArmField::Payload | ArmField::PayloadAt(_)) => Covariate::Payload,
         ParameterSite::Scale | ParameterSite::Strain { .. } => Covariate::Position,
         _ => Covariate::Load,
     }]
