@@ -134,8 +134,9 @@ fn segment_of(arm: &Arm<f64>, site: ParameterSite) -> Option<Segment> {
         {
             Some(Segment::Beam(joint))
         }
+        ParameterSite::Joint { field: JointField::BodyMass, .. }
+        | ParameterSite::Beam { field: BeamField::AddedMass, .. } => None,
         ParameterSite::Joint { joint, .. } => Some(Segment::Joint(joint)),
-        ParameterSite::Beam { field: BeamField::AddedMass, .. } => None,
         ParameterSite::Beam { joint, .. } => Some(Segment::Beam(joint)),
         ParameterSite::Arm(ArmField::MountingX | ArmField::MountingY) => Some(Segment::Mounting),
         _ => None,
