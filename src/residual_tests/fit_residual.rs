@@ -34,7 +34,7 @@ pub struct FitResidual<'a> {
     /// True if σ was declared. A σ estimated from the residuals cannot be tested against their
     /// size.
     pub sigma_is_declared: bool,
-    /// Time of each pose, in any unit and from any origin.
+    /// Time of each pose, in any unit and from any origin; empty if it was not measured.
     pub time: &'a [f64],
     /// Identifier of each pose's session. Tests of order compare poses of one session only.
     pub session: &'a [usize],

@@ -271,7 +271,11 @@ fn write_tested(
                 (None, Some(pose)) => format!("pose {} has ", pose + 1),
                 (None, None) => String::new(),
             };
-            let size = if *failed { "a gross error" } else { "the largest residual, no outlier" };
+            let size = if *failed {
+                "an outlier: a gross error, or an effect that acts in few poses"
+            } else {
+                "the largest residual, no outlier"
+            };
             write!(f, "{pose}{size} ({statistic:.1} × the scatter, expected up to {to:.1})")
         }
         Test::Normality => {

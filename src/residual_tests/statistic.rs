@@ -83,13 +83,16 @@ pub(super) struct Order {
     lags: usize,
 }
 
-/// Returns the orders of the poses `kept` for the tests: by time, and by rows if that differs. The
-/// indices in an order count the kept poses from 0.
+/// Returns the orders of the poses `kept` for the tests: by time if it was measured, and by rows if
+/// that differs. The indices in an order count the kept poses from 0.
 pub(super) fn sequences(
     fit: &FitResidual,
     kept: &[usize],
 ) -> Vec<(Sequence, Result<Order, Untestable>)> {
     let by_rows = Order::of(fit, kept);
+    if fit.time.is_empty() {
+        return vec![(Sequence::Rows, by_rows)];
+    }
     if !kept.iter().all(|&pose| fit.time[pose].is_finite()) {
         return vec![(Sequence::Time, Err(Untestable::NotFinite)), (Sequence::Rows, by_rows)];
     }

@@ -92,7 +92,7 @@ fn statistics(fit: &FitResidual, poses: &[usize]) -> Vec<(Test, Result<Statistic
 
 /// Returns every test with `why` as the reason why it cannot be made.
 fn all_untestable(fit: &FitResidual, why: &Untestable) -> Vec<Tried> {
-    let sequence = Sequence::Time;
+    let sequence = if fit.time.is_empty() { Sequence::Rows } else { Sequence::Time };
     let mut tests = vec![
         Test::ReducedChiSquared,
         Test::LackOfFit,

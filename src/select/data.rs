@@ -228,7 +228,8 @@ impl<'a> Data<'a> {
             covariate: Covariate::declared(which, problem),
             values,
         }));
-        covariates.push(CovariateValues { covariate: Covariate::Time, values: self.time() });
+        let covariate = Covariate::time(measurements.time_measured);
+        covariates.push(CovariateValues { covariate, values: self.time() });
         if let Some(approach) = &measurements.approach {
             let n = measurements.joints;
             covariates.extend(moving.map(|(joint, _)| CovariateValues {

@@ -196,12 +196,13 @@ pub(super) fn check_fit(fitted: &Fitted, data: &Data) -> ResidualTests {
         (0..linearised.poses().len()).map(|pose| linearised.coordinates(pose)).collect();
     // With millions of rows, memory suffices for only one matrix of this size.
     let (columns, residual) = fitted.neighbourhood_as_fitted(linearised).into_fitted();
+    let time = data.time();
     let fit = FitResidual {
         residual: &residual,
         fitted: &columns,
         coordinates: &coordinates,
         sigma_is_declared: fitted.found.noise == Noise::Declared,
-        time: &data.time(),
+        time: if data.measurements.time_measured { &time } else { &[] },
         session: &data.session(),
         setup: &data.setup,
         covariates: &data.covariates(&fitted.problem),

@@ -134,7 +134,8 @@ fn sorted_by_itself(fit: &CheckedFit, before: f64) -> Option<Finding> {
     let rows = fit.fitting.measurements;
     let is_sorted = |values: &[f64]| {
         let mut steps = values.windows(2).map(|pair| pair[1] - pair[0]);
-        steps.clone().all(|step| step >= 0.0) || steps.all(|step| step <= 0.0)
+        let is_constant = values.first() == values.last();
+        !is_constant && (steps.clone().all(|step| step >= 0.0) || steps.all(|step| step <= 0.0))
     };
     let axis = |axis: usize| rows.positions.iter().map(|x| x[axis]).collect::<Vec<f64>>();
     let sorted: Vec<usize> = (0..3).filter(|&k| is_sorted(&axis(k))).collect();

@@ -4,15 +4,10 @@
 use std::borrow::Cow;
 
 use nalgebra::{DMatrix, DMatrixView, DVector};
-use rayon::prelude::*;
 
 use super::orthonormal::{constrained, lengthened, orthonormal, orthonormal_above};
 use super::score::{Score, Sums};
-use crate::numeric::{gram, inverse_factor, product, transposed_narrow_product};
-
-/// Smallest fraction of a direction's squared length outside a block of poses at which the other
-/// poses determine the direction.
-const MIN_DETERMINED_ELSEWHERE: f64 = 1e-6;
+use crate::numeric::{product, transposed_narrow_product};
 
 /// Largest number of columns that are projected one basis direction at a time.
 const MAX_SEQUENTIAL_COLUMNS: usize = 4;
@@ -41,9 +36,9 @@ pub(crate) struct Unknowns {
 #[derive(Debug)]
 pub(crate) struct LinearNeighbourhood {
     /// Whitened residual at the optimum, followed by the rows of the priors.
-    residual: DVector<f64>,
+    pub(super) residual: DVector<f64>,
     /// Basis Q, shape = (3 N + priors, rank).
-    basis: DMatrix<f64>,
+    pub(super) basis: DMatrix<f64>,
     /// Matrix T, shape = (unknowns, rank).
     root: DMatrix<f64>,
     /// Values of the unknowns at the optimum.
@@ -51,7 +46,7 @@ pub(crate) struct LinearNeighbourhood {
     /// Step from the point of the derivatives to the optimum.
     step: DVector<f64>,
     /// Number of rows that belong to data.
-    rows: usize,
+    pub(super) rows: usize,
     /// Number of data rows that are 0, because poses measure fewer than three numbers.
     empty: usize,
     /// Sums of squares, with priors and of the data alone, and degrees of freedom of the data.
@@ -347,33 +342,6 @@ impl LinearNeighbourhood {
         let cosines = a.tr_mul(&b).singular_values();
         cosines.iter().copied().reduce(f64::min).map(|cosine| cosine.clamp(0.0, 1.0).acos())
     }
-
-    /// Returns the sum of squared whitened residuals of poses that are left out, block by block,
-    /// predicted by the fit without them; `None` if it is not finite.
-    ///
-    /// `block` holds the block of each pose. A left-out residual is (I − H_bb)⁻¹ r_b, by Woodbury's
-    /// identity r_b + Q_b (I − Q_bᵀQ_b)⁻¹ Q_bᵀ r_b. Along a direction that the block alone
-    /// determines, the fitted value is kept.
-    pub fn cross_validate(&self, block: &[usize]) -> Option<f64> {
-        self.left_out_squares(block).map(|sums| sums.iter().sum())
-    }
-
-    /// Returns the sum of squared left-out residuals for each block, as in
-    /// [`cross_validate`](Self::cross_validate); `None` if a sum is not finite.
-    pub fn left_out_squares(&self, block: &[usize]) -> Option<Vec<f64>> {
-        let blocks = block.iter().max().map_or(0, |last| last + 1);
-        let n = self.basis.ncols();
-        let left_out = |number: usize| {
-            let rows: Vec<usize> = (0..self.rows).filter(|row| block[row / 3] == number).collect();
-            let (basis, residual) =
-                (self.basis.select_rows(&rows), self.residual.select_rows(&rows));
-            let inner = DMatrix::identity(n, n) - gram(&basis);
-            let step = solve_projected(inner, &basis.tr_mul(&residual));
-            (residual + basis * step).norm_squared()
-        };
-        let sums: Vec<f64> = (0..blocks).into_par_iter().map(left_out).collect();
-        sums.iter().all(|sum| sum.is_finite()).then_some(sums)
-    }
 }
 
 /// Returns true if a projection leaves at least [`MIN_PART_OF_ONE_PROJECTION`] of the length of
@@ -383,21 +351,6 @@ fn keeps_length(remaining: &DMatrix<f64>, lengths: &[f64]) -> bool {
         .column_iter()
         .zip(lengths)
         .all(|(column, length)| column.norm() >= MIN_PART_OF_ONE_PROJECTION * length)
-}
-
-/// Solves M x = `right` for a symmetric M with eigenvalues from 0 to 1. Components along
-/// eigenvalues near 0 are zero.
-fn solve_projected(matrix: DMatrix<f64>, right: &DVector<f64>) -> DVector<f64> {
-    if let Some(root) = inverse_factor(&matrix)
-        && root.diagonal().iter().all(|value| (value * value).recip() > MIN_DETERMINED_ELSEWHERE)
-    {
-        return root.tr_mul(&(&root * right));
-    }
-    let eigen = matrix.symmetric_eigen();
-    let inverted = eigen
-        .eigenvalues
-        .map(|value| if value > MIN_DETERMINED_ELSEWHERE { value.recip() } else { 0.0 });
-    &eigen.eigenvectors * eigen.eigenvectors.tr_mul(right).component_mul(&inverted)
 }
 
 #[cfg(test)]

@@ -6,6 +6,7 @@
 //!   p-value.
 //! - `Scan`: tests of all candidates against one fit.
 
+mod cross_validation;
 mod left_out;
 mod linear;
 mod linearised;

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
 
 use super::misread;
-use super::plainer::compare_with_plainer;
+use super::plainer::{Plainer, compare_with_plainer};
 use super::ranges::ranges;
 use super::state::{Round, SearchState};
 use super::status::Status;
@@ -141,7 +141,9 @@ pub(super) fn found(
             }
             claims
         });
-        let instead = rival.into_iter().flat_map(|rival| {
+        let is_probable =
+            |rival: &&Plainer| 1.0 - rival.share >= MIN_ALTERNATIVE_ODDS * rival.share;
+        let instead = rival.into_iter().filter(is_probable).flat_map(|rival| {
             // The causes act together; their probability is divided equally among them.
             let each = of_class * (1.0 - rival.share) / rival.instead.len() as f64;
             rival.instead.iter().map(move |cause| (cause.clone(), each))
