@@ -14,6 +14,7 @@ mod evidence;
 mod evidence_laws;
 mod harmonics;
 mod limits;
+mod masses;
 mod screening;
 mod selection_rules;
 mod stopped;
