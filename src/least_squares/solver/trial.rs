@@ -69,3 +69,75 @@ impl Trial {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::DVector;
+
+    use super::*;
+
+    /// Returns the trial of a step of length 2 with slope 6, predicted reduction 4 and damping 1,
+    /// taken where the cost is 10.
+    fn trial(after: f64, acceleration: Option<f64>) -> Trial {
+        let point = DVector::zeros(1);
+        let step = Step { point, length: 2.0, slope: 6.0, predicted: 4.0, damping: 1.0 };
+        Trial::new((&step, acceleration), 10.0, after)
+    }
+
+    #[test]
+    fn reductions_are_relative_to_the_cost_before() {
+        let found = trial(7.0, None);
+        let values = [found.actual, found.predicted, found.slope, found.ratio];
+        for (value, expected) in values.into_iter().zip([0.3, 0.4, 0.6, 0.75]) {
+            assert!((value - expected).abs() < 1e-15, "{values:?}");
+        }
+        // A cost that grows a hundredfold, or is infinite, counts as twice the cost before.
+        for after in [1e3, f64::INFINITY] {
+            assert!((trial(after, None).actual + 1.0).abs() < 1e-15);
+        }
+        assert!((trial(990.0, None).actual + 98.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn differences_within_rounding_are_no_miss() {
+        let found = trial(7.0, None);
+        assert!((found.significant_ratio(0.2) - 1.0).abs() < 1e-15);
+        assert!((found.significant_ratio(0.05) - 0.75).abs() < 1e-15);
+    }
+
+    #[test]
+    fn the_radius_follows_the_gain_ratio() {
+        let undamped = |after| Trial { damping: 0.0, ..trial(after, None) };
+        let cases = [
+            // Well predicted: twice the length of the step.
+            (trial(6.0, None), 4.0),
+            // In between: as before if the radius limited the step, else twice its length.
+            (trial(8.0, None), 3.0),
+            (undamped(8.0), 4.0),
+            // Poorly predicted: half if the cost fell, else the minimum of the parabola through
+            // both costs and the slope, 0.5 · 0.6 / (0.6 + 0.4), clamped to 0.1 … 0.5.
+            (trial(9.5, None), 1.5),
+            (trial(14.0, None), 0.9),
+            (trial(10.5, None), 3.0 * 0.5 * 0.6 / 0.65),
+            (trial(19.0, None), 0.6),
+            // The cost doubled or more.
+            (trial(21.0, None), 0.3),
+            (trial(f64::INFINITY, None), 0.3),
+            (Trial { slope: 3.0, ..trial(20.0, None) }, 0.3),
+        ];
+        for (k, (trial, expected)) in cases.into_iter().enumerate() {
+            let radius = trial.next_radius(3.0);
+            assert!((radius - expected).abs() < 1e-12, "case {k}: {radius}");
+        }
+        // A radius far beyond the step shrinks from ten times the length of the step.
+        assert!((trial(9.5, None).next_radius(1e6) - 10.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_radius_of_accelerated_steps_follows_their_acceleration() {
+        for (acceleration, growth) in [(0.01, 3.0), (1e-6, 8.0), (0.0, 8.0), (0.5, 1.5)] {
+            let radius = trial(6.0, Some(acceleration)).next_radius(3.0);
+            assert!((radius - growth * 2.0).abs() < 1e-12, "{acceleration}: {radius}");
+        }
+    }
+}

@@ -428,3 +428,52 @@ impl<O: Objective, S: Subproblem> Solver<O, State> for TrustRegion<S> {
         Ok((state_after_iteration(state, x, cost, termination), Some(log)))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::levenberg_marquardt::Unconstrained;
+    use super::*;
+
+    #[test]
+    fn small_reductions_and_steps_are_convergence() {
+        let settings =
+            Settings { cost_tolerance: 1e-8, step_tolerance: 1e-6, ..Settings::default() };
+        let solver = TrustRegion::new(Unconstrained::default(), settings);
+        let trial = |actual: f64, predicted: f64, length: f64, damping: f64| {
+            let step = Step { length, predicted, damping, ..Step::none(&DVector::zeros(1)) };
+            let trial = Trial::new((&step, None), 1.0, 1.0 - actual);
+            solver.test_convergence(&trial, 10.0)
+        };
+        assert_eq!(trial(1e-3, 1e-3, 1.0, 0.0), None);
+        assert_eq!(trial(1e-9, 1e-9, 1.0, 0.0), Some(Termination::Cost));
+        // A reduction up to twice the prediction agrees with it.
+        assert_eq!(trial(1.5e-9, 1e-9, 1.0, 0.0), Some(Termination::Cost));
+        assert_eq!(trial(3e-9, 1e-9, 1.0, 0.0), None);
+        assert_eq!(trial(1e-3, 1e-3, 9e-6, 0.0), Some(Termination::Step));
+        assert_eq!(trial(f64::NEG_INFINITY, 1e-3, 9e-6, 0.0), Some(Termination::DomainEdge));
+        // The radius limits the step and will grow.
+        assert_eq!(trial(1e-9, 1e-9, 9e-6, 1.0), None);
+    }
+
+    #[test]
+    fn the_first_radius_is_a_multiple_of_the_start_or_the_residual() {
+        let accept = |unit: f64, x: f64| {
+            let mut solver = TrustRegion::new(Unconstrained::default(), Settings::default());
+            let linearisation = Linearisation {
+                cost: 0.5 * 25.0 * unit * unit,
+                triangle: DMatrix::from_element(1, 1, 2.0 * unit),
+                projected: DVector::from_element(1, 3.0 * unit),
+            };
+            assert!(
+                solver.accept_linearisation(&DVector::from_element(1, x), linearisation).is_none()
+            );
+            solver.radius.unwrap()
+        };
+        // ‖r‖ = 5, ‖D x‖ = 2 |x|, in any unit of the residuals.
+        for unit in [1.0, 1e3, 1e-6] {
+            assert!((accept(unit, 1.5) / unit - 300.0).abs() < 1e-9);
+            assert!((accept(unit, 1e-4) / unit - 5.0).abs() < 1e-12);
+        }
+        assert!((accept(1.0, 0.0) - 100.0).abs() < 1e-12);
+    }
+}
