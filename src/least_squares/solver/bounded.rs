@@ -301,3 +301,58 @@ fn step_within_radius(
     }
     best.unwrap_or_else(|| (solve(high), high))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Returns the solution of one coordinate q = g / (b + λ).
+    fn hebden(gradient: f64, curvature: f64, lambda: f64) -> PolyhedronSolution {
+        let q = DVector::from_element(1, gradient / (curvature + lambda));
+        PolyhedronSolution { q, faces: Faces { bounds: vec![None], rows: Vec::new() } }
+    }
+
+    #[test]
+    fn the_damping_is_found_by_the_model_of_two_steps() {
+        // ‖q(λ)‖ = 6 / (2 + λ) is its own model: the second damped step has the radius exactly.
+        for (first, radius) in [(0.0, 1.0), (0.0, 0.02), (5.0, 0.02), (900.0, 0.02), (0.1, 1.5)] {
+            let mut solved = Vec::new();
+            let solve = |lambda| {
+                solved.push(lambda);
+                hebden(6.0, 2.0, lambda)
+            };
+            let (solution, lambda) = step_within_radius(solve, first, 6.0, radius);
+            let expected = 6.0 / radius - 2.0;
+            assert!((lambda / expected - 1.0).abs() < 1e-9, "{first} {radius}: {lambda}");
+            assert!((solution.q[0] / radius - 1.0).abs() < 1e-9);
+            assert_eq!(solved.len(), 3, "{solved:?}");
+        }
+    }
+
+    #[test]
+    fn steps_shorter_than_the_radius_are_not_damped() {
+        let solve = |lambda| hebden(6.0, 2.0, lambda);
+        assert!(step_within_radius(solve, 0.0, 6.0, 2.8).1.abs() < 1e-300);
+        assert!(step_within_radius(solve, 7.0, 6.0, 3.5).1.abs() < 1e-300);
+        // The damping of the unconstrained step is kept if its step has the radius to within 10 %.
+        let (solution, lambda) = step_within_radius(solve, 4.0, 6.0, 1.08);
+        assert!((lambda - 4.0).abs() < 1e-300 && (solution.q[0] - 1.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn the_damping_is_bracketed_where_the_model_fails() {
+        // A length that falls in a jump, as where a face becomes active.
+        let jump = |lambda: f64| if lambda < 3.0 { 4.0 } else { 6.0 / (2.0 + lambda) };
+        let solve = |lambda| PolyhedronSolution {
+            q: DVector::from_element(1, jump(lambda)),
+            faces: Faces { bounds: vec![None], rows: Vec::new() },
+        };
+        for radius in [0.1, 0.9, 1.05] {
+            let (solution, _) = step_within_radius(solve, 0.0, 8.0, radius);
+            assert!((solution.q[0] / radius - 1.0).abs() < MAX_RADIUS_DEVIATION, "{radius}");
+        }
+        // No damping has this radius; the step is shorter.
+        let (solution, lambda) = step_within_radius(solve, 0.0, 8.0, 2.0);
+        assert!(solution.q[0] <= 2.0 && lambda >= 3.0);
+    }
+}

@@ -188,4 +188,19 @@ mod tests {
             DVector::zeros(5)
         );
     }
+
+    #[test]
+    fn triangles_are_well_conditioned_whatever_the_units() {
+        let well = |matrix: &DMatrix<f64>, tolerance| {
+            let factor = Factor::new(matrix.clone(), DVector::zeros(3), tolerance);
+            factor.is_well_conditioned()
+        };
+        let triangle = |last: f64| {
+            DMatrix::from_row_slice(3, 3, &[1e6, 2.0, 1.0, 0.0, 3.0, -1.0, 0.0, 0.0, last])
+        };
+        assert!(well(&triangle(0.5), 1e-12));
+        assert!(!well(&triangle(1e-10), 1e-12) && !well(&triangle(0.0), 1e-12));
+        // Not if the tolerance asks for a rank, nor for another matrix.
+        assert!(!well(&triangle(0.5), 1e-6) && !well(&triangle(0.5).transpose(), 1e-12));
+    }
 }

@@ -80,3 +80,53 @@ impl Spectrum {
         lambda
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Returns the expansion of min ‖B q + c‖ for B = U diag(100, 4, 1) Vᵀ with rotations U and V,
+    /// with B and c.
+    fn example(cut: f64) -> (Spectrum, DMatrix<f64>, DVector<f64>) {
+        let turn = |a, b, c| {
+            let turn = nalgebra::Rotation3::from_euler_angles(a, b, c);
+            DMatrix::from_column_slice(3, 3, turn.matrix().as_slice())
+        };
+        let sizes = DMatrix::from_diagonal(&DVector::from_vec(vec![100.0, 4.0, 1.0]));
+        let matrix = turn(0.3, -0.7, 1.1) * sizes * turn(-0.2, 0.5, 0.9).transpose();
+        let constant = DVector::from_vec(vec![40.0, -7.0, 3.0]);
+        (Spectrum::new(&matrix, &constant, cut), matrix, constant)
+    }
+
+    #[test]
+    fn solutions_satisfy_the_damped_normal_equations() {
+        let (spectrum, matrix, constant) = example(0.0);
+        for lambda in [0.0, 0.3, 50.0] {
+            let q = spectrum.solution(lambda, 3);
+            let normal = matrix.tr_mul(&(&matrix * &q + &constant)) + lambda * &q;
+            assert!(normal.norm() < 1e-11 * matrix.tr_mul(&constant).norm(), "{normal}");
+        }
+    }
+
+    #[test]
+    fn the_damping_meets_the_radius() {
+        let (spectrum, ..) = example(0.0);
+        let full = spectrum.solution(0.0, 3).norm();
+        assert!(spectrum.secular_root(full).abs() < 1e-300);
+        for fraction in [0.7, 0.3, 0.05, 1e-3] {
+            let lambda = spectrum.secular_root(fraction * full);
+            let ratio = spectrum.solution(lambda, 3).norm() / (fraction * full);
+            assert!(lambda > 0.0 && (ratio - 1.0).abs() <= MAX_RADIUS_DEVIATION + 1e-12, "{ratio}");
+        }
+    }
+
+    #[test]
+    fn directions_up_to_the_cut_do_not_move() {
+        // Of the ratios 1, 0.04 and 0.01 to the largest singular value, 0.02 cuts the last.
+        let (full, cut) = (example(0.0), example(0.02));
+        let lost = full.0.solution(0.0, 3) - cut.0.solution(0.0, 3);
+        assert!(lost.norm() > 1e-3);
+        let image = &full.1 * &lost;
+        assert!((image.norm() - lost.norm()).abs() < 1e-10 * lost.norm());
+    }
+}
