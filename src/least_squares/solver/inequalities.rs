@@ -137,3 +137,58 @@ impl Inequalities {
             .fold((0.0, 0.0), |(sum, size), (a, x)| (sum + a * x, size + (a * x).abs()))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_hold_and_are_active_to_within_rounding() {
+        let vector = |values: &[f64]| DVector::from_column_slice(values);
+        let matrix = DMatrix::from_row_slice(2, 2, &[1.0, 2.0, 1e3, -1e3]);
+        let rows = Inequalities::new(matrix, vector(&[-3.0, -f64::INFINITY]), vector(&[5.0, 2e3]));
+        let rows = rows.unwrap();
+        // The first row has the value x₀ + 2 x₁, with terms of size 1 and 4.
+        for (excess, holds, at) in [
+            (0.0, true, Some(AtBound::Upper)),
+            (1e-15, true, Some(AtBound::Upper)),
+            (-1e-3, true, None),
+            (1e-3, false, None),
+            (1e-9, false, None),
+        ] {
+            let x = vector(&[1.0 + excess, 2.0]);
+            assert_eq!((rows.holds(&x, 0), rows.at(&x, 0)), (holds, at), "{excess}");
+            assert_eq!(rows.contain(&x), holds);
+            let x = vector(&[-1.0 - excess, -1.0]);
+            let at = at.map(|_| AtBound::Lower);
+            assert_eq!((rows.holds(&x, 0), rows.at(&x, 0)), (holds, at), "{excess}");
+        }
+        // Rounding is relative to the terms, here 2e6 each.
+        let x = vector(&[2e3 + 2.0 + 1e-12, 2e3]);
+        assert!(rows.holds(&x, 1) && rows.at(&x, 1) == Some(AtBound::Upper));
+        assert!(!rows.holds(&vector(&[2e3 + 2.0 + 1e-6, 2e3]), 1));
+        assert!(rows.holds(&vector(&[-1e9, 2e3]), 1));
+        assert!(!rows.is_empty() && Inequalities::none(2).is_empty());
+    }
+
+    #[test]
+    fn rows_without_a_value_are_refused() {
+        let row = |matrix: [f64; 2], lower: f64, upper: f64| {
+            let (lower, upper) = (DVector::from_element(1, lower), DVector::from_element(1, upper));
+            Inequalities::new(DMatrix::from_row_slice(1, 2, &matrix), lower, upper)
+        };
+        assert!(row([1.0, 0.0], -1.0, 1.0).is_ok() && row([1.0, 0.0], 1.0, 1.0).is_ok());
+        let refused = [
+            row([1.0, 0.0], 1.0, -1.0),
+            row([1.0, 0.0], f64::INFINITY, f64::INFINITY),
+            row([1.0, 0.0], f64::NEG_INFINITY, f64::NEG_INFINITY),
+            row([1.0, 0.0], f64::NAN, 1.0),
+            row([0.0, 0.0], -1.0, 1.0),
+            row([f64::NAN, 0.0], -1.0, 1.0),
+            row([f64::INFINITY, 0.0], -1.0, 1.0),
+        ];
+        for found in refused {
+            assert!(matches!(found, Err(InequalitiesError::Empty { row: 0, .. })), "{found:?}");
+        }
+    }
+}

@@ -298,3 +298,82 @@ impl Polyhedron {
         PolyhedronSolution { faces: self.faces_near(&q, tolerance), q }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn vector(values: &[f64]) -> DVector<f64> {
+        DVector::from_column_slice(values)
+    }
+
+    /// Returns the polyhedron around a point for two bounded unknowns and one without bounds, with
+    /// the rows −3 ≤ x₀ + 2 x₁ + x₂ ≤ 8 and x₁ − x₂ ≤ 1; also point, bounds, rows and scale.
+    fn example(point: [f64; 3]) -> (Polyhedron, DVector<f64>, Bounds, Inequalities, DVector<f64>) {
+        let infinite = f64::INFINITY;
+        let bounds =
+            Bounds::new(vector(&[0.0, -1.0, -infinite]), vector(&[5.0, 4.0, infinite])).unwrap();
+        let matrix = DMatrix::from_row_slice(2, 3, &[1.0, 2.0, 1.0, 0.0, 1.0, -1.0]);
+        let rows =
+            Inequalities::new(matrix, vector(&[-3.0, -infinite]), vector(&[8.0, 1.0])).unwrap();
+        let (x, scale) = (vector(&point), vector(&[2.0, 0.5, 3.0]));
+        (Polyhedron::around(&x, &bounds, &rows, &scale), x, bounds, rows, scale)
+    }
+
+    #[test]
+    fn faces_through_the_point_are_active() {
+        // x₀ on its lower bound, x₀ + 2 x₁ + x₂ on its upper limit, x₁ − x₂ on its limit.
+        let (polyhedron, ..) = example([0.0, 3.0, 2.0]);
+        let faces = polyhedron.faces_at_origin.clone();
+        assert_eq!(faces.bounds, [Some(AtBound::Lower), None, None]);
+        assert_eq!(faces.rows, [false, true, true]);
+        assert_eq!((faces.free_unknowns(), faces.active_rows()), (vec![1, 2], vec![1, 2]));
+        let normals = polyhedron.normals_of(&faces);
+        assert_eq!(normals.row(0), vector(&[1.0, 0.0, 0.0]).transpose());
+        assert_eq!(normals.rows(1, 2), polyhedron.normals.rows(1, 2));
+        // A force made of the normals has their coefficients as multipliers.
+        let force = normals.tr_mul(&vector(&[0.4, 2.0, 3.0]));
+        let (remainder, multipliers) = polyhedron.multipliers(&faces, &force);
+        assert!((remainder - vector(&[0.4, 0.0, 0.0])).amax() < 1e-12);
+        assert_eq!(multipliers.iter().map(|pair| pair.0).collect::<Vec<_>>(), [1, 2]);
+        assert!((multipliers[0].1 - 2.0).abs() < 1e-12 && (multipliers[1].1 - 3.0).abs() < 1e-12);
+        assert!(polyhedron.projected_gradient(&force).amax() < 1e-12);
+        // A descent step leaves the face whose multiplier is negative; the gradient along the
+        // others remains.
+        let force = normals.tr_mul(&vector(&[0.4, 2.0, -1.0]));
+        let (active, _) = polyhedron.active_faces(&force);
+        assert_eq!(
+            (active.bounds[0], active.rows),
+            (Some(AtBound::Lower), vec![false, true, false])
+        );
+        let along = polyhedron.projected_gradient(&force);
+        assert!(along.norm() > 0.1 && along[0].abs() < 1e-300);
+        assert!(polyhedron.normals.row(1).transpose().dot(&along).abs() < 1e-12);
+    }
+
+    #[test]
+    fn points_on_faces_are_spanned_by_the_basis() {
+        let (polyhedron, ..) = example([1.0, 0.5, 0.25]);
+        let mut faces = polyhedron.faces_at_origin.clone();
+        assert!(polyhedron.affine_subspace(&faces).1.is_none());
+        faces.rows[1] = true;
+        let (corner, basis) = polyhedron.affine_subspace(&faces);
+        let basis = basis.unwrap();
+        let normal = polyhedron.normals.row(1).transpose();
+        assert!((normal.dot(&corner) - polyhedron.offsets[1]).abs() < 1e-12);
+        // The shortest point of the face lies along its normal.
+        assert!((&corner - &normal * polyhedron.offsets[1]).amax() < 1e-12);
+        assert_eq!(basis.shape(), (3, 2));
+        assert!((basis.tr_mul(&basis) - DMatrix::identity(2, 2)).amax() < 1e-12);
+        assert!(basis.tr_mul(&normal).amax() < 1e-12);
+        faces.bounds[1] = Some(AtBound::Upper);
+        faces.rows[2] = true;
+        let (corner, basis) = polyhedron.affine_subspace(&faces);
+        assert!((corner[1] - polyhedron.upper[1]).abs() < 1e-12);
+        for i in [1, 2] {
+            let along = polyhedron.normals.row(i).transpose().dot(&corner);
+            assert!((along - polyhedron.offsets[i]).abs() < 1e-12);
+        }
+        assert_eq!(basis.unwrap().shape(), (2, 0));
+    }
+}
