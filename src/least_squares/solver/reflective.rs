@@ -237,3 +237,114 @@ impl Subproblem for Reflective {
         Step { point, length: scaled.norm(), slope, predicted: -change, damping }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn vector(values: &[f64]) -> DVector<f64> {
+        DVector::from_column_slice(values)
+    }
+
+    fn within(lower: &[f64], upper: &[f64]) -> Reflective {
+        Reflective::new(Bounds::new(vector(lower), vector(upper)).unwrap())
+    }
+
+    #[test]
+    fn steps_end_at_the_first_bound() {
+        let infinite = f64::INFINITY;
+        let bounded = within(&[-1.0, -2.0, -infinite], &[3.0, 2.0, infinite]);
+        let x = vector(&[1.0, 0.0, 5.0]);
+        for (step, fraction, hits) in [
+            ([4.0, 1.0, 9.0], 0.5, vec![0]),
+            ([-4.0, 1.0, 9.0], 0.5, vec![0]),
+            ([2.0, -4.0, 0.0], 0.5, vec![1]),
+            ([2.0, 2.0, -1.0], 1.0, vec![0, 1]),
+            ([0.5, 8.0, 0.0], 0.25, vec![1]),
+        ] {
+            let (found, met) = bounded.fraction_to_bound(&x, &vector(&step));
+            assert!((found - fraction).abs() < 1e-15 && met == hits, "{step:?}: {found} {met:?}");
+        }
+        assert!(bounded.fraction_to_bound(&x, &vector(&[0.0, 0.0, 1.0])).0.is_infinite());
+    }
+
+    #[test]
+    fn fractions_reach_the_radius() {
+        let from = vector(&[0.6, -0.2]);
+        for along in [[2.0, 1.0], [-2.0, 1.0], [0.5, 1.5], [-3.0, 0.0]] {
+            let along = vector(&along);
+            let fraction = fraction_to_radius(&from, &along, 1.5);
+            assert!(fraction > 0.0 && ((&from + fraction * &along).norm() - 1.5).abs() < 1e-12);
+        }
+        // From outside and outwards there is none; neither without a direction.
+        assert!(fraction_to_radius(&from, &from, 0.1).abs() < 1e-300);
+        assert!(fraction_to_radius(&from, &vector(&[0.0, 0.0]), 1.5).abs() < 1e-300);
+    }
+
+    #[test]
+    fn starts_are_moved_off_the_bounds() {
+        let infinite = f64::INFINITY;
+        let narrow = 2.0 + 1e-11;
+        let bounded = within(&[-1.0, 2e3, 2.0, -infinite], &[3.0, 4e3, narrow, 7.0]);
+        let mut start = vector(&[-9.0, 5e3, 2.0, 3.0]);
+        assert!(bounded.admit_start(&mut start));
+        // 1e-10 times the magnitude of the bound, or times 1.
+        assert!(((start[0] + 1.0) / 1e-10 - 1.0).abs() < 1e-4, "{start}");
+        assert!(((4e3 - start[1]) / 4e-7 - 1.0).abs() < 1e-4, "{start}");
+        // Between bounds that are closer: the middle.
+        assert!((start[2] - 0.5 * (2.0 + narrow)).abs() < 1e-15);
+        assert!((start[3] - 3.0).abs() < 1e-15);
+        assert!(!bounded.admit_start(&mut vector(&[0.0])));
+    }
+
+    #[test]
+    fn steps_stay_inside_and_reduce_the_model_as_predicted() {
+        let lower = [-1.0, -0.4, -5.0];
+        let upper = [0.3, 2.0, 0.2];
+        let triangle = nalgebra::DMatrix::from_row_slice(
+            3,
+            3,
+            &[2.0, 0.5, -0.3, 0.0, 1.0, 0.8, 0.0, 0.0, 0.5],
+        );
+        let x = vector(&[0.1, 0.2, -0.3]);
+        let scale = DVector::from_iterator(3, triangle.column_iter().map(|c| c.norm()));
+        for projected in [[-3.0, 1.0, -2.0], [3.0, -1.0, 0.4], [0.5, 4.0, -1.0], [-9.0, -9.0, 9.0]]
+        {
+            let projected = vector(&projected);
+            let cost = 0.5 * projected.norm_squared();
+            let gradient = triangle.tr_mul(&projected);
+            let distances = DVector::from_fn(3, |j, _| {
+                (if gradient[j] < 0.0 { upper[j] - x[j] } else { x[j] - lower[j] }).abs()
+            });
+            // gᵀp + ½‖J p‖² + ½ pᵀ V⁻¹|g| p
+            let model = |p: &DVector<f64>| {
+                let barrier = gradient.abs().component_div(&distances);
+                let squares = (&triangle * p).norm_squared() + barrier.dot(&p.component_mul(p));
+                gradient.dot(p) + 0.5 * squares
+            };
+            let linearisation = Linearisation { cost, triangle: triangle.clone(), projected };
+            for radius in [0.2, 1.0, 30.0] {
+                let mut subproblem = within(&lower, &upper);
+                subproblem.prepare(&x, &linearisation, &scale, &Settings::default());
+                let step = subproblem.step(&x, radius);
+                let p = &step.point - &x;
+                assert!((0..3).all(|j| lower[j] < step.point[j] && step.point[j] < upper[j]));
+                assert!(step.length <= 1.1 * radius + 1e-12);
+                assert!((step.slope + gradient.dot(&p)).abs() < 1e-12 * step.slope.abs());
+                assert!((step.predicted + model(&p)).abs() < 1e-12 * step.predicted);
+                // No point of the scaled steepest descent, −t V D⁻¹ g, that is well inside the box
+                // and the radius is lower.
+                let direction = -gradient.component_mul(&distances).component_div(&scale);
+                let squares = direction.component_mul(&scale).component_div(&distances);
+                let longest = 0.9 * radius / squares.dot(&direction).sqrt();
+                for t in (1..100).map(|k| 0.01 * f64::from(k) * longest) {
+                    let p = t * &direction;
+                    let end = &x + &p / MAX_BOUND_FRACTION;
+                    if (0..3).all(|j| lower[j] <= end[j] && end[j] <= upper[j]) {
+                        assert!(-step.predicted <= model(&p) + 1e-12 * step.predicted);
+                    }
+                }
+            }
+        }
+    }
+}
