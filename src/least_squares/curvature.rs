@@ -52,3 +52,43 @@ pub(super) fn curvature_by_differences(
     });
     symmetric.iter().all(|value| value.is_finite()).then_some(symmetric)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn differences_suit_the_sizes_of_residual_and_unknowns() {
+        // r₁ = u (a + a² b), r₂ = u (2 b − a³ − 3) with a = x₀ / s₀, b = x₁ / s₁.
+        for (unit, sizes) in [(1.0, [1.0, 1.0]), (1e4, [1e-3, 1e5]), (1e-4, [1e6, 1e-4])] {
+            let slopes = |x: &DVector<f64>| {
+                let (a, b) = (x[0] / sizes[0], x[1] / sizes[1]);
+                let r = DVector::from_vec(vec![a + a * a * b, 2.0 * b - a.powi(3) - 3.0]) * unit;
+                let d = [1.0 + 2.0 * a * b, a * a, -3.0 * a * a, 2.0];
+                let jacobian = DMatrix::from_fn(2, 2, |i, j| unit * d[2 * i + j] / sizes[j]);
+                QuadraticModel {
+                    cost: 0.5 * r.norm_squared(),
+                    gradient: jacobian.tr_mul(&r),
+                    normal: jacobian.tr_mul(&jacobian),
+                }
+            };
+            let (a, b) = (0.7, -0.4);
+            let x = DVector::from_vec(vec![a * sizes[0], b * sizes[1]]);
+            let (r1, r2) = (a + a * a * b, 2.0 * b - a.powi(3) - 3.0);
+            let cross = r1 * 2.0 * a;
+            let exact = [r1 * 2.0 * b - r2 * 6.0 * a, cross, cross, 0.0];
+            let everywhere = |_: &DVector<f64>| true;
+            let second = curvature_by_differences(slopes, &x, &everywhere).unwrap();
+            for (i, j) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+                let found = second[(i, j)] * sizes[i] * sizes[j] / (unit * unit);
+                assert!((found - exact[2 * i + j]).abs() < 2e-2, "{unit}: {second}");
+            }
+            // Only x₀ may move, and only downwards: the entry of x₁ alone is unknown.
+            let below =
+                |moved: &DVector<f64>| moved[0] <= x[0] && moved[1].to_bits() == x[1].to_bits();
+            let second = curvature_by_differences(slopes, &x, &below).unwrap();
+            let found = second[(0, 1)] * sizes[0] * sizes[1] / (unit * unit);
+            assert!((found - cross).abs() < 2e-2 && second[(1, 1)] == 0.0, "{unit}: {second}");
+        }
+    }
+}

@@ -126,3 +126,38 @@ impl Subproblem for Unconstrained {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn accelerations_are_added_to_the_gradient() {
+        let triangle = DMatrix::from_row_slice(2, 2, &[3.0, 0.4, 0.0, 0.7]);
+        let projected = DVector::from_vec(vec![1.0, -0.6]);
+        let (scale, x) = (DVector::from_vec(vec![2.0, 0.5]), DVector::from_vec(vec![7.0, -4.0]));
+        let acceleration = DVector::from_vec(vec![0.3, -1.1]);
+        let gradient = triangle.tr_mul(&projected) + 0.5 * &acceleration;
+        let linearisation =
+            Linearisation { cost: 1.0, triangle: triangle.clone(), projected: projected.clone() };
+        let model = Model::new(&linearisation, &scale, &Settings::default());
+        let found = model.with_acceleration(&acceleration).unwrap().gradient();
+        assert!((found.component_mul(&scale) - &gradient).amax() < 1e-12);
+        let lacking = Linearisation { triangle: DMatrix::zeros(2, 2), ..linearisation.clone() };
+        let lacking = Model::new(&lacking, &scale, &Settings::default());
+        assert!(lacking.with_acceleration(&acceleration).is_none());
+
+        // (JᵀJ + λ D²) p = −Jᵀr − ½ Jᵀr″ with the damping λ of the step.
+        let mut subproblem = Unconstrained::default();
+        subproblem.prepare(&x, &linearisation, &scale, &Settings::default());
+        for radius in [0.2, 100.0] {
+            let step = subproblem.step(&x, radius);
+            assert_eq!(step.damping > 0.0, radius < 1.0);
+            let point = subproblem.accelerated(&x, &acceleration, step.damping).unwrap();
+            let damped = triangle.tr_mul(&triangle)
+                + DMatrix::from_diagonal(&scale.component_mul(&scale)) * step.damping;
+            let force = damped * (point - &x) + &gradient;
+            assert!(force.amax() < 1e-12 * (1.0 + step.damping), "{force}");
+        }
+    }
+}

@@ -280,4 +280,110 @@ mod tests {
         // first.
         assert!(!forms(0.9, 100, 500) && forms(0.9, 40, 500) && !forms(0.9, 2, 500));
     }
+
+    #[test]
+    fn slow_steps_are_extrapolated_to_the_smallest_reduction() {
+        let with =
+            |lengths: &[f64]| SecondOrder { lengths: lengths.to_vec(), ..Default::default() };
+        // Each step leaves 0.36 of the reduction: ln 1e4 / (2 ln 1/0.6) = 9.02 steps.
+        let slow = with(&[5.0, 1.0, 0.6, 0.36, 0.216]);
+        assert!((slow.expected_steps(1e4) - 9.015).abs() < 1e-3);
+        // Three ratios are needed, none of them below one half.
+        assert!(with(&[1.0, 0.6, 0.36]).expected_steps(1e4).abs() < 1e-300);
+        assert!(with(&[1.0, 0.6, 0.24, 0.2]).expected_steps(1e4).abs() < 1e-300);
+        assert!(with(&[1.0, 0.9, 0.9, 1.0]).expected_steps(1e4).is_infinite());
+    }
+
+    #[test]
+    fn second_derivatives_are_formed_after_enough_poor_predictions() {
+        // Steps limited by the radius, with 6 unknowns or 120; 15 misses, or one in six unknowns.
+        let misses_until = |ratio: f64, unknowns: usize| {
+            let mut second_order = SecondOrder::default();
+            (1..100).find(|_| {
+                second_order.should_form_second_derivatives(
+                    (ratio, true),
+                    (1.0, 0.5),
+                    (1e8, 200),
+                    unknowns,
+                )
+            })
+        };
+        assert_eq!(misses_until(0.3, 6), Some(15));
+        assert_eq!(misses_until(1.6, 6), Some(15));
+        assert_eq!(misses_until(0.3, 120), Some(20));
+        assert_eq!(misses_until(0.6, 6), None);
+    }
+
+    #[test]
+    fn second_derivatives_are_renewed_where_their_prediction_fails() {
+        let formed = || {
+            let mut second_order = SecondOrder::default();
+            second_order.set_matrix(Some(DMatrix::identity(2, 2)));
+            second_order
+        };
+        let next = |second_order: &mut SecondOrder, (ratio, taken), damping, unknowns| {
+            let (length, rest) = ((1.0, damping), (1e8, 200));
+            second_order.should_form_second_derivatives((ratio, taken), length, rest, unknowns)
+        };
+        // With S an undamped step within 10 % is predicted well, a damped one within 50 %.
+        assert!(next(&mut formed(), (0.8, true), 0.0, 6));
+        assert!(!next(&mut formed(), (0.95, true), 0.0, 6));
+        assert!(!next(&mut formed(), (0.8, true), 0.5, 6));
+        assert!(next(&mut formed(), (0.4, true), 0.5, 6));
+        // Not where it was formed at the same point, nor before one step per 40 unknowns.
+        assert!(!next(&mut formed(), (-1.0, false), 0.0, 6));
+        let mut many = formed();
+        assert!(!next(&mut many, (0.8, true), 0.0, 80) && next(&mut many, (0.8, true), 0.0, 80));
+        // Nor after convergence.
+        let mut retired = formed();
+        retired.stop_second_derivatives();
+        retired.misses = 1000;
+        assert!(!next(&mut retired, (0.1, true), 0.0, 6));
+    }
+
+    #[test]
+    fn convex_models_underestimate_the_reduction_by_what_made_them_convex() {
+        let triangle =
+            DMatrix::from_row_slice(3, 3, &[2.0, 0.3, -0.5, 0.0, 1.5, 0.4, 0.0, 0.0, 1.0]);
+        let projected = DVector::from_vec(vec![0.7, -1.2, 0.4]);
+        let gradient = triangle.tr_mul(&projected);
+        let normal = triangle.tr_mul(&triangle);
+        let linearisation = Linearisation { cost: 3.0, triangle, projected };
+        let scale = DVector::from_vec(vec![2.0, 0.5, 3.0]);
+        let face = DMatrix::from_row_slice(1, 3, &[0.0, 0.0, 1.0]);
+        for (lowest, is_damped, is_penalised) in
+            [(0.1, false, false), (-40.0, false, true), (-40.0, true, true)]
+        {
+            let mut second = DMatrix::from_diagonal(&DVector::from_vec(vec![0.2, -0.1, lowest]));
+            let normals = if is_damped { DMatrix::zeros(0, 3) } else { face.clone() };
+            second[(0, 2)] = 0.3;
+            second[(2, 0)] = 0.3;
+            let mut second_order = SecondOrder::default();
+            second_order.set_matrix(Some(second.clone()));
+            let convex = second_order.model(&linearisation, &scale, || normals).unwrap();
+            assert_eq!(convex.damping > 0.0, is_damped);
+            assert_eq!(convex.penalty_rows.nrows() == 1, is_penalised && !is_damped);
+            let model = &convex.linearisation;
+            for p in [[1.0, 0.0, 0.0], [0.3, -0.4, 0.6], [0.0, 2.0, -1.0]] {
+                let p = DVector::from_column_slice(&p);
+                let exact = -gradient.dot(&p) - 0.5 * p.dot(&((&normal + &second) * &p));
+                let slope = model.triangle.tr_mul(&model.projected).dot(&p);
+                let found = -slope - 0.5 * (&model.triangle * &p).norm_squared();
+                let under = convex.underestimated_reduction(&p.component_mul(&scale));
+                assert!((found + under - exact).abs() < 1e-9 * (1.0 + under), "{found} {under}");
+                assert_eq!(under.abs() > 0.0, is_penalised && (is_damped || p[2].abs() > 0.0));
+            }
+            // Just enough damping: with 1.01 times the lowest curvature the model is flat there.
+            if is_damped {
+                let lowest = (0..3).fold(&normal + second, |mut hessian, j| {
+                    hessian.row_mut(j).scale_mut(scale[j].recip());
+                    hessian.column_mut(j).scale_mut(scale[j].recip());
+                    hessian
+                });
+                let lowest = lowest.symmetric_eigenvalues().min();
+                assert!((convex.damping / -lowest - 1.01).abs() < 1e-6, "{}", convex.damping);
+            }
+        }
+        assert!(SecondOrder::default().model(&linearisation, &scale, || face).is_none());
+    }
 }
