@@ -367,4 +367,28 @@ mod tests {
             );
         }
     }
+
+    #[test]
+    fn condition_and_observability_are_those_of_the_singular_values() {
+        // Unit columns with the cosine c have the singular values √(1 + c) and √(1 − c); the lengths
+        // of the columns do not count.
+        let c: f64 = 0.28;
+        let columns = [5.0, 0.0, 0.02 * c, 0.02 * (1.0 - c * c).sqrt()];
+        let found = Identifiability::of(&DMatrix::from_column_slice(2, 2, &columns));
+        let (largest, smallest) = ((1.0 + c).sqrt(), (1.0 - c).sqrt());
+        assert!((found.condition_number() - largest / smallest).abs() < 1e-12);
+        let expected = [
+            (largest * smallest).sqrt() / 3.0,
+            smallest / largest,
+            smallest,
+            smallest * smallest / largest,
+            1.0 / (1.0 / largest + 1.0 / smallest),
+        ];
+        for (index, expected) in found.observability(9).into_iter().zip(expected) {
+            assert!((index - expected).abs() < 1e-12, "{index} {expected}");
+        }
+        let blind = Identifiability::of(&DMatrix::zeros(2, 2));
+        assert!((blind.condition_number() - 1.0).abs() < 1e-15);
+        assert!(blind.observability(9).iter().all(|index| index.abs() < 1e-300));
+    }
 }

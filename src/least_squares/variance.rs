@@ -216,4 +216,49 @@ mod tests {
         let maximum = likelihood(200, 1.0, [30.0, 7.0]).maximum();
         assert!((maximum.0.sqrt() - 1.0).abs() < 0.3, "{maximum:?}");
     }
+
+    #[test]
+    fn the_maximum_is_that_of_the_formula() {
+        // Without priors: s² = ‖y − U c‖² / m, −2 ln L = m ln s² + ‖y − U c‖² / s².
+        let free = |squares: f64, rows: f64| VarianceLikelihood {
+            directions: Vec::new(),
+            residual_squares: squares,
+            free_rows: rows,
+        };
+        for (squares, rows) in [(8.0, 2.0), (0.03, 5.0), (7.0, 7.0), (900.0, 4.0)] {
+            let (variance, excess) = free(squares, rows).maximum();
+            let expected: f64 = squares / rows;
+            assert!((variance / expected - 1.0).abs() < 1e-6, "{variance} {expected}");
+            let gain = squares - rows - rows * expected.ln();
+            assert!((excess - gain).abs() < 1e-9 * (1.0 + gain), "{excess} {gain}");
+            assert!((free(squares, rows).freedom() - rows).abs() < 1e-12);
+        }
+        // A direction with a² = 0.05 and c² = 3 alone: s² + a² = c².
+        let one = VarianceLikelihood {
+            directions: vec![(0.05, 3.0)],
+            residual_squares: 0.0,
+            free_rows: 0.0,
+        };
+        assert!((one.maximum().0 - 2.95).abs() < 1e-5, "{:?}", one.maximum());
+        assert!((one.freedom() - 1.05_f64.powi(-2)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn directions_of_noise_have_their_squares() {
+        // A = U diag(0.2, 0, 3) Vᵀ: the first two directions are counted, with c = Uᵀy.
+        let turn = |a, b, c| nalgebra::Rotation3::from_euler_angles(a, b, c).into_inner();
+        let (left, right) = (turn(0.3, -0.7, 1.1), turn(-0.2, 0.5, 0.9));
+        let size = nalgebra::Vector3::new(0.2, 0.0, 3.0);
+        let a = left * nalgebra::Matrix3::from_diagonal(&size) * right.transpose();
+        let y = left * nalgebra::Vector3::new(2.0, -0.5, 7.0);
+        let a = DMatrix::from_column_slice(3, 3, a.as_slice());
+        let mut counted = noise_directions(&a, &DVector::from_column_slice(y.as_slice()));
+        counted.sort_by(|a, b| a.0.total_cmp(&b.0));
+        assert_eq!(counted.len(), 2, "{counted:?}");
+        for ((square, c), (expected, projection)) in
+            counted.into_iter().zip([(0.0, 0.25), (0.04, 4.0)])
+        {
+            assert!((square - expected).abs() < 1e-12 && (c - projection).abs() < 1e-12);
+        }
+    }
 }

@@ -195,4 +195,26 @@ mod tests {
         assert_eq!(Weak::of(&triangle(2.0), &[Some(10.0), Some(10.0), Some(10.0), None]), None);
         assert_eq!(Weak::of(&triangle(0.0), &[None; 4]), None);
     }
+
+    #[test]
+    fn weak_combinations_are_told_in_plausible_sizes() {
+        // In units of the sizes 2 and 3 both unknowns change the data alike: x₀ / 2 = −x₁ / 3.
+        let triangle = DMatrix::from_row_slice(
+            3,
+            3,
+            &[-50.0, -100.0 / 3.0, 0.0, 0.0, 1e-3, 0.0, 0.0, 0.0, 1e3],
+        );
+        let weak = Weak::of(&triangle, &[Some(2.0), Some(3.0), Some(1.0)]).unwrap();
+        let [combination] = weak.combinations.as_slice() else { panic!("{weak:?}") };
+        let half = 0.5_f64.sqrt();
+        let [(0, first), (1, second)] = combination.weights[..] else { panic!("{combination:?}") };
+        assert!((first - half).abs() < 1e-4 && (second + half).abs() < 1e-4, "{combination:?}");
+        assert!((combination.singular_value - 3e-3 * half).abs() < 1e-6, "{combination:?}");
+        // The row is along the combination in the unknowns themselves: (1/2, −1/3, 0).
+        assert!(
+            (weak.rows[(0, 0)] * 2.0 + weak.rows[(0, 1)] * 3.0).abs() < 1e-3 * weak.rows.amax()
+        );
+        assert!(weak.rows[(0, 2)].abs() < 1e-9 * weak.rows.amax());
+        assert!((weak.visible[0] - 0.5).abs() < 1e-4 && (weak.visible[2] - 1.0).abs() < 1e-9);
+    }
 }
