@@ -247,3 +247,107 @@ fn superpose<S: Scalar>(
         out.rotation.z += k_z * m.x * shape.slope_of_moment;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Returns ∫ f from 0 to `end`, exact for polynomials of degree 5 between the `breaks`.
+    fn integral<const N: usize>(
+        end: f64,
+        breaks: &[f64],
+        f: impl Fn(f64) -> nalgebra::SVector<f64, N>,
+    ) -> nalgebra::SVector<f64, N> {
+        let mut knots: Vec<f64> = breaks.iter().copied().filter(|s| s.abs() < end.abs()).collect();
+        knots.extend([0.0, end]);
+        knots.sort_by(|a, b| a.abs().total_cmp(&b.abs()));
+        let piece = |pair: &[f64]| {
+            let (middle, half) = (0.5 * (pair[0] + pair[1]), 0.5 * (pair[1] - pair[0]));
+            let node = 0.6_f64.sqrt() * half;
+            let outer = f(middle - node) + f(middle + node);
+            (outer * (5.0 / 9.0) + f(middle) * (8.0 / 9.0)) * half
+        };
+        knots.windows(2).map(piece).sum()
+    }
+
+    /// Runs a check on a beam along +x and one along −x, with every kind of load, and the stations
+    /// of its point loads.
+    fn for_loaded_beams(check: impl Fn(&Cantilever<f64>, &[f64])) {
+        for length in [1.3, -0.9] {
+            let stations = [0.3 * length, 0.8 * length, length];
+            let point = |k: usize| {
+                let turn = k as f64 + 1.0;
+                let force = Vector3::new(3.0, -5.0 * turn, 2.0 + turn);
+                (stations[k], Wrench { force, moment: Vector3::new(0.7 * turn, -1.1, 0.4 + turn) })
+            };
+            let points = [point(0), point(1), point(2)];
+            let coupling = Some([2e-4, -3e-4]);
+            let (axial, about_y, about_z, twist) = (5e-5, 7e-4, 9e-4, 1.1e-3);
+            check(
+                &Cantilever {
+                    length,
+                    flexibility: Flexibility { axial, about_y, about_z, twist, coupling },
+                    spread: Vector3::new(4.0, -6.0, 9.0),
+                    strain: Some(Strain { axial: 1e-4, curvature: [2e-4, -5e-4] }),
+                    points: &points,
+                },
+                &stations,
+            );
+        }
+    }
+
+    #[test]
+    fn rotations_are_integrals_of_curvature_and_displacements_of_rotation() {
+        for_loaded_beams(|beam, stations| {
+            let k = beam.flexibility;
+            let [k_y, k_z] = k.coupling.unwrap();
+            let strain = beam.strain.unwrap();
+            let side = beam.length.signum();
+            // Normal force and moments of the loads beyond a section.
+            let internal = |x: f64| {
+                let rest = beam.length - x;
+                let (q, half) = (beam.spread, 0.5 * rest * rest);
+                let spread = nalgebra::Vector4::new(q.x * rest, 0.0, -q.z * half, q.y * half);
+                let beyond = beam.points.iter().filter(|(s, _)| s.abs() > x.abs());
+                beyond.fold(spread, |sum, (s, Wrench { force: f, moment: m })| {
+                    let arm = s - x;
+                    sum + nalgebra::Vector4::new(f.x, m.x, m.y - f.z * arm, m.z + f.y * arm)
+                })
+            };
+            // Stretch and the three curvatures.
+            let rates = |x: f64| {
+                let [n, m_x, m_y, m_z]: [f64; 4] = internal(x).into();
+                let [about_y, about_z] = strain.curvature;
+                nalgebra::Vector4::new(
+                    side * k.axial * n + strain.axial,
+                    side * (k.twist * m_x + k_y * m_y + k_z * m_z),
+                    side * (k.about_y * m_y + k_y * m_x) + about_y,
+                    side * (k.about_z * m_z + k_z * m_x) + about_z,
+                )
+            };
+            for part in [0.2, 0.3, 0.55, 0.9, 1.0] {
+                let x = part * beam.length;
+                let Deflection { displacement, rotation } = beam.at(x);
+                let [stretch, turns @ ..]: [f64; 4] = integral(x, stations, rates).into();
+                assert!((rotation - Vector3::from(turns)).amax() < 1e-14, "{part}: {rotation}");
+                let slopes = |x: f64| {
+                    let rotation = beam.at(x).rotation;
+                    nalgebra::Vector2::new(rotation.z, -rotation.y)
+                };
+                let [y, z]: [f64; 2] = integral(x, stations, slopes).into();
+                let expected = Vector3::new(stretch, y, z);
+                assert!((displacement - expected).amax() < 1e-14, "{part}: {displacement}");
+            }
+            assert_eq!(beam.tip(), beam.at(beam.length));
+        });
+    }
+
+    #[test]
+    fn the_mean_displacement_is_that_of_all_sections() {
+        for_loaded_beams(|beam, stations| {
+            let sum = integral(beam.length, stations, |x| beam.at(x).displacement);
+            let error = beam.mean_displacement() - sum / beam.length;
+            assert!(error.amax() < 1e-14, "{error}");
+        });
+    }
+}

@@ -111,4 +111,12 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn close_ends_are_pulled_along_the_line_between_them() {
+        // The ends are 0.3 m from the axis and 0.3 · 1e-6 m apart: F = F₀ − k l₀ across the lever.
+        let spring = Compensator { anchor: [0.3, 0.0], ..spring(1e3, 900.0) };
+        let moment = spring.moment(1e-6_f64.sin_cos());
+        assert!((moment + 0.3 * (900.0 - 1e3 * 0.2)).abs() < 1e-3, "{moment} N·m");
+    }
 }
