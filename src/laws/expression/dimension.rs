@@ -150,3 +150,29 @@ impl Dimension {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn units_of_sums_and_powers() {
+        let covariate = Dimension::COVARIATE;
+        assert_eq!(Dimension::LENGTH.sum(Dimension::KELVIN), None);
+        assert_eq!(Dimension::ANGLE.sum(Dimension::PLAIN), Some(Dimension::ANGLE));
+        assert_eq!(Dimension::LENGTH.sum(covariate), Some(Dimension::LENGTH));
+        assert_eq!(covariate.sum(Dimension::LENGTH), Some(Dimension::LENGTH));
+        // A unit that is not determined adopts that of the other operand.
+        assert_eq!(covariate.sum(Dimension::FLEXIBLE), Some(covariate));
+        assert_eq!(Dimension::FLEXIBLE.sum(covariate), Some(covariate));
+        assert_eq!(covariate.sum(covariate), Some(covariate));
+        let square = covariate.product(covariate, 1);
+        assert_eq!(covariate.power(Some(2.0)), square);
+        assert_eq!(covariate.sum(square), Some(Dimension::FLEXIBLE));
+        // A broken power has a unit that is not determined, unless its base has none.
+        assert_eq!(Dimension::LENGTH.power(Some(0.5)), Dimension::FLEXIBLE);
+        assert_eq!(Dimension::ANGLE.power(Some(0.5)), Dimension::PLAIN);
+        assert_eq!(Dimension::LENGTH.power(None), Dimension::FLEXIBLE);
+        assert_eq!(Dimension::LENGTH.power(Some(-2.0)).powers[1], -2);
+    }
+}
