@@ -174,29 +174,6 @@ impl ResidualTests {
         failed.min_by(|a, b| p_value(a).total_cmp(&p_value(b)))
     }
 
-    /// Returns √(χ²/ν), the ratio of the residual to the declared σ, if the χ² test is the only
-    /// test of structure that failed; `None` otherwise.
-    pub fn size_alone(&self) -> Option<f64> {
-        let mut failed = self.tests.iter().filter(|test| test.tests_structure() && test.failed());
-        let (Some(only), None) = (failed.next(), failed.next()) else { return None };
-        match (&only.test, &only.outcome) {
-            (Test::ReducedChiSquared, Ok(outcome)) if outcome.statistic > 1.0 => {
-                Some(outcome.statistic.sqrt())
-            }
-            _ => None,
-        }
-    }
-
-    /// Returns √(χ²/ν), the ratio of the residual to the declared σ, if it is significantly less
-    /// than 1; `None` otherwise.
-    pub fn overstated_sigma(&self) -> Option<f64> {
-        let size = self.tests.iter().filter(|test| test.test == Test::ReducedChiSquared);
-        let mut sizes = size.filter_map(|test| test.outcome.as_ref().ok());
-        sizes
-            .find(|outcome| outcome.statistic < outcome.bounds.0)
-            .map(|outcome| outcome.statistic.max(0.0).sqrt())
-    }
-
     /// Returns true if at least one test of structure could be made.
     pub fn is_testable(&self) -> bool {
         self.tests.iter().any(|test| test.tests_structure() && test.outcome.is_ok())

@@ -36,7 +36,7 @@ pub(super) fn blocks(
     let bounds_noise = fitted.found.noise == Noise::Declared && fitted.found.sigma_scale >= 1.0;
     let unless_stopped = |some: &[&Candidate]| {
         (!data.stop.is_requested())
-            .then(|| Candidate::blocks(some, (fitted, &neighbourhood), left_out))
+            .then(|| Candidate::blocks(some.iter().copied(), (fitted, &neighbourhood), left_out))
     };
     let blocks: Vec<Vec<Block>> = candidates
         .par_chunks(HYPOTHESES_PER_PROJECTION)

@@ -37,12 +37,12 @@ pub(super) const HYPOTHESES_PER_PROJECTION: usize = 32;
 impl Candidate {
     /// Returns the blocks of candidates: their columns with the fitted parameters projected out and
     /// the rows of the poses `left_out` set to zero.
-    pub fn blocks(
-        candidates: &[&Self],
+    pub fn blocks<'a>(
+        candidates: impl IntoIterator<Item = &'a Self> + Clone,
         (fitted, fit): (&Fitted, &LinearNeighbourhood),
         left_out: &[usize],
     ) -> Vec<Block> {
-        let design = |candidate: &&Self| {
+        let design = |candidate: &Self| {
             let mut coefficients = candidate.coefficients.clone();
             if fitted.found.noise != Noise::Declared {
                 // If σ was estimated from a residual that contains the effect, it cannot limit the
@@ -51,7 +51,8 @@ impl Candidate {
             }
             (candidate.design.clone().without(left_out), candidate.ln_prior, coefficients)
         };
-        let mut blocks = Block::all(candidates.iter().map(design).collect(), fit);
+        let designs = candidates.clone().into_iter().map(design).collect();
+        let mut blocks = Block::all(designs, fit);
         for (block, candidate) in blocks.iter_mut().zip(candidates) {
             block.family = candidate.hypothesis.effect().map(|effect| effect.name().to_owned());
             let effect = candidate.hypothesis.effect();
@@ -72,12 +73,12 @@ pub(super) fn joint_and_order(effect: &Effect) -> Option<(usize, f64)> {
 
 /// Scales the columns of an effect to equal length over the first `evidence_poses` poses. Also
 /// returns, for each parameter, the root mean square displacement by its largest plausible value,
-/// in units of σ.
+/// in units of σ. Returns `None` if the effect displaces no pose.
 pub(super) fn scaled_to_equal_length(
     mut columns: DMatrix<f64>,
     terms: &[Term],
     evidence_poses: usize,
-) -> (DMatrix<f64>, Vec<f64>) {
+) -> Option<(Design, Vec<f64>)> {
     let mut largest = Vec::new();
     for (k, mut column) in columns.column_iter_mut().enumerate() {
         let length = column.rows(0, 3 * evidence_poses).norm();
@@ -91,5 +92,5 @@ pub(super) fn scaled_to_equal_length(
             column /= length;
         }
     }
-    (columns, largest)
+    Some((Design::Dense(columns).scaled(evidence_poses)?, largest))
 }

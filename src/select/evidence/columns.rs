@@ -64,8 +64,6 @@ impl<'a, 'l> Columns<'a, 'l> {
         effects: &[(Effect, DMatrix<f64>)],
         only: Option<&'a Hypothesis>,
     ) -> (Vec<Candidate>, Vec<SampledCovariate>, f64, OtherHypotheses) {
-        let (candidates, shares, covariates) = (Vec::new(), Vec::new(), Vec::new());
-        let unseen = Vec::new();
         let mut new_columns = Self {
             problem,
             linearised,
@@ -73,10 +71,10 @@ impl<'a, 'l> Columns<'a, 'l> {
             admits_common_prior,
             evidence_poses,
             only,
-            candidates,
-            shares,
-            unseen,
-            covariates,
+            candidates: Vec::new(),
+            shares: Vec::new(),
+            unseen: Vec::new(),
+            covariates: Vec::new(),
         };
         new_columns.add_effects(effects);
         new_columns.add_functions();
@@ -105,28 +103,11 @@ impl<'a, 'l> Columns<'a, 'l> {
         if self.only.is_some_and(|only| *only != hypothesis) {
             return;
         }
-        // The leading space distinguishes this family from families of effects.
-        self.push_candidate(
-            &format!(" {family}"),
-            share,
-            hypothesis,
-            design(),
-            Coefficients::default(),
-        );
-    }
-
-    /// Adds a candidate, unless its columns are zero.
-    fn push_candidate(
-        &mut self,
-        family: &str,
-        share: f64,
-        hypothesis: Hypothesis,
-        design: Design,
-        coefficients: Coefficients,
-    ) {
-        if let Some(design) = design.scaled(self.evidence_poses) {
+        // A candidate whose columns are zero is not added.
+        if let Some(design) = design().scaled(self.evidence_poses) {
             let same = self.candidates.last().filter(|last| last.hypothesis == hypothesis);
             let variant = same.map_or(0, |last| last.variant + 1);
+            let coefficients = Coefficients::default();
             self.candidates.push(Candidate {
                 hypothesis,
                 variant,
@@ -134,7 +115,8 @@ impl<'a, 'l> Columns<'a, 'l> {
                 ln_prior: 0.0,
                 coefficients,
             });
-            self.shares.push((family.to_owned(), share));
+            // The leading space distinguishes this family from families of effects.
+            self.shares.push((format!(" {family}"), share));
         }
     }
 
@@ -223,57 +205,50 @@ impl<'a, 'l> Columns<'a, 'l> {
     /// with their values in every pose.
     fn recorded_covariates(&self) -> Vec<SampledCovariate> {
         let poses = self.linearised.poses();
-        let mut covariates: Vec<(Covariate, Vec<f64>)> = Vec::new();
-        let moving = self
-            .problem
-            .joints
-            .iter()
-            .enumerate()
-            .filter(|(_, joint)| joint.command_kind() != JointKind::Fixed);
-        for (joint, _) in moving.clone() {
-            covariates.push((Covariate::Command(joint), self.command(joint)));
-        }
-        for covariate in [Covariate::Temperature, Covariate::Payload, Covariate::Hoist] {
-            let of = |pose: &Pose| match covariate {
-                Covariate::Temperature => pose.setup.temperature.copied(),
-                Covariate::Payload => pose.setup.payload.copied(),
-                _ => pose.setup.hoist.copied(),
-            };
-            covariates.extend(
-                poses
-                    .iter()
-                    .map(of)
-                    .collect::<Option<Vec<f64>>>()
-                    .map(|values| (covariate, values)),
-            );
-        }
+        let joints = &self.problem.joints;
+        let moving: Vec<usize> = (0..joints.len())
+            .filter(|&joint| joints[joint].command_kind() != JointKind::Fixed)
+            .collect();
+        let mut covariates: Vec<(Covariate, Vec<f64>)> =
+            moving.iter().map(|&joint| (Covariate::Command(joint), self.command(joint))).collect();
+        let mut add = |covariate: Covariate, of: &dyn Fn(&Pose) -> Option<f64>| {
+            let values: Option<Vec<f64>> = poses.iter().map(of).collect();
+            covariates.extend(values.map(|values| (covariate, values)));
+        };
+        add(Covariate::Temperature, &|pose| pose.setup.temperature.copied());
+        add(Covariate::Payload, &|pose| pose.setup.payload.copied());
+        add(Covariate::Hoist, &|pose| pose.setup.hoist.copied());
         for which in 0..self.problem.data.covariates.len() {
-            let values = poses.iter().map(|pose| pose.setup.covariates.get(which).copied());
-            covariates.extend(
-                values
-                    .collect::<Option<Vec<f64>>>()
-                    .map(|values| (Covariate::declared(which, self.problem), values)),
-            );
+            let covariate = Covariate::declared(which, self.problem);
+            add(covariate, &|pose| pose.setup.covariates.get(which).copied());
         }
         // Times count from the first pose of all sessions, because structure may continue from one
         // session to the next.
         let first = poses.iter().map(|pose| pose.setup.time).fold(f64::INFINITY, f64::min);
-        covariates.push((
-            Covariate::time(self.coverage.1),
-            poses.iter().map(|pose| pose.setup.time - first).collect(),
-        ));
-        for (joint, _) in moving {
-            let sides = poses.iter().map(|pose| pose.setup.approach.map(|all| all[joint]));
-            covariates.extend(
-                sides.collect::<Option<Vec<f64>>>().map(|v| (Covariate::Approach(joint), v)),
-            );
+        add(Covariate::time(self.coverage.1), &|pose| Some(pose.setup.time - first));
+        for joint in moving {
+            add(Covariate::Approach(joint), &|pose| pose.setup.approach.map(|all| all[joint]));
         }
-        covariates
-            .into_iter()
-            .filter_map(|(covariate, values)| {
-                SampledCovariate::new(covariate, values, self.evidence_poses)
-            })
-            .collect()
+        let sampled = covariates.into_iter();
+        sampled.filter_map(|(covariate, values)| self.sampled(covariate, values)).collect()
+    }
+
+    /// Returns a covariate with its values in every pose; `None` if it does not vary.
+    pub(super) fn sampled(
+        &self,
+        covariate: Covariate,
+        values: Vec<f64>,
+    ) -> Option<SampledCovariate> {
+        SampledCovariate::new(covariate, values, self.evidence_poses)
+    }
+
+    /// Returns the columns of three coordinates, such as those of a displacement along x, y and z;
+    /// `None` unless all were computed.
+    pub(super) fn columns_at(
+        &self,
+        site: impl Fn(usize) -> ParameterSite,
+    ) -> Option<Vec<DVector<f64>>> {
+        (0..3).map(|axis| self.linearised.column_at(site(axis))).collect()
     }
 
     /// Returns a joint's command in every pose, as the argument of functions of the command.
@@ -326,12 +301,8 @@ impl<'a, 'l> Columns<'a, 'l> {
                 let along = gives.rows(3 * k, 3).dot(&turns.rows(3 * k, 3));
                 if lever(k) > 1e-12 * longest { along / lever(k) } else { 0.0 }
             };
-            SampledCovariate::new(
-                Covariate::Load,
-                (0..turns.len() / 3).map(moment).collect(),
-                self.evidence_poses,
-            )
-            .filter(|moment| moment.levels > 3)
+            let moments = (0..turns.len() / 3).map(moment).collect();
+            self.sampled(Covariate::Load, moments).filter(|moment| moment.levels > 3)
         };
         let axes_of_joints =
             (0..self.problem.joints.len()).flat_map(|joint| pairs.map(|pair| (joint, pair)));
@@ -388,9 +359,7 @@ impl<'a, 'l> Columns<'a, 'l> {
             // A settling quantity changes fast at first, so functions of log time are tried, too.
             let range = of.values[..self.evidence_poses].iter().copied().fold(0.0, f64::max);
             let logarithm = of.values.iter().map(|t| (t.max(0.0) + range / 30.0).ln()).collect();
-            if let Some(of) =
-                SampledCovariate::new(of.covariate.clone(), logarithm, self.evidence_poses)
-            {
+            if let Some(of) = self.sampled(of.covariate.clone(), logarithm) {
                 self.add_variant(family, &hypothesis, warped, || expand(at, &of.basis(0.25)));
             }
         }
@@ -488,13 +457,12 @@ pub(super) fn candidate_of(
     (coverage, evidence_poses): ((bool, bool), usize),
 ) -> Option<Candidate> {
     let terms = effect.terms(problem);
-    let (columns, largest) = scaled_to_equal_length(columns, &terms, evidence_poses);
+    let (design, largest) = scaled_to_equal_length(columns, &terms, evidence_poses)?;
     let coefficients = Coefficients {
         never_negative: terms.iter().map(|term| term.never_negative).collect(),
         alone: acts_along_axes(&terms),
         largest,
     };
-    let design = Design::Dense(columns).scaled(evidence_poses)?;
     let hypothesis = Hypothesis::of_effect(effect, problem, coverage);
     Some(Candidate { hypothesis, variant: 0, design, ln_prior: 0.0, coefficients })
 }

@@ -18,12 +18,7 @@ impl Columns<'_, '_> {
     /// Adds hypotheses about the instrument: displacements of the measured positions as functions
     /// of one covariate, or of the measured position.
     pub(super) fn add_measurement_functions(&mut self, recorded: &[SampledCovariate]) {
-        let axes: Vec<DVector<f64>> = (0..3)
-            .filter_map(|axis| self.linearised.column_at(ParameterSite::Shift { axis }))
-            .collect();
-        if axes.len() < 3 {
-            return;
-        }
+        let Some(axes) = self.columns_at(|axis| ParameterSite::Shift { axis }) else { return };
         let (site, at) = (ParameterSite::Shift { axis: 0 }, axes.iter().collect::<Vec<_>>());
         for of in recorded {
             self.add_smooth("smooth in the measurement", (site, &at), of, (&SMOOTH_LENGTHS, 0));
@@ -35,11 +30,7 @@ impl Columns<'_, '_> {
         }
         let poses = self.linearised.poses();
         let coordinate = |axis: usize| {
-            SampledCovariate::new(
-                Covariate::Position,
-                poses.iter().map(|p| p.measured[axis]).collect(),
-                self.evidence_poses,
-            )
+            self.sampled(Covariate::Position, poses.iter().map(|p| p.measured[axis]).collect())
         };
         let coordinates: Vec<SampledCovariate> = (0..3).filter_map(coordinate).collect();
         let linear = DMatrix::from_fn(poses.len(), coordinates.len(), |k, j| {
@@ -93,29 +84,25 @@ impl Columns<'_, '_> {
     /// Adds rotations of the base as smooth functions of quantities other than commands and
     /// directions of approach, such as temperature, time or payload.
     pub(super) fn add_base_rotations(&mut self, recorded: &[SampledCovariate]) {
-        let axes: Vec<DVector<f64>> = (0..3)
-            .filter_map(|axis| self.linearised.column_at(ParameterSite::Turn { axis }))
-            .collect();
+        let Some(axes) = self.columns_at(|axis| ParameterSite::Turn { axis }) else { return };
         let (site, at) = (ParameterSite::Turn { axis: 0 }, axes.iter().collect::<Vec<_>>());
         let is_command = |of: &&SampledCovariate| {
             matches!(of.covariate, Covariate::Command(_) | Covariate::Approach(_))
         };
-        for of in recorded.iter().filter(|of| axes.len() == 3 && !is_command(of)) {
+        for of in recorded.iter().filter(|of| !is_command(of)) {
             self.add_smooth("smooth at the base", (site, &at), of, (&SMOOTH_LENGTHS[..2], 0));
         }
     }
 
     /// Adds a free displacement of every configuration, shared by all positions measured in it.
     pub(super) fn add_repeats(&mut self) {
-        let axes: Vec<DVector<f64>> = (0..3)
-            .filter_map(|axis| self.linearised.column_at(ParameterSite::Shift { axis }))
-            .collect();
+        let Some(axes) = self.columns_at(|axis| ParameterSite::Shift { axis }) else { return };
         let poses = self.linearised.poses();
         let configurations: Vec<Vec<u64>> =
             poses.iter().map(|pose| bits(pose.setup.configuration)).collect();
         let numbers = numbered(configurations[..self.evidence_poses].iter().cloned());
         let count = numbers.iter().max().map_or(0, |last| last + 1);
-        if count == self.evidence_poses || axes.len() < 3 {
+        if count == self.evidence_poses {
             return;
         }
         let groups = (0..poses.len()).map(|row| numbers.get(row).copied()).collect();

@@ -5,7 +5,7 @@
 //! other members becomes a candidate. Otherwise a strong effect with a slightly wrong value would
 //! leave structure.
 
-use super::block::{Block, Design};
+use super::block::Block;
 use super::candidate::{Candidate, scaled_to_equal_length};
 use super::hypotheses::Hypotheses;
 use super::hypothesis::{Hypothesis, HypothesisKind};
@@ -132,18 +132,12 @@ impl Hypotheses<'_> {
         problem: &Problem,
     ) -> Option<Candidate> {
         let columns = self.linearised.columns(&effect);
-        let (columns, largest) =
-            scaled_to_equal_length(columns, &effect.terms(problem), self.evidence_poses);
-        let design = Design::Dense(columns).scaled(self.evidence_poses)?;
+        let (design, largest) =
+            scaled_to_equal_length(columns, &effect.terms(problem), self.evidence_poses)?;
         let coefficients = Coefficients { largest, ..candidate.coefficients.clone() };
         let hypothesis =
             Hypothesis { kind: HypothesisKind::Effect(effect), ..candidate.hypothesis.clone() };
-        Some(Candidate {
-            hypothesis,
-            variant: 0,
-            design,
-            ln_prior: candidate.ln_prior,
-            coefficients,
-        })
+        let ln_prior = candidate.ln_prior;
+        Some(Candidate { hypothesis, variant: 0, design, ln_prior, coefficients })
     }
 }

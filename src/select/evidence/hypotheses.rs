@@ -93,33 +93,10 @@ impl<'a> Hypotheses<'a> {
             split_unlisted(columns_of_added(&linearised, (&added, &columns_of_part)));
         let new =
             candidates.into_iter().map(|effect| (effect.clone(), linearised.columns(&effect)));
-        let effects: Vec<(Effect, DMatrix<f64>)> = listed_added.into_iter().chain(new).collect();
-        let coverage = coverage(&linearised, data);
-        let (built, covariates, ln_family, others) = Columns::all(
-            &fitted.problem,
-            &linearised,
-            (coverage, data.admits_common_prior, evidence_poses),
-            &effects,
-            None,
-        );
-        let times = data.shift_times();
-        let mut hypotheses = Self {
-            linearised,
-            added,
-            unknowns,
-            candidates: built,
-            evidence_poses,
-            ln_family,
-            covariates,
-            coverage,
-            times,
-            others,
-        };
-        let candidate_of_effect =
-            |(effect, columns)| hypotheses.candidate_of_effect(&effect, columns, &fitted.problem);
-        let unlisted: Vec<Candidate> =
-            unlisted.into_iter().filter_map(candidate_of_effect).collect();
-        hypotheses.candidates.extend(unlisted);
+        let effects: Vec<WithColumns> = listed_added.into_iter().chain(new).collect();
+        let listed = Self::listed(fitted, data, linearised, evidence_poses, (&effects, None));
+        let mut hypotheses = Self { added, unknowns, times: data.shift_times(), ..listed };
+        hypotheses.add_unlisted(unlisted, &fitted.problem);
         hypotheses.candidates.extend(limits(
             fitted,
             &hypotheses.linearised,
@@ -127,6 +104,46 @@ impl<'a> Hypotheses<'a> {
             hypotheses.ln_family,
         ));
         hypotheses
+    }
+
+    /// Creates the hypotheses of listed effects with their columns, and those without a law; if
+    /// `only` is given, only the functions of that hypothesis.
+    fn listed(
+        fitted: &Fitted,
+        data: &Data,
+        linearised: Linearised<'a>,
+        evidence_poses: usize,
+        (effects, only): (&[WithColumns], Option<&Hypothesis>),
+    ) -> Self {
+        let coverage = coverage(&linearised, data);
+        let (candidates, covariates, ln_family, others) = Columns::all(
+            &fitted.problem,
+            &linearised,
+            (coverage, data.admits_common_prior, evidence_poses),
+            effects,
+            only,
+        );
+        Self {
+            linearised,
+            added: Vec::new(),
+            unknowns: Vec::new(),
+            candidates,
+            evidence_poses,
+            ln_family,
+            covariates,
+            coverage,
+            times: Vec::new(),
+            others,
+        }
+    }
+
+    /// Adds the candidates of effects that are not listed.
+    fn add_unlisted(&mut self, unlisted: Vec<WithColumns>, problem: &Problem) {
+        let candidate_of_effect =
+            |(effect, columns)| self.candidate_of_effect(&effect, columns, problem);
+        let candidates: Vec<Candidate> =
+            unlisted.into_iter().filter_map(candidate_of_effect).collect();
+        self.candidates.extend(candidates);
     }
 
     /// Returns the candidate for an effect that is not listed, such as a wave or a station move,
@@ -137,9 +154,8 @@ impl<'a> Hypotheses<'a> {
         columns: DMatrix<f64>,
         problem: &Problem,
     ) -> Option<Candidate> {
-        let (columns, largest) =
-            scaled_to_equal_length(columns, &effect.terms(problem), self.evidence_poses);
-        let design = Design::Dense(columns).scaled(self.evidence_poses)?;
+        let (design, largest) =
+            scaled_to_equal_length(columns, &effect.terms(problem), self.evidence_poses)?;
         let coefficients = Coefficients { largest, ..Coefficients::default() };
         let family = self
             .candidates
@@ -167,23 +183,7 @@ impl<'a> Hypotheses<'a> {
     ) -> Self {
         let linearised =
             fitted.linearised_with(data, rows, &[], &hypothesis_sites(&fitted.problem));
-        let coverage = coverage(&linearised, data);
-        let how = (coverage, data.admits_common_prior, evidence_poses);
-        let (built, covariates, ln_family, others) =
-            Columns::all(&fitted.problem, &linearised, how, &[], Some(of));
-        let (added, unknowns, times) = (Vec::new(), Vec::new(), Vec::new());
-        Self {
-            linearised,
-            added,
-            unknowns,
-            candidates: built,
-            evidence_poses,
-            ln_family,
-            covariates,
-            coverage,
-            times,
-            others,
-        }
+        Self::listed(fitted, data, linearised, evidence_poses, (&[], Some(of)))
     }
 
     /// Creates the hypotheses of the effects `added` alone, with the prior probabilities that they
@@ -247,11 +247,7 @@ impl<'a> Hypotheses<'a> {
             times: data.shift_times(),
             others: others.clone(),
         };
-        let candidate_of_effect =
-            |(effect, columns)| hypotheses.candidate_of_effect(&effect, columns, problem);
-        let unlisted: Vec<Candidate> =
-            unlisted.into_iter().filter_map(candidate_of_effect).collect();
-        hypotheses.candidates.extend(unlisted);
+        hypotheses.add_unlisted(unlisted, problem);
         Some(hypotheses)
     }
 
@@ -306,17 +302,8 @@ impl<'a> Hypotheses<'a> {
                 columns.rows_mut(3 * pose, 3).scale_mut(shape.value(*at));
             }
             let design = Design::Dense(columns).scaled(evidence_poses)?;
-            let coefficients = Coefficients::default();
-            Some((
-                *shape,
-                Candidate {
-                    hypothesis: hypothesis.clone(),
-                    variant: 0,
-                    design,
-                    ln_prior,
-                    coefficients,
-                },
-            ))
+            let (hypothesis, coefficients) = (hypothesis.clone(), Coefficients::default());
+            Some((*shape, Candidate { hypothesis, variant: 0, design, ln_prior, coefficients }))
         };
         shapes.iter().filter_map(candidate_of_shape).collect()
     }

@@ -200,9 +200,7 @@ fn evaluate_without<'a>(
             laws::promising(&hypotheses, &evaluated_sets, &products, (fitted, data, left_out));
         (evaluated_sets, [unlisted, laws].concat(), products.into_cache())
     };
-    let blocks_of = |some: &[Candidate]| {
-        Candidate::blocks(&some.iter().collect::<Vec<_>>(), (fitted, &target.fit), left_out)
-    };
+    let blocks_of = |some: &[Candidate]| Candidate::blocks(some, (fitted, &target.fit), left_out);
     let search_again = |cache: CachedProducts, blocks: &[Block]| {
         let products = Products::with_cache(cache, blocks, &target);
         (search(&products, &present), products.into_cache())

@@ -69,11 +69,7 @@ pub(super) fn promising(
             )
         };
         let candidates: Vec<Candidate> = effects.iter().filter_map(candidate_of_effect).collect();
-        let blocks = Candidate::blocks(
-            &candidates.iter().collect::<Vec<_>>(),
-            (fitted, &products.target.fit),
-            left_out,
-        );
+        let blocks = Candidate::blocks(&candidates, (fitted, &products.target.fit), left_out);
         let odds: Vec<Vec<f64>> =
             reduced_problems.iter().map(|left| left.ln_odds_of(&blocks)).collect();
         candidates

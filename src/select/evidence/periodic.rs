@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::block::Design;
 use super::columns::Columns;
-use super::functions::{SampledCovariate, expand};
+use super::functions::expand;
 use super::hypothesis::{Hypothesis, HypothesisKind, Site};
 use crate::model::parameter::ParameterSite;
 use crate::problem::{Effect, EffectDeclaration, JointKind};
@@ -40,11 +40,7 @@ impl Columns<'_, '_> {
         if self.problem.joints[joint].command_kind() != JointKind::Revolute {
             return;
         }
-        let Some(command) = SampledCovariate::new(
-            Covariate::Command(joint),
-            self.command(joint),
-            self.evidence_poses,
-        ) else {
+        let Some(command) = self.sampled(Covariate::Command(joint), self.command(joint)) else {
             return;
         };
         let slow = command.basis(SLOW_LENGTH);
@@ -85,11 +81,7 @@ impl Columns<'_, '_> {
         if !self.admits_common_prior || self.problem.effects.iter().any(is_present) {
             return;
         }
-        let Some(command) = SampledCovariate::new(
-            Covariate::Command(joint),
-            self.command(joint),
-            self.evidence_poses,
-        ) else {
+        let Some(command) = self.sampled(Covariate::Command(joint), self.command(joint)) else {
             return;
         };
         for highest in GEAR_ORDERS {

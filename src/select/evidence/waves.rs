@@ -281,7 +281,7 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
             let (orders, waves): (Vec<f64>, Vec<Candidate>) =
                 orders.iter().filter_map(wave).unzip();
             let fit = (self.fitted, &self.products.target.fit);
-            let blocks = Candidate::blocks(&waves.iter().collect::<Vec<_>>(), fit, self.left_out);
+            let blocks = Candidate::blocks(&waves, fit, self.left_out);
             let of_sets: Vec<Vec<f64>> =
                 reduced_problems.iter().map(|left| left.ln_odds_of(&blocks)).collect();
             let odds = |k: usize| of_sets.iter().map(|odds| odds[k]).collect();

@@ -76,9 +76,7 @@ impl Verdict {
             Self::Unexplained => "unexplained",
         }
     }
-}
 
-impl Verdict {
     /// Returns the verdict on effects with these statuses. `is_noise` is true if the fit with all
     /// effects leaves only noise, `is_noise_with_found` if the fit with the effects of status
     /// `found` alone does.
