@@ -21,7 +21,7 @@ use flexcal::urdf::{
 
 use super::diagnostic;
 use super::estimate::Trust;
-use super::flags::Flags;
+use super::flags::{Flags, file_in};
 use super::outcome::Outcome;
 use super::output::Results;
 use super::region::parse_numbers;
@@ -188,11 +188,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         .unwrap_or(Path::new("."))
         .to_owned();
     let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-    let file = if arguments.problem.is_dir() {
-        arguments.problem.join("problem.toml")
-    } else {
-        arguments.problem.clone()
-    };
+    let file = file_in(&arguments.problem, "problem.toml");
     let inputs = [&[file, arguments.estimate.clone()], arguments.urdf.as_slice(), files].concat();
     let results = Results::claim("export", folder, inputs, &[&name], (flags.force, flags.quiet))?;
     if let Some(absent) =

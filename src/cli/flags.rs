@@ -70,3 +70,8 @@ impl Flags {
         Results::claim(command, self.folder(name), inputs, names, (self.force, self.quiet))
     }
 }
+
+/// Returns the path of a file that is named itself or by its folder, in which it is called `name`.
+pub fn file_in(path: &Path, name: &str) -> PathBuf {
+    if path.is_dir() { path.join(name) } else { path.to_owned() }
+}

@@ -12,7 +12,7 @@ use flexcal::problem::Problem;
 use flexcal::report::shell_word;
 
 use super::diagnostic;
-use super::flags::Flags;
+use super::flags::{Flags, file_in};
 use super::output::{Results, WriteError};
 
 /// Problem, data, and folder of the results.
@@ -160,8 +160,7 @@ impl Common {
 
     /// Returns the path of the problem file.
     pub fn problem_file(&self) -> PathBuf {
-        let problem = self.problem();
-        if problem.is_dir() { problem.join("problem.toml") } else { problem.to_owned() }
+        file_in(self.problem(), "problem.toml")
     }
 
     /// Returns the name of the default folder of the results: the problem's name, and for a file

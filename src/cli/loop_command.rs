@@ -146,17 +146,13 @@ enum DataFileError {
 /// Returns an error if `problem.closed.toml` cannot name a data file: if the name is not UTF-8, or
 /// if the file is a pipe or standard input, which cannot be read a second time.
 fn check_data_file(file: &Path) -> Result<(), DataFileError> {
-    let name = || file.to_owned();
     match file.canonicalize() {
         // A missing file is reported elsewhere.
         Err(_) if file.symlink_metadata().is_err() => Ok(()),
-        Ok(real) if real.is_file() || real.is_dir() => {
-            if real.to_str().is_some() {
-                Ok(())
-            } else {
-                Err(DataFileError::NotUtf8 { file: name() })
-            }
-        }
-        _ => Err(DataFileError::NotReadableAgain { file: name() }),
+        Ok(real) if real.is_file() || real.is_dir() => match real.to_str() {
+            Some(_) => Ok(()),
+            None => Err(DataFileError::NotUtf8 { file: file.to_owned() }),
+        },
+        _ => Err(DataFileError::NotReadableAgain { file: file.to_owned() }),
     }
 }

@@ -9,7 +9,7 @@ use flexcal::measurement::Measurements;
 use flexcal::problem::{PoseRanges, Problem};
 use flexcal::rig::Truth;
 
-use super::flags::Flags;
+use super::flags::{Flags, file_in};
 
 /// Parses a number of poses from 1 to `MAX`.
 pub fn parse_count<const MAX: u32>(text: &str) -> Result<u32, String> {
@@ -35,10 +35,7 @@ pub struct Source {
 impl Source {
     /// Returns the files that the arguments name: tables of candidates, and TRUTH.toml.
     pub fn files(&self) -> Vec<PathBuf> {
-        let truth = self
-            .truth
-            .iter()
-            .map(|truth| if truth.is_dir() { truth.join("TRUTH.toml") } else { truth.clone() });
+        let truth = self.truth.iter().map(|truth| file_in(truth, "TRUTH.toml"));
         self.candidates.iter().cloned().chain(truth).collect()
     }
 

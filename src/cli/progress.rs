@@ -91,30 +91,26 @@ impl Line {
     }
 }
 
-/// Progress bar of finished items (fits, poses) with the remaining time.
-pub struct CountBar(ProgressBar);
-
-impl CountBar {
-    /// Creates a bar of `count` items called `noun`, of which `kept` were finished in an earlier
-    /// run.
-    pub fn new(noun: &str, count: u64, kept: u64) -> Self {
-        let bar = ProgressBar::new(count);
-        let shown = format!("{{wide_bar}} {{human_pos}} of {{human_len}} {noun}, {{eta}} left");
-        bar.set_style(
-            ProgressStyle::with_template(&shown).unwrap_or_else(|_| ProgressStyle::default_bar()),
-        );
-        bar.set_position(kept);
-        bar.reset_eta();
-        Self(bar)
+/// Does `work` on `count` items called `noun` (fits, poses), of which `kept` were finished in an
+/// earlier run; `work` calls its argument after each item. Meanwhile a progress bar with the
+/// remaining time is shown, unless `is_shown` is false.
+pub fn count_during<T>(
+    is_shown: bool,
+    noun: &str,
+    (count, kept): (usize, usize),
+    work: impl FnOnce(&(dyn Fn() + Sync)) -> T,
+) -> T {
+    if !is_shown {
+        return work(&|| ());
     }
-
-    /// Counts one more item.
-    pub fn advance(&self) {
-        self.0.inc(1);
-    }
-
-    /// Removes the bar from the terminal.
-    pub fn clear(&self) {
-        self.0.finish_and_clear();
-    }
+    let bar = ProgressBar::new(count as u64);
+    let shown = format!("{{wide_bar}} {{human_pos}} of {{human_len}} {noun}, {{eta}} left");
+    bar.set_style(
+        ProgressStyle::with_template(&shown).unwrap_or_else(|_| ProgressStyle::default_bar()),
+    );
+    bar.set_position(kept as u64);
+    bar.reset_eta();
+    let result = work(&|| bar.inc(1));
+    bar.finish_and_clear();
+    result
 }

@@ -10,10 +10,10 @@ use flexcal::report::shell_word;
 use flexcal::rig::{SimulatedPoses, Simulation, Truth, simulate_counted};
 
 use super::diagnostic;
-use super::flags::Flags;
+use super::flags::{Flags, file_in};
 use super::outcome::Outcome;
 use super::poses::parse_count;
-use super::progress::CountBar;
+use super::progress::count_during;
 
 /// Arguments of `flexcal simulate`.
 #[derive(Debug, Args)]
@@ -47,10 +47,8 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let problem = Problem::read(&arguments.problem)?;
     let truth = Truth::read(&arguments.truth, &problem)?;
-    let inside =
-        |path: &Path, name: &str| if path.is_dir() { path.join(name) } else { path.to_owned() };
     let files =
-        [inside(&arguments.problem, "problem.toml"), inside(&arguments.truth, "TRUTH.toml")];
+        [file_in(&arguments.problem, "problem.toml"), file_in(&arguments.truth, "TRUTH.toml")];
     let inputs = [&files[..], &problem.data.files, &arguments.data].concat();
     let flags = &arguments.flags;
     let results =
@@ -66,11 +64,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         SimulatedPoses::Random(count) => *count,
         SimulatedPoses::Given(poses) => poses.len(),
     };
-    let bar = flags.prints_text().then(|| CountBar::new("poses", count as u64, 0));
-    let advance = || bar.iter().for_each(CountBar::advance);
-    let simulation = simulate_counted(&problem, &truth, poses, arguments.seed, &advance);
-    bar.iter().for_each(CountBar::clear);
-    let simulation = simulation?;
+    let simulation = count_during(flags.prints_text(), "poses", (count, 0), |advance| {
+        simulate_counted(&problem, &truth, poses, arguments.seed, advance)
+    })?;
     let (json, table) = (simulation.truth_json(), results.path("measurements.csv"));
     results.write(&[("measurements.csv", &simulation.csv()), ("truth.json", &json)])?;
     // With a declared fraction, rows are held out when the file is read.

@@ -16,7 +16,7 @@ use super::diagnostic;
 use super::flags::Flags;
 use super::outcome::Outcome;
 use super::output::{self, REPORT, Results, WriteError};
-use super::progress::CountBar;
+use super::progress::count_during;
 
 /// Arguments of `flexcal study`.
 #[derive(Debug, Args)]
@@ -178,13 +178,10 @@ fn compute(common: &Common, shard: Option<Shard>) -> Result<Outcome, Box<dyn Err
 fn run_misprints(common: &Common, study: &MisprintStudy) -> Result<Outcome, Box<dyn Error>> {
     let names = ["misprints.json", REPORT[0], REPORT[1]];
     let results = common.claim(&study.name, &study.files, &names)?;
-    let bar = common
-        .flags
-        .prints_text()
-        .then(|| CountBar::new("fits", (study.specimens * study.cases.len()) as u64, 0));
-    let found = study::replicate(study, || bar.iter().for_each(CountBar::advance));
-    bar.iter().for_each(CountBar::clear);
-    let found = found?;
+    let fits = study.specimens * study.cases.len();
+    let found = count_during(common.flags.prints_text(), "fits", (fits, 0), |advance| {
+        study::replicate(study, advance)
+    })?;
     let json = MisprintResult::new(study, &found).to_json();
     results.write_report(&[(names[0], &json)], &report::replica_report(study, &found))?;
     common
@@ -204,13 +201,11 @@ fn compute_parts(
     let share = study.parts().into_iter().enumerate().filter(|(index, _)| shard.holds(*index));
     let repetitions: usize = share.map(|(_, part)| part.repetitions.len()).sum();
     let open: usize = parts.iter().map(|part| part.repetitions.len()).sum();
-    let bar = common
-        .flags
-        .prints_text()
-        .then(|| CountBar::new("fits", repetitions as u64, (repetitions - open) as u64));
-    let done = study::run(study, store, &parts, || bar.iter().for_each(CountBar::advance));
-    bar.iter().for_each(CountBar::clear);
-    Ok(done?)
+    let counts = (repetitions, repetitions - open);
+    count_during(common.flags.prints_text(), "fits", counts, |advance| {
+        study::run(study, store, &parts, advance)
+    })?;
+    Ok(())
 }
 
 /// Collects the results of all parts, writes the files [`RESULT_FILES`] and prints the table. The

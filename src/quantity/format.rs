@@ -2,6 +2,8 @@
 
 /// Smallest magnitude that is written with a power of ten.
 const MIN_SCIENTIFIC_SIZE: f64 = 1e12;
+/// Maximum number of decimals of a value with a standard error.
+pub(crate) const MAX_DECIMALS: usize = 6;
 /// Smallest p-value that is written out. A smaller one depends more on the assumed distribution
 /// than on the data.
 const MIN_WRITTEN_P: f64 = 1e-16;
@@ -68,6 +70,11 @@ pub(crate) fn fixed(value: f64, decimals: usize) -> String {
 /// Formats a count with its noun: "1 pose", "3 poses".
 pub(crate) fn counted(n: usize, noun: &str) -> String {
     format!("{n} {noun}{}", if n == 1 { "" } else { "s" })
+}
+
+/// Returns a probability in percent, rounded to four decimals.
+pub(crate) fn percent_of(probability: f64) -> f64 {
+    (probability * 1e6).round() / 1e4
 }
 
 /// Formats a length \[m\] in mm with `decimals` decimals.

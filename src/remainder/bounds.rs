@@ -1,6 +1,7 @@
 //! Bounds that the errors of predicted positions do not exceed with a given probability.
 
 use super::correction::{CorrectedPose, Correction};
+use crate::quantity::format::percent_of;
 
 /// Uncertainty of predicted poses, and error bounds that hold with the probability `level`.
 #[derive(Debug, Clone)]
@@ -50,6 +51,6 @@ impl Bounds {
     /// Returns the name of the bounds' column in tables, for example `bound95_mm` at a level of
     /// 0.95.
     pub fn column(&self) -> String {
-        format!("bound{}_mm", (self.level * 1e6).round() / 1e4)
+        format!("bound{}_mm", percent_of(self.level))
     }
 }

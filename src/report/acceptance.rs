@@ -5,7 +5,7 @@ use super::identify::NOMINAL_ARM;
 use super::render::{report, text};
 use crate::fit::Verdict;
 use crate::problem::Problem;
-use crate::quantity::format::{about_three_digits, counted, number};
+use crate::quantity::format::{about_three_digits, counted, number, percent_of};
 use crate::results::{AcceptanceResult, PoseAccuracy, TestedTolerance};
 
 /// Number of measurements (cycles) of each pose that ISO 9283 requires.
@@ -155,7 +155,7 @@ fn accuracy_blocks<'a>(result: &AcceptanceResult) -> Vec<Block<'a>> {
         Block::Text(format!(
             "The fit expects {} % of the errors to stay below a bound of {} mm on average; {:.0} of the {} \
              held-out rows do stay below theirs ({} %).",
-            (bound.bounds.level * 1e6).round() / 1e4,
+            percent_of(bound.bounds.level),
             number(bound.bounds.mean_bound_mm, 4),
             bound.coverage * bound.rows as f64,
             bound.rows,

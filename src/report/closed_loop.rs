@@ -13,15 +13,16 @@ use super::parameters::{against_priors, parameters};
 use super::probability::percent;
 use super::remainder::PredictionAccuracy;
 use super::render::{Report, report, text};
+use super::residual_tests::{self, other_reduced_chi2};
 use super::unexplained::{structure_places, structure_sentences, to_declare};
 use super::verdict::{
     alternative, causes, effect_counts, has_place, stand_in_sentence, title, verdict,
 };
-use super::{effect, residual_tests, trace};
+use super::{effect, trace};
 use crate::problem::Problem;
 use crate::quantity::format::{counted, decimals, number};
 use crate::results::{FoundEffect, Gain, LoopResult, PlotData, Summary, TraceResult, nominal_arm};
-use crate::select::{ClosedLoop, Trace};
+use crate::select::ClosedLoop;
 
 /// Maximum number of alternatives that a text names; the page names twice as many.
 const MAX_SHOWN_ALTERNATIVES: usize = 4;
@@ -174,7 +175,7 @@ pub fn loop_text(problem: &Problem, closure: &ClosedLoop) -> String {
     if !failed.is_empty() {
         blocks.push(Block::heading("Residual tests that the declared problem fails"));
         blocks.push(Block::list(failed));
-        blocks.extend(other_chi2_before(closure));
+        blocks.extend(other_reduced_chi2(&closure.before.residual_tests, &closure.before.fit));
     }
     blocks.extend(found_effects(result, MAX_SHOWN_ALTERNATIVES));
     let failed = residual_tests::failed(&closure.residual_tests);
@@ -186,7 +187,9 @@ pub fn loop_text(problem: &Problem, closure: &ClosedLoop) -> String {
         let failed = failed.into_iter().filter(|_| !result.effects.is_empty());
         blocks.push(Block::list(unexplained.chain(failed)));
         let is_listed = has_failed && !result.effects.is_empty();
-        blocks.extend(other_chi2_after(closure).filter(|_| is_listed));
+        blocks.extend(
+            other_reduced_chi2(&closure.residual_tests, &closure.after).filter(|_| is_listed),
+        );
     }
     text(&blocks)
 }
@@ -252,7 +255,7 @@ fn blocks<'a>(
         Block::heading("Residual of the declared problem"),
     ]);
     blocks.extend(residual_tests::blocks(&closure.before.residual_tests));
-    blocks.extend(other_chi2_before(closure));
+    blocks.extend(other_reduced_chi2(&closure.before.residual_tests, &closure.before.fit));
     let traced = TraceResult::new(problem, &closure.before);
     let every = format!("{} writes them all", code("flexcal trace"));
     let mut ranking = trace::ranking(problem, &traced, MAX_SHOWN_CANDIDATES, &every);
@@ -276,7 +279,7 @@ fn blocks<'a>(
             figures::joint_map(plots),
         ]),
     ]);
-    blocks.extend(other_chi2_after(closure));
+    blocks.extend(other_reduced_chi2(&closure.residual_tests, &closure.after));
     blocks.extend(super::remainder::uncertainty(after, plots));
     blocks.push(Block::heading("Parameters of the final fit"));
     blocks.extend(parameters(&closure.closed, after, &file));
@@ -397,20 +400,6 @@ fn known_gain(result: &LoopResult) -> Option<Gain> {
     let is_known =
         |gain: &Gain| result.trusted && !result.effects.is_empty() && gain.mean.is_finite();
     result.gain().filter(is_known)
-}
-
-/// States why the tests of the declared problem's residual have another χ²/ν than its fit; `None`
-/// if both agree.
-fn other_chi2_before(closure: &ClosedLoop) -> Option<Block<'static>> {
-    let Trace { residual_tests: tests, fit, .. } = &closure.before;
-    residual_tests::other_reduced_chi2(tests, fit.reduced_chi2).map(Block::Text)
-}
-
-/// States why the tests of the remaining residual have another χ²/ν than the final fit; `None` if
-/// both agree.
-fn other_chi2_after(closure: &ClosedLoop) -> Option<Block<'static>> {
-    let tests = &closure.residual_tests;
-    residual_tests::other_reduced_chi2(tests, closure.after.reduced_chi2).map(Block::Text)
 }
 
 /// States the gain on the held-out rows with its interval, and the size of the residual.

@@ -4,11 +4,10 @@ use std::path::PathBuf;
 
 use toml_edit::TomlError;
 
-use super::effect::values;
+use super::effect::{seen_ranges, values};
 use crate::error::one_line;
 use crate::problem::{Effect, Problem, edit};
-use crate::quantity::format::{number, p_value};
-use crate::residual_tests::Covariate;
+use crate::quantity::format::p_value;
 use crate::results::ParameterValue;
 use crate::select::{ClosedLoop, Found, Status};
 
@@ -80,11 +79,6 @@ fn comments(found: &Found, closure: &ClosedLoop) -> Vec<String> {
 /// States the identification ranges of the quantities in a law that the search composed; `None` for
 /// other effects.
 fn ranges_of_law(found: &Found) -> Option<String> {
-    let range = |(of, (low, high)): &(Covariate, (f64, f64))| {
-        format!("{of} from {} to {}", number(*low, 3), number(*high, 3))
-    };
-    let ranges: Vec<String> = found.ranges.iter().map(range).collect();
-    (!ranges.is_empty()).then(|| {
-        format!("Seen for {} (SI units, °C); beyond, it is an extrapolation.", ranges.join(", "))
-    })
+    let seen = seen_ranges(&found.ranges)?;
+    Some(format!("Seen for {seen}; beyond, it is an extrapolation."))
 }

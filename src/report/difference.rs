@@ -11,7 +11,7 @@ use super::render::{page, text};
 use crate::fit::SavedEstimate;
 use crate::numeric::{Interval, mean_interval};
 use crate::quantity::Unit;
-use crate::quantity::format::{counted, decimals, number, or_dash};
+use crate::quantity::format::{MAX_DECIMALS, counted, decimals, number, or_dash};
 
 /// Probability that any parameter is said to differ although the arm has not changed.
 const FALSE_ALARM_PROBABILITY: f64 = 0.01;
@@ -29,8 +29,6 @@ const SEED: u64 = 1;
 /// Distance below which two measured positions are those of one row \[mm\]. Tables state positions
 /// to 1e-6 mm.
 const MAX_SAME_DISTANCE: f64 = 1e-5;
-/// Maximum number of decimals of a value.
-const MAX_DECIMALS: usize = 6;
 
 /// One of the two results that are compared: estimate, errors and held-out rows.
 pub(crate) struct Side {

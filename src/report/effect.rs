@@ -1,13 +1,13 @@
 //! Effects in words: values of their parameters, and compact lists of many effects.
 
+use std::fmt::Display;
+
 use super::document::{Point, code};
 use crate::laws::ArgumentKind;
 use crate::problem::{Effect, JointKind, Problem};
-use crate::quantity::format::{decimals, number, power_of_ten};
+use crate::quantity::format::{MAX_DECIMALS, decimals, number, power_of_ten};
 use crate::results::{MAX_LISTED_COEFFICIENTS, MAX_SHOWN_HARMONICS, ParameterValue, joined};
 
-/// Maximum number of decimals of a value.
-const MAX_DECIMALS: usize = 6;
 /// Standard error below which [`MAX_DECIMALS`] decimals show less than two of its digits.
 const MIN_PLAIN_ERROR: f64 = 1e-5;
 /// Absolute value below which a value with such a standard error is written with a power of ten.
@@ -170,6 +170,16 @@ fn ranges(numbers: &[u32]) -> String {
         _ => run.iter().map(u32::to_string).collect::<Vec<_>>().join(", "),
     };
     numbers.chunk_by(|a, b| *b == a + 1).map(run).collect::<Vec<_>>().join(", ")
+}
+
+/// Lists the ranges over the identification rows of the quantities in a law; `None` without
+/// quantities.
+pub(super) fn seen_ranges(ranges: &[(impl Display, (f64, f64))]) -> Option<String> {
+    let range = |(of, (low, high)): &(_, (f64, f64))| {
+        format!("{of} from {} to {}", number(*low, 3), number(*high, 3))
+    };
+    let ranges: Vec<String> = ranges.iter().map(range).collect();
+    (!ranges.is_empty()).then(|| format!("{} (SI units, °C)", ranges.join(", ")))
 }
 
 #[cfg(test)]

@@ -4,10 +4,7 @@ use super::document::Block;
 use crate::design::ExpectedParameter;
 use crate::problem::{HeldOut, Problem};
 use crate::quantity::Display;
-use crate::quantity::format::{counted, decimals, number, or_dash, two_digits};
-
-/// Maximum number of decimals of a value.
-const MAX_DECIMALS: usize = 6;
+use crate::quantity::format::{MAX_DECIMALS, counted, decimals, number, or_dash, two_digits};
 
 /// Formats the nominal value and some standard errors \[SI\] of a parameter in a convenient unit.
 /// Returns the table cells (name, nominal value, errors) and the unit.

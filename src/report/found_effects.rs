@@ -41,7 +41,7 @@ fn point(result: &LoopResult, found: &FoundEffect, alternatives: usize) -> Point
     let mut details: Vec<String> = stand_in_sentence(found).into_iter().collect();
     details.extend(effect::values(&found.effect.effect, &found.parameters));
     details.extend(found.claims.as_ref().map(trace::claims_text));
-    details.extend(ranges_of_law(found));
+    details.extend(effect::seen_ranges(&found.ranges).map(|seen| format!("seen for {seen}")));
     details.extend(found.resembles.as_ref().map(|cause| format!("hint: {cause}")));
     details.extend(found.stability.map(|share| {
         format!(
@@ -74,16 +74,6 @@ fn point(result: &LoopResult, found: &FoundEffect, alternatives: usize) -> Point
         details.push(format!("these data do not exclude: {}", others.join("; ")));
     }
     Point { text: title(found), details, mark: None }
-}
-
-/// States the identification ranges of the quantities in a law that the search composed; `None` for
-/// other effects.
-fn ranges_of_law(found: &FoundEffect) -> Option<String> {
-    let range = |(of, (low, high)): &(String, (f64, f64))| {
-        format!("{of} from {} to {}", number(*low, 3), number(*high, 3))
-    };
-    let ranges: Vec<String> = found.ranges.iter().map(range).collect();
-    (!ranges.is_empty()).then(|| format!("seen for {} (SI units, °C)", ranges.join(", ")))
 }
 
 fn witness(witness: &Witness) -> String {

@@ -7,13 +7,8 @@ use super::render::{page, text};
 use crate::design::{NextOptions, NextPoses, Purpose, StopReason, WorkspaceError};
 use crate::measurement::Measurements;
 use crate::problem::Problem;
-use crate::quantity::format::{counted, number, or_dash};
+use crate::quantity::format::{counted, mm, number, or_dash};
 use crate::results::{CommandedJoint, commanded_joints};
-
-/// Formats a length, given in m, in mm with three decimals.
-fn mm(length: f64) -> String {
-    number(length * 1e3, 3)
-}
 
 /// Returns the text of a choice of poses, ending in a line break.
 pub fn next_text(problem: &Problem, options: &NextOptions, next: &NextPoses) -> String {
@@ -40,14 +35,14 @@ fn blocks<'a>(problem: &Problem, options: &NextOptions, next: &NextPoses) -> Vec
         Some(error) => format!(
             "In the workspace the identified arm errs by {} ± {} mm (expected rms, noise included), and by less than {} mm with a \
              probability of {percent} %.{} The choice allows for a misfit of the model of {} mm per axis besides {} mm of noise.",
-            mm(error.expected),
-            mm(error.expected_sigma),
-            mm(error.bound),
+            mm(error.expected, 3),
+            mm(error.expected_sigma, 3),
+            mm(error.bound, 3),
             next.attainable
-                .map(|least| format!(" No number of further poses brings the rms below {} mm.", mm(least)))
+                .map(|least| format!(" No number of further poses brings the rms below {} mm.", mm(least, 3)))
                 .unwrap_or_default(),
-            mm(next.misfit),
-            mm(next.noise),
+            mm(next.misfit, 3),
+            mm(next.noise, 3),
         ),
         None if next.is_of_cameras => "Cameras measure: the choice lowers the mean variance of predicted pixels of the points in view, \
              over configurations of the workspace that show one. No error in mm is stated, and no misfit of the model is assumed."
@@ -55,8 +50,8 @@ fn blocks<'a>(problem: &Problem, options: &NextOptions, next: &NextPoses) -> Vec
         None => format!(
             "The error in the workspace is stated once ten configurations are measured, and as many coordinates as parameters are \
              fitted; until then a misfit of {} mm per axis is assumed besides {} mm of noise.",
-            mm(next.misfit),
-            mm(next.noise),
+            mm(next.misfit, 3),
+            mm(next.noise, 3),
         ),
     }));
     if !next.effects.is_empty() {
@@ -92,10 +87,10 @@ fn draw_errors(options: &NextOptions, next: &NextPoses, percent: &str) -> Option
         )
     };
     let tolerance =
-        options.tolerance.map(|most| (format!("tolerance {} mm", mm(most)), most * 1e3));
+        options.tolerance.map(|most| (format!("tolerance {} mm", mm(most, 3)), most * 1e3));
     let least = next
         .attainable
-        .map(|least| (format!("least rms that poses can reach {} mm", mm(least)), least * 1e3));
+        .map(|least| (format!("least rms that poses can reach {} mm", mm(least, 3)), least * 1e3));
     let caption = format!(
         "Error of predicted positions in the workspace, measurement noise included, now (0) and expected after each chosen pose: \
          the root mean square, and the bound that {percent} % of the errors do not exceed."
@@ -133,7 +128,7 @@ pub(super) fn commands(problem: &Problem, poses: &Measurements) -> Table {
 /// States whether enough poses are measured, or after how many more there are expected to be
 /// enough.
 fn verdict(options: &NextOptions, next: &NextPoses) -> String {
-    let tolerance = options.tolerance.map(mm);
+    let tolerance = options.tolerance.map(|length| mm(length, 3));
     if !next.found.is_trusted() {
         return "Not judged, because the fit to the measured poses is not to be trusted."
             .to_owned();
@@ -180,8 +175,8 @@ fn steps(options: &NextOptions, next: &NextPoses, percent: &str) -> Table {
             (k + 1).to_string(),
             format!("{} %", number(step.travel * 100.0, 0)),
             format!("{} %", number(step.gain * 100.0, 2)),
-            or_dash(step.error, |error| mm(error.expected)),
-            or_dash(step.error, |error| mm(error.bound)),
+            or_dash(step.error, |error| mm(error.expected, 3)),
+            or_dash(step.error, |error| mm(error.bound, 3)),
         ]
     });
     let header = ["pose", "travel", "gain", "rms, mm", "bound, mm"];

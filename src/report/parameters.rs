@@ -6,13 +6,11 @@ use crate::fit::{Estimate, Identification, PriorSize, open_quantities};
 use crate::least_squares::solver::AtBound;
 use crate::least_squares::{Identifiability, UnidentifiableCombination, WEAK_THRESHOLD};
 use crate::problem::Problem;
-use crate::quantity::format::{decimals, number, or_dash, two_digits};
+use crate::quantity::format::{MAX_DECIMALS, decimals, number, or_dash, two_digits};
 use crate::results::{Knowledge, ManyHarmonics};
 
 /// Number of decimals of a value without a standard error.
 const DEFAULT_DECIMALS: usize = 4;
-/// Maximum number of decimals of a value.
-const MAX_DECIMALS: usize = 6;
 /// Smallest absolute coefficient at which a parameter of a combination is named.
 const MIN_NAMED_COEFFICIENT: f64 = 0.02;
 /// Maximum number of parameters of a combination that are named.

@@ -10,7 +10,7 @@ use super::render::{page, text};
 use super::row_kinds::unsteady_points;
 use crate::fit::{ErrorSummary, Prediction};
 use crate::problem::Problem;
-use crate::quantity::format::{counted, mm};
+use crate::quantity::format::{counted, mm, percent_of};
 use crate::remainder::Bounds;
 
 /// Returns the predictions as text. `arm` describes the arm that was used, and `fitted` lists the
@@ -143,7 +143,7 @@ fn draw_errors(prediction: &Prediction, bounds: Option<&Bounds>) -> Option<Drawi
     let (within, beyond): (Vec<_>, Vec<_>) = points.partition(|(bound, length)| length <= bound);
     let most = bounds.poses.len();
     let bound = (0..most).map(|row| bounds.bound(row) * 1e3).fold(0.0, f64::max);
-    let percent = (bounds.level * 1e6).round() / 1e4;
+    let percent = percent_of(bounds.level);
     Series {
         names: ("prediction-errors", "Error of each row against its bound"),
         caption: format!(

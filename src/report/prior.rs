@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use super::document::{Block, Table};
 use super::figures::{ACCENT, Drawing, Forest, INK};
 use crate::fit::{ComparedParameter, Identification, PriorComparison};
-use crate::quantity::format::{counted, decimals, number, or_dash, p_value};
+use crate::quantity::format::{MAX_DECIMALS, counted, decimals, number, or_dash, p_value};
 
 /// Header of the table of parameters.
 const HEADER: [&str; 7] =
@@ -15,8 +15,6 @@ const MIN_AGREEING_P: f64 = 0.001;
 /// Largest standard error by the new rows, in units of the earlier one, at which the figure shows a
 /// parameter. Above it the new rows add hardly any information.
 const MAX_DRAWN_ERROR: f64 = 10.0;
-/// Maximum number of decimals of a value.
-const MAX_DECIMALS: usize = 6;
 
 /// Returns the comparison with the earlier estimate: a summary, a figure and a table of the
 /// parameters that it informs on. Empty without an earlier estimate.

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use super::document::{Block, Column, Table, code};
 use super::figures;
 use crate::fit::{ErrorSummary, Identification, Residual};
-use crate::quantity::format::{counted, mm, number, two_digits};
+use crate::quantity::format::{counted, mm, number, percent_of, two_digits};
 use crate::remainder::{Bounds, Gain, JointError, Outcome};
 use crate::results::PlotData;
 
@@ -97,7 +97,7 @@ impl PredictionAccuracy {
         let with = if held_out.is_some() { " with the remainder" } else { "" };
         let bounds = &uncertainty.bounds;
         let mean = bounds.iter().map(|at| at.bound).sum::<f64>() / bounds.len() as f64;
-        let percent = (uncertainty.level * 1e6).round() / 1e4;
+        let percent = percent_of(uncertainty.level);
         let bound = mean.is_finite().then(|| {
             format!(
                 "Error bound of a prediction{with} ({percent} %, measurement noise included): {} mm, mean over the workspace.",
@@ -128,7 +128,7 @@ pub(super) fn bound_sentence(bounds: &Bounds, residuals: Option<&[Residual]>) ->
     let mut words = format!(
         "Expected error {} mm rms, measurement noise included; the {} % bound is {} mm on average",
         number(bounds.expected() * 1e3, 3),
-        (bounds.level * 1e6).round() / 1e4,
+        percent_of(bounds.level),
         number(bounds.mean() * 1e3, 3),
     );
     if let Some(residuals) = residuals

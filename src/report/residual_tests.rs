@@ -1,6 +1,7 @@
 //! Tests of the residual of a fit, in words.
 
 use super::document::{Block, Mark, Point};
+use crate::fit::Identification;
 use crate::quantity::format::number;
 use crate::residual_tests::{ResidualTest, ResidualTests, Test};
 
@@ -9,9 +10,11 @@ pub(super) fn failed(tests: &ResidualTests) -> Vec<String> {
     tests.tests.iter().filter(|check| check.failed()).map(ToString::to_string).collect()
 }
 
-/// States why the tests have another χ²/ν than the fit, whose value is `chi2`; `None` if both agree
-/// in the shown digits.
-pub(super) fn other_reduced_chi2(tests: &ResidualTests, chi2: Option<f64>) -> Option<String> {
+/// States why the tests have another χ²/ν than the fit; `None` if both agree in the shown digits.
+pub(super) fn other_reduced_chi2(
+    tests: &ResidualTests,
+    fit: &Identification,
+) -> Option<Block<'static>> {
     let size = tests
         .tests
         .iter()
@@ -19,10 +22,9 @@ pub(super) fn other_reduced_chi2(tests: &ResidualTests, chi2: Option<f64>) -> Op
         .outcome
         .as_ref()
         .ok()?;
-    (number(size.statistic, 2) != number(chi2?, 2)).then(|| {
-        "χ²/ν of these tests is not that of the fit: the tests leave out outliers, and fit each stiffness by itself."
-            .to_owned()
-    })
+    let words = "χ²/ν of these tests is not that of the fit: the tests leave out outliers, and fit each stiffness by itself.";
+    (number(size.statistic, 2) != number(fit.reduced_chi2?, 2))
+        .then(|| Block::Text(words.to_owned()))
 }
 
 fn point(check: &ResidualTest) -> Point {

@@ -47,10 +47,7 @@ fn blocks<'a>(problem: &Problem, trace: &Trace, plots: Option<&PlotData>) -> Vec
         Block::heading("Tests of the residual (measured − predicted) of the identification poses"),
         Block::List(residual_tests::by_outcome(&trace.residual_tests)),
     ]);
-    blocks.extend(
-        residual_tests::other_reduced_chi2(&trace.residual_tests, trace.fit.reduced_chi2)
-            .map(Block::Text),
-    );
+    blocks.extend(residual_tests::other_reduced_chi2(&trace.residual_tests, &trace.fit));
     blocks.extend(ranking(problem, &result, MAX_SHOWN_CANDIDATES, "trace.json holds them all"));
     blocks.extend(plots.map(|plots| {
         Block::figures([

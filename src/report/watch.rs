@@ -8,15 +8,15 @@ use super::render::{page, text};
 use crate::life::{CauseKind, Change, Watch, WatchedCause};
 use crate::measurement::Measurements;
 use crate::problem::Problem;
-use crate::quantity::format::{counted, decimals, number, or_dash, p_value, two_digits};
+use crate::quantity::format::{
+    MAX_DECIMALS, counted, decimals, number, or_dash, p_value, two_digits,
+};
 
 /// Header of the table of causes.
 const HEADER: [&str; 5] = ["cause", "probability", "change ± 1 σ", "error left out", "more poses"];
 /// p-value of the errors below which the text does not say that noise and the misfit explain
 /// them.
 const MIN_EXPECTED_P: f64 = 0.01;
-/// Maximum number of decimals of a change.
-const MAX_DECIMALS: usize = 6;
 
 /// Returns the verdict as text, ending in a line break.
 pub fn watch_text(problem: &Problem, watch: &Watch) -> String {

@@ -4,6 +4,7 @@ use schemars::generate::SchemaSettings;
 use schemars::transform::{RecursiveTransform, Transform as _};
 use schemars::{JsonSchema, Schema};
 use serde::Serialize;
+use serde_json::value::{RawValue, to_raw_value};
 use serde_json::{Value, json};
 
 use crate::files::{DIGEST_KEY, FORMAT_VERSION, Format, PROGRAM, sealed};
@@ -55,6 +56,15 @@ pub(super) fn schema_of<T: JsonSchema>(name: &'static str, is_sealed: bool) -> S
     let mut text = serde_json::to_string_pretty(&schema).unwrap_or_default();
     text.push('\n');
     text
+}
+
+/// Returns the rows of an n × n matrix with the entries `entry`, each as one line of JSON text.
+pub(super) fn json_rows<T: Serialize>(
+    n: usize,
+    entry: impl Fn(usize, usize) -> T,
+) -> Vec<Box<RawValue>> {
+    let rows = (0..n).map(|j| (0..n).map(|k| entry(j, k)).collect::<Vec<_>>());
+    rows.filter_map(|row| to_raw_value(&row).ok()).collect()
 }
 
 /// Result with its format and program, as written to a file.

@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::value::{RawValue, to_raw_value};
 
-use super::document::Document;
+use super::document::{Document, json_rows};
 use super::prior::PriorUse;
 use super::remainder::{self, Remainder};
 use super::summary::{Errors, KindErrors, in_mm_deg_px};
@@ -452,6 +452,5 @@ fn covariance(found: &Identification) -> Vec<Box<RawValue>> {
     let has_error = |k: usize| found.estimates[k].std_error.is_some();
     let entry =
         |j: usize, k: usize| found.covariance.entry(j, k).filter(|_| has_error(j) && has_error(k));
-    let rows = (0..n).map(|j| (0..n).map(|k| entry(j, k)).collect::<Vec<_>>());
-    rows.filter_map(|row| to_raw_value(&row).ok()).collect()
+    json_rows(n, entry)
 }

@@ -3,8 +3,9 @@
 use nalgebra::DMatrix;
 use schemars::JsonSchema;
 use serde::Serialize;
-use serde_json::value::{RawValue, to_raw_value};
+use serde_json::value::RawValue;
 
+use super::document::json_rows;
 use super::summary::Summary;
 use crate::fit::{Estimate, Identification};
 use crate::remainder::{Bounds, Fitted};
@@ -109,7 +110,5 @@ pub(super) fn covariance(found: &Identification, fitted: &Fitted) -> Vec<Box<Raw
         estimate.std_error.filter(|_| spread > 0.0).map_or(1.0, |error| error / spread)
     };
     let factors: Vec<f64> = found.estimates.iter().enumerate().map(factor).collect();
-    let covariance = DMatrix::from_fn(n, n, |k, l| factors[k] * covariance[(k, l)] * factors[l]);
-    let rows = (0..n).map(|k| covariance.row(k).iter().copied().collect::<Vec<f64>>());
-    rows.filter_map(|row| to_raw_value(&row).ok()).collect()
+    json_rows(n, |k, l| factors[k] * covariance[(k, l)] * factors[l])
 }

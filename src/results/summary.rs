@@ -119,10 +119,8 @@ impl Errors {
     /// Creates the errors from the summary of the fitted rows and from that of the rows that test
     /// the fit (`judged`). These are held out or, if `is_left_out`, left out in turn.
     pub(super) fn new(identification: Summary, judged: Summary, is_left_out: bool) -> Self {
-        let (held_out, left_out) = (Some(judged), None);
-        if is_left_out {
-            return Self { identification, held_out: left_out, left_out: held_out };
-        }
+        let (held_out, left_out) =
+            if is_left_out { (None, Some(judged)) } else { (Some(judged), None) };
         Self { identification, held_out, left_out }
     }
 

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 
 use super::chart::{LEFT_SPACE, RIGHT_SPACE};
 use super::prelude::*;
+use crate::quantity::format::percent_of;
 use crate::remainder::{JointError, JointErrorPoint};
 use crate::results::{BoundAt, CommandedJoint};
 
@@ -60,7 +61,7 @@ pub fn bounds_over_workspace(data: &PlotData) -> Option<Drawing> {
             .with(boxes.collect::<Vec<_>>())
     });
     let panels: Vec<Panel> = panels.collect();
-    let level = (uncertainty.level * 1e6).round() / 1e4;
+    let level = percent_of(uncertainty.level);
     let beyond = bounds.iter().filter(|at| at.is_extrapolated).count();
     let caption = format!(
         "Mean bound of measured − predicted that holds with a probability of {level} %, over the \

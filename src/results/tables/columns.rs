@@ -103,13 +103,20 @@ pub(super) fn identifying_columns(
         }
     }
     for name in fixture_columns {
-        let cell = |row: usize| {
-            let mut cells = reference_cells(problem, rows.observation(row));
-            cells.find(|(field, _)| field.name == name).map(|(_, cell)| cell).unwrap_or_default()
-        };
-        add(name, Column::Words(picked.iter().map(|&row| cell(row)).collect()));
+        let cells = picked.iter().map(|&row| reference_cell(problem, rows, (row, name)));
+        add(name, Column::Words(cells.collect()));
     }
     columns
+}
+
+/// Returns what a row names in the column `name` of fixtures; empty if nothing.
+pub(super) fn reference_cell(
+    problem: &Problem,
+    rows: &Measurements,
+    (row, name): (usize, &str),
+) -> String {
+    let mut cells = reference_cells(problem, rows.observation(row));
+    cells.find(|(field, _)| field.name == name).map(|(_, cell)| cell).unwrap_or_default()
 }
 
 /// Group of columns about predictions or residuals: the prefix of the column names, and functions

@@ -1,10 +1,10 @@
 //! Table of poses to measure.
 
+use super::columns::reference_cell;
 use super::commanded::{CommandedJoint, commanded_joints, label, sessions};
 use crate::files::csv;
 use crate::measurement::Measurements;
 use crate::observation::fields;
-use crate::problem::fixture::reference_cells;
 use crate::problem::{HeldOut, Problem};
 use crate::quantity::Unit;
 use crate::quantity::format::fixed;
@@ -86,16 +86,10 @@ fn sigmas(poses: &Measurements) -> Option<Vec<String>> {
 /// Returns the columns that name the fixtures and frames of each row, such as `point`, `anchor`,
 /// `surface` or `frame`. Columns without any entry are left out.
 fn reference_columns(problem: &Problem, poses: &Measurements) -> Vec<(String, Vec<String>)> {
-    let column = |name: &str| -> Vec<String> {
-        let cell = |row| {
-            let mut cells = reference_cells(problem, poses.observation(row));
-            cells.find(|(field, _)| field.name == name).map(|(_, cell)| cell).unwrap_or_default()
-        };
-        (0..poses.len()).map(cell).collect()
-    };
     let mut columns: Vec<(String, Vec<String>)> = Vec::new();
     for field in fields().filter(|field| field.unit().is_none()) {
-        let cells = column(field.name);
+        let cell = |row| reference_cell(problem, poses, (row, field.name));
+        let cells: Vec<String> = (0..poses.len()).map(cell).collect();
         let is_new = columns.iter().all(|(name, _)| name != field.name);
         if is_new && cells.iter().any(|cell| !cell.is_empty()) {
             columns.push((field.name.to_owned(), cells));
