@@ -97,12 +97,8 @@ pub fn identify_model(
     let mut found = fit_rows(model, problem, (measurements, split), options)?;
     // A robust loss already limits the influence of single rows.
     if options.influential_rows && !options.provisional && problem.robust.is_none() {
-        let values =
-            found.estimates.iter().map(|estimate| (estimate.name.clone(), estimate.estimate));
-        let start = values.collect();
         let warm_start = Some(Arc::new(found.warm_start(true)));
-        let provisional =
-            Options { progress: None, warm_start, provisional: true, start, ..options.clone() };
+        let provisional = Options { warm_start, ..provisional_options(&found, options) };
         let without = |rows: &[usize]| {
             let left_out: BTreeSet<usize> = rows.iter().copied().collect();
             let kept = split
@@ -118,22 +114,21 @@ pub fn identify_model(
         found.findings.extend(found.influential_rows.as_ref().map(influential_finding));
     }
     if !options.provisional && options.earlier.is_none() {
-        let values =
-            found.estimates.iter().map(|estimate| (estimate.name.clone(), estimate.estimate));
-        let start = values.collect();
-        let other = Options { progress: None, provisional: true, start, ..options.clone() };
-        let fit = |problem: &Problem| identify(problem, data, &other);
+        let provisional = provisional_options(&found, options);
+        let fit = |problem: &Problem| identify(problem, data, &provisional);
         found.findings.extend(lens_finding(problem, data, &found, fit));
-    }
-    if options.influential_rows && !options.provisional && options.earlier.is_none() {
-        let values =
-            found.estimates.iter().map(|estimate| (estimate.name.clone(), estimate.estimate));
-        let start = values.collect();
-        let other = Options { progress: None, provisional: true, start, ..options.clone() };
-        let fit = |problem: &Problem| identify(problem, data, &other);
-        found.findings.extend(payload_finding(problem, data, &found, fit));
+        if options.influential_rows {
+            found.findings.extend(payload_finding(problem, data, &found, fit));
+        }
     }
     Ok(found)
+}
+
+/// Returns the options of a provisional fit that starts at the values that a fit found.
+fn provisional_options(found: &Identification, options: &Options) -> Options {
+    let values = found.estimates.iter().map(|estimate| (estimate.name.clone(), estimate.estimate));
+    let start = values.collect();
+    Options { progress: None, provisional: true, start, ..options.clone() }
 }
 
 /// Fits the identification rows of a split and checks the result.

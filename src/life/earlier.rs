@@ -53,12 +53,12 @@ impl Earlier {
         days: f64,
     ) -> Result<Self, PriorError> {
         let file = estimate.file.clone();
-        if estimate.strategy() != Strategy::Joint {
-            return Err(PriorError::Strategy { file, found: estimate.strategy().as_str() });
+        if estimate.strategy != Strategy::Joint {
+            return Err(PriorError::Strategy { file, found: estimate.strategy.as_str() });
         }
         estimate.check_same_arm(problem, model)?;
         let drift = drift::variances(problem, model, days)?;
-        let saved = estimate.posterior();
+        let saved = &estimate.posterior;
         let entries: Vec<(usize, usize, f64)> = estimate
             .entries()
             .enumerate()

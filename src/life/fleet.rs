@@ -160,12 +160,12 @@ pub fn fleet(estimates: &[SavedEstimate]) -> Result<Fleet, PriorError> {
             let (other, part) = (first.file.clone(), part.name);
             return Err(PriorError::OtherType { file: file(), other, part });
         }
-        if estimate.posterior().includes_fleet {
+        if estimate.posterior.includes_fleet {
             return Err(PriorError::HasFleetPrior { file: file() });
         }
-        let rows = &estimate.posterior().fitted_rows;
+        let rows = &estimate.posterior.fitted_rows;
         for other in &estimates[..number] {
-            let shared = other.posterior().fitted_rows.intersection(rows).count();
+            let shared = other.posterior.fitted_rows.intersection(rows).count();
             if shared > 0 {
                 let other = other.file.clone();
                 return Err(PriorError::SameRows { file: file(), other, rows: shared });
@@ -215,7 +215,7 @@ pub fn fleet(estimates: &[SavedEstimate]) -> Result<Fleet, PriorError> {
     });
     Ok(Fleet {
         problem: first.problem_name().to_owned(),
-        arm_parts: first.arm_parts().clone(),
+        arm_parts: first.arm_parts.clone(),
         parameters: parameters.collect(),
         left_out,
         arms: arms.collect(),
@@ -227,7 +227,7 @@ pub fn fleet(estimates: &[SavedEstimate]) -> Result<Fleet, PriorError> {
 fn with_variance(estimates: &[SavedEstimate]) -> (Vec<&str>, Vec<String>) {
     let has_variance = |estimate: &SavedEstimate, name: &str| {
         let place = estimate.entries().position(|(other, ..)| other == name);
-        place.is_some_and(|k| estimate.posterior().covariance[(k, k)] > 0.0)
+        place.is_some_and(|k| estimate.posterior.covariance[(k, k)] > 0.0)
     };
     let mut names: Vec<&str> = Vec::new();
     for (name, ..) in estimates.iter().flat_map(SavedEstimate::entries) {
@@ -262,7 +262,7 @@ fn likelihood(
         |i: usize| if is_relative(names[i]) { values[places[i]].abs().recip() } else { 1.0 };
     let n = names.len();
     let covariance = DMatrix::from_fn(n, n, |i, j| {
-        estimate.posterior().covariance[(places[i], places[j])] * slope(i) * slope(j)
+        estimate.posterior.covariance[(places[i], places[j])] * slope(i) * slope(j)
     });
     let scale = covariance.diagonal().map(f64::sqrt);
     let correlation = DMatrix::from_fn(n, n, |i, j| covariance[(i, j)] / (scale[i] * scale[j]));

@@ -25,7 +25,7 @@ impl KnownNoise {
     /// misfit is the excess of the larger of two: the σ that the earlier fit took, and the noise of
     /// its predictions if that is significantly larger than the declared one.
     pub fn of(problem: &Problem, estimate: &SavedEstimate) -> Self {
-        let saved = estimate.posterior();
+        let saved = &estimate.posterior;
         let declared = problem.data.position_sigma.or(estimate.estimated_sigma);
         // For rows that state their σ, the noise is the σ that the fit took without its misfit.
         let of_rows = |taken: f64| taken / saved.noise_factor.max(1.0).sqrt();

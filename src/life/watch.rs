@@ -149,7 +149,7 @@ pub fn watch(
     measurements: &Measurements,
     (days, false_alarm_rate): (f64, f64),
 ) -> Result<Watch, PriorError> {
-    let fitted = &estimate.posterior().fitted_rows;
+    let fitted = &estimate.posterior.fitted_rows;
     let new: Vec<usize> = (0..measurements.len())
         .filter(|&row| !fitted.contains(&measurements.row_digest(row)))
         .collect();

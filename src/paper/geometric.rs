@@ -1,6 +1,6 @@
 //! Motion of the end frame by errors of the geometric parameters, eq. 28-38 of the paper.
 
-use nalgebra::{DMatrix, Matrix6, SMatrix};
+use nalgebra::{DMatrix, Matrix6, SMatrix, matrix};
 
 use super::form::{Misprint, Reading};
 use super::kinematics::{Chain, Mdh};
@@ -23,38 +23,14 @@ pub fn error_matrix(link: &Mdh) -> SMatrix<f64, 6, 5> {
     let (st, ct) = link.theta.sin_cos();
     let (sb, cb) = link.beta.sin_cos();
     let d = link.d;
-    SMatrix::<f64, 6, 5>::from_row_slice(&[
-        -d * st * cb,
-        ct * cb,
-        0.0,
-        -sb,
-        0.0, //
-        -d * ct,
-        -st,
-        0.0,
-        0.0,
-        0.0, //
-        -d * st * sb,
-        ct * sb,
-        0.0,
-        cb,
-        0.0, //
-        ct * cb,
-        0.0,
-        -sb,
-        0.0,
-        0.0, //
-        -st,
-        0.0,
-        0.0,
-        0.0,
-        1.0, //
-        ct * sb,
-        0.0,
-        cb,
-        0.0,
-        0.0,
-    ])
+    matrix![
+        -d * st * cb, ct * cb, 0.0, -sb, 0.0;
+        -d * ct, -st, 0.0, 0.0, 0.0;
+        -d * st * sb, ct * sb, 0.0, cb, 0.0;
+        ct * cb, 0.0, -sb, 0.0, 0.0;
+        -st, 0.0, 0.0, 0.0, 1.0;
+        ct * sb, 0.0, cb, 0.0, 0.0
+    ]
 }
 
 /// Returns the matrix from the motion of frame i (joint `k`, counted from 0) to that of the end

@@ -79,17 +79,15 @@ impl Loads {
         let gravity = problem.gravity;
         let n = problem.joints.len();
         let mut forces = Vec::new();
-        let push =
-            |forces: &mut Vec<Load>, at, force, hoist| forces.push(Load { at, force, hoist });
+        let weight = |at, mass: f64| Load { at, force: gravity * mass, hoist: false };
         let (axes, origin) = split(&chain.before[n]);
         let payload = setup.payload.copied().unwrap_or(problem.tool.payload_mass);
-        push(&mut forces, origin + axes * problem.tool.payload_at, gravity * payload, false);
+        forces.push(weight(origin + axes * problem.tool.payload_at, payload));
         let mut out = Self { links: vec![None; n], joints: vec![JointLoads::default(); n] };
         for (k, joint) in problem.joints.iter().enumerate().rev() {
             let (axes, origin) = split(&chain.before[k + 1]);
-            for body in &joint.bodies {
-                push(&mut forces, origin + axes * body.position, gravity * body.mass, false);
-            }
+            let bodies = joint.bodies.iter();
+            forces.extend(bodies.map(|body| weight(origin + axes * body.position, body.mass)));
             let (axes, tip) = split(&(chain.before[k] * chain.links[k].to_tip()));
             let (weights, hoists) = (sum_about(&forces, tip, false), sum_about(&forces, tip, true));
             let axis = axes.column(2);
@@ -105,9 +103,9 @@ impl Loads {
                     tip_hoist: resolved(&axes, &hoists),
                 };
                 let root = tip - axes.column(0) * length;
-                push(&mut forces, (root + tip) * 0.5, gravity * beam.mass, false);
+                forces.push(weight((root + tip) * 0.5, beam.mass));
                 for (at, force, hoist) in carried(beam, gravity, setup) {
-                    push(&mut forces, root + axes * at, force, hoist);
+                    forces.push(Load { at: root + axes * at, force, hoist });
                     link.points.push(point_load(at, length, axes.tr_mul(&force), hoist));
                 }
                 out.links[k] = Some(link);

@@ -1,5 +1,6 @@
 //! Reader of the rules in `[parameters]`.
 
+use super::Problem;
 use super::item::Item;
 use super::section::Section;
 use crate::error::{InputError, InputErrorKind, Location};
@@ -15,6 +16,16 @@ pub struct ParameterRule {
     pub freedom: Freedom,
     /// Place in the file, for errors.
     pub location: Location,
+}
+
+impl ParameterRule {
+    /// Returns the rule that frees the parameters whose names match `pattern`, without prior and
+    /// bounds; errors name the place of the data.
+    pub(crate) fn free(pattern: String, problem: &Problem) -> Self {
+        let none = Quantities::default();
+        let freedom = Freedom::Free { sigma: none, min: none, max: none };
+        Self { pattern, freedom, location: problem.data.location.clone() }
+    }
 }
 
 /// Freedom of a parameter: fixed, or free with optional prior and bounds.

@@ -132,7 +132,7 @@ const STIFFNESS_UNITS: [Unit; 3] =
 /// Returns the parameters that both estimates have, the largest difference in standard errors
 /// first.
 fn differences([a, b]: &[Side; 2]) -> Vec<Difference> {
-    let variance = |side: &Side, k: usize| side.estimate.posterior().covariance[(k, k)];
+    let variance = |side: &Side, k: usize| side.estimate.posterior.covariance[(k, k)];
     let entries_of_b: Vec<(&str, f64, Option<f64>)> = b.estimate.entries().collect();
     let of = |(k, (name, value, _)): (usize, (&str, f64, Option<f64>))| {
         let index = entries_of_b.iter().position(|entry| entry.0 == name)?;
@@ -252,7 +252,7 @@ fn notes([a, b]: [&SavedEstimate; 2]) -> Vec<String> {
             _ => format!("The arms are declared differently: {name}."),
         });
     }
-    let shared = a.posterior().fitted_rows.intersection(&b.posterior().fitted_rows).count();
+    let shared = a.posterior.fitted_rows.intersection(&b.posterior.fitted_rows).count();
     if shared > 0 {
         notes.push(format!(
             "Both fits use {}: the true standard errors of the differences are smaller than shown.",

@@ -130,15 +130,18 @@ impl Identification {
             .collect();
         let x = self.vector(&model)?;
         let (fixtures, bases) = (model.fixtures(x.as_slice()), model.base_frames(x.as_slice()));
-        let residual = |(row, position): (usize, Vector3<f64>)| Residual {
-            row,
-            predicted: in_space(measurements, row, (&fixtures, &bases), &position).0,
-            held_out: split.held_out.binary_search(&row).is_ok(),
-            position: in_space(measurements, row, (&fixtures, &bases), &position).1,
-            whitened: position / sigma(row),
-            orientation: turns.as_ref().map(|turns| turns[row]),
-            whitened_orientation: turns.as_ref().map(|turns| turns[row] / turn_sigma),
-            outlier: outliers.contains(&row),
+        let residual = |(row, error): (usize, Vector3<f64>)| {
+            let (predicted, position) = in_space(measurements, row, (&fixtures, &bases), &error);
+            Residual {
+                row,
+                predicted,
+                held_out: split.held_out.binary_search(&row).is_ok(),
+                position,
+                whitened: error / sigma(row),
+                orientation: turns.as_ref().map(|turns| turns[row]),
+                whitened_orientation: turns.as_ref().map(|turns| turns[row] / turn_sigma),
+                outlier: outliers.contains(&row),
+            }
         };
         Ok(errors.into_iter().enumerate().map(residual).collect())
     }

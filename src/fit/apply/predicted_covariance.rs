@@ -101,7 +101,7 @@ pub fn standard_errors(
     let mut poses = placement.poses(rows, &all, 1.0);
     estimate.count_time_in(&placement, &mut poses);
     let poses: Vec<Pose> = poses.into_iter().map(|pose| Pose { sigma: 1.0, ..pose }).collect();
-    let of_values = &estimate.posterior().covariance;
+    let of_values = &estimate.posterior.covariance;
     let entry =
         |k: usize| estimate.entries().position(|(name, ..)| name == model.parameters[k].name);
     let entries: Vec<Option<usize>> = (0..model.parameters.len())

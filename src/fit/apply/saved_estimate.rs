@@ -50,10 +50,12 @@ pub struct SavedEstimate {
     /// Digest of the declared arm; `None` in files of older versions.
     arm_digest: Option<String>,
     /// Digest of each part of the declared arm, by its name; empty in files of older versions.
-    arm_parts: BTreeMap<String, String>,
-    strategy: Strategy,
+    pub(crate) arm_parts: BTreeMap<String, String>,
+    /// Strategy of the fit.
+    pub(crate) strategy: Strategy,
     parameters: Vec<Entry>,
-    posterior: SavedPosterior,
+    /// Uncertainty and noise of the estimate.
+    pub(crate) posterior: SavedPosterior,
 }
 
 /// Uncertainty and noise of a saved estimate, from which the next identification of the arm makes
@@ -343,19 +345,18 @@ impl SavedEstimate {
     /// Returns the estimated value of the parameter `name`, in SI units; `None` if the estimate
     /// lacks it.
     pub(crate) fn value(&self, name: &str) -> Option<f64> {
-        self.parameters.iter().find(|entry| entry.name == name).map(|entry| entry.estimate)
+        self.entry(name).map(|entry| entry.estimate)
+    }
+
+    fn entry(&self, name: &str) -> Option<&Entry> {
+        self.parameters.iter().find(|entry| entry.name == name)
     }
 
     /// Returns the rows of `table` to which the arm was fitted.
     #[doc(hidden)]
     pub fn fitted_among(&self, table: &Measurements) -> Vec<usize> {
-        let fitted = &self.posterior().fitted_rows;
+        let fitted = &self.posterior.fitted_rows;
         (0..table.len()).filter(|&row| fitted.contains(&table.row_digest(row))).collect()
-    }
-
-    /// Returns the uncertainty and noise of the estimate.
-    pub(crate) fn posterior(&self) -> &SavedPosterior {
-        &self.posterior
     }
 
     /// Returns name, estimated value \[SI\] and prior σ of every parameter, in the order of the
@@ -366,23 +367,18 @@ impl SavedEstimate {
 
     /// Returns the nominal value of a parameter, SI; `None` if the estimate lacks it.
     pub(crate) fn nominal_of(&self, name: &str) -> Option<f64> {
-        self.parameters.iter().find(|entry| entry.name == name).map(|entry| entry.nominal)
+        self.entry(name).map(|entry| entry.nominal)
     }
 
     /// Returns the symbol of the SI unit of a parameter; `None` if the file has no such parameter,
     /// or no unit for it.
     pub(crate) fn unit_of(&self, name: &str) -> Option<&str> {
-        self.parameters.iter().find(|entry| entry.name == name)?.unit.as_deref()
+        self.entry(name)?.unit.as_deref()
     }
 
     /// Returns the name of the problem that was identified.
     pub(crate) fn problem_name(&self) -> &str {
         &self.problem
-    }
-
-    /// Returns the digest of each part of the declared arm; empty in files of older versions.
-    pub(crate) fn arm_parts(&self) -> &BTreeMap<String, String> {
-        &self.arm_parts
     }
 
     /// Returns the first part of the declared arm in which this estimate and `other` differ; `None`
@@ -400,11 +396,6 @@ impl SavedEstimate {
                 is_declared: [true; 2],
             })
         })
-    }
-
-    /// Returns the strategy of the fit.
-    pub(crate) fn strategy(&self) -> Strategy {
-        self.strategy
     }
 
     /// Checks, as [`check`](Self::check) does, that the estimate is of the declared arm of

@@ -156,6 +156,15 @@ impl Check for EnoughEquations {
     }
 }
 
+/// Checks that held-out rows determine the bases and tools that only they use.
+pub(super) struct HeldOutPlaced;
+
+impl Check for HeldOutPlaced {
+    fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
+        fit.poses.held_out.clone().into_iter().collect()
+    }
+}
+
 /// Checks that the fit converged.
 pub(super) struct Convergence;
 

@@ -13,7 +13,6 @@ use super::row_kind::{RowKind, format_error, row_noun};
 use crate::fit::stages::fitting::Fitting;
 use crate::fit::uncertainty::residual_lengths::{noise_lengths_of_all, scatter};
 use crate::least_squares::{Block, CHUNK_ITEMS, LeastSquares as _};
-use crate::measurement::Measurements;
 use crate::model::parameter::{Parameter, ParameterSite};
 use crate::numeric::median;
 use crate::observation::kind_named;
@@ -84,9 +83,10 @@ pub(in crate::fit) fn outliers(
     (0..rows.len()).filter_map(outlier).collect()
 }
 
-/// Returns the number of held-out rows that copy an identification row: configuration, measured
-/// numbers, session and kind are equal to the bit.
-fn copies(measurements: &Measurements, identification: &[usize], held_out: &[usize]) -> usize {
+/// Returns the number of held-out rows of a fit that copy an identification row: configuration,
+/// measured numbers, session and kind are equal to the bit.
+fn copies(fit: &CheckedFit) -> usize {
+    let Fitting { measurements, split, .. } = fit.fitting;
     let key = |row: usize| -> Vec<u64> {
         let values =
             measurements.configuration(row).iter().chain(measurements.positions[row].iter());
@@ -97,18 +97,12 @@ fn copies(measurements: &Measurements, identification: &[usize], held_out: &[usi
             .chain([measurements.session.of_row[row]]);
         values.map(|value| value.to_bits()).chain(words.map(|word| word as u64)).collect()
     };
-    let fitted: HashSet<Vec<u64>> = identification.iter().map(|&row| key(row)).collect();
-    held_out.iter().filter(|&&row| fitted.contains(&key(row))).count()
+    let fitted: HashSet<Vec<u64>> = split.identification.iter().map(|&row| key(row)).collect();
+    split.held_out.iter().filter(|&&row| fitted.contains(&key(row))).count()
 }
 
 /// Maximum number of held-out rows that the text of a finding names.
 const MAX_NAMED_ROWS: usize = 5;
-
-/// Returns the number of held-out rows of a fit that copy an identification row.
-fn copies_in_fit(fit: &CheckedFit) -> usize {
-    let Fitting { measurements, split, .. } = fit.fitting;
-    copies(measurements, &split.identification, &split.held_out)
-}
 
 /// Checks that at least one held-out row is no copy of an identification row.
 pub(super) struct NotAllCopied;
@@ -116,7 +110,7 @@ pub(super) struct NotAllCopied;
 impl Check for NotAllCopied {
     fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
         let rows = fit.fitting.split.held_out.len();
-        if rows == 0 || copies_in_fit(fit) < rows {
+        if rows == 0 || copies(fit) < rows {
             return Vec::new();
         }
         let text = "all held-out rows are identification rows again: their errors judge nothing"
@@ -130,7 +124,7 @@ pub(super) struct NotRepeated;
 
 impl Check for NotRepeated {
     fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
-        let (rows, of) = (copies_in_fit(fit), fit.fitting.split.held_out.len());
+        let (rows, of) = (copies(fit), fit.fitting.split.held_out.len());
         if rows == 0 || rows == of {
             return Vec::new();
         }
@@ -167,7 +161,7 @@ impl Check for OtherPosesHeldOut {
         let fitted: HashSet<_> = split.identification.iter().map(state).collect();
         let rows = split.held_out.iter().filter(|row| fitted.contains(&state(row))).count();
         let of = split.held_out.len();
-        if rows as f64 <= MIN_FITTED_SHARE * of as f64 || copies_in_fit(fit) > 0 {
+        if rows as f64 <= MIN_FITTED_SHARE * of as f64 || copies(fit) > 0 {
             return Vec::new();
         }
         let text = format!(

@@ -11,7 +11,7 @@ use crate::fit::{Estimate, FindingCode, Identification, IdentifyError, Placement
 use crate::measurement::Dataset;
 use crate::model::Model;
 use crate::observation::Scene;
-use crate::problem::{Fixture, Freedom, ParameterRule, Problem, Quantities};
+use crate::problem::{Fixture, ParameterRule, Problem};
 
 /// Largest p-value of the F test at which freeing the intrinsics improves the fit significantly.
 const MAX_CHANCE_PROBABILITY: f64 = 1e-4;
@@ -69,15 +69,8 @@ pub(in crate::fit) fn lens_finding(
         return None;
     }
     let mut freed = problem.clone();
-    freed.parameters.extend(fixed.iter().map(|name| ParameterRule {
-        pattern: name.clone(),
-        freedom: Freedom::Free {
-            sigma: Quantities::default(),
-            min: Quantities::default(),
-            max: Quantities::default(),
-        },
-        location: problem.data.location.clone(),
-    }));
+    let rules = fixed.iter().map(|name| ParameterRule::free(name.clone(), problem));
+    freed.parameters.extend(rules);
     let other = fit(&freed).ok().filter(|other| other.termination.converged())?;
     let after = other.reduced_chi2?;
     let count = other.unknowns.len().saturating_sub(found.unknowns.len()) as f64;

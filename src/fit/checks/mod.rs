@@ -11,7 +11,6 @@ mod doubted_columns;
 pub(super) mod finding;
 pub(super) mod fitted_rows;
 pub(super) mod held_out;
-mod held_out_placed;
 pub(super) mod lens;
 mod limits;
 pub(super) mod misfit;
@@ -34,7 +33,7 @@ mod table_digits;
 mod two_solutions;
 mod view_order;
 
-use checked_fit::{Check, CheckedFit, Convergence, EnoughEquations};
+use checked_fit::{Check, CheckedFit, Convergence, EnoughEquations, HeldOutPlaced};
 use finding::{Finding, FindingCode};
 
 /// All checks, in the order in which their findings are listed. If a fit is not trusted, commands
@@ -69,7 +68,7 @@ const CHECKS: &[&dyn Check] = &[
     &held_out::NotRepeated,
     &held_out::OtherPosesHeldOut,
     &held_out::WithoutOutliers,
-    &held_out_placed::HeldOutPlaced,
+    &HeldOutPlaced,
     &set_aside::SetAsideByChance,
     &fitted_rows::SteadyPoints,
     &fitted_rows::NoOutliers,

@@ -190,7 +190,7 @@ fn is_length(name: &str) -> bool {
 /// unknowns), each with the names of the unknowns or groups involved.
 fn open_directions(rows: &DMatrix<f64>, names: &[&str]) -> Vec<(Open, Vec<String>)> {
     let Some(null) = orthonormal(rows) else { return Vec::new() };
-    let mut found = Found { null, names, accounted: Vec::new() };
+    let mut found = Found { null, accounted: Vec::new() };
     let mut open = Vec::new();
     let unseen: Vec<usize> =
         (0..names.len()).filter(|&j| !found.within(|k| k == j).is_empty()).collect();
@@ -238,20 +238,20 @@ fn open_directions(rows: &DMatrix<f64>, names: &[&str]) -> Vec<(Open, Vec<String
 }
 
 /// Null space with the directions that have already been found in it.
-struct Found<'a> {
+struct Found {
     /// Orthonormal rows that span the null space.
     null: DMatrix<f64>,
-    names: &'a [&'a str],
     /// Orthonormal directions, in the space of the unknowns, that earlier calls of `within` found.
     accounted: Vec<RowDVector<f64>>,
 }
 
-impl Found<'_> {
+impl Found {
     /// Returns the directions of the null space that lie in the unknowns for whose index
     /// `is_in_set` returns true, without those that earlier calls found. Adds them to `accounted`.
     fn within(&mut self, is_in_set: impl Fn(usize) -> bool) -> Vec<RowDVector<f64>> {
-        let outside: Vec<usize> = (0..self.names.len()).filter(|&k| !is_in_set(k)).collect();
-        if outside.len() == self.names.len() {
+        let unknowns = self.null.ncols();
+        let outside: Vec<usize> = (0..unknowns).filter(|&k| !is_in_set(k)).collect();
+        if outside.len() == unknowns {
             return Vec::new();
         }
         let outside = self.null.select_columns(&outside);

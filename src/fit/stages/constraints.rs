@@ -48,7 +48,7 @@ impl Stage<'_> {
     /// Returns an error if a row or limit is not finite.
     pub fn held(&self, at: &DVector<f64>) -> Result<Vec<ActiveLimit>, StageError> {
         let (which, rows) = self.constraints(at)?;
-        let x = DVector::from_iterator(self.unknowns.len(), self.unknowns.iter().map(|&k| at[k]));
+        let x = self.reduced(at);
         let held = |(i, constraint)| {
             let row = rows.matrix().row(i).iter().copied().collect();
             Some(ActiveLimit { constraint, side: rows.at(&x, i)?, row })

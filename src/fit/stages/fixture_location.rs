@@ -1,9 +1,10 @@
 //! Start values of fixtures (points, anchors, surfaces, cameras, markers) in closed form, from the
 //! target positions that the arm predicts.
 
-use nalgebra::{DMatrix, DVector, Matrix3, SymmetricEigen, Vector3};
+use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::camera_start::{poses_from_views, undetermined_pair};
+use super::marker_pose::principal_axes;
 use crate::model::parameter::{Parameter, ParameterSite};
 use crate::model::{Model, Pose};
 use crate::problem::FixtureKind;
@@ -160,17 +161,6 @@ fn centre(contacts: &[(Vector3<f64>, f64)]) -> Vector3<f64> {
     contacts.iter().map(|(point, _)| point).sum::<Vector3<f64>>() / contacts.len() as f64
 }
 
-/// Returns the principal directions of the points of contacts about their `centre`, with the sums
-/// of squares along them, largest first.
-fn principal(contacts: &[(Vector3<f64>, f64)], centre: &Vector3<f64>) -> [(Vector3<f64>, f64); 3] {
-    let spread: Matrix3<f64> =
-        contacts.iter().map(|(point, _)| (point - centre) * (point - centre).transpose()).sum();
-    let eigen = SymmetricEigen::new(spread);
-    let mut order = [0, 1, 2];
-    order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
-    order.map(|k| (eigen.eigenvectors.column(k).into_owned(), eigen.eigenvalues[k]))
-}
-
 /// Returns the least-squares solution u of the equations a·u = b given by rows (a, b); `None` if
 /// there are no rows.
 fn least_squares(rows: &[(Vec<f64>, f64)]) -> Option<DVector<f64>> {
@@ -188,7 +178,7 @@ fn least_squares(rows: &[(Vec<f64>, f64)]) -> Option<DVector<f64>> {
 /// the two sides, the one that fits better is taken, or the upper one if both fit equally.
 fn anchor(contacts: &[(Vector3<f64>, f64)]) -> Vector3<f64> {
     let centre = centre(contacts);
-    let axes = principal(contacts, &centre);
+    let axes = principal_axes(contacts.iter().map(|(point, _)| point), &centre);
     let flat = axes[2].1 < MAX_COPLANAR_RATIO * MAX_COPLANAR_RATIO * axes[1].1;
     let used = if flat { &axes[..2] } else { &axes[..] };
     let row = |(point, length): &(Vector3<f64>, f64)| {
@@ -238,7 +228,7 @@ fn plane(contacts: &[(Vector3<f64>, f64)], base: &Vector3<f64>) -> [f64; 4] {
     let n = contacts.len() as f64;
     let middle = centre(contacts);
     let offset = contacts.iter().map(|(_, offset)| offset).sum::<f64>() / n;
-    let normal = principal(contacts, &middle)[2].0;
+    let normal = principal_axes(contacts.iter().map(|(point, _)| point), &middle)[2].0;
     let along: f64 = contacts
         .iter()
         .map(|(point, measured)| normal.dot(&(point - middle)) * (measured - offset))

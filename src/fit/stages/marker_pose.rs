@@ -36,18 +36,14 @@ pub(super) fn marker_in_camera(
 /// points in space, up to scale. `None` if the points are too few or lie on a line.
 fn linear_pose(places: &[Vector3<f64>], slopes: &[[f64; 2]]) -> Option<Isometry3<f64>> {
     let middle = places.iter().sum::<Vector3<f64>>() / places.len() as f64;
-    let spread: Matrix3<f64> =
-        places.iter().map(|place| (place - middle) * (place - middle).transpose()).sum();
-    let eigen = SymmetricEigen::new(spread);
-    let mut order = [0, 1, 2];
-    order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
-    let [first, second, third] = order.map(|k| eigen.eigenvalues[k].max(0.0).sqrt());
+    let axes = principal_axes(places.iter(), &middle);
+    let [first, second, third] = axes.map(|(_, squares)| squares.max(0.0).sqrt());
     let is_flat = third < MAX_COPLANAR_RATIO * first;
     let (min_points, columns) = if is_flat { (MIN_POINTS[0], 3) } else { (MIN_POINTS[1], 4) };
     if places.len() < min_points || second < MAX_COPLANAR_RATIO * first {
         return None;
     }
-    let [x, y] = [0, 1].map(|k| eigen.eigenvectors.column(order[k]).into_owned());
+    let [(x, _), (y, _), _] = axes;
     let axes = Matrix3::from_columns(&[x, y, x.cross(&y)]);
     let scale = first / (places.len() as f64).sqrt();
     let mut matrix = DMatrix::zeros(2 * places.len(), 3 * columns);
@@ -120,6 +116,20 @@ fn refined(
     }
     let in_front = places.iter().all(|place| (pose * nalgebra::Point3::from(*place)).z > 0.0);
     in_front.then_some(pose)
+}
+
+/// Returns the principal directions of points about their `centre`, with the sums of squares along
+/// them, largest first.
+pub(super) fn principal_axes<'a>(
+    points: impl Iterator<Item = &'a Vector3<f64>>,
+    centre: &Vector3<f64>,
+) -> [(Vector3<f64>, f64); 3] {
+    let spread: Matrix3<f64> =
+        points.map(|point| (point - centre) * (point - centre).transpose()).sum();
+    let eigen = SymmetricEigen::new(spread);
+    let mut order = [0, 1, 2];
+    order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
+    order.map(|k| (eigen.eigenvectors.column(k).into_owned(), eigen.eigenvalues[k]))
 }
 
 /// Returns the rotation matrix nearest to `matrix` in the Frobenius norm; the identity if `matrix`

@@ -2,6 +2,7 @@
 
 use nalgebra::{DVector, Matrix3, Matrix4, Quaternion, Rotation3, UnitQuaternion, Vector3};
 
+use super::marker_pose::nearest_rotation;
 use crate::model::parameter::{Parameter, ParameterSite};
 use crate::model::{Model, Pose};
 use crate::spatial::{Frame, rotate};
@@ -123,14 +124,9 @@ fn best_rotation(
     let product = |(from, to): ([Vector3<f64>; 3], [Vector3<f64>; 3])| {
         Matrix3::from_columns(&to) * Matrix3::from_columns(&from).transpose()
     };
-    let sum = pairs.map(product).reduce(|a, b| a + b)?;
-    let svd = sum.svd(true, true);
-    let (u, v) = (svd.u?, svd.v_t?);
-    let handed = Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, (u * v).determinant().signum()));
-    Some(
-        UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(u * handed * v))
-            .scaled_axis(),
-    )
+    let rotation = nearest_rotation(&pairs.map(product).reduce(|a, b| a + b)?);
+    let rotation = Rotation3::from_matrix_unchecked(rotation);
+    Some(UnitQuaternion::from_rotation_matrix(&rotation).scaled_axis())
 }
 
 /// Returns the rotation vector \[rad\] and translation \[m\] of the rigid motion that best moves

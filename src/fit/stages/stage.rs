@@ -129,6 +129,11 @@ impl<'a> Stage<'a> {
         self.unknowns.iter().map(|&k| &self.model.parameters[k])
     }
 
+    /// Returns the prior σ of each unknown; `None` without a prior.
+    pub fn prior_sigmas(&self) -> Vec<Option<f64>> {
+        self.parameters().map(|parameter| parameter.sigma).collect()
+    }
+
     /// Returns the number of measured coordinates of all poses.
     pub fn count(&self) -> usize {
         self.poses.iter().map(Pose::coordinates).sum()

@@ -187,7 +187,7 @@ fn next_noise_models(
     } else {
         Fit::new(&residuals).linearise(&x)
     };
-    let priors: Vec<Option<f64>> = stage.parameters().map(|parameter| parameter.sigma).collect();
+    let priors = stage.prior_sigmas();
     let mut held: Vec<bool> = end.at_bound.iter().map(Option::is_some).collect();
     let closed = confine(&data.triangle, &end.gauge.rows, &stage.held(&end.x)?, &mut held);
     let whitened = residual_vector(&residuals, &x);

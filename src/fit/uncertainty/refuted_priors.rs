@@ -70,7 +70,7 @@ pub(in crate::fit) fn refuted_priors(
     names.sort();
     names.dedup();
     let evidence = Evidence::of(stage, at, held, 4.0 * noise_factor);
-    let sigmas: Vec<Option<f64>> = stage.parameters().map(|parameter| parameter.sigma).collect();
+    let sigmas = stage.prior_sigmas();
     let widened = |factors: &[f64]| -> Vec<Option<f64>> {
         let factor = |j: usize| {
             let place = names.iter().position(|name| rules[j].as_ref() == Some(name));

@@ -63,8 +63,7 @@ impl Statistics {
         noise_model: Option<NoiseModel>,
     ) -> Result<Self, StageError> {
         let triangle = stage.weighted_triangle(&end.x);
-        let priors: Vec<Option<f64>> =
-            stage.parameters().map(|parameter| parameter.sigma).collect();
+        let priors = stage.prior_sigmas();
         let mut held: Vec<bool> = end.at_bound.iter().map(Option::is_some).collect();
         let constraints = stage.held(&end.x)?;
         let closed = confine(&triangle, &end.gauge.rows, &constraints, &mut held);
@@ -208,7 +207,7 @@ fn sandwich(
     }
     let triangle = stage.linearised(at, Loss::Squares).triangle * curvature.sqrt();
     let triangle = stage.with_earlier(triangle, at);
-    let priors: Vec<Option<f64>> = stage.parameters().map(|parameter| parameter.sigma).collect();
+    let priors = stage.prior_sigmas();
     let mut uncertainty = Uncertainty::of(&triangle, &priors, closed, held, 1.0);
     let inverse = &uncertainty.covariance;
     let ratio = square / curvature;

@@ -126,7 +126,7 @@ pub fn resolve(
     for (candidate, rule) in candidates.into_iter().zip(decided) {
         if let (true, Some(rule), ParameterSite::Fixture { kind, axis, .. }) =
             (candidate.unknown, rule, candidate.site)
-            && !matches!(&rule.freedom, Freedom::Free { sigma, .. } if quantity_in(sigma, candidate.unit()).is_none())
+            && !matches!(&rule.freedom, Freedom::Free { sigma, .. } if sigma.of_kind(candidate.unit()).is_none())
         {
             let kind = InputErrorKind::UnknownPlaceHeld {
                 parameter: candidate.name,
@@ -137,7 +137,7 @@ pub fn resolve(
         let none = Quantities::default();
         let (sigma, min, max) = match (rule.map(|rule| &rule.freedom), candidate.effect_sigma) {
             (Some(Freedom::Free { sigma, min, max }), _) => {
-                (quantity_in(sigma, candidate.unit()), min, max)
+                (sigma.of_kind(candidate.unit()), min, max)
             }
             // A σ that is not finite belongs to a parameter of unknown unit, which gets no prior.
             (None, Some(sigma)) => (Some(sigma).filter(|sigma| sigma.is_finite()), &none, &none),
@@ -148,9 +148,8 @@ pub fn resolve(
             continue;
         }
         let unit = candidate.unit();
-        let bound = |q: &Quantities| {
-            quantity_in(q, unit).map(|v| if unit.is_relative() { v.ln() } else { v })
-        };
+        let bound =
+            |q: &Quantities| q.of_kind(unit).map(|v| if unit.is_relative() { v.ln() } else { v });
         parameters.push(Parameter {
             name: candidate.name,
             site: candidate.site,
@@ -326,7 +325,7 @@ pub(super) fn candidates(
 fn check_units(rule: &ParameterRule, candidates: &[Candidate]) -> Result<(), InputError> {
     let Freedom::Free { sigma, min, max } = &rule.freedom else { return Ok(()) };
     let fail = |kind| Err(rule.location.clone().error(kind));
-    let given = |unit| [sigma, min, max].iter().any(|q| quantity_in(q, unit).is_some());
+    let given = |unit| [sigma, min, max].iter().any(|q| q.of_kind(unit).is_some());
     let kinds = [Unit::Angle, Unit::Length, Unit::Pixel, Unit::TorsionalStiffness];
     if !kinds.iter().any(|&unit| given(unit)) {
         return Ok(());
@@ -362,7 +361,7 @@ fn applies_to_unit(rule: &ParameterRule, unit: Unit) -> bool {
     let Freedom::Free { sigma, min, max } = &rule.freedom else { return true };
     let quantities = [sigma, min, max];
     quantities.iter().all(|q| **q == Quantities::default())
-        || quantities.iter().any(|q| quantity_in(q, unit).is_some())
+        || quantities.iter().any(|q| q.of_kind(unit).is_some())
 }
 
 fn suffixes(unit: Unit) -> &'static str {
@@ -372,17 +371,5 @@ fn suffixes(unit: Unit) -> &'static str {
         Unit::Pixel => "_px",
         Unit::TorsionalStiffness | Unit::AxialRigidity | Unit::FlexuralRigidity => "_relative",
         _ => "free = true or fixed = true",
-    }
-}
-
-fn quantity_in(quantities: &Quantities, unit: Unit) -> Option<f64> {
-    match unit {
-        Unit::Angle => quantities.angle,
-        Unit::Length => quantities.length,
-        Unit::Pixel => quantities.pixel,
-        Unit::TorsionalStiffness | Unit::AxialRigidity | Unit::FlexuralRigidity => {
-            quantities.relative
-        }
-        _ => None,
     }
 }

@@ -1,7 +1,7 @@
 //! Misreadings that explain why an arm does not fit its measurements.
 
 use super::Misreading;
-use crate::problem::{Effect, Freedom, ParameterRule, Problem, Quantities};
+use crate::problem::{Effect, ParameterRule, Problem};
 
 /// Misreading with whose correction a full fit explains the measurements.
 #[derive(Debug, Clone, PartialEq)]
@@ -74,13 +74,8 @@ impl MisreadEffect {
     /// Frees the effect's parameters in `problem` without priors, because the priors of the
     /// catalogue are for small errors.
     pub fn free_in(&self, problem: &mut Problem) {
-        let none = Quantities::default();
-        let rule = |pattern| ParameterRule {
-            pattern,
-            freedom: Freedom::Free { sigma: none, min: none, max: none },
-            location: problem.data.location.clone(),
-        };
-        let rules: Vec<ParameterRule> = self.parameters(problem).into_iter().map(rule).collect();
+        let names = self.parameters(problem).into_iter();
+        let rules: Vec<_> = names.map(|name| ParameterRule::free(name, problem)).collect();
         problem.parameters.extend(rules);
     }
 }

@@ -10,9 +10,7 @@ use super::candidates::{
 use super::{MassScale, Misreading, numbers_of};
 use crate::measurement::Measurements;
 use crate::model::parameter::JointField;
-use crate::problem::{
-    Effect, Freedom, Joint, JointKind, Observation, ParameterRule, Problem, Quantities,
-};
+use crate::problem::{Effect, Joint, JointKind, Observation, ParameterRule, Problem};
 
 /// Length of an inch \[mm\].
 const MM_PER_INCH: f64 = 25.4;
@@ -71,11 +69,11 @@ impl Misreading {
         let mut problem = declared.clone();
         match self {
             Self::HeldBase => {
-                problem.parameters.push(without_prior("base*".to_owned(), declared));
+                problem.parameters.push(ParameterRule::free("base*".to_owned(), declared));
                 return Some(problem);
             }
             Self::HeldTarget => {
-                let rule = |axis| without_prior(format!("tool*.{axis}"), declared);
+                let rule = |axis| ParameterRule::free(format!("tool*.{axis}"), declared);
                 problem.parameters.extend(["x", "y", "z"].map(rule));
                 return Some(problem);
             }
@@ -156,7 +154,7 @@ impl Misreading {
         let (pattern, _) = self.size(0.0)?;
         let mut problem =
             self.effect().map_or_else(|| problem.clone(), |effect| problem.with_effect(effect));
-        let rule = without_prior(pattern, &problem);
+        let rule = ParameterRule::free(pattern, &problem);
         problem.parameters.push(rule);
         Some(problem)
     }
@@ -376,17 +374,6 @@ fn shift_views(rows: &mut Measurements, table: &Measurements, (chosen, by): (&[u
 /// Returns the rotation of a screw divided by its travel \[rad/m\], given its lead \[mm\].
 fn radians_per_metre(lead: i16) -> f64 {
     2.0 * PI * 1e3 / f64::from(lead)
-}
-
-/// Returns the rule that frees the parameters whose names match `pattern`, without prior and
-/// bounds.
-fn without_prior(pattern: String, problem: &Problem) -> ParameterRule {
-    let none = Quantities::default();
-    ParameterRule {
-        pattern,
-        freedom: Freedom::Free { sigma: none, min: none, max: none },
-        location: problem.data.location.clone(),
-    }
 }
 
 /// Exchanges the entries of two joints in the joint table. Returns `None`, and changes nothing, if
