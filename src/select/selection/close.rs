@@ -154,7 +154,7 @@ pub fn close_by(
     };
     let mut conclusion =
         conclude(&state, &declared, (fitted.clone(), evidence), interrupted, is_used);
-    if !is_used(conclusion.effects.iter().map(|found| found.status).min()) {
+    if !is_used(conclusion.effects.iter().map(|found| found.status_of_any).min()) {
         conclusion =
             conclude(&state, &declared, (declared.clone(), of_declared), interrupted, |_| true);
     }

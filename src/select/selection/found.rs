@@ -31,6 +31,9 @@ pub struct Found {
     pub effect: Effect,
     /// Status: the strongest claim about the effect that the data allow.
     pub status: Status,
+    /// Status of the claim that the effect, or plainer causes that do the same, act. The effect is
+    /// used by this status, because each of them would correct the same error.
+    pub(super) status_of_any: Status,
     /// Claims with their probabilities; `None` if no evidence about the effect was evaluated, or no
     /// probable set contains it.
     pub claims: Option<Claims>,
@@ -157,10 +160,14 @@ pub(super) fn found(
         let law = claims.as_ref().map(|claims| claims.law.1).or(gear_probability);
         let law = law.or_else(|| is_evaluated.then_some(0.0));
         let is_significant = p_value < rules.leaving_level;
-        let status = Status::of(law, rules.stated, (is_significant, verdict));
+        let status_at = |law: Option<f64>| {
+            let status = Status::of(law, rules.stated, (is_significant, verdict));
+            if is_trusted { status } else { status.max(Status::Probable) }
+        };
         Found {
             stability: share,
-            status: if is_trusted { status } else { status.max(Status::Probable) },
+            status: status_at(law),
+            status_of_any: status_at(if rival.is_some() { Some(of_class) } else { law }),
             claims,
             p_value,
             estimates: fitted
@@ -181,7 +188,7 @@ pub(super) fn found(
     };
     let on_all_rows = all(&[]);
     match best {
-        Some(best) if is_used(on_all_rows.iter().map(|found| found.status).min()) => {
+        Some(best) if is_used(on_all_rows.iter().map(|found| found.status_of_any).min()) => {
             let subsets = subset_evidence(fitted, data, best, &reconsidered);
             if subsets.is_empty() { on_all_rows } else { all(&subsets) }
         }
