@@ -12,7 +12,7 @@ pub const FORMAT_VERSION: u32 = 2;
 pub const PROGRAM: &str = concat!("flexcal ", env!("CARGO_PKG_VERSION"));
 
 /// Name and version of the format of a file.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub(crate) struct Format {
     pub name: Cow<'static, str>,
     pub version: u32,

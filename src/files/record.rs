@@ -80,9 +80,8 @@ impl FolderRecord {
 
     /// Adds a record for `text`, which a command is about to write to the file `name`.
     pub fn add(&mut self, command: &str, name: &str, text: &str) {
-        let (digest, command, name) =
-            (hexadecimal(Sha256::digest(text).as_slice()), command.to_owned(), name.to_owned());
-        self.lines.push(RecordLine { digest, command, name });
+        let (command, name) = (command.to_owned(), name.to_owned());
+        self.lines.push(RecordLine { digest: digest(text.as_bytes()), command, name });
     }
 
     /// Keeps the newest line of each name and removes the names for which `is_gone` returns true.

@@ -128,19 +128,18 @@ pub fn identify_with_prior(
             found.fitted_rows.sort();
             found.fitted_rows.dedup();
             let labels = causes.into_iter().map(|cause| cause.label).collect();
-            found.prior =
-                Some(compare(&model, &found, (&original, &prior), |comparison| PriorComparison {
-                    days,
-                    left_out,
-                    variance_ratio: variance_ratio([declared_problem, &problem], &data),
-                    estimated_sigma: problem
-                        .data
-                        .position_sigma
-                        .filter(|_| declared_problem.data.position_sigma.is_none()),
-                    chi2,
-                    causes: labels,
-                    ..comparison
-                }));
+            found.prior = Some(PriorComparison {
+                days,
+                left_out,
+                variance_ratio: variance_ratio([declared_problem, &problem], &data),
+                estimated_sigma: problem
+                    .data
+                    .position_sigma
+                    .filter(|_| declared_problem.data.position_sigma.is_none()),
+                chi2,
+                causes: labels,
+                ..compare(&model, &found, (&original, &prior))
+            });
             return Ok(found);
         };
         for &(parameter, size) in &cause.widened {
@@ -333,12 +332,12 @@ pub(super) fn covariance(
 }
 
 /// Compares the posterior of a fit with the prior `original`; `widened` is the prior as it was
-/// widened for the fit. `with` sets the other entries of the comparison.
+/// widened for the fit. The other entries of the comparison are those of a fit without time, causes
+/// and rows that are left out.
 fn compare(
     model: &Model,
     found: &Identification,
     (original, widened): (&Earlier, &Earlier),
-    with: impl FnOnce(PriorComparison) -> PriorComparison,
 ) -> PriorComparison {
     let variance = |k: usize| found.covariance.entry(k, k).filter(|variance: &f64| *variance > 0.0);
     let compared = |(place, &k): (usize, &usize)| {
@@ -365,19 +364,16 @@ fn compare(
             difference: data.map(|(x, variance)| (x - mean) / (variance + prior).sqrt()),
         }
     };
-    let file = original.file.clone();
-    let parameters = original.indices.iter().enumerate().map(compared).collect();
-    let sigma = original.sigma;
-    with(PriorComparison {
-        file,
+    PriorComparison {
+        file: original.file.clone(),
         days: 0.0,
         left_out: 0,
-        sigma,
+        sigma: original.sigma,
         variance_ratio: 1.0,
         estimated_sigma: None,
         includes_fleet: original.includes_fleet,
         chi2: None,
         causes: Vec::new(),
-        parameters,
-    })
+        parameters: original.indices.iter().enumerate().map(compared).collect(),
+    }
 }

@@ -27,6 +27,15 @@ impl LabelsBuilder {
     }
 }
 
+/// Collects the words of the rows, in row order.
+impl<W: AsRef<str>> FromIterator<W> for Labels {
+    fn from_iter<I: IntoIterator<Item = W>>(words: I) -> Self {
+        let mut builder = LabelsBuilder::default();
+        words.into_iter().for_each(|word| builder.push(word.as_ref()));
+        builder.labels
+    }
+}
+
 /// Names of poses collected so far.
 pub(super) enum PoseNames {
     /// All names are numbers.

@@ -62,7 +62,6 @@ mod table;
 mod time;
 mod unmeasured;
 
-use std::collections::HashMap;
 use std::path::PathBuf;
 
 use nalgebra::{UnitQuaternion, Vector3};
@@ -195,23 +194,6 @@ pub struct Labels {
     pub names: Vec<String>,
     /// Index of the word of each row.
     pub of_row: Vec<usize>,
-}
-
-/// Collects the words of the rows, in row order.
-impl<W: AsRef<str>> FromIterator<W> for Labels {
-    fn from_iter<I: IntoIterator<Item = W>>(words: I) -> Self {
-        let mut labels = Self::default();
-        let mut place_of_word = HashMap::new();
-        for word in words {
-            let word = word.as_ref();
-            let place = *place_of_word.entry(word.to_owned()).or_insert_with(|| {
-                labels.names.push(word.to_owned());
-                labels.names.len() - 1
-            });
-            labels.of_row.push(place);
-        }
-        labels
-    }
 }
 
 impl Measurements {

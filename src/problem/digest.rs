@@ -4,13 +4,13 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use nalgebra::Vector3;
-use sha2::{Digest as _, Sha256};
 
 use super::quoted;
 use super::{
     BasePose, Beam, Body, Effect, Equilibrium, Hoist, Joint, JointKind, Mimic, Placement, Problem,
     Statics, Target, Tool,
 };
+use crate::files::digest;
 
 /// Name of the part of an arm that is neither a joint nor an effect.
 const WHOLE_ARM_NAME: &str = "gravity, statics, tool or base";
@@ -109,11 +109,7 @@ impl Problem {
 
 /// Returns the SHA-256 digest of a text, 64 hexadecimal digits.
 pub(crate) fn hexadecimal(text: &str) -> String {
-    Sha256::digest(text).iter().fold(String::new(), |mut text, byte| {
-        // Writing to a text cannot fail.
-        let _ = write!(text, "{byte:02x}");
-        text
-    })
+    digest(text.as_bytes())
 }
 
 fn push_joint(text: &mut String, index: usize, joint: &Joint) {

@@ -2,14 +2,12 @@
 
 use super::document::Block;
 use super::errors::row_noun;
-use super::identify::{errors_by_axis, headline};
-use super::noise::{influential_rows, noise};
+use super::identify::estimate_head;
 use super::parameters::correlated;
 use super::prior::summary;
 use super::remainder::PredictionAccuracy;
 use super::render::text;
 use super::row_kinds::unsteady_points;
-use super::trust::outcome;
 use crate::fit::{Estimate, Finding, FindingCode, Identification, size_of_kind};
 use crate::problem::Problem;
 use crate::quantity::format::{counted, number};
@@ -22,16 +20,7 @@ pub fn estimate_brief(
     found: &Identification,
     accuracy: Option<PredictionAccuracy>,
 ) -> String {
-    let outcome = outcome(found, accuracy.as_ref());
-    let bound = accuracy.and_then(|accuracy| accuracy.bound);
-    let mut blocks = vec![Block::lines(headline(problem, found, &outcome))];
-    blocks.extend([
-        Block::Table(errors_by_axis(found)),
-        Block::lines(
-            [noise(problem, found)].into_iter().chain(bound).collect::<Vec<_>>().join("\n"),
-        ),
-    ]);
-    blocks.extend(influential_rows(found));
+    let mut blocks = estimate_head(problem, found, accuracy);
     blocks.extend(found.prior.as_ref().map(|comparison| Block::Text(summary(comparison))));
     blocks.push(Block::Lines(parameter_counts(&found.estimates), remarks(found)));
     text(&blocks)

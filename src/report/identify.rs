@@ -26,22 +26,32 @@ use crate::results::{PlotData, nominal_arm, rows_in};
 /// Name of the file with the complete result.
 const RESULT_FILE: &str = "estimate.json";
 
+/// Returns the blocks with which summary and full text begin: headline, errors, size of the
+/// residual, and influential rows.
+pub(super) fn estimate_head<'a>(
+    problem: &Problem,
+    found: &Identification,
+    accuracy: Option<PredictionAccuracy>,
+) -> Vec<Block<'a>> {
+    let outcome = outcome(found, accuracy.as_ref());
+    let bound = accuracy.and_then(|accuracy| accuracy.bound);
+    let size: Vec<String> = [noise(problem, found)].into_iter().chain(bound).collect();
+    let mut blocks = vec![
+        Block::lines(headline(problem, found, &outcome)),
+        Block::Table(errors_by_axis(found)),
+        Block::lines(size.join("\n")),
+    ];
+    blocks.extend(influential_rows(found));
+    blocks
+}
+
 /// Returns the full result as text, ending in a line break.
 pub fn estimate_text(
     problem: &Problem,
     found: &Identification,
     accuracy: Option<PredictionAccuracy>,
 ) -> String {
-    let outcome = outcome(found, accuracy.as_ref());
-    let bound = accuracy.and_then(|accuracy| accuracy.bound);
-    let mut blocks = vec![
-        Block::lines(headline(problem, found, &outcome)),
-        Block::Table(errors_by_axis(found)),
-        Block::lines(
-            [noise(problem, found)].into_iter().chain(bound).collect::<Vec<_>>().join("\n"),
-        ),
-    ];
-    blocks.extend(influential_rows(found));
+    let mut blocks = estimate_head(problem, found, accuracy);
     blocks.extend(prior(found));
     blocks.extend(row_kind_tables(found));
     blocks.extend(orientation(found));

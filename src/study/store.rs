@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::definition::{Cell, Part, Study};
 use super::key::key;
 use super::tally::Tally;
-use crate::files::{StagedFile, changed_key, read_text, sealed};
+use crate::files::{Format, PROGRAM, StagedFile, changed_key, read_text, sealed};
 
 /// Number of hexadecimal digits of the key that form the file name of a part.
 const NAME_DIGITS: usize = 16;
@@ -48,12 +48,6 @@ impl Study {
 /// Name of the format of finished parts, and its version.
 const FORMAT: (&str, u32) = ("flexcal-study-part", 1);
 
-#[derive(Debug, Clone, Default, Serialize, Deserialize)]
-struct Format {
-    name: String,
-    version: u32,
-}
-
 /// Finished part with its statistics.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct FinishedPart {
@@ -91,8 +85,8 @@ impl FinishedPart {
             part.repetitions.end
         );
         Self {
-            format: Format { name: FORMAT.0.to_owned(), version: FORMAT.1 },
-            program: format!("flexcal {}", env!("CARGO_PKG_VERSION")),
+            format: Format { name: FORMAT.0.into(), version: FORMAT.1 },
+            program: PROGRAM.to_owned(),
             part: what,
             key: key(study, part, cell),
             tally,
