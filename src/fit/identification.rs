@@ -377,7 +377,8 @@ fn prepared(
         None => fitting.registered().map(|start| (start.clone(), fitting.errors(&start)))?,
     };
     if !has_declared_noise {
-        let scatter = registered.identification.rms.norm / fitting.measurements.leading().root();
+        let scatter =
+            registered.identification.rms.norm / fitting.measurements.leading().expected_norm();
         fitting.sigma = scatter.max(MIN_SIGMA);
     }
     if let Some(noise) = warm_start.and_then(|warm_start| warm_start.noise) {

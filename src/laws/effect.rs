@@ -313,12 +313,12 @@ impl Effect {
     /// Returns true if the search determines an argument, such as a time, or composed the formula.
     /// Effects with equal [`Self::name_and_place`] then count as one.
     pub(crate) fn is_searched(&self) -> bool {
-        self.searched().is_some() || self.is_described()
+        self.searched().is_some() || self.is_composed()
     }
 
     /// Returns true for a law whose formula a search composed.
-    pub(crate) fn is_described(&self) -> bool {
-        matches!(self, Self::Law(law) if law.description().is_some())
+    pub(crate) fn is_composed(&self) -> bool {
+        matches!(self, Self::Law(law) if law.composed_ln_prior().is_some())
     }
 
     /// Returns true if the effect only changes the coordinate of a joint or its rotation about its

@@ -24,12 +24,12 @@ pub struct Law {
     parameters: Vec<LawParameter>,
     covariates: Vec<String>,
     /// Prior probability and rivals of a law that a search composed; `None` for a declared one.
-    description: Option<Box<Description>>,
+    composition: Option<Box<Composition>>,
 }
 
 /// Prior probability and rivals of a law that a search composed.
 #[derive(Debug, Clone, PartialEq)]
-struct Description {
+struct Composition {
     /// ln of the prior probability among all laws that the search could compose at the site.
     ln_prior: f64,
     /// Laws of other form whose predictions in the measured poses differ by less than the noise,
@@ -196,7 +196,7 @@ impl Law {
                 .collect::<Result<_, _>>()?,
             parameters,
             covariates: vocabulary.covariates.to_vec(),
-            description: None,
+            composition: None,
         })
     }
 
@@ -205,21 +205,21 @@ impl Law {
     /// predictions in the measured poses differ by less than the noise. Each has its share of the
     /// probability that the rivals and this law have together.
     #[must_use]
-    pub fn described(self, ln_prior: f64, rivals: Vec<(Self, f64)>) -> Self {
-        Self { description: Some(Box::new(Description { ln_prior, rivals })), ..self }
+    pub fn composed(self, ln_prior: f64, rivals: Vec<(Self, f64)>) -> Self {
+        Self { composition: Some(Box::new(Composition { ln_prior, rivals })), ..self }
     }
 
     /// Returns ln of the prior probability of a law that a search composed; `None` for a declared
     /// one.
-    pub fn description(&self) -> Option<f64> {
-        self.description.as_ref().map(|description| description.ln_prior)
+    pub fn composed_ln_prior(&self) -> Option<f64> {
+        self.composition.as_ref().map(|composition| composition.ln_prior)
     }
 
     /// Returns the laws of other form whose predictions in the measured poses differ from this
     /// one's by less than the noise, each with its share of the probability; none for a declared
     /// law.
     pub fn rivals(&self) -> &[(Self, f64)] {
-        self.description.as_ref().map_or(&[], |description| &description.rivals)
+        self.composition.as_ref().map_or(&[], |composition| &composition.rivals)
     }
 
     /// Returns the name of the law.
@@ -308,7 +308,7 @@ impl Law {
 
     /// Returns the description of the law in words.
     pub(super) fn describe(&self) -> String {
-        if self.description.is_some() {
+        if self.composition.is_some() {
             let place = self.place_in_words();
             let formulas = self.formulas();
             return match formulas.split_last() {

@@ -64,7 +64,7 @@ impl Identifiability {
         let threshold = UNIDENTIFIABLE_BELOW * singular_values.first().copied().unwrap_or(0.0);
         let rank = singular_values.iter().filter(|&&value| value > threshold).count();
         let null = orthogonal_complement(&right.columns(0, rank).into_owned());
-        let Blind { gauge, visible } = Blind::of(&null, &scale);
+        let UnidentifiableSpace { gauge, visible } = UnidentifiableSpace::of(&null, &scale);
         Self {
             singular_values,
             rank,
@@ -106,14 +106,14 @@ impl Identifiability {
 /// Unidentifiable combinations of unknowns without the singular values, which take longer to
 /// compute.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Blind {
+pub(crate) struct UnidentifiableSpace {
     /// Basis of the unidentifiable combinations, see [`Identifiability::gauge`].
     pub gauge: DMatrix<f64>,
     /// Identified share of each unknown, see [`Identifiability::visible`].
     pub visible: Vec<f64>,
 }
 
-impl Blind {
+impl UnidentifiableSpace {
     /// Finds the unidentifiable combinations of the Jacobian with triangular factor `triangle` (n ×
     /// n).
     ///
@@ -335,7 +335,7 @@ mod tests {
         assert!((&rows * rows.transpose() - DMatrix::identity(3, 3)).amax() < 1e-12);
         assert!((unscaled(&triangle) * rows.transpose()).amax() < 1e-12);
         // The tests without singular values find the same space.
-        let blind = Blind::in_triangle(&triangle);
+        let blind = UnidentifiableSpace::in_triangle(&triangle);
         assert!(certain_null(&ScaledTriangle::of(&triangle).matrix).is_some());
         let recovered = unscaled(&blind.gauge);
         assert!((recovered.transpose() * &recovered - rows.transpose() * &rows).amax() < 1e-12);
@@ -355,7 +355,8 @@ mod tests {
                 if i <= j { ((1 + 3 * i + 7 * j) as f64).sin() + 1.5 } else { 0.0 }
             });
             triangle[(5, 5)] = small;
-            let (blind, found) = (Blind::in_triangle(&triangle), Identifiability::of(&triangle));
+            let (blind, found) =
+                (UnidentifiableSpace::in_triangle(&triangle), Identifiability::of(&triangle));
             assert_eq!(blind.gauge.nrows(), 6 - found.rank, "{small}");
             assert!(
                 blind

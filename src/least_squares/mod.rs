@@ -27,7 +27,7 @@ use std::ops::Range;
 use curvature::{QuadraticModel, curvature_by_differences};
 use nalgebra::{DMatrix, DVector};
 
-pub(crate) use identifiability::Blind;
+pub(crate) use identifiability::UnidentifiableSpace;
 pub use identifiability::{Identifiability, UnidentifiableCombination};
 pub(crate) use uncertainty::Uncertainty;
 pub(crate) use variance::VarianceLikelihood;

@@ -47,7 +47,7 @@ impl Measurements {
         };
         let word = |row: usize| {
             let target = self.target.as_ref().and_then(|target| target.of_row.get(row));
-            (self.session.of_row.get(row), target, self.observation(row).key())
+            (self.session.of_row.get(row), target, self.observation(row).sort_key())
         };
         let is_held = |row: &usize| {
             let (position, before) = (self.positions.get(*row), self.positions.get(row - 1));

@@ -151,7 +151,7 @@ impl Measurements {
         let session = Some(&self.session).filter(|_| by_session);
         let words = [session, self.target.as_ref()].into_iter().flatten();
         let words = words.filter_map(|labels| labels.of_row.get(row)).copied();
-        let words = words.chain(self.observation(row).key()).map(|word| word as u64);
+        let words = words.chain(self.observation(row).sort_key()).map(|word| word as u64);
         let turned = self
             .orientations
             .iter()

@@ -70,7 +70,7 @@ impl<'a> PoseResiduals<'a> {
     }
 
     /// Returns the full parameter vector for unknowns `x`.
-    pub fn full(&self, x: &DVector<f64>) -> DVector<f64> {
+    pub fn full_vector(&self, x: &DVector<f64>) -> DVector<f64> {
         let mut full = self.fixed.clone();
         for (&k, &value) in self.unknowns.iter().zip(x.iter()) {
             full[k] = value;
@@ -79,7 +79,7 @@ impl<'a> PoseResiduals<'a> {
     }
 
     /// Returns the entries of a full parameter vector that belong to the unknowns.
-    pub fn reduced(&self, full: &DVector<f64>) -> DVector<f64> {
+    pub fn unknowns_in(&self, full: &DVector<f64>) -> DVector<f64> {
         DVector::from_iterator(self.unknowns.len(), self.unknowns.iter().map(|&k| full[k]))
     }
 
@@ -109,7 +109,7 @@ impl<'a> PoseResiduals<'a> {
         x: &DVector<f64>,
         error: impl Fn(&Pose, &Prediction) -> Vector3<f64> + Sync,
     ) -> Vec<Vector3<f64>> {
-        let full = self.full(x);
+        let full = self.full_vector(x);
         let chunk = |poses: &[Pose]| {
             let mut predictor = Predictor::new(self.model, full.as_slice());
             poses.iter().map(|pose| error(pose, &predictor.predict(pose))).collect::<Vec<_>>()
@@ -135,7 +135,7 @@ impl LeastSquares for PoseResiduals<'_> {
     }
 
     fn residuals(&self, x: &DVector<f64>, items: Range<usize>, out: &mut [f64]) {
-        let mut predictor = Predictor::new(self.model, self.full(x).as_slice());
+        let mut predictor = Predictor::new(self.model, self.full_vector(x).as_slice());
         for (pose, out) in
             self.poses[items].iter().zip(out.chunks_exact_mut(self.residuals_per_row))
         {
@@ -149,7 +149,7 @@ impl LeastSquares for PoseResiduals<'_> {
     }
 
     fn linearise(&self, x: &DVector<f64>, items: Range<usize>, block: &mut Block) {
-        let full = self.full(x);
+        let full = self.full_vector(x);
         let write = |unknowns: &[usize], block: &mut Block| {
             let kinds = (self.residuals_per_row == RESIDUALS_PER_POSE, self.measures_tilts);
             let columns = JacobianColumns::new(self.model, full.as_slice(), unknowns);

@@ -151,7 +151,7 @@ impl Observation {
 
     /// Returns √k for a row of k measured scalars ([`Observation::coordinates`]), the expected norm
     /// of a whitened residual.
-    pub(crate) fn root(self) -> f64 {
+    pub(crate) fn expected_norm(self) -> f64 {
         (self.coordinates() as f64).sqrt()
     }
 
@@ -178,7 +178,7 @@ impl Observation {
     }
 
     /// Returns a sort key of four numbers, which two observations share only if they are equal.
-    pub(crate) fn key(self) -> [usize; 4] {
+    pub(crate) fn sort_key(self) -> [usize; 4] {
         let kind = kinds().take_while(|kind| kind.name != self.kind()).count();
         let [first, second, third] = self.indices().map(|index| index.map_or(0, |index| index + 1));
         [kind, first, second, third]

@@ -74,7 +74,7 @@ impl Inducing {
             self.knots.iter().zip(cross.columns_range_mut(width..).column_iter_mut())
         {
             for row in 0..rows.len() {
-                let value = input_of(inputs, knot.site).map_or(0.0, |k| rows.inputs[(k, row)]);
+                let value = inputs.sites[knot.site].single.map_or(0.0, |k| rows.inputs[(k, row)]);
                 let covariance = single_covariance(hyper, inputs, knot, value);
                 for axis in AXES * row..AXES * (row + 1) {
                     column[axis] = covariance * rows.sites[(knot.site, axis)];
@@ -101,16 +101,10 @@ impl Inducing {
     }
 }
 
-/// Returns the index of the input that is the command of the site's joint; `None` if the site has
-/// no function uⱼ of that command alone.
-fn input_of(inputs: &Inputs, site: usize) -> Option<usize> {
-    inputs.sites[site].single
-}
-
 /// Returns the covariance of a site's function uⱼ at a knot with the same function at `value`
 /// \[m²\].
 fn single_covariance(hyper: &Hyperparameters, inputs: &Inputs, knot: &Knot, value: f64) -> f64 {
-    let is_angle = input_of(inputs, knot.site).is_some_and(|input| inputs.angles[input]);
+    let is_angle = inputs.sites[knot.site].single.is_some_and(|input| inputs.angles[input]);
     let squared = squared_distance(is_angle, value - knot.at);
     let length = hyper.single_lengths[knot.site];
     hyper.single[knot.site].powi(2) * matern(squared / (length * length)).0

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::kernel::{Hyperparameters, embedded, matern, position_covariances, squared_distances};
 use super::prior::ParameterPrior;
-use super::rows::{AXES, Inputs, Rows, SiteFunctions, Source};
+use super::rows::{AXES, InputSource, Inputs, Rows, SiteFunctions};
 use crate::numeric::{
     gram, gram_of_lower, inverse_lower, lower_factor, product_with_lower, product_with_upper,
 };
@@ -139,7 +139,7 @@ impl<'a> MarginalLikelihood<'a> {
     /// form one family, all ℓᵥ of commands another, and each ℓᵥ of a condition a separate one.
     fn length_families(&self) -> Vec<Range<usize>> {
         let Range { start, end } = self.input_lengths();
-        let is_command = |source: &&Source| matches!(source, Source::Command(_));
+        let is_command = |source: &&InputSource| matches!(source, InputSource::Command(_));
         let conditions = start + self.inputs.sources.iter().filter(is_command).count();
         let commands = [self.single_lengths(), start..conditions].into_iter();
         commands.chain((conditions..end).map(|k| k..k + 1)).collect()

@@ -6,7 +6,7 @@ use std::collections::HashMap;
 use nalgebra::{DMatrix, DVector};
 
 use super::prior::ParameterPrior;
-use super::rows::{AXES, Inputs, Layout, Rows, Site, SiteKind, Source};
+use super::rows::{AXES, InputSource, Inputs, Layout, Rows, Site, SiteKind};
 use crate::fit::Placement;
 use crate::least_squares::jacobian_and_residual;
 use crate::measurement::{Measurements, StartTimes};
@@ -55,19 +55,14 @@ impl Linearisation<'_> {
             (value.unwrap_or(offset) - offset) / unit
         });
         let configuration = configurations(&poses);
-        let residuals =
-            PoseResiduals::new(self.model, poses, self.unknowns.clone(), self.x.clone());
-        let (slopes, residual) = jacobian_and_residual(&residuals, &residuals.reduced(self.x));
-        Rows { residual, jacobian: -slopes, sites, inputs, configuration, relative_sigma }
+        let (jacobian, residual) = derivatives(self.model, poses, self.unknowns.clone(), self.x);
+        Rows { residual, jacobian, sites, inputs, configuration, relative_sigma }
     }
 
     /// Returns the derivatives of the positions of `poses` with respect to the unknowns, shape = (3
     /// poses, unknowns). They are NaN for poses without equilibrium.
     pub fn jacobian(&self, poses: Vec<Pose>) -> DMatrix<f64> {
-        let poses: Vec<Pose> = poses.into_iter().map(|pose| Pose { sigma: 1.0, ..pose }).collect();
-        let residuals =
-            PoseResiduals::new(self.model, poses, self.unknowns.clone(), self.x.clone());
-        -jacobian_and_residual(&residuals, &residuals.reduced(self.x)).0
+        derivatives(self.model, poses, self.unknowns.clone(), self.x).0
     }
 
     /// Returns the derivatives of the positions of `poses` with respect to each site's joint
@@ -110,10 +105,7 @@ impl Linearisation<'_> {
         let first = self.x.len();
         let x = self.x.clone().resize_vertically(first + joints.len(), 0.0);
         let unknowns = (first..first + joints.len()).collect();
-        let poses: Vec<Pose> = poses.iter().map(|pose| Pose { sigma: 1.0, ..*pose }).collect();
-        let residuals = PoseResiduals::new(&probed, poses, unknowns, x.clone());
-        let (slopes, _) = jacobian_and_residual(&residuals, &residuals.reduced(&x));
-        -slopes
+        derivatives(&probed, poses.to_vec(), unknowns, &x).0
     }
 
     /// Determines the joint coordinates and compliances at which errors move the arm in these
@@ -131,7 +123,7 @@ impl Linearisation<'_> {
         }
         let sites = [coordinates, compliances].concat();
         let count = poses.len().max(1) as f64;
-        let commands = joints.iter().map(|&joint| Source::Command(joint));
+        let commands = joints.iter().map(|&joint| InputSource::Command(joint));
         let mut inputs = Inputs {
             sites: Vec::new(),
             sources: Vec::new(),
@@ -139,7 +131,7 @@ impl Linearisation<'_> {
             standard: Vec::new(),
             ranges: Vec::new(),
         };
-        for source in commands.chain(Source::CONDITIONS) {
+        for source in commands.chain(InputSource::CONDITIONS) {
             let values: Option<Vec<f64>> =
                 poses.iter().map(|pose| source.value(&pose.setup)).collect();
             let Some(values) = values else { continue };
@@ -147,7 +139,9 @@ impl Linearisation<'_> {
             let squares = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>();
             let spread = (squares / count).sqrt();
             let is_angle = match source {
-                Source::Command(joint) => self.problem.joints[joint].kind == JointKind::Revolute,
+                InputSource::Command(joint) => {
+                    self.problem.joints[joint].kind == JointKind::Revolute
+                }
                 _ if spread <= MIN_SPREAD * mean.abs() => continue,
                 _ => false,
             };
@@ -235,4 +229,18 @@ pub(super) fn timed_poses<'a>(
     let mut poses = placement.poses(table, rows, sigma);
     placement.count_time_from(starts, &mut poses);
     poses
+}
+
+/// Returns the derivatives of the positions of `poses` with respect to the parameters `unknowns` at
+/// the full parameter vector `x`, shape = (3 poses, unknowns), and the residuals.
+fn derivatives(
+    model: &Model,
+    poses: Vec<Pose>,
+    unknowns: Vec<usize>,
+    x: &DVector<f64>,
+) -> (DMatrix<f64>, DVector<f64>) {
+    let poses: Vec<Pose> = poses.into_iter().map(|pose| Pose { sigma: 1.0, ..pose }).collect();
+    let residuals = PoseResiduals::new(model, poses, unknowns, x.clone());
+    let (slopes, residual) = jacobian_and_residual(&residuals, &residuals.unknowns_in(x));
+    (-slopes, residual)
 }

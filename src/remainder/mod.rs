@@ -54,4 +54,5 @@ pub use self::{
     fit::uncertainty,
     saved::SavedRemainderError,
 };
-pub(crate) use tables::{CorrectionTables, InputSource, InputTable, SiteTable};
+pub(crate) use rows::InputSource;
+pub(crate) use tables::{CorrectionTables, InputTable, SiteTable};

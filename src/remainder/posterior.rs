@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::inducing::Inducing;
 use super::kernel::{Hyperparameters, covariance, variance};
 use super::prior::ParameterPrior;
-use super::rows::{AXES, Inputs, Rows};
+use super::rows::{AXES, Inputs, Rows, coordinates};
 use crate::numeric::{gram, inverse_lower, lower_factor, product, product_with_upper};
 
 /// Fraction of its variance that is added to each inducing variable, so that the covariance remains
@@ -105,12 +105,7 @@ pub(super) struct Training {
     /// noise: N^(−½) y.
     target: DVector<f64>,
     /// Rows of each configuration, with the lower factor of their noise covariance.
-    groups: Vec<(Vec<usize>, DMatrix<f64>)>,
-}
-
-/// Returns the indices 3 · row + axis of the coordinates of some rows.
-fn coordinates(rows: &[usize]) -> Vec<usize> {
-    rows.iter().flat_map(|&row| (0..AXES).map(move |axis| AXES * row + axis)).collect()
+    groups: Vec<Group>,
 }
 
 impl Posterior {

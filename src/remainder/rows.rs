@@ -50,7 +50,7 @@ pub(super) enum SiteKind {
 
 /// Quantity of a pose on which joint errors may depend.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Source {
+pub enum InputSource {
     /// Command of a joint, counted from 0.
     Command(usize),
     /// Temperature of the pose \[°C\].
@@ -61,7 +61,7 @@ pub(super) enum Source {
     Hoist,
 }
 
-impl Source {
+impl InputSource {
     /// Inputs that are conditions of a pose, not commands.
     pub const CONDITIONS: [Self; 3] = [Self::Temperature, Self::Payload, Self::Hoist];
 
@@ -113,7 +113,7 @@ pub(super) struct Inputs {
     /// Error functions at each site of the remainder.
     pub sites: Vec<SiteFunctions>,
     /// Quantity of a pose that each input is.
-    pub sources: Vec<Source>,
+    pub sources: Vec<InputSource>,
     /// For each input, true if it is an angle. Distances between angles are chords, so that q and q
     /// + 2π coincide.
     pub angles: Vec<bool>,
@@ -126,10 +126,10 @@ pub(super) struct Inputs {
 
 impl Inputs {
     /// Returns the error functions at each site, for the given inputs.
-    pub fn functions(sites: &[Site], sources: &[Source]) -> Vec<SiteFunctions> {
+    pub fn functions(sites: &[Site], sources: &[InputSource]) -> Vec<SiteFunctions> {
         let functions = |site: &Site| {
             let is_coordinate = site.kind == SiteKind::Coordinate;
-            let command = Source::Command(site.joint);
+            let command = InputSource::Command(site.joint);
             let input = sources.iter().position(|source| *source == command);
             SiteFunctions {
                 single: input.filter(|_| is_coordinate),
@@ -161,6 +161,11 @@ pub(super) struct Rows {
     pub relative_sigma: Vec<f64>,
 }
 
+/// Returns the indices 3 · row + axis of the coordinates of some rows.
+pub(super) fn coordinates(rows: &[usize]) -> Vec<usize> {
+    rows.iter().flat_map(|&row| (0..AXES).map(move |axis| AXES * row + axis)).collect()
+}
+
 impl Rows {
     /// Returns the number of rows.
     pub fn len(&self) -> usize {
@@ -182,8 +187,7 @@ impl Rows {
 
     /// Returns the rows with the given indices, in this order.
     pub fn select(&self, rows: &[usize]) -> Self {
-        let coordinates: Vec<usize> =
-            rows.iter().flat_map(|&row| (0..AXES).map(move |axis| AXES * row + axis)).collect();
+        let coordinates = coordinates(rows);
         Self {
             residual: self.residual.select_rows(&coordinates),
             jacobian: self.jacobian.select_rows(&coordinates),

@@ -13,7 +13,7 @@ use super::inducing::{Inducing, Knot};
 use super::kernel::Hyperparameters;
 use super::posterior::Posterior;
 use super::prior::ParameterPrior;
-use super::rows::{AXES, Inputs, Layout, Rows, Site, SiteKind, Source};
+use super::rows::{AXES, InputSource, Inputs, Layout, Rows, Site, SiteKind};
 use super::scores::Scores;
 use crate::error::Location;
 use crate::files::{Changes, FORMAT_VERSION, Format, PROGRAM, changed_key, read_limited, sealed};
@@ -185,7 +185,7 @@ impl Correction {
             constant_amplitude_m: hyper.constant[k],
         };
         let inputs = &self.layout.inputs;
-        let input = |(k, source): (usize, &Source)| Input {
+        let input = |(k, source): (usize, &InputSource)| Input {
             name: source.name(),
             is_angle: inputs.angles[k],
             offset: inputs.standard[k].0,
@@ -316,8 +316,8 @@ impl Correction {
             Some(Site { joint: saved.joint.checked_sub(1)?, kind: saved.kind, lever: saved.lever })
         };
         let found_sites: Option<Vec<Site>> = document.sites.iter().map(site).collect();
-        let found_sources: Option<Vec<Source>> =
-            document.inputs.iter().map(|input| Source::parse(&input.name)).collect();
+        let found_sources: Option<Vec<InputSource>> =
+            document.inputs.iter().map(|input| InputSource::parse(&input.name)).collect();
         let (Some(found_sites), Some(sources)) = (found_sites, found_sources) else {
             return Err(wrong("a site or an input has no joint"));
         };
@@ -388,7 +388,7 @@ impl Correction {
             return Err(SavedRemainderError::OtherProblem { file: file(), found, expected });
         }
         let commands = self.layout.inputs.sources.iter().filter_map(|source| match source {
-            Source::Command(joint) => Some(*joint),
+            InputSource::Command(joint) => Some(*joint),
             _ => None,
         });
         let mut joints = self.layout.sites.iter().map(|site| site.joint).chain(commands);

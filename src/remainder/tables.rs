@@ -5,7 +5,7 @@ use nalgebra::DVector;
 use super::correction::Correction;
 use super::inducing::Inducing;
 use super::kernel::Hyperparameters;
-use super::rows::{AXES, Inputs, Layout, Site, SiteKind, Source};
+use super::rows::{AXES, InputSource, Inputs, Layout, Site, SiteKind};
 use crate::model::Model;
 
 /// Site at which the remainder models an error: the coordinate or the compliance of a joint.
@@ -25,19 +25,6 @@ pub struct SiteTable {
     /// Index of the input that is the joint's own command, and 1/ℓᵤ² of the function of that
     /// command alone; `None` without such a function.
     pub single: Option<(usize, f64)>,
-}
-
-/// Quantity of a pose on which joint errors depend.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum InputSource {
-    /// Command of a joint, counted from 0.
-    Command(usize),
-    /// Temperature [°C].
-    Temperature,
-    /// Payload \[kg\].
-    Payload,
-    /// Hoist force \[N\].
-    Hoist,
 }
 
 /// Input of the error functions, with its standardisation and its correlation length.
@@ -128,13 +115,8 @@ impl Correction {
             variances: [single[s], joint[s], constant[s]].map(|size: f64| size * size),
             single: (functions[s].single).map(|input| (input, inverse_square(single_lengths[s]))),
         };
-        let input = |(k, &source): (usize, &Source)| InputTable {
-            source: match source {
-                Source::Command(joint) => InputSource::Command(joint),
-                Source::Temperature => InputSource::Temperature,
-                Source::Payload => InputSource::Payload,
-                Source::Hoist => InputSource::Hoist,
-            },
+        let input = |(k, &source): (usize, &InputSource)| InputTable {
+            source,
             is_angle: angles[k],
             standard: standard[k],
             scale: inverse_square(input_lengths[k]),

@@ -7,7 +7,7 @@ use super::kernel::{Hyperparameters, covariance, variance};
 use super::likelihood::MarginalLikelihood;
 use super::posterior::Training;
 use super::prior::ParameterPrior;
-use super::rows::{AXES, Inputs, Rows, SiteFunctions, Source};
+use super::rows::{AXES, InputSource, Inputs, Rows, SiteFunctions};
 
 /// Number of configurations; the first is measured twice.
 const CONFIGURATIONS: usize = 14;
@@ -19,7 +19,7 @@ fn noise(k: usize) -> f64 {
 
 fn inputs() -> Inputs {
     Inputs {
-        sources: [0, 1, 2].map(Source::Command).to_vec(),
+        sources: [0, 1, 2].map(InputSource::Command).to_vec(),
         angles: vec![true, true, false],
         sites: vec![
             SiteFunctions { single: Some(0), joint: true, constant: false },

@@ -6,7 +6,7 @@ use super::document::code;
 use super::probability::{MIN_PROBABLE, percent};
 use crate::fit::Noise;
 use crate::model::effect::NO_REFERENCE;
-use crate::model::parameter::holds_all;
+use crate::model::parameter::are_all_fixed;
 use crate::problem::{Effect, JointKind, Problem};
 use crate::quantity::format::{number, p_value};
 use crate::residual_tests::Covariate;
@@ -21,7 +21,7 @@ fn correction(closure: &ClosedLoop) -> Option<&Correction> {
 /// Returns the reason why an effect was not tried. If [parameters] holds the effect's parameters
 /// fixed, that is the reason, even if a reference temperature is missing too.
 fn reason_untried(problem: &Problem, (effect, reason): &(Effect, &'static str)) -> &'static str {
-    let is_held = *reason == NO_REFERENCE && holds_all(problem, &effect.parameters(problem));
+    let is_held = *reason == NO_REFERENCE && are_all_fixed(problem, &effect.parameters(problem));
     if is_held { HELD_FIXED } else { reason }
 }
 

@@ -53,7 +53,7 @@ const HINTS: [Hint; 27] = [
 /// effects, for laws with several terms, and for laws without an entry in the table.
 pub(super) fn resembled(effect: &Effect) -> Option<String> {
     let Effect::Law(law) = effect else { return None };
-    law.description()?;
+    law.composed_ln_prior()?;
     let [formula] = law.formulas().try_into().ok()?;
     let site = law.site();
     let site_kind = match law.at() {

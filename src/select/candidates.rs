@@ -2,7 +2,7 @@
 
 use super::data::Data;
 use crate::model::effect::{self, Candidate};
-use crate::model::parameter::{holds_all, refuses};
+use crate::model::parameter::{are_all_fixed, makes_rule_invalid};
 use crate::problem::{Effect, Problem};
 
 /// Reason why an effect is not tried: the rules of the problem fix its parameters at zero.
@@ -37,10 +37,12 @@ impl Candidates {
             match untestable {
                 _ if problem.effects.iter().any(|declared| declared.effect.covers(&effect)) => {}
                 Some(reason) => found.untestable.push((effect, reason)),
-                None if holds_all(problem, &parameters()) => {
+                None if are_all_fixed(problem, &parameters()) => {
                     found.untestable.push((effect, HELD_FIXED));
                 }
-                None if refuses(problem, &parameters()) => found.untestable.push((effect, REFUSED)),
+                None if makes_rule_invalid(problem, &parameters()) => {
+                    found.untestable.push((effect, REFUSED))
+                }
                 None => found.testable.push(effect),
             }
         }

@@ -257,7 +257,7 @@ fn conditions_of(measurements: &Measurements, row: usize) -> Vec<u64> {
     }
     key.extend(bits(measurements.covariates_of(row)));
     key.push(measurements.session.of_row[row] as u64);
-    key.extend(measurements.observation(row).key().map(|word| word as u64));
+    key.extend(measurements.observation(row).sort_key().map(|word| word as u64));
     key.extend(measurements.target.as_ref().map(|target| target.of_row[row] as u64));
     key
 }

@@ -50,7 +50,7 @@ fn check_at(
     let all: Vec<usize> = (0..rows.len()).collect();
     let poses = Placement::of(rows).poses(rows, &all, 1e-3);
     let residuals = PoseResiduals::new(&model, poses, unknowns.to_vec(), x.clone());
-    let (at, step) = (residuals.reduced(x), residuals.reduced(step));
+    let (at, step) = (residuals.unknowns_in(x), residuals.unknowns_in(step));
     let exact = jacobian(&residuals, &at);
     let mut without = Vec::new();
     for (j, column) in check_jacobian(&residuals, &at, &step).columns.iter().enumerate() {

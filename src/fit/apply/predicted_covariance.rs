@@ -61,7 +61,7 @@ impl Identification {
         let poses: Vec<Pose> =
             self.poses(rows, None).into_iter().map(|pose| Pose { sigma: 1.0, ..pose }).collect();
         let residuals = PoseResiduals::new(&model, poses, unknowns, x.clone());
-        let at = residuals.reduced(&x);
+        let at = residuals.unknowns_in(&x);
         let of_row = |(row, position): (usize, Vector3<f64>)| {
             let jacobian = row_jacobian(&residuals, &at, row);
             let spread = &jacobian * &covariance * jacobian.transpose();

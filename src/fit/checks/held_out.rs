@@ -42,7 +42,7 @@ pub(in crate::fit) fn outliers(
     let rows = &fitting.split.held_out;
     let stage = fitting.stage(rows, unknowns.to_vec());
     let residuals = stage.residuals(x);
-    let at = residuals.reduced(x);
+    let at = residuals.unknowns_in(x);
     let n = unknowns.len();
     let rows_per_pose = stage.coordinates();
     let of_chunk = |chunk: usize| -> Vec<f64> {
@@ -92,7 +92,7 @@ fn copies(fit: &CheckedFit) -> usize {
             measurements.configuration(row).iter().chain(measurements.positions[row].iter());
         let words = measurements
             .observation(row)
-            .key()
+            .sort_key()
             .into_iter()
             .chain([measurements.session.of_row[row]]);
         values.map(|value| value.to_bits()).chain(words.map(|word| word as u64)).collect()
@@ -237,7 +237,7 @@ impl Check for BetterThanNominal {
         let (before, after) = (fit.registered.held_out.rms.norm, fit.fitted.held_out.rms.norm);
         let row_kind = fit.kinds().into_iter().find(|row_kind| row_kind.observation.kind() == kind);
         let Some(RowKind { observation, taken_sigma, .. }) = row_kind else { return Vec::new() };
-        let noise = observation.root() * taken_sigma;
+        let noise = observation.expected_norm() * taken_sigma;
         if !(after > MIN_ERROR_RATIO * before && after > MIN_NOISE_MULTIPLE * noise) {
             return Vec::new();
         }

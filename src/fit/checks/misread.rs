@@ -42,7 +42,7 @@ impl Check for ReadAsMeant {
         let errors = fit.fitting.position_errors(&kind.rows, &fit.end.x);
         let rms = fit.rms(&kind.rows, &errors);
         let limit = match kind.declared_sigma {
-            Some(sigma) => MIN_SIGMAS * kind.observation.root() * sigma,
+            Some(sigma) => MIN_SIGMAS * kind.observation.expected_norm() * sigma,
             None => MIN_PART * kind.spread,
         };
         let is_within_priors = WithinPriors.check(fit).is_empty();
@@ -51,7 +51,7 @@ impl Check for ReadAsMeant {
             // Close to the noise, only a mistake that leaves nothing but noise is an explanation.
             let is_searched = fit.has_further_fits && kind.observation.is_position();
             let noise = kind.declared_sigma.filter(|_| is_searched);
-            let noise = noise.map(|sigma| kind.observation.root() * sigma);
+            let noise = noise.map(|sigma| kind.observation.expected_norm() * sigma);
             match noise.filter(|noise| rms > MIN_SIGMAS_OF_MASSES * noise) {
                 Some(noise) => fit.misread_masses(MAX_SIGMAS_LEFT_BY_MASS * noise),
                 None => return Vec::new(),
@@ -65,9 +65,9 @@ impl Check for ReadAsMeant {
         let more = words.len().saturating_sub(MAX_NAMED);
         let more = if more > 0 { format!(", or {more} more") } else { String::new() };
         let name = kind.observation.kind();
-        let is_noise = kind
-            .declared_sigma
-            .is_none_or(|sigma| best.rms <= MAX_NOISE_SIGMAS * kind.observation.root() * sigma);
+        let is_noise = kind.declared_sigma.is_none_or(|sigma| {
+            best.rms <= MAX_NOISE_SIGMAS * kind.observation.expected_norm() * sigma
+        });
         let named = words[..words.len().min(MAX_NAMED)].join(", or ");
         let [rest, as_read] =
             [best.rms, explanations.as_read].map(|error| format_error(name, error, 3));

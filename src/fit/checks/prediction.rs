@@ -97,7 +97,7 @@ fn predictive_chi2(
 ) -> Option<(f64, usize)> {
     let stage = fitting.stage(rows, unknowns.to_vec());
     let (residuals, n, per_pose) = (stage.residuals(x), unknowns.len(), stage.coordinates());
-    let at = residuals.reduced(x);
+    let at = residuals.unknowns_in(x);
     let scale = covariance.diagonal().map(|variance| variance.max(0.0).sqrt());
     let of_chunk = |chunk: usize| {
         let items = chunk * CHUNK_ITEMS..((chunk + 1) * CHUNK_ITEMS).min(rows.len());

@@ -131,7 +131,7 @@ impl Check for SigmaIsNotOverstated {
         let kind = fit.kind(measurements.leading());
         let Some(sigma) = kind.declared_sigma else { return Vec::new() };
         let errors = fit.fitting.position_errors(&kind.rows, &fit.end.x);
-        let rms = fit.rms(&kind.rows, &errors) / kind.observation.root();
+        let rms = fit.rms(&kind.rows, &errors) / kind.observation.expected_norm();
         if rms < MIN_MEASURED_RMS
             || sigma <= MAX_OVERSTATED_RATIO * rms
             || kind.observation.coordinates() * kind.rows.len()

@@ -79,7 +79,7 @@ impl Check for CommandsHaveDigits {
             return Vec::new();
         };
         let rms = fit.rms(&kind.rows, &fit.fitting.position_errors(&kind.rows, &fit.end.x));
-        if rms < MIN_SIGMAS * kind.observation.root() * sigma {
+        if rms < MIN_SIGMAS * kind.observation.expected_norm() * sigma {
             return Vec::new();
         }
         let steps: Vec<(usize, f64)> = revolute_joints(fit)

@@ -48,7 +48,7 @@ impl Stage<'_> {
     /// Returns an error if a row or limit is not finite.
     pub fn held(&self, at: &DVector<f64>) -> Result<Vec<ActiveLimit>, StageError> {
         let (which, rows) = self.constraints(at)?;
-        let x = self.reduced(at);
+        let x = self.unknowns_in(at);
         let held = |(i, constraint)| {
             let row = rows.matrix().row(i).iter().copied().collect();
             Some(ActiveLimit { constraint, side: rows.at(&x, i)?, row })

@@ -361,7 +361,7 @@ impl<'a> Fitting<'a> {
         // ends after a sweep of stages without a small limit of steps.
         let mut long = false;
         for sweep in 1..=MAX_SWEEPS {
-            let begin = whole.reduced(&end.x);
+            let begin = whole.unknowns_in(&end.x);
             let termination = self.sweep(whole, &mut end, (!long).then_some(MAX_SWEEP_STEPS))?;
             end.alternation = Some(Alternation { sweeps: sweep, contraction: None });
             let next = whole.cost(&end.x);
@@ -372,8 +372,8 @@ impl<'a> Fitting<'a> {
             }
             long = settled;
             cost = next;
-            if let Some(tried) = anderson.next(&begin, &whole.reduced(&end.x), &scale) {
-                let tried = whole.full(&end.x, &tried);
+            if let Some(tried) = anderson.next(&begin, &whole.unknowns_in(&end.x), &scale) {
+                let tried = whole.full_vector(&end.x, &tried);
                 end.evaluations += 1;
                 if whole.allows(&tried)? && whole.cost(&tried) < cost {
                     end.x = tried;

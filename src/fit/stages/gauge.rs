@@ -4,7 +4,7 @@
 use nalgebra::DMatrix;
 
 use super::active_limits::ActiveLimit;
-use crate::least_squares::{Blind, Triangle, UnidentifiableCombination, Weak};
+use crate::least_squares::{Triangle, UnidentifiableCombination, UnidentifiableSpace, Weak};
 
 /// Combinations of the unknowns of a stage that data and priors leave undetermined or determine too
 /// weakly. They keep their start values.
@@ -46,7 +46,8 @@ impl Gauge {
         });
         let free: Vec<usize> = (0..n).filter(|&j| !held[j]).collect();
         let factor = Triangle::factor(&stacked.select_columns(&free));
-        let Blind { gauge: undetermined, visible: outside } = Blind::in_triangle(&factor);
+        let UnidentifiableSpace { gauge: undetermined, visible: outside } =
+            UnidentifiableSpace::in_triangle(&factor);
         let sizes: Vec<Option<f64>> = free.iter().map(|&k| sizes[k]).collect();
         let weak = Weak::of(&factor_of_stacked(&factor, &undetermined), &sizes);
         let unidentifiable = undetermined.nrows();

@@ -165,7 +165,7 @@ impl<'a> Stage<'a> {
     /// Linearises the whitened data at `at`, each pose weighted by `loss`, without priors.
     pub fn linearised(&self, at: &DVector<f64>, loss: Loss) -> Linearisation {
         let residuals = self.residuals(at);
-        self.cached(&residuals, at, loss).linearise(&residuals.reduced(at))
+        self.cached(&residuals, at, loss).linearise(&residuals.unknowns_in(at))
     }
 
     /// Creates the objective of `residuals` with this loss. Fits with the same cache and equal data
@@ -259,12 +259,12 @@ impl<'a> Stage<'a> {
     }
 
     /// Returns the values of the unknowns in the full parameter vector `at`.
-    pub fn reduced(&self, at: &DVector<f64>) -> DVector<f64> {
+    pub fn unknowns_in(&self, at: &DVector<f64>) -> DVector<f64> {
         DVector::from_iterator(self.unknowns.len(), self.unknowns.iter().map(|&k| at[k]))
     }
 
     /// Returns the full parameter vector `at` with the unknowns replaced by `x`.
-    pub fn full(&self, at: &DVector<f64>, x: &DVector<f64>) -> DVector<f64> {
+    pub fn full_vector(&self, at: &DVector<f64>, x: &DVector<f64>) -> DVector<f64> {
         let mut full = at.clone();
         self.unknowns.iter().zip(x.iter()).for_each(|(&k, value)| full[k] = *value);
         full
@@ -280,7 +280,7 @@ impl<'a> Stage<'a> {
             .iter()
             .zip(self.parameters())
             .all(|(&k, parameter)| parameter.lower <= at[k] && at[k] <= parameter.upper);
-        Ok(inside && self.constraints(at)?.1.contain(&self.reduced(at)))
+        Ok(inside && self.constraints(at)?.1.contain(&self.unknowns_in(at)))
     }
 
     /// Finds the combinations of the unknowns that data, priors and `active` constraints do not
@@ -304,7 +304,7 @@ impl<'a> Stage<'a> {
     /// Returns an error if no values satisfy bounds and constraints, or if the fit was interrupted.
     pub fn run(&self, start: &DVector<f64>) -> Result<StageEnd, StageError> {
         let residuals = self.residuals(start);
-        let mut begin = residuals.reduced(start);
+        let mut begin = residuals.unknowns_in(start);
         let lower = DVector::from_iterator(begin.len(), self.parameters().map(|p| p.lower));
         let upper = DVector::from_iterator(begin.len(), self.parameters().map(|p| p.upper));
         let bounds = Bounds::new(lower, upper)?;
@@ -326,7 +326,7 @@ impl<'a> Stage<'a> {
             iterations += solution.iterations;
             cost_evaluations += solution.cost_evaluations;
             linearisations += solution.linearisations;
-            let x = residuals.full(&solution.x);
+            let x = residuals.full_vector(&solution.x);
             let held: Vec<bool> = solution.at_bound.iter().map(Option::is_some).collect();
             let now = self.gauge(&x, &held, &self.held(&x)?);
             if now.rows.nrows() >= gauge.rows.nrows() || !solution.termination.converged() {
@@ -354,10 +354,10 @@ impl<'a> Stage<'a> {
         let priors = self.priors();
         let none = DVector::zeros(priors.nrows());
         let fit = self
-            .cached(residuals, &residuals.full(&begin), self.loss)
+            .cached(residuals, &residuals.full_vector(&begin), self.loss)
             .with_rows(LinearRows { matrix: priors, constant: none })?
             .with_rows(LinearRows { matrix: gauge.rows.clone(), constant: -(&gauge.rows * hold) })?
-            .with_rows(self.earlier_rows(&residuals.full(hold)))?;
+            .with_rows(self.earlier_rows(&residuals.full_vector(hold)))?;
         let sizes = self.sizes();
         let fit = StabilisedObjective { objective: fit, sizes: &sizes };
         let settings = Settings {
@@ -413,7 +413,7 @@ impl<'a> Stage<'a> {
     /// earlier data.
     pub fn cost(&self, at: &DVector<f64>) -> f64 {
         let residuals = self.residuals(at);
-        let x = residuals.reduced(at);
+        let x = residuals.unknowns_in(at);
         Fit::new(&residuals).with_loss(self.loss).cost(&x)
             + 0.5 * (self.priors() * &x).norm_squared()
             + 0.5 * self.earlier_squares(at, &x)

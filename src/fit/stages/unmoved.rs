@@ -73,7 +73,7 @@ impl Stage<'_> {
     /// frame.
     fn unmoved_in(&self, at: &DVector<f64>, count: usize) -> Vec<Vector3<f64>> {
         let residuals = self.residuals(at);
-        let (x, n) = (residuals.reduced(at), self.unknowns.len());
+        let (x, n) = (residuals.unknowns_in(at), self.unknowns.len());
         let per_pose = self.coordinates();
         let count = count.min(self.poses.len());
         let mut squares: Vec<Matrix3<f64>> = vec![Matrix3::zeros(); n];

@@ -29,7 +29,8 @@ impl Fitting<'_> {
         let rows = &self.split.identification;
         let stage = self.stage(rows, unknowns.to_vec());
         let (residuals, per_pose) = (stage.residuals(x), stage.coordinates());
-        let (mut jacobian, mut residual) = jacobian_and_residual(&residuals, &residuals.reduced(x));
+        let (mut jacobian, mut residual) =
+            jacobian_and_residual(&residuals, &residuals.unknowns_in(x));
         // At the optimum of a robust loss, the gradient of the rows with these weights is zero.
         let weight = |place: usize| {
             self.loss.weight(residual.rows(per_pose * place, per_pose).norm_squared()).sqrt()

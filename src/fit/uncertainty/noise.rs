@@ -181,7 +181,7 @@ fn next_noise_models(
     let turned = 3 * poses.iter().filter(|pose| pose.orientation.is_some()).count();
     let are_all_poses = poses.len() == stage.poses.len();
     let residuals = stage.residuals_of(poses, &end.x);
-    let x = residuals.reduced(&end.x);
+    let x = residuals.unknowns_in(&end.x);
     let data = if are_all_poses {
         stage.linearised(&end.x, Loss::Squares)
     } else {

@@ -42,7 +42,7 @@ impl Stage<'_> {
             return Ok(Prices { bounds: vec![None; n], constraints: Vec::new() });
         }
         let residuals = self.residuals(at);
-        let x = residuals.reduced(at);
+        let x = residuals.unknowns_in(at);
         let priors = self.priors();
         let constant = DVector::zeros(priors.nrows());
         let fit = Fit::new(&residuals)

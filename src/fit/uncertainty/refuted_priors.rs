@@ -148,7 +148,7 @@ impl Evidence {
     fn of(stage: &Stage, at: &DVector<f64>, held: &[bool], max_variance: f64) -> Self {
         let data = stage.linearised(at, Loss::Squares);
         let free: Vec<usize> = (0..held.len()).filter(|&j| !held[j]).collect();
-        let mut x = stage.reduced(at);
+        let mut x = stage.unknowns_in(at);
         (0..held.len()).filter(|&j| held[j]).for_each(|j| x[j] = 0.0);
         let columns = data.triangle.select_columns(&free);
         let at_nominal = &data.projected - &data.triangle * x;

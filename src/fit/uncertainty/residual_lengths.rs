@@ -105,7 +105,7 @@ impl Lengths {
         declared: Option<f64>,
     ) -> Self {
         let residuals = stage.residuals(at);
-        let whitened = residual_vector(&residuals, &residuals.reduced(at));
+        let whitened = residual_vector(&residuals, &residuals.unknowns_in(at));
         let length = |r: &[f64]| match unmoved.count() {
             0 => r[0].hypot(r[1]).hypot(r[2]),
             _ => unmoved.moved_part(Vector3::new(r[0], r[1], r[2])).norm(),

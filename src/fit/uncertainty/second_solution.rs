@@ -213,7 +213,7 @@ fn starts(stage: &Stage, at: &DVector<f64>, covariance: &DMatrix<f64>) -> Vec<DV
             chosen.push(mirror);
         }
     }
-    chosen.into_iter().map(|mirror| stage.full(at, &mirror.start)).collect()
+    chosen.into_iter().map(|mirror| stage.full_vector(at, &mirror.start)).collect()
 }
 
 /// Residuals and their derivatives at an optimum.
@@ -245,7 +245,7 @@ struct Mirror {
 impl<'a> Surroundings<'a> {
     fn new(stage: &'a Stage<'a>, at: &DVector<f64>, covariance: &'a DMatrix<f64>) -> Self {
         let residuals = stage.residuals(at);
-        let x = residuals.reduced(at);
+        let x = residuals.unknowns_in(at);
         let (derivatives, r) = jacobian_and_residual(&residuals, &x);
         let (priors, earlier) = (stage.priors(), stage.earlier_rows(at).matrix);
         let mut linear = priors.clone().resize_vertically(priors.nrows() + earlier.nrows(), 0.0);

@@ -10,7 +10,7 @@ use crate::fit::stages::stage::{Stage, StageError};
 use crate::fit::uncertainty::hidden_by_bound::{HiddenByBound, hidden_by_bounds};
 use crate::fit::uncertainty::prices::Prices;
 use crate::fit::uncertainty::residual_lengths::Lengths;
-use crate::least_squares::{Blind, Loss, Uncertainty};
+use crate::least_squares::{Loss, Uncertainty, UnidentifiableSpace};
 use crate::model::Pose;
 
 /// Largest part of an unknown in unidentifiable combinations, 0…1, at which the unknown still has a
@@ -139,7 +139,7 @@ impl Statistics {
         let visible = if priors.iter().all(Option::is_some) || stage.cache.is_provisional() {
             vec![1.0; errors.len()]
         } else {
-            Blind::in_triangle(&stage.data_triangle(&end.x)).visible
+            UnidentifiableSpace::in_triangle(&stage.data_triangle(&end.x)).visible
         };
         // The part of a variance that a bound hides is not determined by the data.
         let from_data = |j: usize| match errors[j] {

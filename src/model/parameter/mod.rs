@@ -21,7 +21,7 @@ pub(crate) use inner::{
 };
 pub(crate) use regressor::Regressor;
 pub(crate) use resolve::{EffectParameter, resolve};
-pub(crate) use resolve::{holds_all, refuses, rule_of};
+pub(crate) use resolve::{are_all_fixed, makes_rule_invalid, rule_of};
 pub use site::ParameterSite;
 pub(crate) use waves::Waves;
 

@@ -192,7 +192,7 @@ fn undeclared_effect_error(
 }
 
 /// Returns true if the rules of `problem` hold (fix) all `parameters` of an undeclared effect.
-pub fn holds_all(problem: &Problem, parameters: &[EffectParameter]) -> bool {
+pub fn are_all_fixed(problem: &Problem, parameters: &[EffectParameter]) -> bool {
     let held = |parameter| {
         rule_of(problem, parameter).is_some_and(|rule| matches!(rule.freedom, Freedom::Fixed))
     };
@@ -201,7 +201,7 @@ pub fn holds_all(problem: &Problem, parameters: &[EffectParameter]) -> bool {
 
 /// Returns true if a rule of `problem` would be an error once an effect with these parameters is
 /// declared: it matches only effects and gives no quantity in their unit.
-pub fn refuses(problem: &Problem, parameters: &[EffectParameter]) -> bool {
+pub fn makes_rule_invalid(problem: &Problem, parameters: &[EffectParameter]) -> bool {
     let none = [String::new()];
     let is_for_arm = |rule| {
         candidates(problem, &none, &none, &[]).iter().any(|candidate| candidate.matches(rule))

@@ -60,18 +60,19 @@ pub(super) fn blocks(
         min_ln_factor: if bounds_noise { 0.0 } else { f64::NEG_INFINITY },
     };
     let alike = (PRIOR_OF_SAME_FAMILY.ln() - hypotheses.ln_family - 2.0_f64.ln()).max(0.0);
-    let target = ResidualModel { fit: neighbourhood, noise, alike, stop: data.stop.clone() };
+    let residual_model =
+        ResidualModel { fit: neighbourhood, noise, alike, stop: data.stop.clone() };
     let is_added = |&k: &usize| {
         candidates[k].hypothesis.effect().is_some_and(|effect| hypotheses.added.contains(effect))
     };
     let added: Vec<usize> = (0..candidates.len()).filter(is_added).collect();
     let effects: Vec<&Effect> =
         added.iter().filter_map(|&k| candidates[k].hypothesis.effect()).collect();
-    let products = Products::new(&blocks, &target);
+    let products = Products::new(&blocks, &residual_model);
     let waves = Waves { hypotheses, products: &products, fitted, left_out };
     let ln_likelihood_widths = waves.ln_likelihood_widths(&added, &effects);
     for (k, ln_width) in ln_likelihood_widths {
         blocks[k].ln_prior += ln_width;
     }
-    Some((blocks, target))
+    Some((blocks, residual_model))
 }

@@ -57,7 +57,7 @@ impl Candidate {
             block.family = candidate.hypothesis.effect().map(|effect| effect.name().to_owned());
             let effect = candidate.hypothesis.effect();
             block.joint = effect.filter(|effect| effect.acts_at_joint()).and_then(Effect::joint);
-            block.is_whole_law = effect.is_some_and(Effect::is_described);
+            block.is_whole_law = effect.is_some_and(Effect::is_composed);
             block.is_periodic_of_many_orders =
                 matches!(candidate.hypothesis.kind, HypothesisKind::Gear(_));
             block.is_surface = !block.is_law() && candidate.hypothesis.depends_on.len() > 1;

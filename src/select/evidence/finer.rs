@@ -34,7 +34,7 @@ pub(super) fn finer_candidates(
     blocks_of: impl Fn(&[Candidate]) -> Vec<Block>,
     problem: &Problem,
 ) -> Vec<Candidate> {
-    let Products { blocks, target, .. } = *products;
+    let Products { blocks, residual_model, .. } = *products;
     let mut found: Vec<Candidate> = Vec::new();
     for set in evaluated_sets
         .iter()
@@ -78,7 +78,7 @@ pub(super) fn finer_candidates(
                         farthest,
                         problem,
                     );
-                    if target.stop.is_requested() {
+                    if residual_model.stop.is_requested() {
                         break;
                     }
                     for (candidate, odds) in

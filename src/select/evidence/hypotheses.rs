@@ -53,7 +53,7 @@ type WithColumns = (Effect, DMatrix<f64>);
 fn split_unlisted(all: impl Iterator<Item = WithColumns>) -> (Vec<WithColumns>, Vec<WithColumns>) {
     all.partition(|(effect, _)| {
         joint_and_order(effect).is_some()
-            || effect.is_described()
+            || effect.is_composed()
             || matches!(effect, Effect::StationMove { .. })
     })
 }

@@ -77,7 +77,7 @@ pub(super) fn promising(
     for SitesToSearch { sites, other_members: rest } in
         places.into_iter().chain(elsewhere).chain(links)
     {
-        if products.target.stop.is_requested() {
+        if products.residual_model.stop.is_requested() {
             break;
         }
         let fitted_effects = fitted.effects().iter().map(Effect::name_and_place).collect();
@@ -165,7 +165,7 @@ fn effect_of_proposal(problem: &Problem, at: &LawAt, proposal: &Proposal) -> Opt
     };
     let rival = |(written, share): &(Written, f64)| Some((law(written)?, *share));
     let rivals = proposal.rivals.iter().filter_map(rival).collect();
-    Some(Effect::Law(law(&proposal.law)?.described(proposal.ln_prior, rivals)))
+    Some(Effect::Law(law(&proposal.law)?.composed(proposal.ln_prior, rivals)))
 }
 
 /// Returns the joint, counted from 0, at whose command coordinate or about whose axis a hypothesis
@@ -232,7 +232,7 @@ fn elsewhere(
     let is_elsewhere = |member: usize| {
         let hypothesis = of(member);
         let is_listed = match &hypothesis.kind {
-            HypothesisKind::Effect(effect) => effect.is_described() || !effect.acts_at_joint(),
+            HypothesisKind::Effect(effect) => effect.is_composed() || !effect.acts_at_joint(),
             HypothesisKind::Smooth | HypothesisKind::Wandering => true,
             _ => false,
         };
@@ -340,12 +340,12 @@ impl Search<'_, '_, '_> {
         }
         let members: Vec<&Candidate> =
             other_members.iter().map(|&member| &self.hypotheses.candidates[member]).collect();
-        let Some((blocks, target)) =
+        let Some((blocks, residual_model)) =
             blocks(self.fitted, self.data, self.hypotheses, &members, &dropped)
         else {
             return Vec::new();
         };
-        let products = Products::new(&blocks, &target);
+        let products = Products::new(&blocks, &residual_model);
         let all_blocks: Vec<usize> = (0..blocks.len()).collect();
         let reduced = reduced_by(&all_blocks, &products);
         reduced.map_or_else(Vec::new, |reduced| self.best(sites, &reduced, &products, &kept))
@@ -393,7 +393,7 @@ impl Search<'_, '_, '_> {
         let squares = kept.iter().map(|pose| of_pose(pose).norm_squared());
         let diagonal = DVector::from_iterator(kept.len(), squares);
         let site = WhitenedSite::new(diagonal, &less, product);
-        let noise = Noise::new(left.squares, products.target.noise.freedom, |squares| {
+        let noise = Noise::new(left.squares, products.residual_model.noise.freedom, |squares| {
             products.ln_density(squares)
         });
         let poses_of_fit = linearised.poses();
@@ -402,7 +402,7 @@ impl Search<'_, '_, '_> {
         // The functions of laws that the fit contains follow from their columns and the lever.
         let is_present = |k: &usize| {
             let effect = hypotheses.candidates[*k].hypothesis.effect();
-            matches!(effect, Some(Effect::Law(law)) if law.description().is_some() && law.site() == at.name)
+            matches!(effect, Some(Effect::Law(law)) if law.composed_ln_prior().is_some() && law.site() == at.name)
         };
         let present: Vec<usize> = (0..hypotheses.candidates.len()).filter(is_present).collect();
         let functions = |&k: &usize| {
@@ -430,7 +430,7 @@ fn along_lever(
     (lever, poses): (&DVector<f64>, &[usize]),
 ) -> (DMatrix<f64>, DVector<f64>) {
     let (fitted, reach, residual) =
-        (products.target.fit.fitted(), reduced.reach(), reduced.residual());
+        (products.residual_model.fit.fitted(), reduced.reach(), reduced.residual());
     let rows = [fitted.ncols(), reach.nrows()];
     let mut less = DMatrix::zeros(rows[0] + rows[1], poses.len());
     let mut product = DVector::zeros(poses.len());

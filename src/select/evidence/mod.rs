@@ -94,10 +94,10 @@ pub(super) fn ln_posterior(
         }),
     };
     let members: Vec<&Candidate> = hypotheses.candidates.iter().filter(is_in_set).collect();
-    let (blocks, target) = blocks(fitted, data, &hypotheses, &members, &evidence.left_out)?;
+    let (blocks, residual_model) = blocks(fitted, data, &hypotheses, &members, &evidence.left_out)?;
     Some(
-        search::ln_posterior(&Products::new(&blocks, &target))?
-            - target.noise.freedom * (fitted.sigma / sigma).ln(),
+        search::ln_posterior(&Products::new(&blocks, &residual_model))?
+            - residual_model.noise.freedom * (fitted.sigma / sigma).ln(),
     )
 }
 
@@ -114,9 +114,10 @@ pub(super) fn best_form(
     let smooth = hypotheses.candidate(best, hypothesis)?;
     let evidence_poses = hypotheses.linearised.poses().len();
     let gains = |forms: &[&Candidate]| {
-        let (blocks, target) = blocks(fitted, data, hypotheses, forms, &[])?;
+        let (blocks, residual_model) = blocks(fitted, data, hypotheses, forms, &[])?;
         let all_blocks: Vec<usize> = (0..blocks.len()).collect();
-        let mut gains = search::gains_beside(&[], &all_blocks, &Products::new(&blocks, &target));
+        let mut gains =
+            search::gains_beside(&[], &all_blocks, &Products::new(&blocks, &residual_model));
         gains.sort_by(|a, b| b.1.total_cmp(&a.1));
         Some(gains)
     };
@@ -165,7 +166,7 @@ fn evaluate_without<'a>(
 ) -> Option<(Evidence, Hypotheses<'a>)> {
     let rows = data.evidence_rows();
     let mut hypotheses = Hypotheses::new(fitted, data, added, &rows, rows.len());
-    let (mut blocks, target) = blocks(
+    let (mut blocks, residual_model) = blocks(
         fitted,
         data,
         &hypotheses,
@@ -179,7 +180,7 @@ fn evaluate_without<'a>(
         (0..blocks.len()).filter(|&k| is_present(&hypotheses.candidates[k])).collect();
     let mut explanations: Vec<HypothesisSet> = Vec::new();
     let (mut evaluated_sets, unlisted, mut cache) = {
-        let products = Products::new(&blocks, &target);
+        let products = Products::new(&blocks, &residual_model);
         let evaluated_sets = search(&products, &present);
         if data.stop.is_requested() {
             return None;
@@ -200,9 +201,10 @@ fn evaluate_without<'a>(
             laws::promising(&hypotheses, &evaluated_sets, &products, (fitted, data, left_out));
         (evaluated_sets, [unlisted, laws].concat(), products.into_cache())
     };
-    let blocks_of = |some: &[Candidate]| Candidate::blocks(some, (fitted, &target.fit), left_out);
+    let blocks_of =
+        |some: &[Candidate]| Candidate::blocks(some, (fitted, &residual_model.fit), left_out);
     let search_again = |cache: CachedProducts, blocks: &[Block]| {
-        let products = Products::with_cache(cache, blocks, &target);
+        let products = Products::with_cache(cache, blocks, &residual_model);
         (search(&products, &present), products.into_cache())
     };
     if !unlisted.is_empty() {
@@ -210,7 +212,7 @@ fn evaluate_without<'a>(
         hypotheses.candidates.extend(unlisted);
         (evaluated_sets, cache) = search_again(cache, &blocks);
     }
-    let products = Products::with_cache(cache, &blocks, &target);
+    let products = Products::with_cache(cache, &blocks, &residual_model);
     let finer = finer::finer_candidates(
         &hypotheses,
         &evaluated_sets,
@@ -272,7 +274,7 @@ fn evaluate_without<'a>(
     if let Some(best) = evidence.certain_set(data.rules.inclusion_threshold)
         && best.gears().is_empty()
     {
-        let products = Products::with_cache(cache, &blocks, &target);
+        let products = Products::with_cache(cache, &blocks, &residual_model);
         evidence.stand_ins = stand_ins(best, &hypotheses, &products);
     }
     Some((evidence, hypotheses))

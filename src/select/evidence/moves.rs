@@ -58,7 +58,7 @@ pub(super) fn promising(
         return Vec::new();
     }
     let ln_odds_of = |effects: &[Effect]| -> Vec<(Candidate, Vec<f64>)> {
-        if products.target.stop.is_requested() {
+        if products.residual_model.stop.is_requested() {
             return Vec::new();
         }
         let candidate_of_effect = |effect: &Effect| {
@@ -69,7 +69,8 @@ pub(super) fn promising(
             )
         };
         let candidates: Vec<Candidate> = effects.iter().filter_map(candidate_of_effect).collect();
-        let blocks = Candidate::blocks(&candidates, (fitted, &products.target.fit), left_out);
+        let blocks =
+            Candidate::blocks(&candidates, (fitted, &products.residual_model.fit), left_out);
         let odds: Vec<Vec<f64>> =
             reduced_problems.iter().map(|left| left.ln_odds_of(&blocks)).collect();
         candidates

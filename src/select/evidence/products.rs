@@ -38,7 +38,7 @@ pub(super) struct ResidualModel {
 /// Columns of hypotheses, the residual, and their products.
 pub(super) struct Products<'a> {
     pub blocks: &'a [Block],
-    pub target: &'a ResidualModel,
+    pub residual_model: &'a ResidualModel,
     /// Sum of squares rᵀr, with the fitted parameters projected out.
     pub squares: f64,
     /// Grid of noise factors.
@@ -69,19 +69,19 @@ fn sized_set(members: &[usize], sizes: &[f64]) -> SizedSet {
 }
 
 impl<'a> Products<'a> {
-    pub fn new(blocks: &'a [Block], target: &'a ResidualModel) -> Self {
-        Self::with_cache(CachedProducts::default(), blocks, target)
+    pub fn new(blocks: &'a [Block], residual_model: &'a ResidualModel) -> Self {
+        Self::with_cache(CachedProducts::default(), blocks, residual_model)
     }
 
     /// Creates the products for `blocks`, reusing cached results about the first of them.
     pub fn with_cache(
         mut cache: CachedProducts,
         blocks: &'a [Block],
-        target: &'a ResidualModel,
+        residual_model: &'a ResidualModel,
     ) -> Self {
-        let squares = target.fit.residual().norm_squared();
+        let squares = residual_model.fit.residual().norm_squared();
         cache.columns.extend_to(blocks.len());
-        Self { blocks, target, squares, grid: target.noise.grid(), cache }
+        Self { blocks, residual_model, squares, grid: residual_model.noise.grid(), cache }
     }
 
     /// Returns the cached results, for reuse with more hypotheses.
@@ -107,11 +107,11 @@ impl<'a> Products<'a> {
         }
         let is_alike =
             block.is_law() && others.iter().any(|&other| self.blocks[other].family == block.family);
-        block.ln_prior + if is_alike { self.target.alike } else { 0.0 }
+        block.ln_prior + if is_alike { self.residual_model.alike } else { 0.0 }
     }
 
     fn member(&self, block: usize) -> &Member {
-        self.cache.columns.member(block, self.blocks, &self.target.fit)
+        self.cache.columns.member(block, self.blocks, &self.residual_model.fit)
     }
 
     /// Returns the product AᵀC of a set member's columns A and another hypothesis' columns C.
@@ -122,7 +122,7 @@ impl<'a> Products<'a> {
     /// Forms the products of several set members with other hypotheses together, which is faster
     /// than one after the other.
     pub fn form(&self, members: impl IntoIterator<Item = usize>, others: &[usize]) {
-        if !self.target.stop.is_requested() {
+        if !self.residual_model.stop.is_requested() {
             let members: Vec<&Member> =
                 members.into_iter().map(|member| self.member(member)).collect();
             form_products(&members, others, self.blocks);
@@ -255,7 +255,7 @@ impl ReducedProblem<'_, '_> {
     /// columns have G = (Pₖₖ⁻¹ − 1)/c² and b = Pₖₖ⁻¹tₖ/c. Without it, the set leaves tₖᵀPₖₖ⁻¹tₖ
     /// more squares, and its determinant is det(1 + D AᵀA D) det Pₖₖ.
     pub fn of_member(&self, k: usize) -> Option<(f64, f64)> {
-        let Products { blocks, target, grid, .. } = self.products;
+        let Products { blocks, residual_model, grid, .. } = self.products;
         let (block, size) = (&blocks[self.members[k]], self.sizes[k]);
         if size < MIN_SIZE_OF_MEMBER {
             let others = [&self.members[..k], &self.members[k + 1..]].concat();
@@ -278,13 +278,13 @@ impl ReducedProblem<'_, '_> {
         (0..count).for_each(|j| gram[(j, j)] -= 1.0);
         let normal = Normal::Dense { gram: gram / (size * size), product: product / size };
         let (ln_summed, size) =
-            block.ln_likelihood_over_sizes(&normal, (squares, target.noise.freedom), grid);
+            block.ln_likelihood_over_sizes(&normal, (squares, residual_model.noise.freedom), grid);
         Some((ln_summed - self.ln_determinant - ln_determinant, size))
     }
 
     /// Returns the residual that the set leaves, with the fitted parameters projected out.
     pub fn residual(&self) -> DVector<f64> {
-        let mut residual = self.products.target.fit.residual().clone();
+        let mut residual = self.products.residual_model.fit.residual().clone();
         let along = self.within.tr_mul(&self.residual_along);
         let mut first = 0;
         for &member in &self.members {
@@ -300,7 +300,7 @@ impl ReducedProblem<'_, '_> {
         self.reach.get_or_init(|| {
             let mut reach = DMatrix::zeros(
                 self.residual_along.len(),
-                self.products.target.fit.residual().len(),
+                self.products.residual_model.fit.residual().len(),
             );
             let mut first = 0;
             for &member in &self.members {
@@ -324,7 +324,7 @@ impl ReducedProblem<'_, '_> {
     /// Returns the gains of several hypotheses; empty if the search was stopped.
     pub fn gains(&self, tried: &[usize]) -> Vec<(f64, f64)> {
         self.products.form(self.members.iter().copied(), tried);
-        let stop = &self.products.target.stop;
+        let stop = &self.products.residual_model.stop;
         let of = |some: &[usize]| {
             if stop.is_requested() { Vec::new() } else { self.gains_together(some) }
         };
@@ -361,7 +361,7 @@ impl ReducedProblem<'_, '_> {
     /// These blocks need not be in the list of blocks of the products.
     pub fn ln_odds_of(&self, blocks: &[Block]) -> Vec<f64> {
         let columns: Vec<Arc<DMatrix<f64>>> =
-            blocks.iter().map(|block| block.columns(&self.products.target.fit)).collect();
+            blocks.iter().map(|block| block.columns(&self.products.residual_model.fit)).collect();
         let new_columns: Vec<_> = columns.iter().flat_map(|matrix| matrix.column_iter()).collect();
         if new_columns.is_empty() {
             return Vec::new();
@@ -382,8 +382,8 @@ impl ReducedProblem<'_, '_> {
         blocks: impl Iterator<Item = &'b Block>,
         along: &DMatrix<f64>,
     ) -> Vec<(f64, f64)> {
-        let Products { target, grid, .. } = self.products;
-        let squares_and_freedom = ((self.squares, target.noise.freedom), self.without);
+        let Products { residual_model, grid, .. } = self.products;
+        let squares_and_freedom = ((self.squares, residual_model.noise.freedom), self.without);
         let mut first = 0;
         let gain = |block: &Block| {
             let along_block = along.columns(first, block.product().len()).into_owned();
@@ -428,14 +428,14 @@ mod tests {
             designs.map(|effect| (effect.scaled(40).unwrap(), 0.0, Coefficients::default()));
         let blocks = Block::all(designs.to_vec(), &fit);
         let noise = Noise { freedom: 116.0, ln_half_width: 0.1, min_ln_factor: 0.0 };
-        let target = ResidualModel { fit, noise, alike: 0.0, stop: Stop::default() };
-        let products = Products::new(&blocks, &target);
+        let residual_model = ResidualModel { fit, noise, alike: 0.0, stop: Stop::default() };
+        let products = Products::new(&blocks, &residual_model);
         let (members, sizes) = ([0, 1, 2], [3.0, 0.3, 1.0]);
         let reduced = products.reduced(&members, &sizes).unwrap();
-        let r = target.fit.residual();
+        let r = residual_model.fit.residual();
         let mut covariance = DMatrix::identity(r.len(), r.len());
         for (&member, size) in members.iter().zip(sizes) {
-            let columns = blocks[member].columns(&target.fit);
+            let columns = blocks[member].columns(&residual_model.fit);
             covariance += &*columns * columns.transpose() * (size * size);
         }
         let factor = covariance.cholesky().unwrap();
@@ -487,8 +487,8 @@ mod tests {
         };
         let blocks: Vec<Block> = families.map(block).to_vec();
         let noise = Noise { freedom: 29.0, ln_half_width: 0.1, min_ln_factor: 0.0 };
-        let target = ResidualModel { fit: fit.clone(), noise, alike: 1.5, stop: Stop::default() };
-        let products = Products::new(&blocks, &target);
+        let model = ResidualModel { fit: fit.clone(), noise, alike: 1.5, stop: Stop::default() };
+        let products = Products::new(&blocks, &model);
         let of = |block: usize, others: &[usize]| products.ln_prior(&blocks[block], others);
         let is = |value: f64, expected: f64| assert!((value - expected).abs() < 1e-12, "{value}");
         is(of(1, &[]), -3.0);

@@ -85,7 +85,7 @@ impl<'a> Reevaluation<'a> {
     /// Returns the evidence about the probable hypotheses, evaluated without the poses `left_out`;
     /// `None` if the residual is not finite or the search was stopped.
     fn without(&self, left_out: &[usize]) -> Option<Evidence> {
-        let (blocks, target) = self.blocks(left_out)?;
+        let (blocks, residual_model) = self.blocks(left_out)?;
         let present = self.members(|member| member.effect().is_some());
         let candidates = self.probable_candidates();
         let set = |EvaluatedSet { members, sizes, probability }: EvaluatedSet| HypothesisSet {
@@ -93,7 +93,7 @@ impl<'a> Reevaluation<'a> {
             probability,
             functions: members.iter().map(|&k| candidates[k].variant).zip(sizes).collect(),
         };
-        let sets = search(&Products::new(&blocks, &target), &present).into_iter().map(set);
+        let sets = search(&Products::new(&blocks, &residual_model), &present).into_iter().map(set);
         Some(Evidence {
             sets: sets.collect(),
             stand_ins: Vec::new(),
@@ -106,8 +106,8 @@ impl<'a> Reevaluation<'a> {
     /// to all other members of the best set. The poses `left_out` are not used. Returns `None` if
     /// the sets cannot be evaluated.
     fn single_influential_pose(&self, effect: &Effect, left_out: &[usize]) -> Option<usize> {
-        let (blocks, target) = self.blocks(left_out)?;
-        let products = Products::new(&blocks, &target);
+        let (blocks, residual_model) = self.blocks(left_out)?;
+        let products = Products::new(&blocks, &residual_model);
         let residual_of = |of: &dyn Fn(&Hypothesis) -> bool| {
             Some(reduced_by(&self.members(of), &products)?.residual())
         };
@@ -133,7 +133,7 @@ pub(super) fn single_supporting_pose(
         .hypotheses
         .iter()
         .filter(|hypothesis| {
-            hypothesis.effect().is_some_and(|effect| effect.is_searched() && !effect.is_described())
+            hypothesis.effect().is_some_and(|effect| effect.is_searched() && !effect.is_composed())
         })
         .collect();
     if searched.is_empty() || !best.gears().is_empty() {

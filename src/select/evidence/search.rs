@@ -272,7 +272,7 @@ fn add_replacements(evaluated: &mut BTreeMap<Vec<usize>, Set>, products: &Produc
             replaced((&rest, &removed), instead[kind], least, products)
         };
         let new: Vec<Vec<Set>> = rests.into_par_iter().map(of_rest).collect();
-        if products.target.stop.is_requested() {
+        if products.residual_model.stop.is_requested() {
             return;
         }
         for set in new.into_iter().flatten() {
@@ -294,7 +294,7 @@ fn replaced(
 ) -> Vec<Set> {
     let Products { blocks, .. } = *products;
     let remaining =
-        if products.target.stop.is_requested() { None } else { assembled(rest, products) };
+        if products.residual_model.stop.is_requested() { None } else { assembled(rest, products) };
     let Some(remaining) = remaining else { return Vec::new() };
     let mut with_first = extended(&remaining, first, products);
     with_first.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
@@ -422,8 +422,8 @@ mod tests {
     #[test]
     fn a_set_is_as_probable_in_whatever_order_it_was_taken() {
         let of = |names: [usize; 3], members: &[usize]| {
-            let (blocks, target) = three(names);
-            assembled(members, &Products::new(&blocks, &target)).unwrap().ln_posterior
+            let (blocks, residual_model) = three(names);
+            assembled(members, &Products::new(&blocks, &residual_model)).unwrap().ln_posterior
         };
         let first = of([0, 1, 2], &[0, 1]);
         assert!(
@@ -451,24 +451,25 @@ mod tests {
             block
         };
         let blocks = [&third, &one, &other].map(block);
-        let target = ResidualModel {
+        let residual_model = ResidualModel {
             fit: fit.clone(),
             noise: Noise { freedom: 89.0, ln_half_width: 0.1, min_ln_factor: 0.0 },
             alike: 0.0,
             stop: Stop::default(),
         };
-        let found = search(&Products::new(&blocks, &target), &[]);
+        let found = search(&Products::new(&blocks, &residual_model), &[]);
         assert_eq!(sorted(&found[0].members), [1, 2], "{found:?}");
         assert!(found[0].probability > 0.9, "{}", found[0].probability);
     }
 
     #[test]
     fn what_was_worked_out_before_further_hypotheses_came_changes_nothing() {
-        let (blocks, target) = three([2, 0, 1]);
-        let fewer = Products::new(&blocks[..2], &target);
+        let (blocks, residual_model) = three([2, 0, 1]);
+        let fewer = Products::new(&blocks[..2], &residual_model);
         assert!(!search(&fewer, &[0]).is_empty());
-        let again = search(&Products::with_cache(fewer.into_cache(), &blocks, &target), &[0]);
-        let anew = search(&Products::new(&blocks, &target), &[0]);
+        let again =
+            search(&Products::with_cache(fewer.into_cache(), &blocks, &residual_model), &[0]);
+        let anew = search(&Products::new(&blocks, &residual_model), &[0]);
         assert_eq!(again.len(), anew.len());
         for (set, other) in again.iter().zip(&anew) {
             assert_eq!(set.members, other.members);

@@ -32,7 +32,7 @@ use super::hypothesis::{Hypothesis, HypothesisKind, Site};
 use super::products::{Products, ReducedProblem};
 use super::search::{EvaluatedSet, reduced_by};
 use crate::model::effect::HIGHEST_ORDER;
-use crate::model::parameter::{ParameterSite, holds_all, refuses};
+use crate::model::parameter::{ParameterSite, are_all_fixed, makes_rule_invalid};
 use crate::problem::{Effect, JointKind, Problem};
 use crate::residual_tests::Covariate;
 use crate::select::fitted::Fitted;
@@ -70,7 +70,7 @@ fn function_of_command(of: &Hypothesis, problem: &Problem) -> Option<usize> {
 /// Returns true if the rules of the problem neither fix nor reject the parameters of an effect.
 pub(super) fn is_free(effect: &Effect, problem: &Problem) -> bool {
     let parameters = effect.parameters(problem);
-    !holds_all(problem, &parameters) && !refuses(problem, &parameters)
+    !are_all_fixed(problem, &parameters) && !makes_rule_invalid(problem, &parameters)
 }
 
 /// Returns orders from `low` to `high` in equal steps, at most [`MAX_SCANNED_ORDERS`].
@@ -268,7 +268,7 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
     ) -> Vec<Vec<(f64, f64)>> {
         let problem = &self.fitted.problem;
         let of = |orders: &[f64]| {
-            if self.products.target.stop.is_requested() {
+            if self.products.residual_model.stop.is_requested() {
                 return Vec::new();
             }
             let wave = |&order: &f64| {
@@ -280,7 +280,7 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
             };
             let (orders, waves): (Vec<f64>, Vec<Candidate>) =
                 orders.iter().filter_map(wave).unzip();
-            let fit = (self.fitted, &self.products.target.fit);
+            let fit = (self.fitted, &self.products.residual_model.fit);
             let blocks = Candidate::blocks(&waves, fit, self.left_out);
             let of_sets: Vec<Vec<f64>> =
                 reduced_problems.iter().map(|left| left.ln_odds_of(&blocks)).collect();

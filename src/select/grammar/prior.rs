@@ -19,7 +19,7 @@ const MOTIONS: f64 = 4.0;
 /// effects; `None` for other effects.
 pub fn ln_prior(effect: &Effect, problem: &Problem) -> Option<f64> {
     let Effect::Law(law) = effect else { return None };
-    Some(ln_weight(law, problem) + law.description()?)
+    Some(ln_weight(law, problem) + law.composed_ln_prior()?)
 }
 
 /// Returns ln of the prior weight of all laws at the site of a law, relative to a family of

@@ -132,7 +132,7 @@ impl<'a> Linearised<'a> {
             let probed: Vec<usize> =
                 parameters.iter().copied().chain(first..first + slots.len()).collect();
             let residuals = PoseResiduals::new(&probing, Arc::clone(&poses), probed, at.clone());
-            jacobian_and_residual(&residuals, &residuals.reduced(&at))
+            jacobian_and_residual(&residuals, &residuals.unknowns_in(&at))
         };
         let new = |fitted: DMatrix<f64>, residual| Derivatives {
             fitted: Arc::new(fitted),
@@ -241,7 +241,7 @@ impl<'a> Linearised<'a> {
     ) -> DMatrix<f64> {
         let residuals =
             PoseResiduals::new(model, Arc::clone(&self.poses), parameters.to_vec(), x.clone());
-        jacobian_and_residual(&residuals, &residuals.reduced(x)).0
+        jacobian_and_residual(&residuals, &residuals.unknowns_in(x)).0
     }
 
     /// Returns the whitened residual, length 3 N.

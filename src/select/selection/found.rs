@@ -176,7 +176,7 @@ pub(super) fn found(
                 .map(|k| fitted.found.estimates[k].clone())
                 .collect(),
             held_out_after: held_out_after(&effect),
-            ranges: if effect.is_described() { ranges(fitted, data, &effect) } else { Vec::new() },
+            ranges: if effect.is_composed() { ranges(fitted, data, &effect) } else { Vec::new() },
             alternatives,
             reference_check: check,
             effect,

@@ -355,7 +355,7 @@ impl<'a> Trial<'a> {
     /// Returns the largest rms error \[m\] that noise, or priors that are too narrow, may explain.
     fn largest_usual_error(&self) -> f64 {
         let Fitting { measurements, model, sigma, .. } = self.fitting;
-        let noise = MAX_NOISE_SIGMAS * measurements.leading().root() * sigma;
+        let noise = MAX_NOISE_SIGMAS * measurements.leading().expected_norm() * sigma;
         noise.max(MAX_REACHES_BEYOND_PRIORS * model.reach())
     }
 
