@@ -1,6 +1,7 @@
 //! Changes to the origins and links in the text of a URDF. All other bytes stay.
 
 use std::f64::consts::TAU;
+use std::fmt::Write as _;
 use std::ops::Range;
 
 use nalgebra::{UnitQuaternion, Vector3};
@@ -87,24 +88,19 @@ impl<'a> Patches<'a> {
             joint.origin.written
         };
         let origin = &joint.origin;
-        let patch = |name: &str,
-                     changed: bool,
-                     values: &Vector3<f64>,
-                     at: &Option<Range<usize>>| {
-            match at {
-                Some(at) if changed => (Some((at.clone(), triple(values))), String::new()),
-                None if changed => (None, format!(" {name}=\"{}\"", triple(values))),
-                _ => (None, String::new()),
-            }
+        let mut more = String::new();
+        let mut set = |name: &str, values: &Vector3<f64>, at: &Option<Range<usize>>| match at {
+            Some(at) => self.text.push((at.clone(), triple(values))),
+            None => _ = write!(more, " {name}=\"{}\"", triple(values)),
         };
-        let (first, more) = patch("xyz", shifted, &xyz, &origin.xyz_value);
-        let (second, also) = match &origin.quaternion_value {
-            Some(at) if turned => (Some((at.clone(), quaternion(&rpy))), String::new()),
-            Some(_) => (None, String::new()),
-            None => patch("rpy", turned, &rpy, &origin.rpy_value),
-        };
-        self.text.extend([first, second].into_iter().flatten());
-        let more = format!("{more}{also}");
+        if shifted {
+            set("xyz", &xyz, &origin.xyz_value);
+        }
+        match &origin.quaternion_value {
+            None if turned => set("rpy", &rpy, &origin.rpy_value),
+            Some(at) if turned => self.text.push((at.clone(), quaternion(&rpy))),
+            _ => {}
+        }
         if !more.is_empty() {
             let (at, more) = match &origin.element {
                 Some(element) => (element.start + "<origin".len(), more),

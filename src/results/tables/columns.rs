@@ -141,8 +141,8 @@ pub fn residual_columns(problem: &Problem, rows: &Measurements, residuals: &[Res
         ("predicted", |residual| residual.predicted, &predicted_turn),
         ("residual", |residual| residual.position, &|residual: &Residual| residual.orientation),
     ];
-    let mut add = |name: String, decimals, cell: &dyn Fn(&Residual) -> f64| {
-        columns.push((name, Column::Numbers(residuals.iter().map(cell).collect(), Some(decimals))));
+    let column = |name: String, decimals, cell: &dyn Fn(&Residual) -> f64| {
+        (name, Column::Numbers(residuals.iter().map(cell).collect(), Some(decimals)))
     };
     for joint in commanded_joints(problem) {
         // A distance between two points is measured without the arm.
@@ -151,29 +151,19 @@ pub fn residual_columns(problem: &Problem, rows: &Measurements, residuals: &[Res
             let command = rows.configuration(residual.row)[joint.joint] * joint.factor();
             if is_of_arm { command } else { f64::NAN }
         };
-        add(joint.column(), COMMAND_DECIMALS, &cell);
+        columns.push(column(joint.column(), COMMAND_DECIMALS, &cell));
     }
     for (prefix, value, turn) in groups {
-        for kind in &kinds {
-            let (group, axes) = kind.residuals;
-            let TableUnit { factor, suffix, .. } = kind.unit.in_tables();
-            for (k, axis) in axes.iter().enumerate() {
-                let is_of_kind = |residual: &Residual| {
-                    rows.observation(residual.row).description().residuals.0 == group
-                };
-                let cell = |residual: &Residual| {
-                    if is_of_kind(residual) { value(residual)[k] * factor } else { f64::NAN }
-                };
-                add(format!("{prefix}_{axis}_{suffix}"), 6, &cell);
-            }
-        }
+        let numbers: Vec<(usize, Vector3<f64>)> =
+            residuals.iter().map(|residual| (residual.row, value(residual))).collect();
+        columns.extend(kind_columns(rows, &kinds, (prefix, 6), &numbers));
         for (k, axis) in ["rx", "ry", "rz"].into_iter().enumerate().filter(|_| has_orientations) {
-            add(format!("{prefix}_{axis}_deg"), 7, &|residual| {
+            columns.push(column(format!("{prefix}_{axis}_deg"), 7, &|residual| {
                 turn(residual).map_or(f64::NAN, |turn| turn[k].to_degrees())
-            });
+            }));
         }
     }
-    add("whitened".to_owned(), 4, &Residual::length);
+    columns.push(column("whitened".to_owned(), 4, &Residual::length));
     columns.push((
         "outlier".to_owned(),
         Column::Flags(residuals.iter().map(|residual| residual.outlier).collect()),
@@ -199,22 +189,32 @@ pub(super) fn columns_of_kinds(
     decimals: usize,
     numbers: &[Vector3<f64>],
 ) -> Columns {
+    let mut kinds = kinds_of(rows);
+    kinds.retain(|kind| kind.residuals != Observation::Position.description().residuals);
+    let numbers: Vec<(usize, Vector3<f64>)> = numbers.iter().copied().enumerate().collect();
+    kind_columns(rows, &kinds, (prefix, decimals), &numbers)
+}
+
+/// Returns the columns `<prefix>_<axis>_<unit>` of some kinds of rows. `numbers` holds indices of
+/// rows, each with its vector \[SI or px\]; in the columns of other kinds its cells are NaN.
+fn kind_columns(
+    rows: &Measurements,
+    kinds: &[&Kind],
+    (prefix, decimals): (&str, usize),
+    numbers: &[(usize, Vector3<f64>)],
+) -> Columns {
     let mut columns = Columns::new();
-    let is_position =
-        |kind: &&Kind| kind.residuals == Observation::Position.description().residuals;
-    for kind in kinds_of(rows).into_iter().filter(|kind| !is_position(kind)) {
+    for kind in kinds {
         let (group, axes) = kind.residuals;
         let TableUnit { factor, suffix, .. } = kind.unit.in_tables();
         for (k, axis) in axes.iter().enumerate() {
-            let cell = |(row, numbers): (usize, &Vector3<f64>)| {
-                let is_of_kind = rows.observation(row).description().residuals.0 == group;
+            let cell = |(row, numbers): &(usize, Vector3<f64>)| {
+                let is_of_kind = rows.observation(*row).description().residuals.0 == group;
                 if is_of_kind { numbers[k] * factor } else { f64::NAN }
             };
-            let cells = numbers.iter().enumerate().map(cell).collect();
-            columns.push((
-                format!("{prefix}_{axis}_{suffix}"),
-                Column::Numbers(cells, Some(decimals)),
-            ));
+            let cells = numbers.iter().map(cell).collect();
+            let name = format!("{prefix}_{axis}_{suffix}");
+            columns.push((name, Column::Numbers(cells, Some(decimals))));
         }
     }
     columns
