@@ -24,11 +24,11 @@ pub(crate) fn study_page(study: &Study, results: &Results) -> String {
 
 fn blocks<'a>(study: &Study, results: &Results) -> Vec<Block<'a>> {
     let by = match study.source {
-        Source::Model => "the model itself",
-        Source::Rig => "the virtual test rig",
+        Source::Model => "simulated with the model itself",
+        Source::Rig => "measured by the virtual test rig",
     };
     let head = format!(
-        "{} cells of {} fits, {} parameters, measured by {by}; {} poses held out in each",
+        "{} cells of {} fits, {} parameters, {by}; {} poses held out in each",
         study.cells.len(),
         study.repetitions,
         study.parameters.len(),
@@ -51,7 +51,7 @@ fn blocks<'a>(study: &Study, results: &Results) -> Vec<Block<'a>> {
             Column::number("poses", |(cell, _): &TimedCell| cell.identification_poses.to_string()),
             Column::words("strategy", |(cell, _): &TimedCell| cell.strategy.to_owned()),
             Column::words("solver", |(cell, _): &TimedCell| cell.solver.to_owned()).minor(),
-            Column::number("failed", |(cell, _): &TimedCell| percent(Some(cell.failure_rate))),
+            Column::number("not trusted", |(cell, _): &TimedCell| percent(Some(cell.failure_rate))),
             Column::number("held out mean", |(cell, _): &TimedCell| {
                 shown(cell.held_out_mm.mean, 4)
             }),
@@ -66,7 +66,7 @@ fn blocks<'a>(study: &Study, results: &Results) -> Vec<Block<'a>> {
         ],
     );
     let table = table.noted(&[
-        "held out: measured − predicted, noise included; covered: share of estimates within 1.96 standard errors of the truth, 95 % if the standard errors are right;",
+        "not trusted: share of fits that failed or are not to be trusted; held out: measured − predicted, noise included; covered: share of estimates within 1.96 standard errors of the truth, 95 % if the standard errors are right;",
         "largest bias: largest ratio of bias to standard deviation of the estimates, over all parameters; ms: median time of a fit",
     ]);
     let [titled, untitled] = opening(&study.title, head);
@@ -74,8 +74,8 @@ fn blocks<'a>(study: &Study, results: &Results) -> Vec<Block<'a>> {
     vec![titled, untitled, conclusion, Block::Table(table), Block::figures([draw_errors(&cells)])]
 }
 
-/// States the cell with the smallest rms error of held-out poses, and the cells in which every fit
-/// failed.
+/// States the cell with the smallest rms error of held-out poses, and the cells without a fit that
+/// is trusted.
 fn conclusion(cells: &[TimedCell]) -> String {
     let rms = |cell: &&TimedCell| cell.0.held_out_mm.rms.unwrap_or(f64::INFINITY);
     let best = cells.iter().filter(|cell| cell.0.held_out_mm.rms.is_some());
@@ -91,30 +91,34 @@ fn conclusion(cells: &[TimedCell]) -> String {
     let is_lost = |(cell, _): &&TimedCell| cell.failure_rate >= 1.0;
     let lost: Vec<String> = cells.iter().filter(is_lost).map(|cell| name(&cell.0)).collect();
     if !lost.is_empty() {
-        let _ = write!(words, ". Every fit failed or is not to be trusted: {}", lost.join("; "));
+        let _ = write!(words, ". No fit to be trusted in these cells: {}", lost.join("; "));
     }
     words
 }
 
 /// Returns the conditions of a cell in words.
 fn name(cell: &Cell) -> String {
-    format!(
-        "{} mm, {} poses, {} {}",
-        cell.position_sigma_mm, cell.identification_poses, cell.strategy, cell.solver
-    )
+    format!("{} {}", name_without_solver(cell), cell.solver)
+}
+
+/// Returns noise, number of poses and strategy of a cell in words.
+fn name_without_solver(cell: &Cell) -> String {
+    format!("{} mm, {} poses, {}", cell.position_sigma_mm, cell.identification_poses, cell.strategy)
 }
 
 /// Draws the rms error of held-out poses of each cell.
 fn draw_errors(cells: &[TimedCell]) -> Option<Drawing> {
+    let has_one_solver = cells.windows(2).all(|pair| pair[0].0.solver == pair[1].0.solver);
+    let name = if has_one_solver { name_without_solver } else { name };
     let row = |(cell, _): &TimedCell| {
         let rms = cell.held_out_mm.rms?;
         Some((name(cell), vec![Some((rms, cell.held_out_mm.rms_sd.unwrap_or_default()))]))
     };
+    let caption = "Root mean square error at held-out poses, noise included, with the standard deviation over the fits of the \
+                   cell. A cell is a noise (1 σ), a number of poses, a strategy and a solver.";
     Forest {
         names: ("study-errors", "Held-out error of each cell"),
-        caption: "Root mean square error at held-out poses, noise included, with the standard deviation over the fits of the cell. A \
-                  cell is a noise (1 σ), a number of poses, a strategy and a solver."
-            .to_owned(),
+        caption: caption.to_owned(),
         label: "held-out error, rms [mm]",
         legend: vec![("rms", INK)],
         references: Vec::new(),

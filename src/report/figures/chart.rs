@@ -1,7 +1,9 @@
 //! Charts: panels with axes, the shapes in them, and a legend. One renderer draws every figure.
 
 use super::axis::Axis;
-use super::svg::{Anchor, Colour, FAINT, GRID, INK, MUTED, Paint, Svg, TEXT_SIZE, WARM};
+use super::svg::{
+    Anchor, Colour, FAINT, GRID, INK, MUTED, Paint, Svg, TEXT_SIZE, WARM, text_width,
+};
 
 /// Width of every figure in displayed pixels, without its left margin.
 pub const FIGURE_WIDTH: f64 = 480.0;
@@ -13,6 +15,10 @@ pub const RIGHT_SPACE: f64 = 12.0;
 const SPACE_ABOVE: f64 = 8.0;
 /// Height of the legend in displayed pixels.
 const LEGEND_HEIGHT: f64 = 20.0;
+/// Space between the names of rows and the plot area, and around the names, in displayed pixels.
+const NAME_GAP: f64 = 10.0;
+/// Smallest space between the labels of two ticks in displayed pixels; closer labels are left out.
+const TICK_GAP: f64 = 6.0;
 /// Opacity of a band behind the data, 0 to 1.
 const BAND_OPACITY: f64 = 0.16;
 
@@ -80,17 +86,22 @@ impl Panel {
         Self { x, y, height, sides: (LEFT_SPACE, RIGHT_SPACE), text: TEXT_SIZE, shapes: Vec::new() }
     }
 
-    /// Creates a panel of rows with names. `row` is the height of a row, `names` and `numbers` are
-    /// the space left and right of the plot area, all in displayed pixels.
+    /// Creates a panel of rows with names. `row` is the height of a row, `max_names` is the largest
+    /// space left of the plot area, and `numbers` is that right of it, all in displayed pixels.
+    /// Names that need more space are written smaller.
     pub fn of_rows(
         row: f64,
-        (names, numbers): (f64, f64),
+        (max_names, numbers): (f64, f64),
         x: Axis,
         rows: impl IntoIterator<Item = (String, Colour)>,
     ) -> Self {
         let y = Axis::names(rows);
         let height = row * y.ticks.len() as f64;
-        Self { sides: (names, numbers), ..Self::new(height, x, y) }
+        let widths = y.ticks.iter().map(|tick| text_width(&tick.text));
+        let longest = widths.fold(1.0, f64::max);
+        let names = (longest.max(LEFT_SPACE) + NAME_GAP).min(max_names);
+        let text = TEXT_SIZE * ((names - NAME_GAP) / longest).min(1.0);
+        Self { sides: (names, numbers), text, ..Self::new(height, x, y) }
     }
 
     pub fn with(mut self, shapes: impl IntoIterator<Item = Shape>) -> Self {
@@ -145,8 +156,14 @@ impl Panel {
         let y = |value: f64| bottom - (bottom - top) * share(value, self.y.range);
         let place = |at: At| (x(at.0), y(at.1));
         let grid = Paint::line(GRID, 1.0);
+        let mut end_of_labels = f64::NEG_INFINITY;
         for tick in &self.x.ticks {
             svg.line([(x(tick.at), top), (x(tick.at), bottom)], grid);
+            let half_width = 0.5 * text_width(&tick.text);
+            if x(tick.at) - half_width < end_of_labels + TICK_GAP {
+                continue;
+            }
+            end_of_labels = x(tick.at) + half_width;
             svg.text(
                 &tick.text,
                 (x(tick.at), bottom + 11.0),
@@ -164,7 +181,10 @@ impl Panel {
             svg.line([(left, top), (left, bottom), (right, bottom)], Paint::line(FAINT, 1.0));
         }
         if !self.x.label.is_empty() {
-            let at = (0.5 * (left + right), bottom + self.below() - 10.0);
+            // A label that is wider than the plot area stays within the figure.
+            let half_width = 0.5 * text_width(&self.x.label);
+            let middle = (0.5 * (left + right)).min(FIGURE_WIDTH - half_width).max(half_width);
+            let at = (middle, bottom + self.below() - 10.0);
             svg.text(&self.x.label, at, (INK, TEXT_SIZE), Anchor::Middle);
         }
         if !self.y.label.is_empty() {

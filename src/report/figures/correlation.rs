@@ -50,14 +50,15 @@ pub fn correlation(correlations: &Correlations) -> Option<Drawing> {
     let sides = (left, FIGURE_WIDTH - left - cell * count);
     let rows = names.iter().map(|name| ((*name).to_owned(), MUTED));
     let matrix_panel =
-        Panel { text: text_of(cell), ..Panel::of_rows(cell, sides, x, rows) }.with(boxes);
+        Panel { text: text_of(cell), sides, ..Panel::of_rows(cell, sides, x, rows) }.with(boxes);
     let steps = (0..=10).filter_map(|k| {
         let paint = shade(f64::from(k) / 5.0 - 1.0)?;
         Some(Shape::area((f64::from(k) - 0.5, -0.5), (f64::from(k) + 0.5, 0.5), paint))
     });
     let (low, high) = (("−1".to_owned(), MUTED), "+1   correlation");
     let x = Axis::bare((-0.5, 10.5));
-    let scale = Panel::of_rows(12.0, (left, FIGURE_WIDTH - left - 14.0 * 11.0), x, [low])
+    let sides = (left, FIGURE_WIDTH - left - 14.0 * 11.0);
+    let scale = Panel { sides, ..Panel::of_rows(12.0, sides, x, [low]) }
         .with(steps)
         .with([Shape::text((10.5, 0.0), 6.0, high, MUTED)]);
     let note = if total > shown.len() {

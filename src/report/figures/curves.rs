@@ -9,6 +9,9 @@ const MAX_DOTS: usize = 60;
 const MAX_SCATTERED_DOTS: usize = 600;
 /// Smallest value that a logarithmic axis shows; smaller values are drawn there.
 const MIN_LOGARITHMIC_VALUE: f64 = 1e-12;
+/// Height above the lower edge of the panel from which on the name of a level may stand below its
+/// line, in displayed pixels.
+const MIN_NAME_HEIGHT: f64 = 18.0;
 /// Height of the panel in displayed pixels.
 const PANEL_HEIGHT: f64 = 210.0;
 
@@ -75,7 +78,9 @@ impl Series<'_> {
         let x = if self.is_logarithmic {
             Axis::logarithmic(across, self.labels.0, 8)
         } else {
-            Axis::linear(across, self.labels.0, 7)
+            let is_count = points().all(|at| at.0.fract() == 0.0);
+            let labels = if is_count { labels_of_counts(across, 7) } else { 7 };
+            Axis::linear(across, self.labels.0, labels)
         };
         let named = |text: &String, at: At, shift: (f64, f64), anchor: Anchor| Shape::Text {
             at,
@@ -84,10 +89,13 @@ impl Series<'_> {
             colour: MUTED,
             anchor,
         };
-        // The name of a level is on the side away from the ends of the curves.
+        // The name of a level is on the side away from the ends of the curves, and not on the
+        // numbers below the panel.
         let is_below = |level: f64| {
-            let ends = self.curves.iter().filter(|curve| curve.is_joined);
-            ends.filter_map(|curve| curve.points.last()).any(|at| up(at.1) > level)
+            let last_points = self.curves.iter().filter(|curve| curve.is_joined);
+            let mut last_points = last_points.filter_map(|curve| curve.points.last());
+            let above_edge = PANEL_HEIGHT * (level - ends.0) / (ends.1 - ends.0);
+            above_edge > MIN_NAME_HEIGHT && last_points.any(|at| up(at.1) > level)
         };
         let levels = self.levels.iter().flat_map(|(text, level)| {
             let level = up(*level);
@@ -126,6 +134,12 @@ impl Series<'_> {
         let svg = chart(self.names.1, &legend, &[panel]);
         Some(Drawing::new(self.names, caption, svg, data))
     }
+}
+
+/// Returns the number of tick labels, `most` or fewer, at which an axis of counts has no ticks
+/// between whole numbers.
+fn labels_of_counts((low, high): (f64, f64), most: usize) -> usize {
+    (1..=most).rev().find(|&labels| labels as f64 <= high - low).unwrap_or(1)
 }
 
 impl Curve<'_> {

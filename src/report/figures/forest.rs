@@ -4,6 +4,8 @@ use super::prelude::*;
 
 /// Maximum number of rows that a figure shows.
 const MAX_ROWS: usize = 24;
+/// Largest space for the names of the rows in displayed pixels.
+const MAX_NAME_SPACE: f64 = 270.0;
 /// Distance between the marks of one row, as a share of the height of the row.
 const MARK_SPACING: f64 = 0.22;
 
@@ -60,7 +62,7 @@ impl Forest<'_> {
         });
         let x = Axis::linear(with_margin((low, high), 0.04), self.label, 5);
         let names = shown.iter().map(|row| (row.0.clone(), INK));
-        let panel = Panel::of_rows(22.0, (220.0, 20.0), x, names);
+        let panel = Panel::of_rows(22.0, (MAX_NAME_SPACE, 20.0), x, names);
         let panel =
             self.references.iter().fold(panel, |panel, at| panel.with_reference(*at, FAINT));
         let legend: Vec<_> =
@@ -68,7 +70,11 @@ impl Forest<'_> {
         let legend = if legend.len() > 1 { legend.as_slice() } else { &[] };
         let svg = chart(self.names.1, legend, &[panel.with(marks)]);
         let note = if shown.len() < self.rows.len() {
-            format!(" {} of {} rows are drawn, the farthest ones.", shown.len(), self.rows.len())
+            format!(
+                " Drawn are the {} of {} rows whose values are farthest from {centre}.",
+                shown.len(),
+                self.rows.len()
+            )
         } else {
             String::new()
         };

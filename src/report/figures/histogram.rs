@@ -65,8 +65,8 @@ pub fn histogram(data: &PlotData) -> Option<Drawing> {
     };
     let caption = format!(
         "Residual coordinates of the fitted poses in units of the σ of the measurement. If only \
-         noise is left, they follow the line; a fit reduces them slightly, the more the more \
-         parameters it has.{outside}"
+         noise is left, they follow the line; a fit with many parameters for few coordinates makes \
+         them narrower than the line.{outside}"
     );
     let rows = counts
         .iter()

@@ -39,6 +39,12 @@ pub fn ranking(trace: &Trace) -> Option<Drawing> {
     let evidence = |ranked: &Ranked| -ranked.p_value.max(MIN_DRAWN_P).log10();
     let highest = shown.iter().map(|ranked| evidence(ranked)).fold(1.0, f64::max).max(2.0 * level);
     let is_alike = |ranked: &Ranked| first.alike.iter().any(|(other, _)| *other == ranked.effect);
+    let gain = |k: usize, ranked: &Ranked| {
+        let mark = if k > 0 && is_alike(ranked) { "≈ first, " } else { "" };
+        format!("{mark}{} mm", mm(ranked.gain.max(0.0), 4))
+    };
+    let widths = shown.iter().enumerate().map(|(k, ranked)| text_width(&gain(k, ranked)));
+    let numbers = 10.0 + widths.fold(0.0, f64::max);
     let names = shown.iter().map(|ranked| {
         let colour = if ranked.p_value < trace.level { INK } else { MUTED };
         (label(&ranked.effect, trace), colour)
@@ -51,15 +57,13 @@ pub fn ranking(trace: &Trace) -> Option<Drawing> {
             (_, true, _) => Paint::fill(ACCENT).faded(0.4),
             _ => Paint::fill(FAINT),
         };
-        let mark = if is_alike { "≈ first, " } else { "" };
-        let gain = format!("{mark}{} mm", mm(ranked.gain.max(0.0), 4));
         // The text is to the right of the bar and of the line of significance.
-        let text = Shape::text((end.max(level), row), 6.0, gain, MUTED);
+        let text = Shape::text((end.max(level), row), 6.0, gain(k, ranked), MUTED);
         [Shape::area((0.0, row - 0.28), (end, row + 0.28), paint), text]
     });
     let x = Axis::linear((0.0, highest), "evidence, −log₁₀ p", 5);
     let panel =
-        Panel::of_rows(22.0, (200.0, 96.0), x, names).with(shapes).with_reference(level, INK);
+        Panel::of_rows(22.0, (220.0, numbers), x, names).with(shapes).with_reference(level, INK);
     let caption = format!(
         "{} candidates were tested on the fit of the declared model; these are the best. A longer \
          bar is less likely to arise by chance; left of the vertical line (p = {}) a candidate is \

@@ -25,6 +25,9 @@ pub const WARM: Colour = "#C2521B";
 
 /// Default text size in displayed pixels.
 pub const TEXT_SIZE: f64 = 11.5;
+/// Width of a character at the default text size in displayed pixels, rounded up from the mean of
+/// common sans-serif fonts.
+const CHARACTER_WIDTH: f64 = 6.3;
 /// Margin on the left of a drawing in displayed pixels.
 const LEFT_MARGIN: f64 = 6.0;
 
@@ -152,6 +155,11 @@ impl Svg {
             self.0
         )
     }
+}
+
+/// Estimates the width of a text at the default size in displayed pixels.
+pub fn text_width(text: &str) -> f64 {
+    CHARACTER_WIDTH * text.chars().count() as f64
 }
 
 /// Rounds a coordinate to a tenth of a pixel.

@@ -48,7 +48,9 @@ pub fn bounds_over_workspace(data: &PlotData) -> Option<Drawing> {
         Paint::fill(WARM).faded(0.08 + 0.92 * share)
     };
     let panels = views.iter().zip(&cells).map(|(&(axis, label, below), cells)| {
-        let height = (size(axis) / per_pixel).round();
+        // The upper edge is that of the highest cell.
+        let height = (size(axis) / cell).ceil() * cell;
+        let up = (extent(axis).0, extent(axis).0 + height);
         let boxes = cells.iter().flat_map(|at| {
             let to = (at.from.0 + cell, at.from.1 + cell);
             let middle = (at.from.0 + 0.5 * cell, at.from.1 + 0.5 * cell);
@@ -57,17 +59,20 @@ pub fn bounds_over_workspace(data: &PlotData) -> Option<Drawing> {
                 .into_iter()
                 .chain((2 * at.extrapolated > at.count).then_some(mark))
         });
-        Panel::new(height, Axis::linear(across, below, 6), Axis::linear(extent(axis), label, 5))
-            .with(boxes.collect::<Vec<_>>())
+        let (x, y) = (Axis::linear(across, below, 6), Axis::linear(up, label, 5));
+        Panel::new((height / per_pixel).round(), x, y).with(boxes.collect::<Vec<_>>())
     });
     let panels: Vec<Panel> = panels.collect();
     let level = percent_of(uncertainty.level);
-    let beyond = bounds.iter().filter(|at| at.is_extrapolated).count();
+    let beyond = match bounds.iter().filter(|at| at.is_extrapolated).count() {
+        0 => "none is far from all measured poses".to_owned(),
+        1 => "1 is far from all measured poses; a ring marks cells where most are".to_owned(),
+        n => format!("{n} are far from all measured poses; a ring marks cells where most are"),
+    };
     let caption = format!(
         "Mean bound of measured − predicted that holds with a probability of {level} %, over the \
          workspace in the frame of the arm's base: pale {} mm, deep {} mm or more. Of {} random \
-         configurations within the measured range of each joint, {beyond} are far from all measured \
-         poses; a ring marks cells where most are.",
+         configurations within the measured range of each joint, {beyond}.",
         two_digits(least * 1e3, 4),
         two_digits(most * 1e3, 4),
         bounds.len(),
