@@ -47,7 +47,7 @@ pub fn after_fit(
     } else {
         format!("flexcal loop {named} looks for what the model lacks")
     };
-    match report::show_influential_rows(found, &common.problem_file()) {
+    match report::influential_rows_advice(found, &common.problem_file()) {
         Some(look) => {
             format!(
                 "{look}; if they are right, flexcal loop {named} looks for what the model lacks"
@@ -125,7 +125,7 @@ pub fn after_loop(
     results: &Results,
 ) -> String {
     let named = common.problem_arguments();
-    if let Some(look) = report::show_influential_rows(fit, &common.problem_file()) {
+    if let Some(look) = report::influential_rows_advice(fit, &common.problem_file()) {
         return look;
     }
     if result.interrupted {

@@ -1,12 +1,13 @@
 //! Texts of the command `loop`: summary for one screen, full text (`--verbose`), and report.
 
+use super::arm_names::{DECLARED_ARM, EXTENDED_ARM, NOMINAL_ARM};
 use super::document::{Block, Headline, Point, Table, code, first_of, joined};
 use super::errors::{both_parts, error_label, held_out_rows, rows_of, test_rows_word, unpredicted};
 use super::figures;
 use super::found_effects::{found_effects, found_heading, rounds, status_table};
 use super::identify::{
-    NOMINAL_ARM, fit_warnings, identifiability_with_figures, mean_error, parameters_fact,
-    rms_and_largest, row_counts_fact, why_not_trusted,
+    fit_warnings, identifiability_with_figures, mean_error, parameters_fact, rms_and_largest,
+    row_counts_fact, why_not_trusted,
 };
 use super::noise::{expected_interval, format_chi2, influential_rows, residual_fact};
 use super::parameters::{against_priors, parameters};
@@ -16,9 +17,10 @@ use super::render::{Report, report, text};
 use super::residual_tests::{self, other_reduced_chi2};
 use super::unexplained::{structure_places, structure_sentences, to_declare};
 use super::verdict::{
-    alternative, causes, effect_counts, has_place, stand_in_sentence, title, verdict,
+    alternative, causes, effect_counts, has_place, stand_in_sentence, title, unknown_part, verdict,
 };
 use super::{effect, trace};
+use crate::fit::ErrorSummary;
 use crate::problem::Problem;
 use crate::quantity::format::{counted, decimals, number};
 use crate::results::{FoundEffect, Gain, LoopResult, PlotData, Summary, TraceResult, nominal_arm};
@@ -34,8 +36,8 @@ const MAX_SHOWN_ROWS: usize = 3;
 const MAX_SHOWN_LIMITS: usize = 3;
 /// Number of lines of the summary that fit on one screen beside file names and next steps.
 const SCREEN_LINES: usize = 22;
-/// Name of the arm of the extended problem in tables and headlines.
-const EXTENDED_ARM: &str = "with what was found";
+/// Name of the identification rows in the table of errors.
+const IDENTIFICATION: &str = "identification";
 
 /// Returns a summary of the outcome for one screen, ending in a line break.
 pub fn loop_brief(
@@ -46,15 +48,12 @@ pub fn loop_brief(
     let result = &LoopResult::new(problem, closure);
     let mut blocks = head(problem, closure, result);
     // The summary shows only the errors of held-out rows, whose column of χ² is empty.
-    let mut table = errors(closure, result);
-    table.rows.truncate(table.rows.len() / 2);
+    let corrected = accuracy.as_ref().and_then(|accuracy| accuracy.corrected);
+    let mut table = errors(closure, result, corrected.as_ref());
+    let held_out = table.rows.iter().take_while(|row| row[0] != IDENTIFICATION).count();
+    table.rows.truncate(held_out);
     table.header.pop();
     table.rows.iter_mut().for_each(|row| _ = row.pop());
-    if let Some(errors) = accuracy.as_ref().and_then(|accuracy| accuracy.corrected) {
-        let norms = Summary::of(&errors).norms().0.map(|value| number(value, 4));
-        let names = [String::new(), "with the remainder too".to_owned()];
-        table.rows.push([names.as_slice(), &norms].concat());
-    }
     blocks.push(Block::Table(table));
     let bound = accuracy.and_then(|accuracy| accuracy.bound);
     let size: Vec<String> = gain_sentence(closure, result).into_iter().chain(bound).collect();
@@ -170,7 +169,7 @@ fn set_aside<'a>(problem: &Problem, result: &LoopResult) -> Option<Block<'a>> {
 pub fn loop_text(problem: &Problem, closure: &ClosedLoop) -> String {
     let result = &LoopResult::new(problem, closure);
     let mut blocks = head(problem, closure, result);
-    blocks.extend([Block::Table(errors(closure, result)), gain_block(closure, result)]);
+    blocks.extend([Block::Table(errors(closure, result, None)), gain_block(closure, result)]);
     let failed = residual_tests::failed(&closure.before.residual_tests);
     if !failed.is_empty() {
         blocks.push(Block::heading("Residual tests that the declared problem fails"));
@@ -234,18 +233,16 @@ fn blocks<'a>(
     ];
     blocks.extend(cautions_on_causes(problem, closure, result));
     blocks.extend(fit_warnings(after, plots));
+    let corrected = accuracy.as_ref().and_then(|accuracy| accuracy.corrected);
     blocks.extend([
-        Block::Table(errors(closure, result)),
+        Block::Table(errors(closure, result, corrected.as_ref())),
         gain_block(closure, result),
         Block::Words(found_effects(result, MAX_SHOWN_ALTERNATIVES)),
         Block::Page(found_effects(result, 2 * MAX_SHOWN_ALTERNATIVES)),
-        Block::figures(
-            plots
-                .causes
-                .iter()
-                .zip(1..)
-                .map(|(cause, k)| Some(figures::effect(cause, k, &plots.shown))),
-        ),
+        Block::figures(plots.causes.iter().zip(1..).map(|(cause, k)| {
+            let found = cause.found.and_then(|index| result.effects.get(index));
+            Some(figures::effect(cause, k, &plots.shown, found.and_then(unknown_part)))
+        })),
     ]);
     blocks.extend(status_table(closure, result));
     blocks.extend([
@@ -265,20 +262,13 @@ fn blocks<'a>(
     blocks.extend(rounds(closure, result));
     blocks.push(Block::heading("Remaining residual"));
     let unexplained = structure_sentences(problem, closure, result).into_iter().map(Point::from);
-    let (tests, page) = (
-        residual_tests::by_outcome(&closure.residual_tests),
-        residual_tests::in_order(&closure.residual_tests),
-    );
-    blocks.extend([
-        Block::Words(vec![Block::List(unexplained.clone().chain(tests).collect())]),
-        Block::Page(vec![Block::List(unexplained.chain(page).collect())]),
-        Block::figures([
-            plots.trend.as_ref().map(|trend| figures::unexplained(trend, &plots.shown)),
-            figures::histogram(plots),
-            figures::order(plots),
-            figures::joint_map(plots),
-        ]),
-    ]);
+    blocks.extend(residual_tests::blocks_after(unexplained.collect(), &closure.residual_tests));
+    blocks.push(Block::figures([
+        plots.trend.as_ref().map(|trend| figures::unexplained(trend, &plots.shown)),
+        figures::histogram(plots),
+        figures::order(plots),
+        figures::joint_map(plots),
+    ]));
     blocks.extend(other_reduced_chi2(&closure.residual_tests, &closure.after));
     blocks.extend(super::remainder::uncertainty(after, plots));
     blocks.push(Block::heading("Parameters of the final fit"));
@@ -291,8 +281,8 @@ fn blocks<'a>(
     blocks
 }
 
-/// Returns the summary at the top of the report. If there is a remainder, the last error includes
-/// it.
+/// Returns the summary at the top of the report. If there is a remainder, the last error is that
+/// with it.
 fn headline(
     problem: &Problem,
     closure: &ClosedLoop,
@@ -302,7 +292,6 @@ fn headline(
     let (fit, after) = (&closure.before.fit, &closure.after);
     let (first, last) = (fit.fitted.held_out, after.fitted.held_out);
     let corrected = accuracy.and_then(|accuracy| accuracy.corrected);
-    let with = if corrected.is_some() { ", remainder included" } else { "" };
     let best = corrected.unwrap_or(last);
     let (_, unit) = result.after.errors.judged().norms();
     let mut facts = vec![
@@ -321,9 +310,6 @@ fn headline(
         residual_fact("Residual after", after),
         ("Held out, after", rms_and_largest(&best)),
     ];
-    facts.extend(
-        corrected.map(|_| ("Without the remainder", format!("{} {unit}", mean_error(&last)))),
-    );
     facts.retain(|(name, _)| result.trusted || *name != "Effects found");
     facts.extend(known_gain(result).map(|Gain { mean, interval_95: [low, high] }| {
         let digits = decimals(high - low, 4).max(2);
@@ -334,15 +320,16 @@ fn headline(
         (!problem.effects.is_empty())
             .then(|| ("Effects declared", problem.effects.len().to_string())),
     );
-    let of = format!("{}{with}", held_out_rows(after));
     let mut states = vec![
         (NOMINAL_ARM, mean_error(&fit.registered.held_out)),
-        ("as declared, fitted", mean_error(&first)),
+        (DECLARED_ARM, mean_error(&first)),
     ];
-    if !result.effects.is_empty() || corrected.is_some() {
+    if corrected.is_some() {
+        states.push((corrected_arm(result), mean_error(&best)));
+    } else if !result.effects.is_empty() {
         states.push((EXTENDED_ARM, mean_error(&best)));
     }
-    Headline { states, unit, of, facts, is_doubtful: !result.trusted }
+    Headline { states, unit, of: held_out_rows(after), facts, is_doubtful: !result.trusted }
 }
 
 /// Returns the warnings that the fit is not trusted, and that active limits of the declared problem
@@ -367,9 +354,14 @@ fn cautions<'a>(closure: &ClosedLoop, result: &LoopResult) -> Vec<Block<'a>> {
     untrusted.into_iter().chain(limits).map(Block::Note).collect()
 }
 
+/// Returns the name of the arm whose predictions a remainder corrects.
+fn corrected_arm(result: &LoopResult) -> &'static str {
+    if result.effects.is_empty() { "with the remainder" } else { "with the remainder too" }
+}
+
 /// Returns the table of errors of the nominal arm, of the declared problem's fit and of the
-/// extended problem's fit.
-fn errors(closure: &ClosedLoop, result: &LoopResult) -> Table {
+/// extended problem's fit; `corrected` are those of held-out rows with a remainder, if there is one.
+fn errors(closure: &ClosedLoop, result: &LoopResult, corrected: Option<&ErrorSummary>) -> Table {
     let LoopResult { registered, before, after, .. } = result;
     let row = |rows: &str, arm: &str, summary: &Summary, chi2: Option<f64>| {
         let (norms, _) = summary.norms();
@@ -378,15 +370,18 @@ fn errors(closure: &ClosedLoop, result: &LoopResult) -> Table {
         [vec![rows.to_owned(), arm.to_owned()], norms.to_vec(), vec![chi2]].concat()
     };
     let (fitted, extended) = (&before.errors, &after.errors);
-    let (nominal, declared) = (nominal_arm(&closure.before.fit), "as declared, fitted");
+    let nominal = nominal_arm(&closure.before.fit);
     let mut rows = vec![
         row(test_rows_word(&closure.after.fitted), &nominal, registered.judged(), None),
-        row("", declared, fitted.judged(), None),
+        row("", DECLARED_ARM, fitted.judged(), None),
         row("", EXTENDED_ARM, extended.judged(), None),
-        row("identification", &nominal, &registered.identification, None),
-        row("", declared, &fitted.identification, before.reduced_chi2),
-        row("", EXTENDED_ARM, &extended.identification, after.reduced_chi2),
     ];
+    rows.extend(corrected.map(|errors| row("", corrected_arm(result), &Summary::of(errors), None)));
+    rows.extend([
+        row(IDENTIFICATION, &nominal, &registered.identification, None),
+        row("", DECLARED_ARM, &fitted.identification, before.reduced_chi2),
+        row("", EXTENDED_ARM, &extended.identification, after.reduced_chi2),
+    ]);
     if result.effects.is_empty() {
         rows.retain(|row| row[1] != EXTENDED_ARM);
     }

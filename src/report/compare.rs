@@ -1,11 +1,12 @@
 //! Texts of the command `compare`: every strategy, solver and ablation, and the paper's tables 2
 //! and 3.
 
+use super::arm_names::NOMINAL_ARM;
 use super::document::{Block, Column, Headline, Table, code};
 use super::errors::{both_parts, header, held_out_rows, row_noun, unit};
 use super::figures;
 use super::identify::{
-    NOMINAL_ARM, errors_by_axis, fit_details, fit_sentence, fit_warnings, mean_error, no_errors,
+    errors_by_axis, fit_details, fit_sentence, fit_warnings, mean_error, no_errors,
     parameters_fact, row_counts_fact,
 };
 use super::noise::residual_fact;

@@ -101,10 +101,15 @@ fn counted_rows(found: &Identification, of: &ErrorSummary, adjective: &str) -> S
     format!("{} {adjective}{}", of.n, if of.n == 1 { one } else { many })
 }
 
-/// Returns the noun for one row of the data: "pose" if all rows measure positions, else "row".
+/// Returns the noun for one row of the data: "pose" if all rows measure positions, "point" if poses
+/// have several targets, else "row".
 pub(super) fn row_noun(found: &Identification) -> &'static str {
     let positions = found.kinds.is_empty() && found.fitted.identification.kind == "position";
-    if positions { "pose" } else { "row" }
+    match positions {
+        true if found.several_targets => "point",
+        true => "pose",
+        false => "row",
+    }
 }
 
 /// States for each arm how many poses have no equilibrium, because of which it has no mean errors.

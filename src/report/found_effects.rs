@@ -4,11 +4,13 @@ use std::fmt::Write as _;
 
 use super::document::{Block, Column, Point, Table, split_at_most};
 use super::errors::header;
-use super::verdict::{alternative, stand_in_sentence, title};
+use super::probability::percent;
+use super::verdict::{alternative, has_place, stand_in_sentence, title};
 use super::{effect, figures, trace};
+use crate::problem::Effect;
 use crate::quantity::format::{number, or_dash, p_value};
 use crate::results::{FoundEffect, LoopResult, Step, Witness};
-use crate::select::ClosedLoop;
+use crate::select::{ClosedLoop, Status};
 
 /// Returns the heading of the list of effects, which claims nothing after a fit that is not
 /// trusted.
@@ -40,7 +42,7 @@ pub(super) fn found_effects<'a>(result: &LoopResult, alternatives: usize) -> Vec
 fn point(result: &LoopResult, found: &FoundEffect, alternatives: usize) -> Point {
     let mut details: Vec<String> = stand_in_sentence(found).into_iter().collect();
     details.extend(effect::values(&found.effect.effect, &found.parameters));
-    details.extend(found.claims.as_ref().map(trace::claims_text));
+    details.extend(claims(found));
     details.extend(effect::seen_ranges(&found.ranges).map(|seen| format!("seen for {seen}")));
     details.extend(found.resembles.as_ref().map(|cause| format!("hint: {cause}")));
     details.extend(found.stability.map(|share| {
@@ -56,12 +58,11 @@ fn point(result: &LoopResult, found: &FoundEffect, alternatives: usize) -> Point
     } else {
         ": probability that noise alone does as well"
     });
-    let then = found.held_out_after;
-    if then != *result.after.errors.judged() {
-        let ([mean, rms, _], unit) = then.norms();
+    if has_own_errors(result) {
+        let ([mean, rms, _], unit) = found.held_out_after.norms();
         let _ = write!(
             chance,
-            "; held-out error after the round that added it: mean {} {unit}, rms {} {unit}",
+            "; held-out error of the first model with it whose effects all stayed: mean {} {unit}, rms {} {unit}",
             number(mean, 4),
             number(rms, 4)
         );
@@ -76,6 +77,24 @@ fn point(result: &LoopResult, found: &FoundEffect, alternatives: usize) -> Point
     Point { text: title(found), details, mark: None }
 }
 
+/// States what the data allow to claim about an effect; `None` without evidence. The place and the
+/// inputs of an effect that only represents structure of unknown place and law are not claimed.
+fn claims(found: &FoundEffect) -> Option<String> {
+    let claims = found.claims.as_ref()?;
+    if has_place(found) || stand_in_sentence(found).is_none() {
+        return Some(trace::claims_text(claims));
+    }
+    let law = percent(claims.law.probability);
+    Some(format!("neither place nor law is known: this effect has a probability of {law}"))
+}
+
+/// Returns true if the found effects have different errors after the first round with each whose
+/// effects all stayed. Otherwise the errors say nothing about single effects.
+fn has_own_errors(result: &LoopResult) -> bool {
+    let mut errors = result.effects.iter().map(|found| found.held_out_after);
+    errors.next().is_some_and(|first| errors.any(|other| other != first))
+}
+
 fn witness(witness: &Witness) -> String {
     format!("{} by {}, which took no part in the fit", witness.says, witness.data)
 }
@@ -85,12 +104,16 @@ pub(super) fn rounds<'a>(closure: &'a ClosedLoop, result: &LoopResult) -> Vec<Bl
     if result.steps.is_empty() {
         return Vec::new();
     }
-    let effects = |(_, step): &(usize, &Step)| match step.effects.as_slice() {
-        [] => "none".to_owned(),
-        effects => {
-            let words = effects.iter().map(|effect| closure.before.describe(effect));
-            words.collect::<Vec<_>>().join("; ")
-        }
+    let change = |(round, _): &(usize, &Step)| {
+        let (added, removed) = closure.changes_of_round(round - 1);
+        let listed = |word: &str, effects: Vec<&Effect>| {
+            let words: Vec<String> =
+                effects.into_iter().map(|effect| closure.before.describe(effect)).collect();
+            (!words.is_empty()).then(|| format!("{word}: {}", words.join("; ")))
+        };
+        let parts = [listed("added", added), listed("removed", removed)];
+        let words = parts.into_iter().flatten().collect::<Vec<_>>().join(" – ");
+        if words.is_empty() { "no change".to_owned() } else { words }
     };
     let error = |name, of: fn(&Step) -> f64| {
         Column::number(name, move |(_, step): &(usize, &Step)| number(of(step), 4))
@@ -100,7 +123,7 @@ pub(super) fn rounds<'a>(closure: &'a ClosedLoop, result: &LoopResult) -> Vec<Bl
     let steps: Vec<(usize, &Step)> = (1..).zip(&result.steps).collect();
     let columns = [
         Column::number("round", |(round, _): &(usize, &Step)| round.to_string()),
-        Column::words("effects in the model", effects),
+        Column::words("change of the model", change),
         error(rms, |step| step.errors.identification.norms().0[1]),
         error("held out mean", |step| step.errors.judged().norms().0[0]),
         error("held out rms", |step| step.errors.judged().norms().0[1]),
@@ -119,22 +142,33 @@ pub(super) fn status_table<'a>(closure: &ClosedLoop, result: &LoopResult) -> Opt
     let law = |found: &FoundEffect| {
         or_dash(found.claims.as_ref(), |claims| share(claims.law.probability))
     };
-    let mean = ["held out mean, mm", "held out mean, °", "held out mean, px"];
-    let mean = header(&closure.after.fitted.held_out, mean);
-    let columns = [
+    let status = |found: &FoundEffect| {
+        let is_unknown = found.status == Status::Located && !has_place(found);
+        if is_unknown { "unknown" } else { found.status.as_str() }.to_owned()
+    };
+    let mut columns = vec![
         Column::words("effect", |found: &FoundEffect| found.effect.description.clone()),
-        Column::words("status", |found: &FoundEffect| found.status.as_str().to_owned()),
+        Column::words("status", status),
         Column::number("p", |found: &FoundEffect| p_value(found.p_value)),
         Column::number("law", law),
         Column::number("refits", |found: &FoundEffect| or_dash(found.stability, share)),
         Column::words("data outside the fit", |found: &FoundEffect| {
             or_dash(found.witness.as_ref(), |check| format!("{} by {}", check.says, check.data))
         }),
-        Column::number(mean, |found: &FoundEffect| number(found.held_out_after.norms().0[0], 4)),
     ];
-    let note = "p: probability that noise alone does as well; law: probability of this law, \
-                and of no other, at its place; refits: share of refits on random 80 % subsets of the \
-                poses that find the effect; held out mean: error after the round that added it";
-    let table = Table::of(&result.effects, &columns).noted(&[note]);
+    let mut note = "p: probability that noise alone does as well; law: probability of this law, \
+                    and of no other, at its place; refits: share of refits on random 80 % subsets of \
+                    the poses that find the effect"
+        .to_owned();
+    if has_own_errors(result) {
+        let mean = ["held out mean, mm", "held out mean, °", "held out mean, px"];
+        let mean = header(&closure.after.fitted.held_out, mean);
+        let error = |found: &FoundEffect| number(found.held_out_after.norms().0[0], 4);
+        columns.push(Column::number(mean, error));
+        note.push_str(
+            "; held out mean: error of the first model with this effect whose effects all stayed",
+        );
+    }
+    let table = Table::of(&result.effects, &columns).noted(&[&note]);
     (!result.effects.is_empty()).then_some(Block::Table(table))
 }

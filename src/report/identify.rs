@@ -1,5 +1,6 @@
 //! Texts of the command `identify`: full text (`--verbose`), and report on one fit.
 
+use super::arm_names::NOMINAL_ARM;
 use super::document::{Block, Headline, Table};
 use super::errors::{
     axis_count, brief, error_label, format_error, held_out_rows, rows_of, test_rows_word, unit,
@@ -328,9 +329,6 @@ pub fn joint_sources_text(sources: &JointSources) -> String {
         better.as_str(),
     )
 }
-
-/// Name of the registered nominal arm in a headline.
-pub(super) const NOMINAL_ARM: &str = "nominal arm";
 
 /// Formats the mean error for a headline.
 pub(super) fn mean_error(of: &ErrorSummary) -> String {

@@ -5,6 +5,7 @@
 //! of pages.
 
 mod acceptance;
+mod arm_names;
 mod brief;
 mod check;
 mod closed_loop;
@@ -57,7 +58,7 @@ pub(crate) use identify::joint_sources_text;
 pub use identify::{estimate_text, identification_report};
 pub(crate) use init::init_text;
 pub(crate) use next::next_page;
-pub(crate) use noise::show_influential_rows;
+pub(crate) use noise::influential_rows_advice;
 pub(crate) use plan::plan_page;
 pub(crate) use predict::{prediction_page, prediction_text};
 #[doc(hidden)]

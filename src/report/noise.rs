@@ -183,18 +183,19 @@ pub(super) fn outliers<'a>(problem: &Problem, found: &Identification) -> Option<
         })
     };
     let noun = row_noun(found);
+    let acts_in = if noun == "row" { "rows" } else { "poses" };
     let are_gross = others_agree_with_sigma(found) && found.outliers.iter().all(is_influential);
     let have = match (are_gross, n) {
         (true, 1) => "has a gross error".to_owned(),
         (true, _) => "have gross errors".to_owned(),
         (false, 1) => {
             format!(
-                "stands out from the others: a gross error, or an effect that acts in few {noun}s"
+                "stands out from the others: a gross error, or an effect that acts in few {acts_in}"
             )
         }
         (false, _) => {
             format!(
-                "stand out from the others: gross errors, or an effect that acts in few {noun}s"
+                "stand out from the others: gross errors, or an effect that acts in few {acts_in}"
             )
         }
     };
@@ -241,7 +242,7 @@ pub(super) fn influential_rows<'a>(found: &Identification) -> Option<Block<'a>> 
 
 /// States in one line what to do about influential rows; `None` if there are none. `problem` is the
 /// path of the problem file.
-pub fn show_influential_rows(found: &Identification, problem: &Path) -> Option<String> {
+pub fn influential_rows_advice(found: &Identification, problem: &Path) -> Option<String> {
     let rows = found.influential_rows.as_ref()?.rows.iter();
     let rows = joined(rows.map(|row| row.location.to_string()), MAX_SHOWN_INFLUENTIAL, ", ");
     Some(format!(

@@ -2,7 +2,7 @@
 
 use super::document::{Block, Mark, Point};
 use crate::fit::Identification;
-use crate::quantity::format::number;
+use crate::quantity::format::{counted, number};
 use crate::residual_tests::{ResidualTest, ResidualTests, Test};
 
 /// Describes the failed tests, one sentence each.
@@ -59,13 +59,27 @@ pub(super) fn by_outcome(tests: &ResidualTests) -> Vec<Point> {
     points.chain(of(Mark::Untested).map(|(_, point)| point)).collect()
 }
 
-/// Lists the tests in the order in which they were made, one item each.
-pub(super) fn in_order(tests: &ResidualTests) -> Vec<Point> {
-    tests.tests.iter().map(point).collect()
+/// Returns the tests as blocks after the points `before`: grouped by outcome in texts; on the page
+/// one by one, the passed ones folded.
+pub(super) fn blocks_after<'a>(before: Vec<Point>, tests: &ResidualTests) -> Vec<Block<'a>> {
+    let (passed, other): (Vec<Point>, Vec<Point>) =
+        tests.tests.iter().map(point).partition(|point| point.mark == Some(Mark::Passed));
+    let brief = before.iter().cloned().chain(by_outcome(tests)).collect();
+    let listed: Vec<Point> = before.into_iter().chain(other).collect();
+    let mut page: Vec<Block> =
+        (!listed.is_empty()).then_some(Block::List(listed)).into_iter().collect();
+    if !passed.is_empty() {
+        let title = format!("{} passed", counted(passed.len(), "test"));
+        let names = by_outcome(tests).into_iter().filter(|point| point.mark == Some(Mark::Passed));
+        let on_paper: Vec<String> = names.map(|point| point.text).collect();
+        let on_paper = format!("{title}: {}.", on_paper.join("; "));
+        page.push(Block::Folded(title, vec![Block::List(passed)], on_paper));
+    }
+    vec![Block::Words(vec![Block::List(brief)]), Block::Page(page)]
 }
 
-/// Returns the tests as blocks: grouped by outcome in texts, one by one on the page.
+/// Returns the tests as blocks: grouped by outcome in texts; on the page one by one, the passed ones
+/// folded.
 pub(super) fn blocks<'a>(tests: &ResidualTests) -> Vec<Block<'a>> {
-    let (brief, page) = (Block::List(by_outcome(tests)), Block::List(in_order(tests)));
-    vec![Block::Words(vec![brief]), Block::Page(vec![page])]
+    blocks_after(Vec::new(), tests)
 }

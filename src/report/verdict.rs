@@ -114,7 +114,13 @@ fn outcome(result: &LoopResult, assumes_smaller_sigma: bool) -> String {
 fn probably_explained(result: &LoopResult) -> String {
     let cause = |found: &FoundEffect| {
         let law = found.claims.as_ref().map(|claims| percent(claims.law.probability));
-        let law = law.map_or_else(String::new, |law| format!(" ({law})"));
+        // Without a rival, the probability is low because few subsets of the poses show the effect.
+        let again = found.stability.filter(|_| found.alternatives.is_empty()).map(|share| {
+            let share = number(share * 100.0, 0);
+            format!("; found in {share} % of refits on random 80 % subsets of the poses")
+        });
+        let again = again.unwrap_or_default();
+        let law = law.map_or_else(String::new, |law| format!(" ({law}{again})"));
         let rival = found
             .alternatives
             .first()
@@ -148,14 +154,20 @@ fn found_clause(result: &LoopResult) -> String {
         [] => String::new(),
         [cause] => {
             let rival = cause.alternatives.first();
-            // Without a place and a law, the effects in doubt are examples of what may act.
+            // Without a place and a law, the alternatives are candidates and no rivals.
             let is_unknown = !has_place(cause) && stand_in_sentence(cause).is_some();
-            let link = if is_unknown { "for example" } else { "or else" };
-            let or_else = rival
-                .map_or_else(String::new, |rival| format!(", {link} {}", rival.effect.description));
+            let or_else = rival.map_or_else(String::new, |rival| {
+                if is_unknown {
+                    format!("; the most probable candidate: {}", alternative(rival))
+                } else {
+                    format!(", or else {}", rival.effect.description)
+                }
+            });
             format!("; {}{or_else}", claim(cause, &cause.effect.description))
         }
-        causes => format!("; {} causes are probable or located", causes.len()),
+        causes => {
+            format!("; {} causes are probable, or known at most by their place", causes.len())
+        }
     };
     words += &in_doubt;
     let contradicted: Vec<&FoundEffect> = result.with_status(Status::Contradicted).collect();
@@ -249,6 +261,13 @@ pub(super) fn stand_in_sentence(found: &FoundEffect) -> Option<String> {
     let law = found.claims.as_ref()?.law.probability;
     (law < MIN_CANDIDATE_PROBABILITY && found.status != Status::Contradicted)
         .then(|| format!("the model represents it by: {}", declared(&found.effect)))
+}
+
+/// States what is not known about a cause that the model only represents by some effect: its law, or
+/// place and law. `None` if the effect is at least a candidate for the law.
+pub(super) fn unknown_part(found: &FoundEffect) -> Option<&'static str> {
+    stand_in_sentence(found)?;
+    Some(if has_place(found) { "The law is not known" } else { "Neither place nor law is known" })
 }
 
 /// Returns the text with its first letter in lower case.

@@ -18,10 +18,19 @@ fn law_at(curve: &[(f64, f64)], x: f64) -> f64 {
 }
 
 /// Draws the figure of the effect that the loop found as number `number` (from 1). `shown` are the
-/// rows that figures may draw, ascending.
-pub fn effect(cause: &Cause, number: usize, shown: &[usize]) -> Drawing {
-    let lead = "Found by the loop; the line is the fitted law.";
-    draw(cause, shown, (&format!("effect-{number}"), "fitted law", lead))
+/// rows that figures may draw, ascending. `unknown` states what is not known if the effect only
+/// represents structure of unknown law.
+pub fn effect(cause: &Cause, number: usize, shown: &[usize], unknown: Option<&str>) -> Drawing {
+    let name = format!("effect-{number}");
+    let Some(unknown) = unknown else {
+        let lead = "Found by the loop; the line is the fitted law.";
+        return draw(cause, shown, (&name, "fitted law", lead));
+    };
+    let lead = format!(
+        "{unknown}: the model represents the structure by this effect, and the line is its fit."
+    );
+    let title = format!("structure of unknown law, represented by: {}", cause.title);
+    draw(&Cause { title, ..cause.clone() }, shown, (&name, "fit", &lead))
 }
 
 /// Draws the figure of structure that no effect explains. `shown` are the rows that figures may

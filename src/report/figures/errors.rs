@@ -4,6 +4,7 @@ use nalgebra::Vector3;
 
 use super::prelude::*;
 use crate::fit::{Before, Procedure};
+use crate::report::arm_names::{DECLARED_ARM, EXTENDED_ARM, NOMINAL_ARM};
 use crate::results::{Stage, StageErrors, procedure_stages};
 
 /// Maximum number of poses that the figure shows.
@@ -15,11 +16,13 @@ const MIN_DRAWN_FRACTION: f64 = 0.03;
 /// Returns the name of a stage in the legend.
 fn stage_name(stage: Stage) -> &'static str {
     match stage {
-        Stage::Registered | Stage::Before => "before",
+        Stage::Registered => NOMINAL_ARM,
+        Stage::Before => "before",
         Stage::Ignoring => "elasticity ignored",
         Stage::Elastic => "with elasticity",
         Stage::Identified => "identified",
-        Stage::Closed => "after the loop",
+        Stage::Declared => DECLARED_ARM,
+        Stage::Closed => EXTENDED_ARM,
     }
 }
 

@@ -3,6 +3,7 @@
 use super::prelude::*;
 use crate::fit::{Comparison, Errors};
 use crate::problem::Effect;
+use crate::quantity::format::counted;
 use crate::select::{ClosedLoop, Round};
 
 /// Largest difference of the common logarithms of two errors at which both are marked as best.
@@ -42,7 +43,7 @@ pub fn strategies(comparison: &Comparison) -> Drawing {
                    wide gap between the two marks of a row means that the strategy fits noise. Solvers with the same result \
                    share a row.";
     let titles = ("Errors of the strategies", "Error of every strategy");
-    draw_entries("strategies", titles, caption, &entries)
+    draw_entries("strategies", titles, caption, &entries, ("best", &best(&entries)))
 }
 
 /// Creates the row of one fit, whose name is that of its strategy, ablation or round.
@@ -62,7 +63,8 @@ pub fn ablations(comparison: &Comparison) -> Option<Drawing> {
                    from rigid to complete, on a logarithmic scale.";
     let titles =
         ("Contribution of each part of the elasticity", "Error with parts of the elasticity");
-    (entries.len() > 1).then(|| draw_entries("ablations", titles, caption, &entries))
+    (entries.len() > 1)
+        .then(|| draw_entries("ablations", titles, caption, &entries, ("best", &best(&entries))))
 }
 
 /// Draws the mean errors after each round of a loop, with the effects that the round added. `None`
@@ -81,16 +83,34 @@ pub fn draw_rounds(closure: &ClosedLoop) -> Option<Drawing> {
     let caption = "Mean position error after each round of the loop, at the fitted poses and at the held-out ones, which do not \
                    influence any choice, on a logarithmic scale. If the two diverge, a round has fitted noise.";
     let titles = ("Errors after each round", "Error after every round");
-    (entries.len() > 1).then(|| draw_entries("rounds", titles, caption, &entries))
+    // A search that was interrupted, or that removed effects at its end, keeps another model than
+    // that of its last round.
+    let kept = closure.after.fitted.held_out;
+    if entries.last().is_some_and(|last| last.errors.held_out != kept) {
+        entries.push(entry("final fit".to_owned(), &closure.after.fitted));
+    }
+    let kept = [entries.len() - 1];
+    (!closure.rounds.is_empty())
+        .then(|| draw_entries("rounds", titles, caption, &entries, ("kept", &kept)))
+}
+
+/// Returns the indices of the fits with the smallest held-out error.
+fn best(entries: &[Entry]) -> Vec<usize> {
+    let errors = || entries.iter().map(|entry| entry.errors.held_out.mean.norm.max(1e-12).log10());
+    let least = errors().fold(f64::INFINITY, f64::min);
+    let ties = errors().enumerate().filter(|(_, error)| *error <= least + MAX_TIE_DIFFERENCE);
+    ties.map(|(k, _)| k).collect()
 }
 
 /// Draws the mean errors of some fits as the figure `name` with a title; `label` describes the
-/// figure for screen readers.
+/// figure for screen readers. The fits with the indices `accented` are emphasised, and `word` is
+/// their name in the legend.
 fn draw_entries(
     name: &str,
     (title, label): (&str, &str),
     caption: &str,
     entries: &[Entry],
+    (word, accented): (&str, &[usize]),
 ) -> Drawing {
     let means = |entry: &Entry| {
         [entry.errors.identification.mean.norm, entry.errors.held_out.mean.norm].map(|e| e * 1e3)
@@ -98,13 +118,12 @@ fn draw_entries(
     let log_means = |entry: &Entry| means(entry).map(|mean| mean.max(1e-9).log10());
     let (low, high) = range(entries.iter().flat_map(log_means));
     let ends = if low < high { (low - 0.1, high + 0.1) } else { (low - 0.5, low + 0.5) };
-    let best = entries.iter().map(|entry| log_means(entry)[1]).fold(f64::INFINITY, f64::min);
     let marks = entries.iter().enumerate().flat_map(|(k, entry)| {
         let (row, [fitted, held_out]) = (k as f64, log_means(entry));
         if !(fitted.is_finite() && held_out.is_finite()) {
             return vec![Shape::text((ends.0, row), 8.0, "no result", MUTED)];
         }
-        let colour = if held_out <= best + MAX_TIE_DIFFERENCE { ACCENT } else { INK };
+        let colour = if accented.contains(&k) { ACCENT } else { INK };
         let value = means(entry)[1];
         let value = number(value, decimals(value, 4) + 1);
         vec![
@@ -116,8 +135,8 @@ fn draw_entries(
     });
     let names = entries.iter().map(|entry| (entry.name.clone(), INK));
     let x = Axis::logarithmic(ends, "mean position error [mm]", 5);
-    let panel = Panel::of_rows(22.0, (236.0, 66.0), x, names).with(marks);
-    let legend = [("fitted poses", FAINT), ("held-out poses", INK), ("best", ACCENT)];
+    let panel = Panel::of_rows(22.0, (250.0, 66.0), x, names).with(marks);
+    let legend = [("fitted poses", FAINT), ("held-out poses", INK), (word, ACCENT)];
     let legend = legend.map(|(name, colour)| (name, colour, Mark::Dot));
     let rows = entries.iter().map(|entry| {
         let means = means(entry).map(|mean| fixed(mean, 6));
@@ -130,18 +149,14 @@ fn draw_entries(
 /// Returns the label of round `k` (from 0): its number from 1, and the effects that it added, or
 /// the number that it removed.
 fn round_name(closure: &ClosedLoop, k: usize) -> String {
-    let before = k.checked_sub(1).map_or(&[][..], |last| closure.rounds[last].effects.as_slice());
-    let effects = &closure.rounds[k].effects;
     let named =
         |effect: &Effect| format!("{} {}", effect.name(), effect.place()).trim_end().to_owned();
-    let added: Vec<&Effect> = effects.iter().filter(|effect| !before.contains(effect)).collect();
-    let change = match added.as_slice() {
-        [] if effects.len() < before.len() => {
-            format!("− {} of {}", before.len() - effects.len(), before.len())
-        }
-        [] => "no change".to_owned(),
-        [single] => format!("+ {}", named(single)),
-        [first, others @ ..] => format!("+ {} and {} more", named(first), others.len()),
+    let (added, removed) = closure.changes_of_round(k);
+    let change = match (added.as_slice(), removed.as_slice()) {
+        ([], []) => "no change".to_owned(),
+        ([], removed) => format!("{} removed", counted(removed.len(), "effect")),
+        ([single], _) => format!("+ {}", named(single)),
+        ([first, others @ ..], _) => format!("+ {} and {} more", named(first), others.len()),
     };
-    format!("{} {change}", k + 1)
+    format!("round {}: {change}", k + 1)
 }

@@ -17,6 +17,8 @@ const BAR_SIGMAS: f64 = 10.0;
 
 /// Number of characters above which a word in a table may be broken.
 const MAX_UNBROKEN_WORD: usize = 32;
+/// Number of characters above which a text in a table takes several lines.
+const MAX_UNBROKEN_CELL: usize = 60;
 /// Number of columns above which the headings of a table may take several lines.
 const MAX_ONE_LINE_COLUMNS: usize = 9;
 
@@ -24,8 +26,8 @@ const MAX_ONE_LINE_COLUMNS: usize = 9;
 const SCRIPTS: [&str; 2] = [include_str!("page.js"), include_str!("view.js")];
 
 /// Sentences at the end of a report that explain its errors.
-const ERRORS_NOTE: &str = " Errors are distances between measured and predicted positions. Before: the nominal arm; its free base and \
-                      tool parameters are fitted first. A note under a table names any other arm. Held-out poses influence nothing: \
+const ERRORS_NOTE: &str = " Errors are distances between measured and predicted positions. Nominal arm, or before: the arm without a fit, \
+                      except for its free base and tool parameters. A note under a table names any other arm. Held-out poses influence nothing: \
                       no parameter is fitted to them and no effect chosen by them.";
 
 /// Report in two formats, with its figures.
@@ -211,8 +213,10 @@ fn table(table: &Table) -> Markup {
     // Long words, such as digests, may be broken anywhere.
     let classes = |k: usize, text: &str| {
         let is_long = text.split_whitespace().any(|word| word.chars().count() > MAX_UNBROKEN_WORD);
+        let is_sentence = text.chars().count() > MAX_UNBROKEN_CELL;
         match class(k) {
             Some(class) if is_long => Some(format!("{class} long")),
+            Some(class) if is_sentence => Some(format!("{class} text")),
             class => class.map(str::to_owned),
         }
     };
@@ -225,7 +229,7 @@ fn table(table: &Table) -> Markup {
         @for note in &table.notes { p { (words(note)) } }
         @if bars.is_some() {
             p.wide { "bars: the change from nominal in units of its standard error, limited to ±10, with an interval of one standard error; \
-                larger changes end at the edge, an orange mark there is a bound" }
+                larger changes are drawn at the edge; an orange mark is the bound at which the parameter rests" }
         }
         // Rows that continue the row above cannot be sorted.
         @let sorts = table.rows.len() > 3 && table.rows.iter().all(|row| row.first().is_some_and(|cell| !cell.is_empty()));

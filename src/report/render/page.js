@@ -10,7 +10,7 @@ const flexcal = (() => {
   const shown = (value) => (Number.isFinite(value) ? value.toFixed(Math.min(4, Math.max(0, 2 - Math.floor(Math.log10(Math.abs(value) || 1))))) : "\u2013").replace("-", "\u2212");
   const kind = (pose) => (pose.held_out ? "held out" : "fitted");
   const joints = (pose) => data.joints.map(([name, unit], k) => name + " " + pose.q[k].toFixed(2).replace("-", "\u2212") + (unit === "\u00b0" ? "" : "\u202f") + unit).join(", ");
-  const words = (pose) => pose.place + " (" + kind(pose) + "): residual " + shown(norm(pose.after)) + " mm, before " + shown(norm(pose.before)) + " mm";
+  const words = (pose) => pose.place + " (" + kind(pose) + "): residual " + shown(norm(pose.after)) + " mm, nominal arm " + shown(norm(pose.before)) + " mm";
   const listeners = [];
   const state = { row: null, kept: () => true };
   const tell = () => listeners.forEach((listener) => listener(state));

@@ -81,7 +81,7 @@ fn view(data: &PlotData) -> Markup {
                 label { "deflection, times " input type="range" data-view="give" min="0" max="3" step="0.01" value="0"; }
                 label { "length of lines " input type="range" data-view="length" min="-1" max="1" step="0.01" value="0"; }
                 label { "lines " select data-view="vectors" {
-                    option value="after" { "residual after" } option value="before" { "residual before" } option value="none" { "none" }
+                    option value="after" { "residual" } option value="before" { "error of the nominal arm" } option value="none" { "none" }
                 } }
                 label { "colour by " select data-view="colour" {
                     option value="kind" { "held out or fitted" } option value="size" { "size of the residual" }
@@ -94,8 +94,8 @@ fn view(data: &PlotData) -> Markup {
             p.under { output {} }
         }
         @if coverage.tried > 0 {
-            p { "Joint limits (measured ranges of joints without declared limits): " (number(share, 0)) " % of the end-point positions of "
-                (coverage.tried) " configurations spread evenly over them lie within " (mm(coverage.near, 0)) " mm of a fitted pose (a tenth of the diagonal of all positions)." }
+            p { "Coverage: of " (coverage.tried) " configurations spread evenly over the joint limits (measured ranges where none are declared), "
+                (number(share, 0)) " % end within " (mm(coverage.near, 0)) " mm of a fitted pose. That distance is a tenth of the diagonal of the box around the end points of these configurations." }
         }
     }
 }
@@ -130,7 +130,7 @@ fn largest(data: &PlotData) -> Markup {
             thead { tr {
                 th.l { "row" } th.l { "pose" }
                 @for command in &data.commands { th.o { (command.name()) ", " (command.symbol()) } }
-                th.o { "before, mm" } th { "residual, mm" } th.o { "in σ" }
+                th.o { "nominal arm, mm" } th { "residual, mm" } th.o { "in σ" }
             } }
             tbody { @for row in rows {
                 @let residual = &data.residuals[row];

@@ -43,14 +43,14 @@ impl<'a> Poses<'a> {
     }
 
     /// Returns the indices of all rows.
-    pub fn rows(&self) -> Vec<usize> {
+    pub fn row_indices(&self) -> Vec<usize> {
         (0..self.measurements.len()).collect()
     }
 
     /// Returns the poses of all rows; `sigma` \[m\] is the 1 σ of a coordinate in rows that state
     /// none.
     pub fn all(&self, sigma: f64) -> Vec<Pose<'_>> {
-        self.placement.poses(self.measurements, &self.rows(), sigma)
+        self.placement.poses(self.measurements, &self.row_indices(), sigma)
     }
 
     /// Returns the measured position of each pose, measuring frame \[m\]. For a pose without a

@@ -12,11 +12,9 @@ use super::coverage::{self, Coverage};
 use super::pose::{PoseError, weighted_sample};
 use super::uncertainty::Uncertainty;
 use crate::error::{Location, Warning};
-use crate::fit::{
-    Before, Comparison, Correlations, Identification, IdentifyError, Procedure, Strategy,
-};
+use crate::fit::{Before, Comparison, Correlations, Identification, IdentifyError, Procedure};
 use crate::measurement::Dataset;
-use crate::model::{CentreLine, Model, Pose};
+use crate::model::{CentreLine, Pose};
 use crate::problem::Problem;
 use crate::remainder::Fitted;
 use crate::residual_tests::ResidualTests;
@@ -41,6 +39,8 @@ pub enum Stage {
     Elastic,
     /// Identified arm, if the report does not distinguish elasticity.
     Identified,
+    /// Arm of the declared problem, identified before the loop adds effects.
+    Declared,
     /// Arm identified with the effects that the loop found.
     Closed,
 }
@@ -113,7 +113,7 @@ impl PlotData {
         let fitted = poses.arm(problem, identification)?;
         let stages = vec![
             registered_errors(&poses, &fitted, identification),
-            identified_errors(&poses, &fitted, identification),
+            stage_errors(&poses, Stage::Identified, &fitted),
         ];
         let residual_tests = examine(problem, data, identification)?;
         Ok(Self::new(problem, &poses, stages, (&fitted, identification), residual_tests))
@@ -155,10 +155,10 @@ impl PlotData {
         );
         let stages = vec![
             registered_errors(&poses, &before, fit),
-            identified_errors(&poses, &before, fit),
+            stage_errors(&poses, Stage::Declared, &before),
             stage_errors(&poses, Stage::Closed, &after),
         ];
-        let residuals = poses.errors(&after, &poses.rows());
+        let residuals = poses.errors(&after, &poses.row_indices());
         let coordinates = if closure.effects.is_empty() {
             Vec::new()
         } else {
@@ -166,8 +166,12 @@ impl PlotData {
         };
         let levers = poses.levers(&after, &coordinates);
         let fit = EffectFit { arm: &after, residuals: &residuals, levers: &levers };
-        let cause = |found: &Found| cause::of(&found.effect, &closure.closed, fit, &poses);
-        let causes: Vec<Option<Cause>> = closure.effects.par_iter().map(cause).collect();
+        let cause = |(k, found): (usize, &Found)| {
+            let cause = cause::of(&found.effect, &closure.closed, fit, &poses)?;
+            Some(Cause { found: Some(k), ..cause })
+        };
+        let causes: Vec<Option<Cause>> =
+            closure.effects.par_iter().enumerate().map(cause).collect();
         Ok(Self {
             causes: causes.into_iter().flatten().collect(),
             trend: closure
@@ -193,7 +197,7 @@ impl PlotData {
         residual_tests: ResidualTests,
     ) -> Self {
         let measurements = poses.measurements;
-        let rows = poses.rows();
+        let rows = poses.row_indices();
         let before = poses.errors(&nominal_arm(best, identification), &rows);
         let names: Vec<_> = measurements.files.iter().map(|file| file.file_name()).collect();
         let are_distinct =
@@ -336,15 +340,4 @@ fn stage_errors(poses: &Poses, stage: Stage, arm: &Arm) -> StageErrors {
 /// Returns the held-out errors of the registered nominal arm.
 fn registered_errors(poses: &Poses, fitted: &Arm, identification: &Identification) -> StageErrors {
     stage_errors(poses, Stage::Registered, &nominal_arm(fitted, identification))
-}
-
-/// Returns the held-out errors of the identified arm.
-fn identified_errors(poses: &Poses, fitted: &Arm, identification: &Identification) -> StageErrors {
-    let elastic = is_elastic(&fitted.model) && identification.strategy != Strategy::GeometryOnly;
-    stage_errors(poses, if elastic { Stage::Elastic } else { Stage::Identified }, fitted)
-}
-
-/// Returns true if a stiffness or a rigidity is a free parameter.
-fn is_elastic(model: &Model) -> bool {
-    model.parameters.iter().any(|parameter| parameter.site.is_elastic())
 }

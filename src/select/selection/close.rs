@@ -12,8 +12,7 @@ use super::state::{Round, SearchState};
 use super::status::{Status, Verdict};
 use crate::error::Location;
 use crate::fit::{
-    ErrorSummary, Errors, Finding, FindingCode, Identification, IdentifyError, Options, Progress,
-    identify,
+    Errors, Finding, FindingCode, Identification, IdentifyError, Options, Progress, identify,
 };
 use crate::measurement::Dataset;
 use crate::numeric::Interval;
@@ -68,10 +67,13 @@ pub struct ClosedLoop {
 }
 
 impl ClosedLoop {
-    /// Returns the held-out error after the round that added the effect; `None` if it equals that
-    /// of the final fit.
-    pub fn held_out_once(&self, found: &Found) -> Option<ErrorSummary> {
-        Some(found.held_out_after).filter(|then| *then != self.after.fitted.held_out)
+    /// Returns the effects that round `k` (from 0) added to the model, and those that it removed.
+    pub(crate) fn changes_of_round(&self, k: usize) -> (Vec<&Effect>, Vec<&Effect>) {
+        let before = k.checked_sub(1).map_or(&[][..], |last| self.rounds[last].effects.as_slice());
+        let after = &self.rounds[k].effects;
+        let added = after.iter().filter(|effect| !before.contains(effect)).collect();
+        let removed = before.iter().filter(|effect| !after.contains(effect)).collect();
+        (added, removed)
     }
 }
 
@@ -275,10 +277,12 @@ fn conclude(
 /// Returns the fit with which the loop ends: that of the search, or the declared one if it predicts
 /// left-out poses significantly better.
 ///
-/// A fit of the search with cautions is repeated from the nominal arm, because terms that were
-/// missing at first may have driven a parameter to a wrong optimum. If cautions remain, the fit is
-/// kept only if it predicts significantly better than the declared fit. `of_declared` is the
-/// evidence about the declared fit, if it was evaluated.
+/// A fit of the search that does not describe the arm ([`Identification::describes_arm`]) is
+/// repeated from the nominal arm, because terms that were missing at first may have driven a
+/// parameter to a wrong optimum. If the repeated fit does not describe it either, a converged fit
+/// is kept only if it predicts left-out poses significantly better than the declared fit, and never
+/// if the table was misread. `of_declared` is the evidence about the declared fit, if it was
+/// evaluated.
 fn found_or_declared(
     (declared, of_declared): (&Fitted, Option<&Evidence>),
     (fitted, evidence): (Fitted, Option<Evidence>),

@@ -52,7 +52,7 @@ pub fn of(
     for &k in &indices {
         without.x[k] = 0.0;
     }
-    let partial = poses.errors(&without, &poses.rows());
+    let partial = poses.errors(&without, &poses.row_indices());
     let all_poses = poses.all(1.0);
     let free = arm.model.parameters_at(arm.x.as_slice());
     let term = |&k: &usize| {
@@ -87,7 +87,8 @@ pub fn of(
         .collect();
     let up = (view.up)(largest(&points, &curve));
     let title = effect.describe_in(poses.measurements.time_measured);
-    Some(Cause { title, across: view.across, up, points, curve, reading: view.reading })
+    let (across, reading) = (view.across, view.reading);
+    Some(Cause { title, found: None, across, up, points, curve, reading })
 }
 
 /// Returns the largest finite absolute ordinate of points and curve.

@@ -21,6 +21,9 @@ pub struct Point {
 pub struct Cause {
     /// Description of the effect.
     pub title: String,
+    /// Index (from 0) of the effect among those that the loop found; `None` for structure without a
+    /// known cause.
+    pub found: Option<usize>,
     /// Quantity on the horizontal axis.
     pub across: Quantity,
     /// Quantity on the vertical axis.

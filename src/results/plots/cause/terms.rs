@@ -51,7 +51,8 @@ impl EffectRows<'_> {
         self.terms.iter().map(|(regressor, value)| value * regressor.value(pose)).sum()
     }
 
-    /// Returns the axis label of a regressor: its formula with the unit.
+    /// Returns the axis label of a regressor: its formula with "\[SI\]", or words for a friction
+    /// state.
     pub fn label(regressor: &Regressor) -> String {
         match regressor.as_quantity() {
             Some(LawQuantity::Friction { joint, .. }) => {

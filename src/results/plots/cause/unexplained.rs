@@ -47,5 +47,5 @@ pub fn unexplained(structure: &Unexplained, problem: &Problem, split: &Split) ->
     let site = structure.site?;
     let up = Quantity::error(&site.to_string(), correction.unit);
     let title = format!("{site}: structure without a known cause");
-    Some(Cause { title, across, up, points, curve, reading: COORDINATE_CAPTION })
+    Some(Cause { title, found: None, across, up, points, curve, reading: COORDINATE_CAPTION })
 }
