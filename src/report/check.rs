@@ -33,7 +33,7 @@ fn blocks<'a>(problem: &Problem, check: &Check) -> Vec<Block<'a>> {
     });
     let header = ["parameter", "nominal", "prior ± 1 σ", "± 1 σ", "unit", "identified"];
     let mut notes = vec![
-        "± 1 σ: expected standard error; identified: share of the information that comes from the data; the rest comes from the prior or the start value",
+        "± 1 σ: expected standard error, root mean square over arms drawn from the priors; identified: share of the information that comes from the data; the rest comes from the prior or the start value",
     ];
     if forecast.expected.iter().any(is_confounded_at_nominal) {
         notes.push(
@@ -198,11 +198,11 @@ fn growth_table(check: &Check) -> Table {
 fn recommendation(problem: &Problem, check: &Check) -> String {
     match check.growth.enough {
         Some(enough) if let Some(measured) = poses_to_measure(problem, enough) => format!(
-            "Measure {measured} poses, of which held_out removes {}; more barely help: then all that such poses can identify is identified, and predictions are as accurate as one measured position.",
+            "Measure {measured} poses, of which held_out removes {}: the others identify all that such poses can identify, and predictions are then as accurate as one measured position. More poses still lower the error (table below).",
             measured - enough
         ),
         Some(enough) => format!(
-            "Measure {enough} poses; more barely help: then all that such poses can identify is identified, and predictions are as accurate as one measured position."
+            "Measure {enough} poses: they identify all that such poses can identify, and predictions are then as accurate as one measured position. More poses still lower the error (table below)."
         ),
         None if check.noise.is_none() => {
             "No number of poses is recommended, because nothing measured is a length.".to_owned()

@@ -15,9 +15,10 @@ pub(super) fn at_limits(problem: &Problem, poses: &Measurements, command: &str) 
         })
     };
     let count = (0..poses.len()).filter(is_at_limit).count();
+    let have = if count == 1 { "has" } else { "have" };
     (count > 0).then(|| {
         format!(
-            "{count} of the poses have a joint at its limit. If the controller refuses such commands, declare limits with a margin ({}, \
+            "{count} of the poses {have} a joint at its limit. If the controller refuses such commands, declare limits with a margin ({}, \
              {}) and {command} again.",
             code("min_deg"),
             code("max_deg")

@@ -31,7 +31,30 @@ fn blocks<'a>(problem: &Problem, options: &NextOptions, next: &NextPoses) -> Vec
     );
     let mut blocks = opening(&problem.title, counts).to_vec();
     blocks.push(Block::Text(verdict(options, next)));
-    blocks.push(Block::Text(match next.error {
+    blocks.push(Block::Text(error_paragraph(next, percent)));
+    if !next.effects.is_empty() {
+        let effects = next.effects.iter().map(crate::problem::Effect::describe);
+        blocks.push(Block::Lines(
+            "Effects that the poses distinguish:".to_owned(),
+            effects.collect(),
+        ));
+    }
+    blocks.push(Block::figures([draw_errors(options, next, percent)]));
+    if !next.steps.is_empty() {
+        blocks.push(Block::Table(step_table(options, next, percent)));
+        blocks.extend(at_limits(problem, &next.poses, "choose").map(Block::Text));
+        blocks.push(Block::Page(vec![
+            Block::heading("The chosen poses, in the order of measurement"),
+            Block::Table(command_table(problem, &next.poses)),
+        ]));
+    }
+    blocks
+}
+
+/// States the error in the workspace with its bound, which holds with a probability of `percent` %,
+/// and the misfit that the choice assumes.
+fn error_paragraph(next: &NextPoses, percent: &str) -> String {
+    match next.error {
         Some(error) => format!(
             "In the workspace the identified arm errs by {} ± {} mm (expected rms, noise included), and by less than {} mm with a \
              probability of {percent} %.{} The choice allows for a misfit of the model of {} mm per axis besides {} mm of noise.",
@@ -53,24 +76,7 @@ fn blocks<'a>(problem: &Problem, options: &NextOptions, next: &NextPoses) -> Vec
             mm(next.misfit, 3),
             mm(next.noise, 3),
         ),
-    }));
-    if !next.effects.is_empty() {
-        let effects = next.effects.iter().map(crate::problem::Effect::describe);
-        blocks.push(Block::Lines(
-            "Effects that the poses distinguish:".to_owned(),
-            effects.collect(),
-        ));
     }
-    blocks.push(Block::figures([draw_errors(options, next, percent)]));
-    if !next.steps.is_empty() {
-        blocks.push(Block::Table(steps(options, next, percent)));
-        blocks.extend(at_limits(problem, &next.poses, "choose").map(Block::Text));
-        blocks.push(Block::Page(vec![
-            Block::heading("The chosen poses, in the order of measurement"),
-            Block::Table(commands(problem, &next.poses)),
-        ]));
-    }
-    blocks
 }
 
 /// Draws the error in the workspace against the number of chosen poses; `None` if the error is
@@ -110,7 +116,7 @@ fn draw_errors(options: &NextOptions, next: &NextPoses, percent: &str) -> Option
 }
 
 /// Returns the table of the joint commands of chosen poses.
-pub(super) fn commands(problem: &Problem, poses: &Measurements) -> Table {
+pub(super) fn command_table(problem: &Problem, poses: &Measurements) -> Table {
     let joints = commanded_joints(problem);
     let rows = (0..poses.len()).map(|pose| {
         let q = poses.configuration(pose);
@@ -169,7 +175,7 @@ fn verdict(options: &NextOptions, next: &NextPoses) -> String {
 
 /// Returns the table of the chosen poses with the error expected after each. `percent` is the level
 /// of the bound.
-fn steps(options: &NextOptions, next: &NextPoses, percent: &str) -> Table {
+fn step_table(options: &NextOptions, next: &NextPoses, percent: &str) -> Table {
     let rows = next.steps.iter().enumerate().map(|(k, step)| {
         vec![
             (k + 1).to_string(),

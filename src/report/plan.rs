@@ -5,7 +5,7 @@ use super::document::{Block, Table, opening};
 use super::figures::{ACCENT, Drawing, Forest};
 use super::forecast::{assumptions, cells};
 use super::limited_poses::at_limits;
-use super::next::commands;
+use super::next::command_table;
 use super::parameters::{conditioning, rows_of_sheet, unidentifiable};
 use super::render::{page, text};
 use super::separation;
@@ -81,7 +81,7 @@ fn blocks<'a>(
     });
     let header = ["parameter", "nominal", "prior ± 1 σ", "random", "planned", "gain", "unit"];
     let note = format!(
-        "planned: expected standard error (1 σ); random: the same after random poses, median of {} draws; gain: random / planned",
+        "planned: expected standard error (1 σ) of the nominal arm (that of flexcal check is a root mean square over arms drawn from the priors); random: the same after random poses, median of {} draws; gain: random / planned",
         plan.random.len()
     );
     let meaningful = plan.meaningful();
@@ -119,7 +119,7 @@ fn blocks<'a>(
     blocks.extend(separated.map(separation::blocks).unwrap_or_default());
     blocks.push(Block::Page(vec![
         Block::heading("The planned poses"),
-        Block::Table(commands(problem, &plan.poses)),
+        Block::Table(command_table(problem, &plan.poses)),
     ]));
     blocks
 }
