@@ -2,6 +2,7 @@
 
 use nalgebra::DVector;
 
+use super::evidence::{NOISE_RATIOS, OTHER_RATIOS};
 use super::rows::SensitiveRows;
 use crate::model::Model;
 use crate::model::parameter::{BeamField, JointField, Parameter, ParameterSite};
@@ -79,6 +80,16 @@ impl CauseKind {
         (Self::Fixture, 0.01),
         (Self::Other, 0.01),
     ];
+
+    /// Returns the largest ratio of the errors to the assumed noise that is tried for the cause;
+    /// `None` for a cause without such a ratio.
+    pub(crate) fn largest_ratio(self) -> Option<f64> {
+        match self {
+            Self::Noise => NOISE_RATIOS.last().copied(),
+            Self::Other => OTHER_RATIOS.last().copied(),
+            _ => None,
+        }
+    }
 }
 
 /// Possible cause of a change.
@@ -291,7 +302,10 @@ impl Extended {
             trial_sigmas: Vec::new(),
             ln_weight: 0.0,
         };
-        causes.push(none(CauseKind::Noise, "noise of the measurement"));
+        causes.push(none(
+            CauseKind::Noise,
+            "larger errors without a pattern (noise, or several changes at once)",
+        ));
         causes.push(none(CauseKind::Row, "one gross row"));
         causes.push(none(CauseKind::Other, "something else"));
         set_prior_probabilities(&mut causes, warmth);

@@ -135,7 +135,10 @@ fn verdict(watch: &Watch) -> String {
 }
 
 fn row(cause: &WatchedCause, in_unit: &impl Fn(f64) -> String) -> Vec<String> {
-    let changes: Vec<String> = cause.changes.iter().map(change).collect();
+    let largest = cause.kind.largest_ratio().zip(cause.changes.last());
+    let is_at_end = largest.is_some_and(|(largest, last)| last.change >= largest);
+    let changes: Vec<String> =
+        cause.changes.iter().map(|changed| change(changed, is_at_end)).collect();
     vec![
         cause.label.clone(),
         format!("{:.3}", cause.probability),
@@ -146,8 +149,9 @@ fn row(cause: &WatchedCause, in_unit: &impl Fn(f64) -> String) -> Vec<String> {
 }
 
 /// Formats a change with its standard error; the name is the part of the parameter's name after the
-/// last dot.
-fn change(change: &Change) -> String {
+/// last dot. A ratio of the noise has no standard error: it is the best of some trial values, the
+/// largest one if `is_largest`.
+fn change(change: &Change, is_largest: bool) -> String {
     let (factor, symbol) = if change.unit.is_relative() {
         (100.0, "%".to_owned())
     } else {
@@ -156,7 +160,12 @@ fn change(change: &Change) -> String {
     };
     let name = change.parameter.rsplit('.').next().unwrap_or_default();
     if !change.std_error.is_finite() {
-        return format!("{name} {}", number(change.change, 1));
+        let ratio = number(change.change, 1);
+        return if is_largest {
+            format!("{name} {ratio} or more")
+        } else {
+            format!("{name} about {ratio}")
+        };
     }
     let digits = decimals(change.std_error * factor, MAX_DECIMALS);
     let show = |value: f64| number(value * factor, digits);
