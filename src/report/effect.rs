@@ -124,6 +124,25 @@ fn describe_places(members: &[Effect]) -> String {
     )
 }
 
+/// Describes effects of one family by which joints move each joint: "joint 6 by joints 1, 2".
+fn describe_couplings(members: &[Effect]) -> String {
+    let mut drivers: Vec<(usize, Vec<usize>)> = Vec::new();
+    for (joint, from) in
+        members.iter().filter_map(|effect| Some((effect.joint()?, effect.other_joint()?)))
+    {
+        match drivers.iter_mut().find(|(of, _)| *of == joint) {
+            Some((_, others)) => others.push(from),
+            None => drivers.push((joint, vec![from])),
+        }
+    }
+    let places = drivers.iter().map(|(joint, others)| {
+        let plural = if others.len() > 1 { "s" } else { "" };
+        let others: Vec<String> = others.iter().map(usize::to_string).collect();
+        format!("joint {joint} by joint{plural} {}", others.join(", "))
+    });
+    format!("{} of {}", code(members[0].name()), places.collect::<Vec<_>>().join(" and "))
+}
+
 /// Describes effects of one family: name, places, and orders or numbers of trial values.
 fn describe_group(members: &[Effect]) -> String {
     let name = members[0].name();
@@ -132,6 +151,7 @@ fn describe_group(members: &[Effect]) -> String {
             return format!("{} at {} times", code(name), members.len());
         }
         (_, 2..) if members[0].has_memory() => return describe_places(members),
+        _ if members[0].other_joint().is_some() => return describe_couplings(members),
         (Some((ArgumentKind::Duration, _)), 2..) => {
             return format!("{} of {} time constants", code(name), members.len());
         }
@@ -140,10 +160,6 @@ fn describe_group(members: &[Effect]) -> String {
     let place = |effect: &Effect| match (effect.searched_value(), effect.joint()) {
         (Some((ArgumentKind::Order, order)), Some(joint)) => format!("{joint} (order {order})"),
         (Some((_, seconds)), None) if effect.link().is_none() => format!("{seconds} s"),
-        (_, Some(joint)) => match effect.other_joint() {
-            Some(from) => format!("{joint} by {from}"),
-            None => effect.place(),
-        },
         _ => effect.place(),
     };
     let places = members.iter().map(place).collect::<Vec<_>>().join(", ");
@@ -213,7 +229,7 @@ mod tests {
         let expected = [
             format!("{} of joints 1, 2, orders 1–60", code("joint-harmonic")),
             format!("{} of joint 3", code("backlash")),
-            format!("{} of joint 2 by 1", code("joint-coupling")),
+            format!("{} of joint 2 by joint 1", code("joint-coupling")),
         ];
         assert_eq!(words, expected);
         assert_eq!(ranges(&[1, 3, 4, 5, 6, 8, 9, 11, 12, 13]), "1, 3–6, 8, 9, 11–13");

@@ -45,8 +45,8 @@ pub fn init_text(
         "\nWritten to {written}. Fill in there\n  \
          target_m           where the measured point sits in the frame of {tip}, roughly; now its origin\n  \
          position_sigma_mm  1 σ of a coordinate that your instrument measures; now {SIGMA_MM}\n  \
-         held_out           now {} % of the poses are held out to judge the fit; plan counts the other poses alone, check says\n  \
-                            which it counts\n\
+         held_out           now {} % of the poses are held out to judge the fit; plan counts only those that are fitted,\n  \
+                            check says how many to measure\n\
          and put measurements.csv beside it (its columns stand there, too). A URDF declares no elastic links. To look for elastic\n\
          effects of a link, declare it in [joint.beam]. To look for effects of temperature, give reference_temperature_C and a column\n\
          temperature_C.\n\

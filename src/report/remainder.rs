@@ -22,6 +22,11 @@ pub fn remainder_text(found: &Identification, outcome: &Outcome) -> String {
             None => "No remainder: too few configurations to fit one.".to_owned(),
         };
     };
+    let predicts = if gain.error.ratio() > 0.0 {
+        "does not clearly predict left-out configurations better"
+    } else {
+        "predicts left-out configurations no better"
+    };
     let [without, with] = [gain.without, gain.with].map(|error| number(error * 1e3, 4));
     match after {
         Some(after) => format!(
@@ -30,7 +35,7 @@ pub fn remainder_text(found: &Identification, outcome: &Outcome) -> String {
             counted(outcome.joints, "joint"),
         ),
         None => format!(
-            "No remainder (smooth correction) is kept, because it does not clearly predict left-out configurations better: mean error \
+            "No remainder (smooth correction) is kept, because it {predicts}: mean error \
              {without} mm without it, {with} mm with it, a gain of {} standard errors (more than {} are needed); the log \
              predictive density changes by {} per row, {} standard errors (more than {} are needed), \
              the log likelihood by {} (more than {} is needed).",
@@ -79,6 +84,9 @@ pub(super) fn uncertainty<'a>(found: &Identification, plots: &'a PlotData) -> Ve
     blocks
 }
 
+/// Smallest share of the workspace far from all measured poses that the summaries state \[%\].
+const MIN_SAID_FAR_PERCENT: f64 = 1.0;
+
 /// Accuracy of predictions that the summaries of `identify` and `loop` state.
 #[derive(Debug, Clone)]
 pub struct PredictionAccuracy {
@@ -98,9 +106,16 @@ impl PredictionAccuracy {
         let bounds = &uncertainty.bounds;
         let mean = bounds.iter().map(|at| at.bound).sum::<f64>() / bounds.len() as f64;
         let percent = percent_of(uncertainty.level);
+        let far = bounds.iter().filter(|at| at.is_extrapolated).count() as f64;
+        let far = 100.0 * far / bounds.len() as f64;
+        let far = if far < MIN_SAID_FAR_PERCENT {
+            String::new()
+        } else {
+            format!(", of which {} % is far from all measured poses", number(far, 0))
+        };
         let bound = mean.is_finite().then(|| {
             format!(
-                "Error bound of a prediction{with} ({percent} %, measurement noise included): {} mm, mean over the workspace.",
+                "Error bound of a prediction{with} ({percent} %, measurement noise included): {} mm, mean over the workspace{far}.",
                 two_digits(mean * 1e3, 4)
             )
         });

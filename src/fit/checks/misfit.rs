@@ -81,26 +81,27 @@ fn misfit_finding(kind: &RowKind, rms: f64) -> Option<Finding> {
         return None;
     }
     let kind = observation.kind();
-    let (text, remedy) = if rms.is_finite() {
-        let (what, by, part) =
-            (quantity_noun(kind), format_error(kind, rms, 1), 100.0 * rms / spread);
-        (
-            format!("the fitted arm misses the {what} by {by}, {part:.0} % of their spread"),
-            if rms > MIN_OTHER_ARM_MISS * spread {
-                format!(
-                    "check units, signs of joints, {}, and whether the table is one of this arm",
-                    suspects(kind)
-                )
-            } else {
-                format!("check units, signs of joints, and {}", suspects(kind))
-            },
-        )
-    } else {
-        let text = "the fitted arm misses the measurements by more than can be computed";
-        (text.to_owned(), "check their units".to_owned())
-    };
     let numbers = [kind.into(), rms.into(), spread.into()];
-    Some(Finding::new(FindingCode::MissesMeasurements, numbers, text).with_remedy(remedy))
+    let finding = |text: String, remedy: String| {
+        Some(Finding::new(FindingCode::MissesMeasurements, numbers, text).with_remedy(remedy))
+    };
+    if !rms.is_finite() {
+        let text = "the fitted arm misses the measurements by more than can be computed";
+        return finding(text.to_owned(), "check their units".to_owned());
+    }
+    let (what, by, part) = (quantity_noun(kind), format_error(kind, rms, 1), 100.0 * rms / spread);
+    let text = format!("the fitted arm misses the {what} by {by}, {part:.0} % of their spread");
+    let suspects = suspects(kind);
+    finding(
+        text,
+        if rms > MIN_OTHER_ARM_MISS * spread {
+            format!(
+                "check units, signs of joints, {suspects}, and whether the table is one of this arm"
+            )
+        } else {
+            format!("check units, signs of joints, and {suspects}")
+        },
+    )
 }
 
 /// Returns the finding that a fit predicts rows other than positions no better than the nominal
@@ -130,13 +131,16 @@ fn no_better_finding(kind: &RowKind, before: f64, after: f64) -> Option<Finding>
 /// nominal arm predicts. `None` if the two are alike.
 fn other_size_finding(measured: f64, expected: f64) -> Option<Finding> {
     let is_same = (expected / MAX_SIZE_RATIO..=expected * MAX_SIZE_RATIO).contains(&measured);
+    if expected <= MIN_SPREAD || is_same {
+        return None;
+    }
     let text = format!(
-        "the measured points lie {:.1} mm from their centre, those of the nominal arm {:.1} mm",
+        "the measured points lie {:.1} mm (rms) from their centre, those of the nominal arm {:.1} mm",
         measured * 1e3,
         expected * 1e3
     );
     let numbers = [measured.into(), expected.into()];
-    (expected > MIN_SPREAD && !is_same).then(|| Finding::new(FindingCode::OtherSize, numbers, text))
+    Some(Finding::new(FindingCode::OtherSize, numbers, text))
 }
 
 #[cfg(test)]
