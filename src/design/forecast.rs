@@ -26,7 +26,7 @@ pub struct ExpectedParameter {
     /// Standard deviation of the prior at the nominal value, SI; `None` without a prior.
     pub prior: Option<f64>,
     /// Expected standard error of the estimate, SI (for a logarithm times the nominal value);
-    /// `None` if the data will not inform on the parameter.
+    /// `None` if the data will not determine the parameter at all.
     pub std_error: Option<f64>,
     /// Expected identified share: part of the value that the data will determine, 0…1.
     pub identified: f64,

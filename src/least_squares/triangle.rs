@@ -21,8 +21,8 @@ const MIN_BLOCKED_COLUMNS: usize = 128;
 
 /// Running triangular factor of all rows absorbed so far.
 ///
-/// \[R c; 0 d\] = Qᵀ \[J r\], so ‖J p + r‖² = ‖R p + c‖² + ‖d‖²          [Golub & Van Loan 2013,
-/// §5.2 and §6.5.3]
+/// \[R c; 0 d\] = Qᵀ \[J r\], so ‖J p + r‖² = ‖R p + c‖² + ‖d‖²
+/// [Golub & Van Loan 2013, §5.2 and §6.5.3]
 ///
 /// A block of rows is absorbed by n reflectors; R being triangular, reflector k touches only row k
 /// of R and the rows of the block. Work: 2 n² per row, memory: n². No m × n matrix is ever kept.
@@ -312,8 +312,7 @@ impl Triangle {
 
 /// Computes the Householder reflector that maps (α, v) to (β, 0) and returns (β, τ).
 ///
-/// β = −sign(α) ‖(α, v)‖, τ = (β − α)/β, u = (1, v/(α − β))          [Golub & Van Loan 2013, alg.
-/// 5.1.1]
+/// β = −sign(α) ‖(α, v)‖, τ = (β − α)/β, u = (1, v/(α − β)) [Golub & Van Loan 2013, alg. 5.1.1]
 ///
 /// `vector` becomes the part of u below its leading 1. For v = 0 it stays unchanged and τ = 0.
 pub(super) fn reflector(alpha: f64, vector: &mut [f64]) -> (f64, f64) {

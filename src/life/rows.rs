@@ -147,8 +147,9 @@ impl SensitiveRows {
         (masked, (before..before + added).collect())
     }
 
-    /// Returns the sum of the squared misfits of all residuals, in units of their noise.
-    pub fn misfit_squares(&self) -> f64 {
+    /// Returns the sum over all residuals of the variance of the shared misfit, in units of the
+    /// noise variance; 0 without a misfit.
+    pub fn sum_of_misfit_variances(&self) -> f64 {
         self.misfit.as_ref().map_or(0.0, |misfit| misfit.sigma.norm_squared())
     }
 }

@@ -272,7 +272,7 @@ impl TestedRows<'_> {
         let every_row: Vec<usize> = (0..kept.len()).collect();
         let warmth = warmth(problem, kept, &every_row);
         let causes = extended.causes(problem, &mut rows, warmth.as_deref());
-        let warmed = warmth.as_ref().map(|_| (&*causes, rows.misfit_squares()));
+        let warmed = warmth.as_ref().map(|_| (&*causes, rows.sum_of_misfit_variances()));
         let factor = factor(&covariance(&extended, earlier, &rows, warmed));
         Linearised { extended, rows, causes, factor }
     }

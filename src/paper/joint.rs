@@ -9,7 +9,7 @@ use super::loads::JointLoads;
 /// Returns the torsion angle Δφ \[rad\] of joint `k` (counted from 0) with flexibility l/(`GI_p`) =
 /// 1/stiffness [rad/(N·m)].
 ///
-/// Δφ = `M_V` l/(`GI_p`) − `M_F` l/(`GI_p`)          [Chen2021, eq. 8-10]
+/// Δφ = `M_V` l/(`GI_p`) − `M_F` l/(`GI_p`) [Chen2021, eq. 8-10]
 ///
 /// The moments `M_V` and `M_F` about the joint axis come from weights and hoists; `loads.hoists`
 /// is −`M_F`. Joint 1 rotates about the vertical, so that its moments and Δφ are 0 (eq. 11).

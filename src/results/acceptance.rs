@@ -83,7 +83,8 @@ pub struct CoveredBound {
 /// Test of a tolerance on the accuracy AP of the identified arm in the held-out poses.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct TestedTolerance {
-    /// `pass`, `fail`, or `undecided` if the poses are too few or no test of the arm.
+    /// `pass`, `fail`, or `undecided` if the poses are too few, or if a base or tool was fitted to
+    /// the held-out rows, which then do not test the arm.
     pub verdict: &'static str,
     pub tolerance_mm: f64,
     /// Share of the poses that must be within the tolerance.

@@ -68,13 +68,13 @@ impl Size {
     }
 }
 
-/// Computes the smallest size at which a scan of the catalogue would find each effect, if `poses`
-/// were measured.
+/// Computes the smallest size at which a scan of the catalogue would find each effect with the
+/// probability [`Detection::power`], if `poses` were measured.
 ///
 /// The computation is linear about the nominal arm. Let C be the columns of an effect's parameters
 /// p, with the free parameters projected out as a fit with priors does. An effect of size p has the
 /// noncentrality λ = pᵀ CᵀC p. It is found if F on k and ν − k degrees of freedom is significant at
-/// level / tries. Planned poses without times are assumed to be a minute apart; rows already
+/// level / (tries × families). Planned poses without times are assumed to be a minute apart; rows already
 /// measured without times keep their row numbers as times.
 ///
 /// # Errors

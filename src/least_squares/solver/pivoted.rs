@@ -44,8 +44,7 @@ impl Pivoted {
             return None;
         }
         let (unit, mut inverse_norms) = with_unit_columns(matrix);
-        if tolerance <= MIN_UNPIVOTED_RATIO && regular_inverse(&unit, MIN_UNPIVOTED_RATIO).is_some()
-        {
+        if is_regular_triangle(&unit, tolerance) {
             let (projected, permutation) =
                 (constant.clone(), PermutationSequence::<Dyn>::identity_generic(Dyn(n)));
             let solution = solve(&unit, &projected, &inverse_norms)?;
@@ -85,11 +84,12 @@ impl Pivoted {
         self.unpermuted(self.solution.clone())
     }
 
-    /// Returns the minimiser with ‖q‖ ≤ Δ, to within 10 %, and its damping λ ≥ 0, or `None` if
-    /// Newton's method does not converge in [`MAX_SECULAR_STEPS`].
+    /// Returns the minimiser with ‖q‖ ≤ Δ, to within [`MAX_RADIUS_DEVIATION`], and its damping
+    /// λ ≥ 0, or `None` if Newton's method does not converge in [`MAX_SECULAR_STEPS`].
     ///
-    /// λ ← λ + (‖q‖ − Δ) / (Δ ‖w‖²), `Rᵀw` = S⁻¹ q/‖q‖, with R of the damped problem          [Moré
-    /// 1978, eqs. 5.8 and 5.9]
+    /// λ ← λ + (‖q‖ − Δ) / (Δ ‖w‖²), `Rᵀw` = S⁻¹ q/‖q‖, with R of the damped problem
+    ///
+    /// \[Moré 1978, eqs. 5.8 and 5.9\]
     pub(super) fn limited(&self, radius: f64) -> Option<(DVector<f64>, f64)> {
         let mut lambda = 0.0;
         let mut q = self.solution.clone();
@@ -104,11 +104,7 @@ impl Pivoted {
                 return None;
             }
             lambda += (length - radius) / radius / w.norm_squared();
-            let damped = Triangle::damped(
-                &self.triangle,
-                &self.projected,
-                &(&self.inverse_norms * lambda.sqrt()),
-            );
+            let damped = self.damped(lambda);
             q = solve(&damped.triangle, &damped.projected, &self.inverse_norms)?;
             triangle = damped.triangle;
         }
@@ -120,20 +116,19 @@ impl Pivoted {
         let mut q = gradient.clone();
         self.permutation.permute_rows(&mut q);
         q.component_mul_assign(&self.inverse_norms);
-        let damped = (lambda > 0.0).then(|| {
-            Triangle::damped(
-                &self.triangle,
-                &self.projected,
-                &(&self.inverse_norms * lambda.sqrt()),
-            )
-            .triangle
-        });
+        let damped = (lambda > 0.0).then(|| self.damped(lambda).triangle);
         let triangle = damped.as_ref().unwrap_or(&self.triangle);
         let is_solved = triangle.tr_solve_upper_triangular_mut(&mut q)
             && triangle.solve_upper_triangular_mut(&mut q);
         q.component_mul_assign(&self.inverse_norms);
         let response = self.unpermuted(-q);
         (is_solved && response.iter().all(|value| value.is_finite())).then_some(response)
+    }
+
+    /// Returns the triangular factor of the problem with the damping λ.
+    fn damped(&self, lambda: f64) -> Triangle {
+        let damping = &self.inverse_norms * lambda.sqrt();
+        Triangle::damped(&self.triangle, &self.projected, &damping)
     }
 
     /// Returns q in the order of the columns of B.
@@ -147,8 +142,13 @@ impl Pivoted {
 /// triangular factor of any subset of its columns is then well conditioned, too, with or without
 /// damping.
 pub(super) fn is_well_conditioned(matrix: &DMatrix<f64>, tolerance: f64) -> bool {
-    tolerance <= MIN_UNPIVOTED_RATIO
-        && regular_inverse(&with_unit_columns(matrix).0, MIN_UNPIVOTED_RATIO).is_some()
+    is_regular_triangle(&with_unit_columns(matrix).0, tolerance)
+}
+
+/// Returns true if a matrix with unit columns is an upper triangle that is used without pivoting;
+/// `tolerance` is that of the decomposition.
+fn is_regular_triangle(unit: &DMatrix<f64>, tolerance: f64) -> bool {
+    tolerance <= MIN_UNPIVOTED_RATIO && regular_inverse(unit, MIN_UNPIVOTED_RATIO).is_some()
 }
 
 /// Returns B S⁻¹ and 1/S, with S the column norms of B.

@@ -44,7 +44,7 @@ const GRAM_ROWS: usize = 48;
 /// Cauchy in ln f, with half-width `ln_half_width`.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Noise {
-    /// Degrees of freedom ν.
+    /// Degrees of freedom ν of the residual.
     pub freedom: f64,
     /// Half-width of the Cauchy prior on ln f.
     pub ln_half_width: f64,

@@ -225,8 +225,8 @@ impl<'a> Linearised<'a> {
         (Arc::unwrap_or_clone(fitted), Arc::unwrap_or_clone(residual))
     }
 
-    /// Returns the prior σ of the relaxed parameters, in the order of their columns; `None` for a
-    /// parameter without a prior.
+    /// Returns the prior σ of the relaxed parameters (differences of two stiffnesses that the
+    /// problem declares equal), in the order of their columns; `None` for one without a prior.
     pub fn relaxed(&self) -> &[Option<f64>] {
         &self.derivatives.relaxed
     }
