@@ -4,15 +4,18 @@ use std::error::Error;
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use flexcal::design::{self, Candidates, Explanations, NextOptions, Purpose, StopReason};
+use flexcal::design::{
+    self, Candidates, Explanations, NextOptions, NextPoses, Purpose, StopReason,
+};
 use flexcal::fit::Options;
 use flexcal::measurement::Measurements;
-use flexcal::problem::PoseRanges;
+use flexcal::problem::{PoseRanges, Problem};
 use flexcal::report::{self, shell_word};
 use flexcal::results::{Document as _, NextResult, poses_csv};
 
 use super::input::{Common, Input};
 use super::outcome::Outcome;
+use super::output::Results;
 use super::poses::{Source, parse_count};
 use super::progress::Line;
 use super::region::Region;
@@ -137,7 +140,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let workspace = arguments.region.workspace()?;
     super::tolerance::warn_if_tiny(arguments.tolerance_mm, common.quiet);
     let stop = interrupt::stop();
-    let choose = |fit: Options| {
+    let (next, options) = Line::during(common.prints_text(), stop.clone(), |sink| {
         let options = NextOptions {
             poses: arguments.poses as usize,
             purpose: arguments.purpose.into(),
@@ -147,12 +150,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
             workspace: workspace.as_ref(),
             explanations: explanations.as_ref(),
             remainder: arguments.remainder,
-            fit,
+            fit: Options::default().with_stop(stop).with_progress(sink),
         };
         design::next(&problem, &data, &candidates, &options).map(|next| (next, options))
-    };
-    let (next, options) = Line::during(common.prints_text(), stop.clone(), |sink| {
-        choose(Options::default().with_stop(stop).with_progress(sink))
     })?;
     if let Some(words) = measured_already(&data.measurements, &next.poses)
         .filter(|_| !source.candidates.is_empty() && !common.quiet)
@@ -170,37 +170,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     results.write(&texts)?;
     common.print_result(&json, || {
         let text = report::next_text(&problem, &options, &next);
-        let (named, written) = (common.problem_arguments(), results.written());
-        // More poses cannot correct a model that lacks an effect.
-        let lacks = if next.error.is_some() && next.misfit > next.noise {
-            format!("flexcal loop {named} looks for what the model lacks, because the misfit exceeds the noise; or ")
-        } else {
-            String::new()
-        };
-        if next.poses.is_empty() {
-            return format!("{text}{written}Next: {lacks}flexcal identify {named} writes the estimate to apply\n");
-        }
-        let (file, named) = (results.path("next.csv"), shell_word(common.problem()));
-        let files: Vec<String> =
-            common.files(&problem).iter().map(|file| shell_word(file)).collect();
-        if problem.data.joint_log.is_some() {
-            return format!(
-                "{text}{written}Next: {lacks}measure these poses, append them to the measurements and to the joint table of \
-                 {named}, then\nflexcal next {}\n",
-                common.problem_arguments()
-            );
-        }
-        let measure = if next.is_of_cameras {
-            "take an image in each of these poses, write a row for each point that is found, then"
-        } else {
-            "measure these poses, add the columns x_mm, y_mm, z_mm, then"
-        };
-        format!(
-            "{text}{written}Next: {lacks}{measure}\n\
-             flexcal next {named} --data {1} {0}\n",
-            shell_word(&file),
-            files.join(" "),
-        )
+        let step = next_step(common, &problem, &next, &results);
+        format!("{text}{}Next: {step}\n", results.written())
     })?;
     if !next.found.is_trusted() {
         diagnostic::warn(
@@ -214,4 +185,38 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     } else {
         Outcome::Done
     })
+}
+
+/// States what to do after the choice of poses, with the commands.
+fn next_step(common: &Common, problem: &Problem, next: &NextPoses, results: &Results) -> String {
+    let arguments = common.problem_arguments();
+    // More poses cannot correct a model that lacks an effect.
+    let lacks = if next.error.is_some() && next.misfit > next.noise {
+        format!(
+            "flexcal loop {arguments} looks for what the model lacks, because the misfit exceeds the noise; or "
+        )
+    } else {
+        String::new()
+    };
+    if next.poses.is_empty() {
+        return format!("{lacks}flexcal identify {arguments} writes the estimate to apply");
+    }
+    let file = shell_word(common.problem());
+    if problem.data.joint_log.is_some() {
+        return format!(
+            "{lacks}measure these poses, append them to the measurements and to the joint table of {file}, then\n\
+             flexcal next {arguments}"
+        );
+    }
+    let measure = if next.is_of_cameras {
+        "take an image in each of these poses, write a row for each point that is found, then"
+    } else {
+        "measure these poses, add the columns x_mm, y_mm, z_mm, then"
+    };
+    let measured: Vec<String> = common.files(problem).iter().map(|file| shell_word(file)).collect();
+    format!(
+        "{lacks}{measure}\nflexcal next {file} --data {} {}",
+        measured.join(" "),
+        shell_word(&results.path("next.csv")),
+    )
 }

@@ -88,18 +88,21 @@ impl<'a> Patches<'a> {
             joint.origin.written
         };
         let origin = &joint.origin;
+        // Attributes that the joint does not have yet.
         let mut more = String::new();
-        let mut set = |name: &str, values: &Vector3<f64>, at: &Option<Range<usize>>| match at {
-            Some(at) => self.text.push((at.clone(), triple(values))),
-            None => _ = write!(more, " {name}=\"{}\"", triple(values)),
+        let mut patch = |name: &str, value: String, at: Option<&Range<usize>>| match at {
+            Some(at) => self.text.push((at.clone(), value)),
+            // Writing to a String cannot fail.
+            None => _ = write!(more, " {name}=\"{value}\""),
         };
         if shifted {
-            set("xyz", &xyz, &origin.xyz_value);
+            patch("xyz", triple(&xyz), origin.xyz_value.as_ref());
         }
-        match &origin.quaternion_value {
-            None if turned => set("rpy", &rpy, &origin.rpy_value),
-            Some(at) if turned => self.text.push((at.clone(), quaternion(&rpy))),
-            _ => {}
+        if turned {
+            match &origin.quaternion_value {
+                Some(at) => patch("", quaternion(&rpy), Some(at)),
+                None => patch("rpy", triple(&rpy), origin.rpy_value.as_ref()),
+            }
         }
         if !more.is_empty() {
             let (at, more) = match &origin.element {
@@ -138,7 +141,12 @@ impl<'a> Patches<'a> {
         let xml = Xml::parse(source).ok();
         let end = xml.map_or(source.len(), |xml| xml.root_element().range().end);
         let at = source.get(..end).and_then(|text| text.rfind("</")).unwrap_or(end);
-        let escaped = |name: &str| name.replace('&', "&amp;").replace('<', "&lt;");
+        let escapes = [("&", "&amp;"), ("<", "&lt;"), ("\"", "&quot;")];
+        let escaped = |name: &str| {
+            escapes
+                .iter()
+                .fold(name.to_owned(), |text, (letter, escape)| text.replace(letter, escape))
+        };
         let (link, parent) = (escaped(link), escaped(parent));
         let (xyz, rpy) = (triple(&origin.origin), triple(&origin.roll_pitch_yaw()));
         let text = format!(
