@@ -13,10 +13,10 @@ use flexcal::results::{Document as _, LoopResult, PlotData, REMAINDER_FILE, resi
 use flexcal::select::{self, ClosedLoop};
 
 use super::input::Common;
+use super::loop_record::LoopRecord;
 use super::outcome::Outcome;
 use super::output::REPORT;
 use super::progress::Line;
-use super::unfinished::Unfinished;
 use super::{advice, diagnostic, interrupt};
 
 /// Arguments of `flexcal loop`.
@@ -51,17 +51,17 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     common.warn_if_nothing_is_free(&problem);
     common.warn_of_orientation(&problem, &mut data);
     let stop = interrupt::stop();
-    let unfinished = Unfinished::new(&text, &problem, common.files(&problem), &results);
+    let record = LoopRecord::new(&text, &problem, common.files(&problem), &results);
     let options = Options::default().with_influential_rows().with_stop(stop.clone());
     let close = |sink: Option<ProgressSink>| {
-        let sink = unfinished.recording_sink(sink);
+        let sink = record.recording_sink(sink);
         select::close(&problem, &data, &options.with_progress(sink))
     };
-    let at_deadline = unfinished.clone();
+    let at_deadline = record.clone();
     interrupt::at_deadline(move || at_deadline.write());
     let closure = Line::during(common.prints_text(), stop, close)?;
-    let results = if closure.interrupted { unfinished.beside_finished()? } else { results };
-    let [files, joint_files] = unfinished.files_relative_to(&results.folder)?;
+    let results = if closure.interrupted { record.beside_finished()? } else { results };
+    let [files, joint_files] = record.files_relative_to(&results.folder)?;
     let mut shown = PlotData::of_loop(&problem, &data, &closure)?;
     let closed = report::closed_problem(&text, &problem, &closure, [&files, &joint_files])?;
     let fitted = fit_remainder(&problem, &closed, &closure, &data)?;

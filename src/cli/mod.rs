@@ -20,6 +20,7 @@ mod init;
 mod input;
 mod interrupt;
 mod loop_command;
+mod loop_record;
 mod man;
 mod misplaced;
 mod mistaken;
@@ -37,7 +38,6 @@ mod study;
 mod threads;
 mod tolerance;
 mod trace;
-mod unfinished;
 mod watch;
 
 use std::ffi::OsString;

@@ -88,7 +88,7 @@ impl Misfit {
 
     /// Returns `sensitivity` of the poses of `table` with a row for every weight below those of the
     /// parameters. The new rows are in units of σ, or of `unit` \[m\] if given.
-    pub fn extend(
+    pub fn with_misfit_rows(
         &self,
         site: &Site,
         table: &Measurements,

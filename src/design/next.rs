@@ -241,7 +241,7 @@ pub fn next(
     };
     check_size(poses, (pool.len(), sensitivity.coordinates), unknowns.sigmas.len())?;
     let extended = |rows: &Measurements, of: Sensitivity, unit| match &misfit {
-        Some(misfit) => misfit.extend(&site, rows, &of, unit),
+        Some(misfit) => misfit.with_misfit_rows(&site, rows, &of, unit),
         None => of,
     };
     let (given_rows, given) = site.in_equilibrium(&measured);

@@ -330,16 +330,14 @@ struct WorkspaceGoal {
 }
 
 impl WorkspaceGoal {
-    /// Takes at most [`MAX_WORKSPACE_POSES`] of the first `count` poses of a table as the
-    /// workspace.
+    /// Takes up to [`MAX_WORKSPACE_POSES`] of the first `count` poses of a table as workspace.
     fn new(site: &Site, table: &Measurements, count: usize, seed: u64) -> Self {
         let step = count.div_ceil(MAX_WORKSPACE_POSES).max(1);
         let workspace = table.select(&(0..count).step_by(step).collect::<Vec<_>>());
-        let sigmas = site.sigmas(&workspace, None);
-        let noise = median(sigmas).unwrap_or(0.0);
+        let noise = median(site.sigmas(&workspace, None)).unwrap_or(0.0);
         let misfit = Misfit::new(site, &workspace, noise, seed);
         let sensitivity = site.sensitivity(&workspace, Some(1.0));
-        let sensitivity = misfit.extend(site, &workspace, &sensitivity, Some(1.0));
+        let sensitivity = misfit.with_misfit_rows(site, &workspace, &sensitivity, Some(1.0));
         Self { misfit, mean_square: mean_square(&sensitivity) }
     }
 
@@ -352,10 +350,11 @@ impl WorkspaceGoal {
         given: Option<(&Measurements, &Sensitivity)>,
         poses: usize,
     ) -> Option<Exchange> {
-        let given = given.map(|(table, given)| self.misfit.extend(site, table, given, None));
+        let given =
+            given.map(|(table, given)| self.misfit.with_misfit_rows(site, table, given, None));
         Exchange::of(
             &Unknowns::of(&site.model.parameters).and_standard(self.misfit.weights()),
-            &self.misfit.extend(site, table, sensitivity, None),
+            &self.misfit.with_misfit_rows(site, table, sensitivity, None),
             given.as_ref(),
             poses,
             (&Criterion::I, Some(&self.mean_square)),
@@ -438,8 +437,9 @@ impl Selection {
                 (0..varied.len()).filter(|&k| is_present(k) || is_usable(k)).collect();
             let present = (0..kept.len()).filter(|&k| is_present(kept[k])).collect();
             let sensitivity = sensitivity.select(&kept);
-            let extended = goal
-                .map(|goal| goal.misfit.extend(site, &varied.select(&kept), &sensitivity, None));
+            let extended = goal.map(|goal| {
+                goal.misfit.with_misfit_rows(site, &varied.select(&kept), &sensitivity, None)
+            });
             let result = exchange
                 .with_candidates(extended.as_ref().unwrap_or(&sensitivity))
                 .improve(present, |sweep, value| options.report(None, sweep, value));

@@ -224,7 +224,7 @@ impl Effect {
     pub(crate) fn waves(&self) -> Vec<(usize, f64)> {
         let Some((joint, from)) = self.function_of() else { return Vec::new() };
         let wave = |entry: EffectTerm| {
-            entry.formula.and_then(|formula| Some(formula.expression.wave()?.1))
+            entry.formula.and_then(|formula| Some(formula.expression.as_wave()?.1))
         };
         let waves = self.entries_without_arm().into_iter().filter_map(wave);
         let mut orders: Vec<f64> = waves.filter(|_| joint == from).collect();
@@ -363,7 +363,7 @@ impl Effect {
     /// kind, and for laws.
     fn with(&self, key: &str, value: &Argument) -> Option<Self> {
         let arguments = self.arguments();
-        Self::build(self.name(), |wanted| {
+        Self::from_name(self.name(), |wanted| {
             let present = || arguments.iter().find(|(known, _)| *known == wanted);
             if wanted == key {
                 Some(value.clone())

@@ -210,7 +210,7 @@ impl<'a> Tables<'a> {
             } else if let Some(name) = columns.nest(&table) {
                 rows.push_nest(index, name, &table, &columns)?;
             } else {
-                let in_point = (columns.file == Some(POINT)).then(|| rows.stem(index));
+                let in_point = (columns.file == Some(POINT)).then(|| rows.file_stem(index));
                 let observations = observed::of_row(
                     &table,
                     &columns,
@@ -220,7 +220,7 @@ impl<'a> Tables<'a> {
                 observed::check_target(
                     &table,
                     &columns,
-                    (rows.stem(index), &observations),
+                    (rows.file_stem(index), &observations),
                     self.problem,
                 )?;
                 for observed in &observations {

@@ -109,7 +109,7 @@ impl RowsBuilder {
     }
 
     /// Returns the name of a file without extension.
-    pub fn stem(&self, file: usize) -> &str {
+    pub fn file_stem(&self, file: usize) -> &str {
         self.stems.get(file).map_or("", String::as_str)
     }
 

@@ -136,7 +136,7 @@ impl Instrument {
 
     /// Returns the frame of a base in a pose, measuring frame.
     #[inline]
-    pub fn base(&self, base: &Frame<f64>, setup: &PoseView) -> Frame<f64> {
+    pub fn base_frame(&self, base: &Frame<f64>, setup: &PoseView) -> Frame<f64> {
         if self.rotates_bases() {
             Frame::from_rotation_vector(Vector3::zeros(), &self.base_rotation(setup)).compose(base)
         } else {

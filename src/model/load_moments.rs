@@ -10,7 +10,7 @@ use super::Model;
 use crate::least_squares::Block;
 use crate::mechanics::AxisMoments;
 use crate::model::parameter::{
-    Parameter, ParameterSite, Regressor, load_regressor, slope_regressor, uses_moments,
+    Parameter, ParameterSite, Regressor, load_derivative, slope_regressor, uses_moments,
     with_moments,
 };
 
@@ -58,7 +58,7 @@ impl JacobianColumns {
             for &site in &sites {
                 let at_site: Vec<usize> =
                     terms.iter().copied().filter(|&k| parameters[k].site == site).collect();
-                let regressor = load_regressor(parameters, x, &at_site, &moments);
+                let regressor = load_derivative(parameters, x, &at_site, &moments);
                 columns.push(JacobianColumn { parameter: None, site, regressor });
                 added_to.push(column);
             }

@@ -70,7 +70,7 @@ impl Model {
             let Some(frame) = predictor.target_frame(pose) else {
                 return Vector3::from_element(f64::NAN);
             };
-            rotation_between(&reference, &predictor.axes(pose, &predictor.base(pose), &frame))
+            rotation_between(&reference, &predictor.axes(pose, &predictor.base_frame(pose), &frame))
         })
     }
 

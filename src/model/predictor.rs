@@ -100,8 +100,8 @@ impl<'m> Predictor<'m> {
 
     /// Returns the frame of the arm's base in a pose, measuring frame.
     #[inline]
-    pub fn base(&self, pose: &Pose) -> Frame<f64> {
-        self.instrument.base(&self.bases[pose.base], &pose.setup)
+    pub fn base_frame(&self, pose: &Pose) -> Frame<f64> {
+        self.instrument.base_frame(&self.bases[pose.base], &pose.setup)
     }
 
     /// Returns the axes of the target in a pose, measuring frame. `frame` carries the target, arm
@@ -137,7 +137,7 @@ impl<'m> Predictor<'m> {
             }
             Needs::Target => {
                 let frame = self.target_frame(pose)?;
-                let base = self.base(pose);
+                let base = self.base_frame(pose);
                 let mut target = base.point(&frame.point(&self.target(pose)));
                 if observation.is_position() {
                     target = self.instrument.reading(&target, &pose.setup);
@@ -160,7 +160,7 @@ impl<'m> Predictor<'m> {
     /// Returns the frames that carry the two fixtures of a row, measuring frame; `None` without
     /// equilibrium.
     pub fn carriers(&mut self, pose: &Pose) -> Option<[Frame<f64>; 2]> {
-        let base = self.base(pose);
+        let base = self.base_frame(pose);
         let mut carriers = [Frame::identity(); 2];
         for (frame, carrier) in carriers.iter_mut().zip(self.model.carriers(pose.observation)) {
             *frame = match carrier.map(|carrier| carrier.checked_sub(1)) {

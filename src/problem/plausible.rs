@@ -7,7 +7,7 @@ use super::section::Section;
 use super::{Body, Fixture, Joint, JointKind, ParameterRule, Problem};
 use crate::error::{InputError, InputErrorKind, Location, Warning, WarningKind};
 use crate::observation::FixtureKind;
-use crate::quantity::rounded_right_angle;
+use crate::quantity::unrounded_right_angle;
 
 /// Largest plausible length in the joint table \[m\]. Longer ones are probably in millimetres.
 const MAX_PLAUSIBLE_LENGTH: f64 = 20.0;
@@ -28,7 +28,7 @@ pub(super) fn joint_warnings(section: &Section<'_, '_>) -> Vec<Warning> {
         let Some(item) = section.peek(key) else { continue };
         let angle = item
             .written_number()
-            .and_then(|text| Some((text, rounded_right_angle(text)?)))
+            .and_then(|text| Some((text, unrounded_right_angle(text)?)))
             .filter(|(_, angle)| angle.abs() <= TAU);
         if let Some((text, angle)) = angle {
             let kind = WarningKind::LooksLikeRadians {

@@ -6,6 +6,6 @@ pub(crate) mod format;
 mod right_angle;
 mod unit;
 
-pub(crate) use right_angle::rounded_right_angle;
+pub(crate) use right_angle::unrounded_right_angle;
 pub use unit::Unit;
 pub(crate) use unit::{Display, Suffix, TableUnit};

@@ -11,7 +11,7 @@ const MIN_DECIMALS_OF_45_DEGREES: usize = 4;
 
 /// Returns the multiple of 90° or 45° from which a written angle was rounded: π/2 for `1.5708` or
 /// `1.57`. `None` if there is none.
-pub(crate) fn rounded_right_angle(written: &str) -> Option<f64> {
+pub(crate) fn unrounded_right_angle(written: &str) -> Option<f64> {
     let (_, decimals) = written.split_once('.')?;
     let value: f64 = written.parse().ok()?;
     let places = decimals.len();
@@ -48,7 +48,7 @@ mod tests {
             ("-0.7854", -FRAC_PI_4),
             ("4.71239", 3.0 * FRAC_PI_2),
         ] {
-            assert_eq!(rounded_right_angle(written), Some(meant), "{written}");
+            assert_eq!(unrounded_right_angle(written), Some(meant), "{written}");
         }
         for written in [
             "1.570796",
@@ -63,7 +63,7 @@ mod tests {
             "1.571e0",
             "x.57",
         ] {
-            assert_eq!(rounded_right_angle(written), None, "{written}");
+            assert_eq!(unrounded_right_angle(written), None, "{written}");
         }
     }
 }

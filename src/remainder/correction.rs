@@ -83,7 +83,7 @@ pub struct CorrectedPose {
 
 impl CorrectedPose {
     /// Returns 1 σ of measured − predicted along each axis \[m\].
-    pub fn sigma(&self) -> Vector3<f64> {
+    pub fn error_sigma(&self) -> Vector3<f64> {
         self.covariance.diagonal().map(f64::sqrt)
     }
 }

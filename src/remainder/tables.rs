@@ -59,7 +59,8 @@ pub struct CorrectionTables {
     pub weights: Vec<f64>,
     /// Index in the model, change δ and prior standard deviation S½ of each parameter.
     pub parameters: Vec<(usize, f64, f64)>,
-    /// Lower triangle of the matrix E, row by row.
+    /// Lower triangle of the matrix E, row by row. The data explain the part tr(Φ E Φᵀ) of the
+    /// prior variance of a correction.
     pub explained: Vec<f64>,
 }
 

@@ -7,7 +7,7 @@ use crate::least_squares::solver::AtBound;
 use crate::least_squares::{Identifiability, UnidentifiableCombination, WEAK_THRESHOLD};
 use crate::problem::Problem;
 use crate::quantity::format::{MAX_DECIMALS, decimals, number, or_dash, two_digits};
-use crate::results::{Knowledge, ManyHarmonics};
+use crate::results::{Knowledge, LargestHarmonics};
 
 /// Number of decimals of a value without a standard error.
 const DEFAULT_DECIMALS: usize = 4;
@@ -31,7 +31,7 @@ pub(super) fn parameters<'a>(
     found: &Identification,
     file: &str,
 ) -> Vec<Block<'a>> {
-    let harmonics = ManyHarmonics::new(problem, &found.estimates);
+    let harmonics = LargestHarmonics::of(problem, &found.estimates);
     let (mut shown, mut lower): (Vec<Line>, Vec<Line>) = Default::default();
     for (k, estimate) in found.estimates.iter().enumerate() {
         let line = (row(estimate), bar(estimate));

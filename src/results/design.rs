@@ -68,7 +68,7 @@ pub struct PlanResult {
     pub least_poses: usize,
     #[serde(flatten)]
     pub conditioning: Conditioning,
-    pub parameters: Vec<PlannedParameter>,
+    pub parameters: Vec<ParameterForecast>,
     pub unidentified: Vec<Combination>,
     /// How well the plan distinguishes two effects; absent if that is not its purpose.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -96,7 +96,7 @@ pub struct ExpectedParameter {
 /// Parameter with its expected standard error after the planned poses and after as many random
 /// ones.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
-pub struct PlannedParameter {
+pub struct ParameterForecast {
     #[serde(flatten)]
     pub expected: ExpectedParameter,
     pub random_std_error: Option<f64>,
@@ -259,7 +259,7 @@ impl PlanResult {
     ) -> Self {
         let planned = &plan.planned;
         let (meaningful, name) = (plan.meaningful(), |k: usize| planned.expected[k].name.clone());
-        let parameter = |(k, expected): (usize, &design::ExpectedParameter)| PlannedParameter {
+        let parameter = |(k, expected): (usize, &design::ExpectedParameter)| ParameterForecast {
             expected: ExpectedParameter::new(expected),
             random_std_error: plan.random_error(k),
         };

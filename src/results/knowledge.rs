@@ -83,7 +83,7 @@ fn is_vague(estimate: &Estimate) -> bool {
 
 /// Harmonics of joints, some of which have too many coefficients to list one by one.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct ManyHarmonics {
+pub struct LargestHarmonics {
     /// Joint (from 1) and order of each harmonic coefficient, by the parameter's name.
     coefficients: BTreeMap<String, (usize, u32)>,
     /// For each joint (from 1) with too many coefficients: the orders of its largest amplitudes,
@@ -91,9 +91,9 @@ pub struct ManyHarmonics {
     largest: BTreeMap<usize, (Vec<u32>, usize)>,
 }
 
-impl ManyHarmonics {
+impl LargestHarmonics {
     /// Finds the declared harmonics of all joints, and those with the largest estimated amplitudes.
-    pub fn new(problem: &Problem, estimates: &[Estimate]) -> Self {
+    pub fn of(problem: &Problem, estimates: &[Estimate]) -> Self {
         let joint_and_order = |regressor: &Regressor| match *regressor {
             Regressor::Sine(joint, order) | Regressor::Cosine(joint, order) => {
                 Some((joint + 1, order))
@@ -178,7 +178,7 @@ mod tests {
         estimates.extend(
             coefficients.iter().map(|(name, (_, order))| estimate(name, f64::from(*order))),
         );
-        let many = ManyHarmonics::from_coefficients(coefficients, &estimates);
+        let many = LargestHarmonics::from_coefficients(coefficients, &estimates);
         // Joint 1 has few enough to list all of them.
         assert_eq!(many.largest, BTreeMap::from([(2, (vec![10, 9, 8, 7], 6))]));
         assert!(

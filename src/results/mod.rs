@@ -47,7 +47,7 @@ pub(crate) use effect::NamedEffect;
 pub(crate) use export::Origin;
 pub use identification::IdentificationResult;
 pub(crate) use knowledge::{
-    Knowledge, MAX_LISTED_COEFFICIENTS, MAX_SHOWN_HARMONICS, ManyHarmonics,
+    Knowledge, LargestHarmonics, MAX_LISTED_COEFFICIENTS, MAX_SHOWN_HARMONICS,
 };
 pub use plots::PlotData;
 pub(crate) use plots::{

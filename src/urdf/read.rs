@@ -13,7 +13,7 @@ use crate::error::{
     InputError, InputErrorKind, Location, UrdfErrorKind, XML, is_hidden, shortened, text_format,
 };
 use crate::problem::item::Document;
-use crate::quantity::rounded_right_angle;
+use crate::quantity::unrounded_right_angle;
 use crate::spatial::Frame;
 
 /// Largest deviation of a quaternion's norm from 1 that is attributed to rounding of the
@@ -442,7 +442,7 @@ impl Reader<'_> {
             let words = node.attribute("rpy").unwrap_or_default().split_ascii_whitespace();
             let meant: Vec<f64> = words
                 .zip(rpy)
-                .map(|(word, value)| rounded_right_angle(word).unwrap_or(value))
+                .map(|(word, value)| unrounded_right_angle(word).unwrap_or(value))
                 .collect();
             origin.meant = Vector3::from_iterator(meant);
         }

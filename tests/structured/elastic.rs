@@ -190,7 +190,7 @@ fn held_out_rows_are_met(fit: &Fitted) -> Verdict {
     let (_, poses) = fit.predict(&fit.data.measurements).map_err(|error| error.to_string())?;
     let Some(poses) = poses else { return Ok(()) };
     for residual in fit.residuals.iter().filter(|residual| residual.held_out) {
-        let sigma = poses[residual.row].sigma();
+        let sigma = poses[residual.row].error_sigma();
         let off = (0..3).map(|k| residual.position[k].abs() / sigma[k]).fold(0.0, f64::max);
         ensure!(off < MOST_SIGMAS, "row {}: a held-out error of {off} stated σ", residual.row);
     }

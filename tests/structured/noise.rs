@@ -114,7 +114,7 @@ fn held_out_rows_are_foreseen(case: &Case, fit: &Fitted) -> Verdict {
         if case.rows[residual.row].sight != Sight::Position {
             continue;
         }
-        let stated = poses[residual.row].sigma();
+        let stated = poses[residual.row].error_sigma();
         for k in 0..3 {
             let size = stated[k].max(case.noise[0]);
             let off = residual.position[k].abs() / size;

@@ -167,7 +167,7 @@ impl SavedEstimate {
     /// Parses the text of an `estimate.json`; `file` names it in messages.
     ///
     /// # Errors
-    /// Returns the errors of [`read`](Self::read).
+    /// Returns the errors of [`read`](Self::read), except those of reading the file.
     #[doc(hidden)]
     pub fn parse(text: &str, file: &Path) -> Result<Self, SavedEstimateError> {
         Self::parse_with(text, file, Changes::Refused)

@@ -140,7 +140,7 @@ impl Expression {
 
     /// Returns (joint from 0, order k, true for a cosine) if the expression is sin kq or cos kq;
     /// else `None`.
-    pub fn wave(&self) -> Option<(usize, f64, bool)> {
+    pub fn as_wave(&self) -> Option<(usize, f64, bool)> {
         let Self::Call(function @ (Function::Sin | Function::Cos), argument) = self else {
             return None;
         };
@@ -160,7 +160,7 @@ impl Expression {
     /// Returns joint, order and true for a cosine, like [`wave`](Self::wave), if the order is an
     /// integer.
     pub fn whole_wave(&self) -> Option<(usize, u32, bool)> {
-        let (joint, order, cosine) = self.wave()?;
+        let (joint, order, cosine) = self.as_wave()?;
         Some((joint, whole(order)?, cosine))
     }
 }

@@ -46,7 +46,7 @@ pub fn candidates(problem: &Problem, data: &DataCoverage) -> Vec<Candidate> {
             let argument = |key: &str| {
                 arguments.iter().find(|(name, _)| *name == key).map(|(_, value)| value.clone())
             };
-            let effect = Effect::build(family.name, argument)?;
+            let effect = Effect::from_name(family.name, argument)?;
             let conceivable = family.only.iter().all(|only| effect.meets_condition(*only, problem));
             conceivable.then(|| {
                 let untestable =
@@ -243,7 +243,7 @@ impl Effect {
                 unless(data.has_payload() && data.has_gravity(), "no payload is carried")
             }
             Need::PayloadFromBothSides => unless(
-                both_sides && data.changes_payload(),
+                both_sides && data.payload_varies(),
                 "no payload that changes, or no approach from both sides",
             ),
             Need::Play if data.approach => {

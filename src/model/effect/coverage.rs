@@ -40,7 +40,7 @@ impl DataCoverage {
     }
 
     /// Returns true if the payload varies between poses.
-    pub fn changes_payload(&self) -> bool {
+    pub fn payload_varies(&self) -> bool {
         self.payload.1 > self.payload.0
     }
 

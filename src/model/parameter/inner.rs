@@ -42,7 +42,7 @@ pub(crate) fn slope_regressor(parameters: &[Parameter], x: &[f64], k: usize) -> 
 /// Returns the regressor r for which r(pose) is the derivative of a site's quantity with respect to
 /// a load, through the moments that the `terms` at the site use. `moments` has this load as its
 /// variable, and `terms` are indices of parameters in the full parameter vector `x`.
-pub(crate) fn load_regressor(
+pub(crate) fn load_derivative(
     parameters: &[Parameter],
     x: &[f64],
     terms: &[usize],

@@ -17,7 +17,7 @@ pub use constraint::LinearConstraint;
 pub(crate) use constraint::resolve_constraints;
 
 pub(crate) use inner::{
-    load_regressor, slope_regressor, uses_moments, value_regressor, with_moments,
+    load_derivative, slope_regressor, uses_moments, value_regressor, with_moments,
 };
 pub(crate) use regressor::Regressor;
 pub(crate) use resolve::{EffectParameter, resolve};

@@ -73,7 +73,7 @@ fn uncertainty_columns(bounds: &Bounds) -> Columns {
         .into_iter()
         .enumerate()
         .map(|(k, axis)| {
-            (format!("sigma_{axis}_mm"), numbers(&|pose| bounds.poses[pose].sigma()[k]))
+            (format!("sigma_{axis}_mm"), numbers(&|pose| bounds.poses[pose].error_sigma()[k]))
         })
         .collect();
     columns.push((bounds.column(), numbers(&|pose| bounds.bound(pose))));

@@ -57,7 +57,7 @@ impl ColumnProducts {
 
 impl Member {
     /// Returns the product AᵀC with the columns C of another hypothesis.
-    pub fn product(&self, other: usize, blocks: &[Block]) -> &DMatrix<f64> {
+    pub fn product_with(&self, other: usize, blocks: &[Block]) -> &DMatrix<f64> {
         self.products[other].get_or_init(|| match blocks[other].dense() {
             Some(columns) => products_together(&[self], &[columns]),
             None => blocks[other].times_grouped(&self.transposed),
@@ -160,8 +160,8 @@ mod tests {
         form_products(&members, &all, &blocks);
         for (k, member) in members.iter().enumerate() {
             for &other in &all {
-                let single = alone.member(k, &blocks, &fit).product(other, &blocks);
-                assert_eq!(member.product(other, &blocks), single, "{k} {other}");
+                let single = alone.member(k, &blocks, &fit).product_with(other, &blocks);
+                assert_eq!(member.product_with(other, &blocks), single, "{k} {other}");
                 let exact = member.columns.tr_mul(&*blocks[other].columns(&fit));
                 assert!((single - exact).amax() < 1e-9);
             }

@@ -116,7 +116,7 @@ impl<'a> Products<'a> {
 
     /// Returns the product AᵀC of a set member's columns A and another hypothesis' columns C.
     fn product(&self, member: usize, other: usize) -> &DMatrix<f64> {
-        self.member(member).product(other, self.blocks)
+        self.member(member).product_with(other, self.blocks)
     }
 
     /// Forms the products of several set members with other hypotheses together, which is faster

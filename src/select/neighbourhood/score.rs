@@ -64,12 +64,12 @@ impl Sums {
     /// Returns the gain by columns with this score; `None` if they add nothing.
     pub fn gain(&self, score: &Score) -> Option<Gain> {
         let (squares, freedom) = score.reduction()?;
-        self.gain_of(squares, freedom)
+        self.gain_of_reduction(squares, freedom)
     }
 
     /// Returns the gain for a reduction of the sum of squares by `squares` with `freedom` new
     /// directions; `None` if no degrees of freedom remain.
-    pub fn gain_of(&self, squares: f64, freedom: usize) -> Option<Gain> {
+    pub fn gain_of_reduction(&self, squares: f64, freedom: usize) -> Option<Gain> {
         let degrees = self.freedom();
         let total = self.squares.max(MIN_RESIDUAL_SIGMAS.powi(2) * degrees);
         let remaining_degrees = degrees - freedom as f64;

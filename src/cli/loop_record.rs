@@ -24,7 +24,7 @@ const WRITTEN_STATUS: u8 = 1;
 /// Record of a running loop, from which results are written if it is interrupted and cannot end in
 /// time.
 #[derive(Clone)]
-pub struct Unfinished {
+pub struct LoopRecord {
     /// Text of the problem file.
     text: String,
     /// Effects that the problem file declares.
@@ -37,7 +37,7 @@ pub struct Unfinished {
     added: Arc<Mutex<Vec<Effect>>>,
 }
 
-impl Unfinished {
+impl LoopRecord {
     /// Creates the record of a loop that is about to start.
     pub fn new(text: &str, problem: &Problem, files: &[PathBuf], results: &Results) -> Self {
         let joint_files = problem.data.joint_log.as_ref().map(|log| log.files.clone());
