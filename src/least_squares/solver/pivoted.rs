@@ -3,8 +3,8 @@
 use nalgebra::{DMatrix, DVector, Dyn, PermutationSequence};
 
 use super::settings::MAX_RADIUS_DEVIATION;
-use crate::least_squares::Triangle;
 use crate::least_squares::inverse::regular_inverse;
+use crate::least_squares::{Linearisation, Triangle};
 
 /// Maximum number of Newton steps on the secular equation ‖q(λ)‖ = Δ. If they do not suffice,
 /// singular values are used.
@@ -125,8 +125,8 @@ impl Pivoted {
         (is_solved && response.iter().all(|value| value.is_finite())).then_some(response)
     }
 
-    /// Returns the triangular factor of the problem with the damping λ.
-    fn damped(&self, lambda: f64) -> Triangle {
+    /// Returns the problem with the damping λ, in triangular form.
+    fn damped(&self, lambda: f64) -> Linearisation {
         let damping = &self.inverse_norms * lambda.sqrt();
         Triangle::damped(&self.triangle, &self.projected, &damping)
     }
