@@ -36,7 +36,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     })?;
     let result = TraceResult::new(&problem, &trace);
     let json = result.to_json();
-    let plots = PlotData::of_identification(&problem, &data, &trace.fit)?;
+    // The effects are ranked in a fit to positions, whose model has no orientation of the tool.
+    let plots = PlotData::of_identification(&problem.positions_alone(), &data, &trace.fit)?;
     let page = report::trace_page(&problem, &trace, &plots);
     results.write(&[("trace.json", &json), ("trace.html", &page)])?;
     let outcome = diagnostic::report_fit(&trace.fit, common.quiet);

@@ -165,6 +165,7 @@ fn orientations_that_are_fitted_take_no_part_in_the_loop() {
     folder.simulate("arm", "truth.toml", 78, 5, DATA);
     folder.flexcal("identify arm").success();
     assert_eq!(json(&folder, "loop arm")["verdict"], "nothing-found");
+    folder.flexcal("trace arm").success();
 
     // Two columns in each other's place: positions are as before, but the table is misread.
     folder.edit(DATA, "rx_deg,ry_deg", "ry_deg,rx_deg");
