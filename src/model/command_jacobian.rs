@@ -36,7 +36,9 @@ impl Model {
             other_terms.iter().map(|term| (term.site, 0.0)).collect();
         let arm = arm.with_probes(&probes);
         let columns = moving.len() + probes.len();
-        let poses: Vec<Pose> = poses.into_iter().map(|pose| Pose { sigma: 1.0, ..pose }).collect();
+        // Of a row with an orientation, too, only the position is differentiated.
+        let position = |pose| Pose { sigma: 1.0, orientation: None, ..pose };
+        let poses: Vec<Pose> = poses.into_iter().map(position).collect();
         let count = poses.len();
         let unknowns: Vec<usize> = (0..columns).collect();
         let residuals = PoseResiduals::new(&arm, poses, unknowns, DVector::zeros(columns));
@@ -139,6 +141,7 @@ mod tests {
     use nalgebra::Vector3;
 
     use super::*;
+    use crate::model::MeasuredOrientation;
     use crate::observation::Observation;
     use crate::problem::PoseView;
 
@@ -201,6 +204,23 @@ mod tests {
                 assert!(off < 1e-7, "joint {joint}: {off}");
             }
         }
+    }
+
+    #[test]
+    fn orientations_change_no_position() {
+        let text = "name = 'arm'\n[[joint]]\n[[joint]]\nalpha_deg = 90\n[tool]\ntarget_m = [0.3, 0.1, 0.2]\n";
+        let problem = Problem::parse(text, "problem.toml".as_ref()).unwrap();
+        let model = Model::new(&problem, &[String::new()], &[String::new()]).unwrap();
+        let x = DVector::zeros(model.parameters.len());
+        let nowhere = Vector3::zeros();
+        let orientation = Some(MeasuredOrientation { measured: None, sigma: 0.1 });
+        let configurations = [[0.4, -0.7], [0.1, 0.2], [1.4, 0.3]];
+        let jacobians = |orientation| {
+            let pose = |q| Pose { orientation, ..at(q, &nowhere) };
+            let poses = configurations.iter().map(|q| pose(q.as_slice())).collect();
+            model.command_jacobian(&problem, poses, &x)
+        };
+        assert_eq!(jacobians(orientation), jacobians(None));
     }
 
     fn at<'a>(configuration: &'a [f64], measured: &'a Vector3<f64>) -> Pose<'a> {
