@@ -42,7 +42,7 @@ fn of_problem(
 /// estimate does not contain the uncertainty.
 ///
 /// # Errors
-/// Returns an error if the file is no remainder of this problem.
+/// Returns an error if the file is no remainder of this problem, or one of another estimate.
 pub fn of_estimate(
     problem: &Problem,
     estimate: &SavedEstimate,
@@ -52,7 +52,11 @@ pub fn of_estimate(
     }
     if let Some(name) = estimate.remainder.as_ref().filter(|_| problem.remainder.is_none()) {
         let file = estimate.file.with_file_name(name);
-        return read(problem, &file, estimate.changes).map(Some);
+        let correction = read(problem, &file, estimate.changes)?;
+        if estimate.changes == Changes::Refused {
+            correction.check_estimate(estimate, &file)?;
+        }
+        return Ok(Some(correction));
     }
     let parse = |text: &str| Correction::parse(text, &estimate.file);
     let correction = estimate.prediction.as_deref().map(parse).transpose()?;

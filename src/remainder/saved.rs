@@ -17,12 +17,15 @@ use super::rows::{AXES, InputSource, Inputs, Layout, Rows, Site, SiteKind};
 use super::scores::Scores;
 use crate::error::Location;
 use crate::files::{Changes, FORMAT_VERSION, Format, PROGRAM, changed_key, read_limited, sealed};
+use crate::fit::SavedEstimate;
 use crate::problem::Problem;
 
 /// Largest size of a `remainder.json` that is read \[MiB\].
 const MAX_FILE_MIB: u64 = 256;
 /// Name of the file format.
 pub const FORMAT: &str = "flexcal-remainder";
+/// Largest relative difference between the values of a parameter in two files of one run.
+const MAX_ROUNDING: f64 = 1e-12;
 /// Value of the key `kind`: the only kind of correction that this version reads.
 const KIND: &str = "gaussian-process-at-joints";
 /// Value of the key `kernel`: the correlation function of all processes.
@@ -47,6 +50,8 @@ pub enum SavedRemainderError {
     OtherProblem { file: PathBuf, found: String, expected: String },
     #[error("{}: was fitted to another declared arm (a fixed value, a mass, gravity or an effect has changed since); fit it again with flexcal identify --remainder", file.display())]
     OtherArm { file: PathBuf },
+    #[error("{}: belongs to another estimate than {} ({parameter} differs): one of the two files is of another run; fit both again with flexcal identify --remainder", file.display(), estimate.display())]
+    OtherEstimate { file: PathBuf, estimate: PathBuf, parameter: String },
     #[error(
         "{location}: {source}; fit a remainder with flexcal identify --remainder, or write use = false"
     )]
@@ -397,5 +402,30 @@ impl Correction {
             return Err(SavedRemainderError::OtherArm { file: file() });
         }
         Ok(())
+    }
+
+    /// Checks that the correction was fitted together with `estimate`: equal values of their common
+    /// parameters.
+    ///
+    /// # Errors
+    /// Returns an error with the first parameter whose values differ.
+    pub(super) fn check_estimate(
+        &self,
+        estimate: &SavedEstimate,
+        file: &Path,
+    ) -> Result<(), SavedRemainderError> {
+        let differs = |parameter: &&LinearisedParameter| {
+            estimate.value(&parameter.name).is_some_and(|value| {
+                let largest = value.abs().max(parameter.estimate.abs());
+                (value - parameter.estimate).abs() > MAX_ROUNDING * largest
+            })
+        };
+        self.parameters.iter().find(differs).map_or(Ok(()), |parameter| {
+            Err(SavedRemainderError::OtherEstimate {
+                file: file.to_owned(),
+                estimate: estimate.file.clone(),
+                parameter: parameter.name.clone(),
+            })
+        })
     }
 }

@@ -16,7 +16,7 @@ use serde_json::Value;
 
 use crate::common::arms::path;
 use crate::common::made::{at_random, csv, divided, measure, model_of};
-use crate::common::program::{Folder, number};
+use crate::common::program::{Folder, assert_contains, number};
 use crate::common::reading::read_dataset;
 
 /// 1 σ of a coordinate [m].
@@ -197,6 +197,13 @@ fn files_name_the_remainder_and_switch_it_off() {
     let expected = ["sigma_x_mm", "sigma_y_mm", "sigma_z_mm", "bound95_mm", "extrapolated"];
     assert_eq!(columns[columns.len() - 5..], expected);
     assert!(number(&with["coverage"]) > 0.9, "{with}");
+    // The remainder of another run of the same arm is refused beside this estimate.
+    let others = csv(&problem, &measured(&problem, 3e-4, 4));
+    folder.write("others.csv", others);
+    folder.flexcal("identify . --data others.csv --remainder --out other --quiet").code(0);
+    folder.write("other/estimate.json", folder.read("out/estimate.json"));
+    let run = folder.flexcal("predict . --estimate other/estimate.json --data rows.csv --out not");
+    assert_contains(&run.code(2).stderr, &["remainder.json: belongs to another estimate"]);
     let declared = "\n[remainder]\nfile = \"out/remainder.json\"\n";
     folder.map("problem.toml", |text| format!("{text}{declared}"));
     assert_eq!(predict(), with);
