@@ -170,7 +170,7 @@ impl Results {
         for (name, text) in texts {
             let path = self.path(name);
             match StagedFile::new(&path, text) {
-                Ok(file) => ready.push((file, path)),
+                Ok(file) => ready.push(file),
                 Err(source) => return Err(WriteError::Io { path, source }),
             }
             record.add(self.command, name, text);
@@ -179,9 +179,7 @@ impl Results {
         // The record is written before the files, with the digests of old and new files. After an
         // interruption here, the next run still recognises all of them as written by flexcal.
         self.write_record(&record)?;
-        for (file, path) in ready {
-            file.commit().map_err(|source| WriteError::Io { path, source })?;
-        }
+        StagedFile::commit_all(ready).map_err(|(path, source)| WriteError::Io { path, source })?;
         for name in &outdated {
             let path = self.path(name);
             fs::remove_file(&path).map_err(|source| WriteError::Io { path, source })?;

@@ -53,17 +53,35 @@ impl StagedFile {
     /// # Errors
     /// Returns an error if the file cannot be renamed.
     pub fn commit(self) -> io::Result<()> {
-        let folder = folder_of(&self.path);
-        match self.file {
-            #[cfg(target_os = "linux")]
-            Storage::Nameless(file) => link_at(&file, folder, &self.path)?,
-            Storage::Named(file) => _ = file.persist(&self.path).map_err(|error| error.error)?,
+        Self::commit_all([self]).map_err(|(_, error)| error)
+    }
+
+    /// Moves files to their paths, one right after the other, so that a killed process rarely
+    /// leaves new files beside old ones. Waits for the disk only then.
+    ///
+    /// # Errors
+    /// Returns the path and the error of the first file that cannot be renamed.
+    pub fn commit_all(files: impl IntoIterator<Item = Self>) -> Result<(), (PathBuf, io::Error)> {
+        let mut folders = Vec::new();
+        let moved = files.into_iter().try_for_each(|Self { path, file }| {
+            let folder = folder_of(&path).to_owned();
+            let moved = match file {
+                #[cfg(target_os = "linux")]
+                Storage::Nameless(file) => link_at(&file, &folder, &path),
+                Storage::Named(file) => file.persist(&path).map(drop).map_err(|error| error.error),
+            };
+            if !folders.contains(&folder) {
+                folders.push(folder);
+            }
+            moved.map_err(|error| (path, error))
+        });
+        // A name is durable once its folder is synchronised, which some systems do not support.
+        for folder in folders {
+            if let Ok(folder) = File::open(folder) {
+                let _ = folder.sync_all();
+            }
         }
-        // The name is durable once the folder is synchronised, which some systems do not support.
-        if let Ok(folder) = File::open(folder) {
-            let _ = folder.sync_all();
-        }
-        Ok(())
+        moved
     }
 }
 
