@@ -4,6 +4,7 @@
 use std::env;
 use std::process;
 use std::sync::{Arc, Mutex, PoisonError};
+use std::thread;
 
 use pyo3::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
@@ -12,8 +13,8 @@ use crate::error::of_argument;
 
 /// Variable with the number of threads.
 const VARIABLE: &str = "RAYON_NUM_THREADS";
-/// Maximum number of threads.
-const MAX_THREADS: usize = 1024;
+/// Number of threads that may be requested on any machine; the command line has the same limit.
+const MAX_THREADS: usize = 256;
 /// Stack size of a thread, as much as a main thread has [bytes].
 pub const STACK: usize = 8 << 20;
 
@@ -54,12 +55,13 @@ pub fn detached<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyR
 fn threads() -> PyResult<usize> {
     let Some(text) = env::var_os(VARIABLE).filter(|text| !text.is_empty()) else { return Ok(0) };
     let text = text.to_string_lossy().into_owned();
+    let max = MAX_THREADS.max(thread::available_parallelism().map_or(1, usize::from));
     match text.trim().parse::<usize>() {
-        Ok(threads) if threads <= MAX_THREADS => Ok(threads),
+        Ok(threads) if threads <= max => Ok(threads),
         _ => Err(of_argument(
             VARIABLE,
             format!(
-                "{VARIABLE}={text}: a whole number from 0 (as many as processors) to {MAX_THREADS} \
+                "{VARIABLE}={text}: a whole number from 0 (as many as processors) to {max} \
                  is needed; correct it or unset it"
             ),
         )),

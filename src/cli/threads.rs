@@ -1,19 +1,26 @@
 //! Check of the number of threads that the environment variable `RAYON_NUM_THREADS` requests.
 
-use std::env;
+use std::{env, thread};
 
 /// Environment variable with the number of threads.
 const VARIABLE: &str = "RAYON_NUM_THREADS";
-/// Maximum number of threads that may be requested; more threads would only wait for each other.
-pub const MAX_THREADS: usize = 1024;
+/// Number of threads that may be requested on any machine. Idle threads look for work at each other:
+/// 1000 of them take 60 times the processor time of two.
+const MAX_THREADS: usize = 256;
+
+/// Returns the maximum number of threads that may be requested: at least one for each processor.
+fn max_threads() -> usize {
+    MAX_THREADS.max(thread::available_parallelism().map_or(1, usize::from))
+}
 
 /// Error for a number of threads that is not valid.
 #[derive(Debug, thiserror::Error)]
 #[error(
-    "{VARIABLE}={text}: a whole number from 0 (as many as processors) to {MAX_THREADS} is needed; correct it or unset it"
+    "{VARIABLE}={text}: a whole number from 0 (as many as processors) to {max} is needed; correct it or unset it"
 )]
 pub struct BadThreads {
     text: String,
+    max: usize,
 }
 
 /// Returns an error if the environment requests no valid number of threads. Must be called before
@@ -21,9 +28,10 @@ pub struct BadThreads {
 pub fn check() -> Result<(), BadThreads> {
     let Some(text) = env::var_os(VARIABLE) else { return Ok(()) };
     let text = text.to_string_lossy().into_owned();
+    let max = max_threads();
     match text.trim().parse::<usize>() {
         _ if text.is_empty() => Ok(()),
-        Ok(threads) if threads <= MAX_THREADS => Ok(()),
-        _ => Err(BadThreads { text }),
+        Ok(threads) if threads <= max => Ok(()),
+        _ => Err(BadThreads { text, max }),
     }
 }

@@ -125,7 +125,7 @@ fn an_estimate_that_was_changed_is_refused_or_said() {
 #[test]
 fn an_impossible_number_of_threads_is_refused_at_once() {
     let folder = Folder::with_lunar_sampler();
-    for threads in ["100000", "-1", "many"] {
+    for threads in ["100000", "1000", "-1", "many"] {
         let mut command = folder.command("identify problem.toml");
         let run = Run::of(command.env("RAYON_NUM_THREADS", threads)).code(2);
         let words = format!("RAYON_NUM_THREADS={threads}: a whole number");
