@@ -114,6 +114,10 @@ pub enum TableErrorKind {
     #[error("a decimal comma needs another delimiter than the comma; write delimiter = \";\"")]
     DecimalDelimiter,
     #[error(
+        "numbers can begin with {mark:?} too, and their rows would be lost; write a mark that no row begins with"
+    )]
+    CommentOfNumbers { mark: String },
+    #[error(
         "{} has no such column{}; {}{}",
         file.display(),
         suggestion(name, known),

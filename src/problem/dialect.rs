@@ -133,6 +133,11 @@ pub(super) fn read(data: &mut Section<'_, '_>) -> Result<Dialect, InputError> {
     dialect.rotation =
         format.word("rotation", &["vector", "euler-xyz", "rpy"], &kinds)?.unwrap_or_default();
     dialect.comment = format.text("comment")?.map(str::to_owned);
+    if let (Some(mark), Some(item)) = (&dialect.comment, format.peek("comment"))
+        && format!("{mark}0").parse::<f64>().is_ok()
+    {
+        return Err(item.error(TableErrorKind::CommentOfNumbers { mark: mark.clone() }));
+    }
     if let Some(item) = format.get("missing") {
         dialect.missing = Some(read_missing(item.any_text()?, dialect.decimal_comma));
     }

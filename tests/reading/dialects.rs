@@ -241,6 +241,11 @@ fn wrong_maps_are_named() {
             "problem.toml:7: data.format.decimal: a decimal comma needs another delimiter",
         ),
         (
+            "comment = '1'",
+            "problem.toml:6: data.format.comment: numbers can begin with \"1\" too, and their rows",
+        ),
+        ("comment = '-'", "problem.toml:6: data.format.comment: numbers can begin with \"-\" too"),
+        (
             "decimals = ','",
             "problem.toml:6: data.format.decimals: unknown key (did you mean decimal?)",
         ),
