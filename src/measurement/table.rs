@@ -134,6 +134,8 @@ impl Table {
         for cell in &table.record {
             match std::str::from_utf8(cell.trim_ascii()) {
                 Ok(name) if !name.contains('\0') => {
+                    // A table that was put together or saved twice can have several marks.
+                    let name = name.trim_matches('\u{feff}').trim();
                     table.header.push(unescape_cell(name).to_owned());
                 }
                 // A header that is not text cannot be shown.

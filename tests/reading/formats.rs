@@ -317,6 +317,7 @@ fn line_ends_marks_and_quotes_do_not_matter() {
         plain.trim_end().to_owned(),
         plain.replace('\n', "\r\n").trim_end().to_owned(),
         format!("\u{feff}{plain}"),
+        format!("\u{feff}\u{feff}{plain}"),
         plain.replace("q1_deg,x_m", "\"q1_deg\" , x_m").replace("1,2", " 1 ,\"2\""),
     ];
     for variant in variants {
