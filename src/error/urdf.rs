@@ -66,11 +66,11 @@ pub enum UrdfErrorKind {
     AsProblem { key: String, why: String },
     #[error("there are no links; is it an SRDF, whose URDF is another file?")]
     NoLinks,
-    #[error("several links have no parent: {}; choose one with --base", roots.join(", "))]
+    #[error("several links have no parent: {}; choose one with --base", listed(roots))]
     Roots { roots: Vec<String> },
     #[error(
         "several links end the tree below \"{base}\": {}; choose one with --tip",
-        leaves.join(", ")
+        listed(leaves)
     )]
     Leaves { base: String, leaves: Vec<String> },
     #[error(

@@ -20,6 +20,7 @@ fn mistakes_are_named_with_their_place() {
             ),
         )
     };
+    let many: String = (0..1000).map(|k| format!("<link name=\"l{k}\"/>")).collect();
     let revolute = |inner: &str| chain("type=\"revolute\"", inner);
     let bomb =
         "<!DOCTYPE r [<!ENTITY a \"aaaa\"><!ENTITY b \"&a;&a;&a;&a;\">]>\n<robot name=\"&b;\"/>";
@@ -96,6 +97,7 @@ fn mistakes_are_named_with_their_place() {
             ),
             "the joints form a loop",
         ),
+        ("many roots", with(&many, ""), "l29 and 970 more; choose one with --base"),
         ("roots", with(&format!("{links}<link name=\"c\"/>"), JOINT), "several links have no parent: a, c"),
         ("nothing moves", chain("type=\"fixed\"", ""), "no joint moves between \"a\" and \"b\""),
     ];
