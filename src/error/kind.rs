@@ -375,6 +375,8 @@ pub enum InputErrorKind {
     NoCoefficient,
     #[error("no limit; write at_least or at_most (with a unit for lengths and angles)")]
     NoLimit,
+    #[error("no values satisfy this: the sum of the logarithms is at most {reach:.0} in size")]
+    UnreachableLimit { reach: f64 },
     #[error(
         "no such parameter{}; {}",
         suggestion(name, known),

@@ -155,7 +155,7 @@ fn what_cannot_be_is_refused() {
     let refused = run(&problem(&any), &Options::default().with_solver(solver));
     assert!(matches!(refused, Err(IdentifyError::BoundsIgnored { .. })));
 
-    let mistakes: [(&str, &str, &[&str]); 7] = [
+    let mistakes: [(&str, &str, &[&str]); 8] = [
         (
             "\"C.EI\" = 1",
             "at_least = 0",
@@ -170,6 +170,11 @@ fn what_cannot_be_is_refused() {
             "\"A.EI\" = 1",
             "at_least_mm = 0",
             &["problem.toml:88", "at_least_mm", "A.EI takes at_least"],
+        ),
+        (
+            "\"A.EI\" = 1, \"B.EI\" = -1",
+            "at_least = 1e149",
+            &["problem.toml:88", "at_least", "no values satisfy this", "at most 691 in size"],
         ),
         (
             "\"joint3.a\" = 1",

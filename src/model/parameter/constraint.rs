@@ -3,6 +3,7 @@
 use super::Parameter;
 use super::resolve::{EffectParameter, candidates};
 use crate::error::{InputError, InputErrorKind, Location};
+use crate::problem::item::MAX_MAGNITUDE;
 use crate::problem::{Constraint, Limit, LimitKind, Problem};
 use crate::quantity::Unit;
 
@@ -114,6 +115,17 @@ fn resolve_constraint(
             write: limit_keys(kind),
         };
         return Err(limit.location.clone().error(kind));
+    }
+    // Values beyond this limit of all numbers could not be computed.
+    let sizes: f64 = constraint.terms.iter().map(|term| term.coefficient.abs()).sum();
+    let reach = sizes * MAX_MAGNITUDE.ln();
+    let is_unreachable = |limit: &&Limit, sign: f64| {
+        limit.kind == LimitKind::Logarithm && sign * limit.value > reach
+    };
+    let least = constraint.at_least.as_ref().filter(|limit| is_unreachable(limit, 1.0));
+    let most = constraint.at_most.as_ref().filter(|limit| is_unreachable(limit, -1.0));
+    if let Some(limit) = least.or(most) {
+        return Err(limit.location.clone().error(InputErrorKind::UnreachableLimit { reach }));
     }
     let value = |limit: &Option<Limit>, none: f64| {
         limit.as_ref().map_or(none, |limit| limit.value - nominal)
