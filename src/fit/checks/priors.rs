@@ -132,7 +132,8 @@ impl Check for SigmaIsNotOverstated {
         let Some(sigma) = kind.declared_sigma else { return Vec::new() };
         let errors = fit.fitting.position_errors(&kind.rows, &fit.end.x);
         let rms = fit.rms(&kind.rows, &errors) / kind.observation.expected_norm();
-        if rms < MIN_MEASURED_RMS
+        if !rms.is_finite()
+            || rms < MIN_MEASURED_RMS
             || sigma <= MAX_OVERSTATED_RATIO * rms
             || kind.observation.coordinates() * kind.rows.len()
                 < MIN_NUMBERS_PER_PARAMETER * fit.whole.unknowns.len()

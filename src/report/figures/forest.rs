@@ -53,7 +53,8 @@ impl Forest<'_> {
             let marks = values.iter().zip(&self.legend).enumerate();
             marks.flat_map(move |(of, (value, &(_, colour)))| {
                 let row = k as f64 + MARK_SPACING * (of as f64 - 0.5 * (count - 1.0));
-                value.iter().flat_map(move |&(value, error)| {
+                let drawn = value.iter().filter(|(value, error)| (value + error).is_finite());
+                drawn.flat_map(move |&(value, error)| {
                     let interval = [(value - error, row), (value + error, row)];
                     let dot = Shape::dot((value, row), 3.2, Paint::fill(colour), None);
                     [Shape::line(interval, Paint::line(colour, 1.6)), dot]
