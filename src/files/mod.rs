@@ -88,10 +88,12 @@ pub(crate) fn csv(header: Vec<String>, lines: impl IntoIterator<Item = Vec<Strin
 }
 
 /// Returns true if a spreadsheet would run the word as a formula: it begins with `=`, `+`, `-`, `@`
-/// or a tab, perhaps after apostrophes, and is no number.
+/// or a tab, perhaps after apostrophes, and is no number. Some spreadsheets take the full-width
+/// signs of East Asian keyboards for these too.
 fn is_formula(word: &str) -> bool {
+    const SIGNS: [char; 10] = ['=', '+', '-', '@', '\t', '\r', '＝', '＋', '－', '＠'];
     let start = word.trim_start_matches('\'');
-    start.starts_with(['=', '+', '-', '@', '\t', '\r']) && start.parse::<f64>().is_err()
+    start.starts_with(SIGNS) && start.parse::<f64>().is_err()
 }
 
 /// Escapes a word that a spreadsheet would run as a formula, by an apostrophe in front.
@@ -110,7 +112,7 @@ mod tests {
 
     #[test]
     fn formulas_are_escaped_and_read_back_unchanged() {
-        for word in ["=1+1", "+A1", "-x", "@SUM(A1)", "\tx", "'=1", "''-x"] {
+        for word in ["=1+1", "+A1", "-x", "@SUM(A1)", "\tx", "'=1", "''-x", "＝1+1"] {
             let escaped = escape_cell(word.to_owned());
             assert_eq!(escaped, format!("'{word}"));
             assert_eq!(unescape_cell(&escaped), word);
