@@ -14,5 +14,6 @@
 mod arms;
 mod commands;
 mod mutation;
+mod readers;
 mod run;
 mod targets;
