@@ -312,11 +312,6 @@ impl SavedEstimate {
         Ok(())
     }
 
-    /// Returns the estimated value of a parameter, SI; `None` if the file lacks it.
-    pub(crate) fn value(&self, name: &str) -> Option<f64> {
-        self.parameters.iter().find(|entry| entry.name == name).map(|entry| entry.estimate)
-    }
-
     /// Returns true if the fitted rows did not determine the pose of a base in its measuring frame.
     /// Contacts with sockets at unknown positions, for example, do not determine it.
     pub(crate) fn leaves_base_open(&self) -> bool {
