@@ -25,6 +25,10 @@ const INPUT_MISTAKES: [FindingCode; 5] = [
     FindingCode::BeyondArmSize,
 ];
 
+/// Findings that name rows or columns of the table that are wrong.
+const CORRECTED_IN_TABLE: [FindingCode; 3] =
+    [FindingCode::ColumnDoubted, FindingCode::RowsDoubted, FindingCode::CommandsRounded];
+
 /// Returns what to do after a fit, as a command or in words. `is_structured` is true if the
 /// residual tests detect structure; `estimate` is the path of the estimate.json that was written.
 pub fn after_fit(
@@ -48,6 +52,9 @@ pub fn after_fit(
         format!("flexcal loop {named} looks for what the model lacks")
     };
     match report::influential_rows_advice(found, &common.problem_file()) {
+        _ if !found.is_trusted() && CORRECTED_IN_TABLE.iter().any(|code| found.has(*code)) => {
+            format!("correct the table as the warning says, then flexcal identify {named}")
+        }
         Some(look) => {
             format!(
                 "{look}; if they are right, flexcal loop {named} looks for what the model lacks"

@@ -10,6 +10,7 @@ mod blind;
 mod constraints;
 mod coverage;
 mod dataset;
+mod doubted;
 mod face;
 mod findings;
 mod identified;

@@ -1,10 +1,11 @@
-//! Check of a fit that is far off: a column that stands still, was filled down by a spreadsheet, or
-//! was sorted by itself.
+//! Check of a fit that is far off: a column that stands still, was filled down by a spreadsheet, was
+//! sorted by itself, or holds something else than the coordinate of its joint.
 
 use serde_json::{Value, json};
 
 use super::checked_fit::{Check, CheckedFit};
 use super::finding::{Finding, FindingCode};
+use super::followed_commands::{Unrelated, unrelated};
 use super::misfit::Misfit;
 use super::row_kind::format_error;
 use crate::fit::stages::fitting::Fitting;
@@ -24,8 +25,8 @@ const MAX_UNEQUAL: f64 = 1e-6;
 const MAX_RATIO: f64 = 0.2;
 
 /// Checks, if the fit is far off, that no joint stands still in all rows or from a row on while the
-/// rows before fit, that no column rises by the same step from a row on, and that no coordinate is
-/// sorted by itself.
+/// rows before fit, that no column rises by the same step from a row on, that the positions follow
+/// each joint column, and that no coordinate is sorted by itself.
 pub(super) struct ColumnsHoldMeasurements;
 
 impl Check for ColumnsHoldMeasurements {
@@ -37,6 +38,7 @@ impl Check for ColumnsHoldMeasurements {
             return Vec::new();
         };
         let found = filled_or_frozen(fit, before)
+            .or_else(|| unrelated_to_positions(fit, before))
             .or_else(|| standing_still(fit, before))
             .or_else(|| sorted_by_itself(fit, before));
         found.into_iter().collect()
@@ -44,7 +46,7 @@ impl Check for ColumnsHoldMeasurements {
 }
 
 /// Returns the name of the column of a joint.
-fn column_name(rows: &Measurements, joint: usize) -> String {
+pub(super) fn column_name(rows: &Measurements, joint: usize) -> String {
     let column = rows.command_columns.iter().find(|column| column.joint == joint);
     column.map_or_else(|| format!("q{}", joint + 1), |column| column.name.clone())
 }
@@ -127,6 +129,26 @@ fn filled_or_frozen(fit: &CheckedFit, before: f64) -> Option<Finding> {
         );
         Some(finding(&[name], before, Some(after), text))
     })
+}
+
+/// Reports a column that does not hold the coordinate of its joint, although the positions fit with
+/// another coordinate in each row.
+fn unrelated_to_positions(fit: &CheckedFit, before: f64) -> Option<Finding> {
+    if !fit.has_further_fits || !fit.explanations().fitted.is_empty() {
+        return None;
+    }
+    let joints: Vec<usize> = moving(fit).collect();
+    let Unrelated { joint, after } = unrelated(fit, before, &joints)?;
+    let name = column_name(fit.fitting.measurements, joint);
+    let text = format!(
+        "the positions do not follow the column {name}: with the coordinate of joint {} found from each \
+         position, the nominal arm misses them by {} instead of {}; the column may hold a speed, a \
+         deviation or another axis",
+        joint + 1,
+        format_error("position", after, 3),
+        format_error("position", before, 1)
+    );
+    Some(finding(&[name], before, Some(after), text))
 }
 
 /// Reports a coordinate that rises or falls from row to row in the whole table while no other does.

@@ -71,14 +71,17 @@ finding_codes! {
         "The measured points of a base leave its pose open, as points on a line do.",
         "measure more poses of this session, or give its base a prior";
     Misread: Error "misread" ["explanations", "before", "after"]
-        "With another reading of the table or the problem, less than a fifth of the error remains.",
+        "With another reading of the table or the problem, less than a fifth of the error remains, or no more than noise.",
         "correct units, signs, order or convention in the table or the problem";
     ViewsReversed: Error "views-reversed" ["views", "before", "after"]
         "Some views number the points of a marker from the other end.",
         "reverse the column point in these views or leave them out; a board that looks different after half a turn prevents it";
     ColumnDoubted: Error "column-doubted" ["columns", "before", "after"]
-        "The fit is far off, and a column of the table stands still, is filled down or is sorted by itself.",
+        "The fit is far off, and a column of the table stands still, is filled down, is sorted by itself, or is not followed by the positions.",
         "correct the column, or leave its rows out";
+    RowsDoubted: Error "rows-doubted" ["rows", "of", "before", "after"]
+        "The fit is far off, and the nominal arm fits most rows without the others.",
+        "correct these rows, or leave them out";
     PositionsComputed: Error "positions-computed" ["rms"]
         "The registered nominal arm predicts the positions to 10 µm per metre of its reach and a fifth of σ, as no built arm does.",
         "measure the positions with an instrument; those that the controller shows are computed from the joint angles";

@@ -8,8 +8,10 @@ pub(super) mod checked_fit;
 mod contradicted_entry;
 mod convention;
 mod doubted_columns;
+mod doubted_rows;
 pub(super) mod finding;
 pub(super) mod fitted_rows;
+mod followed_commands;
 pub(super) mod held_out;
 pub(super) mod lens;
 mod limits;
@@ -33,6 +35,8 @@ mod table_digits;
 mod two_solutions;
 mod view_order;
 
+use serde_json::Value;
+
 use checked_fit::{Check, CheckedFit, Convergence, EnoughEquations, HeldOutPlaced};
 use finding::{Finding, FindingCode};
 
@@ -43,9 +47,10 @@ const CHECKS: &[&dyn Check] = &[
     &misread::ReadAsMeant,
     &view_order::PointsInOrder,
     &table_digits::PositionsAreMeasured,
-    &doubted_columns::ColumnsHoldMeasurements,
     &misfit::Misfit,
     &misfit::SizeOfArm,
+    &doubted_columns::ColumnsHoldMeasurements,
+    &doubted_rows::RowsBelongTogether,
     &Convergence,
     &two_solutions::OneSolution,
     &parameter_limits::WithinPriors,
@@ -76,22 +81,44 @@ const CHECKS: &[&dyn Check] = &[
     &open_directions::NamedDirections,
 ];
 
-/// Codes of findings on a misfit that wrong limits cause as well.
-const OF_MISFIT: [FindingCode; 3] =
-    [FindingCode::MissesMeasurements, FindingCode::BeyondPrior, FindingCode::BeyondArmSize];
+/// Codes of findings on a misfit, whose usual remedy is to check units, signs or priors.
+const OF_MISFIT: [FindingCode; 4] = [
+    FindingCode::MissesMeasurements,
+    FindingCode::BeyondPrior,
+    FindingCode::BeyondArmSize,
+    FindingCode::NoiseBeyondDeclared,
+];
+/// Codes of findings that name the cause of a misfit.
+const CAUSES: [FindingCode; 4] = [
+    FindingCode::ColumnDoubted,
+    FindingCode::RowsDoubted,
+    FindingCode::LimitContradicted,
+    FindingCode::CommandsRounded,
+];
 
 /// Runs every check on a fit.
 pub(super) fn findings(fit: &CheckedFit) -> Vec<Finding> {
     let mut findings: Vec<Finding> = CHECKS.iter().flat_map(|check| check.check(fit)).collect();
-    // A misfit that limits of the problem cause is none of units, signs or priors.
-    let limits = findings.iter().find(|finding| finding.code == FindingCode::LimitContradicted);
-    // The finding on the limits states the errors.
-    let named =
-        |finding: &Finding| finding.text.split("; without limits").next().map(str::to_owned);
-    if let Some(text) = limits.and_then(named) {
+    // Where a check names the cause of a misfit, the findings on the misfit state this cause.
+    let cause = CAUSES.iter().find_map(|code| findings.iter().find(|found| found.code == *code));
+    // The finding on the limits states the errors after its cause.
+    let words = |finding: &Finding| match finding.code {
+        FindingCode::LimitContradicted => {
+            finding.text.split("; without limits").next().map(str::to_owned)
+        }
+        _ => Some(finding.to_string()),
+    };
+    // Without a fit that shows it, a cause is only one that may be.
+    let is_shown = cause.is_none_or(|cause| !cause.value("after").is_some_and(Value::is_null));
+    if let Some(text) = cause.and_then(words) {
         for finding in &mut findings {
             if OF_MISFIT.contains(&finding.code) {
-                *finding = finding.clone().with_remedy(text.clone());
+                let remedy = if is_shown {
+                    text.clone()
+                } else {
+                    format!("{text}; otherwise {}", finding.remedy)
+                };
+                *finding = finding.clone().with_remedy(remedy);
             }
         }
     }

@@ -5,6 +5,7 @@ use nalgebra::DMatrix;
 use serde_json::json;
 
 use super::checked_fit::{Check, CheckedFit};
+use super::doubted_columns::column_name;
 use super::finding::{Finding, FindingCode};
 use super::row_kind::{RowKind, format_error};
 use crate::problem::JointKind;
@@ -138,9 +139,7 @@ impl CommandsHaveDigits {
         {
             return Vec::new();
         }
-        let measurements = fit.fitting.measurements;
-        let column = measurements.command_columns.iter().find(|column| column.joint == joint);
-        let name = column.map_or_else(|| format!("q{}", joint + 1), |column| column.name.clone());
+        let name = column_name(fit.fitting.measurements, joint);
         let text = format!(
             "column {name} holds multiples of {}° alone, unlike the other joints; such rounding moves \
              the target by {} rms, as large as the residual of {}, which lies along this joint's motion",

@@ -273,7 +273,7 @@ impl<'a> Fitting<'a> {
 
     /// Returns the full parameter vector of the nominal arm, with free bases, targets and fixtures
     /// located in closed form.
-    fn located(&self) -> DVector<f64> {
+    pub fn located(&self) -> DVector<f64> {
         let mut x = DVector::zeros(self.model.parameters.len());
         let mut poses = self.poses(&self.split.identification);
         let mut has_rows = vec![false; self.placement.bases.len()];

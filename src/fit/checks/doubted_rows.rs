@@ -1,0 +1,207 @@
+//! Check of a fit that is far off: some rows do not belong to the arm that most rows fit.
+
+use nalgebra::Vector3;
+use serde_json::json;
+
+use super::checked_fit::{Check, CheckedFit};
+use super::finding::{Finding, FindingCode};
+use super::misfit::{MAX_MISS, MAX_UNREPORTED_RESIDUAL, Misfit};
+use super::row_kind::format_error;
+use crate::fit::stages::fitting::Fitting;
+use crate::measurement::Split;
+
+/// Number of successive rows of each base to which the nominal arm is registered in a trial. They
+/// determine base and tool.
+const WINDOW: usize = 12;
+/// Maximum number of trials, at evenly spaced places of the table.
+const MAX_TRIALS: usize = 12;
+/// Largest ratio of the error of a row to the rms error of the fit at which the row fits a trial.
+const MAX_RATIO: f64 = 0.2;
+/// Largest error of a row that fits, as a multiple of the rms error that is not reported as a misfit.
+const MAX_OF_RMS: f64 = 2.5;
+/// Smallest share of the rows that fit without the others if no mistake in the others is found. With
+/// fewer, the others may be right.
+const MIN_SHARE: f64 = 0.6;
+/// Number of registrations to the rows that fit the one before.
+const PASSES: usize = 3;
+/// Units of a length \[m\] that a table may confuse: factors of the measured numbers.
+const LENGTH_FACTORS: [f64; 6] = [1e3, 1e-3, 10.0, 0.1, 25.4, 1.0 / 25.4];
+
+/// Names of the coordinates of a position.
+const NAMES: [&str; 3] = ["x", "y", "z"];
+
+/// Checks, if the fit is far off, that most rows do not fit the nominal arm without the others.
+pub(super) struct RowsBelongTogether;
+
+impl Check for RowsBelongTogether {
+    fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
+        let positions = fit.fitting.measurements.leading().is_position();
+        let missed = Misfit.check(fit).into_iter().next().filter(|_| positions);
+        let before = missed.and_then(|found| found.number("rms"));
+        before.and_then(|before| doubted(fit, before)).into_iter().collect()
+    }
+}
+
+/// Errors of the nominal arm after its registration to some rows.
+struct Trial {
+    /// Measured minus predicted position of every examined row \[m\].
+    errors: Vec<Vector3<f64>>,
+    /// Places of the rows that fit, in the list of examined rows.
+    near: Vec<usize>,
+}
+
+/// Returns the finding on rows without which the nominal arm fits; `before` is the rms error of the
+/// fit \[m\].
+fn doubted(fit: &CheckedFit, before: f64) -> Option<Finding> {
+    let kind = fit.kind(fit.fitting.measurements.leading());
+    let rows = &kind.rows;
+    let noise = kind.declared_sigma.map_or(0.0, |sigma| MAX_UNREPORTED_RESIDUAL * sigma);
+    let unreported = (MAX_MISS * kind.spread).max(noise);
+    let limit = (MAX_RATIO * before).min(MAX_OF_RMS * unreported);
+    let registered = |chosen: &[usize]| -> Option<Trial> {
+        let chosen: Vec<usize> = chosen.iter().map(|&place| rows[place]).collect();
+        let x = registration(fit, chosen)?;
+        let errors = fit.fitting.position_errors(rows, &x);
+        let near = |place: &usize| errors[*place].norm() < limit;
+        let near = (0..rows.len()).filter(near).collect();
+        Some(Trial { errors, near })
+    };
+    let windows = windows(fit, rows);
+    let trials = windows.iter().filter_map(|window| registered(window));
+    let mut trial = trials.max_by_key(|trial| trial.near.len())?;
+    for _ in 0..PASSES {
+        trial = registered(&trial.near)?;
+    }
+    let apart: Vec<usize> = (0..rows.len()).filter(|row| !trial.near.contains(row)).collect();
+    let squares = trial.near.iter().map(|&place| trial.errors[place].norm_squared());
+    let after = (squares.sum::<f64>() / trial.near.len().max(1) as f64).sqrt();
+    let is_explained = after < unreported;
+    let are_few = (trial.near.len() as f64) < MIN_SHARE * rows.len() as f64;
+    let (&first, &last) = (apart.first()?, apart.last()?);
+    if !is_explained || apart.len() < 2 {
+        return None;
+    }
+    let measurements = fit.fitting.measurements;
+    let place = |place: usize| measurements.location(rows[place]).to_string();
+    let pairs = apart.iter().map(|&place| {
+        let measured = measurements.positions[rows[place]];
+        (measured, measured - trial.errors[place])
+    });
+    let pairs: Vec<(Vector3<f64>, Vector3<f64>)> = pairs.collect();
+    let is_run = last + 1 - first == apart.len() && apart.len() >= WINDOW;
+    let stands_elsewhere = || {
+        let chosen: Vec<usize> = apart.iter().map(|&place| rows[place]).collect();
+        let x = registration(fit, chosen.clone()).filter(|_| is_run)?;
+        let errors = fit.fitting.position_errors(&chosen, &x);
+        (fit.rms(&chosen, &errors) < limit).then(|| {
+            "they fit by themselves where base or target stand elsewhere: if the instrument, the base or \
+             the target was moved, give them a word of their own in the column session"
+                .to_owned()
+        })
+    };
+    let cause = mistake(&pairs, limit).or_else(stands_elsewhere);
+    if cause.is_none() && are_few {
+        return None;
+    }
+    let cause = cause.unwrap_or_else(|| {
+        "check whether they are of this arm, with the same tool and instrument".to_owned()
+    });
+    let listed = if last + 1 - first == apart.len() && apart.len() > 2 {
+        format!("the rows from {} to {}", place(first), place(last))
+    } else {
+        let shown: Vec<String> = apart.iter().take(4).map(|&row| place(row)).collect();
+        let more = apart.len() - shown.len();
+        let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+        format!("the rows {}{more}", shown.join(", "))
+    };
+    let text = format!(
+        "{listed} ({} of {}) contradict the others, which the nominal arm misses by {} instead of {}: \
+         {cause}",
+        apart.len(),
+        rows.len(),
+        format_error("position", after, 3),
+        format_error("position", before, 1)
+    );
+    let lines: Vec<_> = apart.iter().map(|&row| json!(place(row))).collect();
+    let numbers = [json!(lines), rows.len().into(), before.into(), after.into()];
+    Some(Finding::new(FindingCode::RowsDoubted, numbers, text))
+}
+
+/// Registers the nominal arm to the `chosen` identification rows alone.
+fn registration(fit: &CheckedFit, chosen: Vec<usize>) -> Option<nalgebra::DVector<f64>> {
+    let split = Split { identification: chosen, held_out: Vec::new() };
+    let Fitting { placement, model, measurements, .. } = *fit.fitting;
+    let held_out_only = placement.held_out_only(model, measurements, &split);
+    let declared = fit.fitting.with_declared_noise();
+    let fitting = Fitting { split: &split, turn_sigma: None, held_out_only, ..declared };
+    fitting.registered().ok()
+}
+
+/// Returns sets of places in `rows`: in each set, successive rows of every base.
+fn windows(fit: &CheckedFit, rows: &[usize]) -> Vec<Vec<usize>> {
+    let placement = fit.fitting.placement;
+    let of_base = |base: usize| -> Vec<usize> {
+        (0..rows.len()).filter(|&place| placement.base_of(rows[place]) == base).collect()
+    };
+    let groups: Vec<Vec<usize>> = (0..placement.bases.len()).map(of_base).collect();
+    let trials = MAX_TRIALS.min(rows.len() / WINDOW.max(1));
+    let window = |trial: usize| {
+        let part = |group: &Vec<usize>| {
+            let last = group.len().saturating_sub(WINDOW);
+            let from = last * trial / (trials - 1).max(1);
+            group.iter().copied().skip(from).take(WINDOW).collect::<Vec<_>>()
+        };
+        groups.iter().flat_map(part).collect()
+    };
+    (0..trials).map(window).collect()
+}
+
+/// Returns the words for a mistake that explains pairs of measured and predicted positions to
+/// `limit` \[m\].
+fn mistake(pairs: &[(Vector3<f64>, Vector3<f64>)], limit: f64) -> Option<String> {
+    let fits = |corrected: &dyn Fn(&Vector3<f64>, &Vector3<f64>) -> Vector3<f64>| {
+        let square = |(measured, predicted): &(Vector3<f64>, Vector3<f64>)| {
+            (corrected(measured, predicted) - predicted).norm_squared()
+        };
+        (pairs.iter().map(square).sum::<f64>() / pairs.len() as f64).sqrt() < limit
+    };
+    let sign = (0..3).find(|&axis| {
+        fits(&|measured, _| {
+            let mut corrected = *measured;
+            corrected[axis] = -corrected[axis];
+            corrected
+        })
+    });
+    if let Some(axis) = sign {
+        return Some(format!("their {} has the other sign", NAMES[axis]));
+    }
+    let exchanged = [(0, 1), (0, 2), (1, 2)].into_iter().find(|&(first, second)| {
+        fits(&|measured, _| {
+            let mut corrected = *measured;
+            corrected.swap_rows(first, second);
+            corrected
+        })
+    });
+    if let Some((first, second)) = exchanged {
+        return Some(format!("their {} and {} are exchanged", NAMES[first], NAMES[second]));
+    }
+    let factor = LENGTH_FACTORS.into_iter().find(|factor| fits(&|measured, _| measured * *factor));
+    if let Some(factor) = factor {
+        return Some(format!("their positions are in another unit (factor {factor:.4})"));
+    }
+    let is_of_another = pairs.iter().enumerate().all(|(row, (measured, _))| {
+        let mut others = pairs.iter().enumerate().filter(|(other, _)| *other != row);
+        others.any(|(_, (_, predicted))| (measured - predicted).norm() < limit)
+    });
+    if is_of_another {
+        return Some("their positions belong to each other's joint angles".to_owned());
+    }
+    let axis = (0..3).find(|&axis| {
+        fits(&|measured, predicted| {
+            let mut corrected = *measured;
+            corrected[axis] = predicted[axis];
+            corrected
+        })
+    });
+    axis.map(|axis| format!("their {} alone is wrong", NAMES[axis]))
+}

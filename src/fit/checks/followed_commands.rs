@@ -1,0 +1,132 @@
+//! Search for a joint column that does not hold the coordinate of its joint: the positions fit if
+//! the coordinate is found from each position instead.
+
+use std::f64::consts::{PI, TAU};
+
+use nalgebra::Vector3;
+
+use super::checked_fit::CheckedFit;
+use super::misfit::{MAX_MISS, MAX_UNREPORTED_RESIDUAL};
+use crate::fit::stages::fitting::Fitting;
+use crate::measurement::{Measurements, Split};
+use crate::problem::JointKind;
+
+/// Maximum number of rows, evenly spaced, with which the search is made.
+const MAX_ROWS: usize = 60;
+/// Minimum number of rows of the search. One number of each row is found from it.
+const MIN_ROWS: usize = 20;
+/// Number of trial coordinates of a joint, over a turn or over the range of its commands.
+const TRIALS: usize = 48;
+/// Number of registrations of the nominal arm, each with the coordinates found before.
+const PASSES: usize = 8;
+/// Number of Newton steps of the coordinates after each search.
+const STEPS: usize = 4;
+/// Change of a coordinate for its derivative \[rad\] or \[m\].
+const DIFFERENCE: f64 = 1e-5;
+/// Largest ratio of the error with the coordinates of a joint found from the positions to that of
+/// the fit, at which its column is wrong.
+const MAX_RATIO: f64 = 0.1;
+/// Largest ratio of this error to that with any other joint. Two joints with parallel axes next to
+/// each other explain about the same.
+const MAX_RATIO_TO_OTHERS: f64 = 0.3;
+
+/// Joint column that does not hold the coordinate of its joint.
+pub(super) struct Unrelated {
+    /// Index of the joint.
+    pub joint: usize,
+    /// Error of the registered nominal arm with the coordinate found from each position \[m\].
+    pub after: f64,
+}
+
+/// Returns the only joint whose column does not hold its coordinate, if the positions fit with that
+/// coordinate found from each of them; `before` is the rms error of the fit \[m\] and `joints` are
+/// the indices of the joints with commands.
+pub(super) fn unrelated(fit: &CheckedFit, before: f64, joints: &[usize]) -> Option<Unrelated> {
+    let kind = fit.kind(fit.fitting.measurements.leading());
+    let step = kind.rows.len().div_ceil(MAX_ROWS).max(1);
+    let rows: Vec<usize> = kind.rows.iter().copied().step_by(step).collect();
+    if rows.len() < MIN_ROWS {
+        return None;
+    }
+    let error = |&joint: &usize| Some((joint, error_without(fit, &rows, joint)?));
+    let mut errors: Vec<(usize, f64)> = joints.iter().filter_map(error).collect();
+    errors.sort_by(|a, b| a.1.total_cmp(&b.1));
+    let &(joint, after) = errors.first()?;
+    let noise = kind.declared_sigma.map_or(0.0, |sigma| MAX_UNREPORTED_RESIDUAL * sigma);
+    let limit = (MAX_RATIO * before).min((MAX_MISS * kind.spread).max(noise));
+    let is_alone = errors.get(1).is_none_or(|next| after < MAX_RATIO_TO_OTHERS * next.1);
+    (after < limit && is_alone).then_some(Unrelated { joint, after })
+}
+
+/// Returns the rms error of the registered nominal arm in `rows` with the coordinates of a joint
+/// found from the positions \[m\].
+fn error_without(fit: &CheckedFit, rows: &[usize], joint: usize) -> Option<f64> {
+    let Fitting { placement, model, measurements, .. } = *fit.fitting;
+    let split = Split { identification: rows.to_vec(), held_out: Vec::new() };
+    let mut table = measurements.clone();
+    let is_turning = fit.problem.joints[joint].command_kind() == JointKind::Revolute;
+    let commands = || rows.iter().map(|&row| measurements.configuration(row)[joint]);
+    let least = commands().fold(f64::INFINITY, f64::min);
+    let most = commands().fold(f64::NEG_INFINITY, f64::max);
+    // A sliding joint may have moved as far again as its column says, to either side.
+    let (from, range) =
+        if is_turning { (-PI, TAU) } else { (2.0 * least - most, 3.0 * (most - least)) };
+    let mut found: Vec<f64> = commands().collect();
+    let mut last = f64::INFINITY;
+    for pass in 0..PASSES {
+        set(&mut table, rows, (joint, &found));
+        let held_out_only = placement.held_out_only(model, &table, &split);
+        let declared = fit.fitting.with_declared_noise();
+        let fitting = Fitting {
+            split: &split,
+            measurements: &table,
+            turn_sigma: None,
+            held_out_only,
+            ..declared
+        };
+        // A target that is free moves to the axis of a joint whose column says nothing, so that the
+        // joint has no effect: it keeps its declared place at first.
+        let x = if pass < PASSES / 2 { fitting.located() } else { fitting.registered().ok()? };
+        let errors_at = |coordinates: &[f64]| {
+            let mut table = measurements.clone();
+            set(&mut table, rows, (joint, coordinates));
+            placement.position_errors(model, &x, &table, rows)
+        };
+        if pass < PASSES / 2 {
+            let mut best = lengths(&errors_at(&found));
+            for trial in 0..TRIALS {
+                let coordinate = from + range * trial as f64 / TRIALS as f64;
+                let errors = lengths(&errors_at(&vec![coordinate; rows.len()]));
+                for ((best, error), found) in best.iter_mut().zip(errors).zip(&mut found) {
+                    if error < *best {
+                        (*best, *found) = (error, coordinate);
+                    }
+                }
+            }
+        }
+        for _ in 0..STEPS {
+            let errors = errors_at(&found);
+            let moved: Vec<f64> = found.iter().map(|coordinate| coordinate + DIFFERENCE).collect();
+            for ((found, error), other) in found.iter_mut().zip(&errors).zip(errors_at(&moved)) {
+                let slope = (other - error) / DIFFERENCE;
+                *found -= error.dot(&slope) / slope.norm_squared().max(f64::MIN_POSITIVE);
+            }
+        }
+        let squares = errors_at(&found);
+        last = (squares.iter().map(Vector3::norm_squared).sum::<f64>() / rows.len() as f64).sqrt();
+    }
+    last.is_finite().then_some(last)
+}
+
+/// Writes the coordinates of a joint into `rows` of a table.
+fn set(table: &mut Measurements, rows: &[usize], (joint, coordinates): (usize, &[f64])) {
+    let joints = table.joints;
+    for (&row, coordinate) in rows.iter().zip(coordinates) {
+        table.configurations[row * joints + joint] = *coordinate;
+    }
+}
+
+/// Returns the lengths of errors.
+fn lengths(errors: &[Vector3<f64>]) -> Vec<f64> {
+    errors.iter().map(Vector3::norm).collect()
+}

@@ -1,0 +1,87 @@
+//! Rows and columns that contradict the others are named, with what is wrong in them.
+
+use flexcal::fit::{FindingCode, Identification};
+use flexcal::measurement::Dataset;
+use nalgebra::Vector3;
+
+use crate::common::arms::parse;
+use crate::common::made::{fit, fit_as_command, labels};
+use crate::judged::{PRIORS, measured, text};
+
+/// Mistake in the rows of a range, as a function of a row's position.
+type Mistake = fn(&mut Vector3<f64>);
+
+/// Returns the arm of [`crate::judged`] with a free base, and its measurements.
+fn arm() -> (flexcal::problem::Problem, Dataset) {
+    let problem = parse(&text(&format!("{PRIORS}\n'base.*' = {{ free = true }}")));
+    let data = measured(&problem, 3);
+    (problem, data)
+}
+
+/// Returns the number of doubted rows and the text of the finding on them.
+fn doubted(found: &Identification) -> Option<(usize, String)> {
+    let finding = found.finding(FindingCode::RowsDoubted)?;
+    let rows = finding.value("rows")?.as_array()?.len();
+    Some((rows, finding.to_string()))
+}
+
+#[test]
+fn rows_that_contradict_the_others_are_named_with_their_mistake() {
+    let (problem, clean) = arm();
+    assert_eq!(doubted(&fit(&problem, &clean)), None);
+    let cases: [(std::ops::Range<usize>, Mistake, &str); 5] = [
+        (20..35, |at| at.y = -at.y, "their y has the other sign"),
+        (20..35, |at| at.swap_rows(0, 2), "their x and z are exchanged"),
+        (40..50, |at| *at *= 1e3, "another unit (factor 0.0010)"),
+        (10..20, |at| at.z += 0.3, "their z alone is wrong"),
+        (30..60, |at| *at += Vector3::new(0.5, -0.8, 0.2), "column session"),
+    ];
+    for (rows, mistake, words) in cases {
+        let mut data = clean.clone();
+        data.measurements.positions[rows.clone()].iter_mut().for_each(mistake);
+        let found = fit(&problem, &data);
+        let (count, text) = doubted(&found).unwrap_or_else(|| panic!("{words}: {found:?}"));
+        assert!(count + 2 >= rows.len() && count <= rows.len(), "{words}: {count}, {text}");
+        assert!(text.contains(words), "{words}: {text}");
+        assert!(!found.is_trusted());
+    }
+    let mut data = clean;
+    data.measurements.positions.swap(20, 21);
+    let (count, text) = doubted(&fit(&problem, &data)).unwrap();
+    assert!(count == 2 && text.contains("each other's joint angles"), "{text}");
+}
+
+#[test]
+fn a_column_that_the_positions_do_not_follow_is_named() {
+    let (problem, clean) = arm();
+    for joint in [1, 4] {
+        let mut data = clean.clone();
+        let rows = data.measurements.len();
+        for row in 0..rows {
+            let q = ((row * 7919) % 211) as f64 / 60.0 - 1.7;
+            data.measurements.configurations[row * 5 + joint] = q;
+        }
+        let found = fit_as_command(&problem, &data);
+        let finding =
+            found.finding(FindingCode::ColumnDoubted).unwrap_or_else(|| panic!("{found:?}"));
+        let columns = finding.value("columns").unwrap();
+        assert_eq!(columns[0], format!("q{}", joint + 1), "{finding}");
+        let [before, after] = ["before", "after"].map(|name| finding.number(name).unwrap());
+        assert!(after < 0.1 * before, "{finding}");
+        // The headline states the cause.
+        let misfit = found.first_error().unwrap();
+        assert!(misfit.remedy.contains("do not follow the column"), "{misfit}");
+    }
+}
+
+#[test]
+fn a_base_that_is_held_while_another_is_free_is_named() {
+    let problem = parse(&text(&format!("{PRIORS}\n'base[A].*' = {{ free = true }}")));
+    let mut data = arm().1;
+    data.measurements.session = labels((0..90).map(|row| if row < 60 { "A" } else { "B" }));
+    data.measurements.positions[60..].iter_mut().for_each(|at| at.x += 2.0);
+    let found = fit(&problem, &data);
+    let finding = found.finding(FindingCode::HeldOutMissed);
+    let finding = finding.unwrap_or_else(|| panic!("{:?}", found.findings));
+    assert!(finding.remedy.contains("\"base[B].*\" = { free = true }"), "{finding}");
+}
