@@ -1,6 +1,7 @@
 //! A mass in another unit is named where compliances and a payload nearly make up for it.
 
 use flexcal::fit::{FindingCode, Identification};
+use flexcal::measurement::Dataset;
 use flexcal::problem::Problem;
 use nalgebra::DVector;
 use rand::SeedableRng as _;
@@ -28,8 +29,8 @@ fn arm(mass: f64) -> Problem {
     ))
 }
 
-/// Fits an arm with a forearm of 5.2 kg that is declared with another mass.
-fn declared_with(mass: f64) -> Identification {
+/// Returns measurements of an arm with a forearm of 5.2 kg.
+fn measured() -> Dataset {
     let truth = arm(5.2);
     let mut rng = ChaCha8Rng::seed_from_u64(7);
     let mut rows = at_random(&truth, 2 * ROWS, 1.2, &mut rng);
@@ -45,7 +46,12 @@ fn declared_with(mass: f64) -> Identification {
         model.parameters.iter().map(|parameter| value(&parameter.name)),
     );
     measure(&truth, &mut rows, &x, SIGMA, &mut rng);
-    fit_as_command(&arm(mass), &divided(ROWS, &rows))
+    divided(ROWS, &rows)
+}
+
+/// Fits an arm with a forearm of 5.2 kg that is declared with another mass.
+fn declared_with(mass: f64) -> Identification {
+    fit_as_command(&arm(mass), &measured())
 }
 
 #[test]
@@ -58,9 +64,39 @@ fn a_mass_with_a_misplaced_decimal_point_is_named() {
 }
 
 #[test]
+fn a_mass_in_pounds_is_named_near_the_noise() {
+    let found = declared_with(5.2 / 0.453_592_37);
+    let finding = found.finding(FindingCode::Misread);
+    let words = finding.unwrap_or_else(|| panic!("{:?}", found.findings)).to_string();
+    assert!(words.contains("the mass of fore at joint 3 that is in pounds"), "{words}");
+}
+
+#[test]
 fn a_mass_that_is_right_or_a_little_wrong_is_no_mistake_of_its_unit() {
     for mass in [5.2, 6.0, 8.0] {
         let found = declared_with(mass);
         assert!(!found.has(FindingCode::Misread), "{mass} kg: {:?}", found.findings);
+    }
+}
+
+#[test]
+fn wrong_places_of_masses_are_named_near_the_noise() {
+    let cases: [(fn(&mut Problem), &str); 2] = [
+        (|arm| arm.joints[2].bodies[0].position.x *= -1.0, "x of the centre of mass of fore"),
+        (
+            |arm| {
+                arm.tool.payload_follows = false;
+                arm.tool.payload_at = nalgebra::Vector3::new(0.0, 0.0, -0.9);
+            },
+            "the payload at the measured target",
+        ),
+    ];
+    for (change, words) in cases {
+        let mut declared = arm(5.2);
+        change(&mut declared);
+        let found = fit_as_command(&declared, &measured());
+        let finding = found.finding(FindingCode::Misread);
+        let finding = finding.unwrap_or_else(|| panic!("{words}: {:?}", found.findings));
+        assert!(finding.to_string().contains(words), "{words}: {finding}");
     }
 }

@@ -19,14 +19,16 @@ const MIN_PART: f64 = 0.01;
 /// the declared σ. Residuals of real arms reach several σ.
 pub(super) const MAX_NOISE_SIGMAS: f64 = 5.0;
 
-/// Smallest rms residual of the fit, as a multiple of the declared σ, for which masses in another
-/// unit are searched on an arm that gives way. A fifth of it is noise alone.
-const MIN_SIGMAS_OF_MASSES: f64 = 5.0;
+/// Smallest rms residual of the fit, as a multiple of the declared σ, for which wrong masses and
+/// their places are searched on an arm that gives way.
+const MIN_SIGMAS_OF_MASSES: f64 = 1.7;
+/// Largest share of the variance beyond the noise that a corrected mass leaves.
+const MAX_EXCESS_LEFT_BY_MASS: f64 = 0.04;
 /// Largest rms residual of a fit with a mass corrected, as a multiple of the declared σ, with which
 /// the mass explains what a fit near the noise leaves.
 const MAX_SIGMAS_LEFT_BY_MASS: f64 = 1.5;
 /// Largest ratio of the error with a misreading undone to that as read, at which the misreading is
-/// sure although more than noise is left.
+/// sure although more than noise is left. Another cause that acts alike hardly removes as much.
 const MAX_CLEAR_RATIO: f64 = 0.02;
 
 /// Maximum number of misreadings that the text of the finding names.
@@ -53,7 +55,11 @@ impl Check for ReadAsMeant {
             let noise = kind.declared_sigma.filter(|_| is_searched);
             let noise = noise.map(|sigma| kind.observation.expected_norm() * sigma);
             match noise.filter(|noise| rms > MIN_SIGMAS_OF_MASSES * noise) {
-                Some(noise) => fit.misread_masses(MAX_SIGMAS_LEFT_BY_MASS * noise),
+                Some(noise) => {
+                    let excess = (rms / noise).powi(2) - 1.0;
+                    let left = (1.0 + MAX_EXCESS_LEFT_BY_MASS * excess).sqrt();
+                    fit.misread_masses(left.min(MAX_SIGMAS_LEFT_BY_MASS) * noise)
+                }
                 None => return Vec::new(),
             }
         } else {

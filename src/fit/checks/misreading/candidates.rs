@@ -23,6 +23,10 @@ const GROSS_MASS_SCALES: [MassScale; 4] =
 /// Scales of masses that an arm with compliances nearly makes up for.
 pub(super) const MASS_SCALES: [MassScale; 4] =
     [MassScale::Power(-1), MassScale::Power(1), MassScale::Pounds, MassScale::Newtons];
+/// Smallest coordinate of a centre of mass whose sign is doubted \[m\].
+const MIN_CENTRE: f64 = 0.02;
+/// Number of joints before and after the declared carrier of a target that are tried as its carrier.
+const MAX_OTHER_CARRIERS: usize = 2;
 /// Step between trial errors of a joint's zero position \[°\]. A full fit finds values between
 /// them.
 const ZERO_POSITION_STEP: i16 = 15;
@@ -55,6 +59,7 @@ pub(super) fn candidates(problem: &Problem, table: &Measurements) -> Vec<Misread
     units.extend(turns(true).then_some(Misreading::Degrees));
     units.extend(turns(false).then_some(Misreading::Radians));
     units.extend(turns(false).then_some(Misreading::Gradians));
+    units.extend(of_slides(problem, table));
     units.extend(lengths(false).then_some(Misreading::Metres));
     units.extend(lengths(true).then_some(Misreading::Millimetres));
     units.extend(lengths(false).then_some(Misreading::Inches));
@@ -71,7 +76,38 @@ pub(super) fn candidates(problem: &Problem, table: &Measurements) -> Vec<Misread
     units.extend(of_order(table));
     units.extend(of_joint_table(problem));
     units.extend(of_loads(problem, table));
+    units.extend(of_targets(problem));
     units
+}
+
+/// Returns the misreadings of the unit of sliding joints.
+fn of_slides(problem: &Problem, table: &Measurements) -> Vec<Misreading> {
+    let slides = |joint: usize| {
+        problem.joints.get(joint).is_some_and(|joint| joint.command_kind() == JointKind::Prismatic)
+    };
+    let columns = table.command_columns.iter().filter(|column| slides(column.joint));
+    let units: Vec<bool> = columns.map(|column| column.unit >= 1.0).collect();
+    let power = |&is_metres: &bool| if is_metres { -3 } else { 3 };
+    units.first().map(power).map(|power| Misreading::Slides { power }).into_iter().collect()
+}
+
+/// Returns the misreadings of targets: a target on the frame of another joint near the declared
+/// one, and two exchanged targets.
+fn of_targets(problem: &Problem) -> Vec<Misreading> {
+    let carriers: Vec<usize> = if problem.targets.is_empty() {
+        vec![problem.tool.joint]
+    } else {
+        problem.targets.iter().map(|target| target.joint).collect()
+    };
+    let mut misreadings = Vec::new();
+    for (target, &carrier) in carriers.iter().enumerate() {
+        let others = carrier.saturating_sub(MAX_OTHER_CARRIERS)..=carrier + MAX_OTHER_CARRIERS;
+        let others = others.filter(|&joint| joint != carrier && joint < problem.joints.len());
+        misreadings.extend(others.map(|joint| Misreading::Carrier { target, joint: joint + 1 }));
+        let later = target + 1..problem.targets.len();
+        misreadings.extend(later.map(|with| Misreading::ExchangedTargets { target, with }));
+    }
+    misreadings
 }
 
 /// Returns true if the target of `[tool]` is declared so far from its frame that it may be in
@@ -131,14 +167,6 @@ pub(super) fn of_order(table: &Measurements) -> Vec<Misreading> {
     let places = (0..table.len()).step_by(step).take(SHIFT_PLACES);
     let of_place = |from: usize| shifts.clone().map(move |by| Misreading::Shifted { by, from });
     places.flat_map(of_place).collect()
-}
-
-/// Returns the misreadings of images: exchanged or reversed axes, the numbering of the points, and
-/// images that are shifted against the configurations.
-pub(super) fn of_images() -> Vec<Misreading> {
-    let shifts = [-1, 1].map(|by| Misreading::ShiftedViews { by });
-    let axes = [Misreading::ExchangedAxes, Misreading::FromBottom, Misreading::Transposed];
-    axes.into_iter().chain(shifts).collect()
 }
 
 /// Returns the number of rows between two rows at which a trial shift begins, for a table of `rows`
@@ -228,13 +256,32 @@ pub(super) fn of_masses(
         .collect()
 }
 
+/// Returns the misreadings of the places of masses: a payload at the target, and coordinates of
+/// centres with the other sign.
+pub(super) fn of_places(problem: &Problem, table: &Measurements) -> Vec<Misreading> {
+    let has_payload = table.payload.is_some() || problem.tool.payload_mass > 0.0;
+    let is_elsewhere = has_payload && problem.targets.is_empty() && !problem.tool.payload_follows;
+    let bodies = problem.joints.iter().flat_map(|joint| &joint.bodies);
+    let centres = (1..).zip(bodies).take(MAX_MASSES).flat_map(|(mass, body)| {
+        let axes = (0..3).filter(|&axis| body.position[axis].abs() > MIN_CENTRE);
+        axes.map(move |axis| Misreading::CentreSign { mass, axis })
+    });
+    is_elsewhere.then_some(Misreading::PayloadAtTarget).into_iter().chain(centres).collect()
+}
+
 /// Returns the misreadings of masses, payloads, stiffnesses and gravity; none for a rigid arm.
 pub(super) fn of_loads(problem: &Problem, table: &Measurements) -> Vec<Misreading> {
     if !problem.is_elastic() {
         return Vec::new();
     }
     let mut misreadings = of_masses(problem, table, &GROSS_MASS_SCALES);
-    misreadings.extend([-3, -1, 1, 3, 0].map(|power| Misreading::Stiffness { power }));
+    let elastic = (1..).zip(&problem.joints).filter(|(_, joint)| joint.stiffness.is_some());
+    let elastic: Vec<usize> = elastic.map(|(joint, _)| joint).collect();
+    let single = if elastic.len() > 1 { elastic.as_slice() } else { &[] };
+    for &joint in [0].iter().chain(single) {
+        let of_joint = |power| Misreading::Stiffness { joint, power };
+        misreadings.extend([-3, -1, 1, 3, 0].map(of_joint));
+    }
     for axis in 0..3 {
         let of_sign = |is_negative| Misreading::Gravity { axis, is_negative };
         misreadings.extend([false, true].map(of_sign));

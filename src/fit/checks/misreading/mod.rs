@@ -7,6 +7,8 @@
 
 mod candidates;
 mod explanation;
+mod images;
+mod masses;
 mod search;
 mod undo;
 mod words;
@@ -27,6 +29,11 @@ pub enum Misreading {
     Radians,
     /// Joint angles are in gradians (400 to a turn), declared as degrees.
     Gradians,
+    /// Coordinates of sliding joints are in another unit.
+    Slides {
+        /// Exponent of the power of ten by which the coordinates must be multiplied.
+        power: i8,
+    },
     /// Positions are in metres, declared as millimetres.
     Metres,
     /// Positions are in millimetres, declared as metres.
@@ -163,6 +170,29 @@ pub enum Misreading {
     HeldBase,
     /// The target lies elsewhere than declared, and the problem holds it there.
     HeldTarget,
+    /// A target is declared on the frame of another joint than the one that carries it.
+    Carrier {
+        /// Index of the target in `[[target]]`; 0 for `[tool]`.
+        target: usize,
+        /// Number of the joint that carries the target, from 1.
+        joint: usize,
+    },
+    /// The words of two targets, by index, are exchanged.
+    ExchangedTargets {
+        /// Index of the first target.
+        target: usize,
+        /// Index of the second target.
+        with: usize,
+    },
+    /// The payload hangs at the measured target, declared elsewhere.
+    PayloadAtTarget,
+    /// A coordinate of the centre of a declared mass has the other sign.
+    CentreSign {
+        /// Number of the mass, from 1, counted along the arm over the bodies.
+        mass: usize,
+        /// Coordinate, 0…2 for x, y, z.
+        axis: usize,
+    },
     /// The target of `[tool]` is in millimetres, declared as metres.
     TargetInMillimetres,
     /// Lengths of joints above 1 m are in millimetres, declared as metres; likewise the target.
@@ -181,6 +211,8 @@ pub enum Misreading {
     },
     /// Stiffnesses of joints are in another unit.
     Stiffness {
+        /// Number of the joint, from 1; 0 for all joints.
+        joint: usize,
         /// Exponent of the power of ten by which the stiffnesses must be multiplied; 0 if they are
         /// per degree, declared per radian.
         power: i8,
@@ -195,6 +227,20 @@ pub enum Misreading {
     ShiftedViews {
         /// Number of views by which an image comes too late.
         by: i8,
+    },
+    /// A camera or marker is carried by another frame than declared.
+    Mounted {
+        /// Index of the camera or marker in the fixtures of the problem.
+        fixture: usize,
+        /// Number of the joint whose frame carries it.
+        frame: usize,
+    },
+    /// The carriers of a camera and a marker are exchanged.
+    ExchangedMounts {
+        /// Index of the camera in the fixtures of the problem.
+        fixture: usize,
+        /// Index of the marker.
+        with: usize,
     },
     /// Gravity points along another axis of the base frame.
     Gravity {
@@ -256,6 +302,15 @@ impl Misreading {
             | Self::TableDegrees { joint, field } => (joint, 0, Some(field)),
             Self::Twist { joint, .. } => (joint, 0, Some(JointField::Alpha)),
             Self::Mass { mass, .. } => (mass, 0, None),
+            Self::Stiffness { joint, power } => {
+                (joint, usize::from(power.unsigned_abs()) + usize::from(power > 0) * 8, None)
+            }
+            Self::Carrier { target, joint } => (target, joint, None),
+            Self::ExchangedTargets { target, with } => (target, with, None),
+            Self::CentreSign { mass, axis } => (mass, axis, None),
+            Self::Mounted { fixture, frame: with } | Self::ExchangedMounts { fixture, with } => {
+                (fixture, with, None)
+            }
             Self::AxisUnit { axis, .. } | Self::AxisInches { axis } => (axis, 0, None),
             Self::ExchangedRows { row } | Self::ExchangedLengths { row } => (row, 0, None),
             Self::Reversed { joints } => (usize::try_from(joints).unwrap_or(usize::MAX), 0, None),

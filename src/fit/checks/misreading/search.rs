@@ -7,10 +7,9 @@ use nalgebra::{DVector, Vector3};
 use rayon::prelude::*;
 
 use super::Misreading;
-use super::candidates::{
-    MASS_SCALES, candidates, is_far, of_images, of_loads, of_masses, of_order, shift_step,
-};
+use super::candidates::{candidates, is_far, of_loads, of_order, shift_step};
 use super::explanation::{Explanation, Explanations, LeftOutMisfit};
+use super::images::of_images;
 use super::undo::is_unit_ratio;
 use crate::fit::checks::checked_fit::CheckedFit;
 use crate::fit::checks::misread::MAX_NOISE_SIGMAS;
@@ -80,8 +79,8 @@ struct Outcome {
 }
 
 /// Fit, problem and chosen rows to which misreadings are applied.
-struct Trial<'a> {
-    fitting: &'a Fitting<'a>,
+pub(super) struct Trial<'a> {
+    pub fitting: &'a Fitting<'a>,
     problem: &'a Problem,
     chosen: Vec<usize>,
 }
@@ -91,12 +90,6 @@ impl CheckedFit<'_> {
     /// for them.
     pub fn explanations(&self) -> &Explanations {
         self.explanations.get_or_init(|| explanations(self))
-    }
-
-    /// Returns the masses in another unit that leave at most `limit` \[m\]. For a fit near the
-    /// noise, they replace the other misreadings.
-    pub fn misread_masses(&self, limit: f64) -> &Explanations {
-        self.explanations.get_or_init(|| misread_masses(self, limit))
     }
 }
 
@@ -129,7 +122,7 @@ fn explanations(fit: &CheckedFit) -> Explanations {
     };
     let mut tested: Vec<Misreading> = listed.into_iter().filter(is_tested).collect();
     if measurements.leading().kind() == Observation::Pixel(0, 0, 0).kind() {
-        tested.extend(of_images());
+        tested.extend(of_images(fit.problem));
     }
     // A base that is only a little off is no misreading.
     let is_base_held = is_position && !fit.is_base_free() && is_nominal_far_off(fit);
@@ -148,7 +141,10 @@ fn explanations(fit: &CheckedFit) -> Explanations {
         .collect();
     let is_near_alone = !near_misreadings(&alone, nominal).is_empty();
     let near_alone = if is_near_alone { near_misreadings(&errors, nominal) } else { Vec::new() };
-    errors.extend(trial.several_reversed(&tested));
+    // Registrations to images take long, so that sets of joints are tried only if nothing else fits.
+    if is_position || near_misreadings(&errors, nominal).is_empty() {
+        errors.extend(trial.several_reversed(&tested));
+    }
     errors.sort_by(|a, b| a.1.total_cmp(&b.1));
     if let Some(shift) = errors.iter_mut().find(|(found, _)| found.shifted_from().is_some()) {
         *shift = trial.with_best_start(*shift);
@@ -163,22 +159,6 @@ fn explanations(fit: &CheckedFit) -> Explanations {
         explanations.fitted = trial.fit_in_full(&errors, explanations.as_read);
     }
     explanations
-}
-
-/// Finds the masses in another unit that leave at most `limit` \[m\] after a full fit, where the
-/// fit as declared leaves several times the noise. An arm that gives way hides such a mistake in
-/// other parameters, so that the nominal arm does not show it.
-fn misread_masses(fit: &CheckedFit, limit: f64) -> Explanations {
-    let gives_way =
-        fit.fitting.model.parameters.iter().any(|parameter| parameter.site.is_elastic());
-    if !gives_way && !fit.problem.is_elastic() {
-        return Explanations::default();
-    }
-    let trial = Trial::new(fit);
-    let as_read = trial.error_as_read(fit);
-    let tested = of_masses(fit.problem, fit.fitting.measurements, &MASS_SCALES);
-    let fitted = trial.explained(&tested, limit.min(MAX_EXPLAINED_RATIO * as_read));
-    Explanations { fitted, as_read, ..Explanations::default() }
 }
 
 /// Returns the sum of the squared deviations of the full parameter vector `x` from nominal, in
@@ -202,16 +182,21 @@ fn near_misreadings(errors: &[(Misreading, f64)], nominal: f64) -> Vec<Misreadin
 
 impl<'a> Trial<'a> {
     /// Creates the trial on some of the rows of a fit.
-    fn new(fit: &'a CheckedFit) -> Self {
+    pub(super) fn new(fit: &'a CheckedFit) -> Self {
+        Self::with_rows(fit, MAX_ROWS)
+    }
+
+    /// Creates the trial on at most `count` rows of a fit, evenly spaced.
+    pub(super) fn with_rows(fit: &'a CheckedFit, count: usize) -> Self {
         let identification = &fit.fitting.split.identification;
-        let step = identification.len().div_ceil(MAX_ROWS).max(1);
+        let step = identification.len().div_ceil(count).max(1);
         let chosen = identification.iter().copied().step_by(step).collect();
         Self { fitting: fit.fitting, problem: fit.problem, chosen }
     }
 
     /// Returns the error of the fit as declared, or of its registered nominal arm if that is less
     /// \[m\].
-    fn error_as_read(&self, fit: &CheckedFit) -> f64 {
+    pub(super) fn error_as_read(&self, fit: &CheckedFit) -> f64 {
         let at = |x: &DVector<f64>| self.penalised(self.fitting, &self.chosen, x);
         at(&fit.end.x).min(at(fit.registered_x))
     }
@@ -245,7 +230,7 @@ impl<'a> Trial<'a> {
 
     /// Returns those of the `chosen` misreadings that leave less than `limit` \[m\] after a full
     /// fit, best first.
-    fn explained(&self, chosen: &[Misreading], limit: f64) -> Vec<Explanation> {
+    pub(super) fn explained(&self, chosen: &[Misreading], limit: f64) -> Vec<Explanation> {
         let explanation = |&misreading: &Misreading| {
             let Outcome { rms, size, left_out, is_within_priors } =
                 self.outcome(misreading, true)?;
@@ -288,12 +273,47 @@ impl<'a> Trial<'a> {
     /// Returns the errors with a misreading corrected: those of the registered nominal arm or, if
     /// `is_fitted`, those after a full fit. `None` if the misreading cannot be corrected or fitted.
     fn outcome(&self, misreading: Misreading, is_fitted: bool) -> Option<Outcome> {
+        self.with_corrected(misreading, is_fitted, |fitting, corrected| {
+            let rows = &fitting.split.identification;
+            if !is_fitted {
+                let registered = fitting.registered_to(TRIAL_TOLERANCE).ok()?;
+                let rms = self.error(fitting, rows, &registered);
+                let outcome = Outcome { rms, size: None, left_out: None, is_within_priors: true };
+                return rms.is_finite().then_some(outcome);
+            }
+            let end = fitting.run(&fitting.registered().ok()?).ok()?;
+            let (model, x) = (fitting.model, &end.x);
+            let rms = self.penalised(fitting, rows, x);
+            let value = |name: &str| {
+                let place = model.parameters.iter().position(|parameter| parameter.name == name)?;
+                Some(x[place])
+            };
+            let name = misreading.size(0.0).map(|(name, _)| name);
+            let size = name.and_then(|name| Some(misreading.size(value(&name)?)?.1));
+            let left_out = Some(self.left_out(fitting, &end, corrected));
+            let mut fitted = model.parameters.iter().zip(x);
+            let is_within_priors = !fitted.any(|(parameter, x)| {
+                prior_sigmas(parameter, *x).is_some_and(|sigmas| sigmas > MAX_PRIOR_SIGMAS)
+            });
+            rms.is_finite().then_some(Outcome { rms, size, left_out, is_within_priors })
+        })
+    }
+
+    /// Returns what `result` returns for the fit with a misreading corrected and for the corrected
+    /// problem. If `has_free_size`, the size of the misreading is a free parameter. `None` if the
+    /// misreading cannot be corrected.
+    pub(super) fn with_corrected<R>(
+        &self,
+        misreading: Misreading,
+        has_free_size: bool,
+        result: impl FnOnce(&Fitting, &Problem) -> Option<R>,
+    ) -> Option<R> {
         let Fitting { model, measurements, .. } = *self.fitting;
         let needs_problem = misreading.rewritten(self.problem);
         if needs_problem.is_none() && misreading.concerns_problem() {
             return None;
         }
-        let free = is_fitted
+        let free = has_free_size
             .then(|| misreading.with_free_size(needs_problem.as_ref().unwrap_or(self.problem)));
         let rewritten = free.flatten().or(needs_problem);
         let joints = rewritten.as_ref().map_or(measurements.joints, |problem| problem.joints.len());
@@ -326,30 +346,7 @@ impl<'a> Trial<'a> {
             linear_model: None,
             ..self.fitting.with_declared_noise()
         };
-        let registered =
-            if is_fitted { fitting.registered() } else { fitting.registered_to(TRIAL_TOLERANCE) };
-        let registered = registered.ok()?;
-        if !is_fitted {
-            let rms = self.error(&fitting, &split.identification, &registered);
-            let outcome = Outcome { rms, size: None, left_out: None, is_within_priors: true };
-            return rms.is_finite().then_some(outcome);
-        }
-        let end = fitting.run(&registered).ok()?;
-        let x = &end.x;
-        let rms = self.penalised(&fitting, &split.identification, x);
-        let value = |name: &str| {
-            let place = model.parameters.iter().position(|parameter| parameter.name == name)?;
-            Some(x[place])
-        };
-        let name = misreading.size(0.0).map(|(name, _)| name);
-        let size = name.and_then(|name| Some(misreading.size(value(&name)?)?.1));
-        let corrected = rewritten.as_ref().unwrap_or(self.problem);
-        let left_out = Some(self.left_out(&fitting, &end, corrected));
-        let mut fitted = model.parameters.iter().zip(x);
-        let is_within_priors = !fitted.any(|(parameter, x)| {
-            prior_sigmas(parameter, *x).is_some_and(|sigmas| sigmas > MAX_PRIOR_SIGMAS)
-        });
-        rms.is_finite().then_some(Outcome { rms, size, left_out, is_within_priors })
+        result(&fitting, rewritten.as_ref().unwrap_or(self.problem))
     }
 
     /// Returns the largest rms error \[m\] that noise, or priors that are too narrow, may explain.
@@ -390,7 +387,7 @@ impl<'a> Trial<'a> {
     /// Returns the root mean squared error of `rows` at the full parameter vector `x` \[m\] with
     /// the deviations from priors σₚ included: √((Σ e² + σ² Σ (x/σₚ)²) / n), with the noise σ and n
     /// rows.
-    fn penalised(&self, fitting: &Fitting, rows: &[usize], x: &DVector<f64>) -> f64 {
+    pub(super) fn penalised(&self, fitting: &Fitting, rows: &[usize], x: &DVector<f64>) -> f64 {
         let deviations = deviations(fitting, x) / rows.len().max(1) as f64;
         let square = self.error(fitting, rows, x).powi(2);
         (square + fitting.sigma.powi(2) * deviations).sqrt()

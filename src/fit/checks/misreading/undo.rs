@@ -7,10 +7,11 @@ use nalgebra::Vector3;
 use super::candidates::{
     MIN_MILLIMETRE_LENGTH, is_far, lengths_of, masses_of, number_of, turns_in,
 };
+use super::images::shift_views;
 use super::{MassScale, Misreading, numbers_of};
 use crate::measurement::Measurements;
 use crate::model::parameter::JointField;
-use crate::problem::{Effect, Joint, JointKind, Observation, ParameterRule, Problem};
+use crate::problem::{Effect, Joint, JointKind, ParameterRule, Problem};
 
 /// Length of an inch \[mm\].
 const MM_PER_INCH: f64 = 25.4;
@@ -121,29 +122,72 @@ impl Misreading {
                     can_change.then(|| std::mem::swap(&mut joint.a, &mut joint.d))
                 });
             }
-            Self::Mass { mass, scale } => {
-                let masses = (1..).zip(masses_of(&mut problem));
-                let chosen = masses.filter(|(number, _)| mass == 0 || *number == mass);
-                chosen.for_each(|(_, value)| *value *= scale.factor());
-                return Some(problem);
-            }
             Self::Payload { scale } => problem.tool.payload_mass *= scale.factor(),
-            Self::Stiffness { power } => {
-                let factor = if power == 0 { 180.0 / PI } else { power_of_ten(power) };
-                let stiffnesses =
-                    problem.joints.iter_mut().filter_map(|joint| joint.stiffness.as_mut());
-                stiffnesses.for_each(|stiffness| *stiffness *= factor);
-                return Some(problem);
-            }
-            Self::Gravity { axis, is_negative } => {
-                let sign = if is_negative { -1.0 } else { 1.0 };
-                problem.gravity = Vector3::ith(axis, sign * declared.gravity.norm());
-                return Some(problem);
-            }
+            Self::Mass { .. }
+            | Self::Stiffness { .. }
+            | Self::Gravity { .. }
+            | Self::Carrier { .. }
+            | Self::Mounted { .. }
+            | Self::ExchangedMounts { .. }
+            | Self::PayloadAtTarget
+            | Self::CentreSign { .. } => return self.with_other_loads(problem),
             _ => return None,
         }
         if is_far(&problem) && !matches!(self, Self::Payload { .. }) {
             problem.tool.target *= 1e-3;
+        }
+        Some(problem)
+    }
+
+    /// Returns the problem with the misreading of masses, stiffnesses, gravity, or of the frames of
+    /// targets, cameras and markers corrected; `None` if the correction changes nothing.
+    fn with_other_loads(self, mut problem: Problem) -> Option<Problem> {
+        match self {
+            Self::Mass { mass, scale } => {
+                let masses = (1..).zip(masses_of(&mut problem));
+                let chosen = masses.filter(|(number, _)| mass == 0 || *number == mass);
+                chosen.for_each(|(_, value)| *value *= scale.factor());
+            }
+            Self::Stiffness { joint, power } => {
+                let factor = if power == 0 { 180.0 / PI } else { power_of_ten(power) };
+                let joints = (1..).zip(&mut problem.joints);
+                let chosen = joints.filter(|(number, _)| joint == 0 || *number == joint);
+                let stiffnesses = chosen.filter_map(|(_, joint)| joint.stiffness.as_mut());
+                stiffnesses.for_each(|stiffness| *stiffness *= factor);
+            }
+            Self::Carrier { target, joint } => {
+                if problem.targets.is_empty() {
+                    problem.tool.joint = joint - 1;
+                } else {
+                    problem.targets.get_mut(target)?.joint = joint - 1;
+                }
+            }
+            Self::Mounted { fixture, frame } => {
+                problem.fixtures.get_mut(fixture)?.carrier = Some(frame);
+            }
+            Self::ExchangedMounts { fixture, with } => {
+                let [first, second] =
+                    [fixture, with].map(|index| problem.fixtures.get(index)?.carrier);
+                problem.fixtures.get_mut(fixture)?.carrier = second;
+                problem.fixtures.get_mut(with)?.carrier = first;
+            }
+            Self::PayloadAtTarget => {
+                problem.tool.payload_follows = true;
+                problem.tool.payload_at = problem.tool.target;
+            }
+            Self::CentreSign { mass, axis } => {
+                let mut bodies = problem.joints.iter_mut().flat_map(|joint| &mut joint.bodies);
+                let coordinate = &mut bodies.nth(mass.checked_sub(1)?)?.position[axis];
+                if *coordinate == 0.0 {
+                    return None;
+                }
+                *coordinate = -*coordinate;
+            }
+            Self::Gravity { axis, is_negative } => {
+                let sign = if is_negative { -1.0 } else { 1.0 };
+                problem.gravity = Vector3::ith(axis, sign * problem.gravity.norm());
+            }
+            _ => return None,
         }
         Some(problem)
     }
@@ -244,6 +288,22 @@ impl Misreading {
             Self::ExchangedAxes | Self::FromBottom | Self::Transposed => {
                 self.undo_image(&mut rows, problem);
             }
+            Self::ExchangedTargets { target, with } => {
+                let Some(words) = &mut rows.target else { return rows };
+                let place = |target: usize| {
+                    let name = &problem.targets.get(target)?.name;
+                    words.names.iter().position(|word| word == name)
+                };
+                if let (Some(first), Some(second)) = (place(target), place(with)) {
+                    for word in &mut words.of_row {
+                        *word = match *word {
+                            word if word == first => second,
+                            word if word == second => first,
+                            word => word,
+                        };
+                    }
+                }
+            }
             Self::AxisUnit { axis, power } => {
                 rows.positions
                     .iter_mut()
@@ -260,27 +320,6 @@ impl Misreading {
         rows
     }
 
-    /// Corrects the pixels of images, or the numbers of their points, by the misreading.
-    fn undo_image(self, rows: &mut Measurements, problem: &Problem) {
-        for (observation, pixel) in rows.observations.iter_mut().zip(&mut rows.positions) {
-            let Observation::Pixel(camera, marker, point) = *observation else { continue };
-            match self {
-                Self::ExchangedAxes => pixel.swap_rows(0, 1),
-                Self::FromBottom => {
-                    if let Some(height) = image_height(problem, camera as usize) {
-                        pixel.y = height - pixel.y;
-                    }
-                }
-                _ => {
-                    let points = problem.fixtures.get(marker as usize).map(|of| &of.points[..]);
-                    if let Some(other) = points.and_then(|points| transposed(points, point)) {
-                        *observation = Observation::Pixel(camera, marker, other);
-                    }
-                }
-            }
-        }
-    }
-
     /// Corrects the misreading in a configuration `q` of `table`.
     fn undo_command(self, q: &mut [f64], problem: &Problem, table: &Measurements) {
         match self {
@@ -289,6 +328,13 @@ impl Misreading {
                 let factor = if is_radians { PI / 180.0 } else { 180.0 / PI };
                 let turning = (0..q.len()).filter(|&j| turns_in(problem, table, j, is_radians));
                 turning.for_each(|joint| q[joint] *= factor);
+            }
+            Self::Slides { power } => {
+                let slides = |joint: &usize| {
+                    let kind = problem.joints.get(*joint).map(Joint::command_kind);
+                    kind == Some(JointKind::Prismatic)
+                };
+                (0..q.len()).filter(slides).for_each(|joint| q[joint] *= power_of_ten(power));
             }
             Self::Gradians => {
                 let turning = (0..q.len()).filter(|&j| turns_in(problem, table, j, false));
@@ -319,54 +365,6 @@ impl Misreading {
             Self::Zero { joint, degrees } => q[joint - 1] += f64::from(degrees).to_radians(),
             Self::Ratio { joint, percent } => q[joint - 1] *= f64::from(percent) / 100.0,
             _ => {}
-        }
-    }
-}
-
-/// Index of the vertical image centre in the numbers of a camera.
-const CENTRE_Y: usize = 9;
-
-/// Returns the height of a camera's image \[px\]: the declared one, or twice the vertical centre.
-/// `None` if neither is declared.
-fn image_height(problem: &Problem, camera: usize) -> Option<f64> {
-    let camera = problem.fixtures.get(camera)?;
-    let centre = camera.known.get(CENTRE_Y).copied().flatten();
-    camera.image.map(|[_, height]| height).or(centre.map(|centre| 2.0 * centre))
-}
-
-/// Returns the number of the point that has the number `point` if a grid is counted along its other
-/// side; `None` if the points form no grid that is numbered row by row.
-///
-/// With R rows of C points, point r C + c of the file has the number c R + r.
-fn transposed(points: &[Vector3<f64>], point: u32) -> Option<u32> {
-    let step = points.get(1)? - points[0];
-    let is_next =
-        |pair: &&[Vector3<f64>]| (pair[1] - pair[0] - step).norm() <= MAX_GRID_ERROR * step.norm();
-    let columns = 1 + points.windows(2).take_while(is_next).count();
-    let rows = points.len() / columns;
-    if rows < 2 || rows * columns != points.len() {
-        return None;
-    }
-    let point = point as usize;
-    u32::try_from(point % rows * columns + point / rows).ok()
-}
-
-/// Largest deviation of the distance between neighbouring points of a grid, relative to it.
-const MAX_GRID_ERROR: f64 = 1e-6;
-
-/// Gives each of the `chosen` rows of `table` the configuration of the view that comes `by` views
-/// earlier. A view is a run of rows with one configuration; at the ends of the table, a row keeps
-/// its configuration.
-fn shift_views(rows: &mut Measurements, table: &Measurements, (chosen, by): (&[usize], i8)) {
-    let starts: Vec<usize> = (0..table.len())
-        .filter(|&row| row == 0 || table.configuration(row) != table.configuration(row - 1))
-        .collect();
-    let joints = rows.joints.max(1);
-    for (q, &row) in rows.configurations.chunks_exact_mut(joints).zip(chosen) {
-        let view = starts.partition_point(|&start| start <= row).saturating_sub(1);
-        let source = view.checked_add_signed(-isize::from(by)).and_then(|view| starts.get(view));
-        if let Some(&source) = source {
-            q.copy_from_slice(table.configuration(source));
         }
     }
 }

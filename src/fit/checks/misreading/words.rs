@@ -8,7 +8,8 @@ use super::undo::power_of_ten;
 use super::{MassScale, Misreading, numbers_of};
 use crate::error::Location;
 use crate::model::parameter::JointField;
-use crate::problem::{JointKind, Problem};
+use crate::problem::fixture::carrier_word;
+use crate::problem::{Fixture, JointKind, Problem};
 
 /// Returns the name of an entry of the joint table, such as `alpha of joint 3`; `joint` is 0 for
 /// all joints.
@@ -17,6 +18,11 @@ fn entry_name(joint: usize, field: JointField) -> String {
         0 => format!("{} of all joints", field.name()),
         _ => format!("{} of joint {joint}", field.name()),
     }
+}
+
+/// Returns the name of a camera or marker.
+fn name_of_fixture(problem: &Problem, fixture: usize) -> String {
+    problem.fixtures.get(fixture).map_or_else(String::new, |of| format!("\"{}\"", of.name))
 }
 
 impl Misreading {
@@ -43,6 +49,40 @@ impl Misreading {
             (Self::Coupled { joint, from, .. }, Some(size)) => format!(
                 "joint {joint} that also turns by {size:.3} times the command of joint {from} (declare joint-coupling)"
             ),
+            (Self::Carrier { target, joint }, _) => match problem.targets.get(target) {
+                Some(named) => format!(
+                    "the target \"{}\" on the frame of joint {joint} (joint = {joint})",
+                    named.name
+                ),
+                None => self.to_string(),
+            },
+            (Self::ExchangedTargets { target, with }, _) => {
+                let name = |target: usize| {
+                    problem.targets.get(target).map_or("", |target| target.name.as_str())
+                };
+                format!(
+                    "the words \"{}\" and \"{}\" exchanged in the column target",
+                    name(target),
+                    name(with)
+                )
+            }
+            (Self::Mounted { fixture, frame }, _) => {
+                let name = name_of_fixture(problem, fixture);
+                let mounted = problem.fixtures.get(fixture).cloned();
+                let mounted = mounted.map(|of| Fixture { carrier: Some(frame), ..of });
+                let word = mounted.map_or_else(String::new, |of| carrier_word(problem, &of));
+                format!("{name} on the frame of joint {frame} (on = \"{word}\")")
+            }
+            (Self::ExchangedMounts { fixture, with }, _) => {
+                let [camera, marker] = [fixture, with].map(|index| name_of_fixture(problem, index));
+                format!("{camera} and {marker} with exchanged frames (on = …)")
+            }
+            (Self::CentreSign { mass, axis }, _) => {
+                let mut bodies = problem.joints.iter().flat_map(|joint| &joint.bodies);
+                let name = bodies.nth(mass - 1).map_or("", |body| body.name.as_str());
+                let axis = ['x', 'y', 'z'][axis];
+                format!("{axis} of the centre of mass of {name} that has the other sign")
+            }
             (Self::Mass { mass, scale }, _) => match name_of_mass(problem, mass) {
                 Some((name, joint)) => {
                     format!("the mass of {name} at joint {joint} that is {scale}")
@@ -201,21 +241,54 @@ impl fmt::Display for Misreading {
             Self::ArmInMillimetres => {
                 f.write_str("lengths of joints that are in millimetres, declared in metres")
             }
+            _ => self.fmt_of_loads(f),
+        }
+    }
+}
+
+impl Misreading {
+    /// Writes the description of a misreading of loads, targets, cameras or the joint table.
+    fn fmt_of_loads(self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
             Self::Mass { mass: 0, scale } => write!(f, "masses that are {scale}"),
             Self::Mass { mass, scale } => {
                 write!(f, "mass {mass}, counted along the arm, that is {scale}")
             }
             Self::Payload { scale } => write!(f, "payloads that are {scale}"),
-            Self::Stiffness { power: 0 } => {
-                f.write_str("stiffnesses of joints per degree, declared per radian")
+            Self::Stiffness { joint, power } => {
+                let verb = if joint == 0 { "are" } else { "is" };
+                match joint {
+                    0 => f.write_str("stiffnesses of joints")?,
+                    _ => write!(f, "the stiffness of joint {joint}")?,
+                }
+                match power {
+                    0 => write!(f, " that {verb} per degree, declared per radian"),
+                    _ => write!(f, " that {verb} to be multiplied by {}", power_of_ten(power)),
+                }
             }
-            Self::Stiffness { power } => {
-                write!(
-                    f,
-                    "stiffnesses of joints that are to be multiplied by {}",
-                    power_of_ten(power)
-                )
+            Self::Slides { power } => {
+                let [found, declared] =
+                    if power < 0 { ["millimetres", "metres"] } else { ["metres", "millimetres"] };
+                write!(f, "columns of sliding joints that are in {found}, declared in {declared}")
             }
+            Self::Carrier { joint, .. } => {
+                write!(f, "the target on the frame of joint {joint} (joint = {joint})")
+            }
+            Self::ExchangedTargets { .. } => f.write_str("two targets that are exchanged"),
+            Self::Mounted { frame, .. } => {
+                write!(f, "a camera or marker on the frame of joint {frame}")
+            }
+            Self::ExchangedMounts { .. } => {
+                f.write_str("a camera and a marker with exchanged frames")
+            }
+            Self::PayloadAtTarget => f.write_str(
+                "the payload at the measured target (declare payload_at = \"target\" in [tool])",
+            ),
+            Self::CentreSign { mass, axis } => write!(
+                f,
+                "{} of the centre of mass {mass}, counted along the arm, that has the other sign",
+                ['x', 'y', 'z'][axis]
+            ),
             Self::Gravity { axis, is_negative } => {
                 let sign = if is_negative { "−" } else { "+" };
                 write!(f, "gravity that points along {sign}{}", ['x', 'y', 'z'][axis])
@@ -223,9 +296,7 @@ impl fmt::Display for Misreading {
             _ => self.fmt_of_table(f),
         }
     }
-}
 
-impl Misreading {
     /// Writes the description of a misreading of the joint table; nothing for other misreadings.
     fn fmt_of_table(self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {

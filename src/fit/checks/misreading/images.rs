@@ -1,0 +1,112 @@
+//! Misreadings of images: their candidates, and tables as they should have been read.
+
+use nalgebra::Vector3;
+
+use super::Misreading;
+use crate::measurement::Measurements;
+use crate::observation::FixtureKind;
+use crate::problem::{Fixture, Observation, Problem};
+
+/// Number of joints before and after the declared carrier of a camera or marker that are tried.
+const MAX_OTHER_CARRIERS: usize = 2;
+
+/// Returns the misreadings of images: exchanged or reversed axes, the numbering of the points,
+/// images that are shifted against the configurations, and other carriers of cameras and markers.
+pub(super) fn of_images(problem: &Problem) -> Vec<Misreading> {
+    let shifts = [-1, 1].map(|by| Misreading::ShiftedViews { by });
+    let axes = [Misreading::ExchangedAxes, Misreading::FromBottom, Misreading::Transposed];
+    let mut misreadings: Vec<Misreading> = axes.into_iter().chain(shifts).collect();
+    let of_kind = |wanted: FixtureKind| {
+        let fixtures = problem.fixtures.iter().enumerate();
+        fixtures.filter(move |(_, fixture)| fixture.kind == wanted)
+    };
+    let mounted = of_kind(FixtureKind::Camera).chain(of_kind(FixtureKind::Marker));
+    for (fixture, Fixture { carrier, .. }) in mounted {
+        let Some(carrier) = carrier.filter(|carrier| *carrier > 0) else { continue };
+        let last = (carrier + MAX_OTHER_CARRIERS).min(problem.joints.len());
+        let others = carrier.saturating_sub(MAX_OTHER_CARRIERS).max(1)..=last;
+        let others = others.filter(|frame| *frame != carrier);
+        misreadings.extend(others.map(|frame| Misreading::Mounted { fixture, frame }));
+    }
+    for (fixture, camera) in of_kind(FixtureKind::Camera) {
+        let markers = of_kind(FixtureKind::Marker);
+        let others = markers.filter(|(_, marker)| marker.carrier != camera.carrier);
+        misreadings.extend(others.map(|(with, _)| Misreading::ExchangedMounts { fixture, with }));
+    }
+    misreadings
+}
+
+impl Misreading {
+    /// Corrects the pixels of images, or the numbers of their points, by the misreading.
+    pub(super) fn undo_image(self, rows: &mut Measurements, problem: &Problem) {
+        for (observation, pixel) in rows.observations.iter_mut().zip(&mut rows.positions) {
+            let Observation::Pixel(camera, marker, point) = *observation else { continue };
+            match self {
+                Self::ExchangedAxes => pixel.swap_rows(0, 1),
+                Self::FromBottom => {
+                    if let Some(height) = image_height(problem, camera as usize) {
+                        pixel.y = height - pixel.y;
+                    }
+                }
+                _ => {
+                    let points = problem.fixtures.get(marker as usize).map(|of| &of.points[..]);
+                    if let Some(other) = points.and_then(|points| transposed(points, point)) {
+                        *observation = Observation::Pixel(camera, marker, other);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Index of the vertical image centre in the numbers of a camera.
+const CENTRE_Y: usize = 9;
+
+/// Returns the height of a camera's image \[px\]: the declared one, or twice the vertical centre.
+/// `None` if neither is declared.
+fn image_height(problem: &Problem, camera: usize) -> Option<f64> {
+    let camera = problem.fixtures.get(camera)?;
+    let centre = camera.known.get(CENTRE_Y).copied().flatten();
+    camera.image.map(|[_, height]| height).or(centre.map(|centre| 2.0 * centre))
+}
+
+/// Returns the number of the point that has the number `point` if a grid is counted along its other
+/// side; `None` if the points form no grid that is numbered row by row.
+///
+/// With R rows of C points, point r C + c of the file has the number c R + r.
+fn transposed(points: &[Vector3<f64>], point: u32) -> Option<u32> {
+    let step = points.get(1)? - points[0];
+    let is_next =
+        |pair: &&[Vector3<f64>]| (pair[1] - pair[0] - step).norm() <= MAX_GRID_ERROR * step.norm();
+    let columns = 1 + points.windows(2).take_while(is_next).count();
+    let rows = points.len() / columns;
+    if rows < 2 || rows * columns != points.len() {
+        return None;
+    }
+    let point = point as usize;
+    u32::try_from(point % rows * columns + point / rows).ok()
+}
+
+/// Largest deviation of the distance between neighbouring points of a grid, relative to it.
+const MAX_GRID_ERROR: f64 = 1e-6;
+
+/// Gives each of the `chosen` rows of `table` the configuration of the view that comes `by` views
+/// earlier. A view is a run of rows with one configuration; at the ends of the table, a row keeps
+/// its configuration.
+pub(super) fn shift_views(
+    rows: &mut Measurements,
+    table: &Measurements,
+    (chosen, by): (&[usize], i8),
+) {
+    let starts: Vec<usize> = (0..table.len())
+        .filter(|&row| row == 0 || table.configuration(row) != table.configuration(row - 1))
+        .collect();
+    let joints = rows.joints.max(1);
+    for (q, &row) in rows.configurations.chunks_exact_mut(joints).zip(chosen) {
+        let view = starts.partition_point(|&start| start <= row).saturating_sub(1);
+        let source = view.checked_add_signed(-isize::from(by)).and_then(|view| starts.get(view));
+        if let Some(&source) = source {
+            q.copy_from_slice(table.configuration(source));
+        }
+    }
+}

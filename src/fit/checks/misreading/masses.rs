@@ -1,0 +1,60 @@
+//! Search for wrong masses, and wrong places of masses, of an arm that gives way.
+
+use rayon::prelude::*;
+
+use super::Misreading;
+use super::candidates::{MASS_SCALES, of_masses, of_places};
+use super::explanation::Explanations;
+use super::search::Trial;
+use crate::fit::checks::checked_fit::CheckedFit;
+use crate::fit::stages::fitting::Fitting;
+
+/// Maximum number of rows, evenly spaced, by which the misreadings are ranked.
+const MAX_RANKED_ROWS: usize = 40;
+/// Number of solver steps, from the fit as read, by which they are ranked.
+const RANKING_STEPS: u64 = 2;
+/// Maximum number of misreadings that are fitted in full.
+const MAX_FITTED: usize = 4;
+
+impl CheckedFit<'_> {
+    /// Returns the masses in another unit or at another place that leave at most `limit` \[m\]. For a
+    /// fit near the noise, they replace the other misreadings.
+    pub fn misread_masses(&self, limit: f64) -> &Explanations {
+        self.explanations.get_or_init(|| misread_masses(self, limit))
+    }
+}
+
+/// Finds the masses in another unit or at another place that leave at most `limit` \[m\] after a full
+/// fit, where the fit as declared leaves more than noise. An arm that gives way hides such a mistake
+/// in other parameters, so that the nominal arm does not show it.
+fn misread_masses(fit: &CheckedFit, limit: f64) -> Explanations {
+    let gives_way =
+        fit.fitting.model.parameters.iter().any(|parameter| parameter.site.is_elastic());
+    if !gives_way && !fit.problem.is_elastic() {
+        return Explanations::default();
+    }
+    let measurements = fit.fitting.measurements;
+    let mut tested = of_masses(fit.problem, measurements, &MASS_SCALES);
+    tested.extend(of_places(fit.problem, measurements));
+    let (few, start) = (Trial::with_rows(fit, MAX_RANKED_ROWS), &fit.end.x);
+    let error = |&misreading: &Misreading| {
+        let error = few.with_corrected(misreading, false, |fitting, _| {
+            let steps = Some(RANKING_STEPS);
+            let fitting = Fitting { max_steps: steps, ..fitting.with_declared_noise() };
+            if fitting.model.parameters.len() != start.len() {
+                return None;
+            }
+            let end = fitting.run(start).ok()?;
+            Some(few.penalised(&fitting, &fitting.split.identification, &end.x))
+        })?;
+        error.is_finite().then_some((misreading, error))
+    };
+    let mut ranked: Vec<(Misreading, f64)> = tested.par_iter().filter_map(error).collect();
+    ranked.sort_by(|a, b| a.1.total_cmp(&b.1));
+    let chosen: Vec<Misreading> =
+        ranked.into_iter().map(|(misreading, _)| misreading).take(MAX_FITTED).collect();
+    let trial = Trial::new(fit);
+    let as_read = trial.error_as_read(fit);
+    let fitted = trial.explained(&chosen, limit.min(as_read));
+    Explanations { fitted, as_read, ..Explanations::default() }
+}
