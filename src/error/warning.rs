@@ -48,7 +48,8 @@ pub enum WarningKind {
     )]
     RuleOverridden { by: String, line: usize },
     #[error(
-        "joint {joint} is fixed, so the column is ignored; the joints that move are {}",
+        "joint {joint} is fixed, so the column is ignored; the joints that move are {}: if the arm has \
+         one more, it is declared as fixed",
         moving.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
     )]
     JointIgnored { joint: usize, moving: Vec<usize> },
@@ -187,6 +188,30 @@ pub enum WarningKind {
     )]
     UnusualGravity { size: String, is_unit: bool },
     #[error(
+        "gravity is 0, so that no weight acts on the joints and links that give way; leave the key \
+         out for 9.80665 m/s² downwards"
+    )]
+    NoGravity,
+    #[error(
+        "the reference is {distance} K beyond all temperatures of the table ({least} °C to {most} °C), so \
+         that parameters at the reference are extrapolated; check the reference"
+    )]
+    FarReference { distance: String, least: String, most: String },
+    #[error(
+        "the columns approach1, approach2, … hold 0 and 1 alone; 0 is an unknown direction, and −1 one \
+         from larger values"
+    )]
+    ApproachWithoutSign,
+    #[error(
+        "this σ is of positions, and no row measures one, so that no σ is declared; the rows of this \
+         table have {write}"
+    )]
+    SigmaUnused { write: String },
+    #[error(
+        "{term:?} multiplies an angle by {factor} in a function of angles; q1, q2, … are in radians already"
+    )]
+    AngleConverted { term: String, factor: String },
+    #[error(
         "the radius of gyration √(EI/EA) would be {radius} m, more than the {length} m of the \
          beam; if the bending stiffness is in N·mm², divide it by 1e6"
     )]
@@ -223,6 +248,8 @@ pub enum WarningKind {
          millimetres, write {write}"
     )]
     FarFixture { length: String, links: String, write: String },
+    #[error("the points of the marker lie within {size} mm; if they are in metres, write points_m")]
+    TinyMarker { size: String },
     #[error(
         "no distance is longer than {longest} mm, while the links of the arm are together {links} m \
          long; if these are metres, name the column distance_m"

@@ -322,6 +322,12 @@ impl Law {
         format!("{} at {}: {}", self.name, self.site(), self.formulas().join(", "))
     }
 
+    /// Returns the first term that converts an angle between degrees and radians, and its factor.
+    pub(crate) fn converted_angle(&self) -> Option<(String, f64)> {
+        let mut terms = self.terms.iter().zip(self.formulas());
+        terms.find_map(|(term, text)| Some((text, term.expression.converted_angle()?)))
+    }
+
     /// Returns the arguments with their keys, in the order of files.
     pub(super) fn arguments(&self) -> Vec<(&str, Argument)> {
         let mut arguments = vec![

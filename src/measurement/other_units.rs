@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use super::Measurements;
 use super::limits::Commands;
-use crate::error::{Warning, WarningKind};
+use crate::error::{Location, Warning, WarningKind};
 use crate::problem::{JointKind, Observation, Problem};
 
 /// Range of room temperatures, 15 °C to 35 °C, in degrees Fahrenheit.
@@ -16,6 +16,8 @@ const GRAVITY: f64 = 9.80665;
 /// Largest relative difference between g times the median of the column `hoist_N` and the declared
 /// hoist force, at which the column is probably in kilograms.
 const MAX_HOIST_DIFFERENCE: f64 = 0.2;
+/// Smallest distance of the reference temperature from all temperatures that is reported \[K\].
+const MIN_FAR_REFERENCE: f64 = 10.0;
 /// Step of round payloads \[kg\].
 const ROUND_PAYLOAD: f64 = 0.5;
 /// Largest relative deviation from a round payload.
@@ -81,6 +83,51 @@ impl Measurements {
         };
         let location = self.location(row).with_key("payload_kg");
         (different.len() > 1 && looks_like_weights).then_some(Warning { location, kind })
+    }
+
+    /// Returns a warning if the reference temperature is far beyond all temperatures.
+    pub(super) fn far_reference(&self, problem: &Problem) -> Option<Warning> {
+        let reference = problem.data.reference_temperature?;
+        let values = || self.temperature.iter().flatten().copied();
+        let (least, most) =
+            (values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max));
+        let distance = (least - reference).max(reference - most);
+        let is_far = distance > MIN_FAR_REFERENCE.max(most - least) && distance.is_finite();
+        let kind = WarningKind::FarReference {
+            distance: format!("{distance:.0}"),
+            least: format!("{least}"),
+            most: format!("{most}"),
+        };
+        let location = problem.data.location.clone().with_key("data.reference_temperature_C");
+        is_far.then_some(Warning { location: Location { excerpt: None, ..location }, kind })
+    }
+
+    /// Returns a warning, located at the first row, if all directions of approach are 0 or 1 and
+    /// both occur.
+    pub(super) fn approach_without_sign(&self) -> Option<Warning> {
+        let directions = self.approach.as_deref().unwrap_or_default();
+        let has =
+            |value: f64| directions.iter().any(|direction| direction.total_cmp(&value).is_eq());
+        let location = self.location(0).with_key("approach");
+        let is_unsigned = self.len() >= MIN_ROWS && has(1.0) && has(0.0) && !has(-1.0);
+        is_unsigned.then_some(Warning { location, kind: WarningKind::ApproachWithoutSign })
+    }
+
+    /// Returns a warning if the problem declares a σ of positions, no row measures one, and the rows
+    /// have no σ of their own.
+    pub(super) fn unused_sigma(&self, problem: &Problem) -> Option<Warning> {
+        let data = &problem.data;
+        let kinds = self.kinds();
+        let leading = self.leading();
+        let measures_positions = kinds.iter().any(|kind| kind.is_position());
+        let is_unused = data.position_sigma.is_some()
+            && !measures_positions
+            && data.kind_sigmas.is_empty()
+            && self.sigma.is_none()
+            && leading.kind() != Observation::Pixel(0, 0, 0).kind();
+        let location = Location { excerpt: None, ..data.position_sigma_location.clone() };
+        let kind = WarningKind::SigmaUnused { write: format!("{}_sigma_mm", leading.kind()) };
+        is_unused.then_some(Warning { location, kind })
     }
 
     /// Returns a warning, located at the longest distance to an anchor, if all are far shorter than

@@ -264,6 +264,8 @@ impl<'a> Tables<'a> {
                 warnings.extend(measurements.many_turns(problem, &commands));
                 warnings.extend(measurements.kelvins());
                 warnings.extend(measurements.fahrenheit(problem));
+                warnings.extend(measurements.far_reference(problem));
+                warnings.extend(measurements.approach_without_sign());
                 warnings.extend(measurements.hoist_in_kilograms(problem));
                 warnings.extend(measurements.few_degrees(problem, &commands));
                 warnings.extend(measurements.milliseconds());
@@ -279,6 +281,7 @@ impl<'a> Tables<'a> {
                     let zeros = if is_comma { "0;0;0" } else { "0,0,0" };
                     warnings.extend(measurements.lost_targets(zeros)?);
                     warnings.extend(measurements.same_pose_elsewhere());
+                    warnings.extend(measurements.unused_sigma(problem));
                 }
                 warnings.extend(problem.plausibility_warnings());
                 measurements.warnings.clone_from(&warnings);

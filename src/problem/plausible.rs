@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use super::pattern::matches;
 use super::section::Section;
-use super::{Body, Fixture, Joint, JointKind, ParameterRule, Problem};
+use super::{Body, Effect, Fixture, Joint, JointKind, ParameterRule, Problem};
 use crate::error::{InputError, InputErrorKind, Location, Warning, WarningKind};
 use crate::observation::FixtureKind;
 use crate::quantity::unrounded_right_angle;
@@ -17,6 +17,8 @@ const MAX_LIMIT_RADIANS: f64 = TAU + 0.02;
 /// Largest plausible distance of a fixture from the origin of the measuring frame, or between two
 /// points, as a multiple of the length of the arm's links.
 const MAX_FIXTURE_LINKS: f64 = 20.0;
+/// Smallest plausible size of a marker \[m\].
+const MIN_MARKER: f64 = 2e-3;
 /// Minimum number of rows or turning joints from which the convention of a table is judged.
 const MIN_ROWS_TO_JUDGE_FORM: usize = 3;
 
@@ -117,8 +119,39 @@ impl Problem {
             .chain(self.body_warnings())
             .chain(self.stiff_beam_warning())
             .chain(self.hoist_direction_warning())
+            .chain(self.no_gravity())
+            .chain(self.converted_angle())
             .chain(self.overridden_rule())
             .collect()
+    }
+
+    /// Returns a warning if gravity is zero and a part of the arm gives way.
+    fn no_gravity(&self) -> Option<Warning> {
+        let gives_way = self.is_elastic()
+            || self
+                .effects
+                .iter()
+                .any(|declared| matches!(declared.effect, Effect::JointCompliance { .. }));
+        let is_loaded = self.declared_mass() > 0.0 || self.tool.payload_mass > 0.0;
+        let location = Location { line: None, excerpt: None, ..self.data.location.clone() };
+        (gives_way && is_loaded && self.gravity.norm() == 0.0).then(|| Warning {
+            location: location.with_key("gravity_m_s2"),
+            kind: WarningKind::NoGravity,
+        })
+    }
+
+    /// Returns a warning for the first declared law that converts an angle between degrees and
+    /// radians.
+    fn converted_angle(&self) -> Option<Warning> {
+        let found = self.effects.iter().find_map(|declared| match &declared.effect {
+            Effect::Law(law) => Some((&declared.location, law.converted_angle()?)),
+            _ => None,
+        });
+        let (location, (term, factor)) = found?;
+        Some(Warning {
+            location: Location { excerpt: None, ..location.clone() },
+            kind: WarningKind::AngleConverted { term, factor: format!("{factor:.4}") },
+        })
     }
 
     /// Returns a warning for the first rule of `[parameters]` that one later rule replaces for all
@@ -321,7 +354,21 @@ impl Problem {
         let far = far.map(|fixture| warning(&fixture.location, "at_", place(fixture)));
         let long = self.distances.iter().find(|known| known.length > limit);
         let long = long.map(|known| warning(&known.location, "", known.length));
-        if links > 0.0 { far.into_iter().chain(long).collect() } else { Vec::new() }
+        let size = |fixture: &Fixture| {
+            fixture.points.first().map(|first| {
+                let distances = fixture.points.iter().map(|point| (point - first).norm());
+                distances.fold(0.0, f64::max)
+            })
+        };
+        let is_tiny = |size: f64| size > 0.0 && size < MIN_MARKER;
+        let tiny = self.fixtures.iter().find_map(|fixture| {
+            let size = size(fixture).filter(|size| is_tiny(*size))?;
+            let location = Location { excerpt: None, ..fixture.location.clone() };
+            let kind = WarningKind::TinyMarker { size: format!("{:.3}", size * 1e3) };
+            Some(Warning { location: location.with_key("points_mm"), kind })
+        });
+        let far = far.into_iter().chain(long).filter(|_| links > 0.0);
+        far.chain(tiny).collect()
     }
 
     /// Returns the length of all links together, with the travel of sliding joints \[m\].

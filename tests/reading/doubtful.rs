@@ -153,3 +153,51 @@ fn numbers_in_other_notations_are_named() {
         &["column approach2: \"R\" is not a direction; write 1"],
     );
 }
+
+/// Returns true for the expected kind of warning.
+type Expected = fn(&WarningKind) -> bool;
+
+#[test]
+fn quantities_that_contradict_the_problem_are_named() {
+    let soft = |more: &str| {
+        format!(
+            "name = 'arm'\n{more}[[joint]]\n[[joint]]\na_m = 0.5\nstiffness_N_m_per_rad = 1e4\n\
+             [[joint.body]]\nname = 'a'\nmass_kg = 5\ncom_m = [0.2, 0, 0]\n[[joint]]\na_m = 0.4\n"
+        )
+    };
+    let data = |more: &str| format!("[data]\nposition_sigma_mm = 0.05\nheld_out = 'none'\n{more}");
+    let law = |term: &str| {
+        let law = format!("law = {{ name = 'a', at = 'joint2', terms = ['{term}'] }}");
+        format!("{ARM}{}[[effect]]\n{law}\n", data(""))
+    };
+    let column = |name: &str, value: &dyn Fn(usize) -> f64| {
+        let rows = rows(20, "A", 4);
+        let lines = rows.lines().enumerate().map(|(k, line)| format!("{line},{}\n", value(k)));
+        format!("{},{name}\n{}", HEADER.trim_end(), lines.collect::<String>())
+    };
+    let plain = || format!("{HEADER}{}", rows(20, "A", 4));
+    let warm = |from: f64| column("temperature_C", &|k| from + 0.1 * k as f64);
+    let sides = |least: f64| column("approach2", &|k| if k % 2 == 0 { 1.0 } else { least });
+    let reference =
+        |value: f64| format!("{ARM}{}", data(&format!("reference_temperature_C = {value}\n")));
+    let cases: [(String, String, bool, Expected); 10] = [
+        (soft("gravity_m_s2 = [0, 0, 0]\n") + &data(""), plain(), true, |k| {
+            matches!(k, WarningKind::NoGravity)
+        }),
+        (soft("") + &data(""), plain(), false, |k| matches!(k, WarningKind::NoGravity)),
+        (reference(2.0), warm(15.0), true, |k| matches!(k, WarningKind::FarReference { .. })),
+        (reference(20.0), warm(25.0), false, |k| matches!(k, WarningKind::FarReference { .. })),
+        (reference(20.0), sides(0.0), true, |k| matches!(k, WarningKind::ApproachWithoutSign)),
+        (reference(20.0), sides(-1.0), false, |k| matches!(k, WarningKind::ApproachWithoutSign)),
+        (law("sin(360*q2)"), plain(), true, |k| matches!(k, WarningKind::AngleConverted { .. })),
+        (law("cos(pi*q2/180 + 1)"), plain(), true, |k| {
+            matches!(k, WarningKind::AngleConverted { .. })
+        }),
+        (law("sin(200*q2)"), plain(), false, |k| matches!(k, WarningKind::AngleConverted { .. })),
+        (law("q2/360"), plain(), false, |k| matches!(k, WarningKind::AngleConverted { .. })),
+    ];
+    for (problem, table, is_warned, expected) in cases {
+        let found = try_table(&parse(&problem), &table).unwrap().1;
+        assert_eq!(found.iter().any(|w| expected(&w.kind)), is_warned, "{problem}\n{found:#?}");
+    }
+}

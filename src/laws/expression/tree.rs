@@ -1,5 +1,7 @@
 //! Syntax tree of a formula.
 
+use std::f64::consts::PI;
+
 use crate::laws::quantity::Quantity;
 
 /// Formula over quantities of a pose and named parameters.
@@ -71,6 +73,70 @@ pub enum Function {
     /// Uniform cubic B-spline with the knots 0, 1, 2, 3, 4; 0 outside 0…4. Its shifts by integers
     /// add up to 1.
     Spline,
+}
+
+/// Factors by which angles are converted: degrees and radians, and degrees of a turn.
+const CONVERSIONS: [f64; 4] = [PI / 180.0, 180.0 / PI, 180.0, 360.0];
+
+impl Expression {
+    /// Returns the factor of a joint's command in a sine, cosine or tangent if it is that between
+    /// two units of an angle.
+    pub(crate) fn converted_angle(&self) -> Option<f64> {
+        match self {
+            Self::Call(Function::Sin | Function::Cos | Function::Tan, argument) => {
+                let factor = argument.factor_of_command()?.abs();
+                let is_conversion = |known: &f64| (factor / known - 1.0).abs() < 1e-3;
+                CONVERSIONS.iter().any(|known| is_conversion(known)).then_some(factor)
+            }
+            Self::Call(_, argument) | Self::Negative(argument) => argument.converted_angle(),
+            Self::Binary(_, sides) => sides.iter().find_map(Self::converted_angle),
+            Self::Number(_) | Self::Quantity(_) | Self::Parameter(_) => None,
+        }
+    }
+
+    /// Returns the number that multiplies the command of a joint in a product or sum; `None` if
+    /// there is no such command.
+    fn factor_of_command(&self) -> Option<f64> {
+        match self {
+            Self::Quantity(Quantity::Command(_)) => Some(1.0),
+            Self::Negative(inner) => Some(-inner.factor_of_command()?),
+            Self::Binary(operator, sides) => {
+                let [left, right] = &**sides;
+                let of = |side: &Self| side.factor_of_command();
+                match operator {
+                    Operator::Multiply => {
+                        let left_factor = of(left).zip(right.number());
+                        let (factor, number) =
+                            left_factor.or_else(|| of(right).zip(left.number()))?;
+                        Some(factor * number)
+                    }
+                    Operator::Divide => Some(of(left)? / right.number()?),
+                    Operator::Add | Operator::Subtract => of(left).or_else(|| of(right)),
+                    _ => None,
+                }
+            }
+            _ => None,
+        }
+    }
+
+    /// Returns the value of an expression of numbers alone.
+    fn number(&self) -> Option<f64> {
+        match self {
+            Self::Number(value) => Some(*value),
+            Self::Negative(inner) => Some(-inner.number()?),
+            Self::Binary(operator, sides) => {
+                let [left, right] = [sides[0].number()?, sides[1].number()?];
+                match operator {
+                    Operator::Add => Some(left + right),
+                    Operator::Subtract => Some(left - right),
+                    Operator::Multiply => Some(left * right),
+                    Operator::Divide => Some(left / right),
+                    _ => None,
+                }
+            }
+            _ => None,
+        }
+    }
 }
 
 impl Function {
