@@ -56,10 +56,10 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let results = Results::claim("compare-results", out.clone(), inputs, &[PAGE_FILE], flags)?;
     let sides = [read_side(first, *trust)?, read_side(second, *trust)?];
     let real = [first, second].map(|file| file.canonicalize().ok());
-    if real[0].is_some() && real[0] == real[1] {
+    if !quiet && real[0].is_some() && real[0] == real[1] {
         diagnostic::warn(&format!("A and B are the same file: {}", first.display()));
     }
-    if sides[0].estimate.problem_name() != sides[1].estimate.problem_name() {
+    if !quiet && sides[0].estimate.problem_name() != sides[1].estimate.problem_name() {
         diagnostic::warn("the two results are of problems with different names");
     }
     results.write(&[(PAGE_FILE, &report::difference_page(&sides))])?;

@@ -68,7 +68,7 @@ pub struct Arguments {
     #[arg(long)]
     best_rigid: bool,
     /// Write the geometry that a rigid model without effects gives, fitted to the same measurements
-    #[arg(long, conflicts_with = "best_rigid")]
+    #[arg(long)]
     fitted_alone: bool,
     /// Box of the target in which --best-rigid fits, frame of the arm's base
     #[arg(long, value_name = "X0,X1,Y0,Y1,Z0,Z1", value_parser = parse_numbers::<6>, allow_hyphen_values = true, requires = "best_rigid")]
@@ -119,6 +119,19 @@ impl Format {
     }
 }
 
+/// Checks the options that choose the geometry of a file; `is_rigid` is true if the file holds one.
+fn check_geometry(arguments: &Arguments, is_rigid: bool) -> Result<(), code::ExportError> {
+    let options =
+        [(arguments.best_rigid, "--best-rigid"), (arguments.fitted_alone, "--fitted-alone")];
+    if let Some((_, option)) = options.into_iter().find(|(is_set, _)| *is_set && !is_rigid) {
+        return Err(code::ExportError::WithoutEffect { option });
+    }
+    if arguments.best_rigid && arguments.fitted_alone {
+        return Err(code::ExportError::TwoGeometries);
+    }
+    Ok(())
+}
+
 /// Writes the identified geometry, a camera or the whole model in the requested format. Prints the
 /// parts of the model that the file cannot represent, and its held-out errors.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
@@ -128,13 +141,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     if arguments.camera.is_some() && camera.is_none() {
         return Err(code::ExportError::WithoutEffect { option: "--camera" }.into());
     }
-    for (is_set, option) in
-        [(arguments.best_rigid, "--best-rigid"), (arguments.fitted_alone, "--fitted-alone")]
-    {
-        if is_set && !is_rigid {
-            return Err(code::ExportError::WithoutEffect { option }.into());
-        }
-    }
+    check_geometry(arguments, is_rigid)?;
     let problem = Problem::read(&arguments.problem)?;
     let estimates = arguments.trust.read(&arguments.estimate)?;
     if matches!(arguments.format, Some(Format::C)) {

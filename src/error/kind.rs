@@ -237,9 +237,13 @@ pub enum InputErrorKind {
     // The following errors concern effects.
     #[error(
         "an effect is one key, as in `gear-ratio = {{ joint = 2 }}`; found {found}{}",
-        if *found > 1 { ": a key of another section stands above the sections [[effect]]" } else { "" }
+        match (*found > 1, *are_effects) {
+            (true, true) => "; write each into an [[effect]] of its own",
+            (true, false) => ": a key of another section stands above the sections [[effect]]",
+            (false, _) => "",
+        }
     )]
-    NotOneEffect { found: usize },
+    NotOneEffect { found: usize, are_effects: bool },
     #[error("needs arguments; write {write}")]
     NeedsArguments { write: String },
     #[error("unknown effect{}; known: {}", suggestion(name, *known), known.join(", "))]
@@ -352,6 +356,8 @@ pub enum InputErrorKind {
         joined_list("they are", known, "it has none")
     )]
     MatchesNothing { pattern: String, known: Vec<String> },
+    #[error("parameters are named by the number of the joint, not by its name; write \"{write}\"")]
+    NamedByFrame { write: String },
     #[error(
         "the pattern matches no parameter of this arm; parameters of {effects} exist if an \
          [[effect]] declares it, \

@@ -2,6 +2,8 @@
 
 use thiserror::Error;
 
+use super::phrases::plural;
+
 /// Reason why one part of the split (identification or held-out rows) is empty.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[non_exhaustive]
@@ -11,8 +13,9 @@ pub enum NoRows {
     #[error("every row is of session \"{session}\"")]
     Session { session: String },
     #[error(
-        "the {rows} rows have {configurations} joint configurations, too few for fraction \
-         {fraction}"
+        "the {rows} rows are of {configurations} joint configuration{}, too few for fraction \
+         {fraction}; repeated measurements of a pose show the noise, other poses identify the arm",
+        plural(*configurations)
     )]
     Fraction { rows: usize, configurations: usize, fraction: String },
 }

@@ -235,7 +235,8 @@ pub enum TableErrorKind {
     WordForMeasurement { value: String },
     #[error(
         "the row begins with \"{word}\" and has {empty} empty cells; if it is a summary and no \
-         row of the table, remove it, or write comment = \"{word}\" in [data.format]"
+         row of the table, remove it, or write comment = \"{word}\" in [data.format]; if it is a point that \
+         the instrument measures without the arm, name the point in a column nest"
     )]
     SummaryRow { word: String, empty: usize },
     #[error(

@@ -50,6 +50,9 @@ pub enum ExportError {
         /// Option of the command line.
         option: &'static str,
     },
+    /// Two options choose different geometries.
+    #[error("--best-rigid and --fitted-alone write different geometries; give one of them")]
+    TwoGeometries,
     /// The problem declares no such camera.
     #[error(
         "no such camera; {}",

@@ -393,7 +393,8 @@ impl Reporter<'_> {
         });
         let mut changes: Vec<Change> = changes.collect();
         if matches!(cause.kind, CauseKind::Noise | CauseKind::Other) {
-            let (parameter, unit) = ("ratio of the noise".to_owned(), Unit::Number);
+            let (parameter, unit) =
+                ("noise, as a multiple of the known one".to_owned(), Unit::Number);
             changes.push(Change { parameter, unit, change: assessed.mean[0], std_error: f64::NAN });
         }
         let rival = rival.filter(|rival| rival.cause != assessed.cause);

@@ -136,7 +136,12 @@ fn parse_written(
 fn only_entry<'a, 'i>(section: &Section<'a, 'i>) -> Result<(&'a str, Item<'a, 'i>), InputError> {
     match <[_; 1]>::try_from(section.entries()) {
         Ok([entry]) => Ok(entry),
-        Err(_) => Err(section.error(InputErrorKind::NotOneEffect { found: section.len() })),
+        Err(entries) => {
+            let is_effect = |(key, _): &(&str, Item)| NAMES.contains(key);
+            let are_effects = entries.iter().all(is_effect);
+            let found = section.len();
+            Err(section.error(InputErrorKind::NotOneEffect { found, are_effects }))
+        }
     }
 }
 

@@ -109,7 +109,7 @@ fn declaration<'a, 'i>(section: &Section<'a, 'i>) -> Result<(&'a str, Item<'a, '
         (Some(single), 0) => Ok(single),
         (last, others) => {
             let found = others + usize::from(last.is_some());
-            Err(section.error(InputErrorKind::NotOneEffect { found }))
+            Err(section.error(InputErrorKind::NotOneEffect { found, are_effects: true }))
         }
     }
 }

@@ -6,11 +6,16 @@ use super::contradicted_entry::contradicted_entry;
 use super::finding::{Finding, FindingCode};
 use crate::fit::stages::parameter_size::largest_deviation;
 use crate::model::parameter::{JointField, Parameter, ParameterSite};
+use crate::problem::Observation;
 use crate::quantity::Unit;
 
 /// Largest deviation of an arm parameter from nominal, in σ of its prior, that is not reported. A
 /// normal deviation exceeds 5 σ once in two million.
 pub(super) const MAX_PRIOR_SIGMAS: f64 = 5.0;
+
+/// Usual σ of priors of angles \[°\]. A σ that is in this range if it is read in radians may be meant
+/// so.
+const USUAL_ANGLE_SIGMAS: std::ops::RangeInclusive<f64> = 0.05..=5.0;
 
 /// Returns true if the parameter is a declared quantity of the arm, of a base or of a target; false
 /// if it belongs to an effect or a fixture.
@@ -52,13 +57,75 @@ impl Check for WithinPriors {
                     let text = format!("{text}: {}", entry.words);
                     Finding::new(FindingCode::BeyondPrior, numbers, text).with_remedy(entry.remedy)
                 }
-                None => Finding::new(FindingCode::BeyondPrior, numbers, text),
+                None => {
+                    let finding = Finding::new(FindingCode::BeyondPrior, numbers, text);
+                    match remedy(fit, parameter, sigmas) {
+                        Some(remedy) => finding.with_remedy(remedy),
+                        None => finding,
+                    }
+                }
             }
         };
         let largest =
             largest_ratio(fit, prior_sigmas).filter(|(_, sigmas)| *sigmas > MAX_PRIOR_SIGMAS);
         largest.map(finding).into_iter().collect()
     }
+}
+
+/// Units of a torsional stiffness, each with its size in N·m/rad.
+const STIFFNESS_UNITS: [(f64, &str); 3] =
+    [(180.0 / std::f64::consts::PI, "N·m/°"), (1e3, "kN·m/rad"), (3437.75, "N·m/arcmin")];
+
+/// Returns the ratio of the fitted value of a parameter to its nominal one.
+fn fitted_ratio(fit: &CheckedFit, parameter: &Parameter) -> Option<f64> {
+    let mut fitted = fit.fitting.model.parameters.iter().zip(&fit.end.x);
+    let (_, x) = fitted.find(|(other, _)| std::ptr::eq(*other, parameter))?;
+    (parameter.nominal != 0.0).then(|| parameter.value(*x) / parameter.nominal)
+}
+
+/// Returns the remedy for a parameter that deviates by `sigmas` σ of its prior, where its kind or
+/// the size of σ suggests one.
+fn remedy(fit: &CheckedFit, parameter: &Parameter, sigmas: f64) -> Option<String> {
+    let ratio = fitted_ratio(fit, parameter);
+    let is_stiffness =
+        matches!(parameter.site, ParameterSite::Joint { field: JointField::Stiffness, .. });
+    let ratio = ratio.filter(|ratio| is_stiffness && *ratio > 1.0);
+    if let Some(ratio) = ratio {
+        let unit = STIFFNESS_UNITS.iter().find(|(factor, _)| (ratio / factor).ln().abs() < 0.2);
+        let unit = unit.map_or(String::new(), |(_, unit)| format!(", as one in {unit} would be"));
+        return Some(format!(
+            "the fitted stiffness is {ratio:.3} times the declared one{unit}; check its unit, then the prior"
+        ));
+    }
+    if let ParameterSite::Base { .. } = parameter.site {
+        return Some(
+            "declare the pose of the arm's base in the measuring frame, not that of the instrument in the \
+             frame of the base, or a larger σ; then check signs of joints and units"
+                .to_owned(),
+        );
+    }
+    let kind = fit.fitting.measurements.leading().kind();
+    if parameter.unit() == Unit::Length && !fit.fitting.measurements.leading().is_position() {
+        let scale = if kind == Observation::Pixel(0, 0, 0).kind() {
+            "check the points of the marker, such as the size of its squares"
+        } else if !fit.problem.distances.is_empty() {
+            "check the lengths of [[distance]]"
+        } else {
+            return None;
+        };
+        return Some(format!(
+            "{scale}, from which all lengths follow; then axes, signs of joints, and the prior"
+        ));
+    }
+    let sigma = parameter.sigma.filter(|_| parameter.unit() == Unit::Angle)?.to_degrees();
+    let in_radians = sigma.to_degrees();
+    let is_usual = USUAL_ANGLE_SIGMAS.contains(&in_radians);
+    (is_usual && sigmas.to_radians() < MAX_PRIOR_SIGMAS).then(|| {
+        format!(
+            "if the σ of {sigma:.4}° is meant in radians ({in_radians:.2}°), write sigma_rad; otherwise \
+             check axes of the measuring frame, signs of joints, and units"
+        )
+    })
 }
 
 /// Checks that no parameter deviates from nominal by more than is possible on this arm. Limits are

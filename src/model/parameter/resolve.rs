@@ -114,7 +114,8 @@ pub fn resolve(
             if undeclared.is_some() && matches!(rule.freedom, Freedom::Fixed) {
                 continue;
             }
-            let kind = undeclared.unwrap_or(InputErrorKind::MatchesNothing {
+            let kind = undeclared.or_else(|| named_by_frame(problem, &rule.pattern));
+            let kind = kind.unwrap_or(InputErrorKind::MatchesNothing {
                 pattern: rule.pattern.clone(),
                 known: plain_names,
             });
@@ -171,6 +172,13 @@ pub fn rule_of<'a>(problem: &'a Problem, parameter: &EffectParameter) -> Option<
         .iter()
         .rev()
         .find(|rule| parameter.is_named_by(rule) && applies_to_unit(rule, parameter.unit()))
+}
+
+/// Returns the error of a pattern that begins with the name of a joint instead of its number.
+fn named_by_frame(problem: &Problem, pattern: &str) -> Option<InputErrorKind> {
+    let (name, rest) = pattern.split_once('.')?;
+    let joint = problem.joints.iter().position(|joint| joint.name == name)?;
+    Some(InputErrorKind::NamedByFrame { write: format!("joint{}.{rest}", joint + 1) })
 }
 
 /// Returns the error for a pattern that matches no parameter in `names` but effects which the
