@@ -15,6 +15,8 @@ mod input;
 #[cfg(target_os = "linux")]
 #[path = "cli/interrupt.rs"]
 mod interrupt;
+#[path = "cli/mistaken.rs"]
+mod mistaken;
 #[path = "cli/printed.rs"]
 mod printed;
 #[path = "cli/results.rs"]

@@ -98,6 +98,26 @@ fn targets_in_another_unit_are_asked_about() {
     };
     assert!(warned(&|_, x| x / 1e3).contains("with metres instead of the declared millimetres"));
     assert!(!warned(&|_, x| x).contains("where their joint columns lead"));
+    // The estimate had payloads and hoist forces, which an elastic arm needs.
+    let kept = |names: &[&str]| {
+        let places: Vec<usize> = (0..table.columns.len())
+            .filter(|&place| !names.contains(&table.columns[place].as_str()))
+            .collect();
+        let line = |cells: &Vec<String>| {
+            places.iter().map(|&place| cells[place].as_str()).collect::<Vec<_>>().join(",") + "\n"
+        };
+        let rows: String = table.rows.iter().take(2).map(line).collect();
+        folder.write("targets.csv", line(&table.columns) + &rows);
+        let command = "compensate . --estimate out/estimate.json --data targets.csv --out c";
+        folder.flexcal(command).message()
+    };
+    let lacks = |names: &[&str]| {
+        let message = kept(names);
+        ["payload_kg", "hoist_N"].map(|name| message.contains(&format!("has no column {name}")))
+    };
+    assert_eq!(lacks(&[]), [false, false]);
+    assert_eq!(lacks(&["payload_kg"]), [true, false]);
+    assert_eq!(lacks(&["payload_kg", "hoist_N"]), [true, true]);
 }
 
 #[test]

@@ -5,10 +5,11 @@ use std::path::Path;
 use flexcal::fit::{FindingCode, Identification, Options, SavedEstimate};
 use flexcal::life::{PriorError, PriorSource, identify_with_prior};
 use flexcal::measurement::{Dataset, Split};
+use flexcal::report::estimate_text;
 use flexcal::results::{Document as _, IdentificationResult};
 
 use crate::bench::{Bench, whole, with_zero};
-use crate::common::program::{Folder, assert_contains};
+use crate::common::program::{Folder, assert_contains, in_one_line};
 
 /// Poses of a full calibration.
 const FULL: usize = 40;
@@ -121,6 +122,8 @@ fn the_noise_of_the_first_fit_is_kept() {
         if let Some(sigma) = declared {
             let factor = json["noise_factor"].as_f64().unwrap();
             assert!((factor - (second / sigma).powi(2)).abs() < 1e-6 * factor, "{factor}");
+            let words = in_one_line(&estimate_text(&problem, &found, None));
+            assert!(words.contains("because the earlier estimate was fitted with it"), "{words}");
         } else {
             let sigma = json["estimated_sigma_mm"].as_f64().unwrap();
             assert!((sigma - 1e3 * second).abs() < 1e-6 * sigma, "{sigma}");

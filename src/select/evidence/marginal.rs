@@ -92,7 +92,7 @@ pub(super) struct NoiseGrid {
 
 impl NoiseGrid {
     /// Returns ln of the likelihood of a residual with sum of squares S, summed over the noise
-    /// factor f, up to a constant. It is interpolated with an error below 1e-8.
+    /// factor f, up to a constant. It is interpolated with an error below 1e-8, plus rounding.
     pub fn ln_likelihood(&self, squares: f64) -> f64 {
         self.table.value(squares, |squares| self.summed(squares))
     }

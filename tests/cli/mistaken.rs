@@ -1,0 +1,87 @@
+//! Mistakes in the tables of `compensate` and `next` are named.
+
+use crate::common::program::{Folder, assert_contains};
+
+/// Rigid arm with four joints.
+const PROBLEM: &str = r#"
+name = "elbow"
+joint = [
+  { d_m = 0.45, min_deg = -150, max_deg = 150 },
+  { alpha_deg = 90, a_m = 0.05, min_deg = 0, max_deg = 120 },
+  { a_m = 0.60, min_deg = -130, max_deg = -10 },
+  { a_m = 0.50, min_deg = -100, max_deg = 100 },
+]
+tool.target_m = [0.15, 0.02, 0.0]
+data = { files = ["measurements.csv"], position_sigma_mm = 0.03, held_out = { fraction = 0.3, seed = 1 } }
+
+[parameters]
+"joint*.theta" = { sigma_deg = 0.2 }
+"base.*" = { free = true }
+"#;
+
+/// Truth of the arm, with ranges of its poses.
+const TRUTH: &str = r#"
+[random]
+"joint*.theta" = { sigma_deg = 0.1 }
+
+[noise]
+position_sigma_mm = 0.03
+
+[poses]
+q1_deg = [-150, 150]
+q2_deg = [0, 120]
+q3_deg = [-130, -10]
+q4_deg = [-100, 100]
+"#;
+
+/// Returns a folder with the arm, 40 measured poses and its estimate.
+fn identified() -> Folder {
+    let folder = Folder::with([("problem.toml", PROBLEM), ("TRUTH.toml", TRUTH)]);
+    folder.simulate(".", "TRUTH.toml", 40, 3, "measurements.csv");
+    folder.flexcal("identify . --out est --quiet").success();
+    folder
+}
+
+#[test]
+fn targets_that_contradict_their_joint_columns_are_asked_about() {
+    let folder = identified();
+    let table = folder.table("measurements.csv");
+    let names = ["q1_deg", "q2_deg", "q3_deg", "q4_deg", "x_mm", "y_mm", "z_mm"];
+    let columns = names.map(|name| table.numbers(name));
+    let warned = |header: &str, change: &dyn Fn(&mut Vec<f64>)| {
+        let rows = (0..5).map(|row| {
+            let mut cells: Vec<f64> = columns.iter().map(|column| column[row]).collect();
+            change(&mut cells);
+            cells.iter().map(f64::to_string).collect::<Vec<_>>().join(",") + "\n"
+        });
+        folder.write("targets.csv", format!("{header}\n{}", rows.collect::<String>()));
+        let command = "compensate . --estimate est/estimate.json --data targets.csv --out out";
+        folder.flexcal(command).message()
+    };
+    let header = names.join(",");
+    let cases: [(&dyn Fn(&mut Vec<f64>), &str); 4] = [
+        (&|row| row.swap(1, 2), "the columns of joints 2 and 3 exchanged"),
+        (&|row| row[..4].iter_mut().for_each(|q| *q = q.to_radians()), "start joints in radians"),
+        (&|row| row.swap(4, 5), "the columns of x and y exchanged"),
+        (&|row| row[6] += 80.0, "another point of the tool"),
+    ];
+    for (change, words) in cases {
+        assert_contains(&warned(&header, change), &[words]);
+    }
+    let oriented = format!("{header},rx_deg,ry_deg,rz_deg");
+    let message = warned(&oriented, &|row| row.extend([10.0, 20.0, 30.0]));
+    assert_contains(&message, &["4 joints cannot hold both a position and an orientation"]);
+    assert_eq!(warned(&header, &|_| {}), "");
+}
+
+#[test]
+fn a_pool_of_measured_poses_and_a_tolerance_in_metres_are_asked_about() {
+    let folder = identified();
+    let message = folder.flexcal("next . --pool measurements.csv --poses 2 --out out").message();
+    assert_contains(&message, &["2 of the 2 chosen poses of the pool are measured already"]);
+    let message = folder.flexcal("next . --tolerance-mm 0.0002 --poses 1 --out out").message();
+    assert_contains(&message, &["write --tolerance-mm 0.2"]);
+    let both = "--format mdh --best-rigid --fitted-alone --out arm.txt";
+    let run = folder.flexcal(&format!("export . --estimate est/estimate.json {both}")).code(2);
+    assert_contains(&run.message(), &["write different geometries"]);
+}
