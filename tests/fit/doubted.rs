@@ -70,7 +70,7 @@ fn a_column_that_the_positions_do_not_follow_is_named() {
         assert!(after < 0.1 * before, "{finding}");
         // The headline states the cause.
         let misfit = found.first_error().unwrap();
-        assert!(misfit.remedy.contains("do not follow the column"), "{misfit}");
+        assert!(misfit.to_string().contains("do not follow the column"), "{misfit}");
     }
 }
 
