@@ -148,14 +148,15 @@ pub(super) fn keys(cause: &Cause, joints: &[Joint]) -> Vec<(String, Unit)> {
         }
         Effect::UnmodelledMass { .. } => named(&[("mass", Unit::Mass), ("at", Unit::Length)]),
         Effect::PayloadMass | Effect::BodyMass { .. } => named(&[("mass", Unit::Mass)]),
-        Effect::PayloadPosition => xyz(Unit::Length),
         Effect::HoistDirection => {
             named(&[("lean_x", Unit::Ratio), ("lean_y", Unit::Ratio), ("trolley", Unit::PerLength)])
         }
         Effect::GravityDirection => about_xy(Unit::Angle),
         Effect::DeflectedEquilibrium => named(&[("lambda", Unit::Ratio)]),
         Effect::TrackerDrift => xyz(Unit::Speed),
-        Effect::StationShift { .. } | Effect::TrackerSettling { .. } => xyz(Unit::Length),
+        Effect::PayloadPosition | Effect::StationShift { .. } | Effect::TrackerSettling { .. } => {
+            xyz(Unit::Length)
+        }
         Effect::StationMove { .. } => {
             let turns = ["rx", "ry", "rz"].map(|name| (name, Unit::Angle));
             named(&[["x", "y", "z"].map(|name| (name, Unit::Length)), turns].concat())

@@ -41,7 +41,7 @@ impl Candidates {
                     found.untestable.push((effect, HELD_FIXED));
                 }
                 None if makes_rule_invalid(problem, &parameters()) => {
-                    found.untestable.push((effect, REFUSED))
+                    found.untestable.push((effect, REFUSED));
                 }
                 None => found.testable.push(effect),
             }

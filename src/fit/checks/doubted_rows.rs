@@ -156,10 +156,13 @@ fn windows(fit: &CheckedFit, rows: &[usize]) -> Vec<Vec<usize>> {
     (0..trials).map(window).collect()
 }
 
+/// Function of a measured and a predicted position that returns the corrected measurement.
+type Correction<'a> = dyn Fn(&Vector3<f64>, &Vector3<f64>) -> Vector3<f64> + 'a;
+
 /// Returns the words for a mistake that explains pairs of measured and predicted positions to
 /// `limit` \[m\].
 fn mistake(pairs: &[(Vector3<f64>, Vector3<f64>)], limit: f64) -> Option<String> {
-    let fits = |corrected: &dyn Fn(&Vector3<f64>, &Vector3<f64>) -> Vector3<f64>| {
+    let fits = |corrected: &Correction| {
         let square = |(measured, predicted): &(Vector3<f64>, Vector3<f64>)| {
             (corrected(measured, predicted) - predicted).norm_squared()
         };

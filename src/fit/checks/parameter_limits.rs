@@ -52,18 +52,15 @@ impl Check for WithinPriors {
             let entry = fitted
                 .filter(|(other, _)| std::ptr::eq(*other, parameter))
                 .find_map(|(_, x)| contradicted_entry(fit, (parameter, *x), is_far));
-            match entry {
-                Some(entry) => {
-                    let text = format!("{text}: {}", entry.words);
-                    Finding::new(FindingCode::BeyondPrior, numbers, text).with_remedy(entry.remedy)
-                }
-                None => {
-                    let finding = Finding::new(FindingCode::BeyondPrior, numbers, text);
-                    match remedy(fit, parameter, sigmas) {
-                        Some(remedy) => finding.with_remedy(remedy),
-                        None => finding,
-                    }
-                }
+            if let Some(entry) = entry {
+                let text = format!("{text}: {}", entry.words);
+                return Finding::new(FindingCode::BeyondPrior, numbers, text)
+                    .with_remedy(entry.remedy);
+            }
+            let finding = Finding::new(FindingCode::BeyondPrior, numbers, text);
+            match remedy(fit, parameter, sigmas) {
+                Some(remedy) => finding.with_remedy(remedy),
+                None => finding,
             }
         };
         let largest =

@@ -86,7 +86,7 @@ impl Expression {
             Self::Call(Function::Sin | Function::Cos | Function::Tan, argument) => {
                 let factor = argument.factor_of_command()?.abs();
                 let is_conversion = |known: &f64| (factor / known - 1.0).abs() < 1e-3;
-                CONVERSIONS.iter().any(|known| is_conversion(known)).then_some(factor)
+                CONVERSIONS.iter().any(is_conversion).then_some(factor)
             }
             Self::Call(_, argument) | Self::Negative(argument) => argument.converted_angle(),
             Self::Binary(_, sides) => sides.iter().find_map(Self::converted_angle),
