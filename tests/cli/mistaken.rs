@@ -42,6 +42,9 @@ fn identified() -> Folder {
     folder
 }
 
+/// Function that changes the numbers of a row.
+type Change<'a> = &'a dyn Fn(&mut Vec<f64>);
+
 #[test]
 fn targets_that_contradict_their_joint_columns_are_asked_about() {
     let folder = identified();
@@ -59,7 +62,7 @@ fn targets_that_contradict_their_joint_columns_are_asked_about() {
         folder.flexcal(command).message()
     };
     let header = names.join(",");
-    let cases: [(&dyn Fn(&mut Vec<f64>), &str); 4] = [
+    let cases: [(Change, &str); 4] = [
         (&|row| row.swap(1, 2), "the columns of joints 2 and 3 exchanged"),
         (&|row| row[..4].iter_mut().for_each(|q| *q = q.to_radians()), "start joints in radians"),
         (&|row| row.swap(4, 5), "the columns of x and y exchanged"),

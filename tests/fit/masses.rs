@@ -79,9 +79,12 @@ fn a_mass_that_is_right_or_a_little_wrong_is_no_mistake_of_its_unit() {
     }
 }
 
+/// Function that puts a mistake into a problem.
+type Mistake = fn(&mut Problem);
+
 #[test]
 fn wrong_places_of_masses_are_named_near_the_noise() {
-    let cases: [(fn(&mut Problem), &str); 2] = [
+    let cases: [(Mistake, &str); 2] = [
         (|arm| arm.joints[2].bodies[0].position.x *= -1.0, "x of the centre of mass of fore"),
         (
             |arm| {

@@ -38,6 +38,7 @@ pub fn joint(a: f64) -> Joint<f64> {
         flexibility: None,
         beam: None,
         bodies: Vec::new(),
+        body_error: None,
     }
 }
 
