@@ -310,7 +310,7 @@ catalogue! {
         terms: &[TermEntry::at(At::Joint(JointField::BodyMass), "mass", 0.0).prior(Prior::BodyMass)],
         says: "bodies of joint {joint} weigh more or less than declared",
         only: &[Only::Bodies],
-        needs: &[Need::Loads],
+        needs: &[Need::Loads, Need::GivesWay],
         ..Family::PLAIN
     };
     /// Error m of the payload's mass, in all poses with a payload.
@@ -329,7 +329,7 @@ catalogue! {
             TermEntry::at(At::Arm(ArmField::PayloadAt(2)), "z", PAYLOAD_SHIFT_SIGMA),
         ],
         says: "the payload's centre of mass is not where it is declared",
-        needs: &[Need::Payload],
+        needs: &[Need::Payload, Need::GivesWay],
         ..Family::PLAIN
     };
     /// Relative error k of the hoist's force: F (1 + k).

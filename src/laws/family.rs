@@ -209,6 +209,9 @@ pub enum Need {
     Times,
     /// Requires gravity and poses with a payload.
     Payload,
+    /// Requires that the problem declares a part that gives way. Otherwise an error of the loads
+    /// shows only through causes that the search has added itself.
+    GivesWay,
     /// Requires a payload that varies, and joints that approach from both sides.
     PayloadFromBothSides,
     /// Requires a joint that is approached from both sides. If no sides are recorded, loads must

@@ -36,6 +36,8 @@ pub(super) struct Data<'a> {
     pub candidates: &'a [Effect],
     /// True if the harmonics of all joints may have a common prior: one σ for each order.
     pub admits_common_prior: bool,
+    /// True if a part that the problem declares gives way to loads.
+    pub gives_way: bool,
     /// Request to stop the search early.
     pub stop: Stop,
     /// Laws that the search over formulas proposed.
@@ -78,6 +80,7 @@ impl<'a> Data<'a> {
             block,
             candidates: &[],
             admits_common_prior: admits_common_prior(problem),
+            gives_way: gives_way(problem),
             stop: Stop::default(),
             proposed: Proposed::default(),
         }
@@ -167,6 +170,7 @@ impl<'a> Data<'a> {
             times: self.shift_times(),
             clock: measurements.clock(),
             gravity: problem.gravity,
+            gives_way: self.gives_way,
         }
     }
 
@@ -239,6 +243,13 @@ impl<'a> Data<'a> {
         }
         covariates
     }
+}
+
+/// Returns true if a joint, a link or the base that the problem declares gives way to loads.
+fn gives_way(problem: &Problem) -> bool {
+    let sites = problem.effects.iter().flat_map(|declared| declared.effect.terms(problem));
+    let mut sites = sites.map(|term| term.site);
+    problem.is_elastic() || sites.any(|site| site.is_elastic() && !site.is_load())
 }
 
 /// Returns the bit patterns of all measuring conditions of one row. Equal patterns mean repeated

@@ -1,6 +1,6 @@
 //! Candidates of a search: every effect of the catalogue that is conceivable on an arm.
 
-use super::coverage::{DataCoverage, NO_LOADS, NO_TIMES, STANDS_STILL};
+use super::coverage::{DataCoverage, IS_RIGID, NO_LOADS, NO_TIMES, STANDS_STILL};
 use super::place::slides;
 use crate::laws::{
     Argument, ArgumentKind, Effect, FAMILIES, Family, Need, Only, Quantity, Search, to_three_digits,
@@ -242,6 +242,7 @@ impl Effect {
             Need::Payload => {
                 unless(data.has_payload() && data.has_gravity(), "no payload is carried")
             }
+            Need::GivesWay => unless(data.gives_way, IS_RIGID),
             Need::PayloadFromBothSides => unless(
                 both_sides && data.payload_varies(),
                 "no payload that changes, or no approach from both sides",

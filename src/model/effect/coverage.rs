@@ -26,6 +26,8 @@ pub struct DataCoverage {
     pub covariates: Vec<bool>,
     /// Gravity, arm base frame [m/s²].
     pub gravity: Vector3<f64>,
+    /// True if a part that the problem declares gives way to loads.
+    pub gives_way: bool,
 }
 
 impl DataCoverage {
@@ -61,6 +63,9 @@ pub(super) const NO_TIMES: &str = "no time_s that tells which pose was before wh
 pub(super) const STANDS_STILL: &str = "the joint stands still in these poses";
 /// Reason why an effect of loads cannot be shown: gravity is zero.
 pub(super) const NO_LOADS: &str = "no gravity, so no loads";
+
+/// Reason why an error of the loads cannot be shown: loads move nothing on a rigid arm.
+pub(super) const IS_RIGID: &str = "no declared part gives way, so loads move nothing";
 
 /// Optional columns that a set of measurements has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
