@@ -57,7 +57,8 @@ impl FitResidual<'_> {
         let poses = rows / 3;
         let shapes = rows == 3 * poses
             && self.fitted.nrows() == rows
-            && [self.time.len(), self.session.len(), self.setup.len()] == [poses; 3];
+            && (self.time.is_empty() || self.time.len() == poses)
+            && [self.session.len(), self.setup.len()] == [poses; 2];
         if !shapes {
             return Err(Untestable::SizeMismatch);
         }
