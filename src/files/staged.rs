@@ -56,8 +56,7 @@ impl StagedFile {
         Self::commit_all([self]).map_err(|(_, error)| error)
     }
 
-    /// Moves files to their paths, one right after the other, so that a killed process rarely
-    /// leaves new files beside old ones. Waits for the disk only then.
+    /// Moves files to their paths, one right after the other, and waits for the disk only then.
     ///
     /// # Errors
     /// Returns the path and the error of the first file that cannot be renamed.
