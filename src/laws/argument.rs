@@ -32,6 +32,8 @@ pub enum ArgumentKind {
     /// Number of a revolute joint that is compliant about its axis, so that a gravity compensator
     /// relieves it.
     RelievedJoint,
+    /// Number of a joint that carries bodies with a mass.
+    LoadedJoint,
     /// Number of a joint that takes a command and differs from the joint of the preceding argument.
     OtherJoint,
     /// Joint that takes a command, or the base.

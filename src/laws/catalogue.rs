@@ -306,7 +306,7 @@ catalogue! {
     };
     /// Error m of the mass of a joint's bodies, which is spread over them in proportion to their
     /// declared masses.
-    BodyMass "body-mass" { joint: usize = AnyJoint } => Family {
+    BodyMass "body-mass" { joint: usize = LoadedJoint } => Family {
         terms: &[TermEntry::at(At::Joint(JointField::BodyMass), "mass", 0.0).prior(Prior::BodyMass)],
         says: "bodies of joint {joint} weigh more or less than declared",
         only: &[Only::Bodies],

@@ -1,7 +1,7 @@
 //! Arguments of effects, read and checked against the arm.
 
 use super::section::Section;
-use super::{Joint, JointKind, Problem, beam_names};
+use super::{Body, Joint, JointKind, Problem, beam_names};
 use crate::error::{InputError, InputErrorKind};
 use crate::laws::{Argument, ArgumentKind, quoted};
 use crate::quantity::Unit;
@@ -33,9 +33,11 @@ impl<'s, 'a, 'i> ArgumentReader<'s, 'a, 'i> {
     pub fn read(&mut self, key: &str, kind: ArgumentKind) -> Result<Argument, InputError> {
         let turns = |kind| kind == JointKind::Revolute;
         match kind {
-            // That a link precedes the joint, or that the joint rotates under a moment, is checked
-            // after all effects are read.
-            ArgumentKind::AnyJoint | ArgumentKind::LinkedJoint => self.read_any_joint(key),
+            // That a link precedes the joint, that it carries bodies, or that it rotates under a
+            // moment, is checked after all effects are read.
+            ArgumentKind::AnyJoint | ArgumentKind::LinkedJoint | ArgumentKind::LoadedJoint => {
+                self.read_any_joint(key)
+            }
             ArgumentKind::MovingJoint => self.read_moving_joint(key),
             ArgumentKind::TurningJoint | ArgumentKind::RelievedJoint => {
                 self.read_joint_of_kind(key, turns, |joint| InputErrorKind::NotRevolute { joint })
@@ -238,6 +240,11 @@ impl ArgumentKind {
             Self::LinkedJoint => {
                 let long = (1..).zip(joints).find(|(_, joint)| joint.a != 0.0);
                 long.map_or(first, |(number, _)| number).to_string()
+            }
+            Self::LoadedJoint => {
+                let carries = |joint: &Joint| Body::total_mass(&joint.bodies) > 0.0;
+                let loaded = (1..).zip(joints).find(|(_, joint)| carries(joint));
+                loaded.map_or(first, |(number, _)| number).to_string()
             }
             Self::Covariate => {
                 let covariate = problem.data.covariates.first();

@@ -80,7 +80,10 @@ fn targets_that_contradict_their_joint_columns_are_asked_about() {
 #[test]
 fn a_pool_of_measured_poses_and_a_tolerance_in_metres_are_asked_about() {
     let folder = identified();
-    let message = folder.flexcal("next . --pool measurements.csv --poses 2 --out out").message();
+    // With few fitted poses, the held-out ones in the pool are wanted.
+    folder.write("few.toml", PROBLEM.replace("fraction = 0.3", "fraction = 0.85"));
+    let next = "next few.toml --pool measurements.csv --poses 2 --out out";
+    let message = folder.flexcal(next).message();
     assert_contains(&message, &["2 of the 2 chosen poses of the pool are measured already"]);
     let message = folder.flexcal("next . --tolerance-mm 0.0002 --poses 1 --out out").message();
     assert_contains(&message, &["write --tolerance-mm 0.2"]);

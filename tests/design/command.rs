@@ -232,7 +232,7 @@ fn examples_of_arguments_are_effects_of_the_arm() {
         assert_eq!(read.effect.name(), family.name);
         written += 1;
     }
-    assert_eq!(written, 25);
+    assert_eq!(written, 26);
 }
 
 #[test]

@@ -72,7 +72,9 @@ fn places(family: &Family, problem: &Problem) -> Vec<Arguments> {
         };
         let takes = |joint: &Joint| joint.command_kind() != JointKind::Fixed;
         let values = match kind {
-            ArgumentKind::AnyJoint | ArgumentKind::LinkedJoint => joints(&|_| true),
+            ArgumentKind::AnyJoint | ArgumentKind::LinkedJoint | ArgumentKind::LoadedJoint => {
+                joints(&|_| true)
+            }
             ArgumentKind::MovingJoint | ArgumentKind::OtherJoint => joints(&takes),
             ArgumentKind::TurningJoint | ArgumentKind::RelievedJoint => {
                 joints(&|joint| joint.command_kind() == JointKind::Revolute)
