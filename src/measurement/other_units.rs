@@ -17,7 +17,7 @@ const GRAVITY: f64 = 9.80665;
 /// hoist force, at which the column is probably in kilograms.
 const MAX_HOIST_DIFFERENCE: f64 = 0.2;
 /// Smallest distance of the reference temperature from all temperatures that is reported \[K\].
-const MIN_FAR_REFERENCE: f64 = 10.0;
+const MIN_FAR_REFERENCE: f64 = 40.0;
 /// Step of round payloads \[kg\].
 const ROUND_PAYLOAD: f64 = 0.5;
 /// Largest relative deviation from a round payload.

@@ -185,7 +185,7 @@ fn quantities_that_contradict_the_problem_are_named() {
             matches!(k, WarningKind::NoGravity)
         }),
         (soft("") + &data(""), plain(), false, |k| matches!(k, WarningKind::NoGravity)),
-        (reference(2.0), warm(15.0), true, |k| matches!(k, WarningKind::FarReference { .. })),
+        (reference(68.0), warm(15.0), true, |k| matches!(k, WarningKind::FarReference { .. })),
         (reference(20.0), warm(25.0), false, |k| matches!(k, WarningKind::FarReference { .. })),
         (reference(20.0), sides(0.0), true, |k| matches!(k, WarningKind::ApproachWithoutSign)),
         (reference(20.0), sides(-1.0), false, |k| matches!(k, WarningKind::ApproachWithoutSign)),

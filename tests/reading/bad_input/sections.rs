@@ -327,7 +327,10 @@ fn effects() {
         ("", &[":3: effect[1]: an effect is one key", "found 0"]),
         (
             "payload-mass = {}\nhoist-force = {}",
-            &[":3: effect[1]: an effect is one key", "found 2: a key of another section"],
+            &[
+                ":3: effect[1]: an effect is one key",
+                "found 2; write each into an [[effect]] of its own",
+            ],
         ),
         ("wobble = {}", &[":4: effect[1].wobble: unknown effect; known: ", "backlash"]),
         (

@@ -213,7 +213,7 @@ fn splits() {
         (
             &held_out("fraction = 0.5"),
             rows("note", ["", ""]),
-            &[place, "2 rows have 1 joint configurations"],
+            &[place, "2 rows are of 1 joint configuration, too few"],
         ),
         (ARM, rows("note", ["", ""]), &["problem.toml: data: no held-out rows are declared"]),
         (ARM, rows("split", ["validation"; 2]), &["problem.toml: data: no rows are left to fit"]),
