@@ -40,7 +40,7 @@ pub(super) struct Unrelated {
 
 /// Returns the only joint whose column does not hold its coordinate, if the positions fit with that
 /// coordinate found from each of them; `before` is the rms error of the fit \[m\] and `joints` are
-/// the indices of the joints with commands.
+/// the indices of the joints with commands. The search is local, so it can miss such a column.
 pub(super) fn unrelated(fit: &CheckedFit, before: f64, joints: &[usize]) -> Option<Unrelated> {
     let kind = fit.kind(fit.fitting.measurements.leading());
     let step = kind.rows.len().div_ceil(MAX_ROWS).max(1);
