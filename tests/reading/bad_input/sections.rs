@@ -327,10 +327,7 @@ fn effects() {
         ("", &[":3: effect[1]: an effect is one key", "found 0"]),
         (
             "payload-mass = {}\nhoist-force = {}",
-            &[
-                ":3: effect[1]: an effect is one key",
-                "found 2; write each into an [[effect]] of its own",
-            ],
+            &[":3: effect[1]: an effect is one key", "found 2; write each into"],
         ),
         ("wobble = {}", &[":4: effect[1].wobble: unknown effect; known: ", "backlash"]),
         (
