@@ -11,7 +11,7 @@ pub(super) struct LeftOutGain {
     /// Sum of squared errors of the old fit minus that of the new one \[m²\], for each block.
     gains: Vec<f64>,
     /// The same summed over the blocks, each error in units of its covariance over σ².
-    expected_gain: f64,
+    weighted_gain: f64,
     /// ln of the ratio of the determinants of the covariances of the old and the new fit's errors.
     ln_determinants: f64,
 }
@@ -30,8 +30,8 @@ impl LeftOutGain {
         let pairs = || before.iter().zip(&after);
         Some(Self {
             gains: pairs().map(|(one, other)| one.squares * old - other.squares * new).collect(),
-            expected_gain: pairs()
-                .map(|(one, other)| one.expected_squares * old - other.expected_squares * new)
+            weighted_gain: pairs()
+                .map(|(one, other)| one.weighted_squares * old - other.weighted_squares * new)
                 .sum(),
             ln_determinants: pairs()
                 .map(|(one, other)| other.ln_determinant - one.ln_determinant)
@@ -43,7 +43,7 @@ impl LeftOutGain {
     /// left-out poses, for noise of standard deviation `sigma` \[m\] in each coordinate. The
     /// density takes the uncertainty of each fit's predictions into account.
     pub fn ln_odds(&self, sigma: f64) -> f64 {
-        0.5 * (self.expected_gain / (sigma * sigma) + self.ln_determinants)
+        0.5 * (self.weighted_gain / (sigma * sigma) + self.ln_determinants)
     }
 
     /// Returns true if the mean decrease exceeds its standard error. Otherwise the

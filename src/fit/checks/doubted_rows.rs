@@ -95,7 +95,7 @@ fn doubted(fit: &CheckedFit, before: f64) -> Option<Finding> {
         let errors = fit.fitting.position_errors(&chosen, &x);
         (fit.rms(&chosen, &errors) < limit).then(|| {
             "they fit by themselves where base or target stand elsewhere: if the instrument, the base or \
-             the target was moved, give them a word of their own in the column session"
+             the target was moved, give them another word in the column session"
                 .to_owned()
         })
     };

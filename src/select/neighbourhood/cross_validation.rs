@@ -35,7 +35,7 @@ impl LinearNeighbourhood {
             let predicted = &residual + basis * step;
             LeftOutBlock {
                 squares: predicted.norm_squared(),
-                expected_squares: residual.dot(&predicted),
+                weighted_squares: residual.dot(&predicted),
                 ln_determinant,
             }
         };
@@ -53,14 +53,14 @@ pub(in crate::select) struct LeftOutBlock {
     /// Sum of squares rᵀr.
     pub squares: f64,
     /// Sum of squares rᵀV⁻¹r in units of their covariance.
-    pub expected_squares: f64,
+    pub weighted_squares: f64,
     /// ln det V⁻¹.
     pub ln_determinant: f64,
 }
 
 impl LeftOutBlock {
     fn is_finite(&self) -> bool {
-        [self.squares, self.expected_squares, self.ln_determinant].iter().all(|x| x.is_finite())
+        [self.squares, self.weighted_squares, self.ln_determinant].iter().all(|x| x.is_finite())
     }
 }
 
@@ -111,7 +111,7 @@ mod tests {
             let error = of_block.clone().try_inverse().unwrap() * pull.rows(first, count);
             assert!((block.squares - error.norm_squared()).abs() < 1e-10);
             let expected = error.dot(&(&of_block * &error));
-            assert!((block.expected_squares - expected).abs() < 1e-10);
+            assert!((block.weighted_squares - expected).abs() < 1e-10);
             assert!((block.ln_determinant - of_block.determinant().ln()).abs() < 1e-10);
         }
     }

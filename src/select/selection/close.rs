@@ -144,9 +144,9 @@ pub fn close_by(
         &data,
         &unstoppable,
     )?;
-    // If no effect has the status found, the effects are kept only if they predict left-out poses
-    // better: by more than one standard error of the gain, or significantly if none is even
-    // probable.
+    // If no effect, with the plainer causes in its place, has the status found, the effects are kept
+    // only if they predict left-out poses better: by more than one standard error of the gain, or
+    // significantly if none is even probable.
     let gain = OnceCell::new();
     let gain = || gain.get_or_init(|| LeftOutGain::new(&fitted, &declared, &data)).as_ref();
     let is_used = |best: Option<Status>| match best {
@@ -241,7 +241,7 @@ struct Conclusion {
 
 /// Tests the residual of a fit and collects the claims about the effects that it contains, and
 /// about structure without a law. Evidence that is missing is evaluated first. `is_used` receives
-/// the best status of the effects and returns true if the conclusion is used.
+/// the best [`Found::status_of_any`] of the effects and returns true if the conclusion is used.
 fn conclude(
     state: &SearchState,
     declared: &Fitted,

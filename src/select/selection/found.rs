@@ -66,7 +66,7 @@ pub struct Found {
 /// probabilities are limited to their means over the subsets. They are also limited to those of the
 /// evidence `of_all_rows`, which includes rows that are outliers only of the fit with the effects.
 ///
-/// `is_used` receives the best status of the effects and returns true if the result is used; if
+/// `is_used` receives the best [`Found::status_of_any`] and returns true if the result is used; if
 /// true for one status, it is true for every better one. Subsets only reduce the probabilities.
 /// They are therefore not evaluated if the result on all rows is not used.
 pub(super) fn found(

@@ -25,8 +25,9 @@ pub(super) const MASS_SCALES: [MassScale; 4] =
     [MassScale::Power(-1), MassScale::Power(1), MassScale::Pounds, MassScale::Newtons];
 /// Smallest coordinate of a centre of mass whose sign is doubted \[m\].
 const MIN_CENTRE: f64 = 0.02;
-/// Number of joints before and after the declared carrier of a target that are tried as its carrier.
-const MAX_OTHER_CARRIERS: usize = 2;
+/// Number of joints before and after the declared carrier of a target, camera or marker that are
+/// tried as its carrier.
+pub(super) const MAX_OTHER_CARRIERS: usize = 2;
 /// Step between trial errors of a joint's zero position \[°\]. A full fit finds values between
 /// them.
 const ZERO_POSITION_STEP: i16 = 15;

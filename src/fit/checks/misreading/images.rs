@@ -3,12 +3,10 @@
 use nalgebra::Vector3;
 
 use super::Misreading;
+use super::candidates::MAX_OTHER_CARRIERS;
 use crate::measurement::Measurements;
 use crate::observation::FixtureKind;
 use crate::problem::{Fixture, Observation, Problem};
-
-/// Number of joints before and after the declared carrier of a camera or marker that are tried.
-const MAX_OTHER_CARRIERS: usize = 2;
 
 /// Returns the misreadings of images: exchanged or reversed axes, the numbering of the points,
 /// images that are shifted against the configurations, and other carriers of cameras and markers.

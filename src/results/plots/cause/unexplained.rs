@@ -28,6 +28,7 @@ pub fn unexplained(structure: &Unexplained, problem: &Problem, split: &Split) ->
     let across = match correction.covariate {
         Covariate::Temperature => Quantity::temperature(),
         Covariate::Time => Quantity::elapsed(range(curve.iter().map(|at| at.0)).1),
+        Covariate::Row => Quantity::new("row", 1.0),
         Covariate::Payload => Quantity::new("payload [kg]", 1.0),
         Covariate::Hoist => Quantity::new("hoist force [N]", 1.0),
         Covariate::Command(joint) => Quantity::command(problem, joint + 1),
