@@ -28,6 +28,11 @@ pub enum WarningKind {
     WithoutPartner { rows: usize, others: Vec<String>, gap: Option<String> },
     #[error("not UTF-8 text; read as Windows-1252 (Latin-1), so check accented letters and signs")]
     ReadAsWindows1252,
+    #[error(
+        "the file ends inside this row: its last number has fewer digits than those of all other rows, \
+         and no line end follows; the file was probably cut, so save or copy it again"
+    )]
+    FileCut,
     #[error("{rows} row{} without a measurement, the first here; left out", plural(*rows))]
     RowsMissing { rows: usize },
     #[error(

@@ -53,7 +53,7 @@ pub(super) struct JoinedLog {
     unpaired: Vec<Location>,
     /// Number of measured rows with a partner.
     paired: usize,
-    decoding_warnings: Vec<Warning>,
+    text_warnings: Vec<Warning>,
     /// Names of the measured rows without a partner, for a join by name.
     unpaired_names: Vec<String>,
     /// Column of names in the current table and in the joint table, for a join by order.
@@ -135,7 +135,7 @@ impl JoinedLog {
             requested: 0,
             unpaired: Vec::new(),
             paired: 0,
-            decoding_warnings: Vec::new(),
+            text_warnings: Vec::new(),
             unpaired_names: Vec::new(),
             name_columns: None,
             unlike_pairs: Vec::new(),
@@ -199,7 +199,7 @@ impl JoinedLog {
             let (file, line, cells) = (table.file.clone(), table.line(), table.cells().clone());
             self.rows.push(LogRow { file, line, cells, time, uses: 0 });
         }
-        self.decoding_warnings.extend(table.decoding_warning());
+        self.text_warnings.extend(table.text_warnings());
         Ok(())
     }
 
@@ -495,6 +495,6 @@ impl JoinedLog {
         let jump = clock_jump(self.rule, (&self.times, &self.log_times), self.unpaired.first());
         let others = unpaired.into_iter().flatten();
         let others = others.chain(jump.or_else(|| order_contradicted(&self.timed_pairs)));
-        Ok(self.decoding_warnings.iter().cloned().chain(others).collect())
+        Ok(self.text_warnings.iter().cloned().chain(others).collect())
     }
 }

@@ -13,11 +13,13 @@ pub(super) struct Lines<R> {
     last: u8,
     /// Bytes of the current record, including read-ahead.
     record_bytes: u64,
+    /// True if the text ended without a line end, so that one was added.
+    pub has_added_line_end: bool,
 }
 
 impl<R: BufRead> Lines<R> {
     pub fn new(inner: R) -> Self {
-        Self { inner, last: b'\n', record_bytes: 0 }
+        Self { inner, last: b'\n', record_bytes: 0, has_added_line_end: false }
     }
 
     /// Marks the start of a record, from which its length is counted.
@@ -39,6 +41,7 @@ impl<R: BufRead> Read for Lines<R> {
                     return Ok(0);
                 }
                 self.last = b'\n';
+                self.has_added_line_end = true;
                 out.iter_mut().take(1).for_each(|first| *first = b'\n');
                 return Ok(1);
             }

@@ -14,6 +14,7 @@ mod clocks;
 mod column_table;
 #[deny(clippy::indexing_slicing)]
 mod columns;
+mod cut_end;
 mod dataset;
 #[deny(clippy::indexing_slicing)]
 mod dialect;

@@ -231,7 +231,7 @@ impl<'a> Tables<'a> {
                 break;
             }
         }
-        self.warnings.extend(table.decoding_warning());
+        self.warnings.extend(table.text_warnings());
         if let Some(log) = &log
             && rows.row_count() == before
         {

@@ -8,6 +8,7 @@ use csv::{ByteRecord, Reader, ReaderBuilder};
 
 use super::cell_style::CellStyle;
 use super::cell_words::{UNITS, has_thousands, is_spreadsheet_date, other_notation, unit_behind};
+use super::cut_end::LastCells;
 use super::dialect::{HEADER_SEARCH_BYTES, Layout, NormalizedText};
 use super::headerless::is_row_of_numbers;
 use super::latin::decoded_record;
@@ -58,6 +59,8 @@ pub(super) struct Table {
     partner: Option<(PathBuf, usize)>,
     /// Number of the first line that was decoded from Windows-1252; `None` if there is none.
     decoded_line: Option<usize>,
+    /// Digits of the last cells of the rows so far.
+    last_cells: LastCells,
 }
 
 impl Table {
@@ -114,6 +117,7 @@ impl Table {
             appended_header: None,
             partner: None,
             decoded_line: None,
+            last_cells: LastCells::default(),
         };
         if !table.advance()? {
             return Err(Location::file(file).at_line(1).error(TableErrorKind::EmptyTable));
@@ -219,6 +223,7 @@ impl Table {
             Location::file(&self.file).error(InputErrorKind::Unreadable { source })
         })?;
         if found {
+            self.last_cells.count(&self.record);
             // Every record ends in a line feed. A record without one has a quote that is open to
             // the end of the file.
             self.line = self.next_line().saturating_sub(lines(self.record.as_slice()));
@@ -238,10 +243,17 @@ impl Table {
         Ok(found)
     }
 
-    /// Returns a warning if lines were decoded from Windows-1252.
-    pub fn decoding_warning(&self) -> Option<Warning> {
-        let location = Location::file(&self.file).at_line(self.decoded_line?);
-        Some(Warning { location, kind: WarningKind::ReadAsWindows1252 })
+    /// Returns the warnings about the text of the file, after all rows have been read: lines that
+    /// were decoded from Windows-1252, and a last number that the end of the file cuts.
+    pub fn text_warnings(&self) -> impl Iterator<Item = Warning> {
+        let decoded = self.decoded_line.map(|line| (line, WarningKind::ReadAsWindows1252));
+        let is_cut =
+            self.reader.get_ref().lines.has_added_line_end && self.last_cells.is_last_cut();
+        let cut = is_cut.then_some((self.line, WarningKind::FileCut));
+        decoded.into_iter().chain(cut).map(|(line, kind)| {
+            let location = Location::file(&self.file).at_line(line);
+            Warning { location, kind }
+        })
     }
 
     /// Returns the number of the next line to read.

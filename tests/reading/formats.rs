@@ -443,3 +443,26 @@ fn readings_stand_beside_commands_and_nests_apart() {
     );
     table_error(&commanded, "q1_deg,q2_deg,q1_read_mm,x_m,y_m,z_m\n1,2,3,4,5,6\n");
 }
+
+#[test]
+fn a_table_cut_inside_its_last_number_is_warned_of() {
+    let problem = parse("name = 'arm'\n[[joint]]\na_m = 1\n");
+    let row = |k: i32| format!("{k},{}.25,{k}.5,-{}.125\n", k + 1, k + 2);
+    let rows: String = (0..12).map(row).collect();
+    let whole = format!("q1_deg,x_mm,y_mm,z_mm\n{rows}");
+    let warnings_of = |text: &str| try_table(&problem, text).unwrap().1;
+    let cut = &whole[..whole.len() - 2];
+    let warnings = warnings_of(cut);
+    let says = warnings[0].to_string();
+    assert!(says.contains(":13: the file ends inside this row"), "{says}");
+    assert_eq!(warnings.len(), 1);
+    // No line end alone, a line end behind fewer digits, or few rows prove nothing.
+    assert!(warnings_of(&whole[..whole.len() - 1]).is_empty());
+    assert!(warnings_of(&format!("{cut}\n")).is_empty());
+    let few: String = (0..5).map(row).collect();
+    assert!(warnings_of(&format!("q1_deg,x_mm,y_mm,z_mm\n{few}5,1,2,3")).is_empty());
+    // Numbers without final zeros: one digit less is chance.
+    let varied = whole.replace("-5.125", "-5.0625");
+    assert!(warnings_of(&varied[..varied.len() - 2]).is_empty());
+    assert_eq!(warnings_of(&varied[..varied.len() - 3]).len(), 1);
+}
