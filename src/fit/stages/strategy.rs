@@ -34,6 +34,15 @@ impl Strategy {
         if self == Self::Rigid { declared.ablated(Ablation::Rigid) } else { declared }
     }
 
+    /// Returns the strategy that varies the same parameters as this one, but all at once. Both have
+    /// the same optimum, which a sequential strategy may need many sweeps to reach.
+    pub(crate) fn without_sweeps(self) -> Self {
+        match self {
+            Self::Sequential | Self::OneSweep => Self::Joint,
+            other => other,
+        }
+    }
+
     /// Returns the stages of one sweep. Each stage is a predicate that returns true for the
     /// parameters that it varies; bases and targets vary in every stage.
     pub(crate) fn stages(self) -> &'static [fn(&Parameter) -> bool] {

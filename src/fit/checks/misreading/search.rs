@@ -51,6 +51,8 @@ const MAX_REACHES_BEYOND_PRIORS: f64 = 5e-4;
 const MIN_RATIO_ERROR: f64 = 1e-3;
 /// Maximum number of identification rows, evenly spaced, to which misreadings are applied.
 const MAX_ROWS: usize = 120;
+/// Smallest mean number of rows of a session with which rows of all sessions are chosen.
+const MIN_SESSION_ROWS: usize = 8;
 /// Maximum number of moving joints of which every subset is tried as reversed.
 const MAX_REVERSED: usize = 7;
 /// Maximum number of misreadings that are fitted in full: those with the smallest error of the
@@ -186,19 +188,38 @@ impl<'a> Trial<'a> {
         Self::with_rows(fit, MAX_ROWS)
     }
 
-    /// Creates the trial on at most `count` rows of a fit, evenly spaced.
+    /// Creates the trial on at most about `count` rows of a fit, evenly spaced. If that leaves few
+    /// rows of a session, all rows of some sessions are taken instead, because each session may have
+    /// a free base of its own.
     pub(super) fn with_rows(fit: &'a CheckedFit, count: usize) -> Self {
         let identification = &fit.fitting.split.identification;
-        let step = identification.len().div_ceil(count).max(1);
-        let chosen = identification.iter().copied().step_by(step).collect();
+        let session = |row: &usize| fit.fitting.placement.base_of(*row);
+        let mut sessions: Vec<usize> = identification.iter().map(session).collect();
+        sessions.sort_unstable();
+        sessions.dedup();
+        let rows = if identification.len() > count && count < MIN_SESSION_ROWS * sessions.len() {
+            let step = identification.len().div_ceil(count);
+            let taken: Vec<usize> = sessions.into_iter().step_by(step).collect();
+            identification.iter().copied().filter(|row| taken.contains(&session(row))).collect()
+        } else {
+            identification.clone()
+        };
+        let step = rows.len().div_ceil(count).max(1);
+        let chosen = rows.into_iter().step_by(step).collect();
         Self { fitting: fit.fitting, problem: fit.problem, chosen }
     }
 
-    /// Returns the error of the fit as declared, or of its registered nominal arm if that is less
-    /// \[m\].
+    /// Returns the error of the fit as declared, of its registered nominal arm, or of the declared
+    /// problem fitted to the chosen rows alone, whichever is smallest \[m\].
     pub(super) fn error_as_read(&self, fit: &CheckedFit) -> f64 {
         let at = |x: &DVector<f64>| self.penalised(self.fitting, &self.chosen, x);
-        at(&fit.end.x).min(at(fit.registered_x))
+        let error = at(&fit.end.x).min(at(fit.registered_x));
+        if self.chosen.len() == self.fitting.split.identification.len() {
+            return error;
+        }
+        // Fewer rows leave less of the same misfit, with or without a misreading.
+        let refitted = self.outcome(Misreading::Reversed { joints: 0 }, true);
+        refitted.map_or(error, |outcome| outcome.rms.min(error))
     }
 
     /// Returns the misreadings that can be corrected, each with the rms error of the registered
@@ -337,6 +358,7 @@ impl<'a> Trial<'a> {
             split: &split,
             placement: &placement,
             held_out_only: placement.held_out_only(model, &rows, &split),
+            strategy: self.fitting.strategy.without_sweeps(),
             solver: SolverChoice::Auto.decide(model),
             custom_solver: None,
             progress: None,
