@@ -13,6 +13,7 @@ mod dataset;
 mod doubted;
 mod face;
 mod findings;
+mod held;
 mod identified;
 mod judged;
 mod masses;

@@ -10,6 +10,7 @@ use super::outliers::Outlier;
 use super::point_spread::PointSpread;
 use super::pose_sufficiency::PoseSufficiency;
 use super::row_kind::{RowKind, spread};
+use crate::fit::SolverChoice;
 use crate::fit::errors::Errors;
 use crate::fit::stages::fitting::{FitEnd, Fitting};
 use crate::fit::stages::stage::Stage;
@@ -19,8 +20,12 @@ use crate::fit::uncertainty::prior_sizes::PriorSize;
 use crate::fit::uncertainty::refuted_priors::RefutedPrior;
 use crate::fit::uncertainty::second_solution::SecondSolution;
 use crate::fit::uncertainty::statistics::Statistics;
-use crate::least_squares::Loss;
+use crate::least_squares::{LinearisationCache, Loss};
+use crate::model::Model;
 use crate::problem::{Observation, Problem};
+
+/// Maximum number of solver steps of a further fit with another problem.
+const MAX_FURTHER_STEPS: u64 = 60;
 
 /// Check of a fit that may report findings.
 pub(in crate::fit) trait Check: Sync {
@@ -128,6 +133,32 @@ impl CheckedFit<'_> {
             taken_sigma: assumed,
             rows,
         }
+    }
+
+    /// Returns what `result` returns for the same rows and options with another problem, at the
+    /// declared σ. `None` if the model of this problem cannot be built.
+    pub fn with_problem<R>(
+        &self,
+        problem: &Problem,
+        result: impl FnOnce(&Fitting) -> R,
+    ) -> Option<R> {
+        let Fitting { placement, measurements, split, .. } = *self.fitting;
+        let declared = Model::new(problem, &placement.bases, &placement.targets).ok()?;
+        let model = &self.fitting.strategy.model(declared);
+        // The other model needs a cache of its own, because its linearisations differ.
+        let cache = &LinearisationCache::default();
+        Some(result(&Fitting {
+            model,
+            held_out_only: placement.held_out_only(model, measurements, split),
+            strategy: self.fitting.strategy.without_sweeps(),
+            solver: SolverChoice::Auto.decide(model),
+            custom_solver: None,
+            progress: None,
+            max_steps: Some(MAX_FURTHER_STEPS),
+            cache,
+            linear_model: None,
+            ..self.fitting.with_declared_noise()
+        }))
     }
 
     /// Returns the root mean squared length of the `errors` of some identification rows, in their

@@ -150,7 +150,7 @@ finding_codes! {
         "check the unit of σ: micrometres under a key in millimetres make it 1000 times too large";
     EarlierEstimateContradicted: Warning "earlier-estimate-contradicted" ["cause", "probability", "widened"]
         "New rows contradict the earlier estimate that is the prior, with a false alarm in at most one of 100 fits.",
-        "look for what happened to the arm since; flexcal watch says more";
+        "look for what happened to the arm since, which flexcal watch tells; after a prior of a fleet, for what sets this arm apart";
     HeldOutRepeated: Warning "held-out-repeated" ["rows", "of"]
         "Some held-out rows are identification rows again.",
         "hold out rows that were not fitted";
@@ -172,6 +172,9 @@ finding_codes! {
     LimitContradicted: Warning "limit-contradicted" ["limits", "before", "after"]
         "Bounds or constraints cause most of a misfit that contradicts the declared σ: without them less than half of the error remains.",
         "check these limits";
+    HeldParameter: Warning "held-parameter" ["parameter", "alike", "before", "after"]
+        "A parameter of the geometry that the problem holds causes most of a misfit that contradicts the declared σ: free, it takes away more than four fifths of what noise does not explain.",
+        "free this parameter in [parameters]";
     InfluentialRows: Warning "influential-rows" ["rows", "reduced_chi2_without"]
         "A few rows cause most of the misfit.",
         "look at these rows; a section [robust] limits their influence";

@@ -1,17 +1,13 @@
 //! Check of bounds and constraints against the measurements.
 
-use nalgebra::Vector3;
 use serde_json::json;
 
 use super::checked_fit::{Check, CheckedFit};
 use super::finding::{Finding, FindingCode};
 use super::row_kind::format_error;
 use crate::error::Location;
-use crate::fit::stages::fitting::Fitting;
-use crate::fit::{Noise, SolverChoice};
-use crate::least_squares::LinearisationCache;
+use crate::fit::Noise;
 use crate::least_squares::solver::AtBound;
-use crate::model::Model;
 use crate::model::parameter::{LinearConstraint, Parameter};
 use crate::problem::pattern::matches;
 use crate::problem::{Freedom, ParameterRule, Problem, Quantities};
@@ -20,8 +16,6 @@ use crate::quantity::format::{decimals, number};
 /// Largest ratio of the rms residual without limits to that with them, at which the limits are
 /// refuted. The σ of a prior is refuted by the same ratio.
 const MAX_RATIO: f64 = 0.5;
-/// Maximum number of solver steps of the fit without limits.
-const MAX_STEPS: u64 = 60;
 /// Maximum number of limits that the text names.
 const MAX_NAMED: usize = 3;
 /// Distance from a limit, relative to its size, at which the fit rests on it.
@@ -42,9 +36,11 @@ impl Check for LimitsHold {
         }
         let kind = fit.kind(fit.fitting.measurements.leading());
         let before = fit.rms(&kind.rows, &fit.fitting.position_errors(&kind.rows, &fit.end.x));
-        let after = refitted(fit, &without_limits(fit.problem), &kind.rows)
-            .map(|errors| fit.rms(&kind.rows, &errors));
-        let Some(after) = after.filter(|after| *after < MAX_RATIO * before) else {
+        let after = fit.with_problem(&without_limits(fit.problem), |fitting| {
+            let end = fitting.run(&fitting.registered().ok()?).ok()?;
+            Some(fit.rms(&kind.rows, &fitting.position_errors(&kind.rows, &end.x)))
+        });
+        let Some(after) = after.flatten().filter(|after| *after < MAX_RATIO * before) else {
             return Vec::new();
         };
         let more = limits.len().saturating_sub(MAX_NAMED);
@@ -156,26 +152,4 @@ fn without_limits(declared: &Problem) -> Problem {
         }
     }
     problem
-}
-
-/// Fits another problem to the identification rows. Returns the residuals of `rows`; `None` if the
-/// fit fails.
-fn refitted(fit: &CheckedFit, problem: &Problem, rows: &[usize]) -> Option<Vec<Vector3<f64>>> {
-    let Fitting { placement, measurements, split, .. } = *fit.fitting;
-    let declared = Model::new(problem, &placement.bases, &placement.targets).ok()?;
-    let model = &fit.fitting.strategy.model(declared);
-    let cache = &LinearisationCache::default();
-    let fitting = Fitting {
-        model,
-        held_out_only: placement.held_out_only(model, measurements, split),
-        solver: SolverChoice::Auto.decide(model),
-        custom_solver: None,
-        progress: None,
-        max_steps: Some(MAX_STEPS),
-        cache,
-        linear_model: None,
-        ..fit.fitting.with_declared_noise()
-    };
-    let end = fitting.run(&fitting.registered().ok()?).ok()?;
-    Some(fitting.position_errors(rows, &end.x))
 }

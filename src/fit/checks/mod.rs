@@ -13,6 +13,7 @@ pub(super) mod finding;
 pub(super) mod fitted_rows;
 mod followed_commands;
 pub(super) mod held_out;
+mod held_parameters;
 pub(super) mod lens;
 mod limits;
 pub(super) mod misfit;
@@ -70,6 +71,7 @@ const CHECKS: &[&dyn Check] = &[
     &prediction::NotWorseThanNominal,
     &bounds::BoundsAreSeen,
     &limits::LimitsHold,
+    &held_parameters::HeldGeometryIsRight,
     &held_out::NotRepeated,
     &held_out::OtherPosesHeldOut,
     &held_out::WithoutOutliers,
@@ -82,7 +84,7 @@ const CHECKS: &[&dyn Check] = &[
 ];
 
 /// Codes of findings on a misfit, whose usual remedy is to check units, signs or priors.
-const OF_MISFIT: [FindingCode; 4] = [
+pub(super) const OF_MISFIT: [FindingCode; 4] = [
     FindingCode::MissesMeasurements,
     FindingCode::BeyondPrior,
     FindingCode::BeyondArmSize,

@@ -1,0 +1,212 @@
+//! Check of the geometry that the problem holds at its nominal values.
+
+use nalgebra::{DMatrix, DVector};
+use serde_json::json;
+
+use super::checked_fit::{Check, CheckedFit};
+use super::finding::{Finding, FindingCode};
+use super::row_kind::format_error;
+use crate::fit::Noise;
+use crate::fit::stages::fitting::Fitting;
+use crate::least_squares::jacobian_and_residual;
+use crate::model::parameter::Parameter;
+use crate::problem::{Observation, ParameterRule, Problem};
+use crate::quantity::format::{decimals, number};
+
+/// Smallest share of the misfit, beyond what noise explains, that a held parameter takes away if it
+/// is free. It is then named.
+const MIN_EXPLAINED_SHARE: f64 = 0.8;
+/// Smallest share that the linearised fit must promise, at which the parameter is fitted in full.
+const MIN_EXPECTED_SHARE: f64 = 0.5;
+/// Maximum number of held parameters that are fitted in full, each by itself: those with the
+/// largest expected share.
+const MAX_FITTED: usize = 3;
+/// Smallest squared length of a column, as a fraction of its length before the free parameters are
+/// fitted, at which the data tell the held parameter from them.
+const MIN_OWN_SHARE: f64 = 1e-6;
+/// Ridge on the diagonal of the normal matrix of the free parameters, as a fraction of the entry
+/// there.
+const RIDGE: f64 = 1e-12;
+/// Largest ratio of the mean square of left-out errors to that of the best held parameter, at which
+/// another one acts alike.
+const MAX_RATIO_ALIKE: f64 = 1.2;
+/// Fields of the geometry of a joint, as in names of parameters, with the σ of a usual prior.
+const FIELDS: [(&str, &str); 5] = [
+    ("alpha", "sigma_deg = 1.0"),
+    ("a", "sigma_mm = 5.0"),
+    ("theta", "sigma_deg = 1.0"),
+    ("d", "sigma_mm = 5.0"),
+    ("beta", "sigma_deg = 1.0"),
+];
+
+/// Checks that no single parameter of the geometry that the problem holds causes most of a misfit
+/// which contradicts the declared σ.
+pub(super) struct HeldGeometryIsRight;
+
+impl Check for HeldGeometryIsRight {
+    fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
+        let is_contradicted = fit.noise == Noise::Declared && fit.noise_factor > 1.0;
+        let leading = fit.fitting.measurements.leading();
+        if !(is_contradicted && fit.has_further_fits && leading.is_position())
+            || fit.fitting.earlier.is_some()
+        {
+            return Vec::new();
+        }
+        finding(fit, leading).into_iter().collect()
+    }
+}
+
+/// Held parameter with the result of a fit in which it is free.
+struct Freed {
+    name: String,
+    /// Fitted deviation from nominal, with its unit.
+    deviation: String,
+    /// Key of a usual prior, as in `[parameters]`.
+    prior: &'static str,
+    /// Root mean square of the errors of the leading kind of rows \[m\].
+    rms: f64,
+    /// Mean square of the errors of configurations that are left out one at a time \[m²\].
+    left_out: f64,
+}
+
+/// Returns the finding that names the held parameter which explains most of the misfit.
+fn finding(fit: &CheckedFit, leading: Observation) -> Option<Finding> {
+    let names = promising(fit)?;
+    let rows = fit.kind(leading).rows;
+    let before = fit.rms(&rows, &fit.fitting.position_errors(&rows, &fit.end.x));
+    let noise = before / fit.noise_factor.sqrt();
+    let limit =
+        noise.mul_add(noise, (1.0 - MIN_EXPLAINED_SHARE) * (before * before - noise * noise));
+    let left_out = |fitting: &Fitting, x: &DVector<f64>, at_bound: &[bool]| {
+        let whole = fitting.whole();
+        let free = whole.unknowns.iter().zip(at_bound).filter(|(_, at_bound)| !**at_bound);
+        let unknowns: Vec<usize> = free.map(|(&k, _)| k).collect();
+        let configurations = fitting.measurements.configurations(fit.problem).0;
+        let errors = fitting.left_out_errors(x, &unknowns, &configurations);
+        errors.iter().map(nalgebra::Matrix::norm_squared).sum::<f64>() / errors.len().max(1) as f64
+    };
+    let at_bound = |ends: &[Option<_>]| ends.iter().map(Option::is_some).collect::<Vec<bool>>();
+    let declared = left_out(fit.fitting, &fit.end.x, &at_bound(&fit.end.at_bound));
+    let fitted = |(name, prior): &(String, &'static str)| {
+        let problem = with_free(fit.problem, [name.clone()]);
+        fit.with_problem(&problem, |fitting| {
+            let end = fitting.run(&fitting.registered().ok()?).ok()?;
+            let index = fitting.model.parameters.iter().position(|found| found.name == *name)?;
+            Some(Freed {
+                name: name.clone(),
+                deviation: shown(&fitting.model.parameters[index], end.x[index]),
+                prior,
+                rms: fit.rms(&rows, &fitting.position_errors(&rows, &end.x)),
+                left_out: left_out(fitting, &end.x, &at_bound(&end.at_bound)),
+            })
+        })?
+    };
+    let mut freed: Vec<Freed> = names.iter().filter_map(fitted).collect();
+    freed.retain(|freed| freed.rms * freed.rms <= limit && freed.left_out < declared);
+    freed.sort_by(|a, b| a.left_out.total_cmp(&b.left_out));
+    let best = freed.first()?;
+    let alike = freed[1..].iter().filter(|other| other.left_out <= MAX_RATIO_ALIKE * best.left_out);
+    let alike: Vec<&str> = alike.map(|other| other.name.as_str()).collect();
+    let others = match alike.as_slice() {
+        [] => String::new(),
+        names => format!(" (these poses do not tell it from {})", names.join(" or ")),
+    };
+    let text = format!(
+        "{} is held at its nominal value{others}: if it is free, it deviates by {}, and the rms error is {} instead of {}",
+        best.name,
+        best.deviation,
+        format_error(leading.kind(), best.rms, 3),
+        format_error(leading.kind(), before, 3)
+    );
+    let remedy = format!("free it in [parameters]: \"{}\" = {{ {} }}", best.name, best.prior);
+    let numbers = [json!(best.name), json!(alike), before.into(), best.rms.into()];
+    Some(Finding::new(FindingCode::HeldParameter, numbers, text).with_remedy(remedy))
+}
+
+/// Returns the deviation `x` of a parameter with its unit.
+fn shown(parameter: &Parameter, x: f64) -> String {
+    let unit = parameter.unit().display(parameter.nominal);
+    let value = x * unit.factor;
+    format!("{} {}", number(value, decimals(value.abs(), 4) + 1), unit.symbol)
+}
+
+/// Returns the problem with the named parameters free, without priors.
+fn with_free(declared: &Problem, names: impl IntoIterator<Item = String>) -> Problem {
+    let mut problem = declared.clone();
+    let rules = names.into_iter().map(|name| ParameterRule::free(name, declared));
+    problem.parameters.extend(rules);
+    problem
+}
+
+/// Returns the held parameters that promise to explain most of the misfit, best first, each with
+/// the key of a usual prior.
+///
+/// The gain in χ² of a column h beside the columns J of the free parameters is
+/// (hᵀ r − hᵀ J N⁻¹ g)² / (hᵀ h − hᵀ J N⁻¹ Jᵀ h), with the normal matrix N = Jᵀ J + Λ, the gradient
+/// g = Jᵀ r + Λ x and the information Λ of the priors.
+fn promising(fit: &CheckedFit) -> Option<Vec<(String, &'static str)>> {
+    let is_free = |name: &str| fit.fitting.model.parameters.iter().any(|found| found.name == name);
+    let joints = 1..=fit.problem.joints.len();
+    let all = joints
+        .flat_map(|joint| FIELDS.map(|(field, prior)| (format!("joint{joint}.{field}"), prior)));
+    let held: Vec<(String, &'static str)> = all.filter(|(name, _)| !is_free(name)).collect();
+    let problem = with_free(fit.problem, held.iter().map(|(name, _)| name.clone()));
+    let gains = fit.with_problem(&problem, |fitting| gains(fit, fitting, &held))??;
+    let mut gains: Vec<(usize, f64)> = gains;
+    gains.retain(|(_, share)| *share >= MIN_EXPECTED_SHARE);
+    gains.sort_by(|a, b| b.1.total_cmp(&a.1));
+    gains.truncate(MAX_FITTED);
+    Some(gains.into_iter().map(|(index, _)| held[index].clone()).collect())
+}
+
+/// Returns the share of the misfit beyond noise that each of the `held` parameters is expected to
+/// take away, with its index, at the parameters of `fit`. `fitting` has all of them free.
+fn gains(
+    fit: &CheckedFit,
+    fitting: &Fitting,
+    held: &[(String, &'static str)],
+) -> Option<Vec<(usize, f64)>> {
+    let names = fit.fitting.model.parameters.iter().map(|parameter| parameter.name.as_str());
+    let known: std::collections::HashMap<&str, f64> =
+        names.zip(fit.end.x.iter().copied()).collect();
+    let parameters = &fitting.model.parameters;
+    let x = DVector::from_iterator(
+        parameters.len(),
+        parameters
+            .iter()
+            .map(|parameter| known.get(parameter.name.as_str()).copied().unwrap_or(0.0)),
+    );
+    let whole = fitting.whole();
+    let (jacobian, residual) = {
+        let residuals = whole.residuals(&x);
+        jacobian_and_residual(&residuals, &residuals.unknowns_in(&x))
+    };
+    let place = |k: usize| whole.unknowns.iter().position(|&unknown| unknown == k);
+    let is_known = |k: &usize| known.contains_key(parameters[*k].name.as_str());
+    let free: Vec<usize> =
+        (0..whole.unknowns.len()).filter(|&j| is_known(&whole.unknowns[j])).collect();
+    let columns = jacobian.select_columns(&free);
+    let mut normal = columns.tr_mul(&columns);
+    let mut gradient = columns.tr_mul(&residual);
+    for (j, &column) in free.iter().enumerate() {
+        let k = whole.unknowns[column];
+        let precision = parameters[k].sigma.map_or(0.0, |sigma| sigma.powi(-2));
+        normal[(j, j)] += precision + RIDGE * normal[(j, j)] + f64::MIN_POSITIVE;
+        gradient[j] += precision * x[k];
+    }
+    let factor = normal.cholesky()?;
+    let step = factor.solve(&gradient);
+    let noise = fit.noise_factor;
+    let misfit = residual.norm_squared() * (1.0 - noise.recip());
+    let gain = |(index, (name, _)): (usize, &(String, &'static str))| {
+        let k = parameters.iter().position(|parameter| parameter.name == *name)?;
+        let column: DMatrix<f64> = jacobian.select_columns(&[place(k)?]);
+        let with_free = columns.tr_mul(&column);
+        let before = column.norm_squared();
+        let after = before - with_free.dot(&factor.solve(&with_free));
+        let slope = column.dot(&DMatrix::from_column_slice(residual.len(), 1, residual.as_slice()))
+            - with_free.column(0).dot(&step);
+        (after > MIN_OWN_SHARE * before).then(|| (index, slope * slope / after / misfit))
+    };
+    Some(held.iter().enumerate().filter_map(gain).collect())
+}

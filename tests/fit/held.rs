@@ -1,0 +1,33 @@
+//! A parameter of the geometry that the problem holds, although it deviates, is named.
+
+use flexcal::fit::FindingCode;
+
+use crate::common::arms::parse;
+use crate::common::made::fit_as_command;
+use crate::judged::{PRIORS, measured, text};
+
+#[test]
+fn a_held_parameter_that_causes_the_misfit_is_named() {
+    let free = parse(&text(PRIORS));
+    let data = measured(&free, 4);
+    let found = fit_as_command(&free, &data);
+    assert!(!found.has(FindingCode::HeldParameter), "{:?}", found.findings);
+
+    let holding = |names: &[&str]| {
+        let held: String =
+            names.iter().map(|name| format!("\n'{name}' = {{ fixed = true }}")).collect();
+        fit_as_command(&parse(&text(&format!("{PRIORS}{held}"))), &data)
+    };
+    let held = holding(&["joint3.alpha"]);
+    let finding = held.finding(FindingCode::HeldParameter);
+    let words = finding.unwrap_or_else(|| panic!("{:?}", held.findings)).to_string();
+    assert!(words.contains("joint3.alpha is held at its nominal value"), "{words}");
+    assert!(words.contains("\"joint3.alpha\" = { sigma_deg = 1.0 }"), "{words}");
+    let [before, after] = ["before", "after"].map(|name| finding.unwrap().number(name).unwrap());
+    assert!(before > 3.0 * after && after < 2e-4, "{before} {after}");
+
+    // Many that are held cause it together, so that none explains most of it alone.
+    let many = holding(&["joint*"]);
+    assert!(many.has(FindingCode::NoiseBeyondDeclared), "{:?}", many.findings);
+    assert!(!many.has(FindingCode::HeldParameter), "{:?}", many.findings);
+}
