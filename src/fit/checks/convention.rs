@@ -2,9 +2,10 @@
 
 use std::f64::consts::PI;
 
-use nalgebra::{Matrix4, Quaternion, UnitQuaternion, Vector3};
+use nalgebra::{DVector, Matrix4, Quaternion, UnitQuaternion, Vector3};
 
 use super::checked_fit::CheckedFit;
+use crate::fit::stages::fitting::Fitting;
 use crate::problem::RotationKind;
 
 /// Largest ratio of the rms orientation error with another convention to that with the declared
@@ -13,6 +14,8 @@ const MAX_EXPLAINED_RATIO: f64 = 0.2;
 /// Largest ratio of the error with a convention to that with the best one, at which the convention
 /// is also named.
 const MAX_RATIO_TO_BEST: f64 = 1.5;
+/// Number of times that the meaning of each row is chosen again.
+const MAX_CHOICES: usize = 5;
 /// Axes (0 to 2 for x, y, z) of the twelve Euler conventions, R = R₁(r₁) R₂(r₂) R₃(r₃). If all
 /// three axes differ, each angle is in the column of its axis, else the angles are in the order of
 /// the rotations.
@@ -50,20 +53,28 @@ pub(super) fn fitting_conventions(fit: &CheckedFit, rms: f64) -> Vec<String> {
         .copied()
         .filter(|&row| fitting.measurements.orientation(row).is_some())
         .collect();
-    let predicted = fitting.model.orientations(&fitting.poses(&rows), fit.end.x.as_slice());
-    let pairs: Vec<(UnitQuaternion<f64>, UnitQuaternion<f64>)> = rows
-        .iter()
-        .zip(predicted)
-        .filter_map(|(&row, turn)| {
+    let pairs = |x: &DVector<f64>| -> Vec<(UnitQuaternion<f64>, UnitQuaternion<f64>)> {
+        let predicted = fitting.model.orientations(&fitting.poses(&rows), x.as_slice());
+        let pair = |(&row, turn): (&usize, Vector3<f64>)| {
             let is_known = turn.iter().all(|component| component.is_finite());
             let measured = *fitting.measurements.orientation(row)?;
             is_known.then(|| (UnitQuaternion::from_scaled_axis(turn), measured))
-        })
+        };
+        rows.iter().zip(predicted).filter_map(pair).collect()
+    };
+    // Orientations of a wrong convention bend the fit, so the nominal arm is tried too, with its
+    // base and target fitted to the positions alone.
+    let by_positions = Fitting { turn_sigma: None, ..fitting.with_declared_noise() };
+    let arms: Vec<_> = std::iter::once(pairs(&fit.end.x))
+        .chain(by_positions.registered().ok().map(|x| pairs(&x)))
         .collect();
     let readings = readings(fit.problem.data.dialect.rotation);
     let mut errors: Vec<(String, f64)> = readings
         .into_iter()
-        .map(|(name, reading)| (name, misfit(&pairs, &reading)))
+        .map(|(name, reading)| {
+            let errors = arms.iter().map(|pairs| misfit(pairs, &reading));
+            (name, errors.fold(f64::INFINITY, f64::min))
+        })
         .filter(|(_, error)| *error < MAX_EXPLAINED_RATIO * rms)
         .collect();
     errors.sort_by(|a, b| a.1.total_cmp(&b.1));
@@ -89,7 +100,12 @@ fn readings(kind: RotationKind) -> Vec<(String, Reading)> {
             UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z))
         };
         let letters: Vec<&str> = order.iter().map(|&place| ["x", "y", "z", "w"][place]).collect();
-        let name = format!("quaternions in the order {}", letters.join(", "));
+        let name = match (kind, order) {
+            (RotationKind::Vector, [_, _, _, 3]) => {
+                format!("rotation vectors or quaternions in the order {}", letters[..3].join(", "))
+            }
+            _ => format!("quaternions in the order {}", letters.join(", ")),
+        };
         readings.push((
             format!("the inverse of {name}"),
             Box::new(move |q| vec![reordered(q).inverse()]),
@@ -125,10 +141,14 @@ fn quaternion_orders() -> impl Iterator<Item = [usize; 4]> {
     places.filter(move |order| is_order(order) && *order != [0, 1, 2, 3])
 }
 
-/// Returns the three numbers of the table \[rad\] from which the orientation `q` was read with the
-/// convention `kind`, twice if they are unique. A rotation vector may be shorter or longer than
-/// half a turn.
+/// Returns the three numbers of the table \[rad\] from which the orientation `q` may have been read
+/// with the convention `kind`: a rotation vector that is shorter or longer than half a turn, or the
+/// two triples of angles up to half a turn.
 fn table_numbers(kind: RotationKind, q: &UnitQuaternion<f64>) -> [Vector3<f64>; 2] {
+    let both = |x: f64, y: f64, z: f64| {
+        let behind = |angle: f64| if angle > 0.0 { angle - PI } else { angle + PI };
+        [Vector3::new(x, y, z), Vector3::new(behind(x), PI.copysign(y) - y, behind(z))]
+    };
     match kind {
         RotationKind::Vector => {
             let vector = q.scaled_axis();
@@ -139,11 +159,11 @@ fn table_numbers(kind: RotationKind, q: &UnitQuaternion<f64>) -> [Vector3<f64>; 
         RotationKind::EulerXyz => {
             // R = Rx Ry Rz is the inverse of Rz(−z) Ry(−y) Rx(−x).
             let (x, y, z) = q.inverse().euler_angles();
-            [Vector3::new(-x, -y, -z); 2]
+            both(-x, -y, -z)
         }
         RotationKind::RollPitchYaw => {
             let (x, y, z) = q.euler_angles();
-            [Vector3::new(x, y, z); 2]
+            both(x, y, z)
         }
     }
 }
@@ -175,9 +195,10 @@ fn euler(order: [usize; 3], angles: &Vector3<f64>) -> UnitQuaternion<f64> {
 ///
 /// `pairs` holds the predicted orientation of each row, and the measured one as it was read.
 /// `reading` returns the orientations that the numbers may mean in the other convention. A constant
-/// rotation of the tool is fitted first: the eigenvector of Σ q qᵀ for the largest eigenvalue, with
-/// the rotations q from the prediction to the first meaning  [Markley et al. 2007]. If a row has
-/// several meanings, the nearest one is used.
+/// rotation of the tool is fitted: the eigenvector of Σ q qᵀ for the largest eigenvalue, with the
+/// rotations q from the prediction to a meaning [Markley et al. 2007]. If rows have several
+/// meanings, the nearest one of each row and the rotation are found in turn, from the first and from
+/// the last meaning of all rows.
 fn misfit(pairs: &[(UnitQuaternion<f64>, UnitQuaternion<f64>)], reading: &Reading) -> f64 {
     let differences: Vec<Vec<UnitQuaternion<f64>>> = pairs
         .iter()
@@ -185,17 +206,33 @@ fn misfit(pairs: &[(UnitQuaternion<f64>, UnitQuaternion<f64>)], reading: &Readin
             reading(measured).into_iter().map(|meant| predicted.inverse() * meant).collect()
         })
         .collect();
+    let from = |start: fn(&[UnitQuaternion<f64>]) -> Option<&UnitQuaternion<f64>>| {
+        let mut chosen: Vec<UnitQuaternion<f64>> =
+            differences.iter().filter_map(|meanings| start(meanings)).copied().collect();
+        for _ in 0..MAX_CHOICES {
+            let mean = mean_rotation(&chosen);
+            let nearest = |meanings: &Vec<UnitQuaternion<f64>>| {
+                let angle = |meaning: &UnitQuaternion<f64>| meaning.angle_to(&mean);
+                meanings.iter().copied().min_by(|a, b| angle(a).total_cmp(&angle(b)))
+            };
+            chosen = differences.iter().filter_map(nearest).collect();
+        }
+        let mean = mean_rotation(&chosen);
+        chosen.iter().map(|meaning| meaning.angle_to(&mean).powi(2)).sum::<f64>()
+    };
+    let squares = from(<[_]>::first).min(from(<[_]>::last));
+    (squares / pairs.len().max(1) as f64).sqrt()
+}
+
+/// Returns the mean of some rotations, whose squared chords to them are smallest.
+fn mean_rotation(rotations: &[UnitQuaternion<f64>]) -> UnitQuaternion<f64> {
     let mut sum = Matrix4::zeros();
-    for difference in differences.iter().filter_map(|readings| readings.first()) {
-        sum += difference.coords * difference.coords.transpose();
+    for rotation in rotations {
+        sum += rotation.coords * rotation.coords.transpose();
     }
     let eigen = sum.symmetric_eigen();
     let mean = eigen.eigenvectors.column(eigen.eigenvalues.imax()).into_owned();
-    let mean = UnitQuaternion::from_quaternion(Quaternion::from(mean));
-    let nearest = |readings: &Vec<UnitQuaternion<f64>>| {
-        readings.iter().map(|difference| difference.angle_to(&mean)).fold(PI, f64::min).powi(2)
-    };
-    (differences.iter().map(nearest).sum::<f64>() / pairs.len().max(1) as f64).sqrt()
+    UnitQuaternion::from_quaternion(Quaternion::from(mean))
 }
 
 #[cfg(test)]
@@ -227,5 +264,35 @@ mod tests {
                 assert_eq!(error < 1e-6, is_meant, "{name} {meant:?} {error}");
             }
         }
+    }
+
+    #[test]
+    fn conventions_are_found_where_the_tool_points_down() {
+        // Angles beyond a quarter turn have two triples, rotation vectors near half a turn two lengths.
+        let mut random = stream(5, 0);
+        let tool = UnitQuaternion::from_scaled_axis(Vector3::new(0.1, -0.2, 0.4));
+        let mut numbers = || {
+            let mut small = || 0.3 * normal(&mut random);
+            Vector3::new(small(), std::f64::consts::PI - small().abs(), small())
+        };
+        let rows: Vec<Vector3<f64>> = (0..40).map(|_| numbers()).collect();
+        let found = |meant: RotationKind, read: RotationKind, name: &str| {
+            let pairs: Vec<_> = rows
+                .iter()
+                .map(|angles| {
+                    (rotation_of(meant, angles) * tool.inverse(), rotation_of(read, angles))
+                })
+                .collect();
+            let mut readings = readings(read).into_iter();
+            let (_, reading) = readings.find(|(found, _)| found == name).unwrap();
+            misfit(&pairs, &reading)
+        };
+        let (vector, rpy) = (RotationKind::Vector, RotationKind::RollPitchYaw);
+        let misfits = [
+            found(vector, rpy, "rotation vectors"),
+            found(RotationKind::EulerXyz, vector, "Euler angles with R = Rx Ry Rz"),
+            found(rpy, vector, "Euler angles with R = Rz Ry Rx"),
+        ];
+        assert!(misfits.iter().all(|misfit| *misfit < 1e-6), "{misfits:?}");
     }
 }
