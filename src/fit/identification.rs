@@ -10,7 +10,6 @@ use nalgebra::{DMatrix, DVector};
 use crate::error::TableErrorKind;
 use crate::fit::checks::checked_fit::CheckedFit;
 use crate::fit::checks::finding::{Finding, FindingCode};
-use crate::fit::checks::fitted_rows::influential_finding;
 use crate::fit::checks::lens::lens_finding;
 use crate::fit::checks::misreading::Explanations;
 use crate::fit::checks::outliers::outliers;
@@ -110,8 +109,10 @@ pub fn identify_model(
             let split = Split { identification: kept, held_out: split.held_out.clone() };
             fit_rows(model, problem, (measurements, &split), &provisional).ok()
         };
-        found.influential_rows = influential_rows(&found, without);
-        found.findings.extend(found.influential_rows.as_ref().map(influential_finding));
+        if let Some(influential) = influential_rows(&found, without) {
+            found.state_influential_rows(&influential, measurements.leading());
+            found.influential_rows = Some(influential);
+        }
     }
     if !options.provisional && options.earlier.is_none() {
         let provisional = provisional_options(&found, options);

@@ -3,10 +3,13 @@
 
 use serde_json::json;
 
+use super::OF_MISFIT;
 use super::checked_fit::{Check, CheckedFit};
 use super::finding::{Finding, FindingCode};
 use super::outliers::{InfluentialRows, outliers_as_json};
 use super::point_spread::PointSpread;
+use crate::fit::Identification;
+use crate::problem::Observation;
 
 /// Checks that no identification row has a residual too large to be noise.
 pub(super) struct NoOutliers;
@@ -24,14 +27,58 @@ impl Check for NoOutliers {
     }
 }
 
-/// Creates the finding about few rows that cause most of the misfit of a fit.
-pub(in crate::fit) fn influential_finding(found: &InfluentialRows) -> Finding {
-    let text = match found.rows.len() {
-        1 => "1 row too far off to be noise causes most of the misfit".to_owned(),
-        count => format!("{count} rows too far off to be noise cause most of the misfit"),
-    };
-    let numbers = [outliers_as_json(&found.rows), json!(found.reduced_chi2)];
-    Finding::new(FindingCode::InfluentialRows, numbers, text)
+/// Codes of findings that explain a misfit by another reading of the whole table.
+const READINGS: [FindingCode; 3] =
+    [FindingCode::Misread, FindingCode::ColumnDoubted, FindingCode::RowsDoubted];
+/// Maximum number of influential rows that the reason for distrust names.
+const MAX_NAMED: usize = 3;
+
+impl Identification {
+    /// Adds the finding about few rows that cause most of the misfit, and states these rows as its
+    /// cause in the errors about the misfit. An explanation by another reading of the whole table
+    /// is removed if it leaves more error than the fit without these rows. `leading` is the leading
+    /// kind of rows.
+    pub(in crate::fit) fn state_influential_rows(
+        &mut self,
+        influential: &InfluentialRows,
+        leading: Observation,
+    ) {
+        let InfluentialRows { rows, reduced_chi2, sigma_taken } = influential;
+        let text = match rows.len() {
+            1 => "1 row too far off to be noise causes most of the misfit".to_owned(),
+            count => format!("{count} rows too far off to be noise cause most of the misfit"),
+        };
+        let without = sigma_taken * leading.expected_norm();
+        let is_beaten = |finding: &Finding| {
+            READINGS.contains(&finding.code)
+                && finding.number("after").is_none_or(|after| after > without)
+        };
+        let others = self.findings.iter().filter(|finding| !is_beaten(finding));
+        // Without another error, the fit would be trusted although the rows count in full.
+        if others.clone().any(|finding| OF_MISFIT.contains(&finding.code)) {
+            let mut findings: Vec<Finding> = others.cloned().collect();
+            let places: Vec<String> =
+                rows.iter().take(MAX_NAMED).map(|row| row.location.to_string()).collect();
+            let more = rows.len().saturating_sub(MAX_NAMED);
+            let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+            let (cause, them) = if rows.len() == 1 { ("causes", "it") } else { ("cause", "them") };
+            let remedy = format!(
+                "{}{more} {cause} most of it: correct {them}, or leave {them} out",
+                places.join(", ")
+            );
+            for finding in &mut findings {
+                if OF_MISFIT.contains(&finding.code) {
+                    *finding = finding.clone().with_remedy(remedy.clone());
+                }
+            }
+            if !findings.iter().any(|finding| finding.code == FindingCode::Misread) {
+                self.misread = None;
+            }
+            self.findings = findings;
+        }
+        let numbers = [outliers_as_json(rows), json!(reduced_chi2)];
+        self.findings.push(Finding::new(FindingCode::InfluentialRows, numbers, text));
+    }
 }
 
 /// Checks that at no touched point the predicted target scatters far more than at the others and

@@ -8,6 +8,7 @@ use crate::fit::stages::parameter_size::largest_deviation;
 use crate::model::parameter::{JointField, Parameter, ParameterSite};
 use crate::problem::Observation;
 use crate::quantity::Unit;
+use crate::quantity::format::{decimals, number, two_digits};
 
 /// Largest deviation of an arm parameter from nominal, in σ of its prior, that is not reported. A
 /// normal deviation exceeds 5 σ once in two million.
@@ -45,13 +46,13 @@ impl Check for WithinPriors {
         };
         let finding = |(parameter, sigmas): (&Parameter, f64)| {
             let name = &parameter.name;
-            let text =
-                format!("{name} deviates from nominal by {sigmas:.0} times the σ of its prior");
+            let x = fitted_deviation(fit, parameter);
+            let values = x.map_or_else(String::new, |x| values_in_words(parameter, x));
+            let text = format!(
+                "{name} deviates from nominal by {sigmas:.0} times the σ of its prior{values}"
+            );
             let numbers = [name.as_str().into(), sigmas.into()];
-            let fitted = fit.fitting.model.parameters.iter().zip(&fit.end.x);
-            let entry = fitted
-                .filter(|(other, _)| std::ptr::eq(*other, parameter))
-                .find_map(|(_, x)| contradicted_entry(fit, (parameter, *x), is_far));
+            let entry = x.and_then(|x| contradicted_entry(fit, (parameter, x), is_far));
             if let Some(entry) = entry {
                 let text = format!("{text}: {}", entry.words);
                 return Finding::new(FindingCode::BeyondPrior, numbers, text)
@@ -73,11 +74,28 @@ impl Check for WithinPriors {
 const STIFFNESS_UNITS: [(f64, &str); 3] =
     [(180.0 / std::f64::consts::PI, "N·m/°"), (1e3, "kN·m/rad"), (3437.75, "N·m/arcmin")];
 
+/// Returns the fitted deviation of a parameter from nominal.
+fn fitted_deviation(fit: &CheckedFit, parameter: &Parameter) -> Option<f64> {
+    let mut fitted = fit.fitting.model.parameters.iter().zip(&fit.end.x);
+    fitted.find(|(other, _)| std::ptr::eq(*other, parameter)).map(|(_, x)| *x)
+}
+
+/// States the declared and the fitted value of a parameter: " (declared 200.00 mm, fitted 310.2
+/// mm)".
+fn values_in_words(parameter: &Parameter, x: f64) -> String {
+    let unit = parameter.unit().display(parameter.nominal);
+    let digits = decimals((x * unit.factor).abs(), 4);
+    let show = |value: f64| format!("{} {}", number(value * unit.factor, digits), unit.symbol);
+    if parameter.unit().is_relative() {
+        return format!(" (fitted: {} times the declared value)", two_digits(x.exp(), 4));
+    }
+    format!(" (declared {}, fitted {})", show(parameter.nominal), show(parameter.value(x)))
+}
+
 /// Returns the ratio of the fitted value of a parameter to its nominal one.
 fn fitted_ratio(fit: &CheckedFit, parameter: &Parameter) -> Option<f64> {
-    let mut fitted = fit.fitting.model.parameters.iter().zip(&fit.end.x);
-    let (_, x) = fitted.find(|(other, _)| std::ptr::eq(*other, parameter))?;
-    (parameter.nominal != 0.0).then(|| parameter.value(*x) / parameter.nominal)
+    let x = fitted_deviation(fit, parameter)?;
+    (parameter.nominal != 0.0).then(|| parameter.value(x) / parameter.nominal)
 }
 
 /// Returns the remedy for a parameter that deviates by `sigmas` σ of its prior, where its kind or
