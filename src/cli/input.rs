@@ -8,7 +8,7 @@ use clap::Args;
 use flexcal::error::{InputError, Warning, WarningKind};
 use flexcal::fit::{self, SavedEstimate};
 use flexcal::measurement::{Dataset, Measurements};
-use flexcal::problem::Problem;
+use flexcal::problem::{Freedom, ParameterRule, Problem};
 use flexcal::report::shell_word;
 
 use super::diagnostic;
@@ -113,14 +113,21 @@ impl Common {
         missing.iter().filter(|_| !self.quiet).for_each(|words| diagnostic::warn(words));
     }
 
-    /// Prints a warning if no parameter is free, unless the command is quiet.
+    /// Prints a warning if no parameter of the arm is free, unless the command is quiet.
     pub fn warn_if_nothing_is_free(&self, problem: &Problem) {
-        if problem.parameters.is_empty() && !self.quiet {
-            diagnostic::warn(
-                "no parameter is free, so the nominal arm is judged; to identify it, write [parameters] with lines such as \
-                 \"joint*.alpha\" = { sigma_deg = 1.0 }, \"joint*.a\" = { sigma_mm = 5.0 }, \"joint*.theta\" = { sigma_deg = 1.0 }, \
-                 \"joint*.d\" = { sigma_mm = 5.0 }, \"base.*\" = { free = true }",
-            );
+        let is_of_setup = |rule: &ParameterRule| {
+            let is_placement = ["base", "tool"].iter().any(|name| rule.pattern.starts_with(name));
+            is_placement || matches!(rule.freedom, Freedom::Fixed)
+        };
+        let rules = &problem.parameters;
+        let is_arm_held = rules.iter().all(is_of_setup) && problem.effects.is_empty();
+        if is_arm_held && !self.quiet {
+            let subject = if rules.is_empty() { "no parameter" } else { "no parameter of the arm" };
+            diagnostic::warn(&format!(
+                "{subject} is free, so the nominal arm is judged; to identify it, write [parameters] with lines such as \
+                 \"joint*.alpha\" = {{ sigma_deg = 1.0 }}, \"joint*.a\" = {{ sigma_mm = 5.0 }}, \"joint*.theta\" = {{ sigma_deg = 1.0 }}, \
+                 \"joint*.d\" = {{ sigma_mm = 5.0 }}, \"base.*\" = {{ free = true }}"
+            ));
         }
     }
 

@@ -148,6 +148,11 @@ pub enum WarningKind {
     #[error("all temperatures are {least} °C or more; if these are kelvins, subtract 273.15")]
     Kelvins { least: String },
     #[error(
+        "{value} °C is no temperature of an arm; check the unit, and whether the column holds another \
+         quantity"
+    )]
+    ImpossibleTemperature { value: String },
+    #[error(
         "all temperatures are {least} °C or more, which is hot for an arm; if these are degrees \
          Fahrenheit, convert them: °C = (°F − 32) / 1.8"
     )]

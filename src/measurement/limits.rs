@@ -5,6 +5,7 @@ use std::collections::HashMap;
 use super::Measurements;
 use crate::error::{Warning, WarningKind};
 use crate::problem::{JointKind, Problem};
+use crate::quantity::format::number;
 
 /// Largest excess over a joint limit that counts as rounding \[rad\] or \[m\].
 const LIMIT_TOLERANCE: f64 = 1e-6;
@@ -13,6 +14,8 @@ const MIN_SUSPICIOUS_TURNS: f64 = 2.0;
 /// Highest plausible temperature [°C]. Above it, a warning suggests that the column is in kelvins;
 /// even the temperature of a cold room exceeds it in kelvins.
 const MAX_PLAUSIBLE_TEMPERATURE: f64 = 200.0;
+/// Distance of a temperature from 20 °C \[K\] beyond which no arm has it.
+const MAX_TEMPERATURE_DISTANCE: f64 = 120.0;
 /// Largest plausible payload \[kg\]. The strongest industrial arms lift 2300 kg.
 const MAX_PAYLOAD: f64 = 3000.0;
 /// Largest plausible ratio of a payload to the declared mass of the arm. Arms lift at most about
@@ -71,6 +74,18 @@ impl Measurements {
         let location = self.location(row).with_key("temperature_C");
         (least > MAX_PLAUSIBLE_TEMPERATURE)
             .then(|| Warning { location, kind: WarningKind::Kelvins { least: format!("{least}") } })
+    }
+
+    /// Returns a warning, located at the temperature furthest from 20 °C, if no arm has it, although
+    /// others are plausible.
+    pub(super) fn impossible_temperature(&self) -> Option<Warning> {
+        let distance = |value: f64| (value - 20.0).abs();
+        let values = self.temperature.iter().flatten().enumerate();
+        let (row, &value) = values.max_by(|a, b| distance(*a.1).total_cmp(&distance(*b.1)))?;
+        let location = self.location(row).with_key("temperature_C");
+        let kind = WarningKind::ImpossibleTemperature { value: number(value, 1) };
+        let is_impossible = distance(value) > MAX_TEMPERATURE_DISTANCE && self.kelvins().is_none();
+        is_impossible.then_some(Warning { location, kind })
     }
 
     /// Returns a warning, located at the heaviest payload, if that is implausible for the arm.

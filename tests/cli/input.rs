@@ -71,8 +71,15 @@ const PROBLEM: &str = "problem.toml";
 
 #[test]
 fn where_nothing_is_free_every_command_that_fits_says_so() {
-    let folder = Folder::with_lunar_sampler();
-    replace_parameters(&folder, "");
+    let folder = Folder::new();
+    let problem = "name = 'arm'\n[[joint]]\na_m = 1\n[[joint]]\na_m = 1\n[data]\nfiles = ['rows.csv']\n\
+                   position_sigma_mm = 0.1\nheld_out = { fraction = 0.3, seed = 1 }\n";
+    folder.write("problem.toml", problem);
+    folder.write(
+        "TRUTH.toml",
+        "[noise]\nposition_sigma_mm = 0.1\n[poses]\nq1_deg = [-90, 90]\nq2_deg = [-90, 90]\n",
+    );
+    folder.simulate(".", "TRUTH.toml", 20, 1, "rows.csv");
     for command in ["identify", "trace", "loop"] {
         let run = folder.flexcal(command);
         assert_contains(&run.stderr, &["no parameter is free, so the nominal arm is judged"]);
