@@ -306,7 +306,9 @@ pub fn next(
         let candidates = match (pool, known_ranges(&declared, truth.as_deref())?) {
             (Some(rows), _) => Candidates::Rows(Box::new(rows.as_ref().clone())),
             (None, Some(ranges)) => Candidates::Within(ranges.relevant_to(&declared)),
-            (None, None) => Candidates::Within(PoseRanges::measured(&declared, &data.measurements)),
+            (None, None) => {
+                Candidates::Within(PoseRanges::declared_or_measured(&declared, &data.measurements))
+            }
         };
         let options = NextOptions {
             poses,

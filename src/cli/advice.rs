@@ -17,7 +17,8 @@ const SEPARATING_POSES: usize = 12;
 
 /// Findings that indicate a mistake in the table or the problem, not an effect that the model
 /// lacks.
-const INPUT_MISTAKES: [FindingCode; 5] = [
+const INPUT_MISTAKES: [FindingCode; 6] = [
+    FindingCode::OrientationMisfit,
     FindingCode::MissesMeasurements,
     FindingCode::NoBetterThanNominal,
     FindingCode::OtherSize,
@@ -181,7 +182,7 @@ pub fn after_loop(
         }
         Verdict::Unexplained => {
             let trace = format!(
-                "flexcal trace {named} ranks candidates and names what these data cannot show"
+                "flexcal trace {named} ranks candidates and lists effects that these data cannot show, if there are any"
             );
             let is_better = !result.effects.is_empty() || result.remainder.is_some();
             if is_better {

@@ -128,7 +128,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         Some(rows) => Candidates::Rows(Box::new(rows)),
         None => Candidates::Within(match source.known_ranges(&problem)? {
             Some(ranges) => ranges.relevant_to(&problem),
-            None => PoseRanges::measured(&problem, &data.measurements),
+            None => PoseRanges::declared_or_measured(&problem, &data.measurements),
         }),
     };
     let explanations = if arguments.purpose == PurposeArgument::Accuracy {

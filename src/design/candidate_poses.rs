@@ -54,7 +54,7 @@ impl PoseRanges {
     /// Returns the joint limits that the problem declares, and the range of the commands in `rows`
     /// for joints that lack one. The payloads are those of the rows.
     #[doc(hidden)]
-    pub fn measured(problem: &Problem, rows: &Measurements) -> Self {
+    pub fn declared_or_measured(problem: &Problem, rows: &Measurements) -> Self {
         let of_joint = |(k, joint): (usize, &Joint)| {
             let values = (0..rows.len()).map(|row| rows.configuration(row)[k]);
             let (low, high) = range(values);

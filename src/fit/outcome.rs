@@ -79,7 +79,8 @@ pub struct Identification {
     /// Number of different poses of the arm that were fitted; several targets in one pose count
     /// once.
     pub poses: usize,
-    /// True if several targets were measured in one pose of the arm.
+    /// True if several targets, or several quantities such as the points of an image, are measured
+    /// in one pose of the arm.
     pub several_targets: bool,
     /// Number of steps that were tried, over all stages.
     pub iterations: u64,

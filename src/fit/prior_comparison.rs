@@ -31,6 +31,8 @@ pub(crate) struct PriorComparison {
     /// Texts of the causes of change that explain why the new rows contradict the prior, in the
     /// order in which they were found. Empty if the rows agree with the prior.
     pub causes: Vec<String>,
+    /// True if one of `causes` is larger noise, so that the fit assumes a larger σ.
+    pub has_raised_sigma: bool,
     /// Comparison of each parameter of which the prior contains information.
     pub parameters: Vec<ComparedParameter>,
 }

@@ -353,7 +353,7 @@ impl Effect {
     /// Returns the effect with its time constant or friction distance multiplied by `factor`,
     /// rounded to three digits. `None` if the effect has no such argument, or if the product is
     /// zero or not finite.
-    pub(crate) fn scaled(&self, factor: f64) -> Option<Self> {
+    pub(crate) fn with_scaled_argument(&self, factor: f64) -> Option<Self> {
         let (key, _) = self.key_of(ArgumentKind::is_scalable)?;
         let Some(Argument::Number(number)) = self.argument(key) else { return None };
         self.with(key, &Argument::Number(to_three_digits(factor * number)?))

@@ -152,8 +152,8 @@ impl Earlier {
             .ok_or_else(|| PriorError::NoCovariance { file: self.file.clone() })
     }
 
-    /// Returns the index, in the Gaussian, of the parameter with an index in the model; `None` if
-    /// the Gaussian does not contain it.
+    /// Returns the index in the Gaussian of the parameter whose index in the model is `parameter`;
+    /// `None` if the Gaussian does not contain it.
     pub fn place_of(&self, parameter: usize) -> Option<usize> {
         self.indices.iter().position(|&k| k == parameter)
     }

@@ -123,10 +123,12 @@ pub fn identify_with_prior(
         let cause = cause.filter(|_| is_new_cause && causes.len() < MAX_CAUSES);
         let Some(cause) = cause else {
             causes.extend(contradicting_bound(&model, &found, &original));
-            found.findings.extend(causes.iter().map(|cause| cause.finding(source.file())));
+            let findings = causes.iter().enumerate();
+            found.findings.extend(findings.map(|(k, cause)| cause.finding(k, source.file())));
             found.fitted_rows.extend(original.fitted_rows.iter().cloned());
             found.fitted_rows.sort();
             found.fitted_rows.dedup();
+            let has_raised_sigma = causes.iter().any(|cause| cause.noise_ratio.is_some());
             let labels = causes.into_iter().map(|cause| cause.label).collect();
             found.prior = Some(PriorComparison {
                 days,
@@ -138,6 +140,7 @@ pub fn identify_with_prior(
                     .filter(|_| declared_problem.data.position_sigma.is_none()),
                 chi2,
                 causes: labels,
+                has_raised_sigma,
                 ..compare(&model, &found, (&original, &prior))
             });
             return Ok(found);
@@ -202,15 +205,21 @@ struct Contradiction {
 }
 
 impl Contradiction {
-    /// Returns the finding that the new rows contradict the prior in `file`.
-    fn finding(&self, file: &Path) -> Finding {
+    /// Returns the finding that the new rows contradict the prior in `file`. `index` is the number
+    /// of causes that were found before this one.
+    fn finding(&self, index: usize, file: &Path) -> Finding {
         let treatment = match (self.widened.is_empty(), self.noise_ratio) {
             (false, _) => "; the prior of its parameters was widened".to_owned(),
-            (true, Some(ratio)) => format!("; the fit took a σ {ratio:.1} times as large"),
+            (true, Some(ratio)) => format!("; the fit assumes a σ {ratio:.1} times as large"),
             (true, None) => String::new(),
         };
+        let cause = if index == 0 {
+            "most probable cause"
+        } else {
+            "with what was found before, they still do; most probable further cause"
+        };
         let text = format!(
-            "the new rows contradict {} (false alarms: below 1 %); most probable cause: {} ({:.0} %){treatment}",
+            "the new rows contradict {} (a false alarm in at most one of 100 fits); {cause}: {} ({:.0} %){treatment}",
             file.display(),
             self.label,
             100.0 * self.probability
@@ -374,6 +383,7 @@ fn compare(
         includes_fleet: original.includes_fleet,
         chi2: None,
         causes: Vec::new(),
+        has_raised_sigma: false,
         parameters: original.indices.iter().enumerate().map(compared).collect(),
     }
 }

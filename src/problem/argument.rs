@@ -198,7 +198,7 @@ impl<'s, 'a, 'i> ArgumentReader<'s, 'a, 'i> {
 
     fn read_free_length(&mut self, key: &str) -> Result<Argument, InputError> {
         let base = without_suffix(key, Unit::Length);
-        let found = self.section.not_negative(base, Unit::Length)?;
+        let found = self.section.non_negative_number(base, Unit::Length)?;
         found
             .map(Argument::Length)
             .ok_or_else(|| self.section.missing(base, Unit::Length.alternatives(base)))

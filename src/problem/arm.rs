@@ -244,7 +244,7 @@ fn read_beam(mut section: Section<'_, '_>, beams: &mut Vec<String>) -> Result<Be
     let item = section.require("name", "name = \"…\"")?;
     let name = read_beam_name(&item, beams)?;
     beams.push(name.clone());
-    let mass = section.not_negative("mass", Unit::Mass)?.unwrap_or(0.0);
+    let mass = section.non_negative_number("mass", Unit::Mass)?.unwrap_or(0.0);
     let ea = read_stiffness(&mut section, "EA", Unit::AxialRigidity)?;
     let ei_y = read_stiffness(&mut section, "EIy", Unit::FlexuralRigidity)?;
     let ei_z = read_stiffness(&mut section, "EIz", Unit::FlexuralRigidity)?;
@@ -304,7 +304,7 @@ fn read_bodies(
         let number = bodies.len() + 1;
         let name = section.text("name")?.map_or_else(|| format!("{key} {number}"), str::to_owned);
         let mass = section
-            .not_negative("mass", Unit::Mass)?
+            .non_negative_number("mass", Unit::Mass)?
             .ok_or_else(|| section.missing("mass_kg", "mass_kg"))?;
         let position = if position_needed {
             section.require_vector(base, Unit::Length)?

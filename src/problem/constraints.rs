@@ -97,7 +97,8 @@ fn read_constraint(mut section: Section<'_, '_>) -> Result<Constraint, InputErro
     Ok(Constraint { terms, at_least, at_most, location: section.location() })
 }
 
-/// Reads a limit with its unit; a limit of logarithms has none.
+/// Reads the limit under the key `base` with a suffix for its unit. A limit of logarithms has no
+/// unit, so its key is `base` itself.
 fn read_limit<'a, 'i>(
     section: &mut Section<'a, 'i>,
     base: &str,

@@ -189,7 +189,11 @@ impl<'a, 'i> Section<'a, 'i> {
     }
 
     /// Returns an optional number with a unit that is not negative \[SI\].
-    pub fn not_negative(&mut self, base: &str, unit: Unit) -> Result<Option<f64>, InputError> {
+    pub fn non_negative_number(
+        &mut self,
+        base: &str,
+        unit: Unit,
+    ) -> Result<Option<f64>, InputError> {
         let Some((item, suffix)) = self.quantity(base, unit)? else { return Ok(None) };
         let value = item.number()?;
         if value < 0.0 {

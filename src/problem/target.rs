@@ -108,7 +108,7 @@ pub(super) fn read_tool(
     } else if let Some(at) = section.vector("payload_at", Unit::Length)? {
         (tool.payload_at, tool.payload_is_declared) = (at, true);
     }
-    tool.payload_mass = section.not_negative("payload", Unit::Mass)?.unwrap_or(0.0);
+    tool.payload_mass = section.non_negative_number("payload", Unit::Mass)?.unwrap_or(0.0);
     section.finish()?;
     Ok(tool)
 }

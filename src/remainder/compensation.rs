@@ -39,7 +39,7 @@ pub enum CompensationError {
     /// The targets and the problem do not fit each other.
     #[error(transparent)]
     Input(#[from] InputError),
-    /// The estimate is of another problem.
+    /// The estimate is of another problem, or lacks a base or tool that the targets name.
     #[error(transparent)]
     Estimate(#[from] SavedEstimateError),
     /// The search for a command cannot be set up.
@@ -53,8 +53,8 @@ impl Compensation {
     /// corrects predictions and bounds errors with probability `level`.
     ///
     /// # Errors
-    /// Returns an error if a row is no position, the estimate is of another problem, or the nominal
-    /// arm has no equilibrium at a waypoint.
+    /// Returns an error if a row is no position, the estimate is of another problem or lacks a base
+    /// or tool of the targets, or the nominal arm has no equilibrium at a waypoint.
     pub fn new(
         problem: &Problem,
         (estimate, correction): (&SavedEstimate, Option<&Correction>),

@@ -3,6 +3,7 @@
 use super::document::Block;
 use super::errors::row_noun;
 use super::identify::estimate_head;
+use super::noise::includes_orientation;
 use super::parameters::correlated;
 use super::prior::summary;
 use super::remainder::PredictionAccuracy;
@@ -68,8 +69,16 @@ fn remarks(found: &Identification) -> Vec<String> {
     let farthest = found.outliers.iter().max_by(|a, b| a.distance.total_cmp(&b.distance));
     points.extend(farthest.map(|outlier| {
         let n = counted(found.outliers.len(), row_noun(found));
+        if includes_orientation(found, outlier.kind) {
+            return format!(
+                "{n} too far off to be noise, position and orientation together, the farthest at {}: \
+                 {} × the typical scatter",
+                outlier.location,
+                number(outlier.distance, 1)
+            );
+        }
         format!(
-            "{n} too far off to be noise, the largest at {}: {}",
+            "{n} too far off to be noise, the farthest at {}: {}",
             outlier.location,
             size_of_kind(outlier.kind, outlier.error.norm(), 3)
         )

@@ -198,11 +198,11 @@ fn growth_table(check: &Check) -> Table {
 fn recommendation(problem: &Problem, check: &Check) -> String {
     match check.growth.enough {
         Some(enough) if let Some(measured) = poses_to_measure(problem, enough) => format!(
-            "Measure {measured} poses, of which held_out removes {}: the others identify all that such poses can identify, and predictions are then as accurate as one measured position. More poses still lower the error (table below).",
+            "Measure {measured} poses, of which held_out removes {}: the others determine every combination of parameters that such poses can determine, and predictions are then as accurate as one measured position. More poses still lower the error (table below).",
             measured - enough
         ),
         Some(enough) => format!(
-            "Measure {enough} poses: they identify all that such poses can identify, and predictions are then as accurate as one measured position. More poses still lower the error (table below)."
+            "Measure {enough} poses: they determine every combination of parameters that such poses can determine, and predictions are then as accurate as one measured position. More poses still lower the error (table below)."
         ),
         None if check.noise.is_none() => {
             "No number of poses is recommended, because nothing measured is a length.".to_owned()

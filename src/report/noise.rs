@@ -72,10 +72,10 @@ fn raised_sigma(found: &Identification) -> Option<String> {
     if ratio <= MAX_EQUAL_VARIANCE_RATIO {
         return None;
     }
-    let reason = if prior.causes.is_empty() {
-        "the earlier estimate was fitted with it"
-    } else {
+    let reason = if prior.has_raised_sigma {
         "the new rows contradict the prior"
+    } else {
+        "the earlier estimate was fitted with it"
     };
     Some(format!(
         "Reduced χ² (χ²/ν) is {} with the declared σ and {} with the σ that the fit assumes; {}.\n\
@@ -173,7 +173,13 @@ pub(super) fn outliers<'a>(problem: &Problem, found: &Identification) -> Option<
             outlier.location,
             size_of_kind(outlier.kind, outlier.error.norm(), 3),
             number(outlier.distance, 1),
-            outlier.scatter.map_or_else(String::new, |scatter| scatter_size(outlier.kind, scatter))
+            match outlier.scatter {
+                Some(_) if includes_orientation(found, outlier.kind) => {
+                    " of position and orientation together".to_owned()
+                }
+                Some(scatter) => scatter_size(outlier.kind, scatter),
+                None => String::new(),
+            }
         )
     };
     let points = first_of(found.outliers.iter().map(point), MAX_SHOWN_OUTLIERS, RESULT_FILE);
@@ -201,6 +207,12 @@ pub(super) fn outliers<'a>(problem: &Problem, found: &Identification) -> Option<
     };
     let words = format!("{n} of {} {have} ({treatment}):", counted(all, noun));
     (n > 0).then_some(Block::Lines(words, points))
+}
+
+/// Returns true if the distance of an outlier of a kind includes its error of orientation, so that
+/// the typical scatter is no length.
+pub(super) fn includes_orientation(found: &Identification, kind: &str) -> bool {
+    found.orientation.is_some() && kind == "position"
 }
 
 /// States the size of the typical scatter for rows of a kind, and its source: " (0.197 mm, from the

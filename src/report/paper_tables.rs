@@ -1,7 +1,7 @@
 //! Results of any procedure in the form of tables 2 and 3 of \[Chen2021\].
 
 use super::document::Table;
-use crate::fit::{AxisValues, Comparison, ErrorSummary, Procedure, TableEntry};
+use crate::fit::{AxisValues, Comparison, ErrorSummary, PaperTableEntry, Procedure};
 use crate::paper::published::{BEFORE, Published, WITH_ELASTICITY, WITHOUT_ELASTICITY};
 use crate::paper::{Form, StiffnessStage};
 use crate::quantity::format::{mm, number, or_dash};
@@ -37,11 +37,11 @@ pub(super) fn table_2(procedure: &Procedure) -> Table {
     let show = |column: usize, value: f64| {
         if column.is_multiple_of(2) { number(value.to_degrees(), 3) } else { mm(value, 2) }
     };
-    let marked = |entry: &TableEntry, text: String| match entry.seen {
+    let marked = |entry: &PaperTableEntry, text: String| match entry.seen {
         Some(seen) if seen < MIN_UNMARKED_SHARE => format!("({text})"),
         _ => text,
     };
-    let row = |(joint, entries): &(usize, [TableEntry; 5])| {
+    let row = |(joint, entries): &(usize, [PaperTableEntry; 5])| {
         let fields = || entries.iter().enumerate();
         let nominal = fields().map(|(column, entry)| show(column, entry.nominal));
         let identified =

@@ -59,14 +59,14 @@ pub(super) fn parameters<'a>(
         (count > 0).then(|| format!("smaller harmonics: in {file}")).into_iter().collect();
     if found.estimates.iter().any(|estimate| estimate.std_error.is_none()) {
         notes.push(
-            "–: no standard error, because the data identify the parameter only in a combination with others or not at all, a bound is \
-             active, or it was not fitted"
+            "–: no standard error, because the data identify the parameter only in a combination with others or not at all, a limit \
+             (bound or constraint) decides it, or it was not fitted"
                 .to_owned(),
         );
     }
     notes.push(
         "identified: share of the information that comes from the data or from priors of related parameters; the rest comes from the \
-         parameter's prior, a bound, or the start value along unidentifiable combinations"
+         parameter's prior, a bound or constraint, or the start value along unidentifiable combinations"
             .to_owned(),
     );
     notes.extend(rows_of_sheet(problem));

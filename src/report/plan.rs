@@ -29,7 +29,7 @@ fn sufficiency<'a>(plan: &Plan) -> Block<'a> {
     let parameters = counted(plan.planned.expected.len(), "parameter");
     if rank >= attainable_rank {
         return Block::Text(format!(
-            "Enough poses: more such poses determine nothing further (rank {rank} of {}).",
+            "Enough poses: more such poses determine no further combination of parameters (rank {rank} of {}).",
             plan.planned.expected.len()
         ));
     }

@@ -147,6 +147,9 @@ fn hypothesis_sets<'a>(result: &TraceResult) -> Vec<Block<'a>> {
 pub(super) fn claims_text(claims: &Claims) -> String {
     let Claims { place, depends_on, law, .. } = claims;
     let words = match &law.value {
+        Some(name) if name == "law" => {
+            format!("a law of the terms above: {}", percent(law.probability))
+        }
         Some(name) => format!("law {name}: {}", percent(law.probability)),
         None => "law not known".to_owned(),
     };

@@ -15,7 +15,6 @@ pub(super) fn outcome(found: &Identification, accuracy: Option<&PredictionAccura
     let [before, fitted] = [&found.registered, &found.fitted].map(|errors| &errors.held_out);
     let corrected = accuracy.and_then(|accuracy| accuracy.corrected.as_ref());
     let after = corrected.unwrap_or(fitted);
-    let falls = if after.mean.norm < before.mean.norm { "falls" } else { "does not fall: it goes" };
     let is_larger = match ResidualSize::of(found) {
         ResidualSize::Contradicted(chi2) | ResidualSize::Unclear(chi2) => chi2 > 1.0,
         _ => false,
@@ -35,11 +34,17 @@ pub(super) fn outcome(found: &Identification, accuracy: Option<&PredictionAccura
     } else {
         String::new()
     };
+    let [from, to] = [with_unit(before, before.mean.norm), with_unit(after, after.mean.norm)];
+    let change = if from == to {
+        format!("stays at {to}")
+    } else if after.mean.norm < before.mean.norm {
+        format!("falls from {from} to {to}")
+    } else {
+        format!("does not fall: it goes from {from} to {to}")
+    };
     format!(
-        "Trusted{scope}: the mean {} error {falls} from {} to {}{without}.{}",
+        "Trusted{scope}: the mean {} error {change}{without}.{}",
         test_rows_word(&found.fitted).replace(' ', "-"),
-        with_unit(before, before.mean.norm),
-        with_unit(after, after.mean.norm),
         if is_larger {
             format!(" Not fully explained: the residual is {size}.")
         } else {

@@ -84,6 +84,8 @@ fn outcome(result: &LoopResult, assumes_smaller_sigma: bool) -> String {
                 " Held-out rows or rows that were set aside contradict the fit: see the warnings."
             } else if result.with_status(Status::Contradicted).next().is_some() {
                 ""
+            } else if result.checks_after.iter().any(|test| test.failed) {
+                " With what is in the model, no structure is seen in the residual, but a residual test fails."
             } else {
                 " With what is in the model, the residual looks like noise."
             };
@@ -93,7 +95,7 @@ fn outcome(result: &LoopResult, assumes_smaller_sigma: bool) -> String {
             format!("Explained: {}, and the residual looks like noise.", with_lower_initial(&found))
         }
         (Verdict::NothingFound, true) => {
-            if let Some(ratio) = result.overstated_sigma() {
+            if let Some(ratio) = result.overstated_sigma_ratio() {
                 overstated_sigma_sentence(ratio, assumes_smaller_sigma)
             } else {
                 let apart = match result.set_aside.len() {

@@ -160,7 +160,7 @@ fn change(change: &Change, is_largest: bool) -> String {
     };
     let name = change.parameter.rsplit('.').next().unwrap_or_default();
     if !change.std_error.is_finite() {
-        let ratio = number(change.change, 1);
+        let ratio = two_digits(change.change, 2);
         return if is_largest {
             format!("{name} {ratio} or more")
         } else {

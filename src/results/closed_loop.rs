@@ -325,7 +325,7 @@ impl LoopResult {
 
     /// Returns the ratio √(χ²/ν) of the residual to the declared σ if it is significantly less than
     /// 1; `None` if it is not, or if no σ is declared.
-    pub(crate) fn overstated_sigma(&self) -> Option<f64> {
+    pub(crate) fn overstated_sigma_ratio(&self) -> Option<f64> {
         let (size, chi2) = self.size_test()?;
         let (low, _) = size.bounds?;
         (chi2 < low).then(|| chi2.max(0.0).sqrt())

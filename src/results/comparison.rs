@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::document::Document;
 use super::summary::{Errors, Summary};
 use crate::fit::{
-    self, Baseline, Comparison, ErrorSummary, Identification, SolverChoice, TableEntry,
+    self, Baseline, Comparison, ErrorSummary, Identification, PaperTableEntry, SolverChoice,
 };
 use crate::model::Ablation;
 use crate::problem::Problem;
@@ -163,8 +163,8 @@ impl From<&Baseline> for ComparedFit {
 }
 
 impl Procedure {
-    fn new(before: &fit::Before, procedure: &fit::Procedure) -> Self {
-        let value = |entry: &TableEntry, to: fn(f64) -> f64| GeometryValue {
+    fn new(before: &fit::ErrorsBefore, procedure: &fit::Procedure) -> Self {
+        let value = |entry: &PaperTableEntry, to: fn(f64) -> f64| GeometryValue {
             nominal: to(entry.nominal),
             identified: to(entry.identified),
             change: to(entry.identified - entry.nominal),
@@ -173,7 +173,7 @@ impl Procedure {
         let deg: fn(f64) -> f64 = f64::to_degrees;
         let mm: fn(f64) -> f64 = |length| length * 1e3;
         let joint =
-            |(joint, [alpha, a, theta, d, beta]): &(usize, [TableEntry; 5])| JointGeometry {
+            |(joint, [alpha, a, theta, d, beta]): &(usize, [PaperTableEntry; 5])| JointGeometry {
                 joint: *joint,
                 alpha_deg: value(alpha, deg),
                 a_mm: value(a, mm),

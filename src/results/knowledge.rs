@@ -37,7 +37,7 @@ pub enum Knowledge {
     InPart,
     /// The prior, or the start value, determines nearly all of the parameter.
     Hardly,
-    /// The data contain no information on the parameter.
+    /// The data contain no information on the parameter beyond what active constraints state.
     NotAtAll,
 }
 

@@ -182,10 +182,10 @@ struct Noise {
 fn noise(mut section: Section<'_, '_>) -> Result<Noise, InputError> {
     let mut given = BTreeMap::new();
     for kind in kinds().filter(|kind| kind.needs != Needs::Fixtures) {
-        let sigma = section.not_negative(&format!("{}_sigma", kind.name), kind.unit)?;
+        let sigma = section.non_negative_number(&format!("{}_sigma", kind.name), kind.unit)?;
         given.extend(sigma.map(|sigma| (kind.name, sigma)));
     }
-    let turn = section.not_negative("orientation_sigma", Unit::Angle)?;
+    let turn = section.non_negative_number("orientation_sigma", Unit::Angle)?;
     section.finish()?;
     let missing =
         || section.missing("position_sigma_mm", Unit::Length.alternatives("position_sigma"));

@@ -450,7 +450,7 @@ fn plans_with_a_camera_hold_configurations_that_see_the_board() {
     // The first images show where camera and board are.
     let first: Vec<usize> = (0..90).collect();
     let given = rows.select(&first);
-    let ranges = PoseRanges::measured(&problem, &rows);
+    let ranges = PoseRanges::declared_or_measured(&problem, &rows);
     let options = PlanOptions {
         poses: 8,
         criterion: &Criterion::S,

@@ -30,7 +30,8 @@ pub(in crate::fit) struct PoseSufficiency {
     /// Number of different poses of the arm among the identification rows; several targets in one
     /// pose count once.
     pub poses: usize,
-    /// True if several targets are measured in one pose of the arm.
+    /// True if several targets, or several quantities such as the points of an image, are measured
+    /// in one pose of the arm.
     pub several_targets: bool,
 }
 

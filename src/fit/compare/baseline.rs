@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use nalgebra::Vector3;
 
-use crate::fit::compare::procedure::{Procedure, TableEntry, paper_name};
+use crate::fit::compare::procedure::{PaperTableEntry, Procedure, paper_name};
 use crate::fit::{ErrorSummary, Errors};
 use crate::least_squares::solver::Termination;
 use crate::measurement::{Dataset, Measurements};
@@ -20,7 +20,7 @@ pub struct Baseline {
     /// Source of the stiffness in the procedure.
     pub stage: StiffnessStage,
     /// Table 2 of the paper: α, a, θ, d, β of each joint.
-    pub geometry: Vec<[TableEntry; 5]>,
+    pub geometry: Vec<[PaperTableEntry; 5]>,
     /// Errors of the identified arm, predicted by the paper's closed forms.
     pub errors: Errors,
     /// Errors measured − predicted of the held-out poses, measuring frame \[m\].
@@ -112,7 +112,7 @@ fn baseline(
         let (mut nominal, mut identified) = (Mdh::nominal(declared), *identified);
         let (nominal, identified) =
             (nominal.fields_mut().map(|v| *v), identified.fields_mut().map(|v| *v));
-        std::array::from_fn(|field| TableEntry {
+        std::array::from_fn(|field| PaperTableEntry {
             nominal: nominal[field],
             identified: identified[field],
             seen: Some(found.identified_share[5 * joint + field]),

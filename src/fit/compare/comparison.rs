@@ -34,14 +34,14 @@ pub struct Comparison {
     /// paper's tables. Empty if some rows measure no position, or none is held out.
     pub procedures: Vec<Procedure>,
     /// Errors before identification as the paper defines them: those of the rigid nominal arm.
-    pub before: Before,
+    pub before: ErrorsBefore,
     /// True if the problem declares the arm of the paper, so that the published figures apply.
     pub is_papers_arm: bool,
 }
 
 /// Errors of the rigid nominal arm, before identification.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Before {
+pub struct ErrorsBefore {
     /// Errors measured − predicted of the held-out poses, measuring frame \[m\].
     pub errors: Vec<Vector3<f64>>,
     /// True if base and tool were fitted first, because some of their parameters are free without
@@ -134,6 +134,6 @@ pub fn compare(
     };
     let registered = model.parameters.iter().any(unknown);
     let x = if registered { rigid.registered_x.clone() } else { DVector::zeros(rigid.x.len()) };
-    let before = Before { errors: held_out(&rigid_model, &x), registered };
+    let before = ErrorsBefore { errors: held_out(&rigid_model, &x), registered };
     Ok(Comparison { joint, rigid, strategies, paper, ablations, procedures, before, is_papers_arm })
 }

@@ -8,7 +8,7 @@ use crate::problem::{Joint, Problem};
 
 /// Geometric parameter of a joint before and after identification, as in table 2 of the paper.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TableEntry {
+pub struct PaperTableEntry {
     /// Value that the problem declares \[m\] or \[rad\].
     pub nominal: f64,
     /// Value that the procedure identified \[m\] or \[rad\].
@@ -25,7 +25,7 @@ pub struct Procedure {
     /// joint fit of the declared model.
     pub paper: Option<(Form, StiffnessStage)>,
     /// Table 2: number (from 1) and α, a, θ, d, β of each joint in DH form.
-    pub geometry: Vec<(usize, [TableEntry; 5])>,
+    pub geometry: Vec<(usize, [PaperTableEntry; 5])>,
     /// Errors measured − predicted of the held-out poses after identification, measuring frame
     /// \[m\].
     pub after: Vec<Vector3<f64>>,
@@ -48,7 +48,11 @@ impl Procedure {
                 .estimate(&format!("joint{}.{field}", joint + 1))
                 .filter(|estimate| estimate.fitted);
             let identified = estimate.map_or(nominal, |estimate| estimate.estimate);
-            TableEntry { nominal, identified, seen: estimate.map(|estimate| estimate.identified) }
+            PaperTableEntry {
+                nominal,
+                identified,
+                seen: estimate.map(|estimate| estimate.identified),
+            }
         };
         let row = |(index, joint): (usize, &Joint)| {
             let fields = [

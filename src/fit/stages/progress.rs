@@ -21,8 +21,7 @@ pub enum Progress {
         unknowns: usize,
         /// Number of poses of the current fit.
         poses: usize,
-        /// Cost after the step: ½‖r‖² of whitened residuals and priors, or with a robust loss ρ
-        /// ½Σρ.
+        /// Cost after the step: ½‖r‖² of whitened residuals and priors; with a robust loss ρ, ½Σρ.
         cost: f64,
     },
     /// A round of a loop evaluates candidate effects, or starts another fit.

@@ -111,7 +111,7 @@ impl SecondOrder {
     }
 
     /// Resumes geodesic acceleration if the gain `ratio` shows that the step was predicted poorly.
-    pub fn resume_if_missed(&mut self, ratio: f64) {
+    pub fn resume_acceleration_if_missed(&mut self, ratio: f64) {
         self.is_straight &= ACCURATE_RATIO_RANGE.contains(&ratio);
     }
 
@@ -258,12 +258,12 @@ mod tests {
         assert!(second_order.accelerates());
         // A short (damped) step has a small acceleration on any path.
         second_order.record_acceleration(0.001, 0.5);
-        second_order.resume_if_missed(1.0);
+        second_order.resume_acceleration_if_missed(1.0);
         assert!(second_order.accelerates());
         second_order.record_acceleration(0.001, 0.0);
-        second_order.resume_if_missed(1.0);
+        second_order.resume_acceleration_if_missed(1.0);
         assert!(!second_order.accelerates());
-        second_order.resume_if_missed(0.1);
+        second_order.resume_acceleration_if_missed(0.1);
         assert!(second_order.accelerates());
         // Without S there is nothing to refine.
         assert!(!second_order.stop_second_derivatives() && !second_order.accelerates());

@@ -401,7 +401,7 @@ impl<O: Objective, S: Subproblem> Solver<O, State> for TrustRegion<S> {
         let (x, cost) = if is_accepted { (step.point, trial.cost) } else { (x, cost) };
         if termination.is_none() {
             let ratio = trial.significant_ratio(self.settings.cost_tolerance);
-            self.second_order.resume_if_missed(ratio);
+            self.second_order.resume_acceleration_if_missed(ratio);
             if self.subproblem.accelerates_unconstrained() {
                 self.second_order.count_miss(ratio);
             }

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::prelude::*;
-use crate::fit::{Before, Procedure};
+use crate::fit::{ErrorsBefore, Procedure};
 use crate::report::arm_names::{DECLARED_ARM, EXTENDED_ARM, NOMINAL_ARM};
 use crate::results::{Stage, StageErrors, procedure_stages};
 
@@ -74,7 +74,7 @@ pub fn errors(data: &PlotData) -> Option<Drawing> {
 
 /// Draws the held-out errors of one procedure of a comparison. The figure is named after the
 /// procedure.
-pub fn of_procedure(before: &Before, procedure: &Procedure) -> Drawing {
+pub fn of_procedure(before: &ErrorsBefore, procedure: &Procedure) -> Drawing {
     let name = procedure.name();
     let title = format!("Error of each held-out pose: {name}");
     let stages = procedure_stages(before, procedure);

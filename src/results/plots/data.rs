@@ -12,7 +12,9 @@ use super::coverage::{self, Coverage};
 use super::pose::{PoseError, weighted_sample};
 use super::uncertainty::Uncertainty;
 use crate::error::{Location, Warning};
-use crate::fit::{Before, Comparison, Correlations, Identification, IdentifyError, Procedure};
+use crate::fit::{
+    Comparison, Correlations, ErrorsBefore, Identification, IdentifyError, Procedure,
+};
 use crate::measurement::Dataset;
 use crate::model::{CentreLine, Pose};
 use crate::problem::Problem;
@@ -323,7 +325,7 @@ fn nominal_arm(best: &Arm, identification: &Identification) -> Arm {
 
 /// Returns the held-out errors before and after a procedure, and those with elasticity ignored if
 /// the procedure has them [Chen2021, fig. 13].
-pub(crate) fn procedure_stages(before: &Before, procedure: &Procedure) -> Vec<StageErrors> {
+pub(crate) fn procedure_stages(before: &ErrorsBefore, procedure: &Procedure) -> Vec<StageErrors> {
     let of = |stage, errors: &Vec<Vector3<f64>>| StageErrors { stage, errors: errors.clone() };
     let mut stages = vec![of(Stage::Before, &before.errors)];
     stages.extend(procedure.ignoring.iter().map(|errors| of(Stage::Ignoring, errors)));

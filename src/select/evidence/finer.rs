@@ -47,7 +47,7 @@ pub(super) fn finer_candidates(
             if candidate
                 .hypothesis
                 .effect()
-                .is_none_or(|effect| effect.scaled(LAST_RATIOS[0]).is_none())
+                .is_none_or(|effect| effect.with_scaled_argument(LAST_RATIOS[0]).is_none())
             {
                 continue;
             }
@@ -113,7 +113,7 @@ impl Hypotheses<'_> {
         let factors = (-TRIALS_PER_SIDE..=TRIALS_PER_SIDE)
             .filter(|step| *step != 0)
             .map(|step| farthest.powf(f64::from(step) / f64::from(TRIALS_PER_SIDE)));
-        let others = factors.filter_map(|factor| effect.scaled(factor));
+        let others = factors.filter_map(|factor| effect.with_scaled_argument(factor));
         let is_new = |effect: &Effect| {
             !self.candidates.iter().any(|other| other.hypothesis.effect() == Some(effect))
         };

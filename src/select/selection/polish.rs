@@ -90,7 +90,12 @@ fn better_argument(
 fn neighbouring_arguments(data: &Data, effect: &Effect) -> Vec<Effect> {
     let time = match effect {
         Effect::StationShift { at_time } | Effect::StationMove { at_time } => *at_time,
-        _ => return TRIAL_FACTORS.iter().filter_map(|factor| effect.scaled(*factor)).collect(),
+        _ => {
+            return TRIAL_FACTORS
+                .iter()
+                .filter_map(|factor| effect.with_scaled_argument(*factor))
+                .collect();
+        }
     };
     let times = data.times_between_poses();
     // The evidence uses every n-th row, and the list of times contains every m-th time.

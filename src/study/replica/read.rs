@@ -90,8 +90,8 @@ impl MisprintStudy {
 
 /// Reads a load: a payload, a hoist force or both.
 fn load(mut section: Section<'_, '_>) -> Result<Load, InputError> {
-    let payload = section.not_negative("payload", Unit::Mass)?;
-    let hoist = section.not_negative("hoist", Unit::Force)?;
+    let payload = section.non_negative_number("payload", Unit::Mass)?;
+    let hoist = section.non_negative_number("hoist", Unit::Force)?;
     section.finish()?;
     if payload.is_none() && hoist.is_none() {
         return Err(section.missing("payload_kg", "payload_kg = … or hoist_N = …"));
