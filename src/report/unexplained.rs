@@ -36,7 +36,7 @@ pub(super) fn to_declare(
     if lacks_masses(result) {
         declarations.push(format!(
             "Declare the masses: gravity acts, and the problem declares none. Give each link {} and {} in {}, and each compliant \
-             joint or link its stiffness or {}.",
+             joint or link its stiffness or {}. Rough guesses of unknown masses will do, because fitted compliances make up for them.",
             code("mass_kg"),
             code("com_m"),
             code("[[joint.body]]"),
