@@ -74,6 +74,7 @@ pub(super) fn warning(
     let mut trials = vec![(targets.clone(), other, format!("--frame {name}"))];
     if has_unit(1e-3) {
         trials.push((scaled(1e3), frame, "metres instead of the declared millimetres".to_owned()));
+        trials.push((scaled(25.4), frame, "inches instead of the declared millimetres".to_owned()));
     } else if has_unit(1.0) {
         trials.push((scaled(1e-3), frame, "millimetres instead of the declared metres".to_owned()));
     }

@@ -78,7 +78,10 @@ pub enum UrdfErrorKind {
         if above.is_empty() { "it is the root".to_owned() } else { format!("above it are {}", above.join(", ")) }
     )]
     NotBelow { base: String, tip: String, above: Vec<String> },
-    #[error("no joint moves between \"{base}\" and \"{tip}\"")]
+    #[error(
+        "no joint moves between \"{base}\" and \"{tip}\"{}",
+        if base == tip { "; the file holds this link alone: take the URDF of the whole arm" } else { "" }
+    )]
     NothingMoves { base: String, tip: String },
     #[error("the chain has {found} joints; at most {most}")]
     TooManyJoints { found: usize, most: usize },

@@ -94,7 +94,13 @@ fn usual_mistake(before: &str, after: &str, message: &str) -> Option<(String, &'
             "write its result, such as 0.333 for 1/3, or an angle in degrees with a key in _deg",
         )
     } else if message.contains("duplicate key") && before.starts_with('[') {
-        mistake("the section is given twice", "write its lines into the first section of this name")
+        let remedy = if before.starts_with("[[") {
+            "if it is the first [[…]] of this name, a header above it is misspelt, and parts such as [[joint.body]] then began another \
+             section; otherwise write its lines into the first section of this name"
+        } else {
+            "write its lines into the first section of this name"
+        };
+        mistake("the section is given twice", remedy)
     } else if message.contains("key with no value") && line_has_spaced_key(after) {
         mistake("a key with a space", "put the key in quotes, as in \"Joint 1\" = \"q1_deg\"")
     } else if message.contains("key with no value") {
