@@ -23,3 +23,5 @@ mod printed;
 mod results;
 #[path = "cli/strategies.rs"]
 mod strategies;
+#[path = "cli/two_tables.rs"]
+mod two_tables;

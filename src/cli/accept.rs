@@ -2,16 +2,17 @@
 
 use std::error::Error;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use clap::Args;
-use flexcal::files::{self, digest};
+use flexcal::files::digest;
 use flexcal::fit::{self, Options, SolverChoice, Strategy, Tolerance, Verdict};
 use flexcal::remainder::{self, Bounds};
 use flexcal::report;
 use flexcal::results::{AcceptanceRecord, AcceptanceResult, Document as _};
 
 use super::diagnostic;
+use super::git;
 use super::input::{Common, Input};
 use super::outcome::Outcome;
 use super::progress::Line;
@@ -89,7 +90,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         .chain(problem.data.joint_log.iter().flat_map(|log| &log.files));
     let record = AcceptanceRecord {
         inputs: inputs.map(|file| (file.clone(), sha256(file))).collect(),
-        commit: commit(&file),
+        commit: git::commit(&file),
         instrument: arguments.instrument.clone(),
     };
     let mut result = AcceptanceResult::new(&problem, &data.measurements, &found, &judged, &record);
@@ -150,29 +151,4 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
 /// be read a second time.
 fn sha256(file: &Path) -> Option<String> {
     file.is_file().then(|| fs::read(file).ok()).flatten().map(|bytes| digest(&bytes))
-}
-
-/// Returns the commit at HEAD of the git repository that contains a file; `None` if the file is in
-/// no repository, or HEAD cannot be read.
-fn commit(file: &Path) -> Option<String> {
-    let whole = file.canonicalize().ok()?;
-    let git =
-        whole.ancestors().skip(1).map(|folder| folder.join(".git")).find(|git| git.exists())?;
-    let read = |path: PathBuf| Some(files::read_text(&path).ok()?.trim().to_owned());
-    // In a worktree, .git is a file that names a folder. That folder's file commondir names the
-    // folder with the references.
-    let folder = match read(git.clone()) {
-        Some(text) => git.parent()?.join(text.strip_prefix("gitdir: ")?),
-        None => git,
-    };
-    let head = read(folder.join("HEAD"))?;
-    let Some(name) = head.strip_prefix("ref: ") else { return Some(head) };
-    let common =
-        read(folder.join("commondir")).map_or_else(|| folder.clone(), |common| folder.join(common));
-    read(common.join(name)).or_else(|| {
-        let packed = read(common.join("packed-refs"))?;
-        packed
-            .lines()
-            .find_map(|line| Some(line.strip_suffix(name)?.strip_suffix(' ')?.trim().to_owned()))
-    })
 }

@@ -4,6 +4,7 @@ use std::error::Error;
 use std::path::PathBuf;
 
 use clap::Args;
+use flexcal::error::{InputError, InputErrorKind, TableErrorKind};
 use flexcal::fit;
 use flexcal::measurement::Measurements;
 use flexcal::problem::Problem;
@@ -49,6 +50,17 @@ pub struct Arguments {
 #[error("no targets; name them with --data")]
 struct NoTargets;
 
+/// Adds to the error of a missing column of commands what the column means in a table of targets.
+fn with_start(mut error: InputError) -> InputError {
+    if let InputErrorKind::Table(TableErrorKind::MissingColumn { write, .. }) = &mut *error.kind {
+        let mut letters = write.chars();
+        if letters.next() == Some('q') && letters.next().is_some_and(|next| next.is_ascii_digit()) {
+            write.push_str(", the command to start from");
+        }
+    }
+    error
+}
+
 /// Finds the commands that reach the targets, writes `commands.csv`, and prints which targets are
 /// reached.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
@@ -65,7 +77,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         std::slice::from_ref(&arguments.estimate),
         &["commands.csv"],
     )?;
-    let (targets, warnings) = Measurements::read_poses(common.data(), &problem)?;
+    let (targets, warnings) =
+        Measurements::read_poses(common.data(), &problem).map_err(with_start)?;
     common.warn(&warnings);
     for missing in fit::missing_target_columns(&problem, &targets).iter().filter(|_| !common.quiet)
     {

@@ -3,7 +3,7 @@
 use std::error::Error;
 use std::path::{Path, PathBuf};
 
-use clap::{Args, ValueEnum};
+use clap::{ArgGroup, Args, ValueEnum};
 use flexcal::design::Workspace;
 use flexcal::export as code;
 use flexcal::fit::{Placement, SavedEstimate, check_columns};
@@ -29,6 +29,7 @@ use super::region::parse_numbers;
 /// Arguments of `flexcal export`.
 #[derive(Debug, Args)]
 #[command(
+    group(ArgGroup::new("form").args(["urdf", "format"]).required(true)),
     mut_arg("out", |arg| {
         let default = "in out/<name of the problem>, under the name of the URDF or the form; a folder for --format c";
         arg.value_name("FILE").help(format!("The file to write [default: {default}]"))
@@ -47,12 +48,7 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE")]
     estimate: PathBuf,
     /// The URDF that the problem came from; it is not changed
-    #[arg(
-        long,
-        value_name = "ARM.urdf",
-        required_unless_present = "format",
-        conflicts_with = "format"
-    )]
+    #[arg(long, value_name = "ARM.urdf")]
     urdf: Option<PathBuf>,
     /// Origins of the joints or a camera as YAML, or the whole model as C, instead
     #[arg(long, value_name = "FORMAT", ignore_case = true)]
@@ -104,6 +100,12 @@ enum Format {
     Kalibr,
     /// The whole model as C99, into the folder --out
     C,
+}
+
+/// Returns the values of `--format`.
+pub(super) fn formats() -> Vec<String> {
+    let values = Format::value_variants().iter().filter_map(ValueEnum::to_possible_value);
+    values.map(|value| value.get_name().to_owned()).collect()
 }
 
 impl Format {

@@ -8,7 +8,7 @@ use clap::error::{ContextKind, ContextValue, ErrorKind};
 use flexcal::report::shell_word;
 
 /// Words that are often given as options or values but are neither, with the tip for them.
-const MISTAKEN_WORDS: [(&[&str], &str); 5] = [
+const MISTAKEN_WORDS: [(&[&str], &str); 6] = [
     (
         &["--output", "--ouput", "--outdir", "--out-dir", "--output-dir", "-o"],
         "--out DIR names the folder of the results",
@@ -26,6 +26,7 @@ const MISTAKEN_WORDS: [(&[&str], &str); 5] = [
         &["urdf", "URDF"],
         "leave --format out to write a URDF: --urdf ARM.urdf names the one to change",
     ),
+    (&["csv", "CSV"], "mdh or dh write the table of Denavit-Hartenberg parameters, as YAML"),
 ];
 
 /// Commands, with the words that are often given for their names.
@@ -47,6 +48,7 @@ pub fn with_tip(mut error: clap::Error, words: &[OsString], cli: &Command) -> cl
     if let Some(tip) = tip(&error, words, cli) {
         error.remove(ContextKind::SuggestedArg);
         error.remove(ContextKind::SuggestedSubcommand);
+        error.remove(ContextKind::SuggestedValue);
         error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![tip.into()]));
     }
     error
@@ -73,6 +75,18 @@ fn tip(error: &clap::Error, words: &[OsString], cli: &Command) -> Option<String>
                 Some((command, _)) => Some(format!("flexcal {command} may be meant")),
                 None => None,
             }
+        }
+        ErrorKind::MissingRequiredArgument if first == "export" => {
+            let is_given = |option: &str| {
+                words.iter().filter_map(|word| word.to_str()).any(|word| word.starts_with(option))
+            };
+            let chooses_form = is_given("--urdf") || is_given("--format");
+            (!chooses_form).then(|| {
+                format!(
+                    "--urdf ARM.urdf writes into a URDF; the values of --format are {}",
+                    super::export::formats().join(", ")
+                )
+            })
         }
         ErrorKind::UnknownArgument if first.starts_with('-') => {
             let is_command = |word: &&str| cli.find_subcommand(word).is_some();
@@ -116,6 +130,31 @@ fn other_command(option: &str, command: &str, cli: &Command) -> Option<String> {
         |other: &&Command| other.get_arguments().any(|argument| argument.get_long() == Some(name));
     let others: Vec<&str> =
         cli.get_subcommands().filter(has_option).map(Command::get_name).collect();
-    (!others.is_empty())
-        .then(|| format!("{command} takes no {option}; it is an option of {}", others.join(", ")))
+    if others.is_empty() {
+        return longer_option(option, command, cli);
+    }
+    let fits = FITTING.contains(&command) && option == "--estimate";
+    let instead = if fits { ", because it fits by itself" } else { "" };
+    Some(format!("{command} takes no {option}{instead}; it is an option of {}", others.join(", ")))
+}
+
+/// Commands that fit the measurements and so need no estimate.
+const FITTING: [&str; 7] = ["identify", "compare", "trace", "loop", "accept", "check", "next"];
+
+/// Returns the tip for an `option` that is the beginning of an option of other commands, such as
+/// `--tolerance` of `--tolerance-mm`. `None` if there is none, or if `command` has such an option.
+fn longer_option(option: &str, command: &str, cli: &Command) -> Option<String> {
+    let start = format!("{}-", option.strip_prefix("--")?);
+    let longer = |of: &Command| {
+        let mut names = of.get_arguments().filter_map(|argument| argument.get_long());
+        names.find(|name| name.starts_with(&start)).map(str::to_owned)
+    };
+    if cli.find_subcommand(command).and_then(longer).is_some() {
+        return None;
+    }
+    let name = cli.get_subcommands().find_map(longer)?;
+    let has_option = |of: &&Command| longer(of).is_some_and(|other| other == name);
+    let others: Vec<&str> =
+        cli.get_subcommands().filter(has_option).map(Command::get_name).collect();
+    Some(format!("{command} takes no {option}; --{name} is an option of {}", others.join(", ")))
 }

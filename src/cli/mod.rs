@@ -15,6 +15,7 @@ mod estimate;
 mod export;
 mod flags;
 mod fleet;
+mod git;
 mod identify;
 mod init;
 mod input;

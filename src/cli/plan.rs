@@ -1,7 +1,7 @@
 //! Arguments and work of `flexcal plan`.
 
 use std::error::Error;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use flexcal::design::{self, Candidates, Criterion, EffectPair, PlanOptions, PlanProgress};
@@ -145,6 +145,11 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         PlanResult::new(&problem, criterion, source.seed, &plan, separated.as_ref()).to_json();
     let table = poses_csv(&problem, &plan.poses);
     let page = report::plan_page(&problem, criterion, &plan, separated.as_ref());
+    let others = if pair.is_some() || given.is_some() {
+        columns_at_hand(common.files(&problem), (&problem, &plan.poses))
+    } else {
+        Vec::new()
+    };
     results.write(&[("plan.csv", &table), ("plan.json", &json), ("plan.html", &page)])?;
     common.print_result(&json, || {
         let text = report::plan_text(&problem, criterion, &plan, separated.as_ref());
@@ -154,6 +159,12 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
             "take an image in each of these poses, write a row for each point that is found"
         } else {
             "measure these poses, add the columns x_mm, y_mm, z_mm"
+        };
+        let measure = if others.is_empty() {
+            measure.to_owned()
+        } else {
+            let verb = if plan.is_of_cameras { ", add" } else { " and" };
+            format!("{measure}{verb} {}, which the measurements at hand have", others.join(", "))
         };
         // Two effects are told apart by the measurements at hand and the planned ones together.
         let named = if common.data().is_empty() { &declared_files[..] } else { common.data() };
@@ -172,6 +183,34 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     }
     diagnostic::warn("the plan does not determine all parameters without a prior: plan more poses");
     Ok(Outcome::NotTrusted)
+}
+
+/// Returns the columns that the measurements in `files` have and a table of planned poses lacks. All
+/// tables that are read together have the same columns. Empty if the files cannot be read.
+fn columns_at_hand(
+    files: &[PathBuf],
+    (problem, poses): (&Problem, &Measurements),
+) -> Vec<&'static str> {
+    let Ok((given, _)) = Measurements::read_to_predict(files, problem) else { return Vec::new() };
+    let has_sessions = |of: &Measurements| of.session.names.iter().any(|name| !name.is_empty());
+    let columns = [
+        (
+            if given.has_dates() { "time" } else { "time_s" },
+            given.time_measured,
+            poses.time_measured,
+        ),
+        ("payload_kg", given.payload.is_some(), poses.payload.is_some()),
+        ("hoist_N", given.hoist.is_some(), poses.hoist.is_some()),
+        ("temperature_C", given.temperature.is_some(), poses.temperature.is_some()),
+        ("sigma_mm", given.sigma.is_some(), poses.sigma.is_some()),
+        ("session", has_sessions(&given), has_sessions(poses)),
+        ("approach1 …", given.approach.is_some(), poses.approach.is_some()),
+        ("target", given.target.is_some(), poses.target.is_some()),
+    ];
+    let lacks = |(name, at_hand, planned): (&'static str, bool, bool)| {
+        (at_hand && !planned).then_some(name)
+    };
+    columns.into_iter().filter_map(lacks).collect()
 }
 
 /// Parses the two effects that the plan is to distinguish; `None` if `named` is empty.

@@ -48,11 +48,13 @@ fn parse_probability(text: &str) -> Result<f64, String> {
 /// the verdict.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let common = &arguments.common;
-    let problem = Problem::read(common.problem())?;
+    let mut problem = Problem::read(common.problem())?;
+    // Every row is judged, so none is held out, and the table needs no column that marks such rows.
+    problem.data.held_out = None;
     let estimate_file = std::slice::from_ref(&arguments.estimate);
     let results =
         common.results("watch", &problem, estimate_file, &["watch.json", "watch.html"])?;
-    let (rows, mut warnings) = Measurements::read(common.files(&problem), &problem)?;
+    let (rows, mut warnings) = Measurements::read_to_judge(common.files(&problem), &problem)?;
     warnings.extend(rows.row_warnings(&problem));
     common.warn(&warnings);
     let estimate = arguments.trust.read(&arguments.estimate)?;

@@ -476,8 +476,8 @@ impl InputErrorKind {
     pub(crate) fn expected_file(&self) -> &'static str {
         match self {
             Self::Urdf(_) => {
-                "a URDF; export the arm as a URDF, or write its problem.toml by hand \
-                 (docs/own_arm.md)"
+                "a URDF; export the arm as a URDF, or write its problem.toml by hand, a data sheet \
+                 of Denavit-Hartenberg parameters row by row (docs/tutorial.md, \"The data sheet\")"
             }
             Self::TruthMissing => "a TRUTH.toml",
             Self::Study(_) => "a STUDY.toml",

@@ -182,7 +182,8 @@ pub enum TableErrorKind {
     #[error(
         "\"{value}\" has a decimal point, and [data.format] says decimal = \",\"; write the \
          number with a comma and without \
-         thousands separators, or correct decimal"
+         thousands separators, or correct decimal; in a table with commas between its cells \
+         numbers have points whatever decimal says"
     )]
     DecimalPoint { value: String },
     #[error("missing; add {write}{}", missing_column_remedy(write, near.as_deref(), unknown))]
@@ -265,9 +266,10 @@ pub enum TableErrorKind {
     CommentRow { mark: &'static str, found: usize, expected: usize },
     #[error(
         "the first line holds numbers instead of the names of the columns; write a header line \
-         above it, such as q1_deg,q2_deg,x_mm,y_mm,z_mm"
+         above it, such as q1_deg,q2_deg,x_mm,y_mm,z_mm, or select the columns by their places in \
+         [data.columns], as in {select}"
     )]
-    NoHeader,
+    NoHeader { select: &'static str },
     #[error("the numbers of joints in column names begin with 1; rename q0 to q1, q1 to q2, …")]
     JointsFromZero,
     #[error("\"{value}\" is not a number")]

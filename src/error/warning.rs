@@ -22,10 +22,16 @@ pub enum WarningKind {
     #[error("columns that [data.columns] does not name are ignored: {}", names.join(", "))]
     Unmapped { names: Vec<String> },
     #[error(
-        "{rows} row{} without a partner in the other table, the first here{}; left out{}",
-        plural(*rows), listed(*rows, others), nearest_in_time_hint(gap.as_deref())
+        "{rows} row{} without a partner in the other table, the first here{}; left out{}{}",
+        plural(*rows), listed(*rows, others), nearest_in_time_hint(gap.as_deref()),
+        spelling_hint(alike.as_ref())
     )]
-    WithoutPartner { rows: usize, others: Vec<String>, gap: Option<String> },
+    WithoutPartner {
+        rows: usize,
+        others: Vec<String>,
+        gap: Option<String>,
+        alike: Option<(usize, [String; 2])>,
+    },
     #[error("not UTF-8 text; read as Windows-1252 (Latin-1), so check accented letters and signs")]
     ReadAsWindows1252,
     #[error(
@@ -309,6 +315,18 @@ fn additional_rows(rows: usize) -> String {
 /// Returns the hint for a column that does not resemble a known one.
 fn covariate_hint(meant: Option<&str>) -> &'static str {
     if meant.is_none() { " (name it in [data.covariates] if the arm may depend on it)" } else { "" }
+}
+
+/// Returns the remedy for rows without a partner whose names differ from one only in spelling:
+/// their number, and the first pair of names. Empty for `None`.
+fn spelling_hint(alike: Option<&(usize, [String; 2])>) -> String {
+    alike.map_or_else(String::new, |(rows, [name, other])| {
+        let differ = if *rows == 1 { "differs" } else { "differ" };
+        format!(
+            "; {rows} of them {differ} from a partner only in spelling, as {name} and {other}: \
+             write the names alike"
+        )
+    })
 }
 
 /// Returns a hint for rows without a partner within the tolerance of a join by time. `gap` is their

@@ -79,7 +79,21 @@ pub fn same_file(first: &Path, second: &Path) -> bool {
 /// Returns CSV text with a header line; every line must have as many cells as the header. Words
 /// that a spreadsheet would run as a formula are escaped; see [`unescape_cell`].
 pub(crate) fn csv(header: Vec<String>, lines: impl IntoIterator<Item = Vec<String>>) -> String {
-    let mut writer = csv::Writer::from_writer(Vec::new());
+    separated(b',', header, lines)
+}
+
+/// Formats a table with semicolons between the cells, which may then have decimal commas.
+pub(crate) fn csv_with_semicolons(header: Vec<String>, lines: Vec<Vec<String>>) -> String {
+    separated(b';', header, lines)
+}
+
+/// Formats a table with a delimiter between the cells.
+fn separated(
+    delimiter: u8,
+    header: Vec<String>,
+    lines: impl IntoIterator<Item = Vec<String>>,
+) -> String {
+    let mut writer = csv::WriterBuilder::new().delimiter(delimiter).from_writer(Vec::new());
     for line in std::iter::once(header).chain(lines) {
         // Writing to memory cannot fail.
         let _ = writer.write_record(line.into_iter().map(escape_cell));

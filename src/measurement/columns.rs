@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::convert::identity;
 
-use super::headerless::no_header;
+use super::headerless::{holds_numbers, no_header};
 use super::mapped::{Names, no_such};
 use super::meaning::{
     Meaning, Numbering, affects_results, asked_for_readings, lacking_neighbour, split_unit,
@@ -45,12 +45,13 @@ pub(super) struct Columns {
 
 impl Columns {
     /// Finds the columns in the header of a table. Unknown columns cause warnings. If the poses are
-    /// `measured`, columns of measured quantities and of held-out rows are required.
+    /// `measured`, columns of measured quantities and of held-out rows are required. If
+    /// `is_mapped_whole`, measured poses must have every column of the map.
     #[expect(clippy::too_many_lines, reason = "one column after the other, by what it may mean")]
     pub fn find(
         table: &Table,
         problem: &Problem,
-        measured: bool,
+        (measured, is_mapped_whole): (bool, bool),
         warnings: &mut Vec<Warning>,
     ) -> Result<Self, InputError> {
         let marked_name = match &problem.data.held_out {
@@ -58,7 +59,7 @@ impl Columns {
             None => Some("split"),
             Some(_) => None,
         };
-        let named = Names::map(table, &problem.data.dialect, measured)?;
+        let named = Names::map(table, &problem.data.dialect, measured && is_mapped_whole)?;
         let numbering = Numbering::detect(named.iter(), problem);
         let present: BTreeSet<&str> = named.iter().map(|name| split_unit(name).0).collect();
         let mut found: BTreeMap<Role, (String, Option<&ColumnRule>)> = BTreeMap::new();
@@ -220,7 +221,10 @@ impl Columns {
         unknown: &[&str],
     ) -> Result<(), InputError> {
         let near = |name: &str| nearest(name, unknown).map(|near| (*near).to_owned());
-        let strangers = || unknown.iter().map(|name| (*name).to_owned()).collect();
+        let numeric = unknown.iter().filter(|name| {
+            table.holds_numbers_below(self.names.iter().position(|known| known == *name))
+        });
+        let strangers = || numeric.clone().map(|name| (*name).to_owned()).collect();
         let missing = |bases: &[&str], unit: Unit| {
             if let Some(error) =
                 bases.iter().find_map(|base| self.in_foreign_unit(table, base, unit))
@@ -438,12 +442,6 @@ impl Columns {
 /// Returns true for the error of a missing column.
 fn is_missing_column(error: &InputError) -> bool {
     matches!(*error.kind, InputErrorKind::Table(TableErrorKind::MissingColumn { .. }))
-}
-
-/// Returns true if most names of a header are numbers, as in a table without a header.
-fn holds_numbers(header: &[String]) -> bool {
-    let numbers = header.iter().filter(|name| name.replace(',', ".").parse::<f64>().is_ok());
-    header.len() > 2 && 2 * numbers.count() > header.len()
 }
 
 /// Returns true for a column name that occurs only in result tables of flexcal.

@@ -191,7 +191,7 @@ fn most_frequent_delimiter(line: &str) -> Delimiter {
 }
 
 /// Returns the cells of a line without surrounding white space and quotes.
-fn cells(line: &str, delimiter: Delimiter) -> Vec<String> {
+pub(super) fn cells(line: &str, delimiter: Delimiter) -> Vec<String> {
     let plain = |cell: &str| cell.trim().trim_matches('"').trim().to_owned();
     match delimiter {
         Delimiter::Byte(byte) => line.split(char::from(byte)).map(plain).collect(),

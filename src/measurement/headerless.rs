@@ -1,5 +1,6 @@
 //! Tables without a header, whose columns are selected by their places.
 
+use super::meaning::is_numbered_or_position;
 use crate::error::TableErrorKind;
 use crate::problem::{ColumnRule, ColumnSelector};
 
@@ -23,14 +24,28 @@ pub(super) fn is_row_of_numbers(cells: &[String], rules: &[ColumnRule]) -> bool 
     is_selected && !counts(0.0) && !counts(1.0)
 }
 
+/// Returns true if most names of a header are numbers, as in a table without a header.
+pub(super) fn holds_numbers(header: &[String]) -> bool {
+    let numbers = header.iter().filter(|name| name.replace(',', ".").parse::<f64>().is_ok());
+    header.len() > 2 && 2 * numbers.count() > header.len()
+}
+
 /// Returns the error of a table whose first line holds numbers.
 pub(super) fn no_header(header: &[String]) -> TableErrorKind {
     let is_number = |name: &String| name.replace(',', ".").parse::<f64>().is_ok();
+    // The name of a pose, such as P01, has a number, and that of a quantity has none.
+    let is_quantity = |name: &String| {
+        is_numbered_or_position(name) || !name.contains(|letter: char| letter.is_ascii_digit())
+    };
     match header {
         [first, others @ ..] if !is_number(first) && others.iter().all(is_number) => {
-            TableErrorKind::Transposed { first: first.clone() }
+            if is_quantity(first) {
+                TableErrorKind::Transposed { first: first.clone() }
+            } else {
+                TableErrorKind::NoHeader { select: "\"#1\" = \"pose\", \"#2\" = \"x_mm\"" }
+            }
         }
-        _ => TableErrorKind::NoHeader,
+        _ => TableErrorKind::NoHeader { select: "\"#1\" = \"q1_deg\"" },
     }
 }
 
@@ -44,6 +59,11 @@ mod tests {
             |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
         let transposed = no_header(&header(&["q1_deg", "1.5", "2"]));
         assert_eq!(transposed, TableErrorKind::Transposed { first: "q1_deg".to_owned() });
-        assert_eq!(no_header(&header(&["1", "1.5", "2"])), TableErrorKind::NoHeader);
+        let select = "\"#1\" = \"q1_deg\"";
+        let kind = TableErrorKind::NoHeader { select };
+        assert_eq!(no_header(&header(&["1", "1.5", "2"])), kind);
+        let select = "\"#1\" = \"pose\", \"#2\" = \"x_mm\"";
+        let kind = TableErrorKind::NoHeader { select };
+        assert_eq!(no_header(&header(&["P01", "1.5", "2"])), kind);
     }
 }

@@ -3,13 +3,13 @@
 use std::collections::{HashMap, HashSet};
 use std::path::PathBuf;
 
-use csv::ByteRecord;
-
-use super::cell_style::CellStyle;
+use super::appended::{JointRow, JointTableFormat};
 use super::clocks::{best_shift, clock_jump, nearest};
+use super::headerless::{holds_numbers, no_header};
 use super::mapped::Names;
 use super::meaning::is_numbered_or_position;
 use super::paired_times::{TimedPair, are_whole_minutes, order_contradicted};
+use super::spelling::{quoted, same_but_for_spelling};
 use super::table::{Table, shortened};
 use super::time::shown;
 use crate::error::{InputError, InputErrorKind, Location, TableErrorKind, Warning, WarningKind};
@@ -30,11 +30,10 @@ pub(super) struct JoinedLog {
     /// Place of the declaration in the problem.
     location: Location,
     header: Vec<String>,
-    /// File and line of the header.
-    header_place: (PathBuf, usize),
+    /// Format of the first file; `None` before it has been read.
+    format: Option<JointTableFormat>,
     /// Names of the joint table's columns in flexcal's vocabulary.
     names: Vec<String>,
-    style: CellStyle,
     rows: Vec<LogRow>,
     /// Index of the row with each name, for a join by name.
     of_name: HashMap<String, usize>,
@@ -42,9 +41,6 @@ pub(super) struct JoinedLog {
     by_time: Vec<usize>,
     /// Times of the rows in ascending order, on the clock of the measurements \[s\].
     log_times: Vec<f64>,
-    /// Indices of the joint table's columns that are appended to the current table of measured
-    /// rows.
-    appended: Vec<usize>,
     /// Column in the current table by which rows are paired; `None` for a join by order.
     key: Option<Key>,
     /// Number of measured rows for which a partner has been searched.
@@ -78,9 +74,7 @@ struct Key {
 
 /// Row of the joint table.
 struct LogRow {
-    file: PathBuf,
-    line: usize,
-    cells: ByteRecord,
+    source: JointRow,
     /// Time of the row \[s\], for a join by time on the clock of the measurements; else NaN.
     time: f64,
     /// Number of measured rows whose partner this row is.
@@ -103,14 +97,6 @@ fn time_key(names: &[String]) -> Option<Key> {
     with_unit.or_else(|| place("time").map(|place| Key { place, to_si: |_| f64::NAN }))
 }
 
-/// Returns a name in lower case, without spaces, marks and the zeros before a number.
-fn plain_name(name: &str) -> String {
-    let letters: Vec<char> =
-        name.to_lowercase().chars().filter(|letter| letter.is_alphanumeric()).collect();
-    let runs = letters.chunk_by(|a, b| a.is_ascii_digit() == b.is_ascii_digit());
-    runs.map(|run| run.iter().collect::<String>().trim_start_matches('0').to_owned()).collect()
-}
-
 impl JoinedLog {
     /// Reads the joint table that the problem declares.
     ///
@@ -123,14 +109,12 @@ impl JoinedLog {
             rule: log.by,
             location: log.location.clone(),
             header: Vec::new(),
-            header_place: (PathBuf::new(), 1),
+            format: None,
             names: Vec::new(),
-            style: CellStyle { delimiter: ',', decimal_comma: false },
             rows: Vec::new(),
             of_name: HashMap::new(),
             by_time: Vec::new(),
             log_times: Vec::new(),
-            appended: Vec::new(),
             key: None,
             requested: 0,
             unpaired: Vec::new(),
@@ -161,14 +145,14 @@ impl JoinedLog {
 
     /// Reads the rows of one file of the joint table.
     fn read_file(&mut self, mut table: Table, dialect: &Dialect) -> Result<(), InputError> {
+        table.find_decimal_mark();
         if self.header.is_empty() {
             self.header.clone_from(&table.header);
-            self.header_place = table.header_place();
+            self.format = Some(table.joint_table_format());
             let names = Names::map_present(&table, dialect);
             self.names = names.into_iter().map(str::to_owned).collect();
-            self.style = table.style();
         } else if self.header != table.header {
-            let first = self.rows.first().map(|row| row.file.clone()).unwrap_or_default();
+            let first = self.rows.first().map(|row| row.source.file.clone()).unwrap_or_default();
             let different = |name: &&String| !self.header.contains(*name);
             let name = table.header.iter().find(different);
             let kind = TableErrorKind::ColumnsDiffer { other: first, has: false };
@@ -185,7 +169,7 @@ impl JoinedLog {
                 (JoinRule::Name, Some(key)) => {
                     let name = table.name(key.place)?.to_owned();
                     if let Some(&first) = self.of_name.get(&name) {
-                        let line = self.rows.get(first).map_or(0, |row| row.line);
+                        let line = self.rows.get(first).map_or(0, |row| row.source.line);
                         let kind = TableErrorKind::RepeatedPose { name, line };
                         return Err(table.cell_error(key.place, kind));
                     }
@@ -197,7 +181,8 @@ impl JoinedLog {
                 }
             }
             let (file, line, cells) = (table.file.clone(), table.line(), table.cells().clone());
-            self.rows.push(LogRow { file, line, cells, time, uses: 0 });
+            let source = JointRow { file, line, cells };
+            self.rows.push(LogRow { source, time, uses: 0 });
         }
         self.text_warnings.extend(table.text_warnings());
         Ok(())
@@ -218,7 +203,11 @@ impl JoinedLog {
         };
         let names = names.iter().zip(&table.header).filter(is_unknown);
         let unknown = names.map(|(name, _)| name.clone()).collect();
-        let kind = TableErrorKind::MissingColumn { write: write.to_owned(), near: None, unknown };
+        let kind = if holds_numbers(&table.header) {
+            no_header(&table.header)
+        } else {
+            TableErrorKind::MissingColumn { write: write.to_owned(), near: None, unknown }
+        };
         key.map(Some).ok_or_else(|| table.column(write).error(kind))
     }
 
@@ -239,10 +228,21 @@ impl JoinedLog {
             name.is_some_and(|name| !names.contains(name))
                 && header.is_some_and(|header| !table.header.contains(header))
         };
-        self.appended = (0..self.header.len()).filter(is_new).collect();
-        let headers = self.appended.iter().filter_map(|&place| self.header.get(place).cloned());
-        table.extend_header(headers.collect(), self.style, self.header_place.clone());
+        let places: Vec<usize> = (0..self.header.len()).filter(is_new).collect();
+        let headers: Vec<String> =
+            places.iter().filter_map(|&place| self.header.get(place).cloned()).collect();
+        if let Some(format) = self.format.clone() {
+            table.append_columns(headers.into_iter(), places, format);
+        }
         Ok(())
+    }
+
+    /// Appends the cells of the first joint row to the current row of a table, so that the format
+    /// of the appended columns can be found before rows are paired.
+    pub fn show_first_row(&self, table: &mut Table) {
+        if let Some(row) = self.rows.first() {
+            table.append_row(&row.source);
+        }
     }
 
     /// Appends the cells of the paired joint row to the current measured row; returns false if it
@@ -279,7 +279,7 @@ impl JoinedLog {
         if let Some((place, of_log)) = self.name_columns
             && let Ok(name) = table.text(place)
         {
-            let other = String::from_utf8_lossy(row.cells.get(of_log).unwrap_or_default());
+            let other = String::from_utf8_lossy(row.source.cells.get(of_log).unwrap_or_default());
             if !name.is_empty() && name != other.trim() {
                 self.unlike_pairs.push([name.to_owned(), other.trim().to_owned()]);
             }
@@ -288,11 +288,10 @@ impl JoinedLog {
             && let Ok(measured) = table.time(clock.place, clock.to_si)
         {
             let place = Location::file(&table.file).at_line(table.line());
-            let log_place = Location::file(&row.file).at_line(row.line);
+            let log_place = Location::file(&row.source.file).at_line(row.source.line);
             self.timed_pairs.push(TimedPair { measured, logged: row.time, place, log_place });
         }
-        let cells = self.appended.iter().map(|&place| row.cells.get(place).unwrap_or_default());
-        table.append_cells(cells, (&row.file, row.line));
+        table.append_row(&row.source);
         Ok(true)
     }
 
@@ -341,10 +340,11 @@ impl JoinedLog {
     /// measured row.
     fn check_pairing(&self) -> Result<(), InputError> {
         let error = |kind: TableErrorKind| Err(self.location.clone().error(kind));
-        let quoted = |pair: [&str; 2]| pair.map(|name| format!("\"{}\"", shortened(name)));
         let (left, rows, logged) = (self.unpaired.len(), self.requested, self.rows.len());
         if 2 * left > rows
-            && let Some(pair) = self.names_written_otherwise()
+            && let pairs = self.names_written_otherwise()
+            && let Some(&pair) = pairs.first()
+            && 2 * pairs.len() > self.unpaired_names.len()
         {
             return error(TableErrorKind::NamesWrittenOtherwise { left, rows, pair: quoted(pair) });
         }
@@ -379,7 +379,7 @@ impl JoinedLog {
         let gaps = self.gaps(false);
         let usual = gaps.get(gaps.len() / 2).copied().unwrap_or(0.0);
         if let Some(row) = self.common_partner().filter(|_| usual > MAX_PLAUSIBLE_MEDIAN_GAP) {
-            let partner = Location::file(&row.file).at_line(row.line).to_string();
+            let partner = Location::file(&row.source.file).at_line(row.source.line).to_string();
             let (same, keys, offset) = (row.uses, self.keys(), self.offset());
             return error(TableErrorKind::CommonPartner { same, rows, partner, keys, offset });
         }
@@ -427,26 +427,12 @@ impl JoinedLog {
         (2 * misplaced().count() > self.requested).then_some([name, other])
     }
 
-    /// Returns the name of a measured row without a partner, and that of an unused joint row that
-    /// differs from it only in case, spaces, marks or leading zeros. `None` unless most names
-    /// without a partner have such a counterpart.
-    fn names_written_otherwise(&self) -> Option<[&str; 2]> {
+    /// Returns the pairs of a measured name and a joint name without partners that differ only in
+    /// spelling.
+    fn names_written_otherwise(&self) -> Vec<[&str; 2]> {
         let is_unused = |row: usize| self.rows.get(row).is_some_and(|row| row.uses == 0);
-        let mut unused: Vec<&str> = self
-            .of_name
-            .iter()
-            .filter(|(_, row)| is_unused(**row))
-            .map(|(name, _)| &**name)
-            .collect();
-        unused.sort_unstable();
-        let plain: HashMap<String, &str> =
-            unused.into_iter().rev().map(|name| (plain_name(name), name)).collect();
-        let mut pairs = self.unpaired_names.iter().filter_map(|name| {
-            let other = plain.get(&plain_name(name))?;
-            Some([name.as_str(), *other])
-        });
-        let first = pairs.next()?;
-        (2 * (1 + pairs.count()) > self.unpaired_names.len()).then_some(first)
+        let names = self.of_name.iter().filter(|(_, row)| is_unused(**row));
+        same_but_for_spelling(&self.unpaired_names, names.map(|(name, _)| &**name).collect())
     }
 
     /// Returns examples of the keys of both tables for a message: one name of each, or the ranges
@@ -467,7 +453,7 @@ impl JoinedLog {
 
     /// Returns the files of the joint table.
     pub fn files(&self) -> Vec<PathBuf> {
-        let mut files: Vec<PathBuf> = self.rows.iter().map(|row| row.file.clone()).collect();
+        let mut files: Vec<PathBuf> = self.rows.iter().map(|row| row.source.file.clone()).collect();
         files.dedup();
         files
     }
@@ -482,12 +468,17 @@ impl JoinedLog {
         let unused = self.rows.iter().filter(|row| row.uses == 0);
         let unused: Vec<_> = match self.rule {
             JoinRule::Time { .. } => Vec::new(),
-            _ => unused.map(|row| Location::file(&row.file).at_line(row.line)).collect(),
+            _ => unused
+                .map(|row| Location::file(&row.source.file).at_line(row.source.line))
+                .collect(),
         };
         // Measured rows are listed, because they are lost; unused joint rows are only counted.
+        let pairs = self.names_written_otherwise();
+        let alike = pairs.first().map(|&pair| (pairs.len(), quoted(pair)));
         let warning = |rows: &[Location], gap: Option<String>, listed: usize| {
             let others = rows.iter().skip(1).take(listed).map(ToString::to_string).collect();
-            let kind = WarningKind::WithoutPartner { rows: rows.len(), others, gap };
+            let alike = alike.clone().filter(|_| listed > 0);
+            let kind = WarningKind::WithoutPartner { rows: rows.len(), others, gap, alike };
             Some(Warning { location: rows.first()?.clone(), kind })
         };
         let unpaired =

@@ -4,6 +4,10 @@
 //! [`Dataset::poses`] makes rows without measured positions, for predictions. `docs/problem.md`
 //! lists the columns and their units.
 
+#[deny(clippy::indexing_slicing)]
+mod appended;
+#[deny(clippy::indexing_slicing)]
+mod beginning;
 mod builder;
 #[deny(clippy::indexing_slicing)]
 mod cell_style;
@@ -55,6 +59,7 @@ mod required;
 mod role;
 mod rows;
 mod settled;
+mod spelling;
 mod split;
 mod start_times;
 #[deny(clippy::indexing_slicing)]
@@ -143,6 +148,9 @@ pub struct Measurements {
     /// True for rows marked `validation` in the column that the problem names, or else in `split`;
     /// `None` without the column.
     pub marked_held_out: Option<Vec<bool>>,
+    /// True if numbers of the first file have decimal commas, so that commands for it have them too.
+    #[doc(hidden)]
+    pub has_decimal_commas: bool,
     /// Columns of the commands in the first file, one per moving joint; empty without a file.
     #[doc(hidden)]
     pub command_columns: Vec<CommandColumn>,
@@ -406,6 +414,7 @@ impl Measurements {
                 .marked_held_out
                 .as_ref()
                 .map(|marked| rows.iter().map(|&row| marked[row]).collect()),
+            has_decimal_commas: self.has_decimal_commas,
             command_columns: self.command_columns.clone(),
             warnings: self.warnings.clone(),
             order: RowOrder::default(),

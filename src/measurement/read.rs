@@ -24,6 +24,19 @@ impl Measurements {
         Self::read_table(files, problem, Use::Measured)
     }
 
+    /// Reads measurements that an estimate is compared with. Unlike measurements to fit, they may
+    /// lack columns that `[data.columns]` names, such as times.
+    ///
+    /// # Errors
+    /// Returns the first error in the files, or an error if a file cannot be read.
+    #[doc(hidden)]
+    pub fn read_to_judge(
+        files: &[PathBuf],
+        problem: &Problem,
+    ) -> Result<(Self, Vec<Warning>), InputError> {
+        Self::read_table(files, problem, Use::Judged)
+    }
+
     /// Reads poses that may still be unmeasured; missing positions are set to 0.
     ///
     /// # Errors
@@ -116,6 +129,8 @@ impl Measurements {
 enum Use {
     /// Rows that have to be measured.
     Measured,
+    /// Rows that have to be measured, and may lack columns of the map that no parameter needs.
+    Judged,
     /// Rows that are predicted, and compared with measurements if there are any.
     Predicted,
     /// Planned poses and targets, whose tables contain the commands.
@@ -128,6 +143,8 @@ struct Tables<'a> {
     problem: &'a Problem,
     /// True if the table must contain measurements.
     measured: bool,
+    /// True if measured tables must have every column of `[data.columns]`.
+    is_mapped_whole: bool,
     /// True if tables without joint columns are joined with the joint table of the problem.
     joins: bool,
     warnings: Vec<Warning>,
@@ -141,14 +158,15 @@ impl<'a> Tables<'a> {
     fn new(files: &'a [PathBuf], problem: &'a Problem, table_use: Use) -> Self {
         let by_order = problem.data.joint_log.as_ref().is_some_and(|log| log.by == JoinRule::Order);
         let joins = match table_use {
-            Use::Measured => true,
+            Use::Measured | Use::Judged => true,
             Use::Predicted => !by_order || files == problem.data.files,
             Use::Planned => false,
         };
         Self {
             files,
             problem,
-            measured: table_use == Use::Measured,
+            measured: matches!(table_use, Use::Measured | Use::Judged),
+            is_mapped_whole: table_use != Use::Judged,
             joins,
             warnings: Vec::new(),
             builder: None,
@@ -160,6 +178,9 @@ impl<'a> Tables<'a> {
     fn read(&mut self, index: usize, mut table: Table) -> Result<(), InputError> {
         let dialect = &self.problem.data.dialect;
         let joint_log = self.problem.data.joint_log.as_ref();
+        if joint_log.is_some() {
+            table.find_decimal_mark();
+        }
         let is_joined = self.joins && !Columns::has_joints(&table, self.problem);
         let mut log = match (joint_log.filter(|_| is_joined), self.log.take()) {
             (Some(_), Some(log)) => Some(log),
@@ -177,7 +198,12 @@ impl<'a> Tables<'a> {
             log.extend(&mut table, dialect)?;
         }
         let mut ignored = Vec::new();
-        let mut columns = Columns::find(&table, self.problem, self.measured, &mut ignored)?;
+        let mut columns = Columns::find(
+            &table,
+            self.problem,
+            (self.measured, self.is_mapped_whole),
+            &mut ignored,
+        )?;
         observed::check_target_column(&table, &columns, self.problem)?;
         if !table.next_row()? {
             let line = table.line();
@@ -185,8 +211,12 @@ impl<'a> Tables<'a> {
                 .at_line(line)
                 .error(TableErrorKind::NoRowsBelowHeader));
         }
+        if let Some(log) = &log {
+            log.show_first_row(&mut table);
+        }
         columns.decide_time_column(&table, &mut ignored)?;
         columns.propose_times(&table, &mut ignored);
+        table.detach_row();
         self.warnings.append(&mut ignored);
         let rows = self
             .builder

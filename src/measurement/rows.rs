@@ -36,6 +36,10 @@ pub(super) struct RowsBuilder {
     stems: Vec<String>,
     /// Columns of the first file with their names.
     columns: Vec<(Column, String)>,
+    /// Number of these columns that stand in the first file itself.
+    columns_before: usize,
+    /// Joint table that is joined to the first file, with the other columns.
+    joint_table: Option<PathBuf>,
 }
 
 impl RowsBuilder {
@@ -74,6 +78,7 @@ impl RowsBuilder {
             session: Labels::default(),
             target: (names_targets || columns.has(Role::Target)).then(Labels::default),
             marked_held_out: columns.marked.map(|_| Vec::new()),
+            has_decimal_commas: table.style.decimal_comma && table.style.delimiter != ',',
             command_columns: columns
                 .read
                 .iter()
@@ -100,6 +105,8 @@ impl RowsBuilder {
             rotation: problem.data.dialect.rotation,
             stems: stems(files),
             columns,
+            columns_before: table.columns_before(),
+            joint_table: table.appended_columns().map(|(file, _)| file.to_owned()),
         }
     }
 
@@ -118,7 +125,13 @@ impl RowsBuilder {
     /// their σ and of targets are optional, too.
     pub fn check_same_columns(&self, table: &Table, columns: &Columns) -> Result<(), InputError> {
         let differ = |name: &str, has| {
-            let other = self.measurements.files.first().cloned().unwrap_or_default();
+            let first = self.measurements.files.first().cloned().unwrap_or_default();
+            let is_of_joint_table = |(column, known): &(Column, String)| {
+                known == name && column.place >= self.columns_before
+            };
+            let joint_table = self.joint_table.as_ref().filter(|_| has);
+            let joint_table = joint_table.filter(|_| self.columns.iter().any(is_of_joint_table));
+            let other = joint_table.cloned().unwrap_or(first);
             Err(table.column(name).error(TableErrorKind::ColumnsDiffer { other, has }))
         };
         let of_observed = |role: Role| {

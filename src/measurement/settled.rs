@@ -42,7 +42,7 @@ impl Columns {
         let times = self.read.iter().find(|column| column.role == Role::Time);
         if let Some(place) = times.map(|column| column.place)
             && let value = table.text(place)?
-            && let Some(read) = assumed_month_first(value, table.date_order)
+            && let Some(read) = assumed_month_first(value, table.date_order(place))
         {
             let kind = WarningKind::MonthFirst { value: shortened(value), read };
             warnings.push(Warning { location: table.column(table.name_of(place)), kind });
@@ -56,16 +56,16 @@ impl Columns {
             let (theirs, value) =
                 (table.name_of(column.place), shortened(table.text(column.place)?));
             let is_number = value.is_empty() || table.number(column.place).is_ok();
-            if is_ambiguous(&value, table.date_order) {
+            if is_ambiguous(&value, table.date_order(column.place)) {
                 return Err(table
                     .column(theirs)
-                    .at_line(table.line())
+                    .at_line(table.line_of(column.place))
                     .error(TableErrorKind::AmbiguousDate { value }));
             }
             if !is_number && theirs != "time" {
                 return Err(table
                     .column(theirs)
-                    .at_line(table.line())
+                    .at_line(table.line_of(column.place))
                     .error(TableErrorKind::NotATime { value }));
             }
             let write = Unit::Time.alternatives("time");

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::Measurements;
+use super::time::FIRST_DATE;
 
 /// Time of the first pose of each session \[s\].
 #[derive(Debug, Clone, PartialEq)]
@@ -22,6 +23,12 @@ impl StartTimes {
 }
 
 impl Measurements {
+    /// Returns true if times were measured and are dates, not seconds of a clock with its own zero.
+    #[doc(hidden)]
+    pub fn has_dates(&self) -> bool {
+        self.time_measured && self.time.iter().all(|&time| time >= FIRST_DATE)
+    }
+
     /// Returns the time of the first pose of each session.
     pub(crate) fn start_times(&self) -> StartTimes {
         let starts = self.session_starts();

@@ -6,6 +6,8 @@ use std::sync::Arc;
 
 use csv::{ByteRecord, Reader, ReaderBuilder};
 
+use super::appended::Appended;
+use super::beginning::Beginning;
 use super::cell_style::CellStyle;
 use super::cell_words::{UNITS, has_thousands, is_spreadsheet_date, other_notation, unit_behind};
 use super::cut_end::LastCells;
@@ -32,7 +34,7 @@ const A_TABLE: &str = "a table; save or export it as CSV, text with one row per 
 const MAX_CELLS_OF_KEY: usize = 2;
 
 /// Text whose beginning has already been read.
-type TextFromStart = Chain<Cursor<Vec<u8>>, Box<dyn Read>>;
+type TextFromStart = Chain<Cursor<Arc<[u8]>>, Box<dyn Read>>;
 
 /// Open CSV file with its current row.
 pub(super) struct Table {
@@ -40,23 +42,21 @@ pub(super) struct Table {
     /// Names in the header line without surrounding white space.
     pub header: Vec<String>,
     /// Line of the header, from 1.
-    header_line: usize,
+    pub(super) header_line: usize,
     reader: Reader<NormalizedText<Lines<BufReader<TextFromStart>>>>,
     /// Cells of the current row.
-    record: ByteRecord,
+    pub(super) record: ByteRecord,
     /// Line of the current row, from 1.
     line: usize,
-    style: CellStyle,
+    pub(super) style: CellStyle,
     /// True if the table has no header, and its first record, a row, has not been returned yet.
     starts_with_row: bool,
     /// Order of day and month in dates, by the first lines of the table.
-    pub date_order: DateOrder,
-    /// Format of the appended cells of another table, and the number of cells of this table.
-    appended: Option<(CellStyle, usize)>,
-    /// File and header line of the appended columns.
-    appended_header: Option<(PathBuf, usize)>,
-    /// File and line from which the appended cells of the current row come.
-    partner: Option<(PathBuf, usize)>,
+    pub(super) date_order: DateOrder,
+    /// Columns that a joint table appends to this table; `None` if it is not joined.
+    pub(super) appended: Option<Appended>,
+    /// Beginning of the text, in which the kinds of its numbers are looked up.
+    pub(super) beginning: Beginning,
     /// Number of the first line that was decoded from Windows-1252; `None` if there is none.
     decoded_line: Option<usize>,
     /// Digits of the last cells of the rows so far.
@@ -93,8 +93,9 @@ impl Table {
         }
         let layout = Layout::detect(&beginning, dialect);
         let date_order = DateOrder::of(&beginning);
-        let lines =
-            Lines::new(BufReader::with_capacity(1 << 16, Cursor::new(beginning).chain(input)));
+        let start: Arc<[u8]> = beginning.into();
+        let text = Cursor::new(Arc::clone(&start)).chain(input);
+        let lines = Lines::new(BufReader::with_capacity(1 << 16, text));
         let reader = ReaderBuilder::new()
             .has_headers(false)
             .flexible(true)
@@ -114,8 +115,7 @@ impl Table {
             starts_with_row: false,
             date_order,
             appended: None,
-            appended_header: None,
-            partner: None,
+            beginning: Beginning::new(start, layout, dialect.comment.clone()),
             decoded_line: None,
             last_cells: LastCells::default(),
         };
@@ -186,7 +186,8 @@ impl Table {
         if !std::mem::take(&mut self.starts_with_row) && !self.advance()? {
             return Ok(false);
         }
-        let expected = self.appended.map_or(self.header.len(), |(_, own_cells)| own_cells);
+        self.detach_row();
+        let expected = self.columns_before();
         if self.record.len() != expected {
             let found = self.record.len();
             return Err(self.error(if self.is_empty_row() {
@@ -261,16 +262,20 @@ impl Table {
         usize::try_from(self.reader.position().line()).unwrap_or(usize::MAX)
     }
 
-    /// Returns the format of the table's cells.
-    pub fn style(&self) -> CellStyle {
-        self.style
+    /// Reads numbers with decimal points if the first rows show them, although the problem declares
+    /// decimal commas. Two tables of one measurement may come from programs with different marks.
+    pub fn find_decimal_mark(&mut self) {
+        self.style.decimal_comma = self.style.decimal_comma && !self.beginning.has_decimal_points();
     }
 
     /// Returns the format of the cells in the column with index `place`.
     fn style_of(&self, place: usize) -> CellStyle {
-        self.appended
-            .filter(|&(_, own_cells)| place >= own_cells)
-            .map_or(self.style, |(style, _)| style)
+        self.appended_at(place).map_or(self.style, |(appended, _)| appended.format.style)
+    }
+
+    /// Returns the order of day and month in dates of the column with index `place`.
+    pub fn date_order(&self, place: usize) -> DateOrder {
+        self.appended_at(place).map_or(self.date_order, |(appended, _)| appended.format.date_order)
     }
 
     /// Returns the cells of the current row.
@@ -278,41 +283,16 @@ impl Table {
         &self.record
     }
 
-    /// Appends columns of another table to the header; [`append_cells`](Self::append_cells) fills
-    /// them row by row.
-    ///
-    /// `place` is the file and the header line of the other table.
-    pub fn extend_header(&mut self, names: Vec<String>, style: CellStyle, place: (PathBuf, usize)) {
-        self.appended = Some((style, self.header.len()));
-        self.appended_header = Some(place);
-        self.header.extend(names);
-    }
-
-    /// Appends cells of another table to the current row, which come from the given file and line.
-    pub fn append_cells<'a>(
-        &mut self,
-        cells: impl Iterator<Item = &'a [u8]>,
-        (file, line): (&Path, usize),
-    ) {
-        cells.for_each(|cell| self.record.push_field(cell));
-        self.partner = Some((file.to_owned(), line));
-    }
-
-    /// Returns the file and the line of the header.
-    pub fn header_place(&self) -> (PathBuf, usize) {
-        (self.file.clone(), self.header_line)
-    }
-
-    /// Returns the file of the appended columns of another table, and their names.
-    pub fn appended_columns(&self) -> Option<(&Path, &[String])> {
-        let (file, _) = self.appended_header.as_ref()?;
-        let (_, cells_before) = self.appended?;
-        Some((file, self.header.get(cells_before..)?))
-    }
-
     /// Returns the line of the current row, counted from 1.
     pub fn line(&self) -> usize {
         self.line
+    }
+
+    /// Returns the line of the row that holds the cell in the column with index `place`: a row of
+    /// the table, or of the joint table that is joined to it.
+    pub fn line_of(&self, place: usize) -> usize {
+        let row = self.appended_at(place).and_then(|(appended, _)| appended.row.as_ref());
+        row.map_or(self.line, |row| row.line)
     }
 
     /// Returns a cell of the current row without surrounding white space; empty if there is none.
@@ -411,9 +391,9 @@ impl Table {
     /// and time as seconds since 1970.
     pub fn time(&self, place: usize, to_si: fn(f64) -> f64) -> Result<f64, InputError> {
         let word = self.non_empty_text(place)?;
-        match date_time(word, self.date_order) {
+        match date_time(word, self.date_order(place)) {
             Some(seconds) => Ok(seconds),
-            None if is_ambiguous(word, self.date_order) => {
+            None if is_ambiguous(word, self.date_order(place)) => {
                 Err(self
                     .cell_error(place, TableErrorKind::AmbiguousDate { value: shortened(word) }))
             }
@@ -431,7 +411,7 @@ impl Table {
 
     /// Returns true if a cell of the current row is a date and time.
     pub fn is_date(&self, place: usize) -> bool {
-        self.text(place).is_ok_and(|word| date_time(word, self.date_order).is_some())
+        self.text(place).is_ok_and(|word| date_time(word, self.date_order(place)).is_some())
     }
 
     /// Returns the name in the header of the column with index `place`.
@@ -448,11 +428,11 @@ impl Table {
     /// Returns the location of a column in the header line, for errors.
     pub fn column(&self, name: &str) -> Location {
         let place = self.header.iter().position(|header| header == name);
-        let is_appended =
-            self.appended.is_some_and(|(_, own_cells)| place.is_some_and(|k| k >= own_cells));
-        let appended = self.appended_header.as_ref().filter(|_| is_appended);
-        let (file, line) =
-            appended.map_or((&self.file, self.header_line), |(file, line)| (file, *line));
+        let appended = place.and_then(|place| self.appended_at(place));
+        let (file, line) = appended.map_or((&self.file, self.header_line), |(appended, _)| {
+            let (file, line) = &appended.format.header_place;
+            (file, *line)
+        });
         Location::file(file).at_line(line).with_key(format!("column {}", shortened(name)))
     }
 
@@ -463,10 +443,20 @@ impl Table {
 
     /// Returns the location of the current row, with its text and, if given, the cell to mark.
     fn location(&self, place: Option<usize>) -> Location {
+        let partner = place.and_then(|place| {
+            let (appended, place) = self.appended_at(place)?;
+            Some((appended.row.as_ref()?, appended.format.style, place))
+        });
         let (mut text, mut span) = (String::new(), None);
-        for (index, cell) in self.record.iter().enumerate() {
+        let (cells, count, delimiter, place) = match partner {
+            Some((row, style, place)) => {
+                (&row.cells, row.cells.len(), style.delimiter, Some(place))
+            }
+            None => (&self.record, self.own_cells(), self.style.delimiter, place),
+        };
+        for (index, cell) in cells.iter().take(count).enumerate() {
             if index > 0 {
-                text.push(self.style.delimiter);
+                text.push(delimiter);
             }
             let start = text.len();
             text.push_str(&String::from_utf8_lossy(cell));
@@ -475,9 +465,8 @@ impl Table {
             }
         }
         let span = span.unwrap_or(0..text.len());
-        let is_appended = |place| self.appended.is_some_and(|(_, own_cells)| place >= own_cells);
-        let partner = self.partner.as_ref().filter(|_| place.is_some_and(is_appended));
-        let (file, line) = partner.map_or((&self.file, self.line), |(file, line)| (file, *line));
+        let (file, line) =
+            partner.map_or((&self.file, self.line), |(row, ..)| (&row.file, row.line));
         let excerpt = Excerpt { text: Arc::from(text), first_line: line, span };
         Location { excerpt: Some(excerpt), ..Location::file(file).at_line(line) }
     }

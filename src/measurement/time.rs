@@ -136,7 +136,7 @@ fn hour_of_day(clock: &str) -> Option<(u32, &str, bool)> {
 
 /// Smallest time that [`shown`] writes as a date \[s since 1970\]: 1990-01-01. Smaller numbers are
 /// seconds of a clock with another zero.
-const FIRST_DATE: f64 = 631_152_000.0;
+pub(super) const FIRST_DATE: f64 = 631_152_000.0;
 
 /// Returns a time as text: a date and time from [`FIRST_DATE`] on, else seconds.
 pub(super) fn shown(seconds: f64) -> String {

@@ -111,7 +111,7 @@ impl Problem {
 
 /// Returns a path without folders that a following `..` leaves again, if the shorter path leads to
 /// the same file.
-fn without_detours(path: PathBuf) -> PathBuf {
+pub(super) fn without_detours(path: PathBuf) -> PathBuf {
     let mut short = PathBuf::new();
     for component in path.components() {
         match (component, short.components().next_back()) {

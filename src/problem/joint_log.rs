@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use super::data::without_detours;
 use super::item::Item;
 use super::joint_source::JointSource;
 use crate::error::{InputError, InputErrorKind, Location};
@@ -45,7 +46,10 @@ pub(super) fn read(
     let mut section = item.section()?;
     let names = section.require("files", "files = [\"controller.csv\"]")?;
     let names = names.list("a list of file names")?;
-    let files = names.iter().map(|name| Ok(folder.join(name.text()?))).collect::<Result<_, _>>()?;
+    let files = names
+        .iter()
+        .map(|name| Ok(without_detours(folder.join(name.text()?))))
+        .collect::<Result<_, _>>()?;
     let rules = ["name", "order", "time"];
     let word = section.word("by", &["name", "order", "time"], &rules)?;
     let write = rules.map(|rule| format!("by = \"{rule}\"")).join(" or ");

@@ -56,7 +56,7 @@ pub fn acceptance_page(problem: &Problem, result: &AcceptanceResult) -> String {
         Table::new(&["held-out poses", "from", "to", "unit"], conditions.collect(), &[0, 3]);
     let commit = result.commit.as_ref().map(|commit| {
         Block::Text(format!(
-            "Git commit of the folder that holds the problem: {commit}. Files may differ from that \
+            "Git commit of the repository that tracks the problem: {commit}. Files may differ from that \
              commit; the digests below identify them."
         ))
     });

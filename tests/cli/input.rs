@@ -236,6 +236,15 @@ fn wrong_arguments_end_with_status_two_and_help_with_zero() {
         ("init .", "it is a folder; give a regular file"),
         ("identify . --ouput out", "tip: --out DIR names the folder of the results"),
         ("loop . --solver lm", "tip: loop takes no --solver; it is an option of identify"),
+        (
+            "loop . --tolerance 0.2",
+            "tip: loop takes no --tolerance; --tolerance-mm is an option of accept",
+        ),
+        ("accept . --tolerance 0.2", "'--tolerance-mm'"),
+        ("next . --estimate e.json", "tip: next takes no --estimate, because it fits by itself"),
+        ("export . --estimate e.json", "<--urdf <ARM.urdf>|--format <FORMAT>>"),
+        ("export . --estimate e.json", "the values of --format are ur-yaml, ros-yaml, mdh, dh"),
+        ("export . --estimate e.json --format csv", "tip: mdh or dh write the table"),
         ("accept . --tolerance-mm -0.1", "--tolerance-mm is followed by -0.1"),
         ("calibrate .", "tip: flexcal identify may be meant"),
     ] {

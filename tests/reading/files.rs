@@ -384,9 +384,15 @@ fn an_acceptance_is_of_the_files_that_were_read() {
         &bench.read("signed/acceptance.html"),
         &["measured by", "signed by", "Instrument: tracker", "SHA-256", digest],
     );
-    // A repository around the problem is identified by its commit.
+    // A repository that tracks the problem is identified by its commit, and another one is not.
     bench.write(".git/HEAD", "ref: refs/heads/main\n");
     bench.write(".git/refs/heads/main", "0123abcd\n");
+    let json = bench.flexcal("accept arm --json --out signed").success().json();
+    assert_eq!(json["commit"], Value::Null);
+    let mut index = b"DIRC\0\0\0\x02\0\0\0\x01".to_vec();
+    index.extend([0; 60]);
+    index.extend(b"\0\x10arm/problem.toml\0\0");
+    bench.write(".git/index", index);
     let json = bench.flexcal("accept arm --json --out signed").success().json();
     assert_eq!(json["commit"], "0123abcd");
 }

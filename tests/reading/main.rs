@@ -11,5 +11,6 @@ mod doubtful;
 mod exchange;
 mod files;
 mod formats;
+mod joined;
 mod limits;
 mod names;

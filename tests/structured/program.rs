@@ -44,7 +44,14 @@ impl Table {
     fn read(path: &Path) -> Result<Self, String> {
         let text =
             fs::read_to_string(path).map_err(|error| format!("{}: {error}", path.display()))?;
-        let cells = |line: &str| line.split(',').map(str::to_owned).collect::<Vec<_>>();
+        // Commands have the decimal commas of their targets, and then semicolons.
+        let has_semicolons = text.lines().next().is_some_and(|header| header.contains(';'));
+        let cells = |line: &str| -> Vec<String> {
+            match has_semicolons {
+                true => line.split(';').map(|cell| cell.replace(',', ".")).collect(),
+                false => line.split(',').map(str::to_owned).collect(),
+            }
+        };
         let mut lines = text.lines();
         let columns = lines.next().map(cells).unwrap_or_default();
         Ok(Self { columns, rows: lines.map(cells).collect() })

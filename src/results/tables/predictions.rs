@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use super::columns::{self, COMMAND_DECIMALS, Column, Columns, columns_of_kinds};
 use super::commanded::{commanded_joints, label, sessions};
-use crate::files::csv;
+use crate::files::{csv, csv_with_semicolons};
 use crate::fit::{Command, Prediction};
 use crate::measurement::Measurements;
 use crate::problem::Problem;
@@ -168,5 +168,20 @@ pub fn commands_csv(
             line.push(column.cell(row));
         }
     }
-    csv(header, lines)
+    if targets.has_decimal_commas { with_decimal_commas(header, lines) } else { csv(header, lines) }
+}
+
+/// Columns of words, in which a point is no decimal point.
+const WORD_COLUMNS: [&str; 3] = ["pose", "session", "target"];
+
+/// Formats a table with semicolons between the cells and commas as decimal marks.
+fn with_decimal_commas(header: Vec<String>, mut lines: Vec<Vec<String>>) -> String {
+    for line in &mut lines {
+        for (cell, name) in line.iter_mut().zip(&header) {
+            if !WORD_COLUMNS.contains(&name.as_str()) {
+                *cell = cell.replace('.', ",");
+            }
+        }
+    }
+    csv_with_semicolons(header, lines)
 }

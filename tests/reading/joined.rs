@@ -1,0 +1,146 @@
+//! Two tables of one measurement that programs write in their own ways.
+
+use flexcal::error::{InputError, Warning};
+use flexcal::measurement::Measurements;
+use flexcal::problem::Problem;
+
+use crate::common::program::{Folder, assert_contains};
+use crate::common::reading::{assert_says, words};
+
+const ARM: &str = "name = 'arm'\n[[joint]]\n[[joint]]\na_m = 0.5\n";
+const TRACKER: &str = "// job\nPoint, X, Y, Z\nP1, 1000.5, 2.25, 3\nP2, 1100.5, 4.25, 6\n";
+const LOG: &str =
+    "Stamp;Name;A1;A2\n2026-03-11 09:15:30;P1;10,500;1\n2026-03-11 09:16:36;P2;20,250;2\n";
+
+/// Problem with a tracker table and a log that are joined by name, with decimal commas; `map` is
+/// what `[data.columns]` says of times.
+fn problem(map: &str) -> String {
+    format!(
+        "{ARM}[data]\nfiles = ['tracker.txt']\njoints = {{ files = ['log.csv'], by = 'name' }}\n\
+         [data.columns]\n{map}'Point' = 'pose'\n'Name' = 'pose'\n'A1' = 'q1_deg'\n'A2' = 'q2_deg'\n\
+         'X' = 'x_mm'\n'Y' = 'y_mm'\n'Z' = 'z_mm'\n[data.format]\ndecimal = ','\n"
+    )
+}
+
+fn read(map: &str, tracker: &str, log: &str) -> Result<(Measurements, Vec<Warning>), InputError> {
+    let folder = Folder::with([
+        ("problem.toml", &*problem(map)),
+        ("tracker.txt", tracker),
+        ("log.csv", log),
+    ]);
+    let problem = Problem::read(&folder.path("problem.toml"))?;
+    Measurements::read(&problem.data.files, &problem)
+}
+
+#[test]
+fn dates_of_the_joint_table_are_times_under_either_name() {
+    let named = LOG.replace("Stamp", "time");
+    let slashed = LOG.replace("2026-03-11", "3/14/2026");
+    let days = [("'Stamp' = 'time'\n", LOG), ("'Stamp' = 'time_s'\n", LOG), ("", &named)];
+    for (map, log) in days.into_iter().chain([("'Stamp' = 'time'\n", &*slashed)]) {
+        let (rows, warnings) = read(map, TRACKER, log).unwrap();
+        assert!(rows.time_measured && rows.has_dates(), "{log}");
+        assert!((rows.time[1] - rows.time[0] - 66.0).abs() < 1e-6, "{log}");
+        assert!(warnings.is_empty() || !map.is_empty(), "{}", words(&warnings));
+    }
+    // Dates without a name are proposed as times.
+    let (_, warnings) = read("", TRACKER, LOG).unwrap();
+    assert_contains(&words(&warnings), &["log.csv:1: column Stamp", "\"Stamp\" = \"time\""]);
+    let wrong = read("'Stamp' = 'time'\n", TRACKER, &LOG.replace("2026-03-11 09:15:30", "soon"));
+    assert_says(&wrong.unwrap_err(), &["log.csv:2: column Stamp: \"soon\" is neither"]);
+}
+
+#[test]
+fn errors_show_the_line_of_the_file_they_name() {
+    let shown = |error: InputError| {
+        let excerpt = error.location.excerpt.clone().unwrap();
+        let marked = excerpt.text.get(excerpt.span.clone()).unwrap().to_owned();
+        (excerpt.text.to_string(), excerpt.first_line, marked)
+    };
+    let broken = LOG.replace("20,250", "20,2x0");
+    let error = shown(read("", TRACKER, &broken).unwrap_err());
+    let line = "2026-03-11 09:16:36;P2;20,2x0;2".to_owned();
+    assert_eq!(error, (line, 3, "20,2x0".to_owned()));
+    let broken = TRACKER.replace("4.25", "4.2x");
+    let error = shown(read("", &broken, LOG).unwrap_err());
+    assert_eq!(error, ("P2, 1100.5, 4.2x, 6".to_owned(), 4, " 4.2x".to_owned()));
+}
+
+#[test]
+fn the_two_tables_may_have_different_decimal_marks() {
+    let positions = |tracker: &str, log: &str| {
+        let (rows, _) = read("", tracker, log)?;
+        assert!((rows.positions[0].x - 1.0005).abs() < 1e-12);
+        assert!((rows.configuration(1)[0].to_degrees() - 20.25).abs() < 1e-9);
+        Ok::<(), InputError>(())
+    };
+    let blanks = TRACKER.replace("// job\n", "").replace(',', "");
+    let tabs = blanks.replace(' ', "\t");
+    let (tracker_commas, log_points) =
+        (tabs.replace('.', ","), LOG.replace("10,500", "10,5").replace(',', "."));
+    for (tracker, log) in [
+        (TRACKER, LOG),
+        (&*blanks, LOG),
+        (&*tabs, LOG),
+        (&*tracker_commas, LOG),
+        (&*tracker_commas, &*log_points),
+    ] {
+        positions(tracker, log).unwrap();
+    }
+    // Points that may separate thousands are refused, with a way out.
+    let doubtful = "Point\tX\tY\tZ\nP1\t100.500\t2.250\t3\nP2\t110.500\t4.250\t6\n";
+    let error = read("", doubtful, LOG).unwrap_err();
+    assert_says(&error, &["tracker.txt:2: column X: \"100.500\"", "a table with commas between"]);
+    let mixed = tabs.replace("4.25", "4,25");
+    assert_says(&read("", &mixed, LOG).unwrap_err(), &["\"1000.5\" has a decimal point"]);
+}
+
+#[test]
+fn a_column_of_the_joint_table_is_missed_in_its_name() {
+    let folder = Folder::with([
+        ("problem.toml", &*problem("'Stamp' = 'time'\n")),
+        ("tracker.txt", TRACKER),
+        ("log.csv", LOG),
+        ("plan.csv", "pose,q1_deg,q2_deg,x_mm,y_mm,z_mm\n1,5.5,6,1010,7,8\n"),
+    ]);
+    let problem = Problem::read(&folder.path("problem.toml")).unwrap();
+    let files = ["tracker.txt", "plan.csv"].map(|name| folder.path(name));
+    let error = Measurements::read(&files, &problem).unwrap_err();
+    assert_says(
+        &error,
+        &["plan.csv:1: column time", "log.csv has this column, this file does not"],
+    );
+    assert!(!error.to_string().contains("tracker.txt"));
+    folder.edit("plan.csv", "z_mm\n1", "z_mm,time\n1");
+    folder.edit("plan.csv", "8\n", "8,2026-03-12 08:00:00\n");
+    assert_eq!(Measurements::read(&files, &problem).unwrap().0.len(), 3);
+}
+
+#[test]
+fn few_names_in_another_spelling_are_hinted_at() {
+    let log: String = (1..=8).map(|k| format!("P0{k};{k},5;1\n")).collect();
+    let tracker = |name: fn(usize) -> String| {
+        let rows = (1..=8).map(|k| format!("{}, {k}.5, 2.25, 3\n", name(k)));
+        format!("Point, X, Y, Z\n{}", rows.collect::<String>())
+    };
+    let log = format!("Name;A1;A2\n{log}");
+    let some = tracker(|k| if k < 3 { format!("P{k}") } else { format!("P0{k}") });
+    let (_, warnings) = read("", &some, &log).unwrap();
+    let said = words(&warnings);
+    assert_contains(
+        &said,
+        &["2 of them differ from a partner only in spelling, as \"P1\" and \"P01\": write"],
+    );
+    assert_eq!(said.matches("spelling").count(), 1, "{said}");
+    let (_, warnings) =
+        read("", &tracker(|k| if k < 3 { format!("Q{k}") } else { format!("P0{k}") }), &log)
+            .unwrap();
+    assert!(!words(&warnings).contains("spelling"));
+}
+
+#[test]
+fn columns_of_a_table_without_a_header_are_selected_by_place() {
+    let error = read("", "P1, 1000.5, 2.25, 3\nP2, 1100.5, 4.25, 6\n", LOG).unwrap_err();
+    assert_says(&error, &["tracker.txt:1", "the first line holds numbers", "\"#1\" = \"pose\""]);
+    assert!(!error.to_string().contains("\"P1\" ="), "{error}");
+}
