@@ -101,9 +101,11 @@ impl Common {
     /// Reads the measurements of a problem, prints warnings, and splits the rows into
     /// identification and held-out rows.
     pub fn measurements(&self, problem: &Problem) -> Result<Dataset, InputError> {
-        let (measurements, mut warnings) = Measurements::read(self.files(problem), problem)?;
+        let (mut measurements, mut warnings) = Measurements::read(self.files(problem), problem)?;
         warnings.extend(measurements.row_warnings(problem));
         self.warn(&warnings);
+        // Reports list the warnings of the measurements.
+        measurements.warnings = warnings;
         Dataset::from_measurements(problem, measurements)
     }
 

@@ -237,6 +237,9 @@ fn blocks<'a>(
     blocks.extend([
         Block::Table(errors(closure, result, corrected.as_ref())),
         gain_block(closure, result),
+    ]);
+    blocks.extend(accuracy.and_then(|accuracy| accuracy.bound).map(Block::Text));
+    blocks.extend([
         Block::Words(found_effects(result, MAX_SHOWN_ALTERNATIVES)),
         Block::Page(found_effects(result, 2 * MAX_SHOWN_ALTERNATIVES)),
         Block::figures(plots.causes.iter().zip(1..).map(|(cause, k)| {
