@@ -167,13 +167,9 @@ pub fn after_loop(
         let plan = format!(
             "flexcal plan {named} --poses {SEPARATING_POSES} --separate '{effect}' '{rival}' chooses poses that tell the two apart"
         );
-        return if result.is_probably_explained() {
-            format!(
-                "flexcal identify {closed} writes the estimate to apply; to be sure of the cause, {plan}"
-            )
-        } else {
-            plan
-        };
+        return format!(
+            "flexcal identify {closed} writes the estimate to apply; to be sure of the cause, {plan}"
+        );
     }
     match result.verdict {
         Verdict::Unexplained if result.is_probably_explained() => {

@@ -66,11 +66,15 @@ impl Common {
     /// Formats the problem, and the measurement files named by `--data`, as arguments of a
     /// suggested command.
     pub fn problem_arguments(&self) -> String {
+        format!("{}{}", shell_word(self.problem()), self.data_arguments())
+    }
+
+    /// Formats the measurement files named by `--data` as arguments that follow the problem; empty
+    /// if there are none.
+    pub fn data_arguments(&self) -> String {
         let data: Vec<String> =
             self.data().iter().map(|file| format!(" {}", shell_word(file))).collect();
-        let data =
-            if data.is_empty() { String::new() } else { format!(" --data{}", data.concat()) };
-        format!("{}{data}", shell_word(self.problem()))
+        if data.is_empty() { String::new() } else { format!(" --data{}", data.concat()) }
     }
 
     /// Returns the measurement files named by `--data`; empty if those of the problem are used.
