@@ -204,8 +204,7 @@ pub fn next(
     if poses == 0 {
         return Err(DesignError::NoPoses.into());
     }
-    let found = fit::identify(problem, data, &options.fit)?;
-    check_interrupt(options)?;
+    let found = fitted(problem, data, options)?;
     let explanations = options.explanations.filter(|_| options.purpose != Purpose::Accuracy);
     if options.purpose != Purpose::Accuracy
         && explanations.is_none_or(|of| of.open().next().is_none())
@@ -260,7 +259,6 @@ pub fn next(
     let predicted = extended(&reference, site.sensitivity(&reference, unit), unit);
     let prediction = mean_square(&predicted);
     let cause = explanations.map(|of| cause_goal(&site, &of.parameters(&designed), &prediction));
-    check_interrupt(options)?;
     // Errors of left-out configurations give no bounds if the priors determine the parameters.
     let correction = if is_of_cameras || found.has(FindingCode::PriorsDecide) {
         None
@@ -324,6 +322,18 @@ pub fn next(
     let chosen = take_poses((&mut result, &mut greedy), (&pool, last), options, share)?;
     result.poses = pool.select(&chosen);
     Ok(result)
+}
+
+/// Fits the measured poses. Returns an error also if the caller requested to stop after the last
+/// step of the fit.
+fn fitted(
+    problem: &Problem,
+    data: &Dataset,
+    options: &NextOptions,
+) -> Result<Identification, NextError> {
+    let found = fit::identify(problem, data, &options.fit)?;
+    check_interrupt(options)?;
+    Ok(found)
 }
 
 /// Returns an error if the caller has requested to stop.
@@ -415,6 +425,7 @@ fn correction(
     found: &Identification,
     options: &NextOptions,
 ) -> Result<Option<Correction>, NextError> {
+    check_interrupt(options)?;
     let is_corrected = options.remainder || remainder::declared(problem)?.is_some();
     Ok(if is_corrected {
         remainder::fit(found, problem, data)?.map(|fitted| fitted.correction().clone())

@@ -95,7 +95,7 @@ pub fn set_up_comment(remarks: &ExportRemarks, is_xml: bool) -> String {
         let values = values.join("; ").replace("--", "- -");
         return format!("<!-- {SET_UP_WORDS}: {values} -->\n");
     }
-    let lines: String = values.iter().map(|value| format!("#   {value}\n")).collect();
+    let lines: String = values.iter().map(|value| ["#   ", value, "\n"].concat()).collect();
     format!("# {SET_UP_WORDS}:\n{lines}")
 }
 
