@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use flexcal::fit::{Finding, FindingCode, Identification};
+use flexcal::fit::{Finding, FindingCode, Identification, SavedEstimate};
 use flexcal::problem::{PoseRanges, Problem};
 use flexcal::report::{self, shell_word};
 use flexcal::results::{LoopResult, TraceResult, exceeds_noise};
@@ -168,13 +168,9 @@ pub fn after_loop(
         let plan = format!(
             "flexcal plan {named} --poses {SEPARATING_POSES} --separate '{effect}' '{rival}' chooses poses that tell the two apart"
         );
-        return if result.is_probably_explained() {
-            format!(
-                "flexcal identify {closed} writes the estimate to apply; to be sure of the cause, {plan}"
-            )
-        } else {
-            plan
-        };
+        return format!(
+            "flexcal identify {closed} writes the estimate to apply; to be sure of the cause, {plan}"
+        );
     }
     match result.verdict {
         Verdict::Unexplained if result.is_probably_explained() => {
@@ -198,6 +194,28 @@ pub fn after_loop(
             )
         }
     }
+}
+
+/// Returns what to do after an estimate was applied to rows that do not contradict it. `file` is the
+/// path of the estimate. The advice is that after the fit of the estimate: commands are corrected
+/// only if the fit is trusted and left no more than noise.
+pub fn after_applying(
+    common: &Common,
+    problem: &Problem,
+    estimate: &SavedEstimate,
+    file: &Path,
+) -> String {
+    let [named, file] = [common.problem(), file].map(shell_word);
+    if !estimate.trusted {
+        return format!("flexcal identify {named} says why the estimate is not to be trusted");
+    }
+    // A remainder in the problem comes from a loop, which has searched for causes already.
+    if estimate.posterior.noise_factor > 1.0 && problem.remainder.is_none() {
+        return format!(
+            "flexcal loop {named} looks for what the model lacks, because the estimate leaves more than noise"
+        );
+    }
+    format!("flexcal compensate {named} --estimate {file} --data TARGETS.csv corrects commands")
 }
 
 /// Returns the command to run after a trace.

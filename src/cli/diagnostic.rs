@@ -1,7 +1,7 @@
 //! Errors and warnings on the terminal; an error in the input with the line of the file.
 
 use std::error::Error;
-use std::io::Write as _;
+use std::io::{IsTerminal as _, Write as _};
 
 use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
 use flexcal::design::DesignError;
@@ -79,11 +79,29 @@ pub fn report_fit(fit: &Identification, quiet: bool) -> Outcome {
         warn(&report::why_not_trusted(fit));
     }
     if !quiet {
-        let is_shown =
-            |caution: &&Finding| fit.is_trusted() || caution.code != FindingCode::PriorsDecide;
-        fit.cautions().filter(is_shown).for_each(|caution| warn(&caution.to_string()));
+        print_cautions(fit);
     }
     Outcome::from_trust(fit.is_trusted())
+}
+
+/// Does the same as [`report_fit`] for a command whose text on standard output states the reason
+/// why the fit is not trusted. If `prints_text`, and if both outputs are on a terminal, the warning
+/// leaves the reason to the text, so that it is shown once.
+pub fn report_fit_once(fit: &Identification, (quiet, prints_text): (bool, bool)) -> Outcome {
+    let shows_text = std::io::stdout().is_terminal() && std::io::stderr().is_terminal();
+    if fit.is_trusted() || !prints_text || !shows_text {
+        return report_fit(fit, quiet);
+    }
+    warn("the fit is not to be trusted, for the reason below");
+    print_cautions(fit);
+    Outcome::NotTrusted
+}
+
+/// Prints the warnings of a fit, except the one that it is not trusted.
+fn print_cautions(fit: &Identification) {
+    let is_shown =
+        |caution: &&Finding| fit.is_trusted() || caution.code != FindingCode::PriorsDecide;
+    fit.cautions().filter(is_shown).for_each(|caution| warn(&caution.to_string()));
 }
 
 /// Prints a message to standard error, with the excerpt of the input file if `location` has one.

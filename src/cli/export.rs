@@ -220,6 +220,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         }
         None => None,
     };
+    let is_xml = arguments.urdf.is_some();
+    let text = text + &report::set_up_comment(&remarks, is_xml);
     results.write(&[(&name, &text)])?;
     let mut result = ExportResult::new(&problem, &model, Some(&path), moved.as_deref(), errors);
     if camera.is_some() {
@@ -231,7 +233,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     result.not_held.extend(kept.map(|joint| report::kept_at_end(&joint)));
     flags.print_result(&result.to_json(), || {
         format!(
-            "{}\nNext: {}\n",
+            "{}Next: {}\n",
             report::export_text(&result, &remarks),
             next_command(arguments, &result, &path)
         )
@@ -369,8 +371,9 @@ fn next_command(arguments: &Arguments, result: &ExportResult, path: &Path) -> St
         let data: Vec<String> = arguments.data.iter().map(|file| shell_word(file)).collect();
         let data =
             if data.is_empty() { String::new() } else { format!(" --data {}", data.join(" ")) };
+        let force = if arguments.flags.force { " --force" } else { "" };
         return format!(
-            "flexcal export {problem} --estimate {estimate} {form}{data} {better} --out {} --force",
+            "flexcal export {problem} --estimate {estimate} {form}{data} {better} --out {}{force}",
             shell_word(path)
         );
     }

@@ -172,7 +172,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     interrupt::begin_writing();
     results.write_report(&texts, &told)?;
     let sources = sources.as_ref().map(report::joint_sources_text);
-    let outcome = diagnostic::report_fit(&identification, common.quiet);
+    let outcome =
+        diagnostic::report_fit_once(&identification, (common.quiet, common.prints_text()));
     common.print_result(&json, || {
         let accuracy = PredictionAccuracy::new(&identification, &shown);
         let told = if arguments.verbose {

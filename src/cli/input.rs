@@ -66,11 +66,15 @@ impl Common {
     /// Formats the problem, and the measurement files named by `--data`, as arguments of a
     /// suggested command.
     pub fn problem_arguments(&self) -> String {
+        format!("{}{}", shell_word(self.problem()), self.data_arguments())
+    }
+
+    /// Formats the measurement files named by `--data` as arguments that follow the problem; empty
+    /// if there are none.
+    pub fn data_arguments(&self) -> String {
         let data: Vec<String> =
             self.data().iter().map(|file| format!(" {}", shell_word(file))).collect();
-        let data =
-            if data.is_empty() { String::new() } else { format!(" --data{}", data.concat()) };
-        format!("{}{data}", shell_word(self.problem()))
+        if data.is_empty() { String::new() } else { format!(" --data{}", data.concat()) }
     }
 
     /// Returns the measurement files named by `--data`; empty if those of the problem are used.
@@ -101,9 +105,11 @@ impl Common {
     /// Reads the measurements of a problem, prints warnings, and splits the rows into
     /// identification and held-out rows.
     pub fn measurements(&self, problem: &Problem) -> Result<Dataset, InputError> {
-        let (measurements, mut warnings) = Measurements::read(self.files(problem), problem)?;
+        let (mut measurements, mut warnings) = Measurements::read(self.files(problem), problem)?;
         warnings.extend(measurements.row_warnings(problem));
         self.warn(&warnings);
+        // Reports list the warnings of the measurements.
+        measurements.warnings = warnings;
         Dataset::from_measurements(problem, measurements)
     }
 

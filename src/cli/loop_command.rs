@@ -99,7 +99,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let told = report::loop_report(&problem, &closure, &shown);
     interrupt::begin_writing();
     results.write_report(&texts, &told)?;
-    let outcome = diagnostic::report_fit(&closure.after, common.quiet);
+    let outcome = diagnostic::report_fit_once(&closure.after, (common.quiet, common.prints_text()));
     if closure.interrupted {
         diagnostic::warn(&report::interrupted(closure.rounds.len()));
     }

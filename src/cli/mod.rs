@@ -44,6 +44,7 @@ mod watch;
 use std::ffi::OsString;
 
 use clap::{CommandFactory as _, Parser, Subcommand};
+use flexcal::design::NextError;
 use flexcal::fit::IdentifyError;
 use flexcal::life::PriorError;
 
@@ -162,7 +163,8 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Err(error) => {
             diagnostic::print(error.as_ref());
             let is_interrupted = error.downcast_ref().is_some_and(IdentifyError::is_interrupted)
-                || error.downcast_ref().is_some_and(PriorError::is_interrupted);
+                || error.downcast_ref().is_some_and(PriorError::is_interrupted)
+                || error.downcast_ref().is_some_and(NextError::is_interrupted);
             if is_interrupted { interrupt::INTERRUPTED_STATUS } else { 2 }
         }
     }

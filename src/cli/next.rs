@@ -191,7 +191,16 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
 fn next_step(common: &Common, problem: &Problem, next: &NextPoses, results: &Results) -> String {
     let arguments = common.problem_arguments();
     // More poses cannot correct a model that lacks an effect.
-    let lacks = if next.error.is_some() && next.misfit > next.noise {
+    let lacks_effect = next.error.is_some() && next.misfit > next.noise;
+    let lacks = if lacks_effect {
+        let closed = results.path("problem.closed.toml");
+        if Problem::read(&closed).is_ok_and(|closed| closed.name == problem.name) {
+            return format!(
+                "flexcal next {}{} chooses poses for the problem with the effects that flexcal loop found",
+                shell_word(&closed),
+                common.data_arguments()
+            );
+        }
         format!(
             "flexcal loop {arguments} looks for what the model lacks, because the misfit exceeds the noise; or "
         )
@@ -204,18 +213,24 @@ fn next_step(common: &Common, problem: &Problem, next: &NextPoses, results: &Res
     let file = shell_word(common.problem());
     if problem.data.joint_log.is_some() {
         return format!(
-            "{lacks}measure these poses, append them to the measurements and to the joint table of {file}, then\n\
-             flexcal next {arguments}"
+            "{lacks}measure these poses, append them to the measurements and to the joint table of {file}, then flexcal next {arguments}"
         );
     }
-    let measure = if next.is_of_cameras {
-        "take an image in each of these poses, write a row for each point that is found, then"
-    } else {
-        "measure these poses, add the columns x_mm, y_mm, z_mm, then"
+    let files = common.files(problem);
+    let measure = match files {
+        _ if next.is_of_cameras => {
+            "take an image in each of these poses, write a row for each point that is found, then"
+                .to_owned()
+        }
+        [first, ..] => format!(
+            "measure these poses, add the columns x_mm, y_mm, z_mm and the others of {}, then",
+            first.display()
+        ),
+        [] => "measure these poses, add the columns x_mm, y_mm, z_mm, then".to_owned(),
     };
-    let measured: Vec<String> = common.files(problem).iter().map(|file| shell_word(file)).collect();
+    let measured: Vec<String> = files.iter().map(|file| shell_word(file)).collect();
     format!(
-        "{lacks}{measure}\nflexcal next {file} --data {} {}",
+        "{lacks}{measure} flexcal next {file} --data {} {}",
         measured.join(" "),
         shell_word(&results.path("next.csv")),
     )

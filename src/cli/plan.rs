@@ -4,9 +4,9 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use flexcal::design::{self, Candidates, Criterion, EffectPair, PlanOptions, PlanProgress};
+use flexcal::design::{self, Candidates, Criterion, EffectPair, Plan, PlanOptions, PlanProgress};
 use flexcal::measurement::Measurements;
-use flexcal::problem::Problem;
+use flexcal::problem::{HeldOut, Problem};
 use flexcal::report::{self, shell_word};
 use flexcal::results::{Document as _, PlanResult, poses_csv};
 
@@ -145,38 +145,12 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         PlanResult::new(&problem, criterion, source.seed, &plan, separated.as_ref()).to_json();
     let table = poses_csv(&problem, &plan.poses);
     let page = report::plan_page(&problem, criterion, &plan, separated.as_ref());
-    let others = if pair.is_some() || given.is_some() {
-        columns_at_hand(common.files(&problem), (&problem, &plan.poses))
-    } else {
-        Vec::new()
-    };
     results.write(&[("plan.csv", &table), ("plan.json", &json), ("plan.html", &page)])?;
     common.print_result(&json, || {
         let text = report::plan_text(&problem, criterion, &plan, separated.as_ref());
-        let (problem, table) =
-            (shell_word(common.problem()), shell_word(&results.path("plan.csv")));
-        let measure = if plan.is_of_cameras {
-            "take an image in each of these poses, write a row for each point that is found"
-        } else {
-            "measure these poses, add the columns x_mm, y_mm, z_mm"
-        };
-        let measure = if others.is_empty() {
-            measure.to_owned()
-        } else {
-            let verb = if plan.is_of_cameras { ", add" } else { " and" };
-            format!("{measure}{verb} {}, which the measurements at hand have", others.join(", "))
-        };
-        // Two effects are told apart by the measurements at hand and the planned ones together.
-        let named = if common.data().is_empty() { &declared_files[..] } else { common.data() };
-        let at_hand = named.iter().filter(|_| pair.is_some() || !common.data().is_empty());
-        let at_hand = at_hand.filter(|file| file.is_file());
-        let files: Vec<String> = at_hand.map(|file| shell_word(file)).chain([table]).collect();
-        let command = if pair.is_some() { "loop" } else { "identify" };
-        format!(
-            "{text}{}Next: {measure}, then flexcal {command} {problem} --data {}\n",
-            results.written(),
-            files.join(" ")
-        )
+        let table = results.path("plan.csv");
+        let next = next_step(common, &problem, &declared_files, &table, &plan, pair.is_some());
+        format!("{text}{}Next: {next}\n", results.written())
     })?;
     if plan.suffices {
         return Ok(Outcome::Done);
@@ -211,6 +185,58 @@ fn columns_at_hand(
         (at_hand && !planned).then_some(name)
     };
     columns.into_iter().filter_map(lacks).collect()
+}
+
+/// States how to measure the plan in the file `table`, and the command that reads it afterwards.
+/// `separates` is true if the plan is to distinguish two effects.
+fn next_step(
+    common: &Common,
+    problem: &Problem,
+    declared_files: &[PathBuf],
+    table: &Path,
+    plan: &Plan,
+    separates: bool,
+) -> String {
+    let given = common.data();
+    // Every planned row is for identification, so held-out rows that a column or a session names
+    // are those of the declared files.
+    let (needs_held_out, mark) = match &problem.data.held_out {
+        Some(HeldOut::Column(column)) => (true, format!("validation in the column {column}")),
+        Some(HeldOut::Session(session)) => (true, format!("{session} in the column session")),
+        Some(HeldOut::Fraction { .. } | HeldOut::Nothing) | None => (false, String::new()),
+    };
+    // Two effects are told apart by the measurements at hand and the planned ones together.
+    let named = match given {
+        [] if separates || needs_held_out => declared_files,
+        given => given,
+    };
+    let at_hand: Vec<&PathBuf> = named.iter().filter(|file| file.is_file()).collect();
+    let measure = if plan.is_of_cameras {
+        "take an image in each of these poses, write a row for each point that is found"
+    } else {
+        "measure these poses, add the columns x_mm, y_mm, z_mm"
+    };
+    let others = if at_hand.is_empty() {
+        Vec::new()
+    } else {
+        columns_at_hand(common.files(problem), (problem, &plan.poses))
+    };
+    let beside = if !others.is_empty() {
+        let verb = if plan.is_of_cameras { ", add" } else { " and" };
+        format!("{verb} {}, which the measurements at hand have", others.join(", "))
+    } else if at_hand.is_empty() && needs_held_out {
+        format!(", write {mark} for some of them")
+    } else {
+        String::new()
+    };
+    let files: Vec<String> =
+        at_hand.into_iter().map(PathBuf::as_path).chain([table]).map(shell_word).collect();
+    let command = if separates { "loop" } else { "identify" };
+    format!(
+        "{measure}{beside}, then flexcal {command} {} --data {}",
+        shell_word(common.problem()),
+        files.join(" ")
+    )
 }
 
 /// Parses the two effects that the plan is to distinguish; `None` if `named` is empty.

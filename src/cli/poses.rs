@@ -57,7 +57,7 @@ impl Source {
     /// Returns an error if a limit is missing.
     pub fn all_ranges(&self, problem: &Problem) -> Result<PoseRanges, DesignError> {
         let Some(file) = &self.truth else { return PoseRanges::of(problem) };
-        Ok(Truth::read(file, problem)?.poses)
+        Ok(Truth::read_ranges(file, problem)?)
     }
 
     /// Returns the ranges of a pose without the temperature and the approach directions if no

@@ -12,10 +12,10 @@ use flexcal::remainder::{self, Bounds, CorrectedPrediction};
 use flexcal::report::{self, shell_word};
 use flexcal::results::{Document as _, PredictionErrors, predictions_csv, residuals_csv};
 
-use super::diagnostic;
 use super::estimate::Trust;
 use super::input::Common;
 use super::outcome::Outcome;
+use super::{advice, diagnostic};
 
 /// Arguments of `flexcal predict`.
 #[derive(Debug, Args)]
@@ -134,18 +134,19 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     common.print_result(errors.as_deref().unwrap_or(&PredictionErrors::default().to_json()), || {
         let text = report::prediction_text(&problem, arm, &prediction, (bounds, &fitted));
         let names: Vec<&str> = texts.iter().map(|(name, _)| *name).collect();
-        let problem = shell_word(common.problem());
-        let next = match &arguments.estimate {
-            Some(file) if exceeds_bounds(residuals, bounds) => format!(
+        let next = match (&arguments.estimate, &estimate) {
+            (Some(file), _) if exceeds_bounds(residuals, bounds) => format!(
                 "flexcal watch {} --estimate {} says whether the arm has changed: fewer rows than foreseen lie within their bounds",
                 common.problem_arguments(),
                 shell_word(file)
             ),
-            Some(file) => format!(
-                "flexcal compensate {problem} --estimate {} --data TARGETS.csv corrects commands",
-                shell_word(file)
+            (Some(file), Some(estimate)) => {
+                advice::after_applying(common, &problem, estimate, file)
+            }
+            _ => format!(
+                "flexcal identify {} writes an estimate for --estimate",
+                shell_word(common.problem())
             ),
-            None => format!("flexcal identify {problem} writes an estimate for --estimate"),
         };
         let folder = results.folder.display();
         format!("{text}\nWritten to {folder}: {}\nNext: {next}\n", names.join(", "))

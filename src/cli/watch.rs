@@ -10,11 +10,11 @@ use flexcal::problem::Problem;
 use flexcal::report::{self, shell_word};
 use flexcal::results::{Document as _, WatchResult};
 
-use super::diagnostic;
 use super::estimate::Trust;
 use super::identify::parse_days;
 use super::input::Common;
 use super::outcome::Outcome;
+use super::{advice, diagnostic};
 
 /// Arguments of `flexcal watch`.
 #[derive(Debug, Args)]
@@ -70,7 +70,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let page = report::watch_page(&problem, &watch, &rows);
     results.write(&[("watch.json", &json), ("watch.html", &page)])?;
     common.print_result(&json, || {
-        let [problem_word, estimate] = [common.problem(), &arguments.estimate].map(shell_word);
+        let file = shell_word(&arguments.estimate);
         let first = watch.causes.first().map(|cause| cause.kind);
         let next = if watch.is_changed() && first == Some(CauseKind::Other) {
             format!(
@@ -81,14 +81,14 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
             "measure a few of these poses again. If watch.html shows the evidence rise from some row on, give the rows from there on alone"
                 .to_owned()
         } else if watch.is_changed() && first == Some(CauseKind::Row) {
-            format!("check that row, then flexcal watch {} --estimate {estimate} without it", common.problem_arguments())
+            format!("check that row, then flexcal watch {} --estimate {file} without it", common.problem_arguments())
         } else if watch.is_changed() {
             format!(
-                "flexcal identify {} --prior {estimate} takes the change over into an estimate",
+                "flexcal identify {} --prior {file} takes the change over into an estimate",
                 common.problem_arguments()
             )
         } else {
-            format!("flexcal compensate {problem_word} --estimate {estimate} --data TARGETS.csv corrects commands")
+            advice::after_applying(common, &problem, &estimate, &arguments.estimate)
         };
         let text = report::watch_text(&problem, &watch);
         format!("{text}{}Next: {next}\n", results.written())

@@ -175,6 +175,14 @@ pub enum NextError {
     },
 }
 
+impl NextError {
+    /// Returns true if the choice was stopped on request.
+    #[doc(hidden)]
+    pub fn is_interrupted(&self) -> bool {
+        matches!(self, Self::Identify(error) if error.is_interrupted())
+    }
+}
+
 /// Chooses the next poses to measure, after a fit to the identification rows of `data`.
 ///
 /// The goal is tr(C M), with C the covariance of parameters and misfit after all measured and
@@ -196,7 +204,7 @@ pub fn next(
     if poses == 0 {
         return Err(DesignError::NoPoses.into());
     }
-    let found = fit::identify(problem, data, &options.fit)?;
+    let found = fitted(problem, data, options)?;
     let explanations = options.explanations.filter(|_| options.purpose != Purpose::Accuracy);
     if options.purpose != Purpose::Accuracy
         && explanations.is_none_or(|of| of.open().next().is_none())
@@ -311,26 +319,47 @@ pub fn next(
     }
     let last = measured.configuration(measured.len() - 1);
     let share = |greedy: &Greedy| if before > 0.0 { remaining_error(greedy) / before } else { 1.0 };
-    let chosen = take_poses((&mut result, &mut greedy), (&pool, last), poses, share);
+    let chosen = take_poses((&mut result, &mut greedy), (&pool, last), options, share)?;
     result.poses = pool.select(&chosen);
     Ok(result)
 }
 
-/// Takes up to `count` poses of the `pool` one after the other, each with the largest gain; of
+/// Fits the measured poses. Returns an error also if the caller requested to stop after the last
+/// step of the fit.
+fn fitted(
+    problem: &Problem,
+    data: &Dataset,
+    options: &NextOptions,
+) -> Result<Identification, NextError> {
+    let found = fit::identify(problem, data, &options.fit)?;
+    check_interrupt(options)?;
+    Ok(found)
+}
+
+/// Returns an error if the caller has requested to stop.
+fn check_interrupt(options: &NextOptions) -> Result<(), NextError> {
+    match &options.fit.stop {
+        Some(stop) if stop.is_requested() => Err(IdentifyError::interrupted().into()),
+        _ => Ok(()),
+    }
+}
+
+/// Takes up to `options.poses` poses of the `pool` one after the other, each with the largest gain; of
 /// equal ones the nearest to the configuration before, which is `last` at first. Enters them as
 /// steps of `result`, and returns their rows. `share` returns the fraction of the mean square error
 /// by the parameters that remains.
 fn take_poses(
     (result, greedy): (&mut NextPoses, &mut Greedy),
     (pool, last): (&Measurements, &[f64]),
-    count: usize,
+    options: &NextOptions,
     share: impl Fn(&Greedy) -> f64,
-) -> Vec<usize> {
+) -> Result<Vec<usize>, NextError> {
     let travel = Travel::of(pool);
     let mut last = last.to_vec();
     let (mut chosen, mut is_chosen) = (Vec::new(), vec![false; pool.len()]);
     let first = greedy.value();
-    while chosen.len() < count {
+    while chosen.len() < options.poses {
+        check_interrupt(options)?;
         let gains = greedy.gains();
         let free = || (0..pool.len()).filter(|&k| !is_chosen[k]);
         let largest = free().map(|k| gains[k]).fold(0.0, f64::max);
@@ -353,7 +382,7 @@ fn take_poses(
         chosen.push(pose);
         last = pool.configuration(pose).to_vec();
     }
-    chosen
+    Ok(chosen)
 }
 
 /// Returns the candidates that have not been measured yet, and the poses of the workspace, over
@@ -396,6 +425,7 @@ fn correction(
     found: &Identification,
     options: &NextOptions,
 ) -> Result<Option<Correction>, NextError> {
+    check_interrupt(options)?;
     let is_corrected = options.remainder || remainder::declared(problem)?.is_some();
     Ok(if is_corrected {
         remainder::fit(found, problem, data)?.map(|fitted| fitted.correction().clone())

@@ -91,6 +91,7 @@ fn growth_figure(check: &Check) -> Option<Drawing> {
             curve("median", FAINT, |error| error.median),
         ],
         levels: noise.into_iter().collect(),
+        are_levels_in_legend: true,
         ..Series::default()
     }
     .drawing()

@@ -1,7 +1,7 @@
 //! Texts of the command `loop`: summary for one screen, full text (`--verbose`), and report.
 
 use super::arm_names::{DECLARED_ARM, EXTENDED_ARM, NOMINAL_ARM};
-use super::document::{Block, Headline, Point, Table, code, first_of, joined};
+use super::document::{Block, Headline, Point, Table, code, first_of, joined, split_at_most};
 use super::errors::{both_parts, error_label, held_out_rows, rows_of, test_rows_word, unpredicted};
 use super::figures;
 use super::found_effects::{found_effects, found_heading, rounds, status_table};
@@ -34,7 +34,8 @@ const MAX_SHOWN_CANDIDATES: usize = 8;
 const MAX_SHOWN_ROWS: usize = 3;
 /// Maximum number of limits of the declared problem that a text names.
 const MAX_SHOWN_LIMITS: usize = 3;
-/// Number of lines of the summary that fit on one screen beside file names and next steps.
+/// Number of lines of the summary that fit on one screen beside file names and next steps. A longer
+/// summary has only the first value of each cause.
 const SCREEN_LINES: usize = 22;
 /// Name of the identification rows in the table of errors.
 const IDENTIFICATION: &str = "identification";
@@ -60,41 +61,39 @@ pub fn loop_brief(
     blocks.extend((!size.is_empty()).then(|| Block::Text(size.join(" "))));
     let end = remaining_structure(closure, result)
         .map_or_else(String::new, |words| format!("\n{}", text(&[Block::Text(words)])));
-    let points: Vec<Point> = causes(result).map(cause).collect();
-    if points.is_empty() {
+    // The strongest claims come first.
+    let mut listed: Vec<&FoundEffect> = causes(result).collect();
+    listed.sort_by_key(|found| found.status);
+    if listed.is_empty() {
         return text(&blocks) + &end;
     }
     blocks.push(Block::heading(found_heading(result)));
-    let height = |points: &[Point]| text(&[Block::Ranking(points.to_vec())]).lines().count();
-    let lines_used = text(&blocks).lines().count() + end.lines().count();
-    let room = SCREEN_LINES.saturating_sub(lines_used);
-    let fits = |count: &usize| {
-        // One line is reserved for the note on where the hidden entries are listed.
-        let note = usize::from(*count < points.len());
-        height(&points[..*count]) + note <= room
+    let points = |max_values: usize| {
+        let points = listed.iter().map(|found| cause(found, max_values)).collect();
+        text(&[Block::Ranking(points)])
     };
-    let shown = (1..=points.len()).rev().find(fits).unwrap_or(1);
-    let hidden = points.len() - shown;
-    blocks.push(Block::Ranking(points[..shown].to_vec()));
-    let more = if hidden == 0 {
-        String::new()
-    } else {
-        format!("     and {hidden} more: -v lists them, loop.json holds them\n")
-    };
-    text(&blocks) + &more + &end
+    let head = text(&blocks);
+    let room = SCREEN_LINES.saturating_sub(head.lines().count() + end.lines().count());
+    // Every cause is listed; only its values are shortened.
+    let whole = points(usize::MAX);
+    let shown = if whole.lines().count() <= room { whole } else { points(1) };
+    head + &shown + &end
 }
 
-/// Returns a found effect as a list item: values ± 1 σ, probability of its law, and effects that
-/// the data do not exclude instead.
-fn cause(found: &FoundEffect) -> Point {
+/// Returns a found effect as a list item: at most `max_values` values ± 1 σ, probability of its
+/// law, and effects that the data do not exclude instead.
+fn cause(found: &FoundEffect, max_values: usize) -> Point {
     let values = effect::values(&found.effect.effect, &found.parameters);
     // If the law only represents an unknown one, its values have no meaning.
-    let is_stand_in = stand_in_sentence(found).is_some();
-    let mut facts: Vec<String> =
-        values.iter().filter(|_| !is_stand_in).map(|value| without_effect(value)).collect();
-    let law = found.claims.as_ref().map(|claims| claims.law.probability);
-    let law = law.filter(|_| !is_stand_in);
-    facts.extend(law.map(|law| format!("probability of the law {}", percent(law))));
+    let stand_in = stand_in_sentence(found);
+    let values = values.iter().filter(|_| stand_in.is_none()).map(|value| without_effect(value));
+    let (mut facts, more) = split_at_most(values, max_values);
+    facts.extend((more > 0).then(|| "others in loop.json".to_owned()));
+    let law = match &found.claims {
+        Some(claims) => format!("probability of the law {}", percent(claims.law.probability)),
+        None => "probability of the law not determined".to_owned(),
+    };
+    facts.extend(stand_in.is_none().then_some(law));
     let label = if has_place(found) { "not excluded" } else { "candidates" };
     let others = match found.alternatives.as_slice() {
         [] => String::new(),
@@ -103,7 +102,8 @@ fn cause(found: &FoundEffect) -> Point {
             format!("; {label}: {} and {} more in loop.json", alternative(first), others.len())
         }
     };
-    let details = if facts.is_empty() { Vec::new() } else { vec![facts.join("; ")] };
+    let facts = (!facts.is_empty()).then(|| facts.join("; "));
+    let details = stand_in.into_iter().chain(facts).collect();
     Point { text: title(found) + &others, details, mark: None }
 }
 
@@ -237,6 +237,9 @@ fn blocks<'a>(
     blocks.extend([
         Block::Table(errors(closure, result, corrected.as_ref())),
         gain_block(closure, result),
+    ]);
+    blocks.extend(accuracy.and_then(|accuracy| accuracy.bound).map(Block::Text));
+    blocks.extend([
         Block::Words(found_effects(result, MAX_SHOWN_ALTERNATIVES)),
         Block::Page(found_effects(result, 2 * MAX_SHOWN_ALTERNATIVES)),
         Block::figures(plots.causes.iter().zip(1..).map(|(cause, k)| {

@@ -7,7 +7,7 @@ use super::remainder::bound_sentence;
 use super::render::text;
 use crate::fit::Command;
 use crate::measurement::Measurements;
-use crate::problem::Problem;
+use crate::problem::{Fixture, FixtureKind, Problem};
 use crate::quantity::format::{mm, number};
 use crate::remainder::Bounds;
 use crate::results::CompensationResult;
@@ -25,22 +25,14 @@ pub fn commands_text(
         "{}\n{} of {} targets can be reached",
         problem.title, result.reached, result.targets
     );
-    if let (Some(before), Some(after)) = (result.mean_miss_before_mm, result.mean_miss_mm) {
-        let before = number(before, 4);
-        // With bounds, the text states the expected error (below) instead of the distance to the
-        // target that the solver leaves.
-        let _ = match bounds {
-            Some(_) => write!(
-                words,
-                "; without correction the identified arm would miss them by {before} mm on average"
-            ),
-            None => write!(
-                words,
-                ": the identified arm misses them by {} mm on average with the corrected commands, by \
-                 {before} mm without correction",
-                number(after, 4)
-            ),
-        };
+    // The text states no distance between target and corrected command, which only the solver
+    // leaves: the expected error of the real arm is larger.
+    if let (Some(before), Some(_)) = (result.mean_miss_before_mm, result.mean_miss_mm) {
+        let _ = write!(
+            words,
+            "; without correction the identified arm would miss them by {} mm on average",
+            number(before, 4)
+        );
     }
     if let (Some(before), Some(after)) = (result.mean_turn_before_deg, result.mean_turn_deg) {
         let _ = write!(
@@ -52,6 +44,15 @@ pub fn commands_text(
     }
     if let Some(bounds) = bounds.filter(|_| result.reached > 0) {
         let _ = write!(words, ".\n{}", bound_sentence(bounds, None));
+    } else if result.reached > 0 {
+        let is_camera =
+            |fixture: &Fixture| matches!(fixture.kind, FixtureKind::Camera | FixtureKind::Fisheye);
+        let has_camera = problem.fixtures.iter().any(is_camera);
+        words += ".\nThe expected error of the commands is not known, because the estimate states no uncertainty of positions";
+        if problem.data.position_sigma.is_none() && !has_camera {
+            words += ": declare position_sigma_mm in [data] and identify again";
+        }
+        words.push('.');
     }
     let point = |command: &Command| {
         let (place, miss) = (targets.location(command.row), command.miss.norm());

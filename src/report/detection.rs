@@ -3,6 +3,7 @@
 use super::document::{Block, Table, code};
 use super::effect;
 use super::forecast::format_size;
+use crate::laws::ArgumentKind;
 use crate::problem::{Effect, Problem};
 use crate::select::{Detectable, Detection, Size};
 
@@ -29,6 +30,16 @@ pub(super) fn blocks<'a>(problem: &Problem, detection: &Detection) -> Vec<Block<
     let if_timed: Vec<&Effect> =
         visible.iter().copied().filter(needs_times).map(|effect| &effect.effect).collect();
     visible.retain(|effect| !needs_times(effect));
+    // Times and durations mean nothing if row numbers stand for times.
+    let is_timed = |effect: &&Detectable| {
+        let value = effect.effect.searched_value();
+        let kind = value.map(|(kind, _)| kind);
+        detection.times_are_rows
+            && matches!(kind, Some(ArgumentKind::Time | ArgumentKind::Duration))
+    };
+    let untimed: Vec<&Effect> =
+        visible.iter().copied().filter(is_timed).map(|effect| &effect.effect).collect();
+    visible.retain(|effect| !is_timed(effect));
     let mut families: Vec<&str> = Vec::new();
     for effect in &visible {
         if !families.contains(&effect.effect.name()) {
@@ -51,6 +62,19 @@ pub(super) fn blocks<'a>(problem: &Problem, detection: &Detection) -> Vec<Block<
         blocks.push(Block::Text(format!(
             "These effects can be seen only if the table records {} (the figures assume about one minute between poses): {list}.",
             code("time_s")
+        )));
+    }
+    if !untimed.is_empty() {
+        let mut names: Vec<String> = Vec::new();
+        for name in untimed.iter().map(|effect| code(effect.name())) {
+            if !names.contains(&name) {
+                names.push(name);
+            }
+        }
+        blocks.push(Block::Text(format!(
+            "No size is stated for effects with a time or a time constant, because the table has no {}: {}. Drifts are per row.",
+            code("time_s"),
+            names.join(", ")
         )));
     }
     let acts_by_load = |effect: &&Detectable| LOAD_EFFECTS.contains(&effect.effect.name());

@@ -81,6 +81,24 @@ fn set_up_values(found: &Identification) -> Vec<String> {
     found.estimates.iter().filter(is_set_up).map(line).collect()
 }
 
+/// Words before the values of base and tool of a geometry that was fitted alone.
+const SET_UP_WORDS: &str = "Base and tool of this geometry, which replace those of the estimate";
+
+/// Returns a comment for the end of an exported file with the values of base and tool that belong
+/// to a geometry fitted alone; empty for other geometries. The file is XML if `is_xml`, else YAML.
+pub fn set_up_comment(remarks: &ExportRemarks, is_xml: bool) -> String {
+    let Some(values) = remarks.set_up.as_ref().filter(|values| !values.is_empty()) else {
+        return String::new();
+    };
+    if is_xml {
+        // Two hyphens would end the comment.
+        let values = values.join("; ").replace("--", "- -");
+        return format!("<!-- {SET_UP_WORDS}: {values} -->\n");
+    }
+    let lines: String = values.iter().map(|value| ["#   ", value, "\n"].concat()).collect();
+    format!("# {SET_UP_WORDS}:\n{lines}")
+}
+
 /// Returns the mean length of the errors, in the unit of the summary.
 fn mean(summary: &Summary) -> f64 {
     summary.norms().0[0]
@@ -119,9 +137,7 @@ pub fn export_text(result: &ExportResult, remarks: &ExportRemarks) -> String {
         blocks.push(Block::Lines(words, result.not_held.clone()));
     }
     if let Some(values) = remarks.set_up.as_ref().filter(|values| !values.is_empty()) {
-        let words =
-            "Base and tool of this geometry, which replace those of the estimate".to_owned();
-        blocks.push(Block::Lines(words, values.clone()));
+        blocks.push(Block::Lines(SET_UP_WORDS.to_owned(), values.clone()));
     }
     blocks.extend(result.file.iter().map(|file| Block::lines(format!("Written to {file}"))));
     text(&blocks)

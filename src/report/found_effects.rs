@@ -42,7 +42,9 @@ pub(super) fn found_effects<'a>(result: &LoopResult, alternatives: usize) -> Vec
 fn point(result: &LoopResult, found: &FoundEffect, alternatives: usize) -> Point {
     let mut details: Vec<String> = stand_in_sentence(found).into_iter().collect();
     details.extend(effect::values(&found.effect.effect, &found.parameters));
-    details.extend(claims(found));
+    let is_open = found.claims.is_none() && !found.is_only_with_others();
+    let undetermined = || is_open.then(|| "probability of the law not determined".to_owned());
+    details.extend(claims(found).or_else(undetermined));
     details.extend(effect::seen_ranges(&found.ranges).map(|seen| format!("seen for {seen}")));
     details.extend(found.resembles.as_ref().map(|cause| format!("hint: {cause}")));
     details.extend(found.stability.map(|share| {
@@ -168,6 +170,9 @@ pub(super) fn status_table<'a>(closure: &ClosedLoop, result: &LoopResult) -> Opt
         note.push_str(
             "; held out mean: error of the first model with this effect whose effects all stayed",
         );
+    }
+    if result.effects.iter().any(|found| found.claims.is_none() || found.stability.is_none()) {
+        note.push_str("; –: not determined");
     }
     let table = Table::of(&result.effects, &columns).noted(&[&note]);
     (!result.effects.is_empty()).then_some(Block::Table(table))

@@ -78,7 +78,8 @@ fn blocks<'a>(problem: &Problem, found: &'a Identification, plots: &'a PlotData)
         (NOMINAL_ARM, mean_error(&found.registered.held_out)),
         ("identified", mean_error(&held_out)),
     ];
-    let corrected = PredictionAccuracy::new(found, plots).and_then(|accuracy| accuracy.corrected);
+    let accuracy = PredictionAccuracy::new(found, plots);
+    let corrected = accuracy.as_ref().and_then(|accuracy| accuracy.corrected);
     states.extend(corrected.map(|errors| ("with the remainder", mean_error(&errors))));
     let head = Headline {
         states,
@@ -97,9 +98,13 @@ fn blocks<'a>(problem: &Problem, found: &'a Identification, plots: &'a PlotData)
         ],
         is_doubtful: !found.is_trusted(),
     };
-    let mut blocks = vec![Block::Headline(head), Block::Text(fit_sentence(found))];
+    let outcome = outcome(found, accuracy.as_ref());
+    let outcome = if found.is_trusted() { Block::Text(outcome) } else { Block::Note(outcome) };
+    let fit = Block::Text(format!("{}.", describe_fit(found, "; ")));
+    let mut blocks = vec![Block::Headline(head), outcome, fit];
     blocks.extend(fit_warnings(found, plots));
     blocks.push(Block::Table(errors_by_axis(found)));
+    blocks.extend(accuracy.and_then(|accuracy| accuracy.bound).map(Block::Text));
     blocks.extend(orientation(found));
     blocks.extend(prior(found));
     blocks.extend(row_kind_tables(found));

@@ -81,7 +81,7 @@ pub use self::{
     closed_problem::closed_problem,
     compare::{compare_text, comparison_report},
     compensate::commands_text,
-    export::{ExportRemarks, better_geometry, export_text, kept_at_end},
+    export::{ExportRemarks, better_geometry, export_text, kept_at_end, set_up_comment},
     figures::is_figure,
     identify::why_not_trusted,
     next::next_text,

@@ -8,7 +8,7 @@ use crate::design::{NextOptions, NextPoses, Purpose, StopReason, WorkspaceError}
 use crate::measurement::Measurements;
 use crate::problem::Problem;
 use crate::quantity::format::{counted, mm, number, or_dash};
-use crate::results::{CommandedJoint, commanded_joints};
+use crate::results::{CommandedJoint, commanded_joints, pose_columns};
 
 /// Returns the text of a choice of poses, ending in a line break.
 pub fn next_text(problem: &Problem, options: &NextOptions, next: &NextPoses) -> String {
@@ -115,9 +115,14 @@ fn draw_errors(options: &NextOptions, next: &NextPoses, percent: &str) -> Option
     .drawing()
 }
 
-/// Returns the table of the joint commands of chosen poses.
+/// Returns the table of chosen poses: the joint commands, and all other columns of the CSV table
+/// with their values, such as payload and hoist force.
 pub(super) fn command_table(problem: &Problem, poses: &Measurements) -> Table {
     let joints = commanded_joints(problem);
+    let is_listed =
+        |name: &str| name != "pose" && joints.iter().all(|joint| joint.column() != name);
+    let columns = pose_columns(problem, poses);
+    let others: Vec<_> = columns.iter().filter(|(name, _)| is_listed(name)).collect();
     let rows = (0..poses.len()).map(|pose| {
         let q = poses.configuration(pose);
         let value = |joint: &CommandedJoint| {
@@ -126,9 +131,15 @@ pub(super) fn command_table(problem: &Problem, poses: &Measurements) -> Table {
             format!("{} {}{space}{}", joint.name(), number(command, 2), joint.symbol())
         };
         let commands: Vec<String> = joints.iter().map(value).collect();
-        vec![(pose + 1).to_string(), commands.join(", ")]
+        let mut cells = vec![(pose + 1).to_string(), commands.join(", ")];
+        if !others.is_empty() {
+            let other = |(name, cells): &&(String, Vec<String>)| format!("{name} {}", cells[pose]);
+            cells.push(others.iter().map(other).collect::<Vec<_>>().join(", "));
+        }
+        cells
     });
-    Table::new(&["pose", "commands"], rows.collect(), &[1])
+    let header = &["pose", "commands", "other columns"][..2 + usize::from(!others.is_empty())];
+    Table::new(header, rows.collect(), &[1, 2])
 }
 
 /// States whether enough poses are measured, or after how many more there are expected to be

@@ -29,7 +29,8 @@ fn sufficiency<'a>(plan: &Plan) -> Block<'a> {
     let parameters = counted(plan.planned.expected.len(), "parameter");
     if rank >= attainable_rank {
         return Block::Text(format!(
-            "Enough poses: more such poses determine no further combination of parameters (rank {rank} of {}).",
+            "The rank is complete: more such poses determine no further combination of parameters (rank {rank} of {}). That does not \
+             say that the errors are small enough: flexcal check says how many poses that takes.",
             plan.planned.expected.len()
         ));
     }

@@ -190,9 +190,11 @@ pub(super) fn ranking<'a>(
             )),
         ];
     }
-    let (_, unit) = result.errors.identification.norms();
+    let ([_, rms, _], unit) = result.errors.identification.norms();
+    // Noise of one measured row, if the fit explained all but noise.
+    let noise = rms / result.reduced_chi2.unwrap_or(1.0).max(1.0).sqrt();
     let shown = &significant[..max.min(significant.len())];
-    let points = shown.iter().map(|candidate| point(problem, candidate, unit)).collect();
+    let points = shown.iter().map(|candidate| point(problem, candidate, (unit, noise))).collect();
     let mut notes = format!(
         "{tried} candidates were tried one by one. p is the probability that noise alone does as well, corrected for their number; \
          below {level} a candidate is significant. One cause makes similar effects significant, too: the first entry explains most by itself, \
@@ -216,7 +218,9 @@ pub(super) fn ranking<'a>(
     ]
 }
 
-fn point(problem: &Problem, candidate: &Candidate, unit: &str) -> Point {
+/// Describes a candidate. `unit` is that of the errors, and `noise` the root mean square noise of a
+/// row in that unit: no pose is recommended where two predictions differ by less.
+fn point(problem: &Problem, candidate: &Candidate, (unit, noise): (&str, f64)) -> Point {
     let show = |value: f64| format!("{} {unit}", number(value.abs(), 4));
     let gain = candidate.expected_gain().unwrap_or(f64::NAN);
     let change = |gain: f64| if gain < 0.0 { "rise" } else { "fall" };
@@ -242,12 +246,15 @@ fn point(problem: &Problem, candidate: &Candidate, unit: &str) -> Point {
     }
     if let (Some(pose), Some(first)) = (&candidate.told_apart, candidate.alike.first()) {
         let difference = pose.difference().unwrap_or(f64::NAN);
-        details.push(format!(
-            "to distinguish “{}”, measure at {}: the predictions differ by {}",
-            first.effect.description,
-            pose_words(problem, pose),
-            show(difference)
-        ));
+        let is_above_noise = difference.abs() > noise;
+        details.extend(is_above_noise.then(|| {
+            format!(
+                "to distinguish “{}”, measure at {}: the predictions differ by {}",
+                first.effect.description,
+                pose_words(problem, pose),
+                show(difference)
+            )
+        }));
     }
     Point { text: declared(&candidate.effect), details, mark: None }
 }

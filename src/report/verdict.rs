@@ -4,9 +4,7 @@
 use super::document::code;
 use super::probability::{MIN_PROBABLE, percent};
 use crate::quantity::format::{counted, number};
-use crate::results::{
-    AlternativeEffect, FoundEffect, LoopResult, MAX_LISTED_COEFFICIENTS, NamedEffect,
-};
+use crate::results::{AlternativeEffect, FoundEffect, LoopResult, NamedEffect};
 use crate::select::{Status, Verdict};
 
 /// Smallest probability at which a text names a law as candidate for a cause.
@@ -194,12 +192,9 @@ fn overstated_sigma_sentence(ratio: f64, assumes_smaller_sigma: bool) -> String 
     )
 }
 
-/// Describes an effect, followed by its declaration unless that has many harmonic orders.
+/// Describes an effect, followed by its declaration.
 pub(super) fn declared(effect: &NamedEffect) -> String {
-    match effect.effect.harmonic_orders() {
-        Some(orders) if orders.len() > MAX_LISTED_COEFFICIENTS => effect.description.clone(),
-        _ => format!("{}: {}", effect.description, code(&effect.declaration)),
-    }
+    format!("{}: {}", effect.description, code(&effect.declaration))
 }
 
 /// Describes an effect that may act instead of a found one, with its probability.

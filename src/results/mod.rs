@@ -88,6 +88,7 @@ pub use self::{
 };
 #[doc(hidden)]
 pub use crate::files::{FORMAT_VERSION, PROGRAM};
+pub(crate) use tables::pose_columns;
 
 /// Returns the name of every format with its JSON Schema.
 #[doc(hidden)]

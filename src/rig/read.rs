@@ -14,7 +14,7 @@ use crate::observation::{Kind, Needs, kinds};
 use crate::problem::item::{Document, Item, join};
 use crate::problem::pattern::matches;
 use crate::problem::section::Section;
-use crate::problem::{HeldOut, Joint, JointKind, Problem};
+use crate::problem::{HeldOut, Joint, JointKind, PoseRanges, Problem};
 use crate::quantity::Unit;
 
 impl Truth {
@@ -23,11 +23,23 @@ impl Truth {
     /// # Errors
     /// Returns the first error in the file, or that it cannot be read.
     pub fn read(path: &Path, problem: &Problem) -> Result<Self, InputError> {
-        let inside = path.is_dir().then(|| path.join("TRUTH.toml"));
-        truth(
-            &Document::read(inside.as_deref().unwrap_or(path), InputErrorKind::TruthMissing)?,
-            problem,
-        )
+        truth(&document(path)?, problem)
+    }
+
+    /// Reads the ranges of poses of a `TRUTH.toml`; `path` is the file or its folder. A file that
+    /// holds `[poses]` alone needs no true values.
+    ///
+    /// # Errors
+    /// Returns the first error in the file, or that it cannot be read.
+    #[doc(hidden)]
+    pub fn read_ranges(path: &Path, problem: &Problem) -> Result<PoseRanges, InputError> {
+        let document = document(path)?;
+        let table = document.table()?;
+        let mut root = Section::new(&document, String::new(), 0..0, table.get_ref());
+        if root.entries().iter().any(|(name, _)| *name != "poses") {
+            return Ok(truth(&document, problem)?.poses);
+        }
+        Ok(poses(&mut root, problem)?.ranges)
     }
 
     /// Parses a truth from its text; `file` names it in messages.
@@ -46,6 +58,19 @@ impl Truth {
     ) -> Result<Self, InputError> {
         sections(root, problem)
     }
+}
+
+/// Reads the text of a truth; `path` is the file or its folder.
+fn document(path: &Path) -> Result<Document, InputError> {
+    let inside = path.is_dir().then(|| path.join("TRUTH.toml"));
+    Document::read(inside.as_deref().unwrap_or(path), InputErrorKind::TruthMissing)
+}
+
+/// Reads the section `[poses]`, which a truth must have.
+fn poses(root: &mut Section<'_, '_>, problem: &Problem) -> Result<Poses, InputError> {
+    let section =
+        root.section("poses")?.ok_or_else(|| root.missing("poses", example(&problem.joints)))?;
+    ranges::read(section, problem)
 }
 
 fn truth(document: &Document, problem: &Problem) -> Result<Truth, InputError> {
@@ -108,10 +133,7 @@ fn sections(root: &mut Section<'_, '_>, problem: &Problem) -> Result<Truth, Inpu
     }?;
     check_fixtures(root, problem, &parameters, &random)?;
     let segments = root.section("rig")?.map_or(Ok(SEGMENTS), segments)?;
-    let section =
-        root.section("poses")?.ok_or_else(|| root.missing("poses", example(&problem.joints)))?;
-    let Poses { ranges: poses, time_step, held_out, positions, tilts } =
-        ranges::read(section, problem)?;
+    let Poses { ranges: poses, time_step, held_out, positions, tilts } = poses(root, problem)?;
     let effects = strengths::read(root, problem, &poses)?;
     Ok(Truth {
         parameters,

@@ -30,6 +30,9 @@ pub struct Detection {
     pub untestable: Vec<(Effect, &'static str)>,
     /// True if the poses have no times; one minute is then assumed between consecutive poses.
     pub times_assumed: bool,
+    /// True if the rows are measured without times; their numbers then stand for times, and speeds
+    /// are per row.
+    pub times_are_rows: bool,
 }
 
 /// Smallest sizes at which an effect is found.
@@ -62,6 +65,17 @@ pub struct Size {
 }
 
 impl Size {
+    /// Returns the size with a speed in units per row instead of per second, for times that are row
+    /// numbers.
+    fn per_row(self) -> Self {
+        let unit = match self.unit {
+            Unit::Speed => Unit::LengthPerRow,
+            Unit::AngularSpeed => Unit::AnglePerRow,
+            unit => unit,
+        };
+        Self { unit, ..self }
+    }
+
     /// Returns true if effects as large as the prior σ are found in at least one direction.
     pub fn is_within_prior(&self) -> bool {
         self.best.is_some_and(|best| best <= self.prior)
@@ -81,12 +95,16 @@ impl Size {
 /// Returns an error if rules of `[parameters]` do not match the arm.
 pub fn detectable(problem: &Problem, poses: &Measurements) -> Result<Detection, InputError> {
     let keeps_times = poses.time_measured || poses.position_measured;
+    let times_are_rows = keeps_times && !poses.time_measured;
     let poses = if keeps_times { poses.clone() } else { with_assumed_times(poses) };
     let Candidates { testable, untestable } = candidates(problem, &poses);
     let (tries, families) = tries(&testable, problem);
     let effects = with_linear(problem, &poses, &testable, |linearised, linear| {
         let sizes = |(effect, tries): (&Effect, f64)| Detectable {
-            sizes: sizes(problem, linearised, linear, effect, tries * families as f64),
+            sizes: sizes(problem, linearised, linear, effect, tries * families as f64)
+                .into_iter()
+                .map(|size| if times_are_rows { size.per_row() } else { size })
+                .collect(),
             effect: effect.clone(),
         };
         testable.par_iter().zip(tries).map(sizes).collect()
@@ -97,6 +115,7 @@ pub fn detectable(problem: &Problem, poses: &Measurements) -> Result<Detection, 
         effects,
         untestable,
         times_assumed: !keeps_times,
+        times_are_rows,
     })
 }
 

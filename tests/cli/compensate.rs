@@ -326,3 +326,17 @@ fn errors_of_the_instrument_are_no_errors_of_the_arm() {
         assert!((target - there).norm() < 1e-8, "{} m off", (target - there).norm());
     }
 }
+
+#[test]
+fn without_bounds_no_error_is_promised() {
+    let folder = Folder::with_lunar_sampler();
+    folder.edit("problem.toml", "position_sigma_mm = 0.05", "");
+    folder.flexcal("identify . --out out").success();
+    let run = folder.flexcal(
+        "compensate . --estimate out/estimate.json --data a-none.csv --frame measuring --out c",
+    );
+    assert!(run.status < 2, "{run:?}");
+    let unknown = "The expected error of the commands is not known, because the estimate states no uncertainty";
+    assert_contains(&run.words(), &[unknown, "declare position_sigma_mm in [data]"]);
+    assert!(!run.stdout.contains(" 0.0000 mm"), "{run:?}");
+}

@@ -196,3 +196,35 @@ fn a_fit_that_tells_little_is_followed_by_a_check() {
         ],
     );
 }
+
+#[test]
+fn reports_state_the_verdict_the_bound_and_the_warnings_of_the_screen() {
+    let folder = Folder::with_lunar_sampler();
+    // A copied row causes a warning on the rows.
+    let table = folder.read("a-none.csv");
+    let copied = table.lines().nth(5).unwrap();
+    folder.write("a-none.csv", format!("{table}{copied}\n"));
+    for (command, verdict) in [("identify", "Trusted"), ("loop", "Nothing found: ")] {
+        let run = folder.flexcal(&format!("{command} . --out out"));
+        assert!(run.status < 2, "{run:?}");
+        assert_contains(&run.stderr, &["in all digits"]);
+        for report in ["out/report.md", "out/report.html"] {
+            let words = [verdict, "Error bound of a prediction", "in all digits"];
+            assert_contains(&folder.read(report), &words);
+        }
+    }
+}
+
+#[test]
+fn applying_an_estimate_that_leaves_more_than_noise_is_followed_by_a_loop() {
+    let folder = Folder::with_lunar_sampler();
+    let after = |data: &str| {
+        folder.copy(&format!("tests/cases/{data}.csv"), "a-none.csv");
+        folder.flexcal("identify . --out out").success();
+        let predict = "predict . --estimate out/estimate.json --out p";
+        folder.flexcal(predict).success().words()
+    };
+    let words = "Next: flexcal loop . looks for what the model lacks, because the estimate leaves";
+    assert_contains(&after("c-link-thermal-bending"), &[words]);
+    assert_contains(&after("a-none"), &["Next: flexcal compensate . --estimate"]);
+}

@@ -59,6 +59,8 @@ fn a_plan_can_be_checked_and_measured() {
         "{csv}"
     );
     assert_eq!(csv.lines().count(), 21);
+    // The page lists the loads of each pose, too.
+    assert_contains(&folder.read("plan.html"), &["payload_kg ", "hoist_N "]);
     // Every pose is one of the candidates.
     for line in csv.lines().skip(1) {
         let pose = line.splitn(3, ',').nth(2).unwrap();
@@ -84,6 +86,27 @@ fn drawn(count: usize) -> String {
     plain.data.held_out = None;
     let text = poses_csv(&plain, &poses);
     text.lines().map(|line| line.split_once(',').unwrap().1.to_owned() + "\n").collect()
+}
+
+#[test]
+fn the_command_after_a_plan_runs_once_the_plan_is_measured() {
+    // The declared table has the held-out rows; every planned row is for identification.
+    let folder = Folder::with_lunar_sampler();
+    folder.copy("tests/cases/truth.toml", "truth.toml");
+    let plan = folder.flexcal("plan . --truth truth.toml --poses 20 --out plan").success();
+    let simulate = "simulate . --truth truth.toml --data plan/plan.csv --seed 3 --quiet --out rig";
+    folder.flexcal(simulate).success();
+    folder.write("plan/plan.csv", folder.read("rig/measurements.csv"));
+    let (_, command) = plan.stdout.split_once(", then flexcal ").unwrap();
+    assert_eq!(command.trim(), "identify . --data ./a-none.csv plan/plan.csv");
+    folder.flexcal(command.trim()).success();
+    // Without the declared table, some of the planned rows have to be held out.
+    let moved = folder.read("a-none.csv");
+    std::fs::remove_file(folder.path("a-none.csv")).unwrap();
+    folder.write("elsewhere.csv", moved);
+    let plan = folder.flexcal("plan . --truth truth.toml --poses 20 --out plan --force").success();
+    let next = "write validation in the column split for some of them, then flexcal identify . --data plan/plan.csv";
+    assert_contains(&plan.words(), &[next]);
 }
 
 #[test]
@@ -154,6 +177,11 @@ fn without_times_nothing_that_remembers_is_promised() {
     let detectable = &folder.json("check.json")["detectable"];
     let has = |key: &str| texts(&detectable[key], "effect").contains(&"joint-hysteresis");
     assert!(!has("effects") && has("untestable"), "{detectable}");
+    // Row numbers stand for times, so that a drift is per row.
+    let drift = &entry(&detectable["effects"], |row| row["effect"] == "tracker-drift")["sizes"][0];
+    assert_eq!(drift["unit"], "m/row");
+    assert_contains(&run.stdout, &["mm/row", "Drifts are per row"]);
+    assert!(!run.stdout.contains("mm/h") && !run.stdout.contains("at_time_s"), "{run:?}");
     assert_eq!(detectable["times_assumed"], false);
     // Poses that are still to be measured may get measured times.
     let later = "check tests/cases --truth tests/cases/truth.toml --poses 60";

@@ -2,6 +2,10 @@
 
 use std::fmt::Write as _;
 
+use flexcal::design::{self, Candidates, NextOptions, Purpose};
+use flexcal::fit::{Options, Stop};
+use flexcal::measurement::Dataset;
+use flexcal::problem::{PoseRanges, Problem};
 use serde_json::{Value, json};
 
 use crate::common::arms::path;
@@ -149,4 +153,42 @@ fn a_plan_by_the_mean_variance_of_predictions_lowers_it() {
     let [by_mean, by_determinant] = ["I", "D"].map(rms);
     writeln!(told, "I {by_mean}, D {by_determinant}").unwrap();
     assert!(by_mean < by_determinant, "{told}");
+}
+
+#[test]
+fn a_choice_ends_when_it_is_interrupted() {
+    let folder = measured(20);
+    let problem = Problem::read(&folder.path("arm")).unwrap();
+    let (data, _) = Dataset::read(&problem).unwrap();
+    let candidates = Candidates::Within(PoseRanges::of(&problem).unwrap());
+    let chosen = |fit: Options| {
+        let options = NextOptions {
+            poses: 5,
+            purpose: Purpose::Accuracy,
+            tolerance: None,
+            level: 0.95,
+            seed: 1,
+            workspace: None,
+            explanations: None,
+            remainder: false,
+            fit,
+        };
+        design::next(&problem, &data, &candidates, &options).map(|next| next.poses.len())
+    };
+    assert_eq!(chosen(Options::default()).unwrap(), 5);
+    let stop = Stop::default();
+    stop.request();
+    assert!(chosen(Options::default().with_stop(stop)).unwrap_err().is_interrupted());
+}
+
+#[test]
+fn after_a_loop_poses_are_for_the_closed_problem() {
+    let folder = Folder::with_cases(&["problem.toml", "c-link-thermal-bending.csv"]);
+    folder.edit("problem.toml", "a-none.csv", "c-link-thermal-bending.csv");
+    let advice = || folder.flexcal("next .").success().words();
+    assert_contains(&advice(), &["Next: flexcal loop . looks for what the model lacks"]);
+    folder.flexcal("loop .").success();
+    let closed = "flexcal next out/lunar-sampler/problem.closed.toml";
+    assert_contains(&advice(), &[&format!("Next: {closed} chooses poses for the problem")]);
+    folder.flexcal(closed.strip_prefix("flexcal ").unwrap()).success();
 }

@@ -87,6 +87,7 @@ fn standard_parameters_describe_the_identified_arm() {
     assert!(said.contains("--format mdh --fitted-alone"), "{said}");
     let (alone, said) = export("mdh", "--fitted-alone");
     assert!(alone != modified && alone != best);
+    assert!(alone.contains("# Base and tool of this geometry") && alone.contains("tool.x = "));
     assert!(said.contains("Base and tool of this geometry"), "{said}");
     assert!(said.contains("tool.x = "), "{said}");
     assert!(!said.contains("Not the best"), "{said}");

@@ -19,7 +19,7 @@ use serde_json::Value;
 use crate::bench::{ARM, problem};
 use crate::common::arms::parse;
 use crate::common::made::{draw, model_of, normal};
-use crate::common::program::assert_contains;
+use crate::common::program::{Folder, assert_contains};
 use crate::common::reading::{assert_says, problem_error, read_table, table_error};
 
 /// Cameras on the hand, on the base and in the world, and markers on the hand, on a link and in the
@@ -489,4 +489,34 @@ fn plans_with_a_camera_hold_configurations_that_see_the_board() {
     // Where the camera is, nobody can plan without.
     let error = design::plan(&problem, &candidates, None, &options).map(|_| ()).unwrap_err();
     assert_contains(&error.to_string(), &["the place of the camera \"hand\" is not declared"]);
+}
+
+/// The ranges of poses need no true place of the camera, which first images show.
+#[test]
+fn the_command_plan_takes_ranges_by_themselves() {
+    let folder = Folder::new();
+    for name in ["problem.toml", "data.csv"] {
+        folder.copy(&format!("tests/observations/camera/{name}"), name);
+    }
+    let first: String = folder.read("data.csv").split_inclusive('\n').take(91).collect();
+    folder.write("first.csv", first);
+    let table = folder.table("data.csv");
+    let mut ranges = "[poses]\n".to_owned();
+    for joint in 1..=6 {
+        let angles = table.numbers(&format!("q{joint}_deg"));
+        let low = angles.iter().copied().fold(f64::INFINITY, f64::min);
+        let high = angles.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let _ = writeln!(ranges, "q{joint}_deg = [{low}, {high}]");
+    }
+    folder.write("ranges.toml", &ranges);
+    let plan = "plan . --truth ranges.toml --poses 8";
+    let run = folder.flexcal(&format!("{plan} --data first.csv"));
+    assert!(run.status < 2, "{run:?}");
+    assert_eq!(folder.table("out/camera-six/plan.csv").rows.len(), 8);
+    let refused = folder.flexcal(plan).code(2);
+    assert_contains(&refused.message(), &["the place of the camera \"hand\" is not declared"]);
+    // A file with other sections is a truth, whose values must be there.
+    folder.write("ranges.toml", format!("{ranges}[noise]\nposition_sigma_mm = 0.1\n"));
+    let refused = folder.flexcal(&format!("{plan} --data first.csv")).code(2);
+    assert_contains(&refused.message(), &["write its true value"]);
 }

@@ -132,9 +132,10 @@ fn every_format_states_the_same_verdict_statuses_and_findings() {
                 assert!(text.contains(&claim(found)), "{table}: {format} lacks {}", claim(found));
             }
         }
-        // A screen shows the first causes that act by themselves.
-        if let Some(first) = result.effects.iter().find(|found| !found.is_only_with_others()) {
-            assert!(formats[1].1.contains(&claim(first)), "{table}: {brief}");
+        // A screen shows every cause that acts by itself, with the line that declares it.
+        for found in result.effects.iter().filter(|found| !found.is_only_with_others()) {
+            assert!(formats[1].1.contains(&claim(found)), "{table}: {brief}");
+            assert!(formats[1].1.contains(&plain(&found.effect.declaration)), "{table}: {brief}");
         }
 
         // Tests of the residual, and findings of the checks of the fit.

@@ -46,6 +46,14 @@ fn poses(page: &Report) -> Vec<Value> {
 /// Checks the properties of every page and figure.
 fn check(page: &Report) {
     assert_eq!(badly_nested(&page.html), None);
+    // Names of regions differ, and no header cell is empty.
+    let labels = page.html.split(" role=\"region\" aria-label=\"").skip(1);
+    let mut labels: Vec<&str> = labels.map(|text| text.split('"').next().unwrap()).collect();
+    let count = labels.len();
+    labels.sort_unstable();
+    labels.dedup();
+    assert_eq!(labels.len(), count);
+    assert!(!page.html.contains("></th>"), "an empty header");
     let namespace = "http://www.w3.org/2000/svg";
     for (name, text) in page.figures.iter().chain([&("report.html".to_owned(), page.html.clone())])
     {

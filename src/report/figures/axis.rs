@@ -49,7 +49,8 @@ impl Axis {
         let first = (low / step - 1e-9).ceil();
         let values = (0..=64).map(|k| (first + f64::from(k)) * step);
         let ticks = values.take_while(|value| *value <= high + 1e-9 * (high - low));
-        let tick = |at: f64| (at, number(at, digits).replace('-', "−"));
+        let exponent = low.abs().max(high.abs()).log10().floor();
+        let tick = |at: f64| (at, linear_number(at, digits, (exponent, step)).replace('-', "−"));
         let ticks: Vec<_> = if count > 0 { ticks.map(tick).collect() } else { Vec::new() };
         Self::new((low, high), label, ticks)
     }
@@ -90,6 +91,20 @@ impl Axis {
         let ticks = ticks.into_iter().map(|(at, text)| Tick { at, text, colour: MUTED });
         Self { range, label: label.to_owned(), ticks: ticks.collect(), is_numeric: true }
     }
+}
+
+/// Largest exponent of the values of a linear axis whose ticks are written without a power of ten.
+const MAX_PLAIN_EXPONENT: f64 = 5.0;
+
+/// Returns a tick value of a linear axis as text with `digits` decimals. If the `exponent` of the
+/// largest value is above [`MAX_PLAIN_EXPONENT`], it is written with that power of ten: `2.5·10⁹`.
+fn linear_number(value: f64, digits: usize, (exponent, step): (f64, f64)) -> String {
+    if exponent <= MAX_PLAIN_EXPONENT || value == 0.0 {
+        return number(value, digits);
+    }
+    let mantissa_digits = clamped_integer((exponent - step.log10()).ceil());
+    let mantissa = number(value / 10.0_f64.powf(exponent), mantissa_digits);
+    format!("{mantissa}·{}", power_of_ten(exponent))
 }
 
 /// Returns 10^`exponent` × `step` as text: `0.05`, `30`, or `10⁻⁶`.
@@ -171,6 +186,11 @@ mod tests {
         assert_eq!(texts(&Axis::linear((-1.3, 1.3), "", 5)), "−1.0 −0.5 0.0 0.5 1.0");
         assert_eq!(texts(&Axis::logarithmic((-1.7, 0.7), "", 6)), "0.02 0.05 0.1 0.2 0.5 1 2 5");
         assert_eq!(texts(&Axis::logarithmic((-7.2, 0.0), "", 4)), "10⁻⁶ 0.0001 0.01 1");
+        assert_eq!(
+            texts(&Axis::linear((0.0, 1.1e10), "", 5)),
+            "0 0.2·10¹⁰ 0.4·10¹⁰ 0.6·10¹⁰ 0.8·10¹⁰ 1.0·10¹⁰"
+        );
+        assert_eq!(texts(&Axis::linear((0.0, 150_000.0), "", 2)), "0 50000 100000 150000");
         assert_eq!(texts(&Axis::bare((0.0, 1.0))), "");
     }
 }

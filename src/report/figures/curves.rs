@@ -51,6 +51,8 @@ pub struct Series<'a> {
     pub curves: Vec<Curve<'a>>,
     /// Names and ordinates of horizontal lines, such as a tolerance.
     pub levels: Vec<(String, f64)>,
+    /// True if the legend names the horizontal lines; otherwise their names are at the lines.
+    pub are_levels_in_legend: bool,
     /// Names and abscissas of vertical lines, for example the first row of each file.
     pub starts: Vec<(String, f64)>,
 }
@@ -101,7 +103,8 @@ impl Series<'_> {
             let level = up(*level);
             let shift = if is_below(level) { 9.0 } else { -8.0 };
             let line = Shape::line([(across.0, level), (across.1, level)], Paint::line(WARM, 1.2));
-            [line, named(text, (across.1, level), (-4.0, shift), Anchor::End)]
+            let name = named(text, (across.1, level), (-4.0, shift), Anchor::End);
+            [Some(line), (!self.are_levels_in_legend).then_some(name)].into_iter().flatten()
         });
         let starts = self.starts.iter().flat_map(|(text, start)| {
             let line = Shape::line([(*start, ends.0), (*start, ends.1)], Paint::line(FAINT, 1.0));
@@ -122,8 +125,10 @@ impl Series<'_> {
         });
         let panel = Panel::new(PANEL_HEIGHT, x, y).with(starts).with(levels).with(shapes);
         let mark = |curve: &Curve| if curve.is_joined { Mark::Line } else { Mark::Dot };
-        let legend: Vec<_> =
-            self.curves.iter().map(|curve| (curve.name, curve.colour, mark(curve))).collect();
+        let curves = self.curves.iter().map(|curve| (curve.name, curve.colour, mark(curve)));
+        let levels = self.levels.iter().filter(|_| self.are_levels_in_legend);
+        let levels = levels.map(|(name, _)| (name.as_str(), WARM, Mark::Line));
+        let legend: Vec<_> = curves.chain(levels).collect();
         let rows = self.curves.iter().flat_map(|curve| {
             let row = |at: &At| vec![curve.name.to_owned(), fixed(at.0, 6), fixed(at.1, 6)];
             curve.points.iter().map(row)

@@ -7,5 +7,5 @@ pub use super::svg::{
     ACCENT, Anchor, Colour, FAINT, GRID, INK, MUTED, Paint, TEXT_SIZE, WARM, text_width,
 };
 pub(super) use crate::numeric::range;
-pub(super) use crate::quantity::format::{decimals, fixed, mm, number, two_digits};
+pub(super) use crate::quantity::format::{decimals, fixed, number, two_digits};
 pub(super) use crate::results::{PlotData, PoseError, sample};

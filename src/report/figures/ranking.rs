@@ -1,5 +1,6 @@
 //! Figure of the ranking of candidate effects.
 
+use super::super::errors::unit;
 use super::prelude::*;
 use crate::laws::ArgumentKind;
 use crate::problem::Effect;
@@ -7,6 +8,9 @@ use crate::select::{Ranked, Trace};
 
 /// Maximum number of candidates that the figure shows.
 const MAX_CANDIDATES: usize = 12;
+/// Space for the gaps before and after the number of a bar, and for numbers that are wider than
+/// estimated, in displayed pixels.
+const NUMBERS_MARGIN: f64 = 24.0;
 /// Smallest p-value that is drawn at its value.
 const MIN_DRAWN_P: f64 = 1e-300;
 
@@ -39,12 +43,14 @@ pub fn ranking(trace: &Trace) -> Option<Drawing> {
     let evidence = |ranked: &Ranked| -ranked.p_value.max(MIN_DRAWN_P).log10();
     let highest = shown.iter().map(|ranked| evidence(ranked)).fold(1.0, f64::max).max(2.0 * level);
     let is_alike = |ranked: &Ranked| first.alike.iter().any(|(other, _)| *other == ranked.effect);
+    let errors = &trace.fit.fitted.identification;
     let gain = |k: usize, ranked: &Ranked| {
         let mark = if k > 0 && is_alike(ranked) { "≈ first, " } else { "" };
-        format!("{mark}{} mm", mm(ranked.gain.max(0.0), 4))
+        let (gain, symbol) = (errors.in_unit(ranked.gain.max(0.0)), unit(errors));
+        format!("{mark}{} {symbol}", number(gain, 4))
     };
     let widths = shown.iter().enumerate().map(|(k, ranked)| text_width(&gain(k, ranked)));
-    let numbers = 10.0 + widths.fold(0.0, f64::max);
+    let numbers = NUMBERS_MARGIN + widths.fold(0.0, f64::max);
     let names = shown.iter().map(|ranked| {
         let colour = if ranked.p_value < trace.level { INK } else { MUTED };
         (label(&ranked.effect, trace), colour)
@@ -73,9 +79,10 @@ pub fn ranking(trace: &Trace) -> Option<Drawing> {
     );
     let rows = shown.iter().map(|ranked| {
         let name = label(&ranked.effect, trace);
-        vec![name, format!("{:e}", ranked.p_value), fixed(ranked.gain * 1e3, 6)]
+        vec![name, format!("{:e}", ranked.p_value), fixed(errors.in_unit(ranked.gain), 6)]
     });
     let title = "Candidate effects by evidence";
-    let data = sheet(["effect", "p_value", "expected_gain_mm"], rows);
+    let gain = format!("expected_gain_{}", errors.unit().in_tables().suffix);
+    let data = sheet(["effect", "p_value", gain.as_str()], rows);
     Some(Drawing::new(("ranking", title), caption, chart(title, &[], &[panel]), data))
 }

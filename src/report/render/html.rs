@@ -1,6 +1,8 @@
 //! Rendering of blocks as one self-contained HTML page, and as a report with Markdown and with
 //! figures in separate files. Scripts of the page add interaction with poses.
 
+use std::fmt::Write as _;
+
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::markdown::markdown;
@@ -95,7 +97,21 @@ fn render_page<'a>(
             }
         }
     };
-    (printable(&page.into_string()), figures)
+    (numbered_tables(&printable(&page.into_string())), figures)
+}
+
+/// Beginning of the label of a table's scrolling region, before the region has its number.
+const TABLE_LABEL: &str = "table: ";
+
+/// Numbers the labels of the scrolling regions of a page's tables, so that no two are the same.
+fn numbered_tables(page: &str) -> String {
+    let attribute = format!("aria-label=\"{TABLE_LABEL}");
+    let mut parts = page.split(attribute.as_str());
+    let mut numbered = parts.next().unwrap_or_default().to_owned();
+    for (part, number) in parts.zip(1..) {
+        let _ = write!(numbered, "aria-label=\"table {number}: {part}");
+    }
+    numbered
 }
 
 /// Renders the blocks before the first heading, then a section for each heading.
@@ -233,9 +249,12 @@ fn table(table: &Table) -> Markup {
         }
         // Rows that continue the row above cannot be sorted.
         @let sorts = table.rows.len() > 3 && table.rows.iter().all(|row| row.first().is_some_and(|cell| !cell.is_empty()));
-        div.scroll tabindex="0" role="region" aria-label={ "table: " (table.header.iter().find(|head| !head.is_empty()).unwrap_or(&"")) } { table.sort[sorts].many[table.header.len() > MAX_ONE_LINE_COLUMNS] {
+        div.scroll tabindex="0" role="region" aria-label={ (TABLE_LABEL) (table.header.iter().find(|head| !head.is_empty()).unwrap_or(&"")) } { table.sort[sorts].many[table.header.len() > MAX_ONE_LINE_COLUMNS] {
             thead { tr {
-                @for (k, text) in table.header.iter().enumerate() { th class=[class(k)] { (text) } }
+                // An empty cell is no header.
+                @for (k, text) in table.header.iter().enumerate() {
+                    @if text.is_empty() { td class=[class(k)] {} } @else { th class=[class(k)] { (text) } }
+                }
                 @if let Some((title, _)) = bars { th.l.wide { (title) } }
             } }
             tbody {

@@ -15,6 +15,15 @@ use crate::quantity::format::fixed;
 /// If the problem names a column that marks held-out rows, that column marks every pose as
 /// identification.
 pub fn poses_csv(problem: &Problem, poses: &Measurements) -> String {
+    let columns = pose_columns(problem, poses);
+    let lines =
+        (0..poses.len()).map(|row| columns.iter().map(|(_, cells)| cells[row].clone()).collect());
+    csv(columns.iter().map(|(name, _)| name.clone()).collect(), lines)
+}
+
+/// Returns the names and cells of the columns of [`poses_csv`]; the first is `pose`, the number of
+/// the pose.
+pub(crate) fn pose_columns(problem: &Problem, poses: &Measurements) -> Vec<(String, Vec<String>)> {
     let (joints, session) = (commanded_joints(problem), sessions(poses));
     let split = match &problem.data.held_out {
         Some(HeldOut::Column(name)) => Some(name.clone()),
@@ -68,9 +77,7 @@ pub fn poses_csv(problem: &Problem, poses: &Measurements) -> String {
             (format!("approach{}", joint + 1), sides.collect())
         }));
     }
-    let lines =
-        (0..poses.len()).map(|row| columns.iter().map(|(_, cells)| cells[row].clone()).collect());
-    csv(columns.iter().map(|(name, _)| name.clone()).collect(), lines)
+    columns
 }
 
 /// Returns the declared 1 σ of each row \[mm\], empty for rows that measure no length; `None` if no
