@@ -248,7 +248,9 @@ impl Exchange {
     /// are updated for each pose that is removed or added, which costs far fewer operations than
     /// products with the whole covariance.
     fn sweep_updated(chosen: &mut [usize], mut greedy: Greedy, mut value: f64) {
-        chosen.iter().for_each(|&pose| greedy.take(pose));
+        for &pose in chosen.iter() {
+            greedy.take(pose);
+        }
         for index in 0..chosen.len() {
             greedy.give_back(chosen[index]);
             let without = greedy.value();
