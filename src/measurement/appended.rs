@@ -96,13 +96,6 @@ impl Table {
         Some((appended, *appended.places.get(index)?))
     }
 
-    /// Returns true if the first rows have numbers in the column with index `place`, or if that is
-    /// not known because the column is one of the joint table.
-    pub fn holds_numbers_below(&self, place: Option<usize>) -> bool {
-        let own = place.filter(|place| *place < self.columns_before());
-        own.is_none_or(|place| self.beginning.is_numeric(place))
-    }
-
     /// Returns the file of the appended columns of a joint table, and their names.
     pub fn appended_columns(&self) -> Option<(&Path, &[String])> {
         let appended = self.appended.as_ref()?;

@@ -1,5 +1,6 @@
 //! Look at the first rows of a table, before they are read.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use super::dialect::{HEADER_SEARCH_BYTES, Layout, cells};
@@ -49,13 +50,18 @@ impl Beginning {
         marks.peek().is_some() && marks.all(|mark| mark == Mark::Point)
     }
 
-    /// Returns true if the column with index `place` has cells, and none of them is a word.
-    pub fn is_numeric(&self, place: usize) -> bool {
-        let is_number = |cell: &String| cell.replace(',', ".").parse::<f64>().is_ok();
-        let rows = self.rows();
-        let column = rows.iter().filter_map(|row| row.get(place)).filter(|cell| !cell.is_empty());
-        let mut column = column.peekable();
-        column.peek().is_some() && column.all(is_number)
+    /// Returns the indices of the columns that hold words, not only numbers.
+    pub fn word_columns(&self) -> BTreeSet<usize> {
+        let is_word =
+            |cell: &String| !cell.is_empty() && cell.replace(',', ".").parse::<f64>().is_err();
+        let words_of = |row: Vec<String>| {
+            row.into_iter()
+                .enumerate()
+                .filter(|(_, cell)| is_word(cell))
+                .map(|(place, _)| place)
+                .collect::<Vec<_>>()
+        };
+        self.rows().into_iter().flat_map(words_of).collect()
     }
 }
 

@@ -221,10 +221,7 @@ impl Columns {
         unknown: &[&str],
     ) -> Result<(), InputError> {
         let near = |name: &str| nearest(name, unknown).map(|near| (*near).to_owned());
-        let numeric = unknown.iter().filter(|name| {
-            table.holds_numbers_below(self.names.iter().position(|known| known == *name))
-        });
-        let strangers = || numeric.clone().map(|name| (*name).to_owned()).collect();
+        let strangers = || self.of_numbers(unknown, table);
         let missing = |bases: &[&str], unit: Unit| {
             if let Some(error) =
                 bases.iter().find_map(|base| self.in_foreign_unit(table, base, unit))
@@ -405,6 +402,11 @@ impl Columns {
     pub fn place(&self, role: Role) -> Option<usize> {
         let index = self.read.binary_search_by_key(&role, |column| column.role).ok()?;
         self.read.get(index).map(|column| column.place)
+    }
+
+    /// Iterates over the names of all columns of the table in flexcal's vocabulary.
+    pub fn names(&self) -> impl Iterator<Item = &str> {
+        self.names.iter().map(String::as_str)
     }
 
     /// Returns flexcal's name of a column.

@@ -1,6 +1,8 @@
 //! Guesses what the columns of a table without the expected names are, for messages about missing
 //! columns.
 
+use std::collections::BTreeSet;
+
 use super::columns::Columns;
 use super::meaning::{Numbering, split_unit, unit_of};
 use super::role::{POSITION, Role};
@@ -43,6 +45,16 @@ fn guess(name: &str) -> Option<(String, Option<&'static str>)> {
 }
 
 impl Columns {
+    /// Returns the `unknown` columns without those of words, which are no joints and no positions.
+    pub fn of_numbers(&self, unknown: &[&str], table: &Table) -> Vec<String> {
+        let unknown: BTreeSet<&str> = unknown.iter().copied().collect();
+        let words = table.beginning.word_columns();
+        let is_chosen =
+            |(place, name): &(usize, &str)| unknown.contains(name) && !words.contains(place);
+        let names = self.names().enumerate().filter(is_chosen);
+        names.map(|(_, name)| name.to_owned()).collect()
+    }
+
     /// Returns the error that names all missing columns at once, with the map of the `unknown`
     /// columns that are probably meant; or that joints are counted from 2. `None` if one column is
     /// missing, or a missing column of joints or positions is not among the unknown ones.
