@@ -47,9 +47,10 @@ impl Table {
         // Commands have the decimal commas of their targets, and then semicolons.
         let has_semicolons = text.lines().next().is_some_and(|header| header.contains(';'));
         let cells = |line: &str| -> Vec<String> {
-            match has_semicolons {
-                true => line.split(';').map(|cell| cell.replace(',', ".")).collect(),
-                false => line.split(',').map(str::to_owned).collect(),
+            if has_semicolons {
+                line.split(';').map(|cell| cell.replace(',', ".")).collect()
+            } else {
+                line.split(',').map(str::to_owned).collect()
             }
         };
         let mut lines = text.lines();
