@@ -43,7 +43,8 @@ fn two_tables() -> Folder {
     );
     folder.write("sub/empty", "");
     folder.map("problem.toml", |text| {
-        let joints: String = (1..=4).map(|k| format!("A{k} = 'q{k}_deg'\n")).collect();
+        let joints: Vec<String> = (1..=4).map(|k| format!("A{k} = 'q{k}_deg'\n")).collect();
+        let joints = joints.concat();
         format!(
             "{text}[data.columns]\nName = 'pose'\nStamp = 'time'\n{joints}[data.format]\ndecimal = ','\n"
         )

@@ -14,9 +14,9 @@ fn a_held_parameter_that_causes_the_misfit_is_named() {
     assert!(!found.has(FindingCode::HeldParameter), "{:?}", found.findings);
 
     let holding = |names: &[&str]| {
-        let held: String =
+        let held: Vec<String> =
             names.iter().map(|name| format!("\n'{name}' = {{ fixed = true }}")).collect();
-        fit_as_command(&parse(&text(&format!("{PRIORS}{held}"))), &data)
+        fit_as_command(&parse(&text(&format!("{PRIORS}{}", held.concat()))), &data)
     };
     let held = holding(&["joint3.alpha"]);
     let finding = held.finding(FindingCode::HeldParameter);

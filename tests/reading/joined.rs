@@ -118,7 +118,8 @@ fn a_column_of_the_joint_table_is_missed_in_its_name() {
 
 #[test]
 fn few_names_in_another_spelling_are_hinted_at() {
-    let log: String = (1..=8).map(|k| format!("P0{k};{k},5;1\n")).collect();
+    let log: Vec<String> = (1..=8).map(|k| format!("P0{k};{k},5;1\n")).collect();
+    let log = log.concat();
     let tracker = |name: fn(usize) -> String| {
         let rows = (1..=8).map(|k| format!("{}, {k}.5, 2.25, 3\n", name(k)));
         format!("Point, X, Y, Z\n{}", rows.collect::<String>())
