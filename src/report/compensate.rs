@@ -7,7 +7,7 @@ use super::remainder::bound_sentence;
 use super::render::text;
 use crate::fit::Command;
 use crate::measurement::Measurements;
-use crate::problem::{Fixture, FixtureKind, Problem};
+use crate::problem::Problem;
 use crate::quantity::format::{mm, number};
 use crate::remainder::Bounds;
 use crate::results::CompensationResult;
@@ -45,14 +45,7 @@ pub fn commands_text(
     if let Some(bounds) = bounds.filter(|_| result.reached > 0) {
         let _ = write!(words, ".\n{}", bound_sentence(bounds, None));
     } else if result.reached > 0 {
-        let is_camera =
-            |fixture: &Fixture| matches!(fixture.kind, FixtureKind::Camera | FixtureKind::Fisheye);
-        let has_camera = problem.fixtures.iter().any(is_camera);
-        words += ".\nThe expected error of the commands is not known, because the estimate states no uncertainty of positions";
-        if problem.data.position_sigma.is_none() && !has_camera {
-            words += ": declare position_sigma_mm in [data] and identify again";
-        }
-        words.push('.');
+        words += ".\nThe expected error of the commands is not known, because the estimate states no uncertainty of positions.";
     }
     let point = |command: &Command| {
         let (place, miss) = (targets.location(command.row), command.miss.norm());

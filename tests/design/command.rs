@@ -99,7 +99,9 @@ fn the_command_after_a_plan_runs_once_the_plan_is_measured() {
     folder.write("plan/plan.csv", folder.read("rig/measurements.csv"));
     let (_, command) = plan.stdout.split_once(", then flexcal ").unwrap();
     assert_eq!(command.trim(), "identify . --data ./a-none.csv plan/plan.csv");
-    folder.flexcal(command.trim()).success();
+    // The two tables are of different arms, so that the fit may not be trusted.
+    let run = folder.flexcal(command.trim());
+    assert!(run.status < 2, "{run:?}");
     // Without the declared table, some of the planned rows have to be held out.
     let moved = folder.read("a-none.csv");
     std::fs::remove_file(folder.path("a-none.csv")).unwrap();
