@@ -108,10 +108,12 @@ fn sections(root: &mut Section<'_, '_>, problem: &Problem) -> Result<Truth, Inpu
     }?;
     check_fixtures(root, problem, &parameters, &random)?;
     let segments = root.section("rig")?.map_or(Ok(SEGMENTS), segments)?;
-    let section =
-        root.section("poses")?.ok_or_else(|| root.missing("poses", example(&problem.joints)))?;
     let Poses { ranges: poses, time_step, held_out, positions, tilts } =
-        ranges::read(section, problem)?;
+        match root.section("poses")? {
+            Some(section) => ranges::read(section, problem)?,
+            None => ranges::within_limits(problem)
+                .ok_or_else(|| root.missing("poses", example(&problem.joints)))?,
+        };
     let effects = strengths::read(root, problem, &poses)?;
     Ok(Truth {
         parameters,
