@@ -17,7 +17,7 @@ from importlib.metadata import PackageNotFoundError, version
 
 from ._applied import Compensation, Export
 from ._designs import Check, Next, Plan, Simulation, Study
-from ._fits import ClosedLoop, Comparison, Identification, Trace
+from ._fits import ClosedLoop, Comparison, HeldOutError, Identification, Trace
 from ._fleet import fleet
 from ._forward import Prediction
 from ._least_squares import LeastSquares
@@ -37,6 +37,7 @@ __all__ = [
     "Compensation",
     "Export",
     "FlexcalWarning",
+    "HeldOutError",
     "Identification",
     "InputError",
     "LeastSquares",

@@ -48,11 +48,12 @@ class Export(Result):
 
     @once
     def errors(self) -> pd.DataFrame:
-        """Errors on the held-out rows [mm]: of the ``whole`` model, of the ``rigid`` geometry that the file holds, and of those that it
+        """Errors on the held-out rows, or on the fitted rows if none is held out (column ``rows``) [mm]: of the ``whole`` model, of the ``rigid`` geometry that the file holds, and of those that it
         could hold instead (``identified``, ``best_rigid``, ``fitted_alone``), unless they are the same."""
         import pandas as pd
 
-        return pd.DataFrame([error_row(arm, own) for arm, own in self._document["held_out"].items()]).set_index("arm")
+        rows = "held_out" if self._document["held_out"] is not None else "fitted"
+        return pd.DataFrame([error_row(arm, own) | {"rows": rows} for arm, own in self._document[rows].items()]).set_index("arm")
 
     @property
     def not_held(self) -> list[str]:

@@ -23,8 +23,10 @@ class Simulation(Result):
 
     @once
     def measurements(self) -> pd.DataFrame:
-        """The table of measurements: data for every call of a :class:`Problem`."""
-        return table(self._core.csv())
+        """The table of measurements: data for every call of a :class:`Problem`. It has no column ``split`` where the problem chooses
+        the held-out rows otherwise than by a column (docs/problem.md)."""
+        measured, unused = table(self._core.csv()), self._core.unused_split
+        return measured if unused is None else measured.drop(columns=unused)
 
     @once
     def truth(self) -> pd.DataFrame:
@@ -39,8 +41,8 @@ class Simulation(Result):
     def summary(self) -> str:
         """The number of poses, and the true effects."""
         names = [str(effect.get("effect", effect)) for effect in self.effects] or ["none"]
-        held_out = self._document["held_out"]
-        return f"{self._document['poses']} poses, {held_out} of them held out; true effects: {', '.join(names)}"
+        held_out = f", {self._document['held_out']} of them held out" if self._core.unused_split is None else ""
+        return f"{self._document['poses']} poses{held_out}; true effects: {', '.join(names)}"
 
     def _repr_html_(self) -> str:
         return _html.words(self.summary())

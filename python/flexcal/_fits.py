@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import json
+import os
+import re
 from collections.abc import Sequence
-from functools import lru_cache
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
 from . import _html, _plots
 from ._applied import Compensation, Export
-from ._forward import _Bounded, Forward, Prediction
+from ._forward import _Bounded, Forward, Levels, Prediction
 from ._frames import compared_frame, effects_frame, errors_frame, parameters_frame, residuals_frame
-from ._restored import Restored, Spec, said
+from ._restored import Prior, Restored, Spec, said
 from ._result import Array, Result, once
-from ._tables import Data, Path, region, source, warn
+from ._tables import Data, Path, asked, region, source, warn
+from .errors import InputError
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -23,6 +25,21 @@ if TYPE_CHECKING:
 
     from . import _core
     from ._problem import Problem
+
+
+class HeldOutError(NamedTuple):
+    """Distances between measured and predicted positions of the rows that judge a fit."""
+
+    rows: str
+    """``"held_out"``, or ``"left_out"`` where no row is held out: all rows, each configuration predicted by a fit without it."""
+    n: int
+    """Number of rows."""
+    mean_mm: float
+    """Mean distance [mm]."""
+    rms_mm: float
+    """Root mean square of the distances [mm]."""
+    max_mm: float
+    """Largest distance [mm]."""
 
 
 class Fit(Result):
@@ -96,8 +113,23 @@ class Fit(Result):
 
     @once
     def errors(self) -> pd.DataFrame:
-        """Errors before and after, on the rows fitted and on those held out [mm]: mean, root mean square and largest distance."""
+        """Errors before and after [mm], by ``arm`` and ``rows``: ``n``, ``mean_mm``, ``rms_mm`` and ``max_mm``.
+
+        ``arm`` is ``"registered"`` (the nominal arm, with free base and target fitted) or ``"identified"``; after a loop ``"declared"``
+        and ``"closed"`` instead of the latter. ``rows`` is ``"identification"`` or ``"held_out"``; without held-out rows
+        ``"left_out"``: all rows, each configuration predicted by a fit without it. :attr:`held_out_error` is the last row by itself.
+        """
         return errors_frame(self._document)
+
+    @property
+    def held_out_error(self) -> HeldOutError:
+        """Error of the arm on the rows that judge the fit: those held out, or without such rows those left out in turn.
+
+        >>> result.held_out_error.mean_mm
+        """
+        frame = self.errors
+        rows, last = str(frame.index[-1][1]), frame.iloc[-1]
+        return HeldOutError(rows, int(last["n"]), *(float(last[name]) for name in ("mean_mm", "rms_mm", "max_mm")))
 
     @property
     def trusted(self) -> bool:
@@ -111,7 +143,8 @@ class Fit(Result):
 
     @property
     def cautions(self) -> list[str]:
-        """What to ask about the input."""
+        """What to look at although the fit may be trusted: the texts of all findings of severity ``"warning"``, each of which was
+        also a :class:`FlexcalWarning`. (``cautions`` of the JSON lack those for which reports have a section of their own.)"""
         return self._fit.cautions
 
     @property
@@ -179,7 +212,6 @@ class Identification(Fit, Forward):
         poses, shape = self._poses((q, q_rad, q_deg), columns)
         positions = np.frombuffer(self._forward.predict(poses), dtype=np.float64).reshape(-1, 3)
 
-        @lru_cache(maxsize=4)
         def bounded(level: float) -> _Bounded | None:
             parts = self._core.predict_bounded(poses, level)
             if parts is None:
@@ -188,7 +220,7 @@ class Identification(Fit, Forward):
             all_poses = _Bounded(covariance.reshape(-1, 3, 3), bound, extrapolated > 0.5)
             return _Bounded(*(part[0] for part in all_poses)) if shape.single else all_poses
 
-        return Prediction._of(positions[0] if shape.single else positions, bounded)
+        return Prediction._of(positions[0] if shape.single else positions, Levels(bounded))
 
     @property
     def remainder(self) -> dict[str, Any] | None:
@@ -205,6 +237,8 @@ class Identification(Fit, Forward):
     def watch(self, data: Data, *, drift_days: float = 0.0, false_alarms: float = 0.01) -> dict[str, Any]:
         """Tests new rows, in their order, for a change of the arm since this identification (docs/life.md).
 
+        Ask ``changed`` first: the probabilities of ``causes`` are those of each cause given that something has changed.
+
         Parameters
         ----------
         data
@@ -216,7 +250,8 @@ class Identification(Fit, Forward):
 
         Returns
         -------
-        ``watch.json`` of the command line: ``changed``, and ``causes`` with their probabilities and sizes.
+        ``watch.json`` of the command line as a dict: ``changed``; ``causes``, a dict each with ``parameter`` or what else changed, its
+        ``probability`` if anything has changed, and its size (docs/schema/watch.schema.json lists every key).
 
         Raises
         ------
@@ -236,9 +271,11 @@ class Identification(Fit, Forward):
         ----------
         targets
             A table like measurements: ``x_mm``, ``y_mm``, ``z_mm`` are where the arm should be, ``q1_deg`` … where to start from. Without
-            positions the arm is brought to where the nominal arm would have been; with an orientation that is kept too.
+            positions the arm is brought to where the nominal arm would have been; with an orientation that is kept too. Of the
+            configurations that reach a target the nearest to the start is taken: a start far from its target, of which a
+            :class:`FlexcalWarning` tells, may lead to another one than is meant.
         frame
-            Frame of the targets: the ``"measuring"`` frame, or that of the arm's ``"base"``.
+            Frame of the targets: the ``"measuring"`` frame, or that of the arm's ``"base"`` as it was identified.
         level
             Probability with which the bound of an error holds.
 
@@ -247,7 +284,18 @@ class Identification(Fit, Forward):
         InputError
             A mistake in the targets; a session or target of which nothing is known.
         """
-        core = self._core.compensate(source(targets), frame, level)
+        joints = self._problem.joints
+        try:
+            core = asked(lambda given: self._core.compensate(given, frame, level), source(targets, joints))
+        except InputError as error:
+            column = (error.key or "").removeprefix("column ")
+            if "missing" not in str(error) or not (re.fullmatch(r"q\d+", column) or column in joints):
+                raise
+            message = (
+                f"{error}; targets need a configuration to start from as well, in columns such as q1_deg: of the configurations that reach "
+                "a target the nearest to it is taken"
+            )
+            raise InputError(message, file=error.file, line=error.line, key=error.key) from None
         warn(core.warnings, stacklevel=2)
         return Compensation(core)
 
@@ -359,6 +407,17 @@ class ClosedLoop(Fit):
         return _html.closed_loop(self)
 
 
+def estimate(arm: Path | Identification | ClosedLoop, name: str) -> Prior:
+    """What the extension module takes as an estimate: a file, or the name and the text of one in memory."""
+    if isinstance(arm, ClosedLoop):
+        return name, arm.after.to_json()
+    if isinstance(arm, Identification):
+        return name, arm.to_json()
+    if not isinstance(arm, (str, os.PathLike)):
+        raise TypeError(f"an identification, a loop or the path of an estimate.json is needed, not {type(arm).__name__}")
+    return os.fspath(arm)
+
+
 class Trace(Result):
     """Which effects the residual of a fit points to."""
 
@@ -420,8 +479,8 @@ class Comparison(Fit):
 
     @once
     def fits(self) -> pd.DataFrame:
-        """The fits, a row each: ``strategy``, ``solver``, mean error on the rows fitted and held out [mm], ``iterations``,
-        ``evaluations``, ``seconds``, ``termination``, ``trusted``, ``reduced_chi2``, ``condition_number``."""
+        """The fits, a row each: ``strategy``, ``solver``, mean error on the rows fitted and held out [mm] (``identification_mean_mm``,
+        ``held_out_mean_mm``; ``left_out_mean_mm`` where no row is held out), ``iterations``, ``evaluations``, ``seconds``, ``termination``, ``trusted``, ``reduced_chi2``, ``condition_number``."""
         return compared_frame(self._document["rows"])
 
     @once
@@ -433,7 +492,8 @@ class Comparison(Fit):
     def errors(self) -> pd.DataFrame:
         """Errors of the nominal arm and of the joint fit [mm]; see :attr:`Identification.errors`."""
         joint = json.loads(self._fit.json())
-        return errors_frame({"registered": self._document["registered"]} | {part: joint[part] for part in ("identification", "held_out")})
+        parts = ("identification", "held_out", "left_out")
+        return errors_frame({"registered": self._document["registered"]} | {part: joint[part] for part in parts if part in joint})
 
     def _repr_html_(self) -> str:
         return _html.words(self.summary())

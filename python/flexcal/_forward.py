@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, NamedTuple, Protocol
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 from . import _core
-from ._tables import configurations, Shape, warn
+from ._tables import asked, configurations, Shape, warn
 
 Array = npt.NDArray[np.float64]
+T = TypeVar("T")
 
 
 class _Bounded(NamedTuple):
@@ -20,6 +21,47 @@ class _Bounded(NamedTuple):
     covariance: Array
     bound: Any
     extrapolated: Any
+
+
+class NoUncertaintyError(AttributeError, ValueError):
+    """A prediction of which no uncertainty is known."""
+
+
+class Levels:
+    """Uncertainty of predictions by the level of their bound; the values are read-only."""
+
+    def __init__(self, compute: Callable[[float], _Bounded | None], known: dict[float, _Bounded | None] | None = None) -> None:
+        self._compute = compute
+        self._known = {} if known is None else known
+
+    def __call__(self, level: float) -> _Bounded | None:
+        if level not in self._known:
+            found = self._compute(level)
+            self._known[level] = None if found is None else _Bounded(*(_frozen(values) for values in found))
+        return self._known[level]
+
+    def levels(self) -> list[float]:
+        """Levels to keep in a pickle: 95 %, and those that were read."""
+        return sorted({0.95, *self._known})
+
+
+def _frozen(values: T) -> T:
+    if isinstance(values, np.ndarray):
+        values.flags.writeable = False
+    return values
+
+
+def _prediction(positions: Array, kept: dict[float, _Bounded | None] | None) -> Prediction:
+    """A prediction from its pickle."""
+
+    def lost(level: float) -> _Bounded | None:
+        shown = ", ".join(f"{level:g}" for level in known)
+        raise ValueError(f"level: a pickled prediction keeps the bounds of the levels {shown} alone; predict again for {level:g}")
+
+    if kept is None:
+        return Prediction._of(positions, None)
+    known = {level: None if found is None else _Bounded(*map(_frozen, found)) for level, found in kept.items()}
+    return Prediction._of(positions, Levels(lost, known))
 
 
 class _Predicts(Protocol):
@@ -32,10 +74,14 @@ class Prediction(np.ndarray[Any, np.dtype[np.float64]]):
     """Predicted positions, an array of shape (poses, 3) or (3,), measuring frame [m], with their uncertainty.
 
     The uncertainty is that of measured − predicted: of the parameters, of the remainder, of the noise of a measurement, and of
-    what the model is known to miss. It is computed when it is first read. Arrays computed from a prediction are plain arrays.
+    what the model is known to miss. It is computed when it is first read. Prediction and uncertainty are read-only.
+
+    Selected poses (``p[0]``, ``p[:3]``, ``p[mask]``), pickles and copies by the module ``copy`` keep their uncertainty; a pickle keeps
+    the bounds of 95 % and of the levels that were read before. Coordinates (``p[:, 0]``), ``p.copy()`` and arrays computed from a
+    prediction are plain arrays.
     """
 
-    _bounded: Callable[[float], _Bounded | None] | None
+    _bounded: Levels | None
 
     def __array_finalize__(self, source: Any) -> None:
         self._bounded = None
@@ -44,17 +90,50 @@ class Prediction(np.ndarray[Any, np.dtype[np.float64]]):
         return array[()] if return_scalar else np.asarray(array)
 
     @classmethod
-    def _of(cls, positions: Array, bounded: Callable[[float], _Bounded | None]) -> Prediction:
+    def _of(cls, positions: Array, bounded: Levels | None) -> Prediction:
         prediction = positions.view(cls)
         prediction._bounded = bounded
+        prediction.flags.writeable = False
         return prediction
+
+    def __getitem__(self, key: Any) -> Any:
+        part = np.asarray(self)[key]
+        bounded = self._bounded
+        # Only keys along the poses select whole positions.
+        of_poses = isinstance(key, slice) or not isinstance(key, tuple) and np.ndim(key) <= 1
+        if bounded is None or self.ndim != 2 or not of_poses or part.ndim > 2:
+            return part
+
+        def selected(level: float) -> _Bounded | None:
+            whole = bounded(level)
+            return None if whole is None else _Bounded(*(values[key] for values in whole))
+
+        return Prediction._of(part, Levels(selected))
+
+    def __iter__(self) -> Iterator[Any]:
+        return (self[place] for place in range(len(self)))
+
+    def copy(self, order: Any = "C") -> Array:  # type: ignore[override]
+        """The positions as a plain array that can be changed."""
+        return np.array(self, order=order, subok=False)
+
+    def __copy__(self) -> Prediction:
+        return Prediction._of(np.array(self, subok=False), self._bounded)
+
+    def __deepcopy__(self, memo: dict[int, Any] | None = None) -> Prediction:
+        return self.__copy__()
+
+    def __reduce__(self) -> tuple[object, ...]:
+        bounded = self._bounded
+        kept = None if bounded is None else {level: bounded(level) for level in bounded.levels()}
+        return _prediction, (np.array(self, subok=False), kept)
 
     def _uncertainty(self, level: float = 0.95) -> _Bounded:
         if self._bounded is None:
-            raise ValueError("a part or a copy of a prediction has no uncertainty; read it from the prediction itself")
+            raise NoUncertaintyError("arrays computed from a prediction have no uncertainty; read it from the prediction itself")
         bounded = self._bounded(level)
         if bounded is None:
-            raise ValueError(
+            raise NoUncertaintyError(
                 "the rows fitted give no bounds of predictions: fewer than ten configurations, or rows that measure no position"
             )
         return bounded
@@ -67,7 +146,7 @@ class Prediction(np.ndarray[Any, np.dtype[np.float64]]):
     @property
     def sigma(self) -> Array:
         """1 σ of measured − predicted along each axis, shape (poses, 3) or (3,), measuring frame [m]."""
-        return np.sqrt(np.diagonal(self.covariance, axis1=-2, axis2=-1))
+        return _frozen(np.sqrt(np.diagonal(self.covariance, axis1=-2, axis2=-1)))
 
     @property
     def bound95(self) -> Any:
@@ -100,7 +179,8 @@ class Forward:
             ``q_rad``.
         q_rad, q_deg
             Configurations instead, shape (poses, joints) or (joints,), [rad] or [°], of joints that slide [m]; joints are those that
-            move, or all. Or a table of poses whose columns bear the names of the joints, without a unit.
+            move, or all. Or a table of poses whose columns bear the names of the joints, without a unit; or a Series with these names,
+            one configuration.
         columns
             What else is known of the poses, by the names of columns: ``payload_kg``, ``hoist_N``, ``temperature_C``, ``time_s``,
             ``session``, ``target``, ``approach`` …; one value a pose, or one for all.
@@ -145,8 +225,7 @@ class Forward:
         if name == "q_deg":
             units = ["deg" if unit == "rad" else unit for unit in units]
         # The name of the argument states the unit of columns that bear the names of joints alone.
-        joints = () if name == "q" else self._reader.joints
-        source, shape = configurations(q, units, columns, joints)
-        poses = self._reader.poses(source)
+        source, shape = configurations(name, q, units, columns, self._reader.joints)
+        poses = asked(self._reader.poses, source)
         warn(poses.warnings, stacklevel=3)
         return poses, shape

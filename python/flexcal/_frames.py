@@ -23,18 +23,24 @@ def parameters_frame(entries: list[dict[str, Any]]) -> pd.DataFrame:
     return pd.DataFrame(entries).set_index("name").astype(dict.fromkeys(numbers, np.float64))
 
 
+def judging(parts: dict[str, Any]) -> str:
+    """The rows that judge a fit: those held out, or without such rows those left out in turn."""
+    return "left_out" if parts.get("held_out") is None and "left_out" in parts else "held_out"
+
+
 def compared_frame(entries: list[dict[str, Any]], *first: str) -> pd.DataFrame:
     import pandas as pd
 
     names = [*first, "strategy", "solver"]
+    parts = ("identification", judging(entries[0]) if entries else "held_out")
     rest = ["iterations", "evaluations", "seconds", "termination", "trusted", "reduced_chi2", "condition_number"]
     rows = [
         [entry[name] for name in names]
-        + [entry[part]["mean_mm"]["norm"] for part in ("identification", "held_out")]
+        + [_norm(entry[part], "mean_mm") for part in parts]
         + [entry[name] for name in rest]
         for entry in entries
     ]
-    return pd.DataFrame(rows, columns=[*names, "identification_mean_mm", "held_out_mean_mm", *rest])
+    return pd.DataFrame(rows, columns=[*names, *(f"{part}_mean_mm" for part in parts), *rest])
 
 
 def residuals_frame(columns: dict[str, bytearray | tuple[bytearray, list[str]]]) -> pd.DataFrame:
@@ -63,13 +69,18 @@ def errors_frame(document: dict[str, Any]) -> pd.DataFrame:
         stages["identified"] = document
     rows = []
     for stage, parts in stages.items():
-        for part in ("identification", "held_out"):
+        for part in ("identification", judging(parts)):
             rows.append(error_row(stage, parts[part]) | {"rows": part})
     return pd.DataFrame(rows).set_index(["arm", "rows"])
 
 
 def error_row(arm: str, own: dict[str, Any]) -> dict[str, Any]:
-    return {"arm": arm, "n": own["n"]} | {of: own[of]["norm"] for of in ("mean_mm", "rms_mm", "max_mm")}
+    return {"arm": arm, "n": own["n"]} | {of: _norm(own, of) for of in ("mean_mm", "rms_mm", "max_mm")}
+
+
+def _norm(errors: dict[str, Any], statistic: str) -> float:
+    """A statistic of the lengths of errors; NaN where rows measure no lengths."""
+    return float((errors.get(statistic) or {}).get("norm", np.nan))
 
 
 def effects_frame(entries: list[dict[str, Any]]) -> pd.DataFrame:

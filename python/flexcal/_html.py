@@ -6,6 +6,8 @@ import base64
 from html import escape
 from typing import TYPE_CHECKING, Any
 
+from ._frames import judging
+
 if TYPE_CHECKING:
     from ._fits import ClosedLoop, Identification, Trace
 
@@ -15,7 +17,7 @@ def identification(result: Identification) -> str:
     document = result.to_dict()
     facts = _facts(document["reduced_chi2"], f"{len(result.parameters)} parameters", document["strategy"], document["solver"])
     return _card(
-        _headline(result.problem.title, document["registered"]["held_out"], document["held_out"], facts),
+        _headline(result.problem.title, document["registered"], document, facts),
         _note(result.why_not_trusted),
         _figure(result.figures, "held-out-errors"),
         _folded("parameters", result.parameters),
@@ -31,7 +33,7 @@ def closed_loop(result: ClosedLoop) -> str:
         found.append(f"structure without a known law at {escape(str(result.unexplained['where']))}")
     main = "effect-1" if "effect-1" in result.figures else "held-out-errors"
     return _card(
-        _headline(result.problem.title, document["before"]["held_out"], document["after"]["held_out"], facts),
+        _headline(result.problem.title, document["before"], document["after"], facts),
         _note(result.why_not_trusted),
         _list(found) if found else "<p>No effect was found.</p>",
         _figure(result.figures, main),
@@ -52,13 +54,14 @@ def trace(result: Trace) -> str:
     """Of a trace."""
     document = result.to_dict()
     facts = _facts(document["reduced_chi2"], f"{document['tried']} candidates tried")
-    mean = _mm(document["held_out"])
+    rows = judging(document)
+    mean = _mm(document[rows])
     ranked = [
         f"{escape(entry['description'])}: p {_probability(entry['p_value'])}, takes {_gain(entry)} off the rms error"
         for entry in document["ranking"][:5]
     ]
     return _card(
-        f"<p><b>{escape(result.fit.problem.title)}</b><br>mean error of the held-out poses {mean}{facts}</p>",
+        f"<p><b>{escape(result.fit.problem.title)}</b><br>mean error of the {rows.replace('_', '-')} poses {mean}{facts}</p>",
         _list(ranked),
         _folded("parameters", result.parameters),
     )
@@ -74,8 +77,9 @@ def _card(*parts: str) -> str:
 
 
 def _headline(title: str, before: dict[str, Any], after: dict[str, Any], facts: str) -> str:
-    change = f'<span style="font-size: 1.6em">{_mm(before)} → <b>{_mm(after)}</b></span>'
-    return f"<p><b>{escape(title)}</b><br>{change}<br>mean error of {after['n']} held-out poses{facts}</p>"
+    rows = judging(after)
+    change = f'<span style="font-size: 1.6em">{_mm(before[rows])} → <b>{_mm(after[rows])}</b></span>'
+    return f"<p><b>{escape(title)}</b><br>{change}<br>mean error of {after[rows]['n']} {rows.replace('_', '-')} poses{facts}</p>"
 
 
 def _facts(chi2: float | None, *facts: str) -> str:
@@ -84,7 +88,7 @@ def _facts(chi2: float | None, *facts: str) -> str:
 
 
 def _mm(errors: dict[str, Any]) -> str:
-    mean = errors["mean_mm"]["norm"]
+    mean = (errors.get("mean_mm") or {}).get("norm")
     return "–" if mean is None else f"{mean:.4f} mm"
 
 

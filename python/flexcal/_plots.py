@@ -60,5 +60,5 @@ def _axes(axes: Axes | None, size: tuple[float, float]) -> Axes:
     try:
         from matplotlib import pyplot
     except ImportError as error:
-        raise ImportError("plots need matplotlib: pip install matplotlib") from error
+        raise ImportError("plots need matplotlib: pip install matplotlib, or flexcal[plots] with its dependency") from error
     return pyplot.subplots(figsize=size, layout="constrained")[1]

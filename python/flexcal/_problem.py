@@ -12,12 +12,12 @@ import numpy.typing as npt
 
 from . import _core
 from ._designs import Check, Next, Plan, Simulation, Study
-from ._fits import ClosedLoop, Comparison, Identification, Trace
+from ._fits import ClosedLoop, Comparison, Identification, Trace, estimate
 from ._forward import Forward
 from ._least_squares import LeastSquares
 from ._progress import Told, told
-from ._restored import Prior, Spec
-from ._tables import Data, Path, Source, count, region, source, warn
+from ._restored import Spec
+from ._tables import Data, Path, Source, asked, count, region, source, warn
 from .errors import InputError
 
 Strategy: TypeAlias = Literal["joint", "sequential", "sequential-one-sweep", "geometry-only", "stiffness-only", "rigid"]
@@ -39,13 +39,6 @@ MOST_POSES = 10_000
 MOST_SEED = 2**64 - 1
 MOST_SIMULATED = 1_000_000
 """Poses that a simulation takes at most, as on the command line."""
-
-def _prior(prior: Path | Identification | None) -> Prior | None:
-    """What the extension module takes as prior: a file, or the name and the text of an estimate."""
-    if isinstance(prior, Identification):
-        return ("estimate.json", prior.to_json())
-    return None if prior is None else os.fspath(prior)
-
 
 TEXT = "<text>"
 """What messages call a problem in memory."""
@@ -95,6 +88,10 @@ class Problem(Forward):
         InputError
             The first mistake in the URDF, with its line; a link that it lacks; several leaves to choose from.
         """
+        text = os.fspath(path)
+        if "\n" in text or text.lstrip().startswith("<"):
+            start = text.strip().partition("\n")[0][:40]
+            raise InputError(f"path: the path of a URDF is needed, not its text ({start} …); write the text to a file first", key="path")
         problem = cls.__new__(cls)
         problem._hold(_core.Problem.from_urdf(path, base, tip, TEXT))
         return problem
@@ -131,6 +128,11 @@ class Problem(Forward):
         return list(self._core.files)
 
     @property
+    def joints(self) -> list[str]:
+        """Names of the joints, from the base outwards, fixed ones as well."""
+        return self._core.joints
+
+    @property
     def units(self) -> list[Literal["rad", "m"] | None]:
         """Unit of each joint's command, from the base outwards; None at fixed joints."""
         return self._core.units
@@ -148,7 +150,7 @@ class Problem(Forward):
         solver: Solver = "auto",
         *,
         remainder: bool = False,
-        prior: Path | Identification | None = None,
+        prior: Path | Identification | ClosedLoop | None = None,
         drift_days: float = 0.0,
         progress: Told = False,
     ) -> Identification:
@@ -167,7 +169,7 @@ class Problem(Forward):
             Correct predictions by what no law explains, if poses left out gain by it (docs/accuracy.md). A remainder that the
             problem declares corrects them anyway.
         prior
-            Earlier identification of the same arm, or its ``estimate.json``: its posterior is the prior, and rows that were fitted
+            Earlier identification of the same arm (of a loop its last fit), or its ``estimate.json``: its posterior is the prior, and rows that were fitted
             there are left out; or the ``PRIOR.toml`` of :func:`flexcal.fleet` (docs/life.md).
         drift_days
             Days since the earlier identification, by whose drift the prior is widened.
@@ -182,7 +184,7 @@ class Problem(Forward):
         given = self._given_data(data)
         read = self._read(given)
         with told(progress) as step:
-            earlier = _prior(prior)
+            earlier = None if prior is None else estimate(prior, "estimate.json")
             core = self._core.identify(read, strategy, solver, remainder, earlier, drift_days, step)
         spec = Spec("identify", self, given, strategy, solver, remainder, prior=earlier, drift_days=drift_days)
         result = Identification(core, self, spec)
@@ -265,7 +267,8 @@ class Problem(Forward):
         Parameters
         ----------
         truth
-            A TRUTH.toml, or the folder that holds one: how the true arm deviates from the problem, and where poses lie.
+            A TRUTH.toml, or the folder that holds one: how the true arm deviates from the problem, and where poses lie (within the
+            limits of the joints, if it does not say).
         poses
             Number of random poses.
         data
@@ -310,7 +313,9 @@ class Problem(Forward):
         table = self._given(candidates)
         measured = None
         if table is None and poses is None:
-            measured = self._poses_of(source(data) if data is not None else self.files)
+            if data is None and str(self._core.file) == TEXT and not all(map(os.path.exists, self.files)):
+                raise InputError("poses: nothing to judge; pass poses=, candidates= or data=", key="poses")
+            measured = self._poses_of(source(data, self.joints) if data is not None else self.files)
         elif data is not None:
             raise TypeError("data name the poses; leave out their number")
         return Check(_core.check(self._core, measured, table, poses, truth, seed))
@@ -413,7 +418,7 @@ class Problem(Forward):
 
     def _given_data(self, data: Data | None) -> Source:
         if data is not None:
-            return source(data)
+            return source(data, self.joints)
         missing = [file for file in self.files if not os.path.exists(file)]
         if missing and str(self._core.file) == TEXT:
             message = (
@@ -424,15 +429,15 @@ class Problem(Forward):
         return self.files
 
     def _read(self, given: Source) -> _core.Data:
-        read = self._core.data(given)
+        read = asked(self._core.data, given)
         warn(read.warnings, stacklevel=3)
         return read
 
     def _given(self, data: Data | None) -> _core.Poses | None:
-        return None if data is None else self._poses_of(source(data))
+        return None if data is None else self._poses_of(source(data, self.joints))
 
-    def _poses_of(self, table: object) -> _core.Poses:
-        poses = self._core.poses(table)  # type: ignore[arg-type]
+    def _poses_of(self, table: Source) -> _core.Poses:
+        poses = asked(self._core.poses, table)
         warn(poses.warnings, stacklevel=4)
         return poses
 

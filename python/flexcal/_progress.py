@@ -36,6 +36,8 @@ def told(progress: Told) -> Iterator[Step | None]:
     if callable(progress):
         function = progress
         yield lambda *step: function(Progress(*step))
+    elif not isinstance(progress, bool):
+        raise TypeError(f"progress: a function, True or False is needed, not {progress!r}")
     elif progress:
         line = _Line()
         try:

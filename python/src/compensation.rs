@@ -4,9 +4,10 @@ use std::path::Path;
 use std::sync::Arc;
 
 use flexcal::fit::{SavedEstimate, missing_target_columns};
+use flexcal::measurement::Measurements;
 use flexcal::problem::Problem;
-use flexcal::remainder::{self, Correction, TargetFrame};
-use flexcal::report;
+use flexcal::remainder::{self, CompensationError, Correction, TargetFrame};
+use flexcal::report::{self, Doubts};
 use flexcal::results::{CompensationResult, Document as _, commands_csv};
 use pyo3::prelude::*;
 
@@ -48,6 +49,15 @@ impl Compensation {
     }
 }
 
+/// Returns the argument that chooses a frame.
+fn frame_argument(frame: TargetFrame) -> String {
+    let name = match frame {
+        TargetFrame::Measuring => "measuring",
+        TargetFrame::Base => "base",
+    };
+    format!("frame=\"{name}\"")
+}
+
 impl Compensation {
     /// Finds commands for targets with the estimate.json `estimate` and its correction.
     pub fn new(
@@ -84,9 +94,19 @@ impl Compensation {
         let found = detached(py, || {
             let targets = Arc::unwrap_or_clone(rows);
             let fitted = (&estimate, correction);
-            remainder::Compensation::new(&problem, fitted, targets, frame, level)
+            let solve = |targets: Measurements, frame: TargetFrame| {
+                remainder::Compensation::new(&problem, fitted, targets, frame, level)
+            };
+            let found = solve(targets.clone(), frame)?;
+            let as_given = (&targets, frame, found.commands.as_slice());
+            let doubts = Doubts::new(&problem, as_given, frame_argument, |targets, frame| {
+                solve(targets, frame).ok().map(|found| found.commands)
+            });
+            Ok((found, doubts))
         })?;
-        let found = found.map_err(|error| raised(&error))?;
+        let (found, Doubts { misplaced, others }) =
+            found.map_err(|error: CompensationError| raised(&error))?;
+        warnings.extend(misplaced.into_iter().chain(others));
         if found.is_base_open {
             warnings.push(
                 "the estimate does not know where the arm's base is in the measuring frame, so targets \

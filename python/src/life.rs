@@ -67,11 +67,24 @@ pub fn watch(
     .map_err(|error: PriorError| raised(&error))
 }
 
+/// Estimate of an arm of a fleet: a file, or the estimate.json of an identification in memory with
+/// the name that messages give it.
+#[derive(FromPyObject)]
+pub enum Sibling {
+    /// An estimate.json.
+    File(PathBuf),
+    /// Name and text of an estimate.json.
+    Estimate(PathBuf, String),
+}
+
 /// Finds mean and spread of a fleet; returns the result as JSON, and PRIOR.toml.
 #[pyfunction]
-pub fn fleet(py: Python<'_>, estimates: Vec<PathBuf>) -> PyResult<(String, String)> {
+pub fn fleet(py: Python<'_>, estimates: Vec<Sibling>) -> PyResult<(String, String)> {
     detached(py, || {
-        let read = estimates.iter().map(|file| SavedEstimate::read(file));
+        let read = estimates.iter().map(|sibling| match sibling {
+            Sibling::File(file) => SavedEstimate::read(file),
+            Sibling::Estimate(name, text) => SavedEstimate::parse(text, name),
+        });
         let found = life::fleet(&read.collect::<Result<Vec<_>, _>>()?)?;
         Ok((FleetResult::new(&found).to_json(), found.to_toml()))
     })?

@@ -5,7 +5,7 @@ use std::sync::{Arc, OnceLock};
 
 use flexcal::design::Workspace;
 use flexcal::export::{ExportError, GeometryChoice};
-use flexcal::fit::{self, IdentifyError, Placement};
+use flexcal::fit::{self, IdentifyError, Placement, Severity};
 use flexcal::measurement::{Dataset, Measurements};
 use flexcal::model::Model;
 use flexcal::model::parameter::Parameter;
@@ -218,10 +218,14 @@ impl Identification {
         (!self.found.is_trusted()).then(|| report::why_not_trusted(&self.found))
     }
 
-    /// What to ask about the input.
+    /// Texts of the findings that are warnings, with their remedies.
     #[getter]
     fn cautions(&self) -> Vec<String> {
-        self.found.reasons_to_ask()
+        let findings = self.found.findings.iter();
+        findings
+            .filter(|finding| finding.severity() == Severity::Warning)
+            .map(ToString::to_string)
+            .collect()
     }
 
     /// Covariance of all parameters, SI, shape = (parameters, parameters); NaN where one of the two

@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use flexcal::error::InputError;
 use flexcal::fit::Progress;
+use flexcal::problem::HeldOut;
 use flexcal::report;
 use flexcal::results::{Document as _, StudyResult, study_csv, study_parameters_csv};
 use flexcal::rig::{SimulatedPoses, SimulationError, Truth, simulate_counted};
@@ -22,6 +23,10 @@ use crate::supervise::supervised;
 pub struct Simulation {
     csv: String,
     json: String,
+    /// Column that marks held-out rows although the problem chooses them otherwise; None where the
+    /// problem chooses them by a column.
+    #[pyo3(get)]
+    unused_split: Option<String>,
 }
 
 #[pymethods]
@@ -66,7 +71,9 @@ pub fn simulated(
         let step = || sink(Progress::Step { iteration: 1, unknowns: 0, poses: 1, cost: 0.0 });
         let simulation = simulate_counted(&declared, &truth, poses, seed, &step);
         let simulation = simulation.map_err(Failure::Simulation)?;
-        Ok(Simulation { csv: simulation.csv(), json: simulation.truth_json() })
+        let by_column = matches!(declared.data.held_out, None | Some(HeldOut::Column(_)));
+        let unused_split = (!by_column).then(|| "split".to_owned());
+        Ok(Simulation { csv: simulation.csv(), json: simulation.truth_json(), unused_split })
     })?;
     made.map_err(|error| match error {
         Failure::Input(error) => raised(&error),

@@ -79,9 +79,10 @@ impl Export {
         }
         warnings.extend(report::better_geometry(&result).map(|option| {
             let argument = option.trim_start_matches('-').replace('-', "_");
+            let judged = if result.held_out.is_some() { "held-out" } else { "fitted" };
             format!(
                 "the exported geometry is not the best that a rigid controller can have: {argument}=True gives a smaller error on \
-                 held-out poses; errors lists all of them"
+                 {judged} poses; errors lists all of them"
             )
         }));
         let (json, summary) = (result.to_json(), report::export_text(&result, &remarks));

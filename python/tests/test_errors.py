@@ -8,6 +8,7 @@ import subprocess
 import sys
 import threading
 import time
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -96,6 +97,15 @@ def test_arguments(lunar: flexcal.Problem, tmp_path: Path) -> None:
     assert (caught.value.file, caught.value.key) == ("<text>", "data.files")
     with pytest.raises(TypeError, match="not int"):
         lunar.identify(7)
+    arm = flexcal.Problem.from_urdf(ROOT / "tests" / "urdf" / "odd.urdf", tip="tool")
+    with pytest.raises(flexcal.InputError, match="pass poses=, candidates= or data=") as named:
+        arm.check()
+    assert named.value.key == "poses"
+    with pytest.raises(flexcal.InputError, match="not its text") as named:
+        flexcal.Problem.from_urdf((ROOT / "tests" / "urdf" / "odd.urdf").read_text())
+    assert named.value.key == "path" and len(str(named.value)) < 200
+    with pytest.raises(TypeError, match="progress: a function, True or False"):
+        lunar.identify(progress=3)  # type: ignore[arg-type]
     again = pickle.loads(pickle.dumps(caught.value))
     assert (str(again), again.file, again.key) == (str(caught.value), caught.value.file, caught.value.key)
 
@@ -104,6 +114,18 @@ def test_columns_passed_over_are_warnings(lunar: flexcal.Problem) -> None:
     with pytest.warns(flexcal.FlexcalWarning, match="operator") as caught:
         lunar.identify(FRAME.assign(operator="me"))
     assert all(own.filename == __file__ for own in caught)
+
+
+def test_every_finding_that_is_a_warning_is_raised(closed: flexcal.ClosedLoop) -> None:
+    gross = FRAME.index == FRAME.index[FRAME["split"] == "identification"][4]
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        found = closed.closed_problem.identify(changed(x_mm=FRAME["x_mm"] + 5.0 * gross))
+    expected = [own["text"] for own in found.findings if own["severity"] == "warning"]
+    assert "influential-rows" in {own["code"] for own in found.findings}
+    assert len(found.cautions) == len(expected)
+    told = [str(own.message) for own in caught if own.category is flexcal.FlexcalWarning]
+    assert all(text in caution and caution in told for text, caution in zip(expected, found.cautions, strict=True))
 
 
 def test_progress(lunar: flexcal.Problem, capsys: pytest.CaptureFixture[str]) -> None:

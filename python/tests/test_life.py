@@ -105,6 +105,11 @@ def test_an_earlier_identification_as_prior(arm: Sessions, command: Command) -> 
     # Far fewer rows than parameters, and no less is known than before.
     before, after = (fit.parameters["std_error"].to_numpy(dtype=float) for fit in (arm.identified, found))
     assert np.nanmax(after / before) < 1.5
+    closed = arm.problem.loop(arm.first)
+    of_loop, of_fit = (closed.closed_problem.identify(rows, prior=prior, drift_days=7) for prior in (closed, closed.after))
+    assert of_loop.parameters.equals(of_fit.parameters)
+    with pytest.raises(TypeError, match="not int"):
+        arm.problem.identify(rows, prior=7)  # type: ignore[arg-type]
     again = pickle.loads(pickle.dumps(found))
     assert again.to_json() == found.to_json()
     assert (again.predict(q_deg=[10, 20, -30]) == found.predict(q_deg=[10, 20, -30])).all()
@@ -124,6 +129,14 @@ def test_fleet(arm: Sessions, command: Command) -> None:
         files[-1].write_text(arm.problem.identify(table).to_json())
     prior = arm.folder / "PRIOR.toml"
     found = flexcal.fleet(files, out=prior)
+    # Identifications in memory are estimates as well, and so is what a loop fitted last.
+    of_objects = flexcal.fleet([arm.identified, *files[1:]])
+    assert of_objects["parameters"] == found["parameters"]
+    for wrong in (str(arm.estimate), arm.identified):
+        with pytest.raises(TypeError, match="a list of at least three arms"):
+            flexcal.fleet(wrong)  # type: ignore[arg-type]
+    with pytest.raises(TypeError, match="not int"):
+        flexcal.fleet([1, 2, 3])  # type: ignore[list-item]
     zero = next(row for row in found["parameters"] if row["name"] == "joint2.theta")
     assert zero["spread"] > 0 and len(found["arms"]) == 3
     _, out = command("fleet", *files, file="PRIOR.toml")

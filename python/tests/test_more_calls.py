@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import pickle
+import sys
+import warnings
 from pathlib import Path
 
 import flexcal
@@ -91,6 +93,25 @@ def test_compensate(identified: flexcal.Identification, command: Command, tmp_pa
     with pytest.raises(flexcal.InputError, match="level"):
         identified.compensate(targets, level=1.0)
     assert pickle.loads(pickle.dumps(found)).commands.equals(found.commands)
+    with pytest.raises(flexcal.InputError, match="q1: missing.*targets need a configuration to start from") as caught:
+        identified.compensate(exact(targets)[["x_mm", "y_mm", "z_mm"]])
+    assert caught.value.key == "column q1"
+
+
+def test_compensate_doubts_senseless_starts(identified: flexcal.Identification) -> None:
+    targets = exact(LUNAR / "targets.csv")
+    joints = [f"q{k}_deg" for k in range(1, 5)]
+    exchanged = targets.assign(q1_deg=targets["q2_deg"], q2_deg=targets["q1_deg"])
+    far = targets.assign(**{name: targets[name] + 40.0 for name in joints})
+    for table, words in ((exchanged, "columns of joints 1 and 2 exchanged"), (far, "from where their joint columns lead")):
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            identified.compensate(table)
+        assert any(words in str(own.message) for own in caught), [str(own.message) for own in caught]
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        identified.compensate(targets)
+    assert not any("joint columns" in str(own.message) for own in caught)
 
 
 def test_simulate(lunar: flexcal.Problem, command: Command) -> None:
@@ -153,6 +174,13 @@ def test_plots(identified: flexcal.Identification) -> None:
     figure, axes = pyplot.subplots()
     assert identified.plot_correlation(axes) is axes and axes.images
     pyplot.close("all")
+
+
+def test_without_matplotlib(identified: flexcal.Identification, monkeypatch: pytest.MonkeyPatch) -> None:
+    for module in ("matplotlib", "matplotlib.pyplot"):
+        monkeypatch.setitem(sys.modules, module, None)
+    with pytest.raises(ImportError, match=r"flexcal\[plots\]"):
+        identified.plot_parameters()
 
 
 def test_units_of_configurations(lunar: flexcal.Problem, identified: flexcal.Identification) -> None:

@@ -3,19 +3,18 @@
 use std::error::Error;
 use std::path::PathBuf;
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 use flexcal::error::{InputError, InputErrorKind, TableErrorKind};
 use flexcal::fit;
 use flexcal::measurement::Measurements;
 use flexcal::problem::Problem;
-use flexcal::remainder::{self, Compensation};
-use flexcal::report::{self, shell_word};
+use flexcal::remainder::{self, Compensation, TargetFrame};
+use flexcal::report::{self, Doubts, shell_word};
 use flexcal::results::{CompensationResult, Document as _, commands_csv};
 
 use super::diagnostic;
 use super::estimate::Trust;
 use super::input::Common;
-use super::misplaced::{self, Frame};
 use super::outcome::Outcome;
 
 /// Arguments of `flexcal compensate`.
@@ -43,6 +42,33 @@ pub struct Arguments {
     level: f64,
     #[command(flatten)]
     trust: Trust,
+}
+
+/// Frame in which the targets are given.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Frame {
+    /// The measuring frame, as for measurements
+    Measuring,
+    /// The frame of the arm's base
+    Base,
+}
+
+impl From<Frame> for TargetFrame {
+    fn from(frame: Frame) -> Self {
+        match frame {
+            Frame::Measuring => Self::Measuring,
+            Frame::Base => Self::Base,
+        }
+    }
+}
+
+/// Returns the option that chooses a frame.
+fn frame_option(frame: TargetFrame) -> String {
+    let name = match frame {
+        TargetFrame::Measuring => "measuring",
+        TargetFrame::Base => "base",
+    };
+    format!("--frame {name}")
 }
 
 /// Error of missing targets: no table of targets is named.
@@ -92,14 +118,16 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     }
     let correction = remainder::of_estimate(&problem, &estimate);
     let fitted = (&estimate, correction.as_ref().ok().and_then(Option::as_ref));
-    let solve = |targets: Measurements, frame: Frame| {
-        Compensation::new(&problem, fitted, targets, frame.into(), arguments.level)
+    let solve = |targets: Measurements, frame: TargetFrame| {
+        Compensation::new(&problem, fitted, targets, frame, arguments.level)
     };
-    let found = solve(targets.clone(), arguments.frame)?;
-    let as_given = (&targets, arguments.frame, found.commands.as_slice());
-    let misplaced = misplaced::warning(&problem, as_given, |targets, frame| {
-        solve(targets, frame).ok().map(|found| found.commands)
-    });
+    let frame = arguments.frame.into();
+    let found = solve(targets.clone(), frame)?;
+    let as_given = (&targets, frame, found.commands.as_slice());
+    let Doubts { misplaced, others } =
+        Doubts::new(&problem, as_given, frame_option, |targets, frame| {
+            solve(targets, frame).ok().map(|found| found.commands)
+        });
     // An error of the remainder's file is reported only after errors of the estimate, which explain
     // more.
     correction?;
@@ -113,11 +141,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         diagnostic::warn(words);
     }
     let Compensation { targets, commands, bounds, .. } = &found;
-    let doubts = [
-        misplaced::common_offset(targets, commands).filter(|_| misplaced.is_none()),
-        misplaced::too_few_joints(&problem, targets, commands),
-    ];
-    doubts.iter().flatten().filter(|_| !common.quiet).for_each(|words| diagnostic::warn(words));
+    others.iter().filter(|_| !common.quiet).for_each(|words| diagnostic::warn(words));
     let bounds = bounds.as_ref();
     let table = commands_csv(&problem, targets, commands, bounds);
     results.write(&[("commands.csv", &table)])?;

@@ -23,7 +23,6 @@ mod interrupt;
 mod loop_command;
 mod loop_record;
 mod man;
-mod misplaced;
 mod mistaken;
 mod next;
 mod outcome;

@@ -1,4 +1,4 @@
-//! Rigid geometries that may replace a whole model, and their errors on held-out rows.
+//! Rigid geometries that may replace a whole model, and their errors on the rows that judge them.
 
 use nalgebra::DVector;
 
@@ -6,7 +6,7 @@ use super::error::ExportError;
 use super::rigid::{RigidFit, best_rigid, rigid_errors};
 use crate::design::Workspace;
 use crate::fit::{self, ErrorSummary, Options, Placement, SavedEstimate, Strategy};
-use crate::measurement::Dataset;
+use crate::measurement::{Dataset, Split};
 use crate::mechanics::Arm;
 use crate::model::Model;
 use crate::problem::{Joint, Problem};
@@ -89,11 +89,11 @@ impl Geometry {
         }
     }
 
-    /// Computes errors on the held-out rows of three geometries: this one, the approximation of the
-    /// whole model, and the fit of a rigid model. The first is `None` if this is the identified
-    /// geometry. The others are `None` if they are this one or cannot be computed. They are also
-    /// `None` if the whole model is rigid without effects, or if a held-out row measures no
-    /// position.
+    /// Computes errors of three geometries: this one, the approximation of the whole model, and the
+    /// fit of a rigid model. They are errors on the held-out rows, or on the fitted rows if none is
+    /// held out. The first is `None` if this is the identified geometry. The others are `None` if
+    /// they are this one or cannot be computed. They are also `None` if the whole model is rigid
+    /// without effects, or if one of the rows measures no position.
     ///
     /// # Errors
     /// Returns an error if the estimate does not match the data.
@@ -106,15 +106,20 @@ impl Geometry {
         let placement = Placement::of(&data.measurements);
         let model = estimate.model(Model::new(problem, &placement.bases, &placement.targets)?);
         let x = estimate.vector(problem, &model)?;
-        let held_out = &data.split.held_out;
-        let poses = placement.poses(&data.measurements, held_out, 1.0);
-        let alone = self.fitted_alone.as_ref().map(|alone| alone.fitted.held_out);
+        let Split { identification, held_out } = &data.split;
+        let rows = if held_out.is_empty() { identification } else { held_out };
+        let poses = placement.poses(&data.measurements, rows, 1.0);
+        let of_fit = |alone: &fit::Identification| {
+            let fit::Errors { identification, held_out, .. } = alone.fitted;
+            if data.split.held_out.is_empty() { identification } else { held_out }
+        };
+        let alone = self.fitted_alone.as_ref().map(of_fit);
         if !poses.iter().all(|pose| pose.observation.is_position()) {
             return Ok([alone, None, None]);
         }
         let of_arm = |best: &RigidFit| {
             let rigid = rigid_errors(problem, (&model, &x), &best.arm, &poses);
-            ErrorSummary::of_rows(&data.measurements, held_out.iter().copied(), &rigid)
+            ErrorSummary::of_rows(&data.measurements, rows.iter().copied(), &rigid)
         };
         let exported = self.best_rigid.as_ref().map(of_arm).or(alone);
         let is_elastic = |joint: &Joint| joint.stiffness.is_some() || joint.beam.is_some();
@@ -130,7 +135,7 @@ impl Geometry {
         Ok([
             exported,
             best.flatten().as_ref().map(of_arm),
-            alone.flatten().map(|(_, alone)| alone.fitted.held_out),
+            alone.flatten().as_ref().map(|(_, alone)| of_fit(alone)),
         ])
     }
 }

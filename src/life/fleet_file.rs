@@ -9,6 +9,7 @@ use serde::Deserialize;
 use super::error::PriorError;
 use super::fleet::Fleet;
 use crate::files::read_limited;
+use crate::problem::digest::with_whole_names;
 
 /// Value of the key `format`.
 const FORMAT: &str = "flexcal-prior";
@@ -103,6 +104,7 @@ impl FleetPrior {
         }
         let entry = |(name, entry): (String, Entry)| (name, (entry.mean, entry.sigma()));
         let parameters = parameters.into_iter().map(entry).collect();
+        let arm_parts = with_whole_names(arm_parts);
         Ok(Self { file: file.to_owned(), problem, arm_parts, parameters })
     }
 }

@@ -56,7 +56,7 @@ impl Problem {
                 format!("joint {joints}")
             }
             // The reference temperature, if any, follows the last effect on the same line.
-            _ => line.rsplit_once('}').map_or(line, |(declared, _)| declared).to_owned(),
+            _ => line.rfind('}').map_or(line, |end| &line[..=end]).to_owned(),
         };
         let short = |line: &str| hexadecimal(line).chars().take(16).collect::<String>();
         text.split('\n').enumerate().map(|(k, line)| (name((k, line)), short(line))).collect()
@@ -105,6 +105,15 @@ impl Problem {
         }
         text
     }
+}
+
+/// Returns the parts of an arm as [`Problem::digest_parts`] names them. Files of earlier versions
+/// name an effect without the last brace of its declaration.
+pub(crate) fn with_whole_names(parts: BTreeMap<String, String>) -> BTreeMap<String, String> {
+    let is_cut =
+        |name: &str| name.contains(" = {") && !name.ends_with('}') && !name.starts_with("target ");
+    let whole = |name: String| if is_cut(&name) { name + "}" } else { name };
+    parts.into_iter().map(|(name, digest)| (whole(name), digest)).collect()
 }
 
 /// Returns the SHA-256 digest of a text, 64 hexadecimal digits.
@@ -201,6 +210,21 @@ mod tests {
     use std::path::Path;
 
     use super::*;
+
+    #[test]
+    fn parts_have_whole_names() {
+        let text = "name = 'arm'\ngravity_m_s2 = [0, 0, -9.8]\n[statics]\nequilibrium = 'undeflected'\nbeam_elements = 1\n\
+                    [[joint]]\na_m = 0.5\n[[effect]]\njoint-harmonic = { joint = 1, orders = [1] }\n";
+        let problem = Problem::parse(text, Path::new("problem.toml")).unwrap();
+        let parts = problem.digest_parts();
+        let effect = "joint-harmonic = { joint = 1, orders = [1] }";
+        assert!(parts.contains_key(effect), "{parts:?}");
+        // Earlier versions left out the last brace.
+        let cut = |(name, digest): (&String, &String)| {
+            (name.strip_suffix('}').unwrap_or(name).to_owned(), digest.clone())
+        };
+        assert_eq!(with_whole_names(parts.iter().map(cut).collect()), parts);
+    }
 
     #[test]
     fn effects_enter_as_they_are_declared() {

@@ -47,7 +47,7 @@ impl ExportRemarks {
 /// Returns the option that would export a clearly better geometry than the exported one, the best
 /// if there are two; `None` if there is none.
 pub fn better_geometry(result: &ExportResult) -> Option<&'static str> {
-    let errors = result.held_out.as_ref()?;
+    let errors = result.errors()?;
     let alternatives = [&errors.best_rigid, &errors.fitted_alone].into_iter().zip(GEOMETRY_OPTIONS);
     let compared =
         alternatives.filter_map(|(summary, option)| Some((mean(summary.as_ref()?), option)));
@@ -107,7 +107,7 @@ fn mean(summary: &Summary) -> f64 {
 /// Returns the result as text: the verdict on the exported geometry first.
 pub fn export_text(result: &ExportResult, remarks: &ExportRemarks) -> String {
     let mut blocks = Vec::new();
-    if let Some(errors) = &result.held_out {
+    if let Some(errors) = result.errors() {
         blocks.extend(comparison_blocks(errors, better_geometry(result), remarks));
     }
     blocks.extend(remarks.workspace.as_ref().map(|[exported, identified]| {
@@ -143,7 +143,7 @@ pub fn export_text(result: &ExportResult, remarks: &ExportRemarks) -> String {
     text(&blocks)
 }
 
-/// Compares the held-out errors of the exported geometry with those of the whole model and of the
+/// Compares the held-out or fitted errors of the exported geometry with those of the whole model and of the
 /// geometries that could be exported instead, the best first. `better` is the option that exports a
 /// clearly better geometry.
 fn comparison_blocks<'a>(
@@ -151,7 +151,9 @@ fn comparison_blocks<'a>(
     better: Option<&'static str>,
     remarks: &ExportRemarks,
 ) -> Vec<Block<'a>> {
-    let ExportedErrors { whole, rigid, identified, best_rigid, fitted_alone } = errors;
+    let ExportedErrors { are_held_out, whole, rigid, identified, best_rigid, fitted_alone } =
+        errors;
+    let judged = if *are_held_out { "held-out" } else { "fitted" };
     let unit = rigid.norms().1;
     let size = |summary: &Summary| format!("{} {unit}", number(mean(summary), 4));
     let rows = rows_of_kind(whole.kind.unwrap_or("position"));
@@ -172,7 +174,7 @@ fn comparison_blocks<'a>(
     let least = geometries.first().map_or(0.0, |(_, summary)| mean(summary));
     let is_worse = mean(rigid) > MAX_EQUAL_RATIO * least;
     let mut verdict = format!(
-        "The exported geometry alone misses {} held-out {rows} by {} on average, the whole model by \
+        "The exported geometry alone misses {} {judged} {rows} by {} on average, the whole model by \
          {}.",
         whole.n,
         size(rigid),
@@ -207,10 +209,13 @@ fn comparison_blocks<'a>(
         vec![name.to_owned(), mean, rms, max]
     };
     let listed = [("whole model", whole)].into_iter().chain(geometries);
-    let heading = match unit {
-        "mm" => "held-out error, mm",
-        "°" => "held-out error, °",
-        _ => "held-out error, px",
+    let heading = match (*are_held_out, unit) {
+        (true, "mm") => "held-out error, mm",
+        (true, "°") => "held-out error, °",
+        (true, _) => "held-out error, px",
+        (false, "mm") => "error of fitted rows, mm",
+        (false, "°") => "error of fitted rows, °",
+        (false, _) => "error of fitted rows, px",
     };
     let rows = listed.map(|entry| row(&entry)).collect();
     vec![

@@ -26,6 +26,7 @@ mod identify;
 mod init;
 mod limited_poses;
 mod limits;
+mod misplaced;
 mod next;
 mod noise;
 mod paper_tables;
@@ -84,6 +85,7 @@ pub use self::{
     export::{ExportRemarks, better_geometry, export_text, kept_at_end, set_up_comment},
     figures::is_figure,
     identify::why_not_trusted,
+    misplaced::Doubts,
     next::next_text,
     plan::plan_text,
     remainder::remainder_text,

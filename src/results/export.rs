@@ -24,6 +24,9 @@ pub struct ExportResult {
     /// Joint origins of a URDF that moved; null for other files.
     pub origins: Option<Vec<Origin>>,
     pub held_out: Option<ExportedErrors>,
+    /// Errors on the fitted rows; absent if rows are held out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fitted: Option<ExportedErrors>,
     /// Parts of the model that the file cannot represent.
     pub not_held: Vec<String>,
 }
@@ -42,9 +45,12 @@ pub struct Origin {
     pub turned_deg: f64,
 }
 
-/// Held-out errors of the whole model, and of rigid geometries without its other parts.
+/// Errors of the whole model, and of rigid geometries without its other parts.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct ExportedErrors {
+    /// False if no row is held out, so that the errors are those of the fitted rows.
+    #[serde(skip)]
+    pub are_held_out: bool,
     pub whole: Summary,
     /// Errors of the exported geometry alone.
     pub rigid: Summary,
@@ -62,14 +68,14 @@ pub struct ExportedErrors {
 }
 
 impl ExportResult {
-    /// Collects the result of an export. `file` is the path of the file, if one was written, and
-    /// `moved` are the moved origins of a URDF.
+    /// Collects the result of an export. `file` is the path of the file, if one was written, `moved`
+    /// are the moved origins of a URDF, and `errors` are those on held-out or fitted rows.
     pub fn new(
         problem: &Problem,
         model: &Model,
         file: Option<&Path>,
         moved: Option<&[MovedOrigin]>,
-        held_out: Option<ExportedErrors>,
+        errors: Option<ExportedErrors>,
     ) -> Self {
         let origin = |origin: &MovedOrigin| Origin {
             joint: origin.joint.clone(),
@@ -78,19 +84,30 @@ impl ExportResult {
             moved_mm: origin.distance * 1e3,
             turned_deg: origin.angle.to_degrees(),
         };
+        let (held_out, fitted) = match errors {
+            Some(errors) if !errors.are_held_out => (None, Some(errors)),
+            errors => (errors, None),
+        };
         Self {
             problem: problem.name.clone(),
             file: file.map(|file| file.display().to_string()),
             origins: moved.map(|moved| moved.iter().map(origin).collect()),
             held_out,
+            fitted,
             not_held: unexported_parts(problem, model),
         }
+    }
+
+    /// Returns the errors on the held-out rows, or on the fitted rows if none is held out; `None`
+    /// without measurements.
+    pub fn errors(&self) -> Option<&ExportedErrors> {
+        self.held_out.as_ref().or(self.fitted.as_ref())
     }
 }
 
 impl ExportedErrors {
     /// Computes the errors of the held-out rows of the leading kind in `data` (positions, if there
-    /// are any). `x` is the model's full parameter vector; `saved` is the estimate from which it
+    /// are any), or of the fitted rows if none is held out. `x` is the model's full parameter vector; `saved` is the estimate from which it
     /// was read, if any.
     pub fn new(
         model: &Model,
@@ -100,18 +117,20 @@ impl ExportedErrors {
     ) -> Self {
         let Dataset { measurements, split } = data;
         let placement = Placement::of(measurements);
-        let mut poses = placement.poses(measurements, &split.held_out, 1.0);
+        let are_held_out = !split.held_out.is_empty();
+        let rows = if are_held_out { &split.held_out } else { &split.identification };
+        let mut poses = placement.poses(measurements, rows, 1.0);
         if let Some(saved) = saved {
             saved.count_time_in(&placement, &mut poses);
         }
         let rigid = model.geometric_residuals(&poses, x.as_slice());
         let whole = model.residuals(poses, x);
         let of = |errors: &[Vector3<f64>]| {
-            let rows = split.held_out.iter().copied();
-            Summary::of(&ErrorSummary::of_rows(measurements, rows, errors))
+            Summary::of(&ErrorSummary::of_rows(measurements, rows.iter().copied(), errors))
         };
         let (whole, rigid) = (of(&whole), of(&rigid));
-        Self { whole, rigid, identified: None, best_rigid: None, fitted_alone: None }
+        let [identified, best_rigid, fitted_alone] = [None; 3];
+        Self { are_held_out, whole, rigid, identified, best_rigid, fitted_alone }
     }
 
     /// Adds the errors of the exported geometry, if it is not the identified one, of the geometry

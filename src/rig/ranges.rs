@@ -51,8 +51,34 @@ pub(super) fn read(mut section: Section<'_, '_>, problem: &Problem) -> Result<Po
     Ok(Poses { ranges, time_step, held_out, positions, tilts })
 }
 
+/// Returns the poses of a truth without the section: within the limits of the joints, with the
+/// defaults of everything else. Returns `None` if a joint that moves lacks a limit.
+pub(super) fn within_limits(problem: &Problem) -> Option<Poses> {
+    let range = |joint: &Joint| match joint.command_kind() {
+        JointKind::Fixed => Some((0.0, 0.0)),
+        _ => limits(joint),
+    };
+    let ranges = PoseRanges {
+        joints: problem.joints.iter().map(range).collect::<Option<_>>()?,
+        payloads: Vec::new(),
+        hoist: None,
+        temperature: None,
+        approach: true,
+        covariates: Vec::new(),
+    };
+    let (time_step, held_out) =
+        ((DEFAULT_TIME_STEP, DEFAULT_TIME_STEP), HeldOutRows::Share(DEFAULT_HELD_OUT));
+    Some(Poses { ranges, time_step, held_out, positions: 0, tilts: Vec::new() })
+}
+
+/// Returns the limits of a joint \[rad\] or \[m\]; `None` if one of them is missing.
+fn limits(joint: &Joint) -> Option<(f64, f64)> {
+    Some(joint.limits).filter(|(low, high)| low.is_finite() && high.is_finite())
+}
+
 /// Reads `q1_deg = [from, to]`, or a key with the joint's name in place of `q1` if no other joint
-/// has the name. Returns the range in \[rad\] or \[m\]; 0, 0 for a joint that takes no command.
+/// has the name. Returns the range in \[rad\] or \[m\]: without a key the limits of the joint, and
+/// 0, 0 for a joint that takes no command.
 fn joint_range(
     section: &mut Section<'_, '_>,
     number: usize,
@@ -81,9 +107,9 @@ fn joint_range(
         }
         (Some(given), None) | (None, Some(given)) => given,
         (None, None) => {
-            return Err(
-                section.missing(&base, format!("{} = [from, to]", unit.alternatives(&base)))
-            );
+            let missing =
+                || section.missing(&base, format!("{} = [from, to]", unit.alternatives(&base)));
+            return limits(joint).ok_or_else(missing);
         }
     };
     let (from, to) = pair(&item)?;

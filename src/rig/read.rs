@@ -66,11 +66,14 @@ fn document(path: &Path) -> Result<Document, InputError> {
     Document::read(inside.as_deref().unwrap_or(path), InputErrorKind::TruthMissing)
 }
 
-/// Reads the section `[poses]`, which a truth must have.
+/// Reads the section `[poses]`; without it, poses are within the limits of the joints, which must
+/// all be declared then.
 fn poses(root: &mut Section<'_, '_>, problem: &Problem) -> Result<Poses, InputError> {
-    let section =
-        root.section("poses")?.ok_or_else(|| root.missing("poses", example(&problem.joints)))?;
-    ranges::read(section, problem)
+    match root.section("poses")? {
+        Some(section) => ranges::read(section, problem),
+        None => ranges::within_limits(problem)
+            .ok_or_else(|| root.missing("poses", example(&problem.joints))),
+    }
 }
 
 fn truth(document: &Document, problem: &Problem) -> Result<Truth, InputError> {

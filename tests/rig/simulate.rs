@@ -210,6 +210,21 @@ fn every_mistake_says_where_it_is() {
     };
     fails("", &["poses: missing"]);
     fails("[poses]\nq1_deg = [0, 1]", &["poses.q2: missing", "q2_deg or q2_rad"]);
+    // The limits of the joints stand in for ranges that are missing.
+    let limited = "min_deg = -30, max_deg = 40";
+    let arm =
+        format!("name = 'arm'\njoint = [{{ d_m = 0.3, {limited} }}, {{ a_m = 0.6, {limited} }}]\n");
+    let limited = Problem::parse(&arm, Path::new("problem.toml")).unwrap();
+    for (text, first) in [("", -30.0_f64), ("[poses]\nq1_deg = [0, 1]\n", 0.0)] {
+        let noise = "[noise]\nposition_sigma_mm = 0.1\n";
+        let truth =
+            Truth::parse(&(noise.to_owned() + text), Path::new("TRUTH.toml"), &limited).unwrap();
+        let [(from, _), (low, high)] = truth.poses.joints[..] else { panic!("two joints") };
+        let degrees = [from, low, high].map(f64::to_degrees);
+        for (found, expected) in degrees.into_iter().zip([first, -30.0, 40.0]) {
+            assert!((found - expected).abs() < 1e-9, "{degrees:?}");
+        }
+    }
     fails("[poses]\nq1_deg = [0, 1, 2]", &[":2: poses.q1_deg: a range has two numbers", "found 3"]);
     fails("[poses]\nq1_m = [0, 1]", &["poses.q1_m: an angle is not given in m"]);
     fails("[poses]\nq1_deg = 3", &["poses.q1_deg: a range has two numbers", "write [3, 3]"]);

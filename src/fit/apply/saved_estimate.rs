@@ -18,6 +18,7 @@ use crate::measurement::{Measurements, StartTimes};
 use crate::model::parameter::Parameter;
 use crate::model::{Model, Pose};
 use crate::problem::Problem;
+use crate::problem::digest::with_whole_names;
 use crate::problem::item::MAX_MAGNITUDE;
 
 /// Smallest identified share of a parameter, 0…1, at which the data determine it.
@@ -243,7 +244,7 @@ impl SavedEstimate {
             prediction: prediction.map(|result| result.get().to_owned()),
             problem,
             arm_digest,
-            arm_parts: arm_parts.unwrap_or_default(),
+            arm_parts: with_whole_names(arm_parts.unwrap_or_default()),
             strategy,
             posterior: SavedPosterior {
                 covariance: DMatrix::from_fn(parameters.len(), parameters.len(), |i, j| {
@@ -387,7 +388,7 @@ impl SavedEstimate {
         let (parts, others) = (&self.arm_parts, &other.arm_parts);
         let differs = |name: &&String| parts.get(*name) != others.get(*name);
         let part = parts.keys().chain(others.keys()).find(differs).map(|part| DifferingPart {
-            name: shown_part(part),
+            name: part.clone(),
             is_declared: [parts, others].map(|of| of.is_empty() || of.contains_key(part)),
         });
         part.or_else(|| {
@@ -424,7 +425,7 @@ impl SavedEstimate {
         let differs = |name: &&String| parts.get(*name) != self.arm_parts.get(*name);
         match self.arm_parts.keys().chain(parts.keys()).find(differs) {
             Some(part) if !self.arm_parts.is_empty() => {
-                let (file, part) = (self.file.clone(), shown_part(part));
+                let (file, part) = (self.file.clone(), part.clone());
                 Err(SavedEstimateError::OtherPart { file, part })
             }
             _ => checked,
@@ -466,10 +467,4 @@ pub(crate) struct DifferingPart {
     pub name: String,
     /// True for each of the two estimates whose arm declares the part.
     pub is_declared: [bool; 2],
-}
-
-/// Returns the name of a part of an arm for display. The name of an effect is its declaration, to
-/// which the closing brace is added.
-fn shown_part(part: &str) -> String {
-    if part.contains('{') { format!("{} }}", part.trim_end()) } else { part.to_owned() }
 }

@@ -1,10 +1,10 @@
-//! Recognition of targets of `compensate` that are given in another frame or unit than stated.
+//! Recognition of targets of `compensate` that are given in another frame or unit than stated, or
+//! with senseless start configurations.
 
-use clap::ValueEnum;
-use flexcal::fit::Command;
-use flexcal::measurement::Measurements;
-use flexcal::problem::{Joint, JointKind, Problem};
-use flexcal::remainder::TargetFrame;
+use crate::fit::Command;
+use crate::measurement::Measurements;
+use crate::problem::{Joint, JointKind, Problem};
+use crate::remainder::TargetFrame;
 
 /// Mean distance from the targets to the positions that their joint columns predict, above which
 /// another frame or unit is tried \[m\]. Errors of arms are a few millimetres.
@@ -26,31 +26,45 @@ const MAX_TRIED_TARGETS: usize = 50;
 /// Number of coordinates of a position and an orientation.
 const POSE_NUMBERS: usize = 6;
 
-/// Frame in which the targets are given.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(super) enum Frame {
-    /// The measuring frame, as for measurements
-    Measuring,
-    /// The frame of the arm's base
-    Base,
+/// Mean distance from the targets to the positions that their joint columns predict, above which
+/// these columns do not tell which configuration of the arm is meant \[m\].
+const MIN_FAR_START: f64 = 0.3;
+
+/// Warnings about targets and their joint columns.
+#[derive(Debug)]
+pub struct Doubts {
+    /// Warning that names another frame, unit or order of columns that is probably meant; `None` if
+    /// none fits better.
+    pub misplaced: Option<String>,
+    /// Other warnings.
+    pub others: Vec<String>,
 }
 
-impl From<Frame> for TargetFrame {
-    fn from(frame: Frame) -> Self {
-        match frame {
-            Frame::Measuring => Self::Measuring,
-            Frame::Base => Self::Base,
-        }
+impl Doubts {
+    /// Collects the warnings about the targets and their commands. `solve` finds the commands for
+    /// targets in a frame, and `option` returns the option of the caller that chooses a frame.
+    pub fn new(
+        problem: &Problem,
+        (targets, frame, commands): (&Measurements, TargetFrame, &[Command]),
+        option: impl Fn(TargetFrame) -> String,
+        solve: impl Fn(Measurements, TargetFrame) -> Option<Vec<Command>>,
+    ) -> Self {
+        let misplaced = warning(problem, (targets, frame, commands), option, solve);
+        let starts = common_offset(targets, commands).or_else(|| far_starts(targets, commands));
+        let starts = starts.filter(|_| misplaced.is_none());
+        let others = [starts, too_few_joints(problem, targets, commands)];
+        Self { misplaced, others: others.into_iter().flatten().collect() }
     }
 }
 
 /// Returns a warning that names the frame or unit in which the targets are much nearer to the
 /// positions of their joint columns; `None` if there is no such frame or unit. `solve` finds the
 /// commands for targets in a frame.
-pub(super) fn warning(
+fn warning(
     problem: &Problem,
-    (targets, frame, commands): (&Measurements, Frame, &[Command]),
-    solve: impl Fn(Measurements, Frame) -> Option<Vec<Command>>,
+    (targets, frame, commands): (&Measurements, TargetFrame, &[Command]),
+    option: impl Fn(TargetFrame) -> String,
+    solve: impl Fn(Measurements, TargetFrame) -> Option<Vec<Command>>,
 ) -> Option<String> {
     let given = mean_miss(commands);
     if !targets.position_measured || given <= MIN_MISS {
@@ -59,9 +73,9 @@ pub(super) fn warning(
     // Some of the targets tell as much as all of them.
     let step = targets.len().div_ceil(MAX_TRIED_TARGETS).max(1);
     let targets = &targets.select(&(0..targets.len()).step_by(step).collect::<Vec<_>>());
-    let (other, name) = match frame {
-        Frame::Measuring => (Frame::Base, "base"),
-        Frame::Base => (Frame::Measuring, "measuring"),
+    let other = match frame {
+        TargetFrame::Measuring => TargetFrame::Base,
+        TargetFrame::Base => TargetFrame::Measuring,
     };
     let scaled = |factor: f64| {
         let mut scaled = targets.clone();
@@ -71,7 +85,7 @@ pub(super) fn warning(
     let has_unit = |unit: f64| {
         targets.position_unit.is_some_and(|declared| (declared / unit - 1.0).abs() < 1e-9)
     };
-    let mut trials = vec![(targets.clone(), other, format!("--frame {name}"))];
+    let mut trials = vec![(targets.clone(), other, option(other))];
     if has_unit(1e-3) {
         trials.push((scaled(1e3), frame, "metres instead of the declared millimetres".to_owned()));
         trials.push((scaled(25.4), frame, "inches instead of the declared millimetres".to_owned()));
@@ -138,7 +152,7 @@ fn of_joints(problem: &Problem, targets: &Measurements) -> Vec<(Measurements, St
 
 /// Returns a warning if all targets are about as far from where their joint columns lead, as they
 /// are if they belong to another point of the tool or to another frame.
-pub(super) fn common_offset(targets: &Measurements, commands: &[Command]) -> Option<String> {
+fn common_offset(targets: &Measurements, commands: &[Command]) -> Option<String> {
     let misses = || commands.iter().map(|command| command.seed_miss);
     let least = misses().fold(f64::INFINITY, f64::min);
     let most = misses().fold(0.0, f64::max);
@@ -153,9 +167,23 @@ pub(super) fn common_offset(targets: &Measurements, commands: &[Command]) -> Opt
     })
 }
 
+/// Returns a warning if the joint columns lead so far from the targets that they do not tell which
+/// of the configurations that reach a target is meant.
+fn far_starts(targets: &Measurements, commands: &[Command]) -> Option<String> {
+    let miss = mean_miss(commands);
+    (targets.position_measured && miss > MIN_FAR_START).then(|| {
+        format!(
+            "the targets are {:.0} mm on average from where their joint columns lead, so that the \
+             commands may be of another configuration of the arm than is meant: check units, order \
+             and names of the joint columns before the arm is moved",
+            miss * 1e3
+        )
+    })
+}
+
 /// Returns a warning if targets with orientations are not reached by an arm of fewer than six
 /// joints.
-pub(super) fn too_few_joints(
+fn too_few_joints(
     problem: &Problem,
     targets: &Measurements,
     commands: &[Command],
