@@ -148,18 +148,19 @@ fn cautions_on_causes<'a>(
 fn set_aside<'a>(problem: &Problem, result: &LoopResult) -> Option<Block<'a>> {
     let rows = &result.set_aside;
     let treatment = if problem.robust.is_some() {
-        "The robust loss limits their influence on the fit"
+        "The robust loss limits the influence of such poses on the fit"
     } else {
-        "They count in full in the fit; a section [robust] would limit them"
+        "Such poses count in full in the fit; a section [robust] would limit them"
     };
     let location = |row: &crate::results::Row| match row.line {
         Some(line) => format!("{}:{line}", row.file),
         None => row.file.clone(),
     };
     let words = format!(
-        "{} were excluded from the choice of effects, because they are as far from the others as gross errors: {}. \
+        "{} {} excluded from the choice of effects, as far from the others as gross errors are, or where the model fails: {}. \
          {treatment}.",
         counted(rows.len(), "pose"),
+        if rows.len() == 1 { "was" } else { "were" },
         first_of(rows.iter().map(location), MAX_SHOWN_ROWS, "loop.json").join(", ")
     );
     (!rows.is_empty()).then_some(Block::Text(words))
