@@ -101,7 +101,8 @@ fn tip(error: &clap::Error, words: &[OsString], cli: &Command) -> Option<String>
             let is_unknown = error.kind() == ErrorKind::UnknownArgument;
             elsewhere.map(|(_, tip)| (*tip).to_owned()).or_else(|| {
                 let other = || other_command(word, first, cli);
-                negative_number(words).or_else(other).filter(|_| is_unknown)
+                let table = || table_without_option(word, first);
+                negative_number(words).or_else(other).or_else(table).filter(|_| is_unknown)
             })
         }
     }
@@ -119,6 +120,17 @@ fn negative_number(words: &[OsString]) -> Option<String> {
         "{option} is followed by {value}, which is read as an option; most options take numbers \
          above zero, and others are written {option}={value}"
     ))
+}
+
+/// Returns the tip for a table that is given without `--data`; `None` if the word names none.
+fn table_without_option(word: &str, command: &str) -> Option<String> {
+    let end = Path::new(word).extension()?.to_str()?.to_lowercase();
+    let table = shell_word(Path::new(word));
+    ["csv", "txt", "tsv", "dat"].contains(&end.as_str()).then(|| {
+        format!(
+            "tables of measurements follow --data, as in flexcal {command} PROBLEM --data {table}"
+        )
+    })
 }
 
 /// Returns the tip for an `option` that `command` does not have but others do; `None` if no command

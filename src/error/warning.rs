@@ -59,11 +59,12 @@ pub enum WarningKind {
     )]
     RuleOverridden { by: String, line: usize },
     #[error(
-        "joint {joint} is fixed, so the column is ignored; the joints that move are {}: if the arm has \
-         one more, it is declared as fixed",
-        moving.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
+        "joint {joint} {}; the joints that move are {}: {}",
+        if joint > declared { "is not declared, so the column is ignored" } else { "is fixed, so the column is ignored" },
+        moving.iter().map(ToString::to_string).collect::<Vec<_>>().join(", "),
+        if joint > declared { "if the arm has one more, a [[joint]] is missing" } else { "if the arm has one more, it is declared as fixed" }
     )]
-    JointIgnored { joint: usize, moving: Vec<usize> },
+    JointIgnored { joint: usize, declared: usize, moving: Vec<usize> },
     #[error("unknown column; ignored (write {write})")]
     UnitIgnored { write: String },
     #[error(
@@ -158,6 +159,11 @@ pub enum WarningKind {
          quantity"
     )]
     ImpossibleTemperature { value: String },
+    #[error(
+        "all positions are multiples of {step} mm; such rounding errs by {rounding} mm (1 σ), far \
+         more than the declared σ of {sigma} mm: export them with more digits"
+    )]
+    PositionsRounded { step: String, rounding: String, sigma: String },
     #[error(
         "all temperatures are {least} °C or more, which is hot for an arm; if these are degrees \
          Fahrenheit, convert them: °C = (°F − 32) / 1.8"

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use super::Measurements;
 use crate::error::{Warning, WarningKind};
 use crate::problem::{JointKind, Problem};
-use crate::quantity::format::number;
+use crate::quantity::format::{decimals, number};
 
 /// Largest excess over a joint limit that counts as rounding \[rad\] or \[m\].
 const LIMIT_TOLERANCE: f64 = 1e-6;
@@ -16,6 +16,16 @@ const MIN_SUSPICIOUS_TURNS: f64 = 2.0;
 const MAX_PLAUSIBLE_TEMPERATURE: f64 = 200.0;
 /// Distance of a temperature from 20 °C \[K\] beyond which no arm has it.
 const MAX_TEMPERATURE_DISTANCE: f64 = 120.0;
+/// Trial steps of rounded positions \[m\], the largest first.
+const POSITION_STEPS: [f64; 6] = [0.01, 0.005, 0.001, 5e-4, 2e-4, 1e-4];
+/// Largest distance of a coordinate from a multiple of a step, relative to the step, at which it is
+/// one.
+const MAX_OFF_STEP: f64 = 1e-6;
+/// Minimum number of rows from which a step of positions is determined.
+const MIN_ROUNDED_ROWS: usize = 10;
+/// Largest standard deviation of the error by rounding positions, in units of the declared σ, that
+/// needs no warning.
+const MAX_ROUNDING_SIGMAS: f64 = 2.0;
 /// Largest plausible payload \[kg\]. The strongest industrial arms lift 2300 kg.
 const MAX_PAYLOAD: f64 = 3000.0;
 /// Largest plausible ratio of a payload to the declared mass of the arm. Arms lift at most about
@@ -86,6 +96,30 @@ impl Measurements {
         let kind = WarningKind::ImpossibleTemperature { value: number(value, 1) };
         let is_impossible = distance(value) > MAX_TEMPERATURE_DISTANCE && self.kelvins().is_none();
         is_impossible.then_some(Warning { location, kind })
+    }
+
+    /// Returns a warning if all positions are multiples of a step whose rounding errs by much more
+    /// than the declared σ.
+    pub(super) fn rounded_positions(&self, problem: &Problem) -> Option<Warning> {
+        let sigma = problem.data.position_sigma.filter(|_| self.sigma.is_none())?;
+        let rows: Vec<usize> =
+            (0..self.len()).filter(|&row| self.observation(row).is_position()).collect();
+        let is_multiple = |value: f64| (value - value.round()).abs() < MAX_OFF_STEP;
+        let is_step = |step: &f64| {
+            let mut values = rows.iter().flat_map(|&row| self.positions[row].iter());
+            values.all(|value| is_multiple(value / step))
+        };
+        let step = POSITION_STEPS.into_iter().find(is_step)?;
+        // A rounded number errs by a uniform distribution of variance step²/12.
+        let rounding = step / 12_f64.sqrt();
+        let is_coarse = rows.len() >= MIN_ROUNDED_ROWS && rounding > MAX_ROUNDING_SIGMAS * sigma;
+        let show = |length: f64| number(length * 1e3, decimals(length * 1e3, 4));
+        let kind = WarningKind::PositionsRounded {
+            step: show(step),
+            rounding: show(rounding),
+            sigma: show(sigma),
+        };
+        is_coarse.then(|| Warning { location: self.location(rows[0]), kind })
     }
 
     /// Returns a warning, located at the heaviest payload, if that is implausible for the arm.

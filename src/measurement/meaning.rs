@@ -302,5 +302,6 @@ fn joint_ignored(problem: &Problem, joint: usize) -> WarningKind {
     let moves = |joint: &usize| {
         problem.joints.get(joint - 1).is_some_and(|of| of.command_kind() != JointKind::Fixed)
     };
-    WarningKind::JointIgnored { joint, moving: (1..=problem.joints.len()).filter(moves).collect() }
+    let declared = problem.joints.len();
+    WarningKind::JointIgnored { joint, declared, moving: (1..=declared).filter(moves).collect() }
 }

@@ -246,6 +246,10 @@ fn wrong_arguments_end_with_status_two_and_help_with_zero() {
         ("export . --estimate e.json", "the values of --format are ur-yaml, ros-yaml, mdh, dh"),
         ("export . --estimate e.json --format csv", "tip: mdh or dh write the table"),
         ("accept . --tolerance-mm -0.1", "--tolerance-mm is followed by -0.1"),
+        (
+            "identify . rows.csv",
+            "tip: tables of measurements follow --data, as in flexcal identify PROBLEM --data rows.csv",
+        ),
         ("calibrate .", "tip: flexcal identify may be meant"),
     ] {
         assert_contains(&folder.flexcal(arguments).code(2).stderr, &[words]);

@@ -114,6 +114,17 @@ fn sizes_that_no_arm_has_are_said() {
         &["rows.csv:3: temperature_C: all temperatures are 293 °C or more; if these are kelvins"],
     );
     assert_eq!(warm(20.0), "");
+    // Positions in whole millimetres.
+    let rounded = |step: &str, sigma: f64| {
+        let problem = parse(&format!("{ARM}[data]\nposition_sigma_mm = {sigma}\n"));
+        let row =
+            |k: u32| format!("{},{},{}{step},{},{}\n", k % 7, k % 5, 1000 + k, 3 * k, 500 - k);
+        let rows: Vec<String> = (0..12).map(row).collect();
+        let table = format!("q1_deg,q2_deg,x_mm,y_mm,z_mm\n{}", rows.concat());
+        words(&try_table(&problem, &table).unwrap().1)
+    };
+    assert_contains(&rounded("", 0.05), &["all positions are multiples of 1.0 mm", "by 0.29 mm"]);
+    assert_eq!((rounded(".35", 0.05), rounded("", 0.2)), (String::new(), String::new()));
     // Times under the name of the temperature.
     assert_contains(
         &said(&arm(""), "q1_deg,q2_deg,x_m,y_m,z_m,temperature_C\n1,2,3,4,5,21\n1,3,3,4,5,6675\n"),
