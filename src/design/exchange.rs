@@ -211,9 +211,21 @@ impl Exchange {
         let mut values = vec![self.value(&chosen)];
         for sweep in 1..=MAX_SWEEPS {
             let before = values[values.len() - 1];
-            match self.greedy() {
-                Some(greedy) => Self::sweep_updated(&mut chosen, greedy, before),
-                None => self.sweep(&mut chosen, before),
+            let mut value = before;
+            for index in 0..chosen.len() {
+                let others =
+                    (0..chosen.len()).filter(|&other| other != index).map(|other| chosen[other]);
+                let Some(scan) = CandidateScan::new(&self.criterion, &self.information(others))
+                else {
+                    continue;
+                };
+                // A decrease within rounding is no gain.
+                let limit = value - 1e-10 * value.abs().max(1.0);
+                if let Some((better, gained)) =
+                    scan.best((&self.candidates, self.coordinates), |k| !chosen.contains(&k), limit)
+                {
+                    (chosen[index], value) = (better, gained);
+                }
             }
             let value = self.value(&chosen).min(before);
             values.push(value);
@@ -226,44 +238,6 @@ impl Exchange {
         ExchangeResult { chosen, values }
     }
 
-    /// Exchanges each of the `chosen` poses once. `value` is the logarithm of the criterion.
-    fn sweep(&self, chosen: &mut [usize], mut value: f64) {
-        for index in 0..chosen.len() {
-            let others =
-                (0..chosen.len()).filter(|&other| other != index).map(|other| chosen[other]);
-            let Some(scan) = CandidateScan::new(&self.criterion, &self.information(others)) else {
-                continue;
-            };
-            if let Some((better, gained)) = scan.best(
-                (&self.candidates, self.coordinates),
-                |k| !chosen.contains(&k),
-                below(value),
-            ) {
-                (chosen[index], value) = (better, gained);
-            }
-        }
-    }
-
-    /// Does the same as [`sweep`](Self::sweep) by the criterion I. The products of all candidates
-    /// are updated for each pose that is removed or added, which costs far fewer operations than
-    /// products with the whole covariance.
-    fn sweep_updated(chosen: &mut [usize], mut greedy: Greedy, mut value: f64) {
-        for &pose in chosen.iter() {
-            greedy.take(pose);
-        }
-        for index in 0..chosen.len() {
-            greedy.give_back(chosen[index]);
-            let without = greedy.value();
-            let values = greedy.gains().into_iter().map(|gain| (without - gain).ln()).enumerate();
-            let others = values.filter(|(k, _)| !chosen.contains(k));
-            let best = others.min_by(|a, b| a.1.total_cmp(&b.1));
-            if let Some((better, gained)) = best.filter(|(_, gained)| *gained < below(value)) {
-                (chosen[index], value) = (better, gained);
-            }
-            greedy.take(chosen[index]);
-        }
-    }
-
     /// Returns the information on the scaled unknowns from priors, given poses and a set of
     /// candidates.
     fn information(&self, poses: impl Iterator<Item = usize>) -> DMatrix<f64> {
@@ -274,11 +248,6 @@ impl Exchange {
         }
         information
     }
-}
-
-/// Returns the logarithm of the criterion below which an exchange gains more than rounding.
-fn below(value: f64) -> f64 {
-    value - 1e-10 * value.abs().max(1.0)
 }
 
 /// Returns Jᵀ with respect to the scaled unknowns.
