@@ -18,6 +18,14 @@ worded! {
     }
 }
 
+/// Codes of findings on a misfit, whose usual remedy is to check units, signs or priors.
+pub(super) const OF_MISFIT: [FindingCode; 4] = [
+    FindingCode::MissesMeasurements,
+    FindingCode::BeyondPrior,
+    FindingCode::BeyondArmSize,
+    FindingCode::NoiseBeyondDeclared,
+];
+
 /// Description of a finding code, one row of the table in `docs/findings.md`.
 #[derive(Debug, Clone, Copy)]
 pub struct FindingEntry {

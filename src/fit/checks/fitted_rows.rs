@@ -3,9 +3,8 @@
 
 use serde_json::json;
 
-use super::OF_MISFIT;
 use super::checked_fit::{Check, CheckedFit};
-use super::finding::{Finding, FindingCode};
+use super::finding::{Finding, FindingCode, OF_MISFIT};
 use super::outliers::{InfluentialRows, outliers_as_json};
 use super::point_spread::PointSpread;
 use crate::fit::Identification;

@@ -39,7 +39,7 @@ mod view_order;
 use serde_json::Value;
 
 use checked_fit::{Check, CheckedFit, Convergence, EnoughEquations, HeldOutPlaced};
-use finding::{Finding, FindingCode};
+use finding::{Finding, FindingCode, OF_MISFIT};
 
 /// All checks, in the order in which their findings are listed. If a fit is not trusted, commands
 /// print the first finding that is an error as the reason.
@@ -83,13 +83,6 @@ const CHECKS: &[&dyn Check] = &[
     &open_directions::NamedDirections,
 ];
 
-/// Codes of findings on a misfit, whose usual remedy is to check units, signs or priors.
-pub(super) const OF_MISFIT: [FindingCode; 4] = [
-    FindingCode::MissesMeasurements,
-    FindingCode::BeyondPrior,
-    FindingCode::BeyondArmSize,
-    FindingCode::NoiseBeyondDeclared,
-];
 /// Codes of findings that name the cause of a misfit.
 const CAUSES: [FindingCode; 4] = [
     FindingCode::ColumnDoubted,
