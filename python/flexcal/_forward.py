@@ -97,6 +97,8 @@ class Prediction(np.ndarray[Any, np.dtype[np.float64]]):
         return prediction
 
     def __getitem__(self, key: Any) -> Any:
+        # The bounds are read later, when the caller may have changed a list or an array.
+        key = np.array(key) if isinstance(key, (list, np.ndarray)) else key
         part = np.asarray(self)[key]
         bounded = self._bounded
         # Only keys along the poses select whole positions.

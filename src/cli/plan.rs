@@ -162,10 +162,11 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
 /// Returns the columns that the measurements in `files` have and a table of planned poses lacks. All
 /// tables that are read together have the same columns. Empty if the files cannot be read.
 fn columns_at_hand(
-    files: &[PathBuf],
+    files: &[&PathBuf],
     (problem, poses): (&Problem, &Measurements),
 ) -> Vec<&'static str> {
-    let Ok((given, _)) = Measurements::read_to_predict(files, problem) else { return Vec::new() };
+    let files: Vec<PathBuf> = files.iter().map(|&file| file.clone()).collect();
+    let Ok((given, _)) = Measurements::read_to_predict(&files, problem) else { return Vec::new() };
     let has_sessions = |of: &Measurements| of.session.names.iter().any(|name| !name.is_empty());
     let columns = [
         (
@@ -219,7 +220,7 @@ fn next_step(
     let others = if at_hand.is_empty() {
         Vec::new()
     } else {
-        columns_at_hand(common.files(problem), (problem, &plan.poses))
+        columns_at_hand(&at_hand, (problem, &plan.poses))
     };
     let beside = if !others.is_empty() {
         let verb = if plan.is_of_cameras { ", add" } else { " and" };

@@ -344,8 +344,8 @@ fn check_interrupt(options: &NextOptions) -> Result<(), NextError> {
     }
 }
 
-/// Takes up to `options.poses` poses of the `pool` one after the other, each with the largest gain; of
-/// equal ones the nearest to the configuration before, which is `last` at first. Enters them as
+/// Takes up to `options.poses` poses of the `pool` one after the other, each with the largest gain;
+/// of equal ones the nearest to the configuration before, which is `last` at first. Enters them as
 /// steps of `result`, and returns their rows. `share` returns the fraction of the mean square error
 /// by the parameters that remains.
 fn take_poses(

@@ -35,8 +35,8 @@ pub enum WarningKind {
     #[error("not UTF-8 text; read as Windows-1252 (Latin-1), so check accented letters and signs")]
     ReadAsWindows1252,
     #[error(
-        "the file ends inside this row: its last number has fewer digits than those of all other rows, \
-         and no line end follows; the file was probably cut, so save or copy it again"
+        "the file may end inside this row: its last number has fewer digits than those of all other rows, \
+         and no line end follows; if the file was cut, save or copy it again"
     )]
     FileCut,
     #[error("{rows} row{} without a measurement, the first here; left out", plural(*rows))]
@@ -155,10 +155,10 @@ pub enum WarningKind {
     #[error("all temperatures are {least} °C or more; if these are kelvins, subtract 273.15")]
     Kelvins { least: String },
     #[error(
-        "{value} °C is no temperature of an arm; check the unit, and whether the column holds another \
+        "{value} °C is unusual for an arm; check the unit, and whether the column holds another \
          quantity"
     )]
-    ImpossibleTemperature { value: String },
+    UnusualTemperature { value: String },
     #[error(
         "all positions are multiples of {step} mm; such rounding errs by {rounding} mm (1 σ), far \
          more than the declared σ of {sigma} mm: export them with more digits"

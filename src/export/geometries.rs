@@ -9,7 +9,7 @@ use crate::fit::{self, ErrorSummary, Options, Placement, SavedEstimate, Strategy
 use crate::measurement::{Dataset, Split};
 use crate::mechanics::Arm;
 use crate::model::Model;
-use crate::problem::{Joint, ParameterRule, Problem};
+use crate::problem::{Constraint, Joint, ParameterRule, Problem};
 use crate::remainder::Correction;
 
 /// Choice of the rigid geometry to export.
@@ -146,15 +146,23 @@ fn fit_alone(
     data: &Dataset,
 ) -> Result<(Problem, fit::Identification), ExportError> {
     let mut rigid = Problem { effects: Vec::new(), ..problem.clone() };
-    // A rule for parameters of effects alone would match nothing now, which is an error.
+    // Rules and constraints of effects alone would match nothing now, which is an error.
     let placement = Placement::of(&data.measurements);
     let matches_some = |rule: &ParameterRule| {
         let parameters = vec![rule.clone()];
-        let alone = Problem { parameters, constraints: Vec::new(), ..rigid.clone() };
+        let constraints = Vec::new();
+        let alone = Problem { parameters, constraints, ..rigid.clone() };
         Model::new(&alone, &placement.bases, &placement.targets).is_ok()
     };
     let kept = rigid.parameters.iter().filter(|rule| matches_some(rule)).cloned().collect();
     rigid.parameters = kept;
+    let holds_without = |constraint: &Constraint| {
+        let alone = Problem { constraints: vec![constraint.clone()], ..rigid.clone() };
+        Model::new(&alone, &placement.bases, &placement.targets).is_ok()
+    };
+    let kept =
+        rigid.constraints.iter().filter(|constraint| holds_without(constraint)).cloned().collect();
+    rigid.constraints = kept;
     let options = Options::default().with_strategy(Strategy::Rigid);
     let found = fit::identify(&rigid, data, &options)?;
     Ok((rigid, found))

@@ -38,7 +38,7 @@ impl LastCells {
     pub fn is_last_cut(&self) -> bool {
         self.before.is_some_and(|(fewest, most)| {
             // Numbers that are written without final zeros differ by a digit by chance.
-            let least_difference = if fewest == most { 1 } else { 2 };
+            let least_difference = if fewest == most && fewest > 1 { 1 } else { 2 };
             self.rows > MIN_ROWS && self.current + least_difference <= fewest
         })
     }

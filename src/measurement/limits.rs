@@ -14,7 +14,7 @@ const MIN_SUSPICIOUS_TURNS: f64 = 2.0;
 /// Highest plausible temperature [°C]. Above it, a warning suggests that the column is in kelvins;
 /// even the temperature of a cold room exceeds it in kelvins.
 const MAX_PLAUSIBLE_TEMPERATURE: f64 = 200.0;
-/// Distance of a temperature from 20 °C \[K\] beyond which no arm has it.
+/// Distance of a temperature from 20 °C \[K\] beyond which it is unusual for an arm.
 const MAX_TEMPERATURE_DISTANCE: f64 = 120.0;
 /// Trial steps of rounded positions \[m\], the largest first.
 const POSITION_STEPS: [f64; 6] = [0.01, 0.005, 0.001, 5e-4, 2e-4, 1e-4];
@@ -86,16 +86,16 @@ impl Measurements {
             .then(|| Warning { location, kind: WarningKind::Kelvins { least: format!("{least}") } })
     }
 
-    /// Returns a warning, located at the temperature furthest from 20 °C, if no arm has it, although
-    /// others are plausible.
-    pub(super) fn impossible_temperature(&self) -> Option<Warning> {
+    /// Returns a warning, located at the temperature furthest from 20 °C, if that is unusual for an
+    /// arm, although others are not.
+    pub(super) fn unusual_temperature(&self) -> Option<Warning> {
         let distance = |value: f64| (value - 20.0).abs();
         let values = self.temperature.iter().flatten().enumerate();
         let (row, &value) = values.max_by(|a, b| distance(*a.1).total_cmp(&distance(*b.1)))?;
         let location = self.location(row).with_key("temperature_C");
-        let kind = WarningKind::ImpossibleTemperature { value: number(value, 1) };
-        let is_impossible = distance(value) > MAX_TEMPERATURE_DISTANCE && self.kelvins().is_none();
-        is_impossible.then_some(Warning { location, kind })
+        let kind = WarningKind::UnusualTemperature { value: number(value, 1) };
+        let is_unusual = distance(value) > MAX_TEMPERATURE_DISTANCE && self.kelvins().is_none();
+        is_unusual.then_some(Warning { location, kind })
     }
 
     /// Returns a warning if all positions are multiples of a step whose rounding errs by much more

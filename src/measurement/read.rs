@@ -293,7 +293,7 @@ impl<'a> Tables<'a> {
                 let commands = commands(&columns);
                 warnings.extend(measurements.many_turns(problem, &commands));
                 warnings.extend(measurements.kelvins());
-                warnings.extend(measurements.impossible_temperature());
+                warnings.extend(measurements.unusual_temperature());
                 warnings.extend(measurements.fahrenheit(problem));
                 warnings.extend(measurements.far_reference(problem));
                 warnings.extend(measurements.approach_without_sign());

@@ -183,10 +183,10 @@ impl Table {
 
     /// Reads the next row, which must have as many cells as the header; returns false at the end.
     pub fn next_row(&mut self) -> Result<bool, InputError> {
+        self.detach_row();
         if !std::mem::take(&mut self.starts_with_row) && !self.advance()? {
             return Ok(false);
         }
-        self.detach_row();
         let expected = self.columns_before();
         if self.record.len() != expected {
             let found = self.record.len();

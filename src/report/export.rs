@@ -91,8 +91,8 @@ pub fn set_up_comment(remarks: &ExportRemarks, is_xml: bool) -> String {
         return String::new();
     };
     if is_xml {
-        // Two hyphens would end the comment.
-        let values = values.join("; ").replace("--", "- -");
+        // Two hyphens are not allowed in a comment.
+        let values = values.join("; ").replace('-', "\u{2212}");
         return format!("<!-- {SET_UP_WORDS}: {values} -->\n");
     }
     let lines: String = values.iter().map(|value| ["#   ", value, "\n"].concat()).collect();
@@ -143,9 +143,9 @@ pub fn export_text(result: &ExportResult, remarks: &ExportRemarks) -> String {
     text(&blocks)
 }
 
-/// Compares the held-out or fitted errors of the exported geometry with those of the whole model and of the
-/// geometries that could be exported instead, the best first. `better` is the option that exports a
-/// clearly better geometry.
+/// Compares the held-out or fitted errors of the exported geometry with those of the whole model and
+/// of the geometries that could be exported instead, the best first. `better` is the option that
+/// exports a clearly better geometry.
 fn comparison_blocks<'a>(
     errors: &ExportedErrors,
     better: Option<&'static str>,

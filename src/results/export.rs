@@ -107,8 +107,8 @@ impl ExportResult {
 
 impl ExportedErrors {
     /// Computes the errors of the held-out rows of the leading kind in `data` (positions, if there
-    /// are any), or of the fitted rows if none is held out. `x` is the model's full parameter vector; `saved` is the estimate from which it
-    /// was read, if any.
+    /// are any), or of the fitted rows if none is held out. `x` is the model's full parameter
+    /// vector; `saved` is the estimate from which it was read, if any.
     pub fn new(
         model: &Model,
         x: &DVector<f64>,

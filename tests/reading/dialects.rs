@@ -128,7 +128,7 @@ fn sizes_that_no_arm_has_are_said() {
     // Times under the name of the temperature.
     assert_contains(
         &said(&arm(""), "q1_deg,q2_deg,x_m,y_m,z_m,temperature_C\n1,2,3,4,5,21\n1,3,3,4,5,6675\n"),
-        &["rows.csv:3: temperature_C: 6675.0 °C is no temperature of an arm"],
+        &["rows.csv:3: temperature_C: 6675.0 °C is unusual for an arm"],
     );
 }
 

@@ -14,6 +14,8 @@ const MAX_EXPLAINED_RATIO: f64 = 0.2;
 /// Largest ratio of the error with a convention to that with the best one, at which the convention
 /// is also named.
 const MAX_RATIO_TO_BEST: f64 = 1.5;
+/// Minimum number of measured orientations from which a convention is found.
+const MIN_PAIRS: usize = 3;
 /// Number of times that the meaning of each row is chosen again.
 const MAX_CHOICES: usize = 5;
 /// Axes (0 to 2 for x, y, z) of the twelve Euler conventions, R = R₁(r₁) R₂(r₂) R₃(r₃). If all
@@ -200,6 +202,10 @@ fn euler(order: [usize; 3], angles: &Vector3<f64>) -> UnitQuaternion<f64> {
 /// meanings, the nearest one of each row and the rotation are found in turn, from the first and from
 /// the last meaning of all rows.
 fn misfit(pairs: &[(UnitQuaternion<f64>, UnitQuaternion<f64>)], reading: &Reading) -> f64 {
+    // Fewer orientations fit nearly every convention.
+    if pairs.len() < MIN_PAIRS {
+        return f64::INFINITY;
+    }
     let differences: Vec<Vec<UnitQuaternion<f64>>> = pairs
         .iter()
         .map(|(predicted, measured)| {

@@ -27,8 +27,7 @@ impl Check for NoOutliers {
 }
 
 /// Codes of findings that explain a misfit by another reading of the whole table.
-const READINGS: [FindingCode; 3] =
-    [FindingCode::Misread, FindingCode::ColumnDoubted, FindingCode::RowsDoubted];
+const READINGS: [FindingCode; 2] = [FindingCode::Misread, FindingCode::ColumnDoubted];
 /// Maximum number of influential rows that the reason for distrust names.
 const MAX_NAMED: usize = 3;
 
@@ -50,7 +49,7 @@ impl Identification {
         let without = sigma_taken * leading.expected_norm();
         let is_beaten = |finding: &Finding| {
             READINGS.contains(&finding.code)
-                && finding.number("after").is_none_or(|after| after > without)
+                && finding.number("after").is_some_and(|after| after > without)
         };
         let others = self.findings.iter().filter(|finding| !is_beaten(finding));
         // Without another error, the fit would be trusted although the rows count in full.
@@ -65,8 +64,11 @@ impl Identification {
                 "{}{more} {cause} most of it: correct {them}, or leave {them} out",
                 places.join(", ")
             );
+            // That finding says also what is wrong in the rows.
+            let has_doubted_rows =
+                findings.iter().any(|finding| finding.code == FindingCode::RowsDoubted);
             for finding in &mut findings {
-                if OF_MISFIT.contains(&finding.code) {
+                if OF_MISFIT.contains(&finding.code) && !has_doubted_rows {
                     *finding = finding.clone().with_remedy(remedy.clone());
                 }
             }

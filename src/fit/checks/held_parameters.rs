@@ -1,16 +1,17 @@
 //! Check of the geometry that the problem holds at its nominal values.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 use serde_json::json;
 
 use super::checked_fit::{Check, CheckedFit};
 use super::finding::{Finding, FindingCode};
 use super::row_kind::format_error;
 use crate::fit::Noise;
-use crate::fit::stages::fitting::Fitting;
+use crate::fit::stages::fitting::{FitEnd, Fitting};
 use crate::least_squares::jacobian_and_residual;
 use crate::model::parameter::Parameter;
 use crate::problem::{Observation, ParameterRule, Problem};
+use crate::quantity::Unit;
 use crate::quantity::format::{decimals, number};
 
 /// Smallest share of the misfit, beyond what noise explains, that a held parameter takes away if it
@@ -30,14 +31,10 @@ const RIDGE: f64 = 1e-12;
 /// Largest ratio of the mean square of left-out errors to that of the best held parameter, at which
 /// another one acts alike.
 const MAX_RATIO_ALIKE: f64 = 1.2;
-/// Fields of the geometry of a joint, as in names of parameters, with the σ of a usual prior.
-const FIELDS: [(&str, &str); 5] = [
-    ("alpha", "sigma_deg = 1.0"),
-    ("a", "sigma_mm = 5.0"),
-    ("theta", "sigma_deg = 1.0"),
-    ("d", "sigma_mm = 5.0"),
-    ("beta", "sigma_deg = 1.0"),
-];
+/// Fields of the geometry of a joint, as in names of parameters.
+const FIELDS: [&str; 5] = ["alpha", "a", "theta", "d", "beta"];
+/// Largest deviation, in σ of a usual prior, with which that prior is recommended.
+const MAX_PRIOR_SIGMAS: f64 = 3.0;
 
 /// Checks that no single parameter of the geometry that the problem holds causes most of a misfit
 /// which contradicts the declared σ.
@@ -52,8 +49,18 @@ impl Check for HeldGeometryIsRight {
         {
             return Vec::new();
         }
-        finding(fit, leading).into_iter().collect()
+        // Another reading of the table explains the misfit by itself.
+        let is_misread = fit.explanations.get().is_some_and(|found| !found.fitted.is_empty());
+        finding(fit, leading).filter(|_| !is_misread).into_iter().collect()
     }
+}
+
+/// Result of a fit to the identification rows.
+struct Trial {
+    /// Root mean square of the errors of the leading kind of rows \[m\].
+    rms: f64,
+    /// Mean square of the errors of configurations that are left out one at a time \[m²\].
+    left_out: f64,
 }
 
 /// Held parameter with the result of a fit in which it is free.
@@ -61,52 +68,63 @@ struct Freed {
     name: String,
     /// Fitted deviation from nominal, with its unit.
     deviation: String,
-    /// Key of a usual prior, as in `[parameters]`.
-    prior: &'static str,
-    /// Root mean square of the errors of the leading kind of rows \[m\].
-    rms: f64,
-    /// Mean square of the errors of configurations that are left out one at a time \[m²\].
-    left_out: f64,
+    /// Freedom to write in `[parameters]`: a usual prior, or none if the deviation contradicts it.
+    freedom: &'static str,
+    trial: Trial,
+}
+
+impl Trial {
+    /// Summarises the errors of a fit of `fitting`, with its end.
+    fn of(fit: &CheckedFit, rows: &[usize], (fitting, end): (&Fitting, &FitEnd)) -> Self {
+        let whole = fitting.whole();
+        let free = whole.unknowns.iter().zip(&end.at_bound).filter(|(_, bound)| bound.is_none());
+        let unknowns: Vec<usize> = free.map(|(&k, _)| k).collect();
+        let configurations = fitting.measurements.configurations(fit.problem).0;
+        let errors = fitting.left_out_errors(&end.x, &unknowns, &configurations);
+        let squares: f64 = errors.iter().map(nalgebra::Matrix::norm_squared).sum();
+        Self {
+            rms: fit.rms(rows, &fitting.position_errors(rows, &end.x)),
+            left_out: squares / errors.len().max(1) as f64,
+        }
+    }
 }
 
 /// Returns the finding that names the held parameter which explains most of the misfit.
 fn finding(fit: &CheckedFit, leading: Observation) -> Option<Finding> {
     let names = promising(fit)?;
     let rows = fit.kind(leading).rows;
-    let before = fit.rms(&rows, &fit.fitting.position_errors(&rows, &fit.end.x));
-    let noise = before / fit.noise_factor.sqrt();
-    let limit =
-        noise.mul_add(noise, (1.0 - MIN_EXPLAINED_SHARE) * (before * before - noise * noise));
-    let left_out = |fitting: &Fitting, x: &DVector<f64>, at_bound: &[bool]| {
-        let whole = fitting.whole();
-        let free = whole.unknowns.iter().zip(at_bound).filter(|(_, at_bound)| !**at_bound);
-        let unknowns: Vec<usize> = free.map(|(&k, _)| k).collect();
-        let configurations = fitting.measurements.configurations(fit.problem).0;
-        let errors = fitting.left_out_errors(x, &unknowns, &configurations);
-        errors.iter().map(nalgebra::Matrix::norm_squared).sum::<f64>() / errors.len().max(1) as f64
-    };
-    let at_bound = |ends: &[Option<_>]| ends.iter().map(Option::is_some).collect::<Vec<bool>>();
-    let declared = left_out(fit.fitting, &fit.end.x, &at_bound(&fit.end.at_bound));
-    let fitted = |(name, prior): &(String, &'static str)| {
-        let problem = with_free(fit.problem, [name.clone()]);
-        fit.with_problem(&problem, |fitting| {
+    // All fits have the declared σ, so that the priors weigh equally.
+    let refit = |problem: &Problem, name: Option<&str>| {
+        fit.with_problem(problem, |fitting| {
             let end = fitting.run(&fitting.registered().ok()?).ok()?;
-            let index = fitting.model.parameters.iter().position(|found| found.name == *name)?;
-            Some(Freed {
-                name: name.clone(),
-                deviation: shown(&fitting.model.parameters[index], end.x[index]),
-                prior,
-                rms: fit.rms(&rows, &fitting.position_errors(&rows, &end.x)),
-                left_out: left_out(fitting, &end.x, &at_bound(&end.at_bound)),
-            })
+            let mut parameters = fitting.model.parameters.iter().zip(end.x.iter());
+            let freed = parameters.find(|(parameter, _)| Some(parameter.name.as_str()) == name);
+            let freed = freed.map(|(parameter, x)| (shown(parameter, *x), prior(parameter, *x)));
+            Some((freed, Trial::of(fit, &rows, (fitting, &end))))
         })?
     };
+    let declared = refit(fit.problem, None).filter(|_| !names.is_empty())?.1;
+    let noise =
+        fit.rms(&rows, &fit.fitting.position_errors(&rows, &fit.end.x)).powi(2) / fit.noise_factor;
+    let misfit = (declared.rms.powi(2) - noise).max(0.0);
+    let limit = (1.0 - MIN_EXPLAINED_SHARE).mul_add(misfit, noise);
+    let fitted = |name: &String| {
+        let problem = with_free(fit.problem, [name.clone()]);
+        let (freed, trial) = refit(&problem, Some(name))?;
+        let (deviation, freedom) = freed?;
+        Some(Freed { name: name.clone(), deviation, freedom, trial })
+    };
     let mut freed: Vec<Freed> = names.iter().filter_map(fitted).collect();
-    freed.retain(|freed| freed.rms * freed.rms <= limit && freed.left_out < declared);
-    freed.sort_by(|a, b| a.left_out.total_cmp(&b.left_out));
+    freed.retain(|freed| {
+        freed.trial.rms.powi(2) <= limit && freed.trial.left_out < declared.left_out
+    });
+    freed.sort_by(|a, b| a.trial.left_out.total_cmp(&b.trial.left_out));
     let best = freed.first()?;
-    let alike = freed[1..].iter().filter(|other| other.left_out <= MAX_RATIO_ALIKE * best.left_out);
-    let alike: Vec<&str> = alike.map(|other| other.name.as_str()).collect();
+    let is_alike = |other: &&Freed| other.trial.left_out <= MAX_RATIO_ALIKE * best.trial.left_out;
+    let mut alike: Vec<&str> =
+        freed[1..].iter().filter(is_alike).map(|other| other.name.as_str()).collect();
+    let set_up = held_set_up(fit, &best.name);
+    alike.extend(set_up);
     let others = match alike.as_slice() {
         [] => String::new(),
         names => format!(" (these poses do not tell it from {})", names.join(" or ")),
@@ -115,12 +133,38 @@ fn finding(fit: &CheckedFit, leading: Observation) -> Option<Finding> {
         "{} is held at its nominal value{others}: if it is free, it deviates by {}, and the rms error is {} instead of {}",
         best.name,
         best.deviation,
-        format_error(leading.kind(), best.rms, 3),
-        format_error(leading.kind(), before, 3)
+        format_error(leading.kind(), best.trial.rms, 3),
+        format_error(leading.kind(), declared.rms, 3)
     );
-    let remedy = format!("free it in [parameters]: \"{}\" = {{ {} }}", best.name, best.prior);
-    let numbers = [json!(best.name), json!(alike), before.into(), best.rms.into()];
+    let remedy = match set_up {
+        Some(set_up) => format!("free it in [parameters]: \"{set_up}\" = {{ free = true }}"),
+        None => format!("free it in [parameters]: \"{}\" = {{ {} }}", best.name, best.freedom),
+    };
+    let numbers = [json!(best.name), json!(alike), declared.rms.into(), best.trial.rms.into()];
     Some(Finding::new(FindingCode::HeldParameter, numbers, text).with_remedy(remedy))
+}
+
+/// Returns the pattern of the base or the tool if it is held and acts as the named parameter does:
+/// the base as joint 1, the tool as the last joint.
+fn held_set_up(fit: &CheckedFit, name: &str) -> Option<&'static str> {
+    let is_of = |joint: usize| name.starts_with(&format!("joint{joint}."));
+    if is_of(1) && !fit.is_base_free() {
+        Some("base.*")
+    } else if is_of(fit.problem.joints.len()) && fit.is_target_held() {
+        Some("tool.*")
+    } else {
+        None
+    }
+}
+
+/// Returns the freedom to write in `[parameters]` for a parameter with the deviation `x`: a usual
+/// prior, unless it would contradict the deviation.
+fn prior(parameter: &Parameter, x: f64) -> &'static str {
+    match parameter.unit() {
+        Unit::Angle if x.abs() <= MAX_PRIOR_SIGMAS * 1_f64.to_radians() => "sigma_deg = 1.0",
+        Unit::Length if x.abs() <= MAX_PRIOR_SIGMAS * 5e-3 => "sigma_mm = 5.0",
+        _ => "free = true",
+    }
 }
 
 /// Returns the deviation `x` of a parameter with its unit.
@@ -138,21 +182,18 @@ fn with_free(declared: &Problem, names: impl IntoIterator<Item = String>) -> Pro
     problem
 }
 
-/// Returns the held parameters that promise to explain most of the misfit, best first, each with
-/// the key of a usual prior.
+/// Returns the held parameters that promise to explain most of the misfit, best first.
 ///
 /// The gain in χ² of a column h beside the columns J of the free parameters is
 /// (hᵀ r − hᵀ J N⁻¹ g)² / (hᵀ h − hᵀ J N⁻¹ Jᵀ h), with the normal matrix N = Jᵀ J + Λ, the gradient
 /// g = Jᵀ r + Λ x and the information Λ of the priors.
-fn promising(fit: &CheckedFit) -> Option<Vec<(String, &'static str)>> {
+fn promising(fit: &CheckedFit) -> Option<Vec<String>> {
     let is_free = |name: &str| fit.fitting.model.parameters.iter().any(|found| found.name == name);
     let joints = 1..=fit.problem.joints.len();
-    let all = joints
-        .flat_map(|joint| FIELDS.map(|(field, prior)| (format!("joint{joint}.{field}"), prior)));
-    let held: Vec<(String, &'static str)> = all.filter(|(name, _)| !is_free(name)).collect();
-    let problem = with_free(fit.problem, held.iter().map(|(name, _)| name.clone()));
-    let gains = fit.with_problem(&problem, |fitting| gains(fit, fitting, &held))??;
-    let mut gains: Vec<(usize, f64)> = gains;
+    let all = joints.flat_map(|joint| FIELDS.map(|field| format!("joint{joint}.{field}")));
+    let held: Vec<String> = all.filter(|name| !is_free(name)).collect();
+    let problem = with_free(fit.problem, held.iter().cloned());
+    let mut gains = fit.with_problem(&problem, |fitting| gains(fit, fitting, &held))??;
     gains.retain(|(_, share)| *share >= MIN_EXPECTED_SHARE);
     gains.sort_by(|a, b| b.1.total_cmp(&a.1));
     gains.truncate(MAX_FITTED);
@@ -161,11 +202,7 @@ fn promising(fit: &CheckedFit) -> Option<Vec<(String, &'static str)>> {
 
 /// Returns the share of the misfit beyond noise that each of the `held` parameters is expected to
 /// take away, with its index, at the parameters of `fit`. `fitting` has all of them free.
-fn gains(
-    fit: &CheckedFit,
-    fitting: &Fitting,
-    held: &[(String, &'static str)],
-) -> Option<Vec<(usize, f64)>> {
+fn gains(fit: &CheckedFit, fitting: &Fitting, held: &[String]) -> Option<Vec<(usize, f64)>> {
     let names = fit.fitting.model.parameters.iter().map(|parameter| parameter.name.as_str());
     let known: std::collections::HashMap<&str, f64> =
         names.zip(fit.end.x.iter().copied()).collect();
@@ -198,14 +235,13 @@ fn gains(
     let step = factor.solve(&gradient);
     let noise = fit.noise_factor;
     let misfit = residual.norm_squared() * (1.0 - noise.recip());
-    let gain = |(index, (name, _)): (usize, &(String, &'static str))| {
+    let gain = |(index, name): (usize, &String)| {
         let k = parameters.iter().position(|parameter| parameter.name == *name)?;
-        let column: DMatrix<f64> = jacobian.select_columns(&[place(k)?]);
+        let column = jacobian.column(place(k)?);
         let with_free = columns.tr_mul(&column);
         let before = column.norm_squared();
         let after = before - with_free.dot(&factor.solve(&with_free));
-        let slope = column.dot(&DMatrix::from_column_slice(residual.len(), 1, residual.as_slice()))
-            - with_free.column(0).dot(&step);
+        let slope = column.dot(&residual) - with_free.dot(&step);
         (after > MIN_OWN_SHARE * before).then(|| (index, slope * slope / after / misfit))
     };
     Some(held.iter().enumerate().filter_map(gain).collect())

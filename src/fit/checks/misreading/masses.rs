@@ -55,6 +55,6 @@ fn misread_masses(fit: &CheckedFit, limit: f64) -> Explanations {
         ranked.into_iter().map(|(misreading, _)| misreading).take(MAX_FITTED).collect();
     let trial = Trial::new(fit);
     let as_read = trial.error_as_read(fit);
-    let fitted = trial.explained(&chosen, limit.min(as_read));
+    let fitted = trial.explained(&chosen, limit.min(as_read).min(trial.refitted_error(fit)));
     Explanations { fitted, as_read, ..Explanations::default() }
 }

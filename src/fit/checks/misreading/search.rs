@@ -1,5 +1,7 @@
 //! Search for the misreadings that explain why an arm does not fit its measurements.
 
+use std::cmp::Reverse;
+use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 use std::ops::RangeInclusive;
 
@@ -158,7 +160,8 @@ fn explanations(fit: &CheckedFit) -> Explanations {
     let mut explanations = Explanations { near, near_error, ..Explanations::default() };
     if is_position {
         explanations.as_read = trial.error_as_read(fit);
-        explanations.fitted = trial.fit_in_full(&errors, explanations.as_read);
+        let error = explanations.as_read.min(trial.refitted_error(fit));
+        explanations.fitted = trial.fit_in_full(&errors, error);
     }
     explanations
 }
@@ -189,17 +192,26 @@ impl<'a> Trial<'a> {
     }
 
     /// Creates the trial on at most about `count` rows of a fit, evenly spaced. If that leaves few
-    /// rows of a session, all rows of some sessions are taken instead, because each session may have
-    /// a free base of its own.
+    /// rows of a session, rows of the largest sessions are taken instead, because each session may
+    /// have a free base of its own.
     pub(super) fn with_rows(fit: &'a CheckedFit, count: usize) -> Self {
         let identification = &fit.fitting.split.identification;
         let session = |row: &usize| fit.fitting.placement.base_of(*row);
-        let mut sessions: Vec<usize> = identification.iter().map(session).collect();
-        sessions.sort_unstable();
-        sessions.dedup();
-        let rows = if identification.len() > count && count < MIN_SESSION_ROWS * sessions.len() {
-            let step = identification.len().div_ceil(count);
-            let taken: Vec<usize> = sessions.into_iter().step_by(step).collect();
+        let mut sizes: BTreeMap<usize, usize> = BTreeMap::new();
+        for row in identification {
+            *sizes.entry(session(row)).or_default() += 1;
+        }
+        let rows = if identification.len() > count && count < MIN_SESSION_ROWS * sizes.len() {
+            let mut sessions: Vec<(usize, usize)> = sizes.into_iter().collect();
+            sessions.sort_by_key(|&(_, size)| Reverse(size));
+            let mut left = count;
+            let is_taken = |&(_, size): &(usize, usize)| {
+                let is_taken = left > 0;
+                left = left.saturating_sub(size);
+                is_taken
+            };
+            let taken: Vec<usize> =
+                sessions.into_iter().filter(is_taken).map(|(session, _)| session).collect();
             identification.iter().copied().filter(|row| taken.contains(&session(row))).collect()
         } else {
             identification.clone()
@@ -209,17 +221,26 @@ impl<'a> Trial<'a> {
         Self { fitting: fit.fitting, problem: fit.problem, chosen }
     }
 
-    /// Returns the error of the fit as declared, of its registered nominal arm, or of the declared
-    /// problem fitted to the chosen rows alone, whichever is smallest \[m\].
+    /// Returns the error of the fit as declared, or of its registered nominal arm if that is less
+    /// \[m\].
     pub(super) fn error_as_read(&self, fit: &CheckedFit) -> f64 {
         let at = |x: &DVector<f64>| self.penalised(self.fitting, &self.chosen, x);
-        let error = at(&fit.end.x).min(at(fit.registered_x));
+        at(&fit.end.x).min(at(fit.registered_x))
+    }
+
+    /// Returns the error of the declared problem that is fitted to the chosen rows alone, from the
+    /// parameters of the fit \[m\]. A fit to few rows follows their errors more closely, with or
+    /// without a misreading. Infinity if all rows are chosen, or if the fit fails.
+    pub(super) fn refitted_error(&self, fit: &CheckedFit) -> f64 {
         if self.chosen.len() == self.fitting.split.identification.len() {
-            return error;
+            return f64::INFINITY;
         }
-        // Fewer rows leave less of the same misfit, with or without a misreading.
-        let refitted = self.outcome(Misreading::Reversed { joints: 0 }, true);
-        refitted.map_or(error, |outcome| outcome.rms.min(error))
+        let refitted =
+            self.with_corrected(Misreading::Reversed { joints: 0 }, true, |fitting, _| {
+                let end = fitting.run(&fit.end.x).ok()?;
+                Some(self.penalised(fitting, &fitting.split.identification, &end.x))
+            });
+        refitted.unwrap_or(f64::INFINITY)
     }
 
     /// Returns the misreadings that can be corrected, each with the rms error of the registered
