@@ -31,6 +31,7 @@ mod guessed_names;
 mod headerless;
 #[deny(clippy::indexing_slicing)]
 mod joined;
+mod joined_row;
 #[deny(clippy::indexing_slicing)]
 mod labels;
 mod latin;

@@ -1,9 +1,10 @@
 //! Reader of `[data]`: measurement files and their use.
 
 use std::collections::BTreeMap;
-use std::path::{Component, Path, PathBuf};
+use std::path::{Path, PathBuf};
 
 use super::Problem;
+use super::detours::without_detours;
 use super::dialect::{self, Dialect};
 use super::item::Item;
 use super::joint_log::{self, JointLog};
@@ -107,22 +108,6 @@ impl Problem {
         let of_fixture = fixtures.find_map(|fixture| self.fixtures.get(fixture)?.sigma);
         of_fixture.or(self.data.sigma_of(observation))
     }
-}
-
-/// Returns a path without folders that a following `..` leaves again, if the shorter path leads to
-/// the same file.
-pub(super) fn without_detours(path: PathBuf) -> PathBuf {
-    let mut short = PathBuf::new();
-    for component in path.components() {
-        match (component, short.components().next_back()) {
-            (Component::ParentDir, Some(Component::Normal(_))) => {
-                short.pop();
-            }
-            _ => short.push(component),
-        }
-    }
-    let is_same = || Some(short.canonicalize().ok()? == path.canonicalize().ok()?);
-    if short != path && is_same() == Some(true) { short } else { path }
 }
 
 /// Reads the section; returns empty settings if it is absent.

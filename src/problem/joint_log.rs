@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::data::without_detours;
+use super::detours::without_detours;
 use super::item::Item;
 use super::joint_source::JointSource;
 use crate::error::{InputError, InputErrorKind, Location};

@@ -13,6 +13,7 @@ mod camera;
 mod conditions;
 mod constraints;
 mod data;
+mod detours;
 mod dialect;
 pub(crate) mod digest;
 pub(crate) mod edit;

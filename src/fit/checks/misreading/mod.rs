@@ -6,6 +6,7 @@
 //! in full. Linearised tests at a fit with a large error would not find them.
 
 mod candidates;
+mod chosen_rows;
 mod explanation;
 mod images;
 mod masses;

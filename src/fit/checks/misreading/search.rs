@@ -1,7 +1,5 @@
 //! Search for the misreadings that explain why an arm does not fit its measurements.
 
-use std::cmp::Reverse;
-use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 use std::ops::RangeInclusive;
 
@@ -10,6 +8,7 @@ use rayon::prelude::*;
 
 use super::Misreading;
 use super::candidates::{candidates, is_far, of_loads, of_order, shift_step};
+use super::chosen_rows::chosen_rows;
 use super::explanation::{Explanation, Explanations, LeftOutMisfit};
 use super::images::of_images;
 use super::undo::is_unit_ratio;
@@ -53,8 +52,6 @@ const MAX_REACHES_BEYOND_PRIORS: f64 = 5e-4;
 const MIN_RATIO_ERROR: f64 = 1e-3;
 /// Maximum number of identification rows, evenly spaced, to which misreadings are applied.
 const MAX_ROWS: usize = 120;
-/// Smallest mean number of rows of a session with which rows of all sessions are chosen.
-const MIN_SESSION_ROWS: usize = 8;
 /// Maximum number of moving joints of which every subset is tried as reversed.
 const MAX_REVERSED: usize = 7;
 /// Maximum number of misreadings that are fitted in full: those with the smallest error of the
@@ -191,34 +188,9 @@ impl<'a> Trial<'a> {
         Self::with_rows(fit, MAX_ROWS)
     }
 
-    /// Creates the trial on at most about `count` rows of a fit, evenly spaced. If that leaves few
-    /// rows of a session, rows of the largest sessions are taken instead, because each session may
-    /// have a free base of its own.
+    /// Creates the trial on at most about `count` rows of a fit.
     pub(super) fn with_rows(fit: &'a CheckedFit, count: usize) -> Self {
-        let identification = &fit.fitting.split.identification;
-        let session = |row: &usize| fit.fitting.placement.base_of(*row);
-        let mut sizes: BTreeMap<usize, usize> = BTreeMap::new();
-        for row in identification {
-            *sizes.entry(session(row)).or_default() += 1;
-        }
-        let rows = if identification.len() > count && count < MIN_SESSION_ROWS * sizes.len() {
-            let mut sessions: Vec<(usize, usize)> = sizes.into_iter().collect();
-            sessions.sort_by_key(|&(_, size)| Reverse(size));
-            let mut left = count;
-            let is_taken = |&(_, size): &(usize, usize)| {
-                let is_taken = left > 0;
-                left = left.saturating_sub(size);
-                is_taken
-            };
-            let taken: Vec<usize> =
-                sessions.into_iter().filter(is_taken).map(|(session, _)| session).collect();
-            identification.iter().copied().filter(|row| taken.contains(&session(row))).collect()
-        } else {
-            identification.clone()
-        };
-        let step = rows.len().div_ceil(count).max(1);
-        let chosen = rows.into_iter().step_by(step).collect();
-        Self { fitting: fit.fitting, problem: fit.problem, chosen }
+        Self { fitting: fit.fitting, problem: fit.problem, chosen: chosen_rows(fit.fitting, count) }
     }
 
     /// Returns the error of the fit as declared, or of its registered nominal arm if that is less
