@@ -117,8 +117,9 @@ fn sizes_that_no_arm_has_are_said() {
     // Positions in whole millimetres.
     let rounded = |step: &str, sigma: f64| {
         let problem = parse(&format!("{ARM}[data]\nposition_sigma_mm = {sigma}\n"));
-        let row =
-            |k: u32| format!("{},{},{}{step},{},{}\n", k % 7, k % 5, 1000 + k, 3 * k, 500 - k);
+        let row = |k: u32| {
+            format!("{},{},{}{step},{},{}\n", 10 * (k % 7), 9 * k, 1000 + k, 3 * k, 500 - k)
+        };
         let rows: Vec<String> = (0..12).map(row).collect();
         let table = format!("q1_deg,q2_deg,x_mm,y_mm,z_mm\n{}", rows.concat());
         words(&try_table(&problem, &table).unwrap().1)
