@@ -44,14 +44,15 @@ impl Check for HeldGeometryIsRight {
     fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
         let is_contradicted = fit.noise == Noise::Declared && fit.noise_factor > 1.0;
         let leading = fit.fitting.measurements.leading();
+        // Another reading of the table explains the misfit by itself.
+        let is_misread = fit.explanations.get().is_some_and(|found| !found.fitted.is_empty());
         if !(is_contradicted && fit.has_further_fits && leading.is_position())
             || fit.fitting.earlier.is_some()
+            || is_misread
         {
             return Vec::new();
         }
-        // Another reading of the table explains the misfit by itself.
-        let is_misread = fit.explanations.get().is_some_and(|found| !found.fitted.is_empty());
-        finding(fit, leading).filter(|_| !is_misread).into_iter().collect()
+        finding(fit, leading).into_iter().collect()
     }
 }
 
@@ -91,7 +92,7 @@ impl Trial {
 
 /// Returns the finding that names the held parameter which explains most of the misfit.
 fn finding(fit: &CheckedFit, leading: Observation) -> Option<Finding> {
-    let names = promising(fit)?;
+    let names = promising(fit).filter(|names| !names.is_empty())?;
     let rows = fit.kind(leading).rows;
     // All fits have the declared σ, so that the priors weigh equally.
     let refit = |problem: &Problem, name: Option<&str>| {
@@ -103,7 +104,7 @@ fn finding(fit: &CheckedFit, leading: Observation) -> Option<Finding> {
             Some((freed, Trial::of(fit, &rows, (fitting, &end))))
         })?
     };
-    let declared = refit(fit.problem, None).filter(|_| !names.is_empty())?.1;
+    let (_, declared) = refit(fit.problem, None)?;
     let noise =
         fit.rms(&rows, &fit.fitting.position_errors(&rows, &fit.end.x)).powi(2) / fit.noise_factor;
     let misfit = (declared.rms.powi(2) - noise).max(0.0);
