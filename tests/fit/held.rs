@@ -27,7 +27,7 @@ fn a_held_parameter_that_causes_the_misfit_is_named() {
     assert!(before > 3.0 * after && after < 2e-4, "{before} {after}");
 
     // Many that are held cause it together, so that none explains most of it alone.
-    let many = holding(&["joint*"]);
+    let many = holding(&["joint*.*"]);
     assert!(many.has(FindingCode::NoiseBeyondDeclared), "{:?}", many.findings);
     assert!(!many.has(FindingCode::HeldParameter), "{:?}", many.findings);
 }
