@@ -114,6 +114,11 @@ pub fn after_fit(
         None if found.has(FindingCode::HeldOutNotBetter) => {
             format!("flexcal check {named} says what the poses can tell")
         }
+        None if found.has(FindingCode::NarrowPoses) => {
+            format!(
+                "flexcal plan {named} --poses N chooses poses over the whole range of the joints"
+            )
+        }
         None => to_apply("corrects commands"),
     }
 }

@@ -114,7 +114,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let trusted = estimate.trusted;
     common.warn_of_loads(&problem, &estimate, &targets);
     if !trusted {
-        diagnostic::warn("the estimate is not to be trusted, so the commands are not either");
+        diagnostic::warn(
+            "the estimate is not to be trusted, so the commands are not either: do not move the arm by them",
+        );
     }
     let correction = remainder::of_estimate(&problem, &estimate);
     let fitted = (&estimate, correction.as_ref().ok().and_then(Option::as_ref));
@@ -137,7 +139,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
              happens to be assumed; --frame base takes them in the frame of the base",
         );
     }
-    if let Some(words) = misplaced.as_ref().filter(|_| !common.quiet) {
+    // Beside an estimate that is not to be trusted, its misfit explains targets that seem misplaced.
+    if let Some(words) = misplaced.as_ref().filter(|_| !common.quiet && trusted) {
         diagnostic::warn(words);
     }
     let Compensation { targets, commands, bounds, .. } = &found;
@@ -153,7 +156,12 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         let written = results.path("commands.csv");
         let [problem_word, estimate] = [common.problem(), &arguments.estimate].map(shell_word);
         let reached = commands.iter().filter(|command| command.is_reached()).count();
-        let next = if misplaced.is_some() {
+        let next = if !trusted {
+            format!(
+                "flexcal identify {problem_word} says why the estimate is not to be trusted; correct that, and identify again before commands are \
+                 corrected"
+            )
+        } else if misplaced.is_some() {
             "correct the frame or the unit of the targets, as the warning says".to_owned()
         } else if reached == 0 {
             "check the unit and the frame of the targets (--frame base takes them in the frame of the base) and the limits of the \

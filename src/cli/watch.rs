@@ -62,6 +62,12 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         diagnostic::warn("the estimate is not to be trusted, so the verdict is not either");
     }
     common.warn_of_loads(&problem, &estimate, &rows);
+    for session in estimate.unknown_sessions(&rows).into_iter().filter(|_| !common.quiet) {
+        diagnostic::warn(&format!(
+            "the estimate does not know session {session}: its base is fitted to these rows, so that a base or an instrument that has moved \
+             cannot be seen; if it stands where it stood, give the rows the session of the estimate"
+        ));
+    }
     let settings = (arguments.drift, arguments.false_alarms);
     let rows = rows.arm_rows();
     let watch = life::watch(&problem, &estimate, &rows, settings)?;
@@ -82,6 +88,12 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
                 .to_owned()
         } else if watch.is_changed() && first == Some(CauseKind::Row) {
             format!("check that row, then flexcal watch {} --estimate {file} without it", common.problem_arguments())
+        } else if watch.is_changed() && first == Some(CauseKind::Base) {
+            format!(
+                "if the instrument or the arm was set up anew, give these rows another word in a column session and watch again; if both stood \
+                 still, flexcal identify {} --prior {file} takes the change over into an estimate",
+                common.problem_arguments()
+            )
         } else if watch.is_changed() {
             format!(
                 "flexcal identify {} --prior {file} takes the change over into an estimate",

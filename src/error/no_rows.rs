@@ -8,7 +8,11 @@ use super::phrases::plural;
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum NoRows {
-    #[error("column {column} says {word} in every row")]
+    #[error(
+        "column {column} says {word} in every row; write {} in some of them, or held_out = {{ \
+         fraction = 0.3, seed = 1 }} in [data]",
+        if *word == "identification" { "validation" } else { "identification" }
+    )]
     Column { column: String, word: &'static str },
     #[error("every row is of session \"{session}\"")]
     Session { session: String },

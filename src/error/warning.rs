@@ -262,9 +262,14 @@ pub enum WarningKind {
     FarBody { distance: String },
     #[error(
         "{distance} m from the last frame, while all links together are {links} m long; if \
-         these are millimetres, write target_mm"
+         these are millimetres, write {write}"
     )]
-    FarTarget { distance: String, links: String },
+    FarTarget { distance: String, links: String, write: &'static str },
+    #[error(
+        "the table has no such column, so that the arm carries {mass} kg in every row, although the \
+         problem declares where a payload hangs; add the column, or remove payload_at"
+    )]
+    NoPayloadColumn { mass: String },
     #[error(
         "{length} m is far beyond the arm, whose links together are {links} m long; if these are \
          millimetres, write {write}"

@@ -122,6 +122,18 @@ impl Measurements {
         is_coarse.then(|| Warning { location: self.location(rows[0]), kind })
     }
 
+    /// Returns a warning if the problem declares the place of a payload but no mass, and the table
+    /// has no column of payloads.
+    pub(super) fn missing_payload(&self, problem: &Problem) -> Option<Warning> {
+        let is_missing = self.payload.is_none()
+            && problem.tool.payload_is_declared
+            && problem.tool.payload_mass == 0.0
+            && problem.is_elastic();
+        let kind = WarningKind::NoPayloadColumn { mass: problem.tool.payload_mass.to_string() };
+        let location = self.location(0).with_key("payload_kg");
+        is_missing.then_some(Warning { location, kind })
+    }
+
     /// Returns a warning, located at the heaviest payload, if that is implausible for the arm.
     pub(super) fn heavy_payload(&self, problem: &Problem) -> Option<Warning> {
         let payloads = self.payload.iter().flatten().enumerate();

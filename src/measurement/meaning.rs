@@ -302,6 +302,7 @@ fn joint_ignored(problem: &Problem, joint: usize) -> WarningKind {
     let moves = |joint: &usize| {
         problem.joints.get(joint - 1).is_some_and(|of| of.command_kind() != JointKind::Fixed)
     };
-    let declared = problem.joints.len();
+    // In standard form, the last joint is the flange, which no [[joint]] declares.
+    let declared = problem.joints.len() - usize::from(problem.standard_rows().is_some());
     WarningKind::JointIgnored { joint, declared, moving: (1..=declared).filter(moves).collect() }
 }

@@ -301,6 +301,7 @@ impl<'a> Tables<'a> {
                 warnings.extend(measurements.few_degrees(problem, &commands));
                 warnings.extend(measurements.milliseconds());
                 warnings.extend(measurements.heavy_payload(problem));
+                warnings.extend(measurements.missing_payload(problem));
                 warnings.extend(measurements.payload_in_newtons());
                 warnings.extend(measurements.short_distances(problem));
                 warnings.extend(

@@ -129,6 +129,12 @@ fn read_rule(pattern: &str, item: &Item<'_, '_>) -> Result<ParameterRule, InputE
         return Err(item.error(InputErrorKind::Empty));
     }
     item.check_count("characters in a pattern", pattern.len(), MAX_PATTERN_BYTES)?;
+    // Names of parameters have a point, so that another key belongs to another section.
+    if !item.holds_tables() && !pattern.contains(['.', '*', '?']) {
+        let place = "[parameters] holds names of parameters such as \"joint2.theta\"; a key of [data] \
+                     stands below the line [data]";
+        return Err(item.error(InputErrorKind::MisplacedKey { place: place.to_owned() }));
+    }
     if !item.holds_tables() {
         let expected = "a table such as { free = true }, { fixed = true } or { sigma_mm = 1.0 }";
         return Err(item.wrong_type(expected));

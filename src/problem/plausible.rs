@@ -308,22 +308,26 @@ impl Problem {
         })
     }
 
-    /// Returns a warning if a target is farther from its frame than twice the length of the arm.
+    /// Returns a warning if a target, or the payload, is farther from its frame than twice the length of the arm.
     fn far_target_warning(&self) -> Option<Warning> {
-        let tool_location = || Location {
+        let tool_location = |key: &str| Location {
             line: None,
             excerpt: None,
-            ..self.data.location.clone().with_key("tool.target")
+            ..self.data.location.clone().with_key(key)
         };
         let farthest = self.targets.iter().max_by(|a, b| a.at.norm().total_cmp(&b.at.norm()));
-        let (location, target) = farthest.map_or_else(
-            || (tool_location(), self.tool.target),
-            |target| (target.location.clone(), target.at),
+        let target = farthest.map_or_else(
+            || (tool_location("tool.target"), self.tool.target, "target_mm"),
+            |target| (target.location.clone(), target.at, "target_mm"),
         );
-        let (links, distance) = (self.length_of_links(), target.norm());
+        let payload = (tool_location("tool.payload_at"), self.tool.payload_at, "payload_at_mm");
+        let is_farther = payload.1.norm() > target.1.norm();
+        let (location, place, write) = if is_farther { payload } else { target };
+        let (links, distance) = (self.length_of_links(), place.norm());
         let kind = WarningKind::FarTarget {
             distance: format!("{distance:.3}"),
             links: format!("{links:.3}"),
+            write,
         };
         (links > 0.0 && distance > 2.0 * links).then_some(Warning { location, kind })
     }

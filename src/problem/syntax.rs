@@ -7,6 +7,10 @@ use crate::error::{InputErrorKind, JSON, TABLE, TOML, XML, text_format, typograp
 const OTHER_WORDS: [&str; 12] =
     ["true", "false", "yes", "no", "on", "off", "none", "null", "wahr", "falsch", "vrai", "faux"];
 
+/// Sections that are lists: each element begins with its name in two brackets.
+const LISTS: [&str; 9] =
+    ["joint", "effect", "constraint", "target", "point", "anchor", "surface", "camera", "marker"];
+
 impl Document {
     /// Returns the error of a syntax `error` of the parser, which names the usual mistake if one is
     /// recognised, or the format of the file if that is another one.
@@ -97,6 +101,8 @@ fn usual_mistake(before: &str, after: &str, message: &str) -> Option<(String, &'
         let remedy = if before.starts_with("[[") {
             "if it is the first [[…]] of this name, a header above it is misspelt, and parts such as [[joint.body]] then began another \
              section; otherwise write its lines into the first section of this name"
+        } else if LISTS.iter().any(|list| word.starts_with(list)) {
+            "joints, effects and the like are lists: write two brackets for each of them, as in [[joint]], the first one too"
         } else {
             "write its lines into the first section of this name"
         };

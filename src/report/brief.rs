@@ -84,8 +84,10 @@ fn remarks(found: &Identification) -> Vec<String> {
         )
     }));
     points.extend(unsteady_points(found.spreads.iter().map(|spread| &spread.1)));
-    let of_parameters =
-        format!("of the {} cannot be identified", counted(found.unknowns.len(), "parameter"));
+    let of_parameters = format!(
+        "of the {} cannot be identified (priors or fewer free parameters decide them)",
+        counted(found.unknowns.len(), "parameter")
+    );
     let counts = [
         (found.identifiability().unidentifiable.len(), "combination", of_parameters.as_str()),
         (found.weak.len(), "combination", "determined too weakly"),

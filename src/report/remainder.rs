@@ -115,7 +115,7 @@ impl PredictionAccuracy {
         };
         let bound = mean.is_finite().then(|| {
             format!(
-                "Error bound of a prediction{with} ({percent} %, measurement noise included): {} mm, mean over the workspace{far}.",
+                "Error bound of a prediction{with} ({percent} %, measurement noise included): {} mm, mean over the measured joint ranges{far}.",
                 two_digits(mean * 1e3, 4)
             )
         });

@@ -69,15 +69,16 @@ fn what_is_printed_fits_on_a_screen_unless_more_is_asked_for() {
         assert!(run.status < 2, "{run:?}");
         run.stdout
     };
-    for [problem, data] in arms(&folder) {
+    for (index, [problem, data]) in arms(&folder).into_iter().enumerate() {
         for command in ["identify", "loop"] {
             let arguments = format!("{command} {problem} -o out --data {data}");
-            let (brief, whole) = (run(&arguments), run(&format!("{arguments} -v")));
+            let brief = run(&arguments);
             let lines = |text: &str| text.lines().count();
-            assert!(
-                lines(&brief) <= 25 && lines(&whole) > lines(&brief),
-                "{command} {data}:\n{brief}"
-            );
+            assert!(lines(&brief) <= 25, "{command} {data}:\n{brief}");
+            if index == 0 {
+                let whole = run(&format!("{arguments} -v"));
+                assert!(lines(&whole) > lines(&brief), "{command} {data}:\n{whole}");
+            }
             // The next command may be longer because of its paths.
             let lines = brief.lines().filter(|line| !line.starts_with("Next: "));
             assert!(

@@ -58,12 +58,12 @@ fn figures_of_an_older_page_go_and_other_files_stay() {
     let folder = Folder::with_lunar_sampler();
     let flexcal = |command: &str| folder.flexcal(&format!("{command} . --out out"));
     let is_there = |name: &str| folder.has(format!("out/figures/{name}"));
-    flexcal("compare").success();
-    assert!(is_there("strategies.svg") && is_there("ablations.svg"));
+    flexcal("loop").success();
+    assert!(is_there("effect-1.svg"));
     let write = |name: &str| folder.write(format!("out/figures/{name}"), "mine");
     ["effect-mine.svg", "mine.svg", "ranking.txt"].into_iter().for_each(write);
     flexcal("identify").success();
-    assert!(!is_there("strategies.svg") && !is_there("ablations.svg"));
+    assert!(!is_there("effect-1.svg"));
     let kept = ["effect-mine.svg", "mine.svg", "ranking.txt", "residual-order.svg"];
     assert!(kept.into_iter().all(is_there));
     // A foreign file with the name of a figure prevents all output before any work.

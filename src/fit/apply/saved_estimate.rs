@@ -13,6 +13,7 @@ use super::saved_estimate_error::{
 };
 use crate::error::{binary_format, one_line};
 use crate::files::{Changes, changed_key, read_limited};
+use crate::fit::checks::pose_sufficiency::label;
 use crate::fit::{Placement, Strategy};
 use crate::measurement::{Measurements, StartTimes};
 use crate::model::parameter::Parameter;
@@ -137,6 +138,24 @@ impl SavedEstimate {
         estimate
     }
 
+    /// Returns true if the estimate has parameters of this part of the arm, such as `joint2` or
+    /// `base[A]`.
+    fn has_part(&self, part: &str) -> bool {
+        let of_part =
+            |name: &str| name.strip_prefix(part).is_some_and(|rest| rest.starts_with('.'));
+        self.parameters.iter().any(|entry| of_part(&entry.name))
+    }
+
+    /// Returns the sessions of a table whose base the estimate does not know, although it knows
+    /// bases of other sessions.
+    #[doc(hidden)]
+    pub fn unknown_sessions<'a>(&self, rows: &'a Measurements) -> Vec<&'a str> {
+        let knows_bases = self.parameters.iter().any(|entry| entry.name.starts_with("base["));
+        let names = rows.session.names.iter().map(String::as_str);
+        let is_unknown = |name: &&str| !name.is_empty() && !self.has_part(&label("base", name));
+        if knows_bases { names.filter(is_unknown).collect() } else { Vec::new() }
+    }
+
     /// Reads an `estimate.json`.
     ///
     /// # Errors
@@ -155,6 +174,7 @@ impl SavedEstimate {
         let bytes =
             read_limited(file, MAX_FILE_MIB << 20).map_err(|source| match source.kind() {
                 io::ErrorKind::FileTooLarge => SavedEstimateError::TooLarge { file: named() },
+                io::ErrorKind::NotFound => SavedEstimateError::NoSuchFile { file: named() },
                 _ => SavedEstimateError::Unreadable { file: named(), source },
             })?;
         if let Some(found) = binary_format(&bytes) {

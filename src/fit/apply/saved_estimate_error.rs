@@ -87,6 +87,8 @@ fn identified(known: &[String]) -> String {
 #[non_exhaustive]
 #[expect(missing_docs, reason = "the message of each variant says what it stands for")]
 pub enum SavedEstimateError {
+    #[error("{}: no such file; flexcal identify PROBLEM writes an estimate.json, into the folder that it names", file.display())]
+    NoSuchFile { file: PathBuf },
     #[error("{}: cannot be read: {source}", file.display())]
     Unreadable { file: PathBuf, source: io::Error },
     #[error("{}: not an estimate.json: {source}", file.display())]

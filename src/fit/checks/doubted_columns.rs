@@ -52,7 +52,7 @@ pub(super) fn column_name(rows: &Measurements, joint: usize) -> String {
 }
 
 /// Returns the joints with commands.
-fn moving<'f>(fit: &'f CheckedFit) -> impl Iterator<Item = usize> + 'f {
+pub(super) fn moving<'f>(fit: &'f CheckedFit) -> impl Iterator<Item = usize> + 'f {
     let joints = fit.problem.joints.iter().enumerate();
     let moving = joints.filter(|(_, joint)| joint.command_kind() != JointKind::Fixed);
     moving.map(|(joint, _)| joint).filter(|joint| *joint < fit.fitting.measurements.joints)
@@ -63,17 +63,23 @@ fn commands(rows: &Measurements, joint: usize) -> Vec<f64> {
     (0..rows.len()).map(|row| rows.configuration(row)[joint]).collect()
 }
 
-/// Reports joints that stand still in all rows.
-fn standing_still(fit: &CheckedFit, before: f64) -> Option<Finding> {
-    let rows = fit.fitting.measurements;
+/// Returns those of the `joints` whose commands stay within 0.1° or 0.1 mm in the `rows`.
+pub(super) fn still_joints(fit: &CheckedFit, rows: &[usize], joints: &[usize]) -> Vec<usize> {
+    let table = fit.fitting.measurements;
     let is_still = |joint: &usize| {
-        let values = commands(rows, *joint);
-        let most = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        let least = values.iter().copied().fold(f64::INFINITY, f64::min);
+        let (least, most) =
+            crate::numeric::range(rows.iter().map(|&row| table.configuration(row)[*joint]));
         let is_turning = fit.problem.joints[*joint].command_kind() == JointKind::Revolute;
         most - least < if is_turning { MAX_STILL_TURN } else { MAX_STILL_TRAVEL }
     };
-    let still: Vec<usize> = moving(fit).filter(is_still).collect();
+    joints.iter().copied().filter(is_still).collect()
+}
+
+/// Reports joints that stand still in all rows.
+fn standing_still(fit: &CheckedFit, before: f64) -> Option<Finding> {
+    let rows = fit.fitting.measurements;
+    let every_row: Vec<usize> = (0..rows.len()).collect();
+    let still = still_joints(fit, &every_row, &moving(fit).collect::<Vec<_>>());
     if still.is_empty() || rows.len() < MIN_ROWS {
         return None;
     }

@@ -144,6 +144,9 @@ finding_codes! {
     PriorsDecide: Warning "priors-decide" ["poses", "coordinates", "parameters"]
         "The poses measure fewer coordinates than parameters are fitted, so that priors decide part of the result.",
         "measure more different poses";
+    NarrowPoses: Warning "narrow-poses" ["columns"]
+        "A joint stands still in all fitted rows, or no joint turns by more than 10°, so that the fit says little about other poses.",
+        "measure poses in which it moves (flexcal plan chooses them), if the arm is to be used there";
     NominalFarOff: Warning "nominal-far-off" ["kind", "rms", "spread", "explanations"]
         "The nominal arm misses the measurements by more than a tenth of their spread.",
         "check units, signs of joints, and whether the numbers are of this convention of frames";
@@ -167,7 +170,7 @@ finding_codes! {
         "hold out poses that are not fitted, as held_out = { fraction = 0.3, seed = 1 } does";
     HeldOutOutliers: Warning "held-out-outliers" ["rows", "of"]
         "Some held-out rows are farther from the prediction than its σ allows.",
-        "look at these rows";
+        "check these rows for mistyped numbers and signs, and correct them or leave them out";
     HeldOutBeyondPrediction: Warning "held-out-beyond-prediction" ["chi2", "coordinates", "p_value"]
         "The held-out residuals are larger than the σ and the covariance of the fit predict (probability below 0.001).",
         "look for what the model lacks with flexcal loop, or measure poses like the held-out ones";

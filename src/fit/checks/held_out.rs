@@ -281,6 +281,6 @@ impl Check for WithoutOutliers {
             named.join(", ")
         );
         let numbers = [outliers_as_json(rows), of.into()];
-        vec![Finding::new(FindingCode::HeldOutOutliers, numbers, text).with_remedy(String::new())]
+        vec![Finding::new(FindingCode::HeldOutOutliers, numbers, text)]
     }
 }

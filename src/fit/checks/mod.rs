@@ -26,6 +26,7 @@ pub(super) mod outliers;
 pub(super) mod parameter_limits;
 pub(super) mod payload_place;
 pub(super) mod point_spread;
+mod pose_range;
 pub(super) mod pose_sufficiency;
 mod prediction;
 pub(super) mod priors;
@@ -63,6 +64,7 @@ const CHECKS: &[&dyn Check] = &[
     &priors::NoiseIsDeclared,
     &orientation::OrientationsFit,
     &priors::DataDecide,
+    &pose_range::PosesSpread,
     &nominal_error::NominalIsNear,
     &parameter_limits::GivesWayToLoads,
     &table_digits::CommandsHaveDigits,

@@ -168,7 +168,7 @@ fn coordinates(
 }
 
 /// Returns the label of a base or tool: `base[A]`, or `base` for one without a name.
-fn label(what: &str, word: &str) -> String {
+pub(in crate::fit) fn label(what: &str, word: &str) -> String {
     if word.is_empty() { what.to_owned() } else { format!("{what}[{word}]") }
 }
 

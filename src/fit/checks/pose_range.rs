@@ -1,0 +1,77 @@
+//! Check that the fitted poses move the joints far enough for a statement about other poses.
+
+use serde_json::json;
+
+use super::checked_fit::{Check, CheckedFit};
+use super::doubted_columns::{column_name, moving, still_joints};
+use super::finding::{Finding, FindingCode};
+use super::misfit::Misfit;
+use crate::problem::JointKind;
+
+/// Largest range of the commands of every turning joint at which all poses are alike: 10° \[rad\].
+const MAX_ALIKE_TURN: f64 = 10.0 * std::f64::consts::PI / 180.0;
+/// Largest range of the commands of a sliding joint at which all poses are alike, relative to the
+/// reach of the arm.
+const MAX_ALIKE_TRAVEL: f64 = 0.05;
+/// Minimum number of rows from which the range is judged.
+const MIN_ROWS: usize = 3;
+
+/// Checks that every joint moves in the fitted rows, and that not all poses are alike.
+pub(super) struct PosesSpread;
+
+impl Check for PosesSpread {
+    fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
+        let table = fit.fitting.measurements;
+        let is_of_arm = |row: &&usize| table.observation(**row).is_of_arm();
+        let rows: Vec<usize> =
+            fit.fitting.split.identification.iter().filter(is_of_arm).copied().collect();
+        // If the fit is far off, a joint that stands still is a column in doubt.
+        if rows.len() < MIN_ROWS || !Misfit.check(fit).is_empty() {
+            return Vec::new();
+        }
+        let range = |joint: usize| {
+            let values = rows.iter().map(|&row| table.configuration(row)[joint]);
+            let (low, high) = crate::numeric::range(values);
+            high - low
+        };
+        let is_turning =
+            |joint: usize| fit.problem.joints[joint].command_kind() == JointKind::Revolute;
+        let is_narrow = |joint: usize| {
+            let reach = fit.fitting.model.reach();
+            range(joint) < if is_turning(joint) { MAX_ALIKE_TURN } else { MAX_ALIKE_TRAVEL * reach }
+        };
+        let mut joints: Vec<usize> = moving(fit).collect();
+        let widest = joints.iter().filter(|joint| is_turning(**joint)).map(|&joint| range(joint));
+        let widest = widest.fold(0.0, f64::max).to_degrees();
+        let measure =
+            "measure poses over the whole range of the joints (flexcal plan chooses them)";
+        if joints.iter().all(|&joint| is_narrow(joint)) && !joints.is_empty() {
+            let names: Vec<String> =
+                joints.iter().map(|&joint| column_name(table, joint)).collect();
+            let text = format!(
+                "the fitted poses are alike: no joint turns by more than {widest:.1}°, so that parameters \
+                 and predictions hold near these poses only"
+            );
+            let finding = Finding::new(FindingCode::NarrowPoses, [json!(names)], text);
+            return vec![finding.with_remedy(measure.to_owned())];
+        }
+        // A target on the axis of the last joint stays where it is.
+        joints.pop();
+        let still = still_joints(fit, &rows, &joints);
+        let Some(&first) = still.first() else { return Vec::new() };
+        let names: Vec<String> = still.iter().map(|&joint| column_name(table, joint)).collect();
+        let at = table.configuration(rows[0])[first];
+        let place = match still.len() {
+            1 if is_turning(first) => format!(" at {:.1}°", at.to_degrees()),
+            1 => format!(" at {:.1} mm", at * 1e3),
+            _ => String::new(),
+        };
+        let verb = if still.len() == 1 { "stays" } else { "stay" };
+        let text = format!(
+            "{} {verb}{place} in all fitted rows, so that predictions with other values may be wrong by far \
+             more than their bound",
+            names.join(", ")
+        );
+        vec![Finding::new(FindingCode::NarrowPoses, [json!(names)], text)]
+    }
+}
