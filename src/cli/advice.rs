@@ -114,13 +114,22 @@ pub fn after_fit(
         None if found.has(FindingCode::HeldOutNotBetter) => {
             format!("flexcal check {named} says what the poses can tell")
         }
-        None if found.has(FindingCode::NarrowPoses) => {
+        None if found.has(FindingCode::HeldOutOutliers) => format!(
+            "check the held-out rows that the warning names, then flexcal identify {named}; if they are right, {}",
+            to_apply("corrects commands")
+        ),
+        None if found.finding(FindingCode::NarrowPoses).is_some_and(are_alike) => {
             format!(
                 "flexcal plan {named} --poses N chooses poses over the whole range of the joints"
             )
         }
         None => to_apply("corrects commands"),
     }
+}
+
+/// Returns true if all fitted poses are alike, not only the values of some joints.
+fn are_alike(narrow: &Finding) -> bool {
+    narrow.remedy != FindingCode::NarrowPoses.entry().remedy
 }
 
 /// Returns true if a misreading leaves more than noise, so that it explains the misfit in part only.

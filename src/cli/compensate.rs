@@ -144,7 +144,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         diagnostic::warn(words);
     }
     let Compensation { targets, commands, bounds, .. } = &found;
-    others.iter().filter(|_| !common.quiet).for_each(|words| diagnostic::warn(words));
+    others.iter().filter(|_| !common.quiet && trusted).for_each(|words| diagnostic::warn(words));
     let bounds = bounds.as_ref();
     let table = commands_csv(&problem, targets, commands, bounds);
     results.write(&[("commands.csv", &table)])?;

@@ -46,6 +46,9 @@ impl Table {
             {
                 self.cell_error(place, TableErrorKind::WordForMeasurement { value })
             }
+            InputErrorKind::NotFinite { value } if value.to_lowercase().contains("nan") => {
+                self.cell_error(place, TableErrorKind::WordForMeasurement { value })
+            }
             _ => error,
         })
     }

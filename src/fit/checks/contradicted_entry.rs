@@ -53,9 +53,14 @@ pub(super) fn contradicted_entry(
     if !kind.observation.is_position() || rms > MAX_REMAINING_FRACTION * displacement {
         return None;
     }
+    // Position and orientation of a target are declared apart.
+    let is_same_part = |site, axis: usize| match site {
+        ParameterSite::Target { axis: own, .. } => (own < 3) == (axis < 3),
+        _ => false,
+    };
     let is_same = |site: ParameterSite| match (parameter.site, site) {
         (ParameterSite::Target { target, .. }, ParameterSite::Target { target: other, axis }) => {
-            target == other && axis < 3
+            target == other && is_same_part(parameter.site, axis)
         }
         (site, other) => site == other,
     };
@@ -68,15 +73,20 @@ pub(super) fn contradicted_entry(
         ParameterSite::Joint { joint, .. } => {
             Some(joint_entry(fit.problem.joints.get(joint)?, parameter, x, &left))
         }
-        ParameterSite::Target { axis: 0..3, .. } if fit.problem.targets.is_empty() => {
-            let declared = fit.problem.tool.target;
+        ParameterSite::Target { axis, .. } if fit.problem.targets.is_empty() => {
+            let tool = &fit.problem.tool;
+            let declared = if axis < 3 { tool.target } else { tool.rotation };
             let mut moved = declared;
             for (other, x) in fitted().filter(|(other, _)| is_same(other.site)) {
                 if let ParameterSite::Target { axis, .. } = other.site {
-                    moved[axis] += x;
+                    moved[axis % 3] += x;
                 }
             }
-            Some(tool_entry(fit.problem, declared, moved, &left))
+            Some(if axis < 3 {
+                tool_entry(fit.problem, declared, moved, &left)
+            } else {
+                rotation_entry(declared, moved, &left)
+            })
         }
         _ => None,
     }
@@ -143,6 +153,24 @@ fn tool_entry(
         "enter the target in [tool] if the tool was declared wrongly or not at all; an error in d \
          of the last joint looks the same"
     };
+    ContradictedEntry { words, remedy: remedy.to_owned() }
+}
+
+/// Describes the orientation of the target of `[tool]` as declared and as fitted \[rad\]. `left` is
+/// the formatted rms residual of the fit.
+fn rotation_entry(declared: Vector3<f64>, fitted: Vector3<f64>, left: &str) -> ContradictedEntry {
+    let degrees = |v: Vector3<f64>| {
+        let number = |value: &f64| rounded((value.to_degrees() * 10.0).round() / 10.0);
+        v.iter().map(number).collect::<Vec<_>>().join(", ")
+    };
+    let words = format!(
+        "the target is declared with rotation_deg = [{}], the measurements say [{}], with which the \
+         error of the position is {left}",
+        degrees(declared),
+        degrees(fitted)
+    );
+    let remedy = "if the probe is mounted so, enter that in [tool]; otherwise check the frame and the \
+                  convention of the orientation columns";
     ContradictedEntry { words, remedy: remedy.to_owned() }
 }
 

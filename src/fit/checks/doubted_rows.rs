@@ -8,7 +8,7 @@ use super::finding::{Finding, FindingCode};
 use super::misfit::{MAX_MISS, MAX_UNREPORTED_RESIDUAL, Misfit};
 use super::row_kind::format_error;
 use crate::fit::stages::fitting::Fitting;
-use crate::measurement::Split;
+use crate::measurement::{Measurements, Split};
 
 /// Number of successive rows of each base to which the nominal arm is registered in a trial. They
 /// determine base and tool.
@@ -24,8 +24,15 @@ const MAX_OF_RMS: f64 = 2.5;
 const MIN_SHARE: f64 = 0.6;
 /// Number of registrations to the rows that fit the one before.
 const PASSES: usize = 3;
-/// Units of a length \[m\] that a table may confuse: factors of the measured numbers.
-const LENGTH_FACTORS: [f64; 6] = [1e3, 1e-3, 10.0, 0.1, 25.4, 1.0 / 25.4];
+/// Units of a length that a table may confuse: factors of the measured numbers, with their words.
+const LENGTH_FACTORS: [(f64, &str); 6] = [
+    (1e3, "multiply them by 1000"),
+    (1e-3, "divide them by 1000"),
+    (10.0, "multiply them by 10"),
+    (0.1, "divide them by 10"),
+    (25.4, "multiply them by 25.4"),
+    (1.0 / 25.4, "divide them by 25.4"),
+];
 
 /// Names of the coordinates of a position.
 const NAMES: [&str; 3] = ["x", "y", "z"];
@@ -91,15 +98,24 @@ fn doubted(fit: &CheckedFit, before: f64) -> Option<Finding> {
     let is_run = last + 1 - first == apart.len() && apart.len() >= WINDOW;
     let stands_elsewhere = || {
         let chosen: Vec<usize> = apart.iter().map(|&place| rows[place]).collect();
-        let x = registration(fit, chosen.clone()).filter(|_| is_run)?;
-        let errors = fit.fitting.position_errors(&chosen, &x);
-        (fit.rms(&chosen, &errors) < limit).then(|| {
+        let rms = registration_error(fit, measurements, &chosen).filter(|_| is_run)?;
+        (rms < limit).then(|| {
             "they fit by themselves where base or target stand elsewhere: if the instrument, the base or \
              the target was moved, give them another word in the column session"
                 .to_owned()
         })
     };
-    let cause = mistake(&pairs, limit).or_else(stands_elsewhere);
+    let in_other_unit = || {
+        let chosen: Vec<usize> = apart.iter().map(|&place| rows[place]).collect();
+        let fits = |&(factor, _): &(f64, &str)| {
+            let mut converted = measurements.clone();
+            chosen.iter().for_each(|&row| converted.positions[row] *= factor);
+            registration_error(fit, &converted, &chosen).is_some_and(|rms| rms < limit)
+        };
+        let mut factors = LENGTH_FACTORS.into_iter().filter(|_| chosen.len() >= WINDOW);
+        factors.find(fits).map(|(_, words)| format!("their positions are in another unit: {words}"))
+    };
+    let cause = mistake(&pairs, limit).or_else(stands_elsewhere).or_else(in_other_unit);
     if cause.is_none() && are_few {
         return None;
     }
@@ -130,11 +146,35 @@ fn doubted(fit: &CheckedFit, before: f64) -> Option<Finding> {
 /// Registers the nominal arm to the `chosen` identification rows alone.
 fn registration(fit: &CheckedFit, chosen: Vec<usize>) -> Option<nalgebra::DVector<f64>> {
     let split = Split { identification: chosen, held_out: Vec::new() };
-    let Fitting { placement, model, measurements, .. } = *fit.fitting;
-    let held_out_only = placement.held_out_only(model, measurements, &split);
+    registered(fit, fit.fitting.measurements, &split, |fitting| fitting.registered().ok())
+}
+
+/// Returns the rms error of the nominal arm after its registration to the `chosen` rows of
+/// `measurements` alone \[m\].
+fn registration_error(
+    fit: &CheckedFit,
+    measurements: &Measurements,
+    chosen: &[usize],
+) -> Option<f64> {
+    let split = Split { identification: chosen.to_vec(), held_out: Vec::new() };
+    registered(fit, measurements, &split, |fitting| {
+        let x = fitting.registered().ok()?;
+        Some(fit.rms(chosen, &fitting.position_errors(chosen, &x)))
+    })
+}
+
+/// Calls `evaluate` with the fit of the identification rows of `split` alone.
+fn registered<R>(
+    fit: &CheckedFit,
+    measurements: &Measurements,
+    split: &Split,
+    evaluate: impl FnOnce(&Fitting) -> R,
+) -> R {
+    let Fitting { placement, model, .. } = *fit.fitting;
+    let held_out_only = placement.held_out_only(model, measurements, split);
     let declared = fit.fitting.with_declared_noise();
-    let fitting = Fitting { split: &split, turn_sigma: None, held_out_only, ..declared };
-    fitting.registered().ok()
+    let fitting = Fitting { split, measurements, turn_sigma: None, held_out_only, ..declared };
+    evaluate(&fitting)
 }
 
 /// Returns sets of places in `rows`: in each set, successive rows of every base.
@@ -188,9 +228,9 @@ fn mistake(pairs: &[(Vector3<f64>, Vector3<f64>)], limit: f64) -> Option<String>
     if let Some((first, second)) = exchanged {
         return Some(format!("their {} and {} are exchanged", NAMES[first], NAMES[second]));
     }
-    let factor = LENGTH_FACTORS.into_iter().find(|factor| fits(&|measured, _| measured * *factor));
-    if let Some(factor) = factor {
-        return Some(format!("their positions are in another unit (factor {factor:.4})"));
+    let mut factors = LENGTH_FACTORS.into_iter();
+    if let Some((_, words)) = factors.find(|(factor, _)| fits(&|measured, _| measured * *factor)) {
+        return Some(format!("their positions are in another unit: {words}"));
     }
     let is_of_another = pairs.iter().enumerate().all(|(row, (measured, _))| {
         let mut others = pairs.iter().enumerate().filter(|(other, _)| *other != row);

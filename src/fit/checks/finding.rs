@@ -146,7 +146,7 @@ finding_codes! {
         "measure more different poses";
     NarrowPoses: Warning "narrow-poses" ["columns"]
         "A joint stands still in all fitted rows, or no joint turns by more than 10°, so that the fit says little about other poses.",
-        "measure poses in which it moves (flexcal plan chooses them), if the arm is to be used there";
+        "if other values are used, measure poses in which all joints move (flexcal plan chooses them)";
     NominalFarOff: Warning "nominal-far-off" ["kind", "rms", "spread", "explanations"]
         "The nominal arm misses the measurements by more than a tenth of their spread.",
         "check units, signs of joints, and whether the numbers are of this convention of frames";

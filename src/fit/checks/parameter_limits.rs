@@ -4,6 +4,7 @@
 use super::checked_fit::{Check, CheckedFit};
 use super::contradicted_entry::contradicted_entry;
 use super::finding::{Finding, FindingCode};
+use super::nominal_error::is_nominal_far_off;
 use crate::fit::stages::parameter_size::largest_deviation;
 use crate::model::parameter::{JointField, Parameter, ParameterSite};
 use crate::problem::Observation;
@@ -14,6 +15,9 @@ use crate::quantity::format::{decimals, number, two_digits};
 /// normal deviation exceeds 5 σ once in two million.
 pub(super) const MAX_PRIOR_SIGMAS: f64 = 5.0;
 
+/// Smallest number of further lengths far beyond their priors at which the table is probably one of
+/// another arm.
+const MIN_FURTHER_LENGTHS: usize = 2;
 /// Usual σ of priors of angles \[°\]. A σ that is in this range if it is read in radians may be meant
 /// so.
 const USUAL_ANGLE_SIGMAS: std::ops::RangeInclusive<f64> = 0.05..=5.0;
@@ -58,6 +62,13 @@ impl Check for WithinPriors {
                 return Finding::new(FindingCode::BeyondPrior, numbers, text)
                     .with_remedy(entry.remedy);
             }
+            let further = lengths_beyond(fit, is_far).saturating_sub(1);
+            if further >= MIN_FURTHER_LENGTHS && is_nominal_far_off(fit) {
+                return Finding::new(FindingCode::BeyondPrior, numbers, text).with_remedy(format!(
+                    "so do {further} further lengths of the arm: check whether the table is one of this \
+                     arm, then axes of the measuring frame, signs of joints, units, and the priors"
+                ));
+            }
             let finding = Finding::new(FindingCode::BeyondPrior, numbers, text);
             match remedy(fit, parameter, sigmas) {
                 Some(remedy) => finding.with_remedy(remedy),
@@ -68,6 +79,15 @@ impl Check for WithinPriors {
             largest_ratio(fit, prior_sigmas).filter(|(_, sigmas)| *sigmas > MAX_PRIOR_SIGMAS);
         largest.map(finding).into_iter().collect()
     }
+}
+
+/// Returns the number of lengths of joints for which `is_far` is true.
+fn lengths_beyond(fit: &CheckedFit, is_far: impl Fn(&Parameter, f64) -> bool) -> usize {
+    let fitted = fit.fitting.model.parameters.iter().zip(&fit.end.x);
+    let is_length = |parameter: &Parameter| {
+        matches!(parameter.site, ParameterSite::Joint { .. }) && parameter.unit() == Unit::Length
+    };
+    fitted.filter(|(parameter, x)| is_length(parameter) && is_far(parameter, **x)).count()
 }
 
 /// Units of a torsional stiffness, each with its size in N·m/rad.

@@ -64,7 +64,7 @@ impl Check for PosesSpread {
         let place = match still.len() {
             1 if is_turning(first) => format!(" at {:.1}°", at.to_degrees()),
             1 => format!(" at {:.1} mm", at * 1e3),
-            _ => String::new(),
+            _ => " where they are".to_owned(),
         };
         let verb = if still.len() == 1 { "stays" } else { "stay" };
         let text = format!(

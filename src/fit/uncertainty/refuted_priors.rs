@@ -107,6 +107,41 @@ pub(in crate::fit) fn refuted_priors(
         best = found;
         order.push(place);
     }
+    // Narrow rules of several kinds can hide each other: one wide rule alone gains little while the
+    // others still hold.
+    if order.is_empty() {
+        let together = |factor: f64| {
+            let trial = vec![factor; names.len()];
+            let found = evidence.best(&widened(&trial))?;
+            Some((trial, found))
+        };
+        let widest = TRIAL_FACTORS.into_iter().filter_map(together);
+        let widest = widest.min_by(|a, b| a.1.deviance.total_cmp(&b.1.deviance));
+        if let Some((trial, found)) = widest
+            && best.deviance - found.deviance >= REJECTION_FACTOR * by_chance()
+        {
+            (factors, best) = (trial, found);
+            order = (0..names.len()).collect();
+        }
+        // Each pass gives the σ of the rule with the smallest loss back to the declared one.
+        while order.len() > 1 {
+            let narrowed = |&place: &usize| {
+                let mut trial = factors.clone();
+                trial[place] = 1.0;
+                Some((place, evidence.best(&widened(&trial))?))
+            };
+            let next = order.iter().filter_map(narrowed);
+            let Some((place, found)) = next.min_by(|a, b| a.1.deviance.total_cmp(&b.1.deviance))
+            else {
+                break;
+            };
+            if found.deviance - best.deviance > by_chance() {
+                break;
+            }
+            (factors[place], best) = (1.0, found);
+            order.retain(|open| *open != place);
+        }
+    }
     let ratio = best.variance / declared.variance;
     if ratio > MAX_VARIANCE_RATIO || best.variance > MAX_VARIANCE {
         return Vec::new();
