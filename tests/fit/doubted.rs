@@ -32,7 +32,7 @@ fn rows_that_contradict_the_others_are_named_with_their_mistake() {
     let cases: [(std::ops::Range<usize>, Mistake, &str); 5] = [
         (20..35, |at| at.y = -at.y, "their y has the other sign"),
         (20..35, |at| at.swap_rows(0, 2), "their x and z are exchanged"),
-        (40..50, |at| *at *= 1e3, "another unit (factor 0.0010)"),
+        (40..50, |at| *at *= 1e3, "another unit: divide them by 1000"),
         (10..20, |at| at.z += 0.3, "their z alone is wrong"),
         (30..60, |at| *at += Vector3::new(0.5, -0.8, 0.2), "column session"),
     ];
@@ -45,6 +45,12 @@ fn rows_that_contradict_the_others_are_named_with_their_mistake() {
         assert!(text.contains(words), "{words}: {text}");
         assert!(!found.is_trusted());
     }
+    // A session with a base of its own, in metres under a name in millimetres.
+    let mut data = clean.clone();
+    data.measurements.session = labels((0..90).map(|row| if row % 90 < 36 { "A" } else { "B" }));
+    data.measurements.positions[36..60].iter_mut().for_each(|at| *at *= 1e-3);
+    let (count, text) = doubted(&fit(&problem, &data)).unwrap();
+    assert!(count == 24 && text.contains("another unit: multiply them by 1000"), "{text}");
     let mut data = clean;
     data.measurements.positions.swap(20, 21);
     let (count, text) = doubted(&fit(&problem, &data)).unwrap();

@@ -43,6 +43,30 @@ pub fn measured(problem: &Problem, seed: u64) -> Dataset {
 }
 
 #[test]
+fn poses_that_say_little_about_others_are_named() {
+    let problem = arm(PRIORS);
+    let with = |edit: &dyn Fn(usize, f64) -> f64| {
+        let mut rng = ChaCha8Rng::seed_from_u64(9);
+        let mut rows = at_random(&problem, 90, 2.0, &mut rng);
+        let joints = rows.joints;
+        let commands = rows.configurations.iter_mut().enumerate();
+        commands.for_each(|(place, q)| *q = edit(place % joints, *q));
+        let truth = draw(&model_of(&problem, &rows), |_| 1e-3, &mut rng);
+        measure(&problem, &mut rows, &truth, SIGMA, &mut rng);
+        let found = fit(&problem, &divided(60, &rows));
+        assert!(found.is_trusted(), "{:?}", found.findings);
+        found.finding(FindingCode::NarrowPoses).map(ToString::to_string).unwrap_or_default()
+    };
+    assert_eq!(with(&|_, q| q), "");
+    let still = with(&|joint, q| if joint == 2 { 0.35 } else { q });
+    assert!(still.contains("q3 stays at 20.1° in all fitted rows"), "{still}");
+    let alike = with(&|joint, q| 0.3 * joint as f64 + 0.01 * q);
+    assert!(alike.contains("no joint turns by more than 2."), "{alike}");
+    // The last joint turns the target about its axis at most.
+    assert_eq!(with(&|joint, q| if joint == 4 { 0.35 } else { q }), "");
+}
+
+#[test]
 fn held_out_rows_are_judged() {
     let problem = arm(PRIORS);
     let clean = measured(&problem, 1);

@@ -71,6 +71,21 @@ fn priors_that_are_a_thousand_times_too_narrow_are_named_and_not_trusted() {
 }
 
 #[test]
+fn rules_that_are_too_narrow_together_do_not_hide_each_other() {
+    let problem = parse(&text(
+        "'joint*.a' = { sigma_mm = 0.002 }\n'joint*.d' = { sigma_mm = 0.002 }\n'joint*.alpha' = { sigma_deg = 0.3 }\n\
+         'joint*.theta' = { sigma_deg = 0.3 }\n'tool.*' = { sigma_mm = 2 }",
+    ));
+    let truth =
+        [("joint2.a", 2.5e-3), ("joint3.a", -3e-3), ("joint4.d", 2.5e-3), ("joint1.d", 2e-3)];
+    let found = fit(&problem, &simulated(&problem, &truth, [60, 30], 3));
+    let refuted = found.findings.iter().filter(|of| of.code == FindingCode::PriorContradicted);
+    let rules: Vec<_> = refuted.filter_map(|finding| finding.word("rule")).collect();
+    assert_eq!(rules, ["joint*.a", "joint*.d"], "{:?}", found.findings);
+    assert!(!found.is_trusted());
+}
+
+#[test]
 fn priors_that_hold_are_not_questioned_where_the_model_lacks_something() {
     let problem = parse(&text(PRIORS));
     let mut data = measured(&problem, 4);

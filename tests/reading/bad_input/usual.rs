@@ -20,6 +20,7 @@ fn rows_without_a_measurement_name_the_way_to_leave_them_out() {
     let row = |text: &str| kind(ARM, &format!("{ROWS}{text}\n"));
     assert_eq!(row("1,1,,3"), (TableErrorKind::EmptyMeasurement, Some(3)));
     assert_eq!(row("1,---,2,3").0, TableErrorKind::WordForMeasurement { value: "---".to_owned() });
+    assert_eq!(row("1,NaN,2,3").0, TableErrorKind::WordForMeasurement { value: "NaN".to_owned() });
     assert_eq!(row("1,1..2,2,3").0, TableErrorKind::NotANumber { value: "1..2".to_owned() });
     assert_eq!(row(",1,2,3").0, TableErrorKind::EmptyCell);
     let summary = TableErrorKind::SummaryRow { word: "Mean".to_owned(), empty: 2 };
@@ -109,6 +110,11 @@ fn keys_in_wrong_company_are_named_as_such() {
         (
             "name = 'a'\nrobust = 'huber'\n[[joint]]\n",
             "write the line [robust] and below it loss = \"huber\"",
+        ),
+        ("name = 'a'\n[joint]\na_m = 1\n[joint]\na_m = 1\n", "as in [[joint]], the first one too"),
+        (
+            "name = 'a'\n[[joint]]\n[parameters]\nfiles = ['rows.csv']\n",
+            "parameters.files: does not belong here: [parameters] holds names of parameters",
         ),
     ] {
         check(&problem_error(text), text, &["problem.toml:", words]);
