@@ -94,7 +94,11 @@ impl Problem {
                 body.position = link.resolve(&(body.position - link.origin));
             }
         }
-        Some(self.with_chain(joints))
+        let mut problem = self.with_chain(joints);
+        // Rules for the flange match no parameter without it.
+        let flange = format!("joint{}.", self.joints.len());
+        problem.parameters.retain(|rule| !rule.pattern.starts_with(&flange));
+        Some(problem)
     }
 
     /// Returns the problem with changed rows of the joint table as the file has them. Returns `None`

@@ -82,6 +82,11 @@ fn identified(known: &[String]) -> String {
     if names.is_empty() { String::new() } else { format!("; identified are {}", names.join(", ")) }
 }
 
+/// Rounds a number to 12 digits, without those that the conversion of units added.
+fn rounded(value: f64) -> f64 {
+    format!("{value:.11e}").parse().unwrap_or(value)
+}
+
 /// Error of an `estimate.json` that cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -109,7 +114,7 @@ pub enum SavedEstimateError {
     NoSuchColumn { file: PathBuf, column: &'static str, known: Vec<String> },
     #[error("{}: identifies problem {found}, not {expected}", file.display())]
     OtherProblem { file: PathBuf, found: String, expected: String },
-    #[error("{}: {name} is {found} nominally there, {expected} in the problem; identify again", file.display())]
+    #[error("{}: {name} is {} nominally there, {} in the problem; identify again", file.display(), rounded(*found), rounded(*expected))]
     OtherNominal { file: PathBuf, name: String, found: f64, expected: f64 },
     #[error("{}: was identified with another declared arm (a fixed value, a mass, gravity or an effect has changed since); identify again", file.display())]
     OtherArm { file: PathBuf },

@@ -102,7 +102,12 @@ impl Check for NoiseIsDeclared {
         vec![if UNIT_RATIOS.contains(&ratio) {
             finding.with_remedy("the declared σ may be in another unit: check it".to_owned())
         } else {
-            finding
+            let kind = fit.fitting.measurements.leading().kind();
+            finding.with_remedy(format!(
+                "look for what the model lacks with flexcal loop, or check the unit and the size of the \
+                 declared σ (the residual is like that of an instrument with σ = {})",
+                format_error(kind, fit.sigma_taken, 3)
+            ))
         }]
     }
 }
