@@ -45,6 +45,20 @@ fn rows_that_contradict_the_others_are_named_with_their_mistake() {
         assert!(text.contains(words), "{words}: {text}");
         assert!(!found.is_trusted());
     }
+    // Joint columns are wrong in some rows.
+    let turned = |factor: f64, joints: std::ops::Range<usize>| {
+        let mut data = clean.clone();
+        for row in 30..45 {
+            let of_row = row * 5..(row + 1) * 5;
+            let configuration = &mut data.measurements.configurations[of_row];
+            configuration[joints.clone()].iter_mut().for_each(|q| *q *= factor);
+        }
+        doubted(&fit(&problem, &data)).unwrap().1
+    };
+    let radians = turned(1_f64.to_radians(), 0..5);
+    assert!(radians.contains("their joint angles are in radians"), "{radians}");
+    let reversed = turned(-1.0, 2..3);
+    assert!(reversed.contains("their q3 has the other sign"), "{reversed}");
     // A session with a base of its own, in metres under a name in millimetres.
     let mut data = clean.clone();
     data.measurements.session = labels((0..90).map(|row| if row % 90 < 36 { "A" } else { "B" }));

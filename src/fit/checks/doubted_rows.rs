@@ -1,14 +1,16 @@
 //! Check of a fit that is far off: some rows do not belong to the arm that most rows fit.
 
-use nalgebra::Vector3;
+use nalgebra::{DVector, Vector3};
 use serde_json::json;
 
 use super::checked_fit::{Check, CheckedFit};
+use super::doubted_columns::{column_name, moving};
 use super::finding::{Finding, FindingCode};
 use super::misfit::{MAX_MISS, MAX_UNREPORTED_RESIDUAL, Misfit};
 use super::row_kind::format_error;
 use crate::fit::stages::fitting::Fitting;
 use crate::measurement::{Measurements, Split};
+use crate::problem::JointKind;
 
 /// Number of successive rows of each base to which the nominal arm is registered in a trial. They
 /// determine base and tool.
@@ -51,6 +53,8 @@ impl Check for RowsBelongTogether {
 
 /// Errors of the nominal arm after its registration to some rows.
 struct Trial {
+    /// Full parameter vector of the registered arm.
+    x: DVector<f64>,
     /// Measured minus predicted position of every examined row \[m\].
     errors: Vec<Vector3<f64>>,
     /// Places of the rows that fit, in the list of examined rows.
@@ -71,7 +75,7 @@ fn doubted(fit: &CheckedFit, before: f64) -> Option<Finding> {
         let errors = fit.fitting.position_errors(rows, &x);
         let near = |place: &usize| errors[*place].norm() < limit;
         let near = (0..rows.len()).filter(near).collect();
-        Some(Trial { errors, near })
+        Some(Trial { x, errors, near })
     };
     let windows = windows(fit, rows);
     let trials = windows.iter().filter_map(|window| registered(window));
@@ -96,8 +100,8 @@ fn doubted(fit: &CheckedFit, before: f64) -> Option<Finding> {
     });
     let pairs: Vec<(Vector3<f64>, Vector3<f64>)> = pairs.collect();
     let is_run = last + 1 - first == apart.len() && apart.len() >= WINDOW;
+    let chosen: Vec<usize> = apart.iter().map(|&place| rows[place]).collect();
     let stands_elsewhere = || {
-        let chosen: Vec<usize> = apart.iter().map(|&place| rows[place]).collect();
         let rms = registration_error(fit, measurements, &chosen).filter(|_| is_run)?;
         (rms < limit).then(|| {
             "they fit by themselves where base or target stand elsewhere: if the instrument, the base or \
@@ -106,7 +110,6 @@ fn doubted(fit: &CheckedFit, before: f64) -> Option<Finding> {
         })
     };
     let in_other_unit = || {
-        let chosen: Vec<usize> = apart.iter().map(|&place| rows[place]).collect();
         let fits = |&(factor, _): &(f64, &str)| {
             let mut converted = measurements.clone();
             chosen.iter().for_each(|&row| converted.positions[row] *= factor);
@@ -115,7 +118,10 @@ fn doubted(fit: &CheckedFit, before: f64) -> Option<Finding> {
         let mut factors = LENGTH_FACTORS.into_iter().filter(|_| chosen.len() >= WINDOW);
         factors.find(fits).map(|(_, words)| format!("their positions are in another unit: {words}"))
     };
-    let cause = mistake(&pairs, limit).or_else(stands_elsewhere).or_else(in_other_unit);
+    let cause = mistake(&pairs, limit)
+        .or_else(|| mistaken_joints(fit, &trial.x, &chosen, limit))
+        .or_else(stands_elsewhere)
+        .or_else(in_other_unit);
     if cause.is_none() && are_few {
         return None;
     }
@@ -144,7 +150,7 @@ fn doubted(fit: &CheckedFit, before: f64) -> Option<Finding> {
 }
 
 /// Registers the nominal arm to the `chosen` identification rows alone.
-fn registration(fit: &CheckedFit, chosen: Vec<usize>) -> Option<nalgebra::DVector<f64>> {
+fn registration(fit: &CheckedFit, chosen: Vec<usize>) -> Option<DVector<f64>> {
     let split = Split { identification: chosen, held_out: Vec::new() };
     registered(fit, fit.fitting.measurements, &split, |fitting| fitting.registered().ok())
 }
@@ -194,6 +200,41 @@ fn windows(fit: &CheckedFit, rows: &[usize]) -> Vec<Vec<usize>> {
         groups.iter().flat_map(part).collect()
     };
     (0..trials).map(window).collect()
+}
+
+/// Returns the words for a mistake in the joint columns that explains the positions of the `chosen`
+/// rows to `limit` \[m\], with the registered arm `x`: angles in another unit, or the sign of a
+/// joint.
+fn mistaken_joints(
+    fit: &CheckedFit,
+    x: &DVector<f64>,
+    chosen: &[usize],
+    limit: f64,
+) -> Option<String> {
+    let table = fit.fitting.measurements;
+    let joints: Vec<usize> = moving(fit).collect();
+    let is_turning =
+        |joint: &usize| fit.problem.joints[*joint].command_kind() == JointKind::Revolute;
+    let turning: Vec<usize> = joints.iter().copied().filter(is_turning).collect();
+    let fits = |changed: &[usize], factor: f64| {
+        let mut corrected = table.clone();
+        for &row in chosen {
+            for &joint in changed {
+                corrected.configurations[row * table.joints + joint] *= factor;
+            }
+        }
+        let fitting = Fitting { measurements: &corrected, ..fit.fitting.with_declared_noise() };
+        fit.rms(chosen, &fitting.position_errors(chosen, x)) < limit
+    };
+    let in_degrees = 1_f64.to_radians();
+    if fits(&turning, in_degrees.recip()) {
+        return Some("their joint angles are in radians, unlike those of the others".to_owned());
+    }
+    if fits(&turning, in_degrees) {
+        return Some("their joint angles are in degrees, unlike those of the others".to_owned());
+    }
+    let joint = joints.into_iter().find(|&joint| fits(&[joint], -1.0))?;
+    Some(format!("their {} has the other sign", column_name(table, joint)))
 }
 
 /// Function of a measured and a predicted position that returns the corrected measurement.

@@ -4,6 +4,7 @@ use serde_json::json;
 
 use super::checked_fit::{Check, CheckedFit};
 use super::finding::{Finding, FindingCode};
+use super::misreading::misread_masses;
 use super::nominal_error::is_nominal_far_off;
 use super::parameter_limits::WithinPriors;
 use super::row_kind::format_error;
@@ -49,19 +50,25 @@ impl Check for ReadAsMeant {
         };
         let is_within_priors = WithinPriors.check(fit).is_empty();
         let is_near = rms <= limit && is_within_priors && !is_nominal_far_off(fit);
+        // A wrong mass, which an arm that gives way hides in other parameters, is an explanation
+        // only if it leaves nothing but noise.
+        let is_searched = fit.has_further_fits && kind.observation.is_position();
+        let noise = kind.declared_sigma.filter(|_| is_searched);
+        let noise = noise.map(|sigma| kind.observation.expected_norm() * sigma);
+        let most_left = noise.filter(|noise| rms > MIN_SIGMAS_OF_MASSES * noise).map(|noise| {
+            let excess = (rms / noise).powi(2) - 1.0;
+            let left = (1.0 + MAX_EXCESS_LEFT_BY_MASS * excess).sqrt();
+            left.min(MAX_SIGMAS_LEFT_BY_MASS) * noise
+        });
+        let of_masses;
         let explanations = if is_near {
-            // Close to the noise, only a mistake that leaves nothing but noise is an explanation.
-            let is_searched = fit.has_further_fits && kind.observation.is_position();
-            let noise = kind.declared_sigma.filter(|_| is_searched);
-            let noise = noise.map(|sigma| kind.observation.expected_norm() * sigma);
-            match noise.filter(|noise| rms > MIN_SIGMAS_OF_MASSES * noise) {
-                Some(noise) => {
-                    let excess = (rms / noise).powi(2) - 1.0;
-                    let left = (1.0 + MAX_EXCESS_LEFT_BY_MASS * excess).sqrt();
-                    fit.misread_masses(left.min(MAX_SIGMAS_LEFT_BY_MASS) * noise)
-                }
-                None => return Vec::new(),
-            }
+            let Some(most_left) = most_left else { return Vec::new() };
+            fit.misread_masses(most_left)
+        } else if let Some(most_left) =
+            most_left.filter(|_| is_within_priors && fit.explanations().fitted.is_empty())
+        {
+            of_masses = misread_masses(fit, most_left);
+            &of_masses
         } else {
             fit.explanations()
         };

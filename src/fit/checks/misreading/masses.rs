@@ -27,7 +27,7 @@ impl CheckedFit<'_> {
 /// Finds the masses in another unit or at another place that leave at most `limit` \[m\] after a full
 /// fit, where the fit as declared leaves more than noise. An arm that gives way hides such a mistake
 /// in other parameters, so that the nominal arm does not show it.
-fn misread_masses(fit: &CheckedFit, limit: f64) -> Explanations {
+pub(in crate::fit) fn misread_masses(fit: &CheckedFit, limit: f64) -> Explanations {
     let gives_way =
         fit.fitting.model.parameters.iter().any(|parameter| parameter.site.is_elastic());
     if !gives_way && !fit.problem.is_elastic() {

@@ -16,6 +16,7 @@ mod words;
 
 pub(in crate::fit) use explanation::Explanations;
 pub(crate) use explanation::MisreadEffect;
+pub(in crate::fit) use masses::misread_masses;
 
 use crate::model::parameter::JointField;
 
