@@ -41,16 +41,22 @@ impl Check for PosesSpread {
             range(joint) < if is_turning(joint) { MAX_ALIKE_TURN } else { MAX_ALIKE_TRAVEL * reach }
         };
         let mut joints: Vec<usize> = moving(fit).collect();
-        let widest = joints.iter().filter(|joint| is_turning(**joint)).map(|&joint| range(joint));
-        let widest = widest.fold(0.0, f64::max).to_degrees();
+        let widest = |turning: bool| {
+            let alike = joints.iter().filter(|joint| is_turning(**joint) == turning);
+            alike.map(|&joint| range(joint)).reduce(f64::max)
+        };
+        let turns = widest(true).map(|most| format!("turns by more than {:.1}°", most.to_degrees()));
+        let slides = widest(false).map(|most| format!("slides by more than {:.1} mm", most * 1e3));
+        let least: Vec<String> = turns.into_iter().chain(slides).collect();
         let measure =
             "measure poses over the whole range of the joints (flexcal plan chooses them)";
         if joints.iter().all(|&joint| is_narrow(joint)) && !joints.is_empty() {
             let names: Vec<String> =
                 joints.iter().map(|&joint| column_name(table, joint)).collect();
             let text = format!(
-                "the fitted poses are alike: no joint turns by more than {widest:.1}°, so that parameters \
-                 and predictions hold near these poses only"
+                "the fitted poses are alike: no joint {}, so that parameters and predictions hold near \
+                 these poses only",
+                least.join(" or ")
             );
             let finding = Finding::new(FindingCode::NarrowPoses, [json!(names)], text);
             return vec![finding.with_remedy(measure.to_owned())];
