@@ -470,10 +470,9 @@ impl Step {
     }
 }
 
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes fields by reference")]
 pub(super) fn serialize_symbol<S: serde::Serializer>(
     unit: &Unit,
     serializer: S,
 ) -> Result<S::Ok, S::Error> {
-    serializer.serialize_str(unit.symbol())
+    serializer.serialize_str(&unit.symbol())
 }
