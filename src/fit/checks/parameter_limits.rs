@@ -47,10 +47,8 @@ impl Check for WithinPriors {
         let finding = |(parameter, sigmas): (&Parameter, f64)| {
             let name = &parameter.name;
             let x = fitted_deviation(fit, parameter);
-            let values = x.map_or_else(String::new, |x| values_in_words(parameter, x));
-            let text = format!(
-                "{name} deviates from nominal by {sigmas:.0} times the σ of its prior{values}"
-            );
+            let text =
+                format!("{name} deviates from nominal by {sigmas:.0} times the σ of its prior");
             let numbers = [name.as_str().into(), sigmas.into()];
             let entry = x.and_then(|x| contradicted_entry(fit, (parameter, x), is_far));
             if let Some(entry) = entry {
@@ -58,7 +56,9 @@ impl Check for WithinPriors {
                 return Finding::new(FindingCode::BeyondPrior, numbers, text)
                     .with_remedy(entry.remedy);
             }
-            let finding = Finding::new(FindingCode::BeyondPrior, numbers, text);
+            let values = x.map_or_else(String::new, |x| values_in_words(parameter, x));
+            let finding =
+                Finding::new(FindingCode::BeyondPrior, numbers, format!("{text}{values}"));
             match remedy(fit, parameter, sigmas) {
                 Some(remedy) => finding.with_remedy(remedy),
                 None => finding,
