@@ -22,7 +22,7 @@ pub struct LeastSquares {
 
 /// Name, unit of the value, nominal value \[SI\], unit of x; start, 1 σ of the prior, lower and
 /// upper bound of x.
-type Unknown = (String, &'static str, f64, &'static str, f64, Option<f64>, f64, f64);
+type Unknown = (String, String, f64, String, f64, Option<f64>, f64, f64);
 
 #[pymethods]
 impl LeastSquares {
@@ -31,9 +31,18 @@ impl LeastSquares {
         let start = self.function.start();
         let unknown = |(parameter, start): (&Parameter, &f64)| {
             let unit = parameter.unit();
-            let of_x = if unit.is_relative() { "1" } else { unit.symbol() };
+            let of_x = if unit.is_relative() { "1".into() } else { unit.symbol().into_owned() };
             let Parameter { name, nominal, sigma, lower, upper, .. } = parameter;
-            (name.clone(), unit.symbol(), *nominal, of_x, *start, *sigma, *lower, *upper)
+            (
+                name.clone(),
+                unit.symbol().into_owned(),
+                *nominal,
+                of_x,
+                *start,
+                *sigma,
+                *lower,
+                *upper,
+            )
         };
         self.function.parameters().zip(start.iter()).map(unknown).collect()
     }

@@ -1,7 +1,7 @@
 //! Arguments and work of `flexcal next`.
 
 use std::error::Error;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use flexcal::design::{
@@ -118,6 +118,18 @@ fn measured_already(measured: &Measurements, chosen: &Measurements) -> Option<St
     ))
 }
 
+/// Returns a warning if some of the rows that the loop of `file` fitted, but not all, are not among
+/// the measurements.
+fn other_rows(file: &Path, (missing, of): (usize, usize)) -> Option<String> {
+    (missing > 0 && missing < of).then(|| {
+        format!(
+            "{}: {missing} of the {of} rows that this loop fitted are not among these measurements, \
+             so its probabilities are of other data; run flexcal loop on these",
+            file.display()
+        )
+    })
+}
+
 /// Chooses the next poses, writes `next.csv`, `next.json` and `next.html`, and prints the error
 /// that is expected after them.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
@@ -135,7 +147,13 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         None
     } else {
         let file = arguments.explanations.clone().unwrap_or_else(|| results.path("loop.json"));
-        Some(Explanations::read(&file, &problem)?)
+        let explanations = Explanations::read(&file, &problem)?;
+        if let Some(words) = other_rows(&file, explanations.missing_rows(&data.measurements))
+            .filter(|_| !common.quiet)
+        {
+            diagnostic::warn(&words);
+        }
+        Some(explanations)
     };
     let workspace = arguments.region.workspace()?;
     super::tolerance::warn_if_tiny(arguments.tolerance_mm, common.quiet);

@@ -1,5 +1,6 @@
 //! Explanations of the residual that a loop leaves undecided, as read from its loop.json.
 
+use std::collections::HashSet;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -7,6 +8,7 @@ use serde::Deserialize;
 
 use crate::error::InputError;
 use crate::files::read_limited;
+use crate::measurement::Measurements;
 use crate::problem::{Effect, EffectDeclaration, Problem};
 
 /// Maximum size of a loop.json \[MiB\].
@@ -22,6 +24,8 @@ pub struct Explanations {
     /// Effects among which poses are to decide: those with an alternative or a lower status, and
     /// their alternatives.
     open: Vec<EffectDeclaration>,
+    /// Digests of the rows that the loop fitted; empty in files of older versions.
+    fitted_rows: Vec<String>,
 }
 
 /// Error of a loop.json that cannot be used.
@@ -33,6 +37,11 @@ pub enum ExplanationsError {
     Syntax { file: PathBuf, source: serde_json::Error },
     #[error("{}: is of problem {found}, not of {expected}", file.display())]
     OtherProblem { file: PathBuf, found: String, expected: String },
+    #[error(
+        "loop.json was made from other measurements: none of the {rows} rows that it fitted is among these; run flexcal loop on these \
+         first, or use --for accuracy"
+    )]
+    OtherMeasurements { rows: usize },
     #[error(transparent)]
     Effect(#[from] InputError),
 }
@@ -41,6 +50,8 @@ pub enum ExplanationsError {
 struct Document {
     problem: String,
     effects: Vec<Found>,
+    #[serde(default)]
+    fitted_rows: Vec<String>,
 }
 
 #[derive(Deserialize)]
@@ -71,7 +82,7 @@ impl Explanations {
             let (found, expected) = (document.problem, problem.name.clone());
             return Err(ExplanationsError::OtherProblem { file: named(), found, expected });
         }
-        let mut explanations = Self::default();
+        let mut explanations = Self { fitted_rows: document.fitted_rows, ..Self::default() };
         for found in &document.effects {
             let effect = problem.effect(&found.declaration, file)?;
             let alternatives = found.alternatives.iter().take(MAX_ALTERNATIVES);
@@ -102,6 +113,26 @@ impl Explanations {
             is_first
         });
         Ok(explanations)
+    }
+
+    /// Returns how many of the rows that the loop fitted are not among `measurements`, and how many
+    /// it fitted.
+    #[doc(hidden)]
+    pub fn missing_rows(&self, measurements: &Measurements) -> (usize, usize) {
+        let digests = (0..measurements.len()).map(|row| measurements.row_digest(row));
+        let present: HashSet<String> = digests.collect();
+        let missing = self.fitted_rows.iter().filter(|row| !present.contains(*row)).count();
+        (missing, self.fitted_rows.len())
+    }
+
+    /// Returns an error if the loop fitted none of the rows of `measurements`, so that its
+    /// explanations are of other data.
+    pub(super) fn check_rows(&self, measurements: &Measurements) -> Result<(), ExplanationsError> {
+        let (missing, rows) = self.missing_rows(measurements);
+        if rows > 0 && missing == rows {
+            return Err(ExplanationsError::OtherMeasurements { rows });
+        }
+        Ok(())
     }
 
     /// Returns the effects among which the data do not decide yet.

@@ -157,7 +157,7 @@ pub enum NextError {
     Remainder(#[from] SavedRemainderError),
     /// The loop.json has no effects among which poses could decide.
     #[error(
-        "there is nothing to tell apart: in loop.json every effect that was found is certain and has no alternative; use --for accuracy"
+        "there is nothing to tell apart: loop.json has no effect that is uncertain or has an alternative; use --for accuracy"
     )]
     NothingToSeparate,
     /// The request would take too long, or too much memory.
@@ -331,6 +331,7 @@ fn fitted(
     data: &Dataset,
     options: &NextOptions,
 ) -> Result<Identification, NextError> {
+    options.explanations.map_or(Ok(()), |of| of.check_rows(&data.measurements))?;
     let found = fit::identify(problem, data, &options.fit)?;
     check_interrupt(options)?;
     Ok(found)

@@ -271,11 +271,8 @@ impl Estimate {
     /// Creates the estimate of a parameter that no stage varied, at its nominal value. If
     /// `time_measured` is false, speeds are per row instead of per second.
     pub(super) fn unfitted(parameter: &Parameter, time_measured: bool) -> Self {
-        let unit = match parameter.unit() {
-            Unit::Speed if !time_measured => Unit::LengthPerRow,
-            Unit::AngularSpeed if !time_measured => Unit::AnglePerRow,
-            unit => unit,
-        };
+        let unit = parameter.unit();
+        let unit = if time_measured { unit } else { unit.per_row() };
         Self {
             name: parameter.name.clone(),
             unit,

@@ -138,7 +138,7 @@ catalogue! {
             TermEntry::driven(At::Coordinate, "sin", "sin({order}*q{joint})", DRIFT_SIGMA),
             TermEntry::driven(At::Coordinate, "cos", "cos({order}*q{joint})", DRIFT_SIGMA),
         ],
-        says: "joint {joint} errs in waves of order {order} (every {order:degrees}°, or {order:millimetres} mm of a slide)",
+        says: "joint {joint} errs in waves of order {order}",
         search: Search::Declared,
         chance: Chance::Waves,
         ..Family::PLAIN
@@ -408,7 +408,7 @@ catalogue! {
             TermEntry::driven(At::Shift(1), "y", "t", 1e-5),
             TermEntry::driven(At::Shift(2), "z", "t", 1e-5),
         ],
-        says: "the measuring station drifts",
+        says: "the measuring station or the arm's base drifts",
         needs: &[Need::Times],
         ..Family::PLAIN
     };
@@ -419,8 +419,8 @@ catalogue! {
             TermEntry::driven(At::Shift(1), "y", "step(time - {at_time_s})", READING_SHIFT_SIGMA),
             TermEntry::driven(At::Shift(2), "z", "step(time - {at_time_s})", READING_SHIFT_SIGMA),
         ],
-        says: "the measuring station moved at {at_time_s} s",
-        says_by_row: "the measuring station moved after row {at_time_s:row}",
+        says: "the measuring station or the arm's base moved at {at_time_s} s",
+        says_by_row: "the measuring station or the arm's base moved after row {at_time_s:row}",
         search: Search::Times,
         ..Family::PLAIN
     };
@@ -435,8 +435,8 @@ catalogue! {
             TermEntry::driven(At::Turn(1), "ry", "step(time - {at_time_s})", SETUP_SHIFT_SIGMA),
             TermEntry::driven(At::Turn(2), "rz", "step(time - {at_time_s})", SETUP_SHIFT_SIGMA),
         ],
-        says: "the measuring station moved and turned at {at_time_s} s",
-        says_by_row: "the measuring station moved and turned after row {at_time_s:row}",
+        says: "the measuring station or the arm's base moved and turned at {at_time_s} s",
+        says_by_row: "the measuring station or the arm's base moved and turned after row {at_time_s:row}",
         search: Search::Declared,
         ..Family::PLAIN
     };
@@ -447,8 +447,8 @@ catalogue! {
             TermEntry::driven(At::Shift(1), "y", "-expm1(-t/{time_constant_s})", READING_SHIFT_SIGMA),
             TermEntry::driven(At::Shift(2), "z", "-expm1(-t/{time_constant_s})", READING_SHIFT_SIGMA),
         ],
-        says: "the measuring station settles with a time constant of {time_constant_s} s",
-        says_by_row: "the measuring station settles with a constant of {time_constant_s} rows",
+        says: "the measuring station or the arm's base settles with a time constant of {time_constant_s} s",
+        says_by_row: "the measuring station or the arm's base settles with a time constant of {time_constant_s} rows",
         search: Search::SettlingTimes,
         ..Family::PLAIN
     };

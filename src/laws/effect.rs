@@ -1,5 +1,7 @@
 //! Properties of effects that follow from the data of their laws.
 
+use std::f64::consts::TAU;
+
 use serde::ser::{Serialize, SerializeMap, Serializer};
 
 use super::argument::{Argument, ArgumentKind};
@@ -258,8 +260,18 @@ impl Effect {
     }
 
     /// Returns the description of the effect. If times were not measured, it refers to row numbers,
-    /// counted from 1, instead.
-    pub(crate) fn describe_in(&self, time_measured: bool) -> String {
+    /// counted from 1, instead. `slides` is true for each prismatic joint, so that the period of a
+    /// wave is a length there and an angle elsewhere.
+    pub(crate) fn describe_in(&self, time_measured: bool, slides: &[bool]) -> String {
+        if let Self::JointWave { joint, order } = self {
+            let is_slide = slides.get(joint.wrapping_sub(1)).copied().unwrap_or(false);
+            let period = if is_slide {
+                format!("{:.2} mm", 1e3 * TAU / order)
+            } else {
+                format!("{:.2}°", 360.0 / order)
+            };
+            return format!("{} (every {period})", self.describe());
+        }
         match self.family() {
             Some(family) if !time_measured && !family.says_by_row.is_empty() => {
                 filled(family.says_by_row, &self.arguments())
@@ -286,7 +298,7 @@ impl Effect {
     }
 
     /// Returns the key of the argument that the search determines; `None` if there is none.
-    fn searched(&self) -> Option<&'static str> {
+    pub(crate) fn searched(&self) -> Option<&'static str> {
         self.key_of(ArgumentKind::is_searched).map(|(key, _)| key)
     }
 

@@ -158,6 +158,27 @@ impl LawSite {
     }
 }
 
+/// Returns the factors of a formula in alphabetical order, or the formula itself if it is no plain
+/// product.
+fn factors(formula: &str) -> Vec<String> {
+    let mut factors = vec![String::new()];
+    let mut depth = 0_usize;
+    for sign in formula.chars() {
+        match sign {
+            '(' => depth += 1,
+            ')' => depth = depth.saturating_sub(1),
+            _ => {}
+        }
+        match (depth, sign) {
+            (0, '*') => factors.push(String::new()),
+            (0, '+' | '-' | '/') => return vec![formula.to_owned()],
+            _ => factors.iter_mut().last().into_iter().for_each(|factor| factor.push(sign)),
+        }
+    }
+    factors.sort();
+    factors
+}
+
 /// Returns true if a text is the coordinate of a joint in formulas, such as `q3`.
 fn is_joint_coordinate(text: &str) -> bool {
     text.strip_prefix('q').is_some_and(|number| number.parse::<usize>().is_ok())
@@ -268,6 +289,17 @@ impl Law {
         self.terms.iter().map(|term| term.expression.display(names).to_string()).collect()
     }
 
+    /// Returns true if both laws act at the same site with the same formulas, whatever the order of
+    /// the formulas and of the factors in their products.
+    pub(crate) fn has_same_terms(&self, other: &Self) -> bool {
+        let terms = |law: &Self| {
+            let mut terms: Vec<Vec<String>> = law.formulas().iter().map(|of| factors(of)).collect();
+            terms.sort();
+            terms
+        };
+        self.site() == other.site() && terms(self) == terms(other)
+    }
+
     /// Returns the site in the syntax of files.
     pub fn site(&self) -> String {
         const AXES: [&str; 3] = ["x", "y", "z"];
@@ -292,8 +324,15 @@ impl Law {
         }
     }
 
-    /// Returns the site in words: "joint 2", or "curvature of link A about z".
+    /// Returns the site in words: "joint 2", "the base about x", or "curvature of link A about z".
     fn place_in_words(&self) -> String {
+        let motion = |axis: usize| {
+            let name = MOTION_NAMES.get(axis).copied().unwrap_or_default();
+            match name.strip_prefix('r') {
+                Some(axis) => format!("about {axis}"),
+                None => format!("along {name}"),
+            }
+        };
         match (&self.place, self.at) {
             (LawPlace::Link(link), At::Beam(BeamField::BowY)) => {
                 format!("curvature of link {link} about y")
@@ -302,7 +341,19 @@ impl Law {
                 format!("curvature of link {link} about z")
             }
             (LawPlace::Link(link), _) => format!("strain of link {link}"),
-            _ => self.site().replace("joint", "joint "),
+            (LawPlace::Joint(joint), At::Before(axis)) => {
+                format!("the frame before joint {joint} {}", motion(axis))
+            }
+            (LawPlace::Joint(joint), At::After(axis)) => {
+                format!("the frame behind joint {joint} {}", motion(axis))
+            }
+            (LawPlace::Joint(joint), _) => format!("joint {joint}"),
+            (_, At::Tool(axis)) => format!("the tool {}", motion(axis)),
+            (_, At::Shift(RANGE_AXIS)) => "the measured range".to_owned(),
+            (_, At::Shift(axis)) => format!("the measured position {}", motion(axis)),
+            (_, At::BaseShift(axis)) => format!("the base {}", motion(axis)),
+            (_, At::BaseTurn(axis)) => format!("the base {}", motion(axis + 3)),
+            _ => self.site(),
         }
     }
 
@@ -319,7 +370,13 @@ impl Law {
                 None => place,
             };
         }
-        format!("{} at {}: {}", self.name, self.site(), self.formulas().join(", "))
+        let formulas = self.formulas();
+        let terms = match formulas.split_last() {
+            Some((last, [])) => format!("a multiple of {last}"),
+            Some((last, rest)) => format!("multiples of {} and {last}", rest.join(", ")),
+            None => "nothing".to_owned(),
+        };
+        format!("the law “{}” changes {} by {terms}", self.name, self.place_in_words())
     }
 
     /// Returns the first term that converts an angle between degrees and radians, and its factor.

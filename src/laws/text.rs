@@ -1,14 +1,11 @@
 //! Texts of the catalogue, filled in with arguments.
 
-use std::f64::consts::TAU;
-
 use super::argument::Argument;
 
 /// Returns a text with `{key}` and `{key:form}` replaced by arguments.
 ///
-/// The form `row` rounds a time up to a row, `cycles` lists orders with their noun, `degrees` and
-/// `millimetres` are the period of a wave. A covariate name is quoted in formulas alone: a word as
-/// it is, others in backquotes.
+/// The form `row` rounds a time up to a row, `cycles` lists orders with their noun. A covariate name
+/// is quoted in formulas alone: a word as it is, others in backquotes.
 pub(super) fn filled(text: &str, arguments: &[(&str, Argument)]) -> String {
     let mut out = String::with_capacity(text.len() + 16);
     let mut rest = text;
@@ -34,8 +31,6 @@ fn shown(argument: &Argument, form: &str) -> String {
         }
         (Argument::Orders(orders), _) => listed(orders),
         (Argument::Number(time), "row") => time.ceil().to_string(),
-        (Argument::Number(order), "degrees") => format!("{:.2}", 360.0 / order),
-        (Argument::Number(order), "millimetres") => format!("{:.2}", 1e3 * TAU / order),
         (Argument::Name(name), "formula") => format!("`{name}`"),
         (argument, _) => argument.place().unwrap_or_else(|| argument.toml()),
     }

@@ -1,6 +1,9 @@
 //! Table of all units: SI symbol, suffixes in files, and unit for display.
 
+use std::borrow::Cow;
 use std::f64::consts::PI;
+
+use super::quotient::{BASES, Quotient};
 
 /// Kind of physical quantity, which determines the SI unit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -90,6 +93,9 @@ pub enum Unit {
     Ratio,
     /// Dimensionless number of order 1.
     Number,
+    /// Unit of a coefficient that no other variant has: that of a quantity divided by that of a
+    /// formula.
+    Quotient(Quotient),
 }
 
 /// Unit suffix of a key or column, written after an underscore: `deg` in `alpha_deg`.
@@ -274,12 +280,34 @@ impl Unit {
             }
             Self::Ratio => row!("a ratio", "1", [si("relative")], As(1e3, "‰")),
             Self::Number => row!("a ratio", "1", [si("relative")], Plain),
+            Self::Quotient(_) => row!("a coefficient", "", [], Plain),
         }
     }
 
     /// Returns the symbol of the SI unit.
-    pub fn symbol(self) -> &'static str {
-        self.row().symbol
+    pub fn symbol(self) -> Cow<'static, str> {
+        match self {
+            Self::Quotient(quotient) => quotient.symbol().into(),
+            unit => unit.row().symbol.into(),
+        }
+    }
+
+    /// Returns this unit divided by powers of the base units of formulas: rad, m, K, kg, s, N, and
+    /// the unit of a covariate. Returns this unit if laws cannot add to a quantity with it.
+    pub(crate) fn divided_by(self, powers: [i32; BASES]) -> Self {
+        Quotient::new(self, powers).map_or(self, Self::Quotient)
+    }
+
+    /// Returns the unit with table rows in place of seconds, for times that are row numbers.
+    pub(crate) fn per_row(self) -> Self {
+        match self {
+            Self::Speed => Self::LengthPerRow,
+            Self::AngularSpeed => Self::AnglePerRow,
+            Self::CurvaturePerTime => Self::PerLength.divided_by([0, 0, 0, 0, 1, 0, 0]).per_row(),
+            Self::StrainPerTime => Self::Ratio.divided_by([0, 0, 0, 0, 1, 0, 0]).per_row(),
+            Self::Quotient(quotient) => Self::Quotient(quotient.per_row()),
+            unit => unit,
+        }
     }
 
     /// Returns true if parameters with this unit are estimated as ln(value / nominal): stiffnesses
@@ -292,6 +320,10 @@ impl Unit {
     /// Returns the unit for display: degrees, millimetres, and stiffnesses with the prefix that
     /// suits `magnitude` \[SI\].
     pub(crate) fn display(self, magnitude: f64) -> Display {
+        if let Self::Quotient(quotient) = self {
+            let (factor, symbol) = quotient.shown();
+            return Display { factor, symbol };
+        }
         let UnitRow { symbol, shown, .. } = self.row();
         match shown {
             DisplayRule::As(factor, symbol) => Display { factor, symbol: symbol.to_owned() },
@@ -350,7 +382,9 @@ impl Unit {
         match self {
             Self::Length => TableUnit { factor: 1e3, suffix: "mm", symbol: "mm" },
             Self::Angle => TableUnit { factor: DEGREES_PER_RADIAN, suffix: "deg", symbol: "°" },
-            other => TableUnit { factor: 1.0, suffix: other.si_suffix(), symbol: other.symbol() },
+            other => {
+                TableUnit { factor: 1.0, suffix: other.si_suffix(), symbol: other.row().symbol }
+            }
         }
     }
 

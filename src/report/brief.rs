@@ -9,7 +9,7 @@ use super::prior::summary;
 use super::remainder::PredictionAccuracy;
 use super::render::text;
 use super::row_kinds::unsteady_points;
-use crate::fit::{Estimate, Finding, FindingCode, Identification, size_of_kind};
+use crate::fit::{Finding, FindingCode, Identification, size_of_kind};
 use crate::problem::Problem;
 use crate::quantity::format::{counted, number};
 use crate::results::Knowledge;
@@ -23,33 +23,42 @@ pub fn estimate_brief(
 ) -> String {
     let mut blocks = estimate_head(problem, found, accuracy);
     blocks.extend(found.prior.as_ref().map(|comparison| Block::Text(summary(comparison))));
-    blocks.push(Block::Lines(parameter_counts(&found.estimates), remarks(found)));
+    blocks.push(Block::Lines(parameter_counts(found), remarks(found)));
     text(&blocks)
 }
 
 /// Returns true if the data determine no parameter of the fit well.
 pub fn determines_nothing(found: &Identification) -> bool {
-    !found.estimates.iter().any(|estimate| Knowledge::of(estimate).is_identified())
+    let constraints = &found.active_constraints;
+    !found.estimates.iter().any(|estimate| Knowledge::of(estimate, constraints).is_identified())
 }
 
-/// States how many parameters the data determine well, in part, or hardly.
-fn parameter_counts(estimates: &[Estimate]) -> String {
+/// States how many parameters the data determine well, in part, or hardly, and how many limits
+/// decide.
+fn parameter_counts(found: &Identification) -> String {
+    let Identification { estimates, active_constraints, .. } = found;
     let count = |is: fn(Knowledge) -> bool| {
-        estimates.iter().filter(|estimate| is(Knowledge::of(estimate))).count()
+        let knowledge = |estimate| Knowledge::of(estimate, active_constraints);
+        estimates.iter().filter(|estimate| is(knowledge(estimate))).count()
     };
-    let well = count(Knowledge::is_identified);
+    let is_hardly = |knowledge| matches!(knowledge, Knowledge::Hardly | Knowledge::NotAtAll);
     let others = [
         (count(|knowledge| knowledge == Knowledge::InPart), "in part"),
-        (
-            count(|knowledge| matches!(knowledge, Knowledge::Hardly | Knowledge::NotAtAll)),
-            "hardly or not at all",
-        ),
-        (count(Knowledge::is_held), "at a bound or fixed"),
+        (count(is_hardly), "hardly or not at all"),
     ];
     let others = others.iter().filter(|part| part.0 > 0).map(|(n, how)| format!(", {n} {how}"));
+    let limited = match count(Knowledge::is_limited) {
+        0 => String::new(),
+        n => format!("; a bound or constraint alone decides {n}"),
+    };
+    let fixed = match count(|knowledge| knowledge == Knowledge::NotFitted) {
+        0 => String::new(),
+        n => format!("; {n} not fitted"),
+    };
     format!(
-        "{well} of {} identified well{}; -v lists them.",
+        "Of {} the data determine {} well{}{limited}{fixed}; -v lists them.",
         counted(estimates.len(), "parameter"),
+        count(Knowledge::is_identified),
         others.collect::<String>()
     )
 }
@@ -92,10 +101,14 @@ fn remarks(found: &Identification) -> Vec<String> {
         (found.identifiability().unidentifiable.len(), "combination", of_parameters.as_str()),
         (found.weak.len(), "combination", "determined too weakly"),
         (correlated(found).len(), "pair", "correlated by more than 0.9"),
-        (found.active_constraints.len(), "constraint", "at its limit"),
     ];
     let counts = counts.into_iter().filter(|part| part.0 > 0);
     points.extend(counts.map(|(n, noun, what)| format!("{} {what}", counted(n, noun))));
+    let active = found.active_constraints.iter().map(|active| active.words.as_str());
+    let active: Vec<&str> = active.collect();
+    points.extend((!active.is_empty()).then(|| {
+        format!("{} at the limit: {}", counted(active.len(), "constraint"), active.join("; "))
+    }));
     let is_open = |finding: &&Finding| finding.code == FindingCode::NotToldApart;
     points.extend(found.findings.iter().filter(is_open).map(ToString::to_string));
     points

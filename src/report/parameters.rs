@@ -2,7 +2,7 @@
 
 use super::document::{Bar, Block, Table, first_of};
 use super::figures::{ACCENT, Drawing, Forest};
-use crate::fit::{Estimate, Identification, PriorSize, open_quantities};
+use crate::fit::{ActiveConstraint, Estimate, Identification, PriorSize, open_quantities};
 use crate::least_squares::solver::AtBound;
 use crate::least_squares::{Identifiability, UnidentifiableCombination, WEAK_THRESHOLD};
 use crate::problem::Problem;
@@ -34,7 +34,7 @@ pub(super) fn parameters<'a>(
     let harmonics = LargestHarmonics::of(problem, &found.estimates);
     let (mut shown, mut lower): (Vec<Line>, Vec<Line>) = Default::default();
     for (k, estimate) in found.estimates.iter().enumerate() {
-        let line = (row(estimate), bar(estimate));
+        let line = (row(estimate, &found.active_constraints), bar(estimate));
         if harmonics.is_smaller(&estimate.name) { &mut lower } else { &mut shown }.push(line);
         let of_joint = harmonics.joint_with_smaller(&estimate.name);
         let is_last = found.estimates[k + 1..]
@@ -109,7 +109,7 @@ fn suggested_prior_sigmas(sizes: &[PriorSize]) -> Option<String> {
     })
 }
 
-fn row(estimate: &Estimate) -> Vec<String> {
+fn row(estimate: &Estimate, constraints: &[ActiveConstraint]) -> Vec<String> {
     let unit = estimate.unit.display(estimate.nominal);
     let error = estimate.std_error.map(|error| error * unit.factor);
     let digits = error.map_or(DEFAULT_DECIMALS, |error| decimals(error, MAX_DECIMALS));
@@ -121,7 +121,7 @@ fn row(estimate: &Estimate) -> Vec<String> {
         show(estimate.estimate - estimate.nominal),
         or_dash(error, |error| number(error, digits)),
         unit.symbol,
-        format_identified(estimate),
+        format_identified(estimate, constraints),
     ]
 }
 
@@ -136,12 +136,13 @@ fn bar(estimate: &Estimate) -> Bar {
 
 /// Formats the identified share of a parameter in percent, with a word for how well the data
 /// determine it.
-fn format_identified(estimate: &Estimate) -> String {
+fn format_identified(estimate: &Estimate, constraints: &[ActiveConstraint]) -> String {
     let share = format!("{:3.0} %", estimate.identified * 100.0);
-    match Knowledge::of(estimate) {
+    match Knowledge::of(estimate, constraints) {
         Knowledge::AtBound(AtBound::Lower) => "at its lower bound".to_owned(),
         Knowledge::AtBound(AtBound::Upper) => "at its upper bound".to_owned(),
         Knowledge::NotFitted => "not fitted".to_owned(),
+        Knowledge::SetByConstraints => "set by constraints".to_owned(),
         Knowledge::Vaguely => format!("{share}  but vaguely"),
         Knowledge::Well => format!("{share}  well"),
         Knowledge::InPart => format!("{share}  in part"),

@@ -2,6 +2,8 @@
 
 use std::fmt::Write as _;
 
+use statrs::distribution::{Binomial, DiscreteCDF as _};
+
 use super::document::{Block, Column, Table, code};
 use super::figures;
 use crate::fit::{ErrorSummary, Identification, Residual};
@@ -113,14 +115,38 @@ impl PredictionAccuracy {
         } else {
             format!(", of which {} % is far from all measured poses", number(far, 0))
         };
+        let kept = held_out_share(uncertainty.within, uncertainty.level);
         let bound = mean.is_finite().then(|| {
             format!(
-                "Error bound of a prediction{with} ({percent} %, measurement noise included): {} mm, mean over the measured joint ranges{far}.",
+                "Error bound of a prediction{with} ({percent} %, measurement noise included): {} mm, mean over the measured joint ranges{far}.{kept}",
                 two_digits(mean * 1e3, 4)
             )
         });
         Some(Self { bound, corrected: held_out.filter(|_| !found.fitted.is_left_out) })
     }
+}
+
+/// Probability of as many exceeded bounds by chance below which a text says that there are too many.
+const MIN_CHANCE_OF_EXCESS: f64 = 0.01;
+
+/// States how many of the held-out positions exceed their own bound, if these are too many for bounds
+/// that hold with the probability `level`; otherwise empty.
+fn held_out_share((within, of): (usize, usize), level: f64) -> String {
+    let beyond = of - within;
+    if beyond == 0 {
+        return String::new();
+    }
+    // Probability of at least `beyond` exceeded bounds of `of`.
+    let chance =
+        Binomial::new(1.0 - level, of as u64).map_or(1.0, |count| count.sf(beyond as u64 - 1));
+    if chance >= MIN_CHANCE_OF_EXCESS {
+        return String::new();
+    }
+    let expected = number((1.0 - level) * of as f64, 1);
+    format!(
+        " But {beyond} of {of} held-out positions exceed their own bound, and chance explains {expected}: such poses err more than \
+         the bound says."
+    )
 }
 
 /// Largest error, relative to the expected error, at which measured positions are probably
@@ -166,4 +192,19 @@ pub(super) fn bound_sentence(bounds: &Bounds, residuals: Option<&[Residual]>) ->
         );
     }
     words
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bounds_that_too_many_held_out_positions_exceed_are_said_to_be_too_small() {
+        assert_eq!(
+            [(50, 50), (47, 50), (0, 0)].map(|within| held_out_share(within, 0.95)),
+            [""; 3]
+        );
+        let words = held_out_share((16, 50), 0.95);
+        assert!(words.starts_with(" But 34 of 50 held-out positions exceed"), "{words}");
+    }
 }

@@ -6,7 +6,7 @@ use super::detection::{LOAD_EFFECTS, has_no_mass};
 use super::document::{Block, Point, joined, opening};
 use super::errors::{held_out_rows, rows_of, without_equilibrium};
 use super::noise::format_chi2;
-use super::probability::percent;
+use super::probability::{MIN_PROBABLE, percent};
 use super::render::{page, text};
 use super::verdict::declared;
 use super::{effect, figures, residual_tests};
@@ -97,11 +97,11 @@ fn verdict(result: &TraceResult) -> String {
         "The residual looks like noise"
     };
     let best = result.ranking.first().filter(|candidate| candidate.p_value < result.level);
-    let cause = match (result.explanations.first(), best) {
-        (Some(set), _) if !set.hypotheses.is_empty() => {
-            let words = set.hypotheses.iter().map(|hypothesis| hypothesis.description.clone());
-            let words: Vec<String> = words.collect();
-            format!("most probable cause: {} ({})", numbered(&words), percent(set.probability))
+    let groups = groups_of_sets(result);
+    let cause = match (groups.first(), best) {
+        (Some(alike), _) if alike.iter().any(|set| !set.hypotheses.is_empty()) => {
+            let probability = total_probability(alike);
+            format!("most probable cause: {} ({})", causes_of(alike), percent(probability))
         }
         (None, Some(candidate)) => format!("it points to: {}", candidate.effect.description),
         _ => "no cause is visible".to_owned(),
@@ -120,25 +120,100 @@ fn numbered(causes: &[String]) -> String {
     }
 }
 
-/// Lists the most probable hypothesis sets with their probabilities, and the claims about the
-/// causes in the first set; nothing if no set was evaluated.
-fn hypothesis_sets<'a>(result: &TraceResult) -> Vec<Block<'a>> {
-    let words = |hypothesis: &Hypothesis| hypothesis.description.clone();
-    let point = |set: &HypothesisSet| {
-        let causes: Vec<String> = set.hypotheses.iter().map(words).collect();
-        let causes = if causes.is_empty() { "noise alone".to_owned() } else { numbered(&causes) };
-        format!("{}: {causes}", percent(set.probability))
+/// Returns the sets that differ from `set` only in values of searched arguments, such as the
+/// distance of a friction law, or in the order of factors in formulas; `set` is one of them.
+fn sets_alike<'a>(sets: &'a [HypothesisSet], set: &HypothesisSet) -> Vec<&'a HypothesisSet> {
+    let of = |other: &&HypothesisSet| {
+        let mut left: Vec<&Hypothesis> = set.hypotheses.iter().collect();
+        other.hypotheses.len() == left.len()
+            && other.hypotheses.iter().all(|hypothesis| {
+                let place = left.iter().position(|candidate| candidate.is_alike(hypothesis));
+                place.map(|place| left.remove(place)).is_some()
+            })
     };
-    let shown: Vec<String> = result.explanations.iter().take(MAX_SHOWN_SETS).map(point).collect();
+    sets.iter().filter(of).collect()
+}
+
+fn total_probability(sets: &[&HypothesisSet]) -> f64 {
+    sets.iter().map(|set| set.probability).fold(0.0, |sum, probability| sum + probability)
+}
+
+/// Describes the causes of the first of some sets that differ only in values of searched
+/// arguments, and states which values the others have.
+fn causes_of(alike: &[&HypothesisSet]) -> String {
+    let Some(first) = alike.first() else { return String::new() };
+    let words = |hypothesis: &Hypothesis| {
+        let of = alike.iter().flat_map(|set| &set.hypotheses);
+        let mut values: Vec<f64> = of
+            .filter(|other| other.is_alike(hypothesis))
+            .filter_map(Hypothesis::searched_value)
+            .collect();
+        values.sort_by(f64::total_cmp);
+        values.dedup();
+        match (hypothesis.searched_key(), values.as_slice()) {
+            (Some(key), [low, .., high]) => {
+                let count = values.len();
+                format!("{} [{key} {low} to {high}, {count} values]", hypothesis.description)
+            }
+            _ => hypothesis.description.clone(),
+        }
+    };
+    let causes: Vec<String> = first.hypotheses.iter().map(words).collect();
+    if causes.is_empty() { "noise alone".to_owned() } else { numbered(&causes) }
+}
+
+/// Returns the groups of sets that differ only in values of searched arguments, the most probable
+/// group first.
+fn groups_of_sets(result: &TraceResult) -> Vec<Vec<&HypothesisSet>> {
+    let mut groups: Vec<Vec<&HypothesisSet>> = Vec::new();
+    for set in &result.explanations {
+        if !groups.iter().flatten().any(|listed| std::ptr::eq(*listed, set)) {
+            groups.push(sets_alike(&result.explanations, set));
+        }
+    }
+    groups.sort_by(|a, b| total_probability(b).total_cmp(&total_probability(a)));
+    groups
+}
+
+/// Lists the most probable hypothesis sets with their probabilities, and the claims about the
+/// causes in the first set; nothing if no set was evaluated. Sets that differ only in values of
+/// searched arguments count as one.
+fn hypothesis_sets<'a>(result: &TraceResult) -> Vec<Block<'a>> {
+    let groups = groups_of_sets(result);
+    let point = |alike: &Vec<&HypothesisSet>| {
+        format!("{}: {}", percent(total_probability(alike)), causes_of(alike))
+    };
+    let shown: Vec<String> = groups.iter().take(MAX_SHOWN_SETS).map(point).collect();
     if shown.is_empty() {
         return Vec::new();
     }
     let mut blocks = vec![Block::heading("Most probable explanations"), Block::list(shown)];
-    if !result.claims.is_empty() {
+    // The claims are those of the most probable single set.
+    let is_first = |alike: &Vec<&HypothesisSet>| {
+        result.explanations.first().is_some_and(|set| alike.iter().any(|of| std::ptr::eq(*of, set)))
+    };
+    if !result.claims.is_empty() && groups.first().is_some_and(is_first) {
         blocks.push(Block::heading(
             "How sure the most probable explanation is: where it acts, what it depends on, and its law",
         ));
-        blocks.push(Block::list(result.claims.iter().map(claims_text)));
+        let beside = |claims: &Claims| {
+            let is_there =
+                |other: &&Hypothesis| other.effect.is_none() && other.place == claims.place.value;
+            let first = result.explanations.first();
+            first.is_some_and(|set| set.hypotheses.iter().any(|other| is_there(&other)))
+        };
+        let words = |claims: &Claims| {
+            let is_denied = claims.law.value.is_some()
+                && claims.law.probability < MIN_PROBABLE
+                && beside(claims);
+            if is_denied {
+                claims_text(claims)
+                    + " as the only cause there, because a function of unknown law acts at the same place"
+            } else {
+                claims_text(claims)
+            }
+        };
+        blocks.push(Block::list(result.claims.iter().map(words)));
     }
     blocks
 }

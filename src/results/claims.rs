@@ -4,6 +4,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::effect::EffectKeys;
+use crate::laws::ArgumentKind;
 use crate::problem::Effect;
 use crate::residual_tests::Covariate;
 use crate::select::{self, HypothesisKind, Trace};
@@ -32,6 +33,34 @@ impl Hypothesis {
             depends_on: hypothesis.depends_on.iter().map(ToString::to_string).collect(),
         }
     }
+
+    /// Returns true if both hypotheses are the same but for the searched value of a time or
+    /// distance, or for the order of the factors in the formulas of a law. Waves of other orders are
+    /// other causes.
+    pub(crate) fn is_alike(&self, other: &Self) -> bool {
+        match (&self.effect, &other.effect) {
+            (Some(Effect::Law(law)), Some(Effect::Law(other))) => law.has_same_terms(other),
+            (Some(effect), Some(other)) if effect.searched_value().is_some_and(is_no_order) => {
+                effect.is_but_for_search(other)
+            }
+            _ => self == other,
+        }
+    }
+
+    /// Returns the key of the searched argument; `None` if there is none.
+    pub(crate) fn searched_key(&self) -> Option<&'static str> {
+        self.effect.as_ref()?.searched()
+    }
+
+    /// Returns the value of the searched argument; `None` if there is none.
+    pub(crate) fn searched_value(&self) -> Option<f64> {
+        Some(self.effect.as_ref()?.searched_value()?.1)
+    }
+}
+
+/// Returns true if a searched argument is a time or distance, and not the order of a wave.
+fn is_no_order((kind, _): (ArgumentKind, f64)) -> bool {
+    !matches!(kind, ArgumentKind::Order | ArgumentKind::Orders)
 }
 
 /// Claim with its posterior probability.
@@ -130,7 +159,7 @@ pub(super) const NOWHERE: &str = "nowhere in particular";
 /// Returns the name of a place in result files with its preposition: "at joint 2", "at the base".
 pub(crate) fn at_place(place: &str) -> String {
     match place {
-        NOWHERE => place.to_owned(),
+        NOWHERE => "at a place that the tests do not show".to_owned(),
         joint if joint.starts_with("joint ") => format!("at {joint}"),
         other => format!("at the {other}"),
     }

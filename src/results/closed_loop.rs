@@ -2,6 +2,7 @@
 
 use schemars::JsonSchema;
 use serde::Serialize;
+use serde_json::value::{RawValue, to_raw_value};
 
 use super::claims::{Claims, NOWHERE, law_name};
 use super::document::Document;
@@ -57,6 +58,9 @@ pub struct LoopResult {
     /// Common prior of the harmonics of all joints, one entry for each order; null if there is
     /// none.
     pub harmonic_prior: Option<Vec<OrderPrior>>,
+    /// Digest of each fitted row, by which flexcal next notices a loop.json of other measurements.
+    #[schemars(with = "Vec<String>")]
+    pub fitted_rows: Option<Box<RawValue>>,
     /// Rounds of the search.
     pub steps: Vec<Step>,
     pub checks_before: Vec<ResidualTest>,
@@ -249,6 +253,7 @@ impl LoopResult {
             further: structures.collect(),
             set_aside: closure.set_aside.iter().map(Row::new).collect(),
             harmonic_prior: prior,
+            fitted_rows: to_raw_value(&closure.before.fit.fitted_rows).ok(),
             steps: closure
                 .rounds
                 .iter()
@@ -470,10 +475,9 @@ impl Step {
     }
 }
 
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes fields by reference")]
 pub(super) fn serialize_symbol<S: serde::Serializer>(
     unit: &Unit,
     serializer: S,
 ) -> Result<S::Ok, S::Error> {
-    serializer.serialize_str(unit.symbol())
+    serializer.serialize_str(&unit.symbol())
 }

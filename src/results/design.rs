@@ -1,5 +1,7 @@
 //! Results of the commands `check` and `plan`: check.json and plan.json.
 
+use std::borrow::Cow;
+
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -83,7 +85,7 @@ impl Document for PlanResult {
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct ExpectedParameter {
     pub name: String,
-    pub unit: &'static str,
+    pub unit: Cow<'static, str>,
     pub nominal: f64,
     pub prior_sigma: Option<f64>,
     pub std_error: Option<f64>,
@@ -162,7 +164,7 @@ pub struct DetectableEffect {
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct DetectableSize {
     pub parameters: Vec<String>,
-    pub unit: &'static str,
+    pub unit: Cow<'static, str>,
     pub prior_sigma: f64,
     /// Smallest size that is found even in the least visible combination of the parameters; null if
     /// no size is.

@@ -1,5 +1,6 @@
 //! Result of the command `identify`: estimate.json.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use schemars::JsonSchema;
@@ -153,7 +154,7 @@ impl Conditioning {
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct Parameter {
     pub name: String,
-    pub unit: &'static str,
+    pub unit: Cow<'static, str>,
     pub nominal: f64,
     pub estimate: f64,
     pub std_error: Option<f64>,
@@ -176,7 +177,7 @@ pub struct Price {
     /// Decrease of the root mean square position residual if the limit is moved outwards by one
     /// step of the size `per`.
     pub rms_mm: f64,
-    pub per: &'static str,
+    pub per: Cow<'static, str>,
 }
 
 /// Linear combination of parameters with its singular value.

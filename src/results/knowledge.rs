@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::fit::Estimate;
+use crate::fit::{ActiveConstraint, Estimate};
 use crate::least_squares::solver::AtBound;
 use crate::model::effect;
 use crate::model::parameter::Regressor;
@@ -28,6 +28,8 @@ pub enum Knowledge {
     AtBound(AtBound),
     /// The parameter was not fitted.
     NotFitted,
+    /// Active constraints alone decide the parameter.
+    SetByConstraints,
     /// The data determine the parameter.
     Well,
     /// The data determine the parameter, but with a standard error too large for a calibration:
@@ -37,13 +39,15 @@ pub enum Knowledge {
     InPart,
     /// The prior, or the start value, determines nearly all of the parameter.
     Hardly,
-    /// The data contain no information on the parameter beyond what active constraints state.
+    /// The data contain no information on the parameter.
     NotAtAll,
 }
 
 impl Knowledge {
-    /// Classifies an estimate by its bound, its identified share and its standard error.
-    pub fn of(estimate: &Estimate) -> Self {
+    /// Classifies an estimate by its bound, its identified share and its standard error, and by the
+    /// active constraints of its fit.
+    pub fn of(estimate: &Estimate, constraints: &[ActiveConstraint]) -> Self {
+        let is_constrained = || constraints.iter().any(|active| active.holds(&estimate.name));
         match (estimate.at_bound, estimate.fitted, estimate.identified) {
             (Some(bound), ..) => Self::AtBound(bound),
             (None, false, _) => Self::NotFitted,
@@ -53,6 +57,7 @@ impl Knowledge {
             (None, true, share) if share > MIN_WELL_IDENTIFIED => Self::Well,
             (None, true, share) if share > MIN_PARTLY_IDENTIFIED => Self::InPart,
             (None, true, share) if share > MAX_UNIDENTIFIED => Self::Hardly,
+            _ if is_constrained() => Self::SetByConstraints,
             _ => Self::NotAtAll,
         }
     }
@@ -62,9 +67,9 @@ impl Knowledge {
         matches!(self, Self::Well | Self::Vaguely)
     }
 
-    /// Returns true if the parameter was not fitted, or if its estimate rests on a bound.
-    pub fn is_held(self) -> bool {
-        matches!(self, Self::AtBound(_) | Self::NotFitted)
+    /// Returns true if the estimate rests on a bound, or if active constraints alone decide it.
+    pub fn is_limited(self) -> bool {
+        matches!(self, Self::AtBound(_) | Self::SetByConstraints)
     }
 }
 

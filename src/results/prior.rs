@@ -1,5 +1,7 @@
 //! Comparison with an earlier estimate that was the prior, in estimate.json.
 
+use std::borrow::Cow;
+
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -31,7 +33,7 @@ pub struct PriorUse {
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct PriorParameter {
     pub name: String,
-    pub unit: &'static str,
+    pub unit: Cow<'static, str>,
     /// Earlier estimate; drift widens its standard error.
     pub prior: Value,
     /// Estimate by the new rows, with the prior of the other parameters only. Null if these rows do

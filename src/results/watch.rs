@@ -1,5 +1,7 @@
 //! Result of the command `watch`: watch.json.
 
+use std::borrow::Cow;
+
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -39,7 +41,7 @@ pub struct WatchResult {
     /// Standard deviation (1 σ) of a coordinate, from noise and from the misfit of the estimate's
     /// fit, in `unit`.
     pub sigma: f64,
-    pub unit: &'static str,
+    pub unit: Cow<'static, str>,
     /// Causes of a change, the most probable first.
     pub causes: Vec<CauseResult>,
 }
@@ -69,7 +71,7 @@ pub struct CauseResult {
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct ChangeResult {
     pub parameter: String,
-    pub unit: &'static str,
+    pub unit: Cow<'static, str>,
     pub change: f64,
     pub std_error: Option<f64>,
 }
@@ -102,9 +104,9 @@ impl WatchResult {
             error: watch.error * unit.factor,
             sigma: watch.sigma * unit.factor,
             unit: match watch.unit {
-                Unit::Angle => "deg",
-                Unit::Pixel => "px",
-                _ => "mm",
+                Unit::Angle => "deg".into(),
+                Unit::Pixel => "px".into(),
+                _ => "mm".into(),
             },
             causes: watch.causes.iter().map(|cause| CauseResult::new(cause, unit.factor)).collect(),
         }
@@ -130,7 +132,7 @@ impl ChangeResult {
     fn new(change: &Change) -> Self {
         Self {
             parameter: change.parameter.clone(),
-            unit: if change.unit.is_relative() { "ln" } else { change.unit.symbol() },
+            unit: if change.unit.is_relative() { "ln".into() } else { change.unit.symbol() },
             change: change.change,
             std_error: Some(change.std_error).filter(|error| error.is_finite()),
         }

@@ -1,5 +1,7 @@
 //! Output of a simulation: table of measurements and its truth.
 
+use std::borrow::Cow;
+
 use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::{Map, Value, json};
@@ -34,7 +36,7 @@ pub struct SavedTruth<'a> {
 #[derive(Serialize, JsonSchema)]
 struct Parameter<'a> {
     name: &'a str,
-    unit: &'static str,
+    unit: Cow<'static, str>,
     nominal: f64,
     #[serde(rename = "true")]
     value: f64,

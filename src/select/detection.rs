@@ -68,12 +68,7 @@ impl Size {
     /// Returns the size with a speed in units per row instead of per second, for times that are row
     /// numbers.
     fn per_row(self) -> Self {
-        let unit = match self.unit {
-            Unit::Speed => Unit::LengthPerRow,
-            Unit::AngularSpeed => Unit::AnglePerRow,
-            unit => unit,
-        };
-        Self { unit, ..self }
+        Self { unit: self.unit.per_row(), ..self }
     }
 
     /// Returns true if effects as large as the prior σ are found in at least one direction.

@@ -61,12 +61,14 @@ pub struct Trace {
     pub rules: SelectionRules,
     /// True if times were measured; otherwise row numbers replace them.
     pub time_measured: bool,
+    /// True for each prismatic joint.
+    pub slides: Vec<bool>,
 }
 
 impl Trace {
     /// Describes an effect in words, with row numbers instead of times if these data have no times.
     pub fn describe(&self, effect: &Effect) -> String {
-        effect.describe_in(self.time_measured)
+        effect.describe_in(self.time_measured, &self.slides)
     }
 }
 
@@ -173,6 +175,7 @@ pub(super) fn trace_fit(fitted: &Fitted, data: &Data) -> Trace {
         absorbed,
         evidence: None,
         time_measured: data.measurements.time_measured,
+        slides: fitted.problem.slides(),
     }
 }
 

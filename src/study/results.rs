@@ -1,5 +1,7 @@
 //! Results of a study by cell and by parameter.
 
+use std::borrow::Cow;
+
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -32,7 +34,7 @@ pub struct CellResult {
 pub struct ParameterResult {
     pub name: String,
     /// Unit of the errors: SI, or `relative` for errors of ln(value).
-    pub unit: &'static str,
+    pub unit: Cow<'static, str>,
     /// Number of trusted fits whose truth is known.
     pub fits: u64,
     /// Mean of estimate − truth, in the unit of x.
@@ -74,7 +76,7 @@ impl CellResult {
             let unit = parameter.unit();
             ParameterResult {
                 name: parameter.name.clone(),
-                unit: if unit.is_relative() { "relative" } else { unit.symbol() },
+                unit: if unit.is_relative() { "relative".into() } else { unit.symbol() },
                 fits: error.count,
                 bias: error.mean(),
                 spread: error.deviation(),

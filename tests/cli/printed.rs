@@ -192,7 +192,7 @@ fn a_fit_that_tells_little_is_followed_by_a_check() {
     assert_contains(
         &run.stdout,
         &[
-            "\n0 of 32 parameters identified well",
+            "\nOf 32 parameters the data determine 0 well",
             "\nNext: flexcal check . says what the poses can tell\n",
         ],
     );

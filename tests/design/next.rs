@@ -121,6 +121,12 @@ fn poses_for_causes_tell_open_effects_apart() {
     let harmonic = "joint-harmonic = { joint = 3, orders = [1] }";
     let open = effect("probable", "gear-ratio = { joint = 3 }", &[harmonic]);
     folder.write("loop.json", document(vec![found, open]).to_string());
+    // A loop of other measurements says nothing about these.
+    let mut other: Value = serde_json::from_str(&folder.read("loop.json")).unwrap();
+    other["fitted_rows"] = json!(["0123456789abcdef"]);
+    folder.write("other.json", other.to_string());
+    let refused = next(&folder, "--for causes --explanations other.json");
+    assert_contains(&refused.stderr, &["loop.json was made from other measurements"]);
     for purpose in ["causes", "both"] {
         let arguments = format!("--for {purpose} --explanations loop.json --poses 4");
         let json = next(&folder, &arguments).success().json();

@@ -250,6 +250,27 @@ fn mistakes_are_located() {
 }
 
 #[test]
+fn coefficients_have_the_unit_of_the_site_divided_by_that_of_their_formula() {
+    let (arm, _) = lunar();
+    for (at, term, unit) in [
+        ("joint2", "sin(q1)", "rad"),
+        ("joint2", "q1", "1"),
+        ("joint2", "q1^2", "rad/rad²"),
+        ("joint2", "M2", "rad/(N·m)"),
+        ("joint2", "2*M2^3", "rad/(N·m)³"),
+        ("joint2", "T*q3", "rad/(rad·K)"),
+        ("joint2", "sqrt(abs(M2))", "rad/unit"),
+        ("measurement.x", "hoist", "m/N"),
+        ("base.rx", "payload*t", "rad/(kg·s)"),
+        ("A.curvature_y", "T^2", "1/(m·K²)"),
+        ("A.strain", "M2", "1/(N·m)"),
+    ] {
+        let law = law(&arm, &format!("law = {{ name = 'a', at = '{at}', terms = ['{term}'] }}"));
+        assert_eq!(law.parameters(&arm)[0].unit().symbol(), unit, "{term} at {at}");
+    }
+}
+
+#[test]
 fn a_formula_without_a_value_at_a_pose_is_refused_with_its_row() {
     let (problem, rows) = bench("law = { name = 'a', at = 'joint2', terms = ['log(q2)'] }", 3);
     let error = identify(&problem, &divided(50, &rows), &Options::default()).unwrap_err();
@@ -271,5 +292,5 @@ fn joints_covariates_and_laws_print_as_they_are_read() {
     let json =
         r#"{"effect":"law","name":"a","at":"joint2","terms":["q2*`tilt deg`"],"sigma_rad":0.1}"#;
     assert_eq!(serde_json::to_string(&law).unwrap(), json);
-    assert_eq!(law.describe(), "a at joint2: q2*`tilt deg`");
+    assert_eq!(law.describe(), "the law “a” changes joint 2 by a multiple of q2*`tilt deg`");
 }

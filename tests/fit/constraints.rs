@@ -137,6 +137,9 @@ fn a_constraint_on_one_parameter_is_a_bound() {
     assert!(change < 1e-6 * bounded.x.amax(), "{change} of {}", bounded.x.amax());
     assert!(estimate(&bounded, "A.EI").at_bound.is_some() && held.active_constraints.len() == 1);
     assert!(estimate(&held, "A.EI").std_error.is_none());
+    let printed = estimate_text(&problem(""), &held, None);
+    let row = printed.lines().find(|line| line.trim_start().starts_with("A.EI ")).unwrap();
+    assert!(row.ends_with("set by constraints"), "{row}");
     for (held, bounded) in held.estimates.iter().zip(&bounded.estimates) {
         let errors = (held.std_error.unwrap_or(0.0), bounded.std_error.unwrap_or(0.0));
         assert!((errors.0 - errors.1).abs() <= 1e-5 * errors.1, "{}: {errors:?}", held.name);
@@ -311,8 +314,9 @@ fn the_service_arm_shows_which_limit_is_wrong() {
     let page = fs::read_to_string(arms::path("problems/service-arm/README.md")).unwrap();
     let (_, block) = page.split_once("```text\n").unwrap();
     // The bound comes from predictions in the workspace, of which the fit alone knows nothing.
-    let bound = block.lines().find(|line| line.starts_with("Error bound of a prediction"));
-    let accuracy = PredictionAccuracy { bound: bound.map(str::to_owned), corrected: None };
+    let lines = block.lines().skip_while(|line| !line.starts_with("Error bound of a prediction"));
+    let bound: Vec<&str> = lines.take_while(|line| !line.is_empty()).collect();
+    let accuracy = PredictionAccuracy { bound: Some(bound.join("\n")), corrected: None };
     let printed = estimate_text(&problem, &found, Some(accuracy));
     for line in block.split("```").next().unwrap().lines() {
         assert!(printed.contains(line), "{line}");

@@ -244,6 +244,11 @@ fn exchanged_rows_and_lengths_columns_moved_on_and_one_axis_in_metres_are_named(
         let found = fit(problem, data);
         let finding = found.finding(FindingCode::Misread).unwrap().to_string();
         assert!(!found.is_trusted() && finding.contains(words), "{finding}");
+        // What follows from the misreading has no remedy of its own.
+        for code in [FindingCode::HeldOutNotBetter, FindingCode::HeldOutBeyondPrediction] {
+            let follows = found.finding(code);
+            assert!(follows.is_none_or(|of| of.remedy.contains("another finding (misread)")));
+        }
     };
     let (problem, data) = based();
     let mut moved = data.clone();

@@ -93,6 +93,27 @@ const CAUSES: [FindingCode; 4] = [
     FindingCode::CommandsRounded,
 ];
 
+/// Codes of findings that name a mistake of the input.
+const MISTAKES: [FindingCode; 5] = [
+    FindingCode::Misread,
+    FindingCode::ViewsReversed,
+    FindingCode::ColumnDoubted,
+    FindingCode::RowsDoubted,
+    FindingCode::OtherSize,
+];
+
+/// Codes of findings that follow from a mistake of the input, and whose usual remedies apply only
+/// without one.
+const CONSEQUENCES: [FindingCode; 7] = [
+    FindingCode::PriorContradicted,
+    FindingCode::PriorWidth,
+    FindingCode::NoiseBeyondDeclared,
+    FindingCode::ResidualBeyondDeclared,
+    FindingCode::HeldOutWorse,
+    FindingCode::HeldOutBeyondPrediction,
+    FindingCode::HeldOutNotBetter,
+];
+
 /// Runs every check on a fit.
 pub(super) fn findings(fit: &CheckedFit) -> Vec<Finding> {
     let mut findings: Vec<Finding> = CHECKS.iter().flat_map(|check| check.check(fit)).collect();
@@ -107,7 +128,8 @@ pub(super) fn findings(fit: &CheckedFit) -> Vec<Finding> {
     };
     // Without a fit that shows it, a cause is only one that may be.
     let is_shown = cause.is_none_or(|cause| !cause.value("after").is_some_and(Value::is_null));
-    if let Some(text) = cause.and_then(words) {
+    let cause_text = cause.and_then(words);
+    if let Some(text) = &cause_text {
         for finding in &mut findings {
             if OF_MISFIT.contains(&finding.code) {
                 let remedy = if is_shown {
@@ -117,6 +139,21 @@ pub(super) fn findings(fit: &CheckedFit) -> Vec<Finding> {
                 };
                 *finding = finding.clone().with_remedy(remedy);
             }
+        }
+    }
+    // Where the input is wrong, advice on poses, priors or σ would lead away from the mistake.
+    let mistake = MISTAKES.iter().find(|code| findings.iter().any(|found| found.code == **code));
+    if let Some(mistake) = mistake {
+        let remedy = format!(
+            "correct first the mistake that another finding ({}) names",
+            mistake.entry().code
+        );
+        let is_consequence = |found: &&mut Finding| {
+            CONSEQUENCES.contains(&found.code)
+                && (cause_text.is_none() || !OF_MISFIT.contains(&found.code))
+        };
+        for finding in findings.iter_mut().filter(is_consequence) {
+            *finding = finding.clone().with_remedy(remedy.clone());
         }
     }
     findings

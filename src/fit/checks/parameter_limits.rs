@@ -51,10 +51,8 @@ impl Check for WithinPriors {
         let finding = |(parameter, sigmas): (&Parameter, f64)| {
             let name = &parameter.name;
             let x = fitted_deviation(fit, parameter);
-            let values = x.map_or_else(String::new, |x| values_in_words(parameter, x));
-            let text = format!(
-                "{name} deviates from nominal by {sigmas:.0} times the σ of its prior{values}"
-            );
+            let text =
+                format!("{name} deviates from nominal by {sigmas:.0} times the σ of its prior");
             let numbers = [name.as_str().into(), sigmas.into()];
             let entry = x.and_then(|x| contradicted_entry(fit, (parameter, x), is_far));
             if let Some(entry) = entry {
@@ -62,14 +60,16 @@ impl Check for WithinPriors {
                 return Finding::new(FindingCode::BeyondPrior, numbers, text)
                     .with_remedy(entry.remedy);
             }
+            let values = x.map_or_else(String::new, |x| values_in_words(parameter, x));
+            let finding =
+                Finding::new(FindingCode::BeyondPrior, numbers, format!("{text}{values}"));
             let further = lengths_beyond(fit, is_far).saturating_sub(1);
             if further >= MIN_FURTHER_LENGTHS && is_nominal_far_off(fit) {
-                return Finding::new(FindingCode::BeyondPrior, numbers, text).with_remedy(format!(
+                return finding.with_remedy(format!(
                     "so do {further} further lengths of the arm: check whether the table is one of this \
                      arm, then axes of the measuring frame, signs of joints, units, and the priors"
                 ));
             }
-            let finding = Finding::new(FindingCode::BeyondPrior, numbers, text);
             match remedy(fit, parameter, sigmas) {
                 Some(remedy) => finding.with_remedy(remedy),
                 None => finding,

@@ -45,7 +45,8 @@ impl Check for PosesSpread {
             let alike = joints.iter().filter(|joint| is_turning(**joint) == turning);
             alike.map(|&joint| range(joint)).reduce(f64::max)
         };
-        let turns = widest(true).map(|most| format!("turns by more than {:.1}°", most.to_degrees()));
+        let turns =
+            widest(true).map(|most| format!("turns by more than {:.1}°", most.to_degrees()));
         let slides = widest(false).map(|most| format!("slides by more than {:.1} mm", most * 1e3));
         let least: Vec<String> = turns.into_iter().chain(slides).collect();
         let measure =

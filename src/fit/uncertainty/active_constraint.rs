@@ -23,9 +23,16 @@ pub struct ActiveConstraint {
     pub unit: Unit,
     /// Location of the constraint in the problem file.
     pub location: Location,
+    /// Names of the parameters in the constraint.
+    pub parameters: Vec<String>,
 }
 
 impl ActiveConstraint {
+    /// Returns true if the parameter called `name` is in the constraint.
+    pub(crate) fn holds(&self, name: &str) -> bool {
+        self.parameters.iter().any(|parameter| parameter == name)
+    }
+
     /// Describes the active constraints `held` of a stage with their shadow `prices`, in the
     /// notation of the problem file.
     pub(in crate::fit) fn all(
@@ -41,6 +48,7 @@ impl ActiveConstraint {
             let unit =
                 constraint.terms.first().map_or(Unit::Length, |&(k, _)| model.parameters[k].unit());
             let location = constraint.location.clone();
+            let name = |&(k, _): &(usize, f64)| model.parameters[k].name.clone();
             Self {
                 constraint: held.constraint,
                 words,
@@ -48,6 +56,7 @@ impl ActiveConstraint {
                 shadow_price: *shadow_price,
                 unit,
                 location,
+                parameters: constraint.terms.iter().map(name).collect(),
             }
         };
         held.iter().zip(prices).map(of).collect()

@@ -1,5 +1,7 @@
 //! Shadow price of a bound or constraint: what moving it outwards would gain.
 
+use std::borrow::Cow;
+
 use crate::quantity::Unit;
 
 /// Shadow price of a limit: improvement of the fit per unit by which the limit is moved outwards.
@@ -18,11 +20,11 @@ impl ShadowPrice {
     /// Returns the decrease of the rms residual \[mm\] for a limit moved outwards by one step, and
     /// the name of that step. The step is 1 mm, 1°, 1 % (for logarithms) or one SI unit.
     #[doc(hidden)]
-    pub fn in_mm(self, unit: Unit) -> (f64, &'static str) {
+    pub fn in_mm(self, unit: Unit) -> (f64, Cow<'static, str>) {
         let (step, name) = match unit {
-            Unit::Length => (1e-3, "mm"),
-            Unit::Angle => (1.0_f64.to_radians(), "°"),
-            unit if unit.is_relative() => (0.01, "%"),
+            Unit::Length => (1e-3, "mm".into()),
+            Unit::Angle => (1.0_f64.to_radians(), "°".into()),
+            unit if unit.is_relative() => (0.01, "%".into()),
             unit => (1.0, unit.symbol()),
         };
         (1e3 * self.rms * step, name)

@@ -15,13 +15,15 @@ const SYMBOLS: [&str; BASES] = ["rad", "m", "K", "kg", "s", "N", "units of the c
 pub struct Dimension {
     powers: [i32; BASES],
     flexible: bool,
+    /// True if the powers do not tell the unit: that of a root, or of a power that is fitted.
+    untold: bool,
 }
 
 /// Unit of a formula, by which a site's unit is divided to give the unit of the term's coefficient.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[non_exhaustive]
 pub enum Per {
-    /// No unit, or a unit that files cannot name.
+    /// No unit.
     #[default]
     Number,
     /// Angle \[rad\].
@@ -38,15 +40,17 @@ pub enum Per {
     Torque,
     /// Torque times mass [N·m·kg].
     TorqueMass,
-    /// Unit of a covariate, which the problem declares.
+    /// Unit of a covariate, which the problem declares, or a unit that is not determined.
     Covariate,
+    /// Product of powers of the base units that is none of the other units.
+    Product([i32; BASES]),
 }
 
 impl Dimension {
     /// Unit of a number without unit.
-    pub(super) const PLAIN: Self = Self { powers: [0; BASES], flexible: false };
+    pub(super) const PLAIN: Self = Self { powers: [0; BASES], flexible: false, untold: false };
     /// Unit of a literal or parameter, which may be any.
-    pub(super) const FLEXIBLE: Self = Self { powers: [0; BASES], flexible: true };
+    pub(super) const FLEXIBLE: Self = Self { powers: [0; BASES], flexible: true, untold: false };
     pub(super) const ANGLE: Self = Self::base(0);
     pub(super) const LENGTH: Self = Self::base(1);
     pub(super) const KELVIN: Self = Self::base(2);
@@ -62,11 +66,14 @@ impl Dimension {
     const fn base(index: usize) -> Self {
         let mut powers = [0; BASES];
         powers[index] = 1;
-        Self { powers, flexible: false }
+        Self { powers, flexible: false, untold: false }
     }
 
     /// Returns this unit as the one by which the unit of a coefficient is divided.
     pub fn per(self) -> Per {
+        if self.untold {
+            return Per::Covariate;
+        }
         let is = |of: Self| self.powers == of.powers;
         let denominators = [
             (Self::ANGLE, Per::Angle),
@@ -78,7 +85,9 @@ impl Dimension {
             (Self::TORQUE_MASS, Per::TorqueMass),
             (Self::COVARIATE, Per::Covariate),
         ];
-        denominators.into_iter().find(|(of, _)| is(*of)).map_or(Per::Number, |(_, per)| per)
+        let named = denominators.into_iter().find(|(of, _)| is(*of)).map(|(_, per)| per);
+        let has_unit = self.powers.iter().any(|power| *power != 0);
+        named.unwrap_or(if has_unit { Per::Product(self.powers) } else { Per::Number })
     }
 
     /// Returns true if a function such as `sin` accepts an expression with this unit: it has no
@@ -92,7 +101,11 @@ impl Dimension {
         let powers = std::array::from_fn(|k| {
             self.powers[k].saturating_add(sign.saturating_mul(other.powers[k]))
         });
-        Self { powers, flexible: self.flexible || other.flexible }
+        Self {
+            powers,
+            flexible: self.flexible || other.flexible,
+            untold: self.untold || other.untold,
+        }
     }
 
     /// Returns the unit of a power; `exponent` is `None` if it is not a literal number.
@@ -103,7 +116,14 @@ impl Dimension {
                 powers: self.powers.map(|power| power.saturating_mul(exponent as i32)),
                 ..self
             },
-            _ => Self { flexible: self.flexible || !self.is_plain(), ..Self::PLAIN },
+            _ => {
+                let has_unit = self.powers[1..].iter().any(|power| *power != 0);
+                Self {
+                    flexible: self.flexible || has_unit,
+                    untold: self.untold || has_unit,
+                    ..Self::PLAIN
+                }
+            }
         }
     }
 
@@ -117,7 +137,7 @@ impl Dimension {
             (true, true) if self.powers == other.powers => Some(self),
             (true, true) if self.powers == [0; BASES] => Some(other),
             (true, true) if other.powers == [0; BASES] => Some(self),
-            (true, true) => Some(Self::FLEXIBLE),
+            (true, true) => Some(Self { untold: true, ..Self::FLEXIBLE }),
         }
     }
 

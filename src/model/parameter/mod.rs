@@ -99,7 +99,10 @@ pub(crate) fn unit(site: ParameterSite, regressor: &Regressor) -> Unit {
         (Per::Torque, Unit::PerLength) => Unit::Flexibility,
         (Per::Torque, Unit::Ratio) => Unit::StrainPerTorque,
         (Per::Torque, Unit::Length) => Unit::LengthPerTorque,
+        (Per::Torque, unit) => unit.divided_by([0, 1, 0, 0, 0, 1, 0]),
         (Per::TorqueMass, Unit::Angle) => Unit::AnglePerTorqueMass,
+        (Per::TorqueMass, unit) => unit.divided_by([0, 1, 0, 1, 0, 1, 0]),
+        (Per::Product(powers), unit) => unit.divided_by(powers),
         (Per::Covariate, Unit::Angle) => Unit::AnglePerUnit,
         (Per::Covariate, Unit::PerLength) => Unit::CurvaturePerUnit,
         (Per::Covariate, Unit::Ratio) => Unit::StrainPerUnit,
@@ -109,6 +112,6 @@ pub(crate) fn unit(site: ParameterSite, regressor: &Regressor) -> Unit {
         (Per::Angle, Unit::PerLength) | (Per::Length, Unit::Ratio) => Unit::PerLength,
         (Per::Length, Unit::PerLength) => Unit::CurvaturePerLength,
         (Per::Angle | Per::Length, _) => Unit::Ratio,
-        (_, unit) => unit,
+        (Per::Number, unit) => unit,
     }
 }

@@ -40,7 +40,7 @@ pub fn study_parameters_csv(study: &Study, results: &Results) -> String {
         let line = |parameter: &ParameterResult| {
             vec![
                 parameter.name.clone(),
-                parameter.unit.to_owned(),
+                parameter.unit.clone().into_owned(),
                 parameter.fits.to_string(),
                 number_or_empty(parameter.bias),
                 number_or_empty(parameter.spread),

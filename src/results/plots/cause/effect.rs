@@ -86,7 +86,7 @@ pub fn of(
         .map(|x| (x, (view.law)(x)))
         .collect();
     let up = (view.up)(largest(&points, &curve));
-    let title = effect.describe_in(poses.measurements.time_measured);
+    let title = effect.describe_in(poses.measurements.time_measured, &problem.slides());
     let (across, reading) = (view.across, view.reading);
     Some(Cause { title, found: None, across, up, points, curve, reading })
 }
