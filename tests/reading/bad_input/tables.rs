@@ -132,7 +132,7 @@ fn rows() {
         ("q1_deg,x_mm,y_mm,z_mm,note", &["rows.csv:3: the header is repeated here"]),
         ("// second block", &["rows.csv:3: the row begins with //; if it is a comment, write"]),
         ("1,1,2,3,Test|split", &["two words of this column (is it validation?)"]),
-        ("1,NaN,2,3,", &["rows.csv:3: column x_mm: NaN is not a finite number"]),
+        ("1,NaN,2,3,", &["rows.csv:3: column x_mm: \"NaN\" is not a number"]),
         ("1,1,inf,3,", &["rows.csv:3: column y_mm: inf is not a finite number"]),
         ("1,1,2,-1e999,", &["rows.csv:3: column z_mm: -1e999 is not a finite number"]),
         ("1,,2,3,", &["rows.csv:3: column x_mm: the cell is empty"]),
