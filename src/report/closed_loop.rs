@@ -57,7 +57,8 @@ pub fn loop_brief(
     table.rows.iter_mut().for_each(|row| _ = row.pop());
     blocks.push(Block::Table(table));
     let bound = accuracy.and_then(|accuracy| accuracy.bound);
-    let size: Vec<String> = gain_sentence(closure, result).into_iter().chain(bound).collect();
+    let size: Vec<String> =
+        gain_sentence(closure, result, corrected.is_some()).into_iter().chain(bound).collect();
     blocks.extend((!size.is_empty()).then(|| Block::Text(size.join(" "))));
     let end = remaining_structure(closure, result)
         .map_or_else(String::new, |words| format!("\n{}", text(&[Block::Text(words)])));
@@ -170,7 +171,8 @@ fn set_aside<'a>(problem: &Problem, result: &LoopResult) -> Option<Block<'a>> {
 pub fn loop_text(problem: &Problem, closure: &ClosedLoop) -> String {
     let result = &LoopResult::new(problem, closure);
     let mut blocks = head(problem, closure, result);
-    blocks.extend([Block::Table(errors(closure, result, None)), gain_block(closure, result)]);
+    blocks
+        .extend([Block::Table(errors(closure, result, None)), gain_block(closure, result, false)]);
     let failed = residual_tests::failed(&closure.before.residual_tests);
     if !failed.is_empty() {
         blocks.push(Block::heading("Residual tests that the declared problem fails"));
@@ -237,7 +239,7 @@ fn blocks<'a>(
     let corrected = accuracy.as_ref().and_then(|accuracy| accuracy.corrected);
     blocks.extend([
         Block::Table(errors(closure, result, corrected.as_ref())),
-        gain_block(closure, result),
+        gain_block(closure, result, corrected.is_some()),
     ]);
     blocks.extend(accuracy.and_then(|accuracy| accuracy.bound).map(Block::Text));
     blocks.extend([
@@ -401,8 +403,9 @@ fn known_gain(result: &LoopResult) -> Option<Gain> {
     result.gain().filter(is_known)
 }
 
-/// States the gain on the held-out rows with its interval, and the size of the residual.
-fn gain_sentence(closure: &ClosedLoop, result: &LoopResult) -> Option<String> {
+/// States the gain on the held-out rows with its interval, and the size of the residual, which is
+/// that without a remainder, even if one corrects predictions (`is_corrected`).
+fn gain_sentence(closure: &ClosedLoop, result: &LoopResult, is_corrected: bool) -> Option<String> {
     let after = &closure.after;
     let gain = known_gain(result).map(|Gain { mean, interval_95: [low, high] }| {
         let (_, unit) = result.after.errors.judged().norms();
@@ -415,6 +418,7 @@ fn gain_sentence(closure: &ClosedLoop, result: &LoopResult) -> Option<String> {
         )
     });
     let has_effects = !result.effects.is_empty();
+    let without = if is_corrected { " without the remainder" } else { "" };
     let size = match (result.before.reduced_chi2, result.after.reduced_chi2) {
         (Some(before), Some(after)) if has_effects => {
             Some(format!("{} before, {} after", format_chi2(before), format_chi2(after)))
@@ -424,7 +428,7 @@ fn gain_sentence(closure: &ClosedLoop, result: &LoopResult) -> Option<String> {
     let is_overstated = has_effects && after.sigma_scale < 1.0;
     let overstated = if is_overstated { " The declared σ is too large." } else { "" };
     let chi2 = size.map(|size| {
-        format!("Reduced χ² (χ²/ν): {size}; {}.{overstated}", expected_interval(after))
+        format!("Reduced χ² (χ²/ν){without}: {size}; {}.{overstated}", expected_interval(after))
     });
     let words: Vec<String> = gain.into_iter().chain(chi2).collect();
     (!words.is_empty()).then(|| words.join(" "))
@@ -444,13 +448,13 @@ fn remaining_structure(closure: &ClosedLoop, result: &LoopResult) -> Option<Stri
 }
 
 /// States the gain on held-out rows, and the arms that have poses without an equilibrium.
-fn gain_block(closure: &ClosedLoop, result: &LoopResult) -> Block<'static> {
+fn gain_block(closure: &ClosedLoop, result: &LoopResult, is_corrected: bool) -> Block<'static> {
     let (before, after) = (&closure.before, &closure.after);
     let mut arms = vec![
         ("the nominal arm", &before.fit.registered),
         ("the arm as declared, fitted", &before.fit.fitted),
     ];
     arms.extend((!result.effects.is_empty()).then_some(("what was found", &after.fitted)));
-    let words = [gain_sentence(closure, result), unpredicted(&arms)];
+    let words = [gain_sentence(closure, result, is_corrected), unpredicted(&arms)];
     Block::Text(words.into_iter().flatten().collect::<Vec<_>>().join(" "))
 }

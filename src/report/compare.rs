@@ -229,7 +229,7 @@ fn blocks<'a>(
         );
     }
     blocks.push(Block::heading("Everything fitted at once"));
-    blocks.push(Block::Table(errors_by_axis(joint)));
+    blocks.push(Block::Table(errors_by_axis(joint, false)));
     blocks.push(Block::figures([figures::errors(plots), figures::vectors(plots)]));
     blocks.push(Block::Poses(plots));
     blocks.extend(fit_details(

@@ -35,11 +35,12 @@ pub(super) fn estimate_head<'a>(
     accuracy: Option<PredictionAccuracy>,
 ) -> Vec<Block<'a>> {
     let outcome = outcome(found, accuracy.as_ref());
+    let is_corrected = accuracy.as_ref().is_some_and(|accuracy| accuracy.corrected.is_some());
     let bound = accuracy.and_then(|accuracy| accuracy.bound);
     let size: Vec<String> = [noise(problem, found)].into_iter().chain(bound).collect();
     let mut blocks = vec![
         Block::lines(headline(problem, found, &outcome)),
-        Block::Table(errors_by_axis(found)),
+        Block::Table(errors_by_axis(found, is_corrected)),
         Block::lines(size.join("\n")),
     ];
     blocks.extend(influential_rows(found));
@@ -92,7 +93,10 @@ fn blocks<'a>(problem: &Problem, found: &'a Identification, plots: &'a PlotData)
                 if found.fitted.is_left_out { "Left out, after" } else { "Held out, after" },
                 rms_and_largest(&corrected.unwrap_or(held_out)),
             ),
-            residual_fact("Residual against σ", found),
+            residual_fact(
+                if corrected.is_some() { "Residual, no remainder" } else { "Residual against σ" },
+                found,
+            ),
             ("Strategy", found.strategy.as_str().to_owned()),
             ("Solver", format!("{}, {} steps", found.solver.as_str(), found.iterations)),
         ],
@@ -103,7 +107,7 @@ fn blocks<'a>(problem: &Problem, found: &'a Identification, plots: &'a PlotData)
     let fit = Block::Text(format!("{}.", describe_fit(found, "; ")));
     let mut blocks = vec![Block::Headline(head), outcome, fit];
     blocks.extend(fit_warnings(found, plots));
-    blocks.push(Block::Table(errors_by_axis(found)));
+    blocks.push(Block::Table(errors_by_axis(found, corrected.is_some())));
     blocks.extend(accuracy.and_then(|accuracy| accuracy.bound).map(Block::Text));
     blocks.extend(orientation(found));
     blocks.extend(prior(found));
@@ -185,7 +189,9 @@ fn fitted_rows(found: &Identification) -> String {
 }
 
 /// Returns the table of errors before and after the fit, along each axis and of the norm.
-pub(super) fn errors_by_axis(found: &Identification) -> Table {
+///
+/// `is_corrected` is true if a remainder corrects predictions; the errors are those without it.
+pub(super) fn errors_by_axis(found: &Identification, is_corrected: bool) -> Table {
     let row = |poses: &str, when: &str, of: &ErrorSummary| {
         let axes = &[of.mean.x, of.mean.y, of.mean.z][..axis_count(of)];
         let values = axes
@@ -207,6 +213,9 @@ pub(super) fn errors_by_axis(found: &Identification) -> Table {
     let minor = (2..2 + axis_count(of)).collect();
     let mut table = Table { minor, ..Table::new(&header, rows, &[0, 1]) };
     table.notes.push(format!("before: {}", nominal_arm(found)));
+    if is_corrected {
+        table.notes.push("after: without the remainder, as χ² and σ below".to_owned());
+    }
     if found.fitted.is_left_out {
         table.notes.push("left out: each configuration predicted by a fit without it".to_owned());
     }
@@ -265,7 +274,10 @@ pub(super) fn fit_details<'a>(
     plots: &'a PlotData,
     file: &str,
 ) -> Vec<Block<'a>> {
-    let mut blocks = vec![Block::heading("Residual"), Block::lines(noise(problem, found))];
+    let uncertainty = plots.uncertainty.as_ref();
+    let is_corrected = uncertainty.is_some_and(|of| of.outcome.held_out.is_some());
+    let title = if is_corrected { "Residual without the remainder" } else { "Residual" };
+    let mut blocks = vec![Block::heading(title), Block::lines(noise(problem, found))];
     blocks.extend(influential_rows(found));
     blocks.extend(outliers(problem, found));
     blocks.push(Block::figures([

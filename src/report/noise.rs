@@ -87,6 +87,13 @@ fn raised_sigma(found: &Identification) -> Option<String> {
     ))
 }
 
+/// Returns the ratio of the σ that the fit assumes to the declared one, if the fit raised σ because
+/// the new rows contradict its prior.
+pub(super) fn raised_sigma_ratio(found: &Identification) -> Option<f64> {
+    let prior = found.prior.as_ref().filter(|prior| prior.has_raised_sigma)?;
+    (prior.variance_ratio > MAX_EQUAL_VARIANCE_RATIO).then(|| prior.variance_ratio.sqrt())
+}
+
 /// States the interval that contains χ²/ν with 99.9 % probability if only noise is left.
 pub(super) fn expected_interval(found: &Identification) -> String {
     match found.chance {

@@ -1,6 +1,7 @@
 //! Sentence that states whether a fit is to be trusted.
 
 use super::errors::{test_rows_word, with_unit};
+use super::noise::raised_sigma_ratio;
 use super::remainder::PredictionAccuracy;
 use crate::fit::Identification;
 use crate::quantity::format::number;
@@ -23,12 +24,15 @@ pub(super) fn outcome(found: &Identification, accuracy: Option<&PredictionAccura
         return "The fit is to be trusted.".to_owned();
     }
     let has_bound = accuracy.is_some_and(|accuracy| accuracy.bound.is_some());
-    let scope = if is_larger && has_bound { " within the error bound below" } else { "" };
+    let is_raised = raised_sigma_ratio(found).is_some();
+    let scope =
+        if (is_larger || is_raised) && has_bound { " within the error bound below" } else { "" };
     let size = if found.noise_factor > 1.0 {
         format!("{} × the declared σ", number(found.noise_factor.sqrt(), 1))
     } else {
         "larger than the declared σ explains".to_owned()
     };
+    let of = if corrected.is_some() { " without the remainder" } else { "" };
     let without = if corrected.is_some() {
         format!(" ({} without the remainder)", with_unit(fitted, fitted.mean.norm))
     } else {
@@ -46,7 +50,12 @@ pub(super) fn outcome(found: &Identification, accuracy: Option<&PredictionAccura
         "Trusted{scope}: the mean {} error {change}{without}.{}",
         test_rows_word(&found.fitted).replace(' ', "-"),
         if is_larger {
-            format!(" Not fully explained: the residual is {size}.")
+            format!(" Not fully explained: the residual{of} is {size}.")
+        } else if let Some(ratio) = raised_sigma_ratio(found) {
+            format!(
+                " Not fully explained: the new rows contradict the prior, so the fit assumes {} × the declared σ.",
+                number(ratio, 1)
+            )
         } else {
             String::new()
         }

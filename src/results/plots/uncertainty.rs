@@ -29,6 +29,9 @@ pub struct Uncertainty {
     pub bounds: Vec<BoundAt>,
     /// Errors of the joints that a remainder corrects; empty without a remainder.
     pub joints: Vec<JointError>,
+    /// Number of held-out positions whose error does not exceed its bound, and number of those that
+    /// have one.
+    pub within: (usize, usize),
 }
 
 /// Error bound of a predicted position.
@@ -72,6 +75,7 @@ impl Uncertainty {
                 level: BOUND_LEVEL,
                 bounds: Vec::new(),
                 joints: Vec::new(),
+                within: (0, 0),
             });
         }
         // Sessions may have different measuring frames, so all poses are taken from the first
@@ -111,6 +115,30 @@ impl Uncertainty {
             level: BOUND_LEVEL,
             bounds: bounds.filter(|at| at.bound.is_finite()).collect(),
             joints: correction.joint_errors(DRAWN_COMMANDS),
+            within: within_bounds((found, problem), data, fitted)?,
         })
     }
+}
+
+/// Returns the number of held-out positions whose error does not exceed its bound, and the number of
+/// those that have one.
+fn within_bounds(
+    (found, problem): (&Identification, &Problem),
+    data: &Dataset,
+    fitted: &Fitted,
+) -> Result<(usize, usize), IdentifyError> {
+    let table = &data.measurements;
+    let is_position = |row: &usize| table.observation(*row).is_position();
+    let held_out: Vec<usize> = data.split.held_out.iter().copied().filter(is_position).collect();
+    if held_out.is_empty() {
+        return Ok((0, 0));
+    }
+    let rows = table.select(&held_out);
+    let (positions, corrected) = predict_identified(found, problem, fitted.correction(), &rows)?;
+    let bounds = Bounds::new(fitted.correction(), corrected, BOUND_LEVEL);
+    let errors = positions.iter().zip(&rows.positions).map(|(at, measured)| (measured - at).norm());
+    let pairs = errors.enumerate().map(|(pose, error)| (error, bounds.bound(pose)));
+    let known: Vec<(f64, f64)> =
+        pairs.filter(|(error, bound)| error.is_finite() && bound.is_finite()).collect();
+    Ok((known.iter().filter(|(error, bound)| error <= bound).count(), known.len()))
 }
