@@ -38,7 +38,7 @@ pub struct Arguments {
     /// Folder for the page
     #[arg(short, long, value_name = "DIR", default_value = "out/compare-results")]
     out: PathBuf,
-    /// Replace a page that flexcal did not write
+    /// Also replace a page that flexcal did not write or that was changed since
     #[arg(long)]
     force: bool,
     /// Print errors alone

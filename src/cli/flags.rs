@@ -14,8 +14,8 @@ pub struct Flags {
     /// Folder for results [default: out/<name of the problem>]
     #[arg(short, long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Replace files that this command or the problem reads, and files that flexcal did not write
-    /// or that were changed since
+    /// Also replace files that flexcal did not write or that were changed since, and files that
+    /// this command or the problem reads
     #[arg(long)]
     pub force: bool,
     /// Print the result as JSON on standard output, and nothing else

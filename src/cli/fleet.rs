@@ -25,7 +25,7 @@ pub struct Arguments {
     /// File to write, which identify takes with --prior; the page of the same name ends in .html
     #[arg(short, long, value_name = "PRIOR.toml", default_value = "PRIOR.toml")]
     out: PathBuf,
-    /// Replace a file that flexcal did not write
+    /// Also replace files that flexcal did not write or that were changed since
     #[arg(long)]
     force: bool,
     /// Print the result as JSON and nothing else

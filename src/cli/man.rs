@@ -15,7 +15,7 @@ use super::output::{self, Results};
   flexcal man | man -l -
   flexcal man --out ~/.local/share/man/man1")]
 pub struct Arguments {
-    /// Replace pages that flexcal did not write
+    /// Also replace pages that flexcal did not write or that were changed since
     #[arg(long, requires = "out")]
     force: bool,
     /// Write the page of every command to this folder (flexcal.1, flexcal-identify.1, …), and print

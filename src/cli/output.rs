@@ -32,12 +32,12 @@ pub enum WriteError {
     #[error("cannot write {}: {why}", path.display())]
     InTheWay { path: PathBuf, why: &'static str },
     #[error(
-        "{} is an input of this command or belongs to its problem; name another folder with --out, or replace it with --force",
+        "{} is an input of this command or belongs to its problem; name another place with --out, or overwrite it with --force",
         path.display()
     )]
     Input { path: PathBuf },
     #[error(
-        "{} is there and not as flexcal wrote it; name another folder with --out, or replace it with --force", path.display()
+        "{} is there already, and flexcal did not write it or it was changed since; name another place with --out, or replace the file with --force", path.display()
     )]
     Foreign { path: PathBuf },
 }

@@ -1,7 +1,5 @@
 //! Units of coefficients: the unit of a quantity divided by the unit of a formula.
 
-use super::Unit;
-
 /// Number of base units of formulas: rad, m, K, kg, s, N, and the unit of a covariate.
 pub(super) const BASES: usize = 7;
 /// Symbols of the base units, in the order of the powers.
@@ -27,25 +25,21 @@ pub struct Quotient {
 
 /// Quantity to which a law adds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Dividend {
+pub(super) enum Dividend {
+    /// Angle \[rad\].
     Angle,
+    /// Length \[m\].
     Length,
+    /// Curvature of a link [1/m].
     Curvature,
+    /// Strain of a link.
     Strain,
 }
 
 impl Quotient {
-    /// Creates the unit `of` divided by `powers` of the base units. Returns `None` if laws cannot
-    /// add to a quantity with that unit.
-    pub(super) fn new(of: Unit, powers: [i32; BASES]) -> Option<Self> {
-        let of = match of {
-            Unit::Angle => Dividend::Angle,
-            Unit::Length => Dividend::Length,
-            Unit::PerLength => Dividend::Curvature,
-            Unit::Ratio => Dividend::Strain,
-            _ => return None,
-        };
-        Some(Self { of, powers, per_row: false })
+    /// Creates the unit of the quantity `of` divided by `powers` of the base units.
+    pub(super) fn new(of: Dividend, powers: [i32; BASES]) -> Self {
+        Self { of, powers, per_row: false }
     }
 
     /// Returns the unit with rows in place of seconds.
@@ -142,22 +136,21 @@ mod tests {
     fn quotients_are_written_with_powers() {
         // rad, m, K, kg, s, N, unit
         for (of, powers, symbol, shown) in [
-            (Unit::Angle, [0, 3, 0, 0, 0, 3, 0], "rad/(N·m)³", "nrad/(N·m)³"),
-            (Unit::Angle, [2, 0, 0, 0, 0, 0, 0], "rad/rad²", "°/rad²"),
-            (Unit::Angle, [1, 1, 0, 0, 0, 1, 0], "rad/(N·m·rad)", "µrad/(N·m·rad)"),
-            (Unit::Angle, [0, 0, 1, -1, 0, 0, 0], "rad·kg/K", "°·kg/K"),
-            (Unit::Length, [0, 0, 1, 0, 1, 0, 0], "m/(K·s)", "mm/(K·h)"),
-            (Unit::PerLength, [0, 2, 0, 0, 0, 2, 0], "1/(m·(N·m)²)", "µrad/(m·(N·m)²)"),
-            (Unit::Ratio, [0, 0, 2, 0, 0, 0, 0], "1/K²", "10⁻⁶/K²"),
-            (Unit::Length, [0, 2, 0, 0, 0, 0, 0], "m/m²", "mm/m²"),
+            (Dividend::Angle, [0, 3, 0, 0, 0, 3, 0], "rad/(N·m)³", "nrad/(N·m)³"),
+            (Dividend::Angle, [2, 0, 0, 0, 0, 0, 0], "rad/rad²", "°/rad²"),
+            (Dividend::Angle, [1, 1, 0, 0, 0, 1, 0], "rad/(N·m·rad)", "µrad/(N·m·rad)"),
+            (Dividend::Angle, [0, 0, 1, -1, 0, 0, 0], "rad·kg/K", "°·kg/K"),
+            (Dividend::Length, [0, 0, 1, 0, 1, 0, 0], "m/(K·s)", "mm/(K·h)"),
+            (Dividend::Curvature, [0, 2, 0, 0, 0, 2, 0], "1/(m·(N·m)²)", "µrad/(m·(N·m)²)"),
+            (Dividend::Strain, [0, 0, 2, 0, 0, 0, 0], "1/K²", "10⁻⁶/K²"),
+            (Dividend::Length, [0, 2, 0, 0, 0, 0, 0], "m/m²", "mm/m²"),
         ] {
-            let unit = Quotient::new(of, powers).unwrap();
+            let unit = Quotient::new(of, powers);
             assert_eq!((unit.symbol().as_str(), unit.shown().1.as_str()), (symbol, shown));
         }
-        let squared = Quotient::new(Unit::Angle, [0, 0, 0, 0, 2, 0, 0]).unwrap();
+        let squared = Quotient::new(Dividend::Angle, [0, 0, 0, 0, 2, 0, 0]);
         assert_eq!(squared.per_row().symbol(), "rad/row²");
         assert_eq!(squared.per_row().shown().1, "°/row²");
         assert!((squared.shown().0 / (1_f64.to_degrees() * 3600.0 * 3600.0) - 1.0).abs() < 1e-12);
-        assert_eq!(Quotient::new(Unit::Mass, [0; BASES]), None);
     }
 }

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::f64::consts::PI;
 
-use super::quotient::{BASES, Quotient};
+use super::quotient::{BASES, Dividend, Quotient};
 
 /// Kind of physical quantity, which determines the SI unit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -295,7 +295,14 @@ impl Unit {
     /// Returns this unit divided by powers of the base units of formulas: rad, m, K, kg, s, N, and
     /// the unit of a covariate. Returns this unit if laws cannot add to a quantity with it.
     pub(crate) fn divided_by(self, powers: [i32; BASES]) -> Self {
-        Quotient::new(self, powers).map_or(self, Self::Quotient)
+        let of = match self {
+            Self::Angle => Dividend::Angle,
+            Self::Length => Dividend::Length,
+            Self::PerLength => Dividend::Curvature,
+            Self::Ratio => Dividend::Strain,
+            other => return other,
+        };
+        Self::Quotient(Quotient::new(of, powers))
     }
 
     /// Returns the unit with table rows in place of seconds, for times that are row numbers.

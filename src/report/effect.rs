@@ -13,10 +13,18 @@ const MIN_PLAIN_ERROR: f64 = 1e-5;
 /// Absolute value below which a value with such a standard error is written with a power of ten.
 const MAX_SMALL_VALUE: f64 = 1e-3;
 
+/// Smallest ratio of an amplitude to its standard error at which a single harmonic is significant.
+const MIN_SIGNIFICANCE: f64 = 2.0;
+
 /// Lists the parameters of an effect with their values, one text each. Of many harmonics, only the
 /// largest amplitudes are listed.
 pub(super) fn values(effect: &Effect, parameters: &[ParameterValue]) -> Vec<String> {
     let line = |name: &str, parameter: &ParameterValue| format!("{name} = {}", value(parameter));
+    if let (Effect::PayloadMass | Effect::BodyMass { .. }, [mass]) = (effect, parameters) {
+        let than = if mass.estimate < 0.0 { "lighter" } else { "heavier" };
+        let name = format!("{} − declared", mass.name);
+        return vec![format!("{} ({than} than declared)", line(&name, mass))];
+    }
     let orders = effect.harmonic_orders().unwrap_or_default();
     if parameters.len() <= MAX_LISTED_COEFFICIENTS || parameters.len() != 2 * orders.len() {
         return parameters.iter().map(|parameter| line(&parameter.name, parameter)).collect();
@@ -27,10 +35,11 @@ pub(super) fn values(effect: &Effect, parameters: &[ParameterValue]) -> Vec<Stri
         .zip(parameters.chunks_exact(2).map(ParameterValue::amplitude))
         .collect();
     waves.sort_by(|(_, a), (_, b)| b.estimate.total_cmp(&a.estimate));
-    let largest = waves
-        .iter()
-        .take(MAX_SHOWN_HARMONICS)
-        .map(|(order, wave)| line(&format!("amplitude of order {order}"), wave));
+    let largest = waves.iter().take(MAX_SHOWN_HARMONICS).map(|(order, wave)| {
+        let words = line(&format!("amplitude of order {order}"), wave);
+        let is_small = wave.std_error.is_some_and(|error| wave.estimate < MIN_SIGNIFICANCE * error);
+        if is_small { words + " (not significant by itself)" } else { words }
+    });
     let smaller = waves.len().saturating_sub(MAX_SHOWN_HARMONICS);
     largest.chain((smaller > 0).then(|| format!("{smaller} smaller ones in loop.json"))).collect()
 }

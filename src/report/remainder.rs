@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use statrs::distribution::{Binomial, DiscreteCDF as _};
+use statrs::function::beta::ln_beta;
 
 use super::document::{Block, Column, Table, code};
 use super::figures;
@@ -115,7 +115,7 @@ impl PredictionAccuracy {
         } else {
             format!(", of which {} % is far from all measured poses", number(far, 0))
         };
-        let kept = held_out_share(uncertainty.within, uncertainty.level);
+        let kept = held_out_share(uncertainty.within, uncertainty.level, found.poses);
         let bound = mean.is_finite().then(|| {
             format!(
                 "Error bound of a prediction{with} ({percent} %, measurement noise included): {} mm, mean over the measured joint ranges{far}.{kept}",
@@ -130,16 +130,13 @@ impl PredictionAccuracy {
 const MIN_CHANCE_OF_EXCESS: f64 = 0.01;
 
 /// States how many of the held-out positions exceed their own bound, if these are too many for bounds
-/// that hold with the probability `level`; otherwise empty.
-fn held_out_share((within, of): (usize, usize), level: f64) -> String {
+/// that hold with the probability `level` and rest on `fitted` poses; otherwise empty.
+fn held_out_share((within, of): (usize, usize), level: f64, fitted: usize) -> String {
     let beyond = of - within;
     if beyond == 0 {
         return String::new();
     }
-    // Probability of at least `beyond` exceeded bounds of `of`.
-    let chance =
-        Binomial::new(1.0 - level, of as u64).map_or(1.0, |count| count.sf(beyond as u64 - 1));
-    if chance >= MIN_CHANCE_OF_EXCESS {
+    if chance_of_excess((beyond, of), level, fitted) >= MIN_CHANCE_OF_EXCESS {
         return String::new();
     }
     let expected = number((1.0 - level) * of as f64, 1);
@@ -147,6 +144,21 @@ fn held_out_share((within, of): (usize, usize), level: f64) -> String {
         " But {beyond} of {of} held-out positions exceed their own bound, and chance explains {expected}: such poses err more than \
          the bound says."
     )
+}
+
+/// Returns the probability that at least `beyond` of `of` errors exceed bounds by chance.
+///
+/// The share of errors beyond a quantile of n errors has a beta distribution with the parameters
+/// (1 − level)(n + 1) and level (n + 1), so their number has a beta-binomial distribution.
+fn chance_of_excess((beyond, of): (usize, usize), level: f64, fitted: usize) -> f64 {
+    let (n, of) = (fitted as f64 + 1.0, of as f64);
+    let (a, b) = ((1.0 - level) * n, level * n);
+    let probability = |beyond: usize| {
+        let k = beyond as f64;
+        let ln_choices = -(of + 1.0).ln() - ln_beta(of - k + 1.0, k + 1.0);
+        (ln_choices + ln_beta(k + a, of - k + b) - ln_beta(a, b)).exp()
+    };
+    1.0 - (0..beyond).map(probability).sum::<f64>()
 }
 
 /// Largest error, relative to the expected error, at which measured positions are probably
@@ -200,11 +212,10 @@ mod tests {
 
     #[test]
     fn bounds_that_too_many_held_out_positions_exceed_are_said_to_be_too_small() {
-        assert_eq!(
-            [(50, 50), (47, 50), (0, 0)].map(|within| held_out_share(within, 0.95)),
-            [""; 3]
-        );
-        let words = held_out_share((16, 50), 0.95);
-        assert!(words.starts_with(" But 34 of 50 held-out positions exceed"), "{words}");
+        let words = |within| held_out_share(within, 0.95, 28);
+        assert_eq!([(50, 50), (41, 50), (0, 0)].map(words), [""; 3]);
+        let said = words((16, 50));
+        assert!(said.starts_with(" But 34 of 50 held-out positions exceed"), "{said}");
+        assert!((chance_of_excess((0, 50), 0.95, 28) - 1.0).abs() < 1e-12);
     }
 }

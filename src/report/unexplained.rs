@@ -11,7 +11,7 @@ use crate::problem::{Effect, JointKind, Problem};
 use crate::quantity::format::{number, p_value};
 use crate::residual_tests::Covariate;
 use crate::results::{LoopResult, Structure, Summary, at_place};
-use crate::select::{ClosedLoop, Correction, HELD_FIXED, REFUSED};
+use crate::select::{ClosedLoop, Correction, HELD_FIXED, HypothesisKind, REFUSED};
 
 /// Returns the empirical correction of structure without a law; `None` if none was accepted.
 fn correction(closure: &ClosedLoop) -> Option<&Correction> {
@@ -146,14 +146,30 @@ pub(super) fn structure_sentences(
     }
     sentences.push(catalogue + ".");
     match correction(closure) {
-        None => sentences.push(
-            "No smooth correction is given, because none reduces the error of left-out poses by 5 % or more, or because the \
-             fit has cautions."
-                .to_owned(),
-        ),
+        None => sentences.push(no_correction(closure).to_owned()),
         Some(correction) => sentences.extend(correction_sentences(problem, closure, correction)),
     }
     sentences
+}
+
+/// States why no empirical correction is given: it was not tried, or it gains too little.
+fn no_correction(closure: &ClosedLoop) -> &'static str {
+    let kinds =
+        || closure.unexplained.iter().filter_map(|left| Some(&left.claims.as_ref()?.law.0.kind));
+    let is_function = |kind: &&HypothesisKind| {
+        !matches!(kind, HypothesisKind::PerPose | HypothesisKind::Limit(_))
+    };
+    if kinds().next().is_none() {
+        "No smooth correction was tried, because the place of the structure is not known."
+    } else if kinds().find(is_function).is_none() {
+        "No smooth correction was tried, because an error that varies from pose to pose cannot be predicted."
+    } else if !closure.after.is_trusted() {
+        "No smooth correction was tried, because the fit is not to be trusted."
+    } else if closure.after.fitted.is_left_out {
+        "No smooth correction was tried, because no poses are held out to judge it."
+    } else {
+        "No smooth correction of this structure is given: none could be fitted that reduces the error of left-out poses by 5 % or more."
+    }
 }
 
 /// Returns true if the loop found deflections under weights that the problem does not declare.

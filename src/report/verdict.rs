@@ -166,7 +166,15 @@ fn found_clause(result: &LoopResult) -> String {
             format!("; {}{or_else}", claim(cause, &cause.effect.description))
         }
         causes => {
-            format!("; {} causes are probable, or known at most by their place", causes.len())
+            let probable = causes.iter().filter(|cause| cause.status == Status::Probable).count();
+            let counts = [
+                (probable, "is probable", "are probable"),
+                (causes.len() - probable, "has no known law", "have no known law"),
+            ];
+            let counts = counts.into_iter().filter(|part| part.0 > 0).map(|(n, one, more)| {
+                format!("{} {}", counted(n, "cause"), if n == 1 { one } else { more })
+            });
+            format!("; {}", counts.collect::<Vec<_>>().join(" and "))
         }
     };
     words += &in_doubt;

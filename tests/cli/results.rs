@@ -69,7 +69,10 @@ fn figures_of_an_older_page_go_and_other_files_stay() {
     // A foreign file with the name of a figure prevents all output before any work.
     write("effect-1.svg");
     let run = flexcal("identify").code(2);
-    assert_contains(&run.stderr, &["figures/effect-1.svg is there and not as flexcal wrote it"]);
+    assert_contains(
+        &run.stderr,
+        &["figures/effect-1.svg is there already, and flexcal did not write it"],
+    );
 }
 
 #[test]

@@ -175,7 +175,7 @@ fn without_times_nothing_that_remembers_is_promised() {
     let measured = std::fs::read_to_string(path("tests/cases/a-none.csv")).unwrap();
     let (folder, table) = with_table("untimed.csv", &measured.replacen("time_s", "note", 1));
     let run = flexcal(&folder, &format!("check tests/cases --data {table}")).success();
-    assert_contains(&run.stdout, &["no time_s that tells which pose was before which"]);
+    assert_contains(&run.stdout, &["no column time_s, so the order of the poses is not known"]);
     let detectable = &folder.json("check.json")["detectable"];
     let has = |key: &str| texts(&detectable[key], "effect").contains(&"joint-hysteresis");
     assert!(!has("effects") && has("untestable"), "{detectable}");

@@ -84,7 +84,7 @@ fn what_flexcal_did_not_write_is_not_replaced() {
     fs::create_dir(bench.path("out")).unwrap();
     for name in ["estimate.json", "report.md", "report.html"] {
         bench.write(format!("out/{name}"), "mine");
-        let words = format!("out/{name} is there and not as flexcal wrote it");
+        let words = format!("out/{name} is there already, and flexcal did not write it");
         assert_refused(&bench, "identify arm --out out", "out", &[&words]);
         fs::remove_file(bench.path("out").join(name)).unwrap();
     }

@@ -61,6 +61,7 @@ pub fn histogram(data: &PlotData) -> Option<Drawing> {
     let legend = [("fitted poses", FAINT, Mark::Bar), ("expected from noise", ACCENT, Mark::Line)];
     let outside = match below + above {
         0 => String::new(),
+        1 => format!(" 1 lies beyond ±{reach} σ and is counted in the outermost bar."),
         n => format!(" {n} lie beyond ±{reach} σ and are counted in the outermost bars."),
     };
     let caption = format!(
