@@ -120,10 +120,7 @@ fn a_table_in_memory_is_read_as_the_file_is() {
         ColumnValues::Words((0..78).map(|k| if k == row { word } else { "1" }).collect())
     };
     let told = [
-        (
-            replaced("x_mm", numbers(5, f64::NAN)),
-            "memory:7: column x_mm: \"NaN\" is not a number",
-        ),
+        (replaced("x_mm", numbers(5, f64::NAN)), "memory:7: column x_mm: \"NaN\" is not a number"),
         (replaced("x_mm", numbers(77, 1e200)), "memory:79: column x_mm: 1e200 is larger than"),
         (replaced("x_mm", words(0, "a,\"b")), "memory:2: column x_mm: \"a,\"b\" is not a number"),
         (replaced("split", words(1, "")), "memory:2: column split: \"1\" is neither"),
