@@ -532,7 +532,7 @@ fn next_images_show_the_board_as_the_measured_ones_do() {
     };
     let side = view(&rows, 0).signum();
     for row in (0..rows.len()).step_by(9) {
-        assert_eq!(view(&rows, row).signum(), side);
+        assert!(view(&rows, row) * side > 0.0, "row {row}");
     }
     let areas: Vec<f64> = (0..rows.len()).step_by(9).map(|row| side * view(&rows, row)).collect();
     let largest = areas.iter().copied().fold(0.0, f64::max);
