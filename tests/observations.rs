@@ -15,6 +15,8 @@ mod bench;
 mod cameras;
 #[path = "observations/derivatives.rs"]
 mod derivatives;
+#[path = "observations/moved.rs"]
+mod moved;
 #[path = "observations/named.rs"]
 mod named;
 #[path = "observations/overstated.rs"]

@@ -40,6 +40,9 @@ pub fn after_fit(
 ) -> String {
     let named = common.problem_arguments();
     let to_apply = |what: &str| {
+        if measures_no_position(problem) {
+            return to_export(common, problem, estimate);
+        }
         let [problem, estimate] = [common.problem(), estimate].map(shell_word);
         format!("flexcal compensate {problem} --estimate {estimate} --data TARGETS.csv {what}")
     };
@@ -219,6 +222,7 @@ pub fn after_applying(
     estimate: &SavedEstimate,
     file: &Path,
 ) -> String {
+    let of_estimate = file;
     let [named, file] = [common.problem(), file].map(shell_word);
     if !estimate.trusted {
         return format!("flexcal identify {named} says why the estimate is not to be trusted");
@@ -229,7 +233,28 @@ pub fn after_applying(
             "flexcal loop {named} looks for what the model lacks, because the estimate leaves more than noise"
         );
     }
+    if measures_no_position(problem) {
+        return to_export(common, problem, of_estimate);
+    }
     format!("flexcal compensate {named} --estimate {file} --data TARGETS.csv corrects commands")
+}
+
+/// Returns true if pixels are measured instead of positions, so that the arm need not have a target
+/// whose commands could be corrected.
+fn measures_no_position(problem: &Problem) -> bool {
+    let has_camera = problem.fixtures.iter().any(|fixture| fixture.kind.word() == "camera");
+    has_camera && problem.data.position_sigma.is_none()
+}
+
+/// Returns the command that writes an estimate into the URDF of the arm, or the camera of it if the
+/// problem names no URDF.
+fn to_export(common: &Common, problem: &Problem, estimate: &Path) -> String {
+    let [named, estimate] = [common.problem(), estimate].map(shell_word);
+    let export = format!("flexcal export {named} --estimate {estimate}");
+    match problem.urdf {
+        Some(_) => format!("{export} --urdf ARM.urdf writes the calibrated URDF"),
+        None => format!("{export} --format opencv writes the camera with its pose"),
+    }
 }
 
 /// Returns the command to run after a trace.

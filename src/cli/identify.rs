@@ -1,5 +1,6 @@
 //! Arguments and work of `flexcal identify`.
 
+use std::collections::BTreeSet;
 use std::error::Error;
 use std::path::PathBuf;
 
@@ -7,6 +8,8 @@ use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use flexcal::fit::{self, Options, SolverChoice, Strategy};
 use flexcal::life::{FleetPrior, PriorError, PriorSource, identify_with_prior};
+use flexcal::measurement::Dataset;
+use flexcal::problem::{HeldOut, Problem};
 use flexcal::remainder::{self, Correction, Fitted};
 use flexcal::report::{self, PredictionAccuracy};
 use flexcal::results::{
@@ -19,6 +22,9 @@ use super::outcome::Outcome;
 use super::output::REPORT;
 use super::progress::Line;
 use super::{advice, diagnostic, interrupt};
+
+/// Smallest number of new poses of which some may be held out without a warning.
+const MANY_POSES: usize = 20;
 
 /// Arguments of `flexcal identify`.
 #[derive(Debug, Args)]
@@ -75,6 +81,22 @@ pub(super) fn parse_days(text: &str) -> Result<f64, String> {
     days.ok_or_else(|| "a number of days, at least 0, is expected".to_owned())
 }
 
+/// Prints a warning if few new rows are fitted with a prior and some of them are held out.
+fn warn_of_held_out(problem: &Problem, data: &Dataset) {
+    let Some(HeldOut::Fraction { .. }) = problem.data.held_out else { return };
+    let poses = data.measurements.pose_numbers(problem);
+    let count = |rows: &[usize]| {
+        rows.iter().filter_map(|&row| poses.get(row)).collect::<BTreeSet<_>>().len()
+    };
+    let held_out = count(&data.split.held_out);
+    let all = held_out + count(&data.split.identification);
+    if held_out > 0 && all < MANY_POSES {
+        diagnostic::warn(&format!(
+            "{held_out} of the {all} new poses are held out and not fitted; held_out = \"none\" in [data] fits all"
+        ));
+    }
+}
+
 /// Identifies the arm, writes `estimate.json`, `residuals.csv` and both reports, and
 /// `remainder.json` if one is requested and accepted; prints the result.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
@@ -85,6 +107,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     }
     let Input { problem, data, results } =
         common.read_beside("identify", arguments.prior.as_slice(), &names)?;
+    if arguments.prior.is_some() && !common.quiet {
+        warn_of_held_out(&problem, &data);
+    }
     let prior = match arguments.prior.as_deref() {
         Some(file) if file.extension().is_some_and(|ending| ending == "toml") => {
             Some(PriorSource::Fleet(FleetPrior::read(file)?))
@@ -170,7 +195,14 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let mut texts = vec![("estimate.json", json.as_str()), ("residuals.csv", residuals.as_str())];
     texts.extend(file.as_ref().map(|text| (REMAINDER_FILE, text.as_str())));
     interrupt::begin_writing();
+    let kept = results.keep_estimate(&json)?;
     results.write_report(&texts, &told)?;
+    if let (Some(kept), false) = (kept, common.quiet) {
+        diagnostic::warn(&format!(
+            "the trusted estimate of other rows in the same folder is kept as {}; name another folder with --out",
+            kept.display()
+        ));
+    }
     let sources = sources.as_ref().map(report::joint_sources_text);
     let outcome =
         diagnostic::report_fit_once(&identification, (common.quiet, common.prints_text()));

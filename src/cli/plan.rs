@@ -164,6 +164,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
 fn columns_at_hand(
     files: &[&PathBuf],
     (problem, poses): (&Problem, &Measurements),
+    is_of_cameras: bool,
 ) -> Vec<&'static str> {
     let files: Vec<PathBuf> = files.iter().map(|&file| file.clone()).collect();
     let Ok((given, _)) = Measurements::read_to_predict(&files, problem) else { return Vec::new() };
@@ -177,7 +178,8 @@ fn columns_at_hand(
         ("payload_kg", given.payload.is_some(), poses.payload.is_some()),
         ("hoist_N", given.hoist.is_some(), poses.hoist.is_some()),
         ("temperature_C", given.temperature.is_some(), poses.temperature.is_some()),
-        ("sigma_mm", given.sigma.is_some(), poses.sigma.is_some()),
+        // Of a pixel, σ is that of the camera.
+        ("sigma_mm", given.sigma.is_some(), is_of_cameras || poses.sigma.is_some()),
         ("session", has_sessions(&given), has_sessions(poses)),
         ("approach1 …", given.approach.is_some(), poses.approach.is_some()),
         ("target", given.target.is_some(), poses.target.is_some()),
@@ -220,7 +222,7 @@ fn next_step(
     let others = if at_hand.is_empty() {
         Vec::new()
     } else {
-        columns_at_hand(&at_hand, (problem, &plan.poses))
+        columns_at_hand(&at_hand, (problem, &plan.poses), plan.is_of_cameras)
     };
     let beside = if !others.is_empty() {
         let verb = if plan.is_of_cameras { ", add" } else { " and" };

@@ -1,7 +1,7 @@
 //! Arguments and work of `flexcal watch`.
 
 use std::error::Error;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use flexcal::life::{self, CauseKind};
@@ -44,6 +44,28 @@ fn parse_probability(text: &str) -> Result<f64, String> {
     number.ok_or_else(|| "a probability above 0 and up to 0.5 is expected".to_owned())
 }
 
+/// Returns the argument with the days since the estimate; empty for none.
+fn drift_argument(days: f64) -> String {
+    if days > 0.0 { format!(" --drift {days}") } else { String::new() }
+}
+
+/// Returns the name of a folder beside that of an estimate which does not exist yet, as a word of a
+/// suggested command: `out/arm-update` beside `out/arm`, then `out/arm-update-2`.
+fn unused_folder(estimate: &Path, what: &str) -> String {
+    let folder = estimate.parent().filter(|folder| folder.file_name().is_some());
+    let folder = folder.map_or_else(|| "out".to_owned(), |folder| folder.display().to_string());
+    let (suffix, is_number) = (format!("-{what}"), |text: &str| text.parse::<u32>().is_ok());
+    let stem = folder
+        .rsplit_once(&suffix)
+        .filter(|(_, end)| end.is_empty() || end.strip_prefix('-').is_some_and(is_number));
+    let stem = stem.map_or(folder.as_str(), |(stem, _)| stem);
+    let first = format!("{stem}{suffix}");
+    let mut names = (2..).map(|number| format!("{first}-{number}"));
+    let is_unused = |name: &String| !Path::new(name).exists();
+    let name = if is_unused(&first) { Some(first) } else { names.find(is_unused) };
+    shell_word(Path::new(&name.unwrap_or_default()))
+}
+
 /// Tests whether the rows contradict the estimate, writes `watch.json` and `watch.html`, and prints
 /// the verdict.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
@@ -80,8 +102,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         let first = watch.causes.first().map(|cause| cause.kind);
         let next = if watch.is_changed() && first == Some(CauseKind::Other) {
             format!(
-                "flexcal identify {} says whether units, signs, columns or the order of joints are read wrongly",
-                common.problem_arguments()
+                "flexcal identify {} --out {} says whether units, signs, columns or the order of joints are read wrongly",
+                common.problem_arguments(),
+                unused_folder(&arguments.estimate, "check")
             )
         } else if watch.is_changed() && first == Some(CauseKind::Noise) {
             "measure a few of these poses again. If watch.html shows the evidence rise from some row on, give the rows from there on alone"
@@ -96,8 +119,10 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
             )
         } else if watch.is_changed() {
             format!(
-                "flexcal identify {} --prior {file} takes the change over into an estimate",
-                common.problem_arguments()
+                "flexcal identify {} --prior {file}{} --out {} takes the change over into an estimate",
+                common.problem_arguments(),
+                drift_argument(arguments.drift),
+                unused_folder(&arguments.estimate, "update")
             )
         } else {
             advice::after_applying(common, &problem, &estimate, &arguments.estimate)

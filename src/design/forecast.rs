@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::Sensitivity;
 use crate::least_squares::{Identifiability, Uncertainty};
-use crate::model::parameter::Parameter;
+use crate::model::parameter::{Parameter, ParameterSite};
 use crate::quantity::Unit;
 
 /// Part of a parameter, 0 to 1, that lies in undetermined combinations, from which on the forecast
@@ -214,4 +214,15 @@ fn with_priors(triangle: &DMatrix<f64>, sigmas: &[Option<f64>]) -> DMatrix<f64> 
         DVector::from_iterator(n, sigmas.iter().map(|sigma| sigma.map_or(0.0, f64::recip)));
     stacked.rows_mut(n, n).set_diagonal(&inverse);
     stacked.qr().unpack_r()
+}
+
+/// Returns the number of fixture unknowns without a prior on which none of `rows` depends. A plan
+/// need not determine them, because no row uses the fixture.
+pub(super) fn untouched(parameters: &[Parameter], rows: &[Option<&Sensitivity>]) -> usize {
+    let is_informed =
+        |k: usize| rows.iter().flatten().any(|of| of.rows.row(k).iter().any(|slope| *slope != 0.0));
+    let is_free = |parameter: &Parameter| {
+        matches!(parameter.site, ParameterSite::Fixture { .. }) && parameter.sigma.is_none()
+    };
+    (0..parameters.len()).filter(|&k| is_free(&parameters[k]) && !is_informed(k)).count()
 }

@@ -8,6 +8,7 @@ mod candidate_poses;
 mod check;
 mod coordinates;
 mod criterion;
+mod drawn;
 mod error;
 mod exchange;
 mod explanations;
@@ -29,12 +30,13 @@ mod workspace_error;
 pub(crate) use check::PredictionPoses;
 pub use check::{Check, CheckedPoses, check};
 pub use criterion::Criterion;
+pub use drawn::Candidates;
 pub use error::DesignError;
 pub(crate) use exchange::ExchangeResult;
 pub(crate) use forecast::Prediction;
 pub use forecast::{ExpectedParameter, Forecast};
 pub(crate) use growth::{Growth, GrowthStep};
-pub use plan::{Candidates, Plan, PlanOptions, plan};
+pub use plan::{Plan, PlanOptions, plan};
 // Public for the tests, the benches and the Python module only.
 #[doc(hidden)]
 pub use self::{

@@ -228,7 +228,7 @@ pub fn next(
     let rows: Vec<usize> = data.split.identification.clone();
     let measured = data.measurements.select(&rows);
     let mut site = Site::with_cameras(&designed, &[&measured], pairs)?;
-    site.linearise_at(&found);
+    site.linearise_at(&found, &measured);
     let (pool, reference) = pool_and_workspace(&designed, candidates, &site, &measured, options);
     if let Some(region) = options.workspace.filter(|_| pool.is_empty()) {
         return Err(DesignError::nothing_in(region).into());
@@ -268,7 +268,7 @@ pub fn next(
     let error = match &correction {
         Some(correction) => {
             let mut site = Site::new(&plain, &[&measured])?;
-            site.linearise_at(&found);
+            site.linearise_at(&found, &measured);
             WorkspaceError::of(correction, &site, &reference, (options.level, size.freedom))
         }
         None => None,
@@ -408,7 +408,9 @@ fn pool_and_workspace(
         }
         Candidates::Within(ranges) => {
             let drawn = |count: usize, extremes, stream| {
-                inside(ranges.draw(problem, count, extremes, options.seed, STREAMS[stream]))
+                let drawn = site.poses_to_draw(count);
+                let poses = ranges.draw(problem, drawn, extremes, options.seed, STREAMS[stream]);
+                site.first_in_view(inside(poses), count)
             };
             let [uniform, often] = DRAWN_CANDIDATES.map(|count| count.max(options.poses));
             let pool = drawn(uniform, Extremes::No, 0);

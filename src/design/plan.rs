@@ -6,21 +6,20 @@ use rand::seq::SliceRandom as _;
 use rayon::prelude::*;
 
 use super::coordinates::{coordinates, first_rows};
+use super::drawn::{Candidates, Drawn};
 use super::exchange::Unknowns;
+use super::forecast::untouched;
 use super::misfit::Misfit;
 use super::next::mean_square;
 use super::{
-    Criterion, DesignError, Exchange, ExchangeResult, Extremes, Forecast, Sensitivity, Site,
-    Workspace, views,
+    Criterion, DesignError, Exchange, ExchangeResult, Forecast, Sensitivity, Site, Workspace,
 };
 use crate::measurement::Measurements;
-use crate::model::parameter::{Parameter, ParameterSite};
+use crate::model::parameter::Parameter;
 use crate::numeric::median;
 use crate::problem::{PoseRanges, Problem};
 use crate::random;
 
-/// Minimum number of candidates drawn from ranges: uniformly, and with emphasis on the limits.
-pub(super) const DRAWN_CANDIDATES: [usize; 2] = [500, 2000];
 /// Number of exchanges, each started from random poses.
 const STARTS: usize = 8;
 /// Number of exchanges by the criterion I. Its unknowns include the weights of a misfit, so that an
@@ -38,10 +37,6 @@ const ROUND_CANDIDATES: usize = 2500;
 const CAMERA_ROUND_CANDIDATES: usize = 640;
 /// Number of random sets of poses that a plan is compared with; odd, so that one is the median.
 pub(super) const RANDOM_SETS: usize = 75;
-/// Random stream of the uniform candidates.
-pub(super) const UNIFORM_STREAM: u64 = 0;
-/// Random stream of the candidates with emphasis on the limits of the ranges.
-const EXTREMES_STREAM: u64 = 1;
 /// First random stream of the refinement rounds.
 const REFINEMENT_STREAM: u64 = 2;
 /// Maximum number of poses over which the criterion I averages the variance of predictions.
@@ -50,16 +45,6 @@ const MAX_WORKSPACE_POSES: usize = 500;
 const START_STREAM: u64 = 100;
 /// First random stream of the random sets of poses that a plan is compared with.
 pub(super) const RANDOM_SET_STREAM: u64 = 200;
-
-/// Source of the poses of a plan.
-#[derive(Debug, Clone)]
-#[non_exhaustive]
-pub enum Candidates {
-    /// Poses anywhere within ranges.
-    Within(PoseRanges),
-    /// Rows of a table.
-    Rows(Box<Measurements>),
-}
 
 /// Settings of a plan: number of poses, criterion, seed and limits.
 #[derive(Clone, Copy)]
@@ -120,11 +105,6 @@ pub struct Plan {
     pub is_of_cameras: bool,
 }
 
-/// Returns the error of a plan without candidates. `has_no_cameras` is true if no cameras measure.
-const fn no_candidates(has_no_cameras: bool) -> DesignError {
-    if has_no_cameras { DesignError::NoEquilibrium } else { DesignError::NothingInView }
-}
-
 /// Chooses poses by exchange from several starts. The result depends on the seed, not on the number
 /// of threads.
 ///
@@ -146,14 +126,14 @@ pub fn plan(
     }
     let with_distances = with_known_distances(given, candidates);
     let given = with_distances.as_ref();
-    let (uniform, extremes) = tables(problem, candidates, (poses, seed));
-    let tables: Vec<&Measurements> = std::iter::once(&uniform).chain(given).collect();
-    let pairs = views::pairs(problem, &uniform);
-    if !pairs.is_empty() && *criterion == Criterion::I {
+    let Drawn { site, uniform, extremes } = Drawn::new(problem, candidates, given, (poses, seed))?;
+    let nothing = if site.is_of_cameras(&uniform) && *criterion == Criterion::I {
         return Err(DesignError::NoPositions);
-    }
-    let nothing = no_candidates(pairs.is_empty());
-    let site = Site::with_cameras(problem, &tables, pairs)?;
+    } else if site.is_of_cameras(&uniform) {
+        DesignError::NothingInView
+    } else {
+        DesignError::NoEquilibrium
+    };
     let admitted = |(table, sensitivity): (Measurements, Sensitivity)| match options.workspace {
         Some(workspace) => {
             let rows = site.inside(&table, workspace);
@@ -262,25 +242,6 @@ pub fn plan(
     })
 }
 
-/// Returns the candidates as two tables. The first holds the rows given, or poses drawn uniformly
-/// from the ranges; the second holds poses often at the limits of the ranges, if there are ranges.
-fn tables(
-    problem: &Problem,
-    candidates: &Candidates,
-    (poses, seed): (usize, u64),
-) -> (Measurements, Option<Measurements>) {
-    match candidates {
-        Candidates::Within(ranges) => {
-            let [uniform, extremes] = DRAWN_CANDIDATES.map(|count| count.max(2 * poses));
-            let draw =
-                |count, extremes, stream| ranges.draw(problem, count, extremes, seed, stream);
-            let extremes = draw(extremes, Extremes::Often, EXTREMES_STREAM);
-            (draw(uniform, Extremes::No, UNIFORM_STREAM), Some(extremes))
-        }
-        Candidates::Rows(rows) => (rows.as_ref().clone().arm_rows(), None),
-    }
-}
-
 /// Returns the number of combinations that given poses and all candidates determine together, and
 /// the smallest number of planned poses that can determine them.
 fn rank_and_poses(
@@ -312,17 +273,6 @@ fn with_known_distances(
         Some(given) => Some(given.concatenate(&rows.select(&distances))),
         None => Some(rows.select(&distances)),
     }
-}
-
-/// Returns the number of fixture unknowns without a prior on which none of `rows` depends. A plan
-/// need not determine them, because no row uses the fixture.
-fn untouched(parameters: &[Parameter], rows: &[Option<&Sensitivity>]) -> usize {
-    let is_informed =
-        |k: usize| rows.iter().flatten().any(|of| of.rows.row(k).iter().any(|slope| *slope != 0.0));
-    let is_free = |parameter: &Parameter| {
-        matches!(parameter.site, ParameterSite::Fixture { .. }) && parameter.sigma.is_none()
-    };
-    (0..parameters.len()).filter(|&k| is_free(&parameters[k]) && !is_informed(k)).count()
 }
 
 /// Goal of the criterion I: the mean variance of predictions over the workspace.

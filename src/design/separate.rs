@@ -2,7 +2,8 @@
 
 use rayon::prelude::*;
 
-use super::plan::{DRAWN_CANDIDATES, RANDOM_SET_STREAM, RANDOM_SETS, UNIFORM_STREAM, choose};
+use super::drawn::{DRAWN_CANDIDATES, UNIFORM_STREAM};
+use super::plan::{RANDOM_SET_STREAM, RANDOM_SETS, choose};
 use super::{Candidates, Criterion, DesignError, Extremes, Plan, PlanOptions, Site, plan};
 use crate::measurement::Measurements;
 use crate::numeric::median;

@@ -5,7 +5,8 @@ use std::collections::BTreeSet;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::{DesignError, Sensitivity, Workspace, views};
+use super::views::{self, ViewRule};
+use super::{DesignError, Sensitivity, Workspace};
 use crate::error::InputErrorKind;
 use crate::fit::{Identification, Placement, locate};
 use crate::measurement::Measurements;
@@ -18,6 +19,8 @@ use crate::remainder::Correction;
 /// Mass \[kg\] assumed for a declared `unmodelled-mass` when derivatives are taken. With a mass of
 /// 0, its position would have no influence.
 const PROBE_MASS: f64 = 1.0;
+/// Number of poses that are drawn for each candidate whose view is wanted.
+const DRAWS_PER_VIEW: usize = 10;
 
 /// Returns true if a row of a table helps to locate its fixture. A planned row, which has no
 /// measured numbers yet, does so only if it is a contact.
@@ -40,6 +43,8 @@ pub struct Site<'a> {
     /// Fixture indices of each camera and marker that measure together. They measure the rows that
     /// state no other measured quantity; empty if positions are measured instead.
     pairs: Vec<(usize, usize)>,
+    /// Condition of each pair on the views that are planned.
+    rules: Vec<ViewRule>,
 }
 
 impl<'a> Site<'a> {
@@ -87,7 +92,7 @@ impl<'a> Site<'a> {
         let nominal = DVector::zeros(model.parameters.len());
         let used: Vec<usize> =
             pairs.iter().flat_map(|&(camera, marker)| [camera, marker]).collect();
-        let mut site = Self { model, problem, bases, targets, nominal, pairs };
+        let mut site = Self { model, problem, bases, targets, nominal, pairs, rules: Vec::new() };
         let (mut located, mut planned_only) = (BTreeSet::new(), BTreeSet::from_iter(used));
         for table in tables {
             let mut poses = site.poses(table, &Placement::of(table));
@@ -112,7 +117,21 @@ impl<'a> Site<'a> {
                 return Err(fixture.location.clone().error(kind).into());
             }
         }
+        site.set_view_rules(tables);
         Ok(site)
+    }
+
+    /// Sets the conditions on planned views from the pixels that rows of `tables` measure.
+    fn set_view_rules(&mut self, tables: &[&Measurements]) {
+        let poses: Vec<Pose> = tables
+            .iter()
+            .flat_map(|table| {
+                let poses = self.poses(table, &Placement::of(table));
+                poses.into_iter().filter(|pose| locates(pose.observation, table))
+            })
+            .collect();
+        let rules = views::rules((self.problem, &self.model), &self.pairs, (&poses, &self.nominal));
+        self.rules = rules;
     }
 
     /// Returns the sensitivity of the poses of a table at the nominal arm. `unit` \[m\] replaces σ,
@@ -124,7 +143,7 @@ impl<'a> Site<'a> {
         let values = parameters
             .map(|(parameter, value)| if is_mass(parameter.site) { PROBE_MASS } else { *value });
         let values = DVector::from_iterator(self.model.parameters.len(), values);
-        self.sensitivity_at(table, unit, &values)
+        self.sensitivity_at(table, (unit, Some(&self.rules)), &values)
     }
 
     /// Returns the sensitivities at `count` arms drawn from the priors. Parameters without a prior
@@ -147,20 +166,25 @@ impl<'a> Site<'a> {
                     + &self.nominal
             })
             .collect();
-        let arms = drawn.par_iter().map(|at| self.sensitivity_at(table, None, at));
+        let arms = drawn.par_iter().map(|at| self.sensitivity_at(table, (None, None), at));
         arms.filter(|arm| (0..arm.len()).all(|row| arm.is_finite(row))).collect()
     }
 
-    /// Returns the sensitivity of the poses of a table at a parameter vector.
+    /// Returns the sensitivity of the poses of a table at a parameter vector. Views of cameras have
+    /// to meet the `rules`, if given.
     fn sensitivity_at(
         &self,
         table: &Measurements,
-        unit: Option<f64>,
+        (unit, rules): (Option<f64>, Option<&[ViewRule]>),
         at: &DVector<f64>,
     ) -> Sensitivity {
         let mut poses = self.poses(table, &Placement::of(table));
         if self.is_of_cameras(table) {
-            return views::compressed((self.problem, &self.model), &self.pairs, (&poses, at));
+            return views::compressed(
+                (self.problem, &self.model),
+                (&self.pairs, rules),
+                (&poses, at),
+            );
         }
         for pose in &mut poses {
             pose.sigma = unit.unwrap_or(pose.sigma);
@@ -196,14 +220,15 @@ impl<'a> Site<'a> {
     }
 
     /// Moves the point of linearisation to the values of an identification. Parameters that the
-    /// identification lacks keep their values.
-    pub(super) fn linearise_at(&mut self, found: &Identification) {
+    /// identification lacks keep their values. Planned views are to be like those in `measured`.
+    pub(super) fn linearise_at(&mut self, found: &Identification, measured: &Measurements) {
         for (value, parameter) in self.nominal.iter_mut().zip(&self.model.parameters) {
             let place = found.estimates.iter().position(|of| of.name == parameter.name);
             if let Some(estimated) = place.and_then(|place| found.x.get(place)) {
                 *value = *estimated;
             }
         }
+        self.set_view_rules(&[measured]);
     }
 
     /// Returns the derivatives ∂p/∂q of the predicted positions with respect to the commands, shape
@@ -263,6 +288,22 @@ impl<'a> Site<'a> {
         (0..table.len())
             .filter(|&row| points[row].is_some_and(|point| workspace.contains(&point)))
             .collect()
+    }
+
+    /// Returns how many poses to draw so that about `count` of them are candidates. Cameras see the
+    /// whole marker in few poses.
+    pub(super) fn poses_to_draw(&self, count: usize) -> usize {
+        if self.pairs.is_empty() { count } else { DRAWS_PER_VIEW * count }
+    }
+
+    /// Returns the first `count` drawn poses that cameras measure; all poses without cameras.
+    pub(super) fn first_in_view(&self, table: Measurements, count: usize) -> Measurements {
+        if !self.is_of_cameras(&table) {
+            return table;
+        }
+        let (seen, _) = self.in_equilibrium(&table);
+        let first: Vec<usize> = (0..seen.len().min(count)).collect();
+        seen.select(&first)
     }
 
     /// Returns the rows of a table in which the arm has an equilibrium, and their sensitivity.

@@ -29,6 +29,80 @@ pub(super) const COMPRESSED_ROWS: usize = 12;
 /// lengths \[m\], angles \[rad\], pixels, and distortion coefficients.
 const UNKNOWN_SCALES: [f64; 4] = [1e-3, 1e-3, 1.0, 1e-2];
 
+/// Factors on the smallest and the largest measured distance between camera and marker that bound
+/// the distances of planned views.
+const DISTANCE_RANGE: [f64; 2] = [0.7, 1.5];
+
+/// Condition on the views of a camera and a marker that detectors find.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct ViewRule {
+    /// Smallest number of points in view: that of the measured views, or else all points of the
+    /// marker, because a detector of chessboards finds all corners or none.
+    least_points: usize,
+    /// Sign of the cosine between the line of sight and the marker's normal in the measured views;
+    /// `None` if it is unknown or if the marker is not flat.
+    side: Option<f64>,
+    /// Smallest and largest distance between the camera and the middle of the marker \[m\].
+    distances: [f64; 2],
+}
+
+/// Returns the condition on views of each pair, from the measured pixels among `poses`.
+pub(super) fn rules(
+    (problem, model): (&Problem, &Model),
+    pairs: &[(usize, usize)],
+    (poses, at): (&[Pose], &DVector<f64>),
+) -> Vec<ViewRule> {
+    let fixtures = model.fixtures(at.as_slice());
+    let of_pair = |&(camera, marker): &(usize, usize)| {
+        let points = &problem.fixtures[marker].points;
+        let is_of_pair = |pose: &&Pose| match pose.observation {
+            Observation::Pixel(of, seen, _) => (of as usize, seen as usize) == (camera, marker),
+            _ => false,
+        };
+        let pixels: Vec<Pose> = poses.iter().filter(is_of_pair).copied().collect();
+        // Rows of one view follow each other.
+        let views: Vec<&[Pose]> = pixels
+            .chunk_by(|a, b| a.setup.configuration == b.setup.configuration && a.base == b.base)
+            .collect();
+        let firsts: Vec<Pose> = views.iter().filter_map(|view| view.first().copied()).collect();
+        let carriers = model.carrier_frames(&firsts, at.as_slice());
+        let (middle, normal) = (middle(points), normal(points));
+        let seen: Vec<(f64, Option<f64>)> = carriers
+            .iter()
+            .flatten()
+            .map(|carriers| {
+                let view = View {
+                    lens: fixtures[camera],
+                    marker: fixtures[marker],
+                    carriers: *carriers,
+                    normal,
+                    image: [0.0, 0.0],
+                };
+                let sight = view.sight(middle);
+                (sight.norm(), view.cos_incidence(&sight).map(f64::signum))
+            })
+            .collect();
+        let far = |a: f64, b: &(f64, Option<f64>)| a.max(b.0);
+        let near = |a: f64, b: &(f64, Option<f64>)| a.min(b.0);
+        let fronts = seen.iter().filter_map(|(_, side)| *side).sum::<f64>();
+        let range = [
+            DISTANCE_RANGE[0] * seen.iter().fold(f64::INFINITY, near),
+            DISTANCE_RANGE[1] * seen.iter().fold(0.0, far),
+        ];
+        ViewRule {
+            least_points: views.iter().map(|view| view.len()).min().unwrap_or(points.len()).max(1),
+            side: (fronts != 0.0).then(|| fronts.signum()),
+            distances: if seen.is_empty() { [0.0, f64::INFINITY] } else { range },
+        }
+    };
+    pairs.iter().map(of_pair).collect()
+}
+
+/// Returns the mean of points; zero for none.
+fn middle(points: &[Vector3<f64>]) -> Vector3<f64> {
+    points.iter().sum::<Vector3<f64>>() / points.len().max(1) as f64
+}
+
 /// Returns the pairs of a camera and a marker on different carriers, as fixture indices. The list
 /// is empty if σ of positions is declared or if rows of `table` state what they measure.
 pub(super) fn pairs(problem: &Problem, table: &Measurements) -> Vec<(usize, usize)> {
@@ -50,10 +124,11 @@ pub(super) fn pairs(problem: &Problem, table: &Measurements) -> Vec<(usize, usiz
 
 /// Returns the points of markers in view in each of `poses` at the full parameter vector `at`, as
 /// poses that measure pixels. Of each view at most `most` points are returned, whose σ is reduced
-/// so that they inform as much as all points in view.
+/// so that they inform as much as all points in view. Views that do not meet the rule of their pair
+/// are left out; without `rules`, each point in view counts.
 fn in_view<'a>(
     (problem, model): (&Problem, &Model),
-    pairs: &[(usize, usize)],
+    (pairs, rules): (&[(usize, usize)], Option<&[ViewRule]>),
     (poses, at): (&[Pose<'a>], &DVector<f64>),
     most: usize,
 ) -> Vec<Vec<Pose<'a>>> {
@@ -72,7 +147,8 @@ fn in_view<'a>(
         problem.fixtures.iter().map(|fixture| normal(&fixture.points)).collect();
     let of_pose = |(k, pose): (usize, &Pose<'a>)| {
         let mut seen = Vec::new();
-        for (pair, carriers) in pairs.iter().zip(&carriers[k * pairs.len()..]) {
+        for (place, (pair, carriers)) in pairs.iter().zip(&carriers[k * pairs.len()..]).enumerate()
+        {
             let (camera, marker) = (&problem.fixtures[pair.0], &problem.fixtures[pair.1]);
             let Some(carriers) = carriers else { continue };
             let view = View {
@@ -88,6 +164,10 @@ fn in_view<'a>(
             let visible: Vec<usize> = (0..marker.points.len())
                 .filter(|&point| view.shows(pixel(pair, point), marker.points[point]))
                 .collect();
+            let rule = rules.and_then(|rules| rules.get(place));
+            if rule.is_some_and(|rule| !rule.admits(&view, &marker.points, visible.len())) {
+                continue;
+            }
             let used = visible.len().min(most);
             let weight = (used as f64 / visible.len().max(1) as f64).sqrt();
             let sigma = camera.sigma.unwrap_or(1.0) * weight;
@@ -99,6 +179,19 @@ fn in_view<'a>(
         seen
     };
     poses.iter().enumerate().map(of_pose).collect()
+}
+
+impl ViewRule {
+    /// Returns true if a view of a marker with these `points`, `visible` of which are in view,
+    /// meets the rule.
+    fn admits(&self, view: &View, points: &[Vector3<f64>], visible: usize) -> bool {
+        let sight = view.sight(middle(points));
+        let [near, far] = self.distances;
+        let is_on_side = self
+            .side
+            .is_none_or(|side| view.cos_incidence(&sight).is_none_or(|cos| cos * side > 0.0));
+        visible >= self.least_points && is_on_side && (near..=far).contains(&sight.norm())
+    }
 }
 
 /// View of a marker by a camera.
@@ -123,20 +216,29 @@ impl View {
         let seen = pixel.predict(&scene);
         let [width, height] = self.image;
         let is_in_image = (0.0..width).contains(&seen.x) && (0.0..height).contains(&seen.y);
+        let cos = self.cos_incidence(&self.sight(point));
+        is_in_image && cos.is_none_or(|cos| cos.abs() >= MIN_COS_INCIDENCE)
+    }
+
+    /// Returns the vector from the camera to a point (marker frame), measuring frame \[m\].
+    fn sight(&self, point: Vector3<f64>) -> Vector3<f64> {
+        let Self { lens, marker, carriers, .. } = self;
         let place = carriers[1].point(&marker.frame().point(&point));
-        let sight = (place - carriers[0].point(&lens.position())).normalize();
-        let is_steep = self.normal.is_none_or(|normal| {
-            let normal = carriers[1].vector(&marker.frame().vector(&normal));
-            normal.dot(&sight).abs() >= MIN_COS_INCIDENCE
-        });
-        is_in_image && is_steep
+        place - carriers[0].point(&lens.position())
+    }
+
+    /// Returns the cosine of the angle between a line of sight and the normal of a flat marker;
+    /// `None` for points in space.
+    fn cos_incidence(&self, sight: &Vector3<f64>) -> Option<f64> {
+        let normal = self.marker.frame().vector(&self.normal?);
+        Some(self.carriers[1].vector(&normal).dot(&sight.normalize()))
     }
 }
 
 /// Returns the unit normal of points in a plane; `None` for points on a line, and for points in
 /// space.
 fn normal(points: &[Vector3<f64>]) -> Option<Vector3<f64>> {
-    let middle = points.iter().sum::<Vector3<f64>>() / points.len().max(1) as f64;
+    let middle = middle(points);
     let spread: Matrix3<f64> =
         points.iter().map(|point| (point - middle) * (point - middle).transpose()).sum();
     let eigen = spread.symmetric_eigen();
@@ -153,15 +255,16 @@ pub(super) fn all_points(
     pairs: &[(usize, usize)],
     (poses, at): (&[Pose], &DVector<f64>),
 ) -> Sensitivity {
-    let seen = in_view((problem, model), pairs, (poses, at), FORECAST_POINTS).concat();
+    let seen = in_view((problem, model), (pairs, None), (poses, at), FORECAST_POINTS).concat();
     Sensitivity::of(model, &seen, at)
 }
 
 /// Returns the sensitivity of configurations, each compressed to the [`COMPRESSED_ROWS`] directions
-/// that its views determine best; not finite for a configuration without a point in view.
+/// that its views determine best; not finite for a configuration without a view that meets the
+/// `rules`.
 pub(super) fn compressed(
     (problem, model): (&Problem, &Model),
-    pairs: &[(usize, usize)],
+    (pairs, rules): (&[(usize, usize)], Option<&[ViewRule]>),
     (poses, at): (&[Pose], &DVector<f64>),
 ) -> Sensitivity {
     let n = model.parameters.len();
@@ -172,7 +275,7 @@ pub(super) fn compressed(
         _ => UNKNOWN_SCALES[3],
     };
     let sizes = DVector::from_iterator(n, model.parameters.iter().map(|p| size(p.unit())));
-    let views = in_view((problem, model), pairs, (poses, at), SEARCH_POINTS);
+    let views = in_view((problem, model), (pairs, rules), (poses, at), SEARCH_POINTS);
     let sensitivity = Sensitivity::of(model, &views.concat(), at);
     let starts = views.iter().scan(0, |next, view| {
         let start = *next;

@@ -218,8 +218,9 @@ pub enum InputErrorKind {
     #[error("{word} is no point of the marker, whose points are numbered from 0 to {last}")]
     NoSuchPoint { word: String, last: usize },
     #[error(
-        "the point is behind the camera; check the names and numbers of the row, and the poses of \
-         camera and marker (at_m and rotation_deg), which views of one direction do not determine"
+        "the point is behind the camera; check the names and numbers of the row, whether points_mm \
+         counts the corners as the detector does (10 × 7 or 7 × 10), and the poses of camera and \
+         marker (at_m and rotation_deg), which views of one direction do not determine"
     )]
     PointBehindCamera,
     #[error(

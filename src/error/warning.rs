@@ -46,6 +46,11 @@ pub enum WarningKind {
          = \"{write}\" in [data.format]"
     )]
     PositionZero { write: String },
+    #[error(
+        "{value} px is outside the image of the camera \"{camera}\", image_px = [{}, {}]; correct image_px, which plans and exports use{}",
+        image[0], image[1], more_rows(*rows)
+    )]
+    OutsideImage { value: String, camera: String, image: [String; 2], rows: usize },
     #[error("the search for effects uses positions only, not orientations")]
     OrientationLeftOut,
     #[error(
@@ -357,4 +362,9 @@ pub(super) fn listed(rows: usize, others: &[String]) -> String {
     let left = rows.saturating_sub(1 + others.len());
     let left = if left > 0 { format!(" and {left} more") } else { String::new() };
     if others.is_empty() { String::new() } else { format!(", then {}{left}", others.join(", ")) }
+}
+
+/// Returns a clause that counts the rows which a warning concerns; empty for a single one.
+fn more_rows(rows: usize) -> String {
+    if rows > 1 { format!(" (the first of {rows} rows)") } else { String::new() }
 }

@@ -59,7 +59,7 @@ pub fn camera_yaml(
     let Lens { matrix, coefficients, model } = Lens::of(camera);
     let place = format!(
         "# Pose of the camera (z forward, x right, y down) in {}: position {} m, rotation vector {} rad.\n",
-        carrier_word(problem, fixture),
+        carrier_label(problem, fixture),
         list(&camera.numbers[..3]),
         list(&camera.numbers[3..6])
     );
@@ -99,10 +99,22 @@ pub fn camera_yaml(
         format!("distortion_model: \"{model}\"\n"),
         entry("camera_matrix", (3, 3), &matrix),
         entry("distortion_coefficients", (1, count), &coefficients),
-        format!("carrier: \"{}\"\n", carrier_word(problem, fixture)),
+        format!("carrier: \"{}\"\n", carrier_label(problem, fixture)),
         entry("carrier_from_camera", (4, 4), &rows(&camera.frame())),
     ]
     .concat())
+}
+
+/// Returns the name of the frame in which the pose of a camera is stated: the link of the URDF for
+/// the last frame and the base of an arm that was read from one. The frame of a joint between them
+/// is that of the problem, which need not be that of a link.
+fn carrier_label(problem: &Problem, fixture: &Fixture) -> String {
+    match (&problem.urdf, fixture.carrier) {
+        (Some(ends), Some(0)) => ends.base.clone(),
+        (Some(ends), Some(frame)) if frame == problem.joints.len() => ends.tip.clone(),
+        (Some(_), Some(_)) => format!("{} of problem.toml", carrier_word(problem, fixture)),
+        _ => carrier_word(problem, fixture),
+    }
 }
 
 /// Lens of a camera as ROS and OpenCV describe it.
@@ -142,7 +154,7 @@ fn kalibr(
         }
         let model = if model == "equidistant" { model } else { "radtan" };
         let _ =
-            writeln!(text, "cam{k}:\n  # {} on {}", fixture.name, carrier_word(problem, fixture));
+            writeln!(text, "cam{k}:\n  # {} on {}", fixture.name, carrier_label(problem, fixture));
         let _ =
             writeln!(text, "  camera_model: pinhole\n  intrinsics: {}", list(&[fx, fy, cx, cy]));
         let _ = writeln!(text, "  distortion_model: {model}");

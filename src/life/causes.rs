@@ -1,8 +1,9 @@
 //! Possible causes of a change of an arm: what may have moved, and by how much.
 
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 
-use super::evidence::{NOISE_RATIOS, OTHER_RATIOS};
+use super::evidence::{NOISE_RATIOS, OTHER_RATIOS, ln_sum};
+use super::relocation::is_of_place;
 use super::rows::SensitiveRows;
 use crate::model::Model;
 use crate::model::parameter::{BeamField, JointField, Parameter, ParameterSite};
@@ -34,6 +35,10 @@ const MIN_WARMTH: f64 = 3.0;
 /// Factor on the prior probability of temperature as the cause, if a row differs from the reference
 /// by [`MIN_WARMTH`] or more.
 const WARM_FACTOR: f64 = 20.0;
+
+/// Largest part of a column outside of a space, relative to the column, at which the column counts
+/// as one of the space. Derivatives have a relative error of about 1e-10.
+const MAX_OUTSIDE: f64 = 1e-7;
 
 worded! {
     /// Kind of a cause of a change.
@@ -278,8 +283,7 @@ impl Extended {
             of(&|site, _| matches!(site, ParameterSite::Base { .. })),
             &placed,
         );
-        let fixtures = of(&|site, _| matches!(site, ParameterSite::Fixture { .. }));
-        grouped(CauseKind::Fixture, fixtures, &placed);
+        grouped(CauseKind::Fixture, of(&is_place_of_fixture), &placed);
         let is_law = |site: ParameterSite, parameter: &Parameter| {
             let is_of_arm = matches!(site, ParameterSite::Joint { field, .. } if field.is_geometry())
                 && parameter.regressor.is_constant();
@@ -309,6 +313,47 @@ impl Extended {
         causes.push(none(CauseKind::Row, "one gross row"));
         causes.push(none(CauseKind::Other, "something else"));
         set_prior_probabilities(&mut causes, warmth);
+        self.merged_held_causes(causes, rows)
+    }
+
+    /// Returns true if a cause moves parameters, all of which the model holds.
+    pub fn is_held(&self, cause: &Cause) -> bool {
+        let held = self.declared..self.model.parameters.len();
+        !cause.columns.is_empty() && cause.columns.iter().all(|k| held.contains(k))
+    }
+
+    /// Returns true if a cause moves a parameter that the model frees.
+    fn has_free_parameter(&self, cause: &Cause) -> bool {
+        cause.columns.iter().any(|&k| k < self.declared)
+    }
+
+    /// Returns the causes without those whose parameters are all held, if a placement with free parameters can
+    /// move the rows in the same way. The placement gets the prior probability of that cause,
+    /// because the rows cannot distinguish the two. With pixels alone, for example, a held base and
+    /// a free board in the world are one unknown.
+    fn merged_held_causes(&self, mut causes: Vec<Cause>, rows: &SensitiveRows) -> Vec<Cause> {
+        let is_placement = |cause: &Cause| {
+            matches!(cause.kind, CauseKind::Base | CauseKind::Fixture | CauseKind::Tool)
+        };
+        let spaces: Vec<(usize, ColumnSpace)> = causes
+            .iter()
+            .enumerate()
+            .filter(|(_, cause)| is_placement(cause) && self.has_free_parameter(cause))
+            .map(|(place, cause)| (place, ColumnSpace::new(rows, &cause.columns)))
+            .collect();
+        let mut merged: Vec<(usize, usize)> = Vec::new();
+        for (held, cause) in causes.iter().enumerate().filter(|(_, cause)| self.is_held(cause)) {
+            let twin = spaces.iter().find(|(_, space)| space.contains(rows, &cause.columns));
+            merged.extend(twin.map(|(place, _)| (held, *place)));
+        }
+        for &(held, twin) in &merged {
+            causes[twin].ln_weight = ln_sum([causes[twin].ln_weight, causes[held].ln_weight]);
+        }
+        let mut place = 0;
+        causes.retain(|_| {
+            place += 1;
+            merged.iter().all(|(held, _)| *held != place - 1)
+        });
         causes
     }
 
@@ -368,6 +413,51 @@ impl Extended {
             causes.push(thermal(label, column, amplitude, &JOINT_THERMAL_SIZES));
         }
         causes
+    }
+}
+
+/// Returns true if a parameter belongs to the pose of a camera or marker, or to another fixture.
+fn is_place_of_fixture(site: ParameterSite, parameter: &Parameter) -> bool {
+    matches!(site, ParameterSite::Fixture { .. }) && is_of_place(parameter)
+}
+
+/// Space that columns of the sensitivities span.
+struct ColumnSpace {
+    /// Orthonormal basis, one column for each dimension.
+    basis: DMatrix<f64>,
+}
+
+impl ColumnSpace {
+    /// Creates the space of some columns by Gram–Schmidt orthogonalisation, done twice.
+    fn new(rows: &SensitiveRows, columns: &[usize]) -> Self {
+        let mut space = Self { basis: DMatrix::zeros(rows.sensitivity.nrows(), 0) };
+        for &k in columns {
+            let column = rows.sensitivity.column(k).into_owned();
+            let outside = space.outside(&space.outside(&column));
+            let (length, whole) = (outside.norm(), column.norm());
+            if length > MAX_OUTSIDE * whole {
+                let place = space.basis.ncols();
+                space.basis = space.basis.insert_column(place, 0.0);
+                space.basis.set_column(place, &(outside / length));
+            }
+        }
+        space
+    }
+
+    /// Returns the part of a vector that is orthogonal to the space.
+    fn outside(&self, vector: &DVector<f64>) -> DVector<f64> {
+        vector - &self.basis * self.basis.tr_mul(vector)
+    }
+
+    /// Returns true if the columns lie in the space and at least one of them is not zero.
+    fn contains(&self, rows: &SensitiveRows, columns: &[usize]) -> bool {
+        let parts = columns.iter().map(|&k| {
+            let column = rows.sensitivity.column(k).into_owned();
+            (self.outside(&column).norm(), column.norm())
+        });
+        let parts: Vec<(f64, f64)> = parts.collect();
+        parts.iter().all(|(outside, whole)| *outside <= MAX_OUTSIDE * whole)
+            && parts.iter().any(|(_, whole)| *whole > 0.0)
     }
 }
 

@@ -158,6 +158,18 @@ impl Earlier {
         self.indices.iter().position(|&k| k == parameter)
     }
 
+    /// Replaces what the Gaussian states on some parameters of the model by the mean `x` (full
+    /// parameter vector) and a standard deviation `sigma`, independent of all others.
+    pub fn replace(&mut self, parameters: &[usize], x: &DVector<f64>, sigma: f64) {
+        let places: Vec<usize> = parameters.iter().filter_map(|&k| self.place_of(k)).collect();
+        for place in places {
+            self.covariance.row_mut(place).fill(0.0);
+            self.covariance.column_mut(place).fill(0.0);
+            self.covariance[(place, place)] = sigma * sigma;
+            self.mean[place] = x[self.indices[place]];
+        }
+    }
+
     /// Adds variance to the deviation of the parameter with an index in the model. Does nothing if
     /// the Gaussian does not contain the parameter.
     pub fn widen(&mut self, parameter: usize, variance: f64) {

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use serde_json::json;
 use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 
@@ -13,6 +13,7 @@ use super::earlier::Earlier;
 use super::error::PriorError;
 use super::evidence::factor;
 use super::fleet_file::FleetPrior;
+use super::relocation::{self, MIN_RELOCATION_NATS, Placed};
 use super::rows::SensitiveRows;
 use crate::fit::{
     self, ComparedParameter, Finding, FindingCode, Identification, Options, Placement,
@@ -114,7 +115,7 @@ pub fn identify_with_prior(
             &model,
             (&data, &placement),
             &found,
-            &prior,
+            (&prior, &causes),
         );
         chi2 = chi2.or(now);
         let is_new_cause = cause.as_ref().is_some_and(|cause: &Contradiction| {
@@ -145,6 +146,9 @@ pub fn identify_with_prior(
             });
             return Ok(found);
         };
+        if let Some((placed, x)) = &cause.relocated {
+            prior.replace(&placed.parameters, x, WIDE_SIGMA);
+        }
         for &(parameter, size) in &cause.widened {
             prior.widen(parameter, (WIDENING * size).powi(2));
         }
@@ -188,6 +192,8 @@ fn contradicting_bound(
         ),
         probability: 1.0,
         widened: Vec::new(),
+        relocated: None,
+        is_held: false,
         noise_ratio: None,
     })
 }
@@ -200,15 +206,41 @@ struct Contradiction {
     probability: f64,
     /// Indices of the model's parameters whose prior is widened, with the size of their change.
     widened: Vec<(usize, f64)>,
+    /// Placement whose pose is fitted without its prior, with the full parameter vector at its new
+    /// pose.
+    relocated: Option<(Placed, DVector<f64>)>,
+    /// True if the cause moves parameters, all of which the problem holds.
+    is_held: bool,
     /// Ratio of the noise to the assumed one, if the cause is larger noise.
     noise_ratio: Option<f64>,
 }
 
 impl Contradiction {
+    /// Returns the contradiction with a new pose of the placement that it names, if that is one of
+    /// `moved`. A camera or marker that was moved says nothing of where it stands now.
+    fn with_place(self, moved: &[(Placed, DVector<f64>)]) -> Self {
+        let is_it = |(placed, _): &&(Placed, DVector<f64>)| {
+            !placed.is_base && self.widened.iter().map(|(k, _)| k).eq(&placed.parameters)
+        };
+        match moved.iter().find(is_it) {
+            Some(found) => Self { widened: Vec::new(), relocated: Some(found.clone()), ..self },
+            None => self,
+        }
+    }
+
     /// Returns the finding that the new rows contradict the prior in `file`. `index` is the number
     /// of causes that were found before this one.
     fn finding(&self, index: usize, file: &Path) -> Finding {
+        let is_refitted = self.relocated.is_some() || !self.widened.is_empty();
         let treatment = match (self.widened.is_empty(), self.noise_ratio) {
+            _ if self.relocated.is_some() => {
+                "; its place is fitted anew, without the earlier one".to_owned()
+            }
+            _ if self.is_held => {
+                "; the problem holds its parameters, so that the change goes into \
+                                  others: free them in [parameters]"
+                    .to_owned()
+            }
             (false, _) => "; the prior of its parameters was widened".to_owned(),
             (true, Some(ratio)) => format!("; the fit assumes a σ {ratio:.1} times as large"),
             (true, None) => String::new(),
@@ -224,7 +256,7 @@ impl Contradiction {
             self.label,
             100.0 * self.probability
         );
-        let numbers = [json!(self.label), self.probability.into(), json!(!self.widened.is_empty())];
+        let numbers = [json!(self.label), self.probability.into(), json!(is_refitted)];
         Finding::new(FindingCode::EarlierEstimateContradicted, numbers, text)
     }
 }
@@ -238,7 +270,7 @@ fn contradiction(
     model: &Model,
     (data, placement): (&Dataset, &Placement),
     found: &Identification,
-    prior: &Earlier,
+    (prior, causes_before): (&Earlier, &[Contradiction]),
 ) -> (Option<Contradiction>, Option<(f64, f64, f64)>) {
     let mut x = found.x.clone();
     for (place, &k) in prior.indices.iter().enumerate() {
@@ -248,7 +280,7 @@ fn contradiction(
     let rows = &data.split.identification;
     let turn = problem.data.orientation_sigma.filter(|_| problem.data.fits_orientation);
     let poses = placement.oriented_poses(&data.measurements, rows, (found.sigma, turn));
-    let mut sensitive = SensitiveRows::new(&extended.model, poses, &extended.x);
+    let mut sensitive = SensitiveRows::new(&extended.model, poses.clone(), &extended.x);
     let warmth = warmth(problem, &data.measurements, rows);
     let mut causes = extended.causes(problem, &mut sensitive, warmth.as_deref());
     // Something else has no parameters to widen, so the most probable of the other causes is taken.
@@ -263,22 +295,58 @@ fn contradiction(
     let p_value = ChiSquared::new(assessed.coordinates)
         .map_or(f64::NAN, |distribution| distribution.sf(assessed.chi2));
     let chi2 = Some((assessed.chi2, assessed.coordinates, p_value));
+    let Some((_, evidence)) =
+        assessed.looks.last().filter(|look| look.1 > CONTRADICTION_RATIO.ln())
+    else {
+        return (None, chi2);
+    };
+    let is_before = |placed: &Placed| causes_before.iter().any(|of| of.label == placed.label);
+    let placements = relocation::placements(model).into_iter();
+    let moved: Vec<(Placed, DVector<f64>)> = placements
+        .filter(|placed| !is_before(placed))
+        .filter_map(|placed| {
+            let located = relocation::located_anew(model, &poses, &x, &placed)?;
+            Some((placed, located))
+        })
+        .collect();
+    let relocated = moved.iter().filter_map(|(placed, located)| {
+        let extended =
+            Extended::new(problem, model, located, [&placement.bases, &placement.targets]);
+        let rows = SensitiveRows::new(&extended.model, poses.clone(), &extended.x);
+        let mut prior = prior.clone();
+        prior.replace(&placed.parameters, located, WIDE_SIGMA);
+        let factor = factor(&self::covariance(&extended, &prior, &rows, None));
+        let assessed = assess(&rows, &factor, &[], false)?;
+        let gain = 0.5 * (chi2?.0 - assessed.chi2) - MIN_RELOCATION_NATS;
+        (gain > *evidence).then(|| (gain, (placed.clone(), located.clone())))
+    });
+    if let Some((gain, (placed, x))) = relocated.max_by(|a, b| a.0.total_cmp(&b.0)) {
+        let contradiction = Contradiction {
+            label: placed.label.clone(),
+            probability: (1.0 + (evidence - gain).exp()).recip(),
+            widened: Vec::new(),
+            relocated: Some((placed, x)),
+            is_held: false,
+            noise_ratio: None,
+        };
+        return (Some(contradiction), chi2);
+    }
     let location = |row: usize| data.measurements.location(rows[row]).to_string();
-    (most_probable(&assessed, (&causes, location), extended.declared), chi2)
+    let most_probable = most_probable(&assessed, (&causes, location), &extended);
+    (most_probable.map(|cause| cause.with_place(&moved)), chi2)
 }
 
-/// Returns the most probable cause if the rows contradict the prior; else `None`. `declared` is the
-/// number of parameters of the model, to which the prior belongs.
+/// Returns the most probable cause; `None` if there are no causes. `extended` is the model to whose
+/// columns the causes belong.
 fn most_probable(
     assessed: &Assessment,
     (causes, location): (&[Cause], impl Fn(usize) -> String),
-    declared: usize,
+    extended: &Extended,
 ) -> Option<Contradiction> {
-    let (_, evidence) = *assessed.looks.last()?;
-    let first = assessed.causes.first().filter(|_| evidence > CONTRADICTION_RATIO.ln())?;
+    let first = assessed.causes.first()?;
     let cause = &causes[first.cause];
     let size = |i: usize| first.sizes[i].max(first.mean[i].abs());
-    let widened = cause.columns.iter().enumerate().filter(|(_, k)| **k < declared);
+    let widened = cause.columns.iter().enumerate().filter(|(_, k)| **k < extended.declared);
     // A misfit that no cause explains looks like noise.
     let label = match cause.kind {
         CauseKind::Noise => "larger noise, or something that the model lacks".to_owned(),
@@ -288,6 +356,8 @@ fn most_probable(
         label,
         probability: first.probability,
         widened: widened.map(|(i, &k)| (k, size(i))).collect(),
+        relocated: None,
+        is_held: extended.is_held(cause),
         noise_ratio: (cause.kind == CauseKind::Noise).then(|| first.mean[0]),
     })
 }
@@ -358,7 +428,7 @@ fn compare(
         // The information of the new rows is that of the posterior minus that of the widened prior.
         let data = posterior.and_then(|posterior| {
             let learned = posterior.recip() - fitted.recip();
-            let value = (found.x[k] / posterior - mean / fitted) / learned;
+            let value = (found.x[k] / posterior - widened.mean[place] / fitted) / learned;
             (learned * fitted > MIN_LEARNED).then(|| (value, learned.recip()))
         });
         let value = |x: f64, variance: f64| {

@@ -18,6 +18,8 @@ mod fleet_file;
 mod identify;
 mod known_noise;
 mod onset;
+mod relocation;
+mod reporter;
 mod rows;
 mod watch;
 
@@ -32,4 +34,6 @@ pub use fleet_file::FleetPrior;
 #[doc(hidden)]
 pub use identify::{PriorSource, identify_with_prior};
 #[doc(hidden)]
-pub use watch::{Change, Watch, WatchedCause, watch};
+pub use reporter::{Change, WatchedCause};
+#[doc(hidden)]
+pub use watch::{Watch, watch};

@@ -7,10 +7,12 @@ use super::assessment::{AssessedCause, assess};
 use super::causes::{Cause, CauseKind, Extended};
 use super::earlier::Earlier;
 use super::error::PriorError;
-use super::evidence::{Unchanged, factor};
+use super::evidence::factor;
 use super::identify::{covariance, warmth};
 use super::known_noise::KnownNoise;
-use super::onset::{padded_factor, sums_of, with_onsets};
+use super::onset::with_onsets;
+use super::relocation::{self, MIN_RELOCATION_NATS};
+use super::reporter::{Change, MIN_NAMED_PROBABILITY, Reporter, WatchedCause};
 use super::rows::{SensitiveRows, SharedMisfit};
 use crate::fit::{self, Placement, SavedEstimate, register};
 use crate::measurement::Measurements;
@@ -25,11 +27,8 @@ use crate::spatial::Frame;
 const MAX_REPORTED_CAUSES: usize = 6;
 /// Smallest probability at which a cause is reported that is not the most probable one.
 const MIN_REPORTED_PROBABILITY: f64 = 0.005;
-/// Smallest probability at which the most probable cause is named as the cause.
-const MIN_NAMED_PROBABILITY: f64 = 0.9;
-/// Maximum number of groups of rows that are left out in turn to test a cause.
-const MAX_GROUPS: usize = 60;
-/// Prior odds that something else changed together with the base, against the base alone.
+/// Prior odds that something else changed together with a placement (a base, camera or marker),
+/// against the placement alone.
 const SECOND_CHANGE_ODDS: f64 = 0.05;
 /// Smallest number of measured positions that determine a moved base and test the fit.
 const MIN_BASE_ROWS: usize = 4;
@@ -41,9 +40,6 @@ const MAX_TILT: f64 = 1e-3;
 /// Largest displacement \[m\] of a point on the axis of joint 1 at which the move of a base counts
 /// as a rotation about that axis.
 const MAX_SHIFT: f64 = 2e-3;
-/// Smallest expected evidence per pose for one cause against another \[nats\] at which more poses
-/// can distinguish the causes.
-const MIN_NATS_PER_POSE: f64 = 1e-3;
 
 /// Result of the test whether an arm has changed since its estimate.
 #[derive(Debug, Clone)]
@@ -72,46 +68,6 @@ pub struct Watch {
     pub sigma: f64,
     /// Causes of a change, the most probable first.
     pub causes: Vec<WatchedCause>,
-}
-
-/// Cause of a change with its probability and size.
-#[derive(Debug, Clone)]
-pub struct WatchedCause {
-    /// Kind of the cause.
-    pub kind: CauseKind,
-    /// Name for people, such as "zero of joint 2".
-    pub label: String,
-    /// Index of the gross row among all rows of the table, from 0; `None` for other causes.
-    pub row: Option<usize>,
-    /// Index of the first row that shows the change among all rows of the table, from 0; `None` if
-    /// the change happened before the table.
-    pub from_row: Option<usize>,
-    /// Probability among all causes, given that something changed.
-    pub probability: f64,
-    /// Changes of the parameters that the cause moves. For larger noise and for something else,
-    /// this is the ratio of the errors to the assumed noise.
-    pub changes: Vec<Change>,
-    /// Root mean square error of rows of the leading kind, each predicted with this cause as
-    /// estimated without the row \[m\] or \[rad\]. For a gross row it is the error of the other
-    /// rows; `None` for noise and for something else.
-    pub left_out_error: Option<f64>,
-    /// Number of additional poses like the measured ones after which the data are expected to
-    /// decide between this cause and the most probable other one; `None` if no number would
-    /// suffice, or if there is no other cause.
-    pub poses_to_tell_apart: Option<usize>,
-}
-
-/// Change of one parameter since the estimate.
-#[derive(Debug, Clone)]
-pub struct Change {
-    /// Name of the parameter.
-    pub parameter: String,
-    /// Unit of the change.
-    pub unit: Unit,
-    /// Change, SI; of the logarithm for stiffnesses.
-    pub change: f64,
-    /// Standard error of the change; NaN for a ratio of the noise.
-    pub std_error: f64,
 }
 
 impl Watch {
@@ -207,8 +163,12 @@ pub fn watch(
         })
         .collect();
     let is_unexplained = watched.first().is_some_and(|cause| cause.kind == CauseKind::Other);
-    if changed_at.is_some() && is_unexplained {
-        let moved = tested.moved_base(&poses, &x, (&earlier, &leads), threshold);
+    if changed_at.is_some() {
+        let at = (&*poses, &x);
+        let linear = (assessed.chi2, assessed.looks.last().map_or(0.0, |look| look.1));
+        let moved = tested.moved_fixture(at, (&earlier, &leads), threshold, linear);
+        let base = || tested.moved_base(at.0, at.1, (&earlier, &leads), threshold);
+        let moved = moved.or_else(|| base().filter(|_| is_unexplained));
         watched = moved.unwrap_or(watched);
     }
     Ok(Watch {
@@ -275,6 +235,38 @@ impl TestedRows<'_> {
         let warmed = warmth.as_ref().map(|_| (&*causes, rows.sum_of_misfit_variances()));
         let factor = factor(&covariance(&extended, earlier, &rows, warmed));
         Linearised { extended, rows, causes, factor }
+    }
+
+    /// Returns the move of a camera or marker as the cause, if the rows are as expected once its
+    /// pose has been fitted to them, and if small changes explain them less well. `linear` holds χ²
+    /// of the unchanged arm and ln of the evidence for all small changes. Returns `None` if no
+    /// camera or marker explains the rows.
+    fn moved_fixture(
+        &self,
+        (poses, x): (&[Pose], &DVector<f64>),
+        (earlier, leads): (&Earlier, &[bool]),
+        threshold: f64,
+        (chi2, linear): (f64, f64),
+    ) -> Option<Vec<WatchedCause>> {
+        let fixtures = relocation::placements(self.model);
+        let tried = fixtures.iter().filter(|placed| !placed.is_base).filter_map(|placed| {
+            let located = relocation::located_anew(self.model, poses, x, placed)?;
+            let at_place = self.linearised(poses, &located, earlier);
+            let assessed = assess(&at_place.rows, &at_place.factor, &at_place.causes, false)?;
+            let (_, evidence) = *assessed.looks.last()?;
+            let gain = 0.5 * (chi2 - assessed.chi2) - MIN_RELOCATION_NATS;
+            let is_moved =
+                |cause: &&AssessedCause| at_place.causes[cause.cause].columns == placed.parameters;
+            let moved = assessed.causes.iter().find(is_moved)?;
+            let is_explained = gain > linear && evidence < threshold;
+            let mut watched = at_place.reporter(leads).cause(moved, None);
+            for (change, &k) in watched.changes.iter_mut().zip(&placed.parameters) {
+                change.change += at_place.extended.x[k] - x[k];
+            }
+            watched.probability = 1.0 / (1.0 + SECOND_CHANGE_ODDS * evidence.exp());
+            is_explained.then_some((gain, watched))
+        });
+        tried.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, watched)| vec![watched])
     }
 
     /// Returns a move of the only base as the cause, if it explains the rows: after the base has
@@ -370,131 +362,4 @@ fn turn_about_first_joint(problem: &Problem, old: &Frame<f64>, new: &Frame<f64>)
 /// Returns true if at least one row measures a position.
 fn has_positions(measurements: &Measurements) -> bool {
     (0..measurements.len()).any(|row| measurements.observation(row).is_position())
-}
-
-/// Rows and causes from which the report of a cause is computed.
-struct Reporter<'a> {
-    rows: &'a SensitiveRows,
-    factor: &'a DMatrix<f64>,
-    causes: &'a [Cause],
-    /// True for rows of the leading kind, whose errors are reported.
-    leads: &'a [bool],
-}
-
-impl Reporter<'_> {
-    /// Returns the report of a cause; `rival` is the most probable other one.
-    fn cause(&self, assessed: &AssessedCause, rival: Option<&AssessedCause>) -> WatchedCause {
-        let cause = &self.causes[assessed.cause];
-        let changes = cause.amplitudes.iter().enumerate().map(|(i, (name, unit))| Change {
-            parameter: name.clone(),
-            unit: *unit,
-            change: assessed.mean[i],
-            std_error: assessed.covariance[(i, i)].sqrt(),
-        });
-        let mut changes: Vec<Change> = changes.collect();
-        if matches!(cause.kind, CauseKind::Noise | CauseKind::Other) {
-            let (parameter, unit) =
-                ("noise, as a multiple of the known one".to_owned(), Unit::Number);
-            changes.push(Change { parameter, unit, change: assessed.mean[0], std_error: f64::NAN });
-        }
-        let rival = rival.filter(|rival| rival.cause != assessed.cause);
-        WatchedCause {
-            kind: cause.kind,
-            label: cause.label.clone(),
-            row: assessed.row,
-            from_row: None,
-            probability: assessed.probability,
-            changes,
-            left_out_error: match (cause.kind, assessed.row) {
-                (CauseKind::Noise | CauseKind::Other, _) => None,
-                (_, Some(off)) => {
-                    Some(self.rms_of(|row| row != off, |row| self.rows.residual_of(row)))
-                }
-                _ => self.left_out_error(cause, assessed),
-            },
-            poses_to_tell_apart: rival.and_then(|rival| self.poses_to_tell_apart(assessed, rival)),
-        }
-    }
-
-    /// Returns the root mean square length, over the rows of the leading kind, of the residuals
-    /// that `residual` returns in units of σ \[m\] or \[rad\].
-    fn rms(&self, residual: impl Fn(usize) -> DVector<f64>) -> f64 {
-        self.rms_of(|_| true, residual)
-    }
-
-    /// Returns the same length over those rows for which `is_included` is true.
-    fn rms_of(
-        &self,
-        is_included: impl Fn(usize) -> bool,
-        residual: impl Fn(usize) -> DVector<f64>,
-    ) -> f64 {
-        let chosen: Vec<usize> =
-            (0..self.rows.len()).filter(|&row| self.leads[row] && is_included(row)).collect();
-        let square = |&row: &usize| {
-            let numbers = residual(row);
-            numbers.rows(0, numbers.len().min(3)).norm_squared() * self.rows.sigma[row].powi(2)
-        };
-        (chosen.iter().map(square).sum::<f64>() / chosen.len().max(1) as f64).sqrt()
-    }
-
-    /// Returns the root mean square error of the rows of the leading kind, each predicted with the
-    /// changes of the cause as estimated without the row's group. `None` if a number is not finite.
-    fn left_out_error(&self, cause: &Cause, assessed: &AssessedCause) -> Option<f64> {
-        let (rows, columns) = self.rows.masked_before(assessed.onset, &cause.columns);
-        let (rows, factor) = (&rows, padded_factor(self.factor, columns.len()));
-        let sums = sums_of(rows);
-        let groups = rows.len().min(MAX_GROUPS);
-        let means: Option<Vec<DVector<f64>>> = (0..groups)
-            .map(|group| {
-                let mut others = sums.clone();
-                (group..rows.len()).step_by(groups).for_each(|row| others.add(rows, row, -1.0));
-                let unchanged = Unchanged::new(&others, &factor)?;
-                Some(unchanged.likelihood_ratio(&columns, &assessed.sizes)?.1)
-            })
-            .collect();
-        let means = means?;
-        Some(self.rms(|row| {
-            let moved = rows.of_row(row).select_columns(&columns);
-            rows.residual_of(row) - moved * &means[row % groups]
-        }))
-    }
-
-    /// Returns the number of additional poses like these after which a cause is expected to be nine
-    /// times as probable as its rival, if it is the true one. `None` if one of the two moves no
-    /// parameter, or if the poses hardly distinguish them.
-    fn poses_to_tell_apart(
-        &self,
-        assessed: &AssessedCause,
-        rival: &AssessedCause,
-    ) -> Option<usize> {
-        let (cause, other) = (&self.causes[assessed.cause], &self.causes[rival.cause]);
-        let wanted = (MIN_NAMED_PROBABILITY / (1.0 - MIN_NAMED_PROBABILITY)).ln()
-            - (assessed.probability / rival.probability).ln();
-        if wanted <= 0.0 {
-            return Some(0);
-        }
-        if cause.columns.is_empty() || other.columns.is_empty() {
-            return None;
-        }
-        let (rows, columns) = self.rows.masked_before(assessed.onset, &cause.columns);
-        let (rows, of_rival) = rows.masked_before(rival.onset, &other.columns);
-        let factor = padded_factor(self.factor, columns.len() + of_rival.len());
-        let unchanged = Unchanged::new(&sums_of(&rows), &factor)?;
-        let part = |a: &[usize], b: &[usize]| {
-            DMatrix::from_fn(a.len(), b.len(), |i, j| unchanged.information[(a[i], b[j])])
-        };
-        // Evidence of the change for the cause, minus the part that the rival can imitate.
-        let shown = part(&columns, &columns) * &assessed.mean;
-        let seen = part(&of_rival, &columns) * &assessed.mean;
-        let mut matrix = part(&of_rival, &of_rival);
-        for (i, size) in rival.sizes.iter().enumerate() {
-            matrix[(i, i)] += size.powi(-2);
-        }
-        let imitated = seen.dot(&matrix.cholesky()?.solve(&seen));
-        let nats = 0.5 * (assessed.mean.dot(&shown) - imitated).max(0.0);
-        let of_pose = nats / (rows.len() - assessed.onset) as f64;
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "small, ≥ 0")]
-        let poses = (wanted / of_pose).ceil() as usize;
-        (of_pose > MIN_NATS_PER_POSE).then_some(poses)
-    }
 }

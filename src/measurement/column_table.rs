@@ -9,6 +9,8 @@ use crate::error::{InputError, Location, TableErrorKind};
 
 /// Size of the text that is generated at a time \[bytes\].
 const CHUNK_BYTES: usize = 1 << 15;
+/// Magnitude below which a 64-bit float holds every integer exactly: 2⁵³.
+const MAX_EXACT_INTEGER: f64 = 9_007_199_254_740_992.0;
 
 /// Table of measurements in memory, with the column names that a file would have. Messages refer to
 /// a row by the line that it would have in a file; the first row is on line 2.
@@ -90,11 +92,16 @@ impl ColumnValues {
         }
     }
 
-    /// Appends the cell of a row; numbers keep all their digits.
+    /// Appends the cell of a row; numbers keep all their digits. Whole numbers are written without
+    /// a decimal point, because they may be names, such as those of sessions or markers.
     fn write(&self, row: usize, text: &mut String) {
         match self {
-            // Writing to a String cannot fail.
-            Self::Numbers(values) => _ = values.get(row).map(|value| write!(text, "{value:?}")),
+            Self::Numbers(values) => {
+                let Some(value) = values.get(row) else { return };
+                let is_whole = value.fract() == 0.0 && value.abs() < MAX_EXACT_INTEGER;
+                // Writing to a String cannot fail.
+                _ = if is_whole { write!(text, "{value}") } else { write!(text, "{value:?}") };
+            }
             Self::Words(labels) => {
                 let word = labels.of_row.get(row).and_then(|&label| labels.names.get(label));
                 text.push_str(&quoted(word.map_or("", String::as_str)));

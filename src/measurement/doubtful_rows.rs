@@ -1,9 +1,9 @@
-//! Warnings about doubtful rows and words of a table: an instrument that held its last value, and
-//! session names that are written in two ways.
+//! Warnings about doubtful rows and words of a table: an instrument that held its last value, a
+//! pixel outside its image, and session names that are written in two ways.
 
 use super::Measurements;
 use crate::error::{Warning, WarningKind};
-use crate::problem::{Joint, JointKind, Problem};
+use crate::problem::{Joint, JointKind, Observation, Problem};
 
 /// Smallest difference between the commands of a joint that moves the target: 1° \[rad\], or 1 mm
 /// \[m\].
@@ -21,7 +21,34 @@ impl Measurements {
             .or_else(|| self.rows_of_another_session(sigma))
             .or_else(|| self.rounded_copies(problem));
         let held = self.held_positions(problem);
-        repeated.into_iter().chain(held).chain(self.time_going_back()).collect()
+        let outside = self.pixels_outside(problem);
+        repeated.into_iter().chain(held).chain(self.time_going_back()).chain(outside).collect()
+    }
+
+    /// Returns a warning at the first pixel that lies outside the declared size of its image.
+    fn pixels_outside(&self, problem: &Problem) -> Option<Warning> {
+        let outside = |row: usize| {
+            let Observation::Pixel(camera, ..) = self.observation(row) else { return None };
+            let camera = problem.fixtures.get(camera as usize)?;
+            let (image, pixel) = (camera.image?, self.positions.get(row)?);
+            // A pixel's centre is at whole numbers, so that the image begins at −0.5.
+            let is_outside =
+                |value: f64, size: f64| value.is_finite() && !(-0.5..=size - 0.5).contains(&value);
+            let [width, height] = image;
+            let axes = [("column u_px", pixel.x, width), ("column v_px", pixel.y, height)];
+            let (column, value, _) =
+                axes.into_iter().find(|&(_, value, size)| is_outside(value, size))?;
+            Some((row, column, value, camera))
+        };
+        let mut found = (0..self.len()).filter_map(outside);
+        let (row, column, value, camera) = found.next()?;
+        let kind = WarningKind::OutsideImage {
+            value: format!("{value:.1}"),
+            camera: camera.name.clone(),
+            image: camera.image?.map(|size| size.to_string()),
+            rows: 1 + found.count(),
+        };
+        Some(Warning { location: self.location(row).with_key(column), kind })
     }
 
     /// Returns a warning if rows measure exactly the position of the row above them, although the

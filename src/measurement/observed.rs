@@ -150,7 +150,12 @@ fn point(
         .and_then(|marker| problem.fixtures.get(marker))
         .map_or(0, |known| known.points.len());
     let word = table.name(place)?;
-    let number = word.parse().ok().filter(|number| *number < points);
+    // Programs that keep all columns as floats write the number 3 as 3.0.
+    let of_float = || {
+        let value = table.number(place).ok()?;
+        (0..points).find(|point| (*point as f64).total_cmp(&value).is_eq())
+    };
+    let number = word.parse().ok().filter(|number| *number < points).or_else(of_float);
     number.ok_or_else(|| {
         let kind =
             InputErrorKind::NoSuchPoint { word: word.to_owned(), last: points.saturating_sub(1) };

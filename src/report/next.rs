@@ -187,16 +187,20 @@ fn verdict(options: &NextOptions, next: &NextPoses) -> String {
 /// Returns the table of the chosen poses with the error expected after each. `percent` is the level
 /// of the bound.
 fn step_table(options: &NextOptions, next: &NextPoses, percent: &str) -> Table {
+    // The error in mm is not judged where cameras measure.
+    let columns = if next.is_of_cameras { 3 } else { 5 };
     let rows = next.steps.iter().enumerate().map(|(k, step)| {
-        vec![
+        let mut cells = vec![
             (k + 1).to_string(),
             format!("{} %", number(step.travel * 100.0, 0)),
             format!("{} %", number(step.gain * 100.0, 2)),
             or_dash(step.error, |error| mm(error.expected, 3)),
             or_dash(step.error, |error| mm(error.bound, 3)),
-        ]
+        ];
+        cells.truncate(columns);
+        cells
     });
-    let header = ["pose", "travel", "gain", "rms, mm", "bound, mm"];
+    let header = &["pose", "travel", "gain", "rms, mm", "bound, mm"][..columns];
     let goal = match options.purpose {
         Purpose::Accuracy => {
             "mean variance of predictions that parameters and assumed misfit cause"
@@ -205,8 +209,11 @@ fn step_table(options: &NextOptions, next: &NextPoses, percent: &str) -> Table {
         Purpose::Both => "sum of the variances of predictions and effects",
     };
     let note = format!(
-        "travel: largest move of a joint from the pose before, share of its range; gain: by how much the pose lowers the {goal}, in % of the present one; rms, bound ({percent} %): \
-         expected error in the workspace after the pose, with noise and the misfit that no pose lowers"
+        "travel: largest move of a joint from the pose before, share of its range; gain: by how much the pose lowers the {goal}, in % of the present one"
     );
-    Table::new(&header, rows.collect(), &[]).noted(&[&note])
+    let errors = format!(
+        "; rms, bound ({percent} %): expected error in the workspace after the pose, with noise and the misfit that no pose lowers"
+    );
+    let note = if next.is_of_cameras { note } else { note + &errors };
+    Table::new(header, rows.collect(), &[]).noted(&[&note])
 }

@@ -116,7 +116,9 @@ fn blocks<'a>(
         plan.coordinates,
     )]));
     blocks.push(unidentifiable(&planned.identifiability, &names, "plan.json"));
-    blocks.extend(assumptions(problem, &planned.expected, Some(poses + given)));
+    // Rows of a camera's table are points, not poses.
+    let fitted = (!plan.is_of_cameras || given == 0).then_some(poses + given);
+    blocks.extend(assumptions(problem, &planned.expected, fitted));
     blocks.extend(separated.map(separation::blocks).unwrap_or_default());
     blocks.push(Block::Page(vec![
         Block::heading("The planned poses"),

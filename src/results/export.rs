@@ -94,7 +94,10 @@ impl ExportResult {
             origins: moved.map(|moved| moved.iter().map(origin).collect()),
             held_out,
             fitted,
-            not_held: unexported_parts(problem, model),
+            not_held: unexported_parts(problem, model)
+                .into_iter()
+                .chain(unseen_ends(problem).filter(|_| moved.is_some()))
+                .collect(),
         }
     }
 
@@ -169,5 +172,23 @@ fn unexported_parts(problem: &Problem, model: &Model) -> Vec<String> {
     if !set_up.is_empty() {
         parts.push(format!("base and target of the set-up ({})", set_up.join(", ")));
     }
+    let cameras = problem.fixtures.iter().filter(|fixture| fixture.kind.word() == "camera");
+    parts.extend(cameras.map(|camera| format!("lens of camera {}", camera.name)));
+    let in_world =
+        problem.fixtures.iter().filter(|known| known.kind.has_pose() && known.carrier.is_none());
+    parts.extend(
+        in_world.map(|known| format!("place of {} {} in the world", known.kind.word(), known.name)),
+    );
     parts
+}
+
+/// Returns what a URDF cannot hold after a fit to pixels alone: the true place of base and tip;
+/// `None` if positions were measured.
+fn unseen_ends(problem: &Problem) -> Option<String> {
+    let has_camera = problem.fixtures.iter().any(|fixture| fixture.kind.word() == "camera");
+    (has_camera && problem.data.position_sigma.is_none()).then(|| {
+        "true place of the base and of the tip: views cannot tell the parameters that the problem holds, which stay \
+         nominal; cameras and markers on the arm follow the file"
+            .to_owned()
+    })
 }

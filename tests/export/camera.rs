@@ -97,3 +97,30 @@ fn a_camera_that_a_form_cannot_hold_is_an_error_with_its_remedy() {
     std::fs::write(folder.path("problem.toml"), text).unwrap();
     assert_contains(&error("--format kalibr"), &["has no k3", "camera[hand].k3"]);
 }
+
+#[test]
+fn the_carrier_of_a_camera_is_the_tip_link_of_the_urdf() {
+    let on_tip = |text: &str| {
+        text.replace("pixel_sigma = 0.2", "pixel_sigma = 0.2\nimage_px = [1280, 720]")
+            .replace("[[camera]]", "[urdf]\nbase = \"base_link\"\ntip = \"tool0\"\n\n[[camera]]")
+    };
+    let folder = identified(on_tip);
+    folder.flexcal("export . --estimate fit/estimate.json --format opencv --out cv.yaml").success();
+    let text = std::fs::read_to_string(folder.path("cv.yaml")).unwrap();
+    assert_contains(&text, &["in tool0: position", "carrier: \"tool0\""]);
+    // After a fit to pixels the arm is exported; commands need a measured target.
+    let run = folder.flexcal("identify . --out again").success();
+    assert_contains(&run.stdout, &["Next: flexcal export . --estimate again/estimate.json --urdf"]);
+}
+
+#[test]
+fn pixels_outside_the_declared_image_are_warned_of() {
+    let small =
+        |text: &str| text.replace("pixel_sigma = 0.2", "pixel_sigma = 0.2\nimage_px = [1280, 480]");
+    let folder = identified(small);
+    let run = folder.flexcal("identify . --out again").success();
+    assert_contains(
+        &run.stderr,
+        &["column v_px", "is outside the image of the camera \"hand\", image_px = [1280, 480]"],
+    );
+}

@@ -221,6 +221,13 @@ fn the_command_has_exit_status_3_for_a_changed_arm() {
     folder.write("moved.csv", moved.collect::<Vec<_>>().join("\n") + "\n");
     let changed = folder.flexcal(&format!("{run} --data moved.csv")).code(3);
     assert_contains(&changed.stdout, &["Changed, seen after", "Next: flexcal identify"]);
+    // The suggested command leaves the estimate that is its prior where it is.
+    let before = folder.read("first/estimate.json");
+    let next = changed.stdout.split_once("Next: flexcal ").unwrap().1;
+    let next = next.split_once(" takes").or(next.split_once(" says")).unwrap().0;
+    let run = folder.flexcal(&next.replace('\n', " "));
+    assert!(run.status < 2, "{next} {run:?}");
+    assert_eq!(folder.read("first/estimate.json"), before);
     let json = folder.json("watch/watch.json");
     assert_eq!(json["changed"], true);
 }

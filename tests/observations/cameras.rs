@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use flexcal::design::{self, Candidates, Criterion, PlanOptions};
+use flexcal::design::{self, Candidates, Criterion, NextOptions, PlanOptions, Purpose};
 use flexcal::fit::{FindingCode, Identification, Options, Placement, identify};
 use flexcal::least_squares::{check_jacobian, jacobian};
 use flexcal::measurement::{Dataset, Measurements};
@@ -266,6 +266,11 @@ fn wrong_rows_are_named() {
         ),
         (
             "camera,marker,point,u_px,v_px",
+            "hand,board,1.5,1,1",
+            ":2: column point: 1.5 is no point of the marker, whose points are numbered from 0 to 3",
+        ),
+        (
+            "camera,marker,point,u_px,v_px",
             "eye,board,0,1,1",
             ":2: column camera: no camera is called \"eye\"; there are hand, head, wall",
         ),
@@ -473,7 +478,8 @@ fn plans_with_a_camera_hold_configurations_that_see_the_board() {
                 pixel.x > -30.0 && pixel.x < 1310.0 && pixel.y > -30.0 && pixel.y < 750.0;
             seen += usize::from(is_in_image);
         }
-        assert!(seen > 0, "pose {pose} sees nothing");
+        // The measured views show nine of the 35 points.
+        assert!(seen >= 9, "pose {pose} sees {seen} points");
     }
     let median = |k: usize| {
         let errors = plan.random.iter().map(|set| set.expected[k].std_error);
@@ -489,6 +495,51 @@ fn plans_with_a_camera_hold_configurations_that_see_the_board() {
     // Where the camera is, nobody can plan without.
     let error = design::plan(&problem, &candidates, None, &options).map(|_| ()).unwrap_err();
     assert_contains(&error.to_string(), &["the place of the camera \"hand\" is not declared"]);
+}
+
+/// Views that a detector cannot use are no candidates: behind the board, in part, or too close.
+#[test]
+fn next_images_show_the_board_as_the_measured_ones_do() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/observations/camera");
+    let problem = Problem::read(&folder).unwrap();
+    let (data, _) = Dataset::read(&problem).unwrap();
+    let rows = data.measurements.clone();
+    let ranges = PoseRanges::declared_or_measured(&problem, &rows);
+    let options = NextOptions {
+        poses: 4,
+        purpose: Purpose::Accuracy,
+        tolerance: None,
+        level: 0.95,
+        seed: 1,
+        workspace: None,
+        explanations: None,
+        remainder: false,
+        fit: Options::default(),
+    };
+    let next = design::next(&problem, &data, &Candidates::Within(ranges), &options).unwrap();
+    assert_eq!(next.poses.len(), 4);
+    let model = model_of(&problem, &rows);
+    // Twice the area of the board in the image; its sign is that of the side that is seen.
+    let view = |table: &Measurements, row: usize| {
+        let corner = |point: u32| {
+            let mut pose = Placement::of(table).poses(table, &[row], 0.2);
+            pose[0].observation = Observation::Pixel(0, 1, point);
+            let pixel = model.predict(pose, &next.found.x)[0];
+            nalgebra::Vector2::new(pixel.x, pixel.y)
+        };
+        let [origin, along, across] = [0, 6, 28].map(corner);
+        (along - origin).perp(&(across - origin))
+    };
+    let side = view(&rows, 0).signum();
+    for row in (0..rows.len()).step_by(9) {
+        assert!(view(&rows, row) * side > 0.0, "row {row}");
+    }
+    let areas: Vec<f64> = (0..rows.len()).step_by(9).map(|row| side * view(&rows, row)).collect();
+    let largest = areas.iter().copied().fold(0.0, f64::max);
+    for pose in 0..4 {
+        let area = side * view(&next.poses, pose);
+        assert!(area > 0.0 && area < 4.0 * largest, "pose {pose}: {area} of {largest}");
+    }
 }
 
 /// The ranges of poses need no true place of the camera, which first images show.

@@ -1,0 +1,186 @@
+//! Report of a cause: its size, its probability, and how well it predicts rows that are left out.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::assessment::AssessedCause;
+use super::causes::{Cause, CauseKind};
+use super::evidence::Unchanged;
+use super::onset::{padded_factor, sums_of};
+use super::rows::SensitiveRows;
+use crate::quantity::Unit;
+
+/// Maximum number of groups of rows that are left out in turn to test a cause.
+const MAX_GROUPS: usize = 60;
+/// Smallest expected evidence per pose for one cause against another \[nats\] at which more poses
+/// can distinguish the causes.
+const MIN_NATS_PER_POSE: f64 = 1e-3;
+
+/// Smallest probability at which the most probable cause is named as the cause.
+pub(super) const MIN_NAMED_PROBABILITY: f64 = 0.9;
+
+/// Cause of a change with its probability and size.
+#[derive(Debug, Clone)]
+pub struct WatchedCause {
+    /// Kind of the cause.
+    pub kind: CauseKind,
+    /// Name for people, such as "zero of joint 2".
+    pub label: String,
+    /// Index of the gross row among all rows of the table, from 0; `None` for other causes.
+    pub row: Option<usize>,
+    /// Index of the first row that shows the change among all rows of the table, from 0; `None` if
+    /// the change happened before the table.
+    pub from_row: Option<usize>,
+    /// Probability among all causes, given that something changed.
+    pub probability: f64,
+    /// Changes of the parameters that the cause moves. For larger noise and for something else,
+    /// this is the ratio of the errors to the assumed noise.
+    pub changes: Vec<Change>,
+    /// Root mean square error of rows of the leading kind, each predicted with this cause as
+    /// estimated without the row \[m\] or \[rad\]. For a gross row it is the error of the other
+    /// rows; `None` for noise and for something else.
+    pub left_out_error: Option<f64>,
+    /// Number of additional poses like the measured ones after which the data are expected to
+    /// decide between this cause and the most probable other one; `None` if no number would
+    /// suffice, or if there is no other cause.
+    pub poses_to_tell_apart: Option<usize>,
+}
+
+/// Change of one parameter since the estimate.
+#[derive(Debug, Clone)]
+pub struct Change {
+    /// Name of the parameter.
+    pub parameter: String,
+    /// Unit of the change.
+    pub unit: Unit,
+    /// Change, SI; of the logarithm for stiffnesses.
+    pub change: f64,
+    /// Standard error of the change; NaN for a ratio of the noise.
+    pub std_error: f64,
+}
+
+/// Rows and causes from which the report of a cause is computed.
+pub(super) struct Reporter<'a> {
+    pub rows: &'a SensitiveRows,
+    pub factor: &'a DMatrix<f64>,
+    pub causes: &'a [Cause],
+    /// True for rows of the leading kind, whose errors are reported.
+    pub leads: &'a [bool],
+}
+
+impl Reporter<'_> {
+    /// Returns the report of a cause; `rival` is the most probable other one.
+    pub fn cause(&self, assessed: &AssessedCause, rival: Option<&AssessedCause>) -> WatchedCause {
+        let cause = &self.causes[assessed.cause];
+        let changes = cause.amplitudes.iter().enumerate().map(|(i, (name, unit))| Change {
+            parameter: name.clone(),
+            unit: *unit,
+            change: assessed.mean[i],
+            std_error: assessed.covariance[(i, i)].sqrt(),
+        });
+        let mut changes: Vec<Change> = changes.collect();
+        if matches!(cause.kind, CauseKind::Noise | CauseKind::Other) {
+            let (parameter, unit) =
+                ("noise, as a multiple of the known one".to_owned(), Unit::Number);
+            changes.push(Change { parameter, unit, change: assessed.mean[0], std_error: f64::NAN });
+        }
+        let rival = rival.filter(|rival| rival.cause != assessed.cause);
+        WatchedCause {
+            kind: cause.kind,
+            label: cause.label.clone(),
+            row: assessed.row,
+            from_row: None,
+            probability: assessed.probability,
+            changes,
+            left_out_error: match (cause.kind, assessed.row) {
+                (CauseKind::Noise | CauseKind::Other, _) => None,
+                (_, Some(off)) => {
+                    Some(self.rms_of(|row| row != off, |row| self.rows.residual_of(row)))
+                }
+                _ => self.left_out_error(cause, assessed),
+            },
+            poses_to_tell_apart: rival.and_then(|rival| self.poses_to_tell_apart(assessed, rival)),
+        }
+    }
+
+    /// Returns the root mean square length, over the rows of the leading kind, of the residuals
+    /// that `residual` returns in units of σ \[m\] or \[rad\].
+    pub fn rms(&self, residual: impl Fn(usize) -> DVector<f64>) -> f64 {
+        self.rms_of(|_| true, residual)
+    }
+
+    /// Returns the same length over those rows for which `is_included` is true.
+    fn rms_of(
+        &self,
+        is_included: impl Fn(usize) -> bool,
+        residual: impl Fn(usize) -> DVector<f64>,
+    ) -> f64 {
+        let chosen: Vec<usize> =
+            (0..self.rows.len()).filter(|&row| self.leads[row] && is_included(row)).collect();
+        let square = |&row: &usize| {
+            let numbers = residual(row);
+            numbers.rows(0, numbers.len().min(3)).norm_squared() * self.rows.sigma[row].powi(2)
+        };
+        (chosen.iter().map(square).sum::<f64>() / chosen.len().max(1) as f64).sqrt()
+    }
+
+    /// Returns the root mean square error of the rows of the leading kind, each predicted with the
+    /// changes of the cause as estimated without the row's group. `None` if a number is not finite.
+    fn left_out_error(&self, cause: &Cause, assessed: &AssessedCause) -> Option<f64> {
+        let (rows, columns) = self.rows.masked_before(assessed.onset, &cause.columns);
+        let (rows, factor) = (&rows, padded_factor(self.factor, columns.len()));
+        let sums = sums_of(rows);
+        let groups = rows.len().min(MAX_GROUPS);
+        let means: Option<Vec<DVector<f64>>> = (0..groups)
+            .map(|group| {
+                let mut others = sums.clone();
+                (group..rows.len()).step_by(groups).for_each(|row| others.add(rows, row, -1.0));
+                let unchanged = Unchanged::new(&others, &factor)?;
+                Some(unchanged.likelihood_ratio(&columns, &assessed.sizes)?.1)
+            })
+            .collect();
+        let means = means?;
+        Some(self.rms(|row| {
+            let moved = rows.of_row(row).select_columns(&columns);
+            rows.residual_of(row) - moved * &means[row % groups]
+        }))
+    }
+
+    /// Returns the number of additional poses like these after which a cause is expected to be nine
+    /// times as probable as its rival, if it is the true one. `None` if one of the two moves no
+    /// parameter, or if the poses hardly distinguish them.
+    fn poses_to_tell_apart(
+        &self,
+        assessed: &AssessedCause,
+        rival: &AssessedCause,
+    ) -> Option<usize> {
+        let (cause, other) = (&self.causes[assessed.cause], &self.causes[rival.cause]);
+        let wanted = (MIN_NAMED_PROBABILITY / (1.0 - MIN_NAMED_PROBABILITY)).ln()
+            - (assessed.probability / rival.probability).ln();
+        if wanted <= 0.0 {
+            return Some(0);
+        }
+        if cause.columns.is_empty() || other.columns.is_empty() {
+            return None;
+        }
+        let (rows, columns) = self.rows.masked_before(assessed.onset, &cause.columns);
+        let (rows, of_rival) = rows.masked_before(rival.onset, &other.columns);
+        let factor = padded_factor(self.factor, columns.len() + of_rival.len());
+        let unchanged = Unchanged::new(&sums_of(&rows), &factor)?;
+        let part = |a: &[usize], b: &[usize]| {
+            DMatrix::from_fn(a.len(), b.len(), |i, j| unchanged.information[(a[i], b[j])])
+        };
+        // Evidence of the change for the cause, minus the part that the rival can imitate.
+        let shown = part(&columns, &columns) * &assessed.mean;
+        let seen = part(&of_rival, &columns) * &assessed.mean;
+        let mut matrix = part(&of_rival, &of_rival);
+        for (i, size) in rival.sizes.iter().enumerate() {
+            matrix[(i, i)] += size.powi(-2);
+        }
+        let imitated = seen.dot(&matrix.cholesky()?.solve(&seen));
+        let nats = 0.5 * (assessed.mean.dot(&shown) - imitated).max(0.0);
+        let of_pose = nats / (rows.len() - assessed.onset) as f64;
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "small, ≥ 0")]
+        let poses = (wanted / of_pose).ceil() as usize;
+        (of_pose > MIN_NATS_PER_POSE).then_some(poses)
+    }
+}
