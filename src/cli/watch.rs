@@ -111,19 +111,21 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
                 .to_owned()
         } else if watch.is_changed() && first == Some(CauseKind::Row) {
             format!("check that row, then flexcal watch {} --estimate {file} without it", common.problem_arguments())
-        } else if watch.is_changed() && first == Some(CauseKind::Base) {
-            format!(
-                "if the instrument or the arm was set up anew, give these rows another word in a column session and watch again; if both stood \
-                 still, flexcal identify {} --prior {file} takes the change over into an estimate",
-                common.problem_arguments()
-            )
         } else if watch.is_changed() {
-            format!(
+            let update = format!(
                 "flexcal identify {} --prior {file}{} --out {} takes the change over into an estimate",
                 common.problem_arguments(),
                 drift_argument(arguments.drift),
                 unused_folder(&arguments.estimate, "update")
-            )
+            );
+            if first == Some(CauseKind::Base) {
+                format!(
+                    "if the instrument or the arm was set up anew, give these rows another word in a column session and watch again; if both \
+                     stood still, {update}"
+                )
+            } else {
+                update
+            }
         } else {
             advice::after_applying(common, &problem, &estimate, &arguments.estimate)
         };
