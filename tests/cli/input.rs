@@ -92,7 +92,11 @@ fn bad_input_is_named_and_leaves_nothing_behind() {
     let mistakes: &[Mistake] = &[
         ("empty file", |b| b.write(DATA, ""), &[DATA, "empty"]),
         ("header only", |b| b.map_rows(DATA, |_, _| None), &[DATA, "no rows"]),
-        ("NaN", |b| b.edit(DATA, "1840.7678", "NaN"), &["a-none.csv:2", "x_mm", "finite"]),
+        (
+            "NaN",
+            |b| b.edit(DATA, "1840.7678", "NaN"),
+            &["a-none.csv:2", "x_mm", "missing = \"NaN\""],
+        ),
         ("infinity", |b| b.edit(DATA, "1840.7678", "inf"), &["a-none.csv:2", "x_mm", "finite"]),
         (
             "text in a number",

@@ -55,8 +55,9 @@ fn new_results_are_for_whom_files_are_and_older_ones_keep_their_permissions() {
 
 #[test]
 fn figures_of_an_older_page_go_and_other_files_stay() {
-    let folder = Folder::with_lunar_sampler();
-    let flexcal = |command: &str| folder.flexcal(&format!("{command} . --out out"));
+    let folder = Folder::with_cases(&["problem.toml", "f-two.csv"]);
+    let flexcal =
+        |command: &str| folder.flexcal(&format!("{command} . --data f-two.csv --out out"));
     let is_there = |name: &str| folder.has(format!("out/figures/{name}"));
     flexcal("loop").success();
     assert!(is_there("effect-1.svg"));

@@ -4,7 +4,7 @@ use serde_json::json;
 
 use super::checked_fit::{Check, CheckedFit};
 use super::finding::{Finding, FindingCode};
-use super::misreading::misread_masses;
+use super::misreading::{MAX_NOISE_SIGMAS, misread_masses};
 use super::nominal_error::is_nominal_far_off;
 use super::parameter_limits::WithinPriors;
 use super::row_kind::format_error;
@@ -15,10 +15,6 @@ const MIN_SIGMAS: f64 = 10.0;
 /// Smallest rms residual of the fit, relative to the spread of the points, for which misreadings
 /// are searched if no σ is declared.
 const MIN_PART: f64 = 0.01;
-
-/// Largest rms residual of a fit with a misreading undone that counts as noise, as a multiple of
-/// the declared σ. Residuals of real arms reach several σ.
-pub(super) const MAX_NOISE_SIGMAS: f64 = 5.0;
 
 /// Smallest rms residual of the fit, as a multiple of the declared σ, for which wrong masses and
 /// their places are searched on an arm that gives way.

@@ -17,6 +17,7 @@ mod words;
 pub(in crate::fit) use explanation::Explanations;
 pub(crate) use explanation::MisreadEffect;
 pub(in crate::fit) use masses::misread_masses;
+pub(in crate::fit) use search::MAX_NOISE_SIGMAS;
 
 use crate::model::parameter::JointField;
 

@@ -13,7 +13,6 @@ use super::explanation::{Explanation, Explanations, LeftOutMisfit};
 use super::images::of_images;
 use super::undo::is_unit_ratio;
 use crate::fit::checks::checked_fit::CheckedFit;
-use crate::fit::checks::misread::MAX_NOISE_SIGMAS;
 use crate::fit::checks::nominal_error::is_nominal_far_off;
 use crate::fit::checks::parameter_limits::{MAX_PRIOR_SIGMAS, is_of_arm, prior_sigmas};
 use crate::fit::stages::fitting::{FitEnd, Fitting};
@@ -59,6 +58,9 @@ const MAX_REVERSED: usize = 7;
 const MAX_FITTED_MISREADINGS: usize = 12;
 /// Maximum number of solver steps of a full fit with a misreading.
 const MAX_STEPS: u64 = 60;
+/// Largest rms residual of a fit with a misreading undone that counts as noise, as a multiple of
+/// the declared σ. Residuals of real arms reach several σ.
+pub(in crate::fit) const MAX_NOISE_SIGMAS: f64 = 5.0;
 /// Relative reduction of the cost by one step below which a registration without a full fit ends.
 /// The error is then accurate enough for a comparison at [`MAX_RATIO_TO_BEST`].
 const TRIAL_TOLERANCE: f64 = 1e-4;
