@@ -94,7 +94,7 @@ fn remarks(found: &Identification) -> Vec<String> {
     }));
     points.extend(unsteady_points(found.spreads.iter().map(|spread| &spread.1)));
     let of_parameters = format!(
-        "of the {} cannot be identified (priors or fewer free parameters decide them)",
+        "of the {} cannot be identified (give priors, or free fewer parameters)",
         counted(found.unknowns.len(), "parameter")
     );
     let counts = [
