@@ -218,10 +218,7 @@ impl Problem {
                     .and_then(|text| flexcal::problem::Problem::parse(&text, file).ok())
                     .filter(|closed| closed.digest() == closure.closed.digest());
                 let fitted = closed
-                    .map(|_| {
-                        let searched = closure.searched_effects();
-                        remainder::fit_beside(&closure.after, &closure.closed, &data, &searched)
-                    })
+                    .map(|_| remainder::fit(&closure.after, &closure.closed, &data))
                     .transpose()?
                     .flatten();
                 Ok::<_, IdentifyError>((closure, fitted))

@@ -116,8 +116,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     Ok(if closure.interrupted { Outcome::Interrupted } else { outcome })
 }
 
-/// Fits a remainder beside the effects of the extended problem, whose text is `closed`, or in their
-/// place.
+/// Fits a remainder in addition to the effects of the extended problem, whose text is `closed`.
 /// Returns `None` if the loop was interrupted, if the table was misread, or if the text declares
 /// another arm than was fitted. The latter happens if an effect was removed because data contradict
 /// it.
@@ -132,8 +131,7 @@ fn fit_remainder(
     if declared.digest() != closure.closed.digest() || closure.interrupted || is_misread {
         return Ok(None);
     }
-    let searched = closure.searched_effects();
-    Ok(remainder::fit_beside(&closure.after, &closure.closed, data, &searched)?)
+    Ok(remainder::fit(&closure.after, &closure.closed, data)?)
 }
 
 /// Error of a data file that `problem.closed.toml` cannot name.

@@ -3,7 +3,6 @@
 
 use super::hyperparameter_search::search_near;
 use super::posterior::Training;
-use super::prior::{AssumedPrior, ParameterPrior};
 use super::scores::{LeftOutError, left_out_errors};
 use super::search::Minimum;
 use super::training_rows::TrainingRows;
@@ -16,11 +15,11 @@ pub(super) const MAX_CONFIGURATIONS: usize = 100;
 const FOLDS: usize = 10;
 
 /// Returns the prediction error of each row by a fit to the other folds: first with the parameters
-/// alone, then with a remainder under the prior `assumed`. The search of each fold starts at `near`, the optimum of the
+/// alone, then with a remainder. The search of each fold starts at `near`, the optimum of the
 /// hyperparameters that was found without leaving rows out. `None` if a matrix is not positive
 /// definite because of rounding.
 pub(super) fn cross_validated(
-    (training, assumed): (&TrainingRows, &AssumedPrior),
+    training: &TrainingRows,
     near: &Minimum,
 ) -> Option<[Vec<LeftOutError>; 2]> {
     let noise = training.noise();
@@ -28,14 +27,13 @@ pub(super) fn cross_validated(
     let mut out = [(); 2].map(|()| vec![LeftOutError::default(); training.rows.len()]);
     for (fold, others) in training.folds(FOLDS) {
         let (rows, left_out) = (training.rows.select(&others), training.rows.select(&fold));
-        let hyper = search_near((training, assumed), &rows, near)?;
+        let hyper = search_near(training, &rows, near)?;
         let centres: Vec<usize> = (0..rows.len()).collect();
-        let predicted = |hyper, prior: &ParameterPrior| {
-            let conditioned = Training::new((&rows, inputs), prior, hyper, &centres)?;
+        let predicted = |hyper| {
+            let conditioned = Training::new((&rows, inputs), &training.prior, hyper, &centres)?;
             Some(conditioned.posterior.left_out(&left_out))
         };
-        let (alone, with) =
-            (predicted(&noise, &training.prior)?, predicted(&hyper, &assumed.prior)?);
+        let (alone, with) = (predicted(&noise)?, predicted(&hyper)?);
         let errors = [
             left_out_errors(&noise, &left_out, &alone, &alone),
             left_out_errors(&hyper, &left_out, &alone, &with),

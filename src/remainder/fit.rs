@@ -7,14 +7,12 @@ use super::correction::Correction;
 use super::gain::Gain;
 use super::judge::judge;
 use super::linearise::{Linearisation, prior, timed_poses};
-use super::prior::SearchedEffects;
 use super::residuals::{CorrectedResiduals, residuals};
 use super::training_rows::TrainingRows;
 use crate::fit::{ErrorSummary, Identification, IdentifyError, Placement};
 use crate::measurement::Dataset;
 use crate::model::Model;
-use crate::model::parameter::Regressor;
-use crate::problem::{Effect, Observation, Problem};
+use crate::problem::{Observation, Problem};
 
 /// Minimum number of configurations for which the uncertainty of predictions is estimated.
 const MIN_CONFIGURATIONS: usize = 10;
@@ -29,10 +27,6 @@ pub struct Fitted {
     pub alone: Correction,
     /// Identified arm with a remainder; `None` if the remainder is not kept.
     pub remainder: Option<Correction>,
-    /// True if the remainder corrects in place of effects that a search found: with it, the
-    /// parameters of these effects are zero.
-    #[doc(hidden)]
-    pub replaces_effects: bool,
     /// Gain in accuracy by the remainder on left-out configurations, whether it is kept or not.
     #[doc(hidden)]
     pub gain: Option<Gain>,
@@ -50,8 +44,6 @@ pub struct Outcome {
     pub(crate) gain: Option<Gain>,
     /// True if the remainder was read from a file that the problem names.
     pub(crate) is_declared: bool,
-    /// True if the remainder corrects in place of the effects that a search found.
-    pub(crate) replaces_effects: bool,
     /// Number of joints whose errors the remainder corrects.
     pub(crate) joints: usize,
     /// Held-out errors with the remainder; `None` if none is kept. If no rows are held out, these
@@ -67,7 +59,6 @@ impl Fitted {
         Outcome {
             gain: self.gain,
             is_declared: self.is_declared,
-            replaces_effects: self.replaces_effects,
             joints: self.remainder.as_ref().map_or(0, |remainder| remainder.joints().len()),
             held_out: residuals.map(|corrected| corrected.errors.held_out),
         }
@@ -92,13 +83,7 @@ impl Fitted {
         data: &Dataset,
     ) -> Result<Self, IdentifyError> {
         let residuals = Some(residuals(found, problem, data, &remainder)?);
-        Ok(Self {
-            remainder: Some(remainder),
-            replaces_effects: false,
-            residuals,
-            is_declared: true,
-            ..self
-        })
+        Ok(Self { remainder: Some(remainder), residuals, is_declared: true, ..self })
     }
 }
 
@@ -115,26 +100,7 @@ pub fn fit(
     problem: &Problem,
     data: &Dataset,
 ) -> Result<Option<Fitted>, IdentifyError> {
-    fitted((found, problem), data, Some(&[]))
-}
-
-/// Fits a remainder like [`fit`] to an arm with effects that a search found. `searched` holds these
-/// effects, each with the logarithm of the prior odds that it acts.
-///
-/// The effects may fit the same smooth errors as a remainder does. A remainder beside the effects
-/// and one in their place are therefore compared by their marginal likelihoods times the prior
-/// odds. The latter holds the parameters of the effects at zero.
-///
-/// # Errors
-/// Returns the errors of [`fit`].
-#[doc(hidden)]
-pub fn fit_beside(
-    found: &Identification,
-    problem: &Problem,
-    data: &Dataset,
-    searched: &[(Effect, f64)],
-) -> Result<Option<Fitted>, IdentifyError> {
-    fitted((found, problem), data, Some(searched))
+    fitted((found, problem), data, true)
 }
 
 /// Estimates the uncertainty of the predictions of `found` without fitting a remainder. The
@@ -147,23 +113,20 @@ pub fn uncertainty(
     problem: &Problem,
     data: &Dataset,
 ) -> Result<Option<Fitted>, IdentifyError> {
-    fitted((found, problem), data, None)
+    fitted((found, problem), data, false)
 }
 
-/// Conditions the parameters on the training rows, with a remainder in addition if it predicts
-/// better. The effects `searched` may be replaced by the remainder; if they are `None`, none is
-/// fitted. Returns `None` if the rows do not suffice.
+/// Conditions the parameters on the training rows, with a remainder in addition if one is wanted
+/// and predicts better. Returns `None` if the rows do not suffice.
 fn fitted(
     (found, problem): (&Identification, &Problem),
     data: &Dataset,
-    searched: Option<&[(Effect, f64)]>,
+    is_remainder_wanted: bool,
 ) -> Result<Option<Fitted>, IdentifyError> {
     let placement = Placement::of(&data.measurements);
     let model = found.strategy.model(Model::new(problem, &placement.bases, &placement.targets)?);
-    let Some(mut training) = training_rows(found, problem, &model, data) else { return Ok(None) };
-    let effects = searched.unwrap_or_default();
-    training.effects = searched_effects((found, problem), &model, &training.unknowns, effects);
-    let Some(judged) = judge(&training, searched.is_some()) else { return Ok(None) };
+    let Some(training) = training_rows(found, problem, &model, data) else { return Ok(None) };
+    let Some(judged) = judge(&training, is_remainder_wanted) else { return Ok(None) };
     let correction = |conditioned| {
         Correction::new(found, problem, (&training.layout, &training.unknowns), conditioned)
     };
@@ -171,42 +134,7 @@ fn fitted(
     let remainder = judged.remainder.map(correction);
     let residuals = remainder.as_ref().map(|kept| residuals(found, problem, data, kept));
     let residuals = residuals.transpose()?;
-    Ok(Some(Fitted {
-        alone,
-        remainder,
-        replaces_effects: judged.replaces_effects,
-        gain: judged.gain,
-        residuals,
-        is_declared: false,
-    }))
-}
-
-/// Returns the effects that a remainder may replace, with their parameters among the `unknowns` of
-/// the training rows.
-fn searched_effects(
-    (found, problem): (&Identification, &Problem),
-    model: &Model,
-    unknowns: &[usize],
-    searched: &[(Effect, f64)],
-) -> SearchedEffects {
-    let mut effects = SearchedEffects::default();
-    for (effect, ln_odds) in searched {
-        let names: HashSet<String> =
-            effect.parameters(problem).into_iter().map(|parameter| parameter.name).collect();
-        let count = effects.parameters.len();
-        for (column, &k) in unknowns.iter().enumerate() {
-            let parameter = &model.parameters[k];
-            if names.contains(&parameter.name) {
-                // A parameter within the law, such as a time constant, keeps its value.
-                let is_inner = parameter.regressor == Regressor::Inner;
-                effects.parameters.push((column, if is_inner { 0.0 } else { -found.x[k] }));
-            }
-        }
-        if effects.parameters.len() > count {
-            effects.ln_odds += ln_odds;
-        }
-    }
-    effects
+    Ok(Some(Fitted { alone, remainder, gain: judged.gain, residuals, is_declared: false }))
 }
 
 /// Linearises the rows of an identification. Returns `None` if they do not suffice to estimate the

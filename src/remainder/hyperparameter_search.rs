@@ -4,7 +4,6 @@ use super::kernel::Hyperparameters;
 use super::likelihood::MarginalLikelihood;
 use super::noise_likelihood::evidence_of_noise;
 use super::posterior::Training;
-use super::prior::AssumedPrior;
 use super::rows::Rows;
 use super::search::{Minimum, minimise};
 use super::training_rows::TrainingRows;
@@ -20,70 +19,49 @@ const MAX_STEPS: [usize; 2] = [60, 20];
 
 /// Hyperparameters at a local maximum of the marginal likelihood.
 pub(super) struct Searched {
-    pub assumed: AssumedPrior,
     pub hyper: Hyperparameters,
     /// Minimum of the negative log marginal likelihood, in the logarithms of the hyperparameters.
     pub minimum: Minimum,
-    /// Increase of the log marginal likelihood over that of the fit with noise alone.
+    /// Increase of the log marginal likelihood over that of a model with noise alone.
     pub evidence: f64,
 }
 
 /// Returns the marginal likelihood of `rows`, which are a part of the training rows.
-fn likelihood<'a>(
-    training: &'a TrainingRows,
-    assumed: &AssumedPrior,
-    rows: &'a Rows,
-) -> MarginalLikelihood<'a> {
+fn likelihood<'a>(training: &'a TrainingRows, rows: &'a Rows) -> MarginalLikelihood<'a> {
     let shares_noise = training.shares_noise();
     let rows = (rows, &training.layout.inputs);
-    MarginalLikelihood::new(rows, &assumed.prior, shares_noise, assumed.size)
+    MarginalLikelihood::new(rows, &training.prior, shares_noise, training.size)
 }
 
-/// Searches the hyperparameters of the remainder under each assumed prior, and returns the results
-/// that succeed: the one with the largest marginal likelihood times prior odds first.
-pub(super) fn search(training: &TrainingRows) -> Vec<Searched> {
-    let assumed = training.assumed_priors().into_iter();
-    let mut searched: Vec<Searched> =
-        assumed.filter_map(|assumed| search_under(training, assumed)).collect();
-    let ln_posterior = |of: &Searched| of.assumed.ln_odds - of.minimum.value;
-    searched.sort_by(|a, b| ln_posterior(b).total_cmp(&ln_posterior(a)));
-    searched
-}
-
-/// Searches the hyperparameters of the remainder under one prior: local maxima of the marginal likelihood on few
+/// Searches the hyperparameters of the remainder: local maxima of the marginal likelihood on few
 /// rows, one from each start. The optimum that predicts left-out rows best is refined on more rows.
 /// `None` if no search succeeds.
-fn search_under(training: &TrainingRows, assumed: AssumedPrior) -> Option<Searched> {
+pub(super) fn search(training: &TrainingRows) -> Option<Searched> {
     let [few, more] =
         MAX_SEARCH_ROWS.map(|count| training.rows.select(&training.some_rows(count, 0)));
-    let searched = likelihood(training, &assumed, &few);
+    let searched = likelihood(training, &few);
     let value = |x: &_| searched.value_and_gradient(x);
     let bounds = searched.bounds();
     let minima = STARTS.into_iter().filter_map(|lengths| {
         let minimum = minimise(value, (searched.start(lengths), None), &bounds, MAX_STEPS[0])?;
         let hyper = searched.hyperparameters(&minimum.at);
-        Some((left_out_error((training, &assumed), &few, &hyper)?, minimum))
+        Some((left_out_error(training, &few, &hyper)?, minimum))
     });
     let (_, mut minimum) = minima.min_by(|a, b| a.0.total_cmp(&b.0))?;
     if few.len() < more.len() {
-        minimum = refine((training, &assumed), &more, &minimum, few.len())?;
+        minimum = refine(training, &more, &minimum, few.len())?;
     }
     let hyper = searched.hyperparameters(&minimum.at);
     let noise = evidence_of_noise(&more, &training.prior, training.shares_noise(), training.size)?;
     let evidence = -minimum.value - noise;
-    Some(Searched { assumed, hyper, minimum, evidence })
+    Some(Searched { hyper, minimum, evidence })
 }
 
 /// Returns the optimum of the marginal likelihood of `rows`. The search starts at the optimum
 /// `near` of another selection of `count` training rows. `None` if the likelihood cannot be
 /// evaluated there.
-fn refine(
-    (training, assumed): (&TrainingRows, &AssumedPrior),
-    rows: &Rows,
-    near: &Minimum,
-    count: usize,
-) -> Option<Minimum> {
-    let refined = likelihood(training, assumed, rows);
+fn refine(training: &TrainingRows, rows: &Rows, near: &Minimum, count: usize) -> Option<Minimum> {
+    let refined = likelihood(training, rows);
     let inverse = &near.inverse * (count as f64 / rows.len() as f64);
     let value = |x: &_| refined.value_and_gradient(x);
     minimise(value, (near.at.clone(), Some(inverse)), &refined.bounds(), MAX_STEPS[1])
@@ -92,24 +70,20 @@ fn refine(
 /// Returns the hyperparameters fitted to `rows`, a part of the training rows. The search starts at
 /// the optimum `near` of the search over all of them. `None` if the likelihood cannot be evaluated.
 pub(super) fn search_near(
-    (training, assumed): (&TrainingRows, &AssumedPrior),
+    training: &TrainingRows,
     rows: &Rows,
     near: &Minimum,
 ) -> Option<Hyperparameters> {
-    let minimum = refine((training, assumed), rows, near, training.rows.len())?;
-    Some(likelihood(training, assumed, rows).hyperparameters(&minimum.at))
+    let minimum = refine(training, rows, near, training.rows.len())?;
+    Some(likelihood(training, rows).hyperparameters(&minimum.at))
 }
 
 /// Returns the mean error length \[m\] of rows that are predicted without their configuration;
 /// `None` if a matrix is not positive definite because of rounding.
-fn left_out_error(
-    (training, assumed): (&TrainingRows, &AssumedPrior),
-    rows: &Rows,
-    hyper: &Hyperparameters,
-) -> Option<f64> {
+fn left_out_error(training: &TrainingRows, rows: &Rows, hyper: &Hyperparameters) -> Option<f64> {
     let centres: Vec<usize> = (0..rows.len()).collect();
     let inputs = &training.layout.inputs;
-    let conditioned = Training::new((rows, inputs), &assumed.prior, hyper, &centres)?;
+    let conditioned = Training::new((rows, inputs), &training.prior, hyper, &centres)?;
     let left_out = conditioned.without_each(&rows.configuration, &centres)?;
     Some(left_out.iter().map(|row| row.error.norm()).sum::<f64>() / rows.len() as f64)
 }

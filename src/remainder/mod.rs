@@ -51,7 +51,7 @@ pub use self::{
     bounds::Bounds,
     compensation::{Compensation, CompensationError, TargetFrame},
     declared::{declared, of_estimate},
-    fit::{fit_beside, uncertainty},
+    fit::uncertainty,
     saved::SavedRemainderError,
 };
 pub(crate) use rows::InputSource;

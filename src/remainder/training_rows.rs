@@ -3,8 +3,7 @@
 use rand::seq::SliceRandom as _;
 
 use super::kernel::Hyperparameters;
-use super::posterior::Training;
-use super::prior::{AssumedPrior, ParameterPrior, SearchedEffects};
+use super::prior::ParameterPrior;
 use super::rows::{AXES, Layout, Rows};
 use crate::random::stream;
 
@@ -27,8 +26,6 @@ pub(super) struct TrainingRows {
     pub unknowns: Vec<usize>,
     pub rows: Rows,
     pub prior: ParameterPrior,
-    /// Effects that a remainder may replace.
-    pub effects: SearchedEffects,
     /// Root mean square length of a residual \[m\].
     pub size: f64,
     /// Row indices of each configuration.
@@ -47,38 +44,10 @@ impl TrainingRows {
     ) -> Self {
         let size = (rows.residual.norm_squared() / rows.len().max(1) as f64).sqrt();
         let configurations = rows.configurations();
-        let (effects, judged) = (SearchedEffects::default(), Vec::new());
-        let mut training =
-            Self { layout, unknowns, rows, prior, effects, size, configurations, judged };
+        let judged = Vec::new();
+        let mut training = Self { layout, unknowns, rows, prior, size, configurations, judged };
         training.judged = training.some_rows(MAX_JUDGED_ROWS, 3);
         training
-    }
-
-    /// Returns the priors under which a remainder is searched: that of the fit and, if there are
-    /// searched effects, one without them.
-    pub fn assumed_priors(&self) -> Vec<AssumedPrior> {
-        let as_fitted = AssumedPrior {
-            prior: self.prior.clone(),
-            size: self.size,
-            ln_odds: self.effects.ln_odds,
-            replaces_effects: false,
-        };
-        [Some(as_fitted), self.without_effects()].into_iter().flatten().collect()
-    }
-
-    /// Returns the prior that holds the searched effects at zero; `None` if there are none, or if a
-    /// matrix is not positive definite because of rounding.
-    fn without_effects(&self) -> Option<AssumedPrior> {
-        if self.effects.parameters.is_empty() {
-            return None;
-        }
-        let prior = self.prior.holding(&self.effects.parameters);
-        let rows = (&self.rows, &self.layout.inputs);
-        let refitted = Training::new(rows, &prior, &self.noise(), &[0])?.posterior;
-        let errors = refitted.left_out(&self.rows);
-        let squares = errors.iter().map(|row| row.error.norm_squared()).sum::<f64>();
-        let size = (squares / errors.len() as f64).sqrt();
-        Some(AssumedPrior { prior, size, ln_odds: 0.0, replaces_effects: true })
     }
 
     /// Returns at most `count` rows at random, in whole configurations; more only if a single

@@ -33,13 +33,8 @@ pub fn remainder_text(found: &Identification, outcome: &Outcome) -> String {
     match after {
         Some(after) => format!(
             "A remainder (smooth correction) at {} is kept, because it improves the prediction of poses left out of its fit: the mean \
-             error of left-out configurations falls from {without} mm to {with} mm, that of held-out poses goes from {before} mm to {after} mm.{}",
+             error of left-out configurations falls from {without} mm to {with} mm, that of held-out poses goes from {before} mm to {after} mm.",
             counted(outcome.joints, "joint"),
-            if outcome.replaces_effects {
-                " It corrects in place of the effects that were found, because it explains the same errors with a larger marginal likelihood."
-            } else {
-                ""
-            },
         ),
         None => format!(
             "No remainder (smooth correction) is kept, because it {predicts}: mean error \

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use flexcal::fit::{Identification, Options, Placement, SavedEstimate, identify};
 use flexcal::measurement::{Dataset, Measurements};
-use flexcal::problem::{Effect, Problem};
+use flexcal::problem::Problem;
 use flexcal::remainder::{self, Bounds, Correction, Fitted};
 use flexcal::results::{Document as _, IdentificationResult};
 use flexcal::rig::{Truth, simulate};
@@ -28,36 +28,15 @@ fn panda() -> Problem {
     Problem::read(&path("problems/panda")).unwrap()
 }
 
-/// Panda whose second joint has an effect that a search may have added: a harmonic of `order`.
-fn with_harmonic(order: u32) -> (Problem, Effect) {
-    let file = path("problems/panda/problem.toml");
-    let text = std::fs::read_to_string(&file).unwrap();
-    let declared =
-        format!("{text}\n[[effect]]\njoint-harmonic = {{ joint = 2, orders = [{order}] }}\n");
-    let problem = Problem::parse(&declared, &file).unwrap();
-    let effect = problem.effects[0].effect.clone();
-    (problem, effect)
-}
-
 /// Rows of an arm whose second and fourth joints err by `size` sin(5 q) [rad].
 fn measured(problem: &Problem, size: f64, seed: u64) -> Dataset {
-    measured_with(problem, seed, [1, 3].as_slice(), |q| size * (5.0 * q).sin())
-}
-
-/// Rows of an arm of which some joints err by a function of their command [rad].
-fn measured_with(
-    problem: &Problem,
-    seed: u64,
-    joints: &[usize],
-    error: impl Fn(f64) -> f64,
-) -> Dataset {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut rows = at_random(problem, 2 * FITTED, 1.0, &mut rng);
     let mut moved = rows.clone();
     let n = moved.joints;
     for configuration in moved.configurations.chunks_mut(n) {
-        for &joint in joints {
-            configuration[joint] += error(configuration[joint]);
+        for joint in [1, 3] {
+            configuration[joint] += size * (5.0 * configuration[joint]).sin();
         }
     }
     let x = DVector::zeros(model_of(problem, &rows).parameters.len());
@@ -112,49 +91,6 @@ fn smooth_errors_of_joints_are_corrected_and_bounded() {
     assert!(
         far.is_extrapolated && far.shift.norm() < 1e-5 && far.size > 2.0 * bounds.poses[0].size
     );
-}
-
-#[test]
-fn a_remainder_replaces_a_searched_effect_unless_the_effect_is_its_law() {
-    let declared = panda();
-    let (problem, effect) = with_harmonic(3);
-    let searched = [(effect, -8.0)];
-    // The joint errs by bumps, which one harmonic fits in part.
-    let data = measured_with(&declared, 1, &[1, 3], |q| 4e-4 * (-(3.0 * (q - 0.3)).powi(2)).exp());
-    let plain = fitted(&declared, &data).1.residuals.unwrap().errors.held_out.mean.norm;
-    let found = identify(&problem, &data, &Options::default()).unwrap();
-    let beside = remainder::fit_beside(&found, &problem, &data, &searched).unwrap().unwrap();
-    let corrected = beside.residuals.as_ref().unwrap();
-    let replaced = corrected.errors.held_out.mean.norm;
-    assert!(beside.replaces_effects && replaced < 1.1 * plain, "{replaced} {plain}");
-    // The file holds the effect at zero.
-    let file = Path::new("remainder.json");
-    let text = beside.remainder.as_ref().unwrap().to_json();
-    let json: Value = serde_json::from_str(&text).unwrap();
-    let held = json["parameters"].as_array().unwrap().iter();
-    let held = held.filter(|parameter| parameter["name"].as_str().unwrap().starts_with("joint-"));
-    let left = |parameter: &Value| {
-        let name = parameter["name"].as_str().unwrap();
-        let estimate = found.estimates.iter().find(|estimate| estimate.name == name).unwrap();
-        (parameter["change"].as_f64().unwrap() + estimate.estimate).abs()
-    };
-    assert!(held.clone().count() == 2 && held.map(left).all(|left| left < 1e-8));
-    let read = Correction::parse(&text, file).unwrap();
-    let json =
-        IdentificationResult::new(&problem, &found).with_predictions(&found, &beside).to_json();
-    let saved = SavedEstimate::parse(&json, Path::new("estimate.json")).unwrap();
-    let rows = &data.measurements;
-    let own = remainder::predict(&problem, &saved, &read, rows, None).unwrap();
-    for (predicted, fitted) in own.prediction.residuals.unwrap().iter().zip(&corrected.rows) {
-        assert!((predicted.position - fitted.position).norm() < 1e-9);
-    }
-    // Where the effect is the law, it stays as fitted.
-    let (problem, effect) = with_harmonic(5);
-    let data = measured_with(&declared, 1, &[1], |q| 3e-4 * (5.0 * q).sin());
-    let found = identify(&problem, &data, &Options::default()).unwrap();
-    let beside = remainder::fit_beside(&found, &problem, &data, &[(effect, -8.0)]).unwrap();
-    let beside = beside.unwrap();
-    assert!(!beside.replaces_effects && beside.remainder.is_none(), "{:?}", beside.gain);
 }
 
 #[test]

@@ -67,12 +67,6 @@ pub struct ClosedLoop {
 }
 
 impl ClosedLoop {
-    /// Returns the effects that were found, each with ln of the prior odds that it acts.
-    #[doc(hidden)]
-    pub fn searched_effects(&self) -> Vec<(Effect, f64)> {
-        self.effects.iter().map(|found| (found.effect.clone(), found.ln_odds)).collect()
-    }
-
     /// Returns the effects that round `k` (from 0) added to the model, and those that it removed.
     pub(crate) fn changes_of_round(&self, k: usize) -> (Vec<&Effect>, Vec<&Effect>) {
         let before = k.checked_sub(1).map_or(&[][..], |last| self.rounds[last].effects.as_slice());

@@ -40,9 +40,6 @@ pub struct Found {
     /// p-value of the F test of the fit against the fit without the effect, times the number of
     /// candidates tried.
     pub p_value: f64,
-    /// Logarithm of the prior odds that the effect acts: one of all candidates of its family, and
-    /// one of all families.
-    pub(super) ln_odds: f64,
     /// Estimates of the effect's parameters, fitted together with all others.
     pub estimates: Vec<Estimate>,
     /// Effects that the data cannot distinguish from the found one, best first, each with the
@@ -92,8 +89,7 @@ pub(super) fn found(
             state.rounds.iter().find(|round| holds(round) && round.effects.iter().all(stays));
         round.map_or(fitted.found.fitted.held_out, |round| round.held_out)
     };
-    let found_effect = |(effect, (p_value, ln_odds)): (Effect, (f64, f64)),
-                        subsets: &[SubsetEvidence]| {
+    let found_effect = |(effect, p_value): (Effect, f64), subsets: &[SubsetEvidence]| {
         let alternatives = best.map_or_else(Vec::new, |(evidence, _)| {
             alternatives(evidence, &effect, &parts, MIN_ALTERNATIVE_ODDS)
         });
@@ -174,7 +170,6 @@ pub(super) fn found(
             status_of_any: status_at(if rival.is_some() { Some(of_class) } else { law }),
             claims,
             p_value,
-            ln_odds,
             estimates: fitted
                 .parameters_of(&effect)
                 .into_iter()
@@ -202,13 +197,9 @@ pub(super) fn found(
 }
 
 /// Returns, for each effect of a fit, the p-value of the F test of the fit against the fit without
-/// the effect, times the number of candidates tried, and ln of the prior odds that the effect acts.
-/// For a harmonic that is no periodic error with many orders, they are the smallest p-value of its
-/// orders and the product of their odds.
-///
-/// The prior is that of the evidence: equal for all families and for the candidates within one, and
-/// a half for each further effect.
-fn p_values(state: &SearchState, fitted: &Fitted, effects: &[Effect]) -> Vec<(f64, f64)> {
+/// the effect, times the number of candidates tried. For a harmonic that is no periodic error with
+/// many orders, it is the smallest p-value of its orders.
+fn p_values(state: &SearchState, fitted: &Fitted, effects: &[Effect]) -> Vec<f64> {
     let fit = fitted.neighbourhood_at_rows(state.data);
     let tested: Vec<Vec<Effect>> =
         effects
@@ -229,24 +220,17 @@ fn p_values(state: &SearchState, fitted: &Fitted, effects: &[Effect]) -> Vec<(f6
     let mut tries_left = all_tries[first..].iter();
     let (squares, dof) = (fit.sums().squares, fit.sums().freedom());
     let p_value = |effect: &Effect| {
-        let tries: Vec<f64> = tries_left.by_ref().take(effect.parts().len()).copied().collect();
-        let fewest = tries.iter().copied().fold(f64::INFINITY, f64::min).max(1.0);
-        let ln_odds = -(2.0 * fewest * families as f64).ln();
-        let tries = tries.iter().sum::<f64>() * families as f64;
+        let tries = tries_left.by_ref().take(effect.parts().len()).sum::<f64>() * families as f64;
         let k = fitted.parameters_of(effect).len();
         let lost = fit.loss_without(&fitted.unknowns_of(effect));
         let ratio = lost.map(|lost| lost / k as f64 / (squares / dof)).filter(|f| !f.is_nan());
         let chance = FisherSnedecor::new(k as f64, dof).ok().zip(ratio);
         let p = chance.map_or(1.0, |(chance, ratio)| chance.sf(ratio).max(f64::MIN_POSITIVE));
-        ((p * tries).min(1.0), ln_odds)
+        (p * tries).min(1.0)
     };
-    let by_part: Vec<(f64, f64)> = tested.iter().flatten().map(p_value).collect();
+    let by_part: Vec<f64> = tested.iter().flatten().map(p_value).collect();
     let mut by_part = by_part.into_iter();
-    let of_effect = |parts: &Vec<Effect>| {
-        let parts = by_part.by_ref().take(parts.len());
-        parts.fold((1.0, 0.0), |(p, ln_odds), part| (f64::min(p, part.0), ln_odds + part.1))
-    };
-    tested.iter().map(of_effect).collect()
+    tested.iter().map(|parts| by_part.by_ref().take(parts.len()).fold(1.0, f64::min)).collect()
 }
 
 /// Returns the claims about an effect. For a harmonic of fewer than [`MIN_SEVERAL_ORDERS`] orders
