@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use flexcal::fit::{Finding, FindingCode, Identification, SavedEstimate};
-use flexcal::problem::{PoseRanges, Problem};
+use flexcal::problem::{Fixture, PoseRanges, Problem};
 use flexcal::report::{self, shell_word};
 use flexcal::results::{LoopResult, TraceResult, exceeds_noise};
 use flexcal::select::Verdict;
@@ -132,7 +132,7 @@ pub fn after_fit(
 
 /// Returns true if all fitted poses are alike, not only the values of some joints.
 fn are_alike(narrow: &Finding) -> bool {
-    narrow.remedy != FindingCode::NarrowPoses.entry().remedy
+    narrow.value("alike").is_some_and(|alike| alike == true)
 }
 
 /// Returns true if a misreading leaves more than noise, so that it explains the misfit in part only.
@@ -253,7 +253,29 @@ fn to_export(common: &Common, problem: &Problem, estimate: &Path) -> String {
     let export = format!("flexcal export {named} --estimate {estimate}");
     match problem.urdf {
         Some(_) => format!("{export} --urdf ARM.urdf writes the calibrated URDF"),
-        None => format!("{export} --format opencv writes the camera with its pose"),
+        None => {
+            let cameras: Vec<&Fixture> =
+                problem.fixtures.iter().filter(|fixture| fixture.kind.word() == "camera").collect();
+            let export = match cameras.as_slice() {
+                [first, _, ..] => {
+                    format!(
+                        "{export} --format opencv --camera {}",
+                        shell_word(Path::new(&first.name))
+                    )
+                }
+                _ => format!("{export} --format opencv"),
+            };
+            let lacks_size = cameras.first().is_some_and(|camera| camera.image.is_none());
+            let add = if lacks_size {
+                format!(
+                    "add image_px = [width, height] to [[camera]] in {}, then ",
+                    common.problem_file().display()
+                )
+            } else {
+                String::new()
+            };
+            format!("{add}{export} writes the camera with its pose")
+        }
     }
 }
 

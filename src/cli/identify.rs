@@ -195,14 +195,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let mut texts = vec![("estimate.json", json.as_str()), ("residuals.csv", residuals.as_str())];
     texts.extend(file.as_ref().map(|text| (REMAINDER_FILE, text.as_str())));
     interrupt::begin_writing();
-    let kept = results.keep_estimate(&json)?;
     results.write_report(&texts, &told)?;
-    if let (Some(kept), false) = (kept, common.quiet) {
-        diagnostic::warn(&format!(
-            "the trusted estimate of other rows in the same folder is kept as {}; name another folder with --out",
-            kept.display()
-        ));
-    }
     let sources = sources.as_ref().map(report::joint_sources_text);
     let outcome =
         diagnostic::report_fit_once(&identification, (common.quiet, common.prints_text()));

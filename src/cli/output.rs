@@ -7,7 +7,6 @@ use std::time::Duration;
 
 use flexcal::error::{escape_hidden, is_hidden};
 use flexcal::files::{FolderLock, FolderRecord, StagedFile, same_file};
-use flexcal::fit::SavedEstimate;
 use flexcal::report::{Report, is_figure};
 
 use super::{diagnostic, interrupt};
@@ -38,7 +37,7 @@ pub enum WriteError {
     )]
     Input { path: PathBuf },
     #[error(
-        "{} is there already, and flexcal did not write it or it was changed since; name another place with --out, or replace the file with --force", path.display()
+        "{} exists and was not written by flexcal, or was changed since; name another place with --out, or replace the file with --force", path.display()
     )]
     Foreign { path: PathBuf },
 }
@@ -194,27 +193,6 @@ impl Results {
             ));
         }
         Ok(())
-    }
-
-    /// Copies a trusted estimate of other rows in the folder to a name that is unused, before it is
-    /// replaced by the estimate in `json`. Returns the path of the copy; `None` if nothing is to be
-    /// kept.
-    pub fn keep_estimate(&self, json: &str) -> Result<Option<PathBuf>, WriteError> {
-        let path = self.path("estimate.json");
-        if self.force || !path.is_file() {
-            return Ok(None);
-        }
-        let both = (SavedEstimate::read(&path), SavedEstimate::parse(json, &path));
-        let (Ok(earlier), Ok(new)) = both else { return Ok(None) };
-        let fitted = &earlier.posterior.fitted_rows;
-        let is_of_others = !fitted.is_empty() && fitted.is_disjoint(&new.posterior.fitted_rows);
-        if !earlier.trusted || !is_of_others {
-            return Ok(None);
-        }
-        let mut names = (1..).map(|number| self.path(&format!("estimate.earlier-{number}.json")));
-        let Some(kept) = names.find(|name| !name.exists()) else { return Ok(None) };
-        fs::copy(&path, &kept).map_err(|source| WriteError::Io { path: kept.clone(), source })?;
-        Ok(Some(kept))
     }
 
     /// Returns the first of the files `texts` that another command wrote, a report before other

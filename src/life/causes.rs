@@ -327,8 +327,8 @@ impl Extended {
         cause.columns.iter().any(|&k| k < self.declared)
     }
 
-    /// Returns the causes without those whose parameters are all held, if a placement with free parameters can
-    /// move the rows in the same way. The placement gets the prior probability of that cause,
+    /// Returns the causes without those whose parameters are all held, if the moves of a placement with
+    /// free parameters are exactly theirs. The placement gets the prior probability of that cause,
     /// because the rows cannot distinguish the two. With pixels alone, for example, a held base and
     /// a free board in the world are one unknown.
     fn merged_held_causes(&self, mut causes: Vec<Cause>, rows: &SensitiveRows) -> Vec<Cause> {
@@ -343,7 +343,11 @@ impl Extended {
             .collect();
         let mut merged: Vec<(usize, usize)> = Vec::new();
         for (held, cause) in causes.iter().enumerate().filter(|(_, cause)| self.is_held(cause)) {
-            let twin = spaces.iter().find(|(_, space)| space.contains(rows, &cause.columns));
+            let own = ColumnSpace::new(rows, &cause.columns);
+            let is_twin = |space: &ColumnSpace| {
+                space.basis.ncols() == own.basis.ncols() && space.contains(rows, &cause.columns)
+            };
+            let twin = spaces.iter().find(|(_, space)| is_twin(space));
             merged.extend(twin.map(|(place, _)| (held, *place)));
         }
         for &(held, twin) in &merged {

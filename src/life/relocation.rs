@@ -3,7 +3,7 @@
 //! Tests for small changes are linear in the parameters, which fails for a board that was put down
 //! elsewhere. The pose of such a placement is fitted to the rows without its earlier value.
 
-use nalgebra::DVector;
+use nalgebra::{DVector, Rotation3, Vector3};
 
 use super::rows::SensitiveRows;
 use crate::fit::register;
@@ -30,6 +30,23 @@ pub(super) struct Placed {
     pub parameters: Vec<usize>,
     /// True for a base, false for a camera or marker.
     pub is_base: bool,
+}
+
+impl Placed {
+    /// Returns the move of the placement from the full parameter vector `before` to `after`: the
+    /// shift \[m\], and the rotation vector of the turn \[rad\], both in the frame in which the pose is
+    /// declared. Differences of rotation vectors are no turns.
+    pub fn moved(&self, model: &Model, before: &DVector<f64>, after: &DVector<f64>) -> Vec<f64> {
+        let pose = |x: &DVector<f64>| -> Vec<f64> {
+            self.parameters.iter().map(|&k| model.parameters[k].value(x[k])).collect()
+        };
+        let rotation =
+            |pose: &[f64]| Rotation3::from_scaled_axis(Vector3::new(pose[3], pose[4], pose[5]));
+        let (old, new) = (pose(before), pose(after));
+        let turn = (rotation(&new) * rotation(&old).inverse()).scaled_axis();
+        let shift = new.iter().zip(&old).take(3).map(|(new, old)| new - old);
+        shift.chain(turn.iter().copied()).collect()
+    }
 }
 
 /// Returns true if a parameter is a coordinate of the pose of a base, camera or marker, or of the

@@ -260,8 +260,15 @@ impl TestedRows<'_> {
             let moved = assessed.causes.iter().find(is_moved)?;
             let is_explained = gain > linear && evidence < threshold;
             let mut watched = at_place.reporter(leads).cause(moved, None);
-            for (change, &k) in watched.changes.iter_mut().zip(&placed.parameters) {
-                change.change += at_place.extended.x[k] - x[k];
+            let mut after = at_place.extended.x.clone();
+            for (change, &k) in watched.changes.iter().zip(&placed.parameters) {
+                after[k] += change.change;
+            }
+            let moves = placed.moved(self.model, x, &after);
+            for (axis, (change, moved)) in watched.changes.iter_mut().zip(moves).enumerate() {
+                change.change = moved;
+                // The standard errors are those of the components of a rotation vector.
+                change.std_error = if axis < 3 { change.std_error } else { f64::NAN };
             }
             watched.probability = 1.0 / (1.0 + SECOND_CHANGE_ODDS * evidence.exp());
             is_explained.then_some((gain, watched))

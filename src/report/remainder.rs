@@ -129,7 +129,7 @@ impl PredictionAccuracy {
 /// Probability of as many exceeded bounds by chance below which a text says that there are too many.
 const MIN_CHANCE_OF_EXCESS: f64 = 0.01;
 
-/// States how many of the held-out positions exceed their own bound, if these are too many for bounds
+/// States how many of the held-out configurations exceed their own bound, if these are too many for bounds
 /// that hold with the probability `level` and rest on `fitted` poses; otherwise empty.
 fn held_out_share((within, of): (usize, usize), level: f64, fitted: usize) -> String {
     let beyond = of - within;
@@ -141,8 +141,8 @@ fn held_out_share((within, of): (usize, usize), level: f64, fitted: usize) -> St
     }
     let expected = number((1.0 - level) * of as f64, 1);
     format!(
-        " But {beyond} of {of} held-out positions exceed their own bound, and chance explains {expected}: such poses err more than \
-         the bound says."
+        " But {beyond} of {of} held-out positions exceed their own bound, and chance explains {expected}: predictions at such poses err \
+         more than the bound says."
     )
 }
 
@@ -215,7 +215,7 @@ mod tests {
         let words = |within| held_out_share(within, 0.95, 28);
         assert_eq!([(50, 50), (41, 50), (0, 0)].map(words), [""; 3]);
         let said = words((16, 50));
-        assert!(said.starts_with(" But 34 of 50 held-out positions exceed"), "{said}");
+        assert!(said.starts_with(" But 34 of 50 held-out configurations exceed"), "{said}");
         assert!((chance_of_excess((0, 50), 0.95, 28) - 1.0).abs() < 1e-12);
     }
 }

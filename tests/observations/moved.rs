@@ -62,6 +62,9 @@ fn a_board_that_was_put_down_again_is_named_and_leaves_the_arm() {
         let watched = watch(problem, &estimate, &rows, (0.0, 0.01)).unwrap();
         assert!(watched.is_changed(), "{shift}");
         assert_eq!(watched.causes[0].label, "marker[board]", "{shift} {:?}", watched.causes);
+        let changes = &watched.causes[0].changes;
+        let turned = changes.iter().find(|change| change.parameter == "marker[board].rz").unwrap();
+        assert!((turned.change - turn).abs() < 0.1 * turn + 1e-3, "{turn} {changes:?}");
         let is_base = |kind: CauseKind| kind == CauseKind::Base;
         assert!(!watched.causes.iter().any(|cause| is_base(cause.kind)), "{shift}");
         let split = Split { identification: (0..rows.len()).collect(), held_out: Vec::new() };

@@ -144,9 +144,9 @@ finding_codes! {
     PriorsDecide: Warning "priors-decide" ["poses", "coordinates", "parameters"]
         "The poses measure fewer coordinates than parameters are fitted, so that priors decide part of the result.",
         "measure more different poses";
-    NarrowPoses: Warning "narrow-poses" ["columns"]
+    NarrowPoses: Warning "narrow-poses" ["columns", "alike"]
         "A joint stands still in all fitted rows, or no joint turns by more than 10°, so that the fit says little about other poses.",
-        "if other values are used, measure poses in which all joints move (flexcal plan chooses them)";
+        "if the arm will move beyond these values, measure poses in which all joints move (flexcal plan chooses them)";
     NominalFarOff: Warning "nominal-far-off" ["kind", "rms", "spread", "explanations"]
         "The nominal arm misses the measurements by more than a tenth of their spread.",
         "check units, signs of joints, and whether the numbers are of this convention of frames";

@@ -13,6 +13,8 @@ const MAX_ALIKE_TURN: f64 = 10.0 * std::f64::consts::PI / 180.0;
 /// Largest range of the commands of a sliding joint at which all poses are alike, relative to the
 /// reach of the arm.
 const MAX_ALIKE_TRAVEL: f64 = 0.05;
+/// Largest distance from the axis of the last joint at which a target stays where it is \[m\].
+const MAX_OFF_AXIS: f64 = 1e-3;
 /// Minimum number of rows from which the range is judged.
 const MIN_ROWS: usize = 3;
 
@@ -59,11 +61,15 @@ impl Check for PosesSpread {
                  these poses only",
                 least.join(" or ")
             );
-            let finding = Finding::new(FindingCode::NarrowPoses, [json!(names)], text);
+            let finding = Finding::new(FindingCode::NarrowPoses, [json!(names), true.into()], text);
             return vec![finding.with_remedy(measure.to_owned())];
         }
         // A target on the axis of the last joint stays where it is.
-        joints.pop();
+        let tool = &fit.problem.tool;
+        let is_on_axis = fit.problem.targets.is_empty() && tool.target.xy().norm() < MAX_OFF_AXIS;
+        if joints.last() != Some(&tool.joint) || is_on_axis {
+            joints.pop();
+        }
         let still = still_joints(fit, &rows, &joints);
         let Some(&first) = still.first() else { return Vec::new() };
         let names: Vec<String> = still.iter().map(|&joint| column_name(table, joint)).collect();
@@ -79,6 +85,6 @@ impl Check for PosesSpread {
              more than their bound",
             names.join(", ")
         );
-        vec![Finding::new(FindingCode::NarrowPoses, [json!(names)], text)]
+        vec![Finding::new(FindingCode::NarrowPoses, [json!(names), false.into()], text)]
     }
 }

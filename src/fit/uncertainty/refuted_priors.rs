@@ -88,6 +88,7 @@ pub(in crate::fit) fn refuted_priors(
         return Vec::new();
     }
     let mut best = declared;
+    let declared_deviance = declared.deviance;
     let mut order = Vec::new();
     // Each pass widens the rule with the largest gain.
     loop {
@@ -135,7 +136,8 @@ pub(in crate::fit) fn refuted_priors(
             else {
                 break;
             };
-            if found.deviance - best.deviance > by_chance() {
+            let is_refuted = declared_deviance - found.deviance >= REJECTION_FACTOR * by_chance();
+            if found.deviance - best.deviance > by_chance() || !is_refuted {
                 break;
             }
             (factors[place], best) = (1.0, found);

@@ -1,5 +1,7 @@
 //! Error bounds of predictions over the workspace, and the joint errors that a remainder corrects.
 
+use std::collections::BTreeMap;
+
 use nalgebra::Vector3;
 use rand::RngExt as _;
 
@@ -120,8 +122,8 @@ impl Uncertainty {
     }
 }
 
-/// Returns the number of held-out positions whose error does not exceed its bound, and the number of
-/// those that have one.
+/// Returns the number of held-out configurations whose mean position error does not exceed their
+/// bound, and the number of those that have one.
 fn within_bounds(
     (found, problem): (&Identification, &Problem),
     data: &Dataset,
@@ -137,8 +139,17 @@ fn within_bounds(
     let (positions, corrected) = predict_identified(found, problem, fitted.correction(), &rows)?;
     let bounds = Bounds::new(fitted.correction(), corrected, BOUND_LEVEL);
     let errors = positions.iter().zip(&rows.positions).map(|(at, measured)| (measured - at).norm());
-    let pairs = errors.enumerate().map(|(pose, error)| (error, bounds.bound(pose)));
-    let known: Vec<(f64, f64)> =
-        pairs.filter(|(error, bound)| error.is_finite() && bound.is_finite()).collect();
-    Ok((known.iter().filter(|(error, bound)| error <= bound).count(), known.len()))
+    // Repeats of a configuration err alike, so each counts once with its mean error.
+    let mut of_configuration: BTreeMap<Vec<u64>, Vec<(f64, f64)>> = BTreeMap::new();
+    for (pose, error) in errors.enumerate() {
+        let bound = bounds.bound(pose);
+        if error.is_finite() && bound.is_finite() {
+            let key = rows.configuration(pose).iter().map(|q| q.to_bits()).collect();
+            of_configuration.entry(key).or_default().push((error, bound));
+        }
+    }
+    let is_within = |repeats: &&Vec<(f64, f64)>| {
+        repeats.iter().map(|(error, bound)| error - bound).sum::<f64>() <= 0.0
+    };
+    Ok((of_configuration.values().filter(is_within).count(), of_configuration.len()))
 }

@@ -146,9 +146,9 @@ impl fmt::Display for MassScale {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             // Weights in newtons are nearly ten times as large as masses in kilograms.
-            Self::Power(-1) => {
-                f.write_str("to be multiplied by 0.1, or by 1/9.81 if they are weights in newtons")
-            }
+            Self::Power(-1) => f.write_str(
+                "to be multiplied by 0.1, or divided by 9.81 if weights in newtons were written",
+            ),
             Self::Power(power) => write!(f, "to be multiplied by {}", power_of_ten(*power)),
             Self::Pounds => f.write_str("in pounds, declared as kilograms"),
             Self::Newtons => f.write_str("a weight in newtons, declared as kilograms"),
