@@ -31,8 +31,8 @@ pub struct Uncertainty {
     pub bounds: Vec<BoundAt>,
     /// Errors of the joints that a remainder corrects; empty without a remainder.
     pub joints: Vec<JointError>,
-    /// Number of held-out positions whose error does not exceed its bound, and number of those that
-    /// have one.
+    /// Number of held-out configurations whose mean error does not exceed their bound, and number of
+    /// those that have one.
     pub within: (usize, usize),
 }
 
