@@ -327,10 +327,10 @@ impl Extended {
         cause.columns.iter().any(|&k| k < self.declared)
     }
 
-    /// Returns the causes without those whose parameters are all held, if the moves of a placement with
-    /// free parameters are exactly theirs. The placement gets the prior probability of that cause,
-    /// because the rows cannot distinguish the two. With pixels alone, for example, a held base and
-    /// a free board in the world are one unknown.
+    /// Returns the causes without those whose parameters are all held, if the moves of a placement
+    /// with free parameters are exactly theirs. The placement gets the prior probability of that
+    /// cause, because the rows cannot distinguish the two. With pixels alone, for example, a held
+    /// base and a free board in the world are one unknown.
     fn merged_held_causes(&self, mut causes: Vec<Cause>, rows: &SensitiveRows) -> Vec<Cause> {
         let is_placement = |cause: &Cause| {
             matches!(cause.kind, CauseKind::Base | CauseKind::Fixture | CauseKind::Tool)

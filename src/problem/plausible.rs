@@ -308,7 +308,8 @@ impl Problem {
         })
     }
 
-    /// Returns a warning if a target, or the payload, is farther from its frame than twice the length of the arm.
+    /// Returns a warning if a target, or the payload, is farther from its frame than twice the length
+    /// of the arm.
     fn far_target_warning(&self) -> Option<Warning> {
         let tool_location = |key: &str| Location {
             line: None,
