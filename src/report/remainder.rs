@@ -141,7 +141,7 @@ fn held_out_share((within, of): (usize, usize), level: f64, fitted: usize) -> St
     }
     let expected = number((1.0 - level) * of as f64, 1);
     format!(
-        " But {beyond} of {of} held-out positions exceed their own bound, and chance explains {expected}: predictions at such poses err \
+        " But {beyond} of {of} held-out configurations exceed their own bound, and chance explains {expected}: predictions at such poses err \
          more than the bound says."
     )
 }
