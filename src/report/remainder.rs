@@ -129,8 +129,8 @@ impl PredictionAccuracy {
 /// Probability of as many exceeded bounds by chance below which a text says that there are too many.
 const MIN_CHANCE_OF_EXCESS: f64 = 0.01;
 
-/// States how many of the held-out configurations exceed their own bound, if these are too many for bounds
-/// that hold with the probability `level` and rest on `fitted` poses; otherwise empty.
+/// States how many of the held-out configurations exceed their own bound, if these are too many for
+/// bounds that hold with the probability `level` and rest on `fitted` poses; otherwise empty.
 fn held_out_share((within, of): (usize, usize), level: f64, fitted: usize) -> String {
     let beyond = of - within;
     if beyond == 0 {
