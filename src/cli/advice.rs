@@ -251,32 +251,23 @@ fn measures_no_position(problem: &Problem) -> bool {
 fn to_export(common: &Common, problem: &Problem, estimate: &Path) -> String {
     let [named, estimate] = [common.problem(), estimate].map(shell_word);
     let export = format!("flexcal export {named} --estimate {estimate}");
-    match problem.urdf {
-        Some(_) => format!("{export} --urdf ARM.urdf writes the calibrated URDF"),
-        None => {
-            let cameras: Vec<&Fixture> =
-                problem.fixtures.iter().filter(|fixture| fixture.kind.word() == "camera").collect();
-            let export = match cameras.as_slice() {
-                [first, _, ..] => {
-                    format!(
-                        "{export} --format opencv --camera {}",
-                        shell_word(Path::new(&first.name))
-                    )
-                }
-                _ => format!("{export} --format opencv"),
-            };
-            let lacks_size = cameras.first().is_some_and(|camera| camera.image.is_none());
-            let add = if lacks_size {
-                format!(
-                    "add image_px = [width, height] to [[camera]] in {}, then ",
-                    common.problem_file().display()
-                )
-            } else {
-                String::new()
-            };
-            format!("{add}{export} writes the camera with its pose")
-        }
+    if problem.urdf.is_some() {
+        return format!("{export} --urdf ARM.urdf writes the calibrated URDF");
     }
+    let cameras = problem.fixtures.iter().filter(|fixture| fixture.kind.word() == "camera");
+    let cameras: Vec<&Fixture> = cameras.collect();
+    let camera = match cameras.as_slice() {
+        [first, _, ..] => format!(" --camera {}", shell_word(Path::new(&first.name))),
+        _ => String::new(),
+    };
+    let lacks_size = cameras.first().is_some_and(|camera| camera.image.is_none());
+    let add = if lacks_size {
+        let file = common.problem_file();
+        format!("add image_px = [width, height] to [[camera]] in {}, then ", file.display())
+    } else {
+        String::new()
+    };
+    format!("{add}{export} --format opencv{camera} writes the camera with its pose")
 }
 
 /// Returns the command to run after a trace.

@@ -11,7 +11,7 @@ use super::evidence::factor;
 use super::identify::{covariance, warmth};
 use super::known_noise::KnownNoise;
 use super::onset::with_onsets;
-use super::relocation::{self, MIN_RELOCATION_NATS};
+use super::relocation::{self, MIN_RELOCATION_NATS, Placed};
 use super::reporter::{Change, MIN_NAMED_PROBABILITY, Reporter, WatchedCause};
 use super::rows::{SensitiveRows, SharedMisfit};
 use crate::fit::{self, Placement, SavedEstimate, register};
@@ -171,6 +171,7 @@ pub fn watch(
         let moved = moved.or_else(|| base().filter(|_| is_unexplained));
         watched = moved.unwrap_or(watched);
     }
+    state_turns(&model, &x, &mut watched);
     Ok(Watch {
         false_alarm_rate,
         estimate_trusted: estimate.trusted,
@@ -187,6 +188,28 @@ pub fn watch(
             .map_or(f64::NAN, |first| at_estimate.rows.total_sigma(first)),
         causes: watched,
     })
+}
+
+/// States the changes of the orientation of cameras and markers in `causes` as rotation vectors of
+/// their turns. `x` is the full parameter vector of the unchanged arm. Turns have no standard
+/// errors.
+fn state_turns(model: &Model, x: &DVector<f64>, causes: &mut [WatchedCause]) {
+    let fixtures = relocation::placements(model);
+    for cause in causes {
+        let of_cause = |placed: &&Placed| !placed.is_base && placed.label == cause.label;
+        let Some(placed) = fixtures.iter().find(of_cause) else { continue };
+        let mut after = x.clone();
+        for (change, &k) in cause.changes.iter().zip(&placed.parameters) {
+            after[k] += change.change;
+        }
+        let moves = placed.moved(model, x, &after);
+        for (axis, (change, moved)) in cause.changes.iter_mut().zip(moves).enumerate() {
+            change.change = moved;
+            if axis >= 3 {
+                change.std_error = f64::NAN;
+            }
+        }
+    }
 }
 
 /// Rows that are tested against an estimate, with the model of the estimate.
@@ -260,15 +283,8 @@ impl TestedRows<'_> {
             let moved = assessed.causes.iter().find(is_moved)?;
             let is_explained = gain > linear && evidence < threshold;
             let mut watched = at_place.reporter(leads).cause(moved, None);
-            let mut after = at_place.extended.x.clone();
-            for (change, &k) in watched.changes.iter().zip(&placed.parameters) {
-                after[k] += change.change;
-            }
-            let moves = placed.moved(self.model, x, &after);
-            for (axis, (change, moved)) in watched.changes.iter_mut().zip(moves).enumerate() {
-                change.change = moved;
-                // The standard errors are those of the components of a rotation vector.
-                change.std_error = if axis < 3 { change.std_error } else { f64::NAN };
+            for (change, &k) in watched.changes.iter_mut().zip(&placed.parameters) {
+                change.change += at_place.extended.x[k] - x[k];
             }
             watched.probability = 1.0 / (1.0 + SECOND_CHANGE_ODDS * evidence.exp());
             is_explained.then_some((gain, watched))

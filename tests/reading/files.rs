@@ -84,7 +84,7 @@ fn what_flexcal_did_not_write_is_not_replaced() {
     fs::create_dir(bench.path("out")).unwrap();
     for name in ["estimate.json", "report.md", "report.html"] {
         bench.write(format!("out/{name}"), "mine");
-        let words = format!("out/{name} is there already, and flexcal did not write it");
+        let words = format!("out/{name} exists and was not written by flexcal");
         assert_refused(&bench, "identify arm --out out", "out", &[&words]);
         fs::remove_file(bench.path("out").join(name)).unwrap();
     }
@@ -100,7 +100,7 @@ fn what_flexcal_did_not_write_is_not_replaced() {
     bench.map("out/report.md", |text| format!("{text}and a remark"));
     for command in ["identify", "compare", "loop"] {
         let arguments = format!("{command} arm --out out");
-        assert_refused(&bench, &arguments, "out", &["out/report.md is there"]);
+        assert_refused(&bench, &arguments, "out", &["out/report.md exists"]);
     }
     bench.flexcal("identify arm --out out --force").success();
     assert!(!bench.read("out/report.md").contains("remark"));
@@ -148,7 +148,7 @@ fn links_are_not_followed() {
     // target.
     bench.write("elsewhere/mine", "mine");
     symlink("../elsewhere/mine", bench.path("out/report.md")).unwrap();
-    assert_refused(&bench, "identify arm --out out", ".", &["out/report.md is there"]);
+    assert_refused(&bench, "identify arm --out out", ".", &["out/report.md exists"]);
     bench.flexcal("identify arm --out out --force").success();
     assert_eq!(bench.read("elsewhere/mine"), "mine");
     assert!(

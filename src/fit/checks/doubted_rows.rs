@@ -112,7 +112,9 @@ fn doubted(fit: &CheckedFit, before: f64) -> Option<Finding> {
     let in_other_unit = || {
         let fits = |&(factor, _): &(f64, &str)| {
             let mut converted = measurements.clone();
-            chosen.iter().for_each(|&row| converted.positions[row] *= factor);
+            for &row in &chosen {
+                converted.positions[row] *= factor;
+            }
             registration_error(fit, &converted, &chosen).is_some_and(|rms| rms < limit)
         };
         let mut factors = LENGTH_FACTORS.into_iter().filter(|_| chosen.len() >= WINDOW);
