@@ -91,7 +91,7 @@ pub fn after_fit(
                 .finding(FindingCode::PriorContradicted)
                 .and_then(|finding| finding.word("rule"));
             format!(
-                "give \"{}\" in {} a larger σ, or check what it limits",
+                "give \"{}\" in {} a larger σ, or check the nominal values of these parameters and their units",
                 rule.unwrap_or_default(),
                 common.problem_file().display()
             )
@@ -117,10 +117,9 @@ pub fn after_fit(
         None if found.has(FindingCode::HeldOutNotBetter) => {
             format!("flexcal check {named} says what the poses can tell")
         }
-        None if found.has(FindingCode::HeldOutOutliers) => format!(
-            "check the held-out rows that the warning names, then flexcal identify {named}; if they are right, {}",
-            to_apply("corrects commands")
-        ),
+        None if found.has(FindingCode::HeldOutOutliers) => {
+            format!("check the held-out rows that the warning names; if they are right, {search}")
+        }
         None if found.finding(FindingCode::NarrowPoses).is_some_and(are_alike) => {
             format!(
                 "flexcal plan {named} --poses N chooses poses over the whole range of the joints"

@@ -94,7 +94,7 @@ fn remarks(found: &Identification) -> Vec<String> {
     }));
     points.extend(unsteady_points(found.spreads.iter().map(|spread| &spread.1)));
     let of_parameters = format!(
-        "of the {} cannot be identified (give priors, or free fewer parameters)",
+        "of the {} cannot be identified (see -v)",
         counted(found.unknowns.len(), "parameter")
     );
     let counts = [

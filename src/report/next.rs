@@ -24,7 +24,7 @@ fn blocks<'a>(problem: &Problem, options: &NextOptions, next: &NextPoses) -> Vec
     let percent = number(options.level * 100.0, 1);
     let percent = percent.trim_end_matches(".0");
     let counts = format!(
-        "{} measured; {}; predictions judged at {}",
+        "{} fitted; {}; predictions judged at {}",
         counted(next.measured, "row"),
         counted(next.candidates, "candidate"),
         counted(next.workspace_poses, "pose"),
