@@ -28,7 +28,7 @@ use super::{diagnostic, interrupt};
         "Tables of poses to choose from, with the columns of measurements; positions are not needed. Predictions are judged there"
     )),
     after_help = "Fits the measured poses, then chooses those that lower the error of predictions in the workspace most: the limits of the \
-joints (measured ranges where there are none), the ranges of a TRUTH.toml, or the rows of --pool. Writes next.csv, next.json and the page next.html. Exit \
+joints (measured ranges where there are none), the ranges of a TRUTH.toml, or the rows of --pool. Writes next.json, the page next.html and, unless nothing more is needed, next.csv. Exit \
 status 1: further poses gain nothing and the tolerance is not met.
 
 Examples:
