@@ -35,10 +35,8 @@ def as_words(problem: flexcal.Problem, pixels: pd.DataFrame) -> flexcal.Identifi
 def test_whole_numbers_name_points_and_markers(
     problem: flexcal.Problem, pixels: pd.DataFrame, as_words: flexcal.Identification, kind: str
 ) -> None:
-    tables: dict[str, Any] = {
-        "polars": pl.from_dict({name: pixels[name].to_numpy() for name in pixels}),
-        "dict": {name: pixels[name].to_numpy() for name in pixels},
-    }
+    columns: dict[str, Any] = {str(name): pixels[name].to_numpy() for name in pixels}
+    tables: dict[str, Any] = {"polars": pl.from_dict(columns), "dict": columns}
     table = tables[kind] if kind in tables else pixels.astype({"point": kind, "marker": kind})
     assert problem.identify(table).parameters.equals(as_words.parameters)
 
