@@ -57,7 +57,7 @@ def changed(**columns: Any) -> pd.DataFrame:
         (FRAME.drop(columns="y_mm"), 1, "column y", "missing"),
         (FRAME.rename(columns={"x_mm": "x"}), 1, "column x", "needs a unit"),
         (FRAME.rename(columns={"payload_kg": "paylod_kg"}), 1, "column paylod_kg", "payload_kg"),
-        (changed(x_mm=np.where(FRAME["pose"] == 3, np.nan, FRAME["x_mm"])), 4, "column x_mm", "not a finite number"),
+        (changed(x_mm=np.where(FRAME["pose"] == 3, np.nan, FRAME["x_mm"])), 4, "column x_mm", "missing = "),
         (changed(x_mm=np.where(FRAME["pose"] == 3, np.inf, FRAME["x_mm"])), 4, "column x_mm", "not a finite number"),
         (changed(x_mm=FRAME["x_mm"].astype(str).where(FRAME["pose"] != 2, "1,5")), 3, "column x_mm", "not a number"),
         (changed(split=FRAME["split"].where(FRAME["pose"] != 2, "test")), 3, "column split", "neither"),
