@@ -8,6 +8,7 @@ use super::render::{page, text};
 use crate::life::{CauseKind, Change, Watch, WatchedCause};
 use crate::measurement::Measurements;
 use crate::problem::Problem;
+use crate::quantity::Unit;
 use crate::quantity::format::{
     MAX_DECIMALS, counted, decimals, number, or_dash, p_value, two_digits,
 };
@@ -149,8 +150,8 @@ fn row(cause: &WatchedCause, in_unit: &impl Fn(f64) -> String) -> Vec<String> {
 }
 
 /// Formats a change with its standard error; the name is the part of the parameter's name after the
-/// last dot. A ratio of the noise has no standard error: it is the best of some trial values, the
-/// largest one if `is_largest`.
+/// last dot. A turn has no standard error. Neither has a ratio of the noise: it is the best of some
+/// trial values, the largest one if `is_largest`.
 fn change(change: &Change, is_largest: bool) -> String {
     let (factor, symbol) = if change.unit.is_relative() {
         (100.0, "%".to_owned())
@@ -159,6 +160,9 @@ fn change(change: &Change, is_largest: bool) -> String {
         (unit.factor, unit.symbol)
     };
     let name = change.parameter.rsplit('.').next().unwrap_or_default();
+    if !change.std_error.is_finite() && change.unit != Unit::Number {
+        return format!("{name} {} {symbol}", number(change.change * factor, 2));
+    }
     if !change.std_error.is_finite() {
         let ratio = two_digits(change.change, 2);
         return if is_largest {
