@@ -212,17 +212,16 @@ pub fn after_loop(
     }
 }
 
-/// Returns what to do after an estimate was applied to rows that do not contradict it. `file` is the
+/// Returns what to do after an estimate was applied to rows that do not contradict it. `path` is the
 /// path of the estimate. The advice is that after the fit of the estimate: commands are corrected
 /// only if the fit is trusted and left no more than noise.
 pub fn after_applying(
     common: &Common,
     problem: &Problem,
     estimate: &SavedEstimate,
-    file: &Path,
+    path: &Path,
 ) -> String {
-    let of_estimate = file;
-    let [named, file] = [common.problem(), file].map(shell_word);
+    let [named, file] = [common.problem(), path].map(shell_word);
     if !estimate.trusted {
         return format!("flexcal identify {named} says why the estimate is not to be trusted");
     }
@@ -233,7 +232,7 @@ pub fn after_applying(
         );
     }
     if measures_no_position(problem) {
-        return to_export(common, problem, of_estimate);
+        return to_export(common, problem, path);
     }
     format!("flexcal compensate {named} --estimate {file} --data TARGETS.csv corrects commands")
 }

@@ -23,8 +23,8 @@ use crate::random;
 /// Number of exchanges, each started from random poses.
 const STARTS: usize = 8;
 /// Number of exchanges by the criterion I. Its unknowns include the weights of a misfit, so that an
-/// exchange takes an order of magnitude longer; mean variances after different starts differ by one
-/// or two percent.
+/// exchange takes an order of magnitude longer; mean variances after different starts differ by a
+/// few percent.
 const MEAN_STARTS: usize = 2;
 /// Maximum number of exchanges whose poses are refined: those with the best criterion.
 const REFINED_STARTS: usize = 4;

@@ -54,7 +54,8 @@ pub struct Change {
     pub unit: Unit,
     /// Change, SI; of the logarithm for stiffnesses.
     pub change: f64,
-    /// Standard error of the change; NaN for a ratio of the noise.
+    /// Standard error of the change; NaN for a turn of a camera or marker and for a ratio of the
+    /// noise.
     pub std_error: f64,
 }
 

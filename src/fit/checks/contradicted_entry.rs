@@ -54,14 +54,11 @@ pub(super) fn contradicted_entry(
         return None;
     }
     // Position and orientation of a target are declared apart.
-    let is_same_part = |site, axis: usize| match site {
-        ParameterSite::Target { axis: own, .. } => (own < 3) == (axis < 3),
-        _ => false,
-    };
     let is_same = |site: ParameterSite| match (parameter.site, site) {
-        (ParameterSite::Target { target, .. }, ParameterSite::Target { target: other, axis }) => {
-            target == other && is_same_part(parameter.site, axis)
-        }
+        (
+            ParameterSite::Target { target, axis },
+            ParameterSite::Target { target: other, axis: of_other },
+        ) => target == other && (axis < 3) == (of_other < 3),
         (site, other) => site == other,
     };
     let fitted = || fit.fitting.model.parameters.iter().zip(&fit.end.x);
