@@ -170,7 +170,7 @@ finding_codes! {
         "hold out poses that are not fitted, as held_out = { fraction = 0.3, seed = 1 } does";
     HeldOutOutliers: Warning "held-out-outliers" ["rows", "of"]
         "Some held-out rows are farther from the prediction than its σ allows.",
-        "look for mistyped numbers and signs there; if the rows are right, the model may lack something, for which flexcal loop looks";
+        "look for mistyped numbers and signs there; where there are none, run flexcal loop";
     HeldOutBeyondPrediction: Warning "held-out-beyond-prediction" ["chi2", "coordinates", "p_value"]
         "The held-out residuals are larger than the σ and the covariance of the fit predict (probability below 0.001).",
         "look for what the model lacks with flexcal loop, or measure poses like the held-out ones";
