@@ -2,6 +2,7 @@
 
 use statrs::distribution::{ContinuousCDF as _, StudentsT};
 
+use super::rows::AXES;
 use super::scores::LeftOutError;
 
 /// Probability with which the test of the error length, and the test of the marginal likelihood,
@@ -45,7 +46,8 @@ pub struct Gain {
     pub with: f64,
     /// Decrease of the error length of a left-out configuration \[m\].
     pub error: MeanDifference,
-    /// Increase of the logarithm of the predictive density of a left-out row.
+    /// Increase of the logarithm of the predictive density of a left-out row. Each covariance is
+    /// multiplied by the factor that fits the left-out errors best, as the error bounds are.
     pub density: MeanDifference,
     /// Increase of the logarithm of the marginal likelihood over that of noise alone, including the
     /// priors of the hyperparameters.
@@ -57,24 +59,32 @@ pub struct Gain {
 impl Gain {
     /// Computes the gain from the errors of left-out rows. Errors and densities are averaged within
     /// each configuration, and then over `configurations`.
+    ///
+    /// The factor of all covariances that gives the left-out errors the largest density is their
+    /// mean square in units of these covariances. Without it, the few configurations that a
+    /// confident prediction misses by many σ would decide alone, although the bounds account for
+    /// them.
     pub(super) fn of(
         configurations: &[Vec<usize>],
         (without, with): (&[LeftOutError], &[LeftOutError]),
         ln_evidence: f64,
     ) -> Self {
-        let means = |errors: &[LeftOutError], of: fn(&LeftOutError) -> f64| -> Vec<f64> {
-            let mean = |rows: &Vec<usize>| {
-                rows.iter().map(|&row| of(&errors[row])).sum::<f64>() / rows.len() as f64
-            };
-            configurations.iter().map(mean).collect()
-        };
         let average = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+        let means = |errors: &[LeftOutError], of: &dyn Fn(&LeftOutError) -> f64| -> Vec<f64> {
+            let rows = |rows: &Vec<usize>| -> Vec<f64> {
+                rows.iter().map(|&row| of(&errors[row])).collect()
+            };
+            configurations.iter().map(|configuration| average(&rows(configuration))).collect()
+        };
         let difference = |more: &[f64], less: &[f64]| {
             let pairs = more.iter().zip(less);
             MeanDifference::of(&pairs.map(|(more, less)| more - less).collect::<Vec<f64>>())
         };
-        let [before, after] = [without, with].map(|errors| means(errors, |error| error.length));
-        let [less, more] = [without, with].map(|errors| means(errors, |error| error.density));
+        let [before, after] = [without, with].map(|errors| means(errors, &|error| error.length));
+        let [less, more] = [without, with].map(|errors| {
+            let scale = average(&means(errors, &|error| error.square)) / AXES as f64;
+            means(errors, &|error| error.density(scale))
+        });
         Self {
             without: average(&before),
             with: average(&after),

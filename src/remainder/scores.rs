@@ -2,7 +2,7 @@
 
 use std::f64::consts::{FRAC_2_PI, TAU};
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Matrix3;
 use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 
 use super::kernel::{Hyperparameters, variance};
@@ -34,8 +34,20 @@ pub(super) struct LeftOutError {
     pub length: f64,
     /// Score: error length divided by its expected root mean square.
     pub score: f64,
-    /// Logarithm of the predictive density of the measured position \[ln m⁻³\].
-    pub density: f64,
+    /// Squared error in units of its predicted covariance S, eᵀS⁻¹e. NaN if S is not positive
+    /// definite.
+    pub square: f64,
+    /// Half the logarithm of the determinant of S \[ln m³\].
+    pub ln_volume: f64,
+}
+
+impl LeftOutError {
+    /// Returns the logarithm of the predictive density of the measured position \[ln m⁻³\]: a
+    /// normal density with the covariance `scale` S.
+    pub fn density(&self, scale: f64) -> f64 {
+        let axes = AXES as f64;
+        -0.5 * (self.square / scale + axes * (scale * TAU).ln()) - self.ln_volume
+    }
 }
 
 /// Computes the errors of left-out rows if only the [`applied_share`] of each correction is added.
@@ -56,21 +68,17 @@ pub(super) fn left_out_errors(
         let error = alone.error - correction * share;
         let missed = if prior > 0.0 { (1.0 - share) * correction.norm() } else { 0.0 };
         let faded = Matrix3::from_diagonal_element(missed * missed / AXES as f64);
+        let covariance = with.covariance + faded;
+        let factor = covariance.cholesky();
+        let square = factor.map_or(f64::NAN, |factor| error.dot(&factor.solve(&error)));
         LeftOutError {
             length: error.norm(),
             score: error.norm() / expected_size(whole, missed),
-            density: log_density(&error, &(with.covariance + faded)),
+            square,
+            ln_volume: 0.5 * covariance.determinant().ln(),
         }
     };
     alone.iter().zip(with).enumerate().map(score).collect()
-}
-
-/// Returns the logarithm of a normal density with mean 0 at `error`; NaN if the covariance is not
-/// positive definite.
-fn log_density(error: &Vector3<f64>, covariance: &Matrix3<f64>) -> f64 {
-    let Some(factor) = covariance.cholesky() else { return f64::NAN };
-    let square = error.dot(&factor.solve(error));
-    -0.5 * (square + covariance.determinant().ln() + AXES as f64 * TAU.ln())
 }
 
 /// Returns the expected root mean square error length \[m\]. `variance` is the trace of the error
