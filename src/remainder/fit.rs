@@ -145,9 +145,10 @@ fn training_rows(
     model: &Model,
     data: &Dataset,
 ) -> Option<TrainingRows> {
-    let rows = fitted_rows(found, data)?;
+    let (rows, distances) = fitted_rows(found, data)?;
     let times = (found.sigma, &found.start_times);
     let poses = timed_poses(&data.measurements, &rows, times);
+    let distances = timed_poses(&data.measurements, &distances, times);
     let is_free = |k: &usize| {
         let estimate = &found.estimates[*k];
         estimate.fitted && estimate.at_bound.is_none()
@@ -157,34 +158,38 @@ fn training_rows(
         Linearisation { problem, model, x: &found.x, unknowns, sigma: found.sigma };
     let layout = linearisation.layout(&poses);
     let mut rows = linearisation.rows(&layout, poses);
+    let (slopes, lengths) = linearisation.whitened(distances);
     let finite = |values: &[f64]| values.iter().all(|value| value.is_finite());
     let is_usable = finite(rows.residual.as_slice())
         && finite(rows.jacobian.as_slice())
         && finite(rows.sites.as_slice());
     // Parameters that move none of these rows, such as bases of held-out sessions, are left out.
-    let seen: Vec<usize> =
-        (0..rows.jacobian.ncols()).filter(|&j| rows.jacobian.column(j).amax() > 0.0).collect();
+    let is_seen = |j: &usize| [&rows.jacobian, &slopes].iter().any(|of| of.column(*j).amax() > 0.0);
+    let seen: Vec<usize> = (0..slopes.ncols()).filter(is_seen).collect();
     rows.jacobian = rows.jacobian.select_columns(&seen);
     linearisation.unknowns = seen.iter().map(|&j| linearisation.unknowns[j]).collect();
-    let prior = prior(model, &found.x, &linearisation.unknowns, &rows);
+    let prior = prior(model, &found.x, &linearisation.unknowns, &rows)
+        .with_distances(&slopes.select_columns(&seen), &lengths);
     let unknowns = (layout, linearisation.unknowns);
     let training = TrainingRows::new(unknowns, rows, prior);
     let suffices = training.configurations.len() >= MIN_CONFIGURATIONS && training.size > 0.0;
     (is_usable && suffices).then_some(training)
 }
 
-/// Returns the identification rows that are no outliers; above [`MAX_ROWS`], every n-th of them.
-/// Returns `None` if some measure no position.
-fn fitted_rows(found: &Identification, data: &Dataset) -> Option<Vec<usize>> {
+/// Returns the identification rows that measure positions and are no outliers, above [`MAX_ROWS`]
+/// every n-th of them, and those that state a known distance. Returns `None` if some row measures
+/// something else.
+fn fitted_rows(found: &Identification, data: &Dataset) -> Option<(Vec<usize>, Vec<usize>)> {
     let outliers: HashSet<usize> = found.outliers.iter().map(|outlier| outlier.row).collect();
     let rows = data.split.identification.iter().copied().filter(|row| !outliers.contains(row));
-    let rows: Vec<usize> = rows.collect();
-    let measures_position = |&row: &usize| {
-        matches!(data.measurements.observation(row), Observation::Position | Observation::Point(_))
-    };
-    if !rows.iter().all(measures_position) {
+    let observation = |row: &usize| data.measurements.observation(*row);
+    let is_distance = |row: &usize| matches!(observation(row), Observation::Between(..));
+    let (distances, rows): (Vec<usize>, Vec<usize>) = rows.partition(is_distance);
+    let is_position =
+        |row: &usize| matches!(observation(row), Observation::Position | Observation::Point(_));
+    if !rows.iter().all(is_position) {
         return None;
     }
     let step = rows.len().div_ceil(MAX_ROWS).max(1);
-    Some(rows.into_iter().step_by(step).collect())
+    Some((rows.into_iter().step_by(step).collect(), distances))
 }

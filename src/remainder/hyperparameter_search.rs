@@ -26,8 +26,9 @@ pub(super) struct Searched {
     pub evidence: f64,
 }
 
-/// Returns the marginal likelihood of `rows`, which are a part of the training rows.
-fn likelihood<'a>(training: &'a TrainingRows, rows: &'a Rows) -> MarginalLikelihood<'a> {
+/// Returns the marginal likelihood of `rows`, which are a part of the training rows. Returns `None`
+/// if a matrix is not positive definite because of rounding.
+fn likelihood<'a>(training: &'a TrainingRows, rows: &'a Rows) -> Option<MarginalLikelihood<'a>> {
     let shares_noise = training.shares_noise();
     let rows = (rows, &training.layout.inputs);
     MarginalLikelihood::new(rows, &training.prior, shares_noise, training.size)
@@ -39,7 +40,7 @@ fn likelihood<'a>(training: &'a TrainingRows, rows: &'a Rows) -> MarginalLikelih
 pub(super) fn search(training: &TrainingRows) -> Option<Searched> {
     let [few, more] =
         MAX_SEARCH_ROWS.map(|count| training.rows.select(&training.some_rows(count, 0)));
-    let searched = likelihood(training, &few);
+    let searched = likelihood(training, &few)?;
     let value = |x: &_| searched.value_and_gradient(x);
     let bounds = searched.bounds();
     let minima = STARTS.into_iter().filter_map(|lengths| {
@@ -61,7 +62,7 @@ pub(super) fn search(training: &TrainingRows) -> Option<Searched> {
 /// `near` of another selection of `count` training rows. `None` if the likelihood cannot be
 /// evaluated there.
 fn refine(training: &TrainingRows, rows: &Rows, near: &Minimum, count: usize) -> Option<Minimum> {
-    let refined = likelihood(training, rows);
+    let refined = likelihood(training, rows)?;
     let inverse = &near.inverse * (count as f64 / rows.len() as f64);
     let value = |x: &_| refined.value_and_gradient(x);
     minimise(value, (near.at.clone(), Some(inverse)), &refined.bounds(), MAX_STEPS[1])
@@ -75,7 +76,7 @@ pub(super) fn search_near(
     near: &Minimum,
 ) -> Option<Hyperparameters> {
     let minimum = refine(training, rows, near, training.rows.len())?;
-    Some(likelihood(training, rows).hyperparameters(&minimum.at))
+    Some(likelihood(training, rows)?.hyperparameters(&minimum.at))
 }
 
 /// Returns the mean error length \[m\] of rows that are predicted without their configuration;

@@ -80,12 +80,13 @@ struct PairColumn {
 
 impl<'a> MarginalLikelihood<'a> {
     /// Creates the likelihood of `rows`. `size` is the root mean square length of a residual \[m\].
+    /// Returns `None` if a matrix is not positive definite because of rounding.
     pub fn new(
         (rows, inputs): (&'a Rows, &'a Inputs),
         prior: &ParameterPrior,
         shares_noise: bool,
         size: f64,
-    ) -> Self {
+    ) -> Option<Self> {
         let with = |has: fn(&SiteFunctions) -> bool| -> Vec<usize> {
             (0..inputs.sites.len()).filter(|&site| has(&inputs.sites[site])).collect()
         };
@@ -95,7 +96,7 @@ impl<'a> MarginalLikelihood<'a> {
         let joint = with(|site| site.joint).into_iter().map(|site| (Function::Joint, vec![site]));
         let constant = (!constants.is_empty()).then_some((Function::Constant, constants));
         let amplitudes = single.chain(joint).chain(constant).collect();
-        let (target, scaled) = prior.reduce(rows);
+        let (target, scaled) = prior.reduce(rows)?;
         let embedded = embedded(inputs, rows);
         let width = embedded.nrows();
         let of_row = |row: usize| &embedded.as_slice()[width * row..width * (row + 1)];
@@ -105,7 +106,7 @@ impl<'a> MarginalLikelihood<'a> {
         };
         let distances = (0..rows.len()).into_par_iter().map(behind).collect();
         let (size, scaled_transposed) = (size.ln(), scaled.transpose());
-        Self {
+        Some(Self {
             rows,
             inputs,
             target,
@@ -115,7 +116,7 @@ impl<'a> MarginalLikelihood<'a> {
             shares_noise,
             size,
             distances,
-        }
+        })
     }
 
     /// Returns the number of hyperparameters: the amplitudes, the lengths ℓᵤ and ℓᵥ, σ and, if rows

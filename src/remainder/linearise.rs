@@ -65,6 +65,18 @@ impl Linearisation<'_> {
         derivatives(self.model, poses, self.unknowns.clone(), self.x).0
     }
 
+    /// Returns derivatives and residuals of `poses`, divided by the σ of each pose.
+    pub fn whitened(&self, poses: Vec<Pose>) -> (DMatrix<f64>, DVector<f64>) {
+        let sigmas: Vec<f64> = poses.iter().map(|pose| pose.sigma).collect();
+        let (mut slopes, mut residual) =
+            derivatives(self.model, poses, self.unknowns.clone(), self.x);
+        for (k, mut row) in slopes.row_iter_mut().enumerate() {
+            row /= sigmas[k / AXES];
+            residual[k] /= sigmas[k / AXES];
+        }
+        (slopes, residual)
+    }
+
     /// Returns the derivatives of the positions of `poses` with respect to each site's joint
     /// coordinate or compliance, divided by the site's lever, shape = (sites, 3 poses).
     fn site_columns(&self, sites: &[Site], poses: &[Pose]) -> DMatrix<f64> {
@@ -215,6 +227,7 @@ pub(super) fn prior(
     ParameterPrior {
         mean: DVector::from_fn(unknowns.len(), mean),
         spread: DVector::from_fn(unknowns.len(), |j, _| declared(j).unwrap_or_else(|| wide(j))),
+        distances: None,
     }
 }
 

@@ -32,8 +32,8 @@ struct NoiseLikelihood {
 }
 
 impl NoiseLikelihood {
-    fn new(rows: &Rows, prior: &ParameterPrior) -> Self {
-        let (target, scaled) = prior.reduce(rows);
+    fn new(rows: &Rows, prior: &ParameterPrior) -> Option<Self> {
+        let (target, scaled) = prior.reduce(rows)?;
         let width = scaled.ncols();
         let mut columns = scaled.insert_column(width, 0.0);
         columns.set_column(width, &target);
@@ -54,14 +54,14 @@ impl NoiseLikelihood {
         for (coordinate, mut row) in columns.row_iter_mut().enumerate() {
             row *= weight(coordinate / AXES).sqrt();
         }
-        Self {
+        Some(Self {
             gram: gram(&columns),
             sums,
             weights,
             coordinates: (AXES * rows.len()) as f64,
             log_relative: AXES as f64
                 * rows.relative_sigma.iter().map(|sigma| 2.0 * sigma.ln()).sum::<f64>(),
-        }
+        })
     }
 
     /// Returns the negative logarithm of the likelihood at (ln σ, ln σ_c), or at (ln σ) if the rows
@@ -100,7 +100,7 @@ pub(super) fn evidence_of_noise(
     shares_noise: bool,
     size: f64,
 ) -> Option<f64> {
-    let likelihood = NoiseLikelihood::new(rows, prior);
+    let likelihood = NoiseLikelihood::new(rows, prior)?;
     let count = 1 + usize::from(shares_noise);
     let (low, high) = (size.ln() + NOISE_BOUNDS.0, size.ln() + NOISE_BOUNDS.1);
     let start = DVector::from_fn(count, |k, _| (NOISE_STARTS[k] * size).ln());

@@ -243,7 +243,7 @@ impl Training {
         let inducing = Inducing::new(rows, centres, hyper, inputs);
         let inverse = inverse_lower(&inducing_factor(hyper, inputs, &inducing)?);
         let mut whitened = features(hyper, inputs, (&inducing, &inverse), prior, rows);
-        let (mut target, _) = prior.reduce(rows);
+        let mut target = prior.residuals(rows);
         let kernel = inducing.len();
         let groups: Option<Vec<_>> = rows
             .configurations()
@@ -266,8 +266,11 @@ impl Training {
             }
         }
         let n = whitened.ncols();
-        let factor = lower_factor(DMatrix::identity(n, n) + gram(&whitened))?;
-        let weights = solved(&factor, &whitened.tr_mul(&target));
+        let mut precision = DMatrix::identity(n, n) + gram(&whitened);
+        let mut product = whitened.tr_mul(&target);
+        prior.add_information(&mut precision, &mut product);
+        let factor = lower_factor(precision)?;
+        let weights = solved(&factor, &product);
         let posterior = Posterior {
             hyper: hyper.clone(),
             inputs: inputs.clone(),

@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::rows::Rows;
+use crate::numeric::{gram, lower_factor};
 
 /// Prior δ ~ N(m, S) of the parameters' deviations δ from their fitted values; S is diagonal.
 #[derive(Debug, Clone, PartialEq)]
@@ -11,12 +12,63 @@ pub(super) struct ParameterPrior {
     pub mean: DVector<f64>,
     /// Prior standard deviations of the parameters: the diagonal of S½.
     pub spread: DVector<f64>,
+    /// Known distances, which no error of a joint moves; `None` if there are none.
+    pub distances: Option<DistanceRows>,
+}
+
+/// Linearised rows of known distances, divided by their σ.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct DistanceRows {
+    /// Scaled Jacobian J S½ of the distances.
+    scaled: DMatrix<f64>,
+    /// Residuals at the mean of the prior, r − J m.
+    target: DVector<f64>,
 }
 
 impl ParameterPrior {
-    /// Returns the residuals r − J m at the mean of the prior, and the scaled Jacobian J S½.
-    pub fn reduce(&self, rows: &Rows) -> (DVector<f64>, DMatrix<f64>) {
-        (&rows.residual - &rows.jacobian * &self.mean, self.scale(&rows.jacobian))
+    /// Adds rows of known distances. `jacobian` and `residual` are divided by their σ.
+    pub fn with_distances(mut self, jacobian: &DMatrix<f64>, residual: &DVector<f64>) -> Self {
+        if jacobian.nrows() > 0 {
+            let target = residual - jacobian * &self.mean;
+            self.distances = Some(DistanceRows { scaled: self.scale(jacobian), target });
+        }
+        self
+    }
+
+    /// Returns the residuals r − J m of `rows` at the mean of the prior.
+    pub fn residuals(&self, rows: &Rows) -> DVector<f64> {
+        &rows.residual - &rows.jacobian * &self.mean
+    }
+
+    /// Returns the residuals of `rows` at the mean of the parameters given the known distances, and
+    /// their Jacobian times a factor of the covariance of the parameters given these distances.
+    /// Without known distances these are r − J m and J S½.
+    ///
+    /// With the scaled rows G and g of the distances, z = S^(−½) (δ − m) has the precision I + GᵀG
+    /// = L Lᵀ and the mean (L Lᵀ)⁻¹ Gᵀg. Returns `None` if L does not exist because of rounding.
+    pub fn reduce(&self, rows: &Rows) -> Option<(DVector<f64>, DMatrix<f64>)> {
+        let (mut target, mut scaled) = (self.residuals(rows), self.scale(&rows.jacobian));
+        if let Some(DistanceRows { scaled: known, target: measured }) = &self.distances {
+            let n = known.ncols();
+            let factor = lower_factor(DMatrix::identity(n, n) + gram(known))?;
+            // With X = L⁻¹ (J S½)ᵀ, the Jacobian times the factor is Xᵀ.
+            let transposed = factor.solve_lower_triangular(&scaled.transpose())?;
+            let mean = factor.solve_lower_triangular(&known.tr_mul(measured))?;
+            target -= transposed.tr_mul(&mean);
+            scaled = transposed.transpose();
+        }
+        Some((target, scaled))
+    }
+
+    /// Adds the information of the known distances about the last of the standardised `features`:
+    /// GᵀG to their precision, and Gᵀg to its product with their mean.
+    pub fn add_information(&self, precision: &mut DMatrix<f64>, product: &mut DVector<f64>) {
+        let Some(DistanceRows { scaled, target }) = &self.distances else { return };
+        let (count, first) = (scaled.ncols(), product.len() - scaled.ncols());
+        let mut block = precision.view_mut((first, first), (count, count));
+        block += gram(scaled);
+        let mut part = product.rows_mut(first, count);
+        part += scaled.tr_mul(target);
     }
 
     /// Returns the Jacobian J with each column scaled by the prior σ of its parameter, J S½.

@@ -339,6 +339,8 @@ impl Correction {
         let prior = ParameterPrior {
             mean: of_parameters(|parameter| parameter.prior_mean),
             spread: of_parameters(|parameter| parameter.prior_sigma),
+            // The saved factor of the precision contains what they say.
+            distances: None,
         };
         let centres = Rows {
             residual: DVector::zeros(AXES * count),

@@ -49,6 +49,7 @@ fn prior() -> ParameterPrior {
     ParameterPrior {
         mean: DVector::from_vec(vec![1e-5, -2e-5]),
         spread: DVector::from_vec(vec![3e-4, 1e-1]),
+        distances: None,
     }
 }
 
@@ -84,7 +85,7 @@ fn the_covariance_is_positive_and_its_diagonal_the_variance() {
 #[test]
 fn the_gradient_of_the_likelihood_is_its_slope() {
     let (rows, inputs, prior) = (rows(), inputs(), prior());
-    let likelihood = MarginalLikelihood::new((&rows, &inputs), &prior, true, 1e-4);
+    let likelihood = MarginalLikelihood::new((&rows, &inputs), &prior, true, 1e-4).unwrap();
     let at = likelihood.start([0.4, 0.4]).map_with_location(|k, _, value| value + 0.2 * noise(k));
     let (value, gradient) = likelihood.value_and_gradient(&at).unwrap();
     assert!(value.is_finite() && gradient.len() == likelihood.len());
@@ -171,4 +172,46 @@ fn weights_of_the_centres_restore_a_posterior() {
     for (a, b) in predicted.at(&rows).iter().zip(again.at(&rows)) {
         assert!((a.mean - b.mean).norm() < 1e-12 && (a.covariance - b.covariance).amax() < 1e-16);
     }
+}
+
+#[test]
+fn known_distances_count_as_rows_that_no_joint_error_moves() {
+    let (rows, inputs, prior, hyper) = (rows(), inputs(), prior(), hyper());
+    let known = 4.0;
+    let place = |row: usize| AXES * row..AXES * (row + 1);
+    let mut more = rows.select(&[all(&rows), vec![2]].concat());
+    let last = more.len() - 1;
+    let numbers = |seed: usize| (0..AXES).map(move |axis| noise(seed + axis));
+    more.sites.columns_range_mut(place(last)).fill(0.0);
+    more.relative_sigma[last] = known;
+    more.configuration[last] = CONFIGURATIONS;
+    let of = |row| rows.configuration.iter().position(|&found| found == row).unwrap();
+    let residual = DVector::from_iterator(AXES, numbers(5000).map(|value| 1e-4 * value));
+    let jacobian = DMatrix::from_iterator(AXES, 2, numbers(6000).chain(numbers(7000)));
+    more.residual.rows_range_mut(place(last)).copy_from(&residual);
+    more.jacobian.rows_range_mut(place(last)).copy_from(&jacobian);
+    // A row of its own configuration has the noise of the row and that of the configuration.
+    let sigma = (hyper.noise * known).hypot(hyper.shared_noise);
+    let with = prior.clone().with_distances(&(jacobian / sigma), &(residual / sigma));
+    let centres = [of(0), of(4), of(8)];
+    let posterior = |rows: &Rows, prior: &ParameterPrior| {
+        Training::new((rows, &inputs), prior, &hyper, &centres).unwrap().posterior
+    };
+    let (among_rows, in_prior) = (posterior(&more, &prior), posterior(&rows, &with));
+    for (a, b) in among_rows.at(&rows).iter().zip(in_prior.at(&rows)) {
+        assert!((a.mean - b.mean).norm() < 1e-12, "{} {}", a.mean, b.mean);
+        assert!((a.covariance - b.covariance).amax() < 1e-9 * a.covariance.amax());
+    }
+    // The likelihood of the rows given the distances is that of all over that of the distances.
+    let value = |rows: &Rows, prior: &ParameterPrior, noise: f64| {
+        let likelihood = MarginalLikelihood::new((rows, &inputs), prior, true, 1e-4).unwrap();
+        let mut at = likelihood.start([0.4, 0.4]);
+        let count = at.len();
+        at[count - 2] = hyper.noise.ln();
+        at[count - 1] = hyper.shared_noise.ln();
+        at[0] += noise;
+        likelihood.value_and_gradient(&at).unwrap().0
+    };
+    let difference = |noise| value(&more, &prior, noise) - value(&rows, &with, noise);
+    assert!((difference(0.0) - difference(0.7)).abs() < 1e-9);
 }
