@@ -2,12 +2,12 @@
 
 use std::collections::BTreeSet;
 use std::error::Error;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use flexcal::fit::{self, Options, SolverChoice, Strategy};
-use flexcal::life::{FleetPrior, PriorError, PriorSource, identify_with_prior};
+use flexcal::life::{FleetPrior, PriorError, PriorSource, Update, update};
 use flexcal::measurement::Dataset;
 use flexcal::problem::{HeldOut, Problem};
 use flexcal::remainder::{self, Correction, Fitted};
@@ -97,12 +97,24 @@ fn warn_of_held_out(problem: &Problem, data: &Dataset) {
     }
 }
 
+/// Prints a warning that the remainder of the earlier estimate `prior` is not carried over, because
+/// the problem states another use.
+fn warn_of_remainder(problem: &Problem, prior: Option<&Path>) {
+    let Some((declared, prior)) = problem.remainder.as_ref().zip(prior) else { return };
+    let reason =
+        if declared.is_used { "declares a remainder of its own" } else { "says use = false" };
+    diagnostic::warn(&format!(
+        "the remainder of {} is not carried over, because [remainder] in the problem {reason}; without that section it is",
+        prior.display()
+    ));
+}
+
 /// Identifies the arm, writes `estimate.json`, `residuals.csv` and both reports, and
 /// `remainder.json` if one is requested and accepted; prints the result.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let common = &arguments.common;
     let mut names = vec!["estimate.json", "residuals.csv", REPORT[0], REPORT[1]];
-    if arguments.remainder {
+    if arguments.remainder || arguments.prior.is_some() {
         names.push(REMAINDER_FILE);
     }
     let Input { problem, data, results } =
@@ -131,25 +143,30 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         .with_solver(arguments.solver)
         .with_influential_rows()
         .with_stop(stop.clone());
-    let (sources, identification) =
+    let (sources, updated, identification) =
         Line::during(common.prints_text(), stop, |sink| -> Result<_, PriorError> {
             let options = options.with_progress(sink);
             if let Some(prior) = &prior {
                 let days = arguments.drift;
-                return Ok((None, identify_with_prior(&problem, &data, &options, prior, days)?));
+                let updated = update(&problem, &data, &options, prior, days)?;
+                let Update { found, predictions, leaves_remainder } = updated;
+                return Ok((None, Some((predictions, leaves_remainder)), found));
             }
             let found = fit::identify(&problem, &data, &options)?;
             // The requested fit is complete, so an interrupt only skips the comparison of the
             // sources of the joint values.
             match fit::joint_sources(&problem, &data, &options, &found) {
-                Err(error) if error.is_interrupted() => Ok((None, found)),
-                sources => Ok((sources.map_err(PriorError::from)?, found)),
+                Err(error) if error.is_interrupted() => Ok((None, None, found)),
+                sources => Ok((sources.map_err(PriorError::from)?, None, found)),
             }
         })?;
-    // With a prior from a file, no uncertainty of predictions is computed, because it would use
-    // only the new rows.
-    let fitted = if prior.is_some() {
-        None
+    // With a prior from a file, the uncertainty of predictions is the earlier one, updated: the new
+    // rows alone would be too few.
+    let fitted = if let Some((predictions, leaves_remainder)) = updated {
+        if leaves_remainder && !common.quiet {
+            warn_of_remainder(&problem, arguments.prior.as_deref());
+        }
+        predictions
     } else if arguments.remainder {
         remainder::fit(&identification, &problem, &data)?
     } else {
@@ -167,6 +184,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     }
     let json = result.to_json();
     let is_reported = |corrected: &&Fitted| arguments.remainder || corrected.remainder.is_some();
+    let is_written = |corrected: &&Fitted| !corrected.is_declared;
     let words = fitted
         .as_ref()
         .filter(is_reported)
@@ -190,8 +208,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         None => identification.residuals(&problem, &data)?,
     };
     let residuals = residuals_csv(&problem, &data.measurements, &residuals);
-    let kept = fitted.as_ref().and_then(|corrected| corrected.remainder.as_ref());
-    let file = kept.filter(|_| arguments.remainder).map(Correction::to_json);
+    let kept = fitted.as_ref().filter(is_written).and_then(|of| of.remainder.as_ref());
+    let file = kept.map(Correction::to_json);
     let mut texts = vec![("estimate.json", json.as_str()), ("residuals.csv", residuals.as_str())];
     texts.extend(file.as_ref().map(|text| (REMAINDER_FILE, text.as_str())));
     interrupt::begin_writing();

@@ -1,7 +1,8 @@
 //! Possible causes of a change of an arm: what may have moved, and by how much.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 
+use super::column_space::ColumnSpace;
 use super::evidence::{NOISE_RATIOS, OTHER_RATIOS, ln_sum};
 use super::relocation::is_of_place;
 use super::rows::SensitiveRows;
@@ -35,10 +36,6 @@ const MIN_WARMTH: f64 = 3.0;
 /// Factor on the prior probability of temperature as the cause, if a row differs from the reference
 /// by [`MIN_WARMTH`] or more.
 const WARM_FACTOR: f64 = 20.0;
-
-/// Largest part of a column outside of a space, relative to the column, at which the column counts
-/// as one of the space. Derivatives have a relative error of about 1e-10.
-const MAX_OUTSIDE: f64 = 1e-7;
 
 worded! {
     /// Kind of a cause of a change.
@@ -423,46 +420,6 @@ impl Extended {
 /// Returns true if a parameter belongs to the pose of a camera or marker, or to another fixture.
 fn is_place_of_fixture(site: ParameterSite, parameter: &Parameter) -> bool {
     matches!(site, ParameterSite::Fixture { .. }) && is_of_place(parameter)
-}
-
-/// Space that columns of the sensitivities span.
-struct ColumnSpace {
-    /// Orthonormal basis, one column for each dimension.
-    basis: DMatrix<f64>,
-}
-
-impl ColumnSpace {
-    /// Creates the space of some columns by Gram–Schmidt orthogonalisation, done twice.
-    fn new(rows: &SensitiveRows, columns: &[usize]) -> Self {
-        let mut space = Self { basis: DMatrix::zeros(rows.sensitivity.nrows(), 0) };
-        for &k in columns {
-            let column = rows.sensitivity.column(k).into_owned();
-            let outside = space.outside(&space.outside(&column));
-            let (length, whole) = (outside.norm(), column.norm());
-            if length > MAX_OUTSIDE * whole {
-                let place = space.basis.ncols();
-                space.basis = space.basis.insert_column(place, 0.0);
-                space.basis.set_column(place, &(outside / length));
-            }
-        }
-        space
-    }
-
-    /// Returns the part of a vector that is orthogonal to the space.
-    fn outside(&self, vector: &DVector<f64>) -> DVector<f64> {
-        vector - &self.basis * self.basis.tr_mul(vector)
-    }
-
-    /// Returns true if the columns lie in the space and at least one of them is not zero.
-    fn contains(&self, rows: &SensitiveRows, columns: &[usize]) -> bool {
-        let parts = columns.iter().map(|&k| {
-            let column = rows.sensitivity.column(k).into_owned();
-            (self.outside(&column).norm(), column.norm())
-        });
-        let parts: Vec<(f64, f64)> = parts.collect();
-        parts.iter().all(|(outside, whole)| *outside <= MAX_OUTSIDE * whole)
-            && parts.iter().any(|(_, whole)| *whole > 0.0)
-    }
 }
 
 /// Sets the prior probabilities of the causes; they sum to 1.

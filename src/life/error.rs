@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use crate::error::InputError;
 use crate::fit::{IdentifyError, PredictError, SavedEstimateError};
+use crate::remainder::SavedRemainderError;
 
 /// Error of an earlier estimate that cannot serve as a prior or a reference.
 #[derive(Debug, thiserror::Error)]
@@ -15,6 +16,8 @@ pub enum PriorError {
     Estimate(#[from] SavedEstimateError),
     #[error(transparent)]
     Predict(#[from] PredictError),
+    #[error(transparent)]
+    Remainder(#[from] SavedRemainderError),
     #[error(transparent)]
     Identify(#[from] IdentifyError),
     #[error(

@@ -1,28 +1,32 @@
 //! Identification with an earlier estimate as prior.
 
+use std::collections::HashSet;
 use std::path::Path;
 use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
-use serde_json::json;
 use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 
 use super::assessment::{Assessment, assess};
 use super::causes::{Cause, CauseKind, Extended};
+use super::contradiction::{Contradiction, most_probable};
+use super::corrected::{MAX_TESTED_ROWS, tested};
+use super::drift;
 use super::earlier::Earlier;
 use super::error::PriorError;
 use super::evidence::factor;
 use super::fleet_file::FleetPrior;
 use super::relocation::{self, MIN_RELOCATION_NATS, Placed};
-use super::rows::SensitiveRows;
+use super::rows::{SensitiveRows, warmth};
 use crate::fit::{
-    self, ComparedParameter, Finding, FindingCode, Identification, Options, Placement,
-    PriorComparison, SavedEstimate, Strategy,
+    self, ComparedParameter, Identification, Options, Placement, PriorComparison, SavedEstimate,
+    Strategy,
 };
-use crate::measurement::{Dataset, Measurements, Split};
+use crate::measurement::{Dataset, Split};
 use crate::model::Model;
 use crate::problem::Problem;
 use crate::quantity::Unit;
+use crate::remainder::{ChangedSince, EarlierCorrections, PredictedRows};
 
 /// Likelihood ratio of a change to "unchanged" above which new rows contradict the earlier
 /// estimate: a false alarm in at most one of a hundred identifications.
@@ -78,6 +82,30 @@ pub fn identify_with_prior(
     source: &PriorSource,
     days: f64,
 ) -> Result<Identification, PriorError> {
+    identified(problem, data, options, (source, None), days).map(|identified| identified.found)
+}
+
+/// Identification with a prior, and what changed since the prior.
+pub(super) struct Identified {
+    pub found: Identification,
+    /// Measured rows, of which those that the prior contains are neither fitted nor held out.
+    pub data: Dataset,
+    /// Change since the earlier estimate.
+    pub since: ChangedSince,
+}
+
+/// Fits rows as [`identify_with_prior`] does. With the remainder of the earlier estimate in
+/// `corrections`, the new rows are tested against its corrected predictions.
+///
+/// # Errors
+/// Returns the errors of [`identify_with_prior`].
+pub(super) fn identified(
+    problem: &Problem,
+    data: &Dataset,
+    options: &Options,
+    (source, corrections): (&PriorSource, Option<&EarlierCorrections>),
+    days: f64,
+) -> Result<Identified, PriorError> {
     if options.strategy != Strategy::Joint {
         let (file, found) = (source.file().to_owned(), options.strategy.as_str());
         return Err(PriorError::Strategy { file, found });
@@ -106,15 +134,26 @@ pub fn identify_with_prior(
         problem.data.position_sigma = Some(sigma.max(declared));
     }
     let mut prior = original.clone();
+    let names = || model.parameters.iter().map(|parameter| parameter.name.clone());
+    let mut since = ChangedSince {
+        variances: names().zip(drift::variances(declared_problem, &model, days)?).collect(),
+        replaced: HashSet::new(),
+        noise_ratio: 1.0,
+    };
     let (mut causes, mut chi2) = (Vec::new(), None);
     loop {
         let options = options.clone().with_earlier(Arc::new(prior.data(&model)?));
         let mut found = fit::identify(&problem, &data, &options)?;
+        let found_problem = (&found, &problem);
+        let predicted = match corrections {
+            Some(of) => of.predicted(found_problem, (&data, MAX_TESTED_ROWS), &since)?,
+            None => None,
+        };
         let (cause, now) = contradiction(
             (&problem, declared_problem.data.position_sigma),
             &model,
             (&data, &placement),
-            &found,
+            (&found, predicted),
             (&prior, &causes),
         );
         chi2 = chi2.or(now);
@@ -144,15 +183,21 @@ pub fn identify_with_prior(
                 has_raised_sigma,
                 ..compare(&model, &found, (&original, &prior))
             });
-            return Ok(found);
+            return Ok(Identified { found, data, since });
         };
         if let Some((placed, x)) = &cause.relocated {
             prior.replace(&placed.parameters, x, WIDE_SIGMA);
+            let names = placed.parameters.iter().map(|&k| model.parameters[k].name.clone());
+            since.replaced.extend(names);
         }
         for &(parameter, size) in &cause.widened {
-            prior.widen(parameter, (WIDENING * size).powi(2));
+            let variance = (WIDENING * size).powi(2);
+            prior.widen(parameter, variance);
+            let name = model.parameters[parameter].name.clone();
+            *since.variances.entry(name).or_insert(0.0) += variance;
         }
         if let Some(ratio) = cause.noise_ratio {
+            since.noise_ratio *= ratio;
             problem.data.position_sigma = problem.data.position_sigma.map(|sigma| sigma * ratio);
         }
         causes.push(cause);
@@ -194,71 +239,9 @@ fn contradicting_bound(
         widened: Vec::new(),
         relocated: None,
         is_held: false,
+        instead: None,
         noise_ratio: None,
     })
-}
-
-/// Cause for which new rows contradict the earlier estimate.
-struct Contradiction {
-    /// Name of the cause for people.
-    label: String,
-    /// Probability of the cause, given that something changed.
-    probability: f64,
-    /// Indices of the model's parameters whose prior is widened, with the size of their change.
-    widened: Vec<(usize, f64)>,
-    /// Placement whose pose is fitted without its prior, with the full parameter vector at its new
-    /// pose.
-    relocated: Option<(Placed, DVector<f64>)>,
-    /// True if the cause moves parameters, all of which the problem holds.
-    is_held: bool,
-    /// Ratio of the noise to the assumed one, if the cause is larger noise.
-    noise_ratio: Option<f64>,
-}
-
-impl Contradiction {
-    /// Returns the contradiction with a new pose of the placement that it names, if that is one of
-    /// `moved`. A camera or marker that was moved says nothing of where it stands now.
-    fn with_place(self, moved: &[(Placed, DVector<f64>)]) -> Self {
-        let is_it = |(placed, _): &&(Placed, DVector<f64>)| {
-            !placed.is_base && self.widened.iter().map(|(k, _)| k).eq(&placed.parameters)
-        };
-        match moved.iter().find(is_it) {
-            Some(found) => Self { widened: Vec::new(), relocated: Some(found.clone()), ..self },
-            None => self,
-        }
-    }
-
-    /// Returns the finding that the new rows contradict the prior in `file`. `index` is the number
-    /// of causes that were found before this one.
-    fn finding(&self, index: usize, file: &Path) -> Finding {
-        let is_refitted = self.relocated.is_some() || !self.widened.is_empty();
-        let treatment = match (self.widened.is_empty(), self.noise_ratio) {
-            _ if self.relocated.is_some() => {
-                "; its place is fitted anew, without the earlier one".to_owned()
-            }
-            _ if self.is_held => {
-                "; the problem holds its parameters, so that the change goes into \
-                                  others: free them in [parameters]"
-                    .to_owned()
-            }
-            (false, _) => "; the prior of its parameters was widened".to_owned(),
-            (true, Some(ratio)) => format!("; the fit assumes a σ {ratio:.1} times as large"),
-            (true, None) => String::new(),
-        };
-        let cause = if index == 0 {
-            "most probable cause"
-        } else {
-            "with what was found before, they still do; most probable further cause"
-        };
-        let text = format!(
-            "the new rows contradict {} (a false alarm in at most one of 100 fits); {cause}: {} ({:.0} %){treatment}",
-            file.display(),
-            self.label,
-            100.0 * self.probability
-        );
-        let numbers = [json!(self.label), self.probability.into(), json!(is_refitted)];
-        Finding::new(FindingCode::EarlierEstimateContradicted, numbers, text)
-    }
 }
 
 /// Tests whether the identification rows contradict the prior. Returns the most probable cause if
@@ -269,7 +252,7 @@ fn contradiction(
     (problem, declared_sigma): (&Problem, Option<f64>),
     model: &Model,
     (data, placement): (&Dataset, &Placement),
-    found: &Identification,
+    (found, predicted): (&Identification, Option<PredictedRows>),
     (prior, causes_before): (&Earlier, &[Contradiction]),
 ) -> (Option<Contradiction>, Option<(f64, f64, f64)>) {
     let mut x = found.x.clone();
@@ -292,86 +275,63 @@ fn contradiction(
     let covariance = covariance(&extended, prior, &sensitive, warmed);
     let assessed = assess(&sensitive, &factor(&covariance), &causes, false);
     let Some(assessed) = assessed else { return (None, None) };
-    let p_value = ChiSquared::new(assessed.coordinates)
-        .map_or(f64::NAN, |distribution| distribution.sf(assessed.chi2));
-    let chi2 = Some((assessed.chi2, assessed.coordinates, p_value));
-    let Some((_, evidence)) =
-        assessed.looks.last().filter(|look| look.1 > CONTRADICTION_RATIO.ln())
-    else {
-        return (None, chi2);
-    };
-    let is_before = |placed: &Placed| causes_before.iter().any(|of| of.label == placed.label);
-    let placements = relocation::placements(model).into_iter();
-    let moved: Vec<(Placed, DVector<f64>)> = placements
-        .filter(|placed| !is_before(placed))
-        .filter_map(|placed| {
-            let located = relocation::located_anew(model, &poses, &x, &placed)?;
-            Some((placed, located))
-        })
-        .collect();
-    let relocated = moved.iter().filter_map(|(placed, located)| {
-        let extended =
-            Extended::new(problem, model, located, [&placement.bases, &placement.targets]);
-        let rows = SensitiveRows::new(&extended.model, poses.clone(), &extended.x);
-        let mut prior = prior.clone();
-        prior.replace(&placed.parameters, located, WIDE_SIGMA);
-        let factor = factor(&self::covariance(&extended, &prior, &rows, None));
-        let assessed = assess(&rows, &factor, &[], false)?;
-        let gain = 0.5 * (chi2?.0 - assessed.chi2) - MIN_RELOCATION_NATS;
-        (gain > *evidence).then(|| (gain, (placed.clone(), located.clone())))
-    });
-    if let Some((gain, (placed, x))) = relocated.max_by(|a, b| a.0.total_cmp(&b.0)) {
-        let contradiction = Contradiction {
-            label: placed.label.clone(),
-            probability: (1.0 + (evidence - gain).exp()).recip(),
-            widened: Vec::new(),
-            relocated: Some((placed, x)),
-            is_held: false,
-            noise_ratio: None,
+    let chi2 = chi2_of_rows(&assessed);
+    let evidence = contradicting_evidence(&assessed);
+    let mut moved = Vec::new();
+    if let Some(evidence) = evidence {
+        let is_before = |placed: &Placed| causes_before.iter().any(|of| of.label == placed.label);
+        let placements = relocation::placements(model).into_iter();
+        let of_place = |placed: Placed| {
+            Some((placed.clone(), relocation::located_anew(model, &poses, &x, &placed)?))
         };
-        return (Some(contradiction), chi2);
+        moved = placements.filter(|placed| !is_before(placed)).filter_map(of_place).collect();
+        let at_place = |located: &DVector<f64>| {
+            let extended =
+                Extended::new(problem, model, located, [&placement.bases, &placement.targets]);
+            (SensitiveRows::new(&extended.model, poses.clone(), &extended.x), extended)
+        };
+        let relocated = moved.iter().filter_map(|(placed, located)| {
+            let (rows, extended) = at_place(located);
+            let mut prior = prior.clone();
+            prior.replace(&placed.parameters, located, WIDE_SIGMA);
+            let factor = factor(&self::covariance(&extended, &prior, &rows, None));
+            let assessed = assess(&rows, &factor, &[], false)?;
+            let gain = 0.5 * (chi2.0 - assessed.chi2) - MIN_RELOCATION_NATS;
+            (gain > evidence).then(|| (gain, (placed.clone(), located.clone())))
+        });
+        if let Some((gain, place)) = relocated.max_by(|a, b| a.0.total_cmp(&b.0)) {
+            let probability = (1.0 + (evidence - gain).exp()).recip();
+            return (Some(Contradiction::of_place(place, probability)), Some(chi2));
+        }
+    }
+    if let Some(predicted) = predicted {
+        let at = (problem, model, &found.x);
+        let test = tested(at, (&data.measurements, placement), predicted);
+        let Some(test) = test else { return (None, None) };
+        let location = |row: usize| data.measurements.location(test.places[row]).to_string();
+        let cause = contradicting_evidence(&test.assessed).and_then(|_| {
+            most_probable(&test.assessed, (&test.causes, location), (&test.extended, &test.rows))
+        });
+        return (cause.map(|cause| cause.with_place(&moved)), Some(chi2_of_rows(&test.assessed)));
     }
     let location = |row: usize| data.measurements.location(rows[row]).to_string();
-    let most_probable = most_probable(&assessed, (&causes, location), &extended);
-    (most_probable.map(|cause| cause.with_place(&moved)), chi2)
+    let cause = evidence
+        .and_then(|_| most_probable(&assessed, (&causes, location), (&extended, &sensitive)));
+    (cause.map(|cause| cause.with_place(&moved)), Some(chi2))
 }
 
-/// Returns the most probable cause; `None` if there are no causes. `extended` is the model to whose
-/// columns the causes belong.
-fn most_probable(
-    assessed: &Assessment,
-    (causes, location): (&[Cause], impl Fn(usize) -> String),
-    extended: &Extended,
-) -> Option<Contradiction> {
-    let first = assessed.causes.first()?;
-    let cause = &causes[first.cause];
-    let size = |i: usize| first.sizes[i].max(first.mean[i].abs());
-    let widened = cause.columns.iter().enumerate().filter(|(_, k)| **k < extended.declared);
-    // A misfit that no cause explains looks like noise.
-    let label = match cause.kind {
-        CauseKind::Noise => "larger noise, or something that the model lacks".to_owned(),
-        _ => first.label(causes, location),
-    };
-    Some(Contradiction {
-        label,
-        probability: first.probability,
-        widened: widened.map(|(i, &k)| (k, size(i))).collect(),
-        relocated: None,
-        is_held: extended.is_held(cause),
-        noise_ratio: (cause.kind == CauseKind::Noise).then(|| first.mean[0]),
-    })
+/// Returns ln of the likelihood ratio of a change to "unchanged" if it contradicts the earlier
+/// estimate.
+fn contradicting_evidence(assessed: &Assessment) -> Option<f64> {
+    let (_, evidence) = *assessed.looks.last()?;
+    (evidence > CONTRADICTION_RATIO.ln()).then_some(evidence)
 }
 
-/// Returns the difference of the temperature of `rows` from the reference \[K\], if the table
-/// states both.
-pub(super) fn warmth(
-    problem: &Problem,
-    measurements: &Measurements,
-    rows: &[usize],
-) -> Option<Vec<f64>> {
-    let (temperature, reference) =
-        (measurements.temperature.as_ref()?, problem.data.reference_temperature?);
-    Some(rows.iter().map(|&row| temperature[row] - reference).collect())
+/// Returns χ² of all rows under "unchanged", its degrees of freedom and its p-value.
+fn chi2_of_rows(assessed: &Assessment) -> (f64, f64, f64) {
+    let p_value = ChiSquared::new(assessed.coordinates)
+        .map_or(f64::NAN, |distribution| distribution.sf(assessed.chi2));
+    (assessed.chi2, assessed.coordinates, p_value)
 }
 
 /// Returns the prior covariance of the deviations of all columns: that of the earlier estimate, the

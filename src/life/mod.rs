@@ -3,24 +3,29 @@
 //!
 //! [`identify_with_prior`] fits new rows with the posterior of an earlier estimate as prior. Rows
 //! of the earlier fit are not used again. The prior is widened by drift, and in parameters in which
-//! the new rows contradict it. [`watch()`] tests new rows one after the other for a change since
+//! the new rows contradict it. [`update()`] carries the remainder of the earlier estimate over, too. [`watch()`] tests new rows one after the other for a change since
 //! the estimate. [`fleet()`] finds mean and spread of the parameters of several arms of one type,
 //! which serve as the prior of the next one.
 
 mod assessment;
 mod causes;
+mod column_space;
+mod contradiction;
+mod corrected;
 mod drift;
 mod earlier;
 mod error;
 mod evidence;
 mod fleet;
 mod fleet_file;
+mod held;
 mod identify;
 mod known_noise;
 mod onset;
 mod relocation;
 mod reporter;
 mod rows;
+mod update;
 mod watch;
 
 #[doc(hidden)]
@@ -35,5 +40,7 @@ pub use fleet_file::FleetPrior;
 pub use identify::{PriorSource, identify_with_prior};
 #[doc(hidden)]
 pub use reporter::{Change, WatchedCause};
+#[doc(hidden)]
+pub use update::{Update, update};
 #[doc(hidden)]
 pub use watch::{Watch, watch};

@@ -5,7 +5,9 @@ use std::collections::BTreeMap;
 use nalgebra::{DMatrix, DVector};
 
 use crate::least_squares::jacobian_and_residual;
+use crate::measurement::Measurements;
 use crate::model::{Model, Pose, PoseResiduals};
+use crate::problem::Problem;
 
 /// Whitened residuals r of measured rows at a parameter vector, and their sensitivities K: a change
 /// δ of the true deviations gives r = K δ + noise.
@@ -112,6 +114,20 @@ impl SensitiveRows {
     /// Returns the residuals of one row.
     pub fn residual_of(&self, row: usize) -> DVector<f64> {
         self.residual.rows(row * self.stride, self.stride).into_owned()
+    }
+
+    /// Adds a column for each of the first `coordinates` residuals of each row, which is 1 there and
+    /// 0 elsewhere: errors of the predictions, in units of the noise. Returns the index of the first
+    /// column.
+    pub fn add_error_columns(&mut self, coordinates: usize) -> usize {
+        let (first, added) = (self.sensitivity.ncols(), coordinates * self.len());
+        let sensitivity = std::mem::replace(&mut self.sensitivity, DMatrix::zeros(0, 0));
+        self.sensitivity = sensitivity.resize_horizontally(first + added, 0.0);
+        for k in 0..added {
+            let place = self.stride * (k / coordinates) + k % coordinates;
+            self.sensitivity[(place, first + k)] = 1.0;
+        }
+        first
     }
 
     /// Adds a column and returns its index. It is Σ factor × column over `terms`, multiplied in
@@ -232,4 +248,16 @@ impl Sums {
         }
         (sensitivity, residual, diagonal)
     }
+}
+
+/// Returns the difference of the temperature of `rows` from the reference \[K\], if the table
+/// states both.
+pub(super) fn warmth(
+    problem: &Problem,
+    measurements: &Measurements,
+    rows: &[usize],
+) -> Option<Vec<f64>> {
+    let (temperature, reference) =
+        (measurements.temperature.as_ref()?, problem.data.reference_temperature?);
+    Some(rows.iter().map(|&row| temperature[row] - reference).collect())
 }

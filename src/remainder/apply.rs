@@ -93,7 +93,7 @@ pub fn predict_identified(
     let mut positions = found.predict(problem, rows)?;
     let model = found.model(problem, &Placement::of(rows))?;
     let every_row: Vec<usize> = (0..rows.len()).collect();
-    let poses = timed_poses(rows, &every_row, (found.sigma, &found.start_times));
+    let poses = timed_poses(rows, &every_row, (correction.sigma, &found.start_times));
     let corrected = correction.at((problem, &model, &found.vector(&model)?), &[], &poses);
     for (position, pose) in positions.iter_mut().zip(&corrected) {
         *position += pose.shift;

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use super::correction::Correction;
 use super::saved::SavedRemainderError;
+use super::update::EarlierCorrections;
 use crate::files::Changes;
 use crate::fit::SavedEstimate;
 use crate::problem::{Problem, RemainderDeclaration};
@@ -58,10 +59,35 @@ pub fn of_estimate(
         }
         return Ok(Some(correction));
     }
+    uncertainty_of(problem, estimate)
+}
+
+/// Reads the uncertainty of predictions that `estimate` contains; `None` if it contains none of this
+/// problem.
+fn uncertainty_of(
+    problem: &Problem,
+    estimate: &SavedEstimate,
+) -> Result<Option<Correction>, SavedRemainderError> {
     let parse = |text: &str| Correction::parse(text, &estimate.file);
     let correction = estimate.prediction.as_deref().map(parse).transpose()?;
     // Another check refuses an estimate of another arm, with a better message.
     Ok(correction.filter(|declared| declared.check(problem, &estimate.file).is_ok()))
+}
+
+/// Reads the corrections of an estimate that serves as a prior. Its remainder is left out if the
+/// problem has a section `[remainder]`, which states another use. Returns `None` if the estimate
+/// does not contain the uncertainty of predictions.
+///
+/// # Errors
+/// Returns the errors of [`of_estimate`] for the files of the estimate.
+pub(crate) fn earlier(
+    problem: &Problem,
+    estimate: &SavedEstimate,
+) -> Result<Option<EarlierCorrections>, SavedRemainderError> {
+    let Some(alone) = uncertainty_of(problem, estimate)? else { return Ok(None) };
+    let has_remainder = estimate.remainder.is_some() && problem.remainder.is_none();
+    let remainder = if has_remainder { of_estimate(problem, estimate)? } else { None };
+    Ok(Some(EarlierCorrections { alone, remainder }))
 }
 
 /// Reads a correction, and checks that it belongs to the problem.

@@ -35,6 +35,10 @@ pub struct Fitted {
     pub residuals: Option<CorrectedResiduals>,
     /// True if the remainder was read from a file that the problem names.
     pub is_declared: bool,
+    /// Factor by which error bounds of an earlier estimate were widened when they were carried over
+    /// to a new one, at least 1; `None` if the uncertainty was not carried over.
+    #[doc(hidden)]
+    pub carried: Option<f64>,
 }
 
 /// Summary of the search for a remainder.
@@ -44,6 +48,9 @@ pub struct Outcome {
     pub(crate) gain: Option<Gain>,
     /// True if the remainder was read from a file that the problem names.
     pub(crate) is_declared: bool,
+    /// Factor by which error bounds were widened when remainder and uncertainty of an earlier
+    /// estimate were carried over; `None` if they were not.
+    pub(crate) carried: Option<f64>,
     /// Number of joints whose errors the remainder corrects.
     pub(crate) joints: usize,
     /// Held-out errors with the remainder; `None` if none is kept. If no rows are held out, these
@@ -59,6 +66,7 @@ impl Fitted {
         Outcome {
             gain: self.gain,
             is_declared: self.is_declared,
+            carried: self.carried,
             joints: self.remainder.as_ref().map_or(0, |remainder| remainder.joints().len()),
             held_out: residuals.map(|corrected| corrected.errors.held_out),
         }
@@ -134,7 +142,14 @@ fn fitted(
     let remainder = judged.remainder.map(correction);
     let residuals = remainder.as_ref().map(|kept| residuals(found, problem, data, kept));
     let residuals = residuals.transpose()?;
-    Ok(Some(Fitted { alone, remainder, gain: judged.gain, residuals, is_declared: false }))
+    Ok(Some(Fitted {
+        alone,
+        remainder,
+        gain: judged.gain,
+        residuals,
+        is_declared: false,
+        carried: None,
+    }))
 }
 
 /// Linearises the rows of an identification. Returns `None` if they do not suffice to estimate the
@@ -179,7 +194,10 @@ fn training_rows(
 /// Returns the identification rows that measure positions and are no outliers, above [`MAX_ROWS`]
 /// every n-th of them, and those that state a known distance. Returns `None` if some row measures
 /// something else.
-fn fitted_rows(found: &Identification, data: &Dataset) -> Option<(Vec<usize>, Vec<usize>)> {
+pub(super) fn fitted_rows(
+    found: &Identification,
+    data: &Dataset,
+) -> Option<(Vec<usize>, Vec<usize>)> {
     let outliers: HashSet<usize> = found.outliers.iter().map(|outlier| outlier.row).collect();
     let rows = data.split.identification.iter().copied().filter(|row| !outliers.contains(row));
     let observation = |row: &usize| data.measurements.observation(*row);

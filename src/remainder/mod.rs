@@ -35,6 +35,7 @@ mod tables;
 #[cfg(test)]
 mod tests;
 mod training_rows;
+mod update;
 
 pub use apply::{CorrectedPrediction, predict};
 pub use correction::{CorrectedPose, Correction};
@@ -54,5 +55,7 @@ pub use self::{
     fit::uncertainty,
     saved::SavedRemainderError,
 };
+pub(crate) use declared::earlier;
 pub(crate) use rows::InputSource;
 pub(crate) use tables::{CorrectionTables, InputTable, SiteTable};
+pub(crate) use update::{ChangedSince, EarlierCorrections, PredictedRows};

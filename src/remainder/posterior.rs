@@ -33,10 +33,10 @@ pub(super) struct Posterior {
     /// Inducing variables z, which represent the error functions.
     pub inducing: Inducing,
     /// Inverse L⁻¹ of the lower triangular factor of K_z.
-    inverse: DMatrix<f64>,
+    pub(super) inverse: DMatrix<f64>,
     /// Lower triangular factor of A, and its inverse.
     pub factor: DMatrix<f64>,
-    inverse_factor: DMatrix<f64>,
+    pub(super) inverse_factor: DMatrix<f64>,
     /// Posterior mean ŵ of the weights of all features: those of the inducing variables, then those
     /// of the parameters.
     pub weights: DVector<f64>,
@@ -76,6 +76,18 @@ impl RowFactors {
             prior,
         };
         self.priors.par_iter().enumerate().map(of_row).collect()
+    }
+}
+
+impl RowFactors {
+    /// Returns the joint covariance of the corrections of all rows \[m²\].
+    pub fn covariance(&self) -> DMatrix<f64> {
+        let mut whole = product(&self.spread, &self.spread.transpose());
+        for (row, (_, left)) in self.priors.iter().enumerate() {
+            let mut block = whole.fixed_view_mut::<AXES, AXES>(AXES * row, AXES * row);
+            block += left;
+        }
+        whole
     }
 }
 
@@ -242,7 +254,41 @@ impl Training {
     ) -> Option<Self> {
         let inducing = Inducing::new(rows, centres, hyper, inputs);
         let inverse = inverse_lower(&inducing_factor(hyper, inputs, &inducing)?);
-        let mut whitened = features(hyper, inputs, (&inducing, &inverse), prior, rows);
+        let n = inducing.len() + prior.mean.len();
+        let none = DMatrix::zeros(0, 0);
+        let weights = DVector::zeros(n);
+        let before = Posterior {
+            hyper: hyper.clone(),
+            inputs: inputs.clone(),
+            prior: prior.clone(),
+            inducing,
+            inverse,
+            factor: none.clone(),
+            inverse_factor: none,
+            weights: weights.clone(),
+        };
+        let (mut precision, mut pull) = (DMatrix::identity(n, n), weights);
+        prior.add_information(&mut precision, &mut pull);
+        Self::from_precision(before, (precision, pull), rows)
+    }
+
+    /// Conditions an earlier posterior on further rows, which are linearised about the same
+    /// parameter values. Returns `None` if a matrix is not positive definite because of rounding.
+    pub fn continued(earlier: &Posterior, rows: &Rows) -> Option<Self> {
+        let precision = product_with_upper(&earlier.factor, &earlier.factor.transpose());
+        let pull = &precision * &earlier.weights;
+        Self::from_precision(earlier.clone(), (precision, pull), rows)
+    }
+
+    /// Conditions weights with the precision `precision` and the mean `precision`⁻¹ `pull` on
+    /// `rows`. The weights and factors of `before` are replaced.
+    fn from_precision(
+        before: Posterior,
+        (precision, pull): (DMatrix<f64>, DVector<f64>),
+        rows: &Rows,
+    ) -> Option<Self> {
+        let Posterior { hyper, inputs, prior, inducing, inverse, .. } = &before;
+        let mut whitened = features(hyper, inputs, (inducing, inverse), prior, rows);
         let mut target = prior.residuals(rows);
         let kernel = inducing.len();
         let groups: Option<Vec<_>> = rows
@@ -265,22 +311,10 @@ impl Training {
                 target[place] = target_of_block[k];
             }
         }
-        let n = whitened.ncols();
-        let mut precision = DMatrix::identity(n, n) + gram(&whitened);
-        let mut product = whitened.tr_mul(&target);
-        prior.add_information(&mut precision, &mut product);
-        let factor = lower_factor(precision)?;
-        let weights = solved(&factor, &product);
-        let posterior = Posterior {
-            hyper: hyper.clone(),
-            inputs: inputs.clone(),
-            prior: prior.clone(),
-            inducing,
-            inverse,
-            inverse_factor: inverse_lower(&factor),
-            factor,
-            weights,
-        };
+        let factor = lower_factor(precision + gram(&whitened))?;
+        let weights = solved(&factor, &(whitened.tr_mul(&target) + pull));
+        let inverse_factor = inverse_lower(&factor);
+        let posterior = Posterior { factor, inverse_factor, weights, ..before };
         Some(Self { posterior, whitened, target, groups })
     }
 

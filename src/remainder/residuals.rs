@@ -45,7 +45,7 @@ pub fn residuals(
     let model = found.strategy.model(Model::new(problem, &placement.bases, &placement.targets)?);
     let mut rows = found.residuals(problem, data)?;
     let every_row: Vec<usize> = (0..table.len()).collect();
-    let poses = timed_poses(table, &every_row, (found.sigma, &found.start_times));
+    let poses = timed_poses(table, &every_row, (correction.sigma, &found.start_times));
     let placed = placed(found, &model, correction);
     let corrected = correction.at((problem, &model, &found.x), &placed, &poses);
     if correction.has_remainder() {

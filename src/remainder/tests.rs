@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::kernel::{Hyperparameters, covariance, variance};
 use super::likelihood::MarginalLikelihood;
-use super::posterior::Training;
+use super::posterior::{Posterior, Training};
 use super::prior::ParameterPrior;
 use super::rows::{AXES, InputSource, Inputs, Rows, SiteFunctions};
 
@@ -163,7 +163,7 @@ fn weights_of_the_centres_restore_a_posterior() {
     let (rows, inputs, prior, hyper) = (rows(), inputs(), prior(), hyper());
     let predicted =
         Training::new((&rows, &inputs), &prior, &hyper, &[0, 2, 5, 9, 11]).unwrap().posterior;
-    let again = super::posterior::Posterior::restored(
+    let again = Posterior::restored(
         (hyper.clone(), inputs.clone()),
         (predicted.inducing.clone(), prior.clone()),
         (predicted.factor.clone(), predicted.kernel_weights(), predicted.parameters()),
@@ -214,4 +214,39 @@ fn known_distances_count_as_rows_that_no_joint_error_moves() {
     };
     let difference = |noise| value(&more, &prior, noise) - value(&rows, &with, noise);
     assert!((difference(0.0) - difference(0.7)).abs() < 1e-9);
+}
+
+#[test]
+fn rows_in_turn_say_what_all_rows_say_at_once() {
+    let (rows, inputs, prior, hyper) = (rows(), inputs(), prior(), hyper());
+    // The centres are among the first rows, so that both ways have the same inducing variables.
+    let centres = [0, 2, 5, 7];
+    let (first, later): (Vec<usize>, Vec<usize>) =
+        all(&rows).into_iter().partition(|row| rows.configuration[*row] < 9);
+    let knots =
+        |rows: &Rows| Training::new((rows, &inputs), &prior, &hyper, &centres).unwrap().posterior;
+    let (at_once, before) = (knots(&rows), knots(&rows.select(&first)));
+    let before = Posterior { inducing: at_once.inducing.clone(), ..before };
+    // Knots depend on the rows, so the first rows are conditioned on again with those of all rows.
+    let n = at_once.factor.nrows();
+    let none = Posterior {
+        factor: DMatrix::identity(n, n),
+        inverse: at_once.inverse.clone(),
+        inverse_factor: DMatrix::identity(n, n),
+        weights: DVector::zeros(n),
+        ..before
+    };
+    let first = Training::continued(&none, &rows.select(&first)).unwrap();
+    let both = Training::continued(&first.posterior, &rows.select(&later)).unwrap();
+    for (a, b) in at_once.at(&rows).iter().zip(both.posterior.at(&rows)) {
+        assert!((a.mean - b.mean).norm() < 1e-12, "{} {}", a.mean, b.mean);
+        assert!((a.covariance - b.covariance).amax() < 1e-6 * a.covariance.amax());
+    }
+    // Each later row is predicted by the earlier rows and the other later ones.
+    let left_out = both.without_each(&rows.select(&later).configuration, &[0]).unwrap().remove(0);
+    let others = rows.select(&later[1..]);
+    let without = Training::continued(&first.posterior, &others).unwrap().posterior;
+    let predicted = without.at(&rows.select(&later[..1]))[0];
+    let measured = Vector3::from_fn(|axis, _| rows.residual[AXES * later[0] + axis]);
+    assert!((measured - predicted.mean - left_out.error).norm() < 1e-12);
 }

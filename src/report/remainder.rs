@@ -15,6 +15,9 @@ use crate::results::PlotData;
 pub fn remainder_text(found: &Identification, outcome: &Outcome) -> String {
     let before = number(found.fitted.held_out.mean.norm * 1e3, 4);
     let after = outcome.held_out.map(|errors| number(errors.mean.norm * 1e3, 4));
+    if let Some(widening) = outcome.carried.filter(|_| !outcome.is_declared) {
+        return carried_text(outcome, widening);
+    }
     let Some(gain) = outcome.gain.filter(|_| !outcome.is_declared) else {
         return match after {
             Some(after) => format!(
@@ -52,12 +55,43 @@ pub fn remainder_text(found: &Identification, outcome: &Outcome) -> String {
     }
 }
 
+/// States what was carried over from an earlier estimate; `widening` is the factor on its error
+/// bounds.
+fn carried_text(outcome: &Outcome, widening: f64) -> String {
+    let mut text = match outcome.gain {
+        Some(gain) => {
+            let [without, with] =
+                [gain.without, gain.with].map(|error| number(error * 1e3, 4));
+            format!(
+                "The remainder (smooth correction) of the earlier estimate, at {}, was updated with the new rows, together with the \
+                 parameters. If each new configuration is predicted from the earlier rows and the other new ones, the mean error is \
+                 {without} mm without the remainder and {with} mm with it.",
+                counted(outcome.joints, "joint"),
+            )
+        }
+        None if outcome.joints > 0 => format!(
+            "The remainder (smooth correction) of the earlier estimate, at {}, was kept; no new row measures a position.",
+            counted(outcome.joints, "joint"),
+        ),
+        None => "The error bounds of the earlier estimate were updated with the new rows; it has no remainder."
+            .to_owned(),
+    };
+    if widening > 1.0 {
+        let _ = write!(
+            text,
+            " All error bounds were multiplied by {}, because the new rows err more than the earlier ones.",
+            number(widening, 2)
+        );
+    }
+    text
+}
+
 /// Returns the blocks about the remainder and the uncertainty of predictions; empty if the
 /// uncertainty was not estimated.
 pub(super) fn uncertainty<'a>(found: &Identification, plots: &'a PlotData) -> Vec<Block<'a>> {
     let Some(uncertainty) = &plots.uncertainty else { return Vec::new() };
     let outcome = &uncertainty.outcome;
-    let words = if outcome.gain.is_some() || outcome.is_declared {
+    let words = if outcome.gain.is_some() || outcome.is_declared || outcome.carried.is_some() {
         remainder_text(found, outcome)
     } else {
         format!(

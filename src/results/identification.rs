@@ -362,7 +362,12 @@ impl IdentificationResult {
         let corrected = fitted.residuals.as_ref();
         Self {
             fitted: corrected.map_or(self.fitted, |corrected| Errors::of(&corrected.errors)),
-            covariance: remainder::covariance(found, fitted),
+            // With a prior, the covariance of the fit itself contains all earlier rows.
+            covariance: if found.prior.is_some() {
+                self.covariance
+            } else {
+                remainder::covariance(found, fitted)
+            },
             remainder: Remainder::new(found, fitted),
             prediction: remainder::prediction(fitted),
             ..self

@@ -74,8 +74,8 @@ const STOREYS: &[(&str, &[&[&str]])] = &[
     ("fit", &[GROUND, BELOW_FIT, &["files"]]),
     // Corrections of an identified arm know fits, and no search for effects.
     ("remainder", &[GROUND, BELOW_FIT, &["fit", "files"]]),
-    // Earlier estimates as priors, and changes since.
-    ("life", &[GROUND, BELOW_FIT, &["fit", "files"]]),
+    // Earlier estimates as priors with their remainders, and changes since.
+    ("life", &[GROUND, BELOW_FIT, &["fit", "remainder", "files"]]),
     // Statistical tests of a residual are independent of arms and fits.
     ("residual_tests", &[&["error", "laws", "problem", "model", "numeric"]]),
     ("select", &[GROUND, BELOW_FIT, &["fit", "residual_tests"]]),

@@ -6,6 +6,7 @@
 mod common;
 
 mod bench;
+mod carried;
 mod fleet;
 mod measured;
 mod prior;

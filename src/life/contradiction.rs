@@ -1,0 +1,132 @@
+//! Contradiction of new rows with an earlier estimate, and its most probable cause.
+
+use std::path::Path;
+
+use nalgebra::DVector;
+use serde_json::json;
+
+use super::assessment::Assessment;
+use super::causes::{Cause, CauseKind, Extended};
+use super::relocation::Placed;
+use super::rows::SensitiveRows;
+use crate::fit::{Finding, FindingCode};
+
+/// Cause for which new rows contradict the earlier estimate.
+pub(super) struct Contradiction {
+    /// Name of the cause for people.
+    pub label: String,
+    /// Probability of the cause, given that something changed.
+    pub probability: f64,
+    /// Indices of the model's parameters whose prior is widened, with the size of their change.
+    pub widened: Vec<(usize, f64)>,
+    /// Placement whose pose is fitted without its prior, with the full parameter vector at its new
+    /// pose.
+    pub relocated: Option<(Placed, DVector<f64>)>,
+    /// True if the cause moves parameters, all of which the problem holds.
+    pub is_held: bool,
+    /// Name of the free parameters that are widened instead of held ones, because they move the
+    /// rows in the same way.
+    pub instead: Option<String>,
+    /// Ratio of the noise to the assumed one, if the cause is larger noise.
+    pub noise_ratio: Option<f64>,
+}
+
+impl Contradiction {
+    /// Returns the contradiction of a placement that was moved, with the full parameter vector at
+    /// its new pose.
+    pub fn of_place(place: (Placed, DVector<f64>), probability: f64) -> Self {
+        Self {
+            label: place.0.label.clone(),
+            probability,
+            widened: Vec::new(),
+            relocated: Some(place),
+            is_held: false,
+            instead: None,
+            noise_ratio: None,
+        }
+    }
+
+    /// Returns the contradiction with a new pose of the placement that it names, if that is one of
+    /// `moved`. A camera or marker that was moved says nothing of where it stands now.
+    pub fn with_place(self, moved: &[(Placed, DVector<f64>)]) -> Self {
+        let is_it = |(placed, _): &&(Placed, DVector<f64>)| {
+            !placed.is_base && self.widened.iter().map(|(k, _)| k).eq(&placed.parameters)
+        };
+        match moved.iter().find(is_it) {
+            Some(found) => Self { widened: Vec::new(), relocated: Some(found.clone()), ..self },
+            None => self,
+        }
+    }
+
+    /// Returns the finding that the new rows contradict the prior in `file`. `index` is the number
+    /// of causes that were found before this one.
+    pub fn finding(&self, index: usize, file: &Path) -> Finding {
+        let is_refitted = self.relocated.is_some() || !self.widened.is_empty();
+        let treatment = match (self.widened.is_empty(), self.noise_ratio) {
+            _ if self.relocated.is_some() => {
+                "; its place is fitted anew, without the earlier one".to_owned()
+            }
+            _ if self.instead.is_some() => format!(
+                "; the problem holds its parameters, so the prior of {}, which moves these rows in \
+                                the same way, was widened",
+                self.instead.as_deref().unwrap_or_default()
+            ),
+            _ if self.is_held => {
+                "; the problem holds its parameters, so that the change goes into \
+                                  others: free them in [parameters]"
+                    .to_owned()
+            }
+            (false, _) => "; the prior of its parameters was widened".to_owned(),
+            (true, Some(ratio)) => format!("; the fit assumes a σ {ratio:.1} times as large"),
+            (true, None) => String::new(),
+        };
+        let cause = if index == 0 {
+            "most probable cause"
+        } else {
+            "with what was found before, they still do; most probable further cause"
+        };
+        let text = format!(
+            "the new rows contradict {} (a false alarm in at most one of 100 fits); {cause}: {} ({:.0} %){treatment}",
+            file.display(),
+            self.label,
+            100.0 * self.probability
+        );
+        let numbers = [json!(self.label), self.probability.into(), json!(is_refitted)];
+        Finding::new(FindingCode::EarlierEstimateContradicted, numbers, text)
+    }
+}
+
+/// Returns the most probable cause; `None` if there are no causes. `extended` is the model to whose
+/// columns the causes belong, and `rows` are the tested rows.
+pub(super) fn most_probable(
+    assessed: &Assessment,
+    (causes, location): (&[Cause], impl Fn(usize) -> String),
+    (extended, rows): (&Extended, &SensitiveRows),
+) -> Option<Contradiction> {
+    let first = assessed.causes.first()?;
+    let cause = &causes[first.cause];
+    let size = |i: usize| first.sizes[i].max(first.mean[i].abs());
+    let is_held = extended.is_held(cause);
+    let sizes: Vec<f64> = (0..first.sizes.len()).map(size).collect();
+    let instead = is_held.then(|| extended.free_instead(cause, &sizes, rows)).flatten();
+    let (instead, widened) = if let Some((label, widened)) = instead {
+        (Some(label), widened)
+    } else {
+        let moved = cause.columns.iter().copied().zip(sizes);
+        (None, moved.filter(|(k, _)| *k < extended.declared).collect())
+    };
+    // A misfit that no cause explains looks like noise.
+    let label = match cause.kind {
+        CauseKind::Noise => "larger noise, or something that the model lacks".to_owned(),
+        _ => first.label(causes, location),
+    };
+    Some(Contradiction {
+        label,
+        probability: first.probability,
+        widened,
+        relocated: None,
+        is_held,
+        instead,
+        noise_ratio: (cause.kind == CauseKind::Noise).then(|| first.mean[0]),
+    })
+}
