@@ -135,7 +135,11 @@ impl Identification {
     /// Returns estimate.json, with the uncertainty of predictions.
     pub fn json(&self, py: Python<'_>) -> PyResult<String> {
         detached(py, || {
-            let mut result = IdentificationResult::new(&self.problem, &self.found);
+            // Rows from arrays have a file name, too, but no file.
+            let files = self.data.measurements.files.iter().filter(|file| file.is_file());
+            let files: Vec<_> = files.cloned().collect();
+            let mut result =
+                IdentificationResult::new(&self.problem, &self.found).with_files(&files);
             if let Some(fitted) = self.fitted()? {
                 result = result.with_predictions(&self.found, fitted);
             }

@@ -67,7 +67,10 @@ impl Export {
         let kept = last_joint.filter(|_| geometry.best_rigid.is_some());
         result.not_held.extend(kept.map(report::kept_at_end));
         let remarks = ExportRemarks::new(
-            geometry.best_rigid.as_ref().map(|best| [best.best, best.identified]),
+            (
+                geometry.best_rigid.as_ref().map(|best| [best.best, best.identified]),
+                problem.tool.payload_mass,
+            ),
             geometry.fitted_alone.as_ref(),
         );
         let mut warnings = Vec::new();

@@ -102,7 +102,11 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
             held_out.iter().filter_map(|&row| Some(predicted.rows.get(row)?.position.norm()));
         let errors: Vec<f64> = errors.collect();
         let rows = errors.len();
-        result = result.with_bounds(&bounds, (bounds.coverage(errors), rows), has_remainder);
+        let of_rows = held_out.iter().zip(&errors).enumerate();
+        let test = bounds
+            .test(&data.measurements, of_rows.map(|(pose, (&row, &length))| (pose, row, length)));
+        let covered = (bounds.coverage(errors), rows, test);
+        result = result.with_bounds(&bounds, covered, has_remainder);
     }
     super::tolerance::warn_if_tiny(arguments.tolerance_mm, common.quiet);
     let tolerance = arguments.tolerance_mm.map(|length| Tolerance {

@@ -1,8 +1,8 @@
 //! Suggestions of the next command after a fit, a loop or a trace.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use flexcal::fit::{Finding, FindingCode, Identification, SavedEstimate};
+use flexcal::fit::{Finding, FindingCode, Identification, SavedEstimate, Strategy};
 use flexcal::problem::{Fixture, PoseRanges, Problem};
 use flexcal::report::{self, shell_word};
 use flexcal::results::{LoopResult, TraceResult, exceeds_noise};
@@ -46,8 +46,11 @@ pub fn after_fit(
         let [problem, estimate] = [common.problem(), estimate].map(shell_word);
         format!("flexcal compensate {problem} --estimate {estimate} --data TARGETS.csv {what}")
     };
+    let ignores_elasticity = found.strategy == Strategy::Rigid && problem.is_elastic();
     // A remainder in the problem comes from a loop, which has searched for causes already.
-    let search = if problem.remainder.is_some() {
+    let search = if ignores_elasticity {
+        format!("flexcal identify {named} fits the elasticity that the problem declares, too")
+    } else if problem.remainder.is_some() {
         format!(
             "flexcal trace {named} ranks candidates for what is left; {}",
             to_apply("applies the estimate with its remainder")
@@ -60,9 +63,7 @@ pub fn after_fit(
             format!("correct the table as the warning says, then flexcal identify {named}")
         }
         Some(look) => {
-            format!(
-                "{look}; if they are right, flexcal loop {named} looks for what the model lacks"
-            )
+            format!("{look}; if they are right, {search}")
         }
         None if found.finding(FindingCode::Misread).is_some_and(is_partial) => format!(
             "check what the warning names, then flexcal identify {named}; if the input is right, flexcal loop {named} looks for what the model lacks"
@@ -222,19 +223,36 @@ pub fn after_applying(
     path: &Path,
 ) -> String {
     let [named, file] = [common.problem(), path].map(shell_word);
+    let fitted = fitted_arguments(common, problem, estimate);
     if !estimate.trusted {
-        return format!("flexcal identify {named} says why the estimate is not to be trusted");
+        return format!("flexcal identify {fitted} says why the estimate is not to be trusted");
     }
     // A remainder in the problem comes from a loop, which has searched for causes already.
     if estimate.posterior.noise_factor > 1.0 && problem.remainder.is_none() {
         return format!(
-            "flexcal loop {named} looks for what the model lacks, because the estimate leaves more than noise"
+            "flexcal loop {fitted} looks for what the model lacks, because the estimate leaves more than noise"
         );
     }
     if measures_no_position(problem) {
         return to_export(common, problem, path);
     }
     format!("flexcal compensate {named} --estimate {file} --data TARGETS.csv corrects commands")
+}
+
+/// Formats the problem and the measurement files to which an estimate was fitted as arguments of a
+/// suggested command. Without names of these files, those of the problem are meant.
+pub fn fitted_arguments(common: &Common, problem: &Problem, estimate: &SavedEstimate) -> String {
+    let named = shell_word(common.problem());
+    let files = &estimate.measurement_files;
+    let real = |files: &[PathBuf]| -> Vec<PathBuf> {
+        let of = |file: &PathBuf| file.canonicalize().unwrap_or_else(|_| file.clone());
+        files.iter().map(of).collect()
+    };
+    if files.is_empty() || real(files) == real(&problem.data.files) {
+        return named;
+    }
+    let files: Vec<String> = files.iter().map(|file| shell_word(file)).collect();
+    format!("{named} --data {}", files.join(" "))
 }
 
 /// Returns true if pixels are measured instead of positions, so that the arm need not have a target
@@ -270,11 +288,14 @@ fn to_export(common: &Common, problem: &Problem, estimate: &Path) -> String {
 
 /// Returns the command to run after a trace.
 pub fn after_trace(common: &Common, result: &TraceResult) -> String {
-    let is_significant =
-        result.ranking.first().is_some_and(|candidate| candidate.p_value < result.level);
-    if is_significant || result.structured {
-        format!("flexcal loop {} adds what is missing and fits again", common.problem_arguments())
+    let named = common.problem_arguments();
+    if !result.trusted {
+        format!("flexcal identify {named} says what to correct")
+    } else if report::names_cause(result) {
+        format!("flexcal loop {named} adds what is missing and fits again")
+    } else if result.structured || result.significant().is_some() {
+        format!("flexcal loop {named} says what these data can decide")
     } else {
-        format!("flexcal identify {} writes the estimate to apply", common.problem_arguments())
+        format!("flexcal identify {named} writes the estimate to apply")
     }
 }

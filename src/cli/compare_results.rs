@@ -81,19 +81,26 @@ fn read_side(file: &Path, trust: Trust) -> Result<Side, Box<dyn Error>> {
         .map_err(|source| SavedEstimateError::Unreadable { file: file.to_owned(), source })?;
     let document: serde_json::Value = serde_json::from_str(&text)
         .map_err(|source| SavedEstimateError::Syntax { file: file.to_owned(), source })?;
-    let mut errors = Vec::new();
-    for (key, name) in ERROR_PARTS {
+    let errors_in = |part: Option<&serde_json::Value>, name: &str| {
+        let mut errors = Vec::new();
         for (size, unit, symbol) in ["mean", "rms", "max"]
             .into_iter()
             .flat_map(|size| ERROR_UNITS.map(|(unit, symbol)| (size, unit, symbol)))
         {
-            let value =
-                document.get(key).and_then(|part| part.get(format!("{size}_{unit}"))?.get("norm"));
+            let value = part.and_then(|part| part.get(format!("{size}_{unit}"))?.get("norm"));
             let norm = value.and_then(serde_json::Value::as_f64);
             errors.extend(norm.map(|norm| (format!("{name}, {size}, {symbol}"), norm)));
         }
-    }
-    Ok(Side { estimate, errors, held_out: held_out_rows(file) })
+        errors
+    };
+    let errors = ERROR_PARTS.map(|(key, name)| errors_in(document.get(key), name)).concat();
+    let remainder = document.get("remainder");
+    // The errors of left-out configurations stand in the place of those of held-out rows.
+    let held_out = if document.get("left_out").is_some() { "left out" } else { "held out" };
+    let without = |(key, name)| errors_in(remainder.and_then(|of| of.get(key)), name);
+    let keys = [("held_out_without", held_out), ("identification_without", "fitted rows")];
+    let without_remainder = keys.map(without).concat();
+    Ok(Side { estimate, errors, without_remainder, held_out: held_out_rows(file) })
 }
 
 /// Returns the held-out rows with positions in the residuals.csv beside an estimate.json; empty if

@@ -12,10 +12,10 @@ use flexcal::remainder::{self, Compensation, TargetFrame};
 use flexcal::report::{self, Doubts, shell_word};
 use flexcal::results::{CompensationResult, Document as _, commands_csv};
 
-use super::diagnostic;
 use super::estimate::Trust;
 use super::input::Common;
 use super::outcome::Outcome;
+use super::{advice, diagnostic};
 
 /// Arguments of `flexcal compensate`.
 #[derive(Debug, Args)]
@@ -154,12 +154,12 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     }
     common.print_result(&result.to_json(), || {
         let written = results.path("commands.csv");
-        let [problem_word, estimate] = [common.problem(), &arguments.estimate].map(shell_word);
+        let [problem_word, file] = [common.problem(), &arguments.estimate].map(shell_word);
         let reached = commands.iter().filter(|command| command.is_reached()).count();
         let next = if !trusted {
             format!(
-                "flexcal identify {problem_word} says why the estimate is not to be trusted; correct that, and identify again before commands are \
-                 corrected"
+                "flexcal identify {} says why the estimate is not to be trusted; correct that, and identify again before commands are corrected",
+                advice::fitted_arguments(common, &problem, &estimate)
             )
         } else if misplaced.is_some() {
             "correct the frame or the unit of the targets, as the warning says".to_owned()
@@ -170,7 +170,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         } else {
             let these = if reached < commands.len() { "the commands of reached targets" } else { "these commands" };
             format!(
-                "measure with {these}, then flexcal predict {problem_word} --estimate {estimate} --data MEASURED.csv judges them"
+                "measure with {these}, then flexcal predict {problem_word} --estimate {file} --data MEASURED.csv judges them"
             )
         };
         format!(

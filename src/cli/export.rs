@@ -187,7 +187,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let arm = &geometry.arm;
     let alone = geometry.fitted_alone.as_ref();
     let workspace = geometry.best_rigid.as_ref().map(|best| [best.best, best.identified]);
-    let mut remarks = report::ExportRemarks::new(workspace, alone);
+    let mut remarks = report::ExportRemarks::new((workspace, problem.tool.payload_mass), alone);
     let Rendered { text, moved, name: default, elsewhere } =
         render(arguments, &problem, (&model, &x), (arm, &mut remarks))?;
     let path = flags.out.clone().unwrap_or_else(|| flags.folder(&problem.name).join(default));

@@ -178,7 +178,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         }
         (fitted, _) => fitted,
     };
-    let mut result = IdentificationResult::new(&problem, &identification);
+    let mut result =
+        IdentificationResult::new(&problem, &identification).with_files(common.files(&problem));
     if let Some(fitted) = &fitted {
         result = result.with_predictions(&identification, fitted);
     }

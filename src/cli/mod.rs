@@ -60,8 +60,8 @@ use outcome::Outcome;
   flexcal identify problems/lunar-sampler
   flexcal help identify
 
-Exit status: 0 done; 1 the result is not to be trusted; 2 bad input; 3 the arm has changed (watch);
-130 interrupted."
+Exit status: 0 done; 1 the result is not to be trusted, or does not meet what was asked (accept, next);
+2 bad input; 3 the arm has changed (watch); 130 interrupted."
 )]
 struct Cli {
     #[command(subcommand)]

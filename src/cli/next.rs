@@ -188,7 +188,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     results.write(&texts)?;
     common.print_result(&json, || {
         let text = report::next_text(&problem, &options, &next);
-        let step = next_step(common, &problem, &next, &results);
+        let step = next_step(common, &problem, (&next, options.tolerance), &results);
         format!("{text}{}Next: {step}\n", results.written())
     })?;
     if !next.found.is_trusted() {
@@ -206,11 +206,16 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
 }
 
 /// States what to do after the choice of poses, with the commands.
-fn next_step(common: &Common, problem: &Problem, next: &NextPoses, results: &Results) -> String {
+fn next_step(
+    common: &Common,
+    problem: &Problem,
+    (next, tolerance): (&NextPoses, Option<f64>),
+    results: &Results,
+) -> String {
     let arguments = common.problem_arguments();
     // More poses cannot correct a model that lacks an effect.
-    let lacks_effect = next.error.is_some() && next.misfit > next.noise;
-    let lacks = if lacks_effect {
+    let noise_exceeds = next.noise_exceeds(tolerance);
+    let lacks = if next.has_large_misfit() && !noise_exceeds {
         let closed = results.path("problem.closed.toml");
         if Problem::read(&closed).is_ok_and(|closed| closed.name == problem.name) {
             return format!(
@@ -222,6 +227,9 @@ fn next_step(common: &Common, problem: &Problem, next: &NextPoses, results: &Res
         format!(
             "flexcal loop {arguments} looks for what the model lacks, because the misfit exceeds the noise; or "
         )
+    } else if next.found.is_trusted() && next.is_out_of_reach(tolerance) && !next.poses.is_empty() {
+        "choose another --tolerance-mm or a better instrument; to lower the error all the same, "
+            .to_owned()
     } else {
         String::new()
     };

@@ -8,7 +8,7 @@ use flexcal::fit::{self, Residual};
 use flexcal::measurement::{Measurements, Split};
 use flexcal::nalgebra::Vector3;
 use flexcal::problem::{HeldOut, Problem};
-use flexcal::remainder::{self, Bounds, CorrectedPrediction};
+use flexcal::remainder::{self, BoundTest, Bounds, CorrectedPrediction};
 use flexcal::report::{self, shell_word};
 use flexcal::results::{Document as _, PredictionErrors, predictions_csv, residuals_csv};
 
@@ -42,10 +42,6 @@ pub struct Arguments {
     #[command(flatten)]
     trust: Trust,
 }
-
-/// Number of binomial standard deviations by which the share of rows within their bounds may be
-/// below the level of the bounds.
-const MAX_SHORTFALL_SIGMAS: f64 = 3.0;
 
 /// Minimum number of rows that show a common error.
 const MIN_COMMON_ROWS: usize = 3;
@@ -114,31 +110,37 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
             .map(|residuals| ("residuals.csv", residuals_csv(&problem, &rows, residuals))),
     );
     let residuals = prediction.residuals.as_deref().unwrap_or_default();
+    let fitted = estimate.as_ref().map_or_else(Vec::new, |estimate| estimate.fitted_among(&rows));
+    let test = bounds.and_then(|bounds| test_bounds(bounds, (&rows, residuals), &fitted));
+    let tested = bounds.map(|bounds| (bounds, test.as_ref()));
     let errors = prediction.errors.as_ref().map(|errors_of_rows| {
         let errors = PredictionErrors::new(errors_of_rows, &prediction.spreads);
-        match bounds {
-            Some(bounds) => errors.with_bounds(residuals, bounds).to_json(),
+        match tested {
+            Some(tested) => errors.with_bounds(residuals, tested).to_json(),
             None => errors.to_json(),
         }
     });
     texts.extend(errors.clone().map(|json| ("errors.json", json)));
-    let fitted = estimate.as_ref().map_or_else(Vec::new, |estimate| estimate.fitted_among(&rows));
     let arm = if estimate.is_some() { "the identified arm" } else { "the nominal arm" };
     texts.push((
         RESULT_FILES[3],
-        report::prediction_page(&problem, arm, &prediction, (bounds, &fitted)),
+        report::prediction_page(&problem, arm, &prediction, (tested, &fitted)),
     ));
     let borrowed: Vec<(&str, &str)> =
         texts.iter().map(|(name, text)| (*name, text.as_str())).collect();
     results.write(&borrowed)?;
     common.print_result(errors.as_deref().unwrap_or(&PredictionErrors::default().to_json()), || {
-        let text = report::prediction_text(&problem, arm, &prediction, (bounds, &fitted));
+        let text = report::prediction_text(&problem, arm, &prediction, (tested, &fitted));
         let names: Vec<&str> = texts.iter().map(|(name, _)| *name).collect();
         let next = match (&arguments.estimate, &estimate) {
-            (Some(file), _) if exceeds_bounds(residuals, bounds) => format!(
+            (Some(file), _) if fitted.is_empty() && test.is_some_and(|of| of.is_contradicted()) => format!(
                 "flexcal watch {} --estimate {} says whether the arm has changed: fewer rows than foreseen lie within their bounds",
                 common.problem_arguments(),
                 shell_word(file)
+            ),
+            (Some(_), Some(estimate)) if trusted && test.is_some_and(|of| of.is_contradicted()) => format!(
+                "flexcal loop {} looks for what the model lacks, because fewer rows than foreseen lie within their bounds",
+                advice::fitted_arguments(common, &problem, estimate)
             ),
             (Some(file), Some(estimate)) => {
                 advice::after_applying(common, &problem, estimate, file)
@@ -177,11 +179,14 @@ fn common_error(rows: &Measurements, residuals: &[Residual]) -> Option<String> {
     })
 }
 
-/// Returns true if the share of rows within their bounds is significantly below the level of the
-/// bounds; false without bounds or rows.
-fn exceeds_bounds(residuals: &[Residual], bounds: Option<&Bounds>) -> bool {
-    let Some(bounds) = bounds.filter(|_| !residuals.is_empty()) else { return false };
-    let share = bounds.coverage(residuals.iter().map(|row| row.position.norm()));
-    let spread = (bounds.level * (1.0 - bounds.level) / residuals.len() as f64).sqrt();
-    share < bounds.level - MAX_SHORTFALL_SIGMAS * spread
+/// Tests the bounds by the rows that are not among the `fitted` ones; `None` if no such row has an
+/// error and a bound.
+fn test_bounds(
+    bounds: &Bounds,
+    (rows, residuals): (&Measurements, &[Residual]),
+    fitted: &[usize],
+) -> Option<BoundTest> {
+    let errors = residuals.iter().enumerate().map(|(row, of)| (row, row, of.position.norm()));
+    let errors = errors.filter(|(row, ..)| fitted.binary_search(row).is_err());
+    Some(bounds.test(rows, errors)).filter(|test| test.of > 0)
 }

@@ -22,6 +22,7 @@ mod scan;
 mod sensitivity;
 mod separate;
 mod site;
+mod tolerance;
 mod travel;
 mod views;
 mod workspace;

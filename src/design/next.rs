@@ -130,16 +130,6 @@ pub struct NextPoses {
     pub found: Identification,
 }
 
-impl NextPoses {
-    /// Returns the number of chosen poses after which the error bound is expected to be at most
-    /// `tolerance` \[m\]; `None` without a tolerance, or if no number suffices.
-    pub(crate) fn enough_after(&self, tolerance: Option<f64>) -> Option<usize> {
-        let is_below =
-            |step: &NextStep| step.error.zip(tolerance).is_some_and(|(of, most)| of.bound <= most);
-        self.steps.iter().position(is_below).map(|step| step + 1)
-    }
-}
-
 /// Error that prevents the choice of the next poses.
 #[derive(Debug, thiserror::Error)]
 pub enum NextError {

@@ -1,5 +1,7 @@
 //! Error of predictions over the workspace, now and after more poses.
 
+use statrs::distribution::{ChiSquared, ContinuousCDF as _};
+
 use super::Site;
 use crate::fit::Identification;
 use crate::measurement::Measurements;
@@ -12,6 +14,14 @@ const MIN_MISFIT_RATIO: f64 = 0.5;
 const PRIOR_FREEDOM: f64 = 10.0;
 /// Probability with which the bound over the workspace is not too low.
 const CONFIDENCE: f64 = 0.9;
+
+/// Standard errors of the expected error by which a tolerance must be too small to be out of reach.
+const REACH_SIGMAS: f64 = 2.0;
+
+/// Returns the quantile of the length of a normal vector in space, relative to its root mean square.
+fn normal_bound(level: f64) -> f64 {
+    ChiSquared::new(3.0).map_or(0.0, |squares| (squares.inverse_cdf(level) / 3.0).sqrt())
+}
 
 /// Sizes of noise and misfit, estimated from the residuals of a fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -58,6 +68,10 @@ pub struct WorkspaceError {
     /// Part of the expected error that no estimate of the parameters removes: noise and misfit
     /// \[m\].
     pub least: f64,
+    /// Length below which no number of poses can be expected to bring the bound \[m\]: the bound of
+    /// normally distributed errors with the root mean square `least`, less
+    /// [`REACH_SIGMAS`] standard errors.
+    pub least_bound: f64,
 }
 
 impl WorkspaceError {
@@ -77,7 +91,10 @@ impl WorkspaceError {
         let squares: f64 = sizes.iter().map(|size| size * size).sum();
         let expected = scale * (squares / sizes.len() as f64).sqrt();
         let least = (scale * correction.noise_length()).min(expected);
-        Some(Self { expected, expected_sigma: expected / (2.0 * freedom).sqrt(), bound, least })
+        let error = 1.0 / (2.0 * freedom).sqrt();
+        let reach = normal_bound(level) * (1.0 - REACH_SIGMAS * error).max(0.0);
+        let least_bound = least * reach;
+        Some(Self { expected, expected_sigma: expected * error, bound, least, least_bound })
     }
 
     /// Returns the error after the variance that the parameters cause has fallen to a `share` of
@@ -90,6 +107,7 @@ impl WorkspaceError {
             expected_sigma: self.expected_sigma * ratio,
             bound: self.bound * ratio,
             least: self.least,
+            least_bound: self.least_bound,
         }
     }
 }

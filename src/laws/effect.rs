@@ -7,7 +7,7 @@ use serde::ser::{Serialize, SerializeMap, Serializer};
 use super::argument::{Argument, ArgumentKind};
 use super::catalogue::Effect;
 use super::expression::{Vocabulary, parse};
-use super::family::{At, Family, TermEntry};
+use super::family::{At, Family, Need, TermEntry};
 use super::law::LAW;
 use super::quantity::Quantity;
 use super::site::JointField;
@@ -194,6 +194,11 @@ impl Effect {
     /// quantities that a choice of poses can vary.
     pub(crate) fn follows_time(&self) -> bool {
         self.depends_on(Quantity::follows_time)
+    }
+
+    /// Returns true if the family of the effect has one of these needs.
+    pub(crate) fn has_need(&self, needs: &[Need]) -> bool {
+        self.family().is_some_and(|family| needs.iter().any(|need| family.needs.contains(need)))
     }
 
     /// Returns true if the effect depends on earlier poses.

@@ -81,12 +81,12 @@ impl Contradiction {
             (true, None) => String::new(),
         };
         let cause = if index == 0 {
-            "most probable cause"
+            "most probable of the causes tried"
         } else {
-            "with what was found before, they still do; most probable further cause"
+            "with what was found before, they still do; most probable of the further causes tried"
         };
         let text = format!(
-            "the new rows contradict {} (a false alarm in at most one of 100 fits); {cause}: {} ({:.0} %){treatment}",
+            "the new rows contradict {} (a false alarm in at most one of 100 fits); {cause}: {} ({:.0} % among them){treatment}",
             file.display(),
             self.label,
             100.0 * self.probability

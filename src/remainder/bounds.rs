@@ -1,7 +1,15 @@
 //! Bounds that the errors of predicted positions do not exceed with a given probability.
 
+use std::collections::BTreeMap;
+
+use statrs::function::beta::ln_beta;
+
 use super::correction::{CorrectedPose, Correction};
+use crate::measurement::Measurements;
 use crate::quantity::format::percent_of;
+
+/// Probability of as many exceeded bounds by chance below which the bounds are contradicted.
+const MIN_CHANCE_OF_EXCESS: f64 = 0.01;
 
 /// Uncertainty of predicted poses, and error bounds that hold with the probability `level`.
 #[derive(Debug, Clone)]
@@ -12,12 +20,85 @@ pub struct Bounds {
     pub poses: Vec<CorrectedPose>,
     /// Ratio of a pose's error bound to its expected error length ([`CorrectedPose::size`]).
     factor: f64,
+    /// Number of configurations whose left-out errors determine `factor`.
+    learned_from: usize,
+}
+
+/// Comparison of error bounds with the errors of configurations that were not fitted.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BoundTest {
+    /// Probability with which a bound holds, 0 to 1.
+    pub level: f64,
+    /// Number of configurations whose mean error does not exceed their bound.
+    pub within: usize,
+    /// Number of configurations that have an error and a bound.
+    pub of: usize,
+    /// Number of fitted configurations on which the bounds rest.
+    pub learned_from: usize,
+}
+
+impl BoundTest {
+    /// Returns the number of configurations that exceed their bound.
+    pub fn beyond(&self) -> usize {
+        self.of - self.within
+    }
+
+    /// Returns the number of configurations that are expected to exceed their bound.
+    pub fn expected_beyond(&self) -> f64 {
+        (1.0 - self.level) * self.of as f64
+    }
+
+    /// Returns the probability that by chance at least as many errors exceed their bounds.
+    ///
+    /// The share of errors beyond a quantile of n errors has a beta distribution with the
+    /// parameters (1 − level)(n + 1) and level (n + 1), so their number has a beta-binomial
+    /// distribution.
+    pub fn chance(&self) -> f64 {
+        let (n, of) = (self.learned_from as f64 + 1.0, self.of as f64);
+        let (a, b) = ((1.0 - self.level) * n, self.level * n);
+        let probability = |beyond: usize| {
+            let k = beyond as f64;
+            let ln_choices = -(of + 1.0).ln() - ln_beta(of - k + 1.0, k + 1.0);
+            (ln_choices + ln_beta(k + a, of - k + b) - ln_beta(a, b)).exp()
+        };
+        (1.0 - (0..self.beyond()).map(probability).sum::<f64>()).clamp(0.0, 1.0)
+    }
+
+    /// Returns true if more configurations exceed their bounds than chance explains.
+    pub fn is_contradicted(&self) -> bool {
+        self.beyond() > 0 && self.chance() < MIN_CHANCE_OF_EXCESS
+    }
 }
 
 impl Bounds {
     /// Creates the bounds at probability `level` for poses that `correction` corrected.
     pub fn new(correction: &Correction, poses: Vec<CorrectedPose>, level: f64) -> Self {
-        Self { level, poses, factor: correction.scores.quantile(level) }
+        let scores = &correction.scores;
+        Self { level, poses, factor: scores.quantile(level), learned_from: scores.configurations }
+    }
+
+    /// Compares the bounds with errors that were not fitted. `errors` has for each of them the index
+    /// of its pose in these bounds, its row in `table`, and its length \[m\]. Rows of one
+    /// configuration err alike, so they count once with their mean error.
+    pub fn test(
+        &self,
+        table: &Measurements,
+        errors: impl IntoIterator<Item = (usize, usize, f64)>,
+    ) -> BoundTest {
+        let mut excesses: BTreeMap<Vec<u64>, f64> = BTreeMap::new();
+        for (pose, row, length) in errors {
+            let excess = length - self.bound(pose);
+            if excess.is_finite() {
+                let key = table.configuration(row).iter().map(|q| q.to_bits()).collect();
+                *excesses.entry(key).or_default() += excess;
+            }
+        }
+        BoundTest {
+            level: self.level,
+            within: excesses.values().filter(|excess| **excess <= 0.0).count(),
+            of: excesses.len(),
+            learned_from: self.learned_from,
+        }
     }
 
     /// Returns the upper bound of a pose's error length ‖measured − predicted‖ \[m\].
@@ -52,5 +133,19 @@ impl Bounds {
     /// 0.95.
     pub fn column(&self) -> String {
         format!("bound{}_mm", percent_of(self.level))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bounds_that_too_many_configurations_exceed_are_contradicted() {
+        let test = |within, of| BoundTest { level: 0.95, within, of, learned_from: 28 };
+        assert!([(50, 50), (41, 50), (0, 0)].iter().all(|&(k, n)| !test(k, n).is_contradicted()));
+        assert!(test(16, 50).is_contradicted());
+        assert!((test(50, 50).chance() - 1.0).abs() < 1e-12);
+        assert!((test(41, 50).chance() - 0.0306).abs() < 1e-4);
     }
 }

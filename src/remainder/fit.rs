@@ -15,7 +15,7 @@ use crate::model::Model;
 use crate::problem::{Observation, Problem};
 
 /// Minimum number of configurations for which the uncertainty of predictions is estimated.
-const MIN_CONFIGURATIONS: usize = 10;
+pub(crate) const MIN_CONFIGURATIONS: usize = 10;
 /// Maximum number of rows to which a correction is fitted.
 const MAX_ROWS: usize = 10_000;
 

@@ -39,8 +39,8 @@ mod update;
 
 pub use apply::{CorrectedPrediction, predict};
 pub use correction::{CorrectedPose, Correction};
-pub(crate) use fit::Outcome;
 pub use fit::{Fitted, fit};
+pub(crate) use fit::{MIN_CONFIGURATIONS, Outcome};
 pub(crate) use gain::Gain;
 pub(crate) use joint_errors::{JointError, JointErrorPoint};
 pub(crate) use residuals::residuals;
@@ -49,7 +49,7 @@ pub(crate) use saved::{FORMAT, SavedRemainder};
 #[doc(hidden)]
 pub use self::{
     apply::{compensate, predict_identified},
-    bounds::Bounds,
+    bounds::{BoundTest, Bounds},
     compensation::{Compensation, CompensationError, TargetFrame},
     declared::{declared, of_estimate},
     fit::uncertainty,

@@ -2,6 +2,7 @@
 
 use super::arm_names::NOMINAL_ARM;
 use super::document::{Block, Headline, Table};
+use super::remainder::{HELD_OUT, chance_of_bound};
 use super::render::{report, text};
 use crate::fit::Verdict;
 use crate::problem::Problem;
@@ -154,12 +155,13 @@ fn accuracy_blocks<'a>(result: &AcceptanceResult) -> Vec<Block<'a>> {
     let bound = result.bound.as_ref().map(|bound| {
         Block::Text(format!(
             "The fit expects {} % of the errors to stay below a bound of {} mm on average; {:.0} of the {} \
-             held-out rows do stay below theirs ({} %).",
+             held-out rows do stay below theirs ({} %).{}",
             percent_of(bound.bounds.level),
             number(bound.bounds.mean_bound_mm, 4),
             bound.coverage * bound.rows as f64,
             bound.rows,
             number(bound.coverage * 100.0, 1),
+            chance_of_bound(Some(&bound.test), HELD_OUT),
         ))
     });
     let blocks = [Block::Table(table), Block::Text(SCOPE_NOTE.to_owned())];

@@ -10,6 +10,7 @@ use super::remainder::PredictionAccuracy;
 use super::render::text;
 use super::row_kinds::unsteady_points;
 use crate::fit::{Finding, FindingCode, Identification, size_of_kind};
+use crate::least_squares::UnidentifiableCombination;
 use crate::problem::Problem;
 use crate::quantity::format::{counted, number};
 use crate::results::Knowledge;
@@ -63,6 +64,15 @@ fn parameter_counts(found: &Identification) -> String {
     )
 }
 
+/// Returns true if every parameter of a combination that the data leave open has a prior.
+fn rests_on_priors(found: &Identification, combination: &UnidentifiableCombination) -> bool {
+    let has_prior = |name: &String| {
+        let estimate = found.estimates.iter().find(|estimate| estimate.name == *name);
+        estimate.is_some_and(|estimate| estimate.prior_sigma.is_some())
+    };
+    combination.weights.iter().all(|(k, _)| found.unknowns.get(*k).is_some_and(has_prior))
+}
+
 /// Returns short remarks on what the full text explains, such as orientation errors, outliers,
 /// undetermined combinations and active constraints.
 fn remarks(found: &Identification) -> Vec<String> {
@@ -78,27 +88,32 @@ fn remarks(found: &Identification) -> Vec<String> {
     let farthest = found.outliers.iter().max_by(|a, b| a.distance.total_cmp(&b.distance));
     points.extend(farthest.map(|outlier| {
         let n = counted(found.outliers.len(), row_noun(found));
+        let stand = if found.outliers.len() == 1 { "stands" } else { "stand" };
         if includes_orientation(found, outlier.kind) {
             return format!(
-                "{n} too far off to be noise, position and orientation together, the farthest at {}: \
+                "{n} {stand} out from the others by position and orientation together, the farthest at {}: \
                  {} × the typical scatter",
                 outlier.location,
                 number(outlier.distance, 1)
             );
         }
         format!(
-            "{n} too far off to be noise, the farthest at {}: {}",
+            "{n} {stand} out from the others, the farthest at {}: {}",
             outlier.location,
             size_of_kind(outlier.kind, outlier.error.norm(), 3)
         )
     }));
     points.extend(unsteady_points(found.spreads.iter().map(|spread| &spread.1)));
-    let of_parameters = format!(
-        "of the {} cannot be identified (see -v)",
-        counted(found.unknowns.len(), "parameter")
-    );
+    let unidentifiable = &found.identifiability().unidentifiable;
+    let rest_on_priors =
+        unidentifiable.iter().filter(|combination| rests_on_priors(found, combination)).count();
+    let parameters = counted(found.unknowns.len(), "parameter");
+    let open = format!("of the {parameters} cannot be identified (see -v)");
+    let is = if rest_on_priors == 1 { "is" } else { "are" };
+    let by_priors = format!("of the {parameters} {is} known from the priors alone (see -v)");
     let counts = [
-        (found.identifiability().unidentifiable.len(), "combination", of_parameters.as_str()),
+        (unidentifiable.len() - rest_on_priors, "combination", open.as_str()),
+        (rest_on_priors, "combination", by_priors.as_str()),
         (found.weak.len(), "combination", "determined too weakly"),
         (correlated(found).len(), "pair", "correlated by more than 0.9"),
     ];

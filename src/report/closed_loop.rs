@@ -12,7 +12,7 @@ use super::identify::{
 use super::noise::{expected_interval, format_chi2, influential_rows, residual_fact};
 use super::parameters::{against_priors, parameters};
 use super::probability::percent;
-use super::remainder::PredictionAccuracy;
+use super::remainder::{PredictionAccuracy, why_no_bound};
 use super::render::{Report, report, text};
 use super::residual_tests::{self, other_reduced_chi2};
 use super::unexplained::{structure_places, structure_sentences, to_declare};
@@ -56,7 +56,7 @@ pub fn loop_brief(
     table.header.pop();
     table.rows.iter_mut().for_each(|row| _ = row.pop());
     blocks.push(Block::Table(table));
-    let bound = accuracy.and_then(|accuracy| accuracy.bound);
+    let bound = accuracy.map_or_else(|| why_no_bound(&closure.after), |accuracy| accuracy.bound);
     let size: Vec<String> =
         gain_sentence(closure, result, corrected.is_some()).into_iter().chain(bound).collect();
     blocks.extend((!size.is_empty()).then(|| Block::Text(size.join(" "))));
@@ -241,7 +241,8 @@ fn blocks<'a>(
         Block::Table(errors(closure, result, corrected.as_ref())),
         gain_block(closure, result, corrected.is_some()),
     ]);
-    blocks.extend(accuracy.and_then(|accuracy| accuracy.bound).map(Block::Text));
+    let bound = accuracy.map_or_else(|| why_no_bound(after), |accuracy| accuracy.bound);
+    blocks.extend(bound.map(Block::Text));
     blocks.extend([
         Block::Words(found_effects(result, MAX_SHOWN_ALTERNATIVES)),
         Block::Page(found_effects(result, 2 * MAX_SHOWN_ALTERNATIVES)),

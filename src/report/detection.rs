@@ -3,14 +3,12 @@
 use super::document::{Block, Table, code};
 use super::effect;
 use super::forecast::format_size;
-use crate::laws::ArgumentKind;
+use crate::laws::{ArgumentKind, Need};
 use crate::problem::{Effect, Problem};
 use crate::select::{Detectable, Detection, Size};
 
 /// Maximum number of effects of one family that a table lists.
 const MAX_SHOWN_EFFECTS: usize = 3;
-/// Names of the effects that only a load makes visible.
-pub(super) const LOAD_EFFECTS: [&str; 3] = ["joint-compliance", "link-bending", "base-compliance"];
 /// Note on the columns of the table.
 const COLUMNS_NOTE: &str = "found from: smallest size that is found for every axis or phase; at best: for the most visible axis or phase; –: for some axis or phase, no size is found";
 
@@ -77,7 +75,7 @@ pub(super) fn blocks<'a>(problem: &Problem, detection: &Detection) -> Vec<Block<
             names.join(", ")
         )));
     }
-    let acts_by_load = |effect: &&Detectable| LOAD_EFFECTS.contains(&effect.effect.name());
+    let acts_by_load = |effect: &&Detectable| effect.effect.has_need(&[Need::Loads]);
     if has_no_mass(problem) && hidden.iter().any(acts_by_load) {
         let loaded = hidden.iter().filter(|effect| acts_by_load(effect));
         let list = effect::listed(loaded.map(|effect| &effect.effect)).join("; ");

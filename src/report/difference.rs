@@ -35,6 +35,8 @@ pub(crate) struct Side {
     pub estimate: SavedEstimate,
     /// Names of errors with their values in mm, ° or px, for example `held out, mean, mm`.
     pub errors: Vec<(String, f64)>,
+    /// The same errors without the remainder of the estimate; empty if it has none.
+    pub without_remainder: Vec<(String, f64)>,
     /// Held-out rows that measure positions; empty if no file with them was found.
     pub held_out: Vec<HeldOutRow>,
 }
@@ -109,6 +111,7 @@ fn blocks<'a>(sides: &[Side; 2]) -> Vec<Block<'a>> {
         .iter()
         .map(|(name, _)| vec![name.clone(), error(&sides[0], name), error(&sides[1], name)]);
     blocks.push(Block::Table(Table::new(&["error", "A", "B"], rows.collect(), &[0])));
+    blocks.extend(remainder_sentences(sides).into_iter().map(Block::Text));
     blocks.extend(held_out_sentence(sides).map(Block::Text));
     blocks.push(Block::figures([draw(&differences, limit)]));
     let listed = &differences[..differences.len().min(MAX_LISTED)];
@@ -123,6 +126,22 @@ fn blocks<'a>(sides: &[Side; 2]) -> Vec<Block<'a>> {
     }
     blocks.push(Block::Page(vec![Block::Table(table(&differences))]));
     blocks
+}
+
+/// States the mean errors without the remainder of each side that has one.
+fn remainder_sentences(sides: &[Side; 2]) -> Vec<String> {
+    let sentence = |(name, side): (&str, &Side)| {
+        let means = side.without_remainder.iter().filter(|(of, _)| of.contains("mean"));
+        let words: Vec<String> =
+            means.map(|(of, error)| format!("{of} {}", number(*error, 4))).collect();
+        (!words.is_empty()).then(|| {
+            format!(
+                "Errors of {name} are with its remainder, the parameters below are without it; without it: {}.",
+                words.join("; ")
+            )
+        })
+    };
+    ["A", "B"].into_iter().zip(sides).filter_map(sentence).collect()
 }
 
 /// Units of stiffnesses, which are shown with an SI prefix that suits the value.

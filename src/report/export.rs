@@ -24,6 +24,8 @@ pub struct ExportRemarks {
     /// and the identified geometry, in poses of the workspace; `None` unless `--best-rigid` was
     /// given.
     pub workspace: Option<[ErrorSummary; 2]>,
+    /// Largest payload in these poses \[kg\], the one that the problem declares.
+    pub payload: f64,
     /// Values of base and tool of a geometry that was fitted alone, as texts; `None` unless
     /// `--fitted-alone` was given.
     pub set_up: Option<Vec<String>>,
@@ -37,10 +39,10 @@ impl ExportRemarks {
     /// Collects the remarks on a geometry, from its errors in a workspace and the fit of a geometry
     /// alone.
     pub fn new(
-        workspace: Option<[ErrorSummary; 2]>,
+        (workspace, payload): (Option<[ErrorSummary; 2]>, f64),
         fitted_alone: Option<&Identification>,
     ) -> Self {
-        Self { workspace, set_up: fitted_alone.map(set_up_values), ..Self::default() }
+        Self { workspace, payload, set_up: fitted_alone.map(set_up_values), ..Self::default() }
     }
 }
 
@@ -114,8 +116,13 @@ pub fn export_text(result: &ExportResult, remarks: &ExportRemarks) -> String {
         let [mean, max] = [exported.mean.norm, exported.max.norm].map(|of| mm(of, 4));
         let [other_mean, other_max] = [identified.mean.norm, identified.max.norm].map(|of| mm(of, 4));
         Block::Text(format!(
-            "In the workspace the whole model differs from the exported geometry by {mean} mm on average ({max} at most), from the \
-             identified geometry by {other_mean} mm ({other_max})."
+            "In random poses within the joint limits (and --workspace-mm), {}, the whole model differs from the exported geometry by \
+             {mean} mm on average ({max} mm at most), from the identified geometry by {other_mean} mm ({other_max} mm at most).",
+            if remarks.payload > 0.0 {
+                format!("with payloads up to {} kg", number(remarks.payload, 2))
+            } else {
+                "without payload".to_owned()
+            }
         ))
     }));
     if let Some((_, rows)) = remarks.table.split_first() {

@@ -142,7 +142,7 @@ pub(super) fn rounds<'a>(closure: &'a ClosedLoop, result: &LoopResult) -> Vec<Bl
 pub(super) fn status_table<'a>(closure: &ClosedLoop, result: &LoopResult) -> Option<Block<'a>> {
     let share = |part: f64| format!("{} %", number(part * 100.0, 0));
     let law = |found: &FoundEffect| {
-        or_dash(found.claims.as_ref(), |claims| share(claims.law.probability))
+        or_dash(found.claims.as_ref(), |claims| percent(claims.law.probability))
     };
     let status = |found: &FoundEffect| {
         let is_unknown = found.status == Status::Located && !has_place(found);

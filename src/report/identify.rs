@@ -14,7 +14,7 @@ use super::parameters::{
     weak,
 };
 use super::prior::prior;
-use super::remainder::PredictionAccuracy;
+use super::remainder::{PredictionAccuracy, why_no_bound};
 use super::render::{Report, report, text};
 use super::residual_tests;
 use super::row_kinds::row_kind_tables;
@@ -36,7 +36,7 @@ pub(super) fn estimate_head<'a>(
 ) -> Vec<Block<'a>> {
     let outcome = outcome(found, accuracy.as_ref());
     let is_corrected = accuracy.as_ref().is_some_and(|accuracy| accuracy.corrected.is_some());
-    let bound = accuracy.and_then(|accuracy| accuracy.bound);
+    let bound = accuracy.map_or_else(|| why_no_bound(found), |accuracy| accuracy.bound);
     let size: Vec<String> = [noise(problem, found)].into_iter().chain(bound).collect();
     let mut blocks = vec![
         Block::lines(headline(problem, found, &outcome)),
@@ -108,7 +108,8 @@ fn blocks<'a>(problem: &Problem, found: &'a Identification, plots: &'a PlotData)
     let mut blocks = vec![Block::Headline(head), outcome, fit];
     blocks.extend(fit_warnings(found, plots));
     blocks.push(Block::Table(errors_by_axis(found, corrected.is_some())));
-    blocks.extend(accuracy.and_then(|accuracy| accuracy.bound).map(Block::Text));
+    let bound = accuracy.map_or_else(|| why_no_bound(found), |accuracy| accuracy.bound);
+    blocks.extend(bound.map(Block::Text));
     blocks.extend(orientation(found));
     blocks.extend(prior(found));
     blocks.extend(row_kind_tables(found));

@@ -70,7 +70,7 @@ pub use render::{limit_text_width, text_width};
 pub(crate) use replica::{replica_report, replica_text};
 pub(crate) use shell::shell_word;
 pub(crate) use study::study_page;
-pub(crate) use trace::trace_page;
+pub(crate) use trace::{names_cause, trace_page};
 pub(crate) use unexplained::lacks_masses;
 pub(crate) use verdict::interrupted;
 pub(crate) use watch::{watch_page, watch_text};

@@ -5,6 +5,7 @@ use super::figures::{ACCENT, Curve, Drawing, INK, Series};
 use super::limited_poses::at_limits;
 use super::render::{page, text};
 use crate::design::{NextOptions, NextPoses, Purpose, StopReason, WorkspaceError};
+use crate::fit::Noise;
 use crate::measurement::Measurements;
 use crate::problem::Problem;
 use crate::quantity::format::{counted, mm, number, or_dash};
@@ -57,13 +58,18 @@ fn error_paragraph(next: &NextPoses, percent: &str) -> String {
     match next.error {
         Some(error) => format!(
             "In the workspace the identified arm errs by {} ± {} mm (expected rms, noise included), and by less than {} mm with a \
-             probability of {percent} %.{} The choice allows for a misfit of the model of {} mm per axis besides {} mm of noise.",
+             probability of {percent} %.{} {} a misfit of the model of {} mm per axis besides {} mm of noise.",
             mm(error.expected, 3),
             mm(error.expected_sigma, 3),
             mm(error.bound, 3),
             next.attainable
-                .map(|least| format!(" No number of further poses brings the rms below {} mm.", mm(least, 3)))
+                .map(|least| format!(" As far as these rows tell, no number of further poses brings the rms below {} mm.", mm(least, 3)))
                 .unwrap_or_default(),
+            if next.found.noise == Noise::Declared {
+                "The choice allows for"
+            } else {
+                "No σ is declared, so the choice assumes"
+            },
             mm(next.misfit, 3),
             mm(next.noise, 3),
         ),
@@ -152,7 +158,7 @@ fn verdict(options: &NextOptions, next: &NextPoses) -> String {
     }
     match (next.stop, tolerance, next.enough_after(options.tolerance)) {
         (Some(StopReason::Enough), Some(tolerance), _) => {
-            let incomplete = if next.misfit > next.noise {
+            let incomplete = if next.has_large_misfit() {
                 let ratio = number(next.misfit / next.noise, 1);
                 format!(" A better model would lower the error further: the misfit is {ratio} × the noise.")
             } else {
@@ -162,7 +168,8 @@ fn verdict(options: &NextOptions, next: &NextPoses) -> String {
         }
         (Some(StopReason::GainBelowNoise), Some(tolerance), _) => format!(
             "Further poses gain less than the uncertainty of the error itself, and the bound is above the tolerance of {tolerance} mm: \
-             a better model is needed, not more poses."
+             a better {} is needed, not more poses.",
+            lacking(next, options.tolerance)
         ),
         (Some(StopReason::GainBelowNoise), None, _) => {
             "Enough: all that further poses can gain is less than the uncertainty of the error itself.".to_owned()
@@ -174,6 +181,11 @@ fn verdict(options: &NextOptions, next: &NextPoses) -> String {
             "Not yet enough: after {} the bound is expected to be below the tolerance of {tolerance} mm.",
             counted(poses, "more pose")
         ),
+        (_, Some(tolerance), None) if next.is_out_of_reach(options.tolerance) => format!(
+            "Out of reach: no number of further poses can be expected to bring the bound below the tolerance of {tolerance} mm. A better {} is \
+             needed.",
+            lacking(next, options.tolerance)
+        ),
         (_, Some(tolerance), None) if !next.steps.is_empty() && next.error.is_some() => format!(
             "Not yet enough: after these poses the bound is still expected to be above the tolerance of {tolerance} mm."
         ),
@@ -181,6 +193,15 @@ fn verdict(options: &NextOptions, next: &NextPoses) -> String {
             .to_owned(),
         _ if next.error.is_none() => "Not yet enough: too few poses are measured to judge the error.".to_owned(),
         _ => "Not yet enough: further poses still lower the error.".to_owned(),
+    }
+}
+
+/// Names what must be better for the error bound to fall below the tolerance.
+fn lacking(next: &NextPoses, tolerance: Option<f64>) -> &'static str {
+    match (next.noise_exceeds(tolerance), next.has_large_misfit()) {
+        (true, _) => "instrument",
+        (false, true) => "model",
+        (false, false) => "model or instrument",
     }
 }
 

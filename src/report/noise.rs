@@ -150,16 +150,13 @@ pub(super) fn format_chi2(chi2: f64) -> String {
     number(chi2, decimals(chi2, 6).clamp(2, 6))
 }
 
-/// Returns true if the declared σ explains the residual of the rows that are not influential, or of
-/// all rows if none is. Outliers may then be called gross errors.
+/// Returns true if the declared σ explains the residual of the rows that are not influential. The
+/// influential rows may then be called gross errors.
 fn others_agree_with_sigma(found: &Identification) -> bool {
-    match &found.influential_rows {
-        Some(influential) => influential
-            .reduced_chi2
-            .zip(found.chance)
-            .is_some_and(|(chi2, (_, highest))| chi2 <= highest),
-        None => matches!(ResidualSize::of(found), ResidualSize::Expected(_)),
-    }
+    found.influential_rows.as_ref().is_some_and(|influential| {
+        let expected = influential.reduced_chi2.zip(found.chance);
+        expected.is_some_and(|(chi2, (_, highest))| chi2 <= highest)
+    })
 }
 
 /// Lists the rows whose residual is too large to be noise; `None` if there are none.
@@ -227,7 +224,7 @@ pub(super) fn includes_orientation(found: &Identification, kind: &str) -> bool {
 fn scatter_size(kind: &str, scatter: TypicalScatter) -> String {
     let (size, source) = match scatter {
         TypicalScatter::Median(size) => (size, "the median"),
-        TypicalScatter::Declared(size) => (size, "the declared σ"),
+        TypicalScatter::Declared(size) => (size, "the σ that the fit assumes"),
     };
     format!(" ({}, from {source})", size_of_kind(kind, size, 3))
 }

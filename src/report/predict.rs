@@ -11,7 +11,11 @@ use super::row_kinds::unsteady_points;
 use crate::fit::{ErrorSummary, Prediction};
 use crate::problem::Problem;
 use crate::quantity::format::{counted, mm, percent_of};
-use crate::remainder::Bounds;
+use crate::remainder::{BoundTest, Bounds};
+
+/// Error bounds of the predicted rows, with their test by the rows that were not fitted; the test is
+/// `None` if there are no such rows.
+pub(crate) type Tested<'a> = (&'a Bounds, Option<&'a BoundTest>);
 
 /// Returns the predictions as text. `arm` describes the arm that was used, and `fitted` lists the
 /// predicted rows (from 0, ascending) to which that arm was fitted.
@@ -19,7 +23,7 @@ pub fn prediction_text(
     problem: &Problem,
     arm: &str,
     prediction: &Prediction,
-    (bounds, fitted): (Option<&Bounds>, &[usize]),
+    (bounds, fitted): (Option<Tested>, &[usize]),
 ) -> String {
     text(&blocks(problem, arm, prediction, (bounds, fitted)))
 }
@@ -29,7 +33,7 @@ pub(crate) fn prediction_page(
     problem: &Problem,
     arm: &str,
     prediction: &Prediction,
-    (bounds, fitted): (Option<&Bounds>, &[usize]),
+    (bounds, fitted): (Option<Tested>, &[usize]),
 ) -> String {
     page(&problem.title, "predictions", &blocks(problem, arm, prediction, (bounds, fitted)))
 }
@@ -38,7 +42,7 @@ fn blocks<'a>(
     problem: &Problem,
     arm: &str,
     prediction: &Prediction,
-    (bounds, fitted): (Option<&Bounds>, &[usize]),
+    (bounds, fitted): (Option<Tested>, &[usize]),
 ) -> Vec<Block<'a>> {
     let mut words = format!("{} predicted for {arm}", counted(prediction.positions.len(), "pose"));
     let lost = prediction
@@ -81,12 +85,14 @@ fn blocks<'a>(
     let residuals = prediction.residuals.as_deref();
     let residuals = residuals.filter(|rows| 3 * rows.len() > prediction.placed.len());
     blocks.extend(fitted_rows_sentence(prediction, fitted).map(Block::Text));
-    blocks.extend(bounds.map(|bounds| Block::lines(bound_sentence(bounds, residuals))));
+    blocks.extend(bounds.map(|(bounds, test)| {
+        Block::lines(bound_sentence(bounds, residuals.map(|residuals| (residuals, test))))
+    }));
     let unsteady = unsteady_points(&prediction.spreads);
     if !unsteady.is_empty() {
         blocks.push(Block::list(unsteady));
     }
-    blocks.push(Block::figures([draw_errors(prediction, bounds)]));
+    blocks.push(Block::figures([draw_errors(prediction, bounds.map(|(bounds, _)| bounds))]));
     blocks
 }
 

@@ -2,13 +2,11 @@
 
 use std::fmt::Write as _;
 
-use statrs::function::beta::ln_beta;
-
 use super::document::{Block, Column, Table, code};
 use super::figures;
 use crate::fit::{ErrorSummary, Identification, Residual};
 use crate::quantity::format::{counted, mm, number, percent_of, two_digits};
-use crate::remainder::{Bounds, Gain, JointError, Outcome};
+use crate::remainder::{BoundTest, Bounds, Gain, JointError, MIN_CONFIGURATIONS, Outcome};
 use crate::results::PlotData;
 
 /// States the result of the search for a remainder; `found` has the errors without a remainder.
@@ -123,6 +121,26 @@ pub(super) fn uncertainty<'a>(found: &Identification, plots: &'a PlotData) -> Ve
 /// Smallest share of the workspace far from all measured poses that the summaries state \[%\].
 const MIN_SAID_FAR_PERCENT: f64 = 1.0;
 
+/// Name of the configurations that no fit uses.
+pub(super) const HELD_OUT: &str = "held-out configurations";
+
+/// States why the error bound of predictions is not known; `None` if the reason is not known or the
+/// fit is not to be trusted.
+pub(super) fn why_no_bound(found: &Identification) -> Option<String> {
+    let reason = if !found.is_trusted() {
+        return None;
+    } else if found.prior.is_some() {
+        "with a prior from a file the new rows alone do not determine it".to_owned()
+    } else if found.fitted.identification.kind != "position" {
+        "no positions are measured".to_owned()
+    } else if found.poses < MIN_CONFIGURATIONS {
+        format!("it needs {MIN_CONFIGURATIONS} different fitted poses")
+    } else {
+        return None;
+    };
+    Some(format!("No error bound of a prediction is stated: {reason}."))
+}
+
 /// Accuracy of predictions that the summaries of `identify` and `loop` state.
 #[derive(Debug, Clone)]
 pub struct PredictionAccuracy {
@@ -149,7 +167,7 @@ impl PredictionAccuracy {
         } else {
             format!(", of which {} % is far from all measured poses", number(far, 0))
         };
-        let kept = held_out_share(uncertainty.within, uncertainty.level, found.poses);
+        let kept = contradicted_bound(uncertainty.test.as_ref(), HELD_OUT);
         let bound = mean.is_finite().then(|| {
             format!(
                 "Error bound of a prediction{with} ({percent} %, measurement noise included): {} mm, mean over the measured joint ranges{far}.{kept}",
@@ -160,39 +178,36 @@ impl PredictionAccuracy {
     }
 }
 
-/// Probability of as many exceeded bounds by chance below which a text says that there are too many.
-const MIN_CHANCE_OF_EXCESS: f64 = 0.01;
-
-/// States how many of the held-out configurations exceed their own bound, if these are too many for
-/// bounds that hold with the probability `level` and rest on `fitted` poses; otherwise empty.
-fn held_out_share((within, of): (usize, usize), level: f64, fitted: usize) -> String {
-    let beyond = of - within;
-    if beyond == 0 {
-        return String::new();
-    }
-    if chance_of_excess((beyond, of), level, fitted) >= MIN_CHANCE_OF_EXCESS {
-        return String::new();
-    }
-    let expected = number((1.0 - level) * of as f64, 1);
+/// States how many configurations, which `noun` names, exceed their bounds if chance does not
+/// explain their number; otherwise empty. The sentence begins with a space.
+fn contradicted_bound(test: Option<&BoundTest>, noun: &str) -> String {
+    let Some(test) = test.filter(|test| test.is_contradicted()) else { return String::new() };
+    let (beyond, of) = (test.beyond(), test.of);
+    let expected = number(test.expected_beyond(), 1);
     format!(
-        " But {beyond} of {of} held-out configurations exceed their own bound, and chance explains {expected}: predictions at such poses err \
+        " But {beyond} of {of} {noun} exceed their own bound, and chance explains {expected}: predictions at such poses err \
          more than the bound says."
     )
 }
 
-/// Returns the probability that at least `beyond` of `of` errors exceed bounds by chance.
-///
-/// The share of errors beyond a quantile of n errors has a beta distribution with the parameters
-/// (1 − level)(n + 1) and level (n + 1), so their number has a beta-binomial distribution.
-fn chance_of_excess((beyond, of): (usize, usize), level: f64, fitted: usize) -> f64 {
-    let (n, of) = (fitted as f64 + 1.0, of as f64);
-    let (a, b) = ((1.0 - level) * n, level * n);
-    let probability = |beyond: usize| {
-        let k = beyond as f64;
-        let ln_choices = -(of + 1.0).ln() - ln_beta(of - k + 1.0, k + 1.0);
-        (ln_choices + ln_beta(k + a, of - k + b) - ln_beta(a, b)).exp()
-    };
-    1.0 - (0..beyond).map(probability).sum::<f64>()
+/// States how likely chance alone leaves so few configurations within their bounds, if these are
+/// fewer than expected; otherwise empty. `noun` names the configurations. The sentence begins with
+/// a space.
+pub(super) fn chance_of_bound(test: Option<&BoundTest>, noun: &str) -> String {
+    let contradicted = contradicted_bound(test, noun);
+    if !contradicted.is_empty() {
+        return contradicted;
+    }
+    match test.filter(|test| test.beyond() as f64 > test.expected_beyond()) {
+        Some(test) => format!(
+            " Chance alone leaves at most {} of {} {noun} within their bounds with a probability of {} %: the bounds rest on {}.",
+            test.within,
+            test.of,
+            two_digits(100.0 * test.chance(), 2),
+            counted(test.learned_from, "fitted configuration")
+        ),
+        None => String::new(),
+    }
 }
 
 /// Largest error, relative to the expected error, at which measured positions are probably
@@ -209,9 +224,15 @@ fn are_predicted(bounds: &Bounds, residuals: &[Residual]) -> bool {
         && largest <= MAX_COMPUTED_ERROR * bounds.expected()
 }
 
-/// States the expected error and its mean bound. With `residuals`, adds the share of rows within
-/// their bounds.
-pub(super) fn bound_sentence(bounds: &Bounds, residuals: Option<&[Residual]>) -> String {
+/// States the expected error and its mean bound. With `measured`, which holds the residuals of the
+/// rows and the test of the bounds by rows that were not fitted, adds the share of rows within their
+/// bounds and what the test says.
+pub(super) fn bound_sentence(
+    bounds: &Bounds,
+    measured: Option<(&[Residual], Option<&BoundTest>)>,
+) -> String {
+    let residuals = measured.map(|(residuals, _)| residuals);
+    let test = measured.and_then(|(_, test)| test);
     let mut words = format!(
         "Expected error {} mm rms, measurement noise included; the {} % bound is {} mm on average",
         number(bounds.expected() * 1e3, 3),
@@ -225,8 +246,8 @@ pub(super) fn bound_sentence(bounds: &Bounds, residuals: Option<&[Residual]>) ->
                   nothing";
     } else if let Some(residuals) = residuals {
         let share = bounds.coverage(residuals.iter().map(|pose| pose.position.norm()));
-        let _ =
-            write!(words, "; {} % of these rows lie within their bounds", number(share * 100.0, 1));
+        let share = number(share * 100.0, 1);
+        let _ = write!(words, "; {share} % of these rows lie within their bounds");
     }
     let beyond = bounds.poses.iter().filter(|pose| pose.is_extrapolated).count();
     if beyond > 0 {
@@ -237,7 +258,8 @@ pub(super) fn bound_sentence(bounds: &Bounds, residuals: Option<&[Residual]>) ->
             "; {poses} {lie} outside the range of the fitted poses, with wider bounds"
         );
     }
-    words
+    let chance = chance_of_bound(test, "configurations that were not fitted");
+    if chance.is_empty() { words } else { format!("{words}.{chance}") }
 }
 
 #[cfg(test)]
@@ -246,10 +268,12 @@ mod tests {
 
     #[test]
     fn bounds_that_too_many_held_out_positions_exceed_are_said_to_be_too_small() {
-        let words = |within| held_out_share(within, 0.95, 28);
-        assert_eq!([(50, 50), (41, 50), (0, 0)].map(words), [""; 3]);
-        let said = words((16, 50));
+        let words = |within| {
+            let test = BoundTest { level: 0.95, within, of: 50, learned_from: 28 };
+            contradicted_bound(Some(&test), HELD_OUT)
+        };
+        assert_eq!([50, 41].map(words), [""; 2]);
+        let said = words(16);
         assert!(said.starts_with(" But 34 of 50 held-out configurations exceed"), "{said}");
-        assert!((chance_of_excess((0, 50), 0.95, 28) - 1.0).abs() < 1e-12);
     }
 }

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::detection::{LOAD_EFFECTS, has_no_mass};
+use super::detection::has_no_mass;
 use super::document::{Block, Point, joined, opening};
 use super::errors::{held_out_rows, rows_of, without_equilibrium};
 use super::noise::format_chi2;
@@ -11,6 +11,7 @@ use super::render::{page, text};
 use super::verdict::declared;
 use super::{effect, figures, residual_tests};
 use crate::fit::Identification;
+use crate::laws::Need;
 use crate::problem::{Effect, Problem};
 use crate::quantity::Unit;
 use crate::quantity::format::{counted, number, p_value};
@@ -91,22 +92,45 @@ fn verdict(result: &TraceResult) -> String {
                 warnings name."
             .to_owned();
     }
-    let structure = if result.structured {
-        "The residual has structure"
+    let structure = if let Some(size) = result.size_alone() {
+        let size = number(size, 1);
+        format!("The residual is {size} × the declared σ, and no structure is seen in it")
+    } else if result.structured {
+        "The residual has structure".to_owned()
+    } else if !result.is_testable() {
+        "The residual could not be tested for structure".to_owned()
+    } else if names_cause(result) {
+        "No test finds structure in the residual".to_owned()
     } else {
-        "The residual looks like noise"
+        "The residual looks like noise".to_owned()
     };
-    let best = result.ranking.first().filter(|candidate| candidate.p_value < result.level);
     let groups = groups_of_sets(result);
-    let cause = match (groups.first(), best) {
-        (Some(alike), _) if alike.iter().any(|set| !set.hypotheses.is_empty()) => {
+    let cause = match (groups.first(), result.significant()) {
+        (Some(alike), _) if has_cause(alike) => {
             let probability = total_probability(alike);
-            format!("most probable cause: {} ({})", causes_of(alike), percent(probability))
+            format!("most probable cause: {} ({})", causes_of(alike, result), percent(probability))
         }
         (None, Some(candidate)) => format!("it points to: {}", candidate.effect.description),
+        (Some(_), Some(candidate)) => format!(
+            "no cause is probable, although one effect is significant by itself: {}",
+            candidate.effect.description
+        ),
         _ => "no cause is visible".to_owned(),
     };
     format!("{structure}; {cause}.")
+}
+
+/// Returns true if the text on a trace names a cause.
+pub(crate) fn names_cause(result: &TraceResult) -> bool {
+    match groups_of_sets(result).first() {
+        Some(alike) => has_cause(alike),
+        None => result.significant().is_some(),
+    }
+}
+
+/// Returns true if the sets contain a cause; the empty set means noise alone.
+fn has_cause(alike: &[&HypothesisSet]) -> bool {
+    alike.iter().any(|set| !set.hypotheses.is_empty())
 }
 
 /// Joins the causes of one explanation, with numbers if there are several: "(1) …, (2) …".
@@ -140,7 +164,7 @@ fn total_probability(sets: &[&HypothesisSet]) -> f64 {
 
 /// Describes the causes of the first of some sets that differ only in values of searched
 /// arguments, and states which values the others have.
-fn causes_of(alike: &[&HypothesisSet]) -> String {
+fn causes_of(alike: &[&HypothesisSet], result: &TraceResult) -> String {
     let Some(first) = alike.first() else { return String::new() };
     let words = |hypothesis: &Hypothesis| {
         let of = alike.iter().flat_map(|set| &set.hypotheses);
@@ -159,7 +183,11 @@ fn causes_of(alike: &[&HypothesisSet]) -> String {
         }
     };
     let causes: Vec<String> = first.hypotheses.iter().map(words).collect();
-    if causes.is_empty() { "noise alone".to_owned() } else { numbered(&causes) }
+    match (causes.is_empty(), result.size_alone()) {
+        (false, _) => numbered(&causes),
+        (true, None) => "noise alone".to_owned(),
+        (true, Some(_)) => "noise alone, larger than the declared σ".to_owned(),
+    }
 }
 
 /// Returns the groups of sets that differ only in values of searched arguments, the most probable
@@ -181,7 +209,7 @@ fn groups_of_sets(result: &TraceResult) -> Vec<Vec<&HypothesisSet>> {
 fn hypothesis_sets<'a>(result: &TraceResult) -> Vec<Block<'a>> {
     let groups = groups_of_sets(result);
     let point = |alike: &Vec<&HypothesisSet>| {
-        format!("{}: {}", percent(total_probability(alike)), causes_of(alike))
+        format!("{}: {}", percent(total_probability(alike)), causes_of(alike, result))
     };
     let shown: Vec<String> = groups.iter().take(MAX_SHOWN_SETS).map(point).collect();
     if shown.is_empty() {
@@ -359,9 +387,10 @@ pub(super) fn undetectable_effects<'a>(problem: &Problem, trace: &Trace) -> Vec<
         blocks.push(Block::heading("Effects that these data cannot show"));
         blocks.push(Block::List(effect::reasons(untestable)));
     }
+    // Where a direction of approach is recorded, play moves the arm without loads and is testable.
     let (unloaded, absorbed): (Vec<&Effect>, Vec<&Effect>) = absorbed
         .into_iter()
-        .partition(|of| has_no_mass(problem) && LOAD_EFFECTS.contains(&of.name()));
+        .partition(|of| has_no_mass(problem) && of.has_need(&[Need::Loads, Need::Play]));
     if !unloaded.is_empty() {
         blocks.push(Block::heading(
             "Effects that these data cannot show, because no mass is declared, so that no load acts",

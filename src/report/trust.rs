@@ -3,9 +3,14 @@
 use super::errors::{test_rows_word, with_unit};
 use super::noise::raised_sigma_ratio;
 use super::remainder::PredictionAccuracy;
-use crate::fit::Identification;
+use crate::fit::{FindingCode, Identification};
 use crate::quantity::format::number;
 use crate::results::ResidualSize;
+
+/// Codes of warnings that contradict a trusted fit or its predictions, so that its headline names
+/// reservations.
+const RESERVATIONS: [FindingCode; 2] =
+    [FindingCode::HeldOutBeyondPrediction, FindingCode::HeldOutNotBetter];
 
 /// States whether the fit is to be trusted, the held-out error before and after it, and how much
 /// its residual exceeds the declared noise.
@@ -27,6 +32,9 @@ pub(super) fn outcome(found: &Identification, accuracy: Option<&PredictionAccura
     let is_raised = raised_sigma_ratio(found).is_some();
     let scope =
         if (is_larger || is_raised) && has_bound { " within the error bound below" } else { "" };
+    let is_reserved =
+        is_raised || found.cautions().any(|caution| RESERVATIONS.contains(&caution.code));
+    let reserved = if is_reserved { ", with reservations (see the warnings)" } else { "" };
     let size = if found.noise_factor > 1.0 {
         format!("{} × the declared σ", number(found.noise_factor.sqrt(), 1))
     } else {
@@ -47,7 +55,7 @@ pub(super) fn outcome(found: &Identification, accuracy: Option<&PredictionAccura
         format!("does not fall: it goes from {from} to {to}")
     };
     format!(
-        "Trusted{scope}: the mean {} error {change}{without}.{}",
+        "Trusted{scope}{reserved}: the mean {} error {change}{without}.{}",
         test_rows_word(&found.fitted).replace(' ', "-"),
         if is_larger {
             format!(" Not fully explained: the residual{of} is {size}.")

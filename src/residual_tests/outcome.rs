@@ -251,7 +251,7 @@ fn write_tested(
             let size = if *failed {
                 "an outlier: a gross error, or an effect that acts in few poses"
             } else {
-                "the largest residual, no outlier"
+                "the largest residual, which is not significant"
             };
             write!(f, "{pose}{size} ({statistic:.1} × the scatter, expected up to {to:.1})")
         }

@@ -14,7 +14,7 @@ use crate::measurement::Measurements;
 use crate::numeric::range;
 use crate::problem::{HeldOut, Problem};
 use crate::quantity::format::number;
-use crate::remainder::Bounds;
+use crate::remainder::{BoundTest, Bounds};
 
 /// Input files of an acceptance record, and facts from the command line.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -78,6 +78,11 @@ pub struct CoveredBound {
     pub coverage: f64,
     /// Number of these rows.
     pub rows: usize,
+    /// Probability that chance alone leaves as few held-out configurations within their bounds.
+    pub coverage_p_value: f64,
+    /// Comparison of the bounds with the held-out configurations.
+    #[serde(skip)]
+    pub(crate) test: BoundTest,
 }
 
 /// Test of a tolerance on the accuracy AP of the identified arm in the held-out poses.
@@ -204,17 +209,19 @@ impl AcceptanceResult {
         }
     }
 
-    /// Returns the record with the error bounds of the held-out rows and the share (`coverage`) of
-    /// rows within them. `remainder` is true if a remainder corrects the predictions.
+    /// Returns the record with the error bounds of the held-out rows, the share (`coverage`) of rows
+    /// within them, and the test of the bounds by these rows. `remainder` is true if a remainder corrects the predictions.
     #[must_use]
     pub fn with_bounds(
         self,
         bounds: &Bounds,
-        (coverage, rows): (f64, usize),
+        (coverage, rows, test): (f64, usize, BoundTest),
         remainder: bool,
     ) -> Self {
         let bounds = BoundSummary::new(bounds);
-        Self { remainder, bound: Some(CoveredBound { bounds, coverage, rows }), ..self }
+        let coverage_p_value = test.chance();
+        let bound = CoveredBound { bounds, coverage, rows, coverage_p_value, test };
+        Self { remainder, bound: Some(bound), ..self }
     }
 
     /// Returns the record with the test of a tolerance.

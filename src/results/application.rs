@@ -13,7 +13,7 @@ use super::remainder::BoundSummary;
 use super::summary::Summary;
 use crate::fit::{Command, ErrorsBySession, PointSpread, Residual};
 use crate::problem::Problem;
-use crate::remainder::Bounds;
+use crate::remainder::{BoundTest, Bounds};
 use crate::urdf::{Chain, Description};
 
 /// Errors of predictions against measurements.
@@ -33,6 +33,10 @@ pub struct PredictionErrors {
     /// Share of the rows whose error is within its bound, 0 to 1; absent without bounds.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub coverage: Option<f64>,
+    /// Probability that chance alone leaves as few of the configurations that were not fitted within
+    /// their bounds; absent without bounds or such configurations.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub coverage_p_value: Option<f64>,
     #[serde(flatten)]
     pub bounds: Option<BoundSummary>,
 }
@@ -62,17 +66,23 @@ impl PredictionErrors {
             sessions: sessions.map(|(name, errors)| (name.clone(), Summary::of(errors))).collect(),
             spread: spreads.iter().map(spread).collect(),
             coverage: None,
+            coverage_p_value: None,
             bounds: None,
         }
     }
 
-    /// Returns the errors with a summary of their bounds, and with the share of `residuals` that
-    /// are within the bounds.
+    /// Returns the errors with a summary of their bounds, with the share of `residuals` that are
+    /// within the bounds, and with the `test` of the bounds by rows that were not fitted.
     #[must_use]
-    pub fn with_bounds(self, residuals: &[Residual], bounds: &Bounds) -> Self {
+    pub fn with_bounds(
+        self,
+        residuals: &[Residual],
+        (bounds, test): (&Bounds, Option<&BoundTest>),
+    ) -> Self {
         let lengths = residuals.iter().map(|residual| residual.position.norm());
         let coverage = Some(bounds.coverage(lengths));
-        Self { coverage, bounds: Some(BoundSummary::new(bounds)), ..self }
+        let coverage_p_value = test.map(BoundTest::chance);
+        Self { coverage, coverage_p_value, bounds: Some(BoundSummary::new(bounds)), ..self }
     }
 }
 

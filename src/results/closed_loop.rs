@@ -10,7 +10,7 @@ use super::effect::{EffectKeys, NamedEffect};
 use super::hints::resembled;
 use super::identification::{FindingKeys, InfluentialRowSet};
 use super::remainder::Remainder;
-use super::residual_test::ResidualTest;
+use super::residual_test::{ResidualTest, size_alone, size_test};
 use super::summary::{Errors, KindErrors, Summary, in_mm_deg_px};
 use crate::fit::{Estimate, Finding, FindingCode, Identification};
 use crate::problem::{Effect, Problem};
@@ -311,21 +311,18 @@ impl LoopResult {
     /// Returns the test of the size of the residual against the declared σ, with its χ²/ν; `None`
     /// if the test could not be made.
     fn size_test(&self) -> Option<(&ResidualTest, f64)> {
-        let test = self.checks_after.iter().find(|test| test.check == "reduced-chi-squared")?;
-        Some((test, test.statistic?))
+        size_test(&self.checks_after)
     }
 
     /// Returns the ratio √(χ²/ν) of the residual to the declared σ if it is significantly above 1
     /// and no other test of structure fails. Otherwise, or if structure has a place, returns
     /// `None`.
     pub(crate) fn size_alone(&self) -> Option<f64> {
-        let (size, chi2) = self.size_test()?;
-        let failed = self.checks_after.iter().filter(|test| test.structure && test.failed);
-        let is_alone = failed.count() == 1 && size.failed && chi2 > 1.0;
+        let size = size_alone(&self.checks_after)?;
         let mut structures = self.structures().peekable();
         let is_nowhere =
             structures.peek().is_some() && structures.all(|structure| structure.place == NOWHERE);
-        (is_alone && is_nowhere).then(|| chi2.sqrt())
+        is_nowhere.then_some(size)
     }
 
     /// Returns the ratio √(χ²/ν) of the residual to the declared σ if it is significantly less than

@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -96,6 +97,9 @@ pub struct IdentificationResult {
     /// rows out.
     #[schemars(with = "Vec<String>")]
     pub fitted_rows: Option<Box<RawValue>>,
+    /// Measurement files, as the command named them; absent if the rows are of no files.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub measurement_files: Vec<String>,
     /// Remainder that corrects the predictions and errors of the identified arm; null without one.
     pub remainder: Option<Remainder>,
     /// Uncertainty of predictions without a remainder, in the form of remainder.json.
@@ -349,9 +353,17 @@ impl IdentificationResult {
             findings: found.findings.clone(),
             prior: found.prior.as_ref().map(PriorUse::new),
             fitted_rows: to_raw_value(&found.fitted_rows).ok(),
+            measurement_files: Vec::new(),
             remainder: None,
             prediction: None,
         }
+    }
+
+    /// Returns the result with the names of the measurement files.
+    #[must_use]
+    pub fn with_files(self, files: &[PathBuf]) -> Self {
+        let measurement_files = files.iter().map(|file| file.display().to_string()).collect();
+        Self { measurement_files, ..self }
     }
 
     /// Returns the result with what predictions need: posterior covariance, uncertainty, and the

@@ -38,6 +38,8 @@ pub struct NextResult {
     /// Expected error over the workspace after arbitrarily many additional poses; null if it is
     /// unknown.
     pub attainable_mm: Option<f64>,
+    /// True if no number of poses can be expected to bring the error bound within the tolerance.
+    pub out_of_reach: bool,
     /// Reason for which fewer poses are named than requested: `enough`, `gain-below-noise` or
     /// `no-candidates`; null if there is none.
     pub stop: Option<&'static str>,
@@ -108,6 +110,7 @@ impl NextResult {
             tolerance_mm: options.tolerance.map(|tolerance| tolerance * 1e3),
             now: next.error.map(error),
             attainable_mm: next.attainable.map(|length| length * 1e3),
+            out_of_reach: next.is_out_of_reach(options.tolerance),
             stop: next.stop.map(|stop| match stop {
                 StopReason::Enough => "enough",
                 StopReason::GainBelowNoise => "gain-below-noise",

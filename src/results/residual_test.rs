@@ -46,3 +46,18 @@ impl ResidualTest {
         tests.tests.iter().map(entry).collect()
     }
 }
+
+/// Returns the test of the size of a residual against the declared σ, with its χ²/ν; `None` if the
+/// test could not be made.
+pub(super) fn size_test(tests: &[ResidualTest]) -> Option<(&ResidualTest, f64)> {
+    let test = tests.iter().find(|test| test.check == "reduced-chi-squared")?;
+    Some((test, test.statistic?))
+}
+
+/// Returns the ratio √(χ²/ν) of a residual to the declared σ if it is significantly above 1 and no
+/// other test of structure fails.
+pub(super) fn size_alone(tests: &[ResidualTest]) -> Option<f64> {
+    let (size, chi2) = size_test(tests)?;
+    let failed = tests.iter().filter(|test| test.structure && test.failed);
+    (failed.count() == 1 && size.failed && chi2 > 1.0).then(|| chi2.sqrt())
+}

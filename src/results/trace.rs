@@ -7,7 +7,7 @@ use super::claims::{Claims, Hypothesis};
 use super::document::Document;
 use super::effect::{EffectKeys, NamedEffect, Untestable, joined};
 use super::identification::FindingKeys;
-use super::residual_test::ResidualTest;
+use super::residual_test::{ResidualTest, size_alone};
 use super::summary::{Errors, in_mm_deg_px};
 use crate::fit::{ErrorSummary, Finding};
 use crate::problem::{Effect, Problem};
@@ -164,6 +164,24 @@ impl TraceResult {
             absorbed: absorbed.into_iter().map(|(effect, ())| effect).collect(),
             findings: trace.fit.findings.clone(),
         }
+    }
+}
+
+impl TraceResult {
+    /// Returns the ratio √(χ²/ν) of the residual to the declared σ if it is significantly above 1
+    /// and no other test of structure fails.
+    pub(crate) fn size_alone(&self) -> Option<f64> {
+        size_alone(&self.checks)
+    }
+
+    /// Returns true if at least one test of structure could be made.
+    pub(crate) fn is_testable(&self) -> bool {
+        self.checks.iter().any(|test| test.structure && test.statistic.is_some())
+    }
+
+    /// Returns the best candidate if it is significant.
+    pub(crate) fn significant(&self) -> Option<&Candidate> {
+        self.ranking.first().filter(|candidate| candidate.p_value < self.level)
     }
 }
 

@@ -101,6 +101,12 @@ fn it_says_when_there_are_enough() {
     // The noise alone is larger: either more poses are named, or they are said to be of no use.
     let stop = &narrow.json()["stop"];
     assert!(stop.is_null() || *stop == "gain-below-noise", "{stop}");
+    assert_eq!(
+        (&narrow.json()["out_of_reach"], &wide["out_of_reach"]),
+        (&json!(true), &json!(false))
+    );
+    let told = folder.flexcal("next arm --out out --tolerance-mm 0.001 --poses 2");
+    assert_contains(&told.stdout, &["better instrument is"]);
 }
 
 #[test]

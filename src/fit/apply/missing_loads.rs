@@ -30,9 +30,13 @@ pub(crate) fn missing_loads(
     let depends = problem.is_elastic() || !problem.effects.is_empty();
     let parsed = estimate.prediction.as_deref().map(serde_json::from_str::<Inputs>);
     let Some(Ok(Inputs { inputs })) = parsed.filter(|_| depends) else { return Vec::new() };
+    let has_hoist = problem
+        .joints
+        .iter()
+        .any(|joint| joint.beam.as_ref().is_some_and(|beam| beam.hoist.is_some()));
     let columns = [
         ("payload", "payload_kg", "kg", rows.payload.is_none(), Some(problem.tool.payload_mass)),
-        ("hoist", "hoist_N", "N", rows.hoist.is_none(), None),
+        ("hoist", "hoist_N", "N", rows.hoist.is_none() && has_hoist, None),
     ];
     let lacking = columns.into_iter().filter(|(.., is_missing, _)| *is_missing);
     let sentence = |(name, column, unit, _, taken): (&str, &str, &str, bool, Option<f64>)| {
@@ -44,11 +48,13 @@ pub(crate) fn missing_loads(
         }
         let had =
             if min < max { format!("{min} to {max} {unit}") } else { format!("{min} {unit}") };
-        let taken =
-            taken.map_or_else(|| "the declared force".to_owned(), |m| format!("{m} {unit}"));
+        let (taken, other) = match taken {
+            Some(mass) => (format!("{mass} {unit}"), "the arm carries something else"),
+            None => ("the declared force".to_owned(), "the hoist pulls with another force"),
+        };
         Some(format!(
             "the table has no column {column}, and the rows of the estimate had {had}; {taken} is \
-             taken in every row: add the column if the arm carries something else"
+             taken in every row: add the column if {other}"
         ))
     };
     lacking.filter_map(sentence).collect()

@@ -45,6 +45,8 @@ pub struct SavedEstimate {
     pub start_times: Option<StartTimes>,
     /// Name of the `remainder.json` in the same folder; `None` if no remainder was accepted.
     pub remainder: Option<String>,
+    /// Measurement files of the fit, as its command named them; empty if the file names none.
+    pub measurement_files: Vec<PathBuf>,
     /// Section on the uncertainty of predictions, as JSON text; `None` in files of older versions.
     pub prediction: Option<String>,
     /// Name of the problem.
@@ -110,6 +112,7 @@ struct Document {
     session_times_s: Option<BTreeMap<String, f64>>,
     parameters: Vec<Entry>,
     remainder: Option<RemainderEntry>,
+    measurement_files: Option<Vec<PathBuf>>,
     prediction: Option<Box<RawValue>>,
     arm_parts: Option<BTreeMap<String, String>>,
     covariance: Option<Vec<Vec<Option<f64>>>>,
@@ -207,6 +210,7 @@ impl SavedEstimate {
             session_times_s,
             mut parameters,
             remainder,
+            measurement_files,
             prediction,
             arm_parts,
             covariance,
@@ -261,6 +265,7 @@ impl SavedEstimate {
             start_times: first_time_s
                 .map(|first| StartTimes { first, sessions: session_times_s.unwrap_or_default() }),
             remainder: remainder.and_then(|result| result.file),
+            measurement_files: measurement_files.unwrap_or_default(),
             prediction: prediction.map(|result| result.get().to_owned()),
             problem,
             arm_digest,

@@ -14,6 +14,7 @@ use crate::fit::SolverChoice;
 use crate::fit::errors::Errors;
 use crate::fit::stages::fitting::{FitEnd, Fitting};
 use crate::fit::stages::stage::Stage;
+use crate::fit::stages::strategy::Strategy;
 use crate::fit::uncertainty::hidden_by_bound::HiddenByBound;
 use crate::fit::uncertainty::noise::{Noise, together};
 use crate::fit::uncertainty::prior_sizes::PriorSize;
@@ -92,6 +93,11 @@ pub(in crate::fit) struct CheckedFit<'a> {
 }
 
 impl CheckedFit<'_> {
+    /// Returns true if the strategy fits a rigid arm although the problem declares elasticity.
+    pub fn ignores_elasticity(&self) -> bool {
+        self.fitting.strategy == Strategy::Rigid && self.problem.is_elastic()
+    }
+
     /// Returns the identification rows grouped by their kind, positions first; rows that do not
     /// involve the arm are left out.
     pub fn kinds(&self) -> Vec<RowKind> {

@@ -256,6 +256,7 @@ impl Finding {
                 "declare a larger σ if the instrument is less accurate"
             }
             FindingCode::RowsSetAside => "check these rows",
+            FindingCode::HeldOutOutliers => "look for mistyped numbers and signs there",
             _ => return,
         };
         self.remedy = format!("flexcal loop does not remove this, so {remedy}");

@@ -19,8 +19,8 @@ impl Check for NoOutliers {
         if count == 0 {
             return Vec::new();
         }
-        let verb = if count == 1 { "is" } else { "are" };
-        let text = format!("{count} of {of} identification rows {verb} too far off to be noise");
+        let verb = if count == 1 { "stands" } else { "stand" };
+        let text = format!("{count} of {of} identification rows {verb} out from the others");
         let numbers = [outliers_as_json(fit.outliers), of.into()];
         vec![Finding::new(FindingCode::Outliers, numbers, text)]
     }

@@ -114,6 +114,16 @@ const CONSEQUENCES: [FindingCode; 7] = [
     FindingCode::HeldOutNotBetter,
 ];
 
+/// Codes of findings that elasticity causes if a rigid arm is fitted.
+const OF_RIGID_ARM: [FindingCode; 6] = [
+    FindingCode::NoiseBeyondDeclared,
+    FindingCode::ResidualBeyondDeclared,
+    FindingCode::HeldOutBeyondPrediction,
+    FindingCode::HeldOutNotBetter,
+    FindingCode::HeldOutOutliers,
+    FindingCode::RowsSetAside,
+];
+
 /// Runs every check on a fit.
 pub(super) fn findings(fit: &CheckedFit) -> Vec<Finding> {
     let mut findings: Vec<Finding> = CHECKS.iter().flat_map(|check| check.check(fit)).collect();
@@ -154,6 +164,13 @@ pub(super) fn findings(fit: &CheckedFit) -> Vec<Finding> {
         };
         for finding in findings.iter_mut().filter(is_consequence) {
             *finding = finding.clone().with_remedy(remedy.clone());
+        }
+    } else if cause_text.is_none() && fit.ignores_elasticity() {
+        for finding in findings.iter_mut().filter(|found| OF_RIGID_ARM.contains(&found.code)) {
+            *finding = finding.clone().with_remedy(
+                "strategy rigid ignores the elasticity that the problem declares, so fit with strategy joint"
+                    .to_owned(),
+            );
         }
     }
     findings

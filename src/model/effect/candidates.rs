@@ -1,6 +1,9 @@
 //! Candidates of a search: every effect of the catalogue that is conceivable on an arm.
 
-use super::coverage::{DataCoverage, IS_RIGID, NO_LOADS, NO_TIMES, STANDS_STILL};
+use super::coverage::{
+    DataCoverage, IS_RIGID, NO_LOADS, NO_TEMPERATURE, NO_TIMES, NO_TIMES_NOR_TEMPERATURE,
+    STANDS_STILL,
+};
 use super::place::slides;
 use crate::laws::{
     Argument, ArgumentKind, Effect, FAMILIES, Family, Need, Only, Quantity, Search, to_three_digits,
@@ -239,6 +242,12 @@ impl Effect {
                 unless(data.moves(joint - 1), STANDS_STILL)
             }
             Need::Temperature => data.no_temperature,
+            Need::Clock
+                if data.no_temperature == Some(NO_TEMPERATURE)
+                    && self.has_need(&[Need::Temperature]) =>
+            {
+                unless(data.clock.is_some(), NO_TIMES_NOR_TEMPERATURE)
+            }
             Need::Clock => unless(data.clock.is_some(), NO_TIMES),
             Need::Times => unless(!data.times.is_empty(), "too few poses before or after any time"),
             Need::Payload => {

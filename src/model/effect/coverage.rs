@@ -59,6 +59,9 @@ pub const NO_TEMPERATURE: &str = "no temperature that changes";
 pub const NO_REFERENCE: &str = "the problem declares no reference_temperature_C";
 /// Reason why an effect that depends on earlier poses (lag, friction, settling) cannot be shown.
 pub(super) const NO_TIMES: &str = "no column time_s, so the order of the poses is not known";
+/// Reason why a delayed temperature effect cannot be shown: neither times nor temperatures.
+pub(super) const NO_TIMES_NOR_TEMPERATURE: &str =
+    "no column time_s, and no temperature that changes";
 /// Reason why an effect of a joint whose command is constant cannot be shown.
 pub(super) const STANDS_STILL: &str = "the joint stands still in these poses";
 /// Reason why an effect of loads cannot be shown: gravity is zero.

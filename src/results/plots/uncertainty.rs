@@ -1,7 +1,5 @@
 //! Error bounds of predictions over the workspace, and the joint errors that a remainder corrects.
 
-use std::collections::BTreeMap;
-
 use nalgebra::Vector3;
 use rand::RngExt as _;
 
@@ -9,7 +7,7 @@ use crate::fit::{Identification, IdentifyError};
 use crate::measurement::Dataset;
 use crate::problem::Problem;
 use crate::random::stream;
-use crate::remainder::{Bounds, Fitted, JointError, Outcome, predict_identified};
+use crate::remainder::{BoundTest, Bounds, Fitted, JointError, Outcome, predict_identified};
 
 /// Number of random configurations whose error bounds are drawn.
 const DRAWN_CONFIGURATIONS: usize = 1500;
@@ -31,9 +29,9 @@ pub struct Uncertainty {
     pub bounds: Vec<BoundAt>,
     /// Errors of the joints that a remainder corrects; empty without a remainder.
     pub joints: Vec<JointError>,
-    /// Number of held-out configurations whose mean error does not exceed their bound, and number of
-    /// those that have one.
-    pub within: (usize, usize),
+    /// Comparison of the bounds with the errors of held-out configurations; `None` if none is held
+    /// out.
+    pub test: Option<BoundTest>,
 }
 
 /// Error bound of a predicted position.
@@ -77,7 +75,7 @@ impl Uncertainty {
                 level: BOUND_LEVEL,
                 bounds: Vec::new(),
                 joints: Vec::new(),
-                within: (0, 0),
+                test: None,
             });
         }
         // Sessions may have different measuring frames, so all poses are taken from the first
@@ -117,39 +115,27 @@ impl Uncertainty {
             level: BOUND_LEVEL,
             bounds: bounds.filter(|at| at.bound.is_finite()).collect(),
             joints: correction.joint_errors(DRAWN_COMMANDS),
-            within: within_bounds((found, problem), data, fitted)?,
+            test: bound_test((found, problem), data, fitted)?,
         })
     }
 }
 
-/// Returns the number of held-out configurations whose mean position error does not exceed their
-/// bound, and the number of those that have one.
-fn within_bounds(
+/// Compares the error bounds with the position errors of the held-out configurations.
+fn bound_test(
     (found, problem): (&Identification, &Problem),
     data: &Dataset,
     fitted: &Fitted,
-) -> Result<(usize, usize), IdentifyError> {
+) -> Result<Option<BoundTest>, IdentifyError> {
     let table = &data.measurements;
     let is_position = |row: &usize| table.observation(*row).is_position();
     let held_out: Vec<usize> = data.split.held_out.iter().copied().filter(is_position).collect();
     if held_out.is_empty() {
-        return Ok((0, 0));
+        return Ok(None);
     }
     let rows = table.select(&held_out);
     let (positions, corrected) = predict_identified(found, problem, fitted.correction(), &rows)?;
     let bounds = Bounds::new(fitted.correction(), corrected, BOUND_LEVEL);
     let errors = positions.iter().zip(&rows.positions).map(|(at, measured)| (measured - at).norm());
-    // Repeats of a configuration err alike, so each counts once with its mean error.
-    let mut of_configuration: BTreeMap<Vec<u64>, Vec<(f64, f64)>> = BTreeMap::new();
-    for (pose, error) in errors.enumerate() {
-        let bound = bounds.bound(pose);
-        if error.is_finite() && bound.is_finite() {
-            let key = rows.configuration(pose).iter().map(|q| q.to_bits()).collect();
-            of_configuration.entry(key).or_default().push((error, bound));
-        }
-    }
-    let is_within = |repeats: &&Vec<(f64, f64)>| {
-        repeats.iter().map(|(error, bound)| error - bound).sum::<f64>() <= 0.0
-    };
-    Ok((of_configuration.values().filter(is_within).count(), of_configuration.len()))
+    let errors = errors.enumerate().map(|(pose, error)| (pose, pose, error));
+    Ok(Some(bounds.test(&rows, errors)))
 }
