@@ -286,7 +286,7 @@ pub(super) fn ranking<'a>(
         return vec![
             Block::heading("Candidate effects"),
             Block::Text(format!(
-                "None of {tried} candidates is significant. The best one, {}, does no better than noise (p {}, corrected for the \
+                "None of {tried} candidates is significant. The best one, {}, is not clearly better than noise (p {}, corrected for the \
                  number of candidates; significant below {level}).",
                 declared(&first.effect),
                 p_value(first.p_value),
@@ -310,15 +310,25 @@ pub(super) fn ranking<'a>(
     if shown.iter().any(|candidate| !candidate.alike.is_empty()) {
         notes.push_str(
             " The angle in brackets lies between the displacements by the two effects after all parameters are fitted. At 0° these \
-             poses cannot distinguish the effects, at small angles only precise data can; the probabilities take this into account. \
-             The pose to measure is within the measured ranges.",
+             poses cannot distinguish the effects, at small angles only precise data can; the probabilities take this into account.",
         );
+    }
+    if shown.iter().any(|candidate| separating_pose(candidate, noise).is_some()) {
+        notes.push_str(" The pose to measure is within the measured ranges.");
     }
     vec![
         Block::heading("Candidate effects, best first"),
         Block::Ranking(points),
         Block::Text(notes),
     ]
+}
+
+/// Returns the pose that distinguishes a candidate from the first effect that is hard to tell from
+/// it; `None` if the predictions differ there by no more than `noise`.
+fn separating_pose(candidate: &Candidate, noise: f64) -> Option<(&SeparatingPose, &Confounded)> {
+    let pose = candidate.told_apart.as_ref()?;
+    let is_above_noise = pose.difference().unwrap_or(f64::NAN).abs() > noise;
+    Some((pose, candidate.alike.first()?)).filter(|_| is_above_noise)
 }
 
 /// Describes a candidate. `unit` is that of the errors, and `noise` the root mean square noise of a
@@ -347,17 +357,13 @@ fn point(problem: &Problem, candidate: &Candidate, (unit, noise): (&str, f64)) -
             joined(candidate.alike.iter().map(alike), MAX_SHOWN_CONFOUNDED, "; ")
         ));
     }
-    if let (Some(pose), Some(first)) = (&candidate.told_apart, candidate.alike.first()) {
-        let difference = pose.difference().unwrap_or(f64::NAN);
-        let is_above_noise = difference.abs() > noise;
-        details.extend(is_above_noise.then(|| {
-            format!(
-                "to distinguish “{}”, measure at {}: the predictions differ by {}",
-                first.effect.description,
-                pose_words(problem, pose),
-                show(difference)
-            )
-        }));
+    if let Some((pose, first)) = separating_pose(candidate, noise) {
+        details.push(format!(
+            "to distinguish “{}”, measure at {}: the predictions differ by {}",
+            first.effect.description,
+            pose_words(problem, pose),
+            show(pose.difference().unwrap_or(f64::NAN))
+        ));
     }
     Point { text: declared(&candidate.effect), details, mark: None }
 }
