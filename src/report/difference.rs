@@ -133,10 +133,10 @@ fn remainder_sentences(sides: &[Side; 2]) -> Vec<String> {
     let sentence = |(name, side): (&str, &Side)| {
         let means = side.without_remainder.iter().filter(|(of, _)| of.contains("mean"));
         let words: Vec<String> =
-            means.map(|(of, error)| format!("{of} {}", number(*error, 4))).collect();
+            means.map(|(of, error)| format!("{of}: {}", number(*error, 4))).collect();
         (!words.is_empty()).then(|| {
             format!(
-                "Errors of {name} are with its remainder, the parameters below are without it; without it: {}.",
+                "Errors of {name} are with its remainder. The parameters below, without it, give: {}.",
                 words.join("; ")
             )
         })

@@ -133,3 +133,19 @@ fn an_impossible_number_of_threads_is_refused_at_once() {
         assert_contains(&run.stderr, &[&words]);
     }
 }
+
+#[test]
+fn suggested_commands_name_the_measurements_of_the_fit() {
+    let folder = Folder::with_cases(&["problem.toml", "a-none.csv", "f-two.csv"]);
+    let estimate = folder.flexcal("identify . --data f-two.csv --out two --json").json();
+    assert_eq!(estimate["measurement_files"], serde_json::json!(["f-two.csv"]));
+    let told = folder.flexcal("predict . --data f-two.csv --estimate two/estimate.json --out out");
+    assert_contains(&told.stdout, &["Next: flexcal loop . --data f-two.csv looks for what"]);
+    // The strategy, not a missing effect, causes the misfit of a rigid arm.
+    let rigid = folder.flexcal("identify . --strategy rigid --out rigid").code(1);
+    assert_contains(
+        &rigid.stderr,
+        &["strategy rigid ignores the elasticity that the problem declares"],
+    );
+    assert_contains(&rigid.stdout, &["Next: flexcal identify . fits the elasticity"]);
+}
