@@ -204,6 +204,11 @@ pub enum TableErrorKind {
     RepeatedForAnother { missing: String },
     #[error("{found} values for {expected} rows")]
     ColumnLength { expected: usize, found: usize },
+    #[error(
+        "the row has {found} fields, the header {expected}, and the file ends here without a line end: it \
+         was probably cut off; copy or export it again, or remove this line"
+    )]
+    RowCut { expected: usize, found: usize },
     #[error("the row has {found} fields, the header {expected}{}", decimal_comma_remedy(*found, *expected))]
     RowLength { expected: usize, found: usize },
     #[error(

@@ -132,7 +132,11 @@ impl Columns {
                     return Err(error(TableErrorKind::UnknownMeaning { meant }.into()));
                 }
                 Meaning::Ignored(_) | Meaning::Unknown if is_result_table && is_result(name) => {}
-                Meaning::Ignored(kind) => warnings.push(Warning { location: location(), kind }),
+                Meaning::Ignored(kind) => {
+                    // A misspelt unit may be the reason for which a column is missing.
+                    unknown.extend(matches!(kind, WarningKind::UnitIgnored { .. }).then_some(name));
+                    warnings.push(Warning { location: location(), kind });
+                }
                 Meaning::Unknown if foreign => {
                     unknown.push(name);
                     let file = Location { key: None, ..table.column(name) };
@@ -147,11 +151,8 @@ impl Columns {
                         .as_ref()
                         .filter(|meant| affects_results(meant) && one_typo(name, meant))
                     {
-                        mistyped = mistyped.or_else(|| {
-                            Some(error(
-                                TableErrorKind::MistypedColumn { meant: meant.clone() }.into(),
-                            ))
-                        });
+                        let kind = TableErrorKind::MistypedColumn { meant: meant.clone() };
+                        mistyped.get_or_insert_with(|| error(kind.into()));
                     }
                     let kind = WarningKind::ColumnIgnored { meant };
                     warnings.push(Warning { location: table.column(name), kind });
@@ -165,8 +166,8 @@ impl Columns {
         if let (Some(HeldOut::Fraction { .. }), true) =
             (&problem.data.held_out, measured && columns.has_split())
         {
-            warnings
-                .push(Warning { location: table.column("split"), kind: WarningKind::SplitUnused });
+            let (location, kind) = (table.column("split"), WarningKind::SplitUnused);
+            warnings.push(Warning { location, kind });
         }
         for of_file in unmapped.chunk_by(|(a, _), (b, _)| a.file == b.file) {
             let names = of_file.iter().map(|(_, name)| name.clone()).collect();

@@ -190,6 +190,9 @@ impl Table {
         let expected = self.columns_before();
         if self.record.len() != expected {
             let found = self.record.len();
+            if found < expected && !self.is_empty_row() && self.is_cut_here()? {
+                return Err(self.error(TableErrorKind::RowCut { expected, found }));
+            }
             return Err(self.error(if self.is_empty_row() {
                 TableErrorKind::EmptyRow
             } else if let Some(mark) = self.comment_mark() {
@@ -209,6 +212,15 @@ impl Table {
             }
         }
         Ok(true)
+    }
+
+    /// Returns true if the current record is the last one of a file that ends without a line end.
+    /// The record is kept.
+    fn is_cut_here(&mut self) -> Result<bool, InputError> {
+        let (line, record) = (self.line, self.record.clone());
+        let is_last = !self.advance()?;
+        (self.line, self.record) = (line, record);
+        Ok(is_last && self.reader.get_ref().lines.has_added_line_end)
     }
 
     /// Reads the next record and its line number; returns false at the end.

@@ -445,6 +445,26 @@ fn readings_stand_beside_commands_and_nests_apart() {
 }
 
 #[test]
+fn a_last_row_with_too_few_cells_and_no_line_end_is_cut_off() {
+    let problem = parse("name = 'arm'\n[[joint]]\na_m = 1\n");
+    let header = "q1_deg,x_mm,y_mm,z_mm\n1,2,3,4\n";
+    let error = table_error(&problem, &format!("{header}1,2"));
+    assert_says(&error, &[":3:", "2 fields, the header 4", "cut off", "export it again"]);
+    // With a line end, or above further rows, a cell is missing.
+    for rows in ["1,2\n", "1,2\n1,2,3,4"] {
+        let text = table_error(&problem, &format!("{header}{rows}")).to_string();
+        assert!(text.contains(":3:") && !text.contains("cut off"), "{text}");
+    }
+}
+
+#[test]
+fn a_misspelt_unit_is_asked_for_where_its_column_is_missing() {
+    let problem = parse("name = 'arm'\n[[joint]]\na_m = 1\n");
+    let error = table_error(&problem, "q1_dge,x_mm,y_mm,z_mm\n1,2,3,4\n");
+    assert_says(&error, &[":1: column q1", "add q1_deg or q1_rad", "is it column q1_dge?"]);
+}
+
+#[test]
 fn a_table_cut_inside_its_last_number_is_warned_of() {
     let problem = parse("name = 'arm'\n[[joint]]\na_m = 1\n");
     let row = |k: i32| format!("{k},{}.25,{k}.5,-{}.125\n", k + 1, k + 2);
