@@ -94,6 +94,47 @@ fn a_column_that_the_positions_do_not_follow_is_named() {
     }
 }
 
+/// Returns the place and the text of the finding on a change from a row on.
+fn changed(problem: &flexcal::problem::Problem, data: &Dataset) -> Option<(String, String)> {
+    let found = fit_as_command(problem, data);
+    let finding = found.finding(FindingCode::RowsChanged)?;
+    Some((finding.word("place")?.to_owned(), finding.to_string()))
+}
+
+#[test]
+fn a_place_that_changes_between_two_rows_is_named() {
+    let (problem, clean) = arm();
+    assert_eq!(changed(&problem, &clean), None);
+    // A joint loses its zero position.
+    let mut data = clean.clone();
+    for row in 40..90 {
+        data.measurements.configurations[row * 5 + 2] += 0.01;
+    }
+    let (place, text) = changed(&problem, &data).unwrap();
+    assert!(place == "zero" && text.contains("zero position of joint 3 is off by"), "{text}");
+    assert!(text.contains("0.57") && text.contains("fit the rows before and after"), "{text}");
+    // The station moves by less than a misfit.
+    let mut data = clean.clone();
+    data.measurements.positions[30..]
+        .iter_mut()
+        .for_each(|at| *at += Vector3::new(3e-3, 0.0, 1e-3));
+    let (place, text) = changed(&problem, &data).unwrap();
+    assert!(place == "base" && text.contains("another word in a column session"), "{text}");
+    // A drift over the rows and a dependence on a joint are no change from a row on.
+    let mut data = clean.clone();
+    for (row, at) in data.measurements.positions.iter_mut().enumerate() {
+        at.z += 4e-5 * row as f64;
+    }
+    assert_eq!(changed(&problem, &data), None);
+    let mut data = clean;
+    for row in 0..90 {
+        if data.measurements.configuration(row)[1] > 0.3 {
+            data.measurements.positions[row].y += 3e-3;
+        }
+    }
+    assert_eq!(changed(&problem, &data), None);
+}
+
 #[test]
 fn a_base_that_is_held_while_another_is_free_is_named() {
     let problem = parse(&text(&format!("{PRIORS}\n'base[A].*' = {{ free = true }}")));

@@ -4,6 +4,7 @@
 //! `docs/findings.md` lists the codes of their findings.
 
 pub(super) mod bounds;
+mod changed_rows;
 pub(super) mod checked_fit;
 mod contradicted_entry;
 mod convention;
@@ -53,6 +54,7 @@ const CHECKS: &[&dyn Check] = &[
     &misfit::SizeOfArm,
     &doubted_columns::ColumnsHoldMeasurements,
     &doubted_rows::RowsBelongTogether,
+    &changed_rows::RowsStayAlike,
     &Convergence,
     &two_solutions::OneSolution,
     &parameter_limits::WithinPriors,
@@ -86,19 +88,29 @@ const CHECKS: &[&dyn Check] = &[
 ];
 
 /// Codes of findings that name the cause of a misfit.
-const CAUSES: [FindingCode; 4] = [
+const CAUSES: [FindingCode; 5] = [
     FindingCode::ColumnDoubted,
     FindingCode::RowsDoubted,
+    FindingCode::RowsChanged,
     FindingCode::LimitContradicted,
     FindingCode::CommandsRounded,
 ];
 
+/// Codes of findings on mistakes of which a change from a row on is only a consequence.
+const OF_TABLE: [FindingCode; 4] = [
+    FindingCode::Misread,
+    FindingCode::ColumnDoubted,
+    FindingCode::RowsDoubted,
+    FindingCode::LimitContradicted,
+];
+
 /// Codes of findings that name a mistake of the input.
-const MISTAKES: [FindingCode; 5] = [
+const MISTAKES: [FindingCode; 6] = [
     FindingCode::Misread,
     FindingCode::ViewsReversed,
     FindingCode::ColumnDoubted,
     FindingCode::RowsDoubted,
+    FindingCode::RowsChanged,
     FindingCode::OtherSize,
 ];
 
@@ -127,6 +139,11 @@ const OF_RIGID_ARM: [FindingCode; 6] = [
 /// Runs every check on a fit.
 pub(super) fn findings(fit: &CheckedFit) -> Vec<Finding> {
     let mut findings: Vec<Finding> = CHECKS.iter().flat_map(|check| check.check(fit)).collect();
+    // A mistake in the whole table or in some rows may look like a change from a row on.
+    let is_of_table = |found: &Finding| OF_TABLE.contains(&found.code);
+    if findings.iter().any(is_of_table) {
+        findings.retain(|found| found.code != FindingCode::RowsChanged);
+    }
     // Where a check names the cause of a misfit, the findings on the misfit state this cause.
     let cause = CAUSES.iter().find_map(|code| findings.iter().find(|found| found.code == *code));
     // The finding on the limits states the errors after its cause.
@@ -151,6 +168,9 @@ pub(super) fn findings(fit: &CheckedFit) -> Vec<Finding> {
             }
         }
     }
+    if cause_text.is_none() {
+        state_explanations(&mut findings);
+    }
     // Where the input is wrong, advice on poses, priors or σ would lead away from the mistake.
     let mistake = MISTAKES.iter().find(|code| findings.iter().any(|found| found.code == **code));
     if let Some(mistake) = mistake {
@@ -174,4 +194,26 @@ pub(super) fn findings(fit: &CheckedFit) -> Vec<Finding> {
         }
     }
     findings
+}
+
+/// Extends the remedy of a misfit by the readings of the input that would explain most of the
+/// nominal arm's error.
+fn state_explanations(findings: &mut [Finding]) {
+    let nominal = findings.iter().find(|found| found.code == FindingCode::NominalFarOff);
+    let words = nominal.and_then(|found| found.value("explanations")?.as_array());
+    let words: Vec<&str> = words.into_iter().flatten().filter_map(Value::as_str).collect();
+    if words.is_empty() {
+        return;
+    }
+    let suspect = format!("check first for {}", words.join(", or "));
+    let is_of_misfit = |found: &&mut Finding| {
+        [FindingCode::MissesMeasurements, FindingCode::NoBetterThanNominal].contains(&found.code)
+    };
+    for finding in findings.iter_mut().filter(is_of_misfit) {
+        let remedy = format!(
+            "{suspect}, with which the nominal arm misses far less; otherwise {}",
+            finding.remedy
+        );
+        *finding = finding.clone().with_remedy(remedy);
+    }
 }
