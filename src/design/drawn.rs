@@ -28,6 +28,9 @@ pub(super) struct Drawn<'a> {
     pub uniform: Measurements,
     /// Poses often at the limits of the ranges; `None` without ranges.
     pub extremes: Option<Measurements>,
+    /// Number of poses drawn to find those that cameras see; `None` if cameras do not measure, or
+    /// without ranges.
+    pub drawn: Option<usize>,
 }
 
 impl<'a> Drawn<'a> {
@@ -39,18 +42,18 @@ impl<'a> Drawn<'a> {
         given: Option<&Measurements>,
         counts: (usize, u64),
     ) -> Result<Self, DesignError> {
-        let (uniform, extremes) = tables(problem, candidates, counts, None);
+        let (uniform, extremes, _) = tables(problem, candidates, counts, None);
         let measured: Vec<&Measurements> = std::iter::once(&uniform).chain(given).collect();
         let site = Site::with_cameras(problem, &measured, views::pairs(problem, &uniform))?;
         if matches!(candidates, Candidates::Within(_)) && site.is_of_cameras(&uniform) {
-            let (uniform, extremes) = tables(problem, candidates, counts, Some(&site));
-            return Ok(Self { site, uniform, extremes });
+            let (uniform, extremes, drawn) = tables(problem, candidates, counts, Some(&site));
+            return Ok(Self { site, uniform, extremes, drawn: Some(drawn) });
         }
-        Ok(Self { site, uniform, extremes })
+        Ok(Self { site, uniform, extremes, drawn: None })
     }
 }
 
-/// Returns the candidates as two tables. The first holds the rows given, or poses drawn uniformly
+/// Returns the candidates as two tables, and the number of drawn poses. The first holds the rows given, or poses drawn uniformly
 /// from the ranges; the second holds poses often at the limits of the ranges, if there are ranges.
 /// With a site, poses out of view of its cameras are replaced by others, as far as possible.
 fn tables(
@@ -58,21 +61,20 @@ fn tables(
     candidates: &Candidates,
     (poses, seed): (usize, u64),
     site: Option<&Site>,
-) -> (Measurements, Option<Measurements>) {
+) -> (Measurements, Option<Measurements>, usize) {
     match candidates {
         Candidates::Within(ranges) => {
             let [uniform, extremes] = DRAWN_CANDIDATES.map(|count| count.max(2 * poses));
             let draw = |count, extremes, stream| {
-                let drawn = site.map_or(count, |site| site.poses_to_draw(count));
-                let poses = ranges.draw(problem, drawn, extremes, seed, stream);
-                match site {
-                    Some(site) => site.first_in_view(poses, count),
-                    None => poses,
-                }
+                let Some(site) = site else {
+                    return (ranges.draw(problem, count, extremes, seed, stream), count);
+                };
+                site.draw_in_view(ranges, (count, extremes), (seed, stream), |poses| poses)
             };
-            let extremes = draw(extremes, Extremes::Often, EXTREMES_STREAM);
-            (draw(uniform, Extremes::No, UNIFORM_STREAM), Some(extremes))
+            let (extremes, more) = draw(extremes, Extremes::Often, EXTREMES_STREAM);
+            let (uniform, drawn) = draw(uniform, Extremes::No, UNIFORM_STREAM);
+            (uniform, Some(extremes), drawn + more)
         }
-        Candidates::Rows(rows) => (rows.as_ref().clone().arm_rows(), None),
+        Candidates::Rows(rows) => (rows.as_ref().clone().arm_rows(), None, 0),
     }
 }

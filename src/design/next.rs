@@ -105,6 +105,9 @@ pub struct NextPoses {
     pub measured: usize,
     /// Number of candidates.
     pub candidates: usize,
+    /// Number of poses drawn to find the candidates; `None` if they are rows of a table, or if
+    /// cameras do not measure.
+    pub drawn: Option<usize>,
     /// Number of poses over which predictions are judged.
     pub workspace_poses: usize,
     /// Assumed root mean square misfit of the position along each axis \[m\]; NaN if cameras
@@ -219,7 +222,8 @@ pub fn next(
     let measured = data.measurements.select(&rows);
     let mut site = Site::with_cameras(&designed, &[&measured], pairs)?;
     site.linearise_at(&found, &measured);
-    let (pool, reference) = pool_and_workspace(&designed, candidates, &site, &measured, options);
+    let Pool { candidates: pool, workspace: reference, drawn } =
+        pool_and_workspace(candidates, &site, &measured, options);
     if let Some(region) = options.workspace.filter(|_| pool.is_empty()) {
         return Err(DesignError::nothing_in(region).into());
     }
@@ -294,6 +298,7 @@ pub fn next(
         steps: Vec::new(),
         measured: measured.len(),
         candidates: pool.len(),
+        drawn,
         workspace_poses: reference.len(),
         misfit: if is_of_cameras { f64::NAN } else { size.misfit },
         noise: if is_of_cameras { f64::NAN } else { size.noise },
@@ -376,15 +381,23 @@ fn take_poses(
     Ok(chosen)
 }
 
+/// Candidates for the next poses.
+struct Pool {
+    candidates: Measurements,
+    /// Poses over which predictions are averaged.
+    workspace: Measurements,
+    /// Number of poses drawn to find candidates that cameras see.
+    drawn: Option<usize>,
+}
+
 /// Returns the candidates that have not been measured yet, and the poses of the workspace, over
 /// which predictions are averaged.
 fn pool_and_workspace(
-    problem: &Problem,
     candidates: &Candidates,
     site: &Site,
     measured: &Measurements,
     options: &NextOptions,
-) -> (Measurements, Measurements) {
+) -> Pool {
     let inside = |table: Measurements| match options.workspace {
         Some(workspace) => table.select(&site.inside(&table, workspace)),
         None => table,
@@ -394,18 +407,22 @@ fn pool_and_workspace(
             let rows = inside(rows.as_ref().clone().arm_rows());
             let step = rows.len().div_ceil(WORKSPACE_POSES).max(1);
             let some: Vec<usize> = (0..rows.len()).step_by(step).collect();
-            (rows.select(&unmeasured(&rows, measured)), rows.select(&some))
+            let candidates = rows.select(&unmeasured(&rows, measured));
+            Pool { candidates, workspace: rows.select(&some), drawn: None }
         }
         Candidates::Within(ranges) => {
             let drawn = |count: usize, extremes, stream| {
-                let drawn = site.poses_to_draw(count);
-                let poses = ranges.draw(problem, drawn, extremes, options.seed, STREAMS[stream]);
-                site.first_in_view(inside(poses), count)
+                let stream = (options.seed, STREAMS[stream]);
+                site.draw_in_view(ranges, (count, extremes), stream, inside)
             };
             let [uniform, often] = DRAWN_CANDIDATES.map(|count| count.max(options.poses));
-            let pool = drawn(uniform, Extremes::No, 0);
-            let pool = pool.concatenate(&drawn(often, Extremes::Often, 1));
-            (pool, drawn(WORKSPACE_POSES, Extremes::No, 2))
+            let (pool, count) = drawn(uniform, Extremes::No, 0);
+            let (extremes, more) = drawn(often, Extremes::Often, 1);
+            Pool {
+                candidates: pool.concatenate(&extremes),
+                workspace: drawn(WORKSPACE_POSES, Extremes::No, 2).0,
+                drawn: site.is_of_cameras(&pool).then_some(count + more),
+            }
         }
     }
 }

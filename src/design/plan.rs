@@ -83,6 +83,9 @@ pub struct Plan {
     pub given: usize,
     /// Number of candidates that were tried.
     pub candidates: usize,
+    /// Number of poses drawn to find the first candidates; `None` if they are rows of a table, or
+    /// if cameras do not measure.
+    pub drawn: Option<usize>,
     /// Logarithm of the criterion at the end of each exchange, before refinement.
     pub starts: Vec<f64>,
     /// Logarithm of the criterion of the plan.
@@ -126,7 +129,8 @@ pub fn plan(
     }
     let with_distances = with_known_distances(given, candidates);
     let given = with_distances.as_ref();
-    let Drawn { site, uniform, extremes } = Drawn::new(problem, candidates, given, (poses, seed))?;
+    let Drawn { site, uniform, extremes, drawn } =
+        Drawn::new(problem, candidates, given, (poses, seed))?;
     let nothing = if site.is_of_cameras(&uniform) && *criterion == Criterion::I {
         return Err(DesignError::NoPositions);
     } else if site.is_of_cameras(&uniform) {
@@ -229,6 +233,7 @@ pub fn plan(
         poses: chosen,
         given: given_arm_rows.map_or(0, |rows| rows.len()),
         candidates: tried,
+        drawn,
         starts,
         value,
         suffices: undetermined_now(&planned_forecast) <= unavoidable

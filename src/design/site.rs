@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
+use super::candidate_poses::Extremes;
 use super::views::{self, ViewRule};
 use super::{DesignError, Sensitivity, Workspace};
 use crate::error::InputErrorKind;
@@ -12,15 +13,20 @@ use crate::fit::{Identification, Placement, locate};
 use crate::measurement::Measurements;
 use crate::model::parameter::{BeamField, Parameter, ParameterSite};
 use crate::model::{MeasuredOrientation, Model, Pose};
-use crate::problem::{JointKind, Observation, Problem};
+use crate::problem::{JointKind, Observation, PoseRanges, Problem};
 use crate::random;
 use crate::remainder::Correction;
 
 /// Mass \[kg\] assumed for a declared `unmodelled-mass` when derivatives are taken. With a mass of
 /// 0, its position would have no influence.
 const PROBE_MASS: f64 = 1.0;
-/// Number of poses that are drawn for each candidate whose view is wanted.
+/// Number of poses in a batch of draws, for each candidate whose view is wanted.
 const DRAWS_PER_VIEW: usize = 10;
+/// Maximum number of poses that are drawn for each candidate whose view is wanted. A camera on the
+/// tip sees a whole board in about one of a thousand poses within the limits of an arm.
+const MAX_DRAWS_PER_VIEW: usize = 200;
+/// Offset between the random streams of successive batches of draws. Other streams are smaller.
+const BATCH_STREAM: u64 = 1 << 40;
 
 /// Returns true if a row of a table helps to locate its fixture. A planned row, which has no
 /// measured numbers yet, does so only if it is a contact.
@@ -290,20 +296,45 @@ impl<'a> Site<'a> {
             .collect()
     }
 
-    /// Returns how many poses to draw so that about `count` of them are candidates. Cameras see the
-    /// whole marker in few poses.
-    pub(super) fn poses_to_draw(&self, count: usize) -> usize {
-        if self.pairs.is_empty() { count } else { DRAWS_PER_VIEW * count }
+    /// Draws poses from `ranges` until `count` of them satisfy `select` and are seen by the cameras,
+    /// or [`MAX_DRAWS_PER_VIEW`] times as many were drawn. Without cameras, `count` poses are drawn.
+    /// Returns the poses and the number that was drawn.
+    pub(super) fn draw_in_view(
+        &self,
+        ranges: &PoseRanges,
+        (count, extremes): (usize, Extremes),
+        (seed, stream): (u64, u64),
+        select: impl Fn(Measurements) -> Measurements,
+    ) -> (Measurements, usize) {
+        let draw = |count: usize, batch: u64| {
+            let stream = stream + batch * BATCH_STREAM;
+            select(ranges.draw(self.problem, count, extremes, seed, stream))
+        };
+        if self.pairs.is_empty() {
+            return (draw(count, 0), count);
+        }
+        let first = draw(DRAWS_PER_VIEW * count, 0);
+        if !self.is_of_cameras(&first) {
+            let all: Vec<usize> = (0..first.len().min(count)).collect();
+            return (first.select(&all), count);
+        }
+        let mut seen = self.seen(&first);
+        let mut batches = 1;
+        while seen.len() < count && batches < MAX_DRAWS_PER_VIEW / DRAWS_PER_VIEW {
+            let batch = draw(DRAWS_PER_VIEW * count, batches as u64);
+            seen = seen.concatenate(&self.seen(&batch));
+            batches += 1;
+        }
+        let chosen: Vec<usize> = (0..seen.len().min(count)).collect();
+        (seen.select(&chosen), batches * DRAWS_PER_VIEW * count)
     }
 
-    /// Returns the first `count` drawn poses that cameras measure; all poses without cameras.
-    pub(super) fn first_in_view(&self, table: Measurements, count: usize) -> Measurements {
-        if !self.is_of_cameras(&table) {
-            return table;
-        }
-        let (seen, _) = self.in_equilibrium(&table);
-        let first: Vec<usize> = (0..seen.len().min(count)).collect();
-        seen.select(&first)
+    /// Returns the poses of a table that the cameras see.
+    fn seen(&self, table: &Measurements) -> Measurements {
+        let poses = self.poses(table, &Placement::of(table));
+        let of_site = (self.problem, &self.model);
+        let seen = views::seen(of_site, (&self.pairs, &self.rules), (&poses, &self.nominal));
+        table.select(&seen)
     }
 
     /// Returns the rows of a table in which the arm has an equilibrium, and their sensitivity.

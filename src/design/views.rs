@@ -161,11 +161,14 @@ fn in_view<'a>(
                     [2.0 * cx, 2.0 * cy]
                 }),
             };
+            let rule = rules.and_then(|rules| rules.get(place));
+            if rule.is_some_and(|rule| !rule.admits(&view, &marker.points)) {
+                continue;
+            }
             let visible: Vec<usize> = (0..marker.points.len())
                 .filter(|&point| view.shows(pixel(pair, point), marker.points[point]))
                 .collect();
-            let rule = rules.and_then(|rules| rules.get(place));
-            if rule.is_some_and(|rule| !rule.admits(&view, &marker.points, visible.len())) {
+            if rule.is_some_and(|rule| visible.len() < rule.least_points) {
                 continue;
             }
             let used = visible.len().min(most);
@@ -182,15 +185,15 @@ fn in_view<'a>(
 }
 
 impl ViewRule {
-    /// Returns true if a view of a marker with these `points`, `visible` of which are in view,
-    /// meets the rule.
-    fn admits(&self, view: &View, points: &[Vector3<f64>], visible: usize) -> bool {
+    /// Returns true if the camera of a view is on the right side of a marker with these `points`, at
+    /// a distance within those of the rule.
+    fn admits(&self, view: &View, points: &[Vector3<f64>]) -> bool {
         let sight = view.sight(middle(points));
         let [near, far] = self.distances;
         let is_on_side = self
             .side
             .is_none_or(|side| view.cos_incidence(&sight).is_none_or(|cos| cos * side > 0.0));
-        visible >= self.least_points && is_on_side && (near..=far).contains(&sight.norm())
+        is_on_side && (near..=far).contains(&sight.norm())
     }
 }
 
@@ -247,6 +250,16 @@ fn normal(points: &[Vector3<f64>]) -> Option<Vector3<f64>> {
     let [first, second, third] = order.map(|k| eigen.eigenvalues[k].max(0.0).sqrt());
     let is_flat = second > MAX_FLAT_RATIO * first && third < MAX_FLAT_RATIO * first;
     is_flat.then(|| eigen.eigenvectors.column(order[2]).into_owned())
+}
+
+/// Returns the indices of the poses in which a view of one of the `pairs` meets its rule.
+pub(super) fn seen(
+    of_site: (&Problem, &Model),
+    (pairs, rules): (&[(usize, usize)], &[ViewRule]),
+    (poses, at): (&[Pose], &DVector<f64>),
+) -> Vec<usize> {
+    let views = in_view(of_site, (pairs, Some(rules)), (poses, at), 1);
+    (0..poses.len()).filter(|&pose| !views[pose].is_empty()).collect()
 }
 
 /// Returns the sensitivity of all points in view in some configurations, as rows of one table.

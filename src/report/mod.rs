@@ -7,6 +7,7 @@
 mod acceptance;
 mod arm_names;
 mod brief;
+mod candidates;
 mod check;
 mod closed_loop;
 mod closed_problem;

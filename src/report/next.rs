@@ -1,5 +1,6 @@
 //! Text and page of the command `next`: the poses to measure next, or that there are enough.
 
+use super::candidates::{candidates_drawn, few_in_view};
 use super::document::{Block, Table, opening};
 use super::figures::{ACCENT, Curve, Drawing, INK, Series};
 use super::limited_poses::at_limits;
@@ -27,11 +28,12 @@ fn blocks<'a>(problem: &Problem, options: &NextOptions, next: &NextPoses) -> Vec
     let counts = format!(
         "{} fitted; {}; predictions judged at {}",
         counted(next.measured, "row"),
-        counted(next.candidates, "candidate"),
+        candidates_drawn(next.candidates, next.drawn),
         counted(next.workspace_poses, "pose"),
     );
     let mut blocks = opening(&problem.title, counts).to_vec();
     blocks.push(Block::Text(verdict(options, next)));
+    blocks.extend(few_in_view(next.candidates, next.drawn).map(Block::Text));
     blocks.push(Block::Text(error_paragraph(next, percent)));
     if !next.effects.is_empty() {
         let effects = next.effects.iter().map(crate::problem::Effect::describe);

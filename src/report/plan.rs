@@ -1,6 +1,7 @@
 //! Text and page of the command `plan`: the poses to measure and the accuracy that they are
 //! expected to give.
 
+use super::candidates::candidates_drawn;
 use super::document::{Block, Table, opening};
 use super::figures::{ACCENT, Drawing, Forest};
 use super::forecast::{assumptions, cells};
@@ -99,7 +100,7 @@ fn blocks<'a>(
     let counts = format!(
         "{}{besides}, from {}; criterion {}, best of {}",
         counted(poses, "pose"),
-        counted(plan.candidates, "candidate"),
+        candidates_drawn(plan.candidates, plan.drawn),
         criterion_words(criterion),
         counted(plan.starts.len(), "start"),
     );

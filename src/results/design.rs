@@ -54,6 +54,9 @@ pub struct PlanResult {
     /// Number of poses that are already measured.
     pub given: usize,
     pub candidates: usize,
+    /// Number of poses drawn to find candidates that cameras see; null if cameras do not measure,
+    /// or if the candidates are rows of a table.
+    pub drawn: Option<usize>,
     pub sufficient: bool,
     /// Logarithm of the criterion that the exchange algorithm reached from each of its starts.
     pub starts: Vec<f64>,
@@ -272,6 +275,7 @@ impl PlanResult {
             poses: plan.poses.len(),
             given: plan.given,
             candidates: plan.candidates,
+            drawn: plan.drawn,
             sufficient: plan.suffices,
             starts: plan.starts.clone(),
             value: plan.value,

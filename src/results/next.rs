@@ -22,6 +22,9 @@ pub struct NextResult {
     /// Number of rows that are measured and fitted.
     pub measured: usize,
     pub candidates: usize,
+    /// Number of poses drawn to find candidates that cameras see; null if cameras do not measure,
+    /// or if the candidates are rows of a table.
+    pub drawn: Option<usize>,
     /// Number of poses over which predictions are judged.
     pub workspace_poses: usize,
     /// 1 σ of the noise of one coordinate; null if cameras measure.
@@ -103,6 +106,7 @@ impl NextResult {
             trusted: next.found.is_trusted(),
             measured: next.measured,
             candidates: next.candidates,
+            drawn: next.drawn,
             workspace_poses: next.workspace_poses,
             noise_mm: next.noise * 1e3,
             misfit_mm: next.misfit * 1e3,
